@@ -1,0 +1,10 @@
+//! zsim: a lidar and an IMU on a spring, by computation.
+#![warn(missing_docs)]
+
+pub mod geometry;
+pub mod measurement;
+pub mod random;
+pub mod signal;
+pub mod spec;
+pub mod time;
+pub mod truth;

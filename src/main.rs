@@ -1,0 +1,3 @@
+//! The command `zsim`.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Signals without physics: spectra, Allan deviation, filters.

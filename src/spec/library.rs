@@ -1,0 +1,164 @@
+//! Where specs are found: as a path, in `scenes/` and `specs/` of the working folder, among those built into the binary.
+
+use super::{MAX_SPEC_BYTES, SpecError};
+use include_dir::{Dir, include_dir};
+use std::path::{Path, PathBuf};
+
+static SCENES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenes");
+static SPECS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/specs");
+
+/// The text of a spec, and what to call it in an error.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Source {
+    /// The path as the user would write it.
+    pub name: String,
+    /// The folder against which paths inside the spec are resolved; `None` for one built into the binary.
+    pub folder: Option<PathBuf>,
+    /// The text.
+    pub text: String,
+}
+
+impl Source {
+    /// A spec that is nowhere but in memory, called `name` in errors.
+    pub fn in_memory(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { name: name.into(), folder: None, text: text.into() }
+    }
+
+    /// Reads a spec's file.
+    ///
+    /// # Errors
+    /// When it cannot be read, is not UTF-8, or is far too large for a spec.
+    pub fn read(path: &Path) -> Result<Self, SpecError> {
+        let name = path.display().to_string();
+        let io = |error: std::io::Error| SpecError::plain(&name, format!("cannot be read: {error}"));
+        let meta = std::fs::metadata(path).map_err(io)?;
+        if !meta.is_file() {
+            return Err(SpecError::plain(&name, "is not a file"));
+        }
+        if meta.len() > MAX_SPEC_BYTES {
+            let message = format!("has {} bytes; a spec has at most {MAX_SPEC_BYTES}", meta.len());
+            return Err(SpecError::plain(&name, message));
+        }
+        let bytes = std::fs::read(path).map_err(io)?;
+        let text = String::from_utf8(bytes).map_err(|error| SpecError::plain(&name, format!("is no text: {error}")))?;
+        Ok(Self { name, folder: path.parent().map(Path::to_path_buf), text })
+    }
+}
+
+/// What a spec describes; names the folder where such specs are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// A world: `scenes/`.
+    Scene,
+    /// A head and its linkage: `specs/heads/`.
+    Head,
+    /// A spring: `specs/springs/`.
+    Spring,
+    /// A lidar: `specs/lidars/`.
+    Lidar,
+    /// An inertial measurement unit: `specs/imus/`.
+    Imu,
+    /// The clocks of the sensors: `specs/clocks/`.
+    Clock,
+    /// How the base moves: `specs/motions/`.
+    Motion,
+    /// The estimator's settings: `specs/estimators/`.
+    Estimator,
+    /// A study: `specs/studies/`.
+    Study,
+    /// An experiment of the paper: `specs/experiments/`.
+    Experiment,
+}
+
+impl Kind {
+    /// Every kind.
+    pub const ALL: [Kind; 10] = [
+        Kind::Scene,
+        Kind::Head,
+        Kind::Spring,
+        Kind::Lidar,
+        Kind::Imu,
+        Kind::Clock,
+        Kind::Motion,
+        Kind::Estimator,
+        Kind::Study,
+        Kind::Experiment,
+    ];
+
+    /// The folder of such specs, from the project's root.
+    pub fn folder(self) -> &'static str {
+        match self {
+            Kind::Scene => "scenes",
+            Kind::Head => "specs/heads",
+            Kind::Spring => "specs/springs",
+            Kind::Lidar => "specs/lidars",
+            Kind::Imu => "specs/imus",
+            Kind::Clock => "specs/clocks",
+            Kind::Motion => "specs/motions",
+            Kind::Estimator => "specs/estimators",
+            Kind::Study => "specs/studies",
+            Kind::Experiment => "specs/experiments",
+        }
+    }
+
+    /// What to call one of them.
+    pub fn noun(self) -> &'static str {
+        match self {
+            Kind::Scene => "scene",
+            Kind::Head => "head",
+            Kind::Spring => "spring",
+            Kind::Lidar => "lidar",
+            Kind::Imu => "IMU",
+            Kind::Clock => "clock",
+            Kind::Motion => "motion",
+            Kind::Estimator => "estimator",
+            Kind::Study => "study",
+            Kind::Experiment => "experiment",
+        }
+    }
+}
+
+/// Finds a spec: `name` as a path; then in the kind's folder below the working folder; then in the binary.
+///
+/// # Errors
+/// When it is nowhere (the error lists the names there are), or its file cannot be read.
+pub fn find(kind: Kind, name: &str) -> Result<Source, SpecError> {
+    let file = if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") };
+    let local = Path::new(kind.folder()).join(&file);
+    let candidates = [PathBuf::from(name), PathBuf::from(&file), local];
+    if let Some(path) = candidates.iter().find(|path| path.is_file()) {
+        return Source::read(path);
+    }
+    if let Some(source) = built_in(kind, &file) {
+        return Ok(source);
+    }
+    let noun = kind.noun();
+    Err(SpecError::plain(name, format!("no such {noun}: not a file, not in {}/, not built in", kind.folder()))
+        .with_help(format!("built in are: {}", names(kind).join(", "))))
+}
+
+fn built_in(kind: Kind, file: &str) -> Option<Source> {
+    let inside = folder_in_binary(kind)?.files().find(|entry| file_name(entry) == Some(file))?;
+    let name = format!("{}/{file} (built in)", kind.folder());
+    Some(Source::in_memory(name, inside.contents_utf8()?))
+}
+
+/// The names of the specs of a kind that are built into the binary, sorted.
+pub fn names(kind: Kind) -> Vec<String> {
+    let files = folder_in_binary(kind).into_iter().flat_map(Dir::files);
+    let mut names: Vec<String> =
+        files.filter_map(file_name).filter_map(|name| name.strip_suffix(".ron")).map(str::to_owned).collect();
+    names.sort();
+    names
+}
+
+fn folder_in_binary(kind: Kind) -> Option<&'static Dir<'static>> {
+    match kind.folder().strip_prefix("specs/") {
+        None => Some(&SCENES),
+        Some(sub) => SPECS.get_dir(sub),
+    }
+}
+
+fn file_name<'a>(entry: &'a include_dir::File<'_>) -> Option<&'a str> {
+    entry.path().file_name()?.to_str()
+}
