@@ -12,6 +12,15 @@ pub use lidar::{LidarReturn, LidarScan, PlanarScan};
 
 use crate::time::Stamp;
 
+/// One message of a recording, whichever sensor it is from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Measurement {
+    /// From the IMU.
+    Imu(ImuSample),
+    /// From the lidar.
+    Lidar(LidarScan),
+}
+
 /// Why a sink took nothing: the sink's own error, which the sender passes on.
 pub type SinkError = Box<dyn std::error::Error + Send + Sync>;
 
