@@ -1,6 +1,7 @@
 //! zsim: a lidar and an IMU on a spring, by computation.
 #![warn(missing_docs)]
 
+pub mod estimation;
 pub mod geometry;
 pub mod measurement;
 pub mod random;
