@@ -148,7 +148,7 @@ impl Estimator {
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
         let specs = (&self.spec.inertial, &self.spec.clock);
         let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, specs);
-        if !beginning.at_rest {
+        if beginning.rest.is_none() {
             self.warnings.push(Warning { stamp: self.intake.stamp(*start_s), kind: WarningKind::StartedInMotion });
         }
         self.window = Some(self.first_window(&beginning, *start_s));

@@ -3,7 +3,7 @@
 use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
 use super::spec::{ClockSpec, InertialSpec};
 use super::strapdown::{Biases, Interval, State};
-use crate::geometry::{Pose, Rotation, Vector, roll_pitch_yaw};
+use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
 use crate::measurement::ImuNoise;
 use nalgebra::SMatrix;
 
@@ -15,12 +15,27 @@ const REST_SIGMAS: f64 = 6.0;
 pub(super) struct Beginning {
     pub(super) state: State,
     pub(super) biases: Biases,
-    /// Whether the head rested.
-    pub(super) at_rest: bool,
     /// Standard deviation of the velocity, m/s.
     pub(super) velocity_sigma: f64,
     /// What is known of the border.
     pub(super) information: SMatrix<f64, BORDER, BORDER>,
+    /// What the IMU says while the head rests, if it does.
+    pub(super) rest: Option<Rest>,
+}
+
+/// The head at rest: what the IMU says then, by which the end of the rest is seen.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rest {
+    gyro: Vector,
+    force: Vector,
+}
+
+impl Rest {
+    /// Whether an interval says the same, within its noise.
+    pub(super) fn goes_on(&self, interval: &Interval) -> bool {
+        (interval.gyro - self.gyro).norm() < REST_SIGMAS * interval.gyro_sigma
+            && (interval.accel - self.force).norm() < REST_SIGMAS * interval.accel_sigma
+    }
 }
 
 /// Looks at the first intervals: at rest their mean is the gyroscope's bias and the way up. In motion the mean force is
@@ -36,16 +51,18 @@ pub(super) fn begin(
     let duration: f64 = intervals.iter().map(|i| i.h).sum();
     let mean = |of: fn(&Interval) -> Vector| intervals.iter().map(|i| of(i) * i.h).sum::<Vector>() / duration;
     let (gyro, force) = (mean(|i| i.gyro), mean(|i| i.accel));
-    let quiet = |i: &Interval| {
-        (i.gyro - gyro).norm() < REST_SIGMAS * i.gyro_sigma && (i.accel - force).norm() < REST_SIGMAS * i.accel_sigma
-    };
-    let at_rest = intervals.iter().all(quiet) && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
+    let rest = Rest { gyro, force };
+    let at_rest = intervals.iter().all(|interval| rest.goes_on(interval))
+        && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
     let up = Rotation::rotation_between(&force, &Vector::z()).unwrap_or_else(Rotation::identity);
     let (_, _, yaw) = roll_pitch_yaw(&(up * head_from_imu.rotation.inverse()));
     let rotation = Rotation::from_axis_angle(&Vector::z_axis(), -yaw) * up;
     let head_in_imu = head_from_imu.inverse().translation.vector;
     let state = State { rotation, position: -(rotation * head_in_imu), velocity: Vector::zeros() };
     let gyro_bias = if at_rest { gyro } else { Vector::zeros() };
+    // At rest, what the force is more than gravity is bias; the rest of the bias hides in the level.
+    let excess = force.norm() - gravity_in_world().norm();
+    let accel_bias = if at_rest { force.normalize() * excess } else { Vector::zeros() };
     let gyro_sigma = if at_rest {
         3.0 * noise.gyro_density_rad_per_s_per_sqrt_hz / duration.sqrt()
     } else {
@@ -53,8 +70,8 @@ pub(super) fn begin(
     };
     Beginning {
         state,
-        biases: Biases { gyro: gyro_bias, accel: Vector::zeros() },
-        at_rest,
+        biases: Biases { gyro: gyro_bias, accel: accel_bias },
+        rest: at_rest.then_some(rest),
         velocity_sigma: if at_rest { 0.01 } else { 2.0 },
         information: information(gyro_sigma, at_rest, noise, spec),
     }

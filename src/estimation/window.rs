@@ -2,13 +2,13 @@
 
 use super::border::Border;
 use super::clock::Clock;
-use super::initial::Beginning;
+use super::initial::{Beginning, Rest};
 use super::matching::Matcher;
 use super::nominal::{Correction, Nominal};
 use super::normal_equations::{Factor, NormalEquations};
 use super::residual::inertial::Inertial;
 use super::residual::matched::{self, Plane};
-use super::residual::prior::Start;
+use super::residual::prior::{self, Start};
 use super::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
 use super::spec::EstimatorSpec;
 use super::spline::Basis;
@@ -21,6 +21,10 @@ use std::collections::VecDeque;
 
 /// The normal equations are summed in so many parts, whatever the number of threads, so that sums keep their order.
 const PARTS: usize = 4;
+/// Before the first motion that the IMU shows, the head has begun to move unseen: this long, s.
+const REST_MARGIN_S: f64 = 0.3;
+/// How still the head is at rest, m/s.
+const REST_VELOCITY_SIGMA: f64 = 0.003;
 /// A correction beyond this (m, rad) in one solve is not believed.
 const BELIEVABLE: (f64, f64) = (2.0, 0.8);
 
@@ -45,6 +49,10 @@ pub(super) struct Window {
     border: Border,
     stretches: VecDeque<Stretch>,
     start: Start,
+    /// While the head has not moved yet: what the IMU says at rest.
+    rest: Option<Rest>,
+    /// Until when it rested, IMU time, s.
+    rested_until_s: f64,
     workspace: Workspace,
 }
 
@@ -107,6 +115,8 @@ impl Window {
             border,
             stretches: VecDeque::new(),
             start: Start::first(start_u_s, beginning.velocity_sigma),
+            rest: beginning.rest,
+            rested_until_s: f64::NEG_INFINITY,
             workspace,
         }
     }
@@ -119,6 +129,10 @@ impl Window {
     pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) {
         for (_, interval) in intervals.iter() {
             self.nominal.extend(*interval, &self.biases, &self.gravity);
+            self.rest = self.rest.filter(|rest| rest.goes_on(interval));
+            if self.rest.is_some() {
+                self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
+            }
         }
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         self.stretches.push_back(Stretch { end_tau_s, beams, surfels });
@@ -268,6 +282,10 @@ impl Window {
         }
         self.start.add_to(inertial, layout, total, self.spec.knot_spacing_s);
         self.border.add_to(inertial, layout);
+        let nodes = self.nominal.times_s().iter().zip(states).skip(first);
+        for ((_, state), basis) in nodes.zip(&*bases).take_while(|((time, _), _)| **time < self.rested_until_s) {
+            prior::add_standstill(inertial, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
+        }
         // The outermost knots hardly touch the window: a metre and a radian keep them where nothing else does.
         for unknown in 0..layout.border() {
             inertial.add_entry(unknown, unknown, 1.0);

@@ -3,6 +3,7 @@
 use super::{BORDER, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
+use crate::geometry::Vector;
 use nalgebra::{SMatrix, SVector};
 
 /// How firmly the correction is held to zero where the window begins, so that it goes on from the one before.
@@ -46,6 +47,27 @@ impl Start {
                         equations.add_entry(column(a), column(c), weight * by[a] * by[c]);
                     }
                 }
+            }
+        }
+    }
+}
+
+/// Adds that the velocity is zero at a node: `v + dt' = 0`, to `sigma` (m/s).
+pub(in crate::estimation) fn add_standstill(
+    equations: &mut NormalEquations,
+    layout: &Layout,
+    basis: &Basis,
+    velocity: &Vector,
+    sigma: f64,
+) {
+    let first = layout.knot(basis.first);
+    let weight = sigma.powi(-2);
+    for axis in 0..3 {
+        let column = |a: usize| first + 6 * a + 3 + axis;
+        for a in 0..4 {
+            equations.add_right(column(a), -weight * basis.rate[a] * velocity[axis]);
+            for c in 0..=a {
+                equations.add_entry(column(a), column(c), weight * basis.rate[a] * basis.rate[c]);
             }
         }
     }
