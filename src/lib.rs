@@ -1,6 +1,7 @@
 //! zsim: a lidar and an IMU on a spring, by computation.
 #![warn(missing_docs)]
 
+pub mod evaluation;
 pub mod geometry;
 pub mod measurement;
 pub mod random;
