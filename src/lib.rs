@@ -5,6 +5,7 @@ pub mod evaluation;
 pub mod geometry;
 pub mod measurement;
 pub mod random;
+pub mod report;
 pub mod signal;
 pub mod spec;
 pub mod time;
