@@ -8,13 +8,21 @@
 //! The base's frame stands where the spring is clamped: x forward, y left, z up (REP-103).
 
 mod error;
+mod hand;
 mod jet;
+mod rhythm;
+mod smooth;
 mod spec;
 mod stand;
+mod stops;
+mod walk;
 
 pub use error::MotionError;
+pub use hand::{CarrySpec, GaitSpec, HandSpec, ShakeSpec};
 pub use spec::{MotionSpec, load};
 pub use stand::StandSpec;
+pub use stops::StopsSpec;
+pub use walk::WalkSpec;
 
 use crate::geometry::Kinematics;
 

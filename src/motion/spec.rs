@@ -1,3 +1,4 @@
+use super::hand::{Hand, HandSpec};
 use super::stand::{Stand, StandSpec};
 use super::{BaseMotion, MotionError};
 use crate::geometry::Route;
@@ -10,6 +11,8 @@ use serde::{Deserialize, Serialize};
 pub enum MotionSpec {
     /// It stands still.
     Stand(StandSpec),
+    /// A hand carries and shakes it.
+    Hand(Box<HandSpec>),
 }
 
 /// Finds and parses the motion called `name`: a path, or a name in the library. The source comes with it, for errors of
@@ -31,16 +34,17 @@ impl MotionSpec {
     /// a length of time.
     pub fn build(
         &self,
-        _source: &Source,
+        source: &Source,
         route: Option<&Route>,
         duration_s: f64,
-        _seed: Seed,
+        seed: Seed,
     ) -> Result<Box<dyn BaseMotion>, MotionError> {
         if !(duration_s.is_finite() && duration_s > 0.0) {
             return Err(MotionError::Duration { duration_s });
         }
         Ok(match self {
             MotionSpec::Stand(spec) => Box::new(Stand::new(spec, route)),
+            MotionSpec::Hand(spec) => Box::new(Hand::new(spec, source, route, duration_s, seed)?),
         })
     }
 }
