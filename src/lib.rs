@@ -1,8 +1,11 @@
 //! zsim: a lidar and an IMU on a spring, by computation.
 #![warn(missing_docs)]
 
+pub mod dynamics;
+pub mod elasticity;
 pub mod geometry;
 pub mod measurement;
+pub mod motion;
 pub mod random;
 pub mod signal;
 pub mod spec;
