@@ -8,3 +8,4 @@ pub mod signal;
 pub mod spec;
 pub mod time;
 pub mod truth;
+pub mod world;
