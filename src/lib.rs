@@ -11,3 +11,4 @@ pub mod signal;
 pub mod spec;
 pub mod time;
 pub mod truth;
+pub mod world;
