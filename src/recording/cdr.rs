@@ -305,9 +305,4 @@ impl<'a> Decoder<'a> {
             if off < 1e-12 { Rotation::new_unchecked(quaternion) } else { Rotation::from_quaternion(quaternion) };
         Ok(Pose::from_parts(position.into(), rotation))
     }
-
-    /// Whether numbers are big-endian.
-    pub fn is_big_endian(&self) -> bool {
-        self.big_endian
-    }
 }

@@ -17,7 +17,7 @@ pub enum RecordingError {
     Read(std::io::Error),
     /// Writing went wrong midway.
     #[error("writing stopped: {0}; what was written before can be read")]
-    Write(String),
+    Write(std::io::Error),
     /// The file is not an MCAP file at all.
     #[error("{name}: not an MCAP file (it does not begin with the MCAP magic bytes)")]
     NotMcap {
@@ -88,6 +88,9 @@ pub enum RecordingError {
 
 impl From<mcap::McapError> for RecordingError {
     fn from(error: mcap::McapError) -> Self {
-        Self::Write(error.to_string())
+        Self::Write(match error {
+            mcap::McapError::Io(error) => error,
+            other => std::io::Error::other(other),
+        })
     }
 }

@@ -11,7 +11,7 @@ use crate::time::Stamp;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use std::collections::BTreeMap;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Error, Write};
 use std::ops::Range;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -120,14 +120,14 @@ impl Spool {
         match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),
             Some(Ok(result)) => result,
-            Some(Err(_)) => Err(RecordingError::Write("the writer's thread panicked".to_owned())),
+            Some(Err(_)) => Err(RecordingError::Write(Error::other("the writer's thread panicked"))),
         }
     }
 
     /// The error for which the thread stopped early.
     fn stopped(&mut self) -> Result<(), RecordingError> {
         self.join()?;
-        Err(RecordingError::Write("the writer has stopped".to_owned()))
+        Err(RecordingError::Write(Error::other("the writer has stopped")))
     }
 }
 

@@ -76,8 +76,10 @@ fn ordered<const N: usize>(bytes: &[u8], big_endian: bool) -> [u8; N] {
 /// What a field's number means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meaning {
-    /// Seconds times this after the cloud's stamp.
-    AfterStamp(f64),
+    /// Nanoseconds after the cloud's stamp.
+    NanosAfterStamp,
+    /// Seconds after the cloud's stamp.
+    SecondsAfterStamp,
     /// An instant, counted in this many parts of a second.
     Instant(f64),
 }
@@ -92,7 +94,7 @@ impl<'a> TimeField<'a> {
     /// The time field among `fields`.
     pub fn find(fields: &[Field<'a>]) -> Option<Self> {
         let field = TIME_NAMES.iter().find_map(|name| fields.iter().find(|field| field.name == *name))?;
-        Some(Self { field: *field, meaning: Meaning::AfterStamp(1e-9) })
+        Some(Self { field: *field, meaning: Meaning::NanosAfterStamp })
     }
 
     /// The field's name.
@@ -120,17 +122,17 @@ impl<'a> TimeField<'a> {
             [1.0, 1e6, 1e9].into_iter().find(|parts| within(stamp_s, *parts, reach(*parts))).map(Meaning::Instant)
         };
         let tight = if within(0.0, 1.0, spread(1.0)) { None } else { instant(&spread) };
-        let seconds = (least >= -MOST_SECONDS && most <= MOST_SECONDS).then_some(Meaning::AfterStamp(1.0));
+        let seconds = (least >= -MOST_SECONDS && most <= MOST_SECONDS).then_some(Meaning::SecondsAfterStamp);
         let loose = || instant(&|_| LONGEST_S);
-        self.meaning = tight.or(seconds).or_else(loose).unwrap_or(Meaning::AfterStamp(1e-9));
+        self.meaning = tight.or(seconds).or_else(loose).unwrap_or(Meaning::NanosAfterStamp);
     }
 
     /// A point's time after the stamp; `None` where it is not finite or too far from it.
     pub fn offset(&self, stamp: Stamp, point: &[u8], big_endian: bool) -> Option<Span> {
         let number = self.field.number(point, big_endian);
         let offset = match self.meaning {
-            Meaning::AfterStamp(unit) if unit == 1e-9 => Span::from_nanos(number.round() as i64),
-            Meaning::AfterStamp(unit) => Span::from_seconds(number * unit),
+            Meaning::NanosAfterStamp => Span::from_nanos(number.round() as i64),
+            Meaning::SecondsAfterStamp => Span::from_seconds(number),
             // Whole and fractional seconds apart: their product in nanoseconds is beyond a double's 53 bits.
             Meaning::Instant(parts) => {
                 let whole = (number / parts).floor();
