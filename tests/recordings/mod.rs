@@ -4,12 +4,13 @@
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
-use zsim::geometry::{Pose, Vector, from_roll_pitch_yaw};
+use zsim::geometry::{Kinematics, Pose, Vector, from_roll_pitch_yaw};
 use zsim::measurement::{
     Calibration, ImuNoise, ImuSample, LidarNoise, LidarReturn, LidarScan, Measurement, PlanarScan, Sink,
 };
 use zsim::recording::{RunDescription, Writer};
 use zsim::time::{Span, Stamp};
+use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
 /// Bytes that a writer's thread fills.
 #[derive(Clone, Default)]
@@ -87,10 +88,9 @@ pub fn planar_scan(stamp: Stamp) -> LidarScan {
         let range = match k % 97 {
             0 => f32::INFINITY,
             1 => f32::NEG_INFINITY,
-            2 => f32::NAN.abs(),
+            2 => 31.0,
             _ => ((4.0 + (stamp.nanos() as f64 * 1e-9 + 3.0 * angle).sin()) * 1000.0).round() as f32 / 1000.0,
         };
-        let range = if range.is_nan() { 31.0 } else { range };
         let intensity = (k % 256) as f32;
         planar.ranges_m.push(range);
         planar.intensities.push(intensity);
@@ -104,6 +104,39 @@ pub fn planar_scan(stamp: Stamp) -> LidarScan {
         }
     }
     LidarScan { stamp, returns, planar: Some(planar) }
+}
+
+/// How the head moves: round a circle of 1 m, nodding.
+pub fn truth_sample(now: Stamp, clock: &ClockTruth) -> TruthSample {
+    let t = now.nanos() as f64 * 1e-9;
+    let nod = from_roll_pitch_yaw(0.0, 0.7 * (7.0 * t).sin(), t);
+    let head = Pose::from_parts([t.cos(), t.sin(), 1.4].into(), nod);
+    let base = Pose::from_parts([t.cos(), t.sin(), 1.1].into(), from_roll_pitch_yaw(0.0, 0.0, t));
+    TruthSample {
+        lidar_stamp: now + clock.lidar_ahead,
+        head: Kinematics::at_rest(head),
+        base: Kinematics::at_rest(base),
+    }
+}
+
+/// Records `samples` IMU samples at 100 Hz, scans at 40 Hz and truth at 1 kHz; the file.
+pub fn record_all(run: RunDescription, samples: i64) -> Vec<u8> {
+    let (file, bytes) = shared_file();
+    let mut writer = Writer::new(file, run).unwrap();
+    let clock = ClockTruth { lidar_ahead: Span::ZERO, imu_ahead: Span::from_nanos(3_000_000) };
+    for k in 0..samples * 10 {
+        let now = Stamp::from_nanos(k * 1_000_000);
+        writer.truth(now, &truth_sample(now, &clock)).unwrap();
+        if k % 10 == 0 {
+            writer.clock(now, &clock).unwrap();
+            writer.imu(now, &imu_sample(now + clock.imu_ahead)).unwrap();
+        }
+        if k % 25 == 0 {
+            writer.lidar(now, &planar_scan(now)).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    bytes.take()
 }
 
 /// Records `samples` IMU samples at 100 Hz with scans at 40 Hz between them; the file, and what was written.
