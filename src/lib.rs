@@ -7,6 +7,7 @@ pub mod geometry;
 pub mod measurement;
 pub mod motion;
 pub mod random;
+pub mod recording;
 pub mod signal;
 pub mod spec;
 pub mod time;
