@@ -4,6 +4,7 @@
 pub mod geometry;
 pub mod measurement;
 pub mod random;
+pub mod sensors;
 pub mod signal;
 pub mod spec;
 pub mod time;
