@@ -3,6 +3,7 @@
 
 pub mod geometry;
 pub mod measurement;
+pub mod motion;
 pub mod random;
 pub mod sensors;
 pub mod signal;
