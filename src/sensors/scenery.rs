@@ -9,8 +9,15 @@ pub struct SurfaceHit {
     pub cos_incidence: f32,
     /// Share of the light that comes back diffusely at normal incidence, 0..=1.
     pub reflectance: f32,
-    /// Whether most of a beam goes on behind the surface.
-    pub glass: bool,
+    /// Share of the light that goes on behind the surface, once through; 0 for what is not glass.
+    pub transmission: f32,
+}
+
+impl SurfaceHit {
+    /// Whether a beam may go on behind the surface.
+    pub fn is_glass(&self) -> bool {
+        self.transmission > 0.0
+    }
 }
 
 /// What stands around a lidar: anything a ray can be cast into.

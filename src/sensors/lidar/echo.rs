@@ -92,12 +92,12 @@ impl Lidar {
     }
 
     fn ray_echo(&self, sweep: &Sweep, ray: usize, weight: f64, glass_draw: Option<f64>) -> Option<Echo> {
-        let GlassSpec { echo: glass_echo, transmission, delay_m } = self.spec.errors.glass;
+        let GlassSpec { echo: glass_echo, delay_m } = self.spec.errors.glass;
         let (mut light, mut late_m, mut draw) = (weight, 0.0, glass_draw.unwrap_or(1.0));
         for surface in sweep.surfaces(ray) {
             let cos = f64::from(surface.cos_incidence);
             let turns_back = glass_echo * cos;
-            if !surface.glass || draw < turns_back {
+            if !surface.is_glass() || draw < turns_back {
                 let range_m = surface.range_m + late_m;
                 let power = light * f64::from(surface.reflectance) * cos / (surface.range_m * surface.range_m);
                 return Some(Echo { range_m, power, cos_incidence: cos });
@@ -105,7 +105,7 @@ impl Lidar {
             if glass_draw.is_some() {
                 // Given that the beam passed, the draw is uniform in turns_back..1: stretched, it serves the next surface.
                 draw = (draw - turns_back) / (1.0 - turns_back).max(f64::MIN_POSITIVE);
-                light *= transmission;
+                light *= f64::from(surface.transmission).powi(2);
                 late_m += delay_m;
             }
         }

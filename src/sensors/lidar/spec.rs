@@ -124,16 +124,13 @@ pub struct GrazingSpec {
     pub bias_m: f64,
 }
 
-/// What a surface of glass does.
+/// What a surface of glass does, beside weakening light by its material's transmission, there and back.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GlassSpec {
     /// Share of beams, met squarely, that come back from the glass itself; in proportion to the cosine of incidence.
     #[serde(deserialize_with = "checked::fraction")]
     pub echo: f64,
-    /// Share of a beam's power that is left after it has passed twice, there and back.
-    #[serde(deserialize_with = "checked::fraction")]
-    pub transmission: f64,
     /// How much farther what stands behind it seems, m: thickness times (refractive index - 1).
     #[serde(deserialize_with = "checked::non_negative")]
     pub delay_m: f64,

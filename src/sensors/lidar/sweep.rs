@@ -77,7 +77,7 @@ impl Lidar {
             let Some(hit) = scenery.first_hit(&from, direction, self.spec.range_max_m - gone_m, t_s) else { return };
             let range_m = gone_m + hit.range_m;
             surfaces.push(SurfaceHit { range_m, ..hit });
-            if !hit.glass {
+            if !hit.is_glass() {
                 return;
             }
             gone_m = range_m + BEYOND_GLASS_M;
