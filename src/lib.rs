@@ -7,6 +7,7 @@ pub mod motion;
 pub mod random;
 pub mod sensors;
 pub mod signal;
+pub mod simulation;
 pub mod spec;
 pub mod time;
 pub mod truth;

@@ -31,7 +31,7 @@ pub struct ClockSpec {
 }
 
 /// The clocks of the sensors.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clocks {
     /// The lidar's.
     pub lidar: Clock,
@@ -116,19 +116,38 @@ impl Clock {
         self.epoch + Span::from_seconds(self.offset_s + self.pace * t_s)
     }
 
+    /// When the crystal says `stamp`, true seconds after the start.
+    pub fn true_s_of_crystal(&self, stamp: Stamp) -> f64 {
+        ((stamp - self.epoch).seconds() - self.offset_s) / self.pace
+    }
+
+    /// The first instant of the crystal from `stamp` on that lies half-way between two ticks of the resolution.
+    ///
+    /// A sensor that starts there, and whose period is a whole number of ticks, loses exactly half a tick by rounding: the
+    /// mean that [`Clock::ahead`] counts with. Started on a tick it would lose nothing, and the mean would be wrong.
+    pub fn half_tick_from(&self, stamp: Stamp) -> Stamp {
+        let half = self.half_tick();
+        let tick = (stamp - half).floor_to(self.resolution);
+        if tick + half == stamp { stamp } else { tick + self.resolution + half }
+    }
+
+    fn half_tick(&self) -> Span {
+        Span::from_nanos(self.resolution.nanos() / 2)
+    }
+
     /// How far stamps are ahead of true time at `t_s`: jitter aside, the mean of the rounding included.
     pub fn ahead(&self, t_s: f64) -> Span {
-        Span::from_seconds(self.offset_s + (self.pace - 1.0) * t_s - 0.5 * self.resolution.seconds())
+        Span::from_seconds(self.offset_s + (self.pace - 1.0) * t_s) - self.half_tick()
     }
 
     /// The mean stamp of the instant `t_s` true seconds after the start.
     pub fn stamp_of(&self, t_s: f64) -> Stamp {
-        self.epoch + Span::from_seconds(self.offset_s + self.pace * t_s - 0.5 * self.resolution.seconds())
+        self.crystal(t_s) - self.half_tick()
     }
 
     /// The true time, s after the start, of which `stamp` is the mean stamp.
     pub fn true_s(&self, stamp: Stamp) -> f64 {
-        ((stamp - self.epoch).seconds() - self.offset_s + 0.5 * self.resolution.seconds()) / self.pace
+        self.true_s_of_crystal(stamp + self.half_tick())
     }
 
     /// The first multiple of `step` that is the mean stamp of an instant of the run.
@@ -174,6 +193,15 @@ mod tests {
         assert_eq!(clock(0.0, 0.0, 0.0).first_multiple(ms).nanos(), 1_000_000_000_000);
         assert_eq!(clock(0.3, 0.0, 0.0).first_multiple(ms).nanos(), 1_000_001_000_000);
         assert_eq!(clock(-0.3, 0.0, 0.0).first_multiple(ms).nanos(), 1_000_000_000_000);
+    }
+
+    #[test]
+    fn half_way_between_ticks_is_half_a_millisecond_past_one() {
+        let ns = Stamp::from_nanos;
+        assert_eq!(clock(0.0, 0.0, 1.0).half_tick_from(ns(2_000_000)), ns(2_500_000));
+        assert_eq!(clock(0.0, 0.0, 1.0).half_tick_from(ns(2_500_000)), ns(2_500_000));
+        assert_eq!(clock(0.0, 0.0, 1.0).half_tick_from(ns(2_500_001)), ns(3_500_000));
+        assert_eq!(clock(0.0, 0.0, 0.0).half_tick_from(ns(2_000_001)), ns(2_000_001));
     }
 
     #[test]
