@@ -1,6 +1,8 @@
 //! zsim: a lidar and an IMU on a spring, by computation.
 #![warn(missing_docs)]
 
+pub mod dynamics;
+pub mod elasticity;
 pub mod geometry;
 pub mod measurement;
 pub mod motion;
