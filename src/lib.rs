@@ -13,3 +13,4 @@ pub mod simulation;
 pub mod spec;
 pub mod time;
 pub mod truth;
+pub mod world;
