@@ -3,10 +3,13 @@
 
 pub mod dynamics;
 pub mod elasticity;
+pub mod evaluation;
 pub mod geometry;
 pub mod measurement;
 pub mod motion;
 pub mod random;
+pub mod recording;
+pub mod report;
 pub mod sensors;
 pub mod signal;
 pub mod simulation;

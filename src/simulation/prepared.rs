@@ -70,6 +70,16 @@ impl Simulation {
         self.motion.as_ref()
     }
 
+    /// The lidar.
+    pub fn lidar(&self) -> &Lidar {
+        &self.lidar
+    }
+
+    /// The inertial measurement unit.
+    pub fn imu(&self) -> &Imu {
+        &self.imu
+    }
+
     /// How the sensors sit in the head, and how well they measure.
     pub fn calibration(&self) -> Calibration {
         self.rig().calibration()

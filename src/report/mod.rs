@@ -1,0 +1,3 @@
+//! Results for people: tables, plots, a page.
+
+pub mod plot;
