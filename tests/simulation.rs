@@ -3,11 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 use std::f64::consts::PI;
+use zsim::dynamics::{DynamicsError, HeadState};
 use zsim::geometry::{Kinematics, Pose, Rotation, Trajectory, Vector, from_roll_pitch_yaw, gravity_in_world};
 use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::sensors::{ClockSpec, Clocks, ClocksSpec, Imu, Lidar, Scenery, SurfaceHit};
-use zsim::simulation::{EPOCH, HeadMotion, Moved, Rig, STEP_S, SimulationError, SimulationSummary, simulate};
+use zsim::simulation::{EPOCH, Rig, STEP_S, SimulationError, SimulationSummary, simulate};
 use zsim::spec::{self, Kind, Source};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
@@ -54,11 +55,13 @@ fn nodding(t: f64) -> Kinematics {
     }
 }
 
-impl HeadMotion for Nodding {
-    fn next(&mut self) -> Result<Moved, SimulationError> {
-        let head = nodding(self.step as f64 * STEP_S);
+impl Iterator for Nodding {
+    type Item = Result<HeadState, DynamicsError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let t_s = self.step as f64 * STEP_S;
         self.step += 1;
-        Ok(Moved { head, base: Kinematics::at_rest(Pose::identity()) })
+        Some(Ok(HeadState { t_s, head: nodding(t_s), base: Kinematics::at_rest(Pose::identity()) }))
     }
 }
 
@@ -321,6 +324,24 @@ impl TruthSink for Full {
 fn a_sink_that_is_full_stops_the_run_with_its_own_words() {
     let error = Run::of("utm30lx", "3dm_gx2", 60.0).run(&mut Full::default()).unwrap_err();
     assert!(std::error::Error::source(&error).unwrap().to_string().contains("no space left"), "{error}");
+}
+
+#[test]
+fn a_motion_that_ends_before_the_run_is_an_error() {
+    let source = Source::in_memory("test", "");
+    let rig = Rig {
+        scenery: &Room,
+        lidar: &Lidar::new(&spec::load(Kind::Lidar, "utm30lx").unwrap(), &source).unwrap(),
+        imu: &Imu::new(&spec::load(Kind::Imu, "3dm_gx2").unwrap(), &source).unwrap(),
+        clocks: Clocks::new(&ClocksSpec { lidar: exact(), imu: exact() }, &source, EPOCH).unwrap(),
+        head_from_laser: head_from_laser(),
+        head_from_imu: head_from_imu(),
+        duration_s: 3.0,
+        seed: Seed(1),
+    };
+    let mut short = Nodding { step: 0 }.take(1200);
+    let error = simulate(&rig, &mut short, &mut Kept::default(), &mut |_| ()).unwrap_err();
+    assert_eq!(error.to_string(), "the head's motion ends 1.200 s after the start, before the run does");
 }
 
 #[test]

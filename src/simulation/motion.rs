@@ -1,29 +1,16 @@
-//! How head and base move, block by block.
+//! How head and base move, window by window.
 
 use super::SimulationError;
+use crate::dynamics::{DynamicsError, HeadState};
 use crate::geometry::Kinematics;
 use std::collections::VecDeque;
 
 /// Time between the instants of a [`HeadMotion`], s.
 pub const STEP_S: f64 = 1e-3;
 
-/// How head and base move at an instant, both in the world.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moved {
-    /// The head: `world_from_head` and its derivatives.
-    pub head: Kinematics,
-    /// The base that carries it.
-    pub base: Kinematics,
-}
-
-/// A head in motion, one instant after another: physics, or anything else that moves.
-pub trait HeadMotion: Send {
-    /// How it moves at the next instant: the first call tells time 0, and each one after it [`STEP_S`] later.
-    ///
-    /// # Errors
-    /// When the motion cannot go on.
-    fn next(&mut self) -> Result<Moved, SimulationError>;
-}
+/// A head in motion, at 0, [`STEP_S`], 2 [`STEP_S`], ...: a [`HeadSimulation`](crate::dynamics::HeadSimulation) in steps of
+/// [`STEP_S`], or whatever else tells how a head moves.
+pub type HeadMotion<'a> = dyn Iterator<Item = Result<HeadState, DynamicsError>> + Send + 'a;
 
 /// The motion in a while: instants `first`, `first + 1`, ... of [`STEP_S`] each.
 #[derive(Debug, Clone)]
@@ -37,9 +24,9 @@ pub(super) struct Window {
 
 /// Cuts a motion into windows. Each begins `overlap` instants before the last one's end, so that a scan or a sample which
 /// began then lies in one window.
-pub(super) struct Windows<'a> {
-    motion: &'a mut dyn HeadMotion,
-    recent: VecDeque<Moved>,
+pub(super) struct Windows<'a, 'm> {
+    motion: &'a mut HeadMotion<'m>,
+    recent: VecDeque<HeadState>,
     /// How many instants were asked of the motion.
     told: u64,
     last: u64,
@@ -47,9 +34,9 @@ pub(super) struct Windows<'a> {
     overlap: usize,
 }
 
-impl<'a> Windows<'a> {
+impl<'a, 'm> Windows<'a, 'm> {
     /// Windows of `block` instants each, up to instant `last`.
-    pub fn new(motion: &'a mut dyn HeadMotion, block: u64, overlap: usize, last: u64) -> Self {
+    pub fn new(motion: &'a mut HeadMotion<'m>, block: u64, overlap: usize, last: u64) -> Self {
         Self { motion, recent: VecDeque::new(), told: 0, last, block, overlap }
     }
 
@@ -60,13 +47,14 @@ impl<'a> Windows<'a> {
         }
         let end = (self.told + self.block).min(self.last);
         while self.told <= end {
-            self.recent.push_back(self.motion.next()?);
+            let ended = SimulationError::MotionEnded { t_s: self.told as f64 * STEP_S };
+            self.recent.push_back(self.motion.next().ok_or(ended)??);
             self.told += 1;
         }
         let window = Window {
             first: self.told - self.recent.len() as u64,
-            heads: self.recent.iter().map(|moved| moved.head).collect(),
-            bases: self.recent.iter().map(|moved| moved.base).collect(),
+            heads: self.recent.iter().map(|state| state.head).collect(),
+            bases: self.recent.iter().map(|state| state.base).collect(),
             until_s: end as f64 * STEP_S,
         };
         self.recent.drain(..self.recent.len().saturating_sub(self.overlap));

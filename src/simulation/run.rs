@@ -24,7 +24,7 @@ const DURATION_S: (f64, f64) = (0.1, 1e6);
 /// When the run's duration makes no sense, the motion cannot go on, or the sink refuses.
 pub fn simulate<S: Sink + TruthSink + ?Sized>(
     rig: &Rig,
-    motion: &mut dyn HeadMotion,
+    motion: &mut HeadMotion<'_>,
     sink: &mut S,
     progress: &mut dyn FnMut(f64),
 ) -> Result<SimulationSummary, SimulationError> {
