@@ -3,6 +3,7 @@
 
 pub mod dynamics;
 pub mod elasticity;
+pub mod estimation;
 pub mod evaluation;
 pub mod geometry;
 pub mod measurement;
