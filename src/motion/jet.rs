@@ -28,6 +28,12 @@ impl Jet {
         Self { x: rate * t_s + phase, d: rate, dd: 0.0 }
     }
 
+    /// The function `exp(rate t)` times `scale`.
+    pub fn exponential(t_s: f64, rate: f64, scale: f64) -> Self {
+        let x = scale * (rate * t_s).exp();
+        Self { x, d: rate * x, dd: rate * rate * x }
+    }
+
     /// Sine and cosine of this function.
     pub fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.x.sin_cos();

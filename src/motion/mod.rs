@@ -10,7 +10,10 @@
 mod error;
 mod hand;
 mod jet;
+mod phasor;
 mod rhythm;
+mod shaker;
+mod sines;
 mod smooth;
 mod spec;
 mod stand;
@@ -19,6 +22,7 @@ mod walk;
 
 pub use error::MotionError;
 pub use hand::{CarrySpec, GaitSpec, HandSpec, ShakeSpec};
+pub use shaker::{Axis, DriveSpec, Level, ShakerSpec, SignalSpec};
 pub use spec::{MotionSpec, load};
 pub use stand::StandSpec;
 pub use stops::StopsSpec;

@@ -1,39 +1,30 @@
 //! Irregular rhythms: band-limited random processes as sums of few sinusoids.
 
 use super::jet::Jet;
+use super::sines::{Line, Part, Sines, even_parts};
 use crate::random::Stream;
-use rand::RngExt;
 use std::f64::consts::TAU;
 
-/// A random process of zero mean and unit variance, with power below a bandwidth alone: `sum sqrt(2/n) cos(w_k t + p_k)`,
-/// one frequency drawn in each of `n` equal parts of the band, so that it does not repeat within a run.
+/// Sinusoids in a wander.
+const TERMS: usize = 6;
+
+/// A random process of zero mean and unit variance, with power below a bandwidth alone: few sinusoids of random phase, one
+/// frequency drawn in each of as many equal parts of the band, so that it does not repeat within a run.
 #[derive(Debug, Clone)]
-pub(super) struct Wander {
-    /// Angular frequency and phase of each term.
-    terms: [(f64, f64); Self::TERMS],
-}
+pub(super) struct Wander(Sines<1>);
 
 impl Wander {
-    const TERMS: usize = 6;
-
     /// A process with power up to `bandwidth_hz`.
     pub fn new(bandwidth_hz: f64, stream: &mut Stream) -> Self {
-        let terms = std::array::from_fn(|k| {
-            let within: f64 = stream.random();
-            let frequency_hz = bandwidth_hz * (k as f64 + within) / Self::TERMS as f64;
-            (TAU * frequency_hz, TAU * stream.random::<f64>())
-        });
-        Self { terms }
+        let parts = even_parts((0.0, bandwidth_hz), TERMS, stream);
+        let line = |part: Part| Line { cycles: part.at, amplitudes: [part.amplitude(1.0 / bandwidth_hz)] };
+        Self(Sines::new(parts.into_iter().map(line).collect()))
     }
 
     /// The process at an instant.
     pub fn at(&self, t_s: f64) -> Jet {
-        let mut sum = Jet::default();
-        for (rate, phase) in &self.terms {
-            let (sin, cos) = (rate * t_s + phase).sin_cos();
-            sum += Jet { x: cos, d: -rate * sin, dd: -rate * rate * cos };
-        }
-        sum * (2.0 / Self::TERMS as f64).sqrt()
+        let [jet] = self.0.at(t_s);
+        jet
     }
 }
 

@@ -1,4 +1,5 @@
 use super::hand::{Hand, HandSpec};
+use super::shaker::{Shaker, ShakerSpec};
 use super::stand::{Stand, StandSpec};
 use super::{BaseMotion, MotionError};
 use crate::geometry::Route;
@@ -13,6 +14,8 @@ pub enum MotionSpec {
     Stand(StandSpec),
     /// A hand carries and shakes it.
     Hand(Box<HandSpec>),
+    /// A shaker drives it along or about its axes.
+    Shaker(ShakerSpec),
 }
 
 /// Finds and parses the motion called `name`: a path, or a name in the library. The source comes with it, for errors of
@@ -44,6 +47,7 @@ impl MotionSpec {
         }
         Ok(match self {
             MotionSpec::Stand(spec) => Box::new(Stand::new(spec, route)),
+            MotionSpec::Shaker(spec) => Box::new(Shaker::new(spec, source, route, duration_s, seed)?),
             MotionSpec::Hand(spec) => Box::new(Hand::new(spec, source, route, duration_s, seed)?),
         })
     }

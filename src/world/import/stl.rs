@@ -1,0 +1,51 @@
+//! STL, binary and ASCII. Both may begin with `solid`; the length of the file tells them apart.
+
+use super::{MeshError, Triangle};
+use crate::geometry::Vector;
+use std::io::Cursor;
+
+const HEADER: usize = 84;
+const RECORD: usize = 50;
+
+/// The triangles of an STL file.
+pub(super) fn parse(mut bytes: Vec<u8>) -> Result<Vec<Triangle>, MeshError> {
+    let said = binary_count(&bytes);
+    let is_binary_length = said.is_some_and(|count| bytes.len() == HEADER + RECORD * count);
+    let is_ascii = !is_binary_length && bytes.starts_with(b"solid");
+    if is_binary_length {
+        // The reader takes what begins with `solid` for ASCII.
+        bytes[..5].fill(b' ');
+    } else if !is_ascii {
+        let count = said.ok_or_else(|| malformed(format!("{} bytes are less than a header", bytes.len())))?;
+        let (said, found) = (format!("{count} triangles ({} bytes)", HEADER + RECORD * count), bytes.len());
+        return Err(MeshError::Lies { said, found: format!("{found} bytes") });
+    }
+    let facets = if is_ascii { count_of(b"endfacet", &bytes) } else { said.unwrap_or_default() };
+    let mut cursor = Cursor::new(bytes);
+    let reader = stl_io::create_stl_reader(&mut cursor).map_err(|error| malformed(error.to_string()))?;
+    let mut triangles = Vec::with_capacity(facets);
+    for triangle in reader {
+        let triangle = triangle.map_err(|error| malformed(error.to_string()))?;
+        triangles.push(triangle.vertices.map(|corner| Vector::from(corner.0.map(f64::from))));
+    }
+    if triangles.len() < facets {
+        let problem =
+            format!("{} of its {facets} facets stand after the end of the first solid", facets - triangles.len());
+        return Err(malformed(problem));
+    }
+    Ok(triangles)
+}
+
+/// The count that a binary file states.
+fn binary_count(bytes: &[u8]) -> Option<usize> {
+    let count = bytes.get(HEADER - 4..HEADER)?;
+    usize::try_from(u32::from_le_bytes(count.try_into().ok()?)).ok()
+}
+
+fn count_of(word: &[u8], bytes: &[u8]) -> usize {
+    bytes.windows(word.len()).filter(|window| *window == word).count()
+}
+
+fn malformed(problem: String) -> MeshError {
+    MeshError::Malformed { format: "STL", problem }
+}

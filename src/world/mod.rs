@@ -1,0 +1,43 @@
+//! Worlds: a scene's file becomes surfaces that rays can be cast against.
+//!
+//! A [`SceneSpec`] (RON, under `scenes/`) lists materials, shapes, templates of furniture, scattered objects, meshes from
+//! files, things that move, and routes to walk. [`World::build`] checks it as a whole and turns it into one set of
+//! triangles. [`World::cast`] then answers the only question a lidar asks: what does this ray meet first, how far away, at
+//! what angle, made of what?
+//!
+//! ```
+//! use zsim::geometry::Vector;
+//! use zsim::world::{Ray, World};
+//!
+//! let office = World::load("office")?;
+//! let route = office.default_route().ok_or("no route")?;
+//! let eye = route.points_in_world[0] + Vector::new(0.0, 0.0, 1.0);
+//! let down = Ray { origin_in_world: eye, direction_in_world: -Vector::z() };
+//! let hit = office.cast(&down, 30.0, 0.0).ok_or("no floor")?;
+//! assert!((hit.distance_m - 1.0).abs() < 1e-9);
+//! assert_eq!(office.material(hit.material).name, "carpet");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod build;
+mod caster;
+mod error;
+mod import;
+mod material;
+mod model;
+mod mover;
+mod placement;
+mod ray;
+mod scatter;
+mod shape;
+mod spec;
+
+pub use error::WorldError;
+pub use material::{Material, MaterialId};
+pub use model::World;
+pub use placement::Placement;
+pub use ray::{Hit, Ray};
+pub use shape::{HeightsSpec, OpeningSpec, ShapeSpec};
+pub use spec::{
+    ItemSpec, MaterialKind, MaterialSpec, MoverSpec, RouteSpec, ScatterSpec, SceneSpec, Turn, WaypointSpec,
+};
