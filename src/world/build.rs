@@ -233,7 +233,8 @@ impl Builder<'_> {
         let Some(folder) = &self.source.folder else {
             return Err(wrong(format!("a scene without a folder of its own cannot name the mesh `{file}`")));
         };
-        let mesh = import::read(&folder.join(file), *scale).map_err(|error| wrong(error.to_string()))?;
+        let mesh =
+            import::read(&folder.join(file), *scale).map_err(|error| wrong(format!("the mesh `{file}` {error}")))?;
         if mesh.without_area > 0 {
             let count = mesh.without_area;
             self.notes.push(format!("{file}: {count} triangles without area were left out"));
