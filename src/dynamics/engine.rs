@@ -1,0 +1,66 @@
+//! Rapier: one free body that is pushed. The one file that names the engine and its types.
+
+use super::body::Body;
+use crate::elasticity::{Vector6, split, stack};
+use crate::geometry::Pose;
+use rapier3d_f64::prelude::{MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+
+/// A free rigid body in an empty world without gravity.
+///
+/// A step takes the velocities on by the wrench over the mass, then the pose by the new velocities. With more than one
+/// solver iteration rapier would do so in as many parts with the same wrench, which adds energy to an oscillation. Its own
+/// gyroscopic term is explicit, hence off: it is a part of the wrench.
+pub(super) struct Engine {
+    world: PhysicsWorld,
+    handle: RigidBodyHandle,
+}
+
+impl Engine {
+    /// The body at `world_from_head` with `twist`: the velocity of its centre of mass and its angular velocity, in the world.
+    pub fn new(body: &Body, world_from_head: &Pose, twist: &Vector6, step_s: f64) -> Self {
+        let mut world = PhysicsWorld::new();
+        world.gravity = Default::default();
+        world.integration_parameters.dt = step_s;
+        world.integration_parameters.num_solver_iterations = 1;
+        let inertia = rapier3d_f64::math::Matrix::from_cols(
+            body.inertia_in_head.column(0).into_owned().into(),
+            body.inertia_in_head.column(1).into_owned().into(),
+            body.inertia_in_head.column(2).into_owned().into(),
+        );
+        let mass = MassProperties::with_inertia_matrix(body.centre_of_mass_in_head.into(), body.mass_kg, inertia);
+        let (velocity, turning) = split(twist);
+        let builder = RigidBodyBuilder::dynamic()
+            .pose((*world_from_head).into())
+            .linvel(velocity.into())
+            .angvel(turning.into())
+            .additional_mass_properties(mass)
+            .can_sleep(false)
+            .gyroscopic_forces_enabled(false)
+            .allow_fast_rotation(true);
+        let handle = world.insert_body(builder);
+        Self { world, handle }
+    }
+
+    /// Pushes the body with a force and a torque about its centre of mass, in the world, for one step.
+    pub fn step(&mut self, wrench: &Vector6) {
+        let (force, torque) = split(wrench);
+        if let Some(body) = self.world.bodies.get_mut(self.handle) {
+            body.reset_forces(false);
+            body.reset_torques(false);
+            body.add_force(force.into(), false);
+            body.add_torque(torque.into(), false);
+        }
+        self.world.step();
+    }
+
+    /// `world_from_head`.
+    pub fn pose(&self) -> Pose {
+        (*self.world.bodies[self.handle].position()).into()
+    }
+
+    /// Velocity of the centre of mass and angular velocity, in the world, half a step before the pose's time.
+    pub fn twist(&self) -> Vector6 {
+        let body = &self.world.bodies[self.handle];
+        stack(&body.linvel().into(), &body.angvel().into())
+    }
+}

@@ -1,0 +1,145 @@
+//! A helical spring as a column (Wahl, Mechanical Springs; Timoshenko & Gere, Theory of Elastic Stability, 2.19).
+
+use super::{Column, ElasticityError};
+
+/// Moduli of a wire's material, Pa.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moduli {
+    /// Young's modulus E, Pa.
+    pub youngs_pa: f64,
+    /// Shear modulus G, Pa.
+    pub shear_pa: f64,
+}
+
+impl Moduli {
+    /// Poisson's ratio, `E / 2G - 1`.
+    pub fn poisson(&self) -> f64 {
+        self.youngs_pa / (2.0 * self.shear_pa) - 1.0
+    }
+}
+
+/// A helical spring of round wire.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coil {
+    coil_diameter_m: f64,
+    wire_diameter_m: f64,
+    active_coils: f64,
+    free_length_m: f64,
+    moduli: Moduli,
+}
+
+impl Coil {
+    /// A coil of mean diameter `coil_diameter_m` and free length `free_length_m`, wound of `active_coils` turns of wire.
+    ///
+    /// All numbers are finite and above zero.
+    ///
+    /// # Errors
+    /// When the spring index is below 2, the coils touch already, or the moduli are no solid's.
+    pub fn new(
+        coil_diameter_m: f64,
+        wire_diameter_m: f64,
+        active_coils: f64,
+        free_length_m: f64,
+        moduli: Moduli,
+    ) -> Result<Self, ElasticityError> {
+        let coil = Self { coil_diameter_m, wire_diameter_m, active_coils, free_length_m, moduli };
+        let (poisson, index) = (moduli.poisson(), coil_diameter_m / wire_diameter_m);
+        if !(poisson > -1.0 && poisson <= 0.5) {
+            let (youngs_gpa, shear_gpa) = (moduli.youngs_pa * 1e-9, moduli.shear_pa * 1e-9);
+            return Err(ElasticityError::Moduli { youngs_gpa, shear_gpa, poisson });
+        }
+        if index < 2.0 {
+            let (wire_mm, coil_mm) = (wire_diameter_m * 1e3, coil_diameter_m * 1e3);
+            return Err(ElasticityError::IndexTooSmall { wire_mm, coil_mm, index });
+        }
+        if coil.solid_length_m() >= free_length_m {
+            return Err(ElasticityError::CoilsTouch {
+                coils: active_coils,
+                wire_mm: wire_diameter_m * 1e3,
+                solid_mm: coil.solid_length_m() * 1e3,
+                free_mm: free_length_m * 1e3,
+            });
+        }
+        Ok(coil)
+    }
+
+    /// Free length, m.
+    pub fn free_length_m(&self) -> f64 {
+        self.free_length_m
+    }
+
+    /// Length at which the active coils touch, m; ground or dead end coils come on top.
+    pub fn solid_length_m(&self) -> f64 {
+        self.active_coils * self.wire_diameter_m
+    }
+
+    /// Axial rate `G d^4 / (8 D^3 n)`, N/m.
+    pub fn axial_n_per_m(&self) -> f64 {
+        self.moduli.shear_pa * self.wire_diameter_m.powi(4) / (8.0 * self.coil_diameter_m.powi(3) * self.active_coils)
+    }
+
+    /// Torsional rate about the axis `E d^4 / (64 D n)`, N m/rad.
+    pub fn torsion_nm_per_rad(&self) -> f64 {
+        self.moduli.youngs_pa * self.wire_diameter_m.powi(4) / (64.0 * self.coil_diameter_m * self.active_coils)
+    }
+
+    /// Volume of the active wire, m^3: a quarter of pi squared times `D n d^2`.
+    pub fn wire_volume_m3(&self) -> f64 {
+        let pi = std::f64::consts::PI;
+        0.25 * pi * pi * self.coil_diameter_m * self.active_coils * self.wire_diameter_m.powi(2)
+    }
+
+    /// The spring under `load_n` along its axis, compression positive, as a column: rigidities for its length then.
+    ///
+    /// # Errors
+    /// When the load presses the coils together.
+    pub fn under(&self, load_n: f64) -> Result<Column, ElasticityError> {
+        let length_m = self.free_length_m - load_n / self.axial_n_per_m();
+        if length_m <= self.solid_length_m() {
+            let (loaded_mm, solid_mm) = (length_m * 1e3, self.solid_length_m() * 1e3);
+            return Err(ElasticityError::Clash { load_n, loaded_mm, solid_mm });
+        }
+        let poisson = self.moduli.poisson();
+        let bending_per_length = self.moduli.youngs_pa * self.wire_diameter_m.powi(4)
+            / (32.0 * self.coil_diameter_m * self.active_coils * (2.0 + poisson));
+        Ok(Column {
+            length_m,
+            bending_nm2: length_m * bending_per_length,
+            shear_n: 2.0 * (1.0 + poisson) * self.axial_n_per_m() * length_m,
+            axial_n_per_m: self.axial_n_per_m(),
+            torsion_nm_per_rad: self.torsion_nm_per_rad(),
+            load_n,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEEL: Moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
+
+    #[test]
+    fn a_wire_thicker_than_half_its_coil_is_refused() {
+        let error = Coil::new(0.025, 0.015, 2.0, 0.12, STEEL).unwrap_err();
+        assert!(error.to_string().contains("index, is 1.67"), "{error}");
+    }
+
+    #[test]
+    fn coils_that_touch_are_refused_free_and_under_load() {
+        let error = Coil::new(0.025, 0.003, 40.0, 0.12, STEEL).unwrap_err();
+        assert!(matches!(error, ElasticityError::CoilsTouch { .. }), "{error}");
+        // k = 79.3e9 * 0.003^4 / (8 * 0.025^3 * 12) = 4282.2 N/m; 400 N would leave 26.6 mm, but 12 coils take 36 mm.
+        let coil = Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap();
+        let ElasticityError::Clash { loaded_mm, solid_mm, .. } = coil.under(400.0).unwrap_err() else {
+            panic!("no clash");
+        };
+        assert!((loaded_mm - 26.59).abs() < 0.01 && (solid_mm - 36.0).abs() < 1e-9, "{loaded_mm} {solid_mm}");
+    }
+
+    #[test]
+    fn impossible_moduli_are_refused() {
+        let rubber = Moduli { youngs_pa: 206e9, shear_pa: 50e9 };
+        assert!(matches!(Coil::new(0.025, 0.003, 12.0, 0.12, rubber), Err(ElasticityError::Moduli { .. })));
+    }
+}

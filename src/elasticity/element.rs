@@ -1,0 +1,166 @@
+//! One element of a spring: a quadratic potential in the deformation's coordinates.
+
+use super::deformation::{blocks, split, stack};
+use super::{Column, Deformation, ElasticityError, Matrix6, Vector6, conditioning, loaded_stiffness};
+use crate::geometry::{Matrix, Pose, Vector, skew};
+
+/// A piece of spring between two nodes, straight under an axial load when at rest.
+///
+/// Its potential is `U = f . e + e . K e / 2` in `e`, the coordinates of [`Deformation`] less those of the straight piece,
+/// with `f` the axial load. `K` is such that the top's stiffness about the straight, loaded piece is exactly the one given:
+/// the coordinates' curvature times the load (the geometric stiffness) is taken out of it. So the softening by the load is
+/// in the force law, and gravity is not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Element {
+    rest: Vector6,
+    load: Vector6,
+    stiffness: Matrix6,
+}
+
+impl Element {
+    /// A piece of `length_m` under `load_n` (compression positive), whose top, its base clamped, then has the stiffness
+    /// `at_top`: order x, y, z, rx, ry, rz, about the top.
+    ///
+    /// # Errors
+    /// When `at_top` is not symmetric, or the piece would give way with both ends clamped.
+    pub fn new(length_m: f64, load_n: f64, at_top: &Matrix6) -> Result<Self, ElasticityError> {
+        check_symmetric(at_top)?;
+        // Of the top's displacement (u, theta), a_z = L + u_z + (theta_y u_x - theta_x u_y)/2 - L (theta_x^2 + theta_y^2)/12
+        // to second order; its Hessian times the force -P along it is the geometric stiffness.
+        let mut geometric = Matrix6::zeros();
+        for (shift, turn, sign) in [(0, 4, 1.0), (1, 3, -1.0)] {
+            geometric[(shift, turn)] = -0.5 * sign * load_n;
+            geometric[(turn, shift)] = -0.5 * sign * load_n;
+            geometric[(turn, turn)] = load_n * length_m / 6.0;
+        }
+        // To first order e = (u - theta x L z / 2, theta), so (u, theta) = spread e.
+        let lever = skew(&Vector::z()) * (-0.5 * length_m);
+        let spread = blocks(&Matrix::identity(), &lever, &Matrix::zeros(), &Matrix::identity());
+        let stiffness = spread.tr_mul(&((at_top - geometric) * spread));
+        check_positive_definite(&stiffness)?;
+        Ok(Self {
+            rest: Vector6::new(0.0, 0.0, length_m, 0.0, 0.0, 0.0),
+            load: Vector6::new(0.0, 0.0, -load_n, 0.0, 0.0, 0.0),
+            stiffness: (stiffness + stiffness.transpose()) * 0.5,
+        })
+    }
+
+    /// A piece of a loaded column.
+    ///
+    /// # Errors
+    /// When the load buckles it.
+    pub fn of_column(column: &Column) -> Result<Self, ElasticityError> {
+        Self::new(column.length_m, column.load_n, &loaded_stiffness(column)?)
+    }
+
+    /// The coordinates of the straight, loaded piece.
+    pub fn rest(&self) -> &Vector6 {
+        &self.rest
+    }
+
+    /// The stiffness in the deformation's coordinates.
+    pub fn stiffness(&self) -> &Matrix6 {
+        &self.stiffness
+    }
+
+    /// The gradient of the potential by the coordinates, N and N m.
+    pub fn gradient(&self, coordinates: &Vector6) -> Vector6 {
+        self.load + self.stiffness * (coordinates - self.rest)
+    }
+
+    /// The potential, zero for the straight, loaded piece, J.
+    pub fn potential_j(&self, coordinates: &Vector6) -> f64 {
+        let e = coordinates - self.rest;
+        e.dot(&(self.load + self.stiffness * e * 0.5))
+    }
+
+    /// The wrench on the top, about the top, in the base's frame.
+    pub fn wrench(&self, base_from_top: &Pose) -> Vector6 {
+        let deformation = Deformation::of(base_from_top);
+        -deformation.wrench(&self.gradient(&deformation.coordinates))
+    }
+
+    /// The wrench on the base, about the base, that balances `wrench` on the top.
+    pub fn reaction(base_from_top: &Pose, wrench: &Vector6) -> Vector6 {
+        let (force, torque) = split(wrench);
+        -stack(&force, &(torque + base_from_top.translation.vector.cross(&force)))
+    }
+}
+
+/// Refuses a stiffness that lets go in some direction.
+pub(super) fn check_positive_definite(k: &Matrix6) -> Result<(), ElasticityError> {
+    let least = conditioning(k);
+    if least.is_nan() || least <= 1e-12 { Err(ElasticityError::NotPositiveDefinite { least }) } else { Ok(()) }
+}
+
+fn check_symmetric(k: &Matrix6) -> Result<(), ElasticityError> {
+    for row in 0..6 {
+        for column in row + 1..6 {
+            let (upper, lower) = (k[(row, column)], k[(column, row)]);
+            let scale = (k[(row, row)] * k[(column, column)]).abs().sqrt();
+            if (upper - lower).abs() > 1e-9 * scale {
+                return Err(ElasticityError::NotSymmetric { row: row + 1, column: column + 1, upper, lower });
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Rotation;
+    use approx::assert_relative_eq;
+
+    /// A stiffness of a spring of 120 mm with every coupling there may be, N, m, rad.
+    fn coupled() -> Matrix6 {
+        let skewed = Matrix6::from_fn(|i, j| ((3 * i + 5 * j * j) as f64).sin());
+        let scale = Matrix6::from_diagonal(&Vector6::new(20.0, 20.0, 60.0, 1.0, 1.0, 0.8));
+        scale * (Matrix6::identity() * 8.0 + skewed.tr_mul(&skewed)) * scale * 0.1
+    }
+
+    fn moved(top: &Pose, d: &Vector6) -> Pose {
+        let (dp, dphi) = split(d);
+        Pose::from_parts((top.translation.vector + dp).into(), Rotation::from_scaled_axis(dphi) * top.rotation)
+    }
+
+    #[test]
+    fn the_tangent_at_rest_is_the_stiffness_given_whatever_the_load() {
+        for load in [0.0, 3.9, -3.9] {
+            let element = Element::new(0.12, load, &coupled()).unwrap();
+            let rest = Pose::translation(0.0, 0.0, 0.12);
+            assert_relative_eq!(element.wrench(&rest), Vector6::new(0.0, 0.0, load, 0.0, 0.0, 0.0), epsilon = 1e-12);
+            for k in 0..6 {
+                let d = Vector6::ith(k, 1e-5);
+                let slope = (element.wrench(&moved(&rest, &d)) - element.wrench(&moved(&rest, &-d))) / -2e-5;
+                assert_relative_eq!(slope, coupled().column(k).into_owned(), epsilon = 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn the_wrench_is_the_slope_of_the_potential_at_large_turns() {
+        let element = Element::new(0.12, 3.9, &coupled()).unwrap();
+        let turn = Rotation::from_scaled_axis(Vector::new(0.9, -1.2, 0.5));
+        let top = Pose::from_parts(Vector::new(0.05, 0.03, 0.08).into(), turn);
+        let potential = |top: &Pose| element.potential_j(&Deformation::of(top).coordinates);
+        let wrench = element.wrench(&top);
+        for k in 0..6 {
+            let d = Vector6::ith(k, 1e-6);
+            let slope = (potential(&moved(&top, &d)) - potential(&moved(&top, &-d))) / 2e-6;
+            assert_relative_eq!(-slope, wrench[k], max_relative = 1e-6, epsilon = 1e-7);
+        }
+    }
+
+    #[test]
+    fn a_stiffness_that_lets_go_is_refused() {
+        let mut soft = coupled();
+        soft.set_row(3, &(soft.row(0) * 0.01));
+        soft.set_column(3, &(soft.column(0) * 0.01));
+        assert!(matches!(Element::new(0.12, 0.0, &soft), Err(ElasticityError::NotPositiveDefinite { .. })));
+        let mut lopsided = coupled();
+        lopsided[(0, 4)] += 1.0;
+        let error = Element::new(0.12, 0.0, &lopsided).unwrap_err();
+        assert!(error.to_string().contains("row 1, column 5"), "{error}");
+    }
+}

@@ -1,0 +1,180 @@
+//! A column under an axial load (Haringx, Philips Research Reports 3 and 4, 1948-49).
+
+use super::{Coil, ElasticityError, Matrix6};
+use nalgebra::{Matrix2, Matrix4};
+use std::f64::consts::PI;
+
+/// A straight elastic column under an axial load: length and rigidities as they are under it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Column {
+    /// Length under the load, m.
+    pub length_m: f64,
+    /// Bending rigidity B, N m^2.
+    pub bending_nm2: f64,
+    /// Shear rigidity S, N.
+    pub shear_n: f64,
+    /// Axial rate, N/m.
+    pub axial_n_per_m: f64,
+    /// Torsional rate, N m/rad.
+    pub torsion_nm_per_rad: f64,
+    /// Axial load P, compression positive, N.
+    pub load_n: f64,
+}
+
+impl Column {
+    /// One of `segments` equal pieces of the column, end to end.
+    pub fn piece(&self, segments: usize) -> Self {
+        let share = segments as f64;
+        Self {
+            length_m: self.length_m / share,
+            axial_n_per_m: self.axial_n_per_m * share,
+            torsion_nm_per_rad: self.torsion_nm_per_rad * share,
+            ..*self
+        }
+    }
+
+    /// Stiffness of the top against a lateral force and the moment in its plane, the base clamped: rows (force, moment),
+    /// columns (displacement, rotation that leans the same way).
+    ///
+    /// With the state (y, theta, M, V) along the column: `y' = theta + (V + P theta)/S`, `theta' = M/B`,
+    /// `M' = -(V + P y')`, `V' = 0`; so the state at the top is `exp(A L)` times that at the base, for either sign of P.
+    /// `None` where the column has buckled with its top clamped too.
+    pub fn lateral_stiffness(&self) -> Option<Matrix2<f64>> {
+        let (p, b, s) = (self.load_n, self.bending_nm2, self.shear_n);
+        let soften = 1.0 + p / s;
+        #[rustfmt::skip]
+        let along = Matrix4::new(
+            0.0, soften, 0.0, 1.0 / s,
+            0.0, 0.0, 1.0 / b, 0.0,
+            0.0, -p * soften, 0.0, -soften,
+            0.0, 0.0, 0.0, 0.0,
+        );
+        let transfer = (along * self.length_m).exp();
+        // At the base y = theta = 0: the top's (y, theta) and (M, V) both follow from the base's (M, V).
+        let displaced = transfer.fixed_view::<2, 2>(0, 2).into_owned();
+        let loaded = transfer.fixed_view::<2, 2>(2, 2).into_owned();
+        let moment_and_force = loaded * displaced.try_inverse()?;
+        let stiffness = Matrix2::new(
+            moment_and_force[(1, 0)],
+            moment_and_force[(1, 1)],
+            moment_and_force[(0, 0)],
+            moment_and_force[(0, 1)],
+        );
+        Some((stiffness + stiffness.transpose()) * 0.5)
+    }
+}
+
+/// Stiffness of the column's top with the base clamped, order x, y, z, rx, ry, rz, the axial load in it.
+///
+/// A rotation about +y leans the top towards +x, one about +x towards -y: hence the signs of the two couplings.
+///
+/// Beyond the load at which the column would fall over if its top were free, this is not positive definite; whether
+/// something stands on it is a matter of what holds the top.
+///
+/// # Errors
+/// When the load buckles the column even with its top guided (free to move sideways, not to turn).
+pub fn loaded_stiffness(column: &Column) -> Result<Matrix6, ElasticityError> {
+    let lateral = column
+        .lateral_stiffness()
+        .filter(|k| k.iter().all(|x| x.is_finite()) && k[(0, 0)] > 0.0)
+        .ok_or(ElasticityError::Buckles { load_n: column.load_n, length_mm: column.length_m * 1e3 })?;
+    let mut stiffness = Matrix6::zeros();
+    for (shift, turn, sign) in [(0, 4, 1.0), (1, 3, -1.0)] {
+        stiffness[(shift, shift)] = lateral[(0, 0)];
+        stiffness[(turn, turn)] = lateral[(1, 1)];
+        stiffness[(shift, turn)] = sign * lateral[(0, 1)];
+        stiffness[(turn, shift)] = sign * lateral[(0, 1)];
+    }
+    stiffness[(2, 2)] = column.axial_n_per_m;
+    stiffness[(5, 5)] = column.torsion_nm_per_rad;
+    Ok(stiffness)
+}
+
+/// The load at which a coil buckles with its base clamped and its top guided (free to move sideways, not to turn), N:
+/// where `q L = pi`, with `q^2 = P (1 + P/S) / B` for the length L under the load. `None` for a coil that can be pressed
+/// together without buckling.
+pub fn buckling_load_n(coil: &Coil) -> Option<f64> {
+    let excess = |load_n: f64| {
+        let column = coil.under(load_n).ok()?;
+        let q = (load_n * (1.0 + load_n / column.shear_n) / column.bending_nm2).sqrt();
+        Some(q * column.length_m - PI)
+    };
+    let (mut low, mut high) = (0.0, (coil.free_length_m() - coil.solid_length_m()) * coil.axial_n_per_m());
+    // q L first rises with the load and falls towards the end, as L shrinks: walk up to the first crossing, then bisect.
+    let step = high / 1000.0;
+    high = (1..1000).map(|k| k as f64 * step).find(|load| excess(*load).is_some_and(|e| e >= 0.0))?;
+    low = f64::max(low, high - step);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if excess(middle)? < 0.0 { low = middle } else { high = middle }
+    }
+    Some(0.5 * (low + high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elasticity::Moduli;
+    use approx::assert_relative_eq;
+
+    fn steel(coil_mm: f64, wire_mm: f64, coils: f64, length_mm: f64) -> Coil {
+        let moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
+        Coil::new(coil_mm * 1e-3, wire_mm * 1e-3, coils, length_mm * 1e-3, moduli).unwrap()
+    }
+
+    #[test]
+    fn without_load_it_is_timoshenkos_beam() {
+        // K_xx = 12 B / (L^3 (1 + Phi)), K_ry = (4 + Phi) B / (L (1 + Phi)), K_x,ry = -6 B / (L^2 (1 + Phi)).
+        let column = steel(25.0, 3.0, 12.0, 120.0).under(0.0).unwrap();
+        let (b, l) = (column.bending_nm2, column.length_m);
+        let phi = 12.0 * b / (column.shear_n * l * l);
+        let k = loaded_stiffness(&column).unwrap();
+        assert_relative_eq!(k[(0, 0)], 12.0 * b / (l.powi(3) * (1.0 + phi)), max_relative = 1e-11);
+        assert_relative_eq!(k[(4, 4)], (4.0 + phi) * b / (l * (1.0 + phi)), max_relative = 1e-11);
+        assert_relative_eq!(k[(0, 4)], -6.0 * b / (l * l * (1.0 + phi)), max_relative = 1e-11);
+        assert_relative_eq!(k[(1, 3)], 6.0 * b / (l * l * (1.0 + phi)), max_relative = 1e-11);
+        assert_relative_eq!(k[(2, 2)], 79.3e9 * 3e-3_f64.powi(4) / (8.0 * 0.025_f64.powi(3) * 12.0), epsilon = 1e-8);
+    }
+
+    #[test]
+    fn guided_lateral_stiffness_is_haringxs_and_within_2_percent_of_the_rods() {
+        // D, d, n, L0 in mm, load in N; guided lateral stiffness in N/m of a geometrically exact rod along the helix, and
+        // of the column.
+        let table = [
+            ([50.0, 4.0, 10.0, 120.0], 0.0, 979.5, 974.1),
+            ([50.0, 4.0, 10.0, 120.0], 60.9, 810.4, 801.0),
+            ([40.0, 2.5, 15.0, 120.0], 0.0, 133.4, 132.7),
+            ([40.0, 2.5, 15.0, 120.0], 12.1, 64.9, 63.6),
+            ([30.0, 2.0, 8.0, 60.0], 11.0, 465.9, 460.3),
+        ];
+        for ([coil, wire, coils, length], load, rod, expected) in table {
+            let column = steel(coil, wire, coils, length).under(load).unwrap();
+            let guided = loaded_stiffness(&column).unwrap()[(0, 0)];
+            // The loads are given to 0.05 N, which is up to 0.5 % of the stiffness of the softest.
+            assert_relative_eq!(guided, expected, max_relative = 5e-3);
+            assert_relative_eq!(guided, rod, max_relative = 0.025);
+            if load > 0.0 {
+                // P^2 / (2 q B tan(q L / 2) - P L), q^2 = P (1 + P/S) / B.
+                let (p, b, l) = (load, column.bending_nm2, column.length_m);
+                let q = (p * (1.0 + p / column.shear_n) / b).sqrt();
+                let closed = p * p / (2.0 * q * b * (q * l / 2.0).tan() - p * l);
+                assert_relative_eq!(guided, closed, max_relative = 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn tension_stiffens_and_the_buckling_load_leaves_nothing() {
+        let coil = steel(40.0, 2.5, 15.0, 120.0);
+        let guided = |load: f64| coil.under(load).unwrap().lateral_stiffness().unwrap()[(0, 0)];
+        assert!(guided(-10.0) > guided(0.0) && guided(0.0) > guided(10.0));
+        let critical = buckling_load_n(&coil).unwrap();
+        assert!(guided(critical).abs() < 1e-6 * guided(0.0), "{critical} N leaves {}", guided(critical));
+        assert!(matches!(
+            loaded_stiffness(&coil.under(critical * 1.01).unwrap()),
+            Err(ElasticityError::Buckles { .. })
+        ));
+        // Free length over diameter below 5.2 (1 + nu ...)^-1/2, about 2.6 for clamped ends: never buckles.
+        assert_eq!(buckling_load_n(&steel(50.0, 4.0, 10.0, 120.0)), None);
+    }
+}

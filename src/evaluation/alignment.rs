@@ -1,0 +1,77 @@
+use super::EvaluationError;
+use crate::geometry::{Matrix, Pose, Rotation, Vector};
+use nalgebra::Rotation3;
+
+/// The second singular value of the scatter, relative to the first, below which the points lie on a line.
+const LINE: f64 = 1e-12;
+
+/// The rigid transform `to_from_from` that brings the points `from` nearest to `to`, pair by pair, in least squares.
+///
+/// Umeyama (1991), eq. 40-42, with its scale held at 1: the rotation is `U S V^T` of the singular value decomposition of
+/// the cross covariance, with the sign in `S` that makes it proper.
+///
+/// # Errors
+/// When there are fewer than three pairs, or all points lie on a line.
+pub fn align(to: &[Vector], from: &[Vector]) -> Result<Pose, EvaluationError> {
+    let pairs = to.len().min(from.len());
+    if pairs < 3 {
+        return Err(EvaluationError::TooFew { pairs });
+    }
+    let mean = |points: &[Vector]| points[..pairs].iter().sum::<Vector>() / pairs as f64;
+    let (to_mean, from_mean) = (mean(to), mean(from));
+    let scatter = to
+        .iter()
+        .zip(from)
+        .fold(Matrix::zeros(), |sum, (a, b)| sum + (a - to_mean) * (b - from_mean).transpose() / pairs as f64);
+
+    let svd = scatter.svd(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Err(EvaluationError::OnALine) };
+    if svd.singular_values[1] <= LINE * svd.singular_values[0].max(f64::MIN_POSITIVE) {
+        return Err(EvaluationError::OnALine);
+    }
+    let handedness = (u.determinant() * v_t.determinant()).signum();
+    let proper = u * Matrix::from_diagonal(&Vector::new(1.0, 1.0, handedness)) * v_t;
+    let rotation = Rotation::from_rotation_matrix(&Rotation3::from_matrix_unchecked(proper));
+    Ok(Pose::from_parts((to_mean - rotation * from_mean).into(), rotation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::from_roll_pitch_yaw;
+    use approx::assert_relative_eq;
+
+    fn helix(count: usize) -> Vec<Vector> {
+        let point = |t: f64| Vector::new(2.0 * t.cos(), 2.0 * t.sin(), 0.1 * t);
+        (0..count).map(|k| point(k as f64 * 0.1)).collect()
+    }
+
+    #[test]
+    fn a_planted_transform_is_found() {
+        let points = helix(80);
+        for yaw in [0.3, -2.8] {
+            let planted = Pose::from_parts(Vector::new(1.0, -2.0, 0.5).into(), from_roll_pitch_yaw(0.2, -0.4, yaw));
+            let moved: Vec<Vector> = points.iter().map(|p| planted.rotation * p + planted.translation.vector).collect();
+            let found = align(&moved, &points).unwrap();
+            assert_relative_eq!(found.to_homogeneous(), planted.to_homogeneous(), epsilon = 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_mirror_image_is_met_by_a_rotation_all_the_same() {
+        // Points in a plane fit their mirror image exactly by a half turn; the rotation must be proper.
+        let flat: Vec<Vector> = helix(80).iter().map(|p| Vector::new(p.x, p.y, 0.0)).collect();
+        let mirrored: Vec<Vector> = flat.iter().map(|p| Vector::new(-p.x, p.y, 0.0)).collect();
+        let found = align(&mirrored, &flat).unwrap();
+        assert_relative_eq!(found.rotation.to_rotation_matrix().matrix().determinant(), 1.0, epsilon = 1e-12);
+        assert_relative_eq!(found * nalgebra::Point3::from(flat[7]), mirrored[7].into(), epsilon = 1e-12);
+    }
+
+    #[test]
+    fn points_on_a_line_and_two_points_are_refused() {
+        let line: Vec<Vector> = (0..10).map(|k| Vector::new(k as f64, 2.0 * k as f64, 0.0)).collect();
+        assert_eq!(align(&line, &line), Err(EvaluationError::OnALine));
+        assert_eq!(align(&[Vector::zeros(); 5], &[Vector::zeros(); 5]), Err(EvaluationError::OnALine));
+        assert_eq!(align(&line[..2], &line[..2]), Err(EvaluationError::TooFew { pairs: 2 }));
+    }
+}

@@ -1,0 +1,49 @@
+use crate::time::Stamp;
+
+/// Error of an estimated clock offset.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockError {
+    /// Root mean square over all estimates, the first ones included, s.
+    pub offset_rmse_s: f64,
+    /// Estimated minus true offset at the end, s.
+    pub offset_end_error_s: f64,
+}
+
+/// Judges estimated offsets of the IMU's clock after the lidar's against the true ones, both over lidar time; the truth is
+/// interpolated linearly. `None` where the two have no instant in common.
+pub fn clock_error(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Option<ClockError> {
+    let errors: Vec<f64> =
+        estimate.iter().filter_map(|(stamp, offset_s)| Some(offset_s - offset_at(truth, *stamp)?)).collect();
+    let last = *errors.last()?;
+    let mean_square = errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64;
+    Some(ClockError { offset_rmse_s: mean_square.sqrt(), offset_end_error_s: last })
+}
+
+/// The offset at `stamp` between the two given around it.
+fn offset_at(offsets: &[(Stamp, f64)], stamp: Stamp) -> Option<f64> {
+    let after = offsets.partition_point(|(at, _)| *at <= stamp);
+    let (t0, y0) = offsets[after.checked_sub(1)?];
+    match offsets.get(after) {
+        Some((t1, y1)) => Some(y0 + (y1 - y0) * stamp.seconds_since(t0) / t1.seconds_since(t0)),
+        None if t0 == stamp => Some(y0),
+        None => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn an_estimate_that_starts_from_zero_and_settles_is_told_by_both_numbers() {
+        // Truth 3 ms + 1 ms/min, told at 0 and 60 s. Estimates: 0 at the start (3 ms off), 3.6 at 30 s (+0.1), 3.9 at 60 s.
+        let at = |s: i64| Stamp::from_nanos(s * 1_000_000_000);
+        let truth = [(at(0), 3e-3), (at(60), 4e-3)];
+        let estimate = [(at(0), 0.0), (at(30), 3.6e-3), (at(60), 3.9e-3), (at(61), 9.0)];
+        let found = clock_error(&estimate, &truth).unwrap();
+        assert_relative_eq!(found.offset_end_error_s, -1e-4, epsilon = 1e-12);
+        assert_relative_eq!(found.offset_rmse_s, ((9.0_f64 + 0.01 + 0.01) / 3.0).sqrt() * 1e-3, epsilon = 1e-12);
+        assert_eq!(clock_error(&estimate, &[]), None);
+    }
+}

@@ -1,0 +1,238 @@
+use super::EvaluationError;
+use crate::geometry::{Pose, Rotation, STANDARD_GRAVITY_M_PER_S2, Trajectory, Vector};
+use crate::measurement::ImuSample;
+use crate::time::Stamp;
+use std::collections::VecDeque;
+
+/// What counts as rest at the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// Greatest change of the angular velocity against its mean so far, rad/s.
+    pub gyro_rad_per_s: f64,
+    /// Greatest change of the specific force against its mean so far, m/s^2.
+    pub accel_m_per_s2: f64,
+    /// Least length of the rest, s.
+    pub least_s: f64,
+    /// How long before it shows a motion may have begun, s: so much of the rest's end is not averaged.
+    pub onset_s: f64,
+}
+
+impl Default for Rest {
+    /// Ten standard deviations of a 3DM-GX2's noise at 100 Hz; half a second twice.
+    fn default() -> Self {
+        Self { gyro_rad_per_s: 0.06, accel_m_per_s2: 0.3, least_s: 0.5, onset_s: 0.5 }
+    }
+}
+
+/// What the IMU alone says: its raw samples integrated from a start at rest, the simplest strapdown.
+///
+/// The rest gives the gyroscope's bias (its mean) and down (the mean specific force, whose magnitude is taken for
+/// gravity's). From there attitude, velocity and position are integrated by the trapezoidal rule. Samples that run
+/// backwards in time or are not finite are left out. The map's origin is the IMU's place at rest, its heading arbitrary.
+#[derive(Debug, Clone)]
+pub struct DeadReckoning {
+    rest: Rest,
+    imu_from_head: Pose,
+    start: RestMean,
+    still: bool,
+    /// The end of the rest so far, which may belong to a motion that does not show yet.
+    held: VecDeque<ImuSample>,
+    latest: Option<Stamp>,
+    previous: Option<ImuSample>,
+    map_from_imu: Rotation,
+    position_in_map: Vector,
+    velocity_in_map: Vector,
+    trajectory: Trajectory,
+}
+
+/// Running means over the rest.
+#[derive(Debug, Clone, Default)]
+struct RestMean {
+    first: Option<Stamp>,
+    last: Option<Stamp>,
+    count: f64,
+    gyro: Vector,
+    accel: Vector,
+}
+
+impl RestMean {
+    fn take(&mut self, sample: &ImuSample) {
+        self.first.get_or_insert(sample.stamp);
+        self.last = Some(sample.stamp);
+        self.count += 1.0;
+        self.gyro += (sample.angular_velocity_rad_per_s - self.gyro) / self.count;
+        self.accel += (sample.specific_force_m_per_s2 - self.accel) / self.count;
+    }
+
+    fn seconds(&self) -> f64 {
+        self.first.zip(self.last).map_or(0.0, |(first, last)| last.seconds_since(first))
+    }
+}
+
+impl DeadReckoning {
+    /// Dead reckoning of a head with its IMU at `head_from_imu`.
+    pub fn new(head_from_imu: &Pose, rest: Rest) -> Self {
+        Self {
+            rest,
+            imu_from_head: head_from_imu.inverse(),
+            start: RestMean::default(),
+            still: true,
+            held: VecDeque::new(),
+            latest: None,
+            previous: None,
+            map_from_imu: Rotation::identity(),
+            position_in_map: Vector::zeros(),
+            velocity_in_map: Vector::zeros(),
+            trajectory: Trajectory::new(),
+        }
+    }
+
+    /// Takes the next sample.
+    pub fn push(&mut self, sample: &ImuSample) {
+        let finite = |v: &Vector| v.iter().all(|x| x.is_finite());
+        let usable = finite(&sample.angular_velocity_rad_per_s) && finite(&sample.specific_force_m_per_s2);
+        if !usable || self.latest.is_some_and(|latest| sample.stamp <= latest) {
+            return;
+        }
+        self.latest = Some(sample.stamp);
+        if self.still && self.is_at_rest(sample) {
+            self.hold(sample);
+        } else {
+            self.still = false;
+            for held in std::mem::take(&mut self.held) {
+                self.step(&held);
+            }
+            self.step(sample);
+        }
+    }
+
+    /// Holds a sample of the rest back until it is old enough to belong to the rest for certain.
+    fn hold(&mut self, sample: &ImuSample) {
+        self.held.push_back(*sample);
+        while self.held.front().is_some_and(|held| sample.stamp.seconds_since(held.stamp) >= self.rest.onset_s) {
+            let Some(settled) = self.held.pop_front() else { return };
+            self.start.take(&settled);
+            self.map_from_imu = level(&self.start.accel);
+            self.keep(&settled);
+        }
+    }
+
+    fn is_at_rest(&self, sample: &ImuSample) -> bool {
+        let Some(reference) = self.held.front() else { return true };
+        let (gyro, accel) = match self.start.count {
+            0.0 => (reference.angular_velocity_rad_per_s, reference.specific_force_m_per_s2),
+            _ => (self.start.gyro, self.start.accel),
+        };
+        let gyro = (sample.angular_velocity_rad_per_s - gyro).norm();
+        let accel = (sample.specific_force_m_per_s2 - accel).norm();
+        gyro <= self.rest.gyro_rad_per_s && accel <= self.rest.accel_m_per_s2
+    }
+
+    fn step(&mut self, sample: &ImuSample) {
+        let Some(before) = self.previous else { return self.keep(sample) };
+        let dt_s = sample.stamp.seconds_since(before.stamp);
+        let rate = (before.angular_velocity_rad_per_s + sample.angular_velocity_rad_per_s) / 2.0 - self.start.gyro;
+        let turned = self.map_from_imu * Rotation::from_scaled_axis(rate * dt_s);
+        let force =
+            (self.map_from_imu * before.specific_force_m_per_s2 + turned * sample.specific_force_m_per_s2) / 2.0;
+        let acceleration = force - Vector::z() * self.start.accel.norm();
+        self.position_in_map += self.velocity_in_map * dt_s + acceleration * (dt_s * dt_s / 2.0);
+        self.velocity_in_map += acceleration * dt_s;
+        self.map_from_imu = turned;
+        self.keep(sample);
+    }
+
+    fn keep(&mut self, sample: &ImuSample) {
+        self.previous = Some(*sample);
+        let map_from_imu = Pose::from_parts(self.position_in_map.into(), self.map_from_imu);
+        // Only a run that left all bounds is not finite; its trajectory ends there.
+        let _ = self.trajectory.push(sample.stamp, map_from_imu * self.imu_from_head);
+    }
+
+    /// `map_from_head` at every sample, on the IMU's clock; a recording that rests to its end lacks the last half second.
+    ///
+    /// # Errors
+    /// When the rest at the start was too short.
+    pub fn finish(self) -> Result<Trajectory, EvaluationError> {
+        let (needed_s, found_s) = (self.rest.least_s, self.start.seconds());
+        let weightless = self.start.accel.norm() < STANDARD_GRAVITY_M_PER_S2 / 2.0;
+        if found_s < needed_s || weightless {
+            return Err(EvaluationError::NoRest { needed_s, found_s: if weightless { 0.0 } else { found_s } });
+        }
+        Ok(self.trajectory)
+    }
+}
+
+/// The attitude without heading in which the specific force at rest points up.
+fn level(specific_force: &Vector) -> Rotation {
+    // Straight down has no shortest arc to up: any half turn about a level axis will do.
+    Rotation::rotation_between(specific_force, &Vector::z())
+        .unwrap_or_else(|| Rotation::from_scaled_axis(Vector::x() * std::f64::consts::PI))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Kinematics, from_roll_pitch_yaw};
+    use approx::assert_relative_eq;
+
+    /// At rest for 2 s, then `x = a (1 - cos w s)^2 / 4` forward while pitching by the same law: smooth, back and forth.
+    fn motion(t_s: f64) -> Kinematics {
+        let (size, w) = (1.0, 1.5);
+        let s = (t_s - 2.0).max(0.0);
+        let (sin, cos) = (w * s).sin_cos();
+        let value = size * (1.0 - cos).powi(2) / 4.0;
+        let rate = size * w * sin * (1.0 - cos) / 2.0;
+        let second = size * w * w * (cos * (1.0 - cos) + sin * sin) / 2.0;
+        Kinematics {
+            world_from_body: Pose::from_parts(
+                Vector::x_axis().scale(value).into(),
+                from_roll_pitch_yaw(0.0, value, 0.0),
+            ),
+            velocity_in_world: Vector::x() * rate,
+            angular_velocity_in_world: Vector::y() * rate,
+            acceleration_in_world: Vector::x() * second,
+            angular_acceleration_in_world: Vector::y() * second,
+        }
+    }
+
+    fn reckon(head_from_imu: &Pose, gyro_bias: Vector, seconds: f64) -> Result<Trajectory, EvaluationError> {
+        let mut reckoning = DeadReckoning::new(head_from_imu, Rest::default());
+        for k in 0..(seconds * 1000.0) as i64 {
+            let imu = motion(k as f64 * 1e-3).of_frame(head_from_imu);
+            reckoning.push(&ImuSample {
+                stamp: Stamp::from_nanos(k * 1_000_000),
+                angular_velocity_rad_per_s: imu.angular_velocity_in_body() + gyro_bias,
+                specific_force_m_per_s2: imu.specific_force_in_body(),
+            });
+        }
+        reckoning.finish()
+    }
+
+    #[test]
+    fn a_perfect_imu_finds_its_way_with_its_lever_arm_and_bias() {
+        // 2 mm and 0.02 degrees over 10 s at 1 kHz. The map's origin is the IMU at rest, level and facing as the head does.
+        let head_from_imu = Pose::from_parts(Vector::new(0.02, -0.01, -0.06).into(), Rotation::identity());
+        let found = reckon(&head_from_imu, Vector::new(0.01, -0.02, 0.005), 12.0).unwrap();
+        let map_from_world = head_from_imu.inverse();
+        for (stamp, pose) in found.iter() {
+            let expected = map_from_world * motion(stamp.nanos() as f64 * 1e-9).world_from_body;
+            assert!((pose.translation.vector - expected.translation.vector).norm() < 2e-3, "at {stamp:?}");
+            assert!(pose.rotation.angle_to(&expected.rotation) < 0.02_f64.to_radians(), "at {stamp:?}");
+        }
+    }
+
+    #[test]
+    fn a_tilted_start_is_levelled() {
+        let tilt = from_roll_pitch_yaw(0.3, -0.2, 0.0);
+        let rotation = level(&(tilt.inverse() * Vector::z()));
+        assert_relative_eq!(rotation * (tilt.inverse() * Vector::z()), Vector::z(), epsilon = 1e-12);
+        assert_relative_eq!(level(&-Vector::z()) * -Vector::z(), Vector::z(), epsilon = 1e-12);
+    }
+
+    #[test]
+    fn without_a_rest_there_is_no_dead_reckoning() {
+        let error = reckon(&Pose::identity(), Vector::zeros(), 0.9).unwrap_err();
+        assert!(matches!(error, EvaluationError::NoRest { needed_s, .. } if needed_s == 0.5));
+    }
+}

@@ -1,0 +1,29 @@
+//! How far an estimate is from the truth.
+//!
+//! A trajectory is judged by pairs of poses of one instant ([`Pairs`]), after a rigid alignment by their positions
+//! ([`align`], Umeyama without scale, as `evo_ape -a`): the absolute errors over time ([`Errors`]), the drift out of an
+//! alignment over the first seconds alone ([`drift`]), the error of the motion within a minute ([`relative_error`]). A
+//! clock offset is judged by [`clock_error`], a cloud by its distances to the true surfaces ([`CloudErrors`]). Beside the
+//! estimate stands what the raw IMU alone would have said ([`DeadReckoning`]).
+//!
+//! Everything here is pure: numbers in, numbers out.
+
+mod absolute;
+mod alignment;
+mod clock;
+mod cloud;
+mod dead_reckoning;
+mod drift;
+mod error;
+mod pairs;
+mod relative;
+
+pub use absolute::Errors;
+pub use alignment::align;
+pub use clock::{ClockError, clock_error};
+pub use cloud::{CloudErrors, CloudSummary, Thinning};
+pub use dead_reckoning::{DeadReckoning, Rest};
+pub use drift::{ALIGNED_S, Drift, TAIL_S, drift};
+pub use error::EvaluationError;
+pub use pairs::Pairs;
+pub use relative::{RelativeError, relative_error};

@@ -1,0 +1,308 @@
+//! A shaker: the base driven along or about its axes by test signals, to characterise a head.
+
+use super::jet::{Jet, PoseJet};
+use super::sines::{Line, Part, Sines, even_parts};
+use super::smooth::Steps;
+use super::stand::standpoint;
+use super::{BaseMotion, MotionError};
+use crate::geometry::{Kinematics, Route, Vector};
+use crate::random::Seed;
+use crate::spec::checked::{finite, non_negative, positive};
+use crate::spec::{Source, SpecError};
+use nalgebra::Complex;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
+
+/// A base that is driven along or about its axes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShakerSpec {
+    /// Height of the base above the floor, m.
+    #[serde(deserialize_with = "finite")]
+    pub height_m: f64,
+    /// How long everything is at rest first, s.
+    #[serde(deserialize_with = "non_negative")]
+    pub still_s: f64,
+    /// How long the signals take to reach their full strength, s.
+    #[serde(deserialize_with = "positive")]
+    pub onset_s: f64,
+    /// The signals; those of one axis add up.
+    pub drives: Vec<DriveSpec>,
+}
+
+/// A signal on an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveSpec {
+    /// The axis.
+    pub axis: Axis,
+    /// The signal.
+    pub signal: SignalSpec,
+}
+
+/// An axis of the base at rest: along x (forward), y (left), z (up), or about them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Axis {
+    /// Forward.
+    X,
+    /// To the left.
+    Y,
+    /// Up.
+    Z,
+    /// About x.
+    Roll,
+    /// About y.
+    Pitch,
+    /// About z.
+    Yaw,
+}
+
+impl Axis {
+    /// Every axis.
+    pub const ALL: [Axis; 6] = [Axis::X, Axis::Y, Axis::Z, Axis::Roll, Axis::Pitch, Axis::Yaw];
+
+    /// Whether this is a rotation.
+    pub fn is_rotation(self) -> bool {
+        matches!(self, Axis::Roll | Axis::Pitch | Axis::Yaw)
+    }
+}
+
+/// A test signal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum SignalSpec {
+    /// A sine whose frequency goes exponentially from one end to the other until the end of the run.
+    SweptSine {
+        /// Frequency at the start, Hz.
+        #[serde(deserialize_with = "positive")]
+        from_hz: f64,
+        /// Frequency at the end, Hz.
+        #[serde(deserialize_with = "positive")]
+        to_hz: f64,
+        /// Amplitude, held over the sweep.
+        amplitude: Level,
+    },
+    /// Equal sines at the multiples of `1 / period_s` within a band, with Schroeder's phases (low crest): periodic, so that
+    /// a spectrum over whole periods does not leak.
+    Multisine {
+        /// The period, s.
+        #[serde(deserialize_with = "positive")]
+        period_s: f64,
+        /// Lowest frequency, Hz.
+        #[serde(deserialize_with = "positive")]
+        low_hz: f64,
+        /// Highest frequency, Hz.
+        #[serde(deserialize_with = "positive")]
+        high_hz: f64,
+        /// Root mean square of the whole.
+        rms: Level,
+    },
+    /// Random noise with a flat spectrum within a band: 256 sinusoids.
+    BandNoise {
+        /// Lowest frequency, Hz.
+        #[serde(deserialize_with = "positive")]
+        low_hz: f64,
+        /// Highest frequency, Hz.
+        #[serde(deserialize_with = "positive")]
+        high_hz: f64,
+        /// Root mean square of the whole.
+        rms: Level,
+    },
+}
+
+/// How strong a signal is, and in which derivative it is so at every frequency alike.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Level {
+    /// Displacement, m.
+    Metres(f64),
+    /// Velocity, m/s.
+    MetresPerS(f64),
+    /// Acceleration, m/s^2.
+    MetresPerS2(f64),
+    /// Angle, degrees.
+    Degrees(f64),
+    /// Angular rate, degrees/s.
+    DegreesPerS(f64),
+    /// Angular acceleration, degrees/s^2.
+    DegreesPerS2(f64),
+}
+
+impl Level {
+    /// The level in SI units, and how often the displacement is differentiated to have it.
+    fn parts(self) -> (f64, i32) {
+        match self {
+            Level::Metres(x) => (x, 0),
+            Level::MetresPerS(x) => (x, 1),
+            Level::MetresPerS2(x) => (x, 2),
+            Level::Degrees(x) => (x.to_radians(), 0),
+            Level::DegreesPerS(x) => (x.to_radians(), 1),
+            Level::DegreesPerS2(x) => (x.to_radians(), 2),
+        }
+    }
+
+    fn is_rotation(self) -> bool {
+        matches!(self, Level::Degrees(_) | Level::DegreesPerS(_) | Level::DegreesPerS2(_))
+    }
+
+    /// The displacement of a sine of this level at `freq_hz`, m or rad.
+    fn displacement(self, freq_hz: f64) -> f64 {
+        let (level, order) = self.parts();
+        level / (TAU * freq_hz).powi(order)
+    }
+}
+
+/// Lines in band noise.
+const NOISE_LINES: usize = 256;
+
+/// Most lines of a multisine.
+const MOST_LINES: f64 = 1e5;
+
+/// A base on a shaker.
+pub(super) struct Shaker {
+    rest: PoseJet,
+    onset: Steps,
+    start_s: f64,
+    drives: Vec<(Axis, Drive)>,
+}
+
+enum Drive {
+    Sines(Sines<1>),
+    Sweep { from_hz: f64, growth_per_s: f64, displacement: f64, order: i32 },
+}
+
+impl Shaker {
+    pub fn new(
+        spec: &ShakerSpec,
+        source: &Source,
+        route: Option<&Route>,
+        duration_s: f64,
+        seed: Seed,
+    ) -> Result<Self, MotionError> {
+        let (floor, heading) = standpoint(route);
+        let sweep_s = duration_s - spec.still_s;
+        let mut drives = Vec::new();
+        for (index, drive) in spec.drives.iter().enumerate() {
+            let stream_seed = seed.child(&format!("motion/shaker/{index}"));
+            drives.push((drive.axis, drive.built(source, sweep_s, stream_seed)?));
+        }
+        let mut onset = Steps::from_level(0.0);
+        onset.push(spec.still_s + spec.onset_s / 2.0, spec.onset_s / 2.0, 1.0);
+        let rest = PoseJet::at_rest(&(floor + Vector::z() * spec.height_m), heading);
+        Ok(Self { rest, onset, start_s: spec.still_s, drives })
+    }
+}
+
+impl DriveSpec {
+    fn built(&self, source: &Source, sweep_s: f64, seed: Seed) -> Result<Drive, SpecError> {
+        let fault = |key: &str, message: String| Err(SpecError::about(source, key, message));
+        let (level, key) = match &self.signal {
+            SignalSpec::SweptSine { amplitude, .. } => (*amplitude, "amplitude"),
+            SignalSpec::Multisine { rms, .. } | SignalSpec::BandNoise { rms, .. } => (*rms, "rms"),
+        };
+        if level.is_rotation() != self.axis.is_rotation() {
+            return fault(
+                key,
+                format!("{level:?} does not fit the axis {:?}: lengths along x, y, z; angles about them", self.axis),
+            );
+        }
+        if !(level.parts().0.is_finite() && level.parts().0 > 0.0) {
+            return fault(key, format!("{level:?}: a level is a finite number above 0"));
+        }
+        match self.signal {
+            SignalSpec::SweptSine { from_hz, to_hz, .. } => {
+                if sweep_s <= 0.0 {
+                    return fault("still_s", format!("the run ends {} s before the sweep begins", -sweep_s));
+                }
+                let (displacement, order) = (level.displacement(from_hz), level.parts().1);
+                Ok(Drive::Sweep { from_hz, growth_per_s: (to_hz / from_hz).ln() / sweep_s, displacement, order })
+            }
+            SignalSpec::Multisine { low_hz, high_hz, .. } | SignalSpec::BandNoise { low_hz, high_hz, .. }
+                if high_hz <= low_hz =>
+            {
+                fault("high_hz", format!("the band ends at {high_hz} Hz, not above its begin at {low_hz} Hz"))
+            }
+            SignalSpec::Multisine { period_s, low_hz, high_hz, .. } => {
+                let (first, last) = ((low_hz * period_s - 1e-9).ceil(), (high_hz * period_s + 1e-9).floor());
+                if last < first || last - first >= MOST_LINES {
+                    let message = format!(
+                        "a period of {period_s} s has {} lines from {low_hz} to {high_hz} Hz; a multisine has 1 to {MOST_LINES}",
+                        last - first + 1.0
+                    );
+                    return fault("period_s", message);
+                }
+                Ok(Drive::Sines(multisine((first as u32, last as u32), period_s, level)))
+            }
+            SignalSpec::BandNoise { low_hz, high_hz, .. } => {
+                let parts = even_parts((low_hz, high_hz), NOISE_LINES, &mut seed.stream("noise"));
+                let share = (2.0 / NOISE_LINES as f64).sqrt();
+                let line = |part: &Part| Line {
+                    cycles: part.at,
+                    amplitudes: [part.phase * (share * level.displacement(part.at))],
+                };
+                Ok(Drive::Sines(Sines::new(parts.iter().map(line).collect())))
+            }
+        }
+    }
+}
+
+/// Equal sines at the multiples `first..=last` of `1 / period_s`, with the phases `-pi k (k - 1) / n` (Schroeder 1970).
+fn multisine((first, last): (u32, u32), period_s: f64, level: Level) -> Sines<1> {
+    let count = f64::from(last - first + 1);
+    let line = |multiple: u32| {
+        let (freq_hz, k) = (f64::from(multiple) / period_s, f64::from(multiple - first + 1));
+        let amplitude = (2.0 / count).sqrt() * level.displacement(freq_hz);
+        Line { cycles: freq_hz, amplitudes: [Complex::from_polar(amplitude, -PI * k * (k - 1.0) / count)] }
+    };
+    Sines::new((first..=last).map(line).collect())
+}
+
+impl Drive {
+    /// The displacement `t_s` after the start.
+    fn at(&self, t_s: f64) -> Jet {
+        match self {
+            Drive::Sines(sines) => {
+                let [jet] = sines.at(t_s);
+                jet
+            }
+            Drive::Sweep { from_hz, growth_per_s, displacement, order } => {
+                // Phase: the integral of from_hz exp(growth t). Equal ends make no sweep, and no growth to divide by.
+                let phase = if *growth_per_s == 0.0 {
+                    Jet::linear(t_s, TAU * from_hz, 0.0)
+                } else {
+                    Jet::exponential(t_s, *growth_per_s, TAU * from_hz / growth_per_s)
+                };
+                let falling = Jet::exponential(t_s, -growth_per_s * f64::from(*order), *displacement);
+                phase.sin_cos().0 * falling
+            }
+        }
+    }
+}
+
+impl BaseMotion for Shaker {
+    fn at(&self, t_s: f64) -> Kinematics {
+        if t_s <= self.start_s {
+            return self.rest.kinematics();
+        }
+        let share = self.onset.at(t_s);
+        let mut pose = self.rest;
+        let (sin, cos) = self.rest.yaw.x.sin_cos();
+        for (axis, drive) in &self.drives {
+            let moved = drive.at(t_s - self.start_s) * share;
+            match axis {
+                Axis::X => {
+                    pose.position[0] += moved * cos;
+                    pose.position[1] += moved * sin;
+                }
+                Axis::Y => {
+                    pose.position[0] += moved * -sin;
+                    pose.position[1] += moved * cos;
+                }
+                Axis::Z => pose.position[2] += moved,
+                Axis::Roll => pose.roll += moved,
+                Axis::Pitch => pose.pitch += moved,
+                Axis::Yaw => pose.yaw += moved,
+            }
+        }
+        pose.kinematics()
+    }
+}

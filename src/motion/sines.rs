@@ -1,0 +1,106 @@
+//! Sums of sinusoids: random processes of a given spectrum, and periodic signals.
+
+use super::jet::Jet;
+use super::phasor::sin_cos_turns;
+use crate::random::Stream;
+use nalgebra::Complex;
+use rand::RngExt;
+use std::f64::consts::TAU;
+
+/// One frequency of a sum with `N` outputs.
+#[derive(Debug, Clone)]
+pub(super) struct Line<const N: usize> {
+    /// Cycles per unit of the argument: Hz, or cycles per metre.
+    pub cycles: f64,
+    /// Complex amplitude of each output: it is the real part of `amplitude exp(i 2 pi cycles u)`.
+    pub amplitudes: [Complex<f64>; N],
+}
+
+/// `N` signals that are sums of sinusoids of the same frequencies.
+#[derive(Debug, Clone)]
+pub(super) struct Sines<const N: usize> {
+    lines: Vec<Line<N>>,
+}
+
+impl<const N: usize> Sines<N> {
+    /// The sum of `lines`.
+    pub fn new(lines: Vec<Line<N>>) -> Self {
+        Self { lines }
+    }
+
+    /// The signals at the argument `u`, with their derivatives by it.
+    pub fn at(&self, u: f64) -> [Jet; N] {
+        let mut sums = [Jet::default(); N];
+        for line in &self.lines {
+            let (sin, cos) = sin_cos_turns(line.cycles * u);
+            let rate = TAU * line.cycles;
+            for (sum, amplitude) in sums.iter_mut().zip(&line.amplitudes) {
+                let x = amplitude.re * cos - amplitude.im * sin;
+                let quarter_on = amplitude.re * sin + amplitude.im * cos;
+                *sum += Jet { x, d: -rate * quarter_on, dd: -rate * rate * x };
+            }
+        }
+        sums
+    }
+}
+
+/// A part of a spectrum that one sinusoid stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Part {
+    /// Where in the part the sinusoid is: drawn at random, so that the sum does not repeat.
+    pub at: f64,
+    /// How wide the part is.
+    pub width: f64,
+    /// A phase drawn at random, as a complex number of modulus 1.
+    pub phase: Complex<f64>,
+}
+
+impl Part {
+    /// The complex amplitude of a sinusoid with the power of a one-sided `density` over this part: `sqrt(2 density width)`.
+    pub fn amplitude(&self, density: f64) -> Complex<f64> {
+        self.phase * (2.0 * density * self.width).sqrt()
+    }
+}
+
+/// `count` parts of equal width between `low` and `high`.
+pub(super) fn even_parts((low, high): (f64, f64), count: usize, stream: &mut Stream) -> Vec<Part> {
+    let width = (high - low) / count as f64;
+    let part = |k| {
+        let at = low + width * (k as f64 + stream.random::<f64>());
+        Part { at, width, phase: random_phase(stream) }
+    };
+    (0..count).map(part).collect()
+}
+
+fn random_phase(stream: &mut Stream) -> Complex<f64> {
+    let (sin, cos) = sin_cos_turns(stream.random::<f64>());
+    Complex::new(cos, sin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Seed;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_line_is_its_cosine() {
+        // Amplitude 2 exp(i 0.3) at 1.5 cycles: 2 cos(2 pi 1.5 u + 0.3).
+        let sines = Sines::new(vec![Line { cycles: 1.5, amplitudes: [Complex::from_polar(2.0, 0.3)] }]);
+        let (u, rate) = (0.77, TAU * 1.5);
+        let [jet] = sines.at(u);
+        let (sin, cos) = (rate * u + 0.3).sin_cos();
+        assert_relative_eq!(jet.x, 2.0 * cos, epsilon = 1e-13);
+        assert_relative_eq!(jet.d, -2.0 * rate * sin, epsilon = 1e-12);
+        assert_relative_eq!(jet.dd, -2.0 * rate * rate * cos, epsilon = 1e-11);
+    }
+
+    #[test]
+    fn parts_hold_the_power_of_the_spectrum() {
+        // Density 1 / f^2 from 1 to 2 has the power 0.5; a part's power is |amplitude|^2 / 2.
+        let parts = even_parts((1.0, 2.0), 400, &mut Seed(1).stream("parts"));
+        let power: f64 = parts.iter().map(|p| p.amplitude(p.at.powi(-2)).norm_sqr() / 2.0).sum();
+        assert_relative_eq!(power, 0.5, max_relative = 1e-3);
+        assert!(parts.iter().all(|p| (1.0..2.0).contains(&p.at)));
+    }
+}

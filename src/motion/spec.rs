@@ -1,0 +1,54 @@
+use super::hand::{Hand, HandSpec};
+use super::shaker::{Shaker, ShakerSpec};
+use super::stand::{Stand, StandSpec};
+use super::{BaseMotion, MotionError};
+use crate::geometry::Route;
+use crate::random::Seed;
+use crate::spec::{Kind, Source, SpecError, find, parse};
+use serde::{Deserialize, Serialize};
+
+/// How the base moves, as a file of `specs/motions/` says it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum MotionSpec {
+    /// It stands still.
+    Stand(StandSpec),
+    /// A hand carries and shakes it.
+    Hand(Box<HandSpec>),
+    /// A shaker drives it along or about its axes.
+    Shaker(ShakerSpec),
+}
+
+/// Finds and parses the motion called `name`: a path, or a name in the library. The source comes with it, for errors of
+/// [`MotionSpec::build`].
+///
+/// # Errors
+/// When there is none, or it is wrong.
+pub fn load(name: &str) -> Result<(MotionSpec, Source), SpecError> {
+    let source = find(Kind::Motion, name)?;
+    Ok((parse(&source)?, source))
+}
+
+impl MotionSpec {
+    /// Builds the motion for a run of `duration_s` along `route` (m, on the floor), with all of its chance drawn from
+    /// `seed`. `source` is the spec's text, which errors point into.
+    ///
+    /// # Errors
+    /// When numbers of the spec contradict each other, the route is missing or cannot be followed, or the duration is not
+    /// a length of time.
+    pub fn build(
+        &self,
+        source: &Source,
+        route: Option<&Route>,
+        duration_s: f64,
+        seed: Seed,
+    ) -> Result<Box<dyn BaseMotion>, MotionError> {
+        if !(duration_s.is_finite() && duration_s > 0.0) {
+            return Err(MotionError::Duration { duration_s });
+        }
+        Ok(match self {
+            MotionSpec::Stand(spec) => Box::new(Stand::new(spec, route)),
+            MotionSpec::Shaker(spec) => Box::new(Shaker::new(spec, source, route, duration_s, seed)?),
+            MotionSpec::Hand(spec) => Box::new(Hand::new(spec, source, route, duration_s, seed)?),
+        })
+    }
+}

@@ -1,0 +1,85 @@
+//! Stops: times in which the hand holds the head still.
+
+use super::smooth::Steps;
+use crate::random::Stream;
+use crate::spec::{Source, SpecError};
+use rand::RngExt;
+use serde::{Deserialize, Serialize};
+
+/// When the hand holds the head still, while whatever else it does goes on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum StopsSpec {
+    /// At these times: when each begins, and how long it lasts with grasping and letting go, s. None of them: never.
+    At(Vec<(f64, f64)>),
+    /// At random times.
+    Random {
+        /// Mean time from the end of one to the begin of the next, s; each is between half and one and a half of it.
+        #[serde(deserialize_with = "crate::spec::checked::positive")]
+        every_s: f64,
+        /// The shortest, s.
+        #[serde(deserialize_with = "crate::spec::checked::positive")]
+        shortest_s: f64,
+        /// The longest, s.
+        #[serde(deserialize_with = "crate::spec::checked::positive")]
+        longest_s: f64,
+    },
+}
+
+impl StopsSpec {
+    /// The grip over time, 0..1: each stop rises for `grip_s`, holds, and falls for `grip_s`.
+    pub(super) fn grip(
+        &self,
+        source: &Source,
+        grip_s: f64,
+        (from_s, until_s): (f64, f64),
+        stream: &mut Stream,
+    ) -> Result<Steps, SpecError> {
+        let stops = match self {
+            StopsSpec::At(stops) => stops.clone(),
+            StopsSpec::Random { every_s, shortest_s, longest_s } => {
+                if shortest_s > longest_s {
+                    let message =
+                        format!("the shortest stop lasts {shortest_s} s, more than the longest, {longest_s} s");
+                    return Err(SpecError::about(source, "shortest_s", message));
+                }
+                let mut draw = |low: f64, high: f64| low + (high - low) * stream.random::<f64>();
+                let mut stops = Vec::new();
+                let mut next_s = from_s + every_s * draw(0.5, 1.5);
+                while next_s < until_s {
+                    let length_s = draw(*shortest_s, *longest_s);
+                    stops.push((next_s, length_s));
+                    next_s += length_s + every_s * draw(0.5, 1.5);
+                }
+                stops
+            }
+        };
+        check(&stops, grip_s).map_err(|message| SpecError::about(source, "stops", message))?;
+        let mut grip = Steps::from_level(0.0);
+        for (at_s, length_s) in stops {
+            grip.push(at_s + grip_s / 2.0, grip_s / 2.0, 1.0);
+            grip.push(at_s + length_s - grip_s / 2.0, grip_s / 2.0, -1.0);
+        }
+        Ok(grip)
+    }
+}
+
+/// Checks that stops follow each other, and are long enough to grasp and let go.
+fn check(stops: &[(f64, f64)], grip_s: f64) -> Result<(), String> {
+    let mut free_s = 0.0;
+    for (index, &(at_s, length_s)) in stops.iter().enumerate() {
+        if !(at_s.is_finite() && length_s.is_finite()) {
+            return Err(format!("stop {index} (counted from 0) is at {at_s} s for {length_s} s, which is not finite"));
+        }
+        if length_s < 2.0 * grip_s {
+            return Err(format!("a stop of {length_s} s is too short to grasp and let go, {grip_s} s each"));
+        }
+        if at_s < free_s {
+            return Err(format!(
+                "the stop at {at_s} s begins before {free_s} s, when the one before it (or nothing) ends"
+            ));
+        }
+        free_s = at_s + length_s;
+    }
+    Ok(())
+}

@@ -1,0 +1,14 @@
+use crate::time::Stamp;
+
+/// A point of a map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudPoint {
+    /// Where it is, m, in the map.
+    pub point_in_map: nalgebra::Vector3<f32>,
+    /// Strength of the echo, in the sensor's unit.
+    pub intensity: f32,
+    /// When its beam was fired, on the lidar's clock.
+    pub stamp: Stamp,
+    /// Its distance from the true surface, m; NaN where that is not known.
+    pub error_m: f32,
+}

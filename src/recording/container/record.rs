@@ -1,0 +1,210 @@
+//! Records of the MCAP format (mcap.dev/spec, version 0): an opcode, a length, fields in little-endian order.
+
+use std::collections::BTreeMap;
+
+/// What every MCAP file begins and ends with.
+pub const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
+
+/// Bytes of a record before its fields: opcode and length.
+pub const PREFIX: u64 = 9;
+
+/// Bytes of a message record's fields before its data.
+pub const MESSAGE_FIELDS: usize = 22;
+
+/// Opcodes of the records that are read.
+pub mod op {
+    /// The end of the file.
+    pub const FOOTER: u8 = 0x02;
+    /// A message definition.
+    pub const SCHEMA: u8 = 0x03;
+    /// A topic.
+    pub const CHANNEL: u8 = 0x04;
+    /// A message.
+    pub const MESSAGE: u8 = 0x05;
+    /// Many records, compressed.
+    pub const CHUNK: u8 = 0x06;
+    /// Where the messages of a topic stand in a chunk.
+    pub const MESSAGE_INDEX: u8 = 0x07;
+    /// Where a chunk stands in the file.
+    pub const CHUNK_INDEX: u8 = 0x08;
+    /// How many messages there are.
+    pub const STATISTICS: u8 = 0x0B;
+    /// Names and values.
+    pub const METADATA: u8 = 0x0C;
+    /// The end of the data.
+    pub const DATA_END: u8 = 0x0F;
+
+    /// Whether the format knows the opcode, or leaves it to programs.
+    pub fn is_known(op: u8) -> bool {
+        (0x01..=DATA_END).contains(&op) || op >= 0x80
+    }
+}
+
+/// Reads the fields of a record, one after the other; `None` where the record ends too early.
+pub struct Fields<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Fields<'a> {
+    /// The fields in `bytes`.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { rest: bytes }
+    }
+
+    /// What is left.
+    pub fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.rest.split_first_chunk()?;
+        self.rest = rest;
+        Some(*taken)
+    }
+
+    /// One byte.
+    pub fn u8(&mut self) -> Option<u8> {
+        self.array().map(u8::from_le_bytes)
+    }
+
+    /// Two bytes.
+    pub fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    /// Four bytes.
+    pub fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    /// Eight bytes.
+    pub fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    /// `length` bytes.
+    pub fn bytes(&mut self, length: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.rest.split_at_checked(length)?;
+        self.rest = rest;
+        Some(taken)
+    }
+
+    /// A string, led by its length.
+    pub fn string(&mut self) -> Option<&'a str> {
+        let length = self.u32()? as usize;
+        std::str::from_utf8(self.bytes(length)?).ok()
+    }
+
+    /// Names and values, led by their length in bytes.
+    pub fn map(&mut self) -> Option<BTreeMap<String, String>> {
+        let length = self.u32()? as usize;
+        let mut inner = Fields::new(self.bytes(length)?);
+        let mut map = BTreeMap::new();
+        while !inner.rest.is_empty() {
+            map.insert(inner.string()?.to_owned(), inner.string()?.to_owned());
+        }
+        Some(map)
+    }
+}
+
+/// A message definition's name and encoding.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SchemaRecord {
+    /// Its number in the file.
+    pub id: u16,
+    /// Its name: `package/msg/Type`.
+    pub name: String,
+    /// Whether its first field is a `std_msgs/Header`.
+    pub has_header: bool,
+}
+
+/// A topic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelRecord {
+    /// Its number in the file.
+    pub id: u16,
+    /// Number of the definition of its messages.
+    pub schema: u16,
+    /// Its name.
+    pub topic: String,
+    /// `cdr` in the ROS 2 profile.
+    pub encoding: String,
+}
+
+/// What is said of a chunk before its bytes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChunkHeader {
+    /// Log time of its earliest message, ns.
+    pub start_ns: u64,
+    /// Log time of its latest message, ns.
+    pub end_ns: u64,
+    /// Bytes, decompressed.
+    pub uncompressed_size: u64,
+    /// CRC-32 of the decompressed bytes, 0 where there is none.
+    pub crc: u32,
+    /// `zstd`, `lz4` or nothing.
+    pub compression: String,
+    /// Bytes as they are in the file.
+    pub compressed_size: u64,
+    /// Bytes of the header itself.
+    pub header_size: u64,
+}
+
+/// A message without its data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MessageHeader {
+    /// Number of its topic.
+    pub channel: u16,
+    /// When it was written down, ns.
+    pub log_time_ns: u64,
+}
+
+/// Reads a schema record's fields.
+pub fn schema(bytes: &[u8]) -> Option<SchemaRecord> {
+    let mut fields = Fields::new(bytes);
+    let id = fields.u16()?;
+    let name = fields.string()?.to_owned();
+    fields.string()?;
+    Some(SchemaRecord { id, name, has_header: begins_with_header(fields.string().unwrap_or_default()) })
+}
+
+/// Whether the first field of a `ros2msg` definition is a header.
+fn begins_with_header(definition: &str) -> bool {
+    let mut lines = definition.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let kind = lines.next().and_then(|line| line.split_whitespace().next());
+    matches!(kind, Some("std_msgs/Header" | "std_msgs/msg/Header" | "Header"))
+}
+
+/// Reads a channel record's fields.
+pub fn channel(bytes: &[u8]) -> Option<ChannelRecord> {
+    let mut fields = Fields::new(bytes);
+    let (id, schema) = (fields.u16()?, fields.u16()?);
+    Some(ChannelRecord { id, schema, topic: fields.string()?.to_owned(), encoding: fields.string()?.to_owned() })
+}
+
+/// Reads what a chunk record says before its bytes.
+pub fn chunk_header(bytes: &[u8]) -> Option<ChunkHeader> {
+    let mut fields = Fields::new(bytes);
+    let (start_ns, end_ns) = (fields.u64()?, fields.u64()?);
+    let (uncompressed_size, crc) = (fields.u64()?, fields.u32()?);
+    let compression = fields.string()?.to_owned();
+    let compressed_size = fields.u64()?;
+    let header_size = (bytes.len() - fields.rest.len()) as u64;
+    Some(ChunkHeader { start_ns, end_ns, uncompressed_size, crc, compression, compressed_size, header_size })
+}
+
+/// Reads a message's fields before its data.
+pub fn message_header(bytes: &[u8]) -> Option<MessageHeader> {
+    let mut fields = Fields::new(bytes);
+    let channel = fields.u16()?;
+    fields.u32()?;
+    let log_time_ns = fields.u64()?;
+    fields.u64()?;
+    Some(MessageHeader { channel, log_time_ns })
+}
+
+/// Reads a metadata record's fields: its name, then names and values.
+pub fn metadata(bytes: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
+    let mut fields = Fields::new(bytes);
+    Some((fields.string()?.to_owned(), fields.map()?))
+}

@@ -1,0 +1,96 @@
+use crate::geometry::TrajectoryError;
+use std::path::PathBuf;
+
+/// What is wrong with a recording, a trajectory file or a cloud file.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The file cannot be opened or made.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Reading went wrong midway.
+    #[error("reading stopped: {0}")]
+    Read(std::io::Error),
+    /// Writing went wrong midway.
+    #[error("writing stopped: {0}; what was written before can be read")]
+    Write(std::io::Error),
+    /// The file is not an MCAP file at all.
+    #[error("{name}: not an MCAP file (it does not begin with the MCAP magic bytes)")]
+    NotMcap {
+        /// Which file.
+        name: String,
+    },
+    /// A value that a message cannot hold.
+    #[error("{what} is {value}, but {limit}")]
+    Unwritable {
+        /// Which value.
+        what: &'static str,
+        /// What it is.
+        value: String,
+        /// What the message can hold.
+        limit: &'static str,
+    },
+    /// The recording has no messages of a sensor that is needed.
+    #[error("{name}: no {sensor} in the recording ({needs}); it has {has}")]
+    NoSensor {
+        /// Which file.
+        name: String,
+        /// Which sensor: "lidar" or "IMU".
+        sensor: &'static str,
+        /// Which message types would do.
+        needs: &'static str,
+        /// The topics that are there.
+        has: String,
+    },
+    /// A topic that was asked for is not there, or carries another type.
+    #[error("{name}: topic {topic} {problem}; it has {has}")]
+    Topic {
+        /// Which file.
+        name: String,
+        /// Which topic.
+        topic: String,
+        /// What is the matter with it.
+        problem: String,
+        /// The topics that are there.
+        has: String,
+    },
+    /// The tree of `/tf_static` does not lead where it must.
+    #[error("{name}: /tf_static {problem}")]
+    Frames {
+        /// Which file.
+        name: String,
+        /// What is the matter.
+        problem: String,
+    },
+    /// A line or a part of a text or cloud file that does not say what it must.
+    #[error("{name}:{line}: {problem}")]
+    Line {
+        /// Which file.
+        name: String,
+        /// Which line, from 1.
+        line: usize,
+        /// What is wrong there.
+        problem: String,
+    },
+    /// Poses that are not a trajectory.
+    #[error("{name}: {source}")]
+    Trajectory {
+        /// Which file or topic.
+        name: String,
+        /// Why.
+        source: TrajectoryError,
+    },
+}
+
+impl From<mcap::McapError> for RecordingError {
+    fn from(error: mcap::McapError) -> Self {
+        Self::Write(match error {
+            mcap::McapError::Io(error) => error,
+            other => std::io::Error::other(other),
+        })
+    }
+}

@@ -1,0 +1,94 @@
+//! A recording's measurements, one after the other, without its truth.
+
+use crate::measurement::{ImuSample, LidarScan, Measurement};
+use crate::recording::cdr::DecodeError;
+use crate::recording::container::{Messages, RawMessage};
+use crate::recording::message::scan::Projector;
+use crate::recording::message::{imu, points, scan};
+use crate::recording::selection::LidarKind;
+use crate::recording::{Loss, Reader, RecordingError, Selection};
+
+/// Reads measurements in the order of their log time.
+///
+/// An item is an error only where the file cannot be read on. Messages that cannot be used are left out and counted in
+/// [`loss`](Self::loss).
+pub struct Measurements<'r> {
+    messages: Messages<'r>,
+    lidar: Vec<u16>,
+    lidar_kind: LidarKind,
+    imu: Vec<u16>,
+    projector: Projector,
+    loss: Loss,
+    expected: Option<u64>,
+    ended: bool,
+}
+
+impl Reader {
+    /// The measurements of the selected sensors, in the order of their log time.
+    pub fn measurements(&self, selection: &Selection) -> Measurements<'_> {
+        Measurements {
+            messages: self.messages(),
+            lidar: self.ids_of(&selection.lidar_topic),
+            lidar_kind: selection.lidar_kind,
+            imu: self.ids_of(&selection.imu_topic),
+            projector: Projector::default(),
+            loss: self.loss().clone(),
+            expected: self.expected_messages(),
+            ended: false,
+        }
+    }
+}
+
+impl Measurements<'_> {
+    /// What could not be read so far, the file's own loss with it.
+    pub fn loss(&self) -> &Loss {
+        &self.loss
+    }
+
+    fn next_measurement(&mut self) -> Result<Option<Measurement>, RecordingError> {
+        loop {
+            let message = self.messages.next()?;
+            let Some(message) = message else {
+                self.loss.add_pass(&self.messages, self.expected);
+                return Ok(None);
+            };
+            let decoded = if self.imu.contains(&message.channel) {
+                imu::decode(message.data).map(Measurement::Imu)
+            } else if self.lidar.contains(&message.channel) {
+                lidar(self.lidar_kind, &mut self.projector, &message).map(Measurement::Lidar)
+            } else {
+                continue;
+            };
+            match decoded {
+                Ok(Measurement::Imu(sample)) if !is_finite(&sample) => self.loss.samples_not_finite += 1,
+                Ok(measurement) => return Ok(Some(measurement)),
+                Err(_) => self.loss.unreadable_messages += 1,
+            }
+        }
+    }
+}
+
+fn lidar(kind: LidarKind, projector: &mut Projector, message: &RawMessage<'_>) -> Result<LidarScan, DecodeError> {
+    match kind {
+        LidarKind::Points => points::decode(message.data),
+        LidarKind::Scan => scan::decode(message.data).map(|(stamp, planar)| projector.project(stamp, planar)),
+    }
+}
+
+fn is_finite(sample: &ImuSample) -> bool {
+    let numbers = sample.angular_velocity_rad_per_s.iter().chain(sample.specific_force_m_per_s2.iter());
+    numbers.into_iter().all(|x| x.is_finite())
+}
+
+impl Iterator for Measurements<'_> {
+    type Item = Result<Measurement, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let item = self.next_measurement().transpose();
+        self.ended = !matches!(item, Some(Ok(_)));
+        item
+    }
+}

@@ -1,0 +1,115 @@
+//! An estimate as a recording, for viewers: where the head was, its path, and the cloud that it saw.
+
+use crate::geometry::{Pose, Trajectory};
+use crate::recording::message::transforms::Transform;
+use crate::recording::message::{points, pose, transforms};
+use crate::recording::spool::Spool;
+use crate::recording::topics::{MAP, Topic};
+use crate::recording::{CloudPoint, RecordingError};
+use crate::time::{Span, Stamp};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Time between poses of `/path`.
+const PATH_PERIOD: Span = Span::from_nanos(100_000_000);
+
+/// Longest time that one message of `/cloud` gathers.
+const CLOUD_PERIOD: Span = Span::from_nanos(500_000_000);
+
+/// Most points in one message of `/cloud`: 20 bytes each.
+const CLOUD_POINTS: usize = 50_000;
+
+/// Writes an estimate to a new MCAP file at `path`: `/path`, `/tf` (`map` to `body_frame`, a transform a pose) and
+/// `/cloud` (x, y, z, intensity, error, in `map`), which takes the points in the order in which they come.
+///
+/// # Errors
+/// When the file cannot be made or written, or a stamp does not fit a message.
+pub fn write_result(
+    path: &Path,
+    body_frame: &str,
+    map_from_body: &Trajectory,
+    cloud: impl IntoIterator<Item = CloudPoint>,
+) -> Result<(), RecordingError> {
+    let file = std::fs::File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+    let spool = Spool::new(file, BTreeMap::new())?;
+    let mut result = ResultWriter { spool, body_frame, last: Stamp::from_nanos(0), gathered: Vec::new() };
+    result.path(map_from_body)?;
+    let mut poses = map_from_body.iter().peekable();
+    for point in cloud {
+        if result.is_full_before(&point) {
+            while let Some((stamp, pose)) = poses.next_if(|(stamp, _)| *stamp <= result.latest_gathered()) {
+                result.transform(stamp, pose)?;
+            }
+            result.cloud()?;
+        }
+        result.gathered.push(point);
+    }
+    for (stamp, pose) in poses {
+        result.transform(stamp, pose)?;
+    }
+    result.cloud()?;
+    result.spool.finish()
+}
+
+struct ResultWriter<'a> {
+    spool: Spool,
+    body_frame: &'a str,
+    /// Log time of the message before: it never goes back, though points may.
+    last: Stamp,
+    gathered: Vec<CloudPoint>,
+}
+
+impl ResultWriter<'_> {
+    fn log_time(&mut self, stamp: Stamp) -> Stamp {
+        self.last = self.last.max(stamp);
+        self.last
+    }
+
+    fn path(&mut self, map_from_body: &Trajectory) -> Result<(), RecordingError> {
+        let Some((first, _)) = map_from_body.span() else { return Ok(()) };
+        let mut next = first;
+        let mut kept = Vec::new();
+        for (stamp, pose) in map_from_body.iter() {
+            if stamp >= next {
+                kept.push((stamp, pose));
+                next = stamp + PATH_PERIOD;
+            }
+        }
+        let log_time = self.log_time(first);
+        self.spool.message(Topic::Path, log_time, |out| pose::encode_path(out, MAP, first, kept.into_iter()))
+    }
+
+    fn transform(&mut self, stamp: Stamp, map_from_body: &Pose) -> Result<(), RecordingError> {
+        let transform =
+            Transform { parent: MAP.to_owned(), child: self.body_frame.to_owned(), parent_from_child: *map_from_body };
+        let log_time = self.log_time(stamp);
+        self.spool.message(Topic::Tf, log_time, |out| transforms::encode(out, stamp, &[transform]))
+    }
+
+    fn is_full_before(&self, point: &CloudPoint) -> bool {
+        let first = self.gathered.first().map_or(point.stamp, |first| first.stamp);
+        self.gathered.len() >= CLOUD_POINTS || point.stamp - first >= CLOUD_PERIOD
+    }
+
+    fn latest_gathered(&self) -> Stamp {
+        self.gathered.last().map_or(self.last, |point| point.stamp)
+    }
+
+    fn cloud(&mut self) -> Result<(), RecordingError> {
+        if self.gathered.is_empty() {
+            return Ok(());
+        }
+        let stamp = self.latest_gathered();
+        let log_time = self.log_time(stamp);
+        let gathered = std::mem::take(&mut self.gathered);
+        let rows = gathered.iter().map(|point| {
+            let p = &point.point_in_map;
+            [p.x, p.y, p.z, point.intensity, point.error_m]
+        });
+        let names = ["x", "y", "z", "intensity", "error"];
+        self.spool.message(Topic::Cloud, log_time, |out| points::encode_floats(out, (stamp, MAP), names, rows))?;
+        self.gathered = gathered;
+        self.gathered.clear();
+        Ok(())
+    }
+}

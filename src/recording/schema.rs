@@ -1,0 +1,140 @@
+//! The message types that a recording is made of, as `ros2msg` text.
+//!
+//! Fields are those of the ROS 2 interface packages (`common_interfaces`, `geometry2`, `rcl_interfaces`), whose names,
+//! types and order are what makes two programs understand each other; comments and constants are left out, save those
+//! of `PointField`.
+
+/// A definition of each type, by its short name `package/Type`.
+const DEFINITIONS: [(&str, &str); 20] = [
+    ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
+    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"),
+    ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"),
+    ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"),
+    ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"),
+    ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"),
+    ("geometry_msgs/PoseStamped", "std_msgs/Header header\ngeometry_msgs/Pose pose\n"),
+    ("geometry_msgs/PoseWithCovariance", "geometry_msgs/Pose pose\nfloat64[36] covariance\n"),
+    ("geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"),
+    ("geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist\nfloat64[36] covariance\n"),
+    ("geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"),
+    (
+        "geometry_msgs/TransformStamped",
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n",
+    ),
+    ("tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"),
+    (
+        "nav_msgs/Odometry",
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n",
+    ),
+    ("nav_msgs/Path", "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n"),
+    ("sensor_msgs/TimeReference", "std_msgs/Header header\nbuiltin_interfaces/Time time_ref\nstring source\n"),
+    (
+        "sensor_msgs/Imu",
+        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n",
+    ),
+    (
+        "sensor_msgs/LaserScan",
+        "std_msgs/Header header\nfloat32 angle_min\nfloat32 angle_max\nfloat32 angle_increment\nfloat32 time_increment\nfloat32 scan_time\nfloat32 range_min\nfloat32 range_max\nfloat32[] ranges\nfloat32[] intensities\n",
+    ),
+    (
+        "sensor_msgs/PointField",
+        "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\nuint8 INT32=5\nuint8 UINT32=6\nuint8 FLOAT32=7\nuint8 FLOAT64=8\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n",
+    ),
+    (
+        "sensor_msgs/PointCloud2",
+        "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\nbool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n",
+    ),
+];
+
+/// A message type that recordings carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum MessageType {
+    /// `sensor_msgs/msg/LaserScan`.
+    LaserScan,
+    /// `sensor_msgs/msg/PointCloud2`.
+    PointCloud2,
+    /// `sensor_msgs/msg/Imu`.
+    Imu,
+    /// `sensor_msgs/msg/TimeReference`.
+    TimeReference,
+    /// `tf2_msgs/msg/TFMessage`.
+    Transforms,
+    /// `nav_msgs/msg/Odometry`.
+    Odometry,
+    /// `nav_msgs/msg/Path`.
+    Path,
+    /// `geometry_msgs/msg/PoseStamped`.
+    PoseStamped,
+}
+
+impl MessageType {
+    /// The full name, `package/msg/Type`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LaserScan => "sensor_msgs/msg/LaserScan",
+            Self::PointCloud2 => "sensor_msgs/msg/PointCloud2",
+            Self::Imu => "sensor_msgs/msg/Imu",
+            Self::TimeReference => "sensor_msgs/msg/TimeReference",
+            Self::Transforms => "tf2_msgs/msg/TFMessage",
+            Self::Odometry => "nav_msgs/msg/Odometry",
+            Self::Path => "nav_msgs/msg/Path",
+            Self::PoseStamped => "geometry_msgs/msg/PoseStamped",
+        }
+    }
+
+    /// The definition with those it depends on, as `ros2msg` wants it: each after a line of `=` and its name.
+    pub fn definition(self) -> String {
+        let root = self.name().replace("/msg/", "/");
+        let mut names = vec![root.as_str()];
+        let mut text = String::new();
+        let mut next = 0;
+        while let Some(name) = names.get(next).copied() {
+            if next > 0 {
+                text.push_str(&format!("{}\nMSG: {name}\n", "=".repeat(80)));
+            }
+            let fields = fields_of(name);
+            text.push_str(fields);
+            for needed in fields.lines().filter_map(type_of_field) {
+                if !names.contains(&needed) {
+                    names.push(needed);
+                }
+            }
+            next += 1;
+        }
+        text
+    }
+}
+
+fn fields_of(name: &str) -> &'static str {
+    DEFINITIONS.iter().find(|(known, _)| *known == name).map_or("", |(_, fields)| fields)
+}
+
+/// The message type that a field is made of, `None` where it is a primitive.
+fn type_of_field(line: &'static str) -> Option<&'static str> {
+    let kind = line.split_whitespace().next()?;
+    let kind = kind.split('[').next()?;
+    kind.contains('/').then_some(kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_type_that_a_definition_uses_is_defined() {
+        for (name, fields) in DEFINITIONS {
+            for needed in fields.lines().filter_map(type_of_field) {
+                assert!(!fields_of(needed).is_empty(), "{name} uses {needed}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_definition_carries_each_dependency_once() {
+        let text = MessageType::Odometry.definition();
+        for name in ["std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Vector3", "geometry_msgs/Point"] {
+            assert_eq!(text.matches(&format!("MSG: {name}\n")).count(), 1, "{name}");
+        }
+        assert!(text.starts_with("std_msgs/Header header\nstring child_frame_id\n"));
+    }
+}

@@ -1,0 +1,192 @@
+//! Which topics of a recording are the lidar and the IMU.
+
+use crate::recording::container::RawMessage;
+use crate::recording::message::{points, scan};
+use crate::recording::schema::MessageType;
+use crate::recording::topics::TRUTH_PREFIX;
+use crate::recording::{Reader, RecordingError, cdr::Decoder};
+use std::collections::BTreeMap;
+
+/// Topics that somebody asks for; those not named are found.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Preference {
+    /// The lidar's topic.
+    pub lidar_topic: Option<String>,
+    /// The IMU's topic.
+    pub imu_topic: Option<String>,
+}
+
+/// The topics that measurements are read from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Selection {
+    /// The lidar's topic.
+    pub lidar_topic: String,
+    /// The frame in which its points are.
+    pub lidar_frame: String,
+    /// The IMU's topic.
+    pub imu_topic: String,
+    /// The frame in which it measures.
+    pub imu_frame: String,
+    /// What was chosen among several, and what the choice lacks, a sentence each.
+    pub notes: Vec<String>,
+    pub(super) lidar_kind: LidarKind,
+}
+
+/// How a lidar's messages tell its beams.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LidarKind {
+    /// As `LaserScan`.
+    Scan,
+    /// As `PointCloud2`.
+    Points,
+}
+
+/// How well the times of beams are known, best first; equals are taken by kind, then by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum BeamTimes {
+    /// Each message tells them.
+    Told,
+    /// They follow from the time that a turn takes.
+    Implied,
+    /// All beams seem to be fired at once.
+    Unknown,
+}
+
+/// A topic that may be chosen: what its first message tells.
+struct Candidate {
+    topic: String,
+    frame: String,
+    kind: Option<LidarKind>,
+    times: BeamTimes,
+}
+
+const LIDAR_TYPES: [MessageType; 2] = [MessageType::LaserScan, MessageType::PointCloud2];
+
+/// Endings of IMU topics, preferred first: the raw one is without a filter's opinion.
+const IMU_ENDINGS: [&str; 3] = ["imu/data_raw", "imu/data", "imu"];
+
+impl Reader {
+    /// Finds the lidar and the IMU. A `LaserScan` whose beams' times are told is taken first, then a `PointCloud2` whose
+    /// points have times; of several the first by name. Truth, the recording's own, is never a candidate.
+    ///
+    /// # Errors
+    /// When there is no lidar or no IMU, or not the one that is asked for.
+    pub fn select(&self, preference: &Preference) -> Result<Selection, RecordingError> {
+        let lidars = self.candidates(&LIDAR_TYPES, preference.lidar_topic.as_deref(), lidar_candidate)?;
+        let imus = self.candidates(&[MessageType::Imu], preference.imu_topic.as_deref(), imu_candidate)?;
+        let lidar = lidars.iter().min_by_key(|c| (c.times, c.kind == Some(LidarKind::Points), &c.topic));
+        let imu = imus.iter().min_by_key(|c| (imu_rank(&c.topic), &c.topic));
+        let (lidar, lidar_kind) = lidar
+            .and_then(|lidar| Some((lidar, lidar.kind?)))
+            .ok_or_else(|| self.no_sensor("lidar", "sensor_msgs/msg/LaserScan or sensor_msgs/msg/PointCloud2"))?;
+        let imu = imu.ok_or_else(|| self.no_sensor("IMU", "sensor_msgs/msg/Imu"))?;
+        let notes =
+            [notes_on_choice("lidar", lidar, &lidars), notes_on_choice("IMU", imu, &imus), note_on_times(lidar)];
+        Ok(Selection {
+            lidar_topic: lidar.topic.clone(),
+            lidar_frame: lidar.frame.clone(),
+            imu_topic: imu.topic.clone(),
+            imu_frame: imu.frame.clone(),
+            notes: notes.into_iter().flatten().collect(),
+            lidar_kind,
+        })
+    }
+
+    fn no_sensor(&self, sensor: &'static str, needs: &'static str) -> RecordingError {
+        RecordingError::NoSensor { name: self.name().to_owned(), sensor, needs, has: self.what_it_has() }
+    }
+
+    /// Topics of `types` that have a message which `look` understands; of one topic alone, where it is asked for.
+    fn candidates(
+        &self,
+        types: &[MessageType],
+        asked: Option<&str>,
+        look: fn(&RawMessage<'_>, MessageType, &str) -> Option<Candidate>,
+    ) -> Result<Vec<Candidate>, RecordingError> {
+        let mut open = BTreeMap::new();
+        for channel in self.channels().iter().filter(|channel| channel.encoding == "cdr") {
+            let kind = types.iter().find(|kind| kind.name() == channel.type_name);
+            let wanted = asked.map_or(!channel.topic.starts_with(TRUTH_PREFIX), |asked| asked == channel.topic);
+            if let Some(kind) = kind.filter(|_| wanted) {
+                open.insert(channel.id, (*kind, channel.topic.as_str()));
+            }
+        }
+        if let Some(asked) = asked.filter(|_| open.is_empty()) {
+            let names: Vec<_> = types.iter().map(|kind| kind.name()).collect();
+            let problem = format!("is not there as {}", names.join(" or "));
+            return Err(self.topic_error(asked, problem));
+        }
+        let ids: Vec<u16> = open.keys().copied().collect();
+        let mut found = Vec::new();
+        for mut messages in [self.messages_near(&ids), self.messages()] {
+            while !open.is_empty() {
+                let Some(message) = messages.next()? else { break };
+                let Some((kind, topic)) = open.get(&message.channel) else { continue };
+                if let Some(candidate) = look(&message, *kind, topic) {
+                    open.remove(&message.channel);
+                    found.push(candidate);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    fn topic_error(&self, topic: &str, problem: String) -> RecordingError {
+        let (name, has) = (self.name().to_owned(), self.what_it_has());
+        RecordingError::Topic { name, topic: topic.to_owned(), problem, has }
+    }
+}
+
+fn frame_of(message: &RawMessage<'_>) -> Option<String> {
+    let (_, frame) = Decoder::new(message.data).ok()?.header().ok()?;
+    Some(crate::recording::message::transforms::plain(frame))
+}
+
+fn lidar_candidate(message: &RawMessage<'_>, kind: MessageType, topic: &str) -> Option<Candidate> {
+    let frame = frame_of(message)?;
+    let (kind, times) = if kind == MessageType::LaserScan {
+        let (_, scan) = scan::decode(message.data).ok()?;
+        let times = match (scan.time_increment_s == 0.0, scan::time_increment_s(&scan) == 0.0) {
+            (false, _) => BeamTimes::Told,
+            (true, false) => BeamTimes::Implied,
+            (true, true) => BeamTimes::Unknown,
+        };
+        (LidarKind::Scan, times)
+    } else {
+        let told = points::time_field(message.data).ok()?.is_some();
+        (LidarKind::Points, if told { BeamTimes::Told } else { BeamTimes::Unknown })
+    };
+    Some(Candidate { topic: topic.to_owned(), frame, kind: Some(kind), times })
+}
+
+fn imu_candidate(message: &RawMessage<'_>, _: MessageType, topic: &str) -> Option<Candidate> {
+    let frame = frame_of(message)?;
+    Some(Candidate { topic: topic.to_owned(), frame, kind: None, times: BeamTimes::Told })
+}
+
+fn imu_rank(topic: &str) -> usize {
+    IMU_ENDINGS.iter().position(|ending| topic.ends_with(ending)).unwrap_or(IMU_ENDINGS.len())
+}
+
+/// Says which of several sensors was taken; another message kind of the same sensor is no other sensor.
+fn notes_on_choice(sensor: &str, chosen: &Candidate, all: &[Candidate]) -> Option<String> {
+    let mut others: Vec<_> =
+        all.iter().filter(|c| c.topic != chosen.topic && c.frame != chosen.frame).map(|c| c.topic.as_str()).collect();
+    others.sort_unstable();
+    (!others.is_empty())
+        .then(|| format!("Of several {sensor} topics, {} is read, not {}.", chosen.topic, others.join(", ")))
+}
+
+fn note_on_times(lidar: &Candidate) -> Option<String> {
+    match lidar.times {
+        BeamTimes::Told => None,
+        BeamTimes::Implied => Some(format!(
+            "{} tells no time between beams; an even turn of the mirror is assumed, scan_time a turn.",
+            lidar.topic
+        )),
+        BeamTimes::Unknown => Some(format!(
+            "{} tells no times of its beams; all of a scan are taken to be fired at its stamp, so motion blurs it.",
+            lidar.topic
+        )),
+    }
+}

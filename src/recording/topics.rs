@@ -1,0 +1,102 @@
+//! The topics and frames of a recording that zsim writes.
+
+use crate::recording::schema::MessageType;
+
+/// Frame of the lidar.
+pub const LASER: &str = "laser";
+/// Frame of the IMU.
+pub const IMU: &str = "imu_link";
+/// Frame of the rigid body that carries both.
+pub const HEAD: &str = "head";
+/// Frame of the world as an estimate has it.
+pub const MAP: &str = "map";
+/// Frame of the true world.
+pub const TRUTH_MAP: &str = "truth/map";
+/// Frame of the true head.
+pub const TRUTH_HEAD: &str = "truth/head";
+
+/// What every topic of truth begins with.
+pub const TRUTH_PREFIX: &str = "/ground_truth/";
+
+/// A topic that zsim writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Topic {
+    /// `/scan`.
+    Scan,
+    /// `/points`.
+    Points,
+    /// `/imu/data_raw`.
+    Imu,
+    /// `/tf_static`.
+    TfStatic,
+    /// `/tf`.
+    Tf,
+    /// `/ground_truth/odom`.
+    TruthOdometry,
+    /// `/ground_truth/pose`.
+    TruthPose,
+    /// `/ground_truth/base`.
+    TruthBase,
+    /// `/ground_truth/clock`.
+    TruthClock,
+    /// `/path`.
+    Path,
+    /// `/cloud`.
+    Cloud,
+}
+
+impl Topic {
+    /// How many topics there are.
+    pub const COUNT: usize = 11;
+
+    /// The topic's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scan => "/scan",
+            Self::Points => "/points",
+            Self::Imu => "/imu/data_raw",
+            Self::TfStatic => "/tf_static",
+            Self::Tf => "/tf",
+            Self::TruthOdometry => "/ground_truth/odom",
+            Self::TruthPose => "/ground_truth/pose",
+            Self::TruthBase => "/ground_truth/base",
+            Self::TruthClock => "/ground_truth/clock",
+            Self::Path => "/path",
+            Self::Cloud => "/cloud",
+        }
+    }
+
+    /// What its messages are.
+    pub fn message_type(self) -> MessageType {
+        match self {
+            Self::Scan => MessageType::LaserScan,
+            Self::Points | Self::Cloud => MessageType::PointCloud2,
+            Self::Imu => MessageType::Imu,
+            Self::TfStatic | Self::Tf => MessageType::Transforms,
+            Self::TruthOdometry => MessageType::Odometry,
+            Self::TruthPose | Self::TruthBase => MessageType::PoseStamped,
+            Self::TruthClock => MessageType::TimeReference,
+            Self::Path => MessageType::Path,
+        }
+    }
+
+    /// Its quality of service, as rosbag2 keeps it with a channel: reliable, and for what holds for ever (transforms
+    /// that stand, a whole path) kept for those who come late.
+    pub fn qos(self) -> String {
+        let (depth, durability) = match self {
+            Self::TfStatic | Self::Path => (1, TRANSIENT_LOCAL),
+            _ => (10, VOLATILE),
+        };
+        let forever = "\n    sec: 9223372036\n    nsec: 854775807";
+        format!(
+            "- history: 1\n  depth: {depth}\n  reliability: 1\n  durability: {durability}\n  deadline:{forever}\n  \
+             lifespan:{forever}\n  liveliness: 1\n  liveliness_lease_duration:{forever}\n  \
+             avoid_ros_namespace_conventions: false"
+        )
+    }
+}
+
+/// `RMW_QOS_POLICY_DURABILITY_TRANSIENT_LOCAL`.
+const TRANSIENT_LOCAL: u8 = 1;
+/// `RMW_QOS_POLICY_DURABILITY_VOLATILE`.
+const VOLATILE: u8 = 2;

@@ -1,0 +1,182 @@
+//! Trajectories as text, as the TUM RGB-D benchmark has them: `t x y z qx qy qz qw` a line, seconds and metres.
+
+mod number;
+
+use crate::geometry::{Pose, Rotation, Trajectory, Vector};
+use crate::measurement::SinkError;
+use crate::recording::RecordingError;
+use crate::time::Stamp;
+use crate::truth::{ClockTruth, TruthSample, TruthSink};
+use std::fs::File;
+use std::io::{BufRead, BufReader, BufWriter, Read, Write};
+use std::path::Path;
+
+/// Longest line that is read, bytes; a pose takes about 100.
+const LONGEST_LINE: u64 = 4096;
+
+/// How far the norm of a quaternion may be from 1: files with few decimals come near it.
+const NORM_TOLERANCE: f64 = 1e-2;
+
+/// Writes poses as they come, stamps to the nanosecond, metres and quaternions to nine decimals.
+pub struct TumWriter<W: Write> {
+    out: W,
+    line: Vec<u8>,
+}
+
+impl TumWriter<BufWriter<File>> {
+    /// Begins a new file at `path`; one that is there is replaced.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn create(path: &Path) -> Result<Self, RecordingError> {
+        let file = File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+        Ok(Self::new(BufWriter::new(file)))
+    }
+}
+
+impl<W: Write> TumWriter<W> {
+    /// Begins to write to `out`.
+    pub fn new(out: W) -> Self {
+        Self { out, line: Vec::with_capacity(128) }
+    }
+
+    /// Writes a pose.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn pose(&mut self, stamp: Stamp, pose: &Pose) -> Result<(), RecordingError> {
+        self.line.clear();
+        number::write_stamp(&mut self.line, stamp);
+        for value in pose.translation.vector.iter().chain(pose.rotation.coords.iter()) {
+            self.line.push(b' ');
+            number::write(&mut self.line, *value);
+        }
+        self.line.push(b'\n');
+        self.out.write_all(&self.line).map_err(RecordingError::Write)
+    }
+
+    /// Writes what is left.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn finish(mut self) -> Result<(), RecordingError> {
+        self.out.flush().map_err(RecordingError::Write)
+    }
+}
+
+impl<W: Write> TruthSink for TumWriter<W> {
+    fn truth(&mut self, _: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
+        Ok(self.pose(sample.lidar_stamp, &sample.head.world_from_body)?)
+    }
+
+    fn clock(&mut self, _: Stamp, _: &ClockTruth) -> Result<(), SinkError> {
+        Ok(())
+    }
+}
+
+/// Writes a whole trajectory to a new file at `path`.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_tum(path: &Path, trajectory: &Trajectory) -> Result<(), RecordingError> {
+    let mut writer = TumWriter::create(path)?;
+    for (stamp, pose) in trajectory.iter() {
+        writer.pose(stamp, pose)?;
+    }
+    writer.finish()
+}
+
+/// Reads the trajectory in the file at `path`.
+///
+/// # Errors
+/// When it cannot be read; with the line, where one is not a pose, or is not later than the one before it.
+pub fn read_tum(path: &Path) -> Result<Trajectory, RecordingError> {
+    let file = File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+    parse_tum(&path.display().to_string(), file)
+}
+
+/// Reads a trajectory from `text`, which messages call `name`. Empty lines and those that begin with `#` say nothing.
+///
+/// # Errors
+/// As [`read_tum`].
+pub fn parse_tum(name: &str, text: impl Read) -> Result<Trajectory, RecordingError> {
+    let mut text = BufReader::new(text);
+    let mut trajectory = Trajectory::new();
+    let mut bytes = Vec::new();
+    for line in 1.. {
+        bytes.clear();
+        let read = (&mut text).take(LONGEST_LINE).read_until(b'\n', &mut bytes).map_err(RecordingError::Read)?;
+        if read == 0 {
+            break;
+        }
+        let error = |problem: String| RecordingError::Line { name: name.to_owned(), line, problem };
+        let whole = read < LONGEST_LINE as usize;
+        let line = std::str::from_utf8(&bytes).ok().filter(|_| whole).map(str::trim);
+        let line = line.ok_or_else(|| error("this is no line of text of at most 4096 bytes".to_owned()))?;
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let (stamp, pose) = parse_line(line).map_err(error)?;
+        trajectory.push(stamp, pose).map_err(|problem| error(problem.to_string()))?;
+    }
+    Ok(trajectory)
+}
+
+fn parse_line(line: &str) -> Result<(Stamp, Pose), String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let [stamp, rest @ ..] = words.as_slice() else { return Err("the line is empty".to_owned()) };
+    if rest.len() != 7 {
+        return Err(format!("a pose is 8 numbers, `t x y z qx qy qz qw`; here are {}", words.len()));
+    }
+    let stamp = number::parse_stamp(stamp).ok_or_else(|| format!("`{stamp}` is no time in seconds"))?;
+    let mut numbers = [0.0; 7];
+    for (number, word) in numbers.iter_mut().zip(rest) {
+        *number = word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| format!("`{word}` is no number"))?;
+    }
+    let [x, y, z, qx, qy, qz, qw] = numbers;
+    let quaternion = nalgebra::Quaternion::new(qw, qx, qy, qz);
+    let norm = quaternion.norm();
+    if (norm - 1.0).abs() > NORM_TOLERANCE {
+        return Err(format!("the quaternion's norm is {norm:.4}, not 1"));
+    }
+    Ok((stamp, Pose::from_parts(Vector::new(x, y, z).into(), Rotation::from_quaternion(quaternion))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::from_roll_pitch_yaw;
+
+    #[test]
+    fn a_trajectory_comes_back_to_the_ninth_decimal() {
+        let pose = |k: f64| Pose::from_parts([k, -0.1 * k, 1e-7].into(), from_roll_pitch_yaw(0.1 * k, -0.2, 3.0));
+        let poses = (0..5).map(|k| (Stamp::from_nanos(1_349_049_600_000_000_001 + k), pose(k as f64)));
+        let written = Trajectory::from_poses(poses).unwrap();
+        let mut text = Vec::new();
+        let mut writer = TumWriter::new(&mut text);
+        written.iter().for_each(|(stamp, pose)| writer.pose(stamp, pose).unwrap());
+        writer.finish().unwrap();
+        let read = parse_tum("memory", text.as_slice()).unwrap();
+        assert_eq!(read.stamps(), written.stamps());
+        for (a, b) in read.poses().iter().zip(written.poses()) {
+            assert!((a.translation.vector - b.translation.vector).amax() <= 0.5e-9);
+            assert!(a.rotation.angle_to(&b.rotation) < 4e-9);
+        }
+    }
+
+    #[test]
+    fn an_error_names_file_and_line() {
+        let message = |text: &str| parse_tum("a.tum", text.as_bytes()).unwrap_err().to_string();
+        assert_eq!(
+            message("# t x y z\n1.5 0 0 0 0 0 0\n"),
+            "a.tum:2: a pose is 8 numbers, `t x y z qx qy qz qw`; here are 7"
+        );
+        assert_eq!(message("1 0 0 nan 0 0 0 1\n"), "a.tum:1: `nan` is no number");
+        assert_eq!(message("x 0 0 0 0 0 0 1\n"), "a.tum:1: `x` is no time in seconds");
+        assert_eq!(message("1 0 0 0 0 0 0 2\n"), "a.tum:1: the quaternion's norm is 2.0000, not 1");
+        assert!(
+            message("2 0 0 0 0 0 0 1\n\n1 0 0 0 0 0 0 1\n").starts_with("a.tum:3: pose 1 is stamped 1000000000 ns")
+        );
+        assert!(message(&" ".repeat(5000)).starts_with("a.tum:1: this is no line of text"));
+    }
+}

@@ -1,0 +1,151 @@
+use super::canvas::{Canvas, Pen};
+use super::{Chart, PlotError, font, frame};
+use plotters::prelude::{BitMapBackend, BitMapElement, DrawingBackend, IntoDrawingArea, SVGBackend};
+use std::path::Path;
+
+/// Backends draw at whole units, so an SVG has this many of them to a point.
+const SVG_UNITS: u32 = 4;
+/// Pixels of a PNG to a point.
+const PNG_PIXELS: u32 = 2;
+/// Pixels are averaged from so many drawn ones each way: the pen does not smooth its edges.
+const OVERSAMPLED: u32 = 2;
+
+/// Charts below each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Width, points.
+    pub width: f64,
+    /// Height of each chart that is no map, points; a map has the height it needs.
+    pub chart_height: f64,
+    /// The charts, from the top.
+    pub charts: Vec<Chart>,
+}
+
+impl Figure {
+    /// A figure as wide as a page, with these charts.
+    pub fn of(charts: Vec<Chart>) -> Self {
+        Self { width: 720.0, chart_height: 250.0, charts }
+    }
+
+    fn heights(&self) -> Vec<f64> {
+        self.charts.iter().map(|chart| frame::height_of(chart, self.width, self.chart_height)).collect()
+    }
+
+    fn size(&self) -> (u32, u32) {
+        (self.width.ceil() as u32, self.heights().iter().sum::<f64>().ceil().max(1.0) as u32)
+    }
+
+    fn draw<DB: DrawingBackend>(&self, backend: DB, scale: u32, pen: Pen) -> Result<(), PlotError> {
+        font::register()?;
+        let area = backend.into_drawing_area();
+        let canvas = Canvas { area: &area, scale: f64::from(scale), pen };
+        canvas.clear()?;
+        let mut top = 0.0;
+        for (chart, height) in self.charts.iter().zip(self.heights()) {
+            frame::draw(&canvas, chart, (0.0, top), (self.width, height))?;
+            top += height;
+        }
+        area.present().map_err(PlotError::drawing)
+    }
+
+    /// The figure as the text of an SVG.
+    ///
+    /// # Errors
+    /// When it cannot be drawn.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        let (width, height) = self.size();
+        let (wide, high) = (width * SVG_UNITS, height * SVG_UNITS);
+        let mut text = String::new();
+        self.draw(SVGBackend::with_string(&mut text, (wide, high)), SVG_UNITS, Pen::Vector)?;
+        let drawn = format!("width=\"{wide}\" height=\"{high}\"");
+        let shown = format!("width=\"{width}\" height=\"{height}\"");
+        Ok(text.replacen(&drawn, &shown, 1))
+    }
+
+    /// Writes `NAME.svg` and `NAME.png` into `folder`.
+    ///
+    /// # Errors
+    /// When the figure cannot be drawn, or a file not be written.
+    pub fn save(&self, folder: &Path, name: &str) -> Result<(), PlotError> {
+        let svg = folder.join(format!("{name}.svg"));
+        std::fs::write(&svg, self.svg()?)
+            .map_err(|source| PlotError::File { path: svg.display().to_string(), source })?;
+        self.save_png(&folder.join(format!("{name}.png")))
+    }
+
+    fn save_png(&self, path: &Path) -> Result<(), PlotError> {
+        let (width, height) = self.size();
+        let scale = PNG_PIXELS * OVERSAMPLED;
+        let (wide, high) = (width * scale, height * scale);
+        let mut drawn = vec![0_u8; wide as usize * high as usize * 3];
+        self.draw(BitMapBackend::with_buffer(&mut drawn, (wide, high)), scale, Pen::Pixels)?;
+
+        let size = (width * PNG_PIXELS, height * PNG_PIXELS);
+        let pixels = averaged(&drawn, wide as usize, OVERSAMPLED as usize);
+        let area = BitMapBackend::new(path, size).into_drawing_area();
+        let Some(picture) = BitMapElement::with_owned_buffer((0, 0), size, pixels) else {
+            return Err(PlotError::Drawing("the picture has another size than it was drawn for".to_owned()));
+        };
+        area.draw(&picture).map_err(PlotError::drawing)?;
+        area.present().map_err(PlotError::drawing)
+    }
+}
+
+/// A picture of RGB bytes with every `side` x `side` pixels made one, their mean.
+fn averaged(drawn: &[u8], wide: usize, side: usize) -> Vec<u8> {
+    let high = drawn.len() / 3 / wide;
+    let mut pixels = Vec::with_capacity(drawn.len() / (side * side));
+    for row in 0..high / side {
+        for column in 0..wide / side {
+            for channel in 0..3 {
+                let sum: usize = (0..side * side)
+                    .map(|k| (row * side + k / side) * wide + column * side + k % side)
+                    .map(|pixel| usize::from(drawn[pixel * 3 + channel]))
+                    .sum();
+                pixels.push((sum / (side * side)) as u8);
+            }
+        }
+    }
+    pixels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::plot::{Colour, Series};
+
+    fn figure() -> Figure {
+        let wave = (0..200).map(|k| (k as f64 * 0.1, (k as f64 * 0.1).sin())).collect();
+        let band = (0..200).map(|k| (k as f64 * 0.1, -0.5, 0.5)).collect();
+        let series = Series::line("sine & <co>", Colour::Estimate, wave).with_band(band);
+        Figure::of(vec![Chart::new("A wave", "Time (s)", "Height (m)").with(series)])
+    }
+
+    #[test]
+    fn an_svg_holds_its_words_and_is_well_formed() {
+        let svg = figure().svg().unwrap();
+        for word in ["A wave", "Time (s)", "Height (m)", "sine &amp; &lt;co&gt;", "width=\"720\""] {
+            assert!(svg.contains(word), "{word} is missing");
+        }
+        assert!(svg.trim_end().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn a_figure_is_the_same_each_time_and_on_disk_in_both_forms() {
+        let folder = tempfile::tempdir().unwrap();
+        figure().save(folder.path(), "wave").unwrap();
+        let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+        let (first, svg) = (bytes("wave.png"), bytes("wave.svg"));
+        figure().save(folder.path(), "wave").unwrap();
+        assert!(first == bytes("wave.png") && svg == bytes("wave.svg"));
+        assert_eq!(&first[1..4], b"PNG");
+    }
+
+    #[test]
+    fn no_data_is_an_empty_chart_and_no_panic() {
+        let empty = Figure::of(vec![Chart::new("", "x", "y"), Chart::new("", "x", "y").as_map()]);
+        assert!(empty.svg().is_ok());
+        let nan = Series::line("nan", Colour::Truth, vec![(0.0, f64::NAN), (f64::INFINITY, 1.0)]);
+        assert!(Figure::of(vec![Chart::new("", "x", "y").with(nan)]).svg().is_ok());
+    }
+}

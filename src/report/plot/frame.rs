@@ -1,0 +1,223 @@
+//! One chart on a canvas: title, legend, grid, labels, and the data within.
+
+use super::axis::Axis;
+use super::canvas::{Anchor, At, Canvas};
+use super::palette::{GRID, INK};
+use super::{Chart, Mark, PlotError, Series};
+use plotters::prelude::DrawingBackend;
+
+const TEXT: f64 = 12.0;
+const SMALL: f64 = 11.0;
+/// Room for title and legend, below the axis for numbers and label, and left and right of it.
+const TOP: f64 = 30.0;
+const BOTTOM: f64 = 46.0;
+const LEFT: f64 = 68.0;
+const RIGHT: f64 = 18.0;
+/// Points from one tick to the next, at least about.
+const TICK_X: f64 = 85.0;
+const TICK_Y: f64 = 28.0;
+/// Length of a line in the legend.
+const SAMPLE: f64 = 20.0;
+
+/// Where a chart's axes stand on the sheet.
+struct Frame {
+    left: f64,
+    top: f64,
+    width: f64,
+    height: f64,
+    x: Axis,
+    y: Axis,
+}
+
+impl Frame {
+    fn at(&self, (x, y): (f64, f64)) -> At {
+        (self.left + self.x.fraction(x) * self.width, self.top + (1.0 - self.y.fraction(y)) * self.height)
+    }
+
+    fn bottom(&self) -> f64 {
+        self.top + self.height
+    }
+
+    fn right(&self) -> f64 {
+        self.left + self.width
+    }
+}
+
+/// Height of a chart that is `width` wide: that of the map for a map, else `wanted`.
+pub(super) fn height_of(chart: &Chart, width: f64, wanted: f64) -> f64 {
+    if !chart.equal_axes {
+        return wanted;
+    }
+    let [x, y] = ranges(chart);
+    let shape = (y.high - y.low) / (x.high - x.low);
+    ((width - LEFT - RIGHT) * shape).clamp(150.0, 620.0) + TOP + BOTTOM
+}
+
+/// Draws a chart into the rectangle at `corner`.
+pub(super) fn draw<DB: DrawingBackend>(
+    canvas: &Canvas<DB>,
+    chart: &Chart,
+    corner: At,
+    size: (f64, f64),
+) -> Result<(), PlotError> {
+    let frame = place(chart, corner, size);
+    grid(canvas, &frame, chart)?;
+    for series in &chart.series {
+        band(canvas, &frame, series)?;
+    }
+    for series in &chart.series {
+        points(canvas, &frame, series)?;
+    }
+    header(canvas, &frame, chart)
+}
+
+fn ranges(chart: &Chart) -> [Axis; 2] {
+    let [x, mut y] = chart.extent();
+    if chart.from_zero {
+        y = (y.0.min(0.0), y.1.max(0.0));
+    }
+    let mut y_axis = Axis::over(y, 0.06);
+    if chart.from_zero && y.0 == 0.0 {
+        y_axis.low = 0.0;
+    }
+    let x_axis = if chart.equal_axes { Axis::over(x, 0.04) } else { Axis::over(x, 0.0).to_round_ends() };
+    [x_axis, y_axis]
+}
+
+/// Axes that fill their rectangle; for a map, the shorter axis is made longer until a metre is as long on both.
+fn place(chart: &Chart, corner: At, size: (f64, f64)) -> Frame {
+    let [x, y] = ranges(chart);
+    let (width, height) = (size.0 - LEFT - RIGHT, size.1 - TOP - BOTTOM);
+    let mut frame = Frame { left: corner.0 + LEFT, top: corner.1 + TOP, width, height, x, y };
+    if chart.equal_axes {
+        let per_point = ((x.high - x.low) / width).max((y.high - y.low) / height);
+        let widened = |axis: Axis, points: f64| {
+            let (middle, half) = ((axis.low + axis.high) / 2.0, per_point * points / 2.0);
+            Axis { low: middle - half, high: middle + half }
+        };
+        (frame.x, frame.y) = (widened(x, width), widened(y, height));
+    }
+    frame
+}
+
+fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
+    for (value, label) in frame.x.ticks((frame.width / TICK_X) as usize) {
+        let (x, _) = frame.at((value, frame.y.low));
+        canvas.line(&[(x, frame.top), (x, frame.bottom())], GRID, 0.8)?;
+        canvas.line(&[(x, frame.bottom()), (x, frame.bottom() + 4.0)], INK, 0.8)?;
+        canvas.text(&label, (x, frame.bottom() + 7.0), Anchor::Below, SMALL)?;
+    }
+    for (value, label) in frame.y.ticks((frame.height / TICK_Y) as usize) {
+        let (_, y) = frame.at((frame.x.low, value));
+        canvas.line(&[(frame.left, y), (frame.right(), y)], GRID, 0.8)?;
+        canvas.line(&[(frame.left - 4.0, y), (frame.left, y)], INK, 0.8)?;
+        canvas.text(&label, (frame.left - 8.0, y), Anchor::Right, SMALL)?;
+    }
+    let axes = [(frame.left, frame.top), (frame.left, frame.bottom()), (frame.right(), frame.bottom())];
+    canvas.line(&axes, INK, 0.8)?;
+    canvas.text(&chart.x_label, (frame.left + frame.width / 2.0, frame.bottom() + 25.0), Anchor::Below, TEXT)?;
+    canvas.text(&chart.y_label, (frame.left - LEFT + 14.0, frame.top + frame.height / 2.0), Anchor::Sideways, TEXT)
+}
+
+/// The title at the left, and the legend at the right, above the axes.
+fn header<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
+    let y = frame.top - 13.0;
+    canvas.text(&chart.title, (frame.left, y), Anchor::Left, TEXT)?;
+    let mut right = frame.right();
+    for series in chart.series.iter().rev().filter(|series| !series.name.is_empty()) {
+        let start = right - canvas.width_of(&series.name, SMALL)?;
+        canvas.text(&series.name, (start, y), Anchor::Left, SMALL)?;
+        let sample = [(start - SAMPLE - 6.0, y), (start - 6.0, y)];
+        match series.mark {
+            Mark::Line(width) => canvas.line(&sample, series.colour.rgb(), width.max(1.5))?,
+            Mark::Dashes(width) => dashes(canvas, &sample, series, width.max(1.5))?,
+            Mark::Dots(_) => canvas.dot((start - 6.0 - SAMPLE / 2.0, y), series.colour.rgb(), 6.0)?,
+        }
+        right = start - SAMPLE - 24.0;
+    }
+    Ok(())
+}
+
+fn band<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series) -> Result<(), PlotError> {
+    let upper = series.band.iter().map(|(x, _, high)| (*x, *high));
+    let lower = series.band.iter().rev().map(|(x, low, _)| (*x, *low));
+    let outline: Vec<At> =
+        upper.chain(lower).filter(|(x, y)| x.is_finite() && y.is_finite()).map(|point| frame.at(point)).collect();
+    if outline.len() < 3 { Ok(()) } else { canvas.area_between(&outline, series.colour.rgb(), 0.2) }
+}
+
+fn points<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series) -> Result<(), PlotError> {
+    let colour = series.colour.rgb();
+    let is_finite = |point: &(f64, f64)| point.0.is_finite() && point.1.is_finite();
+    if let Mark::Dots(size) = series.mark {
+        return series.points.iter().filter(|p| is_finite(p)).try_for_each(|p| canvas.dot(frame.at(*p), colour, size));
+    }
+    for stretch in series.points.split(|point| !is_finite(point)) {
+        let path = thinned(&stretch.iter().map(|point| frame.at(*point)).collect::<Vec<At>>());
+        match series.mark {
+            Mark::Dashes(width) => dashes(canvas, &path, series, width)?,
+            Mark::Line(width) | Mark::Dots(width) => canvas.line(&path, colour, width)?,
+        }
+    }
+    Ok(())
+}
+
+fn dashes<DB: DrawingBackend>(canvas: &Canvas<DB>, path: &[At], series: &Series, width: f64) -> Result<(), PlotError> {
+    const DASH: f64 = 5.0;
+    const GAP: f64 = 3.0;
+    let mut along = 0.0;
+    let mut dash = Vec::new();
+    for pair in path.windows(2) {
+        let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
+        let length = (x1 - x0).hypot(y1 - y0);
+        let mut done = 0.0;
+        while done < length {
+            let phase = along % (DASH + GAP);
+            let drawing = phase < DASH;
+            let step = (if drawing { DASH } else { DASH + GAP } - phase).min(length - done).max(1e-6);
+            let at = |s: f64| (x0 + (x1 - x0) * s / length, y0 + (y1 - y0) * s / length);
+            if drawing {
+                dash.extend([at(done), at(done + step)]);
+            } else if !dash.is_empty() {
+                canvas.line(&std::mem::take(&mut dash), series.colour.rgb(), width)?;
+            }
+            done += step;
+            along += step;
+        }
+    }
+    canvas.line(&dash, series.colour.rgb(), width)
+}
+
+/// The path without what a print would not show: of all points within half a point's width, first, least, greatest, last.
+fn thinned(path: &[At]) -> Vec<At> {
+    const COLUMN: f64 = 0.5;
+    let mut kept: Vec<At> = Vec::new();
+    let mut rest = path;
+    while let Some(first) = rest.first() {
+        let count = rest.iter().take_while(|at| (at.0 - first.0).abs() < COLUMN).count();
+        let (column, after) = rest.split_at(count);
+        let by_height = |a: &&At, b: &&At| a.1.total_cmp(&b.1);
+        let ends = [column.iter().min_by(by_height), column.iter().max_by(by_height)];
+        let mut keep: Vec<At> =
+            [column.first(), ends[0], ends[1], column.last()].into_iter().flatten().copied().collect();
+        keep.dedup();
+        kept.extend(keep);
+        rest = after;
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_every_peak() {
+        // 100 000 points over 100 points' width, one spike: a few points a column remain, the spike among them.
+        let spike = |k: usize| if k == 51_234 { -40.0 } else { 10.0 + (k % 7) as f64 };
+        let path: Vec<At> = (0..100_000).map(|k| (k as f64 * 1e-3, spike(k))).collect();
+        let kept = thinned(&path);
+        assert!(kept.len() < 900, "{}", kept.len());
+        assert!(kept.iter().any(|at| at.1 == -40.0));
+    }
+}
