@@ -11,8 +11,8 @@ use crate::spec::{Source, SpecError};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Most triangles of a scene: they take about 200 bytes each.
-pub(super) const MAX_TRIANGLES: usize = 20_000_000;
+/// Most triangles of a scene: they take about 350 bytes each while it is built.
+pub(super) const MAX_TRIANGLES: usize = 10_000_000;
 /// Furthest from the origin that a surface or a route may be, m.
 const MAX_EXTENT_M: f64 = 100_000.0;
 /// Deepest nesting of templates.
