@@ -69,6 +69,7 @@ pub mod sensors;
 pub mod signal;
 pub mod simulation;
 pub mod spec;
+pub mod study;
 pub mod time;
 pub mod truth;
 pub mod world;
