@@ -208,3 +208,24 @@ fn a_recording_without_tf_static_takes_the_defaults_and_says_so() {
     assert_eq!(found.calibration, recordings::calibration());
     assert!(!found.from_recording);
 }
+
+#[test]
+fn a_type_is_known_without_msg_in_its_name() {
+    let mut foreign = Foreign::new(mcap::WriteOptions::new());
+    foreign.message("/scan", "sensor_msgs/LaserScan", 0, &scan(0, 0.001, 0.1));
+    foreign.message("/imu", "sensor_msgs/Imu", 0, &imu(0, "imu"));
+    assert_eq!(scans(&foreign.reader()).len(), 1);
+}
+
+#[test]
+fn a_folder_of_rosbag2_is_opened_when_one_recording_is_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = || Reader::open(folder.path()).map(|reader| reader.name().to_owned()).map_err(|e| e.to_string());
+    assert!(message().unwrap_err().ends_with("there is no .mcap file in this folder"));
+    std::fs::write(folder.path().join("metadata.yaml"), "").unwrap();
+    let (bytes, _) = recordings::record(recordings::run(), 1);
+    std::fs::write(folder.path().join("run_0.mcap"), &bytes).unwrap();
+    assert!(message().unwrap().ends_with("run_0.mcap"));
+    std::fs::write(folder.path().join("run_1.mcap"), &bytes).unwrap();
+    assert!(message().unwrap_err().ends_with("there are 2 .mcap files in this folder: name one"));
+}
