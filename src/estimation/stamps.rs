@@ -1,0 +1,169 @@
+//! Smoothing of a regular sensor's stamps.
+//!
+//! A sensor that samples at a steady rate but is stamped with jitter (by a host, over a bus) says more about its times by
+//! counting than by any single stamp. A Kalman filter over (time of the last sample, period) follows the count: with jitter
+//! `s` and a rate that wanders slowly, the smoothed stamps are good to a few hundredths of `s` within a minute.
+
+/// Wander of a sensor's rate, relative, per square root of a second: 0.2 ppm, a quartz in a room.
+const RATE_WALK_PER_SQRT_S: f64 = 2e-7;
+/// So many stamps in a row far from the count mean that the count is wrong.
+const STRIKES: usize = 5;
+
+/// Follows the stamps of a regular sensor. Seconds on the sensor's own clock.
+#[derive(Debug, Clone)]
+pub(super) struct StampFilter {
+    last_s: f64,
+    period_s: f64,
+    covariance: [f64; 3],
+    jitter2: f64,
+    strikes: usize,
+    started: bool,
+    off: bool,
+}
+
+impl StampFilter {
+    /// A filter for a sensor of about `period_s`; `jitter_s = 0` passes every stamp as it is.
+    pub(super) fn new(period_s: f64, jitter_s: f64) -> Self {
+        Self {
+            last_s: 0.0,
+            period_s,
+            covariance: [jitter_s * jitter_s, 0.0, (0.01 * period_s).powi(2)],
+            jitter2: jitter_s * jitter_s,
+            strikes: 0,
+            started: false,
+            off: jitter_s <= 0.0,
+        }
+    }
+
+    /// The sensor's period as far as known, s.
+    pub(super) fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// When the next sample, stamped `raw_s`, was really taken.
+    pub(super) fn smooth(&mut self, raw_s: f64) -> f64 {
+        if self.off || !self.started {
+            self.started = true;
+            self.last_s = raw_s;
+            return raw_s;
+        }
+        let since = raw_s - self.last_s;
+        // One period unless the stamp is far off: a late stamp must not be taken for a lost sample.
+        let tolerance = (0.5 * self.period_s).max(4.0 * self.jitter2.sqrt());
+        let periods =
+            if (since - self.period_s).abs() < tolerance { 1.0 } else { (since / self.period_s).round().max(0.0) };
+        self.predict(periods);
+        let innovation = raw_s - self.last_s;
+        if innovation.abs() > tolerance {
+            self.strikes += 1;
+            if self.strikes >= STRIKES || innovation.abs() > 20.0 * tolerance {
+                self.strikes = 0;
+                self.last_s = raw_s;
+                self.covariance[0] = self.jitter2;
+                self.covariance[1] = 0.0;
+            }
+            return self.last_s;
+        }
+        self.strikes = 0;
+        self.correct(innovation);
+        self.last_s
+    }
+
+    fn predict(&mut self, periods: f64) {
+        let [xx, xp, pp] = self.covariance;
+        self.last_s += periods * self.period_s;
+        let walk = (RATE_WALK_PER_SQRT_S * self.period_s).powi(2) * periods * self.period_s;
+        self.covariance = [xx + 2.0 * periods * xp + periods * periods * pp, xp + periods * pp, pp + walk];
+    }
+
+    fn correct(&mut self, innovation: f64) {
+        // The jitter is measured as it comes; never believed below 10 us.
+        self.jitter2 += 0.01 * (innovation * innovation - self.jitter2);
+        let [xx, xp, pp] = self.covariance;
+        let total = xx + self.jitter2.max(1e-10);
+        let (gain_x, gain_p) = (xx / total, xp / total);
+        self.last_s += gain_x * innovation;
+        self.period_s += gain_p * innovation;
+        self.covariance = [xx * (1.0 - gain_x), xp * (1.0 - gain_x), pp - gain_p * xp];
+    }
+}
+
+/// The period of a regular sensor from its first stamps, in order: the median interval gives each stamp its count, a line
+/// through stamps over counts the period. `None` for fewer than three stamps, or for stamps that do not advance.
+pub(super) fn period_of(stamps_s: &[f64]) -> Option<f64> {
+    let first = *stamps_s.first()?;
+    let mut intervals: Vec<f64> = stamps_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|dt| *dt > 0.0).collect();
+    if intervals.len() < 2 {
+        return None;
+    }
+    intervals.sort_by(f64::total_cmp);
+    let median = intervals[intervals.len() / 2];
+    let (mut n, mut sx, mut sy, mut sxx, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    let (mut count, mut before) = (0.0, first);
+    for stamp in stamps_s {
+        count += ((stamp - before) / median).round().max(if n > 0.0 { 1.0 } else { 0.0 });
+        before = *stamp;
+        let y = stamp - first;
+        (n, sx, sy, sxx, sxy) = (n + 1.0, sx + count, sy + y, sxx + count * count, sxy + count * y);
+    }
+    let determinant = n * sxx - sx * sx;
+    let slope = (n * sxy - sx * sy) / determinant;
+    (determinant > 0.0 && slope > 0.0).then_some(slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    /// Stamps of a sensor of period 10 ms and 20 ppm whose jitter is Gaussian (sum of twelve uniform numbers).
+    fn stamps(count: usize, jitter_s: f64) -> Vec<(f64, f64)> {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+        (0..count).map(|k| k as f64 * 0.01 * (1.0 + 20e-6)).map(|t| (t, t + jitter_s * normal())).collect()
+    }
+
+    fn error_after(stamps: &[(f64, f64)], from: usize) -> f64 {
+        let raw: Vec<f64> = stamps.iter().take(100).map(|(_, raw)| *raw).collect();
+        let mut filter = StampFilter::new(period_of(&raw).unwrap(), 5e-4);
+        let errors = stamps.iter().map(|(t, raw)| filter.smooth(*raw) - t);
+        let late: Vec<f64> = errors.skip(from).collect();
+        (late.iter().map(|e| e * e).sum::<f64>() / late.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn jitter_of_two_milliseconds_is_smoothed_to_a_tenth_of_one() {
+        // A line through 3000 stamps would know its end to 2 * 2 ms / sqrt(3000) = 0.07 ms.
+        assert!(error_after(&stamps(6000, 2e-3), 3000) < 1.5e-4);
+        assert!(error_after(&stamps(6000, 1e-4), 500) < 2e-5);
+    }
+
+    #[test]
+    fn lost_samples_do_not_shift_the_count() {
+        let mut kept = stamps(6000, 3e-4);
+        let mut index = 0;
+        kept.retain(|_| {
+            index += 1;
+            index % 10 != 3 && !(4000..4100).contains(&index)
+        });
+        assert!(error_after(&kept, 1000) < 1e-4);
+    }
+
+    #[test]
+    fn a_clock_that_jumps_is_followed() {
+        let mut jumped = stamps(2000, 1e-4);
+        for (t, raw) in &mut jumped[1000..] {
+            *t += 0.5;
+            *raw += 0.5;
+        }
+        assert!(error_after(&jumped, 1500) < 1e-4);
+    }
+
+    #[test]
+    fn the_period_is_found_in_spite_of_losses() {
+        let mut kept: Vec<f64> = stamps(200, 1e-4).iter().map(|(_, raw)| *raw).collect();
+        kept.retain(|raw| ((raw / 0.01) as usize) % 7 != 2);
+        assert!((period_of(&kept).unwrap() - 0.01).abs() < 2e-6);
+        assert_eq!(period_of(&[1.0, 1.0, 1.0]), None);
+    }
+}

@@ -1,0 +1,67 @@
+use crate::estimation::EstimationError;
+use crate::recording::RecordingError;
+use crate::report::plot::PlotError;
+use crate::simulation::SimulationError;
+use crate::spec::SpecError;
+use std::path::{Path, PathBuf};
+
+/// Why an experiment did not come to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// The simulation could not begin, or go on.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A file could not be written or read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// There is no estimate.
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+    /// A spec is missing or wrong.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    /// A plot could not be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// The figures could not be written as JSON.
+    #[error("the figures cannot be written: {0}")]
+    Figures(#[from] serde_json::Error),
+    /// A file or folder could not be made.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which one.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Somebody stopped it.
+    #[error("stopped; what is complete can be read")]
+    Stopped,
+}
+
+impl StudyError {
+    pub(super) fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
+        let path = path.to_owned();
+        move |source| Self::File { path, source }
+    }
+
+    /// Whether what was asked for is wrong (a spec, a setting), rather than something on the way.
+    pub fn is_wrong_input(&self) -> bool {
+        match self {
+            Self::Spec(_) => true,
+            Self::Estimation(error) => {
+                matches!(error, EstimationError::Setting { .. } | EstimationError::Calibration(_))
+            }
+            Self::Simulation(error) => {
+                use crate::dynamics::DynamicsError;
+                let failed = match error {
+                    SimulationError::Dynamics(error) => matches!(**error, DynamicsError::Diverged { .. }),
+                    SimulationError::Sink(_) => true,
+                    _ => false,
+                };
+                !failed
+            }
+            _ => false,
+        }
+    }
+}

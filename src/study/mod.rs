@@ -1,0 +1,27 @@
+//! Whole experiments, out of the rooms below.
+//!
+//! [`journey`] is the one that everything else varies: simulate and record, estimate from the recording, judge, report.
+//! [`estimate_recording`] is its second half, for anybody's recording.
+
+mod artefacts;
+mod cadence;
+mod calibration;
+mod error;
+mod estimate;
+mod journey;
+mod judge;
+mod manifest;
+mod memory;
+mod open_loop;
+mod record;
+mod register;
+mod truth_near;
+mod watch;
+
+pub use calibration::CalibrationSpec;
+pub use error::StudyError;
+pub use estimate::{Outcome, Wishes, estimate_recording};
+pub use journey::journey;
+pub use manifest::Manifest;
+pub use record::record;
+pub use watch::{News, Stage, Watch};
