@@ -1,6 +1,6 @@
 //! The reader that makes sense of it: continuous-time SLAM over a sliding window. Measurements in, estimate out.
 //!
-//! The method is that of Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012), in the form that measured best.
+//! The method is that of Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012), with the changes listed below.
 //!
 //! # A stretch's way
 //!
@@ -26,6 +26,8 @@
 //! ```
 //!
 //! # Choices
+//!
+//! Reasoned, and not yet compared with their alternatives; the same holds for the numbers in `default.ron`.
 //!
 //! - The trajectory is that of the IMU, in the IMU's time; the clock offset `l` enters where a beam's time is looked up,
 //!   `u = tau + l(tau)`. The paper keeps the trajectory in lidar time and has `l` in the IMU's terms. Here a change of `l`

@@ -1,8 +1,8 @@
 //! Surfels: small patches of surface, each seen in one passing of the beams.
 //!
 //! A surfel is made once, from points that the trajectory projected when they were new; from then on it moves as one rigid
-//! piece with the trajectory at its mean time (all its points were measured within a fraction of a second, over which the
-//! IMU's own shape of the trajectory is good to a fraction of a millimetre).
+//! piece with the trajectory at its mean time: all its points were measured within a fraction of a second, over which the
+//! shape of the trajectory is left to the IMU.
 
 mod build;
 mod moments;
