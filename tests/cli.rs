@@ -176,7 +176,7 @@ fn a_spec_anywhere_is_known_by_its_text() {
     let here = tempfile::tempdir().unwrap();
     std::fs::copy(root().join("specs/imus/3dm_gx2.ron"), here.path().join("mine.ron")).unwrap();
     let (code, out, _) = run(here.path(), "check mine.ron");
-    assert_eq!((code, out.trim()), (0, "mine.ron: a IMU that is right"));
+    assert_eq!((code, out.trim()), (0, "mine.ron: IMU, right"));
 }
 
 #[test]

@@ -21,7 +21,8 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     table.column_iter_mut().for_each(|column| {
         column.set_padding(padding);
     });
-    if let Some(names) = table.column_mut(0).filter(|names| names.max_content_width() <= WIDTH / 2) {
+    let widest_name = table.column_max_content_widths().first().copied().unwrap_or_default();
+    if let Some(names) = table.column_mut(0).filter(|_| widest_name <= WIDTH / 2) {
         names.set_constraint(ColumnConstraint::ContentWidth);
     }
     if numbers {
