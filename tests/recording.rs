@@ -9,7 +9,7 @@ use recordings::{calibration, imu_sample, planar_scan, record, run};
 use std::io::Cursor;
 use zsim::geometry::{Kinematics, Pose, from_roll_pitch_yaw};
 use zsim::measurement::{LidarScan, Measurement, PlanarScan, Sink};
-use zsim::recording::{Preference, Reader, Truth};
+use zsim::recording::{Preference, Reader, Truth, Writer};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
@@ -69,7 +69,7 @@ fn truth_comes_back_apart_from_measurements() {
     };
     let clock = ClockTruth { lidar_ahead: Span::from_nanos(-5), imu_ahead: Span::from_nanos(3_000_001) };
     let (file, bytes) = recordings::shared_file();
-    let mut writer = zsim::recording::Writer::new(file, run()).unwrap();
+    let mut writer = Writer::new(file, run()).unwrap();
     for k in 0..50 {
         let now = Stamp::from_nanos(k * 1_000_000);
         let sample = TruthSample {
@@ -130,7 +130,7 @@ proptest! {
     #[test]
     fn any_sweep_comes_back_bit_for_bit(sweeps in prop::collection::vec(any_sweep(), 1..5)) {
         let (file, bytes) = recordings::shared_file();
-        let mut writer = zsim::recording::Writer::new(file, run()).unwrap();
+        let mut writer = Writer::new(file, run()).unwrap();
         for (k, sweep) in (0..).zip(&sweeps) {
             writer.imu(Stamp::from_nanos(k), &imu_sample(Stamp::from_nanos(k))).unwrap();
             writer.lidar(Stamp::from_nanos(k), sweep).unwrap();
@@ -143,4 +143,44 @@ proptest! {
             read.into_iter().filter_map(|m| if let Measurement::Lidar(scan) = m { Some(scan) } else { None }).collect();
         prop_assert_eq!(read, sweeps);
     }
+}
+
+/// A disk with room for so many bytes.
+struct FullDisk(usize);
+
+impl std::io::Write for FullDisk {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0 = self.0.checked_sub(bytes.len()).ok_or(std::io::ErrorKind::StorageFull)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_full_disk_is_an_error_wherever_it_fills_up() {
+    for room in [0, 100, 10_000, 500_000, 1_000_000] {
+        let result = Writer::new(FullDisk(room), run()).map_err(|e| e.to_string()).and_then(|mut writer| {
+            for k in 0..200 {
+                let now = Stamp::from_nanos(k * 25_000_000);
+                writer.lidar(now, &planar_scan(now)).map_err(|e| e.to_string())?;
+            }
+            writer.finish().map_err(|e| e.to_string())
+        });
+        let message = result.unwrap_err();
+        assert!(message.starts_with("writing stopped: ") && message.contains("what was written before"), "{message}");
+    }
+}
+
+#[test]
+fn a_writer_that_is_dropped_leaves_a_whole_file() {
+    let (file, bytes) = recordings::shared_file();
+    let mut writer = Writer::new(file, run()).unwrap();
+    writer.lidar(Stamp::from_nanos(0), &planar_scan(Stamp::from_nanos(0))).unwrap();
+    drop(writer);
+    let reader = Reader::new("memory", Cursor::new(bytes.take())).unwrap();
+    assert!(reader.loss().is_none());
+    assert_eq!(reader.info(Span::from_seconds(1.0)).unwrap().messages, 3);
 }

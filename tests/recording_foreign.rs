@@ -2,186 +2,16 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod foreign;
 mod recordings;
 
-use mcap::records::MessageHeader;
-use serde::Serialize;
-use std::collections::BTreeMap;
+use foreign::{
+    Foreign, IMU, Imu, POINTS, SCAN, TF, TransformStamped, UINT32, cloud, header, imu, scan, scans, select, transform,
+};
 use std::io::Cursor;
 use zsim::geometry::Pose;
-use zsim::measurement::{LidarScan, Measurement};
-use zsim::recording::{Preference, Reader, Selection};
-use zsim::time::{Span, Stamp};
-
-// Messages by another implementation of CDR than the one under test: serde and `cdr-encoding`.
-
-#[derive(Serialize, Clone)]
-struct Header {
-    sec: i32,
-    nanosec: u32,
-    frame_id: String,
-}
-
-fn header(stamp_ns: i64, frame: &str) -> Header {
-    Header {
-        sec: (stamp_ns / 1_000_000_000) as i32,
-        nanosec: (stamp_ns % 1_000_000_000) as u32,
-        frame_id: frame.to_owned(),
-    }
-}
-
-#[derive(Serialize)]
-struct Imu {
-    header: Header,
-    orientation: [f64; 4],
-    orientation_covariance: [f64; 9],
-    angular_velocity: [f64; 3],
-    angular_velocity_covariance: [f64; 9],
-    linear_acceleration: [f64; 3],
-    linear_acceleration_covariance: [f64; 9],
-}
-
-fn imu(stamp_ns: i64, frame: &str) -> Imu {
-    Imu {
-        header: header(stamp_ns, frame),
-        orientation: [0.0, 0.0, 0.0, 1.0],
-        orientation_covariance: [0.0; 9],
-        angular_velocity: [0.1, 0.2, 0.3],
-        angular_velocity_covariance: [0.0; 9],
-        linear_acceleration: [0.0, 0.1, 9.8],
-        linear_acceleration_covariance: [0.0; 9],
-    }
-}
-
-#[derive(Serialize)]
-struct PointField {
-    name: String,
-    offset: u32,
-    datatype: u8,
-    count: u32,
-}
-
-#[derive(Serialize)]
-struct PointCloud2 {
-    header: Header,
-    height: u32,
-    width: u32,
-    fields: Vec<PointField>,
-    is_bigendian: bool,
-    point_step: u32,
-    row_step: u32,
-    data: Vec<u8>,
-    is_dense: bool,
-}
-
-const FLOAT32: u8 = 7;
-const FLOAT64: u8 = 8;
-const UINT32: u8 = 6;
-
-/// A cloud of points at (1, 2, 3 + k) whose times are `times`, already in bytes of the type `kind`.
-fn cloud(stamp_ns: i64, (name, kind): (&str, u8), times: &[Vec<u8>]) -> PointCloud2 {
-    let size = times[0].len() as u32;
-    let names = [("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32), (name, 16, kind)];
-    let field =
-        |(name, offset, datatype): (&str, u32, u8)| PointField { name: name.to_owned(), offset, datatype, count: 1 };
-    let step = 16 + size;
-    let mut data = Vec::new();
-    for (k, time) in times.iter().enumerate() {
-        for value in [1.0, 2.0, 3.0 + k as f32, 0.0] {
-            data.extend(value.to_le_bytes());
-        }
-        data.extend(time);
-    }
-    PointCloud2 {
-        header: header(stamp_ns, "os_lidar"),
-        height: 1,
-        width: times.len() as u32,
-        fields: names.map(field).into(),
-        is_bigendian: false,
-        point_step: step,
-        row_step: step * times.len() as u32,
-        data,
-        is_dense: true,
-    }
-}
-
-#[derive(Serialize)]
-struct LaserScan {
-    header: Header,
-    angles: [f32; 3],
-    time_increment: f32,
-    scan_time: f32,
-    range: [f32; 2],
-    ranges: Vec<f32>,
-    intensities: Vec<f32>,
-}
-
-#[derive(Serialize)]
-struct TransformStamped {
-    header: Header,
-    child: String,
-    translation: [f64; 3],
-    rotation: [f64; 4],
-}
-
-fn transform(parent: &str, child: &str, x: f64) -> TransformStamped {
-    let translation = [x, 0.0, 0.0];
-    TransformStamped { header: header(0, parent), child: child.to_owned(), translation, rotation: [0.0, 0.0, 0.0, 1.0] }
-}
-
-fn cdr(message: &impl Serialize) -> Vec<u8> {
-    let mut bytes = vec![0, 1, 0, 0];
-    bytes.extend(cdr_encoding::to_vec::<_, byteorder::LittleEndian>(message).unwrap());
-    bytes
-}
-
-/// Writes files with the `mcap` crate.
-struct Foreign {
-    writer: mcap::Writer<Cursor<Vec<u8>>>,
-    channels: BTreeMap<String, u16>,
-}
-
-impl Foreign {
-    fn new(options: mcap::WriteOptions) -> Self {
-        Self { writer: options.create(Cursor::new(Vec::new())).unwrap(), channels: BTreeMap::new() }
-    }
-
-    fn message(&mut self, topic: &str, kind: &str, log_ns: i64, message: &impl Serialize) -> &mut Self {
-        let id = match self.channels.get(topic) {
-            Some(id) => *id,
-            None => {
-                let text = b"std_msgs/Header header\n";
-                let schema = self.writer.add_schema(kind, "ros2msg", text).unwrap();
-                self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap()
-            }
-        };
-        self.channels.insert(topic.to_owned(), id);
-        let log_time = log_ns as u64;
-        let header = MessageHeader { channel_id: id, sequence: 0, log_time, publish_time: log_time };
-        self.writer.write_to_known_channel(&header, &cdr(message)).unwrap();
-        self
-    }
-
-    fn reader(mut self) -> Reader {
-        self.writer.finish().unwrap();
-        Reader::new("foreign", Cursor::new(self.writer.into_inner().into_inner())).unwrap()
-    }
-}
-
-const IMU: &str = "sensor_msgs/msg/Imu";
-const POINTS: &str = "sensor_msgs/msg/PointCloud2";
-const SCAN: &str = "sensor_msgs/msg/LaserScan";
-const TF: &str = "tf2_msgs/msg/TFMessage";
-
-fn select(reader: &Reader) -> Selection {
-    reader.select(&Preference::default()).unwrap()
-}
-
-fn scans(reader: &Reader) -> Vec<LidarScan> {
-    let selection = select(reader);
-    let measurements = reader.measurements(&selection).map(|m| m.unwrap());
-    measurements.filter_map(|m| if let Measurement::Lidar(scan) = m { Some(scan) } else { None }).collect()
-}
+use zsim::measurement::Measurement;
+use zsim::recording::{Preference, Reader};
 
 #[test]
 fn compression_and_chunks_make_no_difference() {
@@ -238,21 +68,6 @@ fn lz4_chunks_are_read() {
     assert_eq!(scans(&reader).len(), 1);
 }
 
-/// Ten beams over a tenth of a radian each; the third did not come back, the fourth is too near.
-fn scan(stamp_ns: i64, time_increment: f32, scan_time: f32) -> LaserScan {
-    let mut ranges = vec![2.0; 10];
-    (ranges[2], ranges[3], ranges[4], ranges[5]) = (f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.01);
-    LaserScan {
-        header: header(stamp_ns, "laser"),
-        angles: [0.0, 0.9, 0.1],
-        time_increment,
-        scan_time,
-        range: [0.1, 30.0],
-        ranges,
-        intensities: Vec::new(),
-    }
-}
-
 #[test]
 fn messages_that_were_written_topic_after_topic_come_in_the_order_of_time() {
     let options = mcap::WriteOptions::new().chunk_size(Some(5000));
@@ -298,69 +113,6 @@ fn a_scan_without_times_is_read_with_a_note() {
     assert!(select(&reader).notes[0].starts_with("/front tells no time between beams; an even turn"));
     // 0.1 rad of a turn that takes 0.1 s: 0.1 / (2 pi) * 0.1 s = 1.591549 ms.
     assert_eq!(scans(&reader)[0].returns[1].offset.nanos(), 1_591_549);
-}
-
-#[test]
-fn every_way_to_tell_a_points_time_gives_the_same_scan() {
-    let stamp_ns = 1_700_000_000_250_000_000_i64;
-    let stamp_s = stamp_ns as f64 * 1e-9;
-    let at = |k: usize| k as f64 * 1e-3;
-    let f32s =
-        |f: &dyn Fn(usize) -> f64| -> Vec<Vec<u8>> { (0..50).map(|k| (f(k) as f32).to_le_bytes().to_vec()).collect() };
-    let f64s = |f: &dyn Fn(usize) -> f64| -> Vec<Vec<u8>> { (0..50).map(|k| f(k).to_le_bytes().to_vec()).collect() };
-    let u32s = |f: &dyn Fn(usize) -> u32| -> Vec<Vec<u8>> { (0..50).map(|k| f(k).to_le_bytes().to_vec()).collect() };
-    let ways = [
-        ("t", UINT32, u32s(&|k| k as u32 * 1_000_000)),
-        ("offset_time", UINT32, u32s(&|k| k as u32 * 1_000_000)),
-        ("time", FLOAT32, f32s(&at)),
-        ("timestamp", FLOAT64, f64s(&|k| stamp_s + at(k))),
-        ("timestamp", FLOAT64, f64s(&|k| stamp_ns as f64 + k as f64 * 1e6)),
-        ("timestamp", FLOAT64, f64s(&|k| (stamp_s + at(k)) * 1e6)),
-        ("t", FLOAT32, f32s(&|k| at(k) * 1e9)),
-    ];
-    for (name, kind, times) in ways {
-        let mut foreign = Foreign::new(mcap::WriteOptions::new());
-        foreign.message("/imu", IMU, stamp_ns, &imu(stamp_ns, "imu"));
-        foreign.message("/points", POINTS, stamp_ns, &cloud(stamp_ns, (name, kind), &times));
-        let scan = &scans(&foreign.reader())[0];
-        assert_eq!(scan.returns.len(), 50, "{name} {kind}");
-        for (k, point) in scan.returns.iter().enumerate() {
-            let stamp = scan.stamp + point.offset;
-            // A double of seconds since 1970 holds 0.24 us.
-            let off_ns = (stamp - Stamp::from_nanos(stamp_ns + k as i64 * 1_000_000)).nanos();
-            assert!(off_ns.abs() < 500, "{name} {kind}: point {k} is off by {off_ns} ns");
-            assert_eq!(point.point_in_laser.z, 3.0 + k as f32);
-        }
-    }
-}
-
-#[test]
-fn a_cloud_stamped_at_its_end_begins_with_its_first_point() {
-    // Velodyne's driver stamps the last packet: times are negative seconds. Rows are rings, so times go up and down.
-    let times: Vec<_> = [-0.09_f32, -0.05, 0.0, -0.10, -0.04].iter().map(|t| t.to_le_bytes().to_vec()).collect();
-    let stamp_ns = 1_700_000_000_000_000_000;
-    let mut foreign = Foreign::new(mcap::WriteOptions::new());
-    foreign.message("/imu", IMU, stamp_ns, &imu(stamp_ns, "imu"));
-    foreign.message("/velodyne_points", POINTS, stamp_ns, &cloud(stamp_ns, ("time", FLOAT32), &times));
-    let scan = &scans(&foreign.reader())[0];
-    assert!((scan.stamp - Stamp::from_nanos(stamp_ns - 100_000_000)).nanos().abs() < 10);
-    let zs: Vec<_> = scan.returns.iter().map(|r| r.point_in_laser.z).collect();
-    assert_eq!(zs, [6.0, 3.0, 4.0, 7.0, 5.0]);
-    assert_eq!(scan.returns[0].offset, Span::ZERO);
-}
-
-#[test]
-fn times_in_a_simulation_that_starts_at_zero_are_told_apart() {
-    // Absolute seconds, small because the clock is: at 2.0 s, points from 2.00 to 2.09 s.
-    for (stamp_ns, first_s) in [(2_000_000_000_i64, 2.0), (0, 0.0), (50_000_000, 0.05)] {
-        let times: Vec<_> = (0..10).map(|k| (first_s + 0.01 * f64::from(k)).to_le_bytes().to_vec()).collect();
-        let mut foreign = Foreign::new(mcap::WriteOptions::new());
-        foreign.message("/imu", IMU, 0, &imu(0, "imu"));
-        foreign.message("/points", POINTS, 0, &cloud(stamp_ns, ("timestamp", FLOAT64), &times));
-        let scan = &scans(&foreign.reader())[0];
-        assert_eq!(scan.stamp.nanos(), stamp_ns);
-        assert_eq!(scan.returns[9].offset.nanos(), 90_000_000);
-    }
 }
 
 #[test]
@@ -455,4 +207,25 @@ fn a_recording_without_tf_static_takes_the_defaults_and_says_so() {
     let found = reader.calibration(&select(&reader), &recordings::calibration(), None).unwrap();
     assert_eq!(found.calibration, recordings::calibration());
     assert!(!found.from_recording);
+}
+
+#[test]
+fn a_type_is_known_without_msg_in_its_name() {
+    let mut foreign = Foreign::new(mcap::WriteOptions::new());
+    foreign.message("/scan", "sensor_msgs/LaserScan", 0, &scan(0, 0.001, 0.1));
+    foreign.message("/imu", "sensor_msgs/Imu", 0, &imu(0, "imu"));
+    assert_eq!(scans(&foreign.reader()).len(), 1);
+}
+
+#[test]
+fn a_folder_of_rosbag2_is_opened_when_one_recording_is_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = || Reader::open(folder.path()).map(|reader| reader.name().to_owned()).map_err(|e| e.to_string());
+    assert!(message().unwrap_err().ends_with("there is no .mcap file in this folder"));
+    std::fs::write(folder.path().join("metadata.yaml"), "").unwrap();
+    let (bytes, _) = recordings::record(recordings::run(), 1);
+    std::fs::write(folder.path().join("run_0.mcap"), &bytes).unwrap();
+    assert!(message().unwrap().ends_with("run_0.mcap"));
+    std::fs::write(folder.path().join("run_1.mcap"), &bytes).unwrap();
+    assert!(message().unwrap_err().ends_with("there are 2 .mcap files in this folder: name one"));
 }

@@ -93,7 +93,7 @@ impl Legged {
             stride_hz: spec.stride_hz,
             irregularity_turns: spec.irregularity_turns,
             wander: Wander::new(spec.stride_hz / 10.0, &mut seed.stream("motion/legged/stride")),
-            stride: Sines::new(spec.harmonics.iter().map(StrideSpec::line).collect()),
+            stride: Sines::new(spec.harmonics.iter().map(StrideSpec::line)),
         })
     }
 }

@@ -181,7 +181,7 @@ impl Marine {
             rest: PoseJet::at_rest(&water, heading),
             start_s: spec.still_s,
             onset,
-            waves: Sines::new(waves.into_iter().map(|wave| spec.hull.follows(wave)).collect()),
+            waves: Sines::new(waves.into_iter().map(|wave| spec.hull.follows(wave))),
             waterplane_from_base: Pose::translation(x, y, z),
         })
     }

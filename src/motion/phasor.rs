@@ -2,34 +2,54 @@
 //!
 //! Polynomials instead of the system's library: a loop over them is vectorised, and the bits are the same on every machine.
 
-/// Sine and cosine of `turns` whole turns, to 2e-16 for a fraction of a turn; an argument of `n` turns has the rounding of
-/// `n`.
+/// Sine and cosine of `turns` whole turns, to 1e-15 for a fraction of a turn; an argument of `n` turns has the rounding of
+/// `n`. Below 2^49 turns.
 #[inline]
 pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
-    // Adding and taking off 1.5 * 2^52 rounds to the nearest integer, without a branch.
+    // Adding 1.5 * 2^52 rounds to the nearest integer, and leaves it in the lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
-    let quarters = (turns * 4.0 + ROUND) - ROUND;
-    let angle = (turns - quarters * 0.25) * std::f64::consts::TAU;
-    let (sin, cos) = eighth(angle);
-    // The quarter that the angle lies in, 0..4, from the integer's own arithmetic.
-    let quarter = quarters - 4.0 * ((quarters * 0.25 - 0.375 + ROUND) - ROUND);
-    let swapped = quarter == 1.0 || quarter == 3.0;
-    let (a, b) = if swapped { (cos, sin) } else { (sin, cos) };
-    (if quarter >= 2.0 { -a } else { a }, if quarter == 1.0 || quarter == 2.0 { -b } else { b })
+    let rounded = turns * 4.0 + ROUND;
+    let quarter = rounded.to_bits();
+    let (sin, cos) = eighth((turns - (rounded - ROUND) * 0.25) * std::f64::consts::TAU);
+
+    // Odd quarters swap the two; sine is negative in quarters 2 and 3, cosine in 1 and 2. All without a branch.
+    let (sin, cos) = (sin.to_bits(), cos.to_bits());
+    let swapped = (sin ^ cos) & 0_u64.wrapping_sub(quarter & 1);
+    let sin_sign = (quarter & 2) << 62;
+    let cos_sign = (quarter.wrapping_add(1) & 2) << 62;
+    (f64::from_bits(sin ^ swapped ^ sin_sign), f64::from_bits(cos ^ swapped ^ cos_sign))
 }
 
-/// Sine and cosine within an eighth of a turn, by Taylor's polynomials: the first term left out is below 1e-17.
+/// Sine and cosine within an eighth of a turn, by Taylor's polynomials: the first term left out is below 1e-16.
 #[inline]
 fn eighth(y: f64) -> (f64, f64) {
+    const SIN: [f64; 8] = [
+        1.0,
+        -1.0 / 6.0,
+        1.0 / 120.0,
+        -1.0 / 5_040.0,
+        1.0 / 362_880.0,
+        -1.0 / 39_916_800.0,
+        1.0 / 6_227_020_800.0,
+        -1.0 / 1_307_674_368_000.0,
+    ];
+    const COS: [f64; 9] = [
+        1.0,
+        -1.0 / 2.0,
+        1.0 / 24.0,
+        -1.0 / 720.0,
+        1.0 / 40_320.0,
+        -1.0 / 3_628_800.0,
+        1.0 / 479_001_600.0,
+        -1.0 / 87_178_291_200.0,
+        1.0 / 20_922_789_888_000.0,
+    ];
     let y2 = y * y;
-    let mut sin = 1.0;
-    let mut cos = 1.0;
-    for k in (1..=8).rev() {
-        let n = f64::from(2 * k);
-        sin = 1.0 - sin * y2 * (1.0 / (n * (n + 1.0)));
-        cos = 1.0 - cos * y2 * (1.0 / (n * (n - 1.0)));
-    }
-    (sin * y, cos)
+    let s = SIN[0]
+        + y2 * (SIN[1] + y2 * (SIN[2] + y2 * (SIN[3] + y2 * (SIN[4] + y2 * (SIN[5] + y2 * (SIN[6] + y2 * SIN[7]))))));
+    let c = COS[4] + y2 * (COS[5] + y2 * (COS[6] + y2 * (COS[7] + y2 * COS[8])));
+    let c = COS[0] + y2 * (COS[1] + y2 * (COS[2] + y2 * (COS[3] + y2 * c)));
+    (s * y, c)
 }
 
 #[cfg(test)]

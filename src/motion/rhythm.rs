@@ -18,7 +18,7 @@ impl Wander {
     pub fn new(bandwidth_hz: f64, stream: &mut Stream) -> Self {
         let parts = even_parts((0.0, bandwidth_hz), TERMS, stream);
         let line = |part: Part| Line { cycles: part.at, amplitudes: [part.amplitude(1.0 / bandwidth_hz)] };
-        Self(Sines::new(parts.into_iter().map(line).collect()))
+        Self(Sines::new(parts.into_iter().map(line)))
     }
 
     /// The process at an instant.

@@ -239,7 +239,7 @@ impl DriveSpec {
                     cycles: part.at,
                     amplitudes: [part.phase * (share * level.displacement(part.at))],
                 };
-                Ok(Drive::Sines(Sines::new(parts.iter().map(line).collect())))
+                Ok(Drive::Sines(Sines::new(parts.iter().map(line))))
             }
         }
     }
@@ -253,7 +253,7 @@ fn multisine((first, last): (u32, u32), period_s: f64, level: Level) -> Sines<1>
         let amplitude = (2.0 / count).sqrt() * level.displacement(freq_hz);
         Line { cycles: freq_hz, amplitudes: [Complex::from_polar(amplitude, -PI * k * (k - 1.0) / count)] }
     };
-    Sines::new((first..=last).map(line).collect())
+    Sines::new((first..=last).map(line))
 }
 
 impl Drive {

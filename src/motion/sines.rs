@@ -16,31 +16,60 @@ pub(super) struct Line<const N: usize> {
     pub amplitudes: [Complex<f64>; N],
 }
 
+/// How many lines are worked on side by side.
+const LANES: usize = 8;
+
 /// `N` signals that are sums of sinusoids of the same frequencies.
 #[derive(Debug, Clone)]
 pub(super) struct Sines<const N: usize> {
-    lines: Vec<Line<N>>,
+    groups: Vec<Group<N>>,
+}
+
+/// Some lines side by side, the last ones of a sum filled up with silence.
+#[derive(Debug, Clone)]
+struct Group<const N: usize> {
+    cycles: [f64; LANES],
+    re: [[f64; LANES]; N],
+    im: [[f64; LANES]; N],
+}
+
+impl<const N: usize> Group<N> {
+    fn of(lines: &[Line<N>]) -> Self {
+        let lane = |of: &dyn Fn(&Line<N>) -> f64| std::array::from_fn(|lane| lines.get(lane).map_or(0.0, of));
+        Self {
+            cycles: lane(&|line| line.cycles),
+            re: std::array::from_fn(|output| lane(&|line| line.amplitudes[output].re)),
+            im: std::array::from_fn(|output| lane(&|line| line.amplitudes[output].im)),
+        }
+    }
 }
 
 impl<const N: usize> Sines<N> {
     /// The sum of `lines`.
-    pub fn new(lines: Vec<Line<N>>) -> Self {
-        Self { lines }
+    pub fn new(lines: impl IntoIterator<Item = Line<N>>) -> Self {
+        let lines: Vec<Line<N>> = lines.into_iter().collect();
+        Self { groups: lines.chunks(LANES).map(Group::of).collect() }
     }
 
     /// The signals at the argument `u`, with their derivatives by it.
     pub fn at(&self, u: f64) -> [Jet; N] {
-        let mut sums = [Jet::default(); N];
-        for line in &self.lines {
-            let (sin, cos) = sin_cos_turns(line.cycles * u);
-            let rate = TAU * line.cycles;
-            for (sum, amplitude) in sums.iter_mut().zip(&line.amplitudes) {
-                let x = amplitude.re * cos - amplitude.im * sin;
-                let quarter_on = amplitude.re * sin + amplitude.im * cos;
-                *sum += Jet { x, d: -rate * quarter_on, dd: -rate * rate * x };
+        // Value, first and second derivative of each output, a sum a lane: the lanes are added up at the end, in order.
+        let mut sums = [[[0.0; LANES]; 3]; N];
+        for Group { cycles, re, im } in &self.groups {
+            let phasors = cycles.map(|cycles| sin_cos_turns(cycles * u));
+            for (output, [x, d, dd]) in sums.iter_mut().enumerate() {
+                for lane in 0..LANES {
+                    let (sin, cos) = phasors[lane];
+                    let rate = TAU * cycles[lane];
+                    let value = re[output][lane] * cos - im[output][lane] * sin;
+                    let slope = rate * (re[output][lane] * sin + im[output][lane] * cos);
+                    x[lane] += value;
+                    d[lane] -= slope;
+                    dd[lane] -= rate * rate * value;
+                }
             }
         }
-        sums
+        sums.map(|[x, d, dd]| Jet { x: x.iter().sum(), d: d.iter().sum(), dd: dd.iter().sum() })
     }
 }
 
@@ -99,7 +128,7 @@ mod tests {
     #[test]
     fn a_line_is_its_cosine() {
         // Amplitude 2 exp(i 0.3) at 1.5 cycles: 2 cos(2 pi 1.5 u + 0.3).
-        let sines = Sines::new(vec![Line { cycles: 1.5, amplitudes: [Complex::from_polar(2.0, 0.3)] }]);
+        let sines = Sines::new([Line { cycles: 1.5, amplitudes: [Complex::from_polar(2.0, 0.3)] }]);
         let (u, rate) = (0.77, TAU * 1.5);
         let [jet] = sines.at(u);
         let (sin, cos) = (rate * u + 0.3).sin_cos();

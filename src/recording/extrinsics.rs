@@ -57,7 +57,7 @@ impl Reader {
     fn frames(&self) -> Result<FrameTree, RecordingError> {
         let is_static = |topic: &str| topic.trim_start_matches('/') == "tf_static";
         let channels =
-            self.channels().iter().filter(|c| is_static(&c.topic) && c.type_name == MessageType::Transforms.name());
+            self.channels().iter().filter(|c| is_static(&c.topic) && MessageType::Transforms.is_named(&c.type_name));
         let ids: Vec<u16> = channels.map(|channel| channel.id).collect();
         let tree = self.frames_among(self.messages_near(&ids), &ids)?;
         if ids.is_empty() || !tree.is_empty() { Ok(tree) } else { self.frames_among(self.messages(), &ids) }

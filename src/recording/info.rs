@@ -158,7 +158,7 @@ fn stamp_of(message: &RawMessage<'_>, channel: &Channel) -> Option<Stamp> {
         return None;
     }
     let mut input = Decoder::new(message.data).ok()?;
-    if channel.type_name == MessageType::Transforms.name() {
+    if MessageType::Transforms.is_named(&channel.type_name) {
         // The stamp of the first transform, behind their number.
         let count = input.u32().ok()?;
         return if count > 0 { input.time().ok() } else { None };

@@ -2,8 +2,8 @@
 
 use crate::recording::container::{BlockKind, Channel, Directory, Ending, Loaded, Messages, Source, walk};
 use crate::recording::{Loss, RecordingError};
-use std::io::{Read, Seek};
-use std::path::Path;
+use std::io::{Error, Read, Seek};
+use std::path::{Path, PathBuf};
 
 /// An MCAP recording. Opening it finds what is where; messages are read as they are asked for, a chunk or two in memory
 /// at a time, from files that are cut short or damaged as from whole ones.
@@ -16,11 +16,12 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Opens the file at `path`.
+    /// Opens the file at `path`, or the one in the folder at `path`, as rosbag2 makes them.
     ///
     /// # Errors
     /// When it cannot be opened or read, or is no MCAP file. A file that is cut short or damaged is opened.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let path = &file_of(path)?;
         let file =
             std::fs::File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         Self::new(&path.display().to_string(), file)
@@ -91,6 +92,22 @@ impl Reader {
     /// How many messages the summary counts.
     pub(super) fn expected_messages(&self) -> Option<u64> {
         self.directory.expected_messages
+    }
+}
+
+/// The recording in a folder; a path to anything else is that of a recording already.
+fn file_of(path: &Path) -> Result<PathBuf, RecordingError> {
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let at = |source: Error| RecordingError::File { path: path.to_owned(), source };
+    let entries = std::fs::read_dir(path).map_err(at)?.collect::<Result<Vec<_>, _>>().map_err(at)?;
+    let mut files: Vec<_> = entries.into_iter().map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "mcap"));
+    match (files.pop(), files.len()) {
+        (Some(file), 0) => Ok(file),
+        (None, _) => Err(at(Error::other("there is no .mcap file in this folder"))),
+        (_, more) => Err(at(Error::other(format!("there are {} .mcap files in this folder: name one", more + 1)))),
     }
 }
 

@@ -82,6 +82,13 @@ impl MessageType {
         }
     }
 
+    /// Whether `name` is this type's; some writers leave `msg` out of it.
+    pub fn is_named(self, name: &str) -> bool {
+        let full = self.name();
+        name == full
+            || full.split_once("/msg/").is_some_and(|(package, kind)| name.split_once('/') == Some((package, kind)))
+    }
+
     /// The definition with those it depends on, as `ros2msg` wants it: each after a line of `=` and its name.
     pub fn definition(self) -> String {
         let root = self.name().replace("/msg/", "/");

@@ -105,7 +105,7 @@ impl Reader {
     ) -> Result<Vec<Candidate>, RecordingError> {
         let mut open = BTreeMap::new();
         for channel in self.channels().iter().filter(|channel| channel.encoding == "cdr") {
-            let kind = types.iter().find(|kind| kind.name() == channel.type_name);
+            let kind = types.iter().find(|kind| kind.is_named(&channel.type_name));
             let wanted = asked.map_or(!channel.topic.starts_with(TRUTH_PREFIX), |asked| asked == channel.topic);
             if let Some(kind) = kind.filter(|_| wanted) {
                 open.insert(channel.id, (*kind, channel.topic.as_str()));

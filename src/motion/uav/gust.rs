@@ -91,7 +91,7 @@ pub(super) fn horizontal(spec: &UavSpec, axis: Axis, stream: &mut Stream) -> Sin
         let command = -moved * Complex::new(natural * natural, 2.0 * spec.hold_damping * natural * rate);
         Line { cycles: freq_hz, amplitudes: [moved, command / STANDARD_GRAVITY_M_PER_S2] }
     };
-    Sines::new(spec.gust.parts(axis, spec.height_m, stream).into_iter().map(line).collect())
+    Sines::new(spec.gust.parts(axis, spec.height_m, stream).into_iter().map(line))
 }
 
 /// Displacement (m) by the gusts up and down.
@@ -100,7 +100,7 @@ pub(super) fn vertical(spec: &UavSpec, stream: &mut Stream) -> Sines<1> {
         cycles: freq_hz,
         amplitudes: [gust * displacement(spec, TAU * freq_hz)],
     };
-    Sines::new(spec.gust.parts(Axis::Up, spec.height_m, stream).into_iter().map(line).collect())
+    Sines::new(spec.gust.parts(Axis::Up, spec.height_m, stream).into_iter().map(line))
 }
 
 #[cfg(test)]
@@ -128,7 +128,7 @@ mod tests {
         for axis in [Axis::Along, Axis::Across, Axis::Up] {
             let mut stream = Seed(4).stream("gust");
             let line = |(freq_hz, gust)| Line { cycles: freq_hz, amplitudes: [gust] };
-            let gusts = Sines::new(WIND.parts(axis, 30.48, &mut stream).into_iter().map(line).collect());
+            let gusts = Sines::new(WIND.parts(axis, 30.48, &mut stream).into_iter().map(line));
             let samples: Vec<f64> = (0..60_000).map(|k| gusts.at(0.05 * f64::from(k))[0].x).collect();
             let spectrum = power_density(&samples, 20.0, Segments::hann(4096)).unwrap();
             // Octaves of some 15 sinusoids against the formula's integral.

@@ -53,7 +53,7 @@ impl Engine {
             let phase = Complex::from_polar(1.0, TAU * stream.random::<f64>());
             Line { cycles: order.order, amplitudes: order.acceleration_m_per_s2.map(|a| phase * (a / square)) }
         };
-        let shaking = Sines::new(spec.orders.iter().map(line).collect());
+        let shaking = Sines::new(spec.orders.iter().map(line));
         let wander = Wander::new(0.5, stream);
         Self { turns_per_s, irregularity_turns: spec.irregularity_turns, wander, shaking }
     }

@@ -61,3 +61,46 @@ pub fn decode(message: &[u8]) -> Result<ImuSample, DecodeError> {
     let specific_force_m_per_s2 = input.vector()?;
     Ok(ImuSample { stamp, angular_velocity_rad_per_s, specific_force_m_per_s2 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vector;
+    use crate::time::Stamp;
+
+    #[test]
+    fn orientation_is_not_measured_and_variances_are_those_of_a_sample() {
+        let sample = ImuSample {
+            stamp: Stamp::from_nanos(1),
+            angular_velocity_rad_per_s: Vector::new(1.0, 2.0, 3.0),
+            specific_force_m_per_s2: Vector::new(0.0, 0.0, 9.81),
+        };
+        let mut bytes = Vec::new();
+        let variances = Variances { gyro: 2.5e-5, accel: 6.4e-5 };
+        encode(&mut Encoder::new(&mut bytes), "imu_link", &sample, &variances).unwrap();
+        let mut input = Decoder::new(&bytes).unwrap();
+        input.header().unwrap();
+        assert_eq!(input.f64s().unwrap(), [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(input.f64().unwrap(), -1.0);
+        input.f64s::<11>().unwrap();
+        assert_eq!(input.f64s().unwrap(), [2.5e-5, 0.0, 0.0, 0.0, 2.5e-5, 0.0, 0.0, 0.0, 2.5e-5]);
+        assert_eq!(decode(&bytes).unwrap(), sample);
+    }
+
+    #[test]
+    fn a_density_of_5e_4_at_100_hz_is_a_sigma_of_5e_3() {
+        // sigma = density sqrt(rate) = 5e-4 * 10.
+        let noise = ImuNoise {
+            gyro_density_rad_per_s_per_sqrt_hz: 5e-4,
+            accel_density_m_per_s2_per_sqrt_hz: 8e-4,
+            gyro_bias_walk_rad_per_s_per_sqrt_s: 0.0,
+            accel_bias_walk_m_per_s2_per_sqrt_s: 0.0,
+            gyro_turn_on_bias_rad_per_s: 0.0,
+            accel_turn_on_bias_m_per_s2: 0.0,
+            gyro_limit_rad_per_s: 1.0,
+            accel_limit_m_per_s2: 1.0,
+        };
+        let variances = Variances::of(&noise, 100.0);
+        assert!((variances.gyro.sqrt() - 5e-3).abs() < 1e-15 && (variances.accel.sqrt() - 8e-3).abs() < 1e-15);
+    }
+}

@@ -13,6 +13,9 @@ use fields::{FLOAT32, Field, UINT32};
 /// Bytes of a point as [`encode`] writes it: x, y, z, intensity, t.
 const POINT_STEP: usize = 20;
 
+/// Most points that room is made for beforehand.
+const MOST_EXPECTED: usize = 1 << 20;
+
 /// Most fields of a point that a cloud may name.
 const MOST_FIELDS: usize = 256;
 
@@ -113,6 +116,8 @@ impl<'a> Cloud<'a> {
         let (point_step, row_step) = (input.u32()? as usize, input.u32()? as usize);
         let data = input.bytes()?;
         let row = width.checked_mul(point_step).ok_or(DecodeError::Short)?;
+        // Of a cloud in one row, some writers leave out how long the row is.
+        let row_step = if height == 1 { row } else { row_step };
         let whole = height.checked_mul(row_step).ok_or(DecodeError::Short)?;
         if whole > data.len() || row > row_step {
             return Err(DecodeError::Contradiction("a cloud has less data than its width and height say"));
@@ -147,7 +152,7 @@ pub fn decode(message: &[u8]) -> Result<LidarScan, DecodeError> {
     if let Some(time) = &mut time {
         time.learn(cloud.stamp, cloud.points(), cloud.big_endian);
     }
-    let mut returns = Vec::with_capacity(cloud.data.len() / cloud.point_step.max(1));
+    let mut returns = Vec::with_capacity((cloud.data.len() / cloud.point_step.max(1)).min(MOST_EXPECTED));
     for bytes in cloud.points() {
         let number = |field: &Field<'_>| field.number(bytes, cloud.big_endian) as f32;
         let point_in_laser = nalgebra::Vector3::new(number(x), number(y), number(z));

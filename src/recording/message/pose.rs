@@ -63,3 +63,30 @@ pub fn encode_path<'p>(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Vector, from_roll_pitch_yaw};
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn the_twist_of_odometry_is_in_the_moving_frame() {
+        // Facing left of the world's x (yaw 90 degrees), moving along the world's y: forward. Turning about z is the same in both.
+        let pose = Pose::from_parts([1.0, 2.0, 3.0].into(), from_roll_pitch_yaw(0.0, 0.0, std::f64::consts::FRAC_PI_2));
+        let body = Kinematics {
+            velocity_in_world: Vector::new(0.0, 2.0, 0.5),
+            angular_velocity_in_world: Vector::new(0.0, 0.3, 1.0),
+            ..Kinematics::at_rest(pose)
+        };
+        let mut bytes = Vec::new();
+        encode_odometry(&mut Encoder::new(&mut bytes), ("map", "head"), Stamp::from_nanos(5), &body).unwrap();
+        let mut input = Decoder::new(&bytes).unwrap();
+        assert_eq!(input.header().unwrap(), (Stamp::from_nanos(5), "map"));
+        assert_eq!(input.string().unwrap(), "head");
+        assert_eq!(input.pose().unwrap(), pose);
+        assert_eq!(input.f64s::<36>().unwrap(), [0.0; 36]);
+        assert_relative_eq!(input.vector().unwrap(), Vector::new(2.0, 0.0, 0.5), epsilon = 1e-15);
+        assert_relative_eq!(input.vector().unwrap(), Vector::new(0.3, 0.0, 1.0), epsilon = 1e-15);
+    }
+}

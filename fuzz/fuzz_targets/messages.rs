@@ -1,0 +1,62 @@
+//! Any bytes as ROS 2 messages of each kind, in a file that is sound: one of every topic, then the one in question.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use std::io::Cursor;
+use zsim_fuzz::read_all;
+
+const TOPICS: [(&str, &str); 6] = [
+    ("/scan", "sensor_msgs/msg/LaserScan"),
+    ("/points", "sensor_msgs/msg/PointCloud2"),
+    ("/imu/data", "sensor_msgs/msg/Imu"),
+    ("/tf_static", "tf2_msgs/msg/TFMessage"),
+    ("/ground_truth/pose", "geometry_msgs/msg/PoseStamped"),
+    ("/ground_truth/clock", "sensor_msgs/msg/TimeReference"),
+];
+
+fn string(into: &mut Vec<u8>, text: &str) {
+    into.extend((text.len() as u32).to_le_bytes());
+    into.extend(text.as_bytes());
+}
+
+fn record(into: &mut Vec<u8>, opcode: u8, fields: &[u8]) {
+    into.push(opcode);
+    into.extend((fields.len() as u64).to_le_bytes());
+    into.extend(fields);
+}
+
+fn define(file: &mut Vec<u8>, id: u16, (topic, kind): (&str, &str)) {
+    let mut schema = id.to_le_bytes().to_vec();
+    string(&mut schema, kind);
+    string(&mut schema, "ros2msg");
+    string(&mut schema, "std_msgs/Header header\n");
+    record(file, 3, &schema);
+    let mut channel = [id.to_le_bytes(), id.to_le_bytes()].concat();
+    string(&mut channel, topic);
+    string(&mut channel, "cdr");
+    channel.extend(0_u32.to_le_bytes());
+    record(file, 4, &channel);
+}
+
+fn message(file: &mut Vec<u8>, id: u16, data: &[u8]) {
+    let mut fields = id.to_le_bytes().to_vec();
+    fields.extend([0; 20]);
+    // Little-endian CDR leads every message, so that the fuzzer need not find it.
+    fields.extend([0, 1, 0, 0]);
+    fields.extend(data);
+    record(file, 5, &fields);
+}
+
+fuzz_target!(|data: &[u8]| {
+    let Some((kind, data)) = data.split_first() else { return };
+    let mut file = b"\x89MCAP0\r\n".to_vec();
+    for (id, topic) in (1..).zip(TOPICS) {
+        define(&mut file, id, topic);
+    }
+    // An IMU sample and an empty scan, all zeros, that a selection can be made from.
+    message(&mut file, 3, &[0; 400]);
+    message(&mut file, 1, &[0; 64]);
+    message(&mut file, u16::from(kind % 6) + 1, data);
+    read_all(Cursor::new(file));
+});

@@ -1,0 +1,38 @@
+//! What every target that reads a recording does with it.
+
+use std::io::{Read, Seek};
+use zsim::geometry::Pose;
+use zsim::measurement::{Calibration, ImuNoise, LidarNoise};
+use zsim::recording::{Preference, Reader};
+use zsim::time::Span;
+
+/// Reads all that can be read of a recording, by each way there is.
+pub fn read_all(file: impl Read + Seek + Send + 'static) {
+    let Ok(reader) = Reader::new("fuzz", file) else { return };
+    let _ = reader.info(Span::from_seconds(0.1));
+    reader.truth().for_each(drop);
+    let preferences = [None, Some("/points".to_owned())];
+    for lidar_topic in preferences {
+        let Ok(selection) = reader.select(&Preference { lidar_topic, imu_topic: None }) else { continue };
+        let _ = reader.calibration(&selection, &calibration(), None);
+        reader.measurements(&selection).for_each(drop);
+    }
+}
+
+fn calibration() -> Calibration {
+    Calibration {
+        head_from_laser: Pose::identity(),
+        head_from_imu: Pose::identity(),
+        imu: ImuNoise {
+            gyro_density_rad_per_s_per_sqrt_hz: 0.0,
+            accel_density_m_per_s2_per_sqrt_hz: 0.0,
+            gyro_bias_walk_rad_per_s_per_sqrt_s: 0.0,
+            accel_bias_walk_m_per_s2_per_sqrt_s: 0.0,
+            gyro_turn_on_bias_rad_per_s: 0.0,
+            accel_turn_on_bias_m_per_s2: 0.0,
+            gyro_limit_rad_per_s: 1.0,
+            accel_limit_m_per_s2: 1.0,
+        },
+        lidar: LidarNoise { near_sigma_m: 0.0, near_m: 1.0, far_sigma_m: 0.0, far_m: 2.0 },
+    }
+}

@@ -1,0 +1,71 @@
+//! The times of points, in each way that drivers tell them.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod foreign;
+
+use foreign::{FLOAT32, FLOAT64, Foreign, IMU, POINTS, UINT32, cloud, imu, scans};
+use zsim::time::{Span, Stamp};
+
+#[test]
+fn every_way_to_tell_a_points_time_gives_the_same_scan() {
+    let stamp_ns = 1_700_000_000_250_000_000_i64;
+    let stamp_s = stamp_ns as f64 * 1e-9;
+    let at = |k: usize| k as f64 * 1e-3;
+    let f32s =
+        |f: &dyn Fn(usize) -> f64| -> Vec<Vec<u8>> { (0..50).map(|k| (f(k) as f32).to_le_bytes().to_vec()).collect() };
+    let f64s = |f: &dyn Fn(usize) -> f64| -> Vec<Vec<u8>> { (0..50).map(|k| f(k).to_le_bytes().to_vec()).collect() };
+    let u32s = |f: &dyn Fn(usize) -> u32| -> Vec<Vec<u8>> { (0..50).map(|k| f(k).to_le_bytes().to_vec()).collect() };
+    let ways = [
+        ("t", UINT32, u32s(&|k| k as u32 * 1_000_000)),
+        ("offset_time", UINT32, u32s(&|k| k as u32 * 1_000_000)),
+        ("time", FLOAT32, f32s(&at)),
+        ("timestamp", FLOAT64, f64s(&|k| stamp_s + at(k))),
+        ("timestamp", FLOAT64, f64s(&|k| stamp_ns as f64 + k as f64 * 1e6)),
+        ("timestamp", FLOAT64, f64s(&|k| (stamp_s + at(k)) * 1e6)),
+        ("t", FLOAT32, f32s(&|k| at(k) * 1e9)),
+    ];
+    for (name, kind, times) in ways {
+        let mut foreign = Foreign::new(mcap::WriteOptions::new());
+        foreign.message("/imu", IMU, stamp_ns, &imu(stamp_ns, "imu"));
+        foreign.message("/points", POINTS, stamp_ns, &cloud(stamp_ns, (name, kind), &times));
+        let scan = &scans(&foreign.reader())[0];
+        assert_eq!(scan.returns.len(), 50, "{name} {kind}");
+        for (k, point) in scan.returns.iter().enumerate() {
+            let stamp = scan.stamp + point.offset;
+            // A double of seconds since 1970 holds 0.24 us.
+            let off_ns = (stamp - Stamp::from_nanos(stamp_ns + k as i64 * 1_000_000)).nanos();
+            assert!(off_ns.abs() < 500, "{name} {kind}: point {k} is off by {off_ns} ns");
+            assert_eq!(point.point_in_laser.z, 3.0 + k as f32);
+        }
+    }
+}
+
+#[test]
+fn a_cloud_stamped_at_its_end_begins_with_its_first_point() {
+    // Velodyne's driver stamps the last packet: times are negative seconds. Rows are rings, so times go up and down.
+    let times: Vec<_> = [-0.09_f32, -0.05, 0.0, -0.10, -0.04].iter().map(|t| t.to_le_bytes().to_vec()).collect();
+    let stamp_ns = 1_700_000_000_000_000_000;
+    let mut foreign = Foreign::new(mcap::WriteOptions::new());
+    foreign.message("/imu", IMU, stamp_ns, &imu(stamp_ns, "imu"));
+    foreign.message("/velodyne_points", POINTS, stamp_ns, &cloud(stamp_ns, ("time", FLOAT32), &times));
+    let scan = &scans(&foreign.reader())[0];
+    assert!((scan.stamp - Stamp::from_nanos(stamp_ns - 100_000_000)).nanos().abs() < 10);
+    let zs: Vec<_> = scan.returns.iter().map(|r| r.point_in_laser.z).collect();
+    assert_eq!(zs, [6.0, 3.0, 4.0, 7.0, 5.0]);
+    assert_eq!(scan.returns[0].offset, Span::ZERO);
+}
+
+#[test]
+fn times_in_a_simulation_that_starts_at_zero_are_told_apart() {
+    // Absolute seconds, small because the clock is: at 2.0 s, points from 2.00 to 2.09 s.
+    for (stamp_ns, first_s) in [(2_000_000_000_i64, 2.0), (0, 0.0), (50_000_000, 0.05)] {
+        let times: Vec<_> = (0..10).map(|k| (first_s + 0.01 * f64::from(k)).to_le_bytes().to_vec()).collect();
+        let mut foreign = Foreign::new(mcap::WriteOptions::new());
+        foreign.message("/imu", IMU, 0, &imu(0, "imu"));
+        foreign.message("/points", POINTS, 0, &cloud(stamp_ns, ("timestamp", FLOAT64), &times));
+        let scan = &scans(&foreign.reader())[0];
+        assert_eq!(scan.stamp.nanos(), stamp_ns);
+        assert_eq!(scan.returns[9].offset.nanos(), 90_000_000);
+    }
+}
