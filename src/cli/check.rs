@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     for (file, result) in &checked {
         match result {
             Ok(kind) => {
-                words += &format!("{file}: a {} that is right\n", kind.noun());
+                words += &format!("{file}: {}, right\n", kind.noun());
                 figures.push(json!({ "file": file, "kind": kind.noun(), "error": null }));
             }
             Err(error) => {

@@ -6,7 +6,7 @@ use super::bars::{Bars, stop_flag};
 use super::{journey, output};
 use clap::Args;
 use std::path::PathBuf;
-use zsim::recording::Preference;
+use zsim::recording::{Preference, Reader};
 use zsim::study::{self, Watch, Wishes};
 
 /// Estimate trajectory and map from a recording, whoever made it
@@ -45,8 +45,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         topics: Preference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
         ..arguments.estimator.wishes()?
     };
-    // A recording that is not there leaves no folder behind.
-    zsim::recording::Reader::open(&arguments.recording)?;
+    // A recording that is not there, or without a sensor that is needed, leaves no folder behind.
+    Reader::open(&arguments.recording)?.select(&wishes.topics)?;
     let stem = arguments.recording.file_stem().unwrap_or_default().to_string_lossy();
     let wanted = arguments.out.out.clone().unwrap_or_else(|| journey::default_folder(&stem));
     let folder = output::folder(&wanted, arguments.out.force)?;

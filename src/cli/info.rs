@@ -36,7 +36,7 @@ fn words(info: &RecordingInfo) -> String {
     let made = if info.has_manifest { ", made by zsim" } else { "" };
     let head = format!("{}: {:.3} s, {} messages, {mebibytes:.1} MiB{made}", info.name, info.duration_s, info.messages);
     let topics = report::table(
-        &["topic", "type", "messages", "Hz", "longest s", "gaps", "missing", "late"],
+        &["topic", "type", "count", "Hz", "max s", "gaps", "lost", "late"],
         &info.topics.iter().map(topic_row).collect::<Vec<_>>(),
         true,
     );

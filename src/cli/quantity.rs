@@ -5,6 +5,10 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let unit_at = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
     let (number, unit) = text.split_at(unit_at);
+    let number: f64 = number
+        .trim()
+        .parse()
+        .map_err(|_| format!("`{text}` is no length of time; write a number and a unit, as in 120s or 2min"))?;
     let factor = match unit {
         "" | "s" | "sec" => 1.0,
         "ms" => 1e-3,
@@ -12,10 +16,6 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
         "h" => 3600.0,
         _ => return Err(format!("`{unit}` is no unit of time; use ms, s, min or h, as in 120s or 2min")),
     };
-    let number: f64 = number
-        .trim()
-        .parse()
-        .map_err(|_| format!("`{text}` is no length of time; write a number and a unit, as in 120s or 2min"))?;
     let seconds = number * factor;
     if seconds.is_finite() && seconds > 0.0 { Ok(seconds) } else { Err("a length of time is above zero".to_owned()) }
 }

@@ -1,7 +1,7 @@
 //! Tables for the terminal, 80 columns wide at most.
 
 use super::{Metrics, rows};
-use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle};
 
 /// Widest table, columns.
 const WIDTH: u16 = 80;
@@ -16,6 +16,15 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
         table.set_header(header.to_vec());
     }
     table.add_rows(rows.iter().cloned());
+    // Many columns stand closer, and what a row is called is not broken.
+    let padding = if table.column_count() > 6 { (0, 1) } else { (1, 1) };
+    table.column_iter_mut().for_each(|column| {
+        column.set_padding(padding);
+    });
+    let widest_name = table.column_max_content_widths().first().copied().unwrap_or_default();
+    if let Some(names) = table.column_mut(0).filter(|_| widest_name <= WIDTH / 2) {
+        names.set_constraint(ColumnConstraint::ContentWidth);
+    }
     if numbers {
         table.column_iter_mut().skip(1).for_each(|column| {
             column.set_cell_alignment(CellAlignment::Right);

@@ -90,8 +90,9 @@ pub(super) fn estimate_in(
     notes_on(&selection, &found, wishes, watch);
 
     let how = (&wishes.estimator, &found.calibration);
-    let run = run_open_loop(reader, &selection, how, &folder.join("open_loop.tum"), watch)?;
-    run.warnings.iter().for_each(|warning| watch.note(&warning.to_string()));
+    let expected_s = origin.simulation.map(|summary| summary.duration_s);
+    let run = run_open_loop(reader, &selection, how, &folder.join("open_loop.tum"), expected_s, watch)?;
+    run.remarks.iter().for_each(|remark| watch.note(remark));
 
     let known = match found.body_frame == TRUE_FRAME {
         true => judge::truth_of(reader, &run.map_from_head, watch)?,

@@ -1,6 +1,6 @@
 //! Whole experiments, out of the rooms below.
 //!
-//! [`journey`] is the one that everything else varies: simulate and record, estimate from the recording, judge, report.
+//! [`journey()`] is the one that everything else varies: simulate and record, estimate from the recording, judge, report.
 //! [`estimate_recording`] is its second half, for anybody's recording.
 
 mod artefacts;

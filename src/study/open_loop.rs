@@ -21,8 +21,8 @@ pub(super) struct OpenLoopRun {
     pub map_from_head: Trajectory,
     /// The estimated clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
-    /// What the estimator has to say of it.
-    pub warnings: Vec<Warning>,
+    /// What the estimator has to say of it beside the losses, a sentence each.
+    pub remarks: Vec<String>,
     /// What of the recording was lost or left out, a sentence each.
     pub losses: Vec<String>,
     /// Echoes in the recording.
@@ -34,11 +34,13 @@ pub(super) struct OpenLoopRun {
 }
 
 /// Estimates from what `reader` reads; poses go to the TUM file `tum` as they become final.
+/// `expected_s` is the recording's length, where it is known, for the progress.
 pub(super) fn run_open_loop(
     reader: &Reader,
     selection: &Selection,
     how: (&EstimatorSpec, &Calibration),
     tum: &Path,
+    expected_s: Option<f64>,
     watch: &mut Watch,
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
@@ -52,7 +54,7 @@ pub(super) fn run_open_loop(
         estimator.push(measurement)?;
         if index % TELL_EVERY == 0 {
             written.take(&estimator.take_poses())?;
-            watch.progress(Stage::Estimating, heard.seconds(), None);
+            watch.progress(Stage::Estimating, heard.seconds(), expected_s);
             if watch.is_stopped() {
                 written.tum.finish()?;
                 return Err(StudyError::Stopped);
@@ -66,11 +68,12 @@ pub(super) fn run_open_loop(
     let mut losses = measurements.loss().sentences();
     losses.extend(heard.imu.missing("IMU samples"));
     losses.extend(heard.lidar.missing("scans"));
-    losses.extend(result.warnings.iter().filter(|warning| is_loss(&warning.kind)).map(Warning::to_string));
+    let start = heard.start();
+    losses.extend(result.warnings.iter().filter(|warning| is_loss(&warning.kind)).map(|w| since(start, w)));
     Ok(OpenLoopRun {
         map_from_head: written.map_from_head,
         clock_offsets: result.clock_offsets,
-        warnings: result.warnings,
+        remarks: result.warnings.iter().filter(|w| !is_loss(&w.kind)).map(|w| since(start, w)).collect(),
         losses,
         returns: heard.returns,
         acquisition_s: heard.seconds(),
@@ -79,7 +82,7 @@ pub(super) fn run_open_loop(
 }
 
 /// Whether a warning says that measurements were not there, or not used: an estimate with loss.
-pub(super) fn is_loss(kind: &WarningKind) -> bool {
+fn is_loss(kind: &WarningKind) -> bool {
     matches!(
         kind,
         WarningKind::ImuGap { .. }
@@ -87,6 +90,11 @@ pub(super) fn is_loss(kind: &WarningKind) -> bool {
             | WarningKind::Ended { .. }
             | WarningKind::LeftOut { .. }
     )
+}
+
+/// A warning with its time since the start.
+fn since(start: Stamp, warning: &Warning) -> String {
+    format!("{:.2} s after the start: {}", warning.stamp.seconds_since(start), warning.kind)
 }
 
 /// Poses on disk and in memory.
@@ -124,6 +132,11 @@ impl Heard {
                 self.returns += scan.returns.len();
             }
         }
+    }
+
+    fn start(&self) -> Stamp {
+        let spans = [self.imu.span(), self.lidar.span()];
+        spans.into_iter().flatten().map(|(first, _)| first).min().unwrap_or_default()
     }
 
     fn seconds(&self) -> f64 {

@@ -68,10 +68,10 @@ impl Registration<'_> {
             watch,
         };
         write_result(result, self.body_frame, self.map_from_head, beams.by_ref())?;
+        beams.ply.finish()?;
         if let Some(failure) = beams.failure {
             return Err(failure);
         }
-        beams.ply.finish()?;
         Ok(Registered {
             points: beams.points as u64,
             in_map: beams.in_map,
