@@ -69,8 +69,9 @@ pub enum WarningKind {
         /// How long, s.
         seconds: f64,
     },
-    /// A gap too long to bridge: the estimate ends here, later measurements were left out.
-    Ended {
+    /// No IMU sample for `seconds`, too long to bridge: the estimate began again behind it, where it had stopped, and what
+    /// the head did meanwhile is missing from it.
+    BeganAgain {
         /// How long the gap was, s.
         seconds: f64,
     },
@@ -115,9 +116,11 @@ impl fmt::Display for WarningKind {
             Self::StartedInMotion => write!(f, "the head moved at the start; level and gyro bias start less certain"),
             Self::ImuGap { seconds } => write!(f, "no IMU sample for {seconds:.3} s; bridged at constant rates"),
             Self::LidarGap { seconds } => write!(f, "no lidar scan for {seconds:.3} s; carried by the IMU alone"),
-            Self::Ended { seconds } => {
-                write!(f, "a gap of {seconds:.3} s is too long to bridge; the estimate ends here")
-            }
+            Self::BeganAgain { seconds } => write!(
+                f,
+                "no IMU sample for {seconds:.3} s, too long to bridge; began again where the estimate had stopped, so what \
+                 the head did meanwhile is missing"
+            ),
             Self::LeftOut { what, count } => {
                 write!(f, "{count} {what} came late or ran backwards in time, and were left out")
             }

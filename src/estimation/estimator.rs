@@ -1,5 +1,5 @@
 use super::border::Border;
-use super::initial::{self, Beginning};
+use super::initial::{self, Beginning, Carried};
 use super::intake::{Intake, Stretch};
 use super::strapdown::Interval;
 use super::surfel::SurfelMaker;
@@ -23,6 +23,8 @@ pub struct Estimator {
     /// Stretches that wait until there are enough to begin.
     waiting: Vec<Stretch>,
     window: Option<Window>,
+    /// What was known when the IMU last fell silent, until the window behind it is level with it.
+    carried: Option<Carried>,
     views: Views,
     next_pose: Option<Stamp>,
     poses: Vec<EstimatedPose>,
@@ -46,6 +48,7 @@ impl Estimator {
             intake: Intake::new(spec, calibration),
             waiting: Vec::new(),
             window: None,
+            carried: None,
             views: Views::new(&spec.views, spec.fixed_views),
             next_pose: None,
             poses: Vec::new(),
@@ -97,6 +100,9 @@ impl Estimator {
     /// surfels may become a fixed view.
     fn advance(&mut self, stretch: Stretch) {
         self.warnings.extend(self.intake.take_warnings());
+        if stretch.after_silence {
+            self.pause();
+        }
         self.waiting.push(stretch);
         self.begin(false);
         let Some(window) = &mut self.window else { return };
@@ -105,6 +111,11 @@ impl Estimator {
             window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
             let solved = window.solve(&self.views);
             window.remake_newest();
+            if window.is_full()
+                && let Some(carried) = self.carried.take()
+            {
+                window.level_as(&carried);
+            }
             let mut final_until_s = None;
             if window.is_full()
                 && let Some((placed, _)) = window.let_go()
@@ -128,6 +139,19 @@ impl Estimator {
         }
     }
 
+    /// The IMU fell silent: what the window holds is final, and the estimate will begin again behind the silence.
+    fn pause(&mut self) {
+        self.waiting.clear();
+        let Some(window) = &self.window else { return };
+        let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
+        self.carried = window.carried();
+        self.hand_out(end_s);
+        self.window = None;
+        self.next_pose = None;
+        // Where the head is now in the old views is unknown: matched by chance, they would bend the new stretch.
+        self.views = Views::new(&self.spec.views, self.spec.fixed_views);
+    }
+
     /// Begins, when enough of the start is there to tell rest from motion; with `last`, with whatever there is.
     fn begin(&mut self, last: bool) {
         if self.window.is_some() {
@@ -147,10 +171,21 @@ impl Estimator {
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
         let specs = (&self.spec.inertial, &self.spec.clock);
         let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, specs);
-        if beginning.rest.is_none() {
-            self.warnings.push(Warning { stamp: self.intake.stamp(*start_s), kind: WarningKind::StartedInMotion });
-        }
-        self.window = Some(self.first_window(&beginning, *start_s));
+        self.window = Some(match &self.carried {
+            Some(carried) => {
+                let beginning = beginning.going_on_from(carried);
+                let mut window = self.first_window(&beginning, *start_s);
+                window.take_over(carried);
+                window
+            }
+            None => {
+                if beginning.rest.is_none() {
+                    let stamp = self.intake.stamp(*start_s);
+                    self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
+                }
+                self.first_window(&beginning, *start_s)
+            }
+        });
     }
 
     fn first_window(&self, beginning: &Beginning, start_s: f64) -> Window {

@@ -56,6 +56,12 @@ impl InertialStream {
         std::mem::take(&mut self.saturated)
     }
 
+    /// Forgets the samples so far: the next interval does not follow on from the last.
+    pub(super) fn begin_again(&mut self) {
+        self.group.clear();
+        (self.before, self.current, self.end_s) = (None, None, None);
+    }
+
     /// Takes a sample stamped `raw_s`, and appends the intervals it completes to `into`, each with its start.
     pub(super) fn push(&mut self, raw_s: f64, sample: &ImuSample, into: &mut Vec<(f64, Interval)>) {
         let (gyro, accel) = (sample.angular_velocity_rad_per_s, sample.specific_force_m_per_s2);

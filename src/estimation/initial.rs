@@ -1,5 +1,6 @@
 //! Where an estimate begins: level, biases, and whether the head rested.
 
+use super::clock::Clock;
 use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
 use super::spec::{ClockSpec, InertialSpec};
 use super::strapdown::{Biases, Interval, State};
@@ -30,6 +31,27 @@ pub(super) struct Rest {
     force: Vector,
 }
 
+/// What an estimate knew when the IMU fell silent, from which it begins again.
+#[derive(Debug, Clone)]
+pub(super) struct Carried {
+    pub(super) state: State,
+    pub(super) biases: Biases,
+    pub(super) gravity: Vector,
+    pub(super) clock: Clock,
+}
+
+impl Beginning {
+    /// The same beginning, where an estimate had stopped: level as the force says now, heading and place as they were.
+    pub(super) fn going_on_from(mut self, carried: &Carried) -> Self {
+        let yaw = |rotation: &Rotation| roll_pitch_yaw(rotation).2;
+        let turn = yaw(&carried.state.rotation) - yaw(&self.state.rotation);
+        self.state.rotation = Rotation::from_axis_angle(&Vector::z_axis(), turn) * self.state.rotation;
+        self.state.position = carried.state.position;
+        self.biases = carried.biases;
+        self
+    }
+}
+
 impl Rest {
     /// Whether an interval says the same, within its noise.
     pub(super) fn goes_on(&self, interval: &Interval) -> bool {
@@ -39,7 +61,8 @@ impl Rest {
 }
 
 /// Looks at the first intervals: at rest their mean is the gyroscope's bias and the way up. In motion the mean force is
-/// taken for the way up all the same (over a second or more a hand's accelerations cancel), with little trust.
+/// taken for the way up all the same, turned back by the gyroscope to where the head began (over a second or more a hand's
+/// accelerations cancel), with little trust.
 ///
 /// The map's origin is the head's first position, and its x axis points where the head's does.
 pub(super) fn begin(
@@ -54,7 +77,8 @@ pub(super) fn begin(
     let rest = Rest { gyro, force };
     let at_rest = intervals.iter().all(|interval| rest.goes_on(interval))
         && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
-    let up = Rotation::rotation_between(&force, &Vector::z()).unwrap_or_else(Rotation::identity);
+    let upward = if at_rest { force } else { mean_force_at_start(intervals) };
+    let up = Rotation::rotation_between(&upward, &Vector::z()).unwrap_or_else(Rotation::identity);
     let (_, _, yaw) = roll_pitch_yaw(&(up * head_from_imu.rotation.inverse()));
     let rotation = Rotation::from_axis_angle(&Vector::z_axis(), -yaw) * up;
     let head_in_imu = head_from_imu.inverse().translation.vector;
@@ -75,6 +99,19 @@ pub(super) fn begin(
         velocity_sigma: if at_rest { 0.01 } else { 2.0 },
         information: information(gyro_sigma, at_rest, noise, spec),
     }
+}
+
+/// The mean force over `intervals` in the body as it stood at their start: the gyroscope turns it back, so a nod of the
+/// head does not tilt it; what is left beside gravity is the change of velocity by the time it took.
+fn mean_force_at_start(intervals: &[Interval]) -> Vector {
+    let mut start_from_body = Rotation::identity();
+    let mut impulse = Vector::zeros();
+    for interval in intervals {
+        let half_turn = Rotation::from_scaled_axis(interval.gyro * (0.5 * interval.h));
+        impulse += start_from_body * (half_turn * interval.accel) * interval.h;
+        start_from_body *= half_turn * half_turn;
+    }
+    impulse / intervals.iter().map(|interval| interval.h).sum::<f64>()
 }
 
 fn information(

@@ -28,6 +28,8 @@ pub(super) struct Stretch {
     pub(super) intervals: Vec<(f64, Interval)>,
     /// Beams of the stretch in the order of time.
     pub(super) beams: Vec<Beam>,
+    /// Whether the IMU was silent before it, for longer than can be bridged.
+    pub(super) after_silence: bool,
 }
 
 /// Waiting rooms of both sensors.
@@ -47,7 +49,8 @@ pub(super) struct Intake {
     /// Beams already placed in time that belong to the next stretches.
     beams: VecDeque<Beam>,
     next_start_s: f64,
-    ended: bool,
+    /// The next stretch is the first after a silence of the IMU.
+    after_silence: bool,
     warnings: Vec<Warning>,
 }
 
@@ -66,7 +69,7 @@ impl Intake {
             streams: None,
             beams: VecDeque::new(),
             next_start_s: 0.0,
-            ended: false,
+            after_silence: false,
             warnings: Vec::new(),
         }
     }
@@ -112,7 +115,7 @@ impl Intake {
         let seconds = sample.stamp.seconds_since(*self.origin.get_or_insert(sample.stamp));
         if seconds <= self.used_s.0 {
             self.late.0 += 1;
-        } else if !self.ended {
+        } else {
             let at = self.samples.partition_point(|(s, _)| *s <= seconds);
             self.samples.insert(at, (seconds, sample));
         }
@@ -128,7 +131,7 @@ impl Intake {
         let seconds = scan.stamp.seconds_since(*self.origin.get_or_insert(scan.stamp));
         if seconds <= self.used_s.1 {
             self.late.1 += 1;
-        } else if !self.ended {
+        } else {
             let at = self.scans.partition_point(|(s, _)| *s <= seconds);
             self.scans.insert(at, (seconds, scan));
         }
@@ -141,9 +144,6 @@ impl Intake {
         if self.streams.is_none() {
             self.start(last)?;
         }
-        if self.ended {
-            return None;
-        }
         let start_s = self.next_start_s;
         let imu_end_s = self.samples.back().map_or(f64::NEG_INFINITY, |(s, _)| *s) - MARGIN_S;
         let mut end_s = start_s + self.spec.step_s;
@@ -154,15 +154,39 @@ impl Intake {
                 return None;
             }
         }
-        let mut stretch = Stretch { start_s, end_s, ..Stretch::default() };
-        self.use_samples(end_s, &mut stretch);
+        let mut stretch = Stretch { start_s, end_s, after_silence: self.after_silence, ..Stretch::default() };
+        self.after_silence = false;
+        let silent_until_s = self.use_samples(end_s, &mut stretch);
+        if silent_until_s.is_some() {
+            end_s = end_s.min(self.used_s.0 - MARGIN_S);
+            stretch.end_s = end_s;
+        }
         self.use_scans(end_s);
         while self.beams.front().is_some_and(|beam| beam.tau_s < end_s) {
             stretch.beams.extend(self.beams.pop_front());
         }
         self.warn_of_silence(&stretch);
         self.next_start_s = end_s;
+        if let Some(until_s) = silent_until_s {
+            self.begin_again_at(until_s);
+            if stretch.end_s <= stretch.start_s {
+                return self.next_stretch(last);
+            }
+        }
         (!stretch.intervals.is_empty()).then_some(stretch)
+    }
+
+    /// After a silence of the IMU until `until_s`: scans of the silence are of no use, and intervals do not reach across.
+    fn begin_again_at(&mut self, until_s: f64) {
+        self.next_start_s = until_s + MARGIN_S;
+        // The next sample follows at once, and what is older stays late.
+        self.used_s.0 = until_s - 1e-9;
+        self.after_silence = true;
+        self.scans.retain(|(seconds, _)| *seconds >= until_s);
+        self.beams.clear();
+        if let Some((imu, _)) = self.streams.as_mut() {
+            imu.begin_again();
+        }
     }
 
     /// Whether both sensors have passed `end_s`, or waiting for the lidar has become pointless.
@@ -193,16 +217,18 @@ impl Intake {
         Some(())
     }
 
-    fn use_samples(&mut self, end_s: f64, stretch: &mut Stretch) {
-        let Some((imu, _)) = self.streams.as_mut() else { return };
+    /// Uses the samples up to a little after `end_s`; stops where the IMU fell silent for too long, and tells until when.
+    fn use_samples(&mut self, end_s: f64, stretch: &mut Stretch) -> Option<f64> {
+        let (imu, _) = self.streams.as_mut()?;
+        let mut silent_until_s = None;
         while let Some((seconds, sample)) = self.samples.pop_front() {
             let gap_s = seconds - self.used_s.0;
             if gap_s.is_finite() && gap_s > self.spec.inertial.max_gap_s {
-                self.ended = true;
                 let stamp = self.origin.unwrap_or_default() + Span::from_seconds(self.used_s.0);
-                self.warnings.push(Warning { stamp, kind: WarningKind::Ended { seconds: gap_s } });
-                self.samples.clear();
-                return;
+                self.warnings.push(Warning { stamp, kind: WarningKind::BeganAgain { seconds: gap_s } });
+                self.samples.push_front((seconds, sample));
+                silent_until_s = Some(seconds);
+                break;
             }
             if gap_s.is_finite() && gap_s > 4.5 * imu.period_s() {
                 let stamp = self.origin.unwrap_or_default() + Span::from_seconds(self.used_s.0);
@@ -218,6 +244,7 @@ impl Intake {
         if samples > 0 {
             self.warnings.push(Warning { stamp: self.stamp(end_s), kind: WarningKind::Saturated { samples } });
         }
+        silent_until_s
     }
 
     fn use_scans(&mut self, end_s: f64) {

@@ -86,6 +86,15 @@ impl Nominal {
         }
     }
 
+    /// Turns the whole trajectory about `pivot`.
+    pub(super) fn turn(&mut self, turn: &Rotation, pivot: &Vector) {
+        for state in &mut self.states {
+            state.rotation = turn * state.rotation;
+            state.position = pivot + turn * (state.position - pivot);
+            state.velocity = turn * state.velocity;
+        }
+    }
+
     /// Pose and velocities at `u_s`, IMU time; held at the ends.
     pub(super) fn at(&self, u_s: f64, gyro_bias: &Vector) -> Motion {
         let after = self.times_s.partition_point(|t| *t <= u_s).clamp(1, self.times_s.len().max(2) - 1);

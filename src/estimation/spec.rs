@@ -135,7 +135,7 @@ pub struct InertialSpec {
     /// Error of the accelerometer in proportion to its reading, 0..1.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub accel_scale_error: f64,
-    /// Longest stretch without IMU samples that is bridged, s.
+    /// Longest stretch without IMU samples that is bridged, s; behind a longer one the estimate begins again.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_gap_s: f64,
     /// How long the head should rest at the start, s.

@@ -2,7 +2,7 @@
 
 use super::border::Border;
 use super::clock::Clock;
-use super::initial::{Beginning, Rest};
+use super::initial::{Beginning, Carried, Rest};
 use super::matching::Matcher;
 use super::nominal::{Correction, Nominal};
 use super::normal_equations::{Factor, NormalEquations};
@@ -119,6 +119,24 @@ impl Window {
             rested_until_s: f64::NEG_INFINITY,
             workspace,
         }
+    }
+
+    /// What goes on when the IMU falls silent.
+    pub(super) fn carried(&self) -> Option<Carried> {
+        let state = *self.nominal.states().last()?;
+        Some(Carried { state, biases: self.biases, gravity: self.gravity, clock: self.clock })
+    }
+
+    /// Goes on with the clock as it was known before the IMU fell silent.
+    pub(super) fn take_over(&mut self, carried: &Carried) {
+        self.clock = carried.clock.told_from(self.start.u_s);
+    }
+
+    /// Turns the window about its beginning, the shortest way that makes gravity what it is in `carried`'s map.
+    pub(super) fn level_as(&mut self, carried: &Carried) {
+        let turn = Rotation::rotation_between(&self.gravity, &carried.gravity).unwrap_or_else(Rotation::identity);
+        self.nominal.turn(&turn, &carried.state.position);
+        self.gravity = carried.gravity;
     }
 
     pub(super) fn matcher(&self) -> &Matcher {

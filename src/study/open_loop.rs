@@ -87,7 +87,7 @@ fn is_loss(kind: &WarningKind) -> bool {
         kind,
         WarningKind::ImuGap { .. }
             | WarningKind::LidarGap { .. }
-            | WarningKind::Ended { .. }
+            | WarningKind::BeganAgain { .. }
             | WarningKind::LeftOut { .. }
     )
 }
