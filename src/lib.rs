@@ -12,6 +12,7 @@ pub mod recording;
 pub mod report;
 pub mod signal;
 pub mod spec;
+pub mod study;
 pub mod time;
 pub mod truth;
 pub mod world;

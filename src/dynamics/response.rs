@@ -164,7 +164,7 @@ impl FrequencyResponse {
         (1..grid.len().saturating_sub(1))
             .filter(is_top)
             .map(|k| {
-                let freq_hz = maximum(&gain, grid[k - 1], grid[k + 1]);
+                let freq_hz = maximum(gain, grid[k - 1], grid[k + 1]);
                 Peak { freq_hz, gain: gain(freq_hz) }
             })
             .collect()

@@ -22,7 +22,7 @@ mod walk;
 
 pub use error::MotionError;
 pub use hand::{CarrySpec, GaitSpec, HandSpec, ShakeSpec};
-pub use shaker::{Axis, DriveSpec, Level, ShakerSpec, SignalSpec};
+pub use shaker::{Axis, DriveSpec, Level, Phases, ShakerSpec, SignalSpec};
 pub use spec::{MotionSpec, load};
 pub use stand::StandSpec;
 pub use stops::StopsSpec;

@@ -1,0 +1,6 @@
+//! Studies: what a design does, found by running it many times.
+
+mod error;
+pub mod gains;
+
+pub use error::StudyError;
