@@ -3,6 +3,7 @@
 
 pub mod dynamics;
 pub mod elasticity;
+pub mod estimation;
 pub mod evaluation;
 pub mod geometry;
 pub mod measurement;
@@ -10,7 +11,9 @@ pub mod motion;
 pub mod random;
 pub mod recording;
 pub mod report;
+pub mod sensors;
 pub mod signal;
+pub mod simulation;
 pub mod spec;
 pub mod study;
 pub mod time;

@@ -9,7 +9,7 @@ use zsim::motion::{BaseMotion, MotionSpec, SignalSpec, load};
 use zsim::random::Seed;
 use zsim::spec::{Kind, Source, names, parse};
 
-const DURATION_S: f64 = 90.0;
+const DURATION_S: f64 = 50.0;
 
 /// A loop through rooms with right, sharp and blunt corners, and a few steps up and down.
 fn route() -> Route {
@@ -73,7 +73,7 @@ fn accelerations_are_continuous() {
             (a.acceleration_in_world - b.acceleration_in_world).norm()
                 + (a.angular_acceleration_in_world - b.angular_acceleration_in_world).norm()
         };
-        let step_s = 2e-3;
+        let step_s = 4e-3;
         let mut steps: Vec<f64> = (0..(DURATION_S / step_s) as i64).map(|k| k as f64 * step_s).collect();
         steps.sort_by_cached_key(|t| std::cmp::Reverse((change(*t, step_s) * 1e9) as u64));
         // The steps of greatest change, halved towards the greater change: a jump would stay, a slope vanishes.

@@ -60,7 +60,7 @@ pub enum ShapeSpec {
         #[serde(default = "default_sides")]
         sides: usize,
     },
-    /// A flight of stairs that climbs along x from the origin, centred in y; solid below.
+    /// A flight of stairs that climbs along x from the origin, centred in y.
     Stairs {
         /// Number of steps.
         steps: usize,
@@ -73,6 +73,9 @@ pub enum ShapeSpec {
         /// Depth of a step, m.
         #[serde(deserialize_with = "checked::positive")]
         tread_m: f64,
+        /// Thickness below the inner edges of the steps, m, with a soffit along the slope; solid down to z = 0 unless told.
+        #[serde(default, deserialize_with = "checked::non_negative")]
+        slab_m: f64,
     },
     /// Ground with a height at each node of a grid, centred on the origin in x and y.
     HeightField {
@@ -122,9 +125,9 @@ impl ShapeSpec {
                 within("sides", *sides, 3)?;
                 Ok(prism::cylinder(*radius_m, *height_m, *sides))
             }
-            ShapeSpec::Stairs { steps, width_m, rise_m, tread_m } => {
+            ShapeSpec::Stairs { steps, width_m, rise_m, tread_m, slab_m } => {
                 within("steps", *steps, 1)?;
-                Ok(prism::stairs(*steps, Vector::new(*tread_m, *width_m, *rise_m)))
+                Ok(prism::stairs(*steps, Vector::new(*tread_m, *width_m, *rise_m), *slab_m))
             }
             ShapeSpec::HeightField { size_m, heights } => height_field::triangles(*size_m, heights),
             ShapeSpec::Mesh { .. } => Ok(Vec::new()),
@@ -184,8 +187,11 @@ mod tests {
     #[test]
     fn a_flight_of_stairs_holds_the_volume_of_its_steps() {
         // Step k of n (from 1) is k rises high: the sum is n (n + 1) / 2 blocks of tread x width x rise.
-        let faces = triangles(&ShapeSpec::Stairs { steps: 4, width_m: 1.2, rise_m: 0.18, tread_m: 0.27 });
-        assert_relative_eq!(volume(&faces), 10.0 * 1.2 * 0.18 * 0.27, epsilon = 1e-12);
+        // With a slab, each step is a trapezoid: slab + rise high at its front, slab at its back.
+        for (slab_m, expected) in [(0.0, 10.0 * 1.2 * 0.18 * 0.27), (0.2, 4.0 * 1.2 * 0.27 * (0.2 + 0.09))] {
+            let faces = triangles(&ShapeSpec::Stairs { steps: 4, width_m: 1.2, rise_m: 0.18, tread_m: 0.27, slab_m });
+            assert_relative_eq!(volume(&faces), expected, epsilon = 1e-12);
+        }
     }
 
     #[test]
@@ -211,7 +217,7 @@ mod tests {
             assert_eq!(wall(openings).unwrap_err().0, "openings");
         }
         assert!(ShapeSpec::Cylinder { radius_m: 1.0, height_m: 1.0, sides: 2 }.triangles().is_err());
-        let many = ShapeSpec::Stairs { steps: usize::MAX, width_m: 1.0, rise_m: 1.0, tread_m: 1.0 };
+        let many = ShapeSpec::Stairs { steps: usize::MAX, width_m: 1.0, rise_m: 1.0, tread_m: 1.0, slab_m: 0.0 };
         assert_eq!(many.triangles().unwrap_err().0, "steps");
     }
 }

@@ -19,6 +19,15 @@ impl Axis {
         Self { low: low - margin * range, high: high + margin * range }
     }
 
+    /// The same, moved to round numbers where these are within a fiftieth of the range: a run of 119.99 s ends at 120.
+    pub(super) fn to_round_ends(self) -> Self {
+        let range = self.high - self.low;
+        let step = round_step(range / 10.0);
+        let near = |end: f64, round: f64| if (end - round).abs() <= range / 50.0 { round } else { end };
+        let low = near(self.low, (self.low / step).floor() * step);
+        Self { low, high: near(self.high, (self.high / step).ceil() * step) }
+    }
+
     /// Where `value` stands, 0 at the low end and 1 at the high one.
     pub(super) fn fraction(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
@@ -67,6 +76,12 @@ mod tests {
         assert_eq!(labels(-0.31, 0.27, 5), ["\u{2212}0.2", "0.0", "0.2"]);
         assert_eq!(labels(0.0, 1.1, 5), ["0.00", "0.25", "0.50", "0.75", "1.00"]);
         assert_eq!(labels(1e4, 3.1e4, 4), ["10000", "20000", "30000"]);
+    }
+
+    #[test]
+    fn an_end_just_before_a_round_number_moves_there() {
+        assert_eq!(Axis { low: 0.0, high: 119.99 }.to_round_ends(), Axis { low: 0.0, high: 120.0 });
+        assert_eq!(Axis { low: 0.0, high: 113.0 }.to_round_ends(), Axis { low: 0.0, high: 113.0 });
     }
 
     #[test]

@@ -1,4 +1,4 @@
-use super::canvas::Canvas;
+use super::canvas::{Canvas, Pen};
 use super::{Chart, PlotError, font, frame};
 use plotters::prelude::{BitMapBackend, BitMapElement, DrawingBackend, IntoDrawingArea, SVGBackend};
 use std::path::Path;
@@ -35,10 +35,10 @@ impl Figure {
         (self.width.ceil() as u32, self.heights().iter().sum::<f64>().ceil().max(1.0) as u32)
     }
 
-    fn draw<DB: DrawingBackend>(&self, backend: DB, scale: u32) -> Result<(), PlotError> {
+    fn draw<DB: DrawingBackend>(&self, backend: DB, scale: u32, pen: Pen) -> Result<(), PlotError> {
         font::register()?;
         let area = backend.into_drawing_area();
-        let canvas = Canvas { area: &area, scale: f64::from(scale) };
+        let canvas = Canvas { area: &area, scale: f64::from(scale), pen };
         canvas.clear()?;
         let mut top = 0.0;
         for (chart, height) in self.charts.iter().zip(self.heights()) {
@@ -56,7 +56,7 @@ impl Figure {
         let (width, height) = self.size();
         let (wide, high) = (width * SVG_UNITS, height * SVG_UNITS);
         let mut text = String::new();
-        self.draw(SVGBackend::with_string(&mut text, (wide, high)), SVG_UNITS)?;
+        self.draw(SVGBackend::with_string(&mut text, (wide, high)), SVG_UNITS, Pen::Vector)?;
         let drawn = format!("width=\"{wide}\" height=\"{high}\"");
         let shown = format!("width=\"{width}\" height=\"{height}\"");
         Ok(text.replacen(&drawn, &shown, 1))
@@ -78,7 +78,7 @@ impl Figure {
         let scale = PNG_PIXELS * OVERSAMPLED;
         let (wide, high) = (width * scale, height * scale);
         let mut drawn = vec![0_u8; wide as usize * high as usize * 3];
-        self.draw(BitMapBackend::with_buffer(&mut drawn, (wide, high)), scale)?;
+        self.draw(BitMapBackend::with_buffer(&mut drawn, (wide, high)), scale, Pen::Pixels)?;
 
         let size = (width * PNG_PIXELS, height * PNG_PIXELS);
         let pixels = averaged(&drawn, wide as usize, OVERSAMPLED as usize);

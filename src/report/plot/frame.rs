@@ -15,7 +15,7 @@ const LEFT: f64 = 68.0;
 const RIGHT: f64 = 18.0;
 /// Points from one tick to the next, at least about.
 const TICK_X: f64 = 85.0;
-const TICK_Y: f64 = 38.0;
+const TICK_Y: f64 = 28.0;
 /// Length of a line in the legend.
 const SAMPLE: f64 = 20.0;
 
@@ -80,7 +80,8 @@ fn ranges(chart: &Chart) -> [Axis; 2] {
     if chart.from_zero && y.0 == 0.0 {
         y_axis.low = 0.0;
     }
-    [Axis::over(x, if chart.equal_axes { 0.04 } else { 0.0 }), y_axis]
+    let x_axis = if chart.equal_axes { Axis::over(x, 0.04) } else { Axis::over(x, 0.0).to_round_ends() };
+    [x_axis, y_axis]
 }
 
 /// Axes that fill their rectangle; for a map, the shorter axis is made longer until a metre is as long on both.

@@ -32,19 +32,25 @@ pub(super) fn cylinder(radius: f64, height: f64, sides: usize) -> Vec<Triangle> 
     (0..sides).flat_map(side).collect()
 }
 
-/// A solid flight of `steps` that climbs along x; `step` is tread, width, rise.
-pub(super) fn stairs(steps: usize, step: Vector) -> Vec<Triangle> {
-    let corner = |k: usize, rise: usize| Vector::new(k as f64 * step.x, -step.y / 2.0, rise as f64 * step.z);
-    let (tread, across, rise) = (Vector::x() * step.x, Vector::y() * step.y, Vector::z() * step.z);
-    let mut triangles = Vec::with_capacity(steps * 8 + 4);
+/// A flight of `steps` that climbs along x; `step` is tread, width, rise. Its underside is `slab` below the inner edges of
+/// the steps, along the slope, or at z = 0 for a slab of 0.
+pub(super) fn stairs(steps: usize, step: Vector, slab: f64) -> Vec<Triangle> {
+    let across = Vector::y() * step.y;
+    let at = |k: usize, height: f64| Vector::new(k as f64 * step.x, -step.y / 2.0, height);
+    let top = |k: usize| k as f64 * step.z;
+    let below = |k: usize| if slab > 0.0 { top(k) - slab } else { 0.0 };
+    let mut triangles = Vec::with_capacity(steps * 10 + 4);
     for k in 0..steps {
-        let height = rise * (k + 1) as f64;
-        triangles.extend(parallelogram(corner(k, k), rise, across));
-        triangles.extend(parallelogram(corner(k, k + 1), tread, across));
-        triangles.extend(parallelogram(corner(k, 0), tread, height));
-        triangles.extend(parallelogram(corner(k, 0) + across, height, tread));
+        let front = if k == 0 { below(0) } else { top(k) };
+        let [inner, outer] = [at(k, top(k + 1)), at(k + 1, top(k + 1))];
+        let [under, under_next] = [at(k, below(k)), at(k + 1, below(k + 1))];
+        triangles.extend(parallelogram(at(k, front), inner - at(k, front), across));
+        triangles.extend(parallelogram(inner, outer - inner, across));
+        triangles.extend(parallelogram(under, across, under_next - under));
+        triangles.extend([[under, under_next, outer], [under, outer, inner]]);
+        triangles.extend([[under, outer, under_next], [under, inner, outer]].map(|side| side.map(|c| c + across)));
     }
-    triangles.extend(parallelogram(corner(0, 0), across, tread * steps as f64));
-    triangles.extend(parallelogram(corner(steps, 0), across, rise * steps as f64));
+    let end = at(steps, below(steps));
+    triangles.extend(parallelogram(end, across, at(steps, top(steps)) - end));
     triangles
 }

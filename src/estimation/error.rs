@@ -1,0 +1,135 @@
+use crate::time::Stamp;
+use std::fmt;
+
+/// Why there is no estimate.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum EstimationError {
+    /// A setting that makes no sense by itself or beside another.
+    #[error("estimator setting `{key}`: {message}")]
+    Setting {
+        /// Which setting.
+        key: &'static str,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A calibration that nothing can be computed with.
+    #[error("calibration: {0}")]
+    Calibration(String),
+    /// A measurement with NaN or infinity in it.
+    #[error("the {sensor} measurement stamped {stamp_ns} ns is not finite")]
+    NotFinite {
+        /// `"IMU"` or `"lidar"`.
+        sensor: &'static str,
+        /// Its stamp.
+        stamp_ns: i64,
+    },
+    /// A recording without IMU samples.
+    #[error("there is no IMU sample among {scans} lidar scans; the estimator needs both")]
+    NoImu {
+        /// How many scans there were.
+        scans: usize,
+    },
+    /// A recording without lidar scans.
+    #[error("there is no lidar scan among {samples} IMU samples; the estimator needs both")]
+    NoLidar {
+        /// How many samples there were.
+        samples: usize,
+    },
+    /// The two sensors never spoke in the same seconds.
+    #[error("IMU and lidar have {common_s:.3} s in common; at least {needed_s:.3} s are needed to start")]
+    TooShort {
+        /// The time both cover, s.
+        common_s: f64,
+        /// What is needed, s.
+        needed_s: f64,
+    },
+}
+
+/// A stretch of the estimate that is worse than it should be, or missing, and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Warning {
+    /// When, lidar time.
+    pub stamp: Stamp,
+    /// What happened.
+    pub kind: WarningKind,
+}
+
+/// What can degrade an estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WarningKind {
+    /// The estimator started while the head moved, so level and gyro bias began less well known.
+    StartedInMotion,
+    /// No IMU sample for `seconds`; the motion was bridged at constant rates.
+    ImuGap {
+        /// How long, s.
+        seconds: f64,
+    },
+    /// No lidar scan for `seconds`; the IMU alone carried the estimate.
+    LidarGap {
+        /// How long, s.
+        seconds: f64,
+    },
+    /// A gap too long to bridge: the estimate ends here, later measurements were left out.
+    Ended {
+        /// How long the gap was, s.
+        seconds: f64,
+    },
+    /// Measurements that came too late, or with a stamp that runs backwards, and were left out.
+    LeftOut {
+        /// `"IMU samples"` or `"lidar scans"`.
+        what: &'static str,
+        /// How many.
+        count: usize,
+    },
+    /// Too few matches to say anything against the IMU, which alone carried this window.
+    FewMatches {
+        /// How many there were.
+        matches: usize,
+    },
+    /// The surfaces in view leave a direction undetermined; the IMU held it.
+    WeakGeometry {
+        /// Least over greatest information about the position, 0..1.
+        conditioning: f64,
+    },
+    /// A window's solution was not believed, and the IMU's prediction kept.
+    NotSolved {
+        /// Why.
+        reason: &'static str,
+    },
+    /// IMU samples at the end of the sensor's range, which say only "at least".
+    Saturated {
+        /// How many.
+        samples: usize,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at {:.3} s: {}", self.stamp.nanos() as f64 * 1e-9, self.kind)
+    }
+}
+
+impl fmt::Display for WarningKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StartedInMotion => write!(f, "the head moved at the start; level and gyro bias start less certain"),
+            Self::ImuGap { seconds } => write!(f, "no IMU sample for {seconds:.3} s; bridged at constant rates"),
+            Self::LidarGap { seconds } => write!(f, "no lidar scan for {seconds:.3} s; carried by the IMU alone"),
+            Self::Ended { seconds } => {
+                write!(f, "a gap of {seconds:.3} s is too long to bridge; the estimate ends here")
+            }
+            Self::LeftOut { what, count } => {
+                write!(f, "{count} {what} came late or ran backwards in time, and were left out")
+            }
+            Self::FewMatches { matches } => {
+                write!(f, "only {matches} surfaces seen again; carried by the IMU alone")
+            }
+            Self::WeakGeometry { conditioning } => write!(
+                f,
+                "the surfaces in view leave a direction undetermined (conditioning {conditioning:.1e}); held by the IMU"
+            ),
+            Self::NotSolved { reason } => write!(f, "the window's solution was not believed ({reason})"),
+            Self::Saturated { samples } => write!(f, "{samples} IMU samples at the end of the sensor's range"),
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! What comes out of the estimator.
+
+use super::Warning;
+use crate::geometry::{Pose, Trajectory, Vector};
+use crate::time::Stamp;
+
+/// The head at an instant, and what the estimator thought of its sensors then.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatedPose {
+    /// When, lidar time: a whole multiple of the IMU's period, itself rounded to a whole number of milliseconds.
+    pub stamp: Stamp,
+    /// The pose. The map's z axis points up (gravity as it was known at the start), its origin is the first pose's.
+    pub map_from_head: Pose,
+    /// Velocity of the head's origin, m/s.
+    pub velocity_in_map_m_per_s: Vector,
+    /// Bias of the gyroscope, in the IMU's frame, rad/s.
+    pub gyro_bias_rad_per_s: Vector,
+    /// Bias of the accelerometer, in the IMU's frame, m/s^2.
+    pub accel_bias_m_per_s2: Vector,
+    /// How much later the IMU stamps an instant than the lidar does, s.
+    pub clock_offset_s: f64,
+}
+
+/// What a window's solution rested on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WindowReport {
+    /// The window's end, lidar time.
+    pub stamp: Stamp,
+    /// Surfels in the window.
+    pub surfels: usize,
+    /// Matches of the last iteration between surfels of the window.
+    pub matches: usize,
+    /// Matches of the last iteration with fixed views.
+    pub view_matches: usize,
+    /// Fixed views in use.
+    pub views: usize,
+    /// Weighted root mean square of the matches' distances along their normals, m.
+    pub residual_rms_m: f64,
+    /// Iterations of place, match, solve.
+    pub iterations: usize,
+    /// Size of the last iteration's correction: greatest translation of a knot, m.
+    pub last_correction_m: f64,
+    /// Least over greatest eigenvalue of the information that the matches hold about the position, 0..1; 0 without matches.
+    pub conditioning: f64,
+    /// Clock offset after the window, s.
+    pub clock_offset_s: f64,
+    /// Time it took, s. The one figure that differs from run to run.
+    pub elapsed_s: f64,
+}
+
+/// An open-loop estimate.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct OpenLoop {
+    /// `map_from_head` over lidar time: of every pose in `poses`.
+    pub trajectory: Trajectory,
+    /// The poses with velocity, biases and clock offset.
+    pub poses: Vec<EstimatedPose>,
+    /// The clock offset after each window: how much later the IMU stamps an instant than the lidar, s, by lidar time.
+    pub clock_offsets: Vec<(Stamp, f64)>,
+    /// A report a window.
+    pub windows: Vec<WindowReport>,
+    /// What degraded the estimate; empty when nothing did.
+    pub warnings: Vec<Warning>,
+}

@@ -1,0 +1,111 @@
+//! The figures of a run.
+
+use super::plot::{Chart, Colour, Figure, Mark, Series};
+use crate::evaluation::Errors;
+use crate::geometry::{Rotation, Trajectory, Vector};
+use crate::time::Stamp;
+
+const TIME: &str = "Time (s)";
+/// Length of the stretch of the head's pitch that is shown close up, s.
+const CLOSE_UP_S: f64 = 10.0;
+
+/// The way of the head from above: true and estimated, over an outline of the world (points of its walls).
+///
+/// `truth` may be empty, where there is none; the estimate is then in its own map.
+pub fn trajectory_from_above(truth: &Trajectory, estimate: &Trajectory, outline_in_world: &[Vector]) -> Figure {
+    let outline = outline_in_world.iter().map(|point| (point.x, point.y)).collect();
+    let chart = Chart::new("The head from above", "x (m)", "y (m)")
+        .as_map()
+        .with(Series::dots("", Colour::Backdrop, outline).marked(Mark::Dots(1.0)));
+    Figure::of(vec![with_both(chart, &from_above(truth), &from_above(estimate))])
+}
+
+fn from_above(trajectory: &Trajectory) -> Vec<(f64, f64)> {
+    trajectory.poses().iter().map(|pose| (pose.translation.x, pose.translation.y)).collect()
+}
+
+/// Truth behind, estimate in front, each where there is any.
+fn with_both(mut chart: Chart, truth: &[(f64, f64)], estimate: &[(f64, f64)]) -> Chart {
+    if !truth.is_empty() {
+        chart = chart.with(Series::line("truth", Colour::Truth, truth.to_vec()).marked(Mark::Line(2.2)));
+    }
+    if !estimate.is_empty() {
+        chart = chart.with(Series::line("estimate", Colour::Estimate, estimate.to_vec()).marked(Mark::Line(1.1)));
+    }
+    chart
+}
+
+/// Errors of position and attitude over time, along each axis of the world and as a whole.
+pub fn errors_over_time(errors: &Errors) -> Figure {
+    let size = |vectors: &[Vector]| vectors.iter().map(Vector::norm).fold(0.0, f64::max);
+    let (unit, per_m) = length_unit(size(&errors.position_m));
+    let position = Chart::new("Position error, after alignment", TIME, &format!("Error ({unit})"));
+    let rotation = Chart::new("Rotation error, after alignment", TIME, "Error (\u{b0})");
+    Figure::of(vec![
+        with_axes(position, &errors.stamps, &errors.position_m, per_m),
+        with_axes(rotation, &errors.stamps, &errors.rotation_rad, 1_f64.to_degrees()),
+    ])
+}
+
+fn with_axes(mut chart: Chart, stamps: &[Stamp], vectors: &[Vector], factor: f64) -> Chart {
+    let seconds = seconds_of(stamps);
+    let curve = |value: &dyn Fn(&Vector) -> f64| -> Vec<(f64, f64)> {
+        seconds.iter().zip(vectors).map(|(t, vector)| (*t, value(vector) * factor)).collect()
+    };
+    for (axis, (name, colour)) in
+        [("x", Colour::Second), ("y", Colour::Third), ("z", Colour::Estimate)].into_iter().enumerate()
+    {
+        chart = chart.with(Series::line(name, colour, curve(&|v| v[axis])).marked(Mark::Line(1.0)));
+    }
+    chart.with(Series::line("magnitude", Colour::Truth, curve(&|v| v.norm())).marked(Mark::Line(1.5)))
+}
+
+/// Pitch of the head over the run, and closer over ten seconds in its middle.
+pub fn head_pitch(truth: &Trajectory, estimate: &Trajectory) -> Figure {
+    let origin = [truth, estimate].into_iter().find_map(Trajectory::span).map(|(first, _)| first).unwrap_or_default();
+    let (truth, estimate) = (pitches(truth, origin), pitches(estimate, origin));
+    let end_s = truth.last().or(estimate.last()).map_or(0.0, |(t, _)| *t);
+    let (from_s, to_s) = ((end_s - CLOSE_UP_S) / 2.0, (end_s + CLOSE_UP_S) / 2.0);
+    let within = |curve: &[(f64, f64)]| -> Vec<(f64, f64)> {
+        curve.iter().copied().filter(|(t, _)| (from_s..=to_s).contains(t)).collect()
+    };
+    let label = "Pitch, nose up (\u{b0})";
+    let whole = Chart::new("Pitch of the head", TIME, label);
+    let close = Chart::new("The same, ten seconds of it", TIME, label);
+    let mut charts = vec![with_both(whole, &truth, &estimate)];
+    if end_s > 2.0 * CLOSE_UP_S {
+        charts.push(with_both(close, &within(&truth), &within(&estimate)));
+    }
+    Figure::of(charts)
+}
+
+/// Angle of the head's x axis above the horizon, degrees, over seconds since `origin`.
+fn pitches(trajectory: &Trajectory, origin: Stamp) -> Vec<(f64, f64)> {
+    let nose_up = |rotation: &Rotation| (rotation * Vector::x()).z.clamp(-1.0, 1.0).asin().to_degrees();
+    trajectory.iter().map(|(stamp, pose)| (stamp.seconds_since(origin), nose_up(&pose.rotation))).collect()
+}
+
+/// How much later the IMU stamps an instant than the lidar does, over lidar time: estimated, and true where that is known.
+pub fn clock_offset(truth: &[(Stamp, f64)], estimate: &[(Stamp, f64)]) -> Figure {
+    let origin = truth.first().or(estimate.first()).map(|(stamp, _)| *stamp).unwrap_or_default();
+    let curve = |offsets: &[(Stamp, f64)]| -> Vec<(f64, f64)> {
+        offsets.iter().map(|(stamp, offset_s)| (stamp.seconds_since(origin), offset_s * 1e3)).collect()
+    };
+    let chart = Chart::new("Clock of the IMU after that of the lidar", TIME, "Offset (ms)").starting_at_zero();
+    Figure::of(vec![with_both(chart, &curve(truth), &curve(estimate))])
+}
+
+fn seconds_of(stamps: &[Stamp]) -> Vec<f64> {
+    let origin = stamps.first().copied().unwrap_or_default();
+    stamps.iter().map(|stamp| stamp.seconds_since(origin)).collect()
+}
+
+/// The unit in which lengths up to `greatest_m` are small whole numbers, and how many of it make a metre.
+fn length_unit(greatest_m: f64) -> (&'static str, f64) {
+    match greatest_m {
+        m if m < 0.02 => ("mm", 1e3),
+        m if m < 2.0 => ("cm", 1e2),
+        m if m < 2e3 => ("m", 1.0),
+        _ => ("km", 1e-3),
+    }
+}

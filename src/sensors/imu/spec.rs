@@ -1,0 +1,139 @@
+use super::MILLI_G;
+use super::errors::{GaussMarkov, TriadModel};
+use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
+use crate::spec::{Source, SpecError, checked};
+use serde::{Deserialize, Serialize};
+
+/// An inertial measurement unit, as its data sheet has it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImuSpec {
+    /// Samples a second. Each is the average over the time since the one before.
+    #[serde(deserialize_with = "checked::positive")]
+    pub rate_hz: f64,
+    /// How much later than the middle of that time a sample is stamped, ms: half a period for a stamp at its end, less
+    /// for a driver that corrects it, more for a filter or a buffer. The clock's own offset comes on top.
+    #[serde(deserialize_with = "checked::finite")]
+    pub stamp_delay_ms: f64,
+    /// The gyroscope.
+    pub gyro: GyroSpec,
+    /// The accelerometer.
+    pub accel: AccelSpec,
+}
+
+/// The errors of a gyroscope, alike and independent on its three axes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GyroSpec {
+    /// White noise, deg/s/sqrt(Hz).
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub density_deg_per_s_per_sqrt_hz: f64,
+    /// Standard deviation of the bias when switched on, deg/s.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub turn_on_bias_deg_per_s: f64,
+    /// Random walk of the bias, rad/s/sqrt(s).
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub bias_walk_rad_per_s_per_sqrt_s: f64,
+    /// A bias that wanders but returns, deg/h.
+    pub wander_deg_per_h: Option<GaussMarkovSpec>,
+    /// Standard deviation of the scale's error, per cent.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub scale_percent: f64,
+    /// Standard deviation of the angle of each axis towards each of the others, degrees.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub misalignment_deg: f64,
+    /// Greatest rate on an axis, deg/s.
+    #[serde(deserialize_with = "checked::positive")]
+    pub limit_deg_per_s: f64,
+    /// What rates are rounded to a multiple of, deg/s; 0 for none.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub resolution_deg_per_s: f64,
+}
+
+/// The errors of an accelerometer, alike and independent on its three axes. One g is 9.80665 m/s^2.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AccelSpec {
+    /// White noise, ug/sqrt(Hz).
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub density_ug_per_sqrt_hz: f64,
+    /// Standard deviation of the bias when switched on, mg.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub turn_on_bias_mg: f64,
+    /// Random walk of the bias, m/s^2/sqrt(s).
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub bias_walk_m_per_s2_per_sqrt_s: f64,
+    /// A bias that wanders but returns, mg.
+    pub wander_mg: Option<GaussMarkovSpec>,
+    /// Standard deviation of the scale's error, per cent.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub scale_percent: f64,
+    /// Standard deviation of the angle of each axis towards each of the others, degrees.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub misalignment_deg: f64,
+    /// Greatest specific force on an axis, g.
+    #[serde(deserialize_with = "checked::positive")]
+    pub limit_g: f64,
+    /// What specific forces are rounded to a multiple of, mg; 0 for none.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub resolution_mg: f64,
+}
+
+/// A first-order Gauss-Markov process.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GaussMarkovSpec {
+    /// Standard deviation in the long run, in the unit of the key it stands under.
+    #[serde(deserialize_with = "checked::non_negative")]
+    pub sigma: f64,
+    /// Time over which it forgets itself by 1/e, s.
+    #[serde(deserialize_with = "checked::positive")]
+    pub time_s: f64,
+}
+
+impl ImuSpec {
+    /// Checks what concerns several fields.
+    pub(super) fn check(&self, source: &Source) -> Result<(), SpecError> {
+        if self.stamp_delay_ms.abs() > 1e3 {
+            let message = format!("a delay of {} ms; within 1000 ms", self.stamp_delay_ms);
+            return Err(SpecError::about(source, "stamp_delay_ms", message));
+        }
+        let (gyro, accel) = (self.gyro.model(), self.accel.model());
+        for (key, model) in [("resolution_deg_per_s", gyro), ("resolution_mg", accel)] {
+            if model.resolution > model.limit {
+                return Err(SpecError::about(source, key, format!("{key} is greater than the sensor's limit")));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl GyroSpec {
+    pub(super) fn model(&self) -> TriadModel {
+        TriadModel {
+            density: self.density_deg_per_s_per_sqrt_hz.to_radians(),
+            turn_on: self.turn_on_bias_deg_per_s.to_radians(),
+            walk: self.bias_walk_rad_per_s_per_sqrt_s,
+            wander: self.wander_deg_per_h.map(|w| GaussMarkov::from_spec(&w, (1.0_f64 / 3600.0).to_radians())),
+            scale: self.scale_percent * 1e-2,
+            misalignment: self.misalignment_deg.to_radians(),
+            limit: self.limit_deg_per_s.to_radians(),
+            resolution: self.resolution_deg_per_s.to_radians(),
+        }
+    }
+}
+
+impl AccelSpec {
+    pub(super) fn model(&self) -> TriadModel {
+        TriadModel {
+            density: self.density_ug_per_sqrt_hz * 1e-3 * MILLI_G,
+            turn_on: self.turn_on_bias_mg * MILLI_G,
+            walk: self.bias_walk_m_per_s2_per_sqrt_s,
+            wander: self.wander_mg.map(|w| GaussMarkov::from_spec(&w, MILLI_G)),
+            scale: self.scale_percent * 1e-2,
+            misalignment: self.misalignment_deg.to_radians(),
+            limit: self.limit_g * STANDARD_GRAVITY_M_PER_S2,
+            resolution: self.resolution_mg * MILLI_G,
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! From the surfaces that a beam's rays met to the echoes that its detector sees.
+
+use super::{GlassSpec, Lidar, Sweep};
+
+/// Most echoes of a beam: one a ray.
+pub(super) const MAX_ECHOES: usize = 7;
+
+/// Light that came back from one distance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Echo {
+    /// Distance, m: the mean over the rays in it, weighted by power.
+    pub range_m: f64,
+    /// `reflectance cos(incidence) / range^2`, summed over rays by their weights, 1/m^2.
+    pub power: f64,
+    /// Cosine of incidence, the mean weighted by power.
+    pub cos_incidence: f64,
+}
+
+/// The echoes of a beam, nearest first.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Echoes {
+    list: [Echo; MAX_ECHOES],
+    count: usize,
+}
+
+impl Echoes {
+    pub fn as_slice(&self) -> &[Echo] {
+        &self.list[..self.count]
+    }
+
+    /// Drops the weakest echoes until `count` are left; the others keep their order.
+    pub fn keep_strongest(&mut self, count: usize) {
+        while self.count > count {
+            let weakest = (0..self.count).min_by(|a, b| self.list[*a].power.total_cmp(&self.list[*b].power));
+            let Some(weakest) = weakest else { return };
+            self.list.copy_within(weakest + 1..self.count, weakest);
+            self.count -= 1;
+        }
+    }
+
+    /// Puts a ray's echo where its range belongs.
+    fn insert(&mut self, echo: Echo) {
+        let at = self.as_slice().partition_point(|other| other.range_m <= echo.range_m);
+        self.list.copy_within(at..self.count, at + 1);
+        self.list[at] = echo;
+        self.count += 1;
+    }
+
+    /// Joins the rays' echoes whose pulses overlap into mixed ones.
+    fn join_within(&mut self, pulse_m: f64) {
+        let mut kept = 0;
+        let mut first_range_m = f64::NEG_INFINITY;
+        for next in 0..self.count {
+            let echo = self.list[next];
+            if echo.range_m - first_range_m <= pulse_m {
+                self.list[kept - 1] = mixed(&self.list[kept - 1], &echo);
+            } else {
+                first_range_m = echo.range_m;
+                self.list[kept] = echo;
+                kept += 1;
+            }
+        }
+        self.count = kept;
+    }
+}
+
+fn mixed(a: &Echo, b: &Echo) -> Echo {
+    let power = a.power + b.power;
+    let share = if power > 0.0 { b.power / power } else { 0.5 };
+    Echo {
+        range_m: a.range_m + (b.range_m - a.range_m) * share,
+        power,
+        cos_incidence: a.cos_incidence + (b.cos_incidence - a.cos_incidence) * share,
+    }
+}
+
+impl Lidar {
+    /// The echoes of beam `beam`. `glass_draw`, uniform in 0..1, decides at which surface of glass it turns back; `None`
+    /// lets it pass every one, unweakened.
+    pub(super) fn echoes(&self, sweep: &Sweep, beam: usize, glass_draw: Option<f64>) -> Echoes {
+        let per_beam = self.rays_per_beam();
+        let mut echoes = Echoes::default();
+        for (k, weight) in self.weights.iter().enumerate() {
+            if let Some(echo) = self.ray_echo(sweep, beam * per_beam + k, *weight, glass_draw) {
+                echoes.insert(echo);
+            }
+        }
+        if echoes.count > 1 {
+            echoes.join_within(self.spec.pulse_length_m);
+        }
+        echoes
+    }
+
+    fn ray_echo(&self, sweep: &Sweep, ray: usize, weight: f64, glass_draw: Option<f64>) -> Option<Echo> {
+        let GlassSpec { echo: glass_echo, delay_m } = self.spec.errors.glass;
+        let (mut light, mut late_m, mut draw) = (weight, 0.0, glass_draw.unwrap_or(1.0));
+        for surface in sweep.surfaces(ray) {
+            let cos = f64::from(surface.cos_incidence);
+            let turns_back = glass_echo * cos;
+            if !surface.is_glass() || draw < turns_back {
+                let range_m = surface.range_m + late_m;
+                let power = light * f64::from(surface.reflectance) * cos / (surface.range_m * surface.range_m);
+                return Some(Echo { range_m, power, cos_incidence: cos });
+            }
+            if glass_draw.is_some() {
+                // Given that the beam passed, the draw is uniform in turns_back..1: stretched, it serves the next surface.
+                draw = (draw - turns_back) / (1.0 - turns_back).max(f64::MIN_POSITIVE);
+                light *= f64::from(surface.transmission).powi(2);
+                late_m += delay_m;
+            }
+        }
+        None
+    }
+}

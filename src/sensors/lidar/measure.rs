@@ -1,0 +1,85 @@
+//! From echoes to the scan that the sensor reports.
+
+use super::errors::ScanDraws;
+use super::{Beam, Lidar, LidarErrors, Sweep};
+use crate::geometry::Vector;
+use crate::measurement::{LidarReturn, LidarScan, PlanarScan};
+
+impl Lidar {
+    /// The scan that the sensor makes of what its rays met.
+    ///
+    /// With errors switched off, a beam passes all glass and every echo is reported at its exact range, unrounded.
+    pub fn measure(&self, sweep: &Sweep, errors: &LidarErrors) -> LidarScan {
+        let mut draws = errors.of_scan(sweep.firing.index);
+        let mut returns = Vec::with_capacity(self.beams.len());
+        let mut planar = self.empty_scan();
+        for beam in 0..self.beams.len() {
+            let (range, intensity) = self.measure_beam(sweep, beam, (errors, draws.as_mut()), &mut returns);
+            if let Some(scan) = planar.as_mut() {
+                scan.ranges_m.push(range);
+                scan.intensities.push(intensity);
+            }
+        }
+        LidarScan { stamp: sweep.firing.stamp, returns, planar }
+    }
+
+    /// Appends the returns of a beam; gives range and intensity of its strongest, as REP-117 writes them.
+    fn measure_beam(
+        &self,
+        sweep: &Sweep,
+        beam: usize,
+        (errors, mut draws): (&LidarErrors, Option<&mut ScanDraws>),
+        returns: &mut Vec<LidarReturn>,
+    ) -> (f32, f32) {
+        let draw = draws.as_deref_mut().map(ScanDraws::of_beam);
+        let mut echoes = self.echoes(sweep, beam, draw.as_ref().map(|draw| draw.glass));
+        echoes.keep_strongest(usize::from(self.spec.echoes));
+        let (mut best, mut best_power) = ((f32::INFINITY, 0.0), f64::NEG_INFINITY);
+        for (order, echo) in echoes.as_slice().iter().enumerate() {
+            let mut range_m = echo.range_m;
+            if let (Some(draw), Some(draws)) = (&draw, draws.as_deref_mut()) {
+                let z = if order == 0 { draw.range } else { draws.of_later_echo() };
+                if !errors.detects(echo, draw.threshold) {
+                    continue;
+                }
+                range_m = errors.rounded_m(errors.range_m(echo, z));
+            }
+            let intensity = (self.spec.intensity_at_1_m * echo.power.sqrt()).round() as f32;
+            let reported = self.within_limits(range_m);
+            if echo.power > best_power {
+                (best, best_power) = ((reported, if reported.is_finite() { intensity } else { 0.0 }), echo.power);
+            }
+            if reported.is_finite() {
+                let Beam { direction_in_laser, offset, .. } = self.beams[beam];
+                let point: Vector = direction_in_laser * range_m;
+                returns.push(LidarReturn { offset, point_in_laser: point.cast(), intensity });
+            }
+        }
+        best
+    }
+
+    /// A range as REP-117 writes it: `-inf` where too near, `+inf` where too far.
+    fn within_limits(&self, range_m: f64) -> f32 {
+        if range_m < self.spec.range_min_m {
+            f32::NEG_INFINITY
+        } else if range_m > self.spec.range_max_m {
+            f32::INFINITY
+        } else {
+            range_m as f32
+        }
+    }
+
+    /// The polar form of a scan without its beams, for a lidar that scans a plane.
+    fn empty_scan(&self) -> Option<PlanarScan> {
+        self.plane.map(|plane| PlanarScan {
+            angle_min_rad: plane.angle_min_rad,
+            angle_increment_rad: plane.angle_increment_rad,
+            time_increment_s: plane.time_increment_s,
+            scan_time_s: self.period_s(),
+            range_min_m: self.spec.range_min_m as f32,
+            range_max_m: self.spec.range_max_m as f32,
+            ranges_m: Vec::with_capacity(self.beams.len()),
+            intensities: Vec::with_capacity(self.beams.len()),
+        })
+    }
+}

@@ -1,0 +1,80 @@
+//! Lidars: beams in time, the surfaces they meet, and the echoes that come back.
+
+mod echo;
+mod errors;
+mod measure;
+mod pattern;
+mod spec;
+mod sweep;
+
+pub use errors::LidarErrors;
+pub use pattern::{Beam, PatternSpec};
+pub use spec::{DetectionSpec, GlassSpec, GrazingSpec, LidarErrorsSpec, LidarSpec, RangeNoiseSpec, Rays, Switch};
+pub use sweep::{Firing, Sweep};
+
+use crate::geometry::Vector;
+use crate::measurement::LidarNoise;
+use crate::spec::{Source, SpecError};
+use crate::time::Span;
+use pattern::Plane;
+
+/// A lidar: when and where each of its beams goes, and what its errors are like.
+#[derive(Debug, Clone)]
+pub struct Lidar {
+    beams: Vec<Beam>,
+    plane: Option<Plane>,
+    /// The rays of one beam after another, unit vectors in the lidar's frame.
+    rays: Vec<Vector>,
+    /// The share of the beam's light in each of its rays.
+    weights: &'static [f64],
+    spec: LidarSpec,
+}
+
+impl Lidar {
+    /// The lidar that `spec`, from `source`, describes.
+    ///
+    /// # Errors
+    /// When its beams do not fit into its turn, or its limits contradict each other.
+    pub fn new(spec: &LidarSpec, source: &Source) -> Result<Self, SpecError> {
+        spec.check(source)?;
+        let (beams, plane) = spec.pattern.beams(spec.rate_hz, source)?;
+        let (rays, weights) = spec.rays_of(&beams);
+        Ok(Self { beams, plane, rays, weights, spec: spec.clone() })
+    }
+
+    /// The spec it was built from.
+    pub fn spec(&self) -> &LidarSpec {
+        &self.spec
+    }
+
+    /// The beams of a scan, in the order in which they are fired.
+    pub fn beams(&self) -> &[Beam] {
+        &self.beams
+    }
+
+    /// How many rays stand for one beam.
+    pub fn rays_per_beam(&self) -> usize {
+        self.weights.len()
+    }
+
+    /// Time from one scan to the next, s.
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.spec.rate_hz
+    }
+
+    /// Time from the first beam of a scan to its last.
+    pub fn sweep_span(&self) -> Span {
+        self.beams.iter().map(|beam| beam.offset).max().unwrap_or(Span::ZERO)
+    }
+
+    /// How well it measures range, for an estimator: by its spec even where its errors are switched off.
+    pub fn noise(&self) -> LidarNoise {
+        let range = &self.spec.errors.range;
+        LidarNoise {
+            near_sigma_m: range.near_sigma_m,
+            near_m: range.near_m,
+            far_sigma_m: range.far_sigma_m,
+            far_m: range.far_m,
+        }
+    }
+}

@@ -1,0 +1,175 @@
+use crate::geometry::Vector;
+use crate::spec::{Source, SpecError, checked};
+use crate::time::Span;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// Greatest number of beams of a scan: more is a slip of the pen.
+const MAX_BEAMS: usize = 1 << 20;
+
+/// Where and when the beams of a scan are fired.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum PatternSpec {
+    /// A mirror that sweeps the plane z = 0 counter-clockwise, one turn a scan.
+    Planar {
+        /// How many beams.
+        beams: u32,
+        /// Azimuth of the first, degrees from x.
+        #[serde(deserialize_with = "checked::finite")]
+        first_deg: f64,
+        /// Azimuth from one to the next, degrees.
+        #[serde(deserialize_with = "checked::positive")]
+        step_deg: f64,
+        /// How many beams would fit into a whole turn, the blind part included: tells the time from beam to beam.
+        slots_per_turn: u32,
+    },
+    /// Channels at fixed elevations that turn together clockwise (seen from above) from azimuth 0, one turn a scan.
+    Spinning {
+        /// Elevation of each channel, degrees above the plane, in the order in which they fire.
+        elevations_deg: Vec<f64>,
+        /// Time from one channel's shot to the next one's, us.
+        #[serde(deserialize_with = "checked::non_negative")]
+        channel_period_us: f64,
+        /// Time from one round of all channels to the next, us.
+        #[serde(deserialize_with = "checked::positive")]
+        round_period_us: f64,
+    },
+}
+
+/// One beam of a scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beam {
+    /// Unit vector in the lidar's frame.
+    pub direction_in_laser: Vector,
+    /// When it is fired after the first beam, on the lidar's crystal.
+    pub offset: Span,
+    /// The same, s, without the rounding to 1 ns.
+    pub offset_s: f64,
+}
+
+/// What the polar form of a planar scan needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Plane {
+    pub angle_min_rad: f64,
+    pub angle_increment_rad: f64,
+    pub time_increment_s: f64,
+}
+
+impl PatternSpec {
+    /// The beams of a scan of a lidar that scans `rate_hz` times a second, and the plane they lie in, if any.
+    pub(super) fn beams(&self, rate_hz: f64, source: &Source) -> Result<(Vec<Beam>, Option<Plane>), SpecError> {
+        match self {
+            &Self::Planar { beams, first_deg, step_deg, slots_per_turn } => {
+                if beams == 0 || beams > slots_per_turn || beams as usize > MAX_BEAMS {
+                    let message = format!("{beams} beams in {slots_per_turn} slots a turn: 1..={slots_per_turn} fit");
+                    return Err(SpecError::about(source, "beams", message));
+                }
+                let plane = Plane {
+                    angle_min_rad: first_deg.to_radians(),
+                    angle_increment_rad: step_deg.to_radians(),
+                    time_increment_s: 1.0 / (rate_hz * f64::from(slots_per_turn)),
+                };
+                Ok(((0..beams).map(|k| plane.beam(k)).collect(), Some(plane)))
+            }
+            Self::Spinning { elevations_deg, channel_period_us, round_period_us } => {
+                let times = (channel_period_us * 1e-6, round_period_us * 1e-6);
+                Ok((spinning(elevations_deg, times, rate_hz, source)?, None))
+            }
+        }
+    }
+}
+
+impl Plane {
+    fn beam(&self, k: u32) -> Beam {
+        let azimuth = self.angle_min_rad + f64::from(k) * self.angle_increment_rad;
+        Beam::new(azimuth, 0.0, f64::from(k) * self.time_increment_s)
+    }
+}
+
+impl Beam {
+    /// The beam at `azimuth_rad` counter-clockwise from x about z, `elevation_rad` above the plane z = 0.
+    pub fn new(azimuth_rad: f64, elevation_rad: f64, offset_s: f64) -> Self {
+        let (sin, cos) = azimuth_rad.sin_cos();
+        let (up, level) = elevation_rad.sin_cos();
+        let direction_in_laser = Vector::new(level * cos, level * sin, up);
+        Self { direction_in_laser, offset: Span::from_seconds(offset_s), offset_s }
+    }
+}
+
+fn spinning(
+    elevations_deg: &[f64],
+    (channel_s, round_s): (f64, f64),
+    rate_hz: f64,
+    source: &Source,
+) -> Result<Vec<Beam>, SpecError> {
+    let refuse = |key: &str, message: String| Err(SpecError::about(source, key, message));
+    if elevations_deg.is_empty() || elevations_deg.iter().any(|e| !(-90.0..=90.0).contains(e)) {
+        return refuse(
+            "elevations_deg",
+            "a spinning lidar has one channel or more, each from -90 to 90 degrees".into(),
+        );
+    }
+    if channel_s * (elevations_deg.len() - 1) as f64 > round_s {
+        return refuse("channel_period_us", "the channels of one round last longer than the round".into());
+    }
+    let rounds = (1.0 / (rate_hz * round_s)).floor() as usize;
+    if rounds == 0 || rounds.saturating_mul(elevations_deg.len()) > MAX_BEAMS {
+        return refuse("round_period_us", format!("{rounds} rounds a turn; at least 1, and {MAX_BEAMS} beams at most"));
+    }
+    let beam = |round: usize, channel: usize| {
+        let offset_s = round as f64 * round_s + channel as f64 * channel_s;
+        Beam::new(-TAU * rate_hz * offset_s, elevations_deg[channel].to_radians(), offset_s)
+    };
+    Ok((0..rounds).flat_map(|round| (0..elevations_deg.len()).map(move |channel| beam(round, channel))).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn source() -> Source {
+        Source::in_memory("lidar.ron", "(\n pattern: planar(\n beams: 1441,\n))")
+    }
+
+    #[test]
+    fn the_beams_of_a_utm30lx_run_from_minus_135_to_135_degrees_in_18_75_ms() {
+        let pattern = PatternSpec::Planar { beams: 1081, first_deg: -135.0, step_deg: 0.25, slots_per_turn: 1440 };
+        let (beams, plane) = pattern.beams(40.0, &source()).unwrap();
+        let (first, last) = (beams[0], beams[1080]);
+        assert_relative_eq!(
+            first.direction_in_laser,
+            Vector::new(-0.5_f64.sqrt(), -0.5_f64.sqrt(), 0.0),
+            epsilon = 1e-12
+        );
+        assert_relative_eq!(
+            last.direction_in_laser,
+            Vector::new(-0.5_f64.sqrt(), 0.5_f64.sqrt(), 0.0),
+            epsilon = 1e-12
+        );
+        assert_relative_eq!(beams[540].direction_in_laser, Vector::x(), epsilon = 1e-12);
+        assert_eq!((beams[1].offset.nanos(), last.offset.nanos()), (17_361, 18_750_000));
+        assert_relative_eq!(plane.unwrap().time_increment_s, 17.361_111e-6, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn more_beams_than_slots_are_refused_where_they_stand() {
+        let pattern = PatternSpec::Planar { beams: 1441, first_deg: 0.0, step_deg: 0.25, slots_per_turn: 1440 };
+        assert_eq!(pattern.beams(40.0, &source()).unwrap_err().line_and_column(), Some((3, 2)));
+    }
+
+    #[test]
+    fn a_spinning_lidar_turns_clockwise_while_its_channels_fire() {
+        // Two channels 1 ms apart, rounds of 25 ms, 10 Hz: 36 degrees are 10 ms, so a round turns 90 and a channel 3.6.
+        let (channel_period_us, round_period_us) = (1e3, 25e3);
+        let pattern = PatternSpec::Spinning { elevations_deg: vec![-30.0, 30.0], channel_period_us, round_period_us };
+        let (beams, plane) = pattern.beams(10.0, &source()).unwrap();
+        assert!(plane.is_none());
+        assert_eq!(beams.len(), 8);
+        assert_relative_eq!(beams[2].direction_in_laser, Vector::new(0.0, -0.75_f64.sqrt(), -0.5), epsilon = 1e-12);
+        assert_eq!(beams[3].offset.nanos(), 26_000_000);
+        let expected = Beam::new((-93.6_f64).to_radians(), 30_f64.to_radians(), 0.026);
+        assert_relative_eq!(beams[3].direction_in_laser, expected.direction_in_laser, epsilon = 1e-12);
+    }
+}

@@ -1,0 +1,35 @@
+//! Hands a window's events to the sink, in the order of true time.
+
+use super::SimulationError;
+use super::measure::Events;
+use crate::measurement::Sink;
+use crate::time::Stamp;
+use crate::truth::TruthSink;
+
+/// Delivers all events; of one instant truth comes first, then the clocks, the IMU, the lidar.
+pub(super) fn deliver<S: Sink + TruthSink + ?Sized>(events: &Events, sink: &mut S) -> Result<(), SimulationError> {
+    let Events { truth, clocks, samples, scans, .. } = events;
+    let mut at = [0_usize; 4];
+    loop {
+        let next = [time_of(truth, at[0]), time_of(clocks, at[1]), time_of(samples, at[2]), time_of(scans, at[3])];
+        let Some((kind, now)) = earliest(&next) else { return Ok(()) };
+        let index = at[kind];
+        at[kind] += 1;
+        match kind {
+            0 => sink.truth(now, &truth[index].1),
+            1 => sink.clock(now, &clocks[index].1),
+            2 => sink.imu(now, &samples[index].1),
+            _ => sink.lidar(now, &scans[index].1),
+        }
+        .map_err(SimulationError::Sink)?;
+    }
+}
+
+fn time_of<T>(events: &[(Stamp, T)], index: usize) -> Option<Stamp> {
+    events.get(index).map(|(stamp, _)| *stamp)
+}
+
+/// The kind whose next event is the earliest, the first of equals, and when that is.
+fn earliest(next: &[Option<Stamp>]) -> Option<(usize, Stamp)> {
+    next.iter().enumerate().filter_map(|(kind, at)| at.map(|at| (kind, at))).min_by_key(|(kind, at)| (*at, *kind))
+}

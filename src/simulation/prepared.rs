@@ -1,0 +1,125 @@
+use super::{EPOCH, Rig, STEP_S, Scenario, SimulationError, SimulationSummary, Sources, Specs, simulate};
+use crate::dynamics::{HeadModel, HeadSimulation};
+use crate::geometry::Route;
+use crate::measurement::{Calibration, Sink};
+use crate::motion::BaseMotion;
+use crate::sensors::{Clocks, Imu, Lidar};
+use crate::spec::SpecError;
+use crate::truth::TruthSink;
+use crate::world::World;
+
+/// A scenario whose specs are found and checked, ready to run.
+pub struct Simulation {
+    scenario: Scenario,
+    specs: Specs,
+    world: World,
+    head: HeadModel,
+    motion: Box<dyn BaseMotion>,
+    lidar: Lidar,
+    imu: Imu,
+    clocks: Clocks,
+}
+
+impl Simulation {
+    /// Finds the specs that `scenario` names, and builds all that they describe.
+    ///
+    /// # Errors
+    /// When a spec is missing or wrong, alone or with the others.
+    pub fn prepare(scenario: &Scenario) -> Result<Self, SimulationError> {
+        let (specs, sources) = Specs::load(scenario)?;
+        Self::build(scenario, specs, &sources)
+    }
+
+    /// Builds what `specs` describe, which need not be what `scenario` names: a sweep changes them in between.
+    ///
+    /// # Errors
+    /// When they are wrong, alone or with each other.
+    pub fn build(scenario: &Scenario, specs: Specs, sources: &Sources) -> Result<Self, SimulationError> {
+        let world = World::build(&specs.scene, &sources.scene)?;
+        let head = HeadModel::new(&specs.head, &sources.head)?;
+        let route = route(scenario, &world)?;
+        let motion = specs.motion.build(&sources.motion, route, scenario.duration_s, scenario.seed)?;
+        let lidar = Lidar::new(&specs.lidar, &sources.lidar)?;
+        let imu = Imu::new(&specs.imu, &sources.imu)?;
+        let clocks = Clocks::new(&specs.clock, &sources.clock, EPOCH)?;
+        Ok(Self { scenario: scenario.clone(), specs, world, head, motion, lidar, imu, clocks })
+    }
+
+    /// What was asked for.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The specs as used.
+    pub fn specs(&self) -> &Specs {
+        &self.specs
+    }
+
+    /// The world.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The head.
+    pub fn head(&self) -> &HeadModel {
+        &self.head
+    }
+
+    /// How the base moves.
+    pub fn motion(&self) -> &dyn BaseMotion {
+        self.motion.as_ref()
+    }
+
+    /// The lidar.
+    pub fn lidar(&self) -> &Lidar {
+        &self.lidar
+    }
+
+    /// The inertial measurement unit.
+    pub fn imu(&self) -> &Imu {
+        &self.imu
+    }
+
+    /// How the sensors sit in the head, and how well they measure.
+    pub fn calibration(&self) -> Calibration {
+        self.rig().calibration()
+    }
+
+    /// Runs it: `sink` takes what the sensors say and what really happened, `progress` hears the fraction that is done.
+    ///
+    /// Every run of one scenario gives the same bytes, with any number of threads.
+    ///
+    /// # Errors
+    /// When the head's motion fails, or the sink refuses.
+    pub fn run<S: Sink + TruthSink + ?Sized>(
+        &self,
+        sink: &mut S,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<SimulationSummary, SimulationError> {
+        let mut motion = HeadSimulation::new(&self.head, self.motion.as_ref(), STEP_S)?;
+        simulate(&self.rig(), &mut motion, sink, progress)
+    }
+
+    fn rig(&self) -> Rig<'_> {
+        Rig {
+            scenery: &self.world,
+            lidar: &self.lidar,
+            imu: &self.imu,
+            clocks: self.clocks,
+            head_from_laser: *self.head.head_from_laser(),
+            head_from_imu: *self.head.head_from_imu(),
+            duration_s: self.scenario.duration_s,
+            seed: self.scenario.seed,
+        }
+    }
+}
+
+/// The way that is asked for: the named one, or the scene's default, if it has any.
+fn route<'w>(scenario: &Scenario, world: &'w World) -> Result<Option<&'w Route>, SpecError> {
+    let Some(name) = &scenario.route else { return Ok(world.default_route()) };
+    world.routes().get(name).map(Some).ok_or_else(|| {
+        let names: Vec<&str> = world.routes().keys().map(String::as_str).collect();
+        let help = if names.is_empty() { "it has none".to_owned() } else { format!("it has: {}", names.join(", ")) };
+        SpecError::plain(&scenario.scene, format!("the scene has no route `{name}`")).with_help(help)
+    })
+}

@@ -1,0 +1,114 @@
+use super::SimulationError;
+use crate::dynamics::HeadSpec;
+use crate::motion::MotionSpec;
+use crate::random::Seed;
+use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
+use crate::spec::{Kind, Source, SpecError, checked, find, parse};
+use crate::world::SceneSpec;
+use serde::{Deserialize, Serialize};
+
+/// What to simulate, by name: each a path, or a name in the library.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// The world.
+    pub scene: String,
+    /// The head and what carries it.
+    pub head: String,
+    /// How the base moves.
+    pub motion: String,
+    /// The lidar.
+    pub lidar: String,
+    /// The inertial measurement unit.
+    pub imu: String,
+    /// The sensors' clocks.
+    pub clock: String,
+    /// The scene's way to walk; `None` for its default one.
+    pub route: Option<String>,
+    /// How long, s.
+    #[serde(deserialize_with = "checked::positive")]
+    pub duration_s: f64,
+    /// The seed from which all chance follows.
+    pub seed: Seed,
+}
+
+impl Scenario {
+    /// The paper's head carried by hand for two minutes through `scene`: what is simulated unless something else is asked.
+    pub fn in_scene(scene: &str) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            head: "handheld".to_owned(),
+            motion: "hand".to_owned(),
+            lidar: "utm30lx".to_owned(),
+            imu: "3dm_gx2".to_owned(),
+            clock: "drifting".to_owned(),
+            route: None,
+            duration_s: 120.0,
+            seed: Seed(1),
+        }
+    }
+}
+
+/// The specs of a run as they were used, whole: with them and the scenario a run can be repeated anywhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Specs {
+    /// The world.
+    pub scene: SceneSpec,
+    /// The head and what carries it.
+    pub head: HeadSpec,
+    /// How the base moves.
+    pub motion: MotionSpec,
+    /// The lidar.
+    pub lidar: LidarSpec,
+    /// The inertial measurement unit.
+    pub imu: ImuSpec,
+    /// The sensors' clocks.
+    pub clock: ClocksSpec,
+}
+
+/// The texts that the specs of a run came from, for errors about them and for the folder of a scene's meshes.
+#[derive(Debug, Clone)]
+pub struct Sources {
+    /// The world's.
+    pub scene: Source,
+    /// The head's.
+    pub head: Source,
+    /// The motion's.
+    pub motion: Source,
+    /// The lidar's.
+    pub lidar: Source,
+    /// The IMU's.
+    pub imu: Source,
+    /// The clocks'.
+    pub clock: Source,
+}
+
+impl Specs {
+    /// Finds and parses the specs that `scenario` names.
+    ///
+    /// # Errors
+    /// When one is missing, or its text is wrong.
+    pub fn load(scenario: &Scenario) -> Result<(Self, Sources), SimulationError> {
+        let sources = Sources {
+            scene: find(Kind::Scene, &scenario.scene)?,
+            head: find(Kind::Head, &scenario.head)?,
+            motion: find(Kind::Motion, &scenario.motion)?,
+            lidar: find(Kind::Lidar, &scenario.lidar)?,
+            imu: find(Kind::Imu, &scenario.imu)?,
+            clock: find(Kind::Clock, &scenario.clock)?,
+        };
+        Ok((Self::parse(&sources)?, sources))
+    }
+
+    fn parse(sources: &Sources) -> Result<Self, SpecError> {
+        Ok(Self {
+            scene: parse(&sources.scene)?,
+            head: parse(&sources.head)?,
+            motion: parse(&sources.motion)?,
+            lidar: parse(&sources.lidar)?,
+            imu: parse(&sources.imu)?,
+            clock: parse(&sources.clock)?,
+        })
+    }
+}

@@ -1,0 +1,273 @@
+//! What an IMU says against closed forms, and its noise against its spec.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use approx::assert_relative_eq;
+use std::f64::consts::PI;
+use zsim::geometry::{
+    Kinematics, Pose, Rotation, STANDARD_GRAVITY_M_PER_S2 as G, Vector, from_roll_pitch_yaw, gravity_in_world,
+};
+use zsim::random::Seed;
+use zsim::sensors::{GaussMarkovSpec, Imu, ImuErrors, ImuSpec, MeanMotion, mean_motion};
+use zsim::signal::allan_deviation;
+use zsim::spec::{self, Kind, Source};
+
+fn spec_of(name: &str) -> ImuSpec {
+    spec::load(Kind::Imu, name).unwrap()
+}
+
+fn imu(spec: &ImuSpec) -> Imu {
+    Imu::new(spec, &Source::in_memory("test.ron", "")).unwrap()
+}
+
+fn at_rest() -> MeanMotion {
+    MeanMotion { angular_velocity_rad_per_s: Vector::zeros(), specific_force_m_per_s2: Vector::z() * G }
+}
+
+#[test]
+fn every_shipped_imu_loads() {
+    let names = spec::names(Kind::Imu);
+    assert!(names.len() >= 3, "{names:?}");
+    for name in names {
+        imu(&spec_of(&name));
+    }
+}
+
+#[test]
+fn the_noise_of_the_3dm_gx2_is_that_of_its_data_sheet() {
+    let noise = imu(&spec_of("3dm_gx2")).noise();
+    assert_relative_eq!(noise.gyro_density_rad_per_s_per_sqrt_hz, 5.236e-4, max_relative = 1e-4);
+    assert_relative_eq!(noise.accel_density_m_per_s2_per_sqrt_hz, 7.845e-4, max_relative = 1e-4);
+    assert_relative_eq!(noise.gyro_limit_rad_per_s, 10.472, max_relative = 1e-4);
+    assert_relative_eq!(noise.accel_turn_on_bias_m_per_s2, 0.049_033, max_relative = 1e-4);
+}
+
+/// A motion with every axis of rotation and translation in it, in closed form by differences of its exact pose.
+fn tumbling(t: f64) -> Kinematics {
+    // Rz(a) Ry(b) with a = 0.7 sin(2 pi 0.9 t), b = 0.8 sin(2 pi 1.3 t); omega = a' z + Rz(a) b' y.
+    let (wa, wb) = (2.0 * PI * 0.9, 2.0 * PI * 1.3);
+    let (a, b) = (0.7 * (wa * t).sin(), 0.8 * (wb * t).sin());
+    let (a1, b1) = (0.7 * wa * (wa * t).cos(), 0.8 * wb * (wb * t).cos());
+    let (a2, b2) = (-wa * wa * a, -wb * wb * b);
+    let node = Rotation::from_scaled_axis(Vector::z() * a) * Vector::y();
+    let omega = Vector::z() * a1 + node * b1;
+    let alpha = Vector::z() * a2 + node * b2 + Vector::z().cross(&node) * (a1 * b1);
+    let w = 2.0 * PI * 1.1;
+    let sway = |amplitude: f64, phase: f64| {
+        let (sin, cos) = (w * t + phase).sin_cos();
+        (amplitude * sin, amplitude * w * cos, -amplitude * w * w * sin)
+    };
+    let (x, y, z) = (sway(0.2, 0.3), sway(0.1, 1.0), sway(0.05, 2.0));
+    Kinematics {
+        world_from_body: Pose::from_parts(Vector::new(x.0 + 0.5 * t, y.0, z.0).into(), from_roll_pitch_yaw(0.0, b, a)),
+        velocity_in_world: Vector::new(x.1 + 0.5, y.1, z.1),
+        angular_velocity_in_world: omega,
+        acceleration_in_world: Vector::new(x.2, y.2, z.2),
+        angular_acceleration_in_world: alpha,
+    }
+}
+
+#[test]
+fn an_ideal_imu_at_1_khz_integrates_to_the_motion() {
+    let mut errors = ImuErrors::new(&imu(&spec_of("ideal_1khz")), Seed(1));
+    let dt = 1e-3;
+    let start = tumbling(0.0);
+    let (mut rotation, mut velocity) = (start.world_from_body.rotation, start.velocity_in_world);
+    let mut position = start.world_from_body.translation.vector;
+    for k in 0..10_000 {
+        let t = f64::from(k) * dt;
+        let sample = errors.measure(&mean_motion(&tumbling(t), &tumbling(t + dt), dt));
+        // Plain strapdown integration, as a user of /imu/data_raw would write it.
+        let turn = sample.angular_velocity_rad_per_s * dt;
+        let middle = rotation * Rotation::from_scaled_axis(turn * 0.5);
+        let acceleration = middle * sample.specific_force_m_per_s2 + gravity_in_world();
+        position += velocity * dt + acceleration * (0.5 * dt * dt);
+        velocity += acceleration * dt;
+        rotation *= Rotation::from_scaled_axis(turn);
+    }
+    let end = tumbling(10.0).world_from_body;
+    assert!((position - end.translation.vector).norm() < 1e-4, "{}", position - end.translation.vector);
+    assert!(rotation.angle_to(&end.rotation).to_degrees() < 1e-6);
+}
+
+#[test]
+fn on_a_spinning_table_the_arm_feels_the_centripetal_force() {
+    // Rate w about z, arm r along x of the head, sample over T. In the frame half-way, the velocity of a point on a
+    // circle changes by -2 w r sin(w T / 2) along the arm: on average a force of -w^2 r sinc(w T / 2), and gravity.
+    let (rate, arm, period) = (6.0, 0.1, 0.01);
+    let table = |t: f64| {
+        let pose = Pose::from_parts(Vector::zeros().into(), from_roll_pitch_yaw(0.0, 0.0, rate * t));
+        let spinning = Kinematics { angular_velocity_in_world: Vector::z() * rate, ..Kinematics::at_rest(pose) };
+        spinning.of_frame(&Pose::translation(arm, 0.0, 0.0))
+    };
+    let sample = mean_motion(&table(0.3), &table(0.3 + period), period);
+    let half = 0.5 * rate * period;
+    let expected = Vector::new(-rate * rate * arm * half.sin() / half, 0.0, G);
+    assert_relative_eq!(sample.specific_force_m_per_s2, expected, epsilon = 1e-10);
+    assert_relative_eq!(sample.angular_velocity_rad_per_s, Vector::z() * rate, epsilon = 1e-10);
+}
+
+#[test]
+fn an_accelerometer_on_a_pendulum_feels_the_rod_alone() {
+    // A point pendulum of length L: the rod pulls along itself, with g cos(a) + L a'^2, and nothing across. The state is
+    // integrated by RK4 at 0.05 ms; energy gives a'^2 = 2 g / L (cos a - cos a0).
+    let (length, a0) = (0.8, 1.2_f64);
+    let (mut a, mut rate) = (a0, 0.0);
+    let swing = |a: f64| -G / length * a.sin();
+    let state = |a: f64, rate: f64| Kinematics {
+        world_from_body: Pose::from_parts(
+            Vector::new(length * a.sin(), 0.0, -length * a.cos()).into(),
+            from_roll_pitch_yaw(0.0, -a, 0.0),
+        ),
+        velocity_in_world: Vector::new(a.cos(), 0.0, a.sin()) * (length * rate),
+        ..Kinematics::at_rest(Pose::identity())
+    };
+    let h = 5e-5;
+    for k in 1..=12_000 {
+        let before = (a, rate);
+        for half in [0.5 * h, 0.5 * h] {
+            let (k1, l1) = (rate, swing(a));
+            let (k2, l2) = (rate + 0.5 * half * l1, swing(a + 0.5 * half * k1));
+            let (k3, l3) = (rate + 0.5 * half * l2, swing(a + 0.5 * half * k2));
+            let (k4, l4) = (rate + half * l3, swing(a + half * k3));
+            a += half / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+            rate += half / 6.0 * (l1 + 2.0 * l2 + 2.0 * l3 + l4);
+        }
+        if k % 1000 == 0 {
+            let sample = mean_motion(&state(before.0, before.1), &state(a, rate), h);
+            let middle = 0.5 * (a + before.0);
+            let pull = G * middle.cos() + 2.0 * G * (middle.cos() - a0.cos());
+            assert_relative_eq!(sample.specific_force_m_per_s2, Vector::new(0.0, 0.0, pull), epsilon = 1e-6);
+        }
+    }
+}
+
+/// Samples of the x axes of an IMU at rest.
+fn still(spec: &ImuSpec, seed: u64, count: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut errors = ImuErrors::new(&imu(spec), Seed(seed));
+    (0..count)
+        .map(|_| {
+            let sample = errors.measure(&at_rest());
+            (sample.angular_velocity_rad_per_s.x, sample.specific_force_m_per_s2.x)
+        })
+        .unzip()
+}
+
+#[test]
+fn six_hours_at_rest_have_the_allan_deviation_of_the_spec() {
+    let spec = spec_of("3dm_gx2");
+    let noise = imu(&spec).noise();
+    let (gyro, accel) = still(&spec, 1, 6 * 3600 * 100);
+    let averaging: Vec<usize> =
+        [0.01, 0.1, 1.0, 5.0, 10.0, 20.0, 100.0, 500.0, 2000.0].map(|tau| (tau * 100.0) as usize).into();
+    let sources = [
+        (gyro, noise.gyro_density_rad_per_s_per_sqrt_hz, noise.gyro_bias_walk_rad_per_s_per_sqrt_s),
+        (accel, noise.accel_density_m_per_s2_per_sqrt_hz, noise.accel_bias_walk_m_per_s2_per_sqrt_s),
+    ];
+    for (samples, density, walk) in sources {
+        for point in allan_deviation(&samples, 100.0, &averaging) {
+            // White noise falls as N / sqrt(tau), a walk rises as K sqrt(tau / 3) (IEEE Std 952); they add in squares.
+            let tau = point.tau_s;
+            let expected = (density * density / tau + walk * walk * tau / 3.0).sqrt();
+            let (low, high) = point.band(0.999);
+            let near = (point.deviation / expected - 1.0).abs() < 0.10;
+            assert!(
+                if tau <= 20.0 { near } else { low < expected && expected < high },
+                "{point:?}, expected {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_wandering_bias_has_its_spread_and_forgets_in_its_time() {
+    let mut spec = spec_of("ideal_1khz");
+    spec.rate_hz = 10.0;
+    spec.accel.wander_mg = Some(GaussMarkovSpec { sigma: 0.04, time_s: 2.0 });
+    let (_, samples) = still(&spec, 3, 200_000);
+    let covariance = |lag: usize| {
+        let products = samples.iter().zip(&samples[lag..]).map(|(a, b)| a * b);
+        products.sum::<f64>() / (samples.len() - lag) as f64
+    };
+    // 20,000 s hold 10,000 correlation times: relative standard error of a variance sqrt(2 / 10,000) = 1.4 %.
+    let sigma = 0.04e-3 * G;
+    assert_relative_eq!(covariance(0), sigma * sigma, max_relative = 0.06);
+    assert_relative_eq!(covariance(20) / covariance(0), (-1.0_f64).exp(), epsilon = 0.05);
+}
+
+#[test]
+fn a_gyroscope_says_no_more_than_its_limit() {
+    let spec = spec_of("3dm_gx2");
+    let mut errors = ImuErrors::new(&imu(&spec), Seed(1));
+    let fast = MeanMotion {
+        angular_velocity_rad_per_s: Vector::new(20.0, -20.0, 1.0),
+        specific_force_m_per_s2: Vector::new(0.0, 60.0, -60.0),
+    };
+    let said = errors.measure(&fast);
+    let (rate, force) = (said.angular_velocity_rad_per_s, said.specific_force_m_per_s2);
+    assert_relative_eq!(rate.xy(), nalgebra::Vector2::new(1.0, -1.0) * 600_f64.to_radians(), epsilon = 1e-12);
+    assert!((rate.z - 1.0).abs() < 0.1);
+    assert_relative_eq!(force.yz(), nalgebra::Vector2::new(1.0, -1.0) * 5.0 * G, epsilon = 1e-12);
+}
+
+#[test]
+fn rounding_is_to_the_resolution() {
+    let mut spec = spec_of("ideal_1khz");
+    spec.gyro.resolution_deg_per_s = 0.5;
+    let mut errors = ImuErrors::new(&imu(&spec), Seed(1));
+    let turning = MeanMotion { angular_velocity_rad_per_s: Vector::repeat(0.7_f64.to_radians()), ..at_rest() };
+    assert_relative_eq!(
+        errors.measure(&turning).angular_velocity_rad_per_s,
+        Vector::repeat(0.5_f64.to_radians()),
+        epsilon = 1e-12
+    );
+}
+
+#[test]
+fn scale_misalignment_and_turn_on_bias_spread_over_runs_as_the_spec_says() {
+    let mut spec = spec_of("ideal_1khz");
+    (spec.gyro.scale_percent, spec.gyro.misalignment_deg, spec.gyro.turn_on_bias_deg_per_s) = (0.1, 0.05, 0.2);
+    let imu = imu(&spec);
+    let runs = 4000;
+    let mut squares = Vector::zeros();
+    for seed in 0..runs {
+        let mut errors = ImuErrors::new(&imu, Seed(seed));
+        let mut said = |rate: Vector| {
+            errors.measure(&MeanMotion { angular_velocity_rad_per_s: rate, ..at_rest() }).angular_velocity_rad_per_s
+        };
+        let bias = said(Vector::zeros());
+        let turned = said(Vector::x()) - bias;
+        squares += Vector::new(turned.x - 1.0, turned.y, bias.z).map(|x| x * x);
+    }
+    // Standard error of a sigma from n runs: 1 / sqrt(2 n) = 1.1 %.
+    let sigma = (squares / runs as f64).map(f64::sqrt);
+    let expected = Vector::new(1e-3, 0.05_f64.to_radians(), 0.2_f64.to_radians());
+    assert_relative_eq!(sigma.component_div(&expected), Vector::repeat(1.0), epsilon = 0.045);
+}
+
+#[test]
+fn a_walk_leaves_the_white_noise_as_it_was() {
+    let spec = spec_of("3dm_gx2");
+    let mut without = spec.clone();
+    without.gyro.bias_walk_rad_per_s_per_sqrt_s = 0.0;
+    let ((a, accel_a), (b, accel_b)) = (still(&spec, 5, 100), still(&without, 5, 100));
+    assert_eq!(accel_a, accel_b);
+    assert_eq!(a[0], b[0]);
+    // The difference is the walk itself: sigma 5e-5 sqrt(1 s) after 100 samples, and nothing of the white 5e-3 a sample.
+    assert!((a[99] - b[99]).abs() < 2.5e-4 && a[99] != b[99]);
+}
+
+#[test]
+fn nonsense_in_a_spec_is_refused_where_it_stands() {
+    let text = std::fs::read_to_string("specs/imus/3dm_gx2.ron").unwrap();
+    let negative = text.replace("density_ug_per_sqrt_hz: 80", "density_ug_per_sqrt_hz: -80");
+    let error = spec::parse::<ImuSpec>(&Source::in_memory("imu.ron", negative)).unwrap_err();
+    assert_eq!(error.line_and_column().unwrap().0, 16);
+    let unknown = text.replace("limit_g: 5", "limit_kg: 5");
+    assert!(
+        spec::parse::<ImuSpec>(&Source::in_memory("imu.ron", unknown)).unwrap_err().to_string().contains("limit_kg")
+    );
+    let coarse = Source::in_memory("imu.ron", text.replace("resolution_mg: 0", "resolution_mg: 6000"));
+    let error = Imu::new(&spec::parse(&coarse).unwrap(), &coarse).unwrap_err();
+    assert!(error.to_string().contains("greater than the sensor's limit") && error.line_and_column().unwrap().0 == 22);
+}

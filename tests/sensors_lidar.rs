@@ -1,0 +1,294 @@
+//! What a lidar reports against worlds in closed form, and its errors against its spec.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use approx::assert_relative_eq;
+use std::f64::consts::PI;
+use zsim::geometry::{Kinematics, Pose, Trajectory, Vector, from_roll_pitch_yaw};
+use zsim::measurement::LidarScan;
+use zsim::random::Seed;
+use zsim::sensors::{Firing, Lidar, LidarErrors, LidarSpec, Rays, Scenery, SurfaceHit, Switch, Track};
+use zsim::spec::{self, Kind, Source};
+use zsim::time::Stamp;
+
+fn spec_of(name: &str) -> LidarSpec {
+    spec::load(Kind::Lidar, name).unwrap()
+}
+
+fn lidar(spec: &LidarSpec) -> Lidar {
+    Lidar::new(spec, &Source::in_memory("test.ron", "")).unwrap()
+}
+
+/// The inside of a sphere about the origin of the world.
+struct Globe {
+    radius_m: f64,
+    reflectance: f32,
+}
+
+impl Scenery for Globe {
+    fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, _t_s: f64) -> Option<SurfaceHit> {
+        // |o + s d| = R: s = -o.d + sqrt((o.d)^2 + R^2 - o.o).
+        let along = origin.dot(direction);
+        let range_m = -along + (along * along + self.radius_m.powi(2) - origin.norm_squared()).sqrt();
+        let normal = (origin + direction * range_m) / self.radius_m;
+        let cos_incidence = normal.dot(direction).abs() as f32;
+        let hit = SurfaceHit { range_m, cos_incidence, reflectance: self.reflectance, transmission: 0.0 };
+        (range_m <= reach_m).then_some(hit)
+    }
+}
+
+/// Planes across the x axis, in front of the origin; each may end at a y, to its left.
+struct Walls(Vec<Wall>);
+
+struct Wall {
+    x_m: f64,
+    ends_at_y_m: f64,
+    transmission: f32,
+}
+
+impl Scenery for Walls {
+    fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, _t_s: f64) -> Option<SurfaceHit> {
+        let hit_of = |wall: &Wall| {
+            let range_m = (wall.x_m - origin.x) / direction.x;
+            let seen = range_m > 0.0 && range_m <= reach_m && origin.y + direction.y * range_m < wall.ends_at_y_m;
+            let cos_incidence = direction.x.abs() as f32;
+            seen.then_some(SurfaceHit { range_m, cos_incidence, reflectance: 0.5, transmission: wall.transmission })
+        };
+        self.0.iter().filter_map(hit_of).min_by(|a, b| a.range_m.total_cmp(&b.range_m))
+    }
+}
+
+fn wall(x_m: f64) -> Wall {
+    Wall { x_m, ends_at_y_m: f64::INFINITY, transmission: 0.0 }
+}
+
+fn pane(x_m: f64) -> Wall {
+    Wall { transmission: 0.96, ..wall(x_m) }
+}
+
+fn resting() -> Track {
+    Track::new(0, 1e-3, vec![Kinematics::at_rest(Pose::identity()); 101]).unwrap()
+}
+
+fn firing(index: u64) -> Firing {
+    Firing { index, start_s: 0.0, pace: 1.0, stamp: Stamp::from_nanos(1_000_000_000) }
+}
+
+/// Scan `index` of a lidar at rest at the origin.
+fn scan(spec: &LidarSpec, scenery: &dyn Scenery, seed: u64, index: u64) -> LidarScan {
+    let lidar = lidar(spec);
+    lidar.measure(&lidar.sweep(scenery, &resting(), &firing(index)), &LidarErrors::new(&lidar, Seed(seed)))
+}
+
+fn mean_and_sigma(x: &[f64]) -> (f64, f64) {
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    (mean, (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (x.len() - 1) as f64).sqrt())
+}
+
+#[test]
+fn every_shipped_lidar_loads() {
+    let names = spec::names(Kind::Lidar);
+    assert!(names.len() >= 4, "{names:?}");
+    for name in names {
+        lidar(&spec_of(&name));
+    }
+}
+
+/// A head that nods by 45 degrees at 1.5 Hz and sways, in closed form.
+fn nodding(t: f64) -> Kinematics {
+    let w = 3.0 * PI;
+    let (sin, cos) = (w * t).sin_cos();
+    Kinematics {
+        world_from_body: Pose::from_parts(
+            Vector::new(0.1 * sin, 0.5 * t, 0.0).into(),
+            from_roll_pitch_yaw(0.0, 0.25 * PI * sin, 0.0),
+        ),
+        velocity_in_world: Vector::new(0.1 * w * cos, 0.5, 0.0),
+        angular_velocity_in_world: Vector::y() * (0.25 * PI * w * cos),
+        acceleration_in_world: Vector::new(-0.1 * w * w * sin, 0.0, 0.0),
+        angular_acceleration_in_world: Vector::y() * (-0.25 * PI * w * w * sin),
+    }
+}
+
+#[test]
+fn beams_projected_by_poses_at_1_khz_lie_on_the_surface() {
+    // A user interpolates the truth linearly: the error of a nod is A w^2 h^2 / 8 = 9 urad, 0.1 mm at 10 m.
+    let spec = spec_of("utm30lx_exact");
+    let lidar = lidar(&spec);
+    let track = Track::new(0, 1e-3, (0..200).map(|k| nodding(f64::from(k) * 1e-3)).collect()).unwrap();
+    let stamped = (0..200).map(|k| (Stamp::from_nanos(k * 1_000_000), nodding(k as f64 * 1e-3).world_from_body));
+    let truth = Trajectory::from_poses(stamped).unwrap();
+    let globe = Globe { radius_m: 10.0, reflectance: 0.5 };
+    let firing = Firing { index: 3, start_s: 0.0751, pace: 1.0, stamp: Stamp::from_nanos(75_100_000) };
+    let scan = lidar.measure(&lidar.sweep(&globe, &track, &firing), &LidarErrors::new(&lidar, Seed(1)));
+    assert_eq!(scan.returns.len(), 1081);
+    for beam in &scan.returns {
+        let world_from_laser = truth.at(scan.stamp + beam.offset).unwrap();
+        let point = world_from_laser * nalgebra::Point3::from(beam.point_in_laser.cast::<f64>());
+        assert!((point.coords.norm() - 10.0).abs() < 2e-4, "{}", point.coords.norm());
+    }
+}
+
+#[test]
+fn the_polar_form_says_the_same_as_the_points() {
+    let scan = scan(&spec_of("utm30lx"), &Globe { radius_m: 4.0, reflectance: 0.5 }, 1, 0);
+    let planar = scan.planar.unwrap();
+    assert_eq!((planar.ranges_m.len(), planar.intensities.len()), (1081, 1081));
+    for (k, beam) in scan.returns.iter().enumerate() {
+        let angle = planar.angle_min_rad + k as f64 * planar.angle_increment_rad;
+        let range = f64::from(planar.ranges_m[k]);
+        let point = Vector::new(angle.cos(), angle.sin(), 0.0) * range;
+        assert_relative_eq!(beam.point_in_laser.cast::<f64>(), point, epsilon = 1e-6);
+        assert!((beam.offset.seconds() - k as f64 * planar.time_increment_s).abs() < 1e-9);
+        assert_eq!(beam.intensity, planar.intensities[k]);
+        let millimetres = range * 1e3;
+        assert!((millimetres - millimetres.round()).abs() < 1e-3, "rounded to 1 mm: {range}");
+    }
+}
+
+#[test]
+fn range_noise_is_10_mm_near_20_mm_at_20_m_and_shares_a_bias() {
+    for (radius_m, sigma_m) in [(5.0, 0.010), (20.0, 0.020)] {
+        let spec = spec_of("utm30lx");
+        let lidar = lidar(&spec);
+        let (globe, errors) = (Globe { radius_m, reflectance: 0.9 }, LidarErrors::new(&lidar, Seed(11)));
+        let ranges: Vec<f64> = (0..20)
+            .flat_map(|k| lidar.measure(&lidar.sweep(&globe, &resting(), &firing(k)), &errors).planar.unwrap().ranges_m)
+            .filter(|range| range.is_finite())
+            .map(|range| f64::from(range) - radius_m)
+            .collect();
+        let (mean, sigma) = mean_and_sigma(&ranges);
+        // Weak echoes are late by 10 mm times half power over power: (0.9 / 60^2) / (0.9 / r^2) = (r / 60)^2.
+        let late = 0.010 * (radius_m / 60.0).powi(2);
+        // 21,620 ranges: standard errors of 0.7 % and 0.5 % of sigma. Rounding to 1 mm adds 0.3 mm in squares.
+        assert!((mean - errors.bias_m() - late).abs() < 3.5 * 0.007 * sigma_m, "{mean}");
+        assert!((sigma / sigma_m - 1.0).abs() < 0.02, "{sigma}");
+    }
+}
+
+#[test]
+fn the_bias_spreads_over_runs_by_5_mm() {
+    let lidar = lidar(&spec_of("utm30lx"));
+    let biases: Vec<f64> = (0..4000).map(|seed| LidarErrors::new(&lidar, Seed(seed)).bias_m()).collect();
+    let (mean, sigma) = mean_and_sigma(&biases);
+    assert!(mean.abs() < 4.0 * 0.005 / 63.0 && (sigma / 0.005 - 1.0).abs() < 0.045, "{mean} {sigma}");
+}
+
+#[test]
+fn half_of_the_echoes_at_the_threshold_are_missed_and_none_of_strong_ones() {
+    // Power at the threshold: 0.9 / 60^2 = reflectance / r^2, so at 20 m a reflectance of 0.1.
+    let mut spec = spec_of("utm30lx");
+    spec.errors.range.far_sigma_m = 0.010;
+    let seen = |reflectance: f32| {
+        let globe = Globe { radius_m: 20.0, reflectance };
+        (0..4).map(|k| scan(&spec, &globe, 2, k).returns.len()).sum::<usize>() as f64 / 4324.0
+    };
+    // Standard error of a share of half: 0.76 %.
+    assert!((seen(0.1) - 0.5).abs() < 0.03, "{}", seen(0.1));
+    // Odds change by e where the logarithm of power changes by 0.15: at 1.15 of it, ln 1.15 / 0.15 = 0.932.
+    assert!((seen(0.115) - 1.0 / (1.0 + (-0.932_f64).exp())).abs() < 0.03, "{}", seen(0.115));
+    assert_eq!(seen(0.9), 1.0);
+    assert!(seen(0.03) < 0.01);
+}
+
+#[test]
+fn grazing_beams_come_back_too_short_and_then_not_at_all() {
+    // A wall along the beams' plane: 0.5 m ahead of a lidar whose beams meet it at up to 89 degrees.
+    let mut spec = spec_of("utm30lx");
+    spec.errors.range.near_sigma_m = 0.0;
+    spec.errors.range.bias_sigma_m = 0.0;
+    spec.errors.detection.weak_bias_m = 0.0;
+    spec.errors.range.resolution_m = 0.0;
+    let planar = scan(&spec, &Walls(vec![wall(0.5)]), 1, 0).planar.unwrap();
+    let range_at = |degrees: f64| f64::from(planar.ranges_m[((degrees + 135.0) * 4.0) as usize]);
+    let exact = |degrees: f64| 0.5 / degrees.to_radians().cos();
+    assert_relative_eq!(range_at(60.0), exact(60.0), epsilon = 1e-5);
+    // The bias is -20 mm (1 - cos(85) / cos(70)) = -14.9 mm.
+    let bias = -0.020 * (1.0 - 85_f64.to_radians().cos() / 70_f64.to_radians().cos());
+    assert_relative_eq!(range_at(85.0), exact(85.0) + bias, epsilon = 1e-5);
+    // At 89 degrees the range is 28.6 m and the power 0.5 cos(89) / 28.6^2, a twentieth of the threshold.
+    assert_eq!(range_at(89.0), f64::INFINITY);
+}
+
+#[test]
+fn glass_lets_most_beams_through_and_makes_them_late() {
+    let mut spec = spec_of("utm30lx");
+    (spec.errors.range.near_sigma_m, spec.errors.range.bias_sigma_m, spec.errors.detection.weak_bias_m) =
+        (0.0, 0.0, 0.0);
+    spec.errors.range.resolution_m = 0.0;
+    spec.pattern = spec::parse(&Source::in_memory(
+        "narrow",
+        "planar(beams: 1000, first_deg: -0.5, step_deg: 0.001, slots_per_turn: 1440)",
+    ))
+    .unwrap();
+    let window = Walls(vec![pane(2.0), pane(2.006), wall(5.0)]);
+    let ranges: Vec<f32> = (0..4).flat_map(|k| scan(&spec, &window, 1, k).planar.unwrap().ranges_m).collect();
+    let behind = ranges.iter().filter(|r| (**r - 5.003).abs() < 3e-4).count();
+    let from_glass = ranges.iter().filter(|r| **r < 2.008).count();
+    assert_eq!(behind + from_glass, 4000);
+    // Two surfaces, each giving an echo one time in twenty: 1 - 0.95^2 = 9.75 %, with a standard error of 0.47 %.
+    assert!((from_glass as f64 / 4000.0 - 0.0975).abs() < 0.02, "{from_glass}");
+    // Without errors every beam passes, to the exact range.
+    spec.noise = Switch::Off;
+    let exact = scan(&spec, &window, 1, 0).planar.unwrap().ranges_m;
+    assert!(exact.iter().all(|r| (*r - 5.0).abs() < 3e-4), "5 m / cos(0.5 degrees) is 5.0002 m");
+}
+
+#[test]
+fn a_divergent_beam_mixes_near_surfaces_and_tells_far_ones_apart() {
+    // The axis of beam 540 lies along x; the near wall ends there, so that it holds what lies right of the axis.
+    let edge = |depth_m: f64| Walls(vec![Wall { ends_at_y_m: -1e-6, ..wall(5.0) }, wall(5.0 + depth_m)]);
+    let mut spec = spec_of("utm30lx_exact");
+    let middle = |spec: &LidarSpec, depth_m: f64| scan(spec, &edge(depth_m), 1, 0).planar.unwrap().ranges_m[540];
+    assert!((middle(&spec, 0.3) - 5.3).abs() < 1e-6, "one ray sees one wall");
+    spec.beam = Rays::Divergent;
+    // Of seven rays, three of a twelfth fall on the near wall (at 120, 180 and 240 degrees from the left); the powers go
+    // as 1 / r^2: (3 / 25, 9 / 5.3^2) / 12.
+    let (near, far) = (3.0 / 25.0, 9.0 / (5.3 * 5.3));
+    let mixed = (5.0 * near + 5.3 * far) / (near + far);
+    assert!((f64::from(middle(&spec, 0.3)) - mixed).abs() < 1e-4, "{} {mixed}", middle(&spec, 0.3));
+    assert!((middle(&spec, 3.0) - 8.0).abs() < 1e-4, "beyond the pulse the strongest counts");
+
+    spec.echoes = 3;
+    let returns = scan(&spec, &edge(3.0), 1, 0).returns;
+    let offset = lidar(&spec).beams()[540].offset;
+    let of_middle: Vec<f32> = returns.iter().filter(|r| r.offset == offset).map(|r| r.point_in_laser.x).collect();
+    assert_eq!(of_middle.len(), 2);
+    assert!((of_middle[0] - 5.0).abs() < 1e-4 && (of_middle[1] - 8.0).abs() < 1e-4, "{of_middle:?}");
+}
+
+#[test]
+fn beyond_range_is_plus_and_too_near_is_minus_infinity() {
+    let spec = spec_of("utm30lx");
+    let far = scan(&spec, &Globe { radius_m: 31.0, reflectance: 0.9 }, 1, 0);
+    assert!(far.returns.is_empty() && far.planar.unwrap().ranges_m.iter().all(|r| *r == f32::INFINITY));
+    let near = scan(&spec, &Globe { radius_m: 0.04, reflectance: 0.9 }, 1, 0);
+    assert!(near.returns.is_empty() && near.planar.unwrap().ranges_m.iter().all(|r| *r == f32::NEG_INFINITY));
+}
+
+#[test]
+fn a_scan_is_the_same_whichever_was_computed_before_and_differs_by_seed() {
+    let spec = spec_of("utm30lx");
+    let globe = Globe { radius_m: 6.0, reflectance: 0.5 };
+    let alone = scan(&spec, &globe, 1, 5);
+    for index in [7, 3] {
+        assert_ne!(scan(&spec, &globe, 1, index).planar, alone.planar);
+    }
+    assert_eq!(scan(&spec, &globe, 1, 5), alone);
+    assert_ne!(scan(&spec, &globe, 2, 5).planar, alone.planar);
+}
+
+#[test]
+fn nonsense_in_a_spec_is_refused_where_it_stands() {
+    let text = std::fs::read_to_string("specs/lidars/utm30lx.ron").unwrap();
+    let about = |from: &str, to: &str| {
+        let source = Source::in_memory("lidar.ron", text.replace(from, to));
+        let error = spec::parse::<LidarSpec>(&source).and_then(|spec| Lidar::new(&spec, &source)).unwrap_err();
+        (error.line_and_column().unwrap(), error.message().to_owned())
+    };
+    assert!(about("rate_hz: 40", "rate_hz: NaN").1.contains("finite number above 0"));
+    assert!(about("range_min_m: 0.1", "range_min_m: 40").1.contains("is not below range_max_m 30"));
+    assert!(about("beams: 1081", "beams: 2000").1.contains("2000 beams in 1440 slots"));
+    assert!(about("echoes: 1", "echoes: 0").1.contains("0 echoes"));
+    assert!(about("noise: on", "noise: perhaps").1.contains("perhaps"));
+}

@@ -1,0 +1,353 @@
+//! The simulation's pipeline, with a head that moves in closed form through a world in closed form.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use std::f64::consts::PI;
+use zsim::dynamics::{DynamicsError, HeadState};
+use zsim::geometry::{Kinematics, Pose, Rotation, Trajectory, Vector, from_roll_pitch_yaw, gravity_in_world};
+use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
+use zsim::random::Seed;
+use zsim::sensors::{ClockSpec, Clocks, ClocksSpec, Imu, Lidar, Scenery, SurfaceHit};
+use zsim::simulation::{EPOCH, Rig, STEP_S, SimulationError, SimulationSummary, simulate};
+use zsim::spec::{self, Kind, Source};
+use zsim::time::{Span, Stamp};
+use zsim::truth::{ClockTruth, TruthSample, TruthSink};
+
+/// The inside of a box about the origin, 12 x 8 x 5 m.
+struct Room;
+
+const HALF: [f64; 3] = [6.0, 4.0, 2.5];
+
+impl Scenery for Room {
+    fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, _t_s: f64) -> Option<SurfaceHit> {
+        let exits = (0..3).map(|k| ((HALF[k].copysign(direction[k]) - origin[k]) / direction[k], direction[k].abs()));
+        let (range_m, cos) = exits.filter(|(range, _)| *range > 0.0).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let hit = SurfaceHit { range_m, cos_incidence: cos as f32, reflectance: 0.6, transmission: 0.0 };
+        (range_m <= reach_m).then_some(hit)
+    }
+}
+
+/// How far a point is from the nearest wall of the room.
+fn off_the_walls(point: &Vector) -> f64 {
+    (0..3).map(|k| (point[k].abs() - HALF[k]).abs()).fold(f64::INFINITY, f64::min)
+}
+
+/// A head that nods by 40 degrees at 1.2 Hz while it turns and circles.
+struct Nodding {
+    step: u64,
+}
+
+fn nodding(t: f64) -> Kinematics {
+    // Rz(c t) Ry(b): omega = c z + b' y', with y' the turned y axis.
+    let (w, c) = (2.4 * PI, 0.3);
+    let (b, b1, b2) = (0.7 * (w * t).sin(), 0.7 * w * (w * t).cos(), -0.7 * w * w * (w * t).sin());
+    let node = Rotation::from_scaled_axis(Vector::z() * (c * t)) * Vector::y();
+    let (sin, cos) = (c * t).sin_cos();
+    Kinematics {
+        world_from_body: Pose::from_parts(
+            Vector::new(cos, sin, 0.05 * (w * t).sin()).into(),
+            from_roll_pitch_yaw(0.0, b, c * t),
+        ),
+        velocity_in_world: Vector::new(-c * sin, c * cos, 0.05 * w * (w * t).cos()),
+        angular_velocity_in_world: Vector::z() * c + node * b1,
+        acceleration_in_world: Vector::new(-c * c * cos, -c * c * sin, -0.05 * w * w * (w * t).sin()),
+        angular_acceleration_in_world: node * b2 + Vector::z().cross(&node) * (c * b1),
+    }
+}
+
+impl Iterator for Nodding {
+    type Item = Result<HeadState, DynamicsError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let t_s = self.step as f64 * STEP_S;
+        self.step += 1;
+        Some(Ok(HeadState { t_s, head: nodding(t_s), base: Kinematics::at_rest(Pose::identity()) }))
+    }
+}
+
+/// Keeps everything, with its arrival.
+#[derive(Default, PartialEq, Debug)]
+struct Kept {
+    samples: Vec<(Stamp, ImuSample)>,
+    scans: Vec<(Stamp, LidarScan)>,
+    truth: Vec<(Stamp, TruthSample)>,
+    clocks: Vec<(Stamp, ClockTruth)>,
+    last: Stamp,
+}
+
+impl Kept {
+    fn arrive(&mut self, now: Stamp) {
+        assert!(now >= self.last, "arrivals never decrease");
+        self.last = now;
+    }
+
+    fn trajectory(&self) -> Trajectory {
+        Trajectory::from_poses(self.truth.iter().map(|(_, t)| (t.lidar_stamp, t.head.world_from_body))).unwrap()
+    }
+}
+
+impl Sink for Kept {
+    fn imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
+        self.arrive(arrival);
+        self.samples.push((arrival, *sample));
+        Ok(())
+    }
+
+    fn lidar(&mut self, arrival: Stamp, scan: &LidarScan) -> Result<(), SinkError> {
+        self.arrive(arrival);
+        self.scans.push((arrival, scan.clone()));
+        Ok(())
+    }
+}
+
+impl TruthSink for Kept {
+    fn truth(&mut self, now: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
+        self.arrive(now);
+        self.truth.push((now, *sample));
+        Ok(())
+    }
+
+    fn clock(&mut self, now: Stamp, clock: &ClockTruth) -> Result<(), SinkError> {
+        self.arrive(now);
+        self.clocks.push((now, *clock));
+        Ok(())
+    }
+}
+
+fn clock(offset_ms: f64, rate_ppm: f64, jitter_ms: f64, resolution_ms: f64) -> ClockSpec {
+    ClockSpec { offset_ms, rate_ppm, jitter_ms, resolution_ms }
+}
+
+fn exact() -> ClockSpec {
+    clock(0.0, 0.0, 0.0, 0.0)
+}
+
+struct Run {
+    lidar: &'static str,
+    imu: &'static str,
+    clocks: ClocksSpec,
+    duration_s: f64,
+    seed: u64,
+}
+
+impl Run {
+    fn of(lidar: &'static str, imu: &'static str, duration_s: f64) -> Self {
+        Self { lidar, imu, clocks: ClocksSpec { lidar: exact(), imu: exact() }, duration_s, seed: 1 }
+    }
+
+    fn run<S: Sink + TruthSink>(&self, sink: &mut S) -> Result<SimulationSummary, SimulationError> {
+        let source = Source::in_memory("test", "");
+        let rig = Rig {
+            scenery: &Room,
+            lidar: &Lidar::new(&spec::load(Kind::Lidar, self.lidar).unwrap(), &source).unwrap(),
+            imu: &Imu::new(&spec::load(Kind::Imu, self.imu).unwrap(), &source).unwrap(),
+            clocks: Clocks::new(&self.clocks, &source, EPOCH).unwrap(),
+            head_from_laser: head_from_laser(),
+            head_from_imu: head_from_imu(),
+            duration_s: self.duration_s,
+            seed: Seed(self.seed),
+        };
+        simulate(&rig, &mut Nodding { step: 0 }, sink, &mut |_| ())
+    }
+
+    fn kept(&self) -> Kept {
+        let mut kept = Kept::default();
+        self.run(&mut kept).unwrap();
+        kept
+    }
+}
+
+fn head_from_laser() -> Pose {
+    Pose::from_parts(Vector::new(0.02, 0.0, 0.06).into(), from_roll_pitch_yaw(0.0, 0.1, 0.0))
+}
+
+fn head_from_imu() -> Pose {
+    Pose::from_parts(Vector::new(-0.03, 0.01, -0.04).into(), from_roll_pitch_yaw(0.2, 0.0, -0.4))
+}
+
+#[test]
+fn beams_projected_by_truth_lie_within_a_millimetre_of_the_walls() {
+    let mut run = Run::of("utm30lx_exact", "3dm_gx2", 2.2);
+    // Whatever the lidar's clock says, truth is written in its time.
+    run.clocks.lidar = clock(-7.3, 80.0, 0.0, 0.0);
+    let kept = run.kept();
+    let truth = kept.trajectory();
+    assert_eq!(kept.scans.len(), 88);
+    for (_, scan) in &kept.scans {
+        assert_eq!(scan.returns.len(), 1081);
+        for beam in &scan.returns {
+            let world_from_laser = truth.at(scan.stamp + beam.offset).unwrap() * head_from_laser();
+            let point = world_from_laser * nalgebra::Point3::from(beam.point_in_laser.cast::<f64>());
+            assert!(off_the_walls(&point.coords) < 1e-3);
+        }
+    }
+}
+
+#[test]
+fn the_ideal_imu_integrates_to_the_truth_over_10_s() {
+    let kept = Run::of("utm30lx_exact", "ideal_1khz", 10.0).kept();
+    let start = kept.truth[0].1.head.of_frame(&head_from_imu());
+    let (mut rotation, mut velocity) = (start.world_from_body.rotation, start.velocity_in_world);
+    let mut position = start.world_from_body.translation.vector;
+    let dt = 1e-3;
+    assert_eq!(kept.samples.len(), 10_000);
+    for (_, sample) in &kept.samples {
+        let turn = sample.angular_velocity_rad_per_s * dt;
+        let middle = rotation * Rotation::from_scaled_axis(turn * 0.5);
+        let acceleration = middle * sample.specific_force_m_per_s2 + gravity_in_world();
+        position += velocity * dt + acceleration * (0.5 * dt * dt);
+        velocity += acceleration * dt;
+        rotation *= Rotation::from_scaled_axis(turn);
+    }
+    let end = kept.truth[10_000].1.head.of_frame(&head_from_imu()).world_from_body;
+    assert!((position - end.translation.vector).norm() < 2e-3, "{}", position - end.translation.vector);
+    assert!(rotation.angle_to(&end.rotation).to_degrees() < 0.02);
+}
+
+#[test]
+fn truth_is_the_motion_at_whole_milliseconds_of_the_lidars_time() {
+    let mut run = Run::of("utm30lx_exact", "3dm_gx2", 1.0);
+    run.clocks.lidar = clock(2.6, 40.0, 0.0, 1.0);
+    let kept = run.kept();
+    // On average stamps lag by half a tick: the first instant is stamped 2.1 ms on average, the last 1002.14 ms.
+    let of = |ms: i64| EPOCH + Span::from_nanos(ms * 1_000_000);
+    assert_eq!((kept.truth[0].1.lidar_stamp, kept.truth.last().unwrap().1.lidar_stamp), (of(3), of(1002)));
+    for (now, truth) in &kept.truth {
+        // lidar = 1.00004 t + 2.1 ms, so t = (lidar - 2.1 ms) / 1.00004.
+        let t = (truth.lidar_stamp.seconds_since(EPOCH) - 2.1e-3) / 1.000_04;
+        assert!((now.seconds_since(EPOCH) - t).abs() < 2e-9);
+        let expected = nodding(t);
+        assert!(
+            (truth.head.world_from_body.translation.vector - expected.world_from_body.translation.vector).norm() < 1e-8
+        );
+        assert!((truth.head.velocity_in_world - expected.velocity_in_world).norm() < 1e-7);
+        assert!(truth.head.world_from_body.rotation.angle_to(&expected.world_from_body.rotation) < 1e-8);
+    }
+    let (first, last) = kept.trajectory().span().unwrap();
+    let sweep = Span::from_nanos(18_750_000);
+    assert!(kept.scans.iter().all(|(_, scan)| scan.stamp >= first && scan.stamp + sweep <= last));
+}
+
+#[test]
+fn the_clocks_are_as_the_truth_tells() {
+    let mut run = Run::of("utm30lx_exact", "3dm_gx2", 20.0);
+    run.clocks.lidar = clock(1.0, -30.0, 0.2, 1.0);
+    run.clocks.imu = clock(-4.0, 100.0, 0.3, 0.5);
+    let kept = run.kept();
+    assert_eq!(kept.clocks.len(), 200, "ten times a second");
+    let ahead_at = |t_s: f64, of: fn(&ClockTruth) -> Span| {
+        let (first, last) = (of(&kept.clocks[0].1).seconds(), of(&kept.clocks[199].1).seconds());
+        first + (last - first) * t_s / kept.clocks[199].0.seconds_since(EPOCH)
+    };
+    // A scan arrives with its last beam, 18.75 ms of the lidar's crystal after the stamped one; a sample arrives 5 ms of
+    // the IMU's after the middle of its interval, which is what is stamped.
+    let scans = kept.scans.iter().map(|(arrival, scan)| {
+        let fired_s = arrival.seconds_since(EPOCH) - 0.01875 / (1.0 - 30e-6);
+        scan.stamp.seconds_since(EPOCH) - fired_s - ahead_at(fired_s, |clock| clock.lidar_ahead)
+    });
+    let samples = kept.samples.iter().map(|(arrival, sample)| {
+        let middle_s = arrival.seconds_since(EPOCH) - 0.005 / (1.0 + 100e-6);
+        sample.stamp.seconds_since(EPOCH) - middle_s - ahead_at(middle_s, |clock| clock.imu_ahead)
+    });
+    // Spread: jitter, and rounding uniform over a tick (tick / sqrt(12)), in squares.
+    for (errors, sigma) in [
+        (scans.collect::<Vec<f64>>(), 0.2e-3_f64.hypot(1e-3 / 12_f64.sqrt())),
+        (samples.collect(), 0.3e-3_f64.hypot(0.5e-3 / 12_f64.sqrt())),
+    ] {
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        assert!(mean.abs() < 4.0 * sigma / (errors.len() as f64).sqrt(), "{mean} of {sigma}");
+    }
+}
+
+#[test]
+fn stamps_increase_whatever_the_jitter() {
+    let mut run = Run::of("utm30lx", "3dm_gx2", 2.0);
+    (run.clocks.lidar.jitter_ms, run.clocks.imu.jitter_ms) = (10.0, 10.0);
+    let kept = run.kept();
+    assert!(kept.samples.windows(2).all(|pair| pair[0].1.stamp < pair[1].1.stamp));
+    assert!(kept.scans.windows(2).all(|pair| pair[0].1.stamp < pair[1].1.stamp));
+}
+
+#[test]
+fn a_seed_gives_the_same_run_with_one_thread_and_two_and_another_seed_another() {
+    let mut run = Run::of("utm30lx", "3dm_gx2", 2.3);
+    run.clocks.imu = clock(3.0, 16.67, 0.1, 0.0);
+    let with_threads = |count: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
+        pool.install(|| run.kept())
+    };
+    let one = with_threads(1);
+    assert!(one == with_threads(2));
+    assert!(one == run.kept());
+    run.seed = 2;
+    let other = run.kept();
+    assert!(one.truth == other.truth && one.scans != other.scans && one.samples != other.samples);
+}
+
+#[test]
+fn the_summary_counts_what_was_delivered() {
+    let run = Run::of("utm30lx_divergent", "3dm_gx2", 1.2);
+    let mut kept = Kept::default();
+    let summary = run.run(&mut kept).unwrap();
+    assert_eq!((summary.scans, summary.imu_samples), (kept.scans.len() as u64, kept.samples.len() as u64));
+    assert_eq!((summary.scans, summary.imu_samples), (48, 120));
+    assert_eq!((summary.beams, summary.rays), (48 * 1081, 48 * 1081 * 7));
+    assert_eq!(summary.returns, kept.scans.iter().map(|(_, scan)| scan.returns.len() as u64).sum::<u64>());
+}
+
+/// Takes a hundred samples of the IMU, and then no more.
+#[derive(Default)]
+struct Full(u32);
+
+impl Sink for Full {
+    fn imu(&mut self, _: Stamp, _: &ImuSample) -> Result<(), SinkError> {
+        self.0 += 1;
+        if self.0 > 100 { Err("no space left".into()) } else { Ok(()) }
+    }
+
+    fn lidar(&mut self, _: Stamp, _: &LidarScan) -> Result<(), SinkError> {
+        Ok(())
+    }
+}
+
+impl TruthSink for Full {
+    fn truth(&mut self, _: Stamp, _: &TruthSample) -> Result<(), SinkError> {
+        Ok(())
+    }
+
+    fn clock(&mut self, _: Stamp, _: &ClockTruth) -> Result<(), SinkError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_sink_that_is_full_stops_the_run_with_its_own_words() {
+    let error = Run::of("utm30lx", "3dm_gx2", 60.0).run(&mut Full::default()).unwrap_err();
+    assert!(std::error::Error::source(&error).unwrap().to_string().contains("no space left"), "{error}");
+}
+
+#[test]
+fn a_motion_that_ends_before_the_run_is_an_error() {
+    let source = Source::in_memory("test", "");
+    let rig = Rig {
+        scenery: &Room,
+        lidar: &Lidar::new(&spec::load(Kind::Lidar, "utm30lx").unwrap(), &source).unwrap(),
+        imu: &Imu::new(&spec::load(Kind::Imu, "3dm_gx2").unwrap(), &source).unwrap(),
+        clocks: Clocks::new(&ClocksSpec { lidar: exact(), imu: exact() }, &source, EPOCH).unwrap(),
+        head_from_laser: head_from_laser(),
+        head_from_imu: head_from_imu(),
+        duration_s: 3.0,
+        seed: Seed(1),
+    };
+    let mut short = Nodding { step: 0 }.take(1200);
+    let error = simulate(&rig, &mut short, &mut Kept::default(), &mut |_| ()).unwrap_err();
+    assert_eq!(error.to_string(), "the head's motion ends 1.200 s after the start, before the run does");
+}
+
+#[test]
+fn a_run_of_no_time_is_refused() {
+    for duration_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = Run::of("utm30lx", "3dm_gx2", duration_s).run(&mut Kept::default()).unwrap_err();
+        assert!(matches!(error, SimulationError::Duration { .. }), "{error}");
+    }
+}

@@ -1,0 +1,137 @@
+//! The shipped specs, simulated: a head on its spring, carried by hand through the office.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use zsim::geometry::{Pose, Rotation, Surface, Trajectory, gravity_in_world};
+use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
+use zsim::simulation::{Scenario, Simulation, SimulationError, Specs};
+use zsim::time::Stamp;
+use zsim::truth::{ClockTruth, TruthSample, TruthSink};
+
+/// Keeps everything.
+#[derive(Default, PartialEq, Debug)]
+struct Kept {
+    samples: Vec<ImuSample>,
+    scans: Vec<LidarScan>,
+    truth: Vec<TruthSample>,
+    clocks: Vec<ClockTruth>,
+}
+
+impl Sink for Kept {
+    fn imu(&mut self, _: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
+        self.samples.push(*sample);
+        Ok(())
+    }
+
+    fn lidar(&mut self, _: Stamp, scan: &LidarScan) -> Result<(), SinkError> {
+        self.scans.push(scan.clone());
+        Ok(())
+    }
+}
+
+impl TruthSink for Kept {
+    fn truth(&mut self, _: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
+        self.truth.push(*sample);
+        Ok(())
+    }
+
+    fn clock(&mut self, _: Stamp, clock: &ClockTruth) -> Result<(), SinkError> {
+        self.clocks.push(*clock);
+        Ok(())
+    }
+}
+
+/// The office without errors: exact ranges, an ideal IMU at 1 kHz, exact clocks.
+fn exact_office(duration_s: f64) -> Scenario {
+    Scenario {
+        lidar: "utm30lx_exact".to_owned(),
+        imu: "ideal_1khz".to_owned(),
+        clock: "exact".to_owned(),
+        duration_s,
+        ..Scenario::in_scene("office")
+    }
+}
+
+fn kept(simulation: &Simulation) -> Kept {
+    let mut kept = Kept::default();
+    simulation.run(&mut kept, &mut |_| ()).unwrap();
+    kept
+}
+
+#[test]
+fn beams_projected_by_truth_lie_within_a_millimetre_of_the_offices_surfaces() {
+    let simulation = Simulation::prepare(&exact_office(12.0)).unwrap();
+    let kept = kept(&simulation);
+    let poses = kept.truth.iter().map(|truth| (truth.lidar_stamp, truth.head.world_from_body));
+    let truth = Trajectory::from_poses(poses).unwrap();
+    let head_from_laser: Pose = simulation.calibration().head_from_laser;
+    let mut beams = 0;
+    for scan in &kept.scans {
+        for beam in &scan.returns {
+            let world_from_laser = truth.at(scan.stamp + beam.offset).unwrap() * head_from_laser;
+            let point = world_from_laser * nalgebra::Point3::from(beam.point_in_laser.cast::<f64>());
+            // None where nothing is within reach: the surface is not where the beam says it is.
+            assert!(simulation.world().nearest(&point.coords, 1e-3).is_some(), "{point} at {:?}", scan.stamp);
+            beams += 1;
+        }
+    }
+    assert!(beams > 480 * 1000, "nearly every beam comes back in a room: {beams}");
+}
+
+#[test]
+fn the_ideal_imu_integrates_to_the_head_on_its_spring() {
+    let simulation = Simulation::prepare(&exact_office(16.0)).unwrap();
+    let kept = kept(&simulation);
+    let imu = |k: usize| kept.truth[k].head.of_frame(&simulation.calibration().head_from_imu);
+    let dt = 1e-3;
+    // Ten seconds from 6 s on, when the head is carried and swings.
+    let start = imu(6000);
+    let (mut rotation, mut velocity) = (start.world_from_body.rotation, start.velocity_in_world);
+    let mut position = start.world_from_body.translation.vector;
+    for sample in &kept.samples[6000..16_000] {
+        let turn = sample.angular_velocity_rad_per_s * dt;
+        let middle = rotation * Rotation::from_scaled_axis(turn * 0.5);
+        let acceleration = middle * sample.specific_force_m_per_s2 + gravity_in_world();
+        position += velocity * dt + acceleration * (0.5 * dt * dt);
+        velocity += acceleration * dt;
+        rotation *= Rotation::from_scaled_axis(turn);
+    }
+    let end = imu(16_000).world_from_body;
+    assert!((position - end.translation.vector).norm() < 2e-3, "{}", position - end.translation.vector);
+    assert!(rotation.angle_to(&end.rotation).to_degrees() < 0.02);
+}
+
+#[test]
+fn a_seed_gives_the_same_run_with_one_thread_and_two() {
+    let simulation = Simulation::prepare(&Scenario { duration_s: 3.0, ..Scenario::in_scene("office") }).unwrap();
+    let with_threads = |count: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
+        pool.install(|| kept(&simulation))
+    };
+    let one = with_threads(1);
+    assert!(one == with_threads(2));
+    assert!(!one.samples.is_empty() && !one.scans.is_empty() && !one.clocks.is_empty());
+}
+
+#[test]
+fn the_gyroscope_stays_within_its_range_nearly_always() {
+    let simulation = Simulation::prepare(&Scenario { duration_s: 30.0, ..Scenario::in_scene("office") }).unwrap();
+    let summary = simulation.run(&mut Kept::default(), &mut |_| ()).unwrap();
+    assert!(summary.imu_samples_at_limit * 50 < summary.imu_samples, "{summary:?}");
+}
+
+#[test]
+fn specs_as_used_can_be_written_and_read_back() {
+    let simulation = Simulation::prepare(&exact_office(1.0)).unwrap();
+    let text = zsim::spec::to_text(simulation.specs()).unwrap();
+    let read: Specs = zsim::spec::parse(&zsim::spec::Source::in_memory("manifest", text)).unwrap();
+    assert_eq!(&read, simulation.specs());
+}
+
+#[test]
+fn a_missing_route_is_told_with_those_there_are() {
+    let scenario = Scenario { route: Some("nowhere".to_owned()), ..Scenario::in_scene("office") };
+    let Err(error) = Simulation::prepare(&scenario) else { panic!("there is no such route") };
+    assert!(matches!(error, SimulationError::Spec(_)));
+    assert!(error.to_string().contains("no route `nowhere`") && error.to_string().contains("it has: "), "{error}");
+}
