@@ -21,14 +21,14 @@ pub enum DynamicsError {
     /// A time step that the integrator cannot take.
     #[error(
         "a time step of {step_s} s is no good: it must be above 0 and at most {most_s:.2e} s, a sixth of the period of the \
-         head's fastest mode at {fastest_hz:.1} Hz"
+         head's fastest oscillation, {fastest_hz:.1} Hz (held by a hand, or at its end stop)"
     )]
     Step {
         /// The step asked for, s.
         step_s: f64,
         /// The longest that will do, s.
         most_s: f64,
-        /// Frequency of the fastest mode, Hz.
+        /// Frequency of the fastest oscillation, Hz.
         fastest_hz: f64,
     },
     /// A head that left all bounds.

@@ -89,6 +89,15 @@ impl HeadModel {
         self.linear().map_or(&[], |linear| &linear.modes)
     }
 
+    /// An upper bound on how fast the head oscillates, held by a hand and at its end stop, Hz; zero for one that does not.
+    pub(super) fn fastest_hz(&self) -> f64 {
+        let Linkage::Spring(sprung) = &self.linkage else { return 0.0 };
+        let of_modes = sprung.linear.modes.iter().map(|mode| mode.frequency_hz).fold(0.0, f64::max);
+        let lightest = self.body.inertia_in_head.symmetric_eigenvalues().min();
+        let at_stop = sprung.law.end_stop.map_or(0.0, |stop| (stop.stiffness_nm_per_rad / lightest).sqrt() / TAU);
+        of_modes.hypot(sprung.law.hold.as_ref().map_or(0.0, |hand| hand.frequency_hz)).hypot(at_stop)
+    }
+
     /// Energy of the head: of its motion, its height above the world's zero, and its spring, J.
     ///
     /// # Errors
@@ -195,7 +204,13 @@ impl Sprung {
         // The rate was inverted when the head was linearised; a hand of no stiffness stands for the impossible.
         let unrate = rate.try_inverse().unwrap_or_else(Matrix6::zeros);
         let mass = unrate.tr_mul(&(self.linear.mass * unrate));
-        Hold { stiffness: mass * (omega * omega), damping: mass * (2.0 * hand.damping_ratio * omega), rest }
+        let frequency_hz = hand.frequency_hz;
+        Hold {
+            frequency_hz,
+            stiffness: mass * (omega * omega),
+            damping: mass * (2.0 * hand.damping_ratio * omega),
+            rest,
+        }
     }
 
     fn end_stop(&self, stop: &EndStopSpec, source: &Source) -> Result<EndStop, SpecError> {

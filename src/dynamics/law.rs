@@ -25,6 +25,8 @@ pub(super) struct Law {
 /// A hand that pulls the head back to `rest`; all in the deformation's coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct Hold {
+    /// Frequency of the head in a firm hand alone.
+    pub frequency_hz: f64,
     pub stiffness: Matrix6,
     pub damping: Matrix6,
     pub rest: Vector6,

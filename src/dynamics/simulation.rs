@@ -30,9 +30,8 @@ pub struct HeadState {
 /// `M (v[n+1/2] - v[n-1/2]) / dt = F(q[n]) - C (mean v - v_base) - mean w x I mean w`, `q[n+1] = q[n] + dt v[n+1/2]`,
 ///
 /// where the mean is that of the two half steps. The same rule runs backwards in time, so without damping energy has no
-/// trend. What is handed out belongs to the pose: velocity is the mean of the half steps before and after it, acceleration
-/// their difference over dt, both of the head's own frame. So the velocity integrates to the pose exactly
-/// (`x[n+1] = x[n] + dt v[n] + dt^2 a[n] / 2`), and an IMU made of these states agrees with them.
+/// trend. What is handed out is of the head's own frame and belongs to the pose: from the steps' mean velocities, which lead
+/// from pose to pose exactly, the velocity at the pose to third order in dt, and the acceleration to second order.
 ///
 /// It ends after the first error.
 pub struct HeadSimulation<'a> {
@@ -53,9 +52,9 @@ impl<'a> HeadSimulation<'a> {
     /// The motion of `model` on `motion`, in steps of `step_s`.
     ///
     /// # Errors
-    /// When the step is too long for the head's fastest mode, or the head finds no rest on the base as that starts.
+    /// When the step is too long for the head's fastest oscillation, or the head finds no rest on the base as that starts.
     pub fn new(model: &'a HeadModel, motion: &'a dyn BaseMotion, step_s: f64) -> Result<Self, DynamicsError> {
-        let fastest_hz = model.linear_modes().iter().map(|mode| mode.frequency_hz).fold(0.0, f64::max);
+        let fastest_hz = model.fastest_hz();
         let most_s = if fastest_hz > 0.0 { 1.0 / (TAU * fastest_hz) } else { f64::INFINITY };
         if !(step_s > 0.0 && step_s <= most_s && step_s.is_finite()) {
             return Err(DynamicsError::Step { step_s, most_s, fastest_hz });
@@ -103,23 +102,31 @@ struct SprungMotion<'a> {
     spring: SpringState,
     step_s: f64,
     pose: Pose,
-    /// Velocity of the head's origin and angular velocity over the step before, in the world.
+    /// Mean velocity of the head's origin and mean angular velocity over the step before, in the world.
     before: Vector6,
+    /// Those over the step before that.
+    earlier: Vector6,
 }
 
 impl<'a> SprungMotion<'a> {
     fn new(body: &'a Body, sprung: &'a Sprung, base: &Kinematics, step_s: f64) -> Result<Self, DynamicsError> {
-        let pull = gravity_in_world() - base.acceleration_in_world;
-        let gravity_in_base = base.world_from_body.rotation.inverse() * pull;
+        let gravity_in_base = base.world_from_body.rotation.inverse() * gravity_in_world();
         let (rest, _) = Statics { law: &sprung.law, body, gravity_in_base }
             .settle(&sprung.rest)
             .map_err(|unrest| DynamicsError::NoRestAtStart { reason: unrest.to_string() })?;
         let head = base.of_frame(&rest);
         let centre = head.of_frame(&Pose::from_parts(body.centre_of_mass_in_head.into(), Rotation::identity()));
-        let engine = Engine::new(body, &head.world_from_body, &half_step_before(&centre, step_s), step_s);
-        let before = half_step_before(&head, step_s);
-        let spring = sprung.law.spring.state();
-        Ok(Self { body, sprung, engine, spring, step_s, pose: head.world_from_body, before })
+        let engine = Engine::new(body, &head.world_from_body, &velocity_before(&centre, 0.5 * step_s), step_s);
+        Ok(Self {
+            body,
+            sprung,
+            engine,
+            spring: sprung.law.spring.state(),
+            step_s,
+            pose: head.world_from_body,
+            before: velocity_before(&head, 0.5 * step_s),
+            earlier: velocity_before(&head, 1.5 * step_s),
+        })
     }
 
     /// The head at `t_s`, having moved on to the step after.
@@ -136,9 +143,9 @@ impl<'a> SprungMotion<'a> {
         self.engine.step(&(mass * change / self.step_s));
         let next = self.engine.pose();
         let after = velocity_between(&self.pose, &next, self.step_s);
-        let head = kinematics(&self.pose, &self.before, &after, self.step_s);
+        let head = kinematics(&self.pose, [&self.earlier, &self.before, &after], self.step_s);
         self.pose = next;
-        self.before = after;
+        self.earlier = std::mem::replace(&mut self.before, after);
         Ok(head)
     }
 
@@ -158,11 +165,11 @@ impl<'a> SprungMotion<'a> {
     }
 }
 
-/// Velocity and angular velocity half a step before those given.
-fn half_step_before(now: &Kinematics, step_s: f64) -> Vector6 {
+/// Velocity and angular velocity `earlier_s` before the instant given.
+fn velocity_before(now: &Kinematics, earlier_s: f64) -> Vector6 {
     stack(
-        &(now.velocity_in_world - now.acceleration_in_world * (0.5 * step_s)),
-        &(now.angular_velocity_in_world - now.angular_acceleration_in_world * (0.5 * step_s)),
+        &(now.velocity_in_world - now.acceleration_in_world * earlier_s),
+        &(now.angular_velocity_in_world - now.angular_acceleration_in_world * earlier_s),
     )
 }
 
@@ -172,9 +179,12 @@ fn velocity_between(from: &Pose, to: &Pose, step_s: f64) -> Vector6 {
     stack(&(to.translation.vector - from.translation.vector), &turn) / step_s
 }
 
-/// The motion at a pose between the half steps before and after it.
-fn kinematics(pose: &Pose, before: &Vector6, after: &Vector6, step_s: f64) -> Kinematics {
-    let (velocity, turning) = split(&((before + after) * 0.5));
+/// The motion at a pose between two steps.
+///
+/// From the mean velocities over the two steps before it and the one after, the velocity in between is
+/// `(2 after + 5 before - earlier) / 6`, of the parabola with those three means, and the acceleration their difference.
+fn kinematics(pose: &Pose, [earlier, before, after]: [&Vector6; 3], step_s: f64) -> Kinematics {
+    let (velocity, turning) = split(&((after * 2.0 + before * 5.0 - earlier) / 6.0));
     let (acceleration, turning_faster) = split(&((after - before) / step_s));
     Kinematics {
         world_from_body: *pose,

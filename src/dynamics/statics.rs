@@ -15,7 +15,7 @@ const DIFFERENCE: f64 = 1e-5;
 pub(super) struct Statics<'a> {
     pub law: &'a Law,
     pub body: &'a Body,
-    /// Acceleration of free fall, less that of the base.
+    /// Acceleration of free fall, m/s^2.
     pub gravity_in_base: Vector,
 }
 

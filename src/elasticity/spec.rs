@@ -41,6 +41,7 @@ pub enum SpringSpec {
 
 /// One row of a stiffness: force in N, or torque in N m, for each of x, y, z in m and rx, ry, rz in rad.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(transparent)]
 pub struct StiffnessRow(#[serde(deserialize_with = "checked::finite_array")] pub [f64; 6]);
 
 /// What a wire is made of.

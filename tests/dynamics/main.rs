@@ -1,0 +1,11 @@
+//! The simulated head against its linear model, closed forms, and laws.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod decay;
+mod energy;
+mod heads;
+mod imu;
+mod invariance;
+mod linkage;
+mod rest;
+mod wrong;

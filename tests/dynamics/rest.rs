@@ -1,0 +1,100 @@
+use crate::heads::{Still, Table, shipped, states};
+use approx::assert_relative_eq;
+use nalgebra::{Matrix2, Vector2};
+use zsim::dynamics::ModeKind;
+use zsim::elasticity::{Coil, Moduli, loaded_stiffness};
+use zsim::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2 as G, Vector, from_roll_pitch_yaw};
+use zsim::motion::BaseMotion;
+
+#[test]
+fn a_head_rocks_as_fast_as_the_table_says_for_any_number_of_segments() {
+    // Frequencies of a 0.40 kg head with 9e-4 kg m^2 and its centre of mass 70 mm above the spring, upright and hanging, Hz.
+    let table = [
+        ([25.0, 2.5, 10.0, 100.0], true, 1.73),
+        ([25.0, 3.0, 12.0, 120.0], false, 0.98),
+        ([25.0, 3.0, 12.0, 120.0], true, 1.90),
+        ([25.0, 3.0, 8.0, 80.0], false, 1.78),
+        ([25.0, 3.0, 8.0, 80.0], true, 2.52),
+    ];
+    for (coil, hanging, expected_hz) in table {
+        for segments in [1, 2, 4, 8] {
+            let model = Table { coil, hanging, segments, ..Table::default() }.model();
+            let rocking = &model.linear_modes()[0];
+            assert_eq!(rocking.kind, ModeKind::Rocking);
+            assert_relative_eq!(rocking.frequency_hz, expected_hz, max_relative = 0.02);
+        }
+    }
+}
+
+#[test]
+fn a_head_stands_lower_by_its_weight_over_the_axial_rate() {
+    // G d^4 / (8 D^3 n) = 79.3e9 0.003^4 / (8 0.025^3 12) = 4282.2 N/m under 0.40 kg: 0.916 mm.
+    let model = Table::default().model();
+    let sag = 0.40 * G / 4282.2;
+    let rest = model.rest_pose_base_from_head();
+    assert_relative_eq!(rest.translation.vector, Vector::new(0.0, 0.0, 0.12 - sag), epsilon = 1e-8);
+    let hanging = Table { hanging: true, ..Table::default() }.model();
+    assert_relative_eq!(hanging.rest_pose_base_from_head().translation.z, -(0.12 + sag), epsilon = 1e-8);
+}
+
+#[test]
+fn a_head_on_a_tilted_base_leans_as_the_column_does_and_stays() {
+    let model = Table::default().model();
+    let tilt = 0.002;
+    let base = Pose::from_parts(Vector::new(3.0, -2.0, 1.0).into(), from_roll_pitch_yaw(0.0, tilt, 0.4));
+    let path = states(&model, &Still(base), 1e-3, 1.0);
+    // In the base gravity pulls m g tilt along x at 70 mm above the top. The top's (x, theta) solve
+    // [K_xx, K_xt; K_xt, K_tt - m g h] (x, theta) = m g tilt (1, h), K the loaded column's.
+    let moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
+    let column = Coil::new(0.025, 0.003, 12.0, 0.12, moduli).unwrap().under(0.40 * G).unwrap();
+    let k = loaded_stiffness(&column).unwrap();
+    let (weight, h) = (0.40 * G, 0.07);
+    let stiffness = Matrix2::new(k[(0, 0)], k[(0, 4)], k[(0, 4)], k[(4, 4)] - weight * h);
+    let expected = stiffness.try_inverse().unwrap() * Vector2::new(1.0, h) * weight * tilt;
+    let first = base.inv_mul(&path[0].head.world_from_body);
+    // Second order in the lean, which is 0.01 rad.
+    assert_relative_eq!(first.translation.x, expected.x, max_relative = 1e-3);
+    assert_relative_eq!(first.rotation.scaled_axis().y, expected.y, max_relative = 1e-3);
+    for state in &path {
+        let moved = base.inv_mul(&state.head.world_from_body).inv_mul(&first);
+        assert!(moved.translation.vector.norm() < 1e-10 && moved.rotation.angle() < 1e-9, "{} s: {moved}", state.t_s);
+    }
+}
+
+struct Gliding;
+
+impl BaseMotion for Gliding {
+    fn at(&self, t_s: f64) -> Kinematics {
+        let velocity = Vector::new(1.4, -0.3, 0.1);
+        let mut now =
+            Kinematics::at_rest(Pose::from_parts((velocity * t_s).into(), from_roll_pitch_yaw(0.0, 0.0, 1.0)));
+        now.velocity_in_world = velocity;
+        now
+    }
+}
+
+#[test]
+fn a_base_that_glides_takes_its_head_along() {
+    let model = shipped("handheld");
+    for state in states(&model, &Gliding, 1e-3, 2.0) {
+        let relative = state.base.world_from_body.inv_mul(&state.head.world_from_body);
+        let moved = relative.inv_mul(model.rest_pose_base_from_head());
+        assert!(moved.translation.vector.norm() < 1e-10 && moved.rotation.angle() < 1e-9, "{} s: {moved}", state.t_s);
+        assert_relative_eq!(state.head.velocity_in_world, Vector::new(1.4, -0.3, 0.1), epsilon = 1e-9);
+        assert_relative_eq!(state.head.acceleration_in_world, Vector::zeros(), epsilon = 1e-6);
+    }
+}
+
+#[test]
+fn the_handheld_head_is_light_and_rocks_between_1_and_1_5_hz() {
+    let model = shipped("handheld");
+    assert!(model.body().mass_kg < 0.5);
+    let modes = model.linear_modes();
+    for rocking in &modes[..2] {
+        assert_eq!(rocking.kind, ModeKind::Rocking);
+        assert!((1.0..1.5).contains(&rocking.frequency_hz), "{} Hz", rocking.frequency_hz);
+    }
+    let kinds: Vec<_> = modes.iter().map(|mode| mode.kind).collect();
+    assert_eq!(kinds.iter().filter(|kind| **kind == ModeKind::Sway).count(), 2);
+    assert!(kinds.contains(&ModeKind::Bounce) && kinds.contains(&ModeKind::Yaw));
+}

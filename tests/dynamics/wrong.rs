@@ -1,0 +1,90 @@
+use crate::heads::{Table, built};
+
+/// The error of the table's head with one piece of its text replaced.
+fn error_with(from: &str, to: &str) -> String {
+    let text = Table::default().text();
+    assert!(text.contains(from), "the text has no {from}");
+    built(&text.replacen(from, to, 1)).unwrap_err().to_string()
+}
+
+#[test]
+fn what_is_wrong_with_a_number_is_said_where_it_stands() {
+    let negative = error_with("mass_kg: 0.40", "mass_kg: -0.40");
+    assert!(negative.starts_with("head.ron:4:") && negative.contains("above 0, found -0.4"), "{negative}");
+    let nan = error_with("mass_kg: 0.40", "mass_kg: NaN");
+    assert!(nan.starts_with("head.ron:4:") && nan.contains("found NaN"), "{nan}");
+    let unknown = error_with("segments: 1", "segmints: 1");
+    assert!(unknown.starts_with("head.ron:15:") && unknown.contains("segmints"), "{unknown}");
+    let none = error_with("active_coils: 12.0", "active_coils: 0.0");
+    assert!(none.contains("above 0, found 0"), "{none}");
+    let damping = error_with("rocking: 0.0", "rocking: -0.1");
+    assert!(damping.contains("at least 0, found -0.1"), "{damping}");
+}
+
+#[test]
+fn an_inertia_of_no_rigid_body_is_refused() {
+    // zz > xx + yy is the inertia of nothing.
+    let error = error_with("zz: 4e-4", "zz: 4e-3");
+    assert!(error.starts_with("head.ron:6:") && error.contains("at most the sum of the other two"), "{error}");
+    let error = error_with("zz: 4e-4", "zz: 4e-4, xy: 2e-3");
+    assert!(error.contains("principal moments"), "{error}");
+}
+
+#[test]
+fn a_head_that_falls_over_is_told_by_how_much() {
+    // The table's 25/2.0/10/100 falls over under 0.40 kg.
+    let text = Table { coil: [25.0, 2.0, 10.0, 100.0], ..Table::default() }.text();
+    let error = built(&text).unwrap_err().to_string();
+    assert!(error.contains("cannot stand") && error.contains("the head has 0.400 kg"), "{error}");
+    let carries: f64 = error.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    // A little lighter than what it carries it stands, a little heavier it does not.
+    let with_mass = |mass_kg: f64| {
+        // The same load distribution: a lighter head of the same centre of mass; inertia does not matter to statics.
+        built(&text.replacen("mass_kg: 0.40", &format!("mass_kg: {mass_kg}"), 1))
+    };
+    assert!(carries > 0.05 && carries < 0.4, "{carries}");
+    assert!(with_mass(carries * 0.99).is_ok());
+    assert!(with_mass(carries * 1.01).is_err());
+}
+
+#[test]
+fn a_spring_that_is_none_is_refused() {
+    let coil = |coil: [f64; 4]| built(&Table { coil, ..Table::default() }.text()).unwrap_err().to_string();
+    assert!(coil([25.0, 14.0, 2.0, 120.0]).contains("spring index"), "{}", coil([25.0, 14.0, 2.0, 120.0]));
+    assert!(coil([25.0, 3.0, 41.0, 120.0]).contains("coils"), "{}", coil([25.0, 3.0, 41.0, 120.0]));
+    let pieces = error_with("segments: 1", "segments: 0");
+    assert!(pieces.starts_with("head.ron:") && pieces.contains("1 to 64 segments, not 0"), "{pieces}");
+    let text = Table::default().text();
+    let from = text.find("coil(").unwrap();
+    let to = text.find("segments").unwrap();
+    let named = built(&format!("{}named(\"no_such\"), {}", &text[..from], &text[to..])).unwrap_err().to_string();
+    assert!(named.contains("no such spring"), "{named}");
+    let given = |diagonal: &str, segments: usize| {
+        let rows: Vec<String> = (0..6)
+            .map(|i| {
+                let row: Vec<String> = (0..6)
+                    .map(|j| if i == j { diagonal.split(' ').nth(i).unwrap().to_owned() } else { "0.0".to_owned() })
+                    .collect();
+                format!("({})", row.join(", "))
+            })
+            .collect();
+        let spring = format!("stiffness(length_mm: 100.0, rows: ({})), ", rows.join(", "));
+        built(&format!(
+            "{}{spring}{}",
+            &text[..from],
+            &text[to..].replace("segments: 1", &format!("segments: {segments}"))
+        ))
+    };
+    assert!(given("400.0 400.0 4000.0 5.0 5.0 0.8", 1).is_ok());
+    let soft = given("400.0 400.0 4000.0 5.0 -5.0 0.8", 1).unwrap_err().to_string();
+    assert!(soft.starts_with("head.ron:") && soft.contains("not positive definite"), "{soft}");
+    let cut = given("400.0 400.0 4000.0 5.0 5.0 0.8", 2).unwrap_err().to_string();
+    assert!(cut.contains("only a coil can be cut"), "{cut}");
+}
+
+#[test]
+fn a_stop_that_the_head_leans_on_already_is_refused() {
+    let stop = "end_stop: (angle_deg: 175.0, stiffness_nm_per_rad: 20.0, damping_nm_s_per_rad: 0.02),";
+    let error = built(&Table { more: stop, ..Table::default() }.text()).unwrap_err().to_string();
+    assert!(error.starts_with("head.ron:19:") && error.contains("below 170"), "{error}");
+}
