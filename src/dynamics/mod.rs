@@ -5,6 +5,7 @@
 //! is integrated by rapier (see `engine`), which no other room knows.
 
 mod body;
+mod capacity;
 mod engine;
 mod error;
 mod head;
@@ -16,6 +17,7 @@ mod spec;
 mod statics;
 
 pub use body::Body;
+pub use capacity::heaviest_kg;
 pub use error::DynamicsError;
 pub use head::HeadModel;
 pub use modes::{LinearModel, Mode, ModeKind};
