@@ -72,7 +72,7 @@ fn curves_are_the_same_bytes_for_any_number_of_threads() {
     let plan = GainPlan { up_to_hz: 2.0, period_s: Some(2.0), ..plan() };
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        csv(&pool.install(|| gain_curves(&head, &plan)).unwrap())
+        csv(&pool.install(|| gain_curves(&head, &plan).unwrap()))
     };
     let text = with(1);
     assert_eq!(text, with(2));

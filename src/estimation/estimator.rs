@@ -1,16 +1,35 @@
-use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop};
-use crate::geometry::Trajectory;
+use super::border::Border;
+use super::initial::{self, Beginning};
+use super::intake::{Intake, Stretch};
+use super::strapdown::Interval;
+use super::surfel::SurfelMaker;
+use super::views::Views;
+use super::window::{Solved, Window};
+use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
+use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, Measurement};
+use crate::time::Stamp;
+use std::time::Instant;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
-/// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it:
-/// `window_s + step_s` after its instant at most.
+/// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it: `window_s` plus
+/// `step_s` after its instant, plus 0.1 s in which late measurements may still come.
 #[derive(Debug)]
 pub struct Estimator {
-    _spec: EstimatorSpec,
+    spec: EstimatorSpec,
+    calibration: Calibration,
+    intake: Intake,
+    /// Stretches that wait until there are enough to begin.
+    waiting: Vec<Stretch>,
+    window: Option<Window>,
+    views: Views,
+    next_pose: Option<Stamp>,
     poses: Vec<EstimatedPose>,
-    output: OpenLoop,
+    clock_offsets: Vec<(Stamp, f64)>,
+    windows: Vec<WindowReport>,
+    warnings: Vec<Warning>,
+    lost: bool,
 }
 
 impl Estimator {
@@ -18,16 +37,34 @@ impl Estimator {
     ///
     /// # Errors
     /// When a setting or the calibration makes no sense.
-    pub fn new(spec: &EstimatorSpec, _calibration: &Calibration) -> Result<Self, EstimationError> {
+    pub fn new(spec: &EstimatorSpec, calibration: &Calibration) -> Result<Self, EstimationError> {
         spec.check()?;
-        Ok(Self { _spec: spec.clone(), poses: Vec::new(), output: OpenLoop::default() })
+        check(calibration)?;
+        Ok(Self {
+            spec: spec.clone(),
+            calibration: calibration.clone(),
+            intake: Intake::new(spec, calibration),
+            waiting: Vec::new(),
+            window: None,
+            views: Views::new(&spec.views, spec.fixed_views),
+            next_pose: None,
+            poses: Vec::new(),
+            clock_offsets: Vec::new(),
+            windows: Vec::new(),
+            warnings: Vec::new(),
+            lost: false,
+        })
     }
 
-    /// Takes a measurement, in about the order of time, and solves a window when one is full.
+    /// Takes a measurement, in about the order of time; when a stretch of time is complete, the window moves over it.
     ///
     /// # Errors
     /// When the measurement is not finite.
-    pub fn push(&mut self, _measurement: Measurement) -> Result<(), EstimationError> {
+    pub fn push(&mut self, measurement: Measurement) -> Result<(), EstimationError> {
+        self.intake.take(measurement)?;
+        while let Some(stretch) = self.intake.next_stretch(false) {
+            self.advance(stretch);
+        }
         Ok(())
     }
 
@@ -41,8 +78,194 @@ impl Estimator {
     /// # Errors
     /// When there was no IMU, no lidar, or too little of both to start.
     pub fn finish(mut self) -> Result<OpenLoop, EstimationError> {
-        self.output.poses = self.poses;
-        Ok(self.output)
+        while let Some(stretch) = self.intake.next_stretch(true) {
+            self.advance(stretch);
+        }
+        self.begin(true);
+        self.intake.close();
+        self.warnings.extend(self.intake.take_warnings());
+        let Some(window) = &self.window else { return Err(self.why_nothing()) };
+        let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
+        self.hand_out(end_s);
+        let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
+        let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
+        let Self { poses, clock_offsets, windows, warnings, .. } = self;
+        Ok(OpenLoop { trajectory, poses, clock_offsets, windows, warnings })
+    }
+
+    /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and its
+    /// surfels may become a fixed view.
+    fn advance(&mut self, stretch: Stretch) {
+        self.warnings.extend(self.intake.take_warnings());
+        self.waiting.push(stretch);
+        self.begin(false);
+        let Some(window) = &mut self.window else { return };
+        for stretch in std::mem::take(&mut self.waiting) {
+            let started = Instant::now();
+            let had_beams = !stretch.beams.is_empty();
+            window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
+            let solved = window.solve(&self.views);
+            window.remake_newest();
+            let mut final_until_s = None;
+            if window.is_full()
+                && let Some((placed, _)) = window.let_go()
+            {
+                self.views.take(&placed, self.spec.step_s, window.matcher());
+                final_until_s = Some(window.start_s());
+            }
+            self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, started));
+            self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
+            let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
+            let trouble = trouble(&solved, &self.spec, had_beams && moving);
+            // Said once, until a window is well again.
+            if let (Some(kind), false) = (&trouble, self.lost) {
+                self.warnings.push(Warning { stamp: self.intake.stamp(stretch.end_s), kind: kind.clone() });
+            }
+            self.lost = trouble.is_some();
+            if let Some(until_s) = final_until_s {
+                hand_out(&mut self.poses, &mut self.next_pose, (window, &self.intake), &self.calibration, until_s);
+                window.nominal.forget_before(until_s - 0.2);
+            }
+        }
+    }
+
+    /// Begins, when enough of the start is there to tell rest from motion; with `last`, with whatever there is.
+    fn begin(&mut self, last: bool) {
+        if self.window.is_some() {
+            return;
+        }
+        let intervals: Vec<Interval> = self.waiting.iter().flat_map(|s| &s.intervals).map(|(_, i)| *i).collect();
+        let seconds: f64 = intervals.iter().map(|i| i.h).sum();
+        if intervals.is_empty() || (seconds < self.spec.inertial.rest_s && !last) {
+            return;
+        }
+        let Some((start_s, _)) = self.waiting.first().and_then(|s| s.intervals.first()) else { return };
+        let until = intervals.iter().scan(0.0, |sum, i| {
+            *sum += i.h;
+            Some(*sum)
+        });
+        let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
+        let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
+        let specs = (&self.spec.inertial, &self.spec.clock);
+        let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, specs);
+        if beginning.rest.is_none() {
+            self.warnings.push(Warning { stamp: self.intake.stamp(*start_s), kind: WarningKind::StartedInMotion });
+        }
+        self.window = Some(self.first_window(&beginning, *start_s));
+    }
+
+    fn first_window(&self, beginning: &Beginning, start_s: f64) -> Window {
+        let imu_from_laser = self.calibration.head_from_imu.inverse() * self.calibration.head_from_laser;
+        let maker = SurfelMaker {
+            spec: self.spec.surfels.clone(),
+            noise: self.calibration.lidar,
+            scan_normal: imu_from_laser.rotation * Vector::z(),
+            laser_in_imu: imu_from_laser.translation.vector,
+        };
+        let border = Border::new(beginning.information, &self.calibration.imu);
+        Window::new(&self.spec, maker, beginning, start_s, border)
+    }
+
+    fn end_tau_s(&self) -> f64 {
+        self.windows.last().map_or(0.0, |report| report.stamp.seconds_since(self.intake.origin()))
+    }
+
+    fn hand_out(&mut self, until_u_s: f64) {
+        let Some(window) = &self.window else { return };
+        hand_out(&mut self.poses, &mut self.next_pose, (window, &self.intake), &self.calibration, until_u_s);
+    }
+
+    fn why_nothing(&self) -> EstimationError {
+        match self.intake.counts() {
+            (0, scans) => EstimationError::NoImu { scans },
+            (samples, 0) => EstimationError::NoLidar { samples },
+            _ => EstimationError::TooShort { common_s: self.intake.common_s(), needed_s: 2.0 * self.spec.step_s },
+        }
+    }
+}
+
+/// Appends the poses up to `until_u_s` (IMU time) at whole multiples of the IMU's period.
+fn hand_out(
+    poses: &mut Vec<EstimatedPose>,
+    next: &mut Option<Stamp>,
+    (window, intake): (&Window, &Intake),
+    calibration: &Calibration,
+    until_u_s: f64,
+) {
+    let period_ns = intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
+    let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
+    let imu_from_head = calibration.head_from_imu.inverse();
+    let mut stamp = next.unwrap_or_else(|| {
+        let start_ns = intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
+        Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
+    });
+    loop {
+        let tau_s = stamp.seconds_since(intake.origin());
+        let u_s = window.clock.imu_s(tau_s);
+        if u_s.is_nan() || u_s > until_u_s {
+            break;
+        }
+        poses.push(pose_at(window, &imu_from_head, stamp, (tau_s, u_s)));
+        stamp += crate::time::Span::from_nanos(period_ns);
+    }
+    *next = Some(stamp);
+}
+
+fn pose_at(window: &Window, imu_from_head: &Pose, stamp: Stamp, (tau_s, u_s): (f64, f64)) -> EstimatedPose {
+    let motion = window.nominal.at(u_s, &window.biases.gyro);
+    let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
+    let map_from_imu = Pose::from_parts(motion.position.into(), rotation);
+    let arm = rotation * imu_from_head.translation.vector;
+    EstimatedPose {
+        stamp,
+        map_from_head: map_from_imu * imu_from_head,
+        velocity_in_map_m_per_s: motion.velocity + motion.angular_velocity.cross(&arm),
+        gyro_bias_rad_per_s: window.biases.gyro,
+        accel_bias_m_per_s2: window.biases.accel,
+        clock_offset_s: window.clock.offset_at(tau_s),
+    }
+}
+
+fn report(solved: &Solved, stamp: Stamp, window: &Window, started: Instant) -> WindowReport {
+    WindowReport {
+        stamp,
+        surfels: solved.surfels,
+        matches: solved.matches,
+        view_matches: solved.view_matches,
+        views: solved.views,
+        residual_rms_m: solved.residual_rms_m,
+        iterations: solved.iterations,
+        last_correction_m: solved.last_correction_m,
+        conditioning: solved.conditioning,
+        clock_offset_s: window.clock.offset_s,
+        elapsed_s: started.elapsed().as_secs_f64(),
+    }
+}
+
+/// What is to be said about a window, if anything; `expected` tells whether it should have found surfaces.
+fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
+    let matches = solved.matches + solved.view_matches;
+    if let Some(reason) = solved.trouble {
+        Some(WarningKind::NotSolved { reason })
+    } else if expected && matches < spec.solve.min_matches {
+        Some(WarningKind::FewMatches { matches })
+    } else if expected && solved.conditioning < spec.solve.weak_conditioning {
+        Some(WarningKind::WeakGeometry { conditioning: solved.conditioning })
+    } else {
+        None
+    }
+}
+
+fn check(calibration: &Calibration) -> Result<(), EstimationError> {
+    let imu = &calibration.imu;
+    let numbers = [
+        ("gyroscope's noise density", imu.gyro_density_rad_per_s_per_sqrt_hz),
+        ("accelerometer's noise density", imu.accel_density_m_per_s2_per_sqrt_hz),
+        ("lidar's range noise", calibration.lidar.near_sigma_m),
+    ];
+    match numbers.iter().find(|(_, x)| !(x.is_finite() && *x > 0.0)) {
+        Some((what, x)) => Err(EstimationError::Calibration(format!("the {what} is {x}; it must be above 0"))),
+        None => Ok(()),
     }
 }
 
@@ -59,8 +282,5 @@ pub fn estimate_all(
     for measurement in measurements {
         estimator.push(measurement)?;
     }
-    let mut result = estimator.finish()?;
-    let stamped = result.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
-    result.trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-    Ok(result)
+    estimator.finish()
 }

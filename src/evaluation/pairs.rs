@@ -1,6 +1,7 @@
 use super::EvaluationError;
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::time::{Span, Stamp};
+use std::convert::Infallible;
 
 /// Estimated poses, each with the true one of the same instant.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -16,16 +17,38 @@ impl Pairs {
     /// # Errors
     /// When no pose does.
     pub fn associate(estimate: &Trajectory, truth: &Trajectory) -> Result<Self, EvaluationError> {
-        let mut pairs = Self::default();
-        for (stamp, pose) in estimate.iter() {
-            if let Some(true_pose) = truth.at(stamp) {
-                pairs.stamps.push(stamp);
-                pairs.estimate.push(*pose);
-                pairs.truth.push(true_pose);
-            }
-        }
+        let told = truth.iter().map(|(stamp, pose)| Ok::<_, Infallible>((stamp, *pose)));
+        let Ok(pairs) = Self::gather(estimate, told);
         if pairs.is_empty() {
             return Err(EvaluationError::NothingInCommon { estimate: span_of(estimate), truth: span_of(truth) });
+        }
+        Ok(pairs)
+    }
+
+    /// The same, of a truth that is told pose by pose in order of time, and never held as a whole. There may be no pairs.
+    ///
+    /// # Errors
+    /// When the truth cannot be told on.
+    pub fn gather<E>(
+        estimate: &Trajectory,
+        truth: impl IntoIterator<Item = Result<(Stamp, Pose), E>>,
+    ) -> Result<Self, E> {
+        let mut pairs = Self::default();
+        let mut waiting = estimate.iter().peekable();
+        let mut before: Option<(Stamp, Pose)> = None;
+        for told in truth {
+            let now = told?;
+            // What lies before the first true pose has no partner.
+            while let Some((stamp, pose)) = waiting.next_if(|(stamp, _)| *stamp <= now.0) {
+                let around = before.into_iter().filter(|before| before.0 < now.0).chain([now]);
+                let between = Trajectory::from_poses(around).unwrap_or_default();
+                if let Some(true_pose) = between.at(stamp) {
+                    pairs.stamps.push(stamp);
+                    pairs.estimate.push(*pose);
+                    pairs.truth.push(true_pose);
+                }
+            }
+            before = Some(now);
         }
         Ok(pairs)
     }

@@ -12,12 +12,14 @@
 mod kinematics;
 mod rotation;
 mod route;
+mod smooth;
 mod surface;
 mod trajectory;
 
 pub use kinematics::Kinematics;
 pub use rotation::{from_roll_pitch_yaw, left_jacobian, right_jacobian, roll_pitch_yaw, skew};
 pub use route::Route;
+pub use smooth::SmoothCursor;
 pub use surface::{Surface, SurfacePoint};
 pub use trajectory::{Trajectory, TrajectoryError};
 

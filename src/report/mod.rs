@@ -1,6 +1,14 @@
-//! Results for people: tables, plots, a page.
+//! Results for people: figures of a run ([`Metrics`]), tables, plots, a page. It knows results, not how they came.
 
 mod figures;
+mod metrics;
+mod page;
 pub mod plot;
+mod quantity;
+mod rows;
+mod table;
 
 pub use figures::{clock_offset, errors_over_time, head_pitch, trajectory_from_above};
+pub use metrics::{ClockMetrics, ClosedLoopMetrics, CloudMetrics, Metrics, OpenLoopMetrics, SimulationMetrics};
+pub use page::{Section, page};
+pub use table::{summary, table};

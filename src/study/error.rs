@@ -1,12 +1,26 @@
 use crate::dynamics::DynamicsError;
+use crate::estimation::EstimationError;
 use crate::motion::MotionError;
+use crate::recording::RecordingError;
+use crate::report::plot::PlotError;
 use crate::signal::SignalError;
+use crate::simulation::SimulationError;
 use crate::spec::SpecError;
+use std::path::{Path, PathBuf};
 
-/// Why a study cannot be made.
+/// Why an experiment did not come to its end.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// A spec is wrong.
+    /// The simulation could not begin, or go on.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A file could not be written or read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// There is no estimate.
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+    /// A spec is missing or wrong.
     #[error(transparent)]
     Spec(#[from] SpecError),
     /// The head cannot be modelled, or its simulation failed.
@@ -26,4 +40,48 @@ pub enum StudyError {
         /// What is wrong with it, and what to do.
         message: String,
     },
+    /// A plot could not be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// The figures could not be written as JSON.
+    #[error("the figures cannot be written: {0}")]
+    Figures(#[from] serde_json::Error),
+    /// A file or folder could not be made.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which one.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Somebody stopped it.
+    #[error("stopped; what is complete can be read")]
+    Stopped,
+}
+
+impl StudyError {
+    pub(super) fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
+        let path = path.to_owned();
+        move |source| Self::File { path, source }
+    }
+
+    /// Whether what was asked for is wrong (a spec, a setting), rather than something on the way.
+    pub fn is_wrong_input(&self) -> bool {
+        match self {
+            Self::Spec(_) | Self::Motion(_) | Self::Plan { .. } => true,
+            Self::Dynamics(error) => !matches!(error, DynamicsError::Diverged { .. }),
+            Self::Estimation(error) => {
+                matches!(error, EstimationError::Setting { .. } | EstimationError::Calibration(_))
+            }
+            Self::Simulation(error) => {
+                let failed = match error {
+                    SimulationError::Dynamics(error) => matches!(**error, DynamicsError::Diverged { .. }),
+                    SimulationError::Sink(_) => true,
+                    _ => false,
+                };
+                !failed
+            }
+            _ => false,
+        }
+    }
 }

@@ -1,8 +1,33 @@
-//! Studies: what a design does, found by running it many times.
+//! Whole experiments, out of the rooms below.
+//!
+//! [`journey`] is the one that everything else varies: simulate and record, estimate from the recording, judge, report.
+//! [`estimate_recording`] is its second half, for anybody's recording.
+//!
+//! A head by itself is characterised by its [`gains`], by what its [`spring`] bears and how it moves, and by the
+//! [`coverage`] of its lidar.
 
+mod artefacts;
+mod cadence;
+mod calibration;
 pub mod coverage;
 mod error;
+mod estimate;
 pub mod gains;
+mod journey;
+mod judge;
+mod manifest;
+mod memory;
+mod open_loop;
+mod record;
+mod register;
 pub mod spring;
+mod truth_near;
+mod watch;
 
+pub use calibration::CalibrationSpec;
 pub use error::StudyError;
+pub use estimate::{Outcome, Wishes, estimate_recording};
+pub use journey::journey;
+pub use manifest::Manifest;
+pub use record::record;
+pub use watch::{News, Stage, Watch};

@@ -1,0 +1,115 @@
+//! Arguments that several commands share.
+
+use super::failure::Usage;
+use super::quantity;
+use clap::Args;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use zsim::estimation;
+use zsim::random::Seed;
+use zsim::simulation::Scenario;
+use zsim::spec::{Source, parse};
+use zsim::study::{CalibrationSpec, Wishes};
+
+/// What every command understands.
+#[derive(Args)]
+pub(super) struct Global {
+    /// Print results as JSON
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Print results and errors alone
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// Use this many threads (default: all of the machine's); results do not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+}
+
+/// What to simulate beside the scene. A name is looked up as a path, then in scenes/ and specs/, then in the program.
+#[derive(Args)]
+pub(super) struct ScenarioArguments {
+    /// The head and its spring, a name under specs/heads/ or a file [default: handheld]
+    #[arg(long, value_name = "NAME|FILE")]
+    head: Option<String>,
+    /// How the base moves, under specs/motions/ [default: hand]
+    #[arg(long, value_name = "NAME|FILE")]
+    motion: Option<String>,
+    /// The lidar, under specs/lidars/ [default: utm30lx]
+    #[arg(long, value_name = "NAME|FILE")]
+    lidar: Option<String>,
+    /// The IMU, under specs/imus/ [default: 3dm_gx2]
+    #[arg(long, value_name = "NAME|FILE")]
+    imu: Option<String>,
+    /// The clocks, under specs/clocks/ [default: drifting]
+    #[arg(long, value_name = "NAME|FILE")]
+    clock: Option<String>,
+    /// The route through the scene [default: the scene's own]
+    #[arg(long, value_name = "NAME")]
+    route: Option<String>,
+    /// How long: 120s, 2min, 90 [default: 120s]
+    #[arg(long, value_name = "TIME", value_parser = quantity::seconds)]
+    duration: Option<f64>,
+    /// The seed from which all chance follows [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+impl ScenarioArguments {
+    pub(super) fn scenario(&self, scene: &str) -> Scenario {
+        let default = Scenario::in_scene(scene);
+        let or = |given: &Option<String>, default: String| given.clone().unwrap_or(default);
+        Scenario {
+            scene: default.scene,
+            head: or(&self.head, default.head),
+            motion: or(&self.motion, default.motion),
+            lidar: or(&self.lidar, default.lidar),
+            imu: or(&self.imu, default.imu),
+            clock: or(&self.clock, default.clock),
+            route: self.route.clone(),
+            duration_s: self.duration.unwrap_or(default.duration_s),
+            seed: self.seed.map_or(default.seed, Seed),
+        }
+    }
+}
+
+/// How to estimate.
+#[derive(Args)]
+pub(super) struct EstimatorArguments {
+    /// The estimator's settings, a name under specs/estimators/ or a file
+    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    estimator: String,
+    /// How many fixed views to keep [default: the settings', 5]
+    #[arg(long, value_name = "N")]
+    fixed_views: Option<usize>,
+    /// Stop before the global registration
+    #[arg(long)]
+    open_loop: bool,
+}
+
+impl EstimatorArguments {
+    pub(super) fn wishes(&self) -> anyhow::Result<Wishes> {
+        let mut estimator = estimation::load(&self.estimator)?;
+        estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
+        estimator.check().map_err(|error| Usage(error.to_string()))?;
+        Ok(Wishes::with(estimator))
+    }
+}
+
+/// Where results go.
+#[derive(Args)]
+pub(super) struct OutArguments {
+    /// The folder for results; if it exists and is not empty, one with a number after its name
+    #[arg(long, short, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Write into the folder even if it exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Reads a calibration that a user wrote.
+pub(super) fn calibration(path: Option<&Path>) -> anyhow::Result<CalibrationSpec> {
+    match path {
+        Some(path) => Ok(parse(&Source::read(path)?)?),
+        None => Ok(CalibrationSpec::default()),
+    }
+}

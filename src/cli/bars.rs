@@ -1,0 +1,101 @@
+//! Progress and talk on stderr, and the way to stop.
+
+use super::arguments::Global;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use zsim::study::{News, Stage};
+
+/// Set by Ctrl-C.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Steps of a whole bar.
+const STEPS: u64 = 1000;
+
+/// Makes Ctrl-C stop what runs; a second one ends the program at once.
+pub(super) fn stop_flag() -> &'static AtomicBool {
+    // Without the handler Ctrl-C ends the program at once, which files survive too.
+    let _ = ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    });
+    &STOP
+}
+
+/// A progress bar for the stage that runs, on a terminal; remarks above it.
+pub(super) struct Bars {
+    quiet: bool,
+    shown: Option<(Stage, ProgressBar)>,
+}
+
+impl Bars {
+    pub(super) fn new(global: &Global) -> Self {
+        Self { quiet: global.quiet, shown: None }
+    }
+
+    /// Shows what an experiment tells.
+    pub(super) fn tell(&mut self, news: News) {
+        if self.quiet {
+            return;
+        }
+        match news {
+            News::Note(text) => self.remark(text),
+            News::Progress { stage, fraction, done_s } => {
+                let bar = self.bar_of(stage, fraction.is_some());
+                match fraction {
+                    Some(fraction) => bar.set_position((fraction * STEPS as f64) as u64),
+                    None => bar.tick(),
+                }
+                if done_s > 0.0 {
+                    bar.set_message(format!("{done_s:.0} s of data"));
+                }
+            }
+        }
+    }
+
+    /// Prints a remark above the bar.
+    pub(super) fn remark(&self, text: &str) {
+        if self.quiet {
+            return;
+        }
+        match &self.shown {
+            Some((_, bar)) => bar.suspend(|| eprintln!("note: {text}")),
+            None => eprintln!("note: {text}"),
+        }
+    }
+
+    fn bar_of(&mut self, stage: Stage, has_end: bool) -> &ProgressBar {
+        if self.shown.as_ref().is_none_or(|(shown, _)| *shown != stage) {
+            self.finish();
+            let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+            bar.set_style(style(has_end));
+            bar.set_prefix(name(stage));
+            bar.enable_steady_tick(Duration::from_millis(200));
+            return &self.shown.insert((stage, bar)).1;
+        }
+        &self.shown.get_or_insert_with(|| (stage, ProgressBar::hidden())).1
+    }
+
+    /// Takes the bar away.
+    pub(super) fn finish(&mut self) {
+        if let Some((_, bar)) = self.shown.take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn style(has_end: bool) -> ProgressStyle {
+    let template =
+        if has_end { "{prefix:12} {bar:30} {percent:>3} %  {eta:>4}  {msg}" } else { "{prefix:12} {spinner} {msg}" };
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+fn name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Simulating => "simulating",
+        Stage::Estimating => "estimating",
+        Stage::Registering => "registering",
+        Stage::Reporting => "reporting",
+    }
+}

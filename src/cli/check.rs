@@ -1,0 +1,169 @@
+//! `zsim check`: are these scenes and specs right?
+
+use super::arguments::Global;
+use super::{End, failure, output};
+use clap::Args;
+use serde_json::json;
+use std::path::Path;
+use zsim::dynamics::{HeadModel, HeadSpec};
+use zsim::elasticity::{ElasticityError, SpringSpec};
+use zsim::estimation::{EstimationError, EstimatorSpec};
+use zsim::geometry::{Route, Vector};
+use zsim::motion::MotionSpec;
+use zsim::random::Seed;
+use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
+use zsim::simulation::EPOCH;
+use zsim::spec::{Kind, Source, SpecError, find, parse};
+use zsim::study::StudyError;
+use zsim::study::spring::design::{DesignSpec, Search};
+use zsim::world::{SceneSpec, World, WorldError};
+
+/// The kinds that there is a check for.
+const KINDS: [Kind; 9] = [
+    Kind::Scene,
+    Kind::Head,
+    Kind::Spring,
+    Kind::Motion,
+    Kind::Lidar,
+    Kind::Imu,
+    Kind::Clock,
+    Kind::Estimator,
+    Kind::Study,
+];
+
+/// Check scenes and specs: line and column of what is wrong
+///
+/// What a file describes is told by its folder (scenes/, specs/heads/, ...), or else by trying.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim check scenes/office.ron specs/heads/handheld.ron")]
+pub(super) struct Arguments {
+    /// Files, or names in scenes/ and specs/
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<String>,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let checked: Vec<_> = arguments.files.iter().map(|file| (file, check(file))).collect();
+    let mut words = String::new();
+    let mut figures = Vec::new();
+    for (file, result) in &checked {
+        match result {
+            Ok(kind) => {
+                words += &format!("{file}: a {} that is right\n", kind.noun());
+                figures.push(json!({ "file": file, "kind": kind.noun(), "error": null }));
+            }
+            Err(error) => {
+                let at = error.line_and_column();
+                figures.push(json!({ "file": file, "error": error.to_string(), "message": error.message(),
+                    "line": at.map(|at| at.0), "column": at.map(|at| at.1) }));
+                eprintln!("error: {error}");
+            }
+        }
+    }
+    output::tell(global, &words, json!({ "files": figures }), None)?;
+    let wrong = checked.iter().filter(|(_, result)| result.is_err()).count();
+    if wrong > 0 {
+        return Err(failure::Usage(format!("{wrong} of {} files are wrong", checked.len())).into());
+    }
+    Ok(End::Done)
+}
+
+/// The kind of a spec that is right.
+fn check(file: &str) -> Result<Kind, SpecError> {
+    if let Some(kind) = kind_by_folder(file) {
+        return build(kind, &find(kind, file)?).map(|()| kind);
+    }
+    let path = Path::new(file);
+    let source = match path.is_file() {
+        true => Source::read(path)?,
+        false => {
+            let found = KINDS.iter().find_map(|kind| Some((*kind, find(*kind, file).ok()?)));
+            let Some((kind, source)) = found else {
+                return Err(SpecError::plain(file, "no such file, and no scene or spec of this name"));
+            };
+            return build(kind, &source).map(|()| kind);
+        }
+    };
+    kind_by_trying(&source)
+}
+
+/// The kind whose parser reads the text, checked; if none does, the error of the one that came farthest.
+fn kind_by_trying(source: &Source) -> Result<Kind, SpecError> {
+    let mut farthest: Option<SpecError> = None;
+    for kind in KINDS {
+        match parse_as(kind, source) {
+            Ok(()) => return build(kind, source).map(|()| kind),
+            Err(error) => {
+                let is_farther = farthest.as_ref().is_none_or(|far| error.line_and_column() > far.line_and_column());
+                farthest = if is_farther { Some(error) } else { farthest };
+            }
+        }
+    }
+    Err(farthest.unwrap_or_else(|| SpecError::plain(source.name.clone(), "is no scene and no spec")))
+}
+
+fn kind_by_folder(file: &str) -> Option<Kind> {
+    let folder = Path::new(file).parent()?.file_name()?.to_str()?;
+    KINDS.into_iter().find(|kind| kind.folder().rsplit('/').next() == Some(folder))
+}
+
+fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
+    match kind {
+        Kind::Scene => parse::<SceneSpec>(source).map(drop),
+        Kind::Head => parse::<HeadSpec>(source).map(drop),
+        Kind::Motion => parse::<MotionSpec>(source).map(drop),
+        Kind::Lidar => parse::<LidarSpec>(source).map(drop),
+        Kind::Imu => parse::<ImuSpec>(source).map(drop),
+        Kind::Clock => parse::<ClocksSpec>(source).map(drop),
+        Kind::Estimator => parse::<EstimatorSpec>(source).map(drop),
+        Kind::Spring => parse::<SpringSpec>(source).map(drop),
+        Kind::Study => parse::<DesignSpec>(source).map(drop),
+        Kind::Experiment => Err(SpecError::plain(source.name.clone(), format!("a {} cannot be checked", kind.noun()))),
+    }
+}
+
+/// Builds what the spec describes, as a run would.
+fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
+    let spec_error = |error: &dyn std::error::Error| SpecError::plain(source.name.clone(), error.to_string());
+    match kind {
+        Kind::Scene => match World::build(&parse::<SceneSpec>(source)?, source) {
+            Ok(_) => Ok(()),
+            Err(WorldError::Scene(error) | WorldError::Mesh(error)) => Err(error),
+        },
+        Kind::Head => match HeadModel::new(&parse::<HeadSpec>(source)?, source) {
+            Ok(_) => Ok(()),
+            Err(zsim::dynamics::DynamicsError::Spec(error)) => Err(error),
+            Err(error) => Err(spec_error(&error)),
+        },
+        Kind::Motion => match parse::<MotionSpec>(source)?.build(source, Some(&any_route()), 120.0, Seed(1)) {
+            Ok(_) => Ok(()),
+            Err(zsim::motion::MotionError::Spec(error)) => Err(error),
+            Err(error) => Err(spec_error(&error)),
+        },
+        Kind::Lidar => Lidar::new(&parse::<LidarSpec>(source)?, source).map(drop),
+        Kind::Imu => Imu::new(&parse::<ImuSpec>(source)?, source).map(drop),
+        Kind::Clock => Clocks::new(&parse::<ClocksSpec>(source)?, source, EPOCH).map(drop),
+        Kind::Estimator => match parse::<EstimatorSpec>(source)?.check() {
+            Ok(()) => Ok(()),
+            Err(EstimationError::Setting { key, message }) => Err(SpecError::about(source, key, message)),
+            Err(error) => Err(spec_error(&error)),
+        },
+        Kind::Spring => match parse::<SpringSpec>(source)?.design() {
+            Ok(_) => Ok(()),
+            Err(ElasticityError::Spec(error)) => Err(error),
+            Err(error) => Err(SpecError::plain(source.name.clone(), error.to_string())),
+        },
+        Kind::Study => match Search::new(&parse::<DesignSpec>(source)?, source) {
+            Ok(_) => Ok(()),
+            Err(StudyError::Spec(error)) => Err(error),
+            Err(error) => Err(spec_error(&error)),
+        },
+        Kind::Experiment => parse_as(kind, source),
+    }
+}
+
+/// A way that any motion can follow: round a hall of 20 m by 10 m.
+fn any_route() -> Route {
+    let corners = [(0.0, 0.0), (20.0, 0.0), (20.0, 10.0), (0.0, 10.0)];
+    Route { points_in_world: corners.map(|(x, y)| Vector::new(x, y, 0.0)).to_vec(), closed: true }
+}

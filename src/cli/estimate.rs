@@ -1,0 +1,59 @@
+//! `zsim estimate`: the estimator on any recording.
+
+use super::End;
+use super::arguments::{EstimatorArguments, Global, OutArguments, calibration};
+use super::bars::{Bars, stop_flag};
+use super::{journey, output};
+use clap::Args;
+use std::path::PathBuf;
+use zsim::recording::Preference;
+use zsim::study::{self, Watch, Wishes};
+
+/// Estimate trajectory and map from a recording, whoever made it
+///
+/// Lidar and IMU are found among the topics (LaserScan or PointCloud2, and Imu), and where they sit in the head is read
+/// from /tf_static. Where the recording has the truth, the estimate is judged by it.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim estimate recording.mcap --out results/recording --fixed-views 2")]
+pub(super) struct Arguments {
+    /// The recording
+    #[arg(value_name = "FILE.mcap")]
+    recording: PathBuf,
+    #[command(flatten)]
+    estimator: EstimatorArguments,
+    /// A RON file that says where the sensors sit and how well they measure, for what the recording does not say:
+    /// (head_from_laser: (position_m: (0, 0, 0)), head_from_imu: (position_m: (0, 0, -0.08)))
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// The frame whose pose is written [default: head where /tf_static has it, else the IMU's]
+    #[arg(long, value_name = "NAME")]
+    body_frame: Option<String>,
+    /// The lidar's topic [default: found]
+    #[arg(long, value_name = "TOPIC")]
+    lidar_topic: Option<String>,
+    /// The IMU's topic [default: found]
+    #[arg(long, value_name = "TOPIC")]
+    imu_topic: Option<String>,
+    #[command(flatten)]
+    out: OutArguments,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let wishes = Wishes {
+        calibration: calibration(arguments.calibration.as_deref())?,
+        body_frame: arguments.body_frame.clone(),
+        topics: Preference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
+        ..arguments.estimator.wishes()?
+    };
+    // A recording that is not there leaves no folder behind.
+    zsim::recording::Reader::open(&arguments.recording)?;
+    let stem = arguments.recording.file_stem().unwrap_or_default().to_string_lossy();
+    let wanted = arguments.out.out.clone().unwrap_or_else(|| journey::default_folder(&stem));
+    let folder = output::folder(&wanted, arguments.out.force)?;
+
+    let mut bars = Bars::new(global);
+    let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
+    let outcome = study::estimate_recording(&arguments.recording, &folder, &wishes, &mut watch);
+    bars.finish();
+    journey::close(global, &outcome.inspect_err(|_| journey::left_behind(&folder))?, &folder)
+}

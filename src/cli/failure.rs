@@ -1,0 +1,43 @@
+//! What is said when a command fails, and with which code.
+
+use std::error::Error;
+use std::process::ExitCode;
+use zsim::simulation::SimulationError;
+use zsim::spec::SpecError;
+use zsim::study::StudyError;
+use zsim::world::WorldError;
+
+/// Prints the error with its causes, and gives its exit code: 2 when what was asked for is wrong, else 1.
+pub(super) fn tell(error: &anyhow::Error) -> ExitCode {
+    let mut said = error.to_string();
+    eprintln!("error: {said}");
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        // A transparent error has its cause's words.
+        if !said.contains(&cause) {
+            eprintln!("  because: {cause}");
+        }
+        said = cause;
+    }
+    if error.chain().any(is_wrong_input) { ExitCode::from(2) } else { ExitCode::FAILURE }
+}
+
+fn is_wrong_input(error: &(dyn Error + 'static)) -> bool {
+    let simulation = |error: &SimulationError| !matches!(error, SimulationError::Sink(_));
+    error.is::<SpecError>()
+        || error.is::<WorldError>()
+        || error.is::<Usage>()
+        || error.downcast_ref::<SimulationError>().is_some_and(simulation)
+        || error.downcast_ref::<StudyError>().is_some_and(StudyError::is_wrong_input)
+}
+
+/// A wish that makes no sense.
+#[derive(Debug)]
+pub(super) struct Usage(pub String);
+
+impl std::fmt::Display for Usage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl Error for Usage {}

@@ -1,0 +1,71 @@
+//! `zsim info`: what is in a recording.
+
+use super::arguments::Global;
+use super::{End, output, quantity};
+use clap::Args;
+use std::path::PathBuf;
+use zsim::recording::{Reader, RecordingInfo, TopicInfo};
+use zsim::report;
+use zsim::time::Span;
+
+/// Tell what a recording holds: topics, rates, gaps, clocks, and what is lost
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim info recording.mcap")]
+pub(super) struct Arguments {
+    /// The recording
+    #[arg(value_name = "FILE.mcap")]
+    recording: PathBuf,
+    /// What counts as a gap between messages of a topic
+    #[arg(long, value_name = "TIME", default_value = "0.5s", value_parser = quantity::seconds)]
+    gap: f64,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let reader = Reader::open(&arguments.recording)?;
+    let info = reader.info(Span::from_seconds(arguments.gap))?;
+    output::tell(global, &words(&info), serde_json::to_value(&info)?, None)?;
+    if info.loss.is_none() {
+        return Ok(End::Done);
+    }
+    info.loss.sentences().iter().for_each(|loss| eprintln!("loss: {loss}"));
+    Ok(End::WithLoss)
+}
+
+fn words(info: &RecordingInfo) -> String {
+    let mebibytes = info.length_bytes as f64 / (1 << 20) as f64;
+    let made = if info.has_manifest { ", made by zsim" } else { "" };
+    let head = format!("{}: {:.3} s, {} messages, {mebibytes:.1} MiB{made}", info.name, info.duration_s, info.messages);
+    let topics = report::table(
+        &["topic", "type", "messages", "Hz", "longest s", "gaps", "missing", "late"],
+        &info.topics.iter().map(topic_row).collect::<Vec<_>>(),
+        true,
+    );
+    let clocks: Vec<_> = info.topics.iter().filter_map(clock_row).collect();
+    let clocks = report::table(&["stamps against log time", "offset ms", "drift ppm", "jitter ms"], &clocks, true);
+    format!("{head}\n\n{topics}\n{clocks}")
+}
+
+fn topic_row(topic: &TopicInfo) -> Vec<String> {
+    let number = |figure: Option<f64>, decimals: usize| figure.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
+    let short = topic.type_name.rsplit('/').next().unwrap_or_default();
+    vec![
+        topic.topic.clone(),
+        short.to_owned(),
+        topic.messages.to_string(),
+        number(topic.rate_hz, 1),
+        number(topic.longest_gap_s, 3),
+        topic.gaps.to_string(),
+        topic.missing.to_string(),
+        topic.out_of_order.to_string(),
+    ]
+}
+
+fn clock_row(topic: &TopicInfo) -> Option<Vec<String>> {
+    let clock = topic.clock?;
+    Some(vec![
+        topic.topic.clone(),
+        format!("{:.3}", clock.offset_s * 1e3),
+        format!("{:.2}", clock.drift_ppm),
+        format!("{:.3}", clock.jitter_s * 1e3),
+    ])
+}

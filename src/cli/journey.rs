@@ -1,0 +1,64 @@
+//! `zsim --scene`: the whole journey.
+
+use super::End;
+use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
+use super::bars::{Bars, stop_flag};
+use super::output;
+use clap::Args;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use zsim::report;
+use zsim::simulation::Simulation;
+use zsim::study::{self, Outcome, Watch};
+
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// The world, a name under scenes/ or a file
+    #[arg(long, value_name = "NAME|FILE", required = true)]
+    pub scene: Option<String>,
+    #[command(flatten)]
+    scenario: ScenarioArguments,
+    #[command(flatten)]
+    estimator: EstimatorArguments,
+    #[command(flatten)]
+    out: OutArguments,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let scene = arguments.scene.as_deref().unwrap_or_default();
+    let wishes = arguments.estimator.wishes()?;
+    let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
+    let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
+    let folder = output::folder(&wanted, arguments.out.force)?;
+
+    let mut bars = Bars::new(global);
+    simulation.world().notes().iter().for_each(|note| bars.remark(note));
+    let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
+    let outcome = study::journey(&simulation, &wishes, &folder, &mut watch);
+    bars.finish();
+    close(global, &outcome.inspect_err(|_| left_behind(&folder))?, &folder)
+}
+
+/// Where results go unless somebody says otherwise.
+pub(super) fn default_folder(name: &str) -> PathBuf {
+    Path::new("results").join(name)
+}
+
+/// Says where the part is that was complete before a failure.
+pub(super) fn left_behind(folder: &Path) {
+    eprintln!("what is complete is in {}", folder.display());
+}
+
+/// Prints the figures of an estimate, and says what was lost.
+pub(super) fn close(global: &Global, outcome: &Outcome, folder: &Path) -> anyhow::Result<End> {
+    let mut figures = serde_json::to_value(&outcome.metrics)?;
+    if let Value::Object(object) = &mut figures {
+        object.insert("losses".to_owned(), json!(outcome.losses));
+    }
+    output::tell(global, &report::summary(&outcome.metrics), figures, Some(folder))?;
+    if outcome.losses.is_empty() {
+        return Ok(End::Done);
+    }
+    outcome.losses.iter().for_each(|loss| eprintln!("loss: {loss}"));
+    Ok(End::WithLoss)
+}

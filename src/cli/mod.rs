@@ -1,0 +1,119 @@
+//! The command `zsim`: one verb a file.
+//!
+//! Results go to stdout, talk and progress to stderr. Exit codes: 0 done, 1 failed, 2 wrong usage or spec, 3 done with
+//! loss.
+
+mod arguments;
+mod bars;
+mod check;
+mod completions;
+mod estimate;
+mod evaluate;
+mod failure;
+mod gains;
+mod info;
+mod journey;
+mod output;
+mod quantity;
+mod simulate;
+mod spring;
+mod spring_words;
+
+use arguments::Global;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Design and simulate moving range sensors: a lidar and an IMU on a spring, and the continuous-time SLAM that makes a map
+/// of what they see.
+///
+/// With a scene and no command, the whole journey: simulate, record, estimate, evaluate, report.
+#[derive(Parser)]
+#[command(
+    name = "zsim",
+    version,
+    subcommand_negates_reqs = true,
+    arg_required_else_help = true,
+    after_help = "Example:\n  zsim --scene office.ron --duration 120s --seed 1"
+)]
+struct Cli {
+    #[command(flatten)]
+    journey: journey::Arguments,
+    #[command(subcommand)]
+    verb: Option<Verb>,
+    #[command(flatten)]
+    global: Global,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Simulate(simulate::Arguments),
+    Estimate(estimate::Arguments),
+    Evaluate(evaluate::Arguments),
+    Gains(gains::Arguments),
+    Spring(spring::Arguments),
+    Check(check::Arguments),
+    Info(info::Arguments),
+    Completions(completions::Arguments),
+}
+
+/// How a command that did not fail ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    Done,
+    WithLoss,
+}
+
+/// Parses, runs, and turns what happened into an exit code.
+pub fn run() -> ExitCode {
+    // clap itself prints help (code 0) and complaints about usage (code 2).
+    let cli = Cli::parse();
+    match dispatch(&cli) {
+        Ok(End::Done) => ExitCode::SUCCESS,
+        Ok(End::WithLoss) => ExitCode::from(3),
+        Err(error) => failure::tell(&error),
+    }
+}
+
+fn dispatch(cli: &Cli) -> anyhow::Result<End> {
+    let global = &cli.global;
+    if let Some(threads) = global.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
+    }
+    let Some(verb) = &cli.verb else { return journey::run(&cli.journey, global) };
+    if cli.journey.scene.is_some() {
+        let message =
+            "--scene before a command belongs to no command: put it after the command, or leave the command out";
+        Cli::command().error(ErrorKind::ArgumentConflict, message).exit();
+    }
+    match verb {
+        Verb::Simulate(arguments) => simulate::run(arguments, global),
+        Verb::Estimate(arguments) => estimate::run(arguments, global),
+        Verb::Evaluate(arguments) => evaluate::run(arguments, global),
+        Verb::Gains(arguments) => gains::run(arguments, global),
+        Verb::Spring(arguments) => spring::run(arguments, global),
+        Verb::Check(arguments) => check::run(arguments, global),
+        Verb::Info(arguments) => info::run(arguments, global),
+        Verb::Completions(arguments) => completions::run(arguments),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arguments_fit_together() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_help_ends_with_an_example() {
+        let command = Cli::command();
+        for each in command.get_subcommands().chain([&command]) {
+            let help = each.clone().render_long_help().to_string();
+            let last = help.trim_end().lines().last().unwrap_or_default();
+            assert!(last.trim_start().starts_with("zsim"), "{}: {last}", each.get_name());
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! Numbers with units, as people type them.
+
+/// Seconds from `120s`, `2min`, `1.5h`, `250ms` or `90`.
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let unit_at = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
+    let (number, unit) = text.split_at(unit_at);
+    let factor = match unit {
+        "" | "s" | "sec" => 1.0,
+        "ms" => 1e-3,
+        "min" | "m" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(format!("`{unit}` is no unit of time; use ms, s, min or h, as in 120s or 2min")),
+    };
+    let number: f64 = number
+        .trim()
+        .parse()
+        .map_err(|_| format!("`{text}` is no length of time; write a number and a unit, as in 120s or 2min"))?;
+    let seconds = number * factor;
+    if seconds.is_finite() && seconds > 0.0 { Ok(seconds) } else { Err("a length of time is above zero".to_owned()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_length_of_time_is_a_number_and_a_unit() {
+        for (text, expected) in [("120s", 120.0), ("2min", 120.0), ("90", 90.0), ("1.5 h", 5400.0), ("250ms", 0.25)] {
+            assert_eq!(seconds(text), Ok(expected), "{text}");
+        }
+        for text in ["", "s", "-3s", "0", "nan", "inf", "3 parsecs", "1e400s"] {
+            assert!(seconds(text).is_err(), "{text}");
+        }
+    }
+}

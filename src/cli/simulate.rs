@@ -1,0 +1,68 @@
+//! `zsim simulate`: a recording.
+
+use super::End;
+use super::arguments::{Global, ScenarioArguments};
+use super::bars::{Bars, stop_flag};
+use super::output;
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+use zsim::report;
+use zsim::simulation::{Simulation, SimulationSummary};
+use zsim::study::{self, Watch};
+
+/// Simulate and record: an MCAP file with the truth inside, and the true trajectory beside it as TUM
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim simulate --scene office --duration 2min --out office.mcap")]
+pub(super) struct Arguments {
+    /// The world, a name under scenes/ or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    scene: String,
+    #[command(flatten)]
+    scenario: ScenarioArguments,
+    /// The recording; if it exists, one with a number in its name [default: <scene>.mcap]
+    #[arg(long, short, value_name = "FILE.mcap")]
+    out: Option<PathBuf>,
+    /// Write the recording even if it exists
+    #[arg(long)]
+    force: bool,
+    /// Show the true head in /tf, for looking; an estimate of one's own would contradict it
+    #[arg(long)]
+    truth_tf: bool,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let simulation = Simulation::prepare(&arguments.scenario.scenario(&arguments.scene))?;
+    let default = || PathBuf::from(format!("{}.mcap", simulation.world().name()));
+    let recording = output::file(&arguments.out.clone().unwrap_or_else(default), arguments.force)?;
+    let truth = recording.with_extension("tum");
+
+    let mut bars = Bars::new(global);
+    simulation.world().notes().iter().for_each(|note| bars.remark(note));
+    let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
+    let recorded = study::record(&simulation, &recording, &truth, arguments.truth_tf, &mut watch);
+    bars.finish();
+    let summary = recorded.inspect_err(|_| super::journey::left_behind(&recording))?;
+
+    let mut figures = serde_json::to_value(summary)?;
+    if let Some(object) = figures.as_object_mut() {
+        object.insert("scene".to_owned(), json!(simulation.world().name()));
+        object.insert("seed".to_owned(), json!(simulation.scenario().seed));
+        object.insert("truth".to_owned(), json!(truth.display().to_string()));
+    }
+    output::tell(global, &words(&summary), figures, Some(&recording))?;
+    Ok(End::Done)
+}
+
+fn words(summary: &SimulationSummary) -> String {
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let rows = [
+        row("simulated", format!("{} s", summary.duration_s)),
+        row("took", format!("{:.2} s ({:.0} x real time)", summary.wall_s, summary.duration_s / summary.wall_s)),
+        row("scans", summary.scans.to_string()),
+        row("beams", summary.beams.to_string()),
+        row("echoes", summary.returns.to_string()),
+        row("IMU samples", format!("{} ({} at its limit)", summary.imu_samples, summary.imu_samples_at_limit)),
+    ];
+    report::table(&[], &rows, true)
+}

@@ -1,0 +1,95 @@
+//! Where an estimate begins: level, biases, and whether the head rested.
+
+use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
+use super::spec::{ClockSpec, InertialSpec};
+use super::strapdown::{Biases, Interval, State};
+use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
+use crate::measurement::ImuNoise;
+use nalgebra::SMatrix;
+
+/// A sample's deviation from the mean, as a multiple of its noise, up to which the head is at rest.
+const REST_SIGMAS: f64 = 6.0;
+
+/// The state at the first instant, and what is believed of it.
+#[derive(Debug, Clone)]
+pub(super) struct Beginning {
+    pub(super) state: State,
+    pub(super) biases: Biases,
+    /// Standard deviation of the velocity, m/s.
+    pub(super) velocity_sigma: f64,
+    /// What is known of the border.
+    pub(super) information: SMatrix<f64, BORDER, BORDER>,
+    /// What the IMU says while the head rests, if it does.
+    pub(super) rest: Option<Rest>,
+}
+
+/// The head at rest: what the IMU says then, by which the end of the rest is seen.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rest {
+    gyro: Vector,
+    force: Vector,
+}
+
+impl Rest {
+    /// Whether an interval says the same, within its noise.
+    pub(super) fn goes_on(&self, interval: &Interval) -> bool {
+        (interval.gyro - self.gyro).norm() < REST_SIGMAS * interval.gyro_sigma
+            && (interval.accel - self.force).norm() < REST_SIGMAS * interval.accel_sigma
+    }
+}
+
+/// Looks at the first intervals: at rest their mean is the gyroscope's bias and the way up. In motion the mean force is
+/// taken for the way up all the same (over a second or more a hand's accelerations cancel), with little trust.
+///
+/// The map's origin is the head's first position, and its x axis points where the head's does.
+pub(super) fn begin(
+    intervals: &[Interval],
+    head_from_imu: &Pose,
+    noise: &ImuNoise,
+    spec: (&InertialSpec, &ClockSpec),
+) -> Beginning {
+    let duration: f64 = intervals.iter().map(|i| i.h).sum();
+    let mean = |of: fn(&Interval) -> Vector| intervals.iter().map(|i| of(i) * i.h).sum::<Vector>() / duration;
+    let (gyro, force) = (mean(|i| i.gyro), mean(|i| i.accel));
+    let rest = Rest { gyro, force };
+    let at_rest = intervals.iter().all(|interval| rest.goes_on(interval))
+        && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
+    let up = Rotation::rotation_between(&force, &Vector::z()).unwrap_or_else(Rotation::identity);
+    let (_, _, yaw) = roll_pitch_yaw(&(up * head_from_imu.rotation.inverse()));
+    let rotation = Rotation::from_axis_angle(&Vector::z_axis(), -yaw) * up;
+    let head_in_imu = head_from_imu.inverse().translation.vector;
+    let state = State { rotation, position: -(rotation * head_in_imu), velocity: Vector::zeros() };
+    let gyro_bias = if at_rest { gyro } else { Vector::zeros() };
+    // At rest, what the force is more than gravity is bias; the rest of the bias hides in the level.
+    let excess = force.norm() - gravity_in_world().norm();
+    let accel_bias = if at_rest { force.normalize() * excess } else { Vector::zeros() };
+    let gyro_sigma = if at_rest {
+        3.0 * noise.gyro_density_rad_per_s_per_sqrt_hz / duration.sqrt()
+    } else {
+        noise.gyro_turn_on_bias_rad_per_s
+    };
+    Beginning {
+        state,
+        biases: Biases { gyro: gyro_bias, accel: accel_bias },
+        rest: at_rest.then_some(rest),
+        velocity_sigma: if at_rest { 0.01 } else { 2.0 },
+        information: information(gyro_sigma, at_rest, noise, spec),
+    }
+}
+
+fn information(
+    gyro_sigma: f64,
+    at_rest: bool,
+    noise: &ImuNoise,
+    (_, clock): (&InertialSpec, &ClockSpec),
+) -> SMatrix<f64, BORDER, BORDER> {
+    // A level found in motion is off by the mean acceleration over g, one found at rest by the bias over g.
+    let tilt_sigma = if at_rest { 0.02 } else { 0.2 };
+    let mut sigmas = [0.0; BORDER];
+    sigmas[GYRO_BIAS..GYRO_BIAS + 3].fill(gyro_sigma);
+    sigmas[ACCEL_BIAS..ACCEL_BIAS + 3].fill(noise.accel_turn_on_bias_m_per_s2.max(1e-4));
+    sigmas[GRAVITY..GRAVITY + 2].fill(tilt_sigma);
+    sigmas[CLOCK] = clock.start_sigma_s;
+    sigmas[CLOCK_RATE] = (clock.drift_ppm * 1e-6).max(1e-9);
+    SMatrix::from_diagonal(&nalgebra::SVector::from(sigmas.map(|sigma| sigma.powi(-2))))
+}

@@ -1,0 +1,155 @@
+//! The trajectory of the IMU as it stands: strapdown integration, corrected by every window so far.
+
+use super::spline::Basis;
+use super::strapdown::{Biases, Interval, State};
+use crate::geometry::{Matrix, Rotation, Vector};
+
+/// Nodes at the boundaries of the IMU's intervals, in IMU time, and the intervals between them.
+///
+/// Keeping it in the IMU's time has one reason: when the clock offset changes, the trajectory's fast part, which only the
+/// IMU knows, moves along by itself. Lidar time `tau` is looked up at `u = tau + l(tau)`.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Nominal {
+    times_s: Vec<f64>,
+    states: Vec<State>,
+    /// Angular velocity at the nodes as measured, bias included, in the body.
+    rates: Vec<Vector>,
+    intervals: Vec<Interval>,
+}
+
+/// Pose and velocities of the IMU at an instant, in the map.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Motion {
+    pub(super) rotation: Matrix,
+    pub(super) position: Vector,
+    pub(super) velocity: Vector,
+    pub(super) angular_velocity: Vector,
+}
+
+impl Nominal {
+    /// A trajectory that begins at `start_s` in `state`.
+    pub(super) fn beginning(start_s: f64, state: State) -> Self {
+        Self { times_s: vec![start_s], states: vec![state], rates: vec![Vector::zeros()], intervals: Vec::new() }
+    }
+
+    pub(super) fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    pub(super) fn states(&self) -> &[State] {
+        &self.states
+    }
+
+    pub(super) fn intervals(&self) -> &[Interval] {
+        &self.intervals
+    }
+
+    /// The last node's time, or minus infinity.
+    pub(super) fn end_s(&self) -> f64 {
+        self.times_s.last().copied().unwrap_or(f64::NEG_INFINITY)
+    }
+
+    /// Integrates one interval further.
+    pub(super) fn extend(&mut self, interval: Interval, biases: &Biases, gravity: &Vector) {
+        let (Some(time), Some(state)) = (self.times_s.last(), self.states.last()) else { return };
+        let (time, state) = (time + interval.h, state.after(&interval, biases, gravity));
+        // At a boundary the measured rate is about the mean of both sides; the outermost nodes see one side alone.
+        let half_slope = interval.gyro_slope * (0.5 * interval.h);
+        if let Some(rate) = self.rates.last_mut() {
+            let from_this = interval.gyro - half_slope;
+            *rate = if self.intervals.is_empty() { from_this } else { (*rate + from_this) * 0.5 };
+        }
+        self.rates.push(interval.gyro + half_slope);
+        self.times_s.push(time);
+        self.states.push(state);
+        self.intervals.push(interval);
+    }
+
+    /// Forgets the nodes before `time_s`, but for the one at or just before it.
+    pub(super) fn forget_before(&mut self, time_s: f64) {
+        let keep = self.times_s.partition_point(|t| *t <= time_s).saturating_sub(1);
+        self.times_s.drain(..keep);
+        self.states.drain(..keep);
+        self.rates.drain(..keep);
+        self.intervals.drain(..keep);
+    }
+
+    /// Adds a spline of corrections to the nodes from `first` on: `R' = exp(dr) R`, `t' = t + dt` (paper eq. 1-2), and the
+    /// velocity by the spline's derivative.
+    pub(super) fn correct(&mut self, first: usize, curve: impl Fn(usize) -> Correction) {
+        for (index, state) in self.states.iter_mut().enumerate().skip(first) {
+            let correction = curve(index);
+            state.rotation = Rotation::from_scaled_axis(correction.rotation) * state.rotation;
+            state.rotation.renormalize_fast();
+            state.position += correction.translation;
+            state.velocity += correction.velocity;
+        }
+    }
+
+    /// Pose and velocities at `u_s`, IMU time; held at the ends.
+    pub(super) fn at(&self, u_s: f64, gyro_bias: &Vector) -> Motion {
+        let after = self.times_s.partition_point(|t| *t <= u_s).clamp(1, self.times_s.len().max(2) - 1);
+        self.within(after - 1, u_s, gyro_bias)
+    }
+
+    /// As [`Nominal::at`], where `cursor` is near the interval and is moved to it: for a run of instants in order.
+    pub(super) fn at_cursor(&self, cursor: &mut usize, u_s: f64, gyro_bias: &Vector) -> Motion {
+        while *cursor + 2 < self.times_s.len() && self.times_s[*cursor + 1] <= u_s {
+            *cursor += 1;
+        }
+        self.within(*cursor, u_s, gyro_bias)
+    }
+
+    /// Cubic Hermite in position, and in the rotation vector from the interval's start.
+    fn within(&self, k: usize, u_s: f64, gyro_bias: &Vector) -> Motion {
+        if self.intervals.is_empty() {
+            let state = &self.states[0];
+            let rotation = state.rotation.to_rotation_matrix().into_inner();
+            let (velocity, angular_velocity) = (state.velocity, Vector::zeros());
+            return Motion { rotation, position: state.position, velocity, angular_velocity };
+        }
+        let (a, b) = (&self.states[k], &self.states[k + 1]);
+        let h = self.times_s[k + 1] - self.times_s[k];
+        let x = ((u_s - self.times_s[k]) / h).clamp(0.0, 1.0);
+        let (h10, h01, h11) = (x * (1.0 - x) * (1.0 - x), x * x * (3.0 - 2.0 * x), x * x * (x - 1.0));
+        let position = a.position + (b.position - a.position) * h01 + (a.velocity * h10 + b.velocity * h11) * h;
+        let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
+        let (rate_a, rate_b) = (self.rates[k] - gyro_bias, self.rates[k + 1] - gyro_bias);
+        // The rotation vector's own rate at the end is J_r(turn)^-1 rate ~ rate + turn x rate / 2: a step turns little.
+        let rate_end = rate_b + turn.cross(&rate_b) * 0.5;
+        let turned = turn * h01 + (rate_a * h10 + rate_end * h11) * h;
+        let rotation = (a.rotation * Rotation::from_scaled_axis(turned)).to_rotation_matrix().into_inner();
+        Motion {
+            rotation,
+            position,
+            velocity: a.velocity.lerp(&b.velocity, x),
+            angular_velocity: rotation * rate_a.lerp(&rate_b, x),
+        }
+    }
+}
+
+/// A correction of a pose at an instant, in the map.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Correction {
+    /// Rotation vector, rad.
+    pub(super) rotation: Vector,
+    /// Translation, m.
+    pub(super) translation: Vector,
+    /// The translation's derivative, m/s.
+    pub(super) velocity: Vector,
+}
+
+impl Correction {
+    /// The value of a spline whose coefficients (`[dr, dt]` a knot, the first of index `first`) are `coefficients`.
+    pub(super) fn of_spline(basis: &Basis, first: i64, coefficients: &[f64]) -> Self {
+        let mut sum = Self { rotation: Vector::zeros(), translation: Vector::zeros(), velocity: Vector::zeros() };
+        let from = (basis.first - first) as usize * 6;
+        for (a, c) in coefficients[from..from + 24].chunks_exact(6).enumerate() {
+            let translation = Vector::new(c[3], c[4], c[5]);
+            sum.rotation += Vector::new(c[0], c[1], c[2]) * basis.value[a];
+            sum.translation += translation * basis.value[a];
+            sum.velocity += translation * basis.rate[a];
+        }
+        sum
+    }
+}

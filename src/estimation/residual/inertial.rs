@@ -1,0 +1,212 @@
+//! How the trajectory deviates from what the IMU measured over an interval between two nodes.
+//!
+//! ```text
+//! e_w = log(exp(phi(b_w))^-1 R_k^-1 R_(k+1)) / h
+//! e_a = R_mid^T ((v_(k+1) - v_k) / h - g) - (f_mid - b_a)
+//! ```
+//!
+//! Both compare means over the interval, so the rate belongs to its middle and no second difference of positions is taken:
+//! `v` is the integrated velocity, corrected by the spline's exact derivative. With `R' = exp(dr) R`, `t' = t + dt`:
+//!
+//! ```text
+//! de_w / d(dr_(k+1) - dr_k) = R_(k+1)^T / h      de_w / db_w = 1
+//! de_a / d(dv_(k+1) - dv_k) = R_mid^T / h        de_a / d dr_mid = R_mid^T [x]x,  x = (v_(k+1) - v_k) / h - g
+//! de_a / db_a = 1                                de_a / dgamma = R_mid^T [g]x (e_x, e_y),  g' = exp(gamma) g
+//! ```
+
+use super::{ACCEL_BIAS, GRAVITY, GYRO_BIAS, Layout};
+use crate::estimation::normal_equations::NormalEquations;
+use crate::estimation::spline::Basis;
+use crate::estimation::strapdown::{Biases, Interval, State};
+use crate::geometry::{Matrix, Rotation, Vector, skew};
+
+/// The residuals of an interval and what their derivatives are made of.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::estimation) struct Inertial {
+    /// `e_w`, rad/s.
+    pub(in crate::estimation) rate: Vector,
+    /// `e_a`, m/s^2.
+    pub(in crate::estimation) force: Vector,
+    end_from_map: Matrix,
+    middle_from_map: Matrix,
+    acceleration: Vector,
+}
+
+impl Inertial {
+    /// The residuals between the states at an interval's ends.
+    pub(in crate::estimation) fn between(
+        a: &State,
+        b: &State,
+        interval: &Interval,
+        biases: &Biases,
+        gravity: &Vector,
+    ) -> Self {
+        let turn = a.rotation.inverse() * b.rotation;
+        let measured = Rotation::from_scaled_axis(interval.turn(biases));
+        let bend = interval.gyro_slope * (interval.h * interval.h / 8.0);
+        let middle = a.rotation * Rotation::from_scaled_axis(turn.scaled_axis() * 0.5 - bend);
+        let middle_from_map = middle.inverse().to_rotation_matrix().into_inner();
+        let acceleration = (b.velocity - a.velocity) / interval.h - gravity;
+        Self {
+            rate: (measured.inverse() * turn).scaled_axis() / interval.h,
+            force: middle_from_map * acceleration - interval.force_in_middle(biases),
+            end_from_map: b.rotation.inverse().to_rotation_matrix().into_inner(),
+            middle_from_map,
+            acceleration,
+        }
+    }
+
+    /// `de_a / d dr` at the middle.
+    pub(in crate::estimation) fn force_by_turn(&self) -> Matrix {
+        self.middle_from_map * skew(&self.acceleration)
+    }
+
+    /// `de_a / dgamma`: a tilt of gravity about the map's x and y.
+    pub(in crate::estimation) fn force_by_tilt(&self, gravity: &Vector) -> nalgebra::Matrix3x2<f64> {
+        (self.middle_from_map * skew(gravity)).fixed_columns::<2>(0).into_owned()
+    }
+
+    /// Adds the interval's part of the normal equations; `bases` at its two ends.
+    pub(in crate::estimation) fn add_to(
+        &self,
+        equations: &mut NormalEquations,
+        layout: &Layout,
+        bases: (&Basis, &Basis),
+        interval: &Interval,
+        gravity: &Vector,
+    ) {
+        let spread = Spread::of(bases, interval.h);
+        let first = layout.knot(bases.0.first);
+        self.add_rate(equations, layout, (first, &spread), interval);
+        self.add_force(equations, layout, (first, &spread), (interval, gravity));
+    }
+
+    fn add_rate(
+        &self,
+        equations: &mut NormalEquations,
+        layout: &Layout,
+        (first, spread): (usize, &Spread),
+        interval: &Interval,
+    ) {
+        let weight = interval.gyro_sigma.powi(-2);
+        let bias = layout.border() + GYRO_BIAS;
+        // The derivative by a knot is a multiple of a rotation, so its square is that multiple of the identity.
+        let right = self.end_from_map.transpose() * self.rate;
+        for a in 0..spread.used {
+            let scaled = weight * spread.turn[a];
+            for c in 0..=a {
+                for axis in 0..3 {
+                    equations.add_entry(first + 6 * a + axis, first + 6 * c + axis, scaled * spread.turn[c]);
+                }
+            }
+            for axis in 0..3 {
+                equations.add_right(first + 6 * a + axis, -scaled * right[axis]);
+                for row in 0..3 {
+                    equations.add_entry(bias + row, first + 6 * a + axis, scaled * self.end_from_map[(row, axis)]);
+                }
+            }
+        }
+        for axis in 0..3 {
+            equations.add_entry(bias + axis, bias + axis, weight);
+            equations.add_right(bias + axis, -weight * self.rate[axis]);
+        }
+    }
+
+    fn add_force(
+        &self,
+        equations: &mut NormalEquations,
+        layout: &Layout,
+        (first, spread): (usize, &Spread),
+        (interval, gravity): (&Interval, &Vector),
+    ) {
+        let weight = interval.accel_sigma.powi(-2);
+        let (bias, tilt) = (layout.border() + ACCEL_BIAS, layout.border() + GRAVITY);
+        let (by_turn, by_shift, by_tilt) = (self.force_by_turn(), self.middle_from_map, self.force_by_tilt(gravity));
+        let turn_turn = by_turn.transpose() * by_turn;
+        let turn_shift = by_turn.transpose() * by_shift;
+        let (tilt_turn, tilt_shift) = (by_tilt.transpose() * by_turn, by_tilt.transpose() * by_shift);
+        let (right_turn, right_shift) = (by_turn.transpose() * self.force, by_shift.transpose() * self.force);
+        for a in 0..spread.used {
+            let (m, s) = (weight * spread.middle[a], weight * spread.shift[a]);
+            let (turn, shift) = (first + 6 * a, first + 6 * a + 3);
+            for i in 0..3 {
+                equations.add_right(turn + i, -m * right_turn[i]);
+                equations.add_right(shift + i, -s * right_shift[i]);
+                for c in 0..=a {
+                    let (turn_c, shift_c) = (first + 6 * c, first + 6 * c + 3);
+                    equations.add_entry(shift + i, shift_c + i, s * spread.shift[c]);
+                    for j in 0..3 {
+                        // Within one knot the lower triangle alone; between two, the whole block.
+                        if c < a || j <= i {
+                            equations.add_entry(turn + i, turn_c + j, m * spread.middle[c] * turn_turn[(i, j)]);
+                        }
+                        equations.add_entry(shift + i, turn_c + j, s * spread.middle[c] * turn_shift[(j, i)]);
+                        if c < a {
+                            equations.add_entry(turn + i, shift_c + j, m * spread.shift[c] * turn_shift[(i, j)]);
+                        }
+                    }
+                }
+                for j in 0..3 {
+                    equations.add_entry(bias + j, turn + i, m * by_turn[(j, i)]);
+                    equations.add_entry(bias + j, shift + i, s * by_shift[(j, i)]);
+                }
+                for j in 0..2 {
+                    equations.add_entry(tilt + j, turn + i, m * tilt_turn[(j, i)]);
+                    equations.add_entry(tilt + j, shift + i, s * tilt_shift[(j, i)]);
+                }
+            }
+        }
+        self.add_force_border(equations, (bias, tilt), &by_tilt, weight);
+    }
+
+    fn add_force_border(
+        &self,
+        equations: &mut NormalEquations,
+        (bias, tilt): (usize, usize),
+        by_tilt: &nalgebra::Matrix3x2<f64>,
+        weight: f64,
+    ) {
+        let square = by_tilt.transpose() * by_tilt;
+        let right = by_tilt.transpose() * self.force;
+        for i in 0..3 {
+            equations.add_entry(bias + i, bias + i, weight);
+            equations.add_right(bias + i, -weight * self.force[i]);
+            for j in 0..2 {
+                equations.add_entry(tilt + j, bias + i, weight * by_tilt[(i, j)]);
+            }
+        }
+        for i in 0..2 {
+            equations.add_right(tilt + i, -weight * right[i]);
+            for j in 0..=i {
+                equations.add_entry(tilt + i, tilt + j, weight * square[(i, j)]);
+            }
+        }
+    }
+}
+
+/// How an interval's differences hang on the (at most five) knots about it.
+struct Spread {
+    used: usize,
+    /// Of the mean rate of rotation, 1/s.
+    turn: [f64; 5],
+    /// Of the rotation in the middle.
+    middle: [f64; 5],
+    /// Of the mean acceleration, 1/s^2.
+    shift: [f64; 5],
+}
+
+impl Spread {
+    fn of((a, b): (&Basis, &Basis), h: f64) -> Self {
+        let late = (b.first - a.first).clamp(0, 1) as usize;
+        let mut spread = Self { used: 4 + late, turn: [0.0; 5], middle: [0.0; 5], shift: [0.0; 5] };
+        for k in 0..4 {
+            spread.turn[k] -= a.value[k] / h;
+            spread.turn[k + late] += b.value[k] / h;
+            spread.middle[k] += 0.5 * a.value[k];
+            spread.middle[k + late] += 0.5 * b.value[k];
+            spread.shift[k] -= a.rate[k] / h;
+            spread.shift[k + late] += b.rate[k] / h;
+        }
+        spread
+    }
+}

@@ -1,0 +1,40 @@
+//! The terms of the window's cost, each with its derivatives: inertial, matched surfaces, priors.
+
+pub(super) mod inertial;
+pub(super) mod matched;
+pub(super) mod prior;
+
+/// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate.
+pub(super) const BORDER: usize = 10;
+/// Where each begins.
+pub(super) const GYRO_BIAS: usize = 0;
+pub(super) const ACCEL_BIAS: usize = 3;
+pub(super) const GRAVITY: usize = 6;
+pub(super) const CLOCK: usize = 8;
+pub(super) const CLOCK_RATE: usize = 9;
+
+/// Where the unknowns of a window stand.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout {
+    /// Index of the first knot, counted from the start of time.
+    pub(super) first_knot: i64,
+    /// Number of knots.
+    pub(super) knots: usize,
+}
+
+impl Layout {
+    /// How many unknowns.
+    pub(super) fn size(&self) -> usize {
+        self.knots * 6 + BORDER
+    }
+
+    /// The first unknown of the border.
+    pub(super) fn border(&self) -> usize {
+        self.knots * 6
+    }
+
+    /// The first unknown of a knot: three of rotation, three of translation.
+    pub(super) fn knot(&self, index: i64) -> usize {
+        (index - self.first_knot) as usize * 6
+    }
+}

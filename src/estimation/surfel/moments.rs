@@ -1,0 +1,92 @@
+use crate::geometry::{Matrix, Vector};
+
+/// Sums over points: enough for their number, mean time, mean and second central moment, and additive.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(in super::super) struct Moments {
+    count: f64,
+    time_s: f64,
+    noise2: f64,
+    sum: [f64; 3],
+    /// Sums of xx, xy, xz, yy, yz, zz.
+    outer: [f64; 6],
+}
+
+impl Moments {
+    /// Adds a point at `time_s`, measured with variance `noise2` (m^2) along its beam.
+    pub(in super::super) fn add(&mut self, point: &Vector, time_s: f64, noise2: f64) {
+        let [x, y, z] = [point.x, point.y, point.z];
+        self.count += 1.0;
+        self.time_s += time_s;
+        self.noise2 += noise2;
+        for (sum, term) in self.sum.iter_mut().zip([x, y, z]) {
+            *sum += term;
+        }
+        for (sum, term) in self.outer.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
+            *sum += term;
+        }
+    }
+
+    /// Adds the points that another has summed.
+    pub(in super::super) fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.time_s += other.time_s;
+        self.noise2 += other.noise2;
+        for (sum, term) in self.sum.iter_mut().zip(other.sum) {
+            *sum += term;
+        }
+        for (sum, term) in self.outer.iter_mut().zip(other.outer) {
+            *sum += term;
+        }
+    }
+
+    /// How many points.
+    pub(in super::super) fn count(&self) -> f64 {
+        self.count
+    }
+
+    /// The points' mean time, s.
+    pub(in super::super) fn mean_time_s(&self) -> f64 {
+        self.time_s / self.count
+    }
+
+    /// The mean variance of the points along their beams, m^2.
+    pub(in super::super) fn mean_noise2(&self) -> f64 {
+        self.noise2 / self.count
+    }
+
+    /// The points' mean, m.
+    pub(in super::super) fn mean(&self) -> Vector {
+        Vector::from(self.sum) / self.count
+    }
+
+    /// The points' second central moment, m^2.
+    pub(in super::super) fn covariance(&self) -> Matrix {
+        let mean = self.mean();
+        let [xx, xy, xz, yy, yz, zz] = self.outer.map(|sum| sum / self.count);
+        Matrix::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) - mean * mean.transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn merged_moments_are_those_of_all_points() {
+        // Against the definition: mean and mean of (p - mean)(p - mean)^T over all points.
+        let points: Vec<Vector> =
+            (0..40).map(f64::from).map(|k| Vector::new((k * 0.7).sin(), (k * 1.3).cos(), 0.1 * k)).collect();
+        let (mut first, mut second) = (Moments::default(), Moments::default());
+        for (k, point) in points.iter().enumerate() {
+            if k % 3 == 0 { &mut first } else { &mut second }.add(point, k as f64, 1e-4);
+        }
+        first.merge(&second);
+        let mean = points.iter().sum::<Vector>() / 40.0;
+        let brute = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum::<Matrix>() / 40.0;
+        assert_eq!(first.count(), 40.0);
+        assert_relative_eq!(first.mean(), mean, epsilon = 1e-13);
+        assert_relative_eq!(first.mean_time_s(), 19.5, epsilon = 1e-13);
+        assert_relative_eq!(first.covariance(), brute, epsilon = 1e-12);
+    }
+}

@@ -1,0 +1,144 @@
+//! Fixed views: stretches of the past whose surfels stand still in the map, for the window's surfels to match.
+//!
+//! A stretch that left the window is kept when it shows cells that the kept ones do not. Of those kept, a window uses the
+//! few that cover most of what it sees now, and the oldest of about equal ones: an old view has drifted less.
+
+use super::matching::{Forest, Matcher};
+use super::spec::ViewSpec;
+use super::surfel::{Patch, Placed};
+
+/// Edge of the cells by which views are compared, m.
+const CELL_M: f64 = 1.0;
+/// An older view is preferred when it adds at least this fraction of what the best one adds.
+const ABOUT_EQUAL: f64 = 0.7;
+/// A view that adds less than this fraction of the window's cells is not worth its matches.
+const WORTHWHILE: f64 = 0.02;
+
+/// A stretch of the past.
+#[derive(Debug)]
+pub(super) struct View {
+    pub(super) patches: Vec<Patch>,
+    pub(super) forest: Forest,
+    cells: Vec<u64>,
+}
+
+/// The views kept, and the stretch that may become the next one.
+#[derive(Debug)]
+pub(super) struct Views {
+    spec: ViewSpec,
+    active: usize,
+    kept: Vec<View>,
+    gathering: Vec<Patch>,
+    gathered_s: f64,
+}
+
+impl Views {
+    pub(super) fn new(spec: &ViewSpec, active: usize) -> Self {
+        Self { spec: spec.clone(), active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0 }
+    }
+
+    /// Takes the surfels of a stretch of `seconds` that has left the window.
+    pub(super) fn take(&mut self, placed: &[Placed], seconds: f64, matcher: &Matcher) {
+        if self.active == 0 {
+            return;
+        }
+        self.gathering.extend(placed.iter().map(|surfel| surfel.patch));
+        self.gathered_s += seconds;
+        if self.gathered_s < self.spec.length_s - 1e-9 {
+            return;
+        }
+        self.gathered_s = 0.0;
+        let patches = std::mem::take(&mut self.gathering);
+        let cells = cells_of(patches.iter());
+        let mut seen = cells.clone();
+        for view in &self.kept {
+            remove(&mut seen, &view.cells);
+        }
+        let covered = 1.0 - seen.len() as f64 / cells.len().max(1) as f64;
+        if cells.is_empty() || covered >= self.spec.keep_below_coverage {
+            return;
+        }
+        if self.kept.len() >= self.spec.max_kept {
+            self.forget_one();
+        }
+        let forest = matcher.plant(&patches.iter());
+        self.kept.push(View { patches, forest, cells });
+    }
+
+    /// Forgets the view whose cells the others cover best; the first such.
+    fn forget_one(&mut self) {
+        let own = |index: usize| {
+            let mut cells = self.kept[index].cells.clone();
+            for (other, view) in self.kept.iter().enumerate() {
+                if other != index {
+                    remove(&mut cells, &view.cells);
+                }
+            }
+            cells.len()
+        };
+        if let Some(least) = (0..self.kept.len()).min_by_key(|index| own(*index)) {
+            self.kept.remove(least);
+        }
+    }
+
+    /// The views to use for a window that sees `placed`: indices into [`Views::view`].
+    pub(super) fn choose(&self, placed: &[Placed]) -> Vec<usize> {
+        let mut missing = cells_of(placed.iter().map(|surfel| &surfel.patch));
+        let worthwhile = ((missing.len() as f64 * WORTHWHILE) as usize).max(1);
+        let mut chosen = Vec::new();
+        while chosen.len() < self.active.min(self.kept.len()) {
+            let adds: Vec<usize> = self.kept.iter().map(|view| common(&missing, &view.cells)).collect();
+            let best = adds.iter().copied().max().unwrap_or(0);
+            if best < worthwhile {
+                break;
+            }
+            let enough = (best as f64 * ABOUT_EQUAL) as usize;
+            let Some(oldest) = adds.iter().position(|count| *count >= enough.max(worthwhile)) else { break };
+            remove(&mut missing, &self.kept[oldest].cells);
+            chosen.push(oldest);
+        }
+        chosen
+    }
+
+    pub(super) fn view(&self, index: usize) -> &View {
+        &self.kept[index]
+    }
+}
+
+/// The cells in which patches lie, sorted; the side from which they are seen counts.
+fn cells_of<'a>(patches: impl Iterator<Item = &'a Patch>) -> Vec<u64> {
+    let part = |x: f64| (((x / CELL_M).floor() as i64).wrapping_add(1 << 19)) as u64 & 0xf_ffff;
+    let facing = |patch: &Patch| {
+        let axis = patch.normal.iamax();
+        (axis * 2 + usize::from(patch.normal[axis] > 0.0)) as u64
+    };
+    let mut cells: Vec<u64> = patches
+        .map(|patch| {
+            let centre = patch.centre;
+            facing(patch) << 60 | part(centre.x) << 40 | part(centre.y) << 20 | part(centre.z)
+        })
+        .collect();
+    cells.sort_unstable();
+    cells.dedup();
+    cells
+}
+
+/// How many cells two sorted lists have in common.
+fn common(a: &[u64], b: &[u64]) -> usize {
+    let (mut i, mut j, mut count) = (0, 0, 0);
+    while i < a.len() && j < b.len() {
+        match a[i].cmp(&b[j]) {
+            std::cmp::Ordering::Less => i += 1,
+            std::cmp::Ordering::Greater => j += 1,
+            std::cmp::Ordering::Equal => {
+                (i, j, count) = (i + 1, j + 1, count + 1);
+            }
+        }
+    }
+    count
+}
+
+/// Removes from a sorted list what another has.
+fn remove(from: &mut Vec<u64>, others: &[u64]) {
+    from.retain(|cell| others.binary_search(cell).is_err());
+}

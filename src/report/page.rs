@@ -1,0 +1,72 @@
+//! The page: one HTML file that needs nothing else.
+
+use super::plot::{Figure, PlotError};
+use super::{Metrics, rows};
+
+const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;color:#262626;max-width:760px;margin:2rem auto;padding:0 1rem}\
+h1{font-size:1.5rem;font-weight:600}h2{font-size:1.1rem;font-weight:600;margin:2rem 0 .5rem}\
+table{border-collapse:collapse;width:100%}td,th{padding:.15rem .5rem;text-align:left;vertical-align:top}\
+th{font-weight:600;padding-left:0}td:last-child{text-align:right;font-variant-numeric:tabular-nums}\
+tbody tr:first-child>*{border-top:1px solid #d0d0d0}figure{margin:0}svg{width:100%;height:auto}\
+pre{background:#f5f5f5;padding:.8rem;overflow:auto;font-size:.8rem}footer{margin-top:2rem;color:#707070;font-size:.85rem}";
+
+/// A figure on the page, with what it shows.
+pub struct Section {
+    /// Heading.
+    pub title: String,
+    /// The figure.
+    pub figure: Figure,
+}
+
+/// The page of a run: its figures as a table, its plots, and its manifest.
+///
+/// # Errors
+/// When a plot cannot be drawn.
+pub fn page(metrics: &Metrics, sections: &[Section], manifest: &str) -> Result<String, PlotError> {
+    let title = escaped(&rows::title(metrics));
+    let mut body = format!("<h1>{title}</h1>\n{}", figures_table(metrics));
+    for section in sections {
+        let svg = section.figure.svg()?;
+        let svg = &svg[svg.find("<svg").unwrap_or_default()..];
+        body += &format!("<h2>{}</h2>\n<figure>{svg}</figure>\n", escaped(&section.title));
+    }
+    body += &format!("<h2>Manifest</h2>\n<pre>{}</pre>\n", escaped(manifest));
+    let version = escaped(&metrics.version);
+    Ok(format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+         content=\"width=device-width\">\n<title>zsim: {title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{body}\
+         <footer>zsim {version}</footer>\n</body>\n</html>\n"
+    ))
+}
+
+fn figures_table(metrics: &Metrics) -> String {
+    let mut html = String::from("<table>\n");
+    for group in rows::groups(metrics) {
+        html += "<tbody>\n";
+        for (index, row) in group.rows.iter().enumerate() {
+            let title = if index == 0 { group.title } else { "" };
+            html += &format!("<tr><th>{title}</th><td>{}</td><td>{}</td></tr>\n", row.name, escaped(&row.value));
+        }
+        html += "</tbody>\n";
+    }
+    html + "</table>\n"
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::plot::Chart;
+
+    #[test]
+    fn the_page_needs_nothing_else_and_escapes_what_it_is_given() {
+        let metrics = Metrics { scene: Some("<b>&".to_owned()), duration_s: 12.0, ..Metrics::default() };
+        let section = Section { title: "A & B".to_owned(), figure: Figure::of(vec![Chart::new("t", "x", "y")]) };
+        let html = page(&metrics, &[section], "(scene: \"a<b\")").unwrap();
+        assert!(html.contains("&lt;b&gt;&amp;, 12.0 s") && html.contains("A &amp; B") && html.contains("a&lt;b"));
+        assert!(html.contains("<svg") && !html.contains("src=") && !html.contains("href="));
+    }
+}

@@ -1,0 +1,67 @@
+//! Numbers as people read them: three digits and a unit that suits.
+
+/// A length.
+pub(super) fn length(metres: f64) -> String {
+    match metres.abs() {
+        m if m < 0.0995 => format!("{} mm", digits(metres * 1e3)),
+        m if m < 0.995 => format!("{} cm", digits(metres * 1e2)),
+        m if m < 995.0 => format!("{} m", digits(metres)),
+        _ => format!("{} km", digits(metres * 1e-3)),
+    }
+}
+
+/// A time.
+pub(super) fn time(seconds: f64) -> String {
+    match seconds.abs() {
+        s if s < 0.995e-3 => format!("{} \u{b5}s", digits(seconds * 1e6)),
+        s if s < 0.995 => format!("{} ms", digits(seconds * 1e3)),
+        s if s < 120.0 => format!("{} s", digits(seconds)),
+        s if s < 7200.0 => format!("{} min", digits(seconds / 60.0)),
+        _ => format!("{} h", digits(seconds / 3600.0)),
+    }
+}
+
+/// A count.
+pub(super) fn count(number: u64) -> String {
+    match number {
+        n if n < 10_000 => n.to_string(),
+        n if n < 9_950_000 => format!("{} thousand", digits(n as f64 * 1e-3)),
+        n => format!("{} million", digits(n as f64 * 1e-6)),
+    }
+}
+
+/// A share, in per cent.
+pub(super) fn percent(fraction: f64) -> String {
+    format!("{} %", digits(fraction * 1e2))
+}
+
+/// The number with three digits that count, and none of an exponent.
+pub(super) fn digits(number: f64) -> String {
+    if number == 0.0 || !number.is_finite() {
+        return number.to_string();
+    }
+    let magnitude = number.abs().log10().floor() as i32;
+    // 9.996 is 10.0 in three digits, not 10.00.
+    let rounded_up = (number.abs() / 10_f64.powi(magnitude - 2)).round() >= 1000.0;
+    let decimals = (2 - magnitude - i32::from(rounded_up)).clamp(0, 9) as usize;
+    format!("{number:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_digits_and_a_unit_that_suits() {
+        assert_eq!(length(0.012_34), "12.3 mm");
+        assert_eq!(length(-0.25), "-25.0 cm");
+        assert_eq!(length(1234.0), "1.23 km");
+        assert_eq!(time(3.21e-4), "321 \u{b5}s");
+        assert_eq!(time(7.0), "7.00 s");
+        assert_eq!(digits(9.996), "10.0");
+        assert_eq!(digits(0.0), "0");
+        assert_eq!(digits(1e-12), "0.000000000");
+        assert_eq!(percent(0.0351), "3.51 %");
+        assert_eq!((count(950), count(5_189_000)), ("950".to_owned(), "5189 thousand".to_owned()));
+    }
+}

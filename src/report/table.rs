@@ -1,0 +1,38 @@
+//! Tables for the terminal, 80 columns wide at most.
+
+use super::{Metrics, rows};
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+
+/// Widest table, columns.
+const WIDTH: u16 = 80;
+
+/// A table without lines between its rows. The first column is words; the others are aligned right when `numbers` is set.
+pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
+    let mut table = Table::new();
+    let rule = LineStyle::none().left('\u{2500}').fill('\u{2500}').junction('\u{2500}').right('\u{2500}');
+    table.load_style(TableStyle::new().header_separator(rule));
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
+    if !header.is_empty() {
+        table.set_header(header.to_vec());
+    }
+    table.add_rows(rows.iter().cloned());
+    if numbers {
+        table.column_iter_mut().skip(1).for_each(|column| {
+            column.set_cell_alignment(CellAlignment::Right);
+        });
+    }
+    let text = table.to_string();
+    text.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
+}
+
+/// The figures of a run, as they close a command.
+pub fn summary(metrics: &Metrics) -> String {
+    let mut cells = Vec::new();
+    for group in rows::groups(metrics) {
+        for (index, row) in group.rows.into_iter().enumerate() {
+            let title = if index == 0 { group.title } else { "" };
+            cells.push(vec![title.to_owned(), row.name.to_owned(), row.value]);
+        }
+    }
+    format!("{}\n{}", rows::title(metrics), table(&[], &cells, false))
+}

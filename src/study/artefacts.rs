@@ -1,0 +1,71 @@
+//! What a run leaves for people: plots and a page.
+
+use super::judge::Known;
+use super::open_loop::OpenLoopRun;
+use super::register::Beam;
+use super::{Manifest, StudyError};
+use crate::geometry::{Pose, Trajectory, Vector};
+use crate::report::plot::Figure;
+use crate::report::{self, Metrics, Section};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Side of the cells in which the outline has one dot, m.
+const CELL_M: f64 = 0.05;
+/// The outline is cut from the cloud at the head's height, give or take this, m.
+const CUT_M: f64 = 0.4;
+
+/// A plot with its file's name and its heading.
+pub(super) struct Plot {
+    name: &'static str,
+    section: Section,
+}
+
+/// The plots of an estimate.
+pub(super) fn plots(run: &OpenLoopRun, known: Option<&Known>, beams: &[Beam]) -> Vec<Plot> {
+    let world_from_map = known.and_then(|known| known.world_from_map).unwrap_or_else(Pose::identity);
+    let estimate = run.map_from_head.transformed(&world_from_map);
+    let truth = known.map(true_trajectory).unwrap_or_default();
+    let outline = outline(beams, &world_from_map, &estimate);
+    let plot = |name, title: &str, figure: Figure| Plot { name, section: Section { title: title.to_owned(), figure } };
+
+    let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_from_above(&truth, &estimate, &outline))];
+    if let Some(errors) = known.and_then(|known| known.errors.as_ref()) {
+        plots.push(plot("errors", "Errors over time", report::errors_over_time(errors)));
+    }
+    plots.push(plot("pitch", "Pitch of the head", report::head_pitch(&truth, &estimate)));
+    let true_offsets = known.map_or(&[][..], |known| &known.clock_offsets);
+    plots.push(plot("clock", "Clock offset", report::clock_offset(true_offsets, &run.clock_offsets)));
+    plots
+}
+
+fn true_trajectory(known: &Known) -> Trajectory {
+    let stamped = known.pairs.stamps().iter().copied().zip(known.pairs.truth().iter().copied());
+    Trajectory::from_poses(stamped).unwrap_or_default()
+}
+
+/// What of the cloud lies at the head's height: the walls, from above, one point a cell.
+fn outline(beams: &[Beam], world_from_map: &Pose, estimate: &Trajectory) -> Vec<Vector> {
+    let heights = estimate.poses().iter().map(|pose| pose.translation.z);
+    let height = heights.sum::<f64>() / estimate.len().max(1) as f64;
+    let at_height = beams
+        .iter()
+        .map(|beam| world_from_map.rotation * beam.point + world_from_map.translation.vector)
+        .filter(|point| (point.z - height).abs() < CUT_M);
+    let cells: BTreeSet<(i64, i64)> =
+        at_height.map(|point| ((point.x / CELL_M).round() as i64, (point.y / CELL_M).round() as i64)).collect();
+    cells.into_iter().map(|(x, y)| Vector::new(x as f64 * CELL_M, y as f64 * CELL_M, height)).collect()
+}
+
+/// Writes `metrics.json`, the plots, and the page.
+pub(super) fn write(folder: &Path, metrics: &Metrics, plots: Vec<Plot>, manifest: &Manifest) -> Result<(), StudyError> {
+    let write = |path: &Path, text: String| std::fs::write(path, text).map_err(StudyError::file(path));
+    write(&folder.join("metrics.json"), metrics.to_json()?)?;
+    let pictures = folder.join("plots");
+    std::fs::create_dir_all(&pictures).map_err(StudyError::file(&pictures))?;
+    for plot in &plots {
+        plot.section.figure.save(&pictures, plot.name)?;
+    }
+    let sections: Vec<Section> = plots.into_iter().map(|plot| plot.section).collect();
+    write(&folder.join("report.html"), report::page(metrics, &sections, &manifest.text()?)?)
+}

@@ -1,0 +1,63 @@
+//! How the sensors sit in a recording's head, and how well they measure.
+
+use super::{Manifest, StudyError};
+use crate::dynamics::PlacementSpec;
+use crate::geometry::Pose;
+use crate::measurement::{Calibration, ImuNoise, LidarNoise};
+use crate::recording::{FoundCalibration, Reader, Selection};
+use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
+use crate::spec::{Kind, Source, SpecError, find, parse};
+use serde::{Deserialize, Serialize};
+
+/// A calibration as a user writes it; what is left out is taken from the recording, or else from the data sheets of the
+/// UTM-30LX and the 3DM-GX2.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CalibrationSpec {
+    /// Where the lidar is in the head.
+    pub head_from_laser: Option<PlacementSpec>,
+    /// Where the IMU is in the head.
+    pub head_from_imu: Option<PlacementSpec>,
+    /// The IMU's noise.
+    pub imu: Option<ImuNoise>,
+    /// The lidar's noise.
+    pub lidar: Option<LidarNoise>,
+}
+
+/// The calibration for an estimate: the user's word first, then the recording's, then the data sheets'.
+pub(super) fn calibration(
+    reader: &Reader,
+    selection: &Selection,
+    given: &CalibrationSpec,
+    body_frame: Option<&str>,
+) -> Result<FoundCalibration, StudyError> {
+    let placed = |placement: Option<PlacementSpec>| placement.map(|placement| placement.pose());
+    let (head_from_laser, head_from_imu) = (placed(given.head_from_laser), placed(given.head_from_imu));
+    let (imu, lidar) = noise(reader)?;
+    let defaults = Calibration {
+        head_from_laser: head_from_laser.unwrap_or_else(Pose::identity),
+        head_from_imu: head_from_imu.unwrap_or_else(Pose::identity),
+        imu: given.imu.unwrap_or(imu),
+        lidar: given.lidar.unwrap_or(lidar),
+    };
+    if head_from_laser.is_some() && head_from_imu.is_some() {
+        let body_frame = body_frame.unwrap_or("head").to_owned();
+        return Ok(FoundCalibration { calibration: defaults, body_frame, from_recording: false });
+    }
+    let mut found = reader.calibration(selection, &defaults, body_frame)?;
+    let calibration = &mut found.calibration;
+    calibration.head_from_laser = head_from_laser.unwrap_or(calibration.head_from_laser);
+    calibration.head_from_imu = head_from_imu.unwrap_or(calibration.head_from_imu);
+    Ok(found)
+}
+
+/// The noise of the sensors that a recording of ours was made with; of others, that of the paper's sensors.
+fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
+    if let Some(specs) = Manifest::within(reader).and_then(|manifest| manifest.specs) {
+        let source = Source::in_memory("the recording's manifest", "");
+        return Ok((Imu::new(&specs.imu, &source)?.noise(), Lidar::new(&specs.lidar, &source)?.noise()));
+    }
+    let (imu, lidar) = (find(Kind::Imu, "3dm_gx2")?, find(Kind::Lidar, "utm30lx")?);
+    let (imu_spec, lidar_spec): (ImuSpec, LidarSpec) = (parse(&imu)?, parse(&lidar)?);
+    Ok((Imu::new(&imu_spec, &imu)?.noise(), Lidar::new(&lidar_spec, &lidar)?.noise()))
+}

@@ -1,0 +1,160 @@
+//! From a recording to a judged estimate.
+
+use super::calibration::calibration;
+use super::open_loop::{OpenLoopRun, run_open_loop};
+use super::register::{Registered, Registration};
+use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
+use crate::estimation::EstimatorSpec;
+use crate::geometry::Surface;
+use crate::recording::{FoundCalibration, Preference, Reader, Selection};
+use crate::report::{Metrics, OpenLoopMetrics};
+use crate::simulation::SimulationSummary;
+use crate::spec::Source;
+use crate::world::World;
+use std::path::Path;
+
+/// The frame whose truth a recording of ours tells.
+const TRUE_FRAME: &str = "head";
+
+/// What is asked of an estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wishes {
+    /// The estimator's settings.
+    pub estimator: EstimatorSpec,
+    /// What is known of the sensors beside what the recording says.
+    pub calibration: CalibrationSpec,
+    /// The frame whose pose is told; `None` for `head` where the recording has it, else the IMU's.
+    pub body_frame: Option<String>,
+    /// Topics to read; those not named are found.
+    pub topics: Preference,
+}
+
+impl Wishes {
+    /// An estimate with these settings, and no further wish.
+    pub fn with(estimator: EstimatorSpec) -> Self {
+        let (calibration, topics) = (CalibrationSpec::default(), Preference::default());
+        Self { estimator, calibration, body_frame: None, topics }
+    }
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The figures, as in `metrics.json`.
+    pub metrics: Metrics,
+    /// What of the recording was lost or left out, a sentence each; nothing, as a rule.
+    pub losses: Vec<String>,
+}
+
+/// Estimates from the recording at `path`, whoever made it, and writes to `folder`: `manifest.ron`, `open_loop.tum`,
+/// `result.mcap`, `cloud.ply`, `metrics.json`, `plots/`, `report.html`. Where the recording has the truth the estimate is
+/// judged by it, and where it has the scene the cloud is.
+///
+/// # Errors
+/// When the recording cannot be read, there is no estimate, a file cannot be written, or somebody stops it.
+pub fn estimate_recording(
+    path: &Path,
+    folder: &Path,
+    wishes: &Wishes,
+    watch: &mut Watch,
+) -> Result<Outcome, StudyError> {
+    let reader = Reader::open(path)?;
+    let manifest = Manifest::within(&reader).unwrap_or_else(Manifest::of_recording_by_others);
+    let world = world_of(&manifest, watch);
+    let surface = world.as_ref().map(|world| world as &dyn Surface);
+    let origin = Origin { manifest: &manifest.with_estimator(&wishes.estimator), surface, simulation: None };
+    estimate_in(&reader, folder, wishes, &origin, watch)
+}
+
+/// What is known of how a recording was made, for the figures alone.
+pub(super) struct Origin<'a> {
+    /// Its manifest, with the estimator's settings.
+    pub manifest: &'a Manifest,
+    /// The surfaces that the beams met.
+    pub surface: Option<&'a dyn Surface>,
+    /// The simulation, where it has just been.
+    pub simulation: Option<&'a SimulationSummary>,
+}
+
+/// The same with the recording open, and what is known of its origin.
+pub(super) fn estimate_in(
+    reader: &Reader,
+    folder: &Path,
+    wishes: &Wishes,
+    origin: &Origin,
+    watch: &mut Watch,
+) -> Result<Outcome, StudyError> {
+    origin.manifest.write(&folder.join("manifest.ron"))?;
+    let selection = reader.select(&wishes.topics)?;
+    let found = calibration(reader, &selection, &wishes.calibration, wishes.body_frame.as_deref())?;
+    notes_on(&selection, &found, wishes, watch);
+
+    let how = (&wishes.estimator, &found.calibration);
+    let run = run_open_loop(reader, &selection, how, &folder.join("open_loop.tum"), watch)?;
+    run.warnings.iter().for_each(|warning| watch.note(&warning.to_string()));
+
+    let known = match found.body_frame == TRUE_FRAME {
+        true => judge::truth_of(reader, &run.map_from_head, watch)?,
+        false => None,
+    };
+    let registration = Registration {
+        reader,
+        selection: &selection,
+        calibration: &found.calibration,
+        body_frame: &found.body_frame,
+        map_from_head: &run.map_from_head,
+        returns: run.returns,
+        with_truth: known.is_some(),
+    };
+    let registered = registration.run(&folder.join("cloud.ply"), &folder.join("result.mcap"), watch)?;
+
+    watch.progress(Stage::Reporting, 0.0, None);
+    let drifting = match &known {
+        Some(_) => judge::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
+        None => None,
+    };
+    let open_loop = judge::open_loop_metrics(&run, known.as_ref(), drifting);
+    let fixed_views = Some(wishes.estimator.fixed_views as u64);
+    let metrics = Metrics {
+        open_loop: OpenLoopMetrics { fixed_views, ..open_loop },
+        ..metrics(origin, &run, &registered, known.as_ref())
+    };
+    let plots = artefacts::plots(&run, known.as_ref(), &registered.in_map);
+    artefacts::write(folder, &metrics, plots, origin.manifest)?;
+    Ok(Outcome { metrics, losses: run.losses })
+}
+
+/// All figures but those of the open loop.
+fn metrics(origin: &Origin, run: &OpenLoopRun, registered: &Registered, known: Option<&judge::Known>) -> Metrics {
+    let Manifest { scenario, specs, .. } = origin.manifest;
+    let world_from_map = known.and_then(|known| known.world_from_map);
+    Metrics {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        scene: specs.as_ref().map(|specs| specs.scene.name.clone()),
+        seed: scenario.as_ref().map(|scenario| scenario.seed.0),
+        duration_s: origin.simulation.map_or(run.acquisition_s, |summary| summary.duration_s),
+        simulation: origin.simulation.map(judge::simulation_metrics).unwrap_or_default(),
+        clock: judge::clock_metrics(run, known),
+        cloud: judge::cloud_metrics(registered, world_from_map.as_ref(), origin.surface),
+        peak_rss_mib: memory::peak_rss_mib(),
+        ..Metrics::default()
+    }
+}
+
+/// The world in a recording's manifest; `None` where there is none, or its meshes are not at hand.
+fn world_of(manifest: &Manifest, watch: &mut Watch) -> Option<World> {
+    let scene = &manifest.specs.as_ref()?.scene;
+    let built = World::build(scene, &Source::in_memory("the recording's scene", ""));
+    built.inspect_err(|error| watch.note(&format!("the cloud is not judged: {error}"))).ok()
+}
+
+fn notes_on(selection: &Selection, found: &FoundCalibration, wishes: &Wishes, watch: &mut Watch) {
+    selection.notes.iter().for_each(|note| watch.note(note));
+    let given = wishes.calibration.head_from_laser.is_some() && wishes.calibration.head_from_imu.is_some();
+    if !found.from_recording && !given {
+        watch.note(
+            "the recording has no /tf_static: lidar and IMU are taken to sit in one place with the same axes; if they do \
+             not, say so with --calibration",
+        );
+    }
+}

@@ -1,0 +1,33 @@
+//! The whole journey.
+
+use super::estimate::{Origin, estimate_in};
+use super::{Manifest, Outcome, StudyError, Watch, Wishes, record};
+use crate::recording::Reader;
+use crate::simulation::Simulation;
+use std::path::Path;
+
+/// From spring to trajectory error: simulates, records, estimates, judges, reports, all in `folder`, which exists.
+///
+/// The estimator sees what the recording's file says, as of anybody's recording, and nothing else. Nothing is held in
+/// memory that grows with the run but the estimated trajectory.
+///
+/// # Errors
+/// When a part fails, or somebody stops it; what came before is in the folder.
+pub fn journey(
+    simulation: &Simulation,
+    wishes: &Wishes,
+    folder: &Path,
+    watch: &mut Watch,
+) -> Result<Outcome, StudyError> {
+    let manifest = Manifest::of(simulation).with_estimator(&wishes.estimator);
+    manifest.write(&folder.join("manifest.ron"))?;
+
+    // The world, the head on its spring, the sensors: what they say goes to a file.
+    let recording = folder.join("recording.mcap");
+    let summary = record(simulation, &recording, &folder.join("truth.tum"), false, watch)?;
+
+    // From here on there is only the file: estimate, register, judge by the truth that is kept apart in it, report.
+    let reader = Reader::open(&recording)?;
+    let origin = Origin { manifest: &manifest, surface: Some(simulation.world()), simulation: Some(&summary) };
+    estimate_in(&reader, folder, wishes, &origin, watch)
+}

@@ -1,0 +1,149 @@
+//! An estimate against the truth, where the recording has it.
+
+use super::open_loop::OpenLoopRun;
+use super::register::{Beam, Registered};
+use super::{StudyError, Watch};
+use crate::evaluation::{CloudErrors, Errors, EvaluationError, Pairs, clock_error, drift, relative_error};
+use crate::geometry::{Pose, Surface, Trajectory, Vector};
+use crate::recording::{Reader, RecordingError, Truth};
+use crate::report::{ClockMetrics, CloudMetrics, OpenLoopMetrics, SimulationMetrics};
+use crate::simulation::SimulationSummary;
+use crate::time::{Span, Stamp};
+
+/// How far from a point a surface is looked for, m.
+const REACH_M: f64 = 1.0;
+
+/// The truth as far as an estimate asks for it.
+pub(super) struct Known {
+    pub pairs: Pairs,
+    /// The true clock offset over lidar time, s.
+    pub clock_offsets: Vec<(Stamp, f64)>,
+    /// The alignment of the whole estimate, where its positions determine one.
+    pub world_from_map: Option<Pose>,
+    /// What remains after it.
+    pub errors: Option<Errors>,
+}
+
+/// The truth at the instants of an estimate; `None` where the recording has none.
+pub(super) fn truth_of(
+    reader: &Reader,
+    map_from_head: &Trajectory,
+    watch: &mut Watch,
+) -> Result<Option<Known>, StudyError> {
+    let mut clock_offsets = Vec::new();
+    let heads = reader.truth().filter_map(|told| match told {
+        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
+        Ok(Truth::Clock(now, clock)) => {
+            clock_offsets.push((now + clock.lidar_ahead, clock.imu_after_lidar().seconds()));
+            None
+        }
+        Err(error) => Some(Err::<(Stamp, Pose), RecordingError>(error)),
+    });
+    let pairs = Pairs::gather(map_from_head, heads)?;
+    if pairs.is_empty() {
+        return Ok(None);
+    }
+    let world_from_map = known(pairs.world_from_map(), watch);
+    let errors = world_from_map.map(|world_from_map| Errors::after(&pairs, &world_from_map));
+    Ok(Some(Known { pairs, clock_offsets, world_from_map, errors }))
+}
+
+/// A measure, or a note on why there is none.
+fn known<T>(measure: Result<T, EvaluationError>, watch: &mut Watch) -> Option<T> {
+    measure.inspect_err(|error| watch.note(&error.to_string())).ok()
+}
+
+/// The simulation's figures.
+pub(super) fn simulation_metrics(summary: &SimulationSummary) -> SimulationMetrics {
+    SimulationMetrics {
+        wall_s: Some(summary.wall_s),
+        beams: Some(summary.beams),
+        returns: Some(summary.returns),
+        rays: Some(summary.rays),
+        physics_wall_s: Some(summary.physics_wall_s),
+        rays_wall_s: Some(summary.rays_wall_s),
+    }
+}
+
+/// The open loop's figures.
+pub(super) fn open_loop_metrics(
+    run: &OpenLoopRun,
+    known: Option<&Known>,
+    dead_reckoning: Option<Drifting>,
+) -> OpenLoopMetrics {
+    let drift_of = |known: &Known| drift(&known.pairs).ok();
+    let drifted = known.and_then(drift_of);
+    let errors = known.and_then(|known| known.errors.as_ref());
+    let relative = known.and_then(|known| relative_error(&known.pairs, Span::from_seconds(60.0)).ok());
+    OpenLoopMetrics {
+        wall_s: Some(run.wall_s),
+        fraction_of_acquisition: Some(run.wall_s / run.acquisition_s).filter(|share| share.is_finite()),
+        fixed_views: None,
+        position_rmse_m: errors.map(Errors::position_rmse_m),
+        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad().to_degrees()),
+        drift_m_per_min: drifted.map(|drift| drift.position_m_per_min),
+        yaw_drift_deg_per_min: drifted.map(|drift| drift.yaw_rad_per_min.to_degrees()),
+        end_error_m: drifted.map(|drift| drift.end_error_m),
+        relative_error_per_minute_m: relative.map(|error| error.position_rmse_m),
+        imu_only_drift_m_per_min: dead_reckoning.map(|drifting| drifting.0),
+    }
+}
+
+/// Drift of the IMU alone, m/min.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Drifting(f64);
+
+/// How the IMU alone would have drifted; `None` without truth, and where it cannot be told.
+///
+/// Its trajectory is on the IMU's clock, which is a few milliseconds from the lidar's: nothing beside its drift.
+pub(super) fn imu_only(
+    reader: &Reader,
+    dead_reckoning: Result<&Trajectory, &EvaluationError>,
+    watch: &mut Watch,
+) -> Result<Option<Drifting>, StudyError> {
+    let told = dead_reckoning.map_err(Clone::clone);
+    let Some(map_from_head) = known(told, watch) else { return Ok(None) };
+    let heads = reader.truth().filter_map(|told| match told {
+        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
+        Ok(Truth::Clock(..)) => None,
+        Err(error) => Some(Err(error)),
+    });
+    let pairs = Pairs::gather(map_from_head, heads)?;
+    Ok(drift(&pairs).ok().map(|drift| Drifting(drift.position_m_per_min)))
+}
+
+/// The clock's figures.
+pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Known>) -> ClockMetrics {
+    let error = known.and_then(|known| clock_error(&run.clock_offsets, &known.clock_offsets));
+    ClockMetrics {
+        offset_rmse_s: error.map(|error| error.offset_rmse_s),
+        offset_end_error_s: error.map(|error| error.offset_end_error_s),
+    }
+}
+
+/// The cloud's figures: its sample against the true surfaces, where both they and the alignment are known.
+pub(super) fn cloud_metrics(
+    registered: &Registered,
+    world_from_map: Option<&Pose>,
+    surface: Option<&dyn Surface>,
+) -> CloudMetrics {
+    let points = Some(registered.points);
+    let (Some(world_from_map), Some(surface)) = (world_from_map, surface) else {
+        return CloudMetrics { points, ..CloudMetrics::default() };
+    };
+    let errors = |beams: &[Beam], world_from: &Pose| {
+        let moved = |at: &Vector| world_from.rotation * at + world_from.translation.vector;
+        let seen: Vec<_> = beams.iter().map(|beam| (moved(&beam.point), Some(moved(&beam.origin)))).collect();
+        CloudErrors::to_surface(surface, &seen, REACH_M).summary()
+    };
+    let estimated = errors(&registered.in_map, world_from_map);
+    let by_truth = errors(&registered.by_truth, &Pose::identity());
+    CloudMetrics {
+        points,
+        bias_m: estimated.map(|cloud| cloud.bias_m),
+        sigma_m: estimated.map(|cloud| cloud.sigma_m),
+        p95_m: estimated.map(|cloud| cloud.p95_m),
+        far_fraction: estimated.map(|cloud| cloud.beyond_reach),
+        sigma_by_truth_m: by_truth.map(|cloud| cloud.sigma_m),
+    }
+}

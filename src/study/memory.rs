@@ -1,0 +1,16 @@
+/// Most memory that this process ever had, MiB, as Linux tells; `None` elsewhere.
+pub(super) fn peak_rss_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib / 1024.0)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_process_has_some_memory_where_the_system_tells() {
+        let told = std::path::Path::new("/proc/self/status").exists();
+        assert_eq!(super::peak_rss_mib().is_some_and(|mib| mib > 1.0), told);
+    }
+}

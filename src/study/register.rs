@@ -1,0 +1,178 @@
+//! Beams become a cloud: in a file, for viewers, and a sample of it to be judged.
+
+use super::truth_near::TruthNear;
+use super::{Stage, StudyError, Watch};
+use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
+use crate::geometry::{Pose, SmoothCursor, Trajectory, Vector};
+use crate::measurement::{Calibration, LidarScan, Measurement};
+use crate::recording::{CloudPoint, Measurements, PlyWriter, Reader, RecordingError, Selection, write_result};
+use crate::time::Stamp;
+use std::fs::File;
+use std::path::Path;
+
+/// Most points that are judged.
+const JUDGED: usize = 100_000;
+/// Most points for viewers; `cloud.ply` has them all.
+const SHOWN: usize = 1_000_000;
+
+/// A beam of the sample: where it ended and began.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Beam {
+    pub point: Vector,
+    pub origin: Vector,
+}
+
+/// The cloud, and what else a second reading of the recording gave.
+pub(super) struct Registered {
+    /// Points in the cloud.
+    pub points: u64,
+    /// A sample of the beams, in the map.
+    pub in_map: Vec<Beam>,
+    /// The same beams by the true trajectory, in the world; none where there is no truth.
+    pub by_truth: Vec<Beam>,
+    /// What the IMU alone says.
+    pub dead_reckoning: Result<Trajectory, EvaluationError>,
+}
+
+/// What to register, and by what.
+pub(super) struct Registration<'a> {
+    pub reader: &'a Reader,
+    pub selection: &'a Selection,
+    pub calibration: &'a Calibration,
+    pub body_frame: &'a str,
+    pub map_from_head: &'a Trajectory,
+    /// Echoes in the recording.
+    pub returns: usize,
+    /// Whether to project a sample by the truth too.
+    pub with_truth: bool,
+}
+
+impl Registration<'_> {
+    /// Projects every beam by the estimate, into the cloud `ply` and the recording `result`.
+    pub(super) fn run(&self, ply: &Path, result: &Path, watch: &mut Watch) -> Result<Registered, StudyError> {
+        let mut beams = Beams {
+            measurements: self.reader.measurements(self.selection),
+            cursor: SmoothCursor::new(self.map_from_head),
+            truth: self.with_truth.then(|| TruthNear::new(self.reader.truth())),
+            head_from_laser: self.calibration.head_from_laser,
+            ply: PlyWriter::create(ply)?,
+            judged: Thinning::to(JUDGED, self.returns),
+            shown: Thinning::to(SHOWN, self.returns),
+            reckoning: DeadReckoning::new(&self.calibration.head_from_imu, Rest::default()),
+            ready: Vec::new().into_iter(),
+            span: self.map_from_head.span(),
+            points: 0,
+            in_map: Vec::new(),
+            by_truth: Vec::new(),
+            failure: None,
+            watch,
+        };
+        write_result(result, self.body_frame, self.map_from_head, beams.by_ref())?;
+        if let Some(failure) = beams.failure {
+            return Err(failure);
+        }
+        beams.ply.finish()?;
+        Ok(Registered {
+            points: beams.points as u64,
+            in_map: beams.in_map,
+            by_truth: beams.by_truth,
+            dead_reckoning: beams.reckoning.finish(),
+        })
+    }
+}
+
+/// Reads scan by scan, writes every point, and gives those for viewers as an iterator.
+struct Beams<'a, 'w, 's> {
+    measurements: Measurements<'a>,
+    cursor: SmoothCursor<'a>,
+    truth: Option<TruthNear<'a>>,
+    head_from_laser: Pose,
+    ply: PlyWriter<File>,
+    judged: Thinning,
+    shown: Thinning,
+    reckoning: DeadReckoning,
+    ready: std::vec::IntoIter<CloudPoint>,
+    span: Option<(Stamp, Stamp)>,
+    points: usize,
+    in_map: Vec<Beam>,
+    by_truth: Vec<Beam>,
+    failure: Option<StudyError>,
+    watch: &'w mut Watch<'s>,
+}
+
+impl Iterator for Beams<'_, '_, '_> {
+    type Item = CloudPoint;
+
+    fn next(&mut self) -> Option<CloudPoint> {
+        loop {
+            if let Some(point) = self.ready.next() {
+                return Some(point);
+            }
+            match self.next_scan() {
+                Ok(Some(points)) => self.ready = points.into_iter(),
+                Ok(None) => return None,
+                Err(failure) => {
+                    self.failure = Some(failure);
+                    return None;
+                }
+            }
+        }
+    }
+}
+
+impl Beams<'_, '_, '_> {
+    /// The points for viewers of the next scan.
+    fn next_scan(&mut self) -> Result<Option<Vec<CloudPoint>>, StudyError> {
+        loop {
+            match self.measurements.next().transpose()? {
+                None => return Ok(None),
+                Some(Measurement::Imu(sample)) => self.reckoning.push(&sample),
+                Some(Measurement::Lidar(scan)) => {
+                    if self.watch.is_stopped() {
+                        return Err(StudyError::Stopped);
+                    }
+                    if let Some((first, last)) = self.span {
+                        let (done_s, whole_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
+                        self.watch.progress(Stage::Registering, done_s, Some(whole_s));
+                    }
+                    return Ok(Some(self.register(&scan)?));
+                }
+            }
+        }
+    }
+
+    fn register(&mut self, scan: &LidarScan) -> Result<Vec<CloudPoint>, RecordingError> {
+        let mut shown = Vec::new();
+        for beam in &scan.returns {
+            let stamp = scan.stamp + beam.offset;
+            // The estimate begins after the recording and ends before it.
+            let Some(map_from_head) = self.cursor.at(stamp) else { continue };
+            let index = self.points;
+            self.points += 1;
+            let point_in_laser: Vector = beam.point_in_laser.cast();
+            let in_map = self.end_and_origin(&map_from_head, &point_in_laser);
+            let point =
+                CloudPoint { point_in_map: in_map.point.cast(), intensity: beam.intensity, stamp, error_m: f32::NAN };
+            self.ply.point(&point)?;
+            if self.shown.keeps(index) {
+                shown.push(point);
+            }
+            if !self.judged.keeps(index) {
+                continue;
+            }
+            self.in_map.push(in_map);
+            if let Some(truth) = &mut self.truth
+                && let Some(world_from_head) = truth.at(stamp)?
+            {
+                self.by_truth.push(self.end_and_origin(&world_from_head, &point_in_laser));
+            }
+        }
+        Ok(shown)
+    }
+
+    fn end_and_origin(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> Beam {
+        let frame_from_laser = frame_from_head * self.head_from_laser;
+        let origin = frame_from_laser.translation.vector;
+        Beam { point: frame_from_laser.rotation * point_in_laser + origin, origin }
+    }
+}

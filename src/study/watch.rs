@@ -1,0 +1,53 @@
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What an experiment is at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Physics, rays, recording.
+    Simulating,
+    /// The open loop.
+    Estimating,
+    /// Beams become a cloud.
+    Registering,
+    /// Errors, plots, the page.
+    Reporting,
+}
+
+/// What an experiment tells while it runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum News<'a> {
+    /// How far a stage is: from 0 to 1 where its end is known, and by seconds of data.
+    Progress {
+        /// The stage.
+        stage: Stage,
+        /// The share that is done, where that is known.
+        fraction: Option<f64>,
+        /// Seconds of data that are done.
+        done_s: f64,
+    },
+    /// A remark that whoever started it should read.
+    Note(&'a str),
+}
+
+/// Who watches an experiment, and may stop it.
+pub struct Watch<'a> {
+    /// Set from outside to stop as soon as what is begun can be closed.
+    pub stop: &'a AtomicBool,
+    /// Hears how it goes.
+    pub tell: &'a mut dyn FnMut(News),
+}
+
+impl Watch<'_> {
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn progress(&mut self, stage: Stage, done_s: f64, whole_s: Option<f64>) {
+        let fraction = whole_s.filter(|whole_s| *whole_s > 0.0).map(|whole_s| (done_s / whole_s).clamp(0.0, 1.0));
+        (self.tell)(News::Progress { stage, fraction, done_s });
+    }
+
+    pub(super) fn note(&mut self, text: &str) {
+        (self.tell)(News::Note(text));
+    }
+}
