@@ -64,7 +64,7 @@ fn spring_tells_of_a_head_and_of_a_bare_spring() {
 fn wrong_usage_has_code_2_and_a_sentence() {
     for (arguments, sentence) in [
         (&["gains", "--head", "nowhere"][..], "no such head"),
-        (&["gains", "--up-to", "-1"][..], "--up-to"),
+        (&["gains", "--up-to", "0"][..], "--up-to 0"),
         (&["gains", "--realisations", "1"][..], "2 or more"),
         (&["spring", "nowhere"][..], "no such head"),
         (&["spring", "design", "nowhere"][..], "no such study"),

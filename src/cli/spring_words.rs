@@ -16,7 +16,7 @@ pub(super) fn report(report: &SpringReport) -> String {
         let [x, y, z] = rest.position_m.map(|m| m * 1e3);
         rows.push(row("head at rest", format!("{x:.1}, {y:.1}, {z:.1} mm")));
         let [roll, pitch, yaw] = rest.roll_pitch_yaw_deg;
-        rows.push(row("roll, pitch, yaw", format!("{roll:.2}, {pitch:.2}, {yaw:.2} deg")));
+        rows.push(row("roll, pitch, yaw", format!("{}, {}, {} deg", rounded(roll), rounded(pitch), rounded(yaw))));
     }
     rows.extend(report.coil.iter().flat_map(coil));
     let mut words = table(&[], &rows, false);
@@ -26,21 +26,26 @@ pub(super) fn report(report: &SpringReport) -> String {
         words += &modes(report);
     }
     if let Some(stiffness) = &report.stiffness {
-        let rows: Vec<_> = ["x", "y", "z", "about x", "about y", "about z"]
+        let rows: Vec<_> = ["x", "y", "z", "rx", "ry", "rz"]
             .iter()
             .zip(stiffness)
             .map(|(name, values)| {
-                std::iter::once((*name).to_owned()).chain(values.iter().map(|v| format!("{v:.3}"))).collect()
+                std::iter::once((*name).to_owned()).chain(values.iter().map(|v| rounded(*v))).collect()
             })
             .collect();
         words += "\n";
-        words += &table(&["stiffness N, m, rad", "x", "y", "z", "about x", "about y", "about z"], &rows, true);
+        words += &table(&["N, m, rad", "x", "y", "z", "rx", "ry", "rz"], &rows, true);
     }
     words + &report.shaken.as_ref().map(under_shake).unwrap_or_default()
 }
 
 fn row(name: &str, value: String) -> Vec<String> {
     vec![name.to_owned(), value]
+}
+
+/// To three decimals, nought without a sign.
+fn rounded(x: f64) -> String {
+    if x.abs() < 5e-4 { "0".to_owned() } else { format!("{x:.3}") }
 }
 
 fn coil(coil: &CoilReport) -> Vec<Vec<String>> {
@@ -78,11 +83,11 @@ fn modes(report: &SpringReport) -> String {
             };
             let mut cells =
                 vec![name.to_owned(), format!("{:.3}", mode.frequency_hz), format!("{:.3}", mode.damping_ratio)];
-            cells.extend(mode.shape.iter().map(|x| format!("{x:.3}")));
+            cells.extend(mode.shape.iter().map(|x| rounded(*x)));
             cells
         })
         .collect();
-    table(&["mode", "Hz", "damping", "x", "y", "z", "about x", "about y", "about z"], &rows, true)
+    table(&["mode", "Hz", "ratio", "x", "y", "z", "rx", "ry", "rz"], &rows, true)
 }
 
 fn under_shake(shaken: &UnderShake) -> String {
@@ -126,10 +131,10 @@ pub(super) fn design(study: &DesignStudy) -> String {
             let number = |x: Option<f64>, decimals: usize| x.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
             let simulated = verified.simulated.as_ref();
             vec![
-                format!("{:.1}", coil.coil_diameter_mm),
-                format!("{:.2}", coil.wire_diameter_mm),
-                format!("{:.1}", coil.active_coils),
-                format!("{:.0}", coil.free_length_mm),
+                format!(
+                    "{:.1} x {:.2} x {:.1} x {:.0}",
+                    coil.coil_diameter_mm, coil.wire_diameter_mm, coil.active_coils, coil.free_length_mm
+                ),
                 format!("{:.3}", figures.rocking_hz),
                 format!("{:.1}", figures.field_of_view_deg),
                 number(simulated.map(|f| f.field_of_view_deg), 1),

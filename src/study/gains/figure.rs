@@ -6,9 +6,9 @@ use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
 
 /// The panels of the paper's figure 3: rotations; along x and y; along z.
 const PANELS: [(&str, &str, &[Axis]); 3] = [
-    ("Rates of rotation", "Gain, rotation", &[Axis::Roll, Axis::Pitch, Axis::Yaw]),
-    ("Accelerations forward and sideways", "Gain, x and y", &[Axis::X, Axis::Y]),
-    ("Acceleration upward", "Gain, z", &[Axis::Z]),
+    ("Rates of rotation; lines: closed form", "Gain, rotation", &[Axis::Roll, Axis::Pitch, Axis::Yaw]),
+    ("Accelerations level; lines: closed form", "Gain, x and y", &[Axis::X, Axis::Y]),
+    ("Acceleration upward; line: closed form", "Gain, z", &[Axis::Z]),
 ];
 
 /// Below this coherence a gain is not drawn: nothing was measured there.
@@ -23,6 +23,8 @@ pub fn gain_figure(curves: &[GainCurve]) -> Figure {
         let shown = curves.iter().filter(|curve| axes.contains(&curve.axis));
         shown.fold(Chart::new(title, "Frequency (Hz)", label).starting_at_zero(), |chart, curve| {
             let (name, colour) = named(curve.axis);
+            // x and y of a round spring lie on each other: the one behind has the larger dots.
+            let size = if colour == Colour::Estimate { 4.5 } else { 2.5 };
             let model = curve.points.iter().map(|p| (p.freq_hz, p.gain_model)).collect();
             let measured = |p: &&GainPoint| p.coherence >= LEAST_COHERENCE;
             let dots = curve.points.iter().filter(measured).map(|p| (p.freq_hz, p.gain)).collect();
@@ -30,8 +32,8 @@ pub fn gain_figure(curves: &[GainCurve]) -> Figure {
                 |p: &GainPoint| (p.freq_hz, (p.gain - BAND * p.gain_sigma).max(0.0), p.gain + BAND * p.gain_sigma);
             let band = curve.points.iter().filter(measured).map(ends).collect();
             chart
-                .with(Series::line(&format!("{name}, closed form"), colour, model).marked(Mark::Line(1.0)))
-                .with(Series::dots(&format!("{name}, simulated"), colour, dots).marked(Mark::Dots(2.5)).with_band(band))
+                .with(Series::line("", colour, model).marked(Mark::Line(1.0)))
+                .with(Series::dots(name, colour, dots).marked(Mark::Dots(size)).with_band(band))
         })
     });
     Figure::of(panels.collect())
@@ -39,9 +41,10 @@ pub fn gain_figure(curves: &[GainCurve]) -> Figure {
 
 /// The coherence in the same panels.
 pub fn coherence_figure(curves: &[GainCurve]) -> Figure {
-    let panels = PANELS.iter().map(|(title, _, axes)| {
+    let panels = PANELS.iter().map(|(_, label, axes)| {
+        let title = label.replace("Gain", "Coherence");
         let shown = curves.iter().filter(|curve| axes.contains(&curve.axis));
-        shown.fold(Chart::new(title, "Frequency (Hz)", "Coherence").starting_at_zero(), |chart, curve| {
+        shown.fold(Chart::new(&title, "Frequency (Hz)", "Coherence").starting_at_zero(), |chart, curve| {
             let (name, colour) = named(curve.axis);
             chart.with(Series::line(name, colour, curve.points.iter().map(|p| (p.freq_hz, p.coherence)).collect()))
         })
@@ -56,13 +59,14 @@ pub fn swing_figure(studies: &[SwingStudy]) -> Figure {
         studies.iter().fold(empty, |chart, study| {
             let (name, colour) = named(study.axis);
             let points = study.points.iter().filter_map(|p| Some((p.swing_rms_deg, value(p)?))).collect();
-            chart.with(Series::line(name, colour, points))
+            let mark = if study.axis.is_rotation() { Mark::Line(1.5) } else { Mark::Dashes(1.5) };
+            chart.with(Series::line(name, colour, points).marked(mark))
         })
     };
     Figure::of(vec![
         chart("Resonance (Hz)", |p| p.peak.map(|peak| peak.freq_hz)),
         chart("Peak gain", |p| p.peak.map(|peak| peak.gain)).starting_at_zero(),
-        chart("Coherence at the peak", |p| p.coherence).starting_at_zero(),
+        chart("Coherence at the peak", |p| p.coherence),
     ])
 }
 

@@ -15,8 +15,8 @@ const SHOWN: f64 = 0.35;
 /// deflected to one side.
 pub fn mode_figure(spec: &HeadSpec, head: &HeadModel) -> Figure {
     let colours = [Colour::Estimate, Colour::Second, Colour::Third, Colour::Fourth, Colour::Fifth, Colour::Truth];
-    let title = "Modes, slowest from the left, each in its own plane; yaw from above";
-    let chart = Chart::new(title, "Sideways (m)", "Up (m)").as_map();
+    // The legend takes the title's place.
+    let chart = Chart::new("", "Across, each mode in its own plane; yaw seen from above (m)", "Up (m)").as_map();
     let modes = head.linear_modes().iter().zip(colours).enumerate();
     let chart = modes.fold(chart, |chart, (place, (mode, colour))| {
         let picture = Picture::of(spec, head, mode, place as f64 * APART_M);

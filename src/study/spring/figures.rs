@@ -34,7 +34,7 @@ pub struct Figures {
 }
 
 /// Density of steel, kg/m^3.
-const STEEL_KG_PER_M3: f64 = 7850.0;
+pub(super) const STEEL_KG_PER_M3: f64 = 7850.0;
 
 /// Frequencies up to which the peak gain is looked for, Hz.
 const PEAKS_UP_TO_HZ: f64 = 20.0;

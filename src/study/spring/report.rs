@@ -1,6 +1,6 @@
 //! All about one spring under one head.
 
-use super::figures::Design;
+use super::figures::{Design, STEEL_KG_PER_M3};
 use super::{Figures, Shake, closed_form, simulated};
 use crate::dynamics::{HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg};
 use crate::elasticity::{Coil, Matrix6, SpringDesign, buckling_load_n, loaded_stiffness};
@@ -86,7 +86,7 @@ pub struct ModeReport {
     pub damped_frequency_hz: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Displacement of the centre of mass (m) for a turn of 1 rad, or of 1 m without much of a turn; then the turn.
+    /// Displacement of the centre of mass (m) and turn (rad), scaled so that the largest of them is 1.
     pub shape: [f64; 6],
 }
 
@@ -208,7 +208,7 @@ fn coil_report(coil: &Coil, design: &Design, head_mass_kg: f64, stress_pa: Optio
     let at_top = coil.under(weight_n).and_then(|column| loaded_stiffness(&column)).ok();
     CoilReport {
         index: 2.0 * radius_m / wire_m,
-        mass_g: coil.wire_volume_m3() * 7850.0 * 1e3,
+        mass_g: coil.wire_volume_m3() * STEEL_KG_PER_M3 * 1e3,
         axial_n_per_m: coil.axial_n_per_m(),
         torsion_nm_per_rad: coil.torsion_nm_per_rad(),
         stiffness_at_top: at_top.as_ref().map(rows),
@@ -233,9 +233,8 @@ fn rest_report(head: &HeadModel, sag_m: f64) -> RestReport {
 }
 
 fn mode_report(mode: &Mode) -> ModeReport {
-    let turn = mode.shape.fixed_rows::<3>(3).amax();
-    let shift = mode.shape.fixed_rows::<3>(0).amax();
-    let shape = mode.shape / if turn > shift { turn } else { shift };
+    // The largest entry becomes 1, its sign included.
+    let shape = mode.shape / mode.shape[mode.shape.iamax()];
     ModeReport {
         kind: mode.kind,
         frequency_hz: mode.frequency_hz,
