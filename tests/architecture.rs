@@ -14,7 +14,7 @@ const GROUND: [&str; 9] =
 const ABOVE: [(&str, &[&str]); 11] = [
     ("recording", &[]),
     ("world", &[]),
-    ("motion", &[]),
+    ("motion", &["recording"]),
     ("dynamics", &["motion"]),
     ("sensors", &["world"]),
     ("simulation", &["world", "motion", "dynamics", "sensors"]),

@@ -115,7 +115,7 @@ fn one_seed_moves_one_way_and_another_seed_another() {
 /// Whether anything of a motion is left to chance.
 fn has_chance(spec: &MotionSpec) -> bool {
     match spec {
-        MotionSpec::Stand(_) => false,
+        MotionSpec::Stand(_) | MotionSpec::Replay(_) => false,
         MotionSpec::Shaker(spec) => {
             spec.drives.iter().any(|drive| matches!(drive.signal, SignalSpec::BandNoise { .. }))
         }

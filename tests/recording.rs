@@ -4,10 +4,11 @@
 
 mod recordings;
 
+use proptest::prelude::*;
 use recordings::{calibration, imu_sample, planar_scan, record, run};
 use std::io::Cursor;
 use zsim::geometry::{Kinematics, Pose, from_roll_pitch_yaw};
-use zsim::measurement::{Measurement, Sink};
+use zsim::measurement::{LidarScan, Measurement, PlanarScan, Sink};
 use zsim::recording::{Preference, Reader, Truth};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
@@ -99,4 +100,47 @@ fn truth_comes_back_apart_from_measurements() {
 #[test]
 fn two_recordings_of_one_run_are_the_same_bytes() {
     assert_eq!(record(run(), 100).0, record(run(), 100).0);
+}
+
+/// Any sweep that a `LaserScan` can hold: some beams come back, others as REP-117 has it.
+fn any_sweep() -> impl Strategy<Value = LidarScan> {
+    let range = prop_oneof![0.1_f32..30.0, Just(f32::INFINITY), Just(f32::NEG_INFINITY), 30.01_f32..60.0];
+    let beams = prop::collection::vec((range, 0_f32..1e4), 0..300);
+    (beams, -3.2_f32..3.2, 1e-4_f32..0.1, 1e-7_f32..1e-4, 0_i64..1 << 60).prop_map(
+        |(beams, angle_min, increment, step, stamp_ns)| {
+            let (ranges_m, intensities): (Vec<_>, Vec<_>) = beams.into_iter().unzip();
+            let planar = PlanarScan {
+                angle_min_rad: angle_min.into(),
+                angle_increment_rad: increment.into(),
+                time_increment_s: step.into(),
+                scan_time_s: 0.0,
+                range_min_m: 0.1,
+                range_max_m: 30.0,
+                ranges_m,
+                intensities,
+            };
+            recordings::with_returns(Stamp::from_nanos(stamp_ns), planar)
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn any_sweep_comes_back_bit_for_bit(sweeps in prop::collection::vec(any_sweep(), 1..5)) {
+        let (file, bytes) = recordings::shared_file();
+        let mut writer = zsim::recording::Writer::new(file, run()).unwrap();
+        for (k, sweep) in (0..).zip(&sweeps) {
+            writer.imu(Stamp::from_nanos(k), &imu_sample(Stamp::from_nanos(k))).unwrap();
+            writer.lidar(Stamp::from_nanos(k), sweep).unwrap();
+        }
+        writer.finish().unwrap();
+        let reader = Reader::new("memory", Cursor::new(bytes.take())).unwrap();
+        let selection = reader.select(&Preference::default()).unwrap();
+        let read: Vec<_> = reader.measurements(&selection).map(|m| m.unwrap()).collect();
+        let read: Vec<_> =
+            read.into_iter().filter_map(|m| if let Measurement::Lidar(scan) = m { Some(scan) } else { None }).collect();
+        prop_assert_eq!(read, sweeps);
+    }
 }

@@ -258,6 +258,25 @@ fn a_divergent_beam_mixes_near_surfaces_and_tells_far_ones_apart() {
 }
 
 #[test]
+fn a_vlp16_fires_300_000_beams_a_second_in_a_turn_of_100_ms() {
+    // 1808 whole rounds of 55.296 us fit into 100 ms, with 16 beams each; its manual rounds to 300,000 points a second.
+    let spec = spec_of("vlp16");
+    let vlp = lidar(&spec);
+    assert_eq!(vlp.beams().len(), 1808 * 16);
+    let scan = scan(&spec, &Globe { radius_m: 20.0, reflectance: 0.5 }, 1, 0);
+    assert!(scan.planar.is_none());
+    assert_eq!(scan.returns.len(), 1808 * 16);
+    let elevation = |k: usize| {
+        let point = scan.returns[k].point_in_laser;
+        (point.z / point.norm()).asin().to_degrees()
+    };
+    assert!((elevation(0) + 15.0).abs() < 1e-3 && (elevation(1) - 1.0).abs() < 1e-3);
+    // The second round has turned by 360 degrees x 55.296 us / 100 ms = 0.199 degrees to the right.
+    let point = scan.returns[16].point_in_laser;
+    assert!((point.y.atan2(point.x).to_degrees() + 0.199_07).abs() < 1e-3);
+}
+
+#[test]
 fn beyond_range_is_plus_and_too_near_is_minus_infinity() {
     let spec = spec_of("utm30lx");
     let far = scan(&spec, &Globe { radius_m: 31.0, reflectance: 0.9 }, 1, 0);

@@ -6,7 +6,7 @@ use super::law::{EndStop, Hold, Law};
 use super::modes::{LinearModel, Mode, modal_damping, modes};
 use super::spec::{DampingSpec, EndStopSpec, HeadSpec, HoldSpec, LinkageSpec};
 use super::statics::{Statics, Unrest};
-use crate::elasticity::{Matrix6, SpringDesign, blocks, split};
+use crate::elasticity::{Matrix6, SpringDesign, Vector6, blocks, split};
 use crate::geometry::{Kinematics, Matrix, Pose, gravity_in_world, skew};
 use crate::spec::{Source, SpecError};
 use std::f64::consts::TAU;
@@ -57,12 +57,7 @@ impl HeadModel {
 
     fn build(spec: &HeadSpec, source: &Source, explain: Explain) -> Result<Self, DynamicsError> {
         let body = Body::of(spec, source)?;
-        let linkage = match &spec.linkage {
-            LinkageSpec::Rigid { base_from_head } => Linkage::Rigid { base_from_head: base_from_head.pose() },
-            LinkageSpec::Spring { .. } => {
-                Linkage::Spring(Box::new(Sprung::new(&spec.linkage, &body, source, explain)?))
-            }
-        };
+        let linkage = Linkage::new(&spec.linkage, &body, source, explain)?;
         let (head_from_laser, head_from_imu) = (spec.head_from_laser.pose(), spec.head_from_imu.pose());
         Ok(Self { body, linkage, head_from_laser, head_from_imu })
     }
@@ -177,32 +172,57 @@ impl Site<'_> {
     }
 }
 
-impl Sprung {
+impl Linkage {
     fn new(spec: &LinkageSpec, body: &Body, source: &Source, explain: Explain) -> Result<Self, DynamicsError> {
-        let LinkageSpec::Spring { spring, segments, base_from_spring, head_from_spring, damping_ratio, end_stop, hold } =
-            spec
-        else {
-            return Err(SpecError::plain(&source.name, "the linkage is no spring").into());
-        };
-        let design = spring.design().map_err(|error| SpecError::about(source, "spring", error.to_string()))?;
-        let (base_from_spring, head_from_top) = (base_from_spring.pose(), head_from_spring.pose());
-        let site = Site { design, segments: *segments, base_from_spring, head_from_top, body };
-        let (law, rest, stiffness) = site.at_rest(1.0).map_err(|unrest| explain(&site, &unrest, source))?;
-        let mut sprung = Self::linearised(law, rest, stiffness, body, damping_ratio)
-            .ok_or_else(|| SpecError::about(source, "parts", "the head's mass has no inverse"))?;
-        sprung.law.hold = hold.map(|hand| sprung.hold(&hand));
-        sprung.law.end_stop = end_stop.map(|stop| sprung.end_stop(&stop, source)).transpose()?;
-        Ok(sprung)
+        match spec {
+            LinkageSpec::Rigid { base_from_head } => Ok(Linkage::Rigid { base_from_head: base_from_head.pose() }),
+            LinkageSpec::Spring {
+                spring,
+                segments,
+                base_from_spring,
+                head_from_spring,
+                damping_ratio,
+                end_stop,
+                hold,
+            } => {
+                let design = spring.design().map_err(|error| SpecError::about(source, "spring", error.to_string()))?;
+                let (base_from_spring, head_from_top) = (base_from_spring.pose(), head_from_spring.pose());
+                let site = Site { design, segments: *segments, base_from_spring, head_from_top, body };
+                let (law, rest, stiffness) = site.at_rest(1.0).map_err(|unrest| explain(&site, &unrest, source))?;
+                let mut sprung = Sprung::linearised(law, (rest, stiffness), body, damping_ratio, hold.as_ref())
+                    .ok_or_else(|| SpecError::about(source, "parts", "the head's mass has no inverse"))?;
+                sprung.law.end_stop = end_stop.map(|stop| sprung.end_stop(&stop, source)).transpose()?;
+                Ok(Linkage::Spring(Box::new(sprung)))
+            }
+        }
     }
+}
 
-    /// The head at rest with its modes damped; `None` where its mass has no inverse.
-    fn linearised(mut law: Law, rest: Pose, stiffness: Matrix6, body: &Body, damping: &DampingSpec) -> Option<Self> {
+impl Hold {
+    /// A hand on a head of this mass, resting so, both in the deformation's coordinates: `(2 pi f)^2 M` and `4 pi f zeta M`.
+    fn new(hand: &HoldSpec, mass: &Matrix6, rest: Vector6) -> Self {
+        let (frequency_hz, omega) = (hand.frequency_hz, TAU * hand.frequency_hz);
+        let damping = mass * (2.0 * hand.damping_ratio * omega);
+        Self { frequency_hz, stiffness: mass * (omega * omega), damping, rest }
+    }
+}
+
+impl Sprung {
+    /// The head at rest with its modes damped, and a hand near it; `None` where its mass has no inverse.
+    fn linearised(
+        mut law: Law,
+        (rest, stiffness): (Pose, Matrix6),
+        body: &Body,
+        damping: &DampingSpec,
+        hand: Option<&HoldSpec>,
+    ) -> Option<Self> {
         let mass = body.mass_matrix(rest.rotation.to_rotation_matrix().matrix());
-        let (_, rate) = law.rate_matrix(&rest);
+        let (coordinates, rate) = law.rate_matrix(&rest);
         let modes = modes(&mass, &stiffness, &rate, damping)?;
         let unrate = rate.try_inverse()?;
         let modal = modal_damping(&mass, &modes);
         law.damping = unrate.tr_mul(&(modal * unrate));
+        law.hold = hand.map(|hand| Hold::new(hand, &unrate.tr_mul(&(mass * unrate)), coordinates));
         let statics = Statics { law: &law, body, gravity_in_base: gravity_in_world() };
         let base_stiffness = statics.stiffness_to_base(&rest).ok()?;
         // A base that moves by (d, phi) carries a head that is stuck to it by (d + phi x centre, phi).
@@ -212,22 +232,6 @@ impl Sprung {
         let linear =
             LinearModel { mass, damping: modal, stiffness, base_damping: modal * carry, base_stiffness, modes };
         Some(Self { law, rest, linear })
-    }
-
-    /// The hand, in the deformation's coordinates: `(2 pi f)^2 M` and `4 pi f zeta M`.
-    fn hold(&self, hand: &HoldSpec) -> Hold {
-        let (rest, rate) = self.law.rate_matrix(&self.rest);
-        let omega = TAU * hand.frequency_hz;
-        // The rate was inverted when the head was linearised; a hand of no stiffness stands for the impossible.
-        let unrate = rate.try_inverse().unwrap_or_else(Matrix6::zeros);
-        let mass = unrate.tr_mul(&(self.linear.mass * unrate));
-        let frequency_hz = hand.frequency_hz;
-        Hold {
-            frequency_hz,
-            stiffness: mass * (omega * omega),
-            damping: mass * (2.0 * hand.damping_ratio * omega),
-            rest,
-        }
     }
 
     fn end_stop(&self, stop: &EndStopSpec, source: &Source) -> Result<EndStop, SpecError> {

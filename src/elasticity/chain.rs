@@ -20,6 +20,8 @@ pub(super) struct Chain {
     nodes: Vec<Pose>,
     residual: Vec<Vector6>,
     on_top: Vector6,
+    /// Whether the nodes are where a search ended well.
+    settled: bool,
     matrix: Option<Matrices>,
 }
 
@@ -38,6 +40,7 @@ impl Chain {
             nodes: vec![Pose::identity(); segments + 1],
             residual: vec![Vector6::zeros(); inner],
             on_top: Vector6::zeros(),
+            settled: false,
             matrix: None,
         }
     }
@@ -52,7 +55,8 @@ impl Chain {
         segments.map(|one_from_next| element.potential_j(&Deformation::of(&one_from_next).coordinates)).sum()
     }
 
-    /// Moves the inner nodes to where they are in equilibrium with the top at `base_from_top`.
+    /// Moves the inner nodes to where they are in equilibrium with the top at `base_from_top`: from where they last were, or,
+    /// should that fail, from an arc.
     pub(super) fn settle(
         &mut self,
         element: &Element,
@@ -62,9 +66,18 @@ impl Chain {
     ) -> Result<(), ElasticityError> {
         let segments = self.nodes.len() - 1;
         self.nodes[segments] = *base_from_top;
-        if self.matrix.is_none() {
-            self.lay_along_an_arc(&deformation.coordinates);
+        if self.settled && self.iterate(element, length_m).is_ok() {
+            return Ok(());
         }
+        self.matrix = None;
+        self.lay_along_an_arc(&deformation.coordinates);
+        let found = self.iterate(element, length_m);
+        self.settled = found.is_ok();
+        found
+    }
+
+    /// Newton's method for the inner nodes from where they are.
+    fn iterate(&mut self, element: &Element, length_m: f64) -> Result<(), ElasticityError> {
         let tolerance_n = TOLERANCE * element.stiffness().m33 * length_m;
         let mut size_n = self.find_residual(element, length_m);
         for _ in 0..MOST_ITERATIONS {
@@ -80,8 +93,7 @@ impl Chain {
                 self.matrix = None;
             }
         }
-        self.matrix = None;
-        Err(ElasticityError::InnerNodes { segments, residual_n: size_n })
+        Err(ElasticityError::InnerNodes { segments: self.nodes.len() - 1, residual_n: size_n })
     }
 
     /// Puts the inner nodes on the helix of constant curvature from base to top: close to equilibrium wherever loads are.

@@ -102,7 +102,6 @@ impl Estimator {
         let Some(window) = &mut self.window else { return };
         for stretch in std::mem::take(&mut self.waiting) {
             let started = Instant::now();
-            let had_beams = !stretch.beams.is_empty();
             window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
             let solved = window.solve(&self.views);
             window.remake_newest();
@@ -116,7 +115,7 @@ impl Estimator {
             self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, started));
             self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
             let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
-            let trouble = trouble(&solved, &self.spec, had_beams && moving);
+            let trouble = trouble(&solved, &self.spec, moving);
             // Said once, until a window is well again.
             if let (Some(kind), false) = (&trouble, self.lost) {
                 self.warnings.push(Warning { stamp: self.intake.stamp(stretch.end_s), kind: kind.clone() });

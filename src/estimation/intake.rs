@@ -178,11 +178,12 @@ impl Intake {
         let start_s = first_sample.max(first_scan);
         let enough_s = start_s + self.spec.inertial.rest_s + self.spec.step_s;
         let both_s = self.samples.back()?.0.min(self.scans.back()?.0);
-        if both_s < enough_s && !(last && both_s > start_s + 2.0 * self.spec.step_s) {
+        if both_s < enough_s + DISORDER_S && !(last && both_s > start_s + 2.0 * self.spec.step_s) {
             return None;
         }
-        let stamps: Vec<f64> = self.samples.iter().map(|(s, _)| *s).collect();
-        let scan_stamps: Vec<f64> = self.scans.iter().map(|(s, _)| *s).collect();
+        // What came by now beyond the needed does not count, so that the order of arrivals does not.
+        let stamps: Vec<f64> = self.samples.iter().map(|(s, _)| *s).filter(|s| *s <= enough_s).collect();
+        let scan_stamps: Vec<f64> = self.scans.iter().map(|(s, _)| *s).filter(|s| *s <= enough_s).collect();
         let jitter_s = self.spec.clock.jitter_s;
         let imu = StampFilter::new(period_of(&stamps)?, jitter_s);
         let lidar = StampFilter::new(period_of(&scan_stamps)?, jitter_s);

@@ -165,6 +165,20 @@ impl Factor {
     }
 }
 
+#[cfg(test)]
+impl NormalEquations {
+    /// The whole of `H`, for comparison.
+    pub(super) fn dense(&self) -> nalgebra::DMatrix<f64> {
+        let n = self.size;
+        nalgebra::DMatrix::from_fn(n, n, |r, c| self.h[r.max(c) * n + r.min(c)])
+    }
+
+    /// The right-hand side, for comparison.
+    pub(super) fn right(&self) -> nalgebra::DVector<f64> {
+        nalgebra::DVector::from_column_slice(&self.b)
+    }
+}
+
 fn axpy(into: &mut [f64], from: &[f64], scale: f64) {
     for (sum, term) in into.iter_mut().zip(from) {
         *sum += scale * term;

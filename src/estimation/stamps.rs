@@ -110,3 +110,60 @@ pub(super) fn period_of(stamps_s: &[f64]) -> Option<f64> {
     let slope = (n * sxy - sx * sy) / determinant;
     (determinant > 0.0 && slope > 0.0).then_some(slope)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    /// Stamps of a sensor of period 10 ms and 20 ppm whose jitter is Gaussian (sum of twelve uniform numbers).
+    fn stamps(count: usize, jitter_s: f64) -> Vec<(f64, f64)> {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+        (0..count).map(|k| k as f64 * 0.01 * (1.0 + 20e-6)).map(|t| (t, t + jitter_s * normal())).collect()
+    }
+
+    fn error_after(stamps: &[(f64, f64)], from: usize) -> f64 {
+        let raw: Vec<f64> = stamps.iter().take(100).map(|(_, raw)| *raw).collect();
+        let mut filter = StampFilter::new(period_of(&raw).unwrap(), 5e-4);
+        let errors = stamps.iter().map(|(t, raw)| filter.smooth(*raw) - t);
+        let late: Vec<f64> = errors.skip(from).collect();
+        (late.iter().map(|e| e * e).sum::<f64>() / late.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn jitter_of_two_milliseconds_is_smoothed_to_a_tenth_of_one() {
+        // A line through 3000 stamps would know its end to 2 * 2 ms / sqrt(3000) = 0.07 ms.
+        assert!(error_after(&stamps(6000, 2e-3), 3000) < 1.5e-4);
+        assert!(error_after(&stamps(6000, 1e-4), 500) < 2e-5);
+    }
+
+    #[test]
+    fn lost_samples_do_not_shift_the_count() {
+        let mut kept = stamps(6000, 3e-4);
+        let mut index = 0;
+        kept.retain(|_| {
+            index += 1;
+            index % 10 != 3 && !(4000..4100).contains(&index)
+        });
+        assert!(error_after(&kept, 1000) < 1e-4);
+    }
+
+    #[test]
+    fn a_clock_that_jumps_is_followed() {
+        let mut jumped = stamps(2000, 1e-4);
+        for (t, raw) in &mut jumped[1000..] {
+            *t += 0.5;
+            *raw += 0.5;
+        }
+        assert!(error_after(&jumped, 1500) < 1e-4);
+    }
+
+    #[test]
+    fn the_period_is_found_in_spite_of_losses() {
+        let mut kept: Vec<f64> = stamps(200, 1e-4).iter().map(|(_, raw)| *raw).collect();
+        kept.retain(|raw| ((raw / 0.01) as usize) % 7 != 2);
+        assert!((period_of(&kept).unwrap() - 0.01).abs() < 2e-6);
+        assert_eq!(period_of(&[1.0, 1.0, 1.0]), None);
+    }
+}

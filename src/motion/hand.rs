@@ -146,7 +146,7 @@ impl Hand {
                 walk.along(route, spec.still_s, duration_s)?
             }
             CarrySpec::Box { size_m, rounds, speed_m_per_s, smoothing_s } => {
-                round_box((*size_m, *rounds), (*speed_m_per_s, *smoothing_s), spec.still_s, route)
+                round_box((*size_m, *rounds), (*speed_m_per_s, *smoothing_s), times_s, route)
             }
         };
         let grip = spec.stops.grip(source, spec.grip_s, times_s, &mut seed.stream("motion/hand/stops"))?;
@@ -182,23 +182,23 @@ impl BaseMotion for Hand {
     }
 }
 
-/// A hand that goes round a box, beginning at rest `from_s`.
+/// A hand that goes round a box, from `from_s` until it has gone round as often as told, or `until_s` is past.
 fn round_box(
     (size_m, rounds): ([f64; 2], u32),
     (speed_m_per_s, smoothing_s): (f64, f64),
-    from_s: f64,
+    (from_s, until_s): (f64, f64),
     route: Option<&Route>,
 ) -> Walk {
     let (start, heading) = standpoint(route);
     let ahead = Vector::new(heading.cos(), heading.sin(), 0.0) * size_m[0];
     let left = Vector::new(-heading.sin(), heading.cos(), 0.0) * size_m[1];
     let mut way = Way::new(start, from_s + smoothing_s, smoothing_s);
-    for _ in 0..rounds {
-        for (corner, side_m) in
-            [(ahead, size_m[0]), (ahead + left, size_m[1]), (left, size_m[0]), (Vector::zeros(), size_m[1])]
-        {
-            way.go(start + corner, side_m / speed_m_per_s);
+    let corners = [(ahead, size_m[0]), (ahead + left, size_m[1]), (left, size_m[0]), (Vector::zeros(), size_m[1])];
+    for (corner, side_m) in (0..rounds).flat_map(|_| corners) {
+        if way.end_s() > until_s + smoothing_s {
+            break;
         }
+        way.go(start + corner, side_m / speed_m_per_s);
     }
     let speed_share = way.speed_share(speed_m_per_s);
     Walk { way, heading: Steps::from_level(heading), speed_share }

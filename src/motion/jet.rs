@@ -34,6 +34,11 @@ impl Jet {
         Self { x, d: rate * x, dd: rate * rate * x }
     }
 
+    /// This function of an argument, whose derivatives are by the argument, as a function of time.
+    pub fn of(self, argument: Jet) -> Self {
+        Self { x: self.x, d: self.d * argument.d, dd: self.dd * argument.d * argument.d + self.d * argument.dd }
+    }
+
     /// Sine and cosine of this function.
     pub fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.x.sin_cos();

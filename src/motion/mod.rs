@@ -10,7 +10,10 @@
 mod error;
 mod hand;
 mod jet;
+mod legged;
+mod marine;
 mod phasor;
+mod replay;
 mod rhythm;
 mod shaker;
 mod sines;
@@ -18,14 +21,21 @@ mod smooth;
 mod spec;
 mod stand;
 mod stops;
+mod uav;
+mod vehicle;
 mod walk;
 
 pub use error::MotionError;
 pub use hand::{CarrySpec, GaitSpec, HandSpec, ShakeSpec};
+pub use legged::{LeggedSpec, StrideSpec};
+pub use marine::{HullSpec, MarineSpec, SeaSpec};
+pub use replay::{PosesSpec, ReplaySpec};
 pub use shaker::{Axis, DriveSpec, Level, Phases, ShakerSpec, SignalSpec};
 pub use spec::{MotionSpec, load};
 pub use stand::StandSpec;
 pub use stops::StopsSpec;
+pub use uav::{GustSpec, RotorSpec, UavSpec};
+pub use vehicle::{EngineSpec, OrderSpec, RoadClass, RoadSpec, SuspensionSpec, VehicleSpec};
 pub use walk::WalkSpec;
 
 use crate::geometry::Kinematics;

@@ -72,6 +72,19 @@ pub(super) fn even_parts((low, high): (f64, f64), count: usize, stream: &mut Str
     (0..count).map(part).collect()
 }
 
+/// `count` parts between `low` (above zero) and `high`, each wider than the one before by the same factor.
+pub(super) fn geometric_parts((low, high): (f64, f64), count: usize, stream: &mut Stream) -> Vec<Part> {
+    let ratio = (high / low).powf(1.0 / count as f64);
+    let part = |k| {
+        let start = low * ratio.powf(f64::from(k));
+        let at = start * ratio.powf(stream.random::<f64>());
+        // The width at the place drawn, so that the expected power of the part is the integral of the density over it:
+        // drawn evenly in the logarithm, density * f * ln(ratio) has that mean.
+        Part { at, width: at * ratio.ln(), phase: random_phase(stream) }
+    };
+    (0..count as u32).map(part).collect()
+}
+
 fn random_phase(stream: &mut Stream) -> Complex<f64> {
     let (sin, cos) = sin_cos_turns(stream.random::<f64>());
     Complex::new(cos, sin)
@@ -97,10 +110,15 @@ mod tests {
 
     #[test]
     fn parts_hold_the_power_of_the_spectrum() {
-        // Density 1 / f^2 from 1 to 2 has the power 0.5; a part's power is |amplitude|^2 / 2.
-        let parts = even_parts((1.0, 2.0), 400, &mut Seed(1).stream("parts"));
-        let power: f64 = parts.iter().map(|p| p.amplitude(p.at.powi(-2)).norm_sqr() / 2.0).sum();
-        assert_relative_eq!(power, 0.5, max_relative = 1e-3);
-        assert!(parts.iter().all(|p| (1.0..2.0).contains(&p.at)));
+        // Density 1 / f^2 from 0.1 to 10 has the power 9.9; a part's power is |amplitude|^2 / 2.
+        let mut stream = Seed(1).stream("parts");
+        let power = |parts: &[Part]| parts.iter().map(|p| p.amplitude(p.at.powi(-2)).norm_sqr() / 2.0).sum::<f64>();
+        let geometric = geometric_parts((0.1, 10.0), 400, &mut stream);
+        assert_relative_eq!(power(&geometric), 9.9, max_relative = 2e-3);
+        let even = even_parts((1.0, 2.0), 400, &mut stream);
+        assert_relative_eq!(power(&even), 0.5, max_relative = 1e-3);
+        assert!(
+            even.iter().all(|p| (1.0..2.0).contains(&p.at)) && geometric.iter().all(|p| (0.1..10.0).contains(&p.at))
+        );
     }
 }

@@ -32,6 +32,21 @@ fn step(t_s: f64, centre_s: f64, half_s: f64) -> Jet {
     }
 }
 
+/// The rate of a unit step at `centre_s`, smoothed over `half_s` on either side: the bump itself.
+fn bump(t_s: f64, centre_s: f64, half_s: f64) -> Jet {
+    let u = (t_s - centre_s) / half_s;
+    if u.abs() >= 1.0 {
+        return Jet::constant(0.0);
+    }
+    let (u2, bump) = (u * u, 1.0 - u * u);
+    let rate = PEAK / half_s;
+    Jet {
+        x: rate * bump * bump * bump,
+        d: -6.0 * rate * u * bump * bump / half_s,
+        dd: -6.0 * rate * bump * (1.0 - 5.0 * u2) / (half_s * half_s),
+    }
+}
+
 /// A ramp of unit slope from `centre_s` on, smoothed over `half_s` on either side, minus the sharp ramp.
 fn ramp_rounding(t_s: f64, centre_s: f64, half_s: f64) -> Jet {
     let u = (t_s - centre_s) / half_s;
@@ -79,15 +94,30 @@ impl Steps {
 
     /// The level at an instant.
     pub fn at(&self, t_s: f64) -> Jet {
-        let first = self.centres_s.partition_point(|centre| centre + self.widest_s <= t_s);
-        let mut level = Jet::constant(self.levels.get(first).copied().unwrap_or_default());
+        let first = self.first_near(t_s);
+        let before = self.levels.get(first).copied().unwrap_or_default();
+        self.sum_near(first, t_s, Jet::constant(before), step)
+    }
+
+    /// How fast the level changes at an instant, with two more derivatives.
+    pub fn rate_at(&self, t_s: f64) -> Jet {
+        self.sum_near(self.first_near(t_s), t_s, Jet::default(), bump)
+    }
+
+    /// The first step that may not be over yet.
+    fn first_near(&self, t_s: f64) -> usize {
+        self.centres_s.partition_point(|centre| centre + self.widest_s <= t_s)
+    }
+
+    fn sum_near(&self, first: usize, t_s: f64, start: Jet, form: fn(f64, f64, f64) -> Jet) -> Jet {
+        let mut sum = start;
         for k in first..self.centres_s.len() {
             if self.centres_s[k] - self.widest_s >= t_s {
                 break;
             }
-            level += step(t_s, self.centres_s[k], self.halves_s[k]) * self.changes[k];
+            sum += form(t_s, self.centres_s[k], self.halves_s[k]) * self.changes[k];
         }
-        level
+        sum
     }
 }
 
@@ -141,6 +171,16 @@ impl Way {
             }
         }
         share
+    }
+
+    /// The same timing along a straight line: how far the way has led, m, on the first axis.
+    pub fn odometer(&self) -> Way {
+        let mut odometer = Self::new(Vector::zeros(), self.times_s[0], self.half_s);
+        for (points, times) in self.points.windows(2).zip(self.times_s.windows(2)) {
+            let led_m = odometer.end().x + (points[1] - points[0]).norm();
+            odometer.go(Vector::new(led_m, 0.0, 0.0), times[1] - times[0]);
+        }
+        odometer
     }
 
     /// The position at an instant, m.
@@ -220,6 +260,21 @@ mod tests {
         assert_relative_eq!(2.0 - at_corner[0].x, 0.8 * CORNER_CUT, epsilon = 1e-14);
         assert_relative_eq!(at_corner[1].x, 0.8 * CORNER_CUT, epsilon = 1e-14);
         assert_relative_eq!(at_corner[1].dd, PEAK / 0.8, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn the_rate_of_a_level_is_its_derivative() {
+        let mut steps = Steps::from_level(0.3);
+        steps.push(1.0, 0.5, 2.0);
+        let h = 1e-4;
+        for k in 0..30 {
+            let t = 0.45 + 0.04 * f64::from(k);
+            let (level, rate) = (steps.at(t), steps.rate_at(t));
+            assert_relative_eq!(rate.x, level.d, epsilon = 1e-12);
+            assert_relative_eq!(rate.d, level.dd, epsilon = 1e-11);
+            let change = (steps.rate_at(t + h).d - steps.rate_at(t - h).d) / (2.0 * h);
+            assert_relative_eq!(rate.dd, change, epsilon = 1e-2);
+        }
     }
 
     #[test]

@@ -1,6 +1,11 @@
 use super::hand::{Hand, HandSpec};
+use super::legged::{Legged, LeggedSpec};
+use super::marine::{Marine, MarineSpec};
+use super::replay::{Replay, ReplaySpec};
 use super::shaker::{Shaker, ShakerSpec};
 use super::stand::{Stand, StandSpec};
+use super::uav::{Uav, UavSpec};
+use super::vehicle::{Vehicle, VehicleSpec};
 use super::{BaseMotion, MotionError};
 use crate::geometry::Route;
 use crate::random::Seed;
@@ -14,6 +19,16 @@ pub enum MotionSpec {
     Stand(StandSpec),
     /// A hand carries and shakes it.
     Hand(Box<HandSpec>),
+    /// A wheeled vehicle carries it.
+    Vehicle(Box<VehicleSpec>),
+    /// A legged machine carries it.
+    Legged(Box<LeggedSpec>),
+    /// A small multirotor carries it.
+    Uav(Box<UavSpec>),
+    /// A vessel in waves carries it.
+    Marine(Box<MarineSpec>),
+    /// It moves as it was recorded.
+    Replay(ReplaySpec),
     /// A shaker drives it along or about its axes.
     Shaker(ShakerSpec),
 }
@@ -47,6 +62,11 @@ impl MotionSpec {
         }
         Ok(match self {
             MotionSpec::Stand(spec) => Box::new(Stand::new(spec, route)),
+            MotionSpec::Vehicle(spec) => Box::new(Vehicle::new(spec, source, route, duration_s, seed)?),
+            MotionSpec::Legged(spec) => Box::new(Legged::new(spec, source, route, duration_s, seed)?),
+            MotionSpec::Uav(spec) => Box::new(Uav::new(spec, source, route, duration_s, seed)?),
+            MotionSpec::Marine(spec) => Box::new(Marine::new(spec, source, route, seed)?),
+            MotionSpec::Replay(spec) => Box::new(Replay::new(spec, source, route)?),
             MotionSpec::Shaker(spec) => Box::new(Shaker::new(spec, source, route, duration_s, seed)?),
             MotionSpec::Hand(spec) => Box::new(Hand::new(spec, source, route, duration_s, seed)?),
         })

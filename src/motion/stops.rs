@@ -46,7 +46,7 @@ impl StopsSpec {
                 let mut draw = |low: f64, high: f64| low + (high - low) * stream.random::<f64>();
                 let mut stops = Vec::new();
                 let mut next_s = from_s + every_s * draw(0.5, 1.5);
-                while next_s < until_s {
+                while next_s < until_s && stops.len() <= MOST_STOPS {
                     let length_s = draw(*shortest_s, *longest_s);
                     stops.push((next_s, length_s));
                     next_s += length_s + every_s * draw(0.5, 1.5);
@@ -64,8 +64,14 @@ impl StopsSpec {
     }
 }
 
+/// Most stops in a run.
+const MOST_STOPS: usize = 100_000;
+
 /// Checks that stops follow each other, and are long enough to grasp and let go.
 fn check(stops: &[(f64, f64)], grip_s: f64) -> Result<(), String> {
+    if stops.len() > MOST_STOPS {
+        return Err(format!("more than {MOST_STOPS} stops in one run; make them rarer, or the run shorter"));
+    }
     let mut free_s = 0.0;
     for (index, &(at_s, length_s)) in stops.iter().enumerate() {
         if !(at_s.is_finite() && length_s.is_finite()) {

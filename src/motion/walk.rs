@@ -185,7 +185,7 @@ impl<'a> Walker<'a> {
     /// Turns about on the spot, to the left and to the right by turns.
     fn turn_round(&mut self) {
         let half_s = self.spec.turn_half_s(PI);
-        let middle_s = self.way.end_s() + half_s / 2.0;
+        let middle_s = self.way.end_s() + half_s / 2.0 + self.spec.turn_lag_s;
         self.way.go(self.way.end(), half_s);
         self.heading.push(middle_s, half_s, if self.turns.is_multiple_of(2) { PI } else { -PI });
         self.turns += 1;

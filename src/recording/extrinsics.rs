@@ -2,6 +2,7 @@
 
 use crate::geometry::Pose;
 use crate::measurement::Calibration;
+use crate::recording::container::Messages;
 use crate::recording::message::transforms::{self, Transform};
 use crate::recording::schema::MessageType;
 use crate::recording::topics::HEAD;
@@ -58,11 +59,12 @@ impl Reader {
         let channels =
             self.channels().iter().filter(|c| is_static(&c.topic) && c.type_name == MessageType::Transforms.name());
         let ids: Vec<u16> = channels.map(|channel| channel.id).collect();
+        let tree = self.frames_among(self.messages_near(&ids), &ids)?;
+        if ids.is_empty() || !tree.is_empty() { Ok(tree) } else { self.frames_among(self.messages(), &ids) }
+    }
+
+    fn frames_among(&self, mut messages: Messages<'_>, ids: &[u16]) -> Result<FrameTree, RecordingError> {
         let mut tree = FrameTree::default();
-        if ids.is_empty() {
-            return Ok(tree);
-        }
-        let mut messages = self.messages_near(&ids);
         while let Some(message) = messages.next()? {
             if !ids.contains(&message.channel) {
                 continue;

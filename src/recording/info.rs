@@ -116,7 +116,7 @@ impl Reader {
                 _ => loss.unreadable_messages += 1,
             }
         }
-        loss.add_blocks(&messages.take_damaged());
+        loss.add_pass(&messages, self.expected_messages());
         let first = gathered.values().filter_map(|topic| topic.first).min();
         let last = gathered.values().filter_map(|topic| topic.last).max();
         let mut topics: Vec<_> =

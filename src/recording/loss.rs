@@ -1,4 +1,4 @@
-use super::container::{DamagedBlock, Directory, Ending};
+use super::container::{Directory, Ending, Messages};
 use serde::Serialize;
 use std::fmt;
 
@@ -7,12 +7,14 @@ use std::fmt;
 pub struct Loss {
     /// Whether the file ends without its summary: its writer was stopped, or the file was cut.
     pub cut_short: bool,
-    /// Bytes that belong to no readable record.
+    /// Whether the summary's checksum does not match; then it is not used.
+    pub damaged_summary: bool,
+    /// Bytes that could not be read.
     pub lost_bytes: u64,
     /// Chunks that do not decompress, or whose checksum does not match.
     pub damaged_chunks: u64,
-    /// Messages in those chunks, as far as an index tells.
-    pub messages_in_damaged_chunks: u64,
+    /// Messages that the summary counts and that were not there, of all topics together.
+    pub missing_messages: u64,
     /// Messages whose bytes are not what their type says.
     pub unreadable_messages: u64,
     /// IMU samples with NaN or infinity in them.
@@ -22,15 +24,19 @@ pub struct Loss {
 impl Loss {
     /// What the file as a whole lost.
     pub(super) fn of_file(directory: &Directory) -> Self {
-        Self { cut_short: directory.ending == Ending::CutShort, lost_bytes: directory.lost_bytes, ..Self::default() }
+        Self {
+            cut_short: directory.ending == Ending::CutShort,
+            damaged_summary: directory.ending == Ending::SummaryDamaged,
+            lost_bytes: directory.lost_bytes,
+            ..Self::default()
+        }
     }
 
-    pub(super) fn add_blocks(&mut self, damaged: &[DamagedBlock]) {
-        for block in damaged {
-            self.damaged_chunks += 1;
-            self.lost_bytes += block.bytes;
-            self.messages_in_damaged_chunks += block.messages;
-        }
+    /// Adds what a pass through all messages met, `expected` of them by the summary.
+    pub(super) fn add_pass(&mut self, pass: &Messages<'_>, expected: Option<u64>) {
+        self.damaged_chunks += pass.damaged().len() as u64;
+        self.lost_bytes += pass.damaged().iter().map(|block| block.bytes).sum::<u64>();
+        self.missing_messages += expected.map_or(0, |expected| expected.saturating_sub(pass.count()));
     }
 
     /// Whether nothing was lost.
@@ -40,26 +46,20 @@ impl Loss {
 
     /// What was lost, a sentence each.
     pub fn sentences(&self) -> Vec<String> {
-        let mut said = Vec::new();
-        if self.cut_short {
-            said.push("The file ends without its summary; what was complete before is used.".to_owned());
-        }
-        if self.lost_bytes > 0 {
-            said.push(format!("{} bytes could not be read.", self.lost_bytes));
-        }
-        if self.damaged_chunks > 0 {
-            said.push(format!(
-                "{} damaged chunks were left out, with {} messages or more.",
-                self.damaged_chunks, self.messages_in_damaged_chunks
-            ));
-        }
-        if self.unreadable_messages > 0 {
-            said.push(format!("{} messages are not what their type says.", self.unreadable_messages));
-        }
-        if self.samples_not_finite > 0 {
-            said.push(format!("{} IMU samples are not finite and were left out.", self.samples_not_finite));
-        }
-        said
+        let counted = |count: u64, sentence: &str| (count > 0).then(|| format!("{count} {sentence}"));
+        let stated = |holds: bool, sentence: &str| holds.then(|| sentence.to_owned());
+        [
+            stated(self.cut_short, "The file ends without its summary; what was complete before is used."),
+            stated(self.damaged_summary, "The file's summary is damaged; what it says was found by reading."),
+            counted(self.lost_bytes, "bytes could not be read."),
+            counted(self.damaged_chunks, "chunks are damaged and were left out."),
+            counted(self.missing_messages, "messages, of all topics together, are missing."),
+            counted(self.unreadable_messages, "messages are not what their type says and were left out."),
+            counted(self.samples_not_finite, "IMU samples are not finite and were left out."),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
     }
 }
 

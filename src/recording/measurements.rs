@@ -19,6 +19,7 @@ pub struct Measurements<'r> {
     imu: Vec<u16>,
     projector: Projector,
     loss: Loss,
+    expected: Option<u64>,
     ended: bool,
 }
 
@@ -32,6 +33,7 @@ impl Reader {
             imu: self.ids_of(&selection.imu_topic),
             projector: Projector::default(),
             loss: self.loss().clone(),
+            expected: self.expected_messages(),
             ended: false,
         }
     }
@@ -47,7 +49,7 @@ impl Measurements<'_> {
         loop {
             let message = self.messages.next()?;
             let Some(message) = message else {
-                self.loss.add_blocks(&self.messages.take_damaged());
+                self.loss.add_pass(&self.messages, self.expected);
                 return Ok(None);
             };
             let decoded = if self.imu.contains(&message.channel) {

@@ -33,7 +33,7 @@ impl Reader {
     pub fn new(name: &str, input: impl Read + Seek + Send + 'static) -> Result<Self, RecordingError> {
         let source = Source::new(input)?;
         let mut directory = walk(&source, name)?;
-        if directory.ending == Ending::CutShort || directory.channels.is_empty() {
+        if directory.ending != Ending::Complete || directory.channels.is_empty() {
             find_definitions(&source, &mut directory)?;
         }
         let channels = directory.channels().collect();
@@ -83,9 +83,14 @@ impl Reader {
         Messages::new(&self.source, self.directory.blocks.iter())
     }
 
-    /// The messages of blocks that may hold some of `channels`, as the index has it, among others of those blocks.
+    /// The messages of blocks that seem to hold some of `channels`, among others of those blocks.
     pub(super) fn messages_near(&self, channels: &[u16]) -> Messages<'_> {
-        Messages::new(&self.source, self.directory.blocks.iter().filter(|block| block.may_hold(channels)))
+        Messages::new(&self.source, self.directory.blocks.iter().filter(|block| block.seems_to_hold(channels)))
+    }
+
+    /// How many messages the summary counts.
+    pub(super) fn expected_messages(&self) -> Option<u64> {
+        self.directory.expected_messages
     }
 }
 

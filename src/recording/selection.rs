@@ -116,15 +116,16 @@ impl Reader {
             let problem = format!("is not there as {}", names.join(" or "));
             return Err(self.topic_error(asked, problem));
         }
-        let mut found: Vec<Candidate> = Vec::new();
         let ids: Vec<u16> = open.keys().copied().collect();
-        let mut messages = self.messages_near(&ids);
-        while !open.is_empty() {
-            let Some(message) = messages.next()? else { break };
-            let Some((kind, topic)) = open.get(&message.channel) else { continue };
-            if let Some(candidate) = look(&message, *kind, topic) {
-                open.remove(&message.channel);
-                found.push(candidate);
+        let mut found = Vec::new();
+        for mut messages in [self.messages_near(&ids), self.messages()] {
+            while !open.is_empty() {
+                let Some(message) = messages.next()? else { break };
+                let Some((kind, topic)) = open.get(&message.channel) else { continue };
+                if let Some(candidate) = look(&message, *kind, topic) {
+                    open.remove(&message.channel);
+                    found.push(candidate);
+                }
             }
         }
         Ok(found)
@@ -169,8 +170,9 @@ fn imu_rank(topic: &str) -> usize {
 
 /// Says which of several sensors was taken; another message kind of the same sensor is no other sensor.
 fn notes_on_choice(sensor: &str, chosen: &Candidate, all: &[Candidate]) -> Option<String> {
-    let others: Vec<_> =
+    let mut others: Vec<_> =
         all.iter().filter(|c| c.topic != chosen.topic && c.frame != chosen.frame).map(|c| c.topic.as_str()).collect();
+    others.sort_unstable();
     (!others.is_empty())
         .then(|| format!("Of several {sensor} topics, {} is read, not {}.", chosen.topic, others.join(", ")))
 }

@@ -24,6 +24,7 @@ pub struct Truths<'r> {
     clocks: Vec<u16>,
     lidar: Option<clock::Reading<'static>>,
     loss: Loss,
+    expected: Option<u64>,
     ended: bool,
 }
 
@@ -31,9 +32,15 @@ impl Reader {
     /// The truth under `/ground_truth/`; nothing in a recording of the real world.
     pub fn truth(&self) -> Truths<'_> {
         let (poses, clocks) = (self.ids_of(Topic::TruthPose.name()), self.ids_of(Topic::TruthClock.name()));
-        let ids: Vec<u16> = poses.iter().chain(&clocks).copied().collect();
-        let messages = self.messages_near(&ids);
-        Truths { messages, poses, clocks, lidar: None, loss: self.loss().clone(), ended: ids.is_empty() }
+        Truths {
+            messages: self.messages(),
+            ended: poses.is_empty() && clocks.is_empty(),
+            poses,
+            clocks,
+            lidar: None,
+            loss: self.loss().clone(),
+            expected: self.expected_messages(),
+        }
     }
 
     /// The head's true trajectory in lidar time, all of it in memory.
@@ -61,7 +68,7 @@ impl Truths<'_> {
     fn next_truth(&mut self) -> Result<Option<Truth>, RecordingError> {
         loop {
             let Some(message) = self.messages.next()? else {
-                self.loss.add_blocks(&self.messages.take_damaged());
+                self.loss.add_pass(&self.messages, self.expected);
                 return Ok(None);
             };
             let read = if self.poses.contains(&message.channel) {

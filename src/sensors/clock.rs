@@ -161,6 +161,7 @@ impl Clock {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spec::{Kind, find, parse};
 
     fn clock(offset_ms: f64, rate_ppm: f64, resolution_ms: f64) -> Clock {
         let spec = ClockSpec { offset_ms, rate_ppm, jitter_ms: 0.0, resolution_ms };
@@ -202,6 +203,21 @@ mod tests {
         assert_eq!(clock(0.0, 0.0, 1.0).half_tick_from(ns(2_500_000)), ns(2_500_000));
         assert_eq!(clock(0.0, 0.0, 1.0).half_tick_from(ns(2_500_001)), ns(3_500_000));
         assert_eq!(clock(0.0, 0.0, 0.0).half_tick_from(ns(2_000_001)), ns(2_000_001));
+    }
+
+    #[test]
+    fn every_shipped_clock_loads() {
+        let names = crate::spec::names(Kind::Clock);
+        assert!(names.contains(&"drifting".to_owned()), "{names:?}");
+        for name in names {
+            let source = find(Kind::Clock, &name).unwrap();
+            let clocks = Clocks::new(&parse(&source).unwrap(), &source, Stamp::default()).unwrap();
+            assert_eq!(
+                clocks.lidar.ahead(0.0).nanos(),
+                -clocks.lidar.resolution().nanos() / 2,
+                "the reference: {name}"
+            );
+        }
     }
 
     #[test]

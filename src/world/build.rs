@@ -11,8 +11,8 @@ use crate::spec::{Source, SpecError};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Most triangles of a scene: they take about 200 bytes each.
-pub(super) const MAX_TRIANGLES: usize = 20_000_000;
+/// Most triangles of a scene: they take about 350 bytes each while it is built.
+pub(super) const MAX_TRIANGLES: usize = 10_000_000;
 /// Furthest from the origin that a surface or a route may be, m.
 const MAX_EXTENT_M: f64 = 100_000.0;
 /// Deepest nesting of templates.
@@ -233,7 +233,8 @@ impl Builder<'_> {
         let Some(folder) = &self.source.folder else {
             return Err(wrong(format!("a scene without a folder of its own cannot name the mesh `{file}`")));
         };
-        let mesh = import::read(&folder.join(file), *scale).map_err(|error| wrong(error.to_string()))?;
+        let mesh =
+            import::read(&folder.join(file), *scale).map_err(|error| wrong(format!("the mesh `{file}` {error}")))?;
         if mesh.without_area > 0 {
             let count = mesh.without_area;
             self.notes.push(format!("{file}: {count} triangles without area were left out"));

@@ -1,10 +1,11 @@
-use crate::heads::{Still, Table, shipped, states};
+use crate::heads::{Still, Table, built, shipped, states};
 use approx::assert_relative_eq;
 use nalgebra::{Matrix2, Vector2};
 use zsim::dynamics::ModeKind;
-use zsim::elasticity::{Coil, Moduli, loaded_stiffness};
+use zsim::elasticity::{Coil, Moduli, SpringSpec, loaded_stiffness};
 use zsim::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2 as G, Vector, from_roll_pitch_yaw};
 use zsim::motion::BaseMotion;
+use zsim::spec::{Kind, load, names};
 
 #[test]
 fn a_head_rocks_as_fast_as_the_table_says_for_any_number_of_segments() {
@@ -97,4 +98,43 @@ fn the_handheld_head_is_light_and_rocks_between_1_and_1_5_hz() {
     let kinds: Vec<_> = modes.iter().map(|mode| mode.kind).collect();
     assert_eq!(kinds.iter().filter(|kind| **kind == ModeKind::Sway).count(), 2);
     assert!(kinds.contains(&ModeKind::Bounce) && kinds.contains(&ModeKind::Yaw));
+}
+
+#[test]
+fn a_slow_tilt_of_the_base_is_lifted_by_gravity() {
+    // Turns of an upright head over those of its base at zero frequency (the table of gains): 1.58 and 2.64; 1 about z.
+    for (coil, gain) in [([25.0, 3.0, 8.0, 80.0], 1.58), ([25.0, 3.0, 12.0, 120.0], 2.64)] {
+        let model = Table { coil, ..Table::default() }.model();
+        let linear = model.linear().unwrap();
+        let followed = linear.stiffness.try_inverse().unwrap() * linear.base_stiffness;
+        assert_relative_eq!(followed[(3, 3)], gain, max_relative = 0.02);
+        assert_relative_eq!(followed[(4, 4)], gain, max_relative = 0.02);
+        // Shifts of the base, and turns about the vertical, are followed one to one.
+        for k in [0, 1, 2, 5] {
+            assert_relative_eq!(followed[(k, k)], 1.0, epsilon = 1e-6);
+        }
+        // A base and a head that move as one meet no damping: Cb is C times the motion that carries the head along.
+        assert_relative_eq!(linear.base_damping.column(2), linear.damping.column(2), epsilon = 1e-12);
+    }
+}
+
+#[test]
+fn every_shipped_head_and_spring_is_right_and_stands_for_ten_seconds() {
+    for name in names(Kind::Head) {
+        let model = shipped(&name);
+        let path = states(&model, &Still(Pose::identity()), 1e-3, 10.0);
+        let moved = path[path.len() - 1].head.world_from_body.inv_mul(model.rest_pose_base_from_head());
+        assert!(moved.translation.vector.norm() < 1e-9, "{name} moves by {moved}");
+    }
+    for name in names(Kind::Spring) {
+        load::<SpringSpec>(Kind::Spring, &name).unwrap().design().unwrap();
+    }
+}
+
+#[test]
+fn a_head_names_a_spring_of_the_library() {
+    let text = Table::default().text();
+    let (from, to) = (text.find("coil(").unwrap(), text.find("segments").unwrap());
+    let named = built(&format!("{}named(\"25x3x12x120\"), {}", &text[..from], &text[to..])).unwrap();
+    assert_eq!(named.linear_modes(), Table::default().model().linear_modes());
 }

@@ -1,6 +1,8 @@
 //! A head that walks and nods through rooms of boxes, in closed form: rays by slabs, motion by analytic derivatives.
 //! Independent of the simulator, so that the estimator's tests do not rest on it.
 
+#![allow(dead_code, reason = "each test uses its part")]
+
 mod jet;
 mod motion;
 mod room;

@@ -82,28 +82,32 @@ pub fn planar_scan(stamp: Stamp) -> LidarScan {
         ranges_m: Vec::new(),
         intensities: Vec::new(),
     };
-    let mut returns = Vec::new();
     for k in 0..beams {
         let angle = planar.angle_min_rad + f64::from(k) * planar.angle_increment_rad;
-        let range = match k % 97 {
+        planar.ranges_m.push(match k % 97 {
             0 => f32::INFINITY,
             1 => f32::NEG_INFINITY,
-            2 => 31.0,
             _ => ((4.0 + (stamp.nanos() as f64 * 1e-9 + 3.0 * angle).sin()) * 1000.0).round() as f32 / 1000.0,
-        };
-        let intensity = (k % 256) as f32;
-        planar.ranges_m.push(range);
-        planar.intensities.push(intensity);
-        if range.is_finite() && range <= 30.0 {
-            let (r, (sin, cos)) = (f64::from(range), angle.sin_cos());
-            returns.push(LidarReturn {
-                offset: Span::from_seconds(f64::from(k) * planar.time_increment_s),
-                point_in_laser: nalgebra::Vector3::new((r * cos) as f32, (r * sin) as f32, 0.0),
-                intensity,
-            });
-        }
+        });
+        planar.intensities.push((k % 256) as f32);
     }
-    LidarScan { stamp, returns, planar: Some(planar) }
+    with_returns(stamp, planar)
+}
+
+/// A sweep with its returns as points: those within the sensor's range.
+pub fn with_returns(stamp: Stamp, planar: PlanarScan) -> LidarScan {
+    let beams = planar.ranges_m.iter().zip(&planar.intensities).enumerate();
+    let back = beams.filter(|(_, (range, _))| (planar.range_min_m..=planar.range_max_m).contains(*range));
+    let returns = back.map(|(k, (range, intensity))| {
+        let (sin, cos) = (planar.angle_min_rad + k as f64 * planar.angle_increment_rad).sin_cos();
+        let r = f64::from(*range);
+        LidarReturn {
+            offset: Span::from_seconds(k as f64 * planar.time_increment_s),
+            point_in_laser: nalgebra::Vector3::new((r * cos) as f32, (r * sin) as f32, 0.0),
+            intensity: *intensity,
+        }
+    });
+    LidarScan { stamp, returns: returns.collect(), planar: Some(planar) }
 }
 
 /// How the head moves: round a circle of 1 m, nodding.

@@ -118,3 +118,86 @@ pub(in crate::estimation) fn add_fixed(
     let border = Segment { start: layout.border() + CLOCK, values: &clock };
     equations.add_row(&[knots, border], plane.distance_m, weight);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimation::spline::Basis;
+    use crate::geometry::{Rotation, from_roll_pitch_yaw};
+    use approx::assert_relative_eq;
+    use nalgebra::{DMatrix, DVector};
+
+    const AT_S: f64 = 0.5;
+
+    /// Two thin patches of about one plane, seen at different times.
+    fn surfel(tau_s: f64, seed: f64) -> Placed {
+        let turn = from_roll_pitch_yaw(0.02 * seed, 0.3, 0.4).to_rotation_matrix().into_inner();
+        let covariance = turn * Matrix::from_diagonal(&Vector::new(0.02, 0.05, 1e-4)) * turn.transpose();
+        let patch =
+            Patch { centre: Vector::new(2.0 + 0.1 * seed, 1.0, 0.5), normal: turn * Vector::z(), covariance, level: 0 };
+        Placed {
+            patch,
+            tau_s,
+            arm: Vector::new(1.5, 0.2 * seed, -0.4),
+            velocity: Vector::new(3.0, -2.0 * seed, 1.0),
+            basis: Basis::at(tau_s + 0.003, 0.2),
+        }
+    }
+
+    /// The centre after a step `x`, by the definition of the correction and of the clock.
+    fn moved(surfel: &Placed, layout: &Layout, x: &DVector<f64>) -> Vector {
+        let correction = Correction::of_spline(&surfel.basis, layout.first_knot, x.as_slice());
+        let clock = layout.border() + CLOCK;
+        let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - AT_S);
+        let origin = surfel.patch.centre - surfel.arm;
+        let turned = Rotation::from_scaled_axis(correction.rotation) * surfel.arm;
+        origin + correction.translation + turned + surfel.velocity * later_s
+    }
+
+    fn check(a: &Placed, b: Option<&Placed>) {
+        let layout = Layout { first_knot: 0, knots: 12 };
+        let other = b.map_or(surfel(0.0, 0.5).patch, |b| b.patch);
+        let plane = Plane::of(&a.patch, &other, 0.01);
+        let distance = |x: &DVector<f64>| {
+            let there = b.map_or(other.centre, |b| moved(b, &layout, x));
+            plane.normal.dot(&(moved(a, &layout, x) - there))
+        };
+        let jacobian = DMatrix::from_fn(1, layout.size(), |_, k| {
+            let step = |h: f64| DVector::from_fn(layout.size(), |i, _| if i == k { h } else { 0.0 });
+            (distance(&step(1e-6)) - distance(&step(-1e-6))) / 2e-6
+        });
+        let mut equations = NormalEquations::new(layout.size());
+        match b {
+            Some(b) => add_pair(&mut equations, &layout, (a, b), &plane, (3.0, AT_S)),
+            None => add_fixed(&mut equations, &layout, a, &plane, (3.0, AT_S)),
+        }
+        assert_relative_eq!(equations.dense(), jacobian.transpose() * &jacobian * 3.0, epsilon = 1e-7);
+        let right = jacobian.transpose() * (-3.0 * distance(&DVector::zeros(layout.size())));
+        assert_relative_eq!(equations.right(), right.column(0).into_owned(), epsilon = 1e-7);
+        // What a solution moves the surfel by is the same derivative.
+        let x = DVector::from_fn(layout.size(), |k, _| 1e-3 * (k as f64).sin());
+        let by = moved_m(a, &plane.normal, &layout, x.as_slice(), AT_S)
+            - b.map_or(0.0, |b| moved_m(b, &plane.normal, &layout, x.as_slice(), AT_S));
+        assert_relative_eq!(by, (jacobian * x)[0], epsilon = 1e-8);
+    }
+
+    #[test]
+    fn the_derivatives_are_those_of_the_distance() {
+        let (early, near, late) = (surfel(0.31, 1.0), surfel(0.62, -1.0), surfel(1.43, 2.0));
+        check(&early, Some(&late));
+        check(&late, Some(&early));
+        check(&early, Some(&near));
+        check(&early, None);
+    }
+
+    #[test]
+    fn the_common_normal_is_the_least_eigenvector_of_both() {
+        let (a, b) = (surfel(0.3, 1.0).patch, surfel(0.9, -2.0).patch);
+        let plane = Plane::of(&a, &b, 0.01);
+        let eigen = (a.covariance + b.covariance).symmetric_eigen();
+        let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+        assert!(plane.normal.dot(&least).abs() > 1.0 - 1e-6);
+        assert_relative_eq!(plane.variance, 1e-4 + eigen.eigenvalues.min(), max_relative = 1e-2);
+        assert_relative_eq!(plane.normal.norm(), 1.0, epsilon = 1e-12);
+    }
+}

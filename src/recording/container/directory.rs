@@ -29,8 +29,8 @@ pub struct Block {
     pub start_ns: u64,
     /// How it is kept.
     pub kind: BlockKind,
-    /// Messages a channel, where an index tells.
-    pub indexed: Vec<(u16, u64)>,
+    /// The channels of its messages, where an index tells.
+    pub indexed: Vec<u16>,
 }
 
 /// How a block is kept.
@@ -43,9 +43,10 @@ pub enum BlockKind {
 }
 
 impl Block {
-    /// Whether it may hold messages of one of `channels`. A block without an index may hold any.
-    pub fn may_hold(&self, channels: &[u16]) -> bool {
-        self.indexed.is_empty() || self.indexed.iter().any(|(id, _)| channels.contains(id))
+    /// Whether it seems to hold messages of one of `channels`. A block without an index may hold any; an index has no
+    /// checksum, so what is not found by it is to be looked for without.
+    pub fn seems_to_hold(&self, channels: &[u16]) -> bool {
+        self.indexed.is_empty() || self.indexed.iter().any(|id| channels.contains(id))
     }
 }
 
@@ -54,6 +55,8 @@ impl Block {
 pub enum Ending {
     /// With its summary and footer.
     Complete,
+    /// With a summary whose checksum does not match: what it says is not used.
+    SummaryDamaged,
     /// Without: whoever wrote it was stopped, or the file was cut.
     CutShort,
 }
@@ -73,6 +76,8 @@ pub struct Directory {
     pub ending: Ending,
     /// Bytes that belong to no readable record.
     pub lost_bytes: u64,
+    /// How many messages the summary counts.
+    pub expected_messages: Option<u64>,
 }
 
 impl Directory {
@@ -85,6 +90,7 @@ impl Directory {
             metadata: BTreeMap::new(),
             ending: Ending::CutShort,
             lost_bytes: 0,
+            expected_messages: None,
         }
     }
 

@@ -28,8 +28,6 @@ pub struct DamagedBlock {
     pub damage: Damage,
     /// Its bytes in the file.
     pub bytes: u64,
-    /// Messages in it, where an index tells.
-    pub messages: u64,
 }
 
 /// Reads messages in the order of their log time; of those with one log time, in the order of the file.
@@ -43,6 +41,7 @@ pub struct Messages<'r> {
     held: Vec<Held>,
     spare: Vec<Loaded>,
     damaged: Vec<DamagedBlock>,
+    count: u64,
 }
 
 struct Held {
@@ -62,7 +61,7 @@ impl<'r> Messages<'r> {
     pub fn new(source: &'r Source, blocks: impl Iterator<Item = &'r Block>) -> Self {
         let mut to_come: Vec<_> = blocks.enumerate().collect();
         to_come.sort_by_key(|(_, block)| block.start_ns);
-        Self { source, to_come: to_come.into(), held: Vec::new(), spare: Vec::new(), damaged: Vec::new() }
+        Self { source, to_come: to_come.into(), held: Vec::new(), spare: Vec::new(), damaged: Vec::new(), count: 0 }
     }
 
     /// The next message, `None` after the last.
@@ -85,9 +84,14 @@ impl<'r> Messages<'r> {
         Ok(Some(RawMessage { channel: entry.channel, log_time_ns: entry.log_time_ns, data }))
     }
 
-    /// Blocks that could not be read, since the last call.
-    pub fn take_damaged(&mut self) -> Vec<DamagedBlock> {
-        std::mem::take(&mut self.damaged)
+    /// Blocks that could not be read so far.
+    pub fn damaged(&self) -> &[DamagedBlock] {
+        &self.damaged
+    }
+
+    /// Messages in the blocks that could be read so far.
+    pub fn count(&self) -> u64 {
+        self.count
     }
 
     /// Lets go of blocks that are read to their end.
@@ -115,10 +119,12 @@ impl<'r> Messages<'r> {
         let Some((place, block)) = self.to_come.pop_front() else { return Ok(()) };
         let mut loaded = self.spare.pop().unwrap_or_default();
         match loaded.load(self.source, block)? {
-            Ok(()) => self.held.push(Held { place, loaded, next: 0 }),
+            Ok(()) => {
+                self.count += loaded.entries.len() as u64;
+                self.held.push(Held { place, loaded, next: 0 });
+            }
             Err(damage) => {
-                let messages = block.indexed.iter().map(|(_, count)| count).sum();
-                self.damaged.push(DamagedBlock { damage, bytes: block.length, messages });
+                self.damaged.push(DamagedBlock { damage, bytes: block.length });
                 self.spare.push(loaded);
             }
         }

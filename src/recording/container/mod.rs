@@ -13,6 +13,6 @@ mod walk;
 
 pub use chunk::Loaded;
 pub use directory::{BlockKind, Channel, Directory, Ending};
-pub use messages::{DamagedBlock, Messages, RawMessage};
+pub use messages::{Messages, RawMessage};
 pub use source::Source;
 pub use walk::walk;

@@ -27,16 +27,16 @@ pub mod op {
     pub const MESSAGE_INDEX: u8 = 0x07;
     /// Where a chunk stands in the file.
     pub const CHUNK_INDEX: u8 = 0x08;
+    /// How many messages there are.
+    pub const STATISTICS: u8 = 0x0B;
     /// Names and values.
     pub const METADATA: u8 = 0x0C;
     /// The end of the data.
     pub const DATA_END: u8 = 0x0F;
-    /// The first opcode that programs may use for themselves.
-    pub const FIRST_PRIVATE: u8 = 0x80;
 
-    /// Whether the format knows the opcode.
+    /// Whether the format knows the opcode, or leaves it to programs.
     pub fn is_known(op: u8) -> bool {
-        (0x01..=DATA_END).contains(&op) || op >= FIRST_PRIVATE
+        (0x01..=DATA_END).contains(&op) || op >= 0x80
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::directory::{Block, BlockKind, Directory, Ending};
 use super::record::{self, MAGIC, MESSAGE_FIELDS, PREFIX, op};
-use super::signposts;
+use super::signposts::{self, Signposts};
 use super::source::{Input, Source};
 use crate::recording::RecordingError;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -35,6 +35,7 @@ pub fn walk(source: &Source, name: &str) -> Result<Directory, RecordingError> {
     if walk.take(MAGIC.len() as u64)? != MAGIC {
         return Err(RecordingError::NotMcap { name: name.to_owned() });
     }
+    walk.found.expected_messages = walk.signposts.messages;
     while walk.step()? {}
     Ok(walk.found)
 }
@@ -43,7 +44,7 @@ struct Walk<'a> {
     input: BufReader<&'a mut dyn Input>,
     end: u64,
     at: u64,
-    signposts: Vec<u64>,
+    signposts: Signposts,
     found: Directory,
     in_summary: bool,
 }
@@ -72,42 +73,34 @@ impl Walk<'_> {
         let (Some(opcode), Some(length)) = (fields.u8(), fields.u64()) else {
             return self.resume(start);
         };
-        let fits = length <= self.end - self.at && op::is_known(opcode);
-        if !fits || self.straddles_a_signpost(start, self.at.saturating_add(length)) {
+        // Everything but a record of length and opcode that may be sends the walk on to the next signpost.
+        let fits = opcode != 0 && length <= self.end - self.at;
+        let next = self.at.saturating_add(length);
+        let straddles = self.signposts.after(start).is_some_and(|post| post < next);
+        let footer_is_last = opcode != op::FOOTER || next + MAGIC.len() as u64 == self.end;
+        if !fits || straddles || !footer_is_last {
             return self.resume(start);
         }
-        let next = self.at + length;
-        let understood = self.record(opcode, start, length)?;
-        if !understood {
+        let opcode_is_right = op::is_known(opcode) && (opcode == op::CHUNK || !self.signposts.is_chunk(start));
+        if !opcode_is_right || !self.record(opcode, start, length)? {
             self.found.lost_bytes += next - start;
         }
         if opcode == op::FOOTER {
-            self.found.ending = Ending::Complete;
+            self.found.ending = if self.signposts.sound { Ending::Complete } else { Ending::SummaryDamaged };
             return Ok(false);
         }
         self.go_to(next)?;
         Ok(true)
     }
 
-    fn straddles_a_signpost(&self, start: u64, end: u64) -> bool {
-        let next = self.signposts.partition_point(|post| *post <= start);
-        self.signposts.get(next).is_some_and(|post| *post < end)
-    }
-
     /// Goes on at the next place where the summary says that a record begins; ends the walk where there is none.
     fn resume(&mut self, start: u64) -> Result<bool, RecordingError> {
-        let next = self.signposts.partition_point(|post| *post <= start);
-        match self.signposts.get(next).copied() {
-            Some(post) => {
-                self.found.lost_bytes += post - start;
-                self.go_to(post)?;
-                Ok(true)
-            }
-            None => {
-                self.found.lost_bytes += self.end - start;
-                Ok(false)
-            }
+        let next = self.signposts.after(start);
+        self.found.lost_bytes += next.unwrap_or(self.end) - start;
+        if let Some(post) = next {
+            self.go_to(post)?;
         }
+        Ok(next.is_some())
     }
 
     /// Takes what a record tells; `false` where it is not what its opcode says.
@@ -129,6 +122,9 @@ impl Walk<'_> {
     }
 
     fn keep(&mut self, opcode: u8, bytes: &[u8], start: u64) -> bool {
+        if self.in_summary && !self.signposts.sound {
+            return true;
+        }
         if !self.in_summary && opcode != op::METADATA {
             // Definitions between plain messages belong to the block, which is read again with them.
             self.extend_plain(start, PREFIX + bytes.len() as u64, None);
@@ -188,13 +184,13 @@ impl Walk<'_> {
         Ok(true)
     }
 
-    /// A topic's messages in the chunk before: an entry is a time and an offset, eight bytes each.
+    /// Takes up that the chunk before has messages of a topic.
     fn message_index(&mut self, length: u64) -> Result<bool, RecordingError> {
         let bytes = self.take(length.min(6))?;
         let mut fields = record::Fields::new(&bytes);
         let (Some(channel), Some(size)) = (fields.u16(), fields.u32()) else { return Ok(false) };
         if let Some(block) = self.found.blocks.last_mut().filter(|_| size > 0) {
-            block.indexed.push((channel, u64::from(size) / 16));
+            block.indexed.push(channel);
         }
         Ok(true)
     }

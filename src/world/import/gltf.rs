@@ -3,11 +3,13 @@
 //! In glTF y points up; here z does, so that a model stands as it was made to.
 
 mod accessor;
+mod document;
 
 use super::{MAX_BYTES, MeshError, Triangle, fans};
 use crate::geometry::Vector;
-use accessor::{base64, indices, positions};
-use gltf::mesh::Mode;
+use crate::world::build::MAX_TRIANGLES;
+use accessor::{Data, base64};
+use document::{Buffer, Document, Primitive};
 use std::path::{Component, Path};
 
 type Transform = nalgebra::Matrix4<f64>;
@@ -16,15 +18,21 @@ type Transform = nalgebra::Matrix4<f64>;
 const MAX_DEPTH: usize = 64;
 const MAX_VISITS: usize = 1_000_000;
 
+/// `mode` of a primitive: points and lines lie below it.
+const TRIANGLES: u32 = 4;
+const TRIANGLE_STRIP: u32 = 5;
+const TRIANGLE_FAN: u32 = 6;
+
 /// The triangles of a glTF file; `folder` is where its buffers lie.
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Triangle>, MeshError> {
     let (json, blob) = split(bytes)?;
-    let document = gltf::Gltf::from_slice(json).map_err(|error| malformed(error.to_string()))?;
-    let buffers = document.buffers().map(|buffer| load(&buffer, blob, folder)).collect::<Result<Vec<_>, _>>()?;
-    let mut walk = Walk { buffers, triangles: Vec::new(), visits: 0 };
-    let scene = document.default_scene().or_else(|| document.scenes().next());
-    for node in scene.ok_or_else(|| malformed("it has no scene"))?.nodes() {
-        walk.visit(&node, &Transform::identity(), 0)?;
+    let document = Document::parse(json).map_err(malformed)?;
+    let buffers = document.buffers.iter().map(|buffer| load(buffer, blob, folder)).collect::<Result<Vec<_>, _>>()?;
+    let scene = document.scenes.get(document.scene).ok_or_else(|| malformed("it has no scene"))?;
+    let roots = scene.nodes.clone();
+    let mut walk = Walk { data: &Data { document, buffers }, triangles: Vec::new(), visits: 0 };
+    for root in roots {
+        walk.visit(root, &Transform::identity(), 0)?;
     }
     let upright = |corner: Vector| Vector::new(corner.x, -corner.z, corner.y);
     Ok(walk.triangles.into_iter().map(|triangle| triangle.map(upright)).collect())
@@ -58,10 +66,10 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
 }
 
 /// The bytes of a buffer: the binary chunk, a base64 URI, or a file in the mesh's folder or below.
-fn load(buffer: &gltf::Buffer<'_>, blob: Option<&[u8]>, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
-    let data = match buffer.source() {
-        gltf::buffer::Source::Bin => blob.ok_or_else(|| malformed("its binary chunk is missing"))?.to_vec(),
-        gltf::buffer::Source::Uri(uri) => match uri.strip_prefix("data:") {
+fn load(buffer: &Buffer, blob: Option<&[u8]>, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
+    let data = match &buffer.uri {
+        None => blob.ok_or_else(|| malformed("its binary chunk is missing"))?.to_vec(),
+        Some(uri) => match uri.strip_prefix("data:") {
             Some(data) => {
                 let text = data.split_once(";base64,").map(|(_, text)| text);
                 text.and_then(base64).ok_or_else(|| malformed("a buffer's data URI is not base64"))?
@@ -69,8 +77,8 @@ fn load(buffer: &gltf::Buffer<'_>, blob: Option<&[u8]>, folder: Option<&Path>) -
             None => read_beside(uri, folder)?,
         },
     };
-    if data.len() < buffer.length() {
-        let said = format!("{} bytes in buffer {}", buffer.length(), buffer.index());
+    if data.len() < buffer.byte_length {
+        let said = format!("{} bytes in a buffer", buffer.byte_length);
         return Err(MeshError::Lies { said, found: format!("{} bytes", data.len()) });
     }
     Ok(data)
@@ -92,50 +100,55 @@ fn read_beside(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
     std::fs::read(&path).map_err(named)
 }
 
-struct Walk {
-    buffers: Vec<Vec<u8>>,
+struct Walk<'a> {
+    data: &'a Data,
     triangles: Vec<Triangle>,
     visits: usize,
 }
 
-impl Walk {
-    fn visit(&mut self, node: &gltf::Node<'_>, parent: &Transform, depth: usize) -> Result<(), MeshError> {
+impl Walk<'_> {
+    fn visit(&mut self, index: usize, parent: &Transform, depth: usize) -> Result<(), MeshError> {
         self.visits += 1;
         if depth > MAX_DEPTH || self.visits > MAX_VISITS {
             return Err(malformed(format!("its nodes nest deeper than {MAX_DEPTH}, or go round")));
         }
-        let own = Transform::from(node.transform().matrix().map(|column| column.map(f64::from)));
-        let transform = parent * own;
-        for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
-            self.add(&primitive, &transform)?;
+        let document = &self.data.document;
+        let node = document.nodes.get(index);
+        let node = node.ok_or_else(|| malformed(format!("it names node {index}, which it has not")))?;
+        let transform = parent * node.transform();
+        if let Some(mesh) = node.mesh {
+            let known = document.meshes.get(mesh);
+            let known = known.ok_or_else(|| malformed(format!("it names mesh {mesh}, which it has not")))?;
+            for primitive in &known.primitives {
+                self.add(primitive, &transform)?;
+            }
         }
-        for child in node.children() {
-            self.visit(&child, &transform, depth + 1)?;
+        for child in &node.children {
+            self.visit(*child, &transform, depth + 1)?;
         }
         Ok(())
     }
 
     /// Adds a primitive; points and lines have no surface.
-    fn add(&mut self, primitive: &gltf::Primitive<'_>, transform: &Transform) -> Result<(), MeshError> {
-        if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+    fn add(&mut self, primitive: &Primitive, transform: &Transform) -> Result<(), MeshError> {
+        if primitive.mode < TRIANGLES {
             return Ok(());
         }
-        let accessor = primitive.get(&gltf::Semantic::Positions);
-        let vertices: Vec<Vector> =
-            positions(&accessor.ok_or_else(|| malformed("a primitive has no positions"))?, &self.buffers)?
-                .into_iter()
-                .map(|point| transform.transform_point(&point.into()).coords)
-                .collect();
-        let indices = match primitive.indices() {
-            Some(accessor) => indices(&accessor, &self.buffers)?,
+        let positions =
+            primitive.attributes.get("POSITION").ok_or_else(|| malformed("a primitive has no positions"))?;
+        let place = |point: Vector| transform.transform_point(&point.into()).coords;
+        let vertices: Vec<Vector> = self.data.positions(*positions)?.into_iter().map(place).collect();
+        let indices = match primitive.indices {
+            Some(index) => self.data.indices(index)?,
             None => (0..vertices.len() as i64).collect(),
         };
-        self.triangles.extend(match primitive.mode() {
-            Mode::TriangleStrip => fans(&vertices, indices.windows(3).map(<[i64]>::to_vec))?,
-            Mode::TriangleFan => fans(&vertices, std::iter::once(indices))?,
-            _ => fans(&vertices, indices.chunks_exact(3).map(<[i64]>::to_vec))?,
+        self.triangles.extend(match primitive.mode {
+            TRIANGLES => fans(&vertices, indices.chunks_exact(3).map(<[i64]>::to_vec))?,
+            TRIANGLE_STRIP => fans(&vertices, indices.windows(3).map(<[i64]>::to_vec))?,
+            TRIANGLE_FAN => fans(&vertices, std::iter::once(indices))?,
+            mode => return Err(malformed(format!("a primitive has the unknown mode {mode}"))),
         });
-        if self.triangles.len() > super::super::build::MAX_TRIANGLES {
+        if self.triangles.len() > MAX_TRIANGLES {
             return Err(malformed("its nodes repeat meshes to more triangles than a scene may have"));
         }
         Ok(())

@@ -10,7 +10,7 @@ use super::shape::Triangle;
 use crate::geometry::Vector;
 use std::path::Path;
 
-/// Largest file of a mesh: about 20 million triangles of binary STL.
+/// Largest file of a mesh: twice the triangles that a scene may have, as binary STL.
 const MAX_BYTES: u64 = 1 << 30;
 /// Largest share of triangles without area that a mesh may have.
 const MAX_SHARE_WITHOUT_AREA: f64 = 0.01;

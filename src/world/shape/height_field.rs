@@ -29,6 +29,9 @@ pub enum HeightsSpec {
 
 const OCTAVES: u32 = 3;
 
+/// Most cells of a field that is drawn from a seed.
+const MAX_CELLS: usize = 4_000_000;
+
 /// Two triangles a cell, facing up.
 pub(super) fn triangles(size_m: [f64; 2], heights: &HeightsSpec) -> Result<Vec<Triangle>, (&'static str, String)> {
     let rows = match heights {
@@ -39,6 +42,9 @@ pub(super) fn triangles(size_m: [f64; 2], heights: &HeightsSpec) -> Result<Vec<T
         HeightsSpec::Rolling { seed, cells: [columns, rows], amplitude_m, wavelength_m } => {
             within("cells", *columns, 1)?;
             within("cells", *rows, 1)?;
+            if columns * rows > MAX_CELLS {
+                return Err(("cells", format!("{columns} x {rows} cells are more than {MAX_CELLS}")));
+            }
             let noise = Noise { seed: Seed(*seed), amplitude: *amplitude_m, wavelength: *wavelength_m };
             noise.rows(size_m, [*columns, *rows])?
         }

@@ -31,14 +31,14 @@ pub(super) fn triangles(size: Vector, openings: &[OpeningSpec]) -> Result<Vec<Tr
         faces.panel([done, from_m], [0.0, size.z]);
         faces.panel([from_m, to_m], [0.0, sill_m]);
         faces.panel([from_m, to_m], [head_m, size.z]);
-        faces.floor([from_m, to_m], sill_m);
-        faces.ceiling([from_m, to_m], head_m);
         faces.end(from_m, [sill_m, head_m], true);
         faces.end(to_m, [sill_m, head_m], false);
         if sill_m > 0.0 {
+            faces.floor([from_m, to_m], sill_m);
             faces.ceiling([from_m, to_m], 0.0);
         }
         if head_m < size.z {
+            faces.ceiling([from_m, to_m], head_m);
             faces.floor([from_m, to_m], size.z);
         }
         faces.ceiling([done, from_m], 0.0);

@@ -1,56 +1,81 @@
-//! The numbers in a buffer of a glTF file, with every offset checked against its length.
+//! The numbers in the buffers of a glTF file, with every index and every offset checked.
 
+use super::document::{Accessor, Document};
 use super::{MeshError, malformed};
 use crate::geometry::Vector;
-use gltf::accessor::{Accessor, DataType, Dimensions};
 
-/// Points: three single-precision numbers each.
-pub(super) fn positions(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<Vec<Vector>, MeshError> {
-    if (accessor.data_type(), accessor.dimensions()) != (DataType::F32, Dimensions::Vec3) {
-        return Err(malformed("positions are not three floats"));
-    }
-    let point = |element: &[u8]| {
-        let mut numbers = element.chunks_exact(4).map(|word| f32::from_le_bytes([word[0], word[1], word[2], word[3]]));
-        let mut next = || numbers.next().map_or(f64::NAN, f64::from);
-        Vector::new(next(), next(), next())
-    };
-    Ok(elements(accessor, 12, buffers)?.map(point).collect())
+/// `componentType` of the specification.
+const U8: u32 = 5121;
+const U16: u32 = 5123;
+const U32: u32 = 5125;
+const F32: u32 = 5126;
+
+/// A document with the bytes of its buffers.
+pub(super) struct Data {
+    pub document: Document,
+    pub buffers: Vec<Vec<u8>>,
 }
 
-/// Indices of one, two or four bytes.
-pub(super) fn indices(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<Vec<i64>, MeshError> {
-    let size = match (accessor.data_type(), accessor.dimensions()) {
-        (DataType::U8, Dimensions::Scalar) => 1,
-        (DataType::U16, Dimensions::Scalar) => 2,
-        (DataType::U32, Dimensions::Scalar) => 4,
-        _ => return Err(malformed("indices are not unsigned integers")),
-    };
-    let index = |element: &[u8]| element.iter().rev().fold(0, |index, byte| index << 8 | i64::from(*byte));
-    Ok(elements(accessor, size, buffers)?.map(index).collect())
-}
-
-/// The elements of an accessor, `size` bytes each.
-fn elements<'b>(
-    accessor: &Accessor<'_>,
-    size: usize,
-    buffers: &'b [Vec<u8>],
-) -> Result<impl Iterator<Item = &'b [u8]>, MeshError> {
-    if accessor.sparse().is_some() {
-        return Err(malformed("it has sparse accessors, which are not read: export it without"));
+impl Data {
+    /// The points of an accessor: three single-precision numbers each.
+    pub fn positions(&self, index: usize) -> Result<Vec<Vector>, MeshError> {
+        let accessor = self.accessor(index)?;
+        if accessor.component_type != F32 || accessor.shape != "VEC3" {
+            return Err(malformed("positions are not three floats"));
+        }
+        let point = |element: &[u8]| {
+            let mut words =
+                element.chunks_exact(4).map(|word| f32::from_le_bytes([word[0], word[1], word[2], word[3]]));
+            let mut next = || words.next().map_or(f64::NAN, f64::from);
+            Vector::new(next(), next(), next())
+        };
+        Ok(self.elements(index, accessor, 12)?.map(point).collect())
     }
-    let view = accessor.view().ok_or_else(|| malformed("an accessor has no data"))?;
-    let (stride, count) = (view.stride().unwrap_or(size), accessor.count());
-    let span = || {
-        let buffer = buffers.get(view.buffer().index())?;
-        let view_bytes = buffer.get(view.offset()..view.offset().checked_add(view.length())?)?;
-        let last = count.checked_sub(1)?.checked_mul(stride)?.checked_add(size)?;
-        view_bytes.get(accessor.offset()..accessor.offset().checked_add(last)?)
-    };
-    let bytes = if count == 0 { Some(&[][..]) } else { span() };
-    let bytes = bytes
-        .filter(|_| stride >= size)
-        .ok_or_else(|| malformed(format!("accessor {} reaches beyond its buffer", accessor.index())))?;
-    Ok((0..count).map(move |k| &bytes[k * stride..k * stride + size]))
+
+    /// The indices of an accessor: one, two or four bytes each.
+    pub fn indices(&self, index: usize) -> Result<Vec<i64>, MeshError> {
+        let accessor = self.accessor(index)?;
+        let size = match (accessor.component_type, accessor.shape.as_str()) {
+            (U8, "SCALAR") => 1,
+            (U16, "SCALAR") => 2,
+            (U32, "SCALAR") => 4,
+            _ => return Err(malformed("indices are not unsigned integers")),
+        };
+        let value = |element: &[u8]| element.iter().rev().fold(0, |value, byte| value << 8 | i64::from(*byte));
+        Ok(self.elements(index, accessor, size)?.map(value).collect())
+    }
+
+    fn accessor(&self, index: usize) -> Result<&Accessor, MeshError> {
+        let accessor = self.document.accessors.get(index);
+        let accessor = accessor.ok_or_else(|| malformed(format!("it names accessor {index}, which it has not")))?;
+        if accessor.sparse.is_some() {
+            return Err(malformed("it has sparse accessors, which are not read: export it without"));
+        }
+        Ok(accessor)
+    }
+
+    /// The elements of an accessor, `size` bytes each.
+    fn elements(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        size: usize,
+    ) -> Result<impl Iterator<Item = &[u8]>, MeshError> {
+        let span = || {
+            let view = self.document.buffer_views.get(accessor.buffer_view?)?;
+            let stride = view.byte_stride.unwrap_or(size);
+            let bytes = self.buffers.get(view.buffer)?;
+            let bytes = bytes.get(view.byte_offset..view.byte_offset.checked_add(view.byte_length)?)?;
+            let length = match accessor.count.checked_sub(1) {
+                Some(before) => before.checked_mul(stride)?.checked_add(size)?,
+                None => 0,
+            };
+            let bytes = bytes.get(accessor.byte_offset..accessor.byte_offset.checked_add(length)?)?;
+            (stride >= size).then_some((stride, bytes))
+        };
+        let (stride, bytes) = span().ok_or_else(|| malformed(format!("accessor {index} reaches beyond its buffer")))?;
+        Ok((0..accessor.count).map(move |k| &bytes[k * stride..k * stride + size]))
+    }
 }
 
 /// Decodes base64 (RFC 4648), padded or not.
@@ -78,9 +103,9 @@ mod tests {
     #[test]
     fn base64_agrees_with_the_vectors_of_its_standard() {
         // RFC 4648, section 10.
-        for (text, bytes) in
-            [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9v", "foo"), ("Zm9vYg==", "foob"), ("Zm9vYmE", "fooba")]
-        {
+        let vectors =
+            [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9v", "foo"), ("Zm9vYg==", "foob"), ("Zm9vYmE", "fooba")];
+        for (text, bytes) in vectors {
             assert_eq!(base64(text).unwrap(), bytes.as_bytes());
         }
         assert!(base64("Zm9*").is_none());

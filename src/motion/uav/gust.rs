@@ -1,0 +1,144 @@
+//! Gusts of wind, and what a hovering craft makes of them.
+
+use super::UavSpec;
+use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
+use crate::motion::sines::{Line, Part, Sines, geometric_parts};
+use crate::random::Stream;
+use crate::spec::checked::{non_negative, positive};
+use nalgebra::Complex;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
+
+/// Wind with Dryden's gusts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GustSpec {
+    /// Mean wind at 6 m (20 feet) above the ground, m/s: gusts grow with it. Light turbulence: 7.7, moderate: 15.4.
+    #[serde(deserialize_with = "non_negative")]
+    pub wind_m_per_s: f64,
+    /// Speed at which the craft meets the air, m/s.
+    #[serde(deserialize_with = "positive")]
+    pub airspeed_m_per_s: f64,
+}
+
+/// A direction of gusts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Axis {
+    /// Along the airspeed.
+    Along,
+    /// Across it, level.
+    Across,
+    /// Up.
+    Up,
+}
+
+const FOOT_M: f64 = 0.3048;
+
+/// Frequencies of gusts, Hz.
+const BAND_HZ: (f64, f64) = (0.005, 5.0);
+
+/// Sinusoids in the gusts of an axis.
+const LINES: usize = 150;
+
+impl GustSpec {
+    /// Standard deviation (m/s) and scale (m) of the gusts at a height (MIL-F-8785C, section 3.7.3.4): `L_w = h`,
+    /// `L_u = L_v = h / (0.177 + 0.000823 h)^1.2`, `s_w = 0.1 W`, `s_u = s_v = s_w / (0.177 + 0.000823 h)^0.4` with h in feet,
+    /// from 10 to 1000 of them; below and above, the values there.
+    fn scales(&self, axis: Axis, height_m: f64) -> (f64, f64) {
+        let h = (height_m / FOOT_M).clamp(10.0, 1000.0);
+        let base = 0.177 + 0.000_823 * h;
+        let up = 0.1 * self.wind_m_per_s;
+        match axis {
+            Axis::Up => (up, h * FOOT_M),
+            Axis::Along | Axis::Across => (up / base.powf(0.4), h / base.powf(1.2) * FOOT_M),
+        }
+    }
+
+    /// The one-sided density of the gusts along an axis at `freq_hz`, (m/s)^2/Hz. Over the angular frequency w, with
+    /// `x = L w / V` (MIL-F-8785C, section 3.7.1.2): along `s^2 2L/(pi V) / (1 + x^2)`, across and up
+    /// `s^2 L/(pi V) (1 + 3 x^2) / (1 + x^2)^2`.
+    pub(super) fn density(&self, axis: Axis, height_m: f64, freq_hz: f64) -> f64 {
+        let (deviation, scale_m) = self.scales(axis, height_m);
+        let passing_s = scale_m / self.airspeed_m_per_s;
+        let x2 = (passing_s * TAU * freq_hz).powi(2);
+        let form = match axis {
+            Axis::Along => 2.0 / (1.0 + x2),
+            Axis::Across | Axis::Up => (1.0 + 3.0 * x2) / (1.0 + x2).powi(2),
+        };
+        TAU * deviation * deviation * passing_s / PI * form
+    }
+
+    fn parts(&self, axis: Axis, height_m: f64, stream: &mut Stream) -> Vec<(f64, Complex<f64>)> {
+        let parts = geometric_parts(BAND_HZ, LINES, stream);
+        parts.iter().map(|part: &Part| (part.at, part.amplitude(self.density(axis, height_m, part.at)))).collect()
+    }
+}
+
+/// Displacement for a gust of 1 m/s: the craft is dragged by the air and held by `x'' = -2 z w0 x' - w0^2 x + d (g - x')`.
+fn displacement(spec: &UavSpec, rate: f64) -> Complex<f64> {
+    let natural = TAU * spec.hold_hz;
+    let damping = 2.0 * spec.hold_damping * natural + spec.drag_per_s;
+    Complex::from(spec.drag_per_s) / Complex::new(natural * natural - rate * rate, damping * rate)
+}
+
+/// Displacement (m) and tilt (rad, towards the displacement) by the gusts of a level axis: the tilt is the controller's
+/// acceleration over gravity.
+pub(super) fn horizontal(spec: &UavSpec, axis: Axis, stream: &mut Stream) -> Sines<2> {
+    let natural = TAU * spec.hold_hz;
+    let line = |(freq_hz, gust): (f64, Complex<f64>)| {
+        let rate = TAU * freq_hz;
+        let moved = gust * displacement(spec, rate);
+        let command = -moved * Complex::new(natural * natural, 2.0 * spec.hold_damping * natural * rate);
+        Line { cycles: freq_hz, amplitudes: [moved, command / STANDARD_GRAVITY_M_PER_S2] }
+    };
+    Sines::new(spec.gust.parts(axis, spec.height_m, stream).into_iter().map(line).collect())
+}
+
+/// Displacement (m) by the gusts up and down.
+pub(super) fn vertical(spec: &UavSpec, stream: &mut Stream) -> Sines<1> {
+    let line = |(freq_hz, gust): (f64, Complex<f64>)| Line {
+        cycles: freq_hz,
+        amplitudes: [gust * displacement(spec, TAU * freq_hz)],
+    };
+    Sines::new(spec.gust.parts(Axis::Up, spec.height_m, stream).into_iter().map(line).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Seed;
+    use crate::signal::{Segments, power_density};
+    use approx::assert_relative_eq;
+
+    const WIND: GustSpec = GustSpec { wind_m_per_s: 7.7, airspeed_m_per_s: 8.0 };
+
+    #[test]
+    fn the_variance_is_that_of_the_model() {
+        // All power from 0 to infinity is s^2; at 100 feet s_w = 0.77 m/s and s_u = 0.77 / 0.2593^0.4 = 1.321 m/s.
+        for (axis, deviation) in [(Axis::Along, 1.3213), (Axis::Across, 1.3213), (Axis::Up, 0.77)] {
+            let steps = 400_000;
+            let h = 200.0 / f64::from(steps);
+            let power: f64 = (0..steps).map(|k| WIND.density(axis, 30.48, h * (f64::from(k) + 0.5)) * h).sum();
+            assert_relative_eq!(power.sqrt(), deviation, max_relative = 2e-3);
+        }
+    }
+
+    #[test]
+    fn synthesised_gusts_have_drydens_spectrum() {
+        for axis in [Axis::Along, Axis::Across, Axis::Up] {
+            let mut stream = Seed(4).stream("gust");
+            let line = |(freq_hz, gust)| Line { cycles: freq_hz, amplitudes: [gust] };
+            let gusts = Sines::new(WIND.parts(axis, 30.48, &mut stream).into_iter().map(line).collect());
+            let samples: Vec<f64> = (0..60_000).map(|k| gusts.at(0.05 * f64::from(k))[0].x).collect();
+            let spectrum = power_density(&samples, 20.0, Segments::hann(4096)).unwrap();
+            // Octaves of some 15 sinusoids against the formula's integral.
+            for octave in 0..6 {
+                let low = 0.05 * f64::from(1 << octave);
+                let h = low / 1000.0;
+                let expected: f64 =
+                    (0..1000).map(|k| WIND.density(axis, 30.48, low + h * (f64::from(k) + 0.5)) * h).sum();
+                assert_relative_eq!(spectrum.power_between(low, 2.0 * low), expected, max_relative = 0.12);
+            }
+        }
+    }
+}

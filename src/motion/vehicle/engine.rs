@@ -1,0 +1,88 @@
+//! What an engine shakes a body with: harmonics of its speed.
+
+use crate::motion::jet::Jet;
+use crate::motion::rhythm::Wander;
+use crate::motion::sines::{Line, Sines};
+use crate::random::Stream;
+use crate::spec::checked::{finite_array, non_negative, positive};
+use nalgebra::Complex;
+use rand::RngExt;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// An engine that runs at one speed, more or less.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EngineSpec {
+    /// Its speed, revolutions a minute.
+    #[serde(deserialize_with = "positive")]
+    pub speed_rpm: f64,
+    /// How far its phase wanders, turns rms, at up to 0.5 Hz.
+    #[serde(deserialize_with = "non_negative")]
+    pub irregularity_turns: f64,
+    /// Its harmonics.
+    pub orders: Vec<OrderSpec>,
+}
+
+/// A harmonic of an engine's speed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OrderSpec {
+    /// Cycles a revolution: 1 is imbalance; a four-stroke engine of n cylinders fires n / 2 times.
+    #[serde(deserialize_with = "positive")]
+    pub order: f64,
+    /// Amplitude of acceleration forward, to the left and up, m/s^2.
+    #[serde(deserialize_with = "finite_array")]
+    pub acceleration_m_per_s2: [f64; 3],
+}
+
+/// An engine that runs.
+pub(super) struct Engine {
+    turns_per_s: f64,
+    irregularity_turns: f64,
+    wander: Wander,
+    /// Displacement forward, to the left and up, m, over the engine's turns.
+    shaking: Sines<3>,
+}
+
+impl Engine {
+    pub fn new(spec: &EngineSpec, stream: &mut Stream) -> Self {
+        let turns_per_s = spec.speed_rpm / 60.0;
+        let line = |order: &OrderSpec| {
+            let square = (TAU * order.order * turns_per_s).powi(2);
+            let phase = Complex::from_polar(1.0, TAU * stream.random::<f64>());
+            Line { cycles: order.order, amplitudes: order.acceleration_m_per_s2.map(|a| phase * (a / square)) }
+        };
+        let shaking = Sines::new(spec.orders.iter().map(line).collect());
+        let wander = Wander::new(0.5, stream);
+        Self { turns_per_s, irregularity_turns: spec.irregularity_turns, wander, shaking }
+    }
+
+    /// Displacement forward, to the left and up, m.
+    pub fn at(&self, t_s: f64) -> [Jet; 3] {
+        let turns = Jet::linear(t_s, self.turns_per_s, 0.0) + self.wander.at(t_s) * self.irregularity_turns;
+        self.shaking.at(turns.x).map(|jet| jet.of(turns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Seed;
+    use crate::signal::{Segments, power_density};
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn harmonics_stand_at_multiples_of_the_speed_with_their_strength() {
+        // 1500 rpm is 25 Hz: order 1 at 25 Hz, order 2 at 50 Hz; a sine of amplitude a has the power a^2 / 2.
+        let order = |order, up| OrderSpec { order, acceleration_m_per_s2: [0.0, 0.0, up] };
+        let orders = vec![order(1.0, 0.5), order(2.0, 2.0)];
+        let spec = EngineSpec { speed_rpm: 1500.0, irregularity_turns: 0.0, orders };
+        let engine = Engine::new(&spec, &mut Seed(1).stream("engine"));
+        let up: Vec<f64> = (0..20_000).map(|k| engine.at(1e-3 * f64::from(k))[2].dd).collect();
+        let spectrum = power_density(&up, 1000.0, Segments::hann(2000)).unwrap();
+        assert_relative_eq!(spectrum.power_between(23.0, 27.0), 0.125, max_relative = 1e-3);
+        assert_relative_eq!(spectrum.power_between(48.0, 52.0), 2.0, max_relative = 1e-3);
+        assert_relative_eq!(spectrum.power_between(0.0, 501.0), 2.125, max_relative = 1e-3);
+    }
+}

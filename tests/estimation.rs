@@ -1,0 +1,223 @@
+//! The estimator on closed-form walks: accuracy, repeatability, and what it does with recordings that are not as they
+//! should be.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod estimation_fixture;
+
+use estimation_fixture::{Room, Run, Score, Walk, calibration};
+use zsim::estimation::{EstimationError, Estimator, EstimatorSpec, OpenLoop, WarningKind, estimate_all, load};
+use zsim::geometry::{Pose, Vector, from_roll_pitch_yaw};
+use zsim::measurement::Measurement;
+use zsim::time::{Span, Stamp};
+
+fn hall(seed: u64, duration_s: f64) -> Run {
+    Run::new(Room::furnished(), Walk { start_s: 1.5, ..Walk::new((1.8, 1.2), 25.0) }, seed, duration_s)
+}
+
+fn spec() -> EstimatorSpec {
+    load("default").unwrap()
+}
+
+fn estimate(measurements: Vec<Measurement>) -> OpenLoop {
+    estimate_all(&spec(), &calibration(), measurements.into_iter()).unwrap()
+}
+
+fn stamp_of(measurement: &mut Measurement) -> &mut Stamp {
+    match measurement {
+        Measurement::Imu(sample) => &mut sample.stamp,
+        Measurement::Lidar(scan) => &mut scan.stamp,
+    }
+}
+
+fn seconds(measurement: &Measurement) -> f64 {
+    match measurement {
+        Measurement::Imu(sample) => sample.stamp.nanos() as f64 * 1e-9,
+        Measurement::Lidar(scan) => scan.stamp.nanos() as f64 * 1e-9,
+    }
+}
+
+#[test]
+fn a_walk_through_a_hall_is_followed_to_a_centimetre_and_the_clock_to_a_fifth_of_a_millisecond() {
+    let run = hall(11, 14.0);
+    let result = estimate(run.measurements());
+    let score = Score::of(&result, &run);
+    assert!(score.rmse_m < 0.01, "{score:?}");
+    assert!(score.clock_end_s.abs() < 2e-4, "{score:?}");
+    // Poses stand at whole multiples of the IMU's period, without a hole, over the whole recording.
+    let stamps = result.trajectory.stamps();
+    assert!(stamps.iter().all(|stamp| stamp.nanos() % 10_000_000 == 0));
+    assert!(stamps.windows(2).all(|pair| (pair[1] - pair[0]).nanos() == 10_000_000));
+    let (first, last) = result.trajectory.span().unwrap();
+    assert!(first < Stamp::from_nanos(100_000_000) && last > Stamp::from_nanos(13_800_000_000), "{first:?} {last:?}");
+}
+
+#[test]
+fn without_noise_the_walk_is_followed_to_a_few_millimetres() {
+    let run = Run { noise: 0.0, jitter_s: 0.0, ..hall(1, 10.0) };
+    let score = Score::of(&estimate(run.measurements()), &run);
+    assert!(score.rmse_m < 0.003 && score.rotation_deg < 0.06, "{score:?}");
+}
+
+#[test]
+fn the_estimate_is_the_same_to_the_bit_with_one_thread_and_with_three() {
+    let measurements = hall(5, 7.0).measurements();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| estimate(measurements.clone())).poses
+    };
+    assert!(with(1) == with(3));
+}
+
+#[test]
+fn turning_and_shifting_the_world_does_not_change_what_is_estimated_of_it() {
+    let here = hall(6, 8.0);
+    let mut there = here.clone();
+    there.walk.world_from_room =
+        Pose::from_parts(Vector::new(40.0, -25.0, 3.0).into(), from_roll_pitch_yaw(0.0, 0.0, 2.1));
+    let (a, b) = (estimate(here.measurements()), estimate(there.measurements()));
+    // The map begins at the head, whatever the world; a range rounded the other way is all that can differ.
+    for (p, q) in a.poses.iter().zip(&b.poses) {
+        let apart = p.map_from_head.translation.vector - q.map_from_head.translation.vector;
+        assert!(apart.norm() < 1e-4, "{:?}: {apart}", p.stamp);
+    }
+}
+
+#[test]
+fn poses_are_handed_out_in_order_while_measurements_come() {
+    let mut estimator = Estimator::new(&spec(), &calibration()).unwrap();
+    let (mut taken, mut latest_s) = (Vec::new(), 0.0_f64);
+    for measurement in hall(7, 8.0).measurements() {
+        latest_s = latest_s.max(seconds(&measurement));
+        estimator.push(measurement).unwrap();
+        taken.extend(estimator.take_poses());
+        if let Some(last) = taken.last() {
+            // The stated latency: window_s + step_s, and 0.1 s for latecomers; a scan more until the next one comes.
+            let behind_s = latest_s - last.stamp.nanos() as f64 * 1e-9;
+            assert!(behind_s < 4.0 + 2.0 * 0.5 + 0.15, "{behind_s}");
+        }
+    }
+    assert!(taken.len() > 250, "{}", taken.len());
+    let rest = estimator.finish().unwrap();
+    taken.extend(rest.poses);
+    assert!(taken.windows(2).all(|pair| (pair[1].stamp - pair[0].stamp).nanos() == 10_000_000));
+}
+
+#[test]
+fn arrivals_in_small_disorder_change_nothing() {
+    let tidy = hall(8, 6.0).measurements();
+    let mut untidy = tidy.clone();
+    for three in untidy[3..].chunks_exact_mut(3) {
+        three.swap(0, 2);
+    }
+    assert!(tidy != untidy);
+    assert!(estimate(tidy).poses == estimate(untidy).poses);
+}
+
+#[test]
+fn a_start_in_motion_is_said_and_survived() {
+    let mut run = hall(9, 12.0);
+    run.walk.start_s = -10.0;
+    let result = estimate(run.measurements());
+    assert!(result.warnings.iter().any(|w| w.kind == WarningKind::StartedInMotion), "{:?}", result.warnings);
+    let score = Score::of(&result, &run);
+    assert!(score.rmse_m < 0.05, "{score:?}");
+}
+
+#[test]
+fn a_tenth_of_all_messages_may_be_lost() {
+    let run = hall(10, 10.0);
+    let kept = run.measurements().into_iter().enumerate().filter(|(k, _)| k % 10 != 4).map(|(_, m)| m).collect();
+    let score = Score::of(&estimate(kept), &run);
+    assert!(score.rmse_m < 0.03, "{score:?}");
+}
+
+#[test]
+fn a_gap_of_two_seconds_in_everything_is_said() {
+    let measurements = hall(12, 12.0).measurements();
+    let kept = measurements.into_iter().filter(|m| !(6.0..8.0).contains(&seconds(m))).collect();
+    let result = estimate(kept);
+    let gap = |kind: &WarningKind| matches!(kind, WarningKind::ImuGap { seconds } if (1.9..2.1).contains(seconds));
+    assert!(result.warnings.iter().any(|w| gap(&w.kind)), "{:?}", result.warnings);
+    assert!(result.trajectory.span().unwrap().1 > Stamp::from_nanos(11_500_000_000));
+}
+
+#[test]
+fn a_gap_too_long_to_bridge_ends_the_estimate() {
+    let mut measurements = hall(13, 9.0).measurements();
+    for measurement in &mut measurements {
+        if seconds(measurement) > 6.0 {
+            *stamp_of(measurement) += Span::from_seconds(1000.0);
+        }
+    }
+    let result = estimate(measurements);
+    assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::Ended { .. })), "{:?}", result.warnings);
+    let end = result.trajectory.span().unwrap().1;
+    assert!(end > Stamp::from_nanos(5_000_000_000) && end < Stamp::from_nanos(6_100_000_000), "{end:?}");
+}
+
+#[test]
+fn time_that_runs_backwards_is_left_out_and_said() {
+    let mut measurements = hall(14, 9.0).measurements();
+    for measurement in &mut measurements {
+        if seconds(measurement) > 6.0 {
+            *stamp_of(measurement) += Span::from_seconds(-5.0);
+        }
+    }
+    let result = estimate(measurements);
+    let left_out = |kind: &WarningKind| matches!(kind, WarningKind::LeftOut { count, .. } if *count > 50);
+    assert!(result.warnings.iter().any(|w| left_out(&w.kind)), "{:?}", result.warnings);
+    assert!(result.trajectory.len() > 300);
+}
+
+#[test]
+fn a_lidar_that_sees_nothing_leaves_the_imu_and_a_warning() {
+    let mut measurements = hall(15, 8.0).measurements();
+    for measurement in &mut measurements {
+        if let Measurement::Lidar(scan) = measurement {
+            scan.returns.clear();
+        }
+    }
+    let result = estimate(measurements);
+    assert!(result.trajectory.len() > 700);
+    assert!(result.windows.iter().all(|window| window.matches == 0));
+    assert!(!result.warnings.is_empty());
+}
+
+#[test]
+fn a_lidar_that_falls_silent_leaves_the_imu_and_a_warning() {
+    let all = hall(16, 10.0).measurements();
+    let kept = all.into_iter().filter(|m| matches!(m, Measurement::Imu(_)) || seconds(m) < 6.0).collect();
+    let result = estimate(kept);
+    assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::LidarGap { .. })), "{:?}", result.warnings);
+    assert!(result.trajectory.span().unwrap().1 > Stamp::from_nanos(9_000_000_000));
+}
+
+#[test]
+fn a_recording_without_one_of_the_sensors_is_an_error() {
+    let all = hall(17, 4.0).measurements();
+    let (imu, lidar): (Vec<_>, Vec<_>) = all.into_iter().partition(|m| matches!(m, Measurement::Imu(_)));
+    let run = |measurements: Vec<Measurement>| estimate_all(&spec(), &calibration(), measurements.into_iter());
+    assert_eq!(run(Vec::new()).unwrap_err(), EstimationError::NoImu { scans: 0 });
+    assert_eq!(run(lidar).unwrap_err(), EstimationError::NoImu { scans: 160 });
+    assert_eq!(run(imu).unwrap_err(), EstimationError::NoLidar { samples: 400 });
+    let short = hall(17, 0.4).measurements();
+    assert!(matches!(run(short).unwrap_err(), EstimationError::TooShort { .. }));
+}
+
+#[test]
+fn a_measurement_that_is_not_a_number_is_refused() {
+    let mut estimator = Estimator::new(&spec(), &calibration()).unwrap();
+    let mut sample = hall(18, 1.0).measurements().into_iter().find(|m| matches!(m, Measurement::Imu(_))).unwrap();
+    if let Measurement::Imu(sample) = &mut sample {
+        sample.angular_velocity_rad_per_s.x = f64::NAN;
+    }
+    assert!(matches!(estimator.push(sample).unwrap_err(), EstimationError::NotFinite { sensor: "IMU", .. }));
+}
+
+#[test]
+fn a_calibration_without_noise_is_refused() {
+    let mut calibration = calibration();
+    calibration.imu.gyro_density_rad_per_s_per_sqrt_hz = 0.0;
+    assert!(matches!(Estimator::new(&spec(), &calibration).unwrap_err(), EstimationError::Calibration(_)));
+}

@@ -1,0 +1,56 @@
+//! A process that is killed while it records leaves all but its last chunk.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod recordings;
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use zsim::measurement::Sink;
+use zsim::recording::{Preference, Reader, Writer};
+use zsim::time::Stamp;
+
+/// Names the file that the child records to.
+const FILE: &str = "ZSIM_TEST_RECORDING";
+
+#[test]
+#[ignore = "runs for ever: the other test starts it in a process of its own, and kills that"]
+fn record_until_killed() {
+    let Ok(path) = std::env::var(FILE) else { return };
+    let mut writer = Writer::create(Path::new(&path), recordings::run()).unwrap();
+    for k in 0.. {
+        let now = Stamp::from_nanos(k * 25_000_000);
+        writer.lidar(now, &recordings::planar_scan(now)).unwrap();
+        writer.imu(now, &recordings::imu_sample(now)).unwrap();
+    }
+}
+
+#[test]
+fn a_killed_process_leaves_all_but_its_last_chunk() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut child = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "record_until_killed", "--ignored"])
+        .env(FILE, &path)
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let length = || std::fs::metadata(&path).map_or(0, |file| file.len());
+    while length() < 2_000_000 {
+        assert!(child.try_wait().unwrap().is_none(), "the child ended by itself");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+
+    let reader = Reader::open(&path).unwrap();
+    let selection = reader.select(&Preference::default()).unwrap();
+    let mut measurements = reader.measurements(&selection);
+    let count = measurements.by_ref().map(|m| m.unwrap()).count();
+    let loss = measurements.loss();
+    assert!(loss.cut_short && loss.damaged_chunks == 0, "{loss}");
+    // A chunk is a megabyte of messages; what is lost of the file is less than one packed chunk.
+    assert!(loss.lost_bytes < 1 << 20, "{loss}");
+    // A sweep and a sample are about 30 kB, packed to no more: what is in the file was read.
+    assert!(count as u64 * 15_000 > length() - loss.lost_bytes, "{count} measurements of {} bytes", length());
+}

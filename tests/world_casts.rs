@@ -1,0 +1,255 @@
+//! Rays and nearest points against closed forms, and against a search through every triangle.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use approx::assert_relative_eq;
+use rand::RngExt;
+use zsim::geometry::{Surface, Vector};
+use zsim::random::Seed;
+use zsim::spec::{Source, parse};
+use zsim::world::{Ray, World};
+
+/// A world of `items` out of opaque `a` and `b` and transparent `glass`, with more `fields` of a scene.
+fn world(items: &str, fields: &str) -> World {
+    let text = format!(
+        r#"(
+            name: "test",
+            materials: {{"a": (reflectance: 0.5), "b": (reflectance: 0.1), "glass": (reflectance: 0.1, kind: Glass(transmission: 0.8))}},
+            items: [{items}],
+            {fields}
+        )"#
+    );
+    let source = Source::in_memory("test", text);
+    World::build(&parse(&source).unwrap(), &source).unwrap()
+}
+
+fn ray(origin_in_world: Vector, towards: Vector) -> Ray {
+    Ray { origin_in_world, direction_in_world: towards.normalize() }
+}
+
+/// Directions all over the sphere.
+fn directions(count: usize) -> Vec<Vector> {
+    let mut stream = Seed(5).stream("directions");
+    let mut draw = || Vector::from_fn(|_, _| stream.random_range(-1.0..1.0));
+    (0..count).map(|_| draw()).filter(|v: &Vector| v.norm() > 0.1).map(|v| v.normalize()).collect()
+}
+
+#[test]
+fn from_inside_a_box_every_ray_reaches_the_wall_it_points_at() {
+    // Slabs: along each axis the wall is at +-size/2 from the middle; the nearest is hit.
+    let world = world("Solid(shape: Box(size_m: (8, 6, 4)), material: \"a\", at_m_deg: [(100, 50, 10)])", "");
+    let eye_in_box = Vector::new(1.0, -0.5, 0.3);
+    for direction in directions(20_000) {
+        let half = Vector::new(4.0, 3.0, 2.0);
+        let to_wall = |axis: usize| (half[axis] * direction[axis].signum() - eye_in_box[axis]) / direction[axis];
+        let (axis, expected) = (0..3).map(|axis| (axis, to_wall(axis))).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        let hit = world.cast(&ray(eye_in_box + Vector::new(100.0, 50.0, 12.0), direction), 30.0, 0.0).unwrap();
+        assert_relative_eq!(hit.distance_m, expected, epsilon = 1e-9);
+        let normal = Vector::ith(axis, -direction[axis].signum());
+        assert_relative_eq!(hit.normal_in_world, normal, epsilon = 1e-12);
+        assert_eq!(world.material(hit.material).name, "a");
+    }
+}
+
+#[test]
+fn a_cylinder_is_hit_within_the_sagitta_of_its_sides() {
+    // A regular polygon of n sides in a circle of radius r lies within r (1 - cos(pi / n)) of it; an oblique ray meets it
+    // that much later at most, divided by the cosine of incidence on the circle.
+    let world = world(
+        "Solid(shape: Cylinder(radius_m: 0.5, height_m: 4, sides: 64), material: \"a\", at_m_deg: [(3, 0, -2)])",
+        "",
+    );
+    let sagitta = 0.5 * (1.0 - (std::f64::consts::PI / 64.0).cos());
+    for k in -9..=9 {
+        let angle = f64::from(k) / 60.0;
+        let direction = Vector::new(angle.cos(), angle.sin(), 0.0);
+        let beside = 3.0 * angle.sin();
+        let expected = 3.0 * angle.cos() - (0.25 - beside * beside).sqrt();
+        let incidence = (beside / 0.5).asin();
+        let hit = world.cast(&ray(Vector::new(0.0, 0.0, 0.1), direction), 30.0, 0.0).unwrap();
+        assert!(hit.distance_m >= expected - 1e-9, "{k}");
+        assert!(hit.distance_m <= expected + 1.1 * sagitta / incidence.cos(), "{k}: {} {expected}", hit.distance_m);
+    }
+}
+
+#[test]
+fn a_tilted_plane_far_from_the_origin_is_met_to_a_nanometre() {
+    // The plane through p with normal n: t = n . (p - o) / n . d. 50 km away, single precision alone is 2 mm off.
+    let world = world(
+        "Solid(shape: Rectangle(size_m: (200, 200)), material: \"b\", at_m_deg: [(50000, -30000, 7, 20, 30, 10)])",
+        "",
+    );
+    let point = Vector::new(50_000.0, -30_000.0, 7.0);
+    let turn = zsim::geometry::from_roll_pitch_yaw(10_f64.to_radians(), 30_f64.to_radians(), 20_f64.to_radians());
+    let normal = turn * Vector::z();
+    let eye = point + normal * 12.0 + turn * Vector::new(3.0, -4.0, 0.0);
+    for direction in directions(5000).into_iter().filter(|d| normal.dot(d) < -0.2) {
+        let expected = normal.dot(&(point - eye)) / normal.dot(&direction);
+        let hit = world.cast(&ray(eye, direction), 100.0, 0.0).unwrap();
+        assert_relative_eq!(hit.distance_m, expected, epsilon = 1e-9);
+        assert_relative_eq!(hit.normal_in_world, normal, epsilon = 1e-9);
+    }
+}
+
+#[test]
+fn nothing_is_met_beyond_the_range_or_behind_the_eye() {
+    let world = world("Solid(shape: Box(size_m: (1, 10, 10)), material: \"a\", at_m_deg: [(10.5, 0, -5)])", "");
+    let ahead = ray(Vector::zeros(), Vector::x());
+    assert_relative_eq!(world.cast(&ahead, 10.001, 0.0).unwrap().distance_m, 10.0, epsilon = 1e-9);
+    assert!(world.cast(&ahead, 9.999, 0.0).is_none());
+    assert!(world.cast(&ray(Vector::zeros(), -Vector::x()), 30.0, 0.0).is_none());
+}
+
+#[test]
+fn behind_a_pane_of_glass_stands_what_stands_behind_it() {
+    let items = r#"Solid(shape: Rectangle(size_m: (2, 2)), material: "glass", at_m_deg: [(2, 0, 0, 0, 90)]),
+        Solid(shape: Box(size_m: (1, 4, 4)), material: "b", at_m_deg: [(5.5, 0, -2)])"#;
+    let world = world(items, "");
+    let ray = ray(Vector::zeros(), Vector::new(1.0, 0.1, 0.05));
+    let stretch = ray.direction_in_world.x.recip();
+    let pane = world.cast(&ray, 30.0, 0.0).unwrap();
+    assert!(world.material(pane.material).is_transparent());
+    assert_relative_eq!(pane.distance_m, 2.0 * stretch, epsilon = 1e-9);
+    let wall = world.cast_beyond(&ray, pane.distance_m, 30.0, 0.0).unwrap();
+    assert_eq!(world.material(wall.material).name, "b");
+    assert_relative_eq!(wall.distance_m, 5.0 * stretch, epsilon = 1e-9);
+    let back = world.cast_beyond(&ray, wall.distance_m, 30.0, 0.0).unwrap();
+    assert_relative_eq!(back.distance_m, 6.0 * stretch, epsilon = 1e-9);
+    assert!(world.cast_beyond(&ray, wall.distance_m, 5.5, 0.0).is_none());
+}
+
+#[test]
+fn a_door_that_swings_and_a_person_who_walks_are_met_where_they_are_then() {
+    // The person, a box of 0.4 m, walks from y = -4 to 4 m in 8 s at x = 5 m; the door's leaf swings about (2, 0) from
+    // lying along x to lying along y in 2 s.
+    let fields = r#"
+        templates: {
+            "person": [Solid(shape: Box(size_m: (0.4, 0.4, 1.8)), material: "b")],
+            "leaf": [Solid(shape: Box(size_m: (1, 0.04, 2)), material: "a", at_m_deg: [(0.5, 0)])],
+        },
+        movers: [
+            (template: "person", repeats: false, waypoints: [(time_s: 0, at_m_deg: (5, -4)), (time_s: 8, at_m_deg: (5, 4))]),
+            (template: "leaf", repeats: true, waypoints: [
+                (time_s: 0, at_m_deg: (2, 0)), (time_s: 2, at_m_deg: (2, 0, 0, 90)), (time_s: 4, at_m_deg: (2, 0)),
+            ]),
+        ]"#;
+    let world = world("Solid(shape: Box(size_m: (20, 20, 0.1)), material: \"a\", at_m_deg: [(0, 0, -0.1)])", fields);
+    let towards_x = |y: f64| ray(Vector::new(0.0, y, 1.0), Vector::x());
+    // At 6 s the person is at y = 2.
+    let hit = world.cast(&towards_x(2.1), 30.0, 6.0).unwrap();
+    assert_relative_eq!(hit.distance_m, 4.8, epsilon = 1e-9);
+    assert_relative_eq!(hit.normal_in_world, -Vector::x(), epsilon = 1e-12);
+    assert!(world.cast(&towards_x(2.1), 30.0, 4.0).is_none());
+    // At 2 s the leaf stands across the ray at y = 0.5, its face at x = 2 - 0.02; a period later again.
+    for time in [2.0, 6.0] {
+        assert_relative_eq!(world.cast(&towards_x(0.5), 30.0, time).unwrap().distance_m, 1.98, epsilon = 1e-9);
+    }
+    // At 1 s it stands at 45 degrees: the middle plane is met at x = 2 + y, its face half the thickness x sqrt(2) nearer.
+    let expected = 2.5 - 0.02 * 2_f64.sqrt();
+    assert_relative_eq!(world.cast(&towards_x(0.5), 30.0, 1.0).unwrap().distance_m, expected, epsilon = 1e-9);
+    // A ray in front of everything is stopped by the nearer one.
+    assert!(world.cast(&towards_x(0.5), 1.9, 2.0).is_none());
+}
+
+#[test]
+fn the_nearest_point_of_a_box_is_the_clamped_point() {
+    // Outside a box the nearest point is the coordinate-wise clamp (Ericson 2005, section 5.1.3).
+    let world = world("Solid(shape: Box(size_m: (2, 4, 6)), material: \"a\", at_m_deg: [(0, 0, -3)])", "");
+    for direction in directions(3000) {
+        let point = direction * 8.0;
+        let clamped = point.inf(&Vector::new(1.0, 2.0, 3.0)).sup(&Vector::new(-1.0, -2.0, -3.0));
+        let found = world.nearest(&point, 10.0).unwrap();
+        // The search compares distances in single precision: at several metres, near ties differ by less than it tells.
+        assert_relative_eq!(found.point_in_world, clamped, epsilon = 3e-3);
+        assert_relative_eq!((found.point_in_world - point).norm(), (clamped - point).norm(), epsilon = 2e-6);
+        assert_relative_eq!(found.normal_in_world.norm(), 1.0, epsilon = 1e-12);
+        let away = (clamped - point).norm();
+        assert!(world.nearest(&point, away - 1e-4).is_none() && world.nearest(&point, away + 1e-4).is_some());
+    }
+}
+
+/// Triangles thrown into a cube, as a mesh in memory, and as a world by way of a file.
+fn random_triangles(count: usize) -> (Vec<[Vector; 3]>, World) {
+    let mut stream = Seed(9).stream("triangles");
+    let mut draw = |size: f64| Vector::from_fn(|_, _| stream.random_range(-size..size));
+    let triangles: Vec<[Vector; 3]> = (0..count)
+        .map(|_| {
+            let middle = draw(5.0);
+            [middle + draw(0.5), middle + draw(0.5), middle + draw(0.5)]
+        })
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    let corners = triangles.iter().flatten().map(|c| format!("v {} {} {}\n", c.x, c.y, c.z));
+    let faces = (0..count).map(|k| format!("f {} {} {}\n", 3 * k + 1, 3 * k + 2, 3 * k + 3));
+    std::fs::write(folder.path().join("soup.obj"), corners.chain(faces).collect::<String>()).unwrap();
+    let text = r#"(name: "soup", materials: {"a": (reflectance: 0.5)}, items: [Solid(shape: Mesh(file: "soup.obj"), material: "a")])"#;
+    std::fs::write(folder.path().join("soup.ron"), text).unwrap();
+    let world = World::load(folder.path().join("soup.ron").to_str().unwrap()).unwrap();
+    (triangles, world)
+}
+
+/// Where a ray crosses the plane of a triangle, if within it: barycentric coordinates by areas, in double precision.
+fn crossing(ray: &Ray, [a, b, c]: &[Vector; 3]) -> Option<f64> {
+    let normal = (b - a).cross(&(c - a));
+    let distance = normal.dot(&(a - ray.origin_in_world)) / normal.dot(&ray.direction_in_world);
+    let at = ray.at(distance);
+    let is_left_of = |from: &Vector, to: &Vector| normal.dot(&(to - from).cross(&(at - from))) >= 0.0;
+    (distance >= 0.0 && is_left_of(a, b) && is_left_of(b, c) && is_left_of(c, a)).then_some(distance)
+}
+
+#[test]
+fn the_tree_finds_what_a_search_through_every_triangle_finds() {
+    let (triangles, world) = random_triangles(2000);
+    assert_eq!(world.triangle_count(), 2000);
+    let mut errors: Vec<f64> = directions(5000)
+        .into_iter()
+        .map(|direction| {
+            let ray = ray(direction.yzx() * 2.0, direction);
+            let by_all = triangles.iter().filter_map(|t| crossing(&ray, t)).fold(f64::INFINITY, f64::min);
+            let by_tree = world.cast(&ray, 100.0, 0.0).map_or(f64::INFINITY, |hit| hit.distance_m);
+            if by_all == by_tree { 0.0 } else { (by_all - by_tree).abs() }
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    // A ray that grazes an edge may fall on either side of it, so quantiles and not the worst.
+    assert!(errors[errors.len() * 999 / 1000] < 1e-9, "{:?}", &errors[errors.len() - 8..]);
+}
+
+#[test]
+fn the_nearest_point_is_as_near_as_a_search_through_every_triangle_says() {
+    let (triangles, world) = random_triangles(200);
+    for point in directions(100).into_iter().map(|d| d * 4.0) {
+        let by_all = triangles.iter().map(|t| distance_by_sampling(&point, t)).fold(f64::INFINITY, f64::min);
+        let found = world.nearest(&point, 20.0).unwrap();
+        let by_tree = (found.point_in_world - point).norm();
+        // Sampling comes from above, within its step of 1/40 of a triangle of 1 m.
+        assert!(by_tree <= by_all + 1e-6 && by_tree >= by_all - 0.03, "{by_tree} {by_all}");
+    }
+}
+
+fn distance_by_sampling(point: &Vector, [a, b, c]: &[Vector; 3]) -> f64 {
+    let samples = (0..=40).flat_map(|i| (0..=40 - i).map(move |j| (f64::from(i) / 40.0, f64::from(j) / 40.0)));
+    samples.map(|(s, t)| (a + (b - a) * s + (c - a) * t - point).norm()).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn no_ray_slips_between_the_triangles_of_a_closed_room() {
+    // Rays at the edges and corners of the boxes' faces and diagonals, where two triangles meet.
+    let world = world("Solid(shape: Box(size_m: (7, 5, 3)), material: \"a\")", "");
+    let eye = Vector::new(0.3, -0.2, 1.1);
+    for k in 0..=2000 {
+        let t = f64::from(k) / 2000.0;
+        let diagonal = Vector::new(3.5, -2.5 + 5.0 * t, 3.0 * t);
+        let edge = Vector::new(-3.5 + 7.0 * t, 2.5, 3.0);
+        for target in [diagonal, edge] {
+            let hit = world.cast(&ray(eye, target - eye), 30.0, 0.0).unwrap();
+            assert_relative_eq!(hit.distance_m, (target - eye).norm(), epsilon = 1e-5);
+        }
+    }
+}
+
+#[test]
+fn a_world_can_be_looked_at_from_many_threads() {
+    fn is_shared<T: Send + Sync>(_: &T) {}
+    is_shared(&World::load("mocap_room").unwrap());
+}
