@@ -132,7 +132,7 @@ pub(super) fn design(study: &DesignStudy) -> String {
             let simulated = verified.simulated.as_ref();
             vec![
                 format!(
-                    "{:.1} x {:.2} x {:.1} x {:.0}",
+                    "{:.1}x{:.2}x{:.1}x{:.0}",
                     coil.coil_diameter_mm, coil.wire_diameter_mm, coil.active_coils, coil.free_length_mm
                 ),
                 format!("{:.3}", figures.rocking_hz),
