@@ -6,6 +6,7 @@ use clap::Args;
 use serde_json::json;
 use std::path::Path;
 use zsim::dynamics::{HeadModel, HeadSpec};
+use zsim::elasticity::{ElasticityError, SpringSpec};
 use zsim::estimation::{EstimationError, EstimatorSpec};
 use zsim::geometry::{Route, Vector};
 use zsim::motion::MotionSpec;
@@ -13,10 +14,22 @@ use zsim::random::Seed;
 use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
 use zsim::simulation::EPOCH;
 use zsim::spec::{Kind, Source, SpecError, find, parse};
+use zsim::study::StudyError;
+use zsim::study::spring::design::{DesignSpec, Search};
 use zsim::world::{SceneSpec, World, WorldError};
 
 /// The kinds that there is a check for.
-const KINDS: [Kind; 7] = [Kind::Scene, Kind::Head, Kind::Motion, Kind::Lidar, Kind::Imu, Kind::Clock, Kind::Estimator];
+const KINDS: [Kind; 9] = [
+    Kind::Scene,
+    Kind::Head,
+    Kind::Spring,
+    Kind::Motion,
+    Kind::Lidar,
+    Kind::Imu,
+    Kind::Clock,
+    Kind::Estimator,
+    Kind::Study,
+];
 
 /// Check scenes and specs: line and column of what is wrong
 ///
@@ -103,9 +116,9 @@ fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
         Kind::Imu => parse::<ImuSpec>(source).map(drop),
         Kind::Clock => parse::<ClocksSpec>(source).map(drop),
         Kind::Estimator => parse::<EstimatorSpec>(source).map(drop),
-        Kind::Spring | Kind::Study | Kind::Experiment => {
-            Err(SpecError::plain(source.name.clone(), format!("a {} cannot be checked", kind.noun())))
-        }
+        Kind::Spring => parse::<SpringSpec>(source).map(drop),
+        Kind::Study => parse::<DesignSpec>(source).map(drop),
+        Kind::Experiment => Err(SpecError::plain(source.name.clone(), format!("a {} cannot be checked", kind.noun()))),
     }
 }
 
@@ -135,7 +148,17 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
             Err(EstimationError::Setting { key, message }) => Err(SpecError::about(source, key, message)),
             Err(error) => Err(spec_error(&error)),
         },
-        Kind::Spring | Kind::Study | Kind::Experiment => parse_as(kind, source),
+        Kind::Spring => match parse::<SpringSpec>(source)?.design() {
+            Ok(_) => Ok(()),
+            Err(ElasticityError::Spec(error)) => Err(error),
+            Err(error) => Err(SpecError::plain(source.name.clone(), error.to_string())),
+        },
+        Kind::Study => match Search::new(&parse::<DesignSpec>(source)?, source) {
+            Ok(_) => Ok(()),
+            Err(StudyError::Spec(error)) => Err(error),
+            Err(error) => Err(spec_error(&error)),
+        },
+        Kind::Experiment => parse_as(kind, source),
     }
 }
 

@@ -10,11 +10,14 @@ mod completions;
 mod estimate;
 mod evaluate;
 mod failure;
+mod gains;
 mod info;
 mod journey;
 mod output;
 mod quantity;
 mod simulate;
+mod spring;
+mod spring_words;
 
 use arguments::Global;
 use clap::error::ErrorKind;
@@ -47,6 +50,8 @@ enum Verb {
     Simulate(simulate::Arguments),
     Estimate(estimate::Arguments),
     Evaluate(evaluate::Arguments),
+    Gains(gains::Arguments),
+    Spring(spring::Arguments),
     Check(check::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
@@ -85,6 +90,8 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Simulate(arguments) => simulate::run(arguments, global),
         Verb::Estimate(arguments) => estimate::run(arguments, global),
         Verb::Evaluate(arguments) => evaluate::run(arguments, global),
+        Verb::Gains(arguments) => gains::run(arguments, global),
+        Verb::Spring(arguments) => spring::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),
         Verb::Info(arguments) => info::run(arguments, global),
         Verb::Completions(arguments) => completions::run(arguments),

@@ -44,8 +44,20 @@ impl HeadModel {
     /// # Errors
     /// When its numbers are no head's, or it cannot stand on its spring; the error says by how much.
     pub fn new(spec: &HeadSpec, source: &Source) -> Result<Self, DynamicsError> {
+        Self::build(spec, source, |site, unrest, source| site.explain(unrest, source))
+    }
+
+    /// As [`HeadModel::new`], but says of a head that cannot stand only that: a search meets thousands of them.
+    ///
+    /// # Errors
+    /// When its numbers are no head's, or it cannot stand on its spring.
+    pub fn attempt(spec: &HeadSpec, source: &Source) -> Result<Self, DynamicsError> {
+        Self::build(spec, source, |_, unrest, source| SpecError::about(source, "spring", unrest.to_string()))
+    }
+
+    fn build(spec: &HeadSpec, source: &Source, explain: Explain) -> Result<Self, DynamicsError> {
         let body = Body::of(spec, source)?;
-        let linkage = Linkage::new(&spec.linkage, &body, source)?;
+        let linkage = Linkage::new(&spec.linkage, &body, source, explain)?;
         let (head_from_laser, head_from_imu) = (spec.head_from_laser.pose(), spec.head_from_imu.pose());
         Ok(Self { body, linkage, head_from_laser, head_from_imu })
     }
@@ -113,18 +125,21 @@ impl HeadModel {
     }
 }
 
+/// Why a head does not stand, as a sentence.
+type Explain = fn(&Site<'_>, &Unrest, &Source) -> SpecError;
+
 /// What a spring's linkage is built from.
-struct Site<'a> {
-    design: SpringDesign,
-    segments: usize,
-    base_from_spring: Pose,
-    head_from_top: Pose,
-    body: &'a Body,
+pub(super) struct Site<'a> {
+    pub design: SpringDesign,
+    pub segments: usize,
+    pub base_from_spring: Pose,
+    pub head_from_top: Pose,
+    pub body: &'a Body,
 }
 
 impl Site<'_> {
     /// The undamped head at rest under `share` of gravity, with its stiffness.
-    fn at_rest(&self, share: f64) -> Result<(Law, Pose, Matrix6), Unrest> {
+    pub fn at_rest(&self, share: f64) -> Result<(Law, Pose, Matrix6), Unrest> {
         let gravity_in_base = gravity_in_world() * share;
         let along = self.base_from_spring.rotation.inverse() * gravity_in_base;
         let spring = self.design.law(-self.body.mass_kg * along.z, self.segments)?;
@@ -158,7 +173,7 @@ impl Site<'_> {
 }
 
 impl Linkage {
-    fn new(spec: &LinkageSpec, body: &Body, source: &Source) -> Result<Self, DynamicsError> {
+    fn new(spec: &LinkageSpec, body: &Body, source: &Source, explain: Explain) -> Result<Self, DynamicsError> {
         match spec {
             LinkageSpec::Rigid { base_from_head } => Ok(Linkage::Rigid { base_from_head: base_from_head.pose() }),
             LinkageSpec::Spring {
@@ -173,7 +188,7 @@ impl Linkage {
                 let design = spring.design().map_err(|error| SpecError::about(source, "spring", error.to_string()))?;
                 let (base_from_spring, head_from_top) = (base_from_spring.pose(), head_from_spring.pose());
                 let site = Site { design, segments: *segments, base_from_spring, head_from_top, body };
-                let (law, rest, stiffness) = site.at_rest(1.0).map_err(|unrest| site.explain(&unrest, source))?;
+                let (law, rest, stiffness) = site.at_rest(1.0).map_err(|unrest| explain(&site, &unrest, source))?;
                 let mut sprung = Sprung::linearised(law, (rest, stiffness), body, damping_ratio, hold.as_ref())
                     .ok_or_else(|| SpecError::about(source, "parts", "the head's mass has no inverse"))?;
                 sprung.law.end_stop = end_stop.map(|stop| sprung.end_stop(&stop, source)).transpose()?;

@@ -5,18 +5,22 @@
 //! is integrated by rapier (see `engine`), which no other room knows.
 
 mod body;
+mod capacity;
 mod engine;
 mod error;
 mod head;
 mod law;
 mod modes;
+mod response;
 mod simulation;
 mod spec;
 mod statics;
 
 pub use body::Body;
+pub use capacity::heaviest_kg;
 pub use error::DynamicsError;
 pub use head::HeadModel;
 pub use modes::{LinearModel, Mode, ModeKind};
+pub use response::{FrequencyResponse, Peak, Points, Quantity};
 pub use simulation::{HeadSimulation, HeadState};
 pub use spec::{DampingSpec, EndStopSpec, HeadSpec, HoldSpec, InertiaSpec, LinkageSpec, PartSpec, PlacementSpec, load};

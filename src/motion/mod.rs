@@ -30,7 +30,7 @@ pub use hand::{CarrySpec, GaitSpec, HandSpec, ShakeSpec};
 pub use legged::{LeggedSpec, StrideSpec};
 pub use marine::{HullSpec, MarineSpec, SeaSpec};
 pub use replay::{PosesSpec, ReplaySpec};
-pub use shaker::{Axis, DriveSpec, Level, ShakerSpec, SignalSpec};
+pub use shaker::{Axis, DriveSpec, Level, Phases, ShakerSpec, SignalSpec};
 pub use spec::{MotionSpec, load};
 pub use stand::StandSpec;
 pub use stops::StopsSpec;

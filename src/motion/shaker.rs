@@ -6,10 +6,11 @@ use super::smooth::Steps;
 use super::stand::standpoint;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Route, Vector};
-use crate::random::Seed;
+use crate::random::{Seed, Stream};
 use crate::spec::checked::{finite, non_negative, positive};
 use crate::spec::{Source, SpecError};
 use nalgebra::Complex;
+use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
@@ -41,7 +42,7 @@ pub struct DriveSpec {
 }
 
 /// An axis of the base at rest: along x (forward), y (left), z (up), or about them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Axis {
     /// Forward.
     X,
@@ -82,8 +83,8 @@ pub enum SignalSpec {
         /// Amplitude, held over the sweep.
         amplitude: Level,
     },
-    /// Equal sines at the multiples of `1 / period_s` within a band, with Schroeder's phases (low crest): periodic, so that
-    /// a spectrum over whole periods does not leak.
+    /// Equal sines at the multiples of `1 / period_s` within a band: periodic, so that a spectrum over whole periods does
+    /// not leak.
     Multisine {
         /// The period, s.
         #[serde(deserialize_with = "positive")]
@@ -96,6 +97,9 @@ pub enum SignalSpec {
         high_hz: f64,
         /// Root mean square of the whole.
         rms: Level,
+        /// The sines' phases.
+        #[serde(default)]
+        phases: Phases,
     },
     /// Random noise with a flat spectrum within a band: 256 sinusoids.
     BandNoise {
@@ -108,6 +112,16 @@ pub enum SignalSpec {
         /// Root mean square of the whole.
         rms: Level,
     },
+}
+
+/// The phases of a multisine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Phases {
+    /// Schroeder's: a low crest.
+    #[default]
+    Schroeder,
+    /// Drawn at random from the run's seed: seeds differ in nothing else, so what differs in the answers is not linear.
+    Random,
 }
 
 /// How strong a signal is, and in which derivative it is so at every frequency alike.
@@ -221,7 +235,7 @@ impl DriveSpec {
             {
                 fault("high_hz", format!("the band ends at {high_hz} Hz, not above its begin at {low_hz} Hz"))
             }
-            SignalSpec::Multisine { period_s, low_hz, high_hz, .. } => {
+            SignalSpec::Multisine { period_s, low_hz, high_hz, phases, .. } => {
                 let (first, last) = ((low_hz * period_s - 1e-9).ceil(), (high_hz * period_s + 1e-9).floor());
                 if last < first || last - first >= MOST_LINES {
                     let message = format!(
@@ -230,7 +244,11 @@ impl DriveSpec {
                     );
                     return fault("period_s", message);
                 }
-                Ok(Drive::Sines(multisine((first as u32, last as u32), period_s, level)))
+                let mut random = match phases {
+                    Phases::Schroeder => None,
+                    Phases::Random => Some(seed.stream("multisine")),
+                };
+                Ok(Drive::Sines(multisine((first as u32, last as u32), period_s, level, random.as_mut())))
             }
             SignalSpec::BandNoise { low_hz, high_hz, .. } => {
                 let parts = even_parts((low_hz, high_hz), NOISE_LINES, &mut seed.stream("noise"));
@@ -245,13 +263,18 @@ impl DriveSpec {
     }
 }
 
-/// Equal sines at the multiples `first..=last` of `1 / period_s`, with the phases `-pi k (k - 1) / n` (Schroeder 1970).
-fn multisine((first, last): (u32, u32), period_s: f64, level: Level) -> Sines<1> {
+/// Equal sines at the multiples `first..=last` of `1 / period_s`, with random phases, or without a stream for them with the
+/// phases `-pi k (k - 1) / n` (Schroeder 1970).
+fn multisine((first, last): (u32, u32), period_s: f64, level: Level, mut random: Option<&mut Stream>) -> Sines<1> {
     let count = f64::from(last - first + 1);
     let line = |multiple: u32| {
         let (freq_hz, k) = (f64::from(multiple) / period_s, f64::from(multiple - first + 1));
         let amplitude = (2.0 / count).sqrt() * level.displacement(freq_hz);
-        Line { cycles: freq_hz, amplitudes: [Complex::from_polar(amplitude, -PI * k * (k - 1.0) / count)] }
+        let phase = match &mut random {
+            Some(stream) => TAU * stream.random::<f64>(),
+            None => -PI * k * (k - 1.0) / count,
+        };
+        Line { cycles: freq_hz, amplitudes: [Complex::from_polar(amplitude, phase)] }
     };
     Sines::new((first..=last).map(line))
 }

@@ -1,6 +1,9 @@
+use crate::dynamics::DynamicsError;
 use crate::estimation::EstimationError;
+use crate::motion::MotionError;
 use crate::recording::RecordingError;
 use crate::report::plot::PlotError;
+use crate::signal::SignalError;
 use crate::simulation::SimulationError;
 use crate::spec::SpecError;
 use std::path::{Path, PathBuf};
@@ -20,6 +23,23 @@ pub enum StudyError {
     /// A spec is missing or wrong.
     #[error(transparent)]
     Spec(#[from] SpecError),
+    /// The head cannot be modelled, or its simulation failed.
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+    /// The motion cannot be built.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// What was recorded cannot be analysed.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+    /// A plan whose numbers contradict each other.
+    #[error("{what}: {message}")]
+    Plan {
+        /// Which number.
+        what: &'static str,
+        /// What is wrong with it, and what to do.
+        message: String,
+    },
     /// A plot could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -48,12 +68,12 @@ impl StudyError {
     /// Whether what was asked for is wrong (a spec, a setting), rather than something on the way.
     pub fn is_wrong_input(&self) -> bool {
         match self {
-            Self::Spec(_) => true,
+            Self::Spec(_) | Self::Motion(_) | Self::Plan { .. } => true,
+            Self::Dynamics(error) => !matches!(error, DynamicsError::Diverged { .. }),
             Self::Estimation(error) => {
                 matches!(error, EstimationError::Setting { .. } | EstimationError::Calibration(_))
             }
             Self::Simulation(error) => {
-                use crate::dynamics::DynamicsError;
                 let failed = match error {
                     SimulationError::Dynamics(error) => matches!(**error, DynamicsError::Diverged { .. }),
                     SimulationError::Sink(_) => true,

@@ -2,12 +2,17 @@
 //!
 //! [`journey()`] is the one that everything else varies: simulate and record, estimate from the recording, judge, report.
 //! [`estimate_recording`] is its second half, for anybody's recording.
+//!
+//! A head by itself is characterised by its [`gains`], by what its [`spring`] bears and how it moves, and by the
+//! [`coverage`] of its lidar.
 
 mod artefacts;
 mod cadence;
 mod calibration;
+pub mod coverage;
 mod error;
 mod estimate;
+pub mod gains;
 mod journey;
 mod judge;
 mod manifest;
@@ -15,6 +20,7 @@ mod memory;
 mod open_loop;
 mod record;
 mod register;
+pub mod spring;
 mod truth_near;
 mod watch;
 

@@ -1,0 +1,51 @@
+//! Design points by the closed form, and gain curves by simulation.
+
+#![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark fails by panicking")]
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use std::hint::black_box;
+use zsim::dynamics::{HeadModel, LinkageSpec, load};
+use zsim::elasticity::SpringSpec;
+use zsim::spec::{Kind, find, parse};
+use zsim::study::gains::{GainPlan, gain_curves};
+use zsim::study::spring::design::{DesignSpec, Search};
+use zsim::study::spring::{Shake, closed_form};
+
+fn design_points(c: &mut Criterion) {
+    let (spec, source) = load("handheld").unwrap();
+    let shake = Shake::default();
+    c.bench_function("closed form of a design that stands", |b| {
+        b.iter(|| closed_form(black_box(&spec), &source, &shake).unwrap());
+    });
+    let mut falls = spec.clone();
+    if let LinkageSpec::Spring { spring: SpringSpec::Coil { wire_diameter_mm, .. }, .. } = &mut falls.linkage {
+        *wire_diameter_mm = 2.0;
+    }
+    c.bench_function("closed form of a design that falls", |b| {
+        b.iter(|| closed_form(black_box(&falls), &source, &shake).unwrap_err());
+    });
+}
+
+fn studies(c: &mut Criterion) {
+    let mut group = c.benchmark_group("studies");
+    group.sample_size(10);
+    let source = find(Kind::Study, "spring_design").unwrap();
+    let spec: DesignSpec = parse(&source).unwrap();
+    group.bench_function("10,000 designs and their Pareto set", |b| {
+        let search = Search::new(&spec, &source).unwrap();
+        b.iter(|| {
+            let (found, _) = search.explore();
+            let costs: Vec<Vec<f64>> = found.iter().map(|c| c.costs.clone()).collect();
+            zsim::study::spring::design::pareto_set(&costs)
+        });
+    });
+    let (spec, source) = load("handheld").unwrap();
+    let head = HeadModel::new(&spec, &source).unwrap();
+    group.bench_function("gain curves of the handheld head, six axes", |b| {
+        b.iter(|| gain_curves(&head, &GainPlan::default()).unwrap());
+    });
+    group.finish();
+}
+
+criterion_group!(benches, design_points, studies);
+criterion_main!(benches);

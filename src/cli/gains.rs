@@ -1,0 +1,183 @@
+//! `zsim gains`: gain curves of a head.
+
+use super::arguments::{Global, OutArguments};
+use super::failure::Usage;
+use super::{End, output};
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use zsim::dynamics::{DampingSpec, HeadModel, LinkageSpec, Quantity, load};
+use zsim::motion::Axis;
+use zsim::random::Seed;
+use zsim::report;
+use zsim::study::gains::{
+    AXES, GainCurve, GainPlan, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure, swing_csv,
+    swing_figure, swing_study,
+};
+
+/// Measure a head's gain curves: the head's motion over its base's by frequency, from simulation and in closed form
+///
+/// The base is shaken on one axis at a time about the spring's foot by a periodic multisine; the head is watched at its IMU.
+/// Writes gains.csv, swing.csv with --swing, and plots.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim gains --head handheld --out results/gains")]
+pub(super) struct Arguments {
+    /// The head and its spring, a name under specs/heads/ or a file
+    #[arg(long, value_name = "NAME|FILE", default_value = "handheld")]
+    head: String,
+    #[command(flatten)]
+    out: OutArguments,
+    /// The highest frequency, Hz
+    #[arg(long, value_name = "HZ", default_value_t = 10.0)]
+    up_to: f64,
+    /// The multisine's period, s: the reciprocal of the distance between lines [default: two lines in the narrowest peak]
+    #[arg(long, value_name = "S")]
+    period: Option<f64>,
+    /// What is compared along x, y and z
+    #[arg(long, value_enum, default_value_t = Along::Acceleration)]
+    along: Along,
+    /// Damp all modes by this ratio instead of the head's own
+    #[arg(long, value_name = "RATIO")]
+    damping: Option<f64>,
+    /// How many realisations, alike but for their phases, are averaged
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    realisations: usize,
+    /// The simulation's time step, s
+    #[arg(long, value_name = "S", default_value_t = 1e-3)]
+    step: f64,
+    /// The seed of the multisine's phases
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Also shake so hard that the head would swing by these, degrees rms: how resonance and gain move, about and along
+    /// x and y
+    #[arg(long, value_name = "DEG,...", value_delimiter = ',', num_args = 0.., default_missing_value = "0.2,2,5,10,15,20")]
+    swing: Option<Vec<f64>>,
+}
+
+/// What is compared along x, y and z.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Along {
+    /// Acceleration as such.
+    Acceleration,
+    /// What accelerometers read.
+    SpecificForce,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let head = head(arguments)?;
+    let plan = plan(arguments)?;
+    let curves = gain_curves(&head, &plan)?;
+    let swings = arguments.swing.as_ref().map(|degrees| swings(&head, degrees, &plan)).transpose()?;
+
+    let wanted =
+        arguments.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/gains-{}", name(arguments))));
+    let folder = output::folder(&wanted, arguments.out.force)?;
+    write(&folder.join("gains.csv"), &csv(&curves))?;
+    let plots = folder.join("plots");
+    std::fs::create_dir_all(&plots).with_context(|| format!("{} cannot be made", plots.display()))?;
+    gain_figure(&curves).save(&plots, "gains")?;
+    coherence_figure(&curves).save(&plots, "coherence")?;
+    if let Some(swings) = &swings {
+        write(&folder.join("swing.csv"), &swing_csv(swings))?;
+        swing_figure(swings).save(&plots, "swing")?;
+    }
+    let swings = swings.unwrap_or_default();
+    output::tell(global, &words(&curves, &swings), figures(&curves, &swings)?, Some(&folder))?;
+    Ok(End::Done)
+}
+
+/// The head's name without folder and ending.
+fn name(arguments: &Arguments) -> String {
+    Path::new(&arguments.head).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn head(arguments: &Arguments) -> anyhow::Result<HeadModel> {
+    let (mut spec, source) = load(&arguments.head)?;
+    if let (Some(ratio), LinkageSpec::Spring { damping_ratio, .. }) = (arguments.damping, &mut spec.linkage) {
+        if !(ratio.is_finite() && ratio >= 0.0) {
+            return Err(Usage(format!("--damping {ratio}: a damping ratio is a number of at least 0")).into());
+        }
+        *damping_ratio = DampingSpec { rocking: ratio, sway: ratio, bounce: ratio, yaw: ratio };
+    }
+    Ok(HeadModel::new(&spec, &source)?)
+}
+
+fn plan(arguments: &Arguments) -> anyhow::Result<GainPlan> {
+    let given = [("--up-to", Some(arguments.up_to)), ("--period", arguments.period), ("--step", Some(arguments.step))];
+    for (name, value) in given {
+        if let Some(value) = value.filter(|x| !(x.is_finite() && *x > 0.0)) {
+            return Err(Usage(format!("{name} {value}: expected a number above 0")).into());
+        }
+    }
+    Ok(GainPlan {
+        quantity: match arguments.along {
+            Along::Acceleration => Quantity::Kinematic,
+            Along::SpecificForce => Quantity::SpecificForce,
+        },
+        up_to_hz: arguments.up_to,
+        period_s: arguments.period,
+        realisations: arguments.realisations,
+        step_s: arguments.step,
+        seed: Seed(arguments.seed),
+        ..GainPlan::default()
+    })
+}
+
+fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan) -> anyhow::Result<Vec<SwingStudy>> {
+    if let Some(wrong) = degrees.iter().find(|x| !(x.is_finite() && **x > 0.0)) {
+        return Err(Usage(format!("--swing {wrong}: expected degrees above 0")).into());
+    }
+    let axes = [Axis::Roll, Axis::Pitch, Axis::X, Axis::Y];
+    // The resonance of interest is the slowest; above it a hard shake has little to say.
+    let slowest_hz = head.linear_modes().first().map_or(plan.up_to_hz, |mode| mode.frequency_hz);
+    let plan = GainPlan { up_to_hz: plan.up_to_hz.min(3.0 * slowest_hz), ..plan.clone() };
+    axes.iter().map(|axis| Ok(swing_study(head, *axis, degrees, &plan)?)).collect()
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
+}
+
+fn words(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
+    let dash = || "-".to_owned();
+    let row = |curve: &GainCurve| {
+        let peak = |peak: Option<zsim::dynamics::Peak>| {
+            peak.map_or([dash(), dash()], |p| [format!("{:.3}", p.freq_hz), format!("{:.2}", p.gain)])
+        };
+        let ([hz, gain], [model_hz, model_gain]) = (peak(curve.peak), peak(curve.peak_model));
+        vec![axis_name(curve.axis).to_owned(), hz, gain, model_hz, model_gain, format!("{:.4}", least_coherence(curve))]
+    };
+    let header = ["axis", "peak Hz", "gain", "closed form Hz", "gain", "least coherence"];
+    let mut words = report::table(&header, &curves.iter().map(row).collect::<Vec<_>>(), true);
+    for study in swings {
+        let row = |p: &zsim::study::gains::SwingPoint| {
+            let number = |x: Option<f64>, decimals: usize| x.map_or(dash(), |x| format!("{x:.decimals$}"));
+            vec![
+                format!("{} {:.1} deg", axis_name(study.axis), p.swing_rms_deg),
+                format!("{:.1}", p.swing_most_deg),
+                number(p.peak.map(|peak| peak.freq_hz), 3),
+                number(p.peak.map(|peak| peak.gain), 2),
+                number(p.coherence, 3),
+            ]
+        };
+        let header = ["swing rms", "most deg", "peak Hz", "gain", "coherence"];
+        words += "\n";
+        words += &report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
+        words += &study.ended.as_ref().map(|why| format!("ended {why}\n")).unwrap_or_default();
+    }
+    words
+}
+
+/// The least coherence of a curve's lines.
+fn least_coherence(curve: &GainCurve) -> f64 {
+    curve.points.iter().map(|p| p.coherence).fold(1.0, f64::min)
+}
+
+fn figures(curves: &[GainCurve], swings: &[SwingStudy]) -> anyhow::Result<Value> {
+    let axes = AXES.iter().zip(curves).map(|(axis, curve)| {
+        json!({ "axis": axis_name(*axis), "peak": curve.peak, "peak_model": curve.peak_model,
+            "least_coherence": least_coherence(curve), "swing_rms_deg": curve.swing_rms_deg })
+    });
+    Ok(json!({ "axes": axes.collect::<Vec<_>>(), "swing": serde_json::to_value(swings)? }))
+}

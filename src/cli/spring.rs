@@ -1,0 +1,148 @@
+//! `zsim spring`: all about a spring, and the search for one.
+
+use super::arguments::{Global, OutArguments};
+use super::{End, output, spring_words};
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
+use zsim::dynamics::{self, HeadModel, HeadSpec, LinkageSpec};
+use zsim::elasticity::SpringSpec;
+use zsim::sensors::{Imu, Lidar};
+use zsim::spec::{Kind, Source, SpecError, find, parse};
+use zsim::study::coverage::{CoveragePlan, coverage_figure};
+use zsim::study::spring::design::{DesignSpec, Search, csv, pareto_figure};
+use zsim::study::spring::{Shake, mode_figure, spring_report};
+
+/// Tell all about a spring under its head: stiffness, rest, modes, field of view, limits; or search for one
+///
+/// FILE is a head, or a spring, which is then put under the head given by --head. That the head falls is an answer.
+#[derive(Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:\n  zsim spring handheld --json\n  zsim spring design spring_design --out results/springs"
+)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    search: Option<Verb>,
+    /// A head or a spring: a name under specs/heads/ or specs/springs/, or a file
+    #[arg(value_name = "FILE", required = true)]
+    file: Option<String>,
+    /// The head that a bare spring carries
+    #[arg(long, value_name = "NAME|FILE", default_value = "handheld")]
+    head: String,
+    /// The lidar whose view is told
+    #[arg(long, value_name = "NAME|FILE", default_value = "utm30lx")]
+    lidar: String,
+    /// The IMU whose range is told
+    #[arg(long, value_name = "NAME|FILE", default_value = "3dm_gx2")]
+    imu: String,
+    /// Amplitude of the hand's nod, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 2.0)]
+    pitch: f64,
+    /// Frequency of the hand's nod, Hz [default: the head's slowest mode]
+    #[arg(long, value_name = "HZ")]
+    frequency: Option<f64>,
+    /// A folder for plots of the modes and of what the lidar sees
+    #[command(flatten)]
+    out: OutArguments,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Design(Design),
+}
+
+/// Search for a spring that meets targets: the Pareto set as table, CSV and plot, verified by simulation
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim spring design spring_design --out results/springs")]
+struct Design {
+    /// What is wanted, a name under specs/studies/ or a file
+    #[arg(value_name = "FILE")]
+    file: String,
+    #[command(flatten)]
+    out: OutArguments,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    match (&arguments.search, &arguments.file) {
+        (Some(Verb::Design(design)), _) => search(design, global),
+        (None, Some(file)) => tell(file, arguments, global),
+        (None, None) => Err(super::failure::Usage("name a head or a spring".to_owned()).into()),
+    }
+}
+
+fn tell(file: &str, arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let (spec, source) = head_of(file, &arguments.head)?;
+    let lidar_source = find(Kind::Lidar, &arguments.lidar)?;
+    let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
+    let imu_source = find(Kind::Imu, &arguments.imu)?;
+    let imu = Imu::new(&parse(&imu_source)?, &imu_source)?;
+    let given = [("--pitch", Some(arguments.pitch)), ("--frequency", arguments.frequency)];
+    for (name, value) in given {
+        if let Some(value) = value.filter(|x| !(x.is_finite() && *x > 0.0)) {
+            return Err(super::failure::Usage(format!("{name} {value}: expected a number above 0")).into());
+        }
+    }
+    let shake = Shake { pitch_deg: arguments.pitch, frequency_hz: arguments.frequency };
+    let plan =
+        CoveragePlan { from_s: 10.0, rate_limit_deg_per_s: imu.spec().gyro.limit_deg_per_s, ..CoveragePlan::default() };
+    let report = spring_report(&spec, &source, &shake, &lidar, &plan)?;
+    let folder = match &arguments.out.out {
+        None => None,
+        Some(wanted) => {
+            let folder = output::folder(wanted, arguments.out.force)?;
+            if report.stands {
+                mode_figure(&spec, &HeadModel::new(&spec, &source)?).save(&folder, "modes")?;
+            }
+            if let Some(seen) = report.shaken.as_ref().and_then(|shaken| shaken.coverage.as_ref()) {
+                coverage_figure(seen).save(&folder, "coverage")?;
+            }
+            let text = serde_json::to_string_pretty(&report)? + "\n";
+            write(&folder.join("spring.json"), &text)?;
+            Some(folder)
+        }
+    };
+    output::tell(global, &spring_words::report(&report), serde_json::to_value(&report)?, folder.as_deref())?;
+    Ok(End::Done)
+}
+
+/// The head in `file`, or `head` on the spring in it.
+fn head_of(file: &str, head: &str) -> anyhow::Result<(HeadSpec, Source)> {
+    let as_spring =
+        find(Kind::Spring, file).and_then(|source| parse::<SpringSpec>(&source).map(|spring| (spring, source)));
+    match (dynamics::load(file), as_spring) {
+        (Ok(found), _) => Ok(found),
+        (Err(_), Ok((bare, source))) => {
+            let (mut spec, _) = dynamics::load(head)?;
+            let LinkageSpec::Spring { spring, .. } = &mut spec.linkage else {
+                let message = format!("the head \"{head}\" has no spring to replace; name one that has with --head");
+                return Err(SpecError::plain(head, message).into());
+            };
+            *spring = bare;
+            Ok((spec, source))
+        }
+        (Err(as_head), Err(as_spring)) => {
+            // Whichever came farther in reading is what the file means to be.
+            let is_spring = as_spring.line_and_column() > as_head.line_and_column();
+            Err(if is_spring { as_spring } else { as_head }.into())
+        }
+    }
+}
+
+fn search(design: &Design, global: &Global) -> anyhow::Result<End> {
+    let source = find(Kind::Study, &design.file)?;
+    let spec: DesignSpec = parse(&source)?;
+    let study = Search::new(&spec, &source)?.run()?;
+    let stem = Path::new(&design.file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{stem}")));
+    let folder = output::folder(&wanted, design.out.force)?;
+    write(&folder.join("pareto.csv"), &csv(&study))?;
+    write(&folder.join("design.ron"), &source.text)?;
+    pareto_figure(&study).save(&folder, "pareto")?;
+    output::tell(global, &spring_words::design(&study), serde_json::to_value(&study)?, Some(&folder))?;
+    Ok(if study.candidates.is_empty() { End::WithLoss } else { End::Done })
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
+}

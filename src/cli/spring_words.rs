@@ -1,0 +1,157 @@
+//! What `zsim spring` says.
+
+use zsim::dynamics::ModeKind;
+use zsim::report::table;
+use zsim::study::spring::design::DesignStudy;
+use zsim::study::spring::{CoilReport, Figures, SpringReport, UnderShake};
+
+/// All about a spring.
+pub(super) fn report(report: &SpringReport) -> String {
+    let mut rows = vec![row("head", format!("{:.3} kg", report.head_mass_kg))];
+    let heaviest = report.heaviest_head_kg.map_or("any".to_owned(), |kg| format!("{kg:.3} kg"));
+    rows.push(row("stands", if report.stands { "yes" } else { "no" }.to_owned()));
+    rows.push(row("heaviest head of this shape", heaviest));
+    if let Some(rest) = &report.rest {
+        rows.push(row("sag", format!("{:.2} mm", rest.sag_mm)));
+        let [x, y, z] = rest.position_m.map(|m| m * 1e3);
+        rows.push(row("head at rest", format!("{x:.1}, {y:.1}, {z:.1} mm")));
+        let [roll, pitch, yaw] = rest.roll_pitch_yaw_deg;
+        rows.push(row("roll, pitch, yaw", format!("{}, {}, {} deg", rounded(roll), rounded(pitch), rounded(yaw))));
+    }
+    rows.extend(report.coil.iter().flat_map(coil));
+    let mut words = table(&[], &rows, false);
+    words += &report.falls_because.as_ref().map(|why| format!("\n{why}\n")).unwrap_or_default();
+    if !report.modes.is_empty() {
+        words += "\n";
+        words += &modes(report);
+    }
+    if let Some(stiffness) = &report.stiffness {
+        let rows: Vec<_> = ["x", "y", "z", "rx", "ry", "rz"]
+            .iter()
+            .zip(stiffness)
+            .map(|(name, values)| {
+                std::iter::once((*name).to_owned()).chain(values.iter().map(|v| rounded(*v))).collect()
+            })
+            .collect();
+        words += "\n";
+        words += &table(&["N, m, rad", "x", "y", "z", "rx", "ry", "rz"], &rows, true);
+    }
+    words + &report.shaken.as_ref().map(under_shake).unwrap_or_default()
+}
+
+fn row(name: &str, value: String) -> Vec<String> {
+    vec![name.to_owned(), value]
+}
+
+/// To three decimals, nought without a sign.
+fn rounded(x: f64) -> String {
+    if x.abs() < 5e-4 { "0".to_owned() } else { format!("{x:.3}") }
+}
+
+fn coil(coil: &CoilReport) -> Vec<Vec<String>> {
+    let or_dash = |x: Option<f64>, unit: &str| x.map_or("-".to_owned(), |x| format!("{x:.1} {unit}"));
+    let buckles = match (coil.buckling_load_n, coil.buckling_margin) {
+        (Some(load_n), Some(margin)) => format!("at {load_n:.1} N with its top guided, {margin:.1} x the weight"),
+        _ => "never with its top guided".to_owned(),
+    };
+    let stress = match (coil.stress_at_rest_mpa, coil.yield_mpa) {
+        (Some(stress), Some(yields)) => format!("{stress:.0} of {yields:.0} MPa at yield"),
+        (stress, _) => or_dash(stress, "MPa"),
+    };
+    vec![
+        row("spring index", format!("{:.2}", coil.index)),
+        row("mass of the wire", format!("{:.1} g", coil.mass_g)),
+        row("along its axis", format!("{:.1} N/m", coil.axial_n_per_m)),
+        row("about its axis", format!("{:.4} N m/rad", coil.torsion_nm_per_rad)),
+        row("buckles", buckles),
+        row("stress at rest", stress),
+        row("gap between coils", format!("{:.2} mm", coil.gap_mm)),
+        row("coils touch when bent by", format!("{:.0} deg", coil.clash_bend_deg)),
+    ]
+}
+
+fn modes(report: &SpringReport) -> String {
+    let rows: Vec<_> = report
+        .modes
+        .iter()
+        .map(|mode| {
+            let name = match mode.kind {
+                ModeKind::Rocking => "rocking",
+                ModeKind::Sway => "sway",
+                ModeKind::Bounce => "bounce",
+                ModeKind::Yaw => "yaw",
+            };
+            let mut cells =
+                vec![name.to_owned(), format!("{:.3}", mode.frequency_hz), format!("{:.3}", mode.damping_ratio)];
+            cells.extend(mode.shape.iter().map(|x| rounded(*x)));
+            cells
+        })
+        .collect();
+    table(&["mode", "Hz", "ratio", "x", "y", "z", "rx", "ry", "rz"], &rows, true)
+}
+
+fn under_shake(shaken: &UnderShake) -> String {
+    let header = ["nodded by a hand", "closed form", "simulated"];
+    let simulated = shaken.simulated.as_ref();
+    let line = |name: &str, of: fn(&Figures) -> Option<f64>, decimals: usize| {
+        let number =
+            |figures: Option<&Figures>| figures.and_then(of).map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
+        vec![name.to_owned(), number(Some(&shaken.closed_form)), number(simulated)]
+    };
+    let mut rows = vec![
+        line("field of view, deg", |f| Some(f.field_of_view_deg), 1),
+        line("greatest rate, deg/s", |f| Some(f.rate_deg_per_s), 0),
+        line("stress over yield", |f| f.stress_share, 3),
+        line("peak gain of the pitch rate", |f| Some(f.peak_gain), 2),
+    ];
+    if let Some(seen) = &shaken.coverage {
+        let mut add = |name: &str, value: String| rows.push(vec![name.to_owned(), "-".to_owned(), value]);
+        let or_dash = |x: Option<f64>, decimals: usize| x.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
+        add("share of the sphere seen", format!("{:.3}", seen.fraction_seen));
+        add("in a sweep", or_dash(seen.fraction_in_a_sweep, 3));
+        add("time of a sweep, s", or_dash(seen.sweep_s, 3));
+        add("beams per sr in a sweep", or_dash(seen.density_in_a_sweep_per_sr, 0));
+        add("beams per sr and s", format!("{:.0}", seen.density_per_sr_s.median));
+        add("time to nine tenths of it, s", format!("{:.2}", seen.covered_s));
+        add("share of time beyond the gyro's range", format!("{:.4}", seen.gyro.saturated));
+    }
+    let failed = shaken.failed.as_ref().map(|why| format!("no simulation: {why}\n")).unwrap_or_default();
+    format!("\n{}{failed}", table(&header, &rows, true))
+}
+
+/// What a search found.
+pub(super) fn design(study: &DesignStudy) -> String {
+    let header =
+        ["D mm", "d mm", "coils", "L mm", "Hz", "view deg", "simulated", "rate", "sag mm", "g", "stress", "holds"];
+    let rows: Vec<_> = study
+        .candidates
+        .iter()
+        .map(|verified| {
+            let (coil, figures) = (&verified.candidate.coil, &verified.candidate.figures);
+            let number = |x: Option<f64>, decimals: usize| x.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
+            let simulated = verified.simulated.as_ref();
+            vec![
+                format!(
+                    "{:.1}x{:.2}x{:.1}x{:.0}",
+                    coil.coil_diameter_mm, coil.wire_diameter_mm, coil.active_coils, coil.free_length_mm
+                ),
+                format!("{:.3}", figures.rocking_hz),
+                format!("{:.1}", figures.field_of_view_deg),
+                number(simulated.map(|f| f.field_of_view_deg), 1),
+                number(simulated.map(|f| f.rate_deg_per_s), 0),
+                format!("{:.1}", figures.sag_mm),
+                number(figures.spring_mass_g, 0),
+                number(simulated.and_then(|f| f.stress_share), 2),
+                if verified.holds { "yes" } else { "no" }.to_owned(),
+            ]
+        })
+        .collect();
+    let counts = format!(
+        "{} designs tried, {} within all limits, {} of them in the Pareto set\n",
+        study.evaluated, study.feasible, study.pareto
+    );
+    if rows.is_empty() {
+        return counts + "no design is within all limits: widen the bounds or loosen a limit\n";
+    }
+    format!("{counts}\n{}", table(&header, &rows, true))
+}

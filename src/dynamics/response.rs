@@ -1,0 +1,335 @@
+//! How the linearised head answers to a shaken base: the closed form of its gain curves.
+
+use super::head::{HeadModel, Linkage};
+use super::modes::{LinearModel, Mode};
+use crate::elasticity::{Matrix6, Vector6, blocks};
+use crate::geometry::{Matrix, STANDARD_GRAVITY_M_PER_S2, Vector, skew};
+use crate::motion::Axis;
+use nalgebra::{Complex, Matrix6x1};
+use std::f64::consts::TAU;
+
+/// What is compared along x, y and z; about them it is always the rate of rotation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quantity {
+    /// Acceleration as such, gravity not in it.
+    #[default]
+    Kinematic,
+    /// What an accelerometer reads: a head that leans by phi reads `phi x g` more.
+    SpecificForce,
+}
+
+/// Where a gain curve is taken: the base moves at one point, the head is watched at another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Points {
+    /// The point of the base that is shaken, and about which it turns.
+    pub base_in_base: Vector,
+    /// The point of the head that is watched.
+    pub head_in_head: Vector,
+}
+
+/// A local maximum of a gain curve.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Peak {
+    /// Where, Hz.
+    pub freq_hz: f64,
+    /// How high.
+    pub gain: f64,
+}
+
+impl HeadModel {
+    /// The points of the paper's gain curves: the base at the spring's foot (the base's origin where there is no spring),
+    /// the head at its IMU.
+    pub fn usual_points(&self) -> Points {
+        let base_in_base = match &self.linkage {
+            Linkage::Rigid { .. } => Vector::zeros(),
+            Linkage::Spring(sprung) => sprung.law.base_from_spring.translation.vector,
+        };
+        Points { base_in_base, head_in_head: self.head_from_imu().translation.vector }
+    }
+
+    /// The answer of the head, linearised about its rest, to small motions of the base.
+    pub fn frequency_response(&self, points: &Points) -> FrequencyResponse {
+        let rest = self.rest_pose_base_from_head();
+        let at_base = arm(&-points.base_in_base);
+        match self.linear() {
+            None => {
+                let point = rest * nalgebra::Point3::from(points.head_in_head);
+                FrequencyResponse { stuck: arm(&point.coords) * at_base, terms: Vec::new() }
+            }
+            Some(linear) => {
+                let to_point = rest.rotation * (points.head_in_head - self.body().centre_of_mass_in_head);
+                let terms = linear.modes.iter().map(|mode| Term::of(mode, linear, &arm(&to_point), &at_base)).collect();
+                FrequencyResponse { stuck: Matrix6::zeros(), terms }
+            }
+        }
+    }
+}
+
+/// The displacement of a point at `to_point` from another of the same body, by that one's displacement and the body's turn.
+fn arm(to_point: &Vector) -> Matrix6 {
+    blocks(&Matrix::identity(), &-skew(to_point), &Matrix::zeros(), &Matrix::identity())
+}
+
+/// The answer of a linearised head to its base, as a sum over its modes.
+///
+/// From `M x'' + C x' + K x = Cb b' + Kb b` with modal damping (see [`LinearModel`]), the head's displacement per that of
+/// the base at the angular frequency w is
+///
+/// `H(w) = sum_k phi_k phi_k^T (Kb + i w Cb) / (w_k^2 - w^2 + 2 i zeta_k w_k w)`
+///
+/// with the shapes `phi_k` of unit modal mass; points other than the centre of mass and the base's origin enter by their
+/// levers. Everything is written in the axes of the upright base; a body's own axes differ in second order only.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrequencyResponse {
+    /// What follows the base at once: all of it without a spring, nothing with one.
+    stuck: Matrix6,
+    terms: Vec<Term>,
+}
+
+/// A mode's part in the answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Term {
+    omega: f64,
+    damping_ratio: f64,
+    shape: Vector6,
+    by_displacement: Vector6,
+    by_velocity: Vector6,
+}
+
+impl Term {
+    fn of(mode: &Mode, linear: &LinearModel, at_head: &Matrix6, at_base: &Matrix6) -> Self {
+        Self {
+            omega: TAU * mode.frequency_hz,
+            damping_ratio: mode.damping_ratio,
+            shape: at_head * mode.shape,
+            by_displacement: (linear.base_stiffness * at_base).tr_mul(&mode.shape),
+            by_velocity: (linear.base_damping * at_base).tr_mul(&mode.shape),
+        }
+    }
+
+    /// How much of the mode the base's displacement along `input` calls up at `omega`.
+    fn called_up(&self, input: usize, omega: f64) -> Complex<f64> {
+        let force = Complex::new(self.by_displacement[input], omega * self.by_velocity[input]);
+        let resists =
+            Complex::new(self.omega * self.omega - omega * omega, 2.0 * self.damping_ratio * self.omega * omega);
+        force / resists
+    }
+}
+
+/// Below this the specific force of a base that moves sideways is a quotient of two vanishing numbers, Hz.
+const LOWEST_HZ: f64 = 1e-3;
+
+impl FrequencyResponse {
+    /// Displacement and turn of the head's point, per displacement or turn of the base's along or about `input`, at
+    /// `freq_hz`: order x, y, z, about x, y, z.
+    pub fn displacement(&self, input: Axis, freq_hz: f64) -> Matrix6x1<Complex<f64>> {
+        let (column, omega) = (index(input), TAU * freq_hz);
+        let start = self.stuck.column(column).map(|x| Complex::new(x, 0.0));
+        self.terms.iter().fold(start.into_owned(), |sum, term| {
+            let amplitude = term.called_up(column, omega);
+            sum + term.shape.map(|x| amplitude * x)
+        })
+    }
+
+    /// The head's rate or acceleration along `axis` per the base's along the same, at `freq_hz`.
+    pub fn along(&self, axis: Axis, freq_hz: f64, quantity: Quantity) -> Complex<f64> {
+        let row = index(axis);
+        let leans = match (quantity, axis) {
+            // Along x, phi x g is -g phi_y; along y it is g phi_x; over -w^2 it compares with the displacement.
+            (Quantity::SpecificForce, Axis::X) => Some((4, STANDARD_GRAVITY_M_PER_S2)),
+            (Quantity::SpecificForce, Axis::Y) => Some((3, -STANDARD_GRAVITY_M_PER_S2)),
+            _ => None,
+        };
+        let freq_hz = if leans.is_some() { freq_hz.max(LOWEST_HZ) } else { freq_hz };
+        let omega = TAU * freq_hz;
+        let sees = |of: &dyn Fn(usize) -> f64| match leans {
+            Some((turn, g)) => of(row) + of(turn) * g / (omega * omega),
+            None => of(row),
+        };
+        let start = Complex::new(sees(&|k| self.stuck[(k, row)]), 0.0);
+        self.terms.iter().fold(start, |sum, term| sum + term.called_up(row, omega) * sees(&|k| term.shape[k]))
+    }
+
+    /// The modulus of [`FrequencyResponse::along`].
+    pub fn gain(&self, axis: Axis, freq_hz: f64, quantity: Quantity) -> f64 {
+        self.along(axis, freq_hz, quantity).norm()
+    }
+
+    /// The local maxima of a gain curve above 0 and below `up_to_hz`, lowest frequency first.
+    pub fn peaks(&self, axis: Axis, up_to_hz: f64, quantity: Quantity) -> Vec<Peak> {
+        let grid = self.grid(axis, up_to_hz);
+        let gain = |freq_hz: f64| self.gain(axis, freq_hz, quantity);
+        let gains: Vec<f64> = grid.iter().map(|f| gain(*f)).collect();
+        let is_top = |k: &usize| gains[*k] > gains[k - 1] && gains[*k] >= gains[k + 1];
+        (1..grid.len().saturating_sub(1))
+            .filter(is_top)
+            .map(|k| {
+                let freq_hz = maximum(gain, grid[k - 1], grid[k + 1]);
+                Peak { freq_hz, gain: gain(freq_hz) }
+            })
+            .collect()
+    }
+
+    /// The highest of the [`FrequencyResponse::peaks`].
+    pub fn peak(&self, axis: Axis, up_to_hz: f64, quantity: Quantity) -> Option<Peak> {
+        self.peaks(axis, up_to_hz, quantity).into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
+
+    /// Frequencies from 0 to `up_to_hz`, dense by half a bandwidth about the modes that `axis` calls up.
+    fn grid(&self, axis: Axis, up_to_hz: f64) -> Vec<f64> {
+        let column = index(axis);
+        let part = |term: &Term| (term.by_displacement[column] * term.shape[column]).abs() / term.omega.powi(2);
+        let greatest = self.terms.iter().map(part).fold(0.0, f64::max);
+        let mut grid: Vec<f64> = (0..=64).map(|k| up_to_hz * f64::from(k) / 64.0).collect();
+        for term in self.terms.iter().filter(|term| part(term) > 1e-9 * greatest) {
+            let width = term.damping_ratio.clamp(1e-5, 0.2);
+            grid.extend((-16..=16).map(|k| term.omega / TAU * (0.5 * width * f64::from(k)).exp()));
+        }
+        grid.retain(|f| (0.0..=up_to_hz).contains(f));
+        grid.sort_by(f64::total_cmp);
+        grid.dedup_by(|a, b| *a - *b < 1e-12 * *b);
+        grid
+    }
+}
+
+fn index(axis: Axis) -> usize {
+    axis as usize
+}
+
+/// The place of the one maximum between two ends, by golden section, to 1e-8 of it.
+fn maximum(f: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
+    let golden = 0.5 * (5_f64.sqrt() - 1.0);
+    let (mut low, mut high) = (low, high);
+    let (mut left, mut right) = (high - golden * (high - low), low + golden * (high - low));
+    let (mut at_left, mut at_right) = (f(left), f(right));
+    while high - low > 1e-8 * high {
+        if at_left > at_right {
+            (high, right, at_right) = (right, left, at_left);
+            left = high - golden * (high - low);
+            at_left = f(left);
+        } else {
+            (low, left, at_left) = (left, right, at_right);
+            right = low + golden * (high - low);
+            at_right = f(right);
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::{DampingSpec, HeadSpec, LinkageSpec, load};
+    use crate::spec::{Source, parse};
+    use approx::assert_relative_eq;
+
+    fn head(change: impl FnOnce(&mut HeadSpec)) -> HeadModel {
+        let (mut spec, source) = load("handheld").unwrap();
+        change(&mut spec);
+        HeadModel::new(&spec, &source).unwrap()
+    }
+
+    fn damped(ratio: f64) -> HeadModel {
+        head(|spec| {
+            if let LinkageSpec::Spring { damping_ratio, .. } = &mut spec.linkage {
+                *damping_ratio = DampingSpec { rocking: ratio, sway: ratio, bounce: ratio, yaw: ratio };
+            }
+        })
+    }
+
+    /// The head of the mechanics' table, 0.40 kg 70 mm above a spring of 25/3.0/n/L mm, without damping.
+    fn of_the_table(coils: f64, length_mm: f64) -> HeadModel {
+        let text = format!(
+            "(parts: [body(name: \"h\", mass_kg: 0.4, centre_of_mass_m: (0.0, 0.0, 0.07),
+                inertia_kg_m2: (xx: 9e-4, yy: 9e-4, zz: 9e-4))],
+              head_from_laser: (position_m: (0.0, 0.0, 0.0)), head_from_imu: (position_m: (0.0, 0.0, 0.0)),
+              linkage: spring(spring: coil(coil_diameter_mm: 25.0, wire_diameter_mm: 3.0, active_coils: {coils:?},
+                free_length_mm: {length_mm:?}, material: spring_steel), segments: 1,
+                base_from_spring: (position_m: (0.0, 0.0, 0.0)), head_from_spring: (position_m: (0.0, 0.0, 0.0)),
+                damping_ratio: (rocking: 0.0, sway: 0.0, bounce: 0.0, yaw: 0.0)))"
+        );
+        let source = Source::in_memory("table", text);
+        HeadModel::new(&parse(&source).unwrap(), &source).unwrap()
+    }
+
+    #[test]
+    fn gravity_lifts_the_turn_of_an_upright_head_at_zero_frequency() {
+        // Published beside the mechanics: 1.58 for 25/3.0/8/80, 2.64 for 25/3.0/12/120.
+        for (coils, length_mm, expected) in [(8.0, 80.0, 1.58), (12.0, 120.0, 2.64)] {
+            let head = of_the_table(coils, length_mm);
+            let response = head.frequency_response(&head.usual_points());
+            for axis in [Axis::Roll, Axis::Pitch] {
+                assert_relative_eq!(response.gain(axis, 0.0, Quantity::Kinematic), expected, max_relative = 0.02);
+            }
+            for axis in [Axis::X, Axis::Y, Axis::Z, Axis::Yaw] {
+                assert_relative_eq!(response.gain(axis, 0.0, Quantity::Kinematic), 1.0, epsilon = 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn bounce_and_yaw_are_oscillators_of_one_degree_of_freedom() {
+        // |H|^2 = (1 + (2 zeta r)^2) / ((1 - r^2)^2 + (2 zeta r)^2), r = f / f0: transmissibility.
+        let zeta = 0.02;
+        let head = damped(zeta);
+        let response = head.frequency_response(&head.usual_points());
+        for (axis, kind) in [(Axis::Z, super::super::ModeKind::Bounce), (Axis::Yaw, super::super::ModeKind::Yaw)] {
+            let mode = head.linear_modes().iter().find(|mode| mode.kind == kind).unwrap();
+            for r in [0.1, 0.9, 1.0, 1.1, 3.0_f64] {
+                let c = (2.0 * zeta * r).powi(2);
+                let exact = ((1.0 + c) / ((1.0 - r * r).powi(2) + c)).sqrt();
+                let gain = response.gain(axis, r * mode.frequency_hz, Quantity::Kinematic);
+                assert_relative_eq!(gain, exact, max_relative = 1e-4);
+            }
+            let peak = response.peak(axis, 60.0, Quantity::Kinematic).unwrap();
+            assert_relative_eq!(peak.freq_hz, mode.frequency_hz, max_relative = 1e-3);
+            assert_relative_eq!(peak.gain, 1.0 / (2.0 * zeta), max_relative = 2e-3);
+        }
+    }
+
+    #[test]
+    fn the_sum_over_modes_solves_the_equation_of_motion() {
+        let head = damped(0.05);
+        let linear = head.linear().unwrap();
+        let response = head.frequency_response(&Points {
+            base_in_base: Vector::zeros(),
+            head_in_head: head.body().centre_of_mass_in_head,
+        });
+        for freq_hz in [0.3, 1.3, 7.0] {
+            let omega = TAU * freq_hz;
+            let complex = |re: &Matrix6, im: &Matrix6| re.zip_map(im, Complex::new);
+            let left = complex(&(linear.stiffness - linear.mass * (omega * omega)), &(linear.damping * omega));
+            let right = complex(&linear.base_stiffness, &(linear.base_damping * omega));
+            let exact = left.lu().solve(&right).unwrap();
+            for axis in Axis::ALL {
+                let column = response.displacement(axis, freq_hz);
+                assert!((column - exact.column(index(axis))).norm() < 1e-9 * column.norm(), "{axis:?} {freq_hz}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_head_without_spring_follows_its_base() {
+        let (spec, source) = load("rigid").unwrap();
+        let head = HeadModel::new(&spec, &source).unwrap();
+        let response = head.frequency_response(&head.usual_points());
+        assert!(Axis::ALL.iter().all(|axis| response.gain(*axis, 5.0, Quantity::Kinematic) == 1.0));
+        assert!(response.peaks(Axis::X, 10.0, Quantity::Kinematic).is_empty());
+    }
+
+    #[test]
+    fn a_leaning_head_feels_gravity_in_its_specific_force() {
+        // Along x: (a_x - g phi_y) / b_x with a = -w^2 d: the displacement's answer plus g phi_y / w^2.
+        let head = damped(0.05);
+        let response = head.frequency_response(&head.usual_points());
+        let (freq_hz, g) = (2.0, STANDARD_GRAVITY_M_PER_S2);
+        let column = response.displacement(Axis::X, freq_hz);
+        let exact = column[0] + column[4] * (g / (TAU * freq_hz).powi(2));
+        assert_relative_eq!(
+            (response.along(Axis::X, freq_hz, Quantity::SpecificForce) - exact).norm(),
+            0.0,
+            epsilon = 1e-12
+        );
+        assert!(response.gain(Axis::Y, 0.0, Quantity::SpecificForce).is_finite());
+    }
+}

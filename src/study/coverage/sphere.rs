@@ -1,0 +1,109 @@
+//! The sphere of directions in cells of equal size.
+
+use super::Density;
+use crate::geometry::Vector;
+use std::f64::consts::{PI, TAU};
+
+/// Bands of equal height, hence (Archimedes) of equal area.
+const BANDS: usize = 32;
+/// Cells of a band. A cell is 6.1e-3 sr, about 4.5 degrees across.
+const CELLS: usize = 64;
+
+/// How often each cell was looked at.
+#[derive(Debug, Clone)]
+pub(super) struct Sphere {
+    beams: Vec<u32>,
+    in_sweep: Vec<u32>,
+    seen: usize,
+}
+
+impl Default for Sphere {
+    fn default() -> Self {
+        Self { beams: vec![0; BANDS * CELLS], in_sweep: vec![0; BANDS * CELLS], seen: 0 }
+    }
+}
+
+/// The solid angle of a cell.
+const CELL_SR: f64 = 4.0 * PI / (BANDS * CELLS) as f64;
+
+impl Sphere {
+    /// Counts a beam along a unit vector.
+    pub fn see(&mut self, direction: &Vector) {
+        let band = ((direction.z + 1.0) * 0.5 * BANDS as f64) as usize;
+        let around = (direction.y.atan2(direction.x) / TAU + 0.5) * CELLS as f64;
+        let cell = band.min(BANDS - 1) * CELLS + (around as usize).min(CELLS - 1);
+        self.seen += usize::from(self.beams[cell] == 0);
+        self.beams[cell] += 1;
+        self.in_sweep[cell] += 1;
+    }
+
+    /// Share of the sphere that has been seen.
+    pub fn fraction_seen(&self) -> f64 {
+        self.seen as f64 / self.beams.len() as f64
+    }
+
+    /// Share of the sphere that was seen since the last call, and the median of the beams per steradian there.
+    pub fn end_sweep(&mut self) -> (f64, f64) {
+        let mut counts: Vec<u32> = self.in_sweep.iter().copied().filter(|n| *n > 0).collect();
+        self.in_sweep.fill(0);
+        counts.sort_unstable();
+        let median = counts.get(counts.len() / 2).copied().unwrap_or(0);
+        (counts.len() as f64 / (BANDS * CELLS) as f64, f64::from(median) / CELL_SR)
+    }
+
+    /// Beams per steradian and second of those cells that were seen.
+    pub fn density_per_sr(&self, looked_s: f64) -> Density {
+        let mut counts: Vec<u32> = self.beams.iter().copied().filter(|n| *n > 0).collect();
+        counts.sort_unstable();
+        let scale = 1.0 / (CELL_SR * looked_s);
+        let at = |share: f64| counts.get((share * counts.len() as f64) as usize).map_or(0.0, |n| f64::from(*n) * scale);
+        let mean = counts.iter().map(|n| f64::from(*n)).sum::<f64>() / counts.len().max(1) as f64 * scale;
+        Density { mean, p10: at(0.1), median: at(0.5) }
+    }
+
+    /// Beams per steradian and second by elevation, degrees.
+    pub fn by_elevation(&self, looked_s: f64) -> Vec<(f64, f64)> {
+        let bands = self.beams.chunks(CELLS).enumerate();
+        let density = |(band, cells): (usize, &[u32])| {
+            let elevation = ((2.0 * band as f64 + 1.0) / BANDS as f64 - 1.0).asin();
+            let beams: f64 = cells.iter().map(|n| f64::from(*n)).sum();
+            (elevation.to_degrees(), beams / (CELLS as f64 * CELL_SR * looked_s))
+        };
+        bands.map(density).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beams_in_all_directions_alike_cover_the_sphere_alike() {
+        // A golden spiral is even: 200,000 beams over 4 pi sr are 15,915 per sr.
+        let mut sphere = Sphere::default();
+        let count = 200_000;
+        for k in 0..count {
+            let z: f64 = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
+            let (sin, cos) = (f64::from(k) * PI * (3.0 - 5_f64.sqrt())).sin_cos();
+            let rim = (1.0 - z * z).sqrt();
+            sphere.see(&Vector::new(rim * cos, rim * sin, z));
+        }
+        assert_eq!(sphere.fraction_seen(), 1.0);
+        let density = sphere.density_per_sr(1.0);
+        let even = f64::from(count) / (4.0 * PI);
+        assert!((density.mean / even - 1.0).abs() < 1e-9 && (density.median / even - 1.0).abs() < 0.05, "{density:?}");
+        assert!(sphere.by_elevation(2.0).iter().all(|(_, d)| (d * 2.0 / even - 1.0).abs() < 0.02));
+        assert_eq!(sphere.end_sweep().0, 1.0);
+        assert_eq!(sphere.end_sweep(), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_level_scan_sees_its_circle_alone() {
+        let mut sphere = Sphere::default();
+        for k in 0..1080 {
+            let (sin, cos) = (f64::from(k) * TAU / 1080.0).sin_cos();
+            sphere.see(&Vector::new(cos, sin, 1e-9));
+        }
+        assert_eq!(sphere.fraction_seen(), 1.0 / BANDS as f64);
+    }
+}

@@ -1,0 +1,117 @@
+//! The base on its shaker: periodic, so each pose is computed once.
+
+use super::GainPlan;
+use crate::dynamics::HeadModel;
+use crate::geometry::{Kinematics, Pose, Vector};
+use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, Phases, ShakerSpec, SignalSpec};
+use crate::spec::Source;
+use crate::study::StudyError;
+
+/// How long the shaker takes to reach its full strength, s.
+const ONSET_S: f64 = 1.0;
+
+/// The longest settling that is waited for, s. A head that takes longer shows it in its coherence.
+const LONGEST_SETTLING_S: f64 = 200.0;
+
+/// What is left of the settling when recording begins.
+const LEFT_OF_SETTLING: f64 = 1e-5;
+
+/// Times of a measurement, in steps of the simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Schedule {
+    /// Steps until the head has settled.
+    pub settling: usize,
+    /// Steps in the multisine's period.
+    pub period: usize,
+}
+
+impl Schedule {
+    /// When to record `head` by `plan`.
+    ///
+    /// # Errors
+    /// When the period holds no line below the highest frequency, or too few steps.
+    pub fn of(head: &HeadModel, plan: &GainPlan) -> Result<Self, StudyError> {
+        let modes = head.linear_modes();
+        let decay = modes.iter().map(|m| std::f64::consts::TAU * m.frequency_hz * m.damping_ratio);
+        let settling_s = decay.fold(0.0, |most, rate| f64::max(most, -LEFT_OF_SETTLING.ln() / rate));
+        let settling_s = ONSET_S + settling_s.min(LONGEST_SETTLING_S);
+        let within = modes.iter().filter(|m| m.frequency_hz < plan.up_to_hz);
+        let narrowest_hz = within.map(|m| m.frequency_hz * m.damping_ratio).fold(f64::INFINITY, f64::min);
+        let period_s = plan.period_s.unwrap_or_else(|| (1.0 / narrowest_hz).ceil().clamp(20.0, 100.0));
+        let steps_to_highest = 1.0 / (plan.step_s * plan.up_to_hz);
+        if !(steps_to_highest >= 4.0 && period_s * plan.up_to_hz >= 1.0) {
+            let message = format!(
+                "{} Hz must be above one line of a period of {period_s} s, and below a quarter of the rate of steps of {} s",
+                plan.up_to_hz, plan.step_s
+            );
+            return Err(StudyError::Plan { what: "highest frequency", message });
+        }
+        let steps = |span_s: f64| (span_s / plan.step_s).round() as usize;
+        Ok(Self { settling: steps(settling_s) + 1, period: steps(period_s) })
+    }
+
+    /// Steps of a realisation.
+    pub fn steps(&self) -> usize {
+        self.settling + self.period
+    }
+}
+
+/// A base that is shaken along or about one axis, about a point of it.
+pub(super) struct Shaken {
+    motion: Box<dyn BaseMotion>,
+    base_from_point: Pose,
+    step_s: f64,
+    period: usize,
+    /// Steps until the motion is periodic.
+    from: usize,
+    table: Vec<Kinematics>,
+}
+
+impl Shaken {
+    /// Realisation `index` of the shaking along `axis` about the base's point `about`.
+    ///
+    /// # Errors
+    /// When the plan makes no signal.
+    pub fn new(
+        axis: Axis,
+        index: usize,
+        plan: &GainPlan,
+        schedule: Schedule,
+        about: &Vector,
+    ) -> Result<Self, StudyError> {
+        let rms = if axis.is_rotation() {
+            Level::DegreesPerS(plan.rotation_deg_per_s)
+        } else {
+            Level::MetresPerS2(plan.acceleration_m_per_s2)
+        };
+        let period_s = schedule.period as f64 * plan.step_s;
+        let (low_hz, high_hz, phases) = (1.0 / period_s, plan.up_to_hz, Phases::Random);
+        let signal = SignalSpec::Multisine { period_s, low_hz, high_hz, rms, phases };
+        let drives = vec![DriveSpec { axis, signal }];
+        let spec = MotionSpec::Shaker(ShakerSpec { height_m: 0.0, still_s: 0.0, onset_s: ONSET_S, drives });
+        let seed = plan.seed.child(&format!("gains/{axis:?}/{index}"));
+        let source = Source::in_memory("the gains' multisine", "");
+        let motion = spec.build(&source, None, schedule.steps() as f64 * plan.step_s, seed)?;
+        let from = (ONSET_S / plan.step_s).ceil() as usize + 1;
+        let base_from_point = Pose::from_parts((*about).into(), Default::default());
+        let mut shaken =
+            Self { motion, base_from_point, step_s: plan.step_s, period: schedule.period, from, table: Vec::new() };
+        shaken.table = (from..from + schedule.period).map(|n| shaken.computed(n as f64 * plan.step_s)).collect();
+        Ok(shaken)
+    }
+
+    fn computed(&self, t_s: f64) -> Kinematics {
+        self.motion.at(t_s).of_frame(&self.base_from_point.inverse())
+    }
+}
+
+impl BaseMotion for Shaken {
+    fn at(&self, t_s: f64) -> Kinematics {
+        let step = (t_s / self.step_s).round();
+        let is_on_step = (t_s - step * self.step_s).abs() < 1e-6 * self.step_s;
+        match (step as usize).checked_sub(self.from) {
+            Some(after) if is_on_step => self.table[after % self.period],
+            _ => self.computed(t_s),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Springs that can be bought, as CSV: `name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material`.
+
+use super::CoilDesign;
+use crate::elasticity::Material;
+use crate::spec::{Source, SpecError};
+use std::path::Path;
+
+/// The catalogue that is built in: `specs/springs/catalogue.csv`.
+pub const STOCK: &str = include_str!("../../../../specs/springs/catalogue.csv");
+
+const HEADER: &str = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material";
+
+/// The springs of the catalogue `name`: a CSV file, or `"stock"`.
+///
+/// # Errors
+/// When it cannot be read, or a line is no spring's; the error has the line.
+pub fn catalogue(name: &str) -> Result<Vec<CoilDesign>, SpecError> {
+    let source = match name {
+        "stock" => Source::in_memory("specs/springs/catalogue.csv (built in)", STOCK),
+        path => Source::read(Path::new(path))?,
+    };
+    let lines = source.text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let mut lines = lines.map(|(index, line)| (index + 1, line.trim()));
+    match lines.next() {
+        Some((_, HEADER)) => {}
+        _ => return Err(SpecError::plain(&source.name, format!("a catalogue of springs begins with \"{HEADER}\""))),
+    }
+    lines.map(|(number, line)| spring(line).map_err(|what| fault(&source, number, &what))).collect()
+}
+
+fn fault(source: &Source, line: usize, what: &str) -> SpecError {
+    SpecError::plain(&source.name, format!("line {line}: {what}"))
+}
+
+fn spring(line: &str) -> Result<CoilDesign, String> {
+    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+    let [name, coil, wire, coils, length, material] = fields[..] else {
+        return Err(format!("{} fields where a spring has 6", fields.len()));
+    };
+    let number = |text: &str| match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
+        _ => Err(format!("expected a finite number above 0, found \"{text}\"")),
+    };
+    let material = match material {
+        "spring_steel" => Material::SpringSteel,
+        "stainless" => Material::Stainless,
+        other => return Err(format!("expected spring_steel or stainless, found \"{other}\"")),
+    };
+    Ok(CoilDesign {
+        name: name.to_owned(),
+        coil_diameter_mm: number(coil)?,
+        wire_diameter_mm: number(wire)?,
+        active_coils: number(coils)?,
+        free_length_mm: number(length)?,
+        material,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_spring_in_stock_can_be_wound() {
+        let springs = catalogue("stock").unwrap();
+        assert!(springs.len() > 100);
+        for spring in springs {
+            assert!(spring.spring().design().is_ok(), "{spring:?}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_line_is_named() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), format!("{HEADER}\na,25,3,12,120,spring_steel\nb,25,-3,12,120,stainless\n"))
+            .unwrap();
+        let error = catalogue(file.path().to_str().unwrap()).unwrap_err().to_string();
+        assert!(error.contains("line 3") && error.contains("-3"), "{error}");
+    }
+}

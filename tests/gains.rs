@@ -1,0 +1,93 @@
+//! Gain curves of the simulated head against the closed form of the linearised one.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use zsim::dynamics::{DampingSpec, HeadModel, LinkageSpec, Quantity, load};
+use zsim::motion::Axis;
+use zsim::study::gains::{GainCurve, GainPlan, GainPoint, csv, gain_curve, gain_curves, swing_study};
+
+/// The handheld head with one damping ratio for all modes.
+fn handheld(ratio: f64) -> HeadModel {
+    let (mut spec, source) = load("handheld").unwrap();
+    if let LinkageSpec::Spring { damping_ratio, .. } = &mut spec.linkage {
+        *damping_ratio = DampingSpec { rocking: ratio, sway: ratio, bounce: ratio, yaw: ratio };
+    }
+    HeadModel::new(&spec, &source).unwrap()
+}
+
+/// Up to 25 Hz, so that each axis has its peak (bounce has 17 Hz), by two realisations.
+fn plan() -> GainPlan {
+    GainPlan { up_to_hz: 25.0, realisations: 2, ..GainPlan::default() }
+}
+
+/// The greatest deviation from the closed form where coherence is above 0.95, in parts of what is allowed: 3 % or three sigma.
+fn worst(curve: &GainCurve) -> (f64, &GainPoint) {
+    let allowed = |p: &GainPoint| f64::max(0.03 * p.gain_model, 3.0 * p.gain_sigma);
+    let deviation = |p: &GainPoint| (p.gain - p.gain_model).abs() / allowed(p);
+    let coherent = curve.points.iter().filter(|p| p.coherence > 0.95);
+    let worst = coherent.max_by(|a, b| deviation(a).total_cmp(&deviation(b))).unwrap();
+    (deviation(worst), worst)
+}
+
+#[test]
+fn small_gains_of_all_six_axes_are_those_of_the_closed_form() {
+    let curves = gain_curves(&handheld(0.02), &plan()).unwrap();
+    assert_eq!(curves.len(), 6);
+    for curve in &curves {
+        let (peak, model) = (curve.peak.unwrap(), curve.peak_model.unwrap());
+        let axis = curve.axis;
+        assert!((peak.freq_hz / model.freq_hz - 1.0).abs() < 0.005, "{axis:?}: {peak:?} for {model:?}");
+        assert!((peak.gain / model.gain - 1.0).abs() < 0.03, "{axis:?}: {peak:?} for {model:?}");
+        let (deviation, point) = worst(curve);
+        assert!(deviation < 1.0, "{axis:?}: {point:?}");
+        let coherent = curve.points.iter().filter(|p| p.coherence > 0.95).count();
+        assert!(coherent * 10 > curve.points.len() * 9, "{axis:?}: {coherent} of {} lines", curve.points.len());
+    }
+}
+
+#[test]
+fn half_the_time_step_changes_the_peak_by_less_than_a_hundredth() {
+    let head = handheld(0.06);
+    let plan = GainPlan { up_to_hz: 5.0, ..plan() };
+    let peak =
+        |step_s: f64| gain_curve(&head, Axis::Pitch, &GainPlan { step_s, ..plan.clone() }).unwrap().peak.unwrap();
+    let (whole, half) = (peak(1e-3), peak(0.5e-3));
+    assert!((whole.gain / half.gain - 1.0).abs() < 0.01, "{whole:?} {half:?}");
+}
+
+#[test]
+fn specific_force_is_measured_as_its_closed_form_says() {
+    let head = handheld(0.06);
+    let plan = GainPlan { quantity: Quantity::SpecificForce, up_to_hz: 5.0, ..plan() };
+    for axis in [Axis::X, Axis::Y] {
+        let curve = gain_curve(&head, axis, &plan).unwrap();
+        let (deviation, point) = worst(&curve);
+        assert!(deviation < 1.0, "{axis:?}: {point:?}");
+    }
+}
+
+#[test]
+fn curves_are_the_same_bytes_for_any_number_of_threads() {
+    let head = handheld(0.2);
+    let plan = GainPlan { up_to_hz: 2.0, period_s: Some(2.0), ..plan() };
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        csv(&pool.install(|| gain_curves(&head, &plan).unwrap()))
+    };
+    let text = with(1);
+    assert_eq!(text, with(2));
+    assert!(text.starts_with("axis,freq_hz,gain,coherence,gain_model"));
+    assert_eq!(text.lines().count(), 1 + 6 * 4);
+}
+
+#[test]
+fn a_large_swing_moves_the_resonance_and_shows_in_the_coherence() {
+    let plan = GainPlan { up_to_hz: 3.0, realisations: 3, ..plan() };
+    let study = swing_study(&handheld(0.06), Axis::Pitch, &[0.1, 15.0], &plan).unwrap();
+    let [small, large] = study.points[..] else { panic!("{study:?}") };
+    let (at_small, at_large) = (small.peak.unwrap(), large.peak.unwrap());
+    assert!((at_small.freq_hz / study.peak_model.unwrap().freq_hz - 1.0).abs() < 0.005);
+    assert!(large.swing_rms_deg > 8.0 && large.swing_most_deg > 20.0, "{large:?}");
+    assert!((at_large.freq_hz / at_small.freq_hz - 1.0).abs() > 0.01, "{study:?}");
+    assert!(small.coherence.unwrap() > 0.999 && large.coherence.unwrap() < small.coherence.unwrap(), "{study:?}");
+}

@@ -1,0 +1,80 @@
+//! The commands `gains` and `spring`.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use serde_json::Value;
+
+fn zsim(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("zsim").unwrap();
+    command.args(arguments);
+    command
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = zsim(arguments).assert().success().get_output().stdout.clone();
+    serde_json::from_slice(&output).unwrap()
+}
+
+#[test]
+fn gains_writes_its_table_and_its_plots() {
+    let here = tempfile::tempdir().unwrap();
+    let out = here.path().join("gains");
+    let figures = json(&[
+        "gains",
+        "--head",
+        "handheld",
+        "--period",
+        "10",
+        "--up-to",
+        "3",
+        "--realisations",
+        "2",
+        "--json",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert_eq!(figures["axes"].as_array().unwrap().len(), 6);
+    assert_eq!(figures["out"], out.to_str().unwrap());
+    let table = std::fs::read_to_string(out.join("gains.csv")).unwrap();
+    assert!(table.starts_with("axis,freq_hz,gain,coherence,gain_model"));
+    assert_eq!(table.lines().count(), 1 + 6 * 30);
+    for file in ["gains.svg", "gains.png", "coherence.svg", "coherence.png"] {
+        assert!(out.join("plots").join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn spring_tells_of_a_head_and_of_a_bare_spring() {
+    let here = tempfile::tempdir().unwrap();
+    let head = json(&["spring", "handheld", "--json"]);
+    assert_eq!(head["stands"], true);
+    assert_eq!(head["modes"].as_array().unwrap().len(), 6);
+    let file = here.path().join("soft.ron");
+    let soft = "coil(coil_diameter_mm: 25, wire_diameter_mm: 2.0, active_coils: 10, free_length_mm: 100, material: spring_steel)";
+    std::fs::write(&file, soft).unwrap();
+    let fallen = json(&["spring", file.to_str().unwrap(), "--json"]);
+    assert_eq!(fallen["stands"], false);
+    assert!(fallen["heaviest_head_kg"].as_f64().unwrap() < 0.35);
+    zsim(&["spring", file.to_str().unwrap()]).assert().success().stdout(predicate::str::contains("cannot stand"));
+}
+
+#[test]
+fn wrong_usage_has_code_2_and_a_sentence() {
+    for (arguments, sentence) in [
+        (&["gains", "--head", "nowhere"][..], "no such head"),
+        (&["gains", "--up-to", "0"][..], "--up-to 0"),
+        (&["gains", "--realisations", "1"][..], "2 or more"),
+        (&["spring", "nowhere"][..], "no such head"),
+        (&["spring", "design", "nowhere"][..], "no such study"),
+        (&["spring", "handheld", "--pitch", "0"][..], "--pitch 0"),
+    ] {
+        zsim(arguments).assert().code(2).stderr(predicate::str::contains(sentence));
+    }
+}
+
+#[test]
+fn the_shipped_studies_and_springs_are_right() {
+    zsim(&["check", "specs/studies/spring_design.ron", "specs/studies/spring_stock.ron"]).assert().success();
+}
