@@ -27,7 +27,7 @@ fn at_rest() -> MeanMotion {
 #[test]
 fn every_shipped_imu_loads() {
     let names = spec::names(Kind::Imu);
-    assert!(names.len() >= 3, "{names:?}");
+    assert!(names.len() >= 5, "{names:?}");
     for name in names {
         imu(&spec_of(&name));
     }
@@ -153,30 +153,98 @@ fn still(spec: &ImuSpec, seed: u64, count: usize) -> (Vec<f64>, Vec<f64>) {
         .unzip()
 }
 
-#[test]
-fn six_hours_at_rest_have_the_allan_deviation_of_the_spec() {
-    let spec = spec_of("3dm_gx2");
-    let noise = imu(&spec).noise();
-    let (gyro, accel) = still(&spec, 1, 6 * 3600 * 100);
+/// The Allan variance at `tau_s` that a sensor's spec tells, in squares of its SI unit.
+struct AllanOfSpec {
+    density: f64,
+    walk: f64,
+    /// Spread and time of the bias that wanders.
+    wander: Option<(f64, f64)>,
+    /// What readings are rounded to.
+    resolution: f64,
+    period_s: f64,
+}
+
+impl AllanOfSpec {
+    /// Of gyroscope and accelerometer.
+    fn of(spec: &ImuSpec) -> [Self; 2] {
+        let (noise, period_s) = (imu(spec).noise(), 1.0 / spec.rate_hz);
+        let wander = |wander: Option<GaussMarkovSpec>, unit: f64| wander.map(|w| (w.sigma * unit, w.time_s));
+        let gyro = Self {
+            density: noise.gyro_density_rad_per_s_per_sqrt_hz,
+            walk: noise.gyro_bias_walk_rad_per_s_per_sqrt_s,
+            wander: wander(spec.gyro.wander_deg_per_h, PI / 180.0 / 3600.0),
+            resolution: spec.gyro.resolution_deg_per_s.to_radians(),
+            period_s,
+        };
+        let accel = Self {
+            density: noise.accel_density_m_per_s2_per_sqrt_hz,
+            walk: noise.accel_bias_walk_m_per_s2_per_sqrt_s,
+            wander: wander(spec.accel.wander_mg, 1e-3 * G),
+            resolution: spec.accel.resolution_mg * 1e-3 * G,
+            period_s,
+        };
+        [gyro, accel]
+    }
+
+    /// White noise falls as N^2 / tau, a walk rises as K^2 tau / 3, a Gauss-Markov process of spread s and time T has
+    /// `2 s^2 T / tau (1 - T / (2 tau) (3 - 4 exp(-tau / T) + exp(-2 tau / T)))` (IEEE Std 952); they add. Rounding to q
+    /// adds q^2 / 12 a sample, white where the noise of a sample is no less than q.
+    fn variance(&self, tau_s: f64) -> f64 {
+        let rounding = self.resolution.powi(2) / 12.0 * self.period_s;
+        let wander = self.wander.map_or(0.0, |(sigma, time_s)| {
+            let x = tau_s / time_s;
+            2.0 * sigma * sigma / x * (1.0 - (3.0 - 4.0 * (-x).exp() + (-2.0 * x).exp()) / (2.0 * x))
+        });
+        (self.density.powi(2) + rounding) / tau_s + self.walk.powi(2) * tau_s / 3.0 + wander
+    }
+}
+
+/// Checks a record at rest of `hours` against the spec: within 10 % up to a thousandth of its length, and beyond that,
+/// where chance alone moves it by more, in the band of 99.9 %.
+fn assert_allan_deviation_of_spec(name: &str, hours: f64) {
+    let spec = spec_of(name);
+    let duration_s = hours * 3600.0;
+    let (gyro, accel) = still(&spec, 1, (duration_s * spec.rate_hz) as usize);
+    let times = [0.01, 0.1, 1.0, 5.0, 10.0, 20.0, 100.0, 500.0, 2000.0];
     let averaging: Vec<usize> =
-        [0.01, 0.1, 1.0, 5.0, 10.0, 20.0, 100.0, 500.0, 2000.0].map(|tau| (tau * 100.0) as usize).into();
-    let sources = [
-        (gyro, noise.gyro_density_rad_per_s_per_sqrt_hz, noise.gyro_bias_walk_rad_per_s_per_sqrt_s),
-        (accel, noise.accel_density_m_per_s2_per_sqrt_hz, noise.accel_bias_walk_m_per_s2_per_sqrt_s),
-    ];
-    for (samples, density, walk) in sources {
-        for point in allan_deviation(&samples, 100.0, &averaging) {
-            // White noise falls as N / sqrt(tau), a walk rises as K sqrt(tau / 3) (IEEE Std 952); they add in squares.
-            let tau = point.tau_s;
-            let expected = (density * density / tau + walk * walk * tau / 3.0).sqrt();
+        times.iter().filter(|tau| **tau <= 0.1 * duration_s).map(|tau| (tau * spec.rate_hz).round() as usize).collect();
+    for (samples, expected) in [gyro, accel].iter().zip(AllanOfSpec::of(&spec)) {
+        for point in allan_deviation(samples, spec.rate_hz, &averaging) {
+            let deviation = expected.variance(point.tau_s).sqrt();
+            if deviation == 0.0 {
+                assert!(point.deviation < 1e-9, "{name}: {point:?}, expected none");
+                continue;
+            }
             let (low, high) = point.band(0.999);
-            let near = (point.deviation / expected - 1.0).abs() < 0.10;
-            assert!(
-                if tau <= 20.0 { near } else { low < expected && expected < high },
-                "{point:?}, expected {expected}"
-            );
+            let near = (point.deviation / deviation - 1.0).abs() < 0.10;
+            let right = if point.tau_s <= 1e-3 * duration_s { near } else { low < deviation && deviation < high };
+            assert!(right, "{name}: {point:?}, expected {deviation}");
         }
     }
+}
+
+#[test]
+fn six_hours_at_rest_have_the_allan_deviation_of_the_spec() {
+    assert_allan_deviation_of_spec("3dm_gx2", 6.0);
+}
+
+#[test]
+fn every_shipped_imu_has_the_allan_deviation_of_its_spec_in_an_hour_at_rest() {
+    for name in spec::names(Kind::Imu) {
+        assert_allan_deviation_of_spec(&name, if spec_of(&name).rate_hz > 500.0 { 0.1 } else { 1.0 });
+    }
+}
+
+#[test]
+fn the_noise_of_consumer_and_tactical_imus_is_that_of_their_data_sheets() {
+    // 0.007 deg/s/sqrt(Hz) and 180 ug/sqrt(Hz); 0.15 deg/sqrt(h) and 0.07 m/s/sqrt(h), by sqrt(3600).
+    let noise = imu(&spec_of("consumer")).noise();
+    assert_relative_eq!(noise.gyro_density_rad_per_s_per_sqrt_hz, 1.2217e-4, max_relative = 1e-4);
+    assert_relative_eq!(noise.accel_density_m_per_s2_per_sqrt_hz, 1.7652e-3, max_relative = 1e-4);
+    let noise = imu(&spec_of("tactical")).noise();
+    assert_relative_eq!(noise.gyro_density_rad_per_s_per_sqrt_hz, (0.15_f64 / 60.0).to_radians(), max_relative = 1e-9);
+    assert_relative_eq!(noise.accel_density_m_per_s2_per_sqrt_hz, 0.07 / 60.0, max_relative = 1e-3);
+    assert_relative_eq!(noise.gyro_limit_rad_per_s, 400_f64.to_radians(), max_relative = 1e-12);
 }
 
 #[test]

@@ -113,19 +113,22 @@ fn nodding(t: f64) -> Kinematics {
 #[test]
 fn beams_projected_by_poses_at_1_khz_lie_on_the_surface() {
     // A user interpolates the truth linearly: the error of a nod is A w^2 h^2 / 8 = 9 urad, 0.1 mm at 10 m.
-    let spec = spec_of("utm30lx_exact");
-    let lidar = lidar(&spec);
     let track = Track::new(0, 1e-3, (0..200).map(|k| nodding(f64::from(k) * 1e-3)).collect()).unwrap();
     let stamped = (0..200).map(|k| (Stamp::from_nanos(k * 1_000_000), nodding(k as f64 * 1e-3).world_from_body));
     let truth = Trajectory::from_poses(stamped).unwrap();
     let globe = Globe { radius_m: 10.0, reflectance: 0.5 };
     let firing = Firing { index: 3, start_s: 0.0751, pace: 1.0, stamp: Stamp::from_nanos(75_100_000) };
-    let scan = lidar.measure(&lidar.sweep(&globe, &track, &firing), &LidarErrors::new(&lidar, Seed(1)));
-    assert_eq!(scan.returns.len(), 1081);
-    for beam in &scan.returns {
-        let world_from_laser = truth.at(scan.stamp + beam.offset).unwrap();
-        let point = world_from_laser * nalgebra::Point3::from(beam.point_in_laser.cast::<f64>());
-        assert!((point.coords.norm() - 10.0).abs() < 2e-4, "{}", point.coords.norm());
+    for (name, beams) in [("utm30lx_exact", 1081), ("lms291_0_25deg", 721), ("vlp16", 28_928), ("mid360", 20_000)] {
+        let mut spec = spec_of(name);
+        (spec.noise, spec.beam) = (Switch::Off, Rays::Single);
+        let lidar = lidar(&spec);
+        let scan = lidar.measure(&lidar.sweep(&globe, &track, &firing), &LidarErrors::new(&lidar, Seed(1)));
+        assert_eq!(scan.returns.len(), beams);
+        for beam in &scan.returns {
+            let world_from_laser = truth.at(scan.stamp + beam.offset).unwrap();
+            let point = world_from_laser * nalgebra::Point3::from(beam.point_in_laser.cast::<f64>());
+            assert!((point.coords.norm() - 10.0).abs() < 2e-4, "{name}: {}", point.coords.norm());
+        }
     }
 }
 
@@ -274,6 +277,68 @@ fn a_vlp16_fires_300_000_beams_a_second_in_a_turn_of_100_ms() {
     // The second round has turned by 360 degrees x 55.296 us / 100 ms = 0.199 degrees to the right.
     let point = scan.returns[16].point_in_laser;
     assert!((point.y.atan2(point.x).to_degrees() + 0.199_07).abs() < 1e-3);
+}
+
+#[test]
+fn an_lms291_scans_13_575_beams_a_second_and_only_its_scans_at_one_degree_have_a_polar_form() {
+    // 181 beams 75 times a second; interlaced, neighbouring scans share the turn's ends: 361 x 37.5 and 721 x 18.75.
+    for (name, beams, rate_hz, planar) in
+        [("lms291", 181, 75.0, true), ("lms291_0_5deg", 361, 37.5, false), ("lms291_0_25deg", 721, 18.75, false)]
+    {
+        let scan = scan(&spec_of(name), &Globe { radius_m: 20.0, reflectance: 0.9 }, 1, 0);
+        assert_eq!((scan.returns.len(), scan.planar.is_some()), (beams, planar), "{name}");
+        assert_eq!(spec_of(name).rate_hz, rate_hz);
+        // The last beam of a scan is fired before the next scan begins, and in the last mirror turn, of 1 / 75 s.
+        let last_s = scan.returns[beams - 1].offset.seconds();
+        assert!(last_s < 1.0 / rate_hz && last_s > 1.0 / rate_hz - 1.0 / 75.0, "{name}: {last_s}");
+        for beam in &scan.returns {
+            let centimetres = f64::from(beam.point_in_laser.norm()) * 100.0;
+            assert!((centimetres - centimetres.round()).abs() < 1e-3, "{name}: rounded to 10 mm");
+        }
+    }
+}
+
+/// Azimuth, 0..360, and elevation of the returns of scan `index` of a Mid-360 amid a globe, degrees.
+fn angles_of_mid360(index: u64) -> Vec<(f64, f64)> {
+    let scan = scan(&spec_of("mid360"), &Globe { radius_m: 10.0, reflectance: 0.9 }, 1, index);
+    let angles = |point: nalgebra::Vector3<f64>| {
+        (point.y.atan2(point.x).to_degrees().rem_euclid(360.0), (point.z / point.norm()).asin().to_degrees())
+    };
+    scan.returns.iter().map(|beam| angles(beam.point_in_laser.cast())).collect()
+}
+
+#[test]
+fn a_mid360_fires_200_000_beams_a_second_into_its_field_of_view() {
+    let angles = angles_of_mid360(0);
+    assert_eq!(angles.len() as f64 * spec_of("mid360").rate_hz, 200_000.0);
+    let (low, high) = angles.iter().fold((90.0_f64, -90.0_f64), |(low, high), (_, e)| (low.min(*e), high.max(*e)));
+    assert!((low + 7.0).abs() < 0.01 && (high - 52.0).abs() < 0.01, "{low} {high}");
+    // Each eighth of the circle gets an eighth of the beams, within one of the 16.6 turns' share.
+    for octant in 0..8 {
+        let share = angles.iter().filter(|(azimuth, _)| (azimuth / 45.0) as usize == octant).count() as f64 / 20_000.0;
+        assert!((share - 0.125).abs() < 0.125 / 16.0, "{octant}: {share}");
+    }
+}
+
+#[test]
+fn each_scan_of_a_mid360_is_turned_and_fills_the_gaps_of_those_before() {
+    // 16.618034 turns a scan, of which 0.618034 count: 1.854102 turns after three scans, of which 0.854102 count.
+    let (first, fourth) = (angles_of_mid360(0), angles_of_mid360(3));
+    for (a, b) in first.iter().zip(&fourth) {
+        let turned = (b.0 - a.0 - 0.854_102 * 360.0 + 180.0).rem_euclid(360.0) - 180.0;
+        assert!(turned.abs() < 1e-3 && (a.1 - b.1).abs() < 1e-3, "{a:?} {b:?}");
+    }
+    // Cells of a degree, 360 x 59 of them.
+    let mut seen = vec![false; 360 * 59];
+    let mut shares = Vec::new();
+    for index in 0..10 {
+        for (azimuth, elevation) in angles_of_mid360(index) {
+            let row = ((elevation + 7.0).max(0.0) as usize).min(58);
+            seen[row * 360 + (azimuth as usize).min(359)] = true;
+        }
+        shares.push(seen.iter().filter(|seen| **seen).count() as f64 / seen.len() as f64);
+    }
+    assert!(shares[0] < 0.75 && shares[9] > 0.98, "{shares:?}");
 }
 
 #[test]

@@ -51,7 +51,8 @@ impl Lidar {
             }
             if reported.is_finite() {
                 let Beam { direction_in_laser, offset, .. } = self.beams[beam];
-                let point: Vector = direction_in_laser * range_m;
+                let direction = sweep.turned.map_or(direction_in_laser, |turn| turn * direction_in_laser);
+                let point: Vector = direction * range_m;
                 returns.push(LidarReturn { offset, point_in_laser: point.cast(), intensity });
             }
         }

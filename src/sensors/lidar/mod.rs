@@ -2,8 +2,10 @@
 
 mod echo;
 mod errors;
+mod interlaced;
 mod measure;
 mod pattern;
+mod rosette;
 mod spec;
 mod sweep;
 
@@ -12,17 +14,20 @@ pub use pattern::{Beam, PatternSpec};
 pub use spec::{DetectionSpec, GlassSpec, GrazingSpec, LidarErrorsSpec, LidarSpec, RangeNoiseSpec, Rays, Switch};
 pub use sweep::{Firing, Sweep};
 
-use crate::geometry::Vector;
+use crate::geometry::{Rotation, Vector};
 use crate::measurement::LidarNoise;
 use crate::spec::{Source, SpecError};
 use crate::time::Span;
-use pattern::Plane;
+use pattern::{Pattern, Plane};
+use std::f64::consts::TAU;
 
 /// A lidar: when and where each of its beams goes, and what its errors are like.
 #[derive(Debug, Clone)]
 pub struct Lidar {
     beams: Vec<Beam>,
     plane: Option<Plane>,
+    /// By how much the beams of a scan are turned about z against those of the scan before, turns.
+    turns_per_scan: f64,
     /// The rays of one beam after another, unit vectors in the lidar's frame.
     rays: Vec<Vector>,
     /// The share of the beam's light in each of its rays.
@@ -37,9 +42,9 @@ impl Lidar {
     /// When its beams do not fit into its turn, or its limits contradict each other.
     pub fn new(spec: &LidarSpec, source: &Source) -> Result<Self, SpecError> {
         spec.check(source)?;
-        let (beams, plane) = spec.pattern.beams(spec.rate_hz, source)?;
+        let Pattern { beams, plane, turns_per_scan } = spec.pattern.build(spec.rate_hz, source)?;
         let (rays, weights) = spec.rays_of(&beams);
-        Ok(Self { beams, plane, rays, weights, spec: spec.clone() })
+        Ok(Self { beams, plane, turns_per_scan, rays, weights, spec: spec.clone() })
     }
 
     /// The spec it was built from.
@@ -47,7 +52,8 @@ impl Lidar {
         &self.spec
     }
 
-    /// The beams of a scan, in the order in which they are fired.
+    /// The beams of scan 0, in the order in which they are fired. Those of other scans are the same, or turned about z where
+    /// the pattern does not repeat.
     pub fn beams(&self) -> &[Beam] {
         &self.beams
     }
@@ -65,6 +71,12 @@ impl Lidar {
     /// Time from the first beam of a scan to its last.
     pub fn sweep_span(&self) -> Span {
         self.beams.iter().map(|beam| beam.offset).max().unwrap_or(Span::ZERO)
+    }
+
+    /// By what the beams of scan `scan` are turned against those of scan 0, where the pattern does not repeat.
+    fn turned(&self, scan: u64) -> Option<Rotation> {
+        let turns = (self.turns_per_scan.fract() * scan as f64).fract();
+        (self.turns_per_scan != 0.0).then(|| Rotation::from_axis_angle(&Vector::z_axis(), TAU * turns))
     }
 
     /// How well it measures range, for an estimator: by its spec even where its errors are switched off.

@@ -1,3 +1,5 @@
+use super::interlaced::Interlaced;
+use super::rosette::Rosette;
 use crate::geometry::Vector;
 use crate::spec::{Source, SpecError, checked};
 use crate::time::Span;
@@ -5,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Greatest number of beams of a scan: more is a slip of the pen.
-const MAX_BEAMS: usize = 1 << 20;
+pub(super) const MAX_BEAMS: usize = 1 << 20;
 
 /// Where and when the beams of a scan are fired.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,6 +37,50 @@ pub enum PatternSpec {
         #[serde(deserialize_with = "checked::positive")]
         round_period_us: f64,
     },
+    /// A mirror that sweeps the plane z = 0 counter-clockwise and takes several turns for a scan, each a step further on
+    /// than the one before. As the time of a beam is not linear in its azimuth, such a scan has no polar form.
+    Interlaced {
+        /// How many beams of the whole scan.
+        beams: u32,
+        /// Azimuth of the first, degrees from x.
+        #[serde(deserialize_with = "checked::finite")]
+        first_deg: f64,
+        /// Azimuth between neighbours in the whole scan, degrees: beams of one mirror turn are `mirror_turns` steps apart.
+        #[serde(deserialize_with = "checked::positive")]
+        step_deg: f64,
+        /// How many beams of one mirror turn would fit into a whole turn, the blind part included.
+        slots_per_turn: u32,
+        /// Turns of the mirror a scan.
+        mirror_turns: u32,
+    },
+    /// A curve that turns counter-clockwise about z while it swings up and down, and is another one in each scan: an
+    /// approximation of lidars whose pattern does not repeat.
+    Rosette {
+        /// How many beams of a scan, evenly spaced in time over its whole period.
+        beams: u32,
+        /// Elevation at which the curve turns up, degrees above the plane z = 0.
+        #[serde(deserialize_with = "checked::finite")]
+        lowest_deg: f64,
+        /// Elevation at which it turns down, degrees.
+        #[serde(deserialize_with = "checked::finite")]
+        highest_deg: f64,
+        /// Turns about z a scan; what it has beyond a whole number turns each scan against the one before.
+        #[serde(deserialize_with = "checked::positive")]
+        turns_per_scan: f64,
+        /// Swings up and down a scan.
+        waves_per_scan: u32,
+    },
+}
+
+/// The beams of scans.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Pattern {
+    /// Those of scan 0, in the order in which they are fired.
+    pub beams: Vec<Beam>,
+    /// The plane they lie in, if the polar form of a planar scan can say them.
+    pub plane: Option<Plane>,
+    /// By how much the beams of a scan are turned about z against those of the scan before, turns.
+    pub turns_per_scan: f64,
 }
 
 /// One beam of a scan.
@@ -57,8 +103,9 @@ pub(super) struct Plane {
 }
 
 impl PatternSpec {
-    /// The beams of a scan of a lidar that scans `rate_hz` times a second, and the plane they lie in, if any.
-    pub(super) fn beams(&self, rate_hz: f64, source: &Source) -> Result<(Vec<Beam>, Option<Plane>), SpecError> {
+    /// The beams of a lidar that scans `rate_hz` times a second.
+    pub(super) fn build(&self, rate_hz: f64, source: &Source) -> Result<Pattern, SpecError> {
+        let still = |beams| Pattern { beams, plane: None, turns_per_scan: 0.0 };
         match self {
             &Self::Planar { beams, first_deg, step_deg, slots_per_turn } => {
                 if beams == 0 || beams > slots_per_turn || beams as usize > MAX_BEAMS {
@@ -70,11 +117,21 @@ impl PatternSpec {
                     angle_increment_rad: step_deg.to_radians(),
                     time_increment_s: 1.0 / (rate_hz * f64::from(slots_per_turn)),
                 };
-                Ok(((0..beams).map(|k| plane.beam(k)).collect(), Some(plane)))
+                let beams = (0..beams).map(|k| plane.beam(k)).collect();
+                Ok(Pattern { plane: Some(plane), ..still(beams) })
             }
             Self::Spinning { elevations_deg, channel_period_us, round_period_us } => {
                 let times = (channel_period_us * 1e-6, round_period_us * 1e-6);
-                Ok((spinning(elevations_deg, times, rate_hz, source)?, None))
+                Ok(still(spinning(elevations_deg, times, rate_hz, source)?))
+            }
+            &Self::Interlaced { beams, first_deg, step_deg, slots_per_turn, mirror_turns } => {
+                let (first_rad, step_rad) = (first_deg.to_radians(), step_deg.to_radians());
+                let interlaced = Interlaced { beams, first_rad, step_rad, slots_per_turn, mirror_turns };
+                Ok(still(interlaced.beams(rate_hz, source)?))
+            }
+            &Self::Rosette { beams, lowest_deg, highest_deg, turns_per_scan, waves_per_scan } => {
+                let rosette = Rosette { beams, lowest_deg, highest_deg, turns: turns_per_scan, waves: waves_per_scan };
+                Ok(Pattern { turns_per_scan, ..still(rosette.beams(rate_hz, source)?) })
             }
         }
     }
@@ -136,7 +193,7 @@ mod tests {
     #[test]
     fn the_beams_of_a_utm30lx_run_from_minus_135_to_135_degrees_in_18_75_ms() {
         let pattern = PatternSpec::Planar { beams: 1081, first_deg: -135.0, step_deg: 0.25, slots_per_turn: 1440 };
-        let (beams, plane) = pattern.beams(40.0, &source()).unwrap();
+        let Pattern { beams, plane, .. } = pattern.build(40.0, &source()).unwrap();
         let (first, last) = (beams[0], beams[1080]);
         assert_relative_eq!(
             first.direction_in_laser,
@@ -156,7 +213,7 @@ mod tests {
     #[test]
     fn more_beams_than_slots_are_refused_where_they_stand() {
         let pattern = PatternSpec::Planar { beams: 1441, first_deg: 0.0, step_deg: 0.25, slots_per_turn: 1440 };
-        assert_eq!(pattern.beams(40.0, &source()).unwrap_err().line_and_column(), Some((3, 2)));
+        assert_eq!(pattern.build(40.0, &source()).unwrap_err().line_and_column(), Some((3, 2)));
     }
 
     #[test]
@@ -164,7 +221,7 @@ mod tests {
         // Two channels 1 ms apart, rounds of 25 ms, 10 Hz: 36 degrees are 10 ms, so a round turns 90 and a channel 3.6.
         let (channel_period_us, round_period_us) = (1e3, 25e3);
         let pattern = PatternSpec::Spinning { elevations_deg: vec![-30.0, 30.0], channel_period_us, round_period_us };
-        let (beams, plane) = pattern.beams(10.0, &source()).unwrap();
+        let Pattern { beams, plane, .. } = pattern.build(10.0, &source()).unwrap();
         assert!(plane.is_none());
         assert_eq!(beams.len(), 8);
         assert_relative_eq!(beams[2].direction_in_laser, Vector::new(0.0, -0.75_f64.sqrt(), -0.5), epsilon = 1e-12);

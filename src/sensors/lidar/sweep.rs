@@ -1,4 +1,5 @@
 use super::Lidar;
+use crate::geometry::Rotation;
 use crate::sensors::{Scenery, SurfaceHit, Track};
 use crate::time::Stamp;
 
@@ -25,6 +26,8 @@ pub struct Firing {
 pub struct Sweep {
     /// When the scan was taken.
     pub firing: Firing,
+    /// By what its beams are turned against those of scan 0.
+    pub(super) turned: Option<Rotation>,
     surfaces: Vec<SurfaceHit>,
     /// Where the surfaces of each ray end in `surfaces`.
     ends: Vec<u32>,
@@ -49,6 +52,7 @@ impl Lidar {
     pub fn sweep(&self, scenery: &dyn Scenery, laser: &Track, firing: &Firing) -> Sweep {
         let mut sweep = Sweep {
             firing: *firing,
+            turned: self.turned(firing.index),
             surfaces: Vec::with_capacity(self.rays.len() + self.rays.len() / 8),
             ends: Vec::with_capacity(self.rays.len()),
         };
@@ -56,8 +60,10 @@ impl Lidar {
             let t_s = firing.start_s + beam.offset_s / firing.pace;
             let world_from_laser = laser.pose(t_s);
             let origin = world_from_laser.translation.vector;
+            let world_from_beams =
+                sweep.turned.map_or(world_from_laser.rotation, |turn| world_from_laser.rotation * turn);
             for ray in rays {
-                let direction = world_from_laser.rotation * ray;
+                let direction = world_from_beams * ray;
                 self.follow(scenery, (&origin, &direction, t_s), &mut sweep.surfaces);
                 sweep.ends.push(sweep.surfaces.len() as u32);
             }
