@@ -71,6 +71,7 @@ fn run(lidar: &str, imu: &str, clock: &str) {
     let imu_model = Imu::new(&parse(&of_imu).unwrap(), &of_imu).unwrap();
     let rig = Rig {
         scenery: &Globe,
+        carrier: &[],
         lidar: &lidar_model,
         imu: &imu_model,
         clocks: Clocks::new(&parse(&of_clock).unwrap(), &of_clock, EPOCH).unwrap(),

@@ -13,6 +13,7 @@
 //! Every source of noise has a stream of its own, named after what it disturbs; a lidar's has one part a scan, so that
 //! scans can be computed in any order, on any thread.
 
+mod carrier;
 mod clock;
 mod imu;
 mod lidar;
@@ -20,6 +21,7 @@ mod scenery;
 mod stamper;
 mod track;
 
+pub use carrier::{Carried, Cylinder};
 pub use clock::{Clock, ClockSpec, Clocks, ClocksSpec};
 pub use imu::{AccelSpec, GaussMarkovSpec, GyroSpec, Imu, ImuErrors, ImuSpec, MeanMotion, mean_motion};
 pub use lidar::{

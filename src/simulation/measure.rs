@@ -5,7 +5,7 @@ use super::schedule::{ImuInterval, Schedule};
 use super::{Rig, SimulationSummary};
 use crate::geometry::Vector;
 use crate::measurement::{ImuSample, LidarScan};
-use crate::sensors::{Firing, ImuErrors, LidarErrors, Track, mean_motion};
+use crate::sensors::{Carried, Firing, ImuErrors, LidarErrors, Scenery, Track, mean_motion};
 use crate::time::{Span, Stamp};
 use crate::truth::{ClockTruth, TruthSample};
 use rayon::prelude::*;
@@ -52,7 +52,7 @@ impl<'a> Sensors<'a> {
             truth: self.schedule.truths(until_s).iter().map(|at| self.truth(&head, &base, *at)).collect(),
             clocks: self.schedule.clocks(until_s).iter().map(|t_s| self.clock(*t_s)).collect(),
             samples: samples.iter().map(|interval| self.sample(&head, interval, summary)).collect(),
-            scans: self.scans(&head, until_s, summary),
+            scans: self.scans((&head, &base), until_s, summary),
             until_s,
         };
         summary.scans += events.scans.len() as u64;
@@ -85,13 +85,20 @@ impl<'a> Sensors<'a> {
         (self.rig.true_stamp(interval.to_s), sample)
     }
 
-    fn scans(&mut self, head: &Track, until_s: f64, summary: &mut SimulationSummary) -> Vec<(Stamp, LidarScan)> {
+    fn scans(
+        &mut self,
+        (head, base): (&Track, &Track),
+        until_s: f64,
+        summary: &mut SimulationSummary,
+    ) -> Vec<(Stamp, LidarScan)> {
         let laser = head.of_frame(&self.rig.head_from_laser);
         let firings = self.schedule.scans(until_s);
-        let lidar = self.rig.lidar;
+        let Rig { lidar, scenery, carrier, .. } = *self.rig;
+        let carried = Carried { scenery, carrier, base };
+        let scenery: &dyn Scenery = if carrier.is_empty() { scenery } else { &carried };
         let started = Instant::now();
         let scan = |firing: &Firing| {
-            let sweep = lidar.sweep(self.rig.scenery, &laser, firing);
+            let sweep = lidar.sweep(scenery, &laser, firing);
             let over_s = firing.start_s + lidar.sweep_span().seconds() / firing.pace;
             (self.rig.true_stamp(over_s), lidar.measure(&sweep, &self.lidar_errors))
         };

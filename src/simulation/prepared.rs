@@ -103,6 +103,7 @@ impl Simulation {
     fn rig(&self) -> Rig<'_> {
         Rig {
             scenery: &self.world,
+            carrier: &[],
             lidar: &self.lidar,
             imu: &self.imu,
             clocks: self.clocks,

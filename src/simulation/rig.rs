@@ -2,7 +2,7 @@ use super::motion::STEP_S;
 use crate::geometry::Pose;
 use crate::measurement::Calibration;
 use crate::random::Seed;
-use crate::sensors::{Clocks, Imu, Lidar, Scenery};
+use crate::sensors::{Clocks, Cylinder, Imu, Lidar, Scenery};
 use crate::time::{NANOS_PER_SECOND, Span, Stamp};
 
 /// When a run starts in true time, so that recordings look like any other's: 2012-10-01, the year of the paper.
@@ -13,6 +13,8 @@ pub const EPOCH: Stamp = Stamp::from_nanos(1_349_049_600 * NANOS_PER_SECOND);
 pub struct Rig<'a> {
     /// What stands around.
     pub scenery: &'a dyn Scenery,
+    /// What of its carrier the lidar may see, fixed to the base: the operator, a handle, a cart.
+    pub carrier: &'a [Cylinder],
     /// The lidar.
     pub lidar: &'a Lidar,
     /// The inertial measurement unit.

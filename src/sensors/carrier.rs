@@ -1,0 +1,140 @@
+use super::{Scenery, SurfaceHit, Track};
+use crate::geometry::Vector;
+
+/// An upright cylinder, closed at both ends, fixed in the base's frame: an operator's body, a handle, a cart's mast.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cylinder {
+    /// Where its axis, along z of the base, ends below, in the base's frame, m.
+    pub foot_in_base: Vector,
+    /// Its radius, m.
+    pub radius_m: f64,
+    /// Its height, m.
+    pub height_m: f64,
+    /// Share of the light that comes back diffusely at normal incidence, 0..=1.
+    pub reflectance: f32,
+}
+
+impl Cylinder {
+    /// The first of its surfaces that a ray of the base's frame meets in front of its origin.
+    fn first_hit(&self, origin: &Vector, direction: &Vector) -> Option<SurfaceHit> {
+        let from = origin - self.foot_in_base;
+        let at = |range_m: f64| from + direction * range_m;
+        let hit = |range_m: f64, cos: f64| SurfaceHit {
+            range_m,
+            cos_incidence: cos.abs() as f32,
+            reflectance: self.reflectance,
+            transmission: 0.0,
+        };
+        let caps = [0.0, self.height_m].into_iter().filter_map(|z| {
+            let range_m = (z - from.z) / direction.z;
+            (range_m > 0.0 && at(range_m).xy().norm() <= self.radius_m).then(|| hit(range_m, direction.z))
+        });
+        // |(from + s direction).xy| = radius: a s^2 + 2 b s + c = 0.
+        let a = direction.xy().norm_squared();
+        let b = from.xy().dot(&direction.xy());
+        let c = from.xy().norm_squared() - self.radius_m.powi(2);
+        let root = (b * b - a * c).sqrt();
+        let side = [(-b - root) / a, (-b + root) / a].into_iter().filter_map(|range_m| {
+            let point = at(range_m);
+            let on_side = range_m > 0.0 && (0.0..=self.height_m).contains(&point.z);
+            on_side.then(|| hit(range_m, point.xy().dot(&direction.xy()) / self.radius_m))
+        });
+        caps.chain(side).min_by(|a, b| a.range_m.total_cmp(&b.range_m))
+    }
+}
+
+/// What stands around a lidar and, before it, what carries the lidar: solids that move with the base.
+#[derive(Clone, Copy)]
+pub struct Carried<'a> {
+    /// What stands around.
+    pub scenery: &'a dyn Scenery,
+    /// The solids that carry the lidar.
+    pub carrier: &'a [Cylinder],
+    /// The track of the base.
+    pub base: &'a Track,
+}
+
+impl Scenery for Carried<'_> {
+    fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, t_s: f64) -> Option<SurfaceHit> {
+        let world_from_base = self.base.pose(t_s);
+        let origin_in_base = world_from_base.inverse_transform_point(&(*origin).into()).coords;
+        let direction_in_base = world_from_base.inverse_transform_vector(direction);
+        let solids = self.carrier.iter().filter_map(|solid| solid.first_hit(&origin_in_base, &direction_in_base));
+        let nearest = solids.filter(|hit| hit.range_m <= reach_m).min_by(|a, b| a.range_m.total_cmp(&b.range_m));
+        let beyond_m = nearest.map_or(reach_m, |hit| hit.range_m);
+        self.scenery.first_hit(origin, direction, beyond_m, t_s).or(nearest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Kinematics, Pose, from_roll_pitch_yaw};
+    use approx::assert_relative_eq;
+    use std::f64::consts::FRAC_PI_2;
+
+    /// A wall across the world's x axis.
+    struct Wall(f64);
+
+    impl Scenery for Wall {
+        fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, _t_s: f64) -> Option<SurfaceHit> {
+            let range_m = (self.0 - origin.x) / direction.x;
+            let hit = SurfaceHit { range_m, cos_incidence: 1.0, reflectance: 0.5, transmission: 0.0 };
+            (range_m > 0.0 && range_m <= reach_m).then_some(hit)
+        }
+    }
+
+    /// An operator half a metre behind the base, from 1.2 m below it to 0.5 m above.
+    fn operator() -> Cylinder {
+        Cylinder { foot_in_base: Vector::new(-0.5, 0.0, -1.2), radius_m: 0.2, height_m: 1.7, reflectance: 0.3 }
+    }
+
+    #[test]
+    fn a_ray_meets_the_side_and_the_ends_of_a_cylinder() {
+        let hit = |origin: Vector, direction: Vector| operator().first_hit(&origin, &direction.normalize());
+        // Straight back: 0.5 - 0.2. Passing the axis at 0.12 m: 0.5 - sqrt(0.04 - 0.0144) = 0.34, cosine 0.16 / 0.2.
+        let side = hit(Vector::zeros(), -Vector::x()).unwrap();
+        assert_relative_eq!(side.range_m, 0.3, epsilon = 1e-12);
+        let off = hit(Vector::y() * 0.12, -Vector::x()).unwrap();
+        assert_relative_eq!(off.range_m, 0.34, epsilon = 1e-12);
+        assert_relative_eq!(off.cos_incidence, 0.8, epsilon = 1e-6);
+        // From 2 m above the base straight down onto the head, at 0.5 m.
+        let top = hit(Vector::new(-0.4, 0.1, 2.0), -Vector::z()).unwrap();
+        assert_relative_eq!(top.range_m, 1.5, epsilon = 1e-12);
+        // At 45 degrees up, the side is met at a height of 0.3 m, at 60 degrees (0.52 m) nothing is.
+        assert_relative_eq!(
+            hit(Vector::zeros(), Vector::new(-1.0, 0.0, 1.0)).unwrap().range_m,
+            0.3 * 2_f64.sqrt(),
+            epsilon = 1e-12
+        );
+        assert!(hit(Vector::zeros(), Vector::new(-0.3, 0.0, 0.3 * 3_f64.sqrt())).is_none());
+        assert!(hit(Vector::zeros(), Vector::x()).is_none() && hit(Vector::y() * 0.21, -Vector::x()).is_none());
+    }
+
+    #[test]
+    fn the_carrier_moves_with_its_base_before_what_stands_around() {
+        // The base walks along x at 1 m/s and faces y, so that its operator stands half a metre towards -y.
+        let walking = |k: u32| {
+            let pose = Pose::from_parts(
+                Vector::new(f64::from(k) * 0.01, 0.0, 0.0).into(),
+                from_roll_pitch_yaw(0.0, 0.0, FRAC_PI_2),
+            );
+            Kinematics { velocity_in_world: Vector::x(), ..Kinematics::at_rest(pose) }
+        };
+        let base = Track::new(0, 0.01, (0..=100).map(walking).collect()).unwrap();
+        let carrier = [operator()];
+        let carried = Carried { scenery: &Wall(3.0), carrier: &carrier, base: &base };
+        let range = |origin: Vector, direction: Vector, t_s: f64| {
+            carried.first_hit(&origin, &direction, 30.0, t_s).map(|hit| hit.range_m)
+        };
+        assert_relative_eq!(range(Vector::x() * 0.7, -Vector::y(), 0.7).unwrap(), 0.3, epsilon = 1e-9);
+        assert!(range(Vector::zeros(), -Vector::y(), 0.7).is_none(), "it was there at the start, not any more");
+        // Along x at y = -0.5: the operator stands at 0.7 m, its near side at 0.5, the wall at 3; a wall before it hides it.
+        let along = Vector::new(0.0, -0.5, 0.0);
+        assert_relative_eq!(range(along, Vector::x(), 0.7).unwrap(), 0.5, epsilon = 1e-9);
+        assert_relative_eq!(range(along + Vector::y(), Vector::x(), 0.7).unwrap(), 3.0, epsilon = 1e-9);
+        let hidden = Carried { scenery: &Wall(0.4), ..carried };
+        assert_relative_eq!(hidden.first_hit(&along, &Vector::x(), 30.0, 0.7).unwrap().range_m, 0.4, epsilon = 1e-9);
+        assert!(carried.first_hit(&along, &Vector::x(), 0.4, 0.7).is_none(), "beyond reach");
+    }
+}
