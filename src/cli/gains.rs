@@ -7,7 +7,7 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim::dynamics::{DampingSpec, HeadModel, LinkageSpec, Quantity, load};
+use zsim::dynamics::{DampingSpec, HeadModel, Quantity, load};
 use zsim::motion::Axis;
 use zsim::random::Seed;
 use zsim::report;
@@ -37,7 +37,7 @@ pub(super) struct Arguments {
     /// What is compared along x, y and z
     #[arg(long, value_enum, default_value_t = Along::Acceleration)]
     along: Along,
-    /// Damp all modes by this ratio instead of the head's own
+    /// Damp all modes by this ratio instead of the head's own; what its elements take comes on top
     #[arg(long, value_name = "RATIO")]
     damping: Option<f64>,
     /// How many realisations, alike but for their phases, are averaged
@@ -94,7 +94,7 @@ fn name(arguments: &Arguments) -> String {
 
 fn head(arguments: &Arguments) -> anyhow::Result<HeadModel> {
     let (mut spec, source) = load(&arguments.head)?;
-    if let (Some(ratio), LinkageSpec::Spring { damping_ratio, .. }) = (arguments.damping, &mut spec.linkage) {
+    if let (Some(ratio), Some(damping_ratio)) = (arguments.damping, spec.linkage.damping_ratio_mut()) {
         if !(ratio.is_finite() && ratio >= 0.0) {
             return Err(Usage(format!("--damping {ratio}: a damping ratio is a number of at least 0")).into());
         }

@@ -1,6 +1,6 @@
 //! What `zsim spring` says.
 
-use zsim::dynamics::ModeKind;
+use zsim::dynamics::{Bearing, BearingKind, ModeKind};
 use zsim::report::table;
 use zsim::study::spring::design::DesignStudy;
 use zsim::study::spring::{CoilReport, Figures, SpringReport, UnderShake};
@@ -12,12 +12,13 @@ pub(super) fn report(report: &SpringReport) -> String {
     rows.push(row("stands", if report.stands { "yes" } else { "no" }.to_owned()));
     rows.push(row("heaviest head of this shape", heaviest));
     if let Some(rest) = &report.rest {
-        rows.push(row("sag", format!("{:.2} mm", rest.sag_mm)));
+        rows.extend(rest.sag_mm.map(|mm| row("sag", format!("{mm:.2} mm"))));
         let [x, y, z] = rest.position_m.map(|m| m * 1e3);
         rows.push(row("head at rest", format!("{x:.1}, {y:.1}, {z:.1} mm")));
         let [roll, pitch, yaw] = rest.roll_pitch_yaw_deg;
         rows.push(row("roll, pitch, yaw", format!("{}, {}, {} deg", rounded(roll), rounded(pitch), rounded(yaw))));
     }
+    rows.extend(report.bearings.iter().map(bearing));
     rows.extend(report.coil.iter().flat_map(coil));
     let mut words = table(&[], &rows, false);
     words += &report.falls_because.as_ref().map(|why| format!("\n{why}\n")).unwrap_or_default();
@@ -43,6 +44,16 @@ fn row(name: &str, value: String) -> Vec<String> {
     vec![name.to_owned(), value]
 }
 
+fn bearing(bearing: &Bearing) -> Vec<String> {
+    let name = match bearing.kind {
+        BearingKind::Spring => "a spring is pressed by",
+        BearingKind::Cord => "a cord is pulled by",
+        BearingKind::Float => "a float is lifted by",
+        BearingKind::UniversalJoint => "a universal joint bears",
+    };
+    row(name, bearing.load_n.map_or("the rest".to_owned(), |n| format!("{n:.2} N")))
+}
+
 /// To three decimals, nought without a sign.
 fn rounded(x: f64) -> String {
     if x.abs() < 5e-4 { "0".to_owned() } else { format!("{x:.3}") }
@@ -60,7 +71,7 @@ fn coil(coil: &CoilReport) -> Vec<Vec<String>> {
     };
     vec![
         row("spring index", format!("{:.2}", coil.index)),
-        row("mass of the wire", format!("{:.1} g", coil.mass_g)),
+        row("mass of the wire", or_dash(coil.mass_g, "g")),
         row("along its axis", format!("{:.1} N/m", coil.axial_n_per_m)),
         row("about its axis", format!("{:.4} N m/rad", coil.torsion_nm_per_rad)),
         row("buckles", buckles),

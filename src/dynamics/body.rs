@@ -1,8 +1,8 @@
 //! The head's mass.
 
 use super::spec::{HeadSpec, PartSpec};
-use crate::elasticity::{Matrix6, blocks};
-use crate::geometry::{Matrix, Vector};
+use crate::elasticity::{Matrix6, Vector6, blocks, split};
+use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::spec::{Source, SpecError};
 
 /// Mass properties of the head.
@@ -40,6 +40,15 @@ impl Body {
     pub(super) fn mass_matrix(&self, rotation: &Matrix) -> Matrix6 {
         let inertia = rotation * self.inertia_in_head * rotation.transpose();
         blocks(&(Matrix::identity() * self.mass_kg), &Matrix::zeros(), &Matrix::zeros(), &inertia)
+    }
+
+    /// A head's pose after a displacement of its centre of mass and a turn about it.
+    pub(super) fn displaced(&self, pose: &Pose, displacement: &Vector6) -> Pose {
+        let (shift, turn) = split(displacement);
+        let turn = Rotation::from_scaled_axis(turn);
+        let arm = pose.rotation * self.centre_of_mass_in_head;
+        let origin = arm + pose.translation.vector + shift - turn * arm;
+        Pose::from_parts(origin.into(), turn * pose.rotation)
     }
 }
 

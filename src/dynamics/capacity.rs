@@ -2,28 +2,21 @@
 
 use super::body::Body;
 use super::error::DynamicsError;
-use super::head::Site;
-use super::spec::{HeadSpec, LinkageSpec};
-use crate::spec::{Source, SpecError};
+use super::site::Mount;
+use super::spec::HeadSpec;
+use crate::spec::Source;
 
 /// The most that is tried, in parts of the head's mass.
 const MOST: f64 = 1024.0;
 
-/// The heaviest head of the shape of `spec`'s that stands on its spring, kg, to a millionth; `None` where nothing falls: a
-/// head without spring, or one that hangs.
-///
-/// A head of twice the mass rests as this one would under twice the gravity.
+/// The heaviest head of the shape of `spec`'s that rests in its linkage, kg, to a millionth; `None` where nothing falls: a
+/// rigid head, or one that hangs.
 ///
 /// # Errors
 /// When the spec's numbers are no head's or no spring's.
 pub fn heaviest_kg(spec: &HeadSpec, source: &Source) -> Result<Option<f64>, DynamicsError> {
     let body = Body::of(spec, source)?;
-    let LinkageSpec::Spring { spring, segments, base_from_spring, head_from_spring, .. } = &spec.linkage else {
-        return Ok(None);
-    };
-    let design = spring.design().map_err(|error| SpecError::about(source, "spring", error.to_string()))?;
-    let (base_from_spring, head_from_top) = (base_from_spring.pose(), head_from_spring.pose());
-    let site = Site { design, segments: *segments, base_from_spring, head_from_top, body: &body };
+    let Mount::Gives(site) = Mount::of(&spec.linkage, &body, source)? else { return Ok(None) };
     let (mut stands, mut falls) = (0.0, 1.0);
     while site.at_rest(falls).is_ok() {
         (stands, falls) = (falls, 2.0 * falls);

@@ -2,16 +2,17 @@
 
 use super::body::Body;
 use super::error::DynamicsError;
-use super::law::{EndStop, Hold, Law};
-use super::modes::{LinearModel, Mode, modal_damping, modes};
-use super::spec::{DampingSpec, EndStopSpec, HeadSpec, HoldSpec, LinkageSpec};
-use super::statics::{Statics, Unrest};
-use crate::elasticity::{Matrix6, SpringDesign, Vector6, blocks, split};
-use crate::geometry::{Kinematics, Matrix, Pose, gravity_in_world, skew};
+use super::modes::{LinearModel, Mode};
+use super::push::Instant;
+use super::site::{Manner, Mount, Site};
+use super::spec::{HeadSpec, LinkageSpec};
+use super::sprung::{Bearing, Sprung};
+use super::statics::Unrest;
+use crate::elasticity::stack;
+use crate::geometry::{Kinematics, Pose, gravity_in_world};
 use crate::spec::{Source, SpecError};
-use std::f64::consts::TAU;
 
-/// A head and its linkage, valid by construction: its parts are a rigid body, and it stands.
+/// A head and its linkage, valid by construction: its parts are a rigid body, and it stands or hangs.
 #[derive(Debug, Clone)]
 pub struct HeadModel {
     pub(super) body: Body,
@@ -25,24 +26,15 @@ pub struct HeadModel {
 pub(super) enum Linkage {
     /// Nothing gives.
     Rigid { base_from_head: Pose },
-    /// One spring.
-    Spring(Box<Sprung>),
-}
-
-/// A head on its spring.
-#[derive(Debug, Clone)]
-pub(super) struct Sprung {
-    pub law: Law,
-    /// `base_from_head` at rest, the base upright and still.
-    pub rest: Pose,
-    pub linear: LinearModel,
+    /// One spring, or several elements.
+    Sprung(Box<Sprung>),
 }
 
 impl HeadModel {
     /// The model of the head that `spec`, read from `source`, describes.
     ///
     /// # Errors
-    /// When its numbers are no head's, or it cannot stand on its spring; the error says by how much.
+    /// When its numbers are no head's, or it finds no rest in its linkage; the error says why.
     pub fn new(spec: &HeadSpec, source: &Source) -> Result<Self, DynamicsError> {
         Self::build(spec, source, |site, unrest, source| site.explain(unrest, source))
     }
@@ -50,9 +42,9 @@ impl HeadModel {
     /// As [`HeadModel::new`], but says of a head that cannot stand only that: a search meets thousands of them.
     ///
     /// # Errors
-    /// When its numbers are no head's, or it cannot stand on its spring.
+    /// When its numbers are no head's, or it finds no rest in its linkage.
     pub fn attempt(spec: &HeadSpec, source: &Source) -> Result<Self, DynamicsError> {
-        Self::build(spec, source, |_, unrest, source| SpecError::about(source, "spring", unrest.to_string()))
+        Self::build(spec, source, |site, unrest, source| SpecError::about(source, site.key(), unrest.to_string()))
     }
 
     fn build(spec: &HeadSpec, source: &Source, explain: Explain) -> Result<Self, DynamicsError> {
@@ -81,7 +73,7 @@ impl HeadModel {
     pub fn rest_pose_base_from_head(&self) -> &Pose {
         match &self.linkage {
             Linkage::Rigid { base_from_head } => base_from_head,
-            Linkage::Spring(sprung) => &sprung.rest,
+            Linkage::Sprung(sprung) => &sprung.rest,
         }
     }
 
@@ -89,7 +81,7 @@ impl HeadModel {
     pub fn linear(&self) -> Option<&LinearModel> {
         match &self.linkage {
             Linkage::Rigid { .. } => None,
-            Linkage::Spring(sprung) => Some(&sprung.linear),
+            Linkage::Sprung(sprung) => Some(&sprung.linear),
         }
     }
 
@@ -98,16 +90,24 @@ impl HeadModel {
         self.linear().map_or(&[], |linear| &linear.modes)
     }
 
-    /// An upper bound on how fast the head oscillates, held by a hand and at its end stop, Hz; zero for one that does not.
-    pub(super) fn fastest_hz(&self) -> f64 {
-        let Linkage::Spring(sprung) = &self.linkage else { return 0.0 };
-        let of_modes = sprung.linear.modes.iter().map(|mode| mode.frequency_hz).fold(0.0, f64::max);
-        let lightest = self.body.inertia_in_head.symmetric_eigenvalues().min();
-        let at_stop = sprung.law.end_stop.map_or(0.0, |stop| (stop.stiffness_nm_per_rad / lightest).sqrt() / TAU);
-        of_modes.hypot(sprung.law.hold.as_ref().map_or(0.0, |hand| hand.frequency_hz)).hypot(at_stop)
+    /// What each element of the linkage bears with head and base at rest; nothing for a rigid one.
+    pub fn bearings(&self) -> Vec<Bearing> {
+        match &self.linkage {
+            Linkage::Rigid { .. } => Vec::new(),
+            Linkage::Sprung(sprung) => sprung.bearings(),
+        }
     }
 
-    /// Energy of the head: of its motion, its height above the world's zero, and its spring, J.
+    /// An upper bound on how fast the head oscillates, held by a hand and at its end stop, Hz; zero for one that does not.
+    pub(super) fn fastest_hz(&self) -> f64 {
+        match &self.linkage {
+            Linkage::Rigid { .. } => 0.0,
+            Linkage::Sprung(sprung) => sprung.fastest_hz(&self.body),
+        }
+    }
+
+    /// Energy of the head: of its motion, its height above the world's zero, and its linkage, J. Masses that move along,
+    /// of wire and fluid, count by their motion relative to the base.
     ///
     /// # Errors
     /// When a segmented spring finds no equilibrium there.
@@ -117,56 +117,56 @@ impl HeadModel {
         let moving = 0.5 * self.body.mass_kg * centre.velocity_in_world.norm_squared()
             + 0.5 * turning.dot(&(self.body.inertia_in_head * turning));
         let height = -self.body.mass_kg * gravity_in_world().dot(&centre.world_from_body.translation.vector);
-        let in_linkage = match &self.linkage {
-            Linkage::Rigid { .. } => 0.0,
-            Linkage::Spring(sprung) => sprung.law.potential_j(&world_from_base.inv_mul(&head.world_from_body))?,
+        let Linkage::Sprung(sprung) = &self.linkage else { return Ok(moving + height) };
+        let base_from_head = world_from_base.inv_mul(&head.world_from_body);
+        let in_linkage = sprung.law.potential_j(world_from_base, &base_from_head, &gravity_in_world())?;
+        let twist = stack(&centre.velocity_in_world, &centre.angular_velocity_in_world);
+        let now = Instant {
+            base: &Kinematics::at_rest(*world_from_base),
+            world_from_head: &head.world_from_body,
+            twist: &twist,
+            body: &self.body,
+            hold: 0.0,
+            gravity_in_world: gravity_in_world(),
         };
-        Ok(moving + height + in_linkage)
+        let inertia = sprung.law.forces(&mut sprung.law.state(), &now)?.inertia;
+        Ok(moving + height + in_linkage + 0.5 * twist.dot(&(inertia * twist)))
     }
 }
 
 /// Why a head does not stand, as a sentence.
 type Explain = fn(&Site<'_>, &Unrest, &Source) -> SpecError;
 
-/// What a spring's linkage is built from.
-pub(super) struct Site<'a> {
-    pub design: SpringDesign,
-    pub segments: usize,
-    pub base_from_spring: Pose,
-    pub head_from_top: Pose,
-    pub body: &'a Body,
-}
-
 impl Site<'_> {
-    /// The undamped head at rest under `share` of gravity, with its stiffness.
-    pub fn at_rest(&self, share: f64) -> Result<(Law, Pose, Matrix6), Unrest> {
-        let gravity_in_base = gravity_in_world() * share;
-        let along = self.base_from_spring.rotation.inverse() * gravity_in_base;
-        let spring = self.design.law(-self.body.mass_kg * along.z, self.segments)?;
-        let straight = Pose::translation(0.0, 0.0, spring.length_m());
-        let start = self.base_from_spring * straight * self.head_from_top.inverse();
-        let law = Law::undamped(spring, self.base_from_spring, self.head_from_top, self.body);
-        let (rest, stiffness) = Statics { law: &law, body: self.body, gravity_in_base }.settle(&start)?;
-        Ok((law, rest, stiffness))
+    /// The spec's word for what holds the head.
+    fn key(&self) -> &'static str {
+        if self.is_one_spring() { "spring" } else { "elements" }
     }
 
-    /// The head's fall as a sentence: why, and how much the spring would carry.
+    /// The head's fall as a sentence: why, and how much the linkage would carry.
     fn explain(&self, unrest: &Unrest, source: &Source) -> SpecError {
         let (mut stands, mut falls) = (0.0, 1.0);
         for _ in 0..24 {
             let middle = 0.5 * (stands + falls);
             if self.at_rest(middle).is_ok() { stands = middle } else { falls = middle }
         }
-        let mass_kg = self.body.mass_kg;
+        let mass_kg = self.body().mass_kg;
+        let on = if self.is_one_spring() { "its spring" } else { "its elements" };
         if stands < 1e-3 {
-            return SpecError::about(source, "spring", unrest.to_string());
+            let message = if self.is_one_spring() {
+                unrest.to_string()
+            } else {
+                format!("the head cannot stand or hang on {on}: {unrest}")
+            };
+            return SpecError::about(source, self.key(), message);
         }
+        let carrier = if self.is_one_spring() { "the spring carries" } else { "they carry" };
         let message = format!(
-            "the head cannot stand on its spring: {unrest}; mounted so, the spring carries at most {:.3} kg, and the head has \
+            "the head cannot stand on {on}: {unrest}; mounted so, {carrier} at most {:.3} kg, and the head has \
              {mass_kg:.3} kg",
             stands * mass_kg
         );
-        SpecError::about(source, "spring", message).with_help(
+        SpecError::about(source, self.key(), message).with_help(
             "a thicker wire, fewer coils or a shorter spring are stiffer; a lighter or lower head asks for less",
         )
     }
@@ -174,81 +174,17 @@ impl Site<'_> {
 
 impl Linkage {
     fn new(spec: &LinkageSpec, body: &Body, source: &Source, explain: Explain) -> Result<Self, DynamicsError> {
-        match spec {
-            LinkageSpec::Rigid { base_from_head } => Ok(Linkage::Rigid { base_from_head: base_from_head.pose() }),
-            LinkageSpec::Spring {
-                spring,
-                segments,
-                base_from_spring,
-                head_from_spring,
-                damping_ratio,
-                end_stop,
-                hold,
-            } => {
-                let design = spring.design().map_err(|error| SpecError::about(source, "spring", error.to_string()))?;
-                let (base_from_spring, head_from_top) = (base_from_spring.pose(), head_from_spring.pose());
-                let site = Site { design, segments: *segments, base_from_spring, head_from_top, body };
-                let (law, rest, stiffness) = site.at_rest(1.0).map_err(|unrest| explain(&site, &unrest, source))?;
-                let mut sprung = Sprung::linearised(law, (rest, stiffness), body, damping_ratio, hold.as_ref())
-                    .ok_or_else(|| SpecError::about(source, "parts", "the head's mass has no inverse"))?;
-                sprung.law.end_stop = end_stop.map(|stop| sprung.end_stop(&stop, source)).transpose()?;
-                Ok(Linkage::Spring(Box::new(sprung)))
-            }
+        let site = match Mount::of(spec, body, source)? {
+            Mount::Rigid(base_from_head) => return Ok(Linkage::Rigid { base_from_head }),
+            Mount::Gives(site) => site,
+        };
+        let found = site.at_rest(1.0).map_err(|unrest| explain(&site, &unrest, source))?;
+        let Manner { damping_ratio, end_stop, hold } = site.manner();
+        let mut sprung = Sprung::linearised(found, body, &damping_ratio, hold.as_ref())
+            .ok_or_else(|| SpecError::about(source, "parts", "the head's mass has no inverse"))?;
+        if let Some(stop) = &end_stop {
+            sprung.stop(stop, body, source)?;
         }
-    }
-}
-
-impl Hold {
-    /// A hand on a head of this mass, resting so, both in the deformation's coordinates: `(2 pi f)^2 M` and `4 pi f zeta M`.
-    fn new(hand: &HoldSpec, mass: &Matrix6, rest: Vector6) -> Self {
-        let (frequency_hz, omega) = (hand.frequency_hz, TAU * hand.frequency_hz);
-        let damping = mass * (2.0 * hand.damping_ratio * omega);
-        Self { frequency_hz, stiffness: mass * (omega * omega), damping, rest }
-    }
-}
-
-impl Sprung {
-    /// The head at rest with its modes damped, and a hand near it; `None` where its mass has no inverse.
-    fn linearised(
-        mut law: Law,
-        (rest, stiffness): (Pose, Matrix6),
-        body: &Body,
-        damping: &DampingSpec,
-        hand: Option<&HoldSpec>,
-    ) -> Option<Self> {
-        let mass = body.mass_matrix(rest.rotation.to_rotation_matrix().matrix());
-        let (coordinates, rate) = law.rate_matrix(&rest);
-        let modes = modes(&mass, &stiffness, &rate, damping)?;
-        let unrate = rate.try_inverse()?;
-        let modal = modal_damping(&mass, &modes);
-        law.damping = unrate.tr_mul(&(modal * unrate));
-        law.hold = hand.map(|hand| Hold::new(hand, &unrate.tr_mul(&(mass * unrate)), coordinates));
-        let statics = Statics { law: &law, body, gravity_in_base: gravity_in_world() };
-        let base_stiffness = statics.stiffness_to_base(&rest).ok()?;
-        // A base that moves by (d, phi) carries a head that is stuck to it by (d + phi x centre, phi).
-        let centre = (rest.translation.vector) + rest.rotation * body.centre_of_mass_in_head;
-        let (one, zero) = (Matrix::identity(), Matrix::zeros());
-        let carry = blocks(&one, &-skew(&centre), &zero, &one);
-        let linear =
-            LinearModel { mass, damping: modal, stiffness, base_damping: modal * carry, base_stiffness, modes };
-        Some(Self { law, rest, linear })
-    }
-
-    fn end_stop(&self, stop: &EndStopSpec, source: &Source) -> Result<EndStop, SpecError> {
-        let (coordinates, _) = self.law.rate_matrix(&self.rest);
-        let (_, turn) = split(&coordinates);
-        let lean_deg = turn.norm().to_degrees();
-        if stop.angle_deg <= lean_deg || stop.angle_deg >= 170.0 {
-            let message = format!(
-                "the stop at {} degrees must be beyond the head's lean at rest, {lean_deg:.1} degrees, and below 170",
-                stop.angle_deg
-            );
-            return Err(SpecError::about(source, "angle_deg", message));
-        }
-        Ok(EndStop {
-            angle_rad: stop.angle_deg.to_radians(),
-            stiffness_nm_per_rad: stop.stiffness_nm_per_rad,
-            damping_nm_s_per_rad: stop.damping_nm_s_per_rad,
-        })
+        Ok(Linkage::Sprung(Box::new(sprung)))
     }
 }

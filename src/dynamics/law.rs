@@ -1,28 +1,35 @@
-//! What acts on a sprung head: spring, damping, hand, end stop. Not gravity.
+//! What acts on a head in its linkage: the elements' pushes, damping, hand, end stop. Not gravity.
 
 use super::body::Body;
-use crate::elasticity::{Deformation, ElasticityError, Matrix6, Spring, SpringState, Vector6, blocks, split, stack};
-use crate::geometry::{Kinematics, Matrix, Pose, Vector, skew};
+use super::cord::Cord;
+use super::float::Float;
+use super::joint::UniversalJoint;
+use super::mounted::MountedSpring;
+use super::push::{Between, Ends, Forces, Instant};
+use crate::elasticity::{ElasticityError, Matrix6, SpringState, Vector6, split, stack};
+use crate::geometry::{Kinematics, Pose, Vector};
 
-/// The force law of a linkage with a spring.
+/// The force law of a linkage: the sum of its elements' pushes, and what is said of the linkage as a whole.
 ///
-/// Everything but the end stop works in the spring's [`Deformation`] coordinates e: their gradient of potential plus
-/// `C e_dot`, taken to the head by the transposed rate of e. A motion of head and base as one body changes no e, so it meets
-/// neither force nor damping, and power lost is `e_dot . C e_dot`, never negative.
+/// Damping and the hand work in the [`Deformation`](crate::elasticity::Deformation) coordinates e between two frames, the
+/// *seat*: a force `C e_dot`, taken to the head by the transposed rate of e. A motion of head and base as one body changes
+/// no e, so it meets no damping, and power lost is `e_dot . C e_dot`, never negative.
 #[derive(Debug, Clone)]
 pub(super) struct Law {
-    pub spring: Spring,
-    pub base_from_spring: Pose,
-    pub head_from_top: Pose,
-    /// From the head's centre of mass to the spring's top.
-    pub lever_in_head: Vector,
-    /// In the deformation's coordinates.
+    pub springs: Vec<MountedSpring>,
+    pub cords: Vec<Cord>,
+    pub floats: Vec<Float>,
+    /// Leaves the head two turns and nothing else.
+    pub joint: Option<UniversalJoint>,
+    /// The frames of a single spring's ends; of several elements, two in the centre of mass that agree at rest.
+    pub seat: Ends,
+    /// In the seat's coordinates.
     pub damping: Matrix6,
     pub hold: Option<Hold>,
     pub end_stop: Option<EndStop>,
 }
 
-/// A hand that pulls the head back to `rest`; all in the deformation's coordinates.
+/// A hand that pulls the head back to `rest`; all in the seat's coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct Hold {
     /// Frequency of the head in a firm hand alone.
@@ -32,7 +39,7 @@ pub(super) struct Hold {
     pub rest: Vector6,
 }
 
-/// A stop, elastic and damped, for the angle between the axes of the spring's foot and top.
+/// A stop, elastic and damped, for the angle between the z axes of the seat's two frames.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct EndStop {
     pub angle_rad: f64,
@@ -40,122 +47,109 @@ pub(super) struct EndStop {
     pub damping_nm_s_per_rad: f64,
 }
 
-/// Where head and base are at an instant, and how fast.
-pub(super) struct Instant<'a> {
-    pub base: &'a Kinematics,
-    pub world_from_head: &'a Pose,
-    /// Velocity of the head's centre of mass, and angular velocity, in the world.
-    pub twist: &'a Vector6,
-    /// How firmly the hand holds, 0 to 1.
-    pub hold: f64,
-}
-
-/// What acts on the head, about its centre of mass, in the world.
-pub(super) struct Forces {
-    /// Force and torque at the instant's velocities.
-    pub wrench: Vector6,
-    /// Minus the derivative of the wrench by the head's twist: symmetric, never negative.
-    pub damping: Matrix6,
-    /// How far the top has turned from the foot, rad.
-    pub turn_rad: f64,
-}
+/// Where the springs' inner nodes last were.
+#[derive(Debug, Clone)]
+pub(super) struct LawState(Vec<SpringState>);
 
 impl Law {
-    /// A spring alone, without damping.
-    pub fn undamped(spring: Spring, base_from_spring: Pose, head_from_top: Pose, body: &Body) -> Self {
-        let lever_in_head = head_from_top.translation.vector - body.centre_of_mass_in_head;
-        let damping = Matrix6::zeros();
-        Self { spring, base_from_spring, head_from_top, lever_in_head, damping, hold: None, end_stop: None }
+    /// Inner nodes that nobody has looked at yet.
+    pub fn state(&self) -> LawState {
+        LawState(self.springs.iter().map(|mounted| mounted.spring.state()).collect())
     }
 
-    /// Forces at an instant.
+    /// Forces at an instant; of a joint those of its torsion springs, not those that hold it together.
     ///
     /// # Errors
     /// When a segmented spring finds no equilibrium.
-    pub fn forces(&self, state: &mut SpringState, now: &Instant<'_>) -> Result<Forces, ElasticityError> {
-        let world_from_spring = now.base.world_from_body * self.base_from_spring;
-        let world_from_top = now.world_from_head * self.head_from_top;
-        let spring_from_top = world_from_spring.inv_mul(&world_from_top);
-        let deformation = Deformation::of(&spring_from_top);
-        let axes = world_from_spring.rotation.to_rotation_matrix().into_inner();
-        let lever = now.world_from_head.rotation * self.lever_in_head;
-
-        let rate = deformation.rate(&self.relative_twist(now, &world_from_top, &lever, &axes));
-        let (resist, damping) = self.resistance(&deformation.coordinates, &rate, now.hold);
-        let on_top = self.spring.wrench(state, &spring_from_top, &deformation)? - deformation.wrench(&resist);
-        let (force, torque) = split(&on_top);
-        let force = axes * force;
-        let mut wrench = stack(&force, &(axes * torque + lever.cross(&force)));
-
-        let by_twist = rate_by_twist(&deformation, &axes, &lever);
-        let mut damping = by_twist.tr_mul(&(damping * by_twist));
+    pub fn forces(&self, state: &mut LawState, now: &Instant<'_>) -> Result<Forces, ElasticityError> {
+        let mut forces = Forces::none();
+        for (mounted, state) in self.springs.iter().zip(&mut state.0) {
+            mounted.push(state, now, &mut forces)?;
+        }
+        self.cords.iter().for_each(|cord| cord.push(now, &mut forces));
+        self.floats.iter().for_each(|float| float.push(now, &mut forces));
+        if let Some(joint) = &self.joint {
+            joint.push(now, &mut forces);
+        }
+        let between = self.seat.at(now);
+        self.resist(&between, now, &mut forces);
         if let Some(stop) = &self.end_stop {
-            let from = axes.column(2).into_owned();
-            let to = world_from_top.rotation * Vector::z();
+            let from = between.axes.column(2).into_owned();
+            let to = now.world_from_head.rotation * self.seat.head_from_top.rotation * Vector::z();
             let (_, turning) = split(now.twist);
-            stop.press(&from, &to, &(turning - now.base.angular_velocity_in_world), &mut wrench, &mut damping);
+            stop.press(&from, &to, &(turning - now.base.angular_velocity_in_world), &mut forces);
         }
-        let (_, turn) = split(&deformation.coordinates);
-        Ok(Forces { wrench, damping, turn_rad: turn.norm() })
+        forces.turn_rad = forces.turn_rad.max(between.turn_rad());
+        Ok(forces)
     }
 
-    /// The twist of the spring's top as seen from its foot, in the foot's axes.
-    fn relative_twist(&self, now: &Instant<'_>, world_from_top: &Pose, lever: &Vector, axes: &Matrix) -> Vector6 {
-        let (velocity, turning) = split(now.twist);
-        let base = now.base;
-        let arm = world_from_top.translation.vector - base.world_from_body.translation.vector;
-        let top = velocity + turning.cross(lever);
-        let carried = base.velocity_in_world + base.angular_velocity_in_world.cross(&arm);
-        stack(&axes.tr_mul(&(top - carried)), &axes.tr_mul(&(turning - base.angular_velocity_in_world)))
-    }
-
-    /// Damping and the hand, as a force in the coordinates, and the damping matrix there.
-    fn resistance(&self, coordinates: &Vector6, rate: &Vector6, firmness: f64) -> (Vector6, Matrix6) {
-        match &self.hold {
-            Some(hand) if firmness > 0.0 => {
-                let damping = self.damping + hand.damping * firmness;
-                (damping * rate + hand.stiffness * (coordinates - hand.rest) * firmness, damping)
+    /// Adds the modes' damping and the hand.
+    fn resist(&self, between: &Between, now: &Instant<'_>, forces: &mut Forces) {
+        let rate = between.rate_by_twist();
+        let moving = rate * now.relative_twist();
+        let (push, damping) = match &self.hold {
+            Some(hand) if now.hold > 0.0 => {
+                let damping = self.damping + hand.damping * now.hold;
+                let away = between.deformation.coordinates - hand.rest;
+                (damping * moving + hand.stiffness * away * now.hold, damping)
             }
-            _ => (self.damping * rate, self.damping),
-        }
+            _ => (self.damping * moving, self.damping),
+        };
+        forces.wrench -= rate.tr_mul(&push);
+        forces.damping += rate.tr_mul(&(damping * rate));
     }
 
-    /// Energy in spring and end stop, J.
+    /// Forces of the masses that move along, quadratic in the head's twist.
+    pub fn bend(&self, now: &Instant<'_>, twist: &Vector6) -> Vector6 {
+        let of_springs = self.springs.iter().map(|mounted| mounted.bend(now, twist)).sum::<Vector6>();
+        of_springs + self.floats.iter().map(|float| float.bend(now, twist)).sum::<Vector6>()
+    }
+
+    /// Energy in all that gives, J.
     ///
     /// # Errors
     /// When a segmented spring finds no equilibrium.
-    pub fn potential_j(&self, base_from_head: &Pose) -> Result<f64, ElasticityError> {
-        let spring_from_top = self.base_from_spring.inv_mul(&(base_from_head * self.head_from_top));
-        let in_spring = self.spring.potential_j(&mut self.spring.state(), &spring_from_top)?;
-        let lean = Vector::z().angle(&(spring_from_top.rotation * Vector::z()));
+    pub fn potential_j(
+        &self,
+        world_from_base: &Pose,
+        base_from_head: &Pose,
+        gravity_in_world: &Vector,
+    ) -> Result<f64, ElasticityError> {
+        let mut energy_j = 0.0;
+        for mounted in &self.springs {
+            energy_j += mounted.potential_j(world_from_base, base_from_head, gravity_in_world)?;
+        }
+        energy_j += self.cords.iter().map(|cord| cord.potential_j(base_from_head)).sum::<f64>();
+        let of_float = |float: &Float| float.potential_j(world_from_base, base_from_head, gravity_in_world);
+        energy_j += self.floats.iter().map(of_float).sum::<f64>();
+        energy_j += self.joint.map_or(0.0, |joint| joint.potential_j(base_from_head));
+        let lean = Vector::z().angle(&(self.seat.foot_from_top(base_from_head).rotation * Vector::z()));
         let in_stop = self.end_stop.map_or(0.0, |stop| {
             let beyond = (lean - stop.angle_rad).max(0.0);
             0.5 * stop.stiffness_nm_per_rad * beyond * beyond
         });
-        Ok(in_spring + in_stop)
+        Ok(energy_j + in_stop)
     }
 
-    /// The rate of the coordinates by the head's twist about its centre of mass, in the base's axes, at a pose.
-    pub fn rate_matrix(&self, base_from_head: &Pose) -> (Vector6, Matrix6) {
-        let deformation = Deformation::of(&self.base_from_spring.inv_mul(&(base_from_head * self.head_from_top)));
-        let axes = self.base_from_spring.rotation.to_rotation_matrix().into_inner();
-        let lever = base_from_head.rotation * self.lever_in_head;
-        (deformation.coordinates, rate_by_twist(&deformation, &axes, &lever))
+    /// The seat's coordinates and their rate by the head's twist about its centre of mass, in the base's axes, at a pose.
+    pub fn rate_matrix(&self, base_from_head: &Pose, body: &Body) -> (Vector6, Matrix6) {
+        let now = Instant {
+            base: &Kinematics::at_rest(Pose::identity()),
+            world_from_head: base_from_head,
+            twist: &Vector6::zeros(),
+            body,
+            hold: 0.0,
+            gravity_in_world: Vector::zeros(),
+        };
+        let between = self.seat.at(&now);
+        (between.deformation.coordinates, between.rate_by_twist())
     }
-}
-
-/// The rate of the coordinates by the head's twist about its centre of mass, which is written in axes to which `axes` turns
-/// the spring's; `lever` leads from the centre of mass to the top.
-fn rate_by_twist(deformation: &Deformation, axes: &Matrix, lever: &Vector) -> Matrix6 {
-    let by_velocity = deformation.straight * axes.transpose();
-    let by_turning = deformation.mixed * axes.transpose() - by_velocity * skew(lever);
-    blocks(&by_velocity, &by_turning, &Matrix::zeros(), &by_velocity)
 }
 
 impl EndStop {
     /// Adds the stop's torque and damping where the axis `to` leans too far from `from`; `turning` is the relative angular
     /// velocity.
-    fn press(&self, from: &Vector, to: &Vector, turning: &Vector, wrench: &mut Vector6, damping: &mut Matrix6) {
+    fn press(&self, from: &Vector, to: &Vector, turning: &Vector, forces: &mut Forces) {
         let across = from.cross(to);
         let sine = across.norm();
         let beyond = sine.atan2(from.dot(to)) - self.angle_rad;
@@ -164,9 +158,8 @@ impl EndStop {
         }
         let axis = across / sine;
         let torque = -(self.stiffness_nm_per_rad * beyond + self.damping_nm_s_per_rad * axis.dot(turning));
-        let mut torques = wrench.fixed_rows_mut::<3>(3);
-        torques += axis * torque;
-        let mut block = damping.fixed_view_mut::<3, 3>(3, 3);
+        forces.wrench += stack(&Vector::zeros(), &(axis * torque));
+        let mut block = forces.damping.fixed_view_mut::<3, 3>(3, 3);
         block += axis * axis.transpose() * self.damping_nm_s_per_rad;
     }
 }

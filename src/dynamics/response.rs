@@ -37,12 +37,12 @@ pub struct Peak {
 }
 
 impl HeadModel {
-    /// The points of the paper's gain curves: the base at the spring's foot (the base's origin where there is no spring),
-    /// the head at its IMU.
+    /// The points of the paper's gain curves: the base at the spring's foot (the base's origin where there is not one spring
+    /// alone), the head at its IMU.
     pub fn usual_points(&self) -> Points {
         let base_in_base = match &self.linkage {
+            Linkage::Sprung(sprung) => sprung.foot_in_base(),
             Linkage::Rigid { .. } => Vector::zeros(),
-            Linkage::Spring(sprung) => sprung.law.base_from_spring.translation.vector,
         };
         Points { base_in_base, head_in_head: self.head_from_imu().translation.vector }
     }
@@ -51,17 +51,13 @@ impl HeadModel {
     pub fn frequency_response(&self, points: &Points) -> FrequencyResponse {
         let rest = self.rest_pose_base_from_head();
         let at_base = arm(&-points.base_in_base);
-        match self.linear() {
-            None => {
-                let point = rest * nalgebra::Point3::from(points.head_in_head);
-                FrequencyResponse { stuck: arm(&point.coords) * at_base, terms: Vec::new() }
-            }
-            Some(linear) => {
-                let to_point = rest.rotation * (points.head_in_head - self.body().centre_of_mass_in_head);
-                let terms = linear.modes.iter().map(|mode| Term::of(mode, linear, &arm(&to_point), &at_base)).collect();
-                FrequencyResponse { stuck: Matrix6::zeros(), terms }
-            }
-        }
+        let Some(linear) = self.linear() else {
+            let point = rest * nalgebra::Point3::from(points.head_in_head);
+            return FrequencyResponse { stuck: arm(&point.coords) * at_base, terms: Vec::new(), coupling: None };
+        };
+        let at_head = arm(&(rest.rotation * (points.head_in_head - self.body().centre_of_mass_in_head)));
+        let terms = linear.modes.iter().map(|mode| Term::of(mode, linear, &at_head, &at_base)).collect();
+        FrequencyResponse { stuck: at_head * linear.carried * at_base, terms, coupling: Coupling::of(linear) }
     }
 }
 
@@ -72,18 +68,21 @@ fn arm(to_point: &Vector) -> Matrix6 {
 
 /// The answer of a linearised head to its base, as a sum over its modes.
 ///
-/// From `M x'' + C x' + K x = Cb b' + Kb b` with modal damping (see [`LinearModel`]), the head's displacement per that of
-/// the base at the angular frequency w is
+/// From `M x'' + C x' + K x = Mb b'' + Cb b' + Kb b` (see [`LinearModel`]) with `x = T b + y`, T what the base carries along
+/// and y the head's own motion in its modes, of shapes `phi_k` with unit modal mass: where damping keeps to the modes, the
+/// head's displacement per that of the base at the angular frequency w is
 ///
-/// `H(w) = sum_k phi_k phi_k^T (Kb + i w Cb) / (w_k^2 - w^2 + 2 i zeta_k w_k w)`
+/// `H(w) = T + sum_k phi_k phi_k^T (Kb - K T + i w (Cb - C T) + w^2 (M T - Mb)) / (w_k^2 - w^2 + 2 i zeta_k w_k w)`,
 ///
-/// with the shapes `phi_k` of unit modal mass; points other than the centre of mass and the base's origin enter by their
-/// levers. Everything is written in the axes of the upright base; a body's own axes differ in second order only.
+/// and where it couples them the quotients are the solution of six equations, or two in a joint. Points other than the
+/// centre of mass and the base's origin enter by their levers. Everything is written in the axes of the upright base; a
+/// body's own axes differ in second order only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrequencyResponse {
-    /// What follows the base at once: all of it without a spring, nothing with one.
+    /// What follows the base at once.
     stuck: Matrix6,
     terms: Vec<Term>,
+    coupling: Option<Coupling>,
 }
 
 /// A mode's part in the answer.
@@ -94,25 +93,49 @@ struct Term {
     shape: Vector6,
     by_displacement: Vector6,
     by_velocity: Vector6,
+    by_acceleration: Vector6,
 }
 
 impl Term {
     fn of(mode: &Mode, linear: &LinearModel, at_head: &Matrix6, at_base: &Matrix6) -> Self {
+        let work = |own: &Matrix6, of_base: &Matrix6| ((of_base - own * linear.carried) * at_base).tr_mul(&mode.shape);
         Self {
             omega: TAU * mode.frequency_hz,
             damping_ratio: mode.damping_ratio,
             shape: at_head * mode.shape,
-            by_displacement: (linear.base_stiffness * at_base).tr_mul(&mode.shape),
-            by_velocity: (linear.base_damping * at_base).tr_mul(&mode.shape),
+            by_displacement: work(&linear.stiffness, &linear.base_stiffness),
+            by_velocity: work(&linear.damping, &linear.base_damping),
+            by_acceleration: work(&linear.mass, &linear.base_mass),
         }
     }
 
-    /// How much of the mode the base's displacement along `input` calls up at `omega`.
-    fn called_up(&self, input: usize, omega: f64) -> Complex<f64> {
-        let force = Complex::new(self.by_displacement[input], omega * self.by_velocity[input]);
-        let resists =
-            Complex::new(self.omega * self.omega - omega * omega, 2.0 * self.damping_ratio * self.omega * omega);
-        force / resists
+    /// What the base's displacement along `input` does on the mode at `omega`.
+    fn force(&self, input: usize, omega: f64) -> Complex<f64> {
+        let still = self.by_displacement[input] - omega * omega * self.by_acceleration[input];
+        Complex::new(still, omega * self.by_velocity[input])
+    }
+
+    /// What the mode answers to a unit force.
+    fn resists(&self, omega: f64) -> Complex<f64> {
+        Complex::new(self.omega * self.omega - omega * omega, 2.0 * self.damping_ratio * self.omega * omega)
+    }
+}
+
+/// Damping between modes, `Phi^T C Phi`, without what each mode has by itself.
+#[derive(Debug, Clone, PartialEq)]
+struct Coupling(Matrix6);
+
+impl Coupling {
+    /// That of a linear model; `None` where damping keeps to the modes.
+    fn of(linear: &LinearModel) -> Option<Self> {
+        let modes = &linear.modes;
+        let of_pair = |i: usize, k: usize| match (modes.get(i), modes.get(k)) {
+            (Some(one), Some(other)) if i != k => one.shape.dot(&(linear.damping * other.shape)),
+            _ => 0.0,
+        };
+        let between = Matrix6::from_fn(of_pair);
+        let own = modes.iter().map(|mode| 2.0 * mode.damping_ratio * TAU * mode.frequency_hz).fold(0.0, f64::max);
+        (between.amax() > 1e-9 * own).then_some(Self(between))
     }
 }
 
@@ -123,12 +146,28 @@ impl FrequencyResponse {
     /// Displacement and turn of the head's point, per displacement or turn of the base's along or about `input`, at
     /// `freq_hz`: order x, y, z, about x, y, z.
     pub fn displacement(&self, input: Axis, freq_hz: f64) -> Matrix6x1<Complex<f64>> {
-        let (column, omega) = (index(input), TAU * freq_hz);
+        let column = index(input);
         let start = self.stuck.column(column).map(|x| Complex::new(x, 0.0));
-        self.terms.iter().fold(start.into_owned(), |sum, term| {
-            let amplitude = term.called_up(column, omega);
+        let amplitudes = self.amplitudes(column, TAU * freq_hz);
+        self.terms.iter().zip(&amplitudes).fold(start.into_owned(), |sum, (term, amplitude)| {
             sum + term.shape.map(|x| amplitude * x)
         })
+    }
+
+    /// How much of each mode the base's displacement along `input` calls up at `omega`; nought beyond the last mode.
+    fn amplitudes(&self, input: usize, omega: f64) -> Matrix6x1<Complex<f64>> {
+        let nought = Complex::new(0.0, 0.0);
+        let force = Matrix6x1::from_fn(|k, _| self.terms.get(k).map_or(nought, |term| term.force(input, omega)));
+        let resists = |k: usize| self.terms.get(k).map_or(Complex::new(1.0, 0.0), |term| term.resists(omega));
+        let alone = || Matrix6x1::from_fn(|k, _| force[k] / resists(k));
+        match &self.coupling {
+            None => alone(),
+            Some(Coupling(between)) => {
+                let mut all = between.map(|c| Complex::new(0.0, omega * c));
+                (0..6).for_each(|k| all[(k, k)] = resists(k));
+                all.lu().solve(&force).unwrap_or_else(alone)
+            }
+        }
     }
 
     /// The head's rate or acceleration along `axis` per the base's along the same, at `freq_hz`.
@@ -147,7 +186,10 @@ impl FrequencyResponse {
             None => of(row),
         };
         let start = Complex::new(sees(&|k| self.stuck[(k, row)]), 0.0);
-        self.terms.iter().fold(start, |sum, term| sum + term.called_up(row, omega) * sees(&|k| term.shape[k]))
+        let amplitudes = self.amplitudes(row, omega);
+        self.terms.iter().zip(&amplitudes).fold(start, |sum, (term, amplitude)| {
+            sum + amplitude * sees(&|k| term.shape[k])
+        })
     }
 
     /// The modulus of [`FrequencyResponse::along`].
@@ -178,7 +220,9 @@ impl FrequencyResponse {
     /// Frequencies from 0 to `up_to_hz`, dense by half a bandwidth about the modes that `axis` calls up.
     fn grid(&self, axis: Axis, up_to_hz: f64) -> Vec<f64> {
         let column = index(axis);
-        let part = |term: &Term| (term.by_displacement[column] * term.shape[column]).abs() / term.omega.powi(2);
+        let part = |term: &Term| {
+            term.force(column, term.omega).norm() * term.shape[column].abs() / (term.omega * term.omega)
+        };
         let greatest = self.terms.iter().map(part).fold(0.0, f64::max);
         let mut grid: Vec<f64> = (0..=64).map(|k| up_to_hz * f64::from(k) / 64.0).collect();
         for term in self.terms.iter().filter(|term| part(term) > 1e-9 * greatest) {

@@ -3,10 +3,12 @@
 use super::body::Body;
 use super::engine::Engine;
 use super::error::DynamicsError;
-use super::head::{HeadModel, Linkage, Sprung};
-use super::law::Instant;
+use super::head::{HeadModel, Linkage};
+use super::law::LawState;
+use super::push::{Forces, Instant};
+use super::sprung::Sprung;
 use super::statics::Statics;
-use crate::elasticity::{Matrix6, SpringState, Vector6, split, stack};
+use crate::elasticity::{Matrix6, Vector6, split, stack};
 use crate::geometry::{Kinematics, Pose, Rotation, Vector, gravity_in_world};
 use crate::motion::BaseMotion;
 use std::f64::consts::TAU;
@@ -24,12 +26,13 @@ pub struct HeadState {
 
 /// The motion of a head on a moving base: an endless iterator of [`HeadState`]s at 0, dt, 2 dt, ...
 ///
-/// At the start the head rests on its base, and moves along if that moves. A head on a spring is a free body in rapier,
-/// pushed by the spring's wrench (leapfrog): velocities v live half a step before poses, and at step n
+/// At the start the head rests on its base, and moves along if that moves. A head that gives is a free body in rapier,
+/// pushed by its linkage's wrench (leapfrog): velocities v live half a step before poses, and at step n
 ///
 /// `M (v[n+1/2] - v[n-1/2]) / dt = F(q[n]) - C (mean v - v_base) - mean w x I mean w`, `q[n+1] = q[n] + dt v[n+1/2]`,
 ///
-/// where the mean is that of the two half steps. The same rule runs backwards in time, so without damping energy has no
+/// where the mean is that of the two half steps. In a joint the wrench that holds it together comes to the right side, such
+/// that `q[n+1]` is in the joint again. The same rule runs backwards in time, so without damping energy has no
 /// trend. What is handed out is of the head's own frame and belongs to the pose: from the steps' mean velocities, which lead
 /// from pose to pose exactly, the velocity at the pose to third order in dt, and the acceleration to second order.
 ///
@@ -44,7 +47,7 @@ pub struct HeadSimulation<'a> {
 
 enum Mechanism<'a> {
     Rigid { base_from_head: Pose },
-    Spring(Box<SprungMotion<'a>>),
+    Sprung(Box<SprungMotion<'a>>),
     Failed,
 }
 
@@ -61,9 +64,9 @@ impl<'a> HeadSimulation<'a> {
         }
         let mechanism = match &model.linkage {
             Linkage::Rigid { base_from_head } => Mechanism::Rigid { base_from_head: *base_from_head },
-            Linkage::Spring(sprung) => {
+            Linkage::Sprung(sprung) => {
                 let start = motion.at(0.0);
-                Mechanism::Spring(Box::new(SprungMotion::new(&model.body, sprung, &start, step_s)?))
+                Mechanism::Sprung(Box::new(SprungMotion::new(&model.body, sprung, &start, step_s)?))
             }
         };
         Ok(Self { model, motion, step_s, count: 0, mechanism })
@@ -85,7 +88,10 @@ impl Iterator for HeadSimulation<'_> {
         let head = match &mut self.mechanism {
             Mechanism::Failed => return None,
             Mechanism::Rigid { base_from_head } => Ok(base.of_frame(base_from_head)),
-            Mechanism::Spring(sprung) => sprung.advance(t_s, &base, self.motion.hold(t_s)),
+            Mechanism::Sprung(sprung) => {
+                let next_base = || self.motion.at(self.count as f64 * self.step_s).world_from_body;
+                sprung.advance(t_s, &base, self.motion.hold(t_s), &next_base)
+            }
         };
         if head.is_err() {
             self.mechanism = Mechanism::Failed;
@@ -99,7 +105,7 @@ struct SprungMotion<'a> {
     body: &'a Body,
     sprung: &'a Sprung,
     engine: Engine,
-    spring: SpringState,
+    state: LawState,
     step_s: f64,
     pose: Pose,
     /// Mean velocity of the head's origin and mean angular velocity over the step before, in the world.
@@ -111,7 +117,8 @@ struct SprungMotion<'a> {
 impl<'a> SprungMotion<'a> {
     fn new(body: &'a Body, sprung: &'a Sprung, base: &Kinematics, step_s: f64) -> Result<Self, DynamicsError> {
         let gravity_in_base = base.world_from_body.rotation.inverse() * gravity_in_world();
-        let (rest, _) = Statics { law: &sprung.law, body, gravity_in_base }
+        let scale_m = sprung.law.springs.first().map_or(0.1, |mounted| mounted.spring.length_m());
+        let (rest, _) = Statics { law: &sprung.law, body, gravity_in_base, weight: 1.0, scale_m }
             .settle(&sprung.rest)
             .map_err(|unrest| DynamicsError::NoRestAtStart { reason: unrest.to_string() })?;
         let head = base.of_frame(&rest);
@@ -121,7 +128,7 @@ impl<'a> SprungMotion<'a> {
             body,
             sprung,
             engine,
-            spring: sprung.law.spring.state(),
+            state: sprung.law.state(),
             step_s,
             pose: head.world_from_body,
             before: velocity_before(&head, 0.5 * step_s),
@@ -129,16 +136,24 @@ impl<'a> SprungMotion<'a> {
         })
     }
 
-    /// The head at `t_s`, having moved on to the step after.
-    fn advance(&mut self, t_s: f64, base: &Kinematics, hold: f64) -> Result<Kinematics, DynamicsError> {
+    /// The head at `t_s`, having moved on to the step after, at which the base will be at `next_base`.
+    fn advance(
+        &mut self,
+        t_s: f64,
+        base: &Kinematics,
+        hold: f64,
+        next_base: &dyn Fn() -> Pose,
+    ) -> Result<Kinematics, DynamicsError> {
         let twist = self.engine.twist();
-        let now = Instant { base, world_from_head: &self.pose, twist: &twist, hold };
-        let forces = self.sprung.law.forces(&mut self.spring, &now)?;
+        let gravity_in_world = gravity_in_world();
+        let now =
+            Instant { base, world_from_head: &self.pose, twist: &twist, body: self.body, hold, gravity_in_world };
+        let forces = self.sprung.law.forces(&mut self.state, &now)?;
         check_bounds(t_s, forces.turn_rad, &twist)?;
         let rotation = self.pose.rotation.to_rotation_matrix().into_inner();
         let mass = self.body.mass_matrix(&rotation);
         let change = self
-            .change_of_twist(&mass, &forces.damping, &forces.wrench, &twist)
+            .change_of_twist(&mass, &forces, &now, next_base)
             .ok_or_else(|| DynamicsError::Diverged { t_s, what: "mass and damping have no inverse".to_owned() })?;
         self.engine.step(&(mass * change / self.step_s));
         let next = self.engine.pose();
@@ -150,16 +165,29 @@ impl<'a> SprungMotion<'a> {
     }
 
     /// The change of the twist over the step, with damping and gyroscopic torque at the mean of old and new twist.
-    fn change_of_twist(&self, mass: &Matrix6, damping: &Matrix6, wrench: &Vector6, twist: &Vector6) -> Option<Vector6> {
-        let weight = stack(&(gravity_in_world() * self.body.mass_kg), &Vector::zeros());
-        let implicit = (mass + damping * (0.5 * self.step_s)).cholesky()?;
+    fn change_of_twist(
+        &self,
+        mass: &Matrix6,
+        forces: &Forces,
+        now: &Instant<'_>,
+        next_base: &dyn Fn() -> Pose,
+    ) -> Option<Vector6> {
+        let law = &self.sprung.law;
+        let weight = stack(&(now.gravity_in_world * self.body.mass_kg), &Vector::zeros());
+        let implicit = (mass + forces.inertia + forces.damping * (0.5 * self.step_s)).cholesky()?;
         let inertia = mass.fixed_view::<3, 3>(3, 3);
+        let joint = law.joint.as_ref().map(|joint| (joint, next_base()));
         let mut change = Vector6::zeros();
         // The gyroscopic torque changes by a hundredth of itself at most from one pass to the next.
         for _ in 0..3 {
-            let (_, turning) = split(&(twist + change * 0.5));
+            let mean = now.twist + change * 0.5;
+            let (_, turning) = split(&mean);
             let gyroscopic = stack(&Vector::zeros(), &-turning.cross(&(inertia * turning)));
-            change = implicit.solve(&((wrench + weight + gyroscopic) * self.step_s));
+            let push = forces.wrench + weight + gyroscopic + law.bend(now, &mean);
+            change = implicit.solve(&(push * self.step_s));
+            if let Some((joint, next_base)) = &joint {
+                change = joint.held((now, next_base), self.step_s, &change, |wrenches| implicit.solve(wrenches))?;
+            }
         }
         Some(change)
     }
@@ -195,7 +223,8 @@ fn kinematics(pose: &Pose, [earlier, before, after]: [&Vector6; 3], step_s: f64)
     }
 }
 
-/// Greatest turn of the spring's top from its foot that the force law covers, rad; its logarithm ends at pi.
+/// Greatest turn of a spring's top from its foot, or of the head from its rest, that the force law covers, rad; its
+/// logarithm ends at pi.
 const MOST_TURN_RAD: f64 = 3.0;
 
 /// Greatest speed of a head, m/s.
@@ -207,7 +236,7 @@ fn check_bounds(t_s: f64, turn_rad: f64, twist: &Vector6) -> Result<(), Dynamics
         "the head's pose or velocity is no number".to_owned()
     } else if turn_rad > MOST_TURN_RAD {
         format!(
-            "the spring's top has turned by {:.0} degrees; its force law covers {:.0}: an end stop would hold the head",
+            "the head has turned by {:.0} degrees; its linkage's force law covers {:.0}: an end stop would hold the head",
             turn_rad.to_degrees(),
             MOST_TURN_RAD.to_degrees()
         )

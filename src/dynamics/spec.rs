@@ -1,5 +1,6 @@
 //! A head as it is written: `specs/heads/NAME.ron`.
 
+use super::elements::{CableSpec, ElementSpec, SpringMassSpec};
 use crate::elasticity::SpringSpec;
 use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use crate::spec::{Kind, Source, SpecError, checked, find, parse};
@@ -129,6 +130,12 @@ pub enum LinkageSpec {
         base_from_spring: PlacementSpec,
         /// Pose of the spring's top in the head.
         head_from_spring: PlacementSpec,
+        /// What becomes of the spring's own mass.
+        #[serde(default)]
+        spring_mass: SpringMassSpec,
+        /// A cable through the spring.
+        #[serde(default)]
+        cable: Option<CableSpec>,
         /// How its modes are damped.
         damping_ratio: DampingSpec,
         /// What stops the head when it swings too far.
@@ -138,6 +145,33 @@ pub enum LinkageSpec {
         #[serde(default)]
         hold: Option<HoldSpec>,
     },
+    /// Several springs, cords, floats, a joint, side by side.
+    Suspension {
+        /// What holds the head.
+        elements: Vec<ElementSpec>,
+        /// Pose of the head in the base near which it rests.
+        base_from_head: PlacementSpec,
+        /// How its modes are damped, beside what its elements take.
+        damping_ratio: DampingSpec,
+        /// What stops the head when it swings too far.
+        #[serde(default)]
+        end_stop: Option<EndStopSpec>,
+        /// The hand that holds the head when the motion says so.
+        #[serde(default)]
+        hold: Option<HoldSpec>,
+    },
+}
+
+impl LinkageSpec {
+    /// The damping ratios of its modes; `None` for one that has none.
+    pub fn damping_ratio_mut(&mut self) -> Option<&mut DampingSpec> {
+        match self {
+            LinkageSpec::Rigid { .. } => None,
+            LinkageSpec::Spring { damping_ratio, .. } | LinkageSpec::Suspension { damping_ratio, .. } => {
+                Some(damping_ratio)
+            }
+        }
+    }
 }
 
 /// Damping ratios of the six modes about rest.
@@ -158,7 +192,8 @@ pub struct DampingSpec {
     pub yaw: f64,
 }
 
-/// A stop against which the head comes when its axis leans too far from the foot's.
+/// A stop against which the head comes when its axis leans too far: the axis of a spring's top from its foot's, or, on
+/// several elements, the head's from where it rests.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct EndStopSpec {

@@ -63,6 +63,11 @@ impl Coil {
         Ok(coil)
     }
 
+    /// Mean diameter of the coil, m.
+    pub fn coil_diameter_m(&self) -> f64 {
+        self.coil_diameter_m
+    }
+
     /// Free length, m.
     pub fn free_length_m(&self) -> f64 {
         self.free_length_m

@@ -24,7 +24,7 @@ pub use deformation::{Deformation, blocks, split, stack};
 pub use element::Element;
 pub use error::ElasticityError;
 pub use haringx::{Column, buckling_load_n, loaded_stiffness};
-pub use spec::{Material, SpringDesign, SpringSpec, StiffnessRow};
+pub use spec::{Density, Material, SpringDesign, SpringSpec, StiffnessRow};
 pub use spring::{MOST_SEGMENTS, Spring, SpringState};
 
 /// A wrench, a twist, or a small displacement: translation, then rotation.

@@ -52,6 +52,22 @@ where
     }
 }
 
+/// `N` finite numbers of at least zero.
+///
+/// # Errors
+/// When there are not `N`, or one of them is not.
+pub fn non_negative_array<'de, D, const N: usize>(deserializer: D) -> Result<[f64; N], D::Error>
+where
+    D: Deserializer<'de>,
+    [f64; N]: Deserialize<'de>,
+{
+    let numbers = <[f64; N]>::deserialize(deserializer)?;
+    match numbers.iter().find(|x| !(x.is_finite() && **x >= 0.0)) {
+        Some(bad) => Err(D::Error::custom(format!("expected {N} finite numbers of at least 0, found {bad} among them"))),
+        None => Ok(numbers),
+    }
+}
+
 /// `N` finite numbers above zero.
 ///
 /// # Errors

@@ -32,7 +32,7 @@ impl Schedule {
     /// When the period holds no line below the highest frequency, or too few steps.
     pub fn of(head: &HeadModel, plan: &GainPlan) -> Result<Self, StudyError> {
         let modes = head.linear_modes();
-        let decay = modes.iter().map(|m| std::f64::consts::TAU * m.frequency_hz * m.damping_ratio);
+        let decay = modes.iter().map(|mode| mode.decay_per_s());
         let settling_s = decay.fold(0.0, |most, rate| f64::max(most, -LEFT_OF_SETTLING.ln() / rate));
         let settling_s = ONSET_S + settling_s.min(LONGEST_SETTLING_S);
         let within = modes.iter().filter(|m| m.frequency_hz < plan.up_to_hz);

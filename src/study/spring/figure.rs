@@ -1,6 +1,6 @@
 //! A picture of the modes.
 
-use crate::dynamics::{HeadModel, HeadSpec, LinkageSpec, Mode, ModeKind, PartSpec};
+use crate::dynamics::{ElementSpec, HeadModel, HeadSpec, LinkageSpec, Mode, ModeKind, PartSpec};
 use crate::elasticity::split;
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
@@ -38,12 +38,46 @@ fn kind_name(kind: ModeKind) -> &'static str {
     }
 }
 
-/// A head and its spring, drawn in a plane.
+/// An element as it is drawn.
+enum Link {
+    /// A spring, by its two ends.
+    Spring { foot: Pose, head_from_top: Pose },
+    /// A straight line: a cord, or from a joint to the head.
+    Cord { foot: Vector, top_in_head: Vector },
+}
+
+/// What is drawn of a linkage. A float is one of the head's parts already.
+fn links(linkage: &LinkageSpec) -> Vec<Link> {
+    match linkage {
+        LinkageSpec::Spring { base_from_spring, head_from_spring, .. } => {
+            vec![Link::Spring { foot: base_from_spring.pose(), head_from_top: head_from_spring.pose() }]
+        }
+        LinkageSpec::Suspension { elements, .. } => elements.iter().filter_map(link).collect(),
+        LinkageSpec::Rigid { .. } => Vec::new(),
+    }
+}
+
+fn link(element: &ElementSpec) -> Option<Link> {
+    match element {
+        ElementSpec::Spring(spring) => {
+            Some(Link::Spring { foot: spring.base_from_spring.pose(), head_from_top: spring.head_from_spring.pose() })
+        }
+        ElementSpec::Cord(cord) => {
+            Some(Link::Cord { foot: cord.base_point_m.into(), top_in_head: cord.head_point_m.into() })
+        }
+        ElementSpec::UniversalJoint(joint) => {
+            let foot = joint.base_from_joint.pose().translation.vector;
+            Some(Link::Cord { foot, top_in_head: Vector::zeros() })
+        }
+        ElementSpec::Float(_) => None,
+    }
+}
+
+/// A head and its linkage, drawn in a plane.
 struct Picture<'a> {
     spec: &'a HeadSpec,
     rest: Pose,
-    foot: Pose,
-    head_from_top: Pose,
+    links: Vec<Link>,
     /// The two directions of the paper.
     right: Vector,
     up: Vector,
@@ -66,19 +100,24 @@ impl<'a> Picture<'a> {
         let across = Vector::new(turn.y, -turn.x, 0.0);
         let right = if from_above || across.norm() < 1e-9 { Vector::x() } else { across.normalize() };
         let up = if from_above { Vector::y() } else { Vector::z() };
-        let (foot, head_from_top) = match &spec.linkage {
-            LinkageSpec::Spring { base_from_spring, head_from_spring, .. } => {
-                (base_from_spring.pose(), head_from_spring.pose())
-            }
-            LinkageSpec::Rigid { .. } => (Pose::identity(), rest.inverse()),
-        };
-        Self { spec, rest, foot, head_from_top, right, up, from_above, offset_m, moved }
+        Self { spec, rest, links: links(&spec.linkage), right, up, from_above, offset_m, moved }
     }
 
-    /// The spring and the edges of the head's parts, displaced, in one broken line.
+    /// The elements and the edges of the head's parts, displaced, in one broken line.
     fn outline(&self, displaced: &Pose) -> Vec<(f64, f64)> {
         let head = displaced * self.rest;
-        let mut line = if self.from_above { Vec::new() } else { self.spring(&(head * self.head_from_top)) };
+        let mut line = Vec::new();
+        for link in &self.links {
+            line.push((f64::NAN, f64::NAN));
+            match link {
+                Link::Spring { .. } if self.from_above => {}
+                Link::Spring { foot, head_from_top } => line.extend(self.spring(foot, &(head * head_from_top))),
+                Link::Cord { foot, top_in_head } => {
+                    let top = head * nalgebra::Point3::from(*top_in_head);
+                    line.extend([self.on_paper(foot), self.on_paper(&top.coords)]);
+                }
+            }
+        }
         for part in &self.spec.parts {
             line.push((f64::NAN, f64::NAN));
             line.extend(self.edges(part).map(|corner| self.on_paper(&(head * corner).coords)));
@@ -87,10 +126,10 @@ impl<'a> Picture<'a> {
     }
 
     /// A cubic from the foot to the top that leaves both along their axes.
-    fn spring(&self, top: &Pose) -> Vec<(f64, f64)> {
-        let (p, q) = (self.foot.translation.vector, top.translation.vector);
+    fn spring(&self, foot: &Pose, top: &Pose) -> Vec<(f64, f64)> {
+        let (p, q) = (foot.translation.vector, top.translation.vector);
         let length = (q - p).norm();
-        let (leave, arrive) = (self.foot.rotation * Vector::z() * length, top.rotation * Vector::z() * length);
+        let (leave, arrive) = (foot.rotation * Vector::z() * length, top.rotation * Vector::z() * length);
         let at = |k: i32| {
             let u = f64::from(k) / 20.0;
             let place = p * ((1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u)) + q * (u * u * (3.0 - 2.0 * u));

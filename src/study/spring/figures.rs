@@ -23,7 +23,7 @@ pub struct Figures {
     pub peak_gain: f64,
     /// How far the spring shortens under the head, mm.
     pub sag_mm: f64,
-    /// Mass of the spring's active wire, g; nothing for a spring known by its stiffness alone.
+    /// Mass of the spring's active wire, g; nothing for a spring or a material known by its stiffness alone.
     pub spring_mass_g: Option<f64>,
     /// Twice the amplitude of the head's pitch, degrees; from a simulation the forward beam's range in 95 % of the time.
     pub field_of_view_deg: f64,
@@ -32,9 +32,6 @@ pub struct Figures {
     /// Greatest stress in the wire over its yield.
     pub stress_share: Option<f64>,
 }
-
-/// Density of steel, kg/m^3.
-pub(super) const STEEL_KG_PER_M3: f64 = 7850.0;
 
 /// Frequencies up to which the peak gain is looked for, Hz.
 const PEAKS_UP_TO_HZ: f64 = 20.0;
@@ -132,7 +129,7 @@ impl Design {
             wire: Wire::of(spring)?,
             mounting,
             free_length_m: coil.map(|coil| coil.free_length_m()),
-            mass_kg: coil.map(|coil| coil.wire_volume_m3() * STEEL_KG_PER_M3),
+            mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
         })
     }
 

@@ -1,8 +1,8 @@
 //! All about one spring under one head.
 
-use super::figures::{Design, STEEL_KG_PER_M3};
+use super::figures::Design;
 use super::{Figures, Shake, closed_form, simulated};
-use crate::dynamics::{HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg};
+use crate::dynamics::{Bearing, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg};
 use crate::elasticity::{Coil, Matrix6, SpringDesign, buckling_load_n, loaded_stiffness};
 use crate::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2, roll_pitch_yaw};
 use crate::sensors::Lidar;
@@ -23,7 +23,9 @@ pub struct SpringReport {
     pub falls_because: Option<String>,
     /// The heaviest head of this shape that stands, kg; nothing where none falls.
     pub heaviest_head_kg: Option<f64>,
-    /// The coil; nothing for a spring known by its stiffness.
+    /// What each element of the linkage bears at rest.
+    pub bearings: Vec<Bearing>,
+    /// The coil of a head on one spring; nothing for a spring known by its stiffness.
     pub coil: Option<CoilReport>,
     /// Where the head rests, if it does.
     pub rest: Option<RestReport>,
@@ -42,8 +44,8 @@ pub struct SpringReport {
 pub struct CoilReport {
     /// Mean diameter of coil over diameter of wire.
     pub index: f64,
-    /// Mass of the active wire, g.
-    pub mass_g: f64,
+    /// Mass of the active wire, g; nothing for a material known by its moduli alone.
+    pub mass_g: Option<f64>,
     /// Stiffness along the axis, N/m.
     pub axial_n_per_m: f64,
     /// Stiffness about the axis, N m/rad.
@@ -71,8 +73,8 @@ pub struct RestReport {
     pub position_m: [f64; 3],
     /// Its roll, pitch and yaw, degrees.
     pub roll_pitch_yaw_deg: [f64; 3],
-    /// How much nearer foot and top are than without load, mm.
-    pub sag_mm: f64,
+    /// How much nearer foot and top of the one spring are than without load, mm.
+    pub sag_mm: Option<f64>,
 }
 
 /// A mode.
@@ -140,8 +142,9 @@ pub fn spring_report(
         stands: true,
         falls_because: None,
         heaviest_head_kg,
+        bearings: head.bearings(),
         coil,
-        rest: Some(rest_report(&head, design.sag_m(&head))),
+        rest: Some(rest_report(&head, design.free_length_m.map(|_| design.sag_m(&head)))),
         stiffness: head.linear().map(|linear| rows(&linear.stiffness)),
         modes: head.linear_modes().iter().map(mode_report).collect(),
         gain_peaks: AXES.map(peak).to_vec(),
@@ -156,15 +159,19 @@ fn fallen(spec: &HeadSpec, heaviest_head_kg: Option<f64>, because: String) -> Re
     });
     let head_mass_kg = mass.sum();
     let design = match &spec.linkage {
-        LinkageSpec::Spring { spring, .. } => super::Wire::of(spring)?,
-        LinkageSpec::Rigid { .. } => None,
+        LinkageSpec::Spring { spring, .. } => Design {
+            wire: super::Wire::of(spring)?,
+            mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
+            ..Design::unmounted()
+        },
+        LinkageSpec::Rigid { .. } | LinkageSpec::Suspension { .. } => Design::unmounted(),
     };
-    let design = Design { wire: design, ..Design::unmounted() };
     Ok(SpringReport {
         head_mass_kg,
         stands: false,
         falls_because: Some(because),
         heaviest_head_kg,
+        bearings: Vec::new(),
         coil: coil_of(spec)?.map(|coil| coil_report(&coil, &design, head_mass_kg, None)),
         rest: None,
         stiffness: None,
@@ -208,7 +215,7 @@ fn coil_report(coil: &Coil, design: &Design, head_mass_kg: f64, stress_pa: Optio
     let at_top = coil.under(weight_n).and_then(|column| loaded_stiffness(&column)).ok();
     CoilReport {
         index: 2.0 * radius_m / wire_m,
-        mass_g: coil.wire_volume_m3() * STEEL_KG_PER_M3 * 1e3,
+        mass_g: design.mass_kg.map(|mass_kg| mass_kg * 1e3),
         axial_n_per_m: coil.axial_n_per_m(),
         torsion_nm_per_rad: coil.torsion_nm_per_rad(),
         stiffness_at_top: at_top.as_ref().map(rows),
@@ -222,13 +229,13 @@ fn coil_report(coil: &Coil, design: &Design, head_mass_kg: f64, stress_pa: Optio
     }
 }
 
-fn rest_report(head: &HeadModel, sag_m: f64) -> RestReport {
+fn rest_report(head: &HeadModel, sag_m: Option<f64>) -> RestReport {
     let rest = head.rest_pose_base_from_head();
     let (roll, pitch, yaw) = roll_pitch_yaw(&rest.rotation);
     RestReport {
         position_m: rest.translation.vector.into(),
         roll_pitch_yaw_deg: [roll, pitch, yaw].map(f64::to_degrees),
-        sag_mm: sag_m * 1e3,
+        sag_mm: sag_m.map(|m| m * 1e3),
     }
 }
 
@@ -267,7 +274,7 @@ mod tests {
         assert!(report.stands && report.heaviest_head_kg.unwrap() > report.head_mass_kg);
         let coil = report.coil.unwrap();
         // Under 0.35 kg at 4282 N/m the spring shortens by 0.80 mm, and 12 gaps share 120 - 36 - 0.8 mm.
-        assert!((report.rest.unwrap().sag_mm - 0.80).abs() < 0.02);
+        assert!((report.rest.unwrap().sag_mm.unwrap() - 0.80).abs() < 0.02);
         assert!((coil.gap_mm - 83.2 / 12.0).abs() < 0.01, "{}", coil.gap_mm);
         assert!(coil.stress_at_rest_mpa.unwrap() < 0.3 * coil.yield_mpa.unwrap());
         let shaken = report.shaken.unwrap();

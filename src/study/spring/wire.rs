@@ -34,17 +34,13 @@ impl Wire {
     /// # Errors
     /// When a named spring is not there.
     pub fn of(spec: &SpringSpec) -> Result<Option<Self>, crate::spec::SpecError> {
-        Ok(match spec {
-            SpringSpec::Named(name) => match crate::spec::load(crate::spec::Kind::Spring, name)? {
-                SpringSpec::Named(_) => None,
-                spring => Self::of(&spring)?,
-            },
+        Ok(match spec.described()? {
             SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, material, .. } => Some(Self {
                 coil_radius_m: 0.5e-3 * coil_diameter_mm,
                 diameter_m: 1e-3 * wire_diameter_mm,
-                material: *material,
+                material,
             }),
-            SpringSpec::Stiffness { .. } => None,
+            SpringSpec::Named(_) | SpringSpec::Stiffness { .. } => None,
         })
     }
 
@@ -104,9 +100,11 @@ pub struct Mounting {
 }
 
 impl Mounting {
-    /// That of a head; `None` for one without spring.
+    /// That of a head on one spring; `None` for any other, and for one whose spring shares its load with a cable.
     pub fn of(spec: &HeadSpec, body: &Body) -> Option<Self> {
-        let LinkageSpec::Spring { base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
+        let LinkageSpec::Spring { base_from_spring, head_from_spring, cable: None, .. } = &spec.linkage else {
+            return None;
+        };
         Some(Self { base_from_foot: base_from_spring.pose(), head_from_top: head_from_spring.pose(), body: *body })
     }
 

@@ -1,0 +1,127 @@
+//! A rope or an elastic cable: it pulls, and never pushes.
+
+use super::elements::{CableSpec, CordSpec, CordStiffnessSpec};
+use super::push::{Ends, Forces, Instant};
+use crate::elasticity::split;
+use crate::geometry::{Matrix, Pose, Vector};
+use nalgebra::Point3;
+
+/// Stretch over which a cord goes from slack to taut, in parts of its length: fibres that come to bear one by one.
+const TOE: f64 = 1e-3;
+
+/// A cord without mass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cord {
+    pub point_in_base: Vector,
+    pub point_in_head: Vector,
+    /// Without tension.
+    length_m: f64,
+    pub stiffness_n_per_m: f64,
+    damping_n_s_per_m: f64,
+}
+
+impl Cord {
+    /// The cord of a spec.
+    pub fn of(spec: &CordSpec) -> Self {
+        Self {
+            point_in_base: spec.base_point_m.into(),
+            point_in_head: spec.head_point_m.into(),
+            length_m: spec.length_m,
+            stiffness_n_per_m: match spec.stiffness {
+                CordStiffnessSpec::NPerM(stiffness) => stiffness,
+                CordStiffnessSpec::EaN(ea) => ea / spec.length_m,
+            },
+            damping_n_s_per_m: spec.damping_n_s_per_m,
+        }
+    }
+
+    /// The cable through a spring; `None` for one that would have no length without its tension.
+    pub fn through(cable: &CableSpec, spring: &Ends) -> Option<Self> {
+        let length_m = cable.length_m - cable.tension_n / cable.stiffness_n_per_m;
+        (length_m > 0.0).then_some(Self {
+            point_in_base: spring.base_from_foot.translation.vector,
+            point_in_head: spring.head_from_top.translation.vector,
+            length_m,
+            stiffness_n_per_m: cable.stiffness_n_per_m,
+            damping_n_s_per_m: cable.damping_n_s_per_m,
+        })
+    }
+
+    /// How far it is stretched, smoothly nought where it is slack: the stretch, its derivative, and its integral (m^2).
+    ///
+    /// Beyond the toe it is the plain stretch; within, a parabola that joins both branches with their slopes.
+    fn stretch(&self, distance_m: f64) -> (f64, f64, f64) {
+        let (toe, stretch) = (TOE * self.length_m, distance_m - self.length_m);
+        let into = stretch + 0.5 * toe;
+        if into <= 0.0 {
+            (0.0, 0.0, 0.0)
+        } else if into < toe {
+            (into * into / (2.0 * toe), into / toe, into.powi(3) / (6.0 * toe))
+        } else {
+            // The integral over the toe, a sixth of its square, less what the plain branch would have had there.
+            (stretch, 1.0, 0.5 * stretch * stretch + toe * toe / 24.0)
+        }
+    }
+
+    /// Tension at rest with the head at a pose, N.
+    pub fn tension_n(&self, base_from_head: &Pose) -> f64 {
+        let between = base_from_head * Point3::from(self.point_in_head) - Point3::from(self.point_in_base);
+        self.stiffness_n_per_m * self.stretch(between.norm()).0
+    }
+
+    /// Adds the cord's pull at an instant.
+    pub fn push(&self, now: &Instant<'_>, forces: &mut Forces) {
+        let lever = now.lever(&self.point_in_head);
+        let tied = now.base.world_from_body * Point3::from(self.point_in_base);
+        let between = now.centre() + lever - tied.coords;
+        let distance_m = between.norm();
+        let (stretch, tautness, _) = self.stretch(distance_m);
+        if tautness == 0.0 {
+            return;
+        }
+        let along = between / distance_m;
+        let relative = now.relative_twist();
+        let (velocity, turning) = split(&relative);
+        let damping = self.damping_n_s_per_m * tautness;
+        let tension_n =
+            self.stiffness_n_per_m * stretch + damping * along.dot(&(velocity + turning.cross(&lever)));
+        // A damper that would push lets go.
+        if tension_n > 0.0 {
+            forces.add_force(&lever, &(along * -tension_n));
+            let c: Matrix = along * along.transpose() * damping;
+            forces.add_damper(&lever, &c);
+        }
+    }
+
+    /// Energy in the stretched cord, J.
+    pub fn potential_j(&self, base_from_head: &Pose) -> f64 {
+        let between = base_from_head * Point3::from(self.point_in_head) - Point3::from(self.point_in_base);
+        self.stiffness_n_per_m * self.stretch(between.norm()).2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_cord_pulls_by_its_stretch_and_smoothly_goes_slack() {
+        let cord = Cord {
+            point_in_base: Vector::zeros(),
+            point_in_head: Vector::zeros(),
+            length_m: 0.5,
+            stiffness_n_per_m: 2_000.0,
+            damping_n_s_per_m: 0.0,
+        };
+        let at = |distance_m: f64| Pose::translation(0.0, 0.0, -distance_m);
+        assert_relative_eq!(cord.tension_n(&at(0.51)), 20.0, max_relative = 1e-12);
+        assert_eq!(cord.tension_n(&at(0.49)), 0.0);
+        // Tension is the slope of the energy on all three branches.
+        for distance_m in [0.499, 0.4999, 0.5001, 0.50025, 0.502] {
+            let h = 1e-7;
+            let slope = (cord.potential_j(&at(distance_m + h)) - cord.potential_j(&at(distance_m - h))) / (2.0 * h);
+            assert_relative_eq!(cord.tension_n(&at(distance_m)), slope, epsilon = 1e-5);
+        }
+    }
+}

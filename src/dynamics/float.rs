@@ -1,0 +1,137 @@
+//! A cylinder that floats: buoyancy, drag, and the fluid that moves along.
+
+use super::elements::FloatSpec;
+use super::push::{Forces, Instant, at_lever};
+use crate::elasticity::{Vector6, split, stack};
+use crate::geometry::{Matrix, Pose, Vector};
+use nalgebra::Point3;
+use std::f64::consts::{PI, TAU};
+
+/// Directions in which the cylinder's cross-section is cut into columns.
+const DIRECTIONS: usize = 12;
+
+/// Where the columns of a direction stand, in parts of the squared radius (Gauss-Legendre, two points): with equal shares
+/// of the area that gives area and second moment exactly.
+const SQUARED_RADII: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
+/// A float on the head, and its fluid on the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Float {
+    spec: FloatSpec,
+}
+
+/// A column of the cylinder, upright in the head: its bottom in the head, and its cross-section.
+struct Column {
+    bottom_in_head: Vector,
+    area_m2: f64,
+}
+
+impl Float {
+    /// The float of a spec.
+    pub fn of(spec: &FloatSpec) -> Self {
+        Self { spec: *spec }
+    }
+
+    /// Middle of the cylinder in the head.
+    pub fn middle_in_head(&self) -> Vector {
+        Vector::from(self.spec.head_bottom_m) + Vector::z() * (0.5 * self.spec.height_m)
+    }
+
+    fn columns(&self) -> impl Iterator<Item = Column> {
+        let FloatSpec { head_bottom_m, radius_m, .. } = self.spec;
+        let area_m2 = PI * radius_m * radius_m / (SQUARED_RADII.len() * DIRECTIONS) as f64;
+        SQUARED_RADII.into_iter().enumerate().flat_map(move |(ring, squared)| {
+            (0..DIRECTIONS).map(move |k| {
+                // The rings are turned against each other by half a step.
+                let angle = TAU * (k as f64 + 0.5 * ring as f64) / DIRECTIONS as f64;
+                let out = Vector::new(angle.cos(), angle.sin(), 0.0) * (radius_m * squared.sqrt());
+                Column { bottom_in_head: Vector::from(head_bottom_m) + out, area_m2 }
+            })
+        })
+    }
+
+    /// Volume under water, m^3, its first moment in the head, m^4, and the integral of depth over it, m^4, where `up` and
+    /// the surface are given in the head.
+    fn submerged(&self, up: &Vector, surface: &Vector) -> (f64, Vector, f64) {
+        let height_m = self.spec.height_m;
+        let (mut volume, mut moment, mut depth) = (0.0, Vector::zeros(), 0.0);
+        for Column { bottom_in_head, area_m2 } in self.columns() {
+            let (deep, shallow) = {
+                let at_bottom = up.dot(&(surface - bottom_in_head));
+                (at_bottom, at_bottom - height_m * up.z)
+            };
+            // The part of the column, from its bottom, that is below the surface.
+            let (from, to) = match (deep > 0.0, shallow > 0.0) {
+                (true, true) => (0.0, height_m),
+                (true, false) => (0.0, deep / up.z),
+                (false, true) => (deep / up.z, height_m),
+                (false, false) => continue,
+            };
+            let (length, middle) = (to - from, 0.5 * (from + to));
+            volume += area_m2 * length;
+            moment += (bottom_in_head + Vector::z() * middle) * (area_m2 * length);
+            depth += area_m2 * length * (deep - up.z * middle);
+        }
+        (volume, moment, depth)
+    }
+
+    /// Adds buoyancy, drag and added mass at an instant.
+    pub fn push(&self, now: &Instant<'_>, forces: &mut Forces) {
+        let spec = &self.spec;
+        let surface = now.base.world_from_body * Point3::from(spec.base_surface_m);
+        let apparent = now.gravity_in_world - now.carried_acceleration(&surface.coords);
+        let into_head = now.world_from_head.rotation.inverse();
+        let up = into_head * -apparent.normalize();
+        let surface_in_head = now.world_from_head.inverse_transform_point(&surface).coords;
+        let (volume, moment, _) = self.submerged(&up, &surface_in_head);
+        if volume > 0.0 {
+            forces.add_force(&now.lever(&(moment / volume)), &(apparent * (-spec.density_kg_per_m3 * volume)));
+        }
+        self.drag(now, forces);
+        let lever = now.lever(&self.middle_in_head());
+        let carried = now.carried_acceleration(&(now.centre() + lever));
+        forces.add_force(&lever, &(carried * spec.added_mass_kg));
+        forces.inertia += at_lever(&lever, &(Matrix::identity() * spec.added_mass_kg));
+    }
+
+    fn drag(&self, now: &Instant<'_>, forces: &mut Forces) {
+        let spec = &self.spec;
+        let lever = now.lever(&self.middle_in_head());
+        let (velocity, turning) = split(&now.relative_twist());
+        let through = velocity + turning.cross(&lever);
+        let speed = through.norm();
+        let drag = spec.drag_n_s_per_m + spec.drag_n_s2_per_m2 * speed;
+        forces.add_force(&lever, &(through * -drag));
+        let mut slope = Matrix::identity() * drag;
+        if speed > 0.0 {
+            slope += through * through.transpose() * (spec.drag_n_s2_per_m2 / speed);
+        }
+        forces.add_damper(&lever, &slope);
+        forces.add_torque(&(turning * -spec.drag_nm_s_per_rad));
+        let mut block = forces.damping.fixed_view_mut::<3, 3>(3, 3);
+        block += Matrix::identity() * spec.drag_nm_s_per_rad;
+    }
+
+    /// The centripetal force of the added mass, `-m w x (w x r)`, at the twist `twist` of the head.
+    pub fn bend(&self, now: &Instant<'_>, twist: &Vector6) -> Vector6 {
+        let (_, turning) = split(twist);
+        let lever = now.lever(&self.middle_in_head());
+        let force = turning.cross(&turning.cross(&lever)) * -self.spec.added_mass_kg;
+        stack(&force, &lever.cross(&force))
+    }
+
+    /// Energy of the fluid pushed aside, J.
+    pub fn potential_j(&self, world_from_base: &Pose, base_from_head: &Pose, gravity_in_world: &Vector) -> f64 {
+        let up = (world_from_base.rotation * base_from_head.rotation).inverse() * -gravity_in_world.normalize();
+        let surface = base_from_head.inverse_transform_point(&Point3::from(self.spec.base_surface_m)).coords;
+        let (_, _, depth) = self.submerged(&up, &surface);
+        self.spec.density_kg_per_m3 * gravity_in_world.norm() * depth
+    }
+
+    /// Buoyancy with head and base at rest, N.
+    pub fn buoyancy_n(&self, base_from_head: &Pose, gravity_in_base: &Vector) -> f64 {
+        let up = base_from_head.rotation.inverse() * -gravity_in_base.normalize();
+        let surface = base_from_head.inverse_transform_point(&Point3::from(self.spec.base_surface_m)).coords;
+        self.spec.density_kg_per_m3 * gravity_in_base.norm() * self.submerged(&up, &surface).0
+    }
+}
