@@ -7,7 +7,7 @@ use crate::geometry::{Matrix, Pose, Vector};
 use nalgebra::Point3;
 
 /// Stretch over which a cord goes from slack to taut, in parts of its length: fibres that come to bear one by one.
-const TOE: f64 = 1e-3;
+const TOE: f64 = 1e-4;
 
 /// A cord without mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,8 +83,7 @@ impl Cord {
         let relative = now.relative_twist();
         let (velocity, turning) = split(&relative);
         let damping = self.damping_n_s_per_m * tautness;
-        let tension_n =
-            self.stiffness_n_per_m * stretch + damping * along.dot(&(velocity + turning.cross(&lever)));
+        let tension_n = self.stiffness_n_per_m * stretch + damping * along.dot(&(velocity + turning.cross(&lever)));
         // A damper that would push lets go.
         if tension_n > 0.0 {
             forces.add_force(&lever, &(along * -tension_n));

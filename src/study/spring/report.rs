@@ -2,7 +2,9 @@
 
 use super::figures::Design;
 use super::{Figures, Shake, closed_form, simulated};
-use crate::dynamics::{Bearing, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg};
+use crate::dynamics::{
+    Bearing, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg,
+};
 use crate::elasticity::{Coil, Matrix6, SpringDesign, buckling_load_n, loaded_stiffness};
 use crate::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2, roll_pitch_yaw};
 use crate::sensors::Lidar;
@@ -133,7 +135,7 @@ pub fn spring_report(
         head: Kinematics::at_rest(*head.rest_pose_base_from_head()),
         base: Kinematics::at_rest(Pose::identity()),
     };
-    let stress_pa = design.wire.zip(design.mounting).map(|(wire, mounting)| mounting.stress_pa(&wire, &at_rest));
+    let stress_pa = design.stress_pa(&at_rest);
     let coil = coil_of(spec)?.map(|coil| coil_report(&coil, &design, mass_kg, stress_pa));
     let response = head.frequency_response(&head.usual_points());
     let peak = |axis| (axis_name(axis), response.peak(axis, 20.0, Quantity::Kinematic));

@@ -35,11 +35,9 @@ impl Wire {
     /// When a named spring is not there.
     pub fn of(spec: &SpringSpec) -> Result<Option<Self>, crate::spec::SpecError> {
         Ok(match spec.described()? {
-            SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, material, .. } => Some(Self {
-                coil_radius_m: 0.5e-3 * coil_diameter_mm,
-                diameter_m: 1e-3 * wire_diameter_mm,
-                material,
-            }),
+            SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, material, .. } => {
+                Some(Self { coil_radius_m: 0.5e-3 * coil_diameter_mm, diameter_m: 1e-3 * wire_diameter_mm, material })
+            }
             SpringSpec::Named(_) | SpringSpec::Stiffness { .. } => None,
         })
     }
@@ -100,11 +98,9 @@ pub struct Mounting {
 }
 
 impl Mounting {
-    /// That of a head on one spring; `None` for any other, and for one whose spring shares its load with a cable.
+    /// That of a head on one spring; `None` for any other.
     pub fn of(spec: &HeadSpec, body: &Body) -> Option<Self> {
-        let LinkageSpec::Spring { base_from_spring, head_from_spring, cable: None, .. } = &spec.linkage else {
-            return None;
-        };
+        let LinkageSpec::Spring { base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
         Some(Self { base_from_foot: base_from_spring.pose(), head_from_top: head_from_spring.pose(), body: *body })
     }
 
