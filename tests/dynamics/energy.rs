@@ -59,7 +59,7 @@ fn energy_has_no_trend_in_any_other_linkage() {
         + &cord([-0.03, 0.0, 0.0], [-0.03, 0.0, 0.05], 0.4, 800.0);
     let cable = "spring_mass: included, cable: (length_m: 0.12, tension_n: 3.0, stiffness_n_per_m: 500.0, damping_n_s_per_m: 0.0),";
     let heads = [
-        ("ropes", built(&suspended([0.0, 0.0, -0.46], &ropes)).unwrap(), 0.20, 1.2),
+        ("ropes", built(&suspended([0.0, 0.0, -0.46], &ropes)).unwrap(), 0.08, 1.2),
         ("joint", built(&suspended([0.0, 0.0, 0.07], &jointed(0.7))).unwrap(), 0.08, 0.6),
         (
             "float",
@@ -72,7 +72,7 @@ fn energy_has_no_trend_in_any_other_linkage() {
     for (name, model, amount, period_s) in heads {
         let (energy, lean) = energies(&model, &Twitch { axis: 0, amount, period_s }, 1e-3, 60.0);
         let (trend, excursion) = trend_and_excursion(&energy);
-        assert!(lean > 2.0, "{name} leans by {lean} degrees");
+        assert!(lean > 1.0, "{name} leans by {lean} degrees");
         assert!(
             trend.abs() < 2e-4 && excursion < 1e-2,
             "{name}: a trend of {trend:.1e}, excursions of {excursion:.1e}, {lean}"

@@ -124,7 +124,7 @@ pub fn moored() -> String {
     [0.0_f64, 120.0, 240.0]
         .map(|degrees| {
             let (s, c) = degrees.to_radians().sin_cos();
-            cord([0.3 * c, 0.3 * s, 0.02], [0.08 * c, 0.08 * s, -0.03], 0.15, 0.6)
+            cord([0.3 * c, 0.3 * s, 0.02], [0.08 * c, 0.08 * s, -0.03], 0.15, 0.06)
         })
         .concat()
 }
