@@ -64,3 +64,11 @@ impl Engine {
         stack(&body.linvel().into(), &body.angvel().into())
     }
 }
+
+/// The pose to which a step takes a head of `twist`: rapier turns it not by `|w| h` but by `2 atan(|w| h / 2)`.
+pub(super) fn ahead(body: &Body, pose: &Pose, twist: &Vector6, step_s: f64) -> Pose {
+    let (shift, turn) = split(&(twist * step_s));
+    let angle = turn.norm();
+    let turned = if angle > 0.0 { turn * (2.0 * (0.5 * angle).atan() / angle) } else { turn };
+    body.displaced(pose, &stack(&shift, &turned))
+}

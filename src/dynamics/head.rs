@@ -166,9 +166,12 @@ impl Site<'_> {
              {mass_kg:.3} kg",
             stands * mass_kg
         );
-        SpecError::about(source, self.key(), message).with_help(
-            "a thicker wire, fewer coils or a shorter spring are stiffer; a lighter or lower head asks for less",
-        )
+        let help = if self.is_one_spring() {
+            "a thicker wire, fewer coils or a shorter spring are stiffer; a lighter or lower head asks for less"
+        } else {
+            "more, stiffer or wider-set elements hold it; a lighter or lower head asks for less"
+        };
+        SpecError::about(source, self.key(), message).with_help(help)
     }
 }
 

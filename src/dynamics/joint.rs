@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::elements::UniversalJointSpec;
+use super::engine::ahead;
 use super::push::{Ends, Forces, Instant};
 use crate::elasticity::{Vector6, stack};
 use crate::geometry::{Pose, Rotation, Vector};
@@ -117,7 +118,7 @@ impl UniversalJoint {
         let as_near_as_told = 1e-14 * (1.0 + next_base.translation.vector.norm());
         let mut held = *change;
         for _ in 0..MOST_ITERATIONS {
-            let next = now.body.displaced(now.world_from_head, &((now.twist + held) * step_s));
+            let next = ahead(now.body, now.world_from_head, &(now.twist + held), step_s);
             let apart = self.apart(next_base, &next);
             if apart.amax() <= as_near_as_told {
                 return Some(held);

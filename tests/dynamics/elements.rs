@@ -214,14 +214,14 @@ fn a_joint_leaves_two_turns_that_rock_by_spring_less_weight() {
 fn a_joint_holds_together_however_the_base_moves() {
     let model = model([0.0, 0.0, 0.07], &jointed(0.7));
     let mut lean = 0.0_f64;
-    for state in states(&model, &crate::heads::Nodding { amount_rad: 0.05 }, 1e-3, 5.0) {
+    for state in states(&model, &crate::heads::Nodding { amount_rad: 0.1 }, 1e-3, 5.0) {
         let seen = state.base.world_from_body.inv_mul(&state.head.world_from_body);
         let pivot = seen * nalgebra::Point3::new(0.0, 0.0, -0.07);
         let (x, y) = (Vector::x(), seen.rotation * Vector::y());
-        assert!(pivot.coords.norm() < 1e-10 && x.dot(&y).abs() < 1e-10, "{} m apart", pivot.coords.norm());
+        assert!(pivot.coords.norm() < 1e-12 && x.dot(&y).abs() < 1e-12, "{} m apart", pivot.coords.norm());
         lean = lean.max(seen.rotation.angle());
     }
-    assert!(lean > 0.3, "leans by {lean} rad only");
+    assert!(lean > 0.2, "leans by {lean} rad only");
 }
 
 #[test]
