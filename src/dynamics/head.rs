@@ -1,5 +1,6 @@
 //! The model of a head: its mass, its linkage, its rest.
 
+use super::actuated::Actuated;
 use super::body::Body;
 use super::error::DynamicsError;
 use super::law::{EndStop, Hold, Law};
@@ -25,6 +26,8 @@ pub struct HeadModel {
 pub(super) enum Linkage {
     /// Nothing gives.
     Rigid { base_from_head: Pose },
+    /// A motor turns the head.
+    Actuated(Box<Actuated>),
     /// One spring.
     Spring(Box<Sprung>),
 }
@@ -77,23 +80,37 @@ impl HeadModel {
         &self.body
     }
 
-    /// Pose of the head in the base when both rest, the base upright.
+    /// Pose of the head in the base when both rest, the base upright; of one that a motor turns, before that starts.
     pub fn rest_pose_base_from_head(&self) -> &Pose {
         match &self.linkage {
             Linkage::Rigid { base_from_head } => base_from_head,
+            Linkage::Actuated(actuated) => &actuated.start,
             Linkage::Spring(sprung) => &sprung.rest,
         }
     }
 
-    /// The head's small motions about its rest; `None` for one that does not move.
+    /// Why a head that gives nowhere has nothing to characterise; `None` for one that swings.
+    pub fn unyielding(&self) -> Option<&'static str> {
+        match &self.linkage {
+            Linkage::Rigid { .. } => {
+                Some("it is screwed to its base: there is no spring, hence nothing to characterise")
+            }
+            Linkage::Actuated(_) => {
+                Some("a motor turns it, whatever its base does: there is no spring, hence nothing to characterise")
+            }
+            Linkage::Spring(_) => None,
+        }
+    }
+
+    /// The head's small motions about its rest; `None` for one that gives nowhere.
     pub fn linear(&self) -> Option<&LinearModel> {
         match &self.linkage {
-            Linkage::Rigid { .. } => None,
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => None,
             Linkage::Spring(sprung) => Some(&sprung.linear),
         }
     }
 
-    /// The head's modes about its rest, slowest first; none for one that does not move.
+    /// The head's modes about its rest, slowest first; none for one that gives nowhere.
     pub fn linear_modes(&self) -> &[Mode] {
         self.linear().map_or(&[], |linear| &linear.modes)
     }
@@ -118,7 +135,7 @@ impl HeadModel {
             + 0.5 * turning.dot(&(self.body.inertia_in_head * turning));
         let height = -self.body.mass_kg * gravity_in_world().dot(&centre.world_from_body.translation.vector);
         let in_linkage = match &self.linkage {
-            Linkage::Rigid { .. } => 0.0,
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => 0.0,
             Linkage::Spring(sprung) => sprung.law.potential_j(&world_from_base.inv_mul(&head.world_from_body))?,
         };
         Ok(moving + height + in_linkage)
@@ -176,6 +193,9 @@ impl Linkage {
     fn new(spec: &LinkageSpec, body: &Body, source: &Source, explain: Explain) -> Result<Self, DynamicsError> {
         match spec {
             LinkageSpec::Rigid { base_from_head } => Ok(Linkage::Rigid { base_from_head: base_from_head.pose() }),
+            LinkageSpec::Actuated { base_from_head, motor } => {
+                Ok(Linkage::Actuated(Box::new(Actuated::new(base_from_head, motor, source)?)))
+            }
             LinkageSpec::Spring {
                 spring,
                 segments,

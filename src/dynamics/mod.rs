@@ -4,6 +4,7 @@
 //! modes; a [`HeadSimulation`] moves it on a base that moves. The spring's mechanics are [`crate::elasticity`]'s; the body
 //! is integrated by rapier (see `engine`), which no other room knows.
 
+mod actuated;
 mod body;
 mod capacity;
 mod engine;
@@ -16,6 +17,7 @@ mod simulation;
 mod spec;
 mod statics;
 
+pub use actuated::{MotorSpec, TurnSpec};
 pub use body::Body;
 pub use capacity::heaviest_kg;
 pub use error::DynamicsError;

@@ -41,7 +41,7 @@ impl HeadModel {
     /// the head at its IMU.
     pub fn usual_points(&self) -> Points {
         let base_in_base = match &self.linkage {
-            Linkage::Rigid { .. } => Vector::zeros(),
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => Vector::zeros(),
             Linkage::Spring(sprung) => sprung.law.base_from_spring.translation.vector,
         };
         Points { base_in_base, head_in_head: self.head_from_imu().translation.vector }

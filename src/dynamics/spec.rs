@@ -1,5 +1,6 @@
 //! A head as it is written: `specs/heads/NAME.ron`.
 
+use super::actuated::MotorSpec;
 use crate::elasticity::SpringSpec;
 use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use crate::spec::{Kind, Source, SpecError, checked, find, parse};
@@ -118,6 +119,13 @@ pub enum LinkageSpec {
     Rigid {
         /// Pose of the head in the base.
         base_from_head: PlacementSpec,
+    },
+    /// A motor turns the head, as stiff as a screw.
+    Actuated {
+        /// Pose of the head in the base before the motor starts.
+        base_from_head: PlacementSpec,
+        /// The motor.
+        motor: MotorSpec,
     },
     /// One spring.
     Spring {

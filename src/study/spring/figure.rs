@@ -70,7 +70,7 @@ impl<'a> Picture<'a> {
             LinkageSpec::Spring { base_from_spring, head_from_spring, .. } => {
                 (base_from_spring.pose(), head_from_spring.pose())
             }
-            LinkageSpec::Rigid { .. } => (Pose::identity(), rest.inverse()),
+            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => (Pose::identity(), rest.inverse()),
         };
         Self { spec, rest, foot, head_from_top, right, up, from_above, offset_m, moved }
     }
