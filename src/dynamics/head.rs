@@ -2,6 +2,7 @@
 
 use super::actuated::Actuated;
 use super::body::Body;
+use super::carrier;
 use super::error::DynamicsError;
 use super::law::{EndStop, Hold, Law};
 use super::modes::{LinearModel, Mode, modal_damping, modes};
@@ -62,7 +63,10 @@ impl HeadModel {
         let body = Body::of(spec, source)?;
         let linkage = Linkage::new(&spec.linkage, &body, source, explain)?;
         let (head_from_laser, head_from_imu) = (spec.head_from_laser.pose(), spec.head_from_imu.pose());
-        Ok(Self { body, linkage, head_from_laser, head_from_imu })
+        let model = Self { body, linkage, head_from_laser, head_from_imu };
+        let base_from_laser = model.rest_pose_base_from_head() * head_from_laser;
+        carrier::check(spec, &base_from_laser.translation.vector, source)?;
+        Ok(model)
     }
 
     /// Pose of the lidar in the head.

@@ -7,6 +7,7 @@
 mod actuated;
 mod body;
 mod capacity;
+mod carrier;
 mod engine;
 mod error;
 mod head;
@@ -20,6 +21,7 @@ mod statics;
 pub use actuated::{MotorSpec, TurnSpec};
 pub use body::Body;
 pub use capacity::heaviest_kg;
+pub use carrier::CarrierSpec;
 pub use error::DynamicsError;
 pub use head::HeadModel;
 pub use modes::{LinearModel, Mode, ModeKind};

@@ -1,6 +1,7 @@
 //! A head as it is written: `specs/heads/NAME.ron`.
 
 use super::actuated::MotorSpec;
+use super::carrier::CarrierSpec;
 use crate::elasticity::SpringSpec;
 use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use crate::spec::{Kind, Source, SpecError, checked, find, parse};
@@ -21,6 +22,9 @@ pub struct HeadSpec {
     pub head_from_imu: PlacementSpec,
     /// What holds the head on the base.
     pub linkage: LinkageSpec,
+    /// What of its carrier the laser may see, fixed to the base: an operator, a handle, a cart.
+    #[serde(default)]
+    pub carrier: Vec<CarrierSpec>,
 }
 
 /// Finds and parses the head called `name`: a path, or a name in the library. The source comes with it, for errors of
