@@ -78,3 +78,13 @@ fn wrong_usage_has_code_2_and_a_sentence() {
 fn the_shipped_studies_and_springs_are_right() {
     zsim(&["check", "specs/studies/spring_design.ron", "specs/studies/spring_stock.ron"]).assert().success();
 }
+
+#[test]
+fn a_mount_without_a_spring_has_nothing_to_characterise_and_that_is_said() {
+    for arguments in [["gains", "--head", "spinning"], ["gains", "--head", "trawling"]] {
+        let told = predicate::str::contains("there is no spring, hence nothing to characterise");
+        zsim(&arguments).assert().code(2).stderr(told);
+    }
+    zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns it"));
+    zsim(&["check", "spinning", "nodding", "trawling"]).assert().success();
+}

@@ -1,6 +1,8 @@
 //! The model of a head: its mass, its linkage, its rest.
 
+use super::actuated::Actuated;
 use super::body::Body;
+use super::carrier;
 use super::error::DynamicsError;
 use super::modes::{LinearModel, Mode};
 use super::push::Instant;
@@ -26,6 +28,8 @@ pub struct HeadModel {
 pub(super) enum Linkage {
     /// Nothing gives.
     Rigid { base_from_head: Pose },
+    /// A motor turns the head.
+    Actuated(Box<Actuated>),
     /// One spring, or several elements.
     Sprung(Box<Sprung>),
 }
@@ -51,7 +55,10 @@ impl HeadModel {
         let body = Body::of(spec, source)?;
         let linkage = Linkage::new(&spec.linkage, &body, source, explain)?;
         let (head_from_laser, head_from_imu) = (spec.head_from_laser.pose(), spec.head_from_imu.pose());
-        Ok(Self { body, linkage, head_from_laser, head_from_imu })
+        let model = Self { body, linkage, head_from_laser, head_from_imu };
+        let base_from_laser = model.rest_pose_base_from_head() * head_from_laser;
+        carrier::check(spec, &base_from_laser.translation.vector, source)?;
+        Ok(model)
     }
 
     /// Pose of the lidar in the head.
@@ -69,31 +76,45 @@ impl HeadModel {
         &self.body
     }
 
-    /// Pose of the head in the base when both rest, the base upright.
+    /// Pose of the head in the base when both rest, the base upright; of one that a motor turns, before that starts.
     pub fn rest_pose_base_from_head(&self) -> &Pose {
         match &self.linkage {
             Linkage::Rigid { base_from_head } => base_from_head,
+            Linkage::Actuated(actuated) => &actuated.start,
             Linkage::Sprung(sprung) => &sprung.rest,
         }
     }
 
-    /// The head's small motions about its rest; `None` for one that does not move.
+    /// Why a head that gives nowhere has nothing to characterise; `None` for one that swings.
+    pub fn unyielding(&self) -> Option<&'static str> {
+        match &self.linkage {
+            Linkage::Rigid { .. } => {
+                Some("it is screwed to its base: there is no spring, hence nothing to characterise")
+            }
+            Linkage::Actuated(_) => {
+                Some("a motor turns it, whatever its base does: there is no spring, hence nothing to characterise")
+            }
+            Linkage::Sprung(_) => None,
+        }
+    }
+
+    /// The head's small motions about its rest; `None` for one that gives nowhere.
     pub fn linear(&self) -> Option<&LinearModel> {
         match &self.linkage {
-            Linkage::Rigid { .. } => None,
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => None,
             Linkage::Sprung(sprung) => Some(&sprung.linear),
         }
     }
 
-    /// The head's modes about its rest, slowest first; none for one that does not move.
+    /// The head's modes about its rest, slowest first; none for one that gives nowhere.
     pub fn linear_modes(&self) -> &[Mode] {
         self.linear().map_or(&[], |linear| &linear.modes)
     }
 
-    /// What each element of the linkage bears with head and base at rest; nothing for a rigid one.
+    /// What each element of the linkage bears with head and base at rest; nothing for one that gives nowhere.
     pub fn bearings(&self) -> Vec<Bearing> {
         match &self.linkage {
-            Linkage::Rigid { .. } => Vec::new(),
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => Vec::new(),
             Linkage::Sprung(sprung) => sprung.bearings(),
         }
     }
@@ -101,7 +122,7 @@ impl HeadModel {
     /// An upper bound on how fast the head oscillates, held by a hand and at its end stop, Hz; zero for one that does not.
     pub(super) fn fastest_hz(&self) -> f64 {
         match &self.linkage {
-            Linkage::Rigid { .. } => 0.0,
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => 0.0,
             Linkage::Sprung(sprung) => sprung.fastest_hz(&self.body),
         }
     }
@@ -179,6 +200,7 @@ impl Linkage {
     fn new(spec: &LinkageSpec, body: &Body, source: &Source, explain: Explain) -> Result<Self, DynamicsError> {
         let site = match Mount::of(spec, body, source)? {
             Mount::Rigid(base_from_head) => return Ok(Linkage::Rigid { base_from_head }),
+            Mount::Actuated(actuated) => return Ok(Linkage::Actuated(Box::new(actuated))),
             Mount::Gives(site) => site,
         };
         let found = site.at_rest(1.0).map_err(|unrest| explain(&site, &unrest, source))?;

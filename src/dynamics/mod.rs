@@ -5,8 +5,10 @@
 //! elements. The springs' mechanics are [`crate::elasticity`]'s; the body
 //! is integrated by rapier (see `engine`), which no other room knows.
 
+mod actuated;
 mod body;
 mod capacity;
+mod carrier;
 mod cord;
 mod elements;
 mod engine;
@@ -25,8 +27,10 @@ mod spec;
 mod sprung;
 mod statics;
 
+pub use actuated::{MotorSpec, TurnSpec};
 pub use body::Body;
 pub use capacity::heaviest_kg;
+pub use carrier::CarrierSpec;
 pub use elements::{
     CableSpec, CordSpec, CordStiffnessSpec, ElementSpec, FloatSpec, SpringElementSpec, SpringMassSpec,
     UniversalJointSpec,

@@ -42,7 +42,7 @@ impl HeadModel {
     pub fn usual_points(&self) -> Points {
         let base_in_base = match &self.linkage {
             Linkage::Sprung(sprung) => sprung.foot_in_base(),
-            Linkage::Rigid { .. } => Vector::zeros(),
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => Vector::zeros(),
         };
         Points { base_in_base, head_in_head: self.head_from_imu().translation.vector }
     }

@@ -1,5 +1,6 @@
 //! The head's motion, step by step.
 
+use super::actuated::Actuated;
 use super::body::Body;
 use super::engine::Engine;
 use super::error::DynamicsError;
@@ -26,7 +27,8 @@ pub struct HeadState {
 
 /// The motion of a head on a moving base: an endless iterator of [`HeadState`]s at 0, dt, 2 dt, ...
 ///
-/// At the start the head rests on its base, and moves along if that moves. A head that gives is a free body in rapier,
+/// At the start the head rests on its base, and moves along if that moves. A rigid head, or one that a motor turns, moves in
+/// closed form. A head that gives is a free body in rapier,
 /// pushed by its linkage's wrench (leapfrog): velocities v live half a step before poses, and at step n
 ///
 /// `M (v[n+1/2] - v[n-1/2]) / dt = F(q[n]) - C (mean v - v_base) - mean w x I mean w`, `q[n+1] = q[n] + dt v[n+1/2]`,
@@ -47,6 +49,7 @@ pub struct HeadSimulation<'a> {
 
 enum Mechanism<'a> {
     Rigid { base_from_head: Pose },
+    Actuated(&'a Actuated),
     Sprung(Box<SprungMotion<'a>>),
     Failed,
 }
@@ -64,6 +67,7 @@ impl<'a> HeadSimulation<'a> {
         }
         let mechanism = match &model.linkage {
             Linkage::Rigid { base_from_head } => Mechanism::Rigid { base_from_head: *base_from_head },
+            Linkage::Actuated(actuated) => Mechanism::Actuated(actuated),
             Linkage::Sprung(sprung) => {
                 let start = motion.at(0.0);
                 Mechanism::Sprung(Box::new(SprungMotion::new(&model.body, sprung, &start, step_s)?))
@@ -88,6 +92,7 @@ impl Iterator for HeadSimulation<'_> {
         let head = match &mut self.mechanism {
             Mechanism::Failed => return None,
             Mechanism::Rigid { base_from_head } => Ok(base.of_frame(base_from_head)),
+            Mechanism::Actuated(actuated) => Ok(actuated.carried(&base, t_s)),
             Mechanism::Sprung(sprung) => {
                 let next_base = || self.motion.at(self.count as f64 * self.step_s).world_from_body;
                 sprung.advance(t_s, &base, self.motion.hold(t_s), &next_base)

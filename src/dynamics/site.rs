@@ -1,5 +1,6 @@
 //! A linkage as its spec has it, before any load; and the head at rest in it.
 
+use super::actuated::Actuated;
 use super::body::Body;
 use super::cord::Cord;
 use super::elements::{CableSpec, ElementSpec, SpringElementSpec, SpringMassSpec};
@@ -19,6 +20,8 @@ use crate::spec::{Source, SpecError};
 pub(super) enum Mount<'a> {
     /// Nothing gives: `base_from_head`.
     Rigid(Pose),
+    /// A motor turns the head.
+    Actuated(Actuated),
     /// Something gives.
     Gives(Site<'a>),
 }
@@ -74,13 +77,16 @@ impl<'a> Mount<'a> {
     pub fn of(linkage: &LinkageSpec, body: &'a Body, source: &Source) -> Result<Self, SpecError> {
         let (damping_ratio, end_stop, hold) = match linkage {
             LinkageSpec::Rigid { base_from_head } => return Ok(Mount::Rigid(base_from_head.pose())),
+            LinkageSpec::Actuated { base_from_head, motor } => {
+                return Ok(Mount::Actuated(Actuated::new(base_from_head, motor, source)?));
+            }
             LinkageSpec::Spring { damping_ratio, end_stop, hold, .. }
             | LinkageSpec::Suspension { damping_ratio, end_stop, hold, .. } => (*damping_ratio, *end_stop, *hold),
         };
         let manner = Manner { damping_ratio, end_stop, hold };
         let mut site = Site { springs: vec![], cords: vec![], floats: vec![], joint: None, start: None, body, manner };
         match linkage {
-            LinkageSpec::Rigid { .. } => {}
+            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => {}
             LinkageSpec::Spring {
                 spring, segments, base_from_spring, head_from_spring, spring_mass, cable, ..
             } => {

@@ -1,5 +1,7 @@
 //! A head as it is written: `specs/heads/NAME.ron`.
 
+use super::actuated::MotorSpec;
+use super::carrier::CarrierSpec;
 use super::elements::{CableSpec, ElementSpec, SpringMassSpec};
 use crate::elasticity::SpringSpec;
 use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
@@ -21,6 +23,9 @@ pub struct HeadSpec {
     pub head_from_imu: PlacementSpec,
     /// What holds the head on the base.
     pub linkage: LinkageSpec,
+    /// What of its carrier the laser may see, fixed to the base: an operator, a handle, a cart.
+    #[serde(default)]
+    pub carrier: Vec<CarrierSpec>,
 }
 
 /// Finds and parses the head called `name`: a path, or a name in the library. The source comes with it, for errors of
@@ -120,6 +125,13 @@ pub enum LinkageSpec {
         /// Pose of the head in the base.
         base_from_head: PlacementSpec,
     },
+    /// A motor turns the head, as stiff as a screw.
+    Actuated {
+        /// Pose of the head in the base before the motor starts.
+        base_from_head: PlacementSpec,
+        /// The motor.
+        motor: MotorSpec,
+    },
     /// One spring.
     Spring {
         /// The spring.
@@ -166,7 +178,7 @@ impl LinkageSpec {
     /// The damping ratios of its modes; `None` for one that has none.
     pub fn damping_ratio_mut(&mut self) -> Option<&mut DampingSpec> {
         match self {
-            LinkageSpec::Rigid { .. } => None,
+            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => None,
             LinkageSpec::Spring { damping_ratio, .. } | LinkageSpec::Suspension { damping_ratio, .. } => {
                 Some(damping_ratio)
             }

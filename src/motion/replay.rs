@@ -1,4 +1,4 @@
-//! A recorded trajectory played again.
+//! A recorded trajectory played again, from a file of poses or a recording.
 //!
 //! A natural cubic spline leads through the recorded poses, in position and in the components of the quaternion, which is
 //! then normalised: twice continuously differentiable, and through every pose. Play starts and ends by easing the time in
@@ -9,7 +9,7 @@ use super::smooth::Way;
 use super::stand::standpoint;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Pose, Rotation, Route, Trajectory, Vector, from_roll_pitch_yaw};
-use crate::recording::read_tum;
+use crate::recording::{Reader, read_tum};
 use crate::spec::checked::{non_negative, positive};
 use crate::spec::{Source, SpecError};
 use crate::time::Stamp;
@@ -40,6 +40,15 @@ pub struct ReplaySpec {
 pub enum PosesSpec {
     /// In a file in the TUM format; a relative path is from the spec's folder.
     Tum(String),
+    /// In an MCAP recording, of zsim's or another's.
+    Recording {
+        /// The file, or the folder that holds it; a relative path is from the spec's folder.
+        file: String,
+        /// The topic, of `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`; `/ground_truth/odom`, or the first such topic
+        /// by name, unless it is told.
+        #[serde(default)]
+        topic: Option<String>,
+    },
     /// Here: time in s, position in m, roll, pitch and yaw in degrees.
     Here(Vec<(f64, [f64; 3], [f64; 3])>),
 }
@@ -87,10 +96,12 @@ fn onto((floor, heading): &(Vector, f64), first: &Pose) -> Pose {
 impl PosesSpec {
     fn trajectory(&self, source: &Source) -> Result<Trajectory, SpecError> {
         let fault = |message: String| SpecError::about(source, "poses", message);
+        let beside = |file: &str| source.folder.as_deref().unwrap_or(Path::new("")).join(file);
         match self {
-            PosesSpec::Tum(file) => {
-                let path = source.folder.as_deref().unwrap_or(Path::new("")).join(file);
-                read_tum(&path).map_err(|error| fault(error.to_string()))
+            PosesSpec::Tum(file) => read_tum(&beside(file)).map_err(|error| fault(error.to_string())),
+            PosesSpec::Recording { file, topic } => {
+                let poses = Reader::open(&beside(file)).and_then(|reader| reader.poses(topic.as_deref()));
+                poses.map_err(|error| fault(error.to_string()))
             }
             PosesSpec::Here(rows) => {
                 let stamped = rows.iter().map(|(t_s, position_m, degrees)| {

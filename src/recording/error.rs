@@ -58,6 +58,15 @@ pub enum RecordingError {
         /// The topics that are there.
         has: String,
     },
+    /// A recording of which all is needed, and not all can be read.
+    #[error(
+        "{name}: the recording is cut short or damaged, so that poses may be missing; `mcap recover` makes a whole one of what is \
+         left"
+    )]
+    NotWhole {
+        /// Which file.
+        name: String,
+    },
     /// The tree of `/tf_static` does not lead where it must.
     #[error("{name}: /tf_static {problem}")]
     Frames {

@@ -3,7 +3,7 @@
 //! [`Writer`] takes what a simulated run says, measurements and truth, and makes an MCAP file in the ROS 2 profile, which
 //! ROS, Foxglove and rerun read. [`Reader`] reads such a file, or one by another program. Measurements
 //! ([`Reader::measurements`]) and truth ([`Reader::truth`]) come by different ways, so that an estimator can be given the
-//! one without the other.
+//! one without the other; [`Reader::poses`] gives those of any one topic.
 //!
 //! | topic | type | frame | what |
 //! |---|---|---|---|
@@ -30,6 +30,7 @@ mod loss;
 mod measurements;
 mod message;
 mod ply;
+mod poses;
 mod reader;
 mod result;
 mod schema;

@@ -18,6 +18,13 @@ impl Cylinder {
     /// The first of its surfaces that a ray of the base's frame meets in front of its origin.
     fn first_hit(&self, origin: &Vector, direction: &Vector) -> Option<SurfaceHit> {
         let from = origin - self.foot_in_base;
+        // Along |(from + s direction).xy|^2 = a s^2 + 2 b s + c + radius^2 most rays go away from the axis, or pass it by.
+        let a = direction.xy().norm_squared();
+        let b = from.xy().dot(&direction.xy());
+        let c = from.xy().norm_squared() - self.radius_m * self.radius_m;
+        if c > 0.0 && (b >= 0.0 || b * b < a * c) {
+            return None;
+        }
         let at = |range_m: f64| from + direction * range_m;
         let hit = |range_m: f64, cos: f64| SurfaceHit {
             range_m,
@@ -29,10 +36,6 @@ impl Cylinder {
             let range_m = (z - from.z) / direction.z;
             (range_m > 0.0 && at(range_m).xy().norm() <= self.radius_m).then(|| hit(range_m, direction.z))
         });
-        // |(from + s direction).xy| = radius: a s^2 + 2 b s + c = 0.
-        let a = direction.xy().norm_squared();
-        let b = from.xy().dot(&direction.xy());
-        let c = from.xy().norm_squared() - self.radius_m.powi(2);
         let root = (b * b - a * c).sqrt();
         let side = [(-b - root) / a, (-b + root) / a].into_iter().filter_map(|range_m| {
             let point = at(range_m);

@@ -1,9 +1,9 @@
 use super::{EPOCH, Rig, STEP_S, Scenario, SimulationError, SimulationSummary, Sources, Specs, simulate};
-use crate::dynamics::{HeadModel, HeadSimulation};
-use crate::geometry::Route;
+use crate::dynamics::{CarrierSpec, HeadModel, HeadSimulation};
+use crate::geometry::{Route, Vector};
 use crate::measurement::{Calibration, Sink};
 use crate::motion::BaseMotion;
-use crate::sensors::{Clocks, Imu, Lidar};
+use crate::sensors::{Clocks, Cylinder, Imu, Lidar};
 use crate::spec::SpecError;
 use crate::truth::TruthSink;
 use crate::world::World;
@@ -14,6 +14,7 @@ pub struct Simulation {
     specs: Specs,
     world: World,
     head: HeadModel,
+    carrier: Vec<Cylinder>,
     motion: Box<dyn BaseMotion>,
     lidar: Lidar,
     imu: Imu,
@@ -37,12 +38,13 @@ impl Simulation {
     pub fn build(scenario: &Scenario, specs: Specs, sources: &Sources) -> Result<Self, SimulationError> {
         let world = World::build(&specs.scene, &sources.scene)?;
         let head = HeadModel::new(&specs.head, &sources.head)?;
+        let carrier = specs.head.carrier.iter().map(cylinder).collect();
         let route = route(scenario, &world)?;
         let motion = specs.motion.build(&sources.motion, route, scenario.duration_s, scenario.seed)?;
         let lidar = Lidar::new(&specs.lidar, &sources.lidar)?;
         let imu = Imu::new(&specs.imu, &sources.imu)?;
         let clocks = Clocks::new(&specs.clock, &sources.clock, EPOCH)?;
-        Ok(Self { scenario: scenario.clone(), specs, world, head, motion, lidar, imu, clocks })
+        Ok(Self { scenario: scenario.clone(), specs, world, head, carrier, motion, lidar, imu, clocks })
     }
 
     /// What was asked for.
@@ -63,6 +65,11 @@ impl Simulation {
     /// The head.
     pub fn head(&self) -> &HeadModel {
         &self.head
+    }
+
+    /// What of its carrier the lidar may see, in the base's frame.
+    pub fn carrier(&self) -> &[Cylinder] {
+        &self.carrier
     }
 
     /// How the base moves.
@@ -103,7 +110,7 @@ impl Simulation {
     fn rig(&self) -> Rig<'_> {
         Rig {
             scenery: &self.world,
-            carrier: &[],
+            carrier: &self.carrier,
             lidar: &self.lidar,
             imu: &self.imu,
             clocks: self.clocks,
@@ -112,6 +119,16 @@ impl Simulation {
             duration_s: self.scenario.duration_s,
             seed: self.scenario.seed,
         }
+    }
+}
+
+/// A part of the carrier as the lidar sees it.
+fn cylinder(part: &CarrierSpec) -> Cylinder {
+    Cylinder {
+        foot_in_base: Vector::from(part.foot_in_base_m),
+        radius_m: part.radius_m,
+        height_m: part.height_m,
+        reflectance: part.reflectance as f32,
     }
 }
 

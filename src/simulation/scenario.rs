@@ -3,7 +3,7 @@ use crate::dynamics::HeadSpec;
 use crate::motion::MotionSpec;
 use crate::random::Seed;
 use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use crate::spec::{Kind, Source, SpecError, checked, find, parse};
+use crate::spec::{Kind, Source, checked, find, parse};
 use crate::world::SceneSpec;
 use serde::{Deserialize, Serialize};
 
@@ -53,7 +53,7 @@ impl Scenario {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Specs {
-    /// The world.
+    /// The world, with the scenes that it includes.
     pub scene: SceneSpec,
     /// The head and what carries it.
     pub head: HeadSpec,
@@ -98,12 +98,13 @@ impl Specs {
             imu: find(Kind::Imu, &scenario.imu)?,
             clock: find(Kind::Clock, &scenario.clock)?,
         };
-        Ok((Self::parse(&sources)?, sources))
+        let specs = Self::parse(&sources)?;
+        Ok((specs, sources))
     }
 
-    fn parse(sources: &Sources) -> Result<Self, SpecError> {
+    fn parse(sources: &Sources) -> Result<Self, SimulationError> {
         Ok(Self {
-            scene: parse(&sources.scene)?,
+            scene: parse::<SceneSpec>(&sources.scene)?.with_includes(&sources.scene)?,
             head: parse(&sources.head)?,
             motion: parse(&sources.motion)?,
             lidar: parse(&sources.lidar)?,

@@ -23,6 +23,7 @@ mod build;
 mod caster;
 mod error;
 mod import;
+mod include;
 mod material;
 mod model;
 mod mover;

@@ -34,8 +34,9 @@ impl World {
     /// meshes.
     ///
     /// # Errors
-    /// When the scene names what it does not have, gives numbers that do not fit together, or names a bad mesh.
+    /// When the scene includes what it cannot, names what it does not have, gives numbers that do not fit together, or names a bad mesh.
     pub fn build(spec: &SceneSpec, source: &Source) -> Result<Self, WorldError> {
+        let spec = &spec.with_includes(source)?;
         let Parts { materials, still, movers, routes, notes } = build(spec, source)?;
         let still = Caster::new(&still.triangles, &still.materials);
         let (name, default_route) = (spec.name.clone(), spec.default_route.clone());

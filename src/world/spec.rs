@@ -11,6 +11,9 @@ use std::collections::BTreeMap;
 pub struct SceneSpec {
     /// What to call it.
     pub name: String,
+    /// Other scenes, by path or name, all of which is a part of this one.
+    #[serde(default)]
+    pub include: Vec<String>,
     /// The materials, by name.
     pub materials: BTreeMap<String, MaterialSpec>,
     /// Groups of items that are placed as one, each in a frame of its own, by name.

@@ -1,7 +1,7 @@
 use crate::heads::{Still, Table, built, shipped, states};
 use approx::assert_relative_eq;
 use nalgebra::{Matrix2, Vector2};
-use zsim::dynamics::ModeKind;
+use zsim::dynamics::{HeadSpec, LinkageSpec, ModeKind};
 use zsim::elasticity::{Coil, Moduli, SpringSpec, loaded_stiffness};
 use zsim::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2 as G, Vector, from_roll_pitch_yaw};
 use zsim::motion::BaseMotion;
@@ -119,10 +119,14 @@ fn a_slow_tilt_of_the_base_is_lifted_by_gravity() {
 }
 
 #[test]
-fn every_shipped_head_and_spring_is_right_and_stands_for_ten_seconds() {
+fn every_shipped_head_and_spring_is_right_and_stands_for_ten_seconds_or_until_its_motor_starts() {
     for name in names(Kind::Head) {
         let model = shipped(&name);
-        let path = states(&model, &Still(Pose::identity()), 1e-3, 10.0);
+        let rests_s = match load::<HeadSpec>(Kind::Head, &name).unwrap().linkage {
+            LinkageSpec::Actuated { motor, .. } => motor.still_s,
+            _ => 10.0,
+        };
+        let path = states(&model, &Still(Pose::identity()), 1e-3, rests_s);
         let moved = path[path.len() - 1].head.world_from_body.inv_mul(model.rest_pose_base_from_head());
         assert!(moved.translation.vector.norm() < 1e-9, "{name} moves by {moved}");
     }

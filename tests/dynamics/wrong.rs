@@ -130,3 +130,32 @@ fn a_wire_or_a_cable_that_is_none_is_refused() {
     let known = text.replace("spring_steel", "moduli(youngs_gpa: 206.0, shear_gpa: 79.3, density_kg_per_m3: 7850.0)");
     assert_eq!(built(&known).unwrap().linear_modes(), built(&text).unwrap().linear_modes());
 }
+
+#[test]
+fn what_is_wrong_with_a_carrier_is_said_where_it_stands() {
+    let with = |carrier: &str| {
+        let text = Table::default().text();
+        let (body, _) = text.rsplit_once(')').unwrap();
+        built(&format!("{body}    carrier: [\n        ({carrier}),\n    ],\n)"))
+    };
+    // The head stands on a spring of 120 mm, its laser 100 mm above that.
+    let around = "name: \"post\", foot_in_base_m: (0.0, 0.0, 0.2), radius_m: 0.05, height_m: 0.1, reflectance: 0.5";
+    let told = |from: &str, to: &str| {
+        assert!(around.contains(from), "{from}");
+        with(&around.replacen(from, to, 1)).unwrap_err().to_string()
+    };
+    assert!(with(&around.replacen("0.2)", "0.3)", 1)).is_ok());
+    assert!(with(&around.replacen("radius_m: 0.05", "radius_m: 1e-9", 1).replacen("(0.0,", "(0.1,", 1)).is_ok());
+    let inside = with(around).unwrap_err().to_string();
+    assert!(inside.starts_with("head.ron:22:") && inside.contains("inside the carrier's `post`"), "{inside}");
+    for (from, to, part) in [
+        ("radius_m: 0.05", "radius_m: -0.05", "above 0, found -0.05"),
+        ("height_m: 0.1", "height_m: inf", "found inf"),
+        ("reflectance: 0.5", "reflectance: 1.5", "from 0 to 1, found 1.5"),
+        ("foot_in_base_m: (0.0,", "foot_in_base_m: (NaN,", "NaN"),
+        ("radius_m: 0.05", "radios_m: 0.05", "radios_m"),
+    ] {
+        let error = told(from, to);
+        assert!(error.starts_with("head.ron:22:") && error.contains(part), "{to}: {error}");
+    }
+}

@@ -25,6 +25,17 @@ pub fn decode(message: &[u8]) -> Result<(Stamp, Pose), DecodeError> {
     Ok((stamp, input.pose()?))
 }
 
+/// Reads the pose of an `Odometry`.
+///
+/// # Errors
+/// When the bytes are not such a message, or the pose is not a rigid one.
+pub fn decode_odometry(message: &[u8]) -> Result<(Stamp, Pose), DecodeError> {
+    let mut input = Decoder::new(message)?;
+    let (stamp, _) = input.header()?;
+    input.string()?;
+    Ok((stamp, input.pose()?))
+}
+
 /// Writes an `Odometry`: the pose in `frame`, the twist in the moving frame `child`.
 ///
 /// # Errors

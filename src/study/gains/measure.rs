@@ -35,6 +35,9 @@ pub fn gain_curve(head: &HeadModel, axis: Axis, plan: &GainPlan) -> Result<GainC
 }
 
 fn checked(head: &HeadModel, plan: &GainPlan) -> Result<Schedule, StudyError> {
+    if let Some(why) = head.unyielding() {
+        return Err(StudyError::Plan { what: "head", message: why.to_owned() });
+    }
     if plan.realisations < 2 {
         let message = format!("{} tell nothing of coherence: take 2 or more", plan.realisations);
         return Err(StudyError::Plan { what: "realisations", message });

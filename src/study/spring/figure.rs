@@ -53,7 +53,7 @@ fn links(linkage: &LinkageSpec) -> Vec<Link> {
             vec![Link::Spring { foot: base_from_spring.pose(), head_from_top: head_from_spring.pose() }]
         }
         LinkageSpec::Suspension { elements, .. } => elements.iter().filter_map(link).collect(),
-        LinkageSpec::Rigid { .. } => Vec::new(),
+        LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => Vec::new(),
     }
 }
 

@@ -114,7 +114,7 @@ pub struct UnderShake {
 /// That the head falls is an answer, not an error.
 ///
 /// # Errors
-/// When the spec is wrong.
+/// When the spec is wrong, or its head is on no spring.
 pub fn spring_report(
     spec: &HeadSpec,
     source: &Source,
@@ -125,9 +125,14 @@ pub fn spring_report(
     let heaviest_head_kg = heaviest_kg(spec, source)?;
     let head = match HeadModel::new(spec, source) {
         Ok(head) => head,
-        // Numbers that are wrong have been refused above: what is left is a head that falls.
+        // A head that no mass brings down does not fall: it is wrong.
+        Err(error) if heaviest_head_kg.is_none() => return Err(error.into()),
+        // Numbers of a spring that are wrong have been refused above: what is left is a head that falls.
         Err(error) => return fallen(spec, heaviest_head_kg, error.to_string()),
     };
+    if let Some(why) = head.unyielding() {
+        return Err(StudyError::Plan { what: "head", message: why.to_owned() });
+    }
     let mass_kg = head.body().mass_kg;
     let design = Design::of(spec, &head)?;
     let at_rest = HeadState {
@@ -166,7 +171,7 @@ fn fallen(spec: &HeadSpec, heaviest_head_kg: Option<f64>, because: String) -> Re
             mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
             ..Design::unmounted()
         },
-        LinkageSpec::Rigid { .. } | LinkageSpec::Suspension { .. } => Design::unmounted(),
+        LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } | LinkageSpec::Suspension { .. } => Design::unmounted(),
     };
     Ok(SpringReport {
         head_mass_kg,
