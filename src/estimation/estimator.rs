@@ -118,9 +118,9 @@ impl Estimator {
             }
             let mut final_until_s = None;
             if window.is_full()
-                && let Some((placed, _)) = window.let_go()
+                && let Some(patches) = window.let_go()
             {
-                self.views.take(&placed, self.spec.step_s, window.matcher());
+                self.views.take(&patches, self.spec.step_s, window.matcher());
                 final_until_s = Some(window.start_s());
             }
             self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, started));
@@ -193,7 +193,7 @@ impl Estimator {
         let maker = SurfelMaker {
             spec: self.spec.surfels.clone(),
             noise: self.calibration.lidar,
-            scan_normal: imu_from_laser.rotation * Vector::z(),
+            scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
             laser_in_imu: imu_from_laser.translation.vector,
         };
         let border = Border::new(beginning.information, &self.calibration.imu);

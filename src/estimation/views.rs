@@ -38,11 +38,11 @@ impl Views {
     }
 
     /// Takes the surfels of a stretch of `seconds` that has left the window.
-    pub(super) fn take(&mut self, placed: &[Placed], seconds: f64, matcher: &Matcher) {
+    pub(super) fn take(&mut self, patches: &[Patch], seconds: f64, matcher: &Matcher) {
         if self.active == 0 {
             return;
         }
-        self.gathering.extend(placed.iter().map(|surfel| surfel.patch));
+        self.gathering.extend(patches);
         self.gathered_s += seconds;
         if self.gathered_s < self.spec.length_s - 1e-9 {
             return;
@@ -61,7 +61,7 @@ impl Views {
         if self.kept.len() >= self.spec.max_kept {
             self.forget_one();
         }
-        let forest = matcher.plant(&patches.iter());
+        let forest = matcher.plant(&patches);
         self.kept.push(View { patches, forest, cells });
     }
 
