@@ -139,23 +139,27 @@ impl NormalEquations {
 
     /// The solution, by a factor of these equations.
     pub(super) fn solve(&self, factor: &Factor) -> Vec<f64> {
-        let n = self.size;
-        let mut x = self.b.clone();
-        for i in 0..n {
-            let row = factor.row(i);
-            x[i] = (x[i] - dot(&row[factor.first[i]..i], &x[factor.first[i]..i])) / row[i];
-        }
-        for i in (0..n).rev() {
-            let row = factor.row(i);
-            x[i] /= row[i];
-            let (scale, from) = (-x[i], factor.first[i]);
-            axpy(&mut x[from..i], &row[from..i], scale);
-        }
-        x
+        factor.solve(&self.b)
     }
 }
 
 impl Factor {
+    /// `H^-1 b`.
+    pub(super) fn solve(&self, b: &[f64]) -> Vec<f64> {
+        let mut x = b.to_vec();
+        for i in 0..self.size {
+            let row = self.row(i);
+            x[i] = (x[i] - dot(&row[self.first[i]..i], &x[self.first[i]..i])) / row[i];
+        }
+        for i in (0..self.size).rev() {
+            let row = self.row(i);
+            x[i] /= row[i];
+            let (scale, from) = (-x[i], self.first[i]);
+            axpy(&mut x[from..i], &row[from..i], scale);
+        }
+        x
+    }
+
     fn row(&self, i: usize) -> &[f64] {
         &self.l[i * self.size..=i * self.size + i]
     }

@@ -178,6 +178,26 @@ pub(in crate::estimation) fn add_fixed(own: &mut Own, surfel: &Placed, plane: &P
     own.add(&by_motion(surfel, &plane.normal), plane.distance_m, weight);
 }
 
+/// Adds the row of the Jacobian of a match of `surfel`, `scales[k]` times to column `k` of six.
+pub(in crate::estimation) fn add_scaled_row(
+    columns: &mut [Vec<f64>; 6],
+    layout: &Layout,
+    (surfel, normal): (&Placed, &Vector),
+    scales: &[f64; 6],
+    clock_at_s: f64,
+) {
+    let row = Row::of(surfel, &by_motion(surfel, normal), clock_at_s);
+    let (first, clock) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
+    for (column, scale) in columns.iter_mut().zip(scales) {
+        for (sum, term) in column[first..first + 24].iter_mut().zip(row.knots) {
+            *sum += scale * term;
+        }
+        for (sum, term) in column[clock..clock + 2].iter_mut().zip(row.clock) {
+            *sum += scale * term;
+        }
+    }
+}
+
 /// A row of the Jacobian: the four knots about a surfel, and the clock's offset and rate.
 struct Row {
     knots: [f64; 24],

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 const MOVED_M: f64 = 0.02;
 
 /// The window's surfels in the map.
+#[derive(Debug)]
 pub(super) struct Scene {
     /// Patches, then streaks.
     pub placed: Vec<Placed>,
@@ -31,10 +32,12 @@ pub(super) struct Neighbours {
 }
 
 /// The matches of an iteration.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct Matches {
+    /// Of the window: indices into the scene.
     pub pairs: Vec<(u32, u32, Plane)>,
-    pub fixed: Vec<(u32, Plane)>,
+    /// With views: an index into the scene, a view.
+    pub fixed: Vec<(u32, u32, Plane)>,
 }
 
 impl Matches {
@@ -43,7 +46,7 @@ impl Matches {
     }
 
     pub fn planes(&self) -> impl Iterator<Item = &Plane> {
-        self.pairs.iter().map(|(.., plane)| plane).chain(self.fixed.iter().map(|(_, plane)| plane))
+        self.pairs.iter().map(|(.., plane)| plane).chain(self.fixed.iter().map(|(.., plane)| plane))
     }
 }
 
@@ -106,11 +109,11 @@ impl Window {
             .with_min_len(512)
             .map(|(a, b)| Some((*a, *b, plane(*a, &scene.placed[*b as usize].patch)?)))
             .collect();
-        let fixed: Vec<Option<(u32, Plane)>> = neighbours
+        let fixed: Vec<Option<(u32, u32, Plane)>> = neighbours
             .fixed
             .par_iter()
             .with_min_len(512)
-            .map(|(a, view, k)| Some((*a, plane(*a, &views.view(*view as usize).patches[*k as usize])?)))
+            .map(|(a, view, k)| Some((*a, *view, plane(*a, &views.view(*view as usize).patches[*k as usize])?)))
             .collect();
         Matches { pairs: pairs.into_iter().flatten().collect(), fixed: fixed.into_iter().flatten().collect() }
     }

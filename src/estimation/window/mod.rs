@@ -3,8 +3,10 @@
 mod correspondence;
 mod equations;
 mod solve;
+mod uncertainty;
 
 pub(super) use solve::Solved;
+pub(super) use uncertainty::Linearised;
 
 use super::border::Border;
 use super::clock::Clock;
@@ -139,20 +141,21 @@ impl Window {
         of_window(swept) > 1.0 - 1e-9 || of_window(self.stretches.len()) > LONGEST
     }
 
+    /// Where the window will begin when its oldest stretch has gone, IMU time, s.
+    pub(super) fn next_start_s(&self) -> Option<f64> {
+        Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).max(self.start.u_s))
+    }
+
     /// Lets the oldest stretch go: what is before its end is final. Its patches as they stand in the map.
     pub(super) fn let_go(&mut self) -> Option<Vec<Patch>> {
+        let start_s = self.next_start_s()?;
         let oldest = self.stretches.pop_front()?;
         let spacing = self.spec.knot_spacing_s;
         let place = |surfel: &Surfel| surfel.place(&self.nominal, &self.clock, &self.biases, spacing).patch;
         let placed = oldest.surfels.patches.iter().map(place).collect();
-        self.start = Start::held(self.clock.imu_s(oldest.end_tau_s).max(self.start.u_s));
+        self.start = Start::held(start_s);
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
         Some(placed)
-    }
-
-    /// Where the window begins, IMU time, s: before it the trajectory is final.
-    pub(super) fn start_s(&self) -> f64 {
-        self.start.u_s
     }
 }

@@ -3,6 +3,7 @@
 use super::Window;
 use super::correspondence::{Matches, Neighbours};
 use super::equations::Robust;
+use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
@@ -31,8 +32,8 @@ pub(in crate::estimation) struct Solved {
 }
 
 impl Window {
-    /// Solves the window.
-    pub(in crate::estimation) fn solve(&mut self, views: &Views) -> Solved {
+    /// Solves the window; what it was linearised at, where its solution is believed.
+    pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
         let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity);
@@ -41,6 +42,7 @@ impl Window {
         let mut solved = Solved::default();
         let mut neighbours = Neighbours::default();
         let mut chosen = None;
+        let mut linearised = None;
         for iteration in 0..self.spec.solve.max_iterations {
             let scene = self.scene();
             let chosen = chosen.get_or_insert_with(|| views.choose(&scene.placed[..scene.patches]));
@@ -63,6 +65,7 @@ impl Window {
             self.apply(&x, first, &layout, &mut total);
             neighbours.moved(shift + ARM_M * turn);
             solved.last_correction_m = shift.max(turn);
+            linearised = Some(Linearised { layout, scene, matches, robust });
             if solved.last_correction_m < self.spec.solve.settled_m {
                 break;
             }
@@ -70,8 +73,9 @@ impl Window {
         if solved.trouble.is_some() {
             (self.nominal, self.clock, self.biases, self.gravity) = backup;
             self.border.begin_window();
+            linearised = None;
         }
-        solved
+        (solved, linearised)
     }
 
     /// Moves the window's unknowns by a solution.
