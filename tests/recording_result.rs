@@ -20,7 +20,7 @@ fn a_result_has_a_path_a_transform_a_pose_and_all_points_in_the_order_of_time() 
     });
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("result.mcap");
-    write_result(&path, "head", &trajectory, points).unwrap();
+    write_result(&path, "head", (&trajectory, &[]), points).unwrap();
 
     let bytes = std::fs::read(path).unwrap();
     let mut counts = BTreeMap::new();

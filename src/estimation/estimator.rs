@@ -1,10 +1,11 @@
 use super::border::Border;
+use super::consider::{Consider, Sensitivity};
 use super::initial::{self, Beginning, Carried};
 use super::intake::{Intake, Stretch};
 use super::strapdown::Interval;
 use super::surfel::SurfelMaker;
 use super::views::Views;
-use super::window::{Solved, Window};
+use super::window::{Linearised, Solved, Window};
 use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, Measurement};
@@ -26,6 +27,9 @@ pub struct Estimator {
     /// What was known when the IMU last fell silent, until the window behind it is level with it.
     carried: Option<Carried>,
     views: Views,
+    consider: Consider,
+    /// How the newest window's end hangs on its beginning.
+    at_end: Option<Sensitivity>,
     next_pose: Option<Stamp>,
     poses: Vec<EstimatedPose>,
     clock_offsets: Vec<(Stamp, f64)>,
@@ -50,6 +54,8 @@ impl Estimator {
             window: None,
             carried: None,
             views: Views::new(&spec.views, spec.fixed_views),
+            consider: Consider::new(Vector::zeros()),
+            at_end: None,
             next_pose: None,
             poses: Vec::new(),
             clock_offsets: Vec::new(),
@@ -89,6 +95,7 @@ impl Estimator {
         self.warnings.extend(self.intake.take_warnings());
         let Some(window) = &self.window else { return Err(self.why_nothing()) };
         let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
+        self.consider_the_end();
         self.hand_out(end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
@@ -105,38 +112,58 @@ impl Estimator {
         }
         self.waiting.push(stretch);
         self.begin(false);
-        let Some(window) = &mut self.window else { return };
-        for stretch in std::mem::take(&mut self.waiting) {
-            let started = Instant::now();
-            window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
-            let solved = window.solve(&self.views);
-            window.remake_newest();
-            if window.is_full()
-                && let Some(carried) = self.carried.take()
-            {
-                window.level_as(&carried);
-            }
-            let mut final_until_s = None;
-            if window.is_full()
-                && let Some((placed, _)) = window.let_go()
-            {
-                self.views.take(&placed, self.spec.step_s, window.matcher());
-                final_until_s = Some(window.start_s());
-            }
-            self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, started));
-            self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
-            let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
-            let trouble = trouble(&solved, &self.spec, moving);
-            // Said once, until a window is well again.
-            if let (Some(kind), false) = (&trouble, self.lost) {
-                self.warnings.push(Warning { stamp: self.intake.stamp(stretch.end_s), kind: kind.clone() });
-            }
-            self.lost = trouble.is_some();
-            if let Some(until_s) = final_until_s {
-                hand_out(&mut self.poses, &mut self.next_pose, (window, &self.intake), &self.calibration, until_s);
-                window.nominal.forget_before(until_s - 0.2);
+        if self.window.is_some() {
+            for stretch in std::mem::take(&mut self.waiting) {
+                self.take_in(stretch);
             }
         }
+    }
+
+    fn take_in(&mut self, stretch: Stretch) {
+        let Some(window) = &mut self.window else { return };
+        let started = Instant::now();
+        window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
+        let (solved, linearised) = window.solve(&self.views);
+        window.remake_newest();
+        if window.is_full()
+            && let Some(carried) = self.carried.take()
+        {
+            window.level_as(&carried);
+        }
+        let final_until_s = self.let_go(linearised.as_ref());
+        let Some(window) = &mut self.window else { return };
+        self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, started));
+        self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
+        let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
+        let trouble = trouble(&solved, &self.spec, moving);
+        // Said once, until a window is well again.
+        if let (Some(kind), false) = (&trouble, self.lost) {
+            self.warnings.push(Warning { stamp: self.intake.stamp(stretch.end_s), kind: kind.clone() });
+        }
+        self.lost = trouble.is_some();
+        if let Some(until_s) = final_until_s {
+            self.hand_out(until_s);
+            let Some(window) = &mut self.window else { return };
+            window.nominal.forget_before(until_s - 0.2);
+        }
+    }
+
+    /// Lets the oldest stretch go if the window is full. Until when, IMU time, the poses are final then, s.
+    fn let_go(&mut self, linearised: Option<&Linearised>) -> Option<f64> {
+        let window = self.window.as_mut()?;
+        let end_s = window.nominal.end_s();
+        self.at_end = linearised.map(|at| window.sensitivity_at(end_s, at, &self.views));
+        if !window.is_full() {
+            return None;
+        }
+        let until_s = window.next_start_s()?;
+        if let Some(at) = linearised {
+            self.consider.advance(&window.sensitivity_at(until_s, at, &self.views));
+        }
+        let patches = window.let_go()?;
+        let taken = self.views.take(&patches, self.spec.step_s, (window.matcher(), self.consider.pivot()));
+        self.consider.take(taken);
+        Some(until_s)
     }
 
     /// The IMU fell silent: what the window holds is final, and the estimate will begin again behind the silence.
@@ -145,7 +172,9 @@ impl Estimator {
         let Some(window) = &self.window else { return };
         let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
         self.carried = window.carried();
+        self.consider_the_end();
         self.hand_out(end_s);
+        self.consider = Consider::lost(self.consider.pivot());
         self.window = None;
         self.next_pose = None;
         // Where the head is now in the old views is unknown: matched by chance, they would bend the new stretch.
@@ -193,20 +222,61 @@ impl Estimator {
         let maker = SurfelMaker {
             spec: self.spec.surfels.clone(),
             noise: self.calibration.lidar,
-            scan_normal: imu_from_laser.rotation * Vector::z(),
+            scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
             laser_in_imu: imu_from_laser.translation.vector,
         };
         let border = Border::new(beginning.information, &self.calibration.imu);
         Window::new(&self.spec, maker, beginning, start_s, border)
     }
 
+    /// What the window still holds is final: it is as uncertain as its end.
+    fn consider_the_end(&mut self) {
+        if let Some(end) = self.at_end.take() {
+            self.consider.carry(&end);
+        }
+    }
+
     fn end_tau_s(&self) -> f64 {
         self.windows.last().map_or(0.0, |report| report.stamp.seconds_since(self.intake.origin()))
     }
 
+    /// Hands out the poses up to `until_u_s` (IMU time) at whole multiples of the IMU's period.
     fn hand_out(&mut self, until_u_s: f64) {
         let Some(window) = &self.window else { return };
-        hand_out(&mut self.poses, &mut self.next_pose, (window, &self.intake), &self.calibration, until_u_s);
+        let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
+        let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
+        let mut stamp = self.next_pose.unwrap_or_else(|| {
+            let start_ns = self.intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
+            Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
+        });
+        loop {
+            let tau_s = stamp.seconds_since(self.intake.origin());
+            let u_s = window.clock.imu_s(tau_s);
+            if u_s.is_nan() || u_s > until_u_s {
+                break;
+            }
+            self.poses.push(self.pose_at(window, stamp, (tau_s, u_s)));
+            stamp += crate::time::Span::from_nanos(period_ns);
+        }
+        self.next_pose = Some(stamp);
+    }
+
+    fn pose_at(&self, window: &Window, stamp: Stamp, (tau_s, u_s): (f64, f64)) -> EstimatedPose {
+        let imu_from_head = self.calibration.head_from_imu.inverse();
+        let motion = window.nominal.at(u_s, &window.biases.gyro);
+        let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
+        let map_from_imu = Pose::from_parts(motion.position.into(), rotation);
+        let map_from_head = map_from_imu * imu_from_head;
+        let arm = rotation * imu_from_head.translation.vector;
+        EstimatedPose {
+            stamp,
+            map_from_head,
+            covariance: self.consider.covariance_at(&map_from_head.translation.vector),
+            velocity_in_map_m_per_s: motion.velocity + motion.angular_velocity.cross(&arm),
+            gyro_bias_rad_per_s: window.biases.gyro,
+            accel_bias_m_per_s2: window.biases.accel,
+            clock_offset_s: window.clock.offset_at(tau_s),
+        }
     }
 
     fn why_nothing(&self) -> EstimationError {
@@ -215,48 +285,6 @@ impl Estimator {
             (samples, 0) => EstimationError::NoLidar { samples },
             _ => EstimationError::TooShort { common_s: self.intake.common_s(), needed_s: 2.0 * self.spec.step_s },
         }
-    }
-}
-
-/// Appends the poses up to `until_u_s` (IMU time) at whole multiples of the IMU's period.
-fn hand_out(
-    poses: &mut Vec<EstimatedPose>,
-    next: &mut Option<Stamp>,
-    (window, intake): (&Window, &Intake),
-    calibration: &Calibration,
-    until_u_s: f64,
-) {
-    let period_ns = intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
-    let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
-    let imu_from_head = calibration.head_from_imu.inverse();
-    let mut stamp = next.unwrap_or_else(|| {
-        let start_ns = intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
-        Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
-    });
-    loop {
-        let tau_s = stamp.seconds_since(intake.origin());
-        let u_s = window.clock.imu_s(tau_s);
-        if u_s.is_nan() || u_s > until_u_s {
-            break;
-        }
-        poses.push(pose_at(window, &imu_from_head, stamp, (tau_s, u_s)));
-        stamp += crate::time::Span::from_nanos(period_ns);
-    }
-    *next = Some(stamp);
-}
-
-fn pose_at(window: &Window, imu_from_head: &Pose, stamp: Stamp, (tau_s, u_s): (f64, f64)) -> EstimatedPose {
-    let motion = window.nominal.at(u_s, &window.biases.gyro);
-    let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
-    let map_from_imu = Pose::from_parts(motion.position.into(), rotation);
-    let arm = rotation * imu_from_head.translation.vector;
-    EstimatedPose {
-        stamp,
-        map_from_head: map_from_imu * imu_from_head,
-        velocity_in_map_m_per_s: motion.velocity + motion.angular_velocity.cross(&arm),
-        gyro_bias_rad_per_s: window.biases.gyro,
-        accel_bias_m_per_s2: window.biases.accel,
-        clock_offset_s: window.clock.offset_at(tau_s),
     }
 }
 

@@ -15,6 +15,8 @@ use std::collections::VecDeque;
 pub(super) const MARGIN_S: f64 = 0.05;
 /// Disorder of arrivals that is put right, s.
 const DISORDER_S: f64 = 0.1;
+/// A point whose direction leaves the x-y plane by more than this sine is of no planar lidar.
+const OUT_OF_PLANE: f32 = 0.01;
 /// A silence of the lidar longer than this is a gap, s.
 const LIDAR_GAP_S: f64 = 0.5;
 
@@ -44,6 +46,8 @@ pub(super) struct Intake {
     /// Raw stamps of the last sample and scan that were used; what comes before is late.
     used_s: (f64, f64),
     counts: (usize, usize),
+    /// Whether all points so far lay in the lidar's x-y plane.
+    planar: bool,
     late: (usize, usize),
     streams: Option<(InertialStream, StampFilter)>,
     /// Beams already placed in time that belong to the next stretches.
@@ -65,6 +69,7 @@ impl Intake {
             scans: VecDeque::new(),
             used_s: (f64::NEG_INFINITY, f64::NEG_INFINITY),
             counts: (0, 0),
+            planar: true,
             late: (0, 0),
             streams: None,
             beams: VecDeque::new(),
@@ -91,6 +96,11 @@ impl Intake {
 
     pub(super) fn take_warnings(&mut self) -> Vec<Warning> {
         std::mem::take(&mut self.warnings)
+    }
+
+    /// Whether the lidar scans in one plane, as far as its scans have shown.
+    pub(super) fn is_planar(&self) -> bool {
+        self.planar
     }
 
     /// How many IMU samples and lidar scans came.
@@ -128,6 +138,8 @@ impl Intake {
             return Err(EstimationError::NotFinite { sensor: "lidar", stamp_ns: scan.stamp.nanos() });
         }
         self.counts.1 += 1;
+        let in_plane = |p: &nalgebra::Vector3<f32>| p.z.abs() <= OUT_OF_PLANE * p.norm();
+        self.planar &= scan.returns.iter().all(|hit| in_plane(&hit.point_in_laser));
         let seconds = scan.stamp.seconds_since(*self.origin.get_or_insert(scan.stamp));
         if seconds <= self.used_s.1 {
             self.late.1 += 1;

@@ -1,16 +1,29 @@
 //! Which surfels show the same surface: near each other in position and normal, from both sides, and at different times.
+//! A streak has no normal: it may lie in any patch that is near, runs along it and faces the lidar.
 
 use super::spec::{MatchingSpec, SurfelSpec};
 use super::surfel::{Patch, Placed};
+use crate::geometry::Vector;
 use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
-/// Position in voxel edges and scaled normal.
-#[derive(Debug, Clone, Copy, Default)]
-struct Feature([NotNan<f32>; 6]);
+/// A streak lies in a patch only when its beams meet the patch at this cosine or more: a table's top is near to a streak on the
+/// wall behind it, and parallel to it.
+const LEAST_INCIDENCE: f64 = 0.3;
 
-impl Point<f32> for Feature {
-    const DIM: u32 = 6;
+/// Position in voxel edges and, of six dimensions, scaled normal.
+#[derive(Debug, Clone, Copy)]
+struct Feature<const D: usize>([NotNan<f32>; D]);
+
+impl<const D: usize> Default for Feature<D> {
+    fn default() -> Self {
+        Self([NotNan::default(); D])
+    }
+}
+
+impl<const D: usize> Point<f32> for Feature<D> {
+    const DIM: u32 = D as u32;
     fn set(&mut self, i: u32, value: NotNan<f32>) {
         self.0[i as usize] = value;
     }
@@ -27,14 +40,34 @@ pub(super) struct Matcher {
     pub(super) levels: usize,
 }
 
-/// The patches of each resolution in a tree.
+/// The patches of each resolution in a tree of six dimensions, and of three once a streak asks.
 pub(super) struct Forest {
-    levels: Vec<Level>,
+    levels: Vec<Level<6>>,
+    places: OnceLock<Vec<Level<3>>>,
 }
 
-struct Level {
+struct Level<const D: usize> {
     members: Vec<u32>,
-    tree: Option<KDTree<f32, Feature>>,
+    tree: Option<KDTree<f32, Feature<D>>>,
+}
+
+impl<const D: usize> Level<D> {
+    fn of(level: usize, patches: &[Patch], feature: impl Fn(&Patch) -> Feature<D>) -> Self {
+        let of_level = patches.iter().enumerate().filter(|(_, patch)| patch.level == level);
+        let (members, features): (Vec<u32>, Vec<Feature<D>>) =
+            of_level.map(|(index, patch)| (index as u32, feature(patch))).unzip();
+        let tree = (!features.is_empty()).then(|| KDTree::new(&features));
+        Self { members, tree }
+    }
+
+    /// The `count` members nearest to `feature`, nearest first.
+    fn nearest(&self, feature: &Feature<D>, count: usize, max_distance: f64) -> Vec<u32> {
+        let Some(tree) = &self.tree else { return Vec::new() };
+        let max_radius = max_distance as f32;
+        let parameters = Parameters { epsilon: 0.0, max_radius, allow_self_match: false, sort_results: true };
+        let near = tree.knn_advanced(count as u32, feature, CandidateContainer::Linear, &parameters, None);
+        near.iter().map(|neighbour| self.members[neighbour.index as usize]).collect()
+    }
 }
 
 impl std::fmt::Debug for Forest {
@@ -48,65 +81,60 @@ impl Matcher {
         Self { spec: spec.clone(), finest_voxel_m: surfels.finest_voxel_m, levels: surfels.levels }
     }
 
-    fn feature(&self, patch: &Patch) -> Feature {
+    fn feature(&self, patch: &Patch) -> Feature<6> {
+        let Feature([x, y, z]) = self.place(patch);
+        let [a, b, c] = <[f64; 3]>::from(patch.normal * self.spec.normal_scale).map(number);
+        Feature([x, y, z, a, b, c])
+    }
+
+    fn place(&self, patch: &Patch) -> Feature<3> {
         let per_edge = 1.0 / (self.finest_voxel_m * f64::from(1_u32 << patch.level));
-        let (centre, normal) = (patch.centre * per_edge, patch.normal * self.spec.normal_scale);
-        let number = |x: f64| NotNan::new(x as f32).unwrap_or_default();
-        Feature([centre.x, centre.y, centre.z, normal.x, normal.y, normal.z].map(number))
+        Feature(<[f64; 3]>::from(patch.centre * per_edge).map(number))
     }
 
     /// Plants a tree a resolution.
-    pub(super) fn plant<'a>(&self, patches: &(impl Iterator<Item = &'a Patch> + Clone)) -> Forest {
-        let plant = |level: usize| {
-            let of_level = patches.clone().enumerate().filter(|(_, patch)| patch.level == level);
-            let (members, features): (Vec<u32>, Vec<Feature>) =
-                of_level.map(|(index, patch)| (index as u32, self.feature(patch))).unzip();
-            let tree = (!features.is_empty()).then(|| KDTree::new(&features));
-            Level { members, tree }
-        };
-        Forest { levels: (0..self.levels).map(plant).collect() }
+    pub(super) fn plant(&self, patches: &[Patch]) -> Forest {
+        let plant = |level| Level::of(level, patches, |patch| self.feature(patch));
+        Forest { levels: (0..self.levels).map(plant).collect(), places: OnceLock::new() }
     }
 
-    /// The `count` patches nearest to `patch` in six dimensions, nearest first, into `found`.
-    pub(super) fn neighbours(&self, forest: &Forest, patch: &Patch, count: usize, found: &mut Vec<u32>) {
-        let Some(Level { members, tree: Some(tree) }) = forest.levels.get(patch.level) else { return };
-        let parameters = Parameters {
-            epsilon: 0.0,
-            max_radius: self.spec.max_distance as f32,
-            allow_self_match: false,
-            sort_results: true,
-        };
-        let near = tree.knn_advanced(count as u32, &self.feature(patch), CandidateContainer::Linear, &parameters, None);
-        found.extend(near.iter().map(|neighbour| members[neighbour.index as usize]));
+    /// The `count` patches nearest to `patch` in six dimensions, nearest first.
+    pub(super) fn neighbours(&self, forest: &Forest, patch: &Patch, count: usize) -> Vec<u32> {
+        let level = forest.levels.get(patch.level);
+        level.map_or_else(Vec::new, |level| level.nearest(&self.feature(patch), count, self.spec.max_distance))
     }
 
-    /// Pairs among the window's own surfels, in order: indices `(i, j)`, `i < j`.
-    pub(super) fn among(&self, placed: &[Placed], gate_m: f64) -> Vec<(u32, u32)> {
-        let forest = self.plant(&placed.iter().map(|surfel| &surfel.patch));
-        let count = self.spec.neighbours;
+    /// Those of `patches`, planted in `forest`, that are nearest to a streak, nearest first.
+    pub(super) fn around(&self, forest: &Forest, patches: &[Patch], streak: &Patch) -> Vec<u32> {
+        let plant = |level| Level::of(level, patches, |patch| self.place(patch));
+        let places = forest.places.get_or_init(|| (0..self.levels).map(plant).collect());
+        let (count, level) = (self.spec.neighbours, places.get(streak.level));
+        level.map_or_else(Vec::new, |level| level.nearest(&self.place(streak), count, self.spec.max_distance))
+    }
+
+    /// Pairs among the window's own patches, planted in `forest`, in order: indices `(i, j)`, `i < j`.
+    pub(super) fn among(&self, placed: &[Placed], forest: &Forest) -> Vec<(u32, u32)> {
         let near: Vec<Vec<u32>> = placed
             .par_iter()
             .with_min_len(256)
-            .map(|surfel| {
-                let mut found = Vec::with_capacity(count);
-                self.neighbours(&forest, &surfel.patch, count, &mut found);
-                found
-            })
+            .map(|surfel| self.neighbours(forest, &surfel.patch, self.spec.neighbours))
             .collect();
         let mut pairs = Vec::new();
         for (i, surfel) in placed.iter().enumerate() {
-            for j in &near[i] {
-                let mutual = near[*j as usize].contains(&(i as u32));
-                let other = &placed[*j as usize];
-                let first_of_both = i < *j as usize || !mutual;
-                let apart = (surfel.tau_s - other.tau_s).abs() >= self.spec.min_time_difference_s;
-                let counts = mutual || !self.spec.reciprocal;
-                if first_of_both && counts && apart && self.agree(&surfel.patch, &other.patch, gate_m) {
-                    pairs.push((i.min(*j as usize) as u32, i.max(*j as usize) as u32));
+            for j in near[i].iter().map(|j| *j as usize) {
+                let mutual = near[j].contains(&(i as u32));
+                let first_of_both = i < j || !mutual;
+                if first_of_both && (mutual || !self.spec.reciprocal) && self.apart(surfel, &placed[j]) {
+                    pairs.push((i.min(j) as u32, i.max(j) as u32));
                 }
             }
         }
         pairs
+    }
+
+    /// Whether two surfels were seen at times different enough.
+    pub(super) fn apart(&self, a: &Placed, b: &Placed) -> bool {
+        (a.tau_s - b.tau_s).abs() >= self.spec.min_time_difference_s
     }
 
     /// Whether two patches can be the same surface, as far as normals and the distance along them say.
@@ -116,4 +144,15 @@ impl Matcher {
             && apart.dot(&a.normal).abs().max(apart.dot(&b.normal).abs()) < 3.0 * gate_m
             && apart.dot(&(a.normal + b.normal)).abs() < 2.0 * gate_m
     }
+
+    /// Whether a streak, with the beam that saw it, can lie in a patch.
+    pub(super) fn lies_in(&self, (streak, beam): (&Patch, &Vector), patch: &Patch, gate_m: f64) -> bool {
+        patch.normal.dot(&streak.normal).abs() < self.spec.max_normal_angle_deg.to_radians().sin()
+            && patch.normal.dot(beam) < -LEAST_INCIDENCE * beam.norm()
+            && (streak.centre - patch.centre).dot(&patch.normal).abs() < gate_m
+    }
+}
+
+fn number(x: f64) -> NotNan<f32> {
+    NotNan::new(x as f32).unwrap_or_default()
 }

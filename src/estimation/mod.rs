@@ -42,6 +42,7 @@
 
 mod border;
 mod clock;
+mod consider;
 mod error;
 mod estimator;
 mod inertial;

@@ -28,13 +28,6 @@ pub(super) struct Factor {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NotDetermined(pub(super) usize);
 
-/// Part of a row of the Jacobian: consecutive entries from a column on.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Segment<'a> {
-    pub(super) start: usize,
-    pub(super) values: &'a [f64],
-}
-
 impl NormalEquations {
     /// Empty equations of `size` unknowns.
     pub(super) fn new(size: usize) -> Self {
@@ -86,22 +79,33 @@ impl NormalEquations {
         self.b[row] += value;
     }
 
-    /// Adds a scalar residual `r + J x` with `weight`: `weight J^T J` and `-weight r J^T`. Segments in order of columns,
-    /// without overlap.
-    pub(super) fn add_row(&mut self, segments: &[Segment<'_>], residual: f64, weight: f64) {
-        for (k, rows) in segments.iter().enumerate() {
-            for (r, value) in rows.values.iter().enumerate() {
-                let row = rows.start + r;
-                let scaled = weight * value;
-                self.b[row] -= scaled * residual;
-                if let Some(leading) = segments.first() {
-                    self.first[row] = self.first[row].min(leading.start);
-                }
-                let line = &mut self.h[row * self.size..=row * self.size + row];
-                for columns in &segments[..k] {
-                    axpy(&mut line[columns.start..columns.start + columns.values.len()], columns.values, scaled);
-                }
-                axpy(&mut line[rows.start..], &rows.values[..=r], scaled);
+    /// Adds `weight (u v^T + v u^T)` to `H`, with `u` and `v` zero but for consecutive entries from a column on; `u` begins
+    /// no later than `v`.
+    pub(super) fn add_product<const U: usize, const V: usize>(
+        &mut self,
+        (start_u, u): (usize, &[f64; U]),
+        (start_v, v): (usize, &[f64; V]),
+        weight: f64,
+    ) {
+        if start_v < start_u + U {
+            return self.add_overlapping((start_u, u), (start_v, v), weight);
+        }
+        for (r, value) in v.iter().enumerate() {
+            let row = start_v + r;
+            self.first[row] = self.first[row].min(start_u);
+            let from = row * self.size + start_u;
+            let scaled = weight * value;
+            for (sum, term) in self.h[from..from + U].iter_mut().zip(u) {
+                *sum += scaled * term;
+            }
+        }
+    }
+
+    fn add_overlapping(&mut self, (start_u, u): (usize, &[f64]), (start_v, v): (usize, &[f64]), weight: f64) {
+        for (r, x) in v.iter().enumerate() {
+            for (c, y) in u.iter().enumerate() {
+                let twice = if start_v + r == start_u + c { 2.0 } else { 1.0 };
+                self.add_entry(start_v + r, start_u + c, twice * weight * x * y);
             }
         }
     }
@@ -135,23 +139,27 @@ impl NormalEquations {
 
     /// The solution, by a factor of these equations.
     pub(super) fn solve(&self, factor: &Factor) -> Vec<f64> {
-        let n = self.size;
-        let mut x = self.b.clone();
-        for i in 0..n {
-            let row = factor.row(i);
-            x[i] = (x[i] - dot(&row[factor.first[i]..i], &x[factor.first[i]..i])) / row[i];
-        }
-        for i in (0..n).rev() {
-            let row = factor.row(i);
-            x[i] /= row[i];
-            let (scale, from) = (-x[i], factor.first[i]);
-            axpy(&mut x[from..i], &row[from..i], scale);
-        }
-        x
+        factor.solve(&self.b)
     }
 }
 
 impl Factor {
+    /// `H^-1 b`.
+    pub(super) fn solve(&self, b: &[f64]) -> Vec<f64> {
+        let mut x = b.to_vec();
+        for i in 0..self.size {
+            let row = self.row(i);
+            x[i] = (x[i] - dot(&row[self.first[i]..i], &x[self.first[i]..i])) / row[i];
+        }
+        for i in (0..self.size).rev() {
+            let row = self.row(i);
+            x[i] /= row[i];
+            let (scale, from) = (-x[i], self.first[i]);
+            axpy(&mut x[from..i], &row[from..i], scale);
+        }
+        x
+    }
+
     fn row(&self, i: usize) -> &[f64] {
         &self.l[i * self.size..=i * self.size + i]
     }
@@ -204,39 +212,45 @@ mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    /// Segments (start, values) of a row of the Jacobian, and its residual.
-    type Row = (Vec<(usize, Vec<f64>)>, f64);
+    /// Products `u v^T + v u^T` with their starts, over 20 unknowns and a border of 3, on a heavy diagonal.
+    fn products() -> Vec<(usize, [f64; 3], usize, [f64; 2])> {
+        let wave = |k: usize, m: usize| ((k * k * 3 + m * m * 5 + k * m * 11) as f64 * 0.37).sin();
+        (0..60_usize)
+            .map(|k| {
+                let start = k % 16;
+                let far = [start + 2, start + 1, start, 20 + k % 2, (start + 5).min(18)][k % 5];
+                (start, std::array::from_fn(|m| wave(k, m)), far, std::array::from_fn(|m| wave(k, m + 3)))
+            })
+            .collect()
+    }
 
-    /// A band of residuals over 20 unknowns and a dense border of 3, with a few links between far unknowns.
-    fn rows() -> Vec<Row> {
-        let mut rows = Vec::new();
-        for k in 0..60_usize {
-            let start = k % 18;
-            let wave = |m: usize| ((k * k * 3 + m * m * 5 + k * m * 11) as f64 * 0.37).sin();
-            let near = (start, (0..3).map(wave).collect());
-            let border = (20, (3..6).map(wave).collect());
-            let far = (k % 10 == 0 && start < 12).then(|| (start + 5, vec![wave(7), wave(8)]));
-            rows.push((std::iter::once(near).chain(far).chain([border]).collect(), wave(9)));
+    fn add(equations: &mut NormalEquations, (start_u, u, start_v, v): &(usize, [f64; 3], usize, [f64; 2])) {
+        equations.add_product((*start_u, u), (*start_v, v), 0.7);
+    }
+
+    fn with_diagonal(size: usize) -> NormalEquations {
+        let mut equations = NormalEquations::new(size);
+        for k in 0..size {
+            equations.add_entry(k, k, 40.0);
+            equations.add_right(k, (k as f64).cos());
         }
-        rows
+        equations
     }
 
     #[test]
     fn the_solution_is_that_of_dense_cholesky() {
-        let mut equations = NormalEquations::new(23);
-        let mut dense = DMatrix::<f64>::zeros(23, 23);
-        let mut right = DVector::<f64>::zeros(23);
-        for (row, residual) in rows() {
-            let segments: Vec<Segment<'_>> =
-                row.iter().map(|(start, values)| Segment { start: *start, values }).collect();
-            equations.add_row(&segments, residual, 0.7);
-            let mut j = DVector::<f64>::zeros(23);
-            for (start, values) in &row {
-                j.rows_mut(*start, values.len()).copy_from_slice(values);
-            }
-            dense += &j * j.transpose() * 0.7;
-            right -= &j * (residual * 0.7);
+        let mut equations = with_diagonal(23);
+        let mut dense = DMatrix::<f64>::identity(23, 23) * 40.0;
+        let right = DVector::<f64>::from_fn(23, |k, _| (k as f64).cos());
+        for product in products() {
+            add(&mut equations, &product);
+            let (start_u, u, start_v, v) = product;
+            let (mut whole_u, mut whole_v) = (DVector::<f64>::zeros(23), DVector::<f64>::zeros(23));
+            whole_u.rows_mut(start_u, 3).copy_from_slice(&u);
+            whole_v.rows_mut(start_v, 2).copy_from_slice(&v);
+            dense += (&whole_u * whole_v.transpose() + &whole_v * whole_u.transpose()) * 0.7;
         }
+        assert_relative_eq!(equations.dense(), dense, epsilon = 1e-12);
         let mut factor = Factor::default();
         equations.factor(&mut factor).unwrap();
         let x = DVector::from_vec(equations.solve(&factor));
@@ -254,13 +268,11 @@ mod tests {
 
     #[test]
     fn parts_add_up_to_the_whole() {
-        let mut whole = NormalEquations::new(23);
-        let mut parts = [NormalEquations::new(23), NormalEquations::new(23)];
-        for (k, (row, residual)) in rows().into_iter().enumerate() {
-            let segments: Vec<Segment<'_>> =
-                row.iter().map(|(start, values)| Segment { start: *start, values }).collect();
-            whole.add_row(&segments, residual, 1.0);
-            parts[k % 2].add_row(&segments, residual, 1.0);
+        let mut whole = with_diagonal(23);
+        let mut parts = [with_diagonal(23), NormalEquations::new(23)];
+        for (k, product) in products().iter().enumerate() {
+            add(&mut whole, product);
+            add(&mut parts[k % 2], product);
         }
         let [mut sum, second] = parts;
         sum.add(&second);
@@ -275,7 +287,8 @@ mod tests {
     #[test]
     fn an_unknown_that_nothing_measures_is_named() {
         let mut equations = NormalEquations::new(3);
-        equations.add_row(&[Segment { start: 0, values: &[1.0, 0.5] }], 0.1, 1.0);
+        equations.add_entry(0, 0, 1.0);
+        equations.add_product((0, &[0.3]), (1, &[0.5]), 1.0);
         equations.add_entry(1, 1, 1.0);
         assert_eq!(equations.factor(&mut Factor::default()), Err(NotDetermined(2)));
     }

@@ -1,7 +1,7 @@
 //! What comes out of the estimator.
 
 use super::Warning;
-use crate::geometry::{Pose, Trajectory, Vector};
+use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::time::Stamp;
 
 /// The head at an instant, and what the estimator thought of its sensors then.
@@ -11,6 +11,8 @@ pub struct EstimatedPose {
     pub stamp: Stamp,
     /// The pose. The map's z axis points up (gravity as it was known at the start), its origin is the first pose's.
     pub map_from_head: Pose,
+    /// How uncertain it is against the map, which is where the first pose puts it: m^2, m rad, rad^2.
+    pub covariance: PoseCovariance,
     /// Velocity of the head's origin, m/s.
     pub velocity_in_map_m_per_s: Vector,
     /// Bias of the gyroscope, in the IMU's frame, rad/s.

@@ -117,6 +117,10 @@ pub struct SolveSpec {
     pub match_weight: f64,
     /// Fewest matches that a window's solution may rest on.
     pub min_matches: usize,
+    /// Multiple of the covariance that the window's equations give: matches of one surface share their errors, and the
+    /// equations do not know it.
+    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    pub covariance_inflation: f64,
     /// Conditioning below which a window is said to have weak geometry.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub weak_conditioning: f64,

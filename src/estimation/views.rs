@@ -6,6 +6,7 @@
 use super::matching::{Forest, Matcher};
 use super::spec::ViewSpec;
 use super::surfel::{Patch, Placed};
+use crate::geometry::Vector;
 
 /// Edge of the cells by which views are compared, m.
 const CELL_M: f64 = 1.0;
@@ -20,6 +21,19 @@ pub(super) struct View {
     pub(super) patches: Vec<Patch>,
     pub(super) forest: Forest,
     cells: Vec<u64>,
+    /// Its number, counted from the first view kept.
+    pub(super) number: u64,
+    /// About what its errors turn: where the IMU was when it was kept, m.
+    pub(super) pivot: Vector,
+}
+
+/// What became of a stretch's patches.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Taken {
+    /// The number of the view that was kept.
+    pub(super) kept: Option<u64>,
+    /// The number of the one forgotten for it.
+    pub(super) forgotten: Option<u64>,
 }
 
 /// The views kept, and the stretch that may become the next one.
@@ -30,22 +44,23 @@ pub(super) struct Views {
     kept: Vec<View>,
     gathering: Vec<Patch>,
     gathered_s: f64,
+    next: u64,
 }
 
 impl Views {
     pub(super) fn new(spec: &ViewSpec, active: usize) -> Self {
-        Self { spec: spec.clone(), active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0 }
+        Self { spec: spec.clone(), active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
     }
 
-    /// Takes the surfels of a stretch of `seconds` that has left the window.
-    pub(super) fn take(&mut self, placed: &[Placed], seconds: f64, matcher: &Matcher) {
+    /// Takes the patches of a stretch of `seconds` that has left the window, the IMU being at `pivot` in the end.
+    pub(super) fn take(&mut self, patches: &[Patch], seconds: f64, (matcher, pivot): (&Matcher, Vector)) -> Taken {
         if self.active == 0 {
-            return;
+            return Taken::default();
         }
-        self.gathering.extend(placed.iter().map(|surfel| surfel.patch));
+        self.gathering.extend(patches);
         self.gathered_s += seconds;
         if self.gathered_s < self.spec.length_s - 1e-9 {
-            return;
+            return Taken::default();
         }
         self.gathered_s = 0.0;
         let patches = std::mem::take(&mut self.gathering);
@@ -56,17 +71,17 @@ impl Views {
         }
         let covered = 1.0 - seen.len() as f64 / cells.len().max(1) as f64;
         if cells.is_empty() || covered >= self.spec.keep_below_coverage {
-            return;
+            return Taken::default();
         }
-        if self.kept.len() >= self.spec.max_kept {
-            self.forget_one();
-        }
-        let forest = matcher.plant(&patches.iter());
-        self.kept.push(View { patches, forest, cells });
+        let forgotten = if self.kept.len() >= self.spec.max_kept { self.forget_one() } else { None };
+        let (forest, number) = (matcher.plant(&patches), self.next);
+        self.next += 1;
+        self.kept.push(View { patches, forest, cells, number, pivot });
+        Taken { kept: Some(number), forgotten }
     }
 
-    /// Forgets the view whose cells the others cover best; the first such.
-    fn forget_one(&mut self) {
+    /// Forgets the view whose cells the others cover best; the first such. Its number.
+    fn forget_one(&mut self) -> Option<u64> {
         let own = |index: usize| {
             let mut cells = self.kept[index].cells.clone();
             for (other, view) in self.kept.iter().enumerate() {
@@ -76,9 +91,8 @@ impl Views {
             }
             cells.len()
         };
-        if let Some(least) = (0..self.kept.len()).min_by_key(|index| own(*index)) {
-            self.kept.remove(least);
-        }
+        let least = (0..self.kept.len()).min_by_key(|index| own(*index))?;
+        Some(self.kept.remove(least).number)
     }
 
     /// The views to use for a window that sees `placed`: indices into [`Views::view`].

@@ -32,6 +32,10 @@ pub type Rotation = nalgebra::UnitQuaternion<f64>;
 /// A rigid transform: rotation, then translation.
 pub type Pose = nalgebra::Isometry3<f64>;
 
+/// Covariance of a pose, of its position (m), then of its attitude (rad): a small turn in the axes of the frame that the pose is
+/// told in. The order of `geometry_msgs/PoseWithCovariance`.
+pub type PoseCovariance = nalgebra::Matrix6<f64>;
+
 /// Standard gravity, m/s^2 (CGPM 1901), along -z of the world.
 pub const STANDARD_GRAVITY_M_PER_S2: f64 = 9.806_65;
 

@@ -1,6 +1,6 @@
 //! An estimate as a recording, for viewers: where the head was, its path, and the cloud that it saw.
 
-use crate::geometry::{Pose, Trajectory};
+use crate::geometry::{Pose, PoseCovariance, Trajectory};
 use crate::recording::message::transforms::Transform;
 use crate::recording::message::{points, pose, transforms};
 use crate::recording::spool::Spool;
@@ -19,7 +19,8 @@ const CLOUD_PERIOD: Span = Span::from_nanos(500_000_000);
 /// Most points in one message of `/cloud`: 20 bytes each.
 const CLOUD_POINTS: usize = 50_000;
 
-/// Writes an estimate to a new MCAP file at `path`: `/path`, `/tf` (`map` to `body_frame`, a transform a pose) and
+/// Writes an estimate to a new MCAP file at `path`: `/path`, `/pose` (with the covariances that are given, each at the stamp
+/// of a pose, in order of time), `/tf` (`map` to `body_frame`, a transform a pose) and
 /// `/cloud` (x, y, z, intensity, error, in `map`), which takes the points in the order in which they come.
 ///
 /// # Errors
@@ -27,12 +28,12 @@ const CLOUD_POINTS: usize = 50_000;
 pub fn write_result(
     path: &Path,
     body_frame: &str,
-    map_from_body: &Trajectory,
+    (map_from_body, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),
     cloud: impl IntoIterator<Item = CloudPoint>,
 ) -> Result<(), RecordingError> {
     let file = std::fs::File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
     let spool = Spool::new(file, BTreeMap::new())?;
-    let mut result = ResultWriter { spool, body_frame, last: Stamp::from_nanos(0), gathered: Vec::new() };
+    let mut result = ResultWriter { spool, body_frame, covariances, last: Stamp::from_nanos(0), gathered: Vec::new() };
     result.path(map_from_body)?;
     let mut poses = map_from_body.iter().peekable();
     for point in cloud {
@@ -54,6 +55,7 @@ pub fn write_result(
 struct ResultWriter<'a> {
     spool: Spool,
     body_frame: &'a str,
+    covariances: &'a [(Stamp, PoseCovariance)],
     /// Log time of the message before: it never goes back, though points may.
     last: Stamp,
     gathered: Vec<CloudPoint>,
@@ -83,7 +85,15 @@ impl ResultWriter<'_> {
         let transform =
             Transform { parent: MAP.to_owned(), child: self.body_frame.to_owned(), parent_from_child: *map_from_body };
         let log_time = self.log_time(stamp);
-        self.spool.message(Topic::Tf, log_time, |out| transforms::encode(out, stamp, &[transform]))
+        self.spool.message(Topic::Tf, log_time, |out| transforms::encode(out, stamp, &[transform]))?;
+        while let Some(((at, covariance), rest)) = self.covariances.split_first().filter(|((at, _), _)| *at <= stamp) {
+            self.covariances = rest;
+            if *at == stamp {
+                let pose = (map_from_body, covariance);
+                self.spool.message(Topic::Pose, log_time, |out| pose::encode_uncertain(out, MAP, stamp, pose))?;
+            }
+        }
+        Ok(())
     }
 
     fn is_full_before(&self, point: &CloudPoint) -> bool {

@@ -5,7 +5,7 @@
 //! of `PointField`.
 
 /// A definition of each type, by its short name `package/Type`.
-const DEFINITIONS: [(&str, &str); 20] = [
+const DEFINITIONS: [(&str, &str); 21] = [
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"),
     ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"),
@@ -14,6 +14,7 @@ const DEFINITIONS: [(&str, &str); 20] = [
     ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"),
     ("geometry_msgs/PoseStamped", "std_msgs/Header header\ngeometry_msgs/Pose pose\n"),
     ("geometry_msgs/PoseWithCovariance", "geometry_msgs/Pose pose\nfloat64[36] covariance\n"),
+    ("geometry_msgs/PoseWithCovarianceStamped", "std_msgs/Header header\ngeometry_msgs/PoseWithCovariance pose\n"),
     ("geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"),
     ("geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist\nfloat64[36] covariance\n"),
     ("geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"),
@@ -65,6 +66,8 @@ pub enum MessageType {
     Path,
     /// `geometry_msgs/msg/PoseStamped`.
     PoseStamped,
+    /// `geometry_msgs/msg/PoseWithCovarianceStamped`.
+    PoseWithCovariance,
 }
 
 impl MessageType {
@@ -79,6 +82,7 @@ impl MessageType {
             Self::Odometry => "nav_msgs/msg/Odometry",
             Self::Path => "nav_msgs/msg/Path",
             Self::PoseStamped => "geometry_msgs/msg/PoseStamped",
+            Self::PoseWithCovariance => "geometry_msgs/msg/PoseWithCovarianceStamped",
         }
     }
 

@@ -43,11 +43,13 @@ pub enum Topic {
     Path,
     /// `/cloud`.
     Cloud,
+    /// `/pose`.
+    Pose,
 }
 
 impl Topic {
     /// How many topics there are.
-    pub const COUNT: usize = 11;
+    pub const COUNT: usize = 12;
 
     /// The topic's name.
     pub fn name(self) -> &'static str {
@@ -63,6 +65,7 @@ impl Topic {
             Self::TruthClock => "/ground_truth/clock",
             Self::Path => "/path",
             Self::Cloud => "/cloud",
+            Self::Pose => "/pose",
         }
     }
 
@@ -77,6 +80,7 @@ impl Topic {
             Self::TruthPose | Self::TruthBase => MessageType::PoseStamped,
             Self::TruthClock => MessageType::TimeReference,
             Self::Path => MessageType::Path,
+            Self::Pose => MessageType::PoseWithCovariance,
         }
     }
 

@@ -71,6 +71,10 @@ pub struct OpenLoopMetrics {
     pub relative_error_per_minute_m: Option<f64>,
     /// Drift of the raw IMU integrated alone, m/min.
     pub imu_only_drift_m_per_min: Option<f64>,
+    /// Error of the position squared, over its covariance: 3 on average where the covariance is right.
+    pub position_nees: Option<f64>,
+    /// The same of the attitude.
+    pub attitude_nees: Option<f64>,
 }
 
 /// The closed-loop estimate.
@@ -156,6 +160,8 @@ mod tests {
             "yaw_drift_deg_per_min",
             "end_error_m",
             "imu_only_drift_m_per_min",
+            "position_nees",
+            "attitude_nees",
             "closed_loop",
             "wall_s",
             "fraction_of_acquisition",

@@ -104,6 +104,7 @@ pub(super) fn estimate_in(
         calibration: &found.calibration,
         body_frame: &found.body_frame,
         map_from_head: &run.map_from_head,
+        covariances: &run.covariances,
         returns: run.returns,
         with_truth: known.is_some(),
     };

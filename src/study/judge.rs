@@ -3,7 +3,7 @@
 use super::open_loop::OpenLoopRun;
 use super::register::{Beam, Registered};
 use super::{StudyError, Watch};
-use crate::evaluation::{CloudErrors, Errors, EvaluationError, Pairs, clock_error, drift, relative_error};
+use crate::evaluation::{CloudErrors, Errors, EvaluationError, Pairs, clock_error, consistency, drift, relative_error};
 use crate::geometry::{Pose, Surface, Trajectory, Vector};
 use crate::recording::{Reader, RecordingError, Truth};
 use crate::report::{ClockMetrics, CloudMetrics, OpenLoopMetrics, SimulationMetrics};
@@ -74,6 +74,7 @@ pub(super) fn open_loop_metrics(
     let drift_of = |known: &Known| drift(&known.pairs).ok();
     let drifted = known.and_then(drift_of);
     let errors = known.and_then(|known| known.errors.as_ref());
+    let consistent = known.and_then(|known| consistency(&known.pairs, &run.covariances));
     let relative = known.and_then(|known| relative_error(&known.pairs, Span::from_seconds(60.0)).ok());
     OpenLoopMetrics {
         wall_s: Some(run.wall_s),
@@ -86,6 +87,8 @@ pub(super) fn open_loop_metrics(
         end_error_m: drifted.map(|drift| drift.end_error_m),
         relative_error_per_minute_m: relative.map(|error| error.position_rmse_m),
         imu_only_drift_m_per_min: dead_reckoning.map(|drifting| drifting.0),
+        position_nees: consistent.map(|found| found.position_nees),
+        attitude_nees: consistent.map(|found| found.attitude_nees),
     }
 }
 

@@ -3,10 +3,10 @@
 use super::cadence::Cadence;
 use super::{Stage, StudyError, Watch};
 use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Warning, WarningKind};
-use crate::geometry::Trajectory;
+use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, Measurement};
 use crate::recording::{Reader, RecordingError, Selection, TumWriter};
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -15,10 +15,15 @@ use std::time::Instant;
 /// Measurements between two looks at the clock of the progress.
 const TELL_EVERY: usize = 200;
 
+/// Time between the covariances that are kept.
+const COVARIANCE_PERIOD: Span = Span::from_nanos(100_000_000);
+
 /// What the open loop made of a recording.
 pub(super) struct OpenLoopRun {
     /// The estimate.
     pub map_from_head: Trajectory,
+    /// How uncertain the estimate is, ten times a second.
+    pub covariances: Vec<(Stamp, PoseCovariance)>,
     /// The estimated clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// What the estimator has to say of it beside the losses, a sentence each.
@@ -45,7 +50,8 @@ pub(super) fn run_open_loop(
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
     let mut estimator = Estimator::new(how.0, how.1)?;
-    let mut written = Written { tum: TumWriter::create(tum)?, map_from_head: Trajectory::new() };
+    let mut written =
+        Written { tum: TumWriter::create(tum)?, map_from_head: Trajectory::new(), covariances: Vec::new() };
     let mut heard = Heard::default();
     let mut measurements = reader.measurements(selection);
     for (index, measurement) in measurements.by_ref().enumerate() {
@@ -72,6 +78,7 @@ pub(super) fn run_open_loop(
     losses.extend(result.warnings.iter().filter(|warning| is_loss(&warning.kind)).map(|w| since(start, w)));
     Ok(OpenLoopRun {
         map_from_head: written.map_from_head,
+        covariances: written.covariances,
         clock_offsets: result.clock_offsets,
         remarks: result.warnings.iter().filter(|w| !is_loss(&w.kind)).map(|w| since(start, w)).collect(),
         losses,
@@ -101,6 +108,7 @@ fn since(start: Stamp, warning: &Warning) -> String {
 struct Written {
     tum: TumWriter<BufWriter<File>>,
     map_from_head: Trajectory,
+    covariances: Vec<(Stamp, PoseCovariance)>,
 }
 
 impl Written {
@@ -110,6 +118,9 @@ impl Written {
             let name = "the estimate".to_owned();
             let kept = self.map_from_head.push(pose.stamp, pose.map_from_head);
             kept.map_err(|source| RecordingError::Trajectory { name, source })?;
+            if self.covariances.last().is_none_or(|(last, _)| pose.stamp - *last >= COVARIANCE_PERIOD) {
+                self.covariances.push((pose.stamp, pose.covariance));
+            }
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use super::truth_near::TruthNear;
 use super::{Stage, StudyError, Watch};
 use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
-use crate::geometry::{Pose, SmoothCursor, Trajectory, Vector};
+use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarScan, Measurement};
 use crate::recording::{CloudPoint, Measurements, PlyWriter, Reader, RecordingError, Selection, write_result};
 use crate::time::Stamp;
@@ -41,6 +41,7 @@ pub(super) struct Registration<'a> {
     pub calibration: &'a Calibration,
     pub body_frame: &'a str,
     pub map_from_head: &'a Trajectory,
+    pub covariances: &'a [(Stamp, PoseCovariance)],
     /// Echoes in the recording.
     pub returns: usize,
     /// Whether to project a sample by the truth too.
@@ -67,7 +68,7 @@ impl Registration<'_> {
             failure: None,
             watch,
         };
-        write_result(result, self.body_frame, self.map_from_head, beams.by_ref())?;
+        write_result(result, self.body_frame, (self.map_from_head, self.covariances), beams.by_ref())?;
         beams.ply.finish()?;
         if let Some(failure) = beams.failure {
             return Err(failure);

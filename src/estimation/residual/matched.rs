@@ -2,10 +2,13 @@
 //!
 //! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by
 //! `zeta^2 = 1 / (sigma_r^2 + lambda)`. A live surfel's centre moves by `dt + dr x arm + v dl`; one of a fixed view does not.
+//!
+//! A streak takes the patch's plane. It may lie beside the patch's points, where that plane is less certain, so its
+//! `zeta^2 = 1 / (sigma_r^2 + lambda + x)`, see `Patch::variance_of_extrapolation`.
 
-use super::{CLOCK, CLOCK_RATE, Layout};
+use super::{CLOCK, Layout};
 use crate::estimation::nominal::Correction;
-use crate::estimation::normal_equations::{NormalEquations, Segment};
+use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::surfel::{Patch, Placed};
 use crate::geometry::{Matrix, Vector};
 
@@ -23,12 +26,23 @@ pub(in crate::estimation) struct Plane {
 impl Plane {
     /// The plane common to two patches, `sigma_m` being what a match may be off beside their thickness.
     pub(in crate::estimation) fn of(a: &Patch, b: &Patch, sigma_m: f64) -> Self {
+        Self::towards(a.normal + b.normal, a, b, sigma_m)
+    }
+
+    /// The plane of a patch, as a streak in it sees it too.
+    pub(in crate::estimation) fn around(streak: &Patch, patch: &Patch, sigma_m: f64) -> Self {
+        let plane = Self::towards(patch.normal, streak, patch, sigma_m);
+        let within = streak.centre - patch.centre - plane.normal * plane.distance_m;
+        let extrapolated = patch.variance_of_extrapolation(&plane.normal, &within);
+        Self { variance: plane.variance + extrapolated, ..plane }
+    }
+
+    fn towards(start: Vector, a: &Patch, b: &Patch, sigma_m: f64) -> Self {
         let both = a.covariance + b.covariance;
         // One step of inverse iteration from the mean normal: the adjugate is the inverse but for a factor, and exists
         // for a perfectly thin patch as well.
-        let start = a.normal + b.normal;
         let normal = adjugate(&both) * start;
-        let normal = normal.try_normalize(0.0).or_else(|| start.try_normalize(0.0)).unwrap_or(a.normal);
+        let normal = normal.try_normalize(0.0).or_else(|| start.try_normalize(0.0)).unwrap_or(b.normal);
         let lambda = normal.dot(&(both * normal));
         let distance_m = normal.dot(&(a.centre - b.centre));
         Self { normal, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) }
@@ -40,24 +54,10 @@ fn adjugate(m: &Matrix) -> Matrix {
     Matrix::from_rows(&[b.cross(&c).transpose(), c.cross(&a).transpose(), a.cross(&b).transpose()])
 }
 
-/// The derivative of `e` by the knots about a live surfel, as a row of 24.
-pub(in crate::estimation) fn by_knots(surfel: &Placed, normal: &Vector, sign: f64) -> [f64; 24] {
-    let turn = surfel.arm.cross(normal) * sign;
-    let shift = normal * sign;
-    let mut row = [0.0; 24];
-    for (knot, value) in row.chunks_exact_mut(6).zip(surfel.basis.value) {
-        let entries = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
-        for (entry, derivative) in knot.iter_mut().zip(entries) {
-            *entry = value * derivative;
-        }
-    }
-    row
-}
-
-/// The derivative of `e` by clock offset and clock rate.
-pub(in crate::estimation) fn by_clock(surfel: &Placed, normal: &Vector, sign: f64, clock_at_s: f64) -> [f64; 2] {
-    let by_offset = sign * normal.dot(&surfel.velocity);
-    [by_offset, by_offset * (surfel.tau_s - clock_at_s)]
+/// The derivative of `e` by what moves a live surfel: its turn, its shift, and the clock offset at its time.
+fn by_motion(surfel: &Placed, normal: &Vector) -> [f64; OWN] {
+    let turn = surfel.arm.cross(normal);
+    [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z, normal.dot(&surfel.velocity)]
 }
 
 /// How far a solution `x` moves a live surfel along `normal`, m.
@@ -69,54 +69,151 @@ pub(in crate::estimation) fn moved_m(
     clock_at_s: f64,
 ) -> f64 {
     let correction = Correction::of_spline(&surfel.basis, layout.first_knot, x);
-    let clock = &x[layout.border() + CLOCK..=layout.border() + CLOCK_RATE];
-    let by = by_clock(surfel, normal, 1.0, clock_at_s);
-    normal.dot(&(correction.translation + correction.rotation.cross(&surfel.arm))) + by[0] * clock[0] + by[1] * clock[1]
+    let clock = layout.border() + CLOCK;
+    let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - clock_at_s);
+    normal.dot(&(correction.translation + correction.rotation.cross(&surfel.arm) + surfel.velocity * later_s))
 }
 
-/// Adds a match between two live surfels.
-pub(in crate::estimation) fn add_pair(
-    equations: &mut NormalEquations,
-    layout: &Layout,
-    (a, b): (&Placed, &Placed),
-    plane: &Plane,
-    (weight, clock_at_s): (f64, f64),
-) {
-    let (a, b, sign) = if a.basis.first <= b.basis.first { (a, b, 1.0) } else { (b, a, -1.0) };
-    let (row_a, row_b) = (by_knots(a, &plane.normal, sign), by_knots(b, &plane.normal, -sign));
-    let (clock_a, clock_b) =
-        (by_clock(a, &plane.normal, sign, clock_at_s), by_clock(b, &plane.normal, -sign, clock_at_s));
-    let clock = [clock_a[0] + clock_b[0], clock_a[1] + clock_b[1]];
-    let border = Segment { start: layout.border() + CLOCK, values: &clock };
-    let (start_a, start_b) = (layout.knot(a.basis.first), layout.knot(b.basis.first));
-    let gap = start_b - start_a;
-    if gap >= 24 {
-        let knots = [Segment { start: start_a, values: &row_a }, Segment { start: start_b, values: &row_b }, border];
-        equations.add_row(&knots, plane.distance_m, weight);
-    } else {
-        let mut row = [0.0; 48];
-        row[..24].copy_from_slice(&row_a);
-        for (sum, term) in row[gap..gap + 24].iter_mut().zip(row_b) {
+/// The motions of a surfel of its own: turn, shift, clock offset.
+const OWN: usize = 7;
+
+/// What all matches of a surfel say about its own motion: `sum w g g^T` and `-sum w e g`, with `g` the derivative of `e`.
+///
+/// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::estimation) struct Own {
+    /// Lower triangle by rows.
+    square: [f64; OWN * (OWN + 1) / 2],
+    right: [f64; OWN],
+}
+
+impl Own {
+    fn add(&mut self, by: &[f64; OWN], distance_m: f64, weight: f64) {
+        let mut entries = self.square.iter_mut();
+        for i in 0..OWN {
+            let scaled = weight * by[i];
+            self.right[i] -= scaled * distance_m;
+            for (other, entry) in by[..=i].iter().zip(entries.by_ref()) {
+                *entry += scaled * other;
+            }
+        }
+    }
+
+    /// Adds what another part of the matches says.
+    pub(in crate::estimation) fn merge(&mut self, other: &Self) {
+        for (sum, term) in self.square.iter_mut().zip(other.square) {
             *sum += term;
         }
-        let knots = [Segment { start: start_a, values: &row[..gap + 24] }, border];
-        equations.add_row(&knots, plane.distance_m, weight);
+        for (sum, term) in self.right.iter_mut().zip(other.right) {
+            *sum += term;
+        }
+    }
+
+    fn square(&self, i: usize, j: usize) -> f64 {
+        let (i, j) = (i.max(j), i.min(j));
+        self.square[i * (i + 1) / 2 + j]
+    }
+
+    /// Adds it to the equations of the window's unknowns, by the surfel's place among the knots and its time.
+    pub(in crate::estimation) fn add_to(
+        &self,
+        equations: &mut NormalEquations,
+        layout: &Layout,
+        surfel: &Placed,
+        clock_at_s: f64,
+    ) {
+        let (first, clock) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
+        let by_clock = [1.0, surfel.tau_s - clock_at_s];
+        for (k, value) in surfel.basis.value.iter().enumerate() {
+            for i in 0..6 {
+                let row = first + 6 * k + i;
+                equations.add_right(row, value * self.right[i]);
+                for (l, other) in surfel.basis.value[..=k].iter().enumerate() {
+                    for j in 0..if l < k { 6 } else { i + 1 } {
+                        equations.add_entry(row, first + 6 * l + j, value * other * self.square(i, j));
+                    }
+                }
+                for (c, by) in by_clock.iter().enumerate() {
+                    equations.add_entry(clock + c, row, by * value * self.square(6, i));
+                }
+            }
+        }
+        for (c, by) in by_clock.iter().enumerate() {
+            equations.add_right(clock + c, by * self.right[6]);
+            for (d, other) in by_clock[..=c].iter().enumerate() {
+                equations.add_entry(clock + c, clock + d, by * other * self.square(6, 6));
+            }
+        }
     }
 }
 
-/// Adds a match between a live surfel and one of a fixed view.
-pub(in crate::estimation) fn add_fixed(
-    equations: &mut NormalEquations,
+/// Adds a match between two live surfels: to what each says by itself, and how they hang together.
+pub(in crate::estimation) fn add_pair(
+    (equations, own): (&mut NormalEquations, &mut [Own]),
     layout: &Layout,
-    a: &Placed,
+    (placed, a, b): (&[Placed], usize, usize),
     plane: &Plane,
     (weight, clock_at_s): (f64, f64),
 ) {
-    let row = by_knots(a, &plane.normal, 1.0);
-    let clock = by_clock(a, &plane.normal, 1.0, clock_at_s);
-    let knots = Segment { start: layout.knot(a.basis.first), values: &row };
-    let border = Segment { start: layout.border() + CLOCK, values: &clock };
-    equations.add_row(&[knots, border], plane.distance_m, weight);
+    let by_a = by_motion(&placed[a], &plane.normal);
+    let by_b = by_motion(&placed[b], &plane.normal).map(|x| -x);
+    own[a].add(&by_a, plane.distance_m, weight);
+    own[b].add(&by_b, plane.distance_m, weight);
+    let (row_a, row_b) = (Row::of(&placed[a], &by_a, clock_at_s), Row::of(&placed[b], &by_b, clock_at_s));
+    let (early, late) = if placed[a].basis.first <= placed[b].basis.first {
+        ((&placed[a], row_a), (&placed[b], row_b))
+    } else {
+        ((&placed[b], row_b), (&placed[a], row_a))
+    };
+    let starts = (layout.knot(early.0.basis.first), layout.knot(late.0.basis.first));
+    equations.add_product((starts.0, &early.1.knots), (starts.1, &late.1.knots), weight);
+    let clock = layout.border() + CLOCK;
+    equations.add_product((starts.0, &early.1.knots), (clock, &late.1.clock), weight);
+    equations.add_product((starts.1, &late.1.knots), (clock, &early.1.clock), weight);
+    equations.add_product((clock, &early.1.clock), (clock, &late.1.clock), weight);
+}
+
+/// Adds a match between a live surfel and one of a fixed view.
+pub(in crate::estimation) fn add_fixed(own: &mut Own, surfel: &Placed, plane: &Plane, weight: f64) {
+    own.add(&by_motion(surfel, &plane.normal), plane.distance_m, weight);
+}
+
+/// Adds the row of the Jacobian of a match of `surfel`, `scales[k]` times to column `k` of six.
+pub(in crate::estimation) fn add_scaled_row(
+    columns: &mut [Vec<f64>; 6],
+    layout: &Layout,
+    (surfel, normal): (&Placed, &Vector),
+    scales: &[f64; 6],
+    clock_at_s: f64,
+) {
+    let row = Row::of(surfel, &by_motion(surfel, normal), clock_at_s);
+    let (first, clock) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
+    for (column, scale) in columns.iter_mut().zip(scales) {
+        for (sum, term) in column[first..first + 24].iter_mut().zip(row.knots) {
+            *sum += scale * term;
+        }
+        for (sum, term) in column[clock..clock + 2].iter_mut().zip(row.clock) {
+            *sum += scale * term;
+        }
+    }
+}
+
+/// A row of the Jacobian: the four knots about a surfel, and the clock's offset and rate.
+struct Row {
+    knots: [f64; 24],
+    clock: [f64; 2],
+}
+
+impl Row {
+    fn of(surfel: &Placed, by: &[f64; OWN], clock_at_s: f64) -> Self {
+        let mut knots = [0.0; 24];
+        for (knot, value) in knots.chunks_exact_mut(6).zip(surfel.basis.value) {
+            for (entry, derivative) in knot.iter_mut().zip(by) {
+                *entry = value * derivative;
+            }
+        }
+        Self { knots, clock: [by[6], by[6] * (surfel.tau_s - clock_at_s)] }
+    }
 }
 
 #[cfg(test)]
@@ -133,8 +230,13 @@ mod tests {
     fn surfel(tau_s: f64, seed: f64) -> Placed {
         let turn = from_roll_pitch_yaw(0.02 * seed, 0.3, 0.4).to_rotation_matrix().into_inner();
         let covariance = turn * Matrix::from_diagonal(&Vector::new(0.02, 0.05, 1e-4)) * turn.transpose();
-        let patch =
-            Patch { centre: Vector::new(2.0 + 0.1 * seed, 1.0, 0.5), normal: turn * Vector::z(), covariance, level: 0 };
+        let patch = Patch {
+            centre: Vector::new(2.0 + 0.1 * seed, 1.0, 0.5),
+            normal: turn * Vector::z(),
+            points: 50.0,
+            covariance,
+            level: 0,
+        };
         Placed {
             patch,
             tau_s,
@@ -167,9 +269,14 @@ mod tests {
             (distance(&step(1e-6)) - distance(&step(-1e-6))) / 2e-6
         });
         let mut equations = NormalEquations::new(layout.size());
+        let placed: Vec<Placed> = std::iter::once(a).chain(b).cloned().collect();
+        let mut own = vec![Own::default(); placed.len()];
         match b {
-            Some(b) => add_pair(&mut equations, &layout, (a, b), &plane, (3.0, AT_S)),
-            None => add_fixed(&mut equations, &layout, a, &plane, (3.0, AT_S)),
+            Some(_) => add_pair((&mut equations, &mut own), &layout, (&placed, 0, 1), &plane, (3.0, AT_S)),
+            None => add_fixed(&mut own[0], a, &plane, 3.0),
+        }
+        for (own, surfel) in own.iter().zip(&placed) {
+            own.add_to(&mut equations, &layout, surfel, AT_S);
         }
         assert_relative_eq!(equations.dense(), jacobian.transpose() * &jacobian * 3.0, epsilon = 1e-7);
         let right = jacobian.transpose() * (-3.0 * distance(&DVector::zeros(layout.size())));

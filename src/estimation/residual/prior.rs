@@ -52,6 +52,30 @@ impl Start {
     }
 }
 
+impl Start {
+    /// The right-hand side that asks for these corrections, turn then shift, and their first derivatives where the window
+    /// begins.
+    pub(in crate::estimation) fn right_hand_side(
+        &self,
+        layout: &Layout,
+        (value, rate): (&[f64; 6], &[f64; 6]),
+        knot_spacing_s: f64,
+    ) -> Vec<f64> {
+        let basis = Basis::at(self.u_s, knot_spacing_s);
+        let first = layout.knot(basis.first);
+        let mut right = vec![0.0; layout.size()];
+        for (by, asked, sigmas) in [(basis.value, value, self.sigmas[0]), (basis.rate, rate, self.sigmas[1])] {
+            for axis in 0..6 {
+                let weight = sigmas[axis / 3].powi(-2);
+                for a in 0..4 {
+                    right[first + 6 * a + axis] += weight * by[a] * asked[axis];
+                }
+            }
+        }
+        right
+    }
+}
+
 /// Adds that the velocity is zero at a node: `v + dt' = 0`, to `sigma` (m/s).
 pub(in crate::estimation) fn add_standstill(
     equations: &mut NormalEquations,

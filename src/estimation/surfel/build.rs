@@ -1,7 +1,7 @@
 //! From beams to surfels: voxels at several resolutions and on two grids, filled from fine to coarse.
 
 use super::moments::Moments;
-use super::{Beam, Surfel};
+use super::{Beam, Surfel, Surfels};
 use crate::estimation::Clock;
 use crate::estimation::nominal::{Motion, Nominal};
 use crate::estimation::spec::SurfelSpec;
@@ -11,14 +11,20 @@ use crate::measurement::LidarNoise;
 
 /// Poses are computed at this spacing and taken linearly in between, s: at 400 degrees/s the chord is 1.5 um/m from the arc.
 const POSE_SPACING_S: f64 = 0.0005;
+/// A streak is at least this long, as a standard deviation in edges of its cell: shorter ones may be anything. There are none
+/// of the finest resolution, whose patches know their normals too badly to hold them: the error of a normal that leans, say,
+/// upwards would pass for knowledge of the height, which a level scan does not have.
+const STREAK_LENGTH: f64 = 0.1;
+/// A streak that runs along its beams more than this (a cosine) is one whose range errors are its length.
+const GRAZING: f64 = 0.94;
 
 /// What it takes to turn beams into surfels.
 #[derive(Debug, Clone)]
 pub(in super::super) struct SurfelMaker {
     pub(in super::super) spec: SurfelSpec,
     pub(in super::super) noise: LidarNoise,
-    /// Normal of the scan plane and the lidar's place, in the IMU's frame.
-    pub(in super::super) scan_normal: Vector,
+    /// Normal of the scan plane, if the lidar has one plane, and the lidar's place, in the IMU's frame.
+    pub(in super::super) scan_normal: Option<Vector>,
     pub(in super::super) laser_in_imu: Vector,
 }
 
@@ -32,15 +38,9 @@ struct Fragment {
 }
 
 impl SurfelMaker {
-    /// The surfels of a stretch of beams, in order of resolution, grid, cell and time.
-    pub(in super::super) fn build(
-        &self,
-        beams: &[Beam],
-        nominal: &Nominal,
-        clock: &Clock,
-        biases: &Biases,
-    ) -> Vec<Surfel> {
-        let Some(first) = beams.first() else { return Vec::new() };
+    /// The surfels and streaks of a stretch of beams, each in order of resolution, grid, cell and time.
+    pub(in super::super) fn build(&self, beams: &[Beam], nominal: &Nominal, clock: &Clock, biases: &Biases) -> Surfels {
+        let Some(first) = beams.first() else { return Surfels::default() };
         let origin = nominal.at(clock.imu_s(first.tau_s), &biases.gyro).position;
         let edge = self.spec.finest_voxel_m;
         let mut regular = Fragments::new(origin, edge, 0.0);
@@ -53,13 +53,16 @@ impl SurfelMaker {
                 offset.add(&point, beam.tau_s, noise2);
             }
         });
-        let mut surfels = Vec::new();
+        let mut surfels = Surfels::default();
         let mut keyed = Vec::new();
         let mut collect = |fragments: &[Fragment], level: usize, shift: i32| {
-            let groups = group(fragments, &mut keyed, level, shift, &self.spec);
-            surfels.extend(
-                groups.iter().filter_map(|moments| self.surfel(moments, level, &origin, (nominal, clock, biases))),
-            );
+            for moments in group(fragments, &mut keyed, level, shift, &self.spec) {
+                match self.shape(&moments, level, &origin, (nominal, clock, biases)) {
+                    Some(Shape::Patch(surfel)) => surfels.patches.push(surfel),
+                    Some(Shape::Streak(surfel)) => surfels.streaks.push(surfel),
+                    None => {}
+                }
+            }
         };
         for level in 0..self.spec.levels {
             collect(regular.done(), level, 0);
@@ -101,14 +104,14 @@ impl SurfelMaker {
         }
     }
 
-    /// The surfel of a cell's points, if they are one.
-    fn surfel(
+    /// What a cell's points are, if anything.
+    fn shape(
         &self,
         moments: &Moments,
         level: usize,
         origin: &Vector,
         state: (&Nominal, &Clock, &Biases),
-    ) -> Option<Surfel> {
+    ) -> Option<Shape> {
         let (nominal, clock, biases) = state;
         let covariance = moments.covariance();
         let eigen = covariance.symmetric_eigen();
@@ -116,8 +119,11 @@ impl SurfelMaker {
         order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
         let [l1, l2, l3] = order.map(|k| eigen.eigenvalues[k].max(0.0));
         let planarity = 2.0 * (l2 - l1) / (l1 + l2 + l3).max(f64::MIN_POSITIVE);
-        let noise2 = moments.mean_noise2();
-        if planarity < self.spec.min_planarity || l1 > self.spec.max_thickness_sigmas.powi(2) * noise2 {
+        let thick2 = self.spec.max_thickness_sigmas.powi(2) * moments.mean_noise2();
+        let edge_m = self.spec.finest_voxel_m * f64::from(1_u32 << level);
+        let is_line = level > 0 && l2 <= thick2 && l3 >= (STREAK_LENGTH * edge_m).powi(2);
+        let is_plane = planarity >= self.spec.min_planarity && l1 <= thick2;
+        if !is_plane && !is_line {
             return None;
         }
         let tau_s = moments.mean_time_s();
@@ -126,14 +132,32 @@ impl SurfelMaker {
         let centre_in_imu = imu_from_map * (moments.mean() + origin - motion.position);
         let beam = (centre_in_imu - self.laser_in_imu).normalize();
         let rate_in_imu = imu_from_map * motion.angular_velocity;
-        if rate_in_imu.cross(&beam).dot(&self.scan_normal).abs() < self.spec.min_sweep_deg_per_s.to_radians() {
-            return None;
-        }
-        let normal = imu_from_map * eigen.eigenvectors.column(order[0]);
-        let normal_in_imu = if normal.dot(&beam) > 0.0 { -normal } else { normal };
+        let sweeps = self.scan_normal.is_none_or(|scan_normal| {
+            rate_in_imu.cross(&beam).dot(&scan_normal).abs() >= self.spec.min_sweep_deg_per_s.to_radians()
+        });
+        let axis = |k: usize| imu_from_map * eigen.eigenvectors.column(order[k]);
+        let (normal, along) = (axis(0), axis(2));
         let covariance_in_imu = imu_from_map * covariance * motion.rotation;
-        Some(Surfel { tau_s, centre_in_imu, normal_in_imu, covariance_in_imu, points: moments.count(), level })
+        let surfel = |normal_in_imu: Vector| Surfel {
+            tau_s,
+            centre_in_imu,
+            normal_in_imu,
+            covariance_in_imu,
+            points: moments.count(),
+            level,
+        };
+        if sweeps {
+            is_plane.then(|| Shape::Patch(surfel(if normal.dot(&beam) > 0.0 { -normal } else { normal })))
+        } else {
+            (is_line && along.dot(&beam).abs() < GRAZING).then(|| Shape::Streak(surfel(along)))
+        }
     }
+}
+
+/// What the points of a cell look like.
+enum Shape {
+    Patch(Surfel),
+    Streak(Surfel),
 }
 
 /// Fragments of one grid, in the order of time.

@@ -1,6 +1,6 @@
-//! `geometry_msgs/PoseStamped`, `nav_msgs/Odometry` and `nav_msgs/Path`.
+//! `geometry_msgs/PoseStamped`, `geometry_msgs/PoseWithCovarianceStamped`, `nav_msgs/Odometry` and `nav_msgs/Path`.
 
-use crate::geometry::{Kinematics, Pose};
+use crate::geometry::{Kinematics, Pose, PoseCovariance};
 use crate::recording::RecordingError;
 use crate::recording::cdr::{DecodeError, Decoder, Encoder};
 use crate::time::Stamp;
@@ -12,6 +12,23 @@ use crate::time::Stamp;
 pub fn encode(out: &mut Encoder<'_>, frame: &str, stamp: Stamp, pose: &Pose) -> Result<(), RecordingError> {
     out.header(stamp, frame)?;
     out.pose(pose);
+    Ok(())
+}
+
+/// Writes a `PoseWithCovarianceStamped` in `frame`.
+///
+/// # Errors
+/// When the stamp does not fit a message.
+pub fn encode_uncertain(
+    out: &mut Encoder<'_>,
+    frame: &str,
+    stamp: Stamp,
+    (pose, covariance): (&Pose, &PoseCovariance),
+) -> Result<(), RecordingError> {
+    out.header(stamp, frame)?;
+    out.pose(pose);
+    // Rows one after the other; of a symmetric matrix that is columns too.
+    out.f64s(covariance.as_slice());
     Ok(())
 }
 

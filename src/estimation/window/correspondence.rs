@@ -1,0 +1,159 @@
+//! Which of the window's surfels show what others show, or what a fixed view shows.
+
+use super::Window;
+use crate::estimation::residual::matched::Plane;
+use crate::estimation::surfel::{Patch, Placed, Surfel};
+use crate::estimation::views::Views;
+use rayon::prelude::*;
+
+/// Neighbours are looked for again when a surfel may have moved by this since, m: by less, they hardly change.
+const MOVED_M: f64 = 0.02;
+
+/// The window's surfels in the map.
+#[derive(Debug)]
+pub(super) struct Scene {
+    /// Patches, then streaks.
+    pub placed: Vec<Placed>,
+    /// How many of them are patches.
+    pub patches: usize,
+}
+
+/// Which surfels may belong together, before anything is said of how far apart they are.
+#[derive(Default)]
+pub(super) struct Neighbours {
+    /// Of the window: indices into the scene, the second a patch.
+    pairs: Vec<(u32, u32)>,
+    /// With views: a surfel of the scene, a view, a patch of the view.
+    fixed: Vec<(u32, u32, u32)>,
+    /// How many surfels there were.
+    of: (usize, usize),
+    /// How far surfels may have moved since, m.
+    moved_m: f64,
+}
+
+/// The matches of an iteration.
+#[derive(Debug, Default)]
+pub(super) struct Matches {
+    /// Of the window: indices into the scene.
+    pub pairs: Vec<(u32, u32, Plane)>,
+    /// With views: an index into the scene, a view.
+    pub fixed: Vec<(u32, u32, Plane)>,
+}
+
+impl Matches {
+    pub fn len(&self) -> usize {
+        self.pairs.len() + self.fixed.len()
+    }
+
+    pub fn planes(&self) -> impl Iterator<Item = &Plane> {
+        self.pairs.iter().map(|(.., plane)| plane).chain(self.fixed.iter().map(|(.., plane)| plane))
+    }
+}
+
+impl Neighbours {
+    /// The surfels have moved by at most `by_m`.
+    pub fn moved(&mut self, by_m: f64) {
+        self.moved_m += by_m;
+    }
+
+    fn are_good_for(&self, scene: &Scene) -> bool {
+        self.of == (scene.placed.len(), scene.patches) && self.moved_m < MOVED_M
+    }
+}
+
+impl Window {
+    /// The window's surfels in the map; those that a change of clock has moved out of the window's knots stay out.
+    pub(super) fn scene(&self) -> Scene {
+        let (from, to) = (self.start.u_s, self.nominal.end_s());
+        let spacing = self.spec.knot_spacing_s;
+        let place = |surfels: Vec<&Surfel>| -> Vec<Option<Placed>> {
+            let place = |surfel: &&Surfel| {
+                let u_s = self.clock.imu_s(surfel.tau_s);
+                (from..=to).contains(&u_s).then(|| surfel.place(&self.nominal, &self.clock, &self.biases, spacing))
+            };
+            surfels.par_iter().with_min_len(512).map(place).collect()
+        };
+        let patches = place(self.stretches.iter().flat_map(|stretch| &stretch.surfels.patches).collect());
+        let streaks = place(self.stretches.iter().flat_map(|stretch| &stretch.surfels.streaks).collect());
+        let mut placed: Vec<Placed> = patches.into_iter().flatten().collect();
+        let patches = placed.len();
+        placed.extend(streaks.into_iter().flatten());
+        Scene { placed, patches }
+    }
+
+    /// The matches of `scene`; `neighbours` are looked for again where they have moved too far.
+    pub(super) fn match_up(
+        &self,
+        scene: &Scene,
+        (views, chosen): (&Views, &[usize]),
+        neighbours: &mut Neighbours,
+        iteration: usize,
+    ) -> Matches {
+        let gate_m = self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
+        if !neighbours.are_good_for(scene) {
+            *neighbours = self.look_around(scene, (views, chosen));
+        }
+        let sigma_m = self.spec.solve.match_sigma_m;
+        let plane = |a: u32, patch: &Patch| {
+            let surfel = &scene.placed[a as usize].patch;
+            if (a as usize) < scene.patches {
+                self.matcher.agree(surfel, patch, gate_m).then(|| Plane::of(surfel, patch, sigma_m))
+            } else {
+                let beam = &scene.placed[a as usize].arm;
+                self.matcher.lies_in((surfel, beam), patch, gate_m).then(|| Plane::around(surfel, patch, sigma_m))
+            }
+        };
+        let pairs: Vec<Option<(u32, u32, Plane)>> = neighbours
+            .pairs
+            .par_iter()
+            .with_min_len(512)
+            .map(|(a, b)| Some((*a, *b, plane(*a, &scene.placed[*b as usize].patch)?)))
+            .collect();
+        let fixed: Vec<Option<(u32, u32, Plane)>> = neighbours
+            .fixed
+            .par_iter()
+            .with_min_len(512)
+            .map(|(a, view, k)| Some((*a, *view, plane(*a, &views.view(*view as usize).patches[*k as usize])?)))
+            .collect();
+        Matches { pairs: pairs.into_iter().flatten().collect(), fixed: fixed.into_iter().flatten().collect() }
+    }
+
+    fn look_around(&self, scene: &Scene, (views, chosen): (&Views, &[usize])) -> Neighbours {
+        let patches: Vec<Patch> = scene.placed[..scene.patches].iter().map(|surfel| surfel.patch).collect();
+        let forest = self.matcher.plant(&patches);
+        let mut pairs = self.matcher.among(&scene.placed[..scene.patches], &forest);
+        let streaks = scene.placed.iter().enumerate().skip(scene.patches).collect::<Vec<_>>();
+        let lying: Vec<Vec<(u32, u32)>> = streaks
+            .par_iter()
+            .with_min_len(64)
+            .map(|(a, streak)| {
+                let near = self.matcher.around(&forest, &patches, &streak.patch);
+                let apart = near.into_iter().filter(|b| self.matcher.apart(streak, &scene.placed[*b as usize]));
+                apart.map(|b| (*a as u32, b)).collect()
+            })
+            .collect();
+        pairs.extend(lying.into_iter().flatten());
+        let count = self.spec.views.neighbours;
+        let fixed: Vec<Vec<(u32, u32, u32)>> = scene
+            .placed
+            .par_iter()
+            .enumerate()
+            .with_min_len(256)
+            .map(|(a, surfel)| {
+                let mut found = Vec::new();
+                for index in chosen {
+                    let view = views.view(*index);
+                    let near = if a < scene.patches {
+                        self.matcher.neighbours(&view.forest, &surfel.patch, count)
+                    } else {
+                        self.matcher.around(&view.forest, &view.patches, &surfel.patch)
+                    };
+                    found.extend(near.into_iter().map(|k| (a as u32, *index as u32, k)));
+                }
+                found
+            })
+            .collect();
+        let of = (scene.placed.len(), scene.patches);
+        Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), of, moved_m: 0.0 }
+    }
+}

@@ -1,0 +1,161 @@
+//! The sliding window: what is being solved, and how.
+
+mod correspondence;
+mod equations;
+mod solve;
+mod uncertainty;
+
+pub(super) use solve::Solved;
+pub(super) use uncertainty::Linearised;
+
+use super::border::Border;
+use super::clock::Clock;
+use super::initial::{Beginning, Carried, Rest};
+use super::matching::Matcher;
+use super::nominal::Nominal;
+use super::residual::prior::Start;
+use super::spec::EstimatorSpec;
+use super::strapdown::{Biases, Interval};
+use super::surfel::{Beam, Patch, Surfel, SurfelMaker, Surfels};
+use crate::geometry::{Rotation, Vector};
+use equations::Workspace;
+use std::collections::VecDeque;
+
+/// Before the first motion that the IMU shows, the head has begun to move unseen: this long, s.
+const REST_MARGIN_S: f64 = 0.3;
+/// The window grows to at most this multiple of its length while too few surfaces are swept.
+const LONGEST: f64 = 3.0;
+/// A stretch counts as swept when it shows this fraction of the patches of the window's richest.
+const SWEPT: f64 = 0.25;
+
+/// A stretch of time in the window.
+#[derive(Debug)]
+struct Stretch {
+    end_tau_s: f64,
+    beams: Vec<Beam>,
+    surfels: Surfels,
+}
+
+/// The state of the estimator: trajectory, biases, gravity, clock, and the surfels of the last few seconds.
+#[derive(Debug)]
+pub(super) struct Window {
+    spec: EstimatorSpec,
+    maker: SurfelMaker,
+    matcher: Matcher,
+    pub(super) nominal: Nominal,
+    pub(super) clock: Clock,
+    pub(super) biases: Biases,
+    pub(super) gravity: Vector,
+    border: Border,
+    stretches: VecDeque<Stretch>,
+    start: Start,
+    /// While the head has not moved yet: what the IMU says at rest.
+    rest: Option<Rest>,
+    /// Until when it rested, IMU time, s.
+    rested_until_s: f64,
+    workspace: Workspace,
+}
+
+impl Window {
+    /// A window that begins with the IMU's first interval, at `start_u_s`.
+    pub(super) fn new(
+        spec: &EstimatorSpec,
+        maker: SurfelMaker,
+        beginning: &Beginning,
+        start_u_s: f64,
+        border: Border,
+    ) -> Self {
+        let clock = Clock { offset_s: spec.clock.start_s, rate: 0.0, at_s: start_u_s };
+        Self {
+            spec: spec.clone(),
+            matcher: Matcher::new(&spec.matching, &spec.surfels),
+            maker,
+            nominal: Nominal::beginning(start_u_s, beginning.state),
+            clock,
+            biases: beginning.biases,
+            gravity: crate::geometry::gravity_in_world(),
+            border,
+            stretches: VecDeque::new(),
+            start: Start::first(start_u_s, beginning.velocity_sigma),
+            rest: beginning.rest,
+            rested_until_s: f64::NEG_INFINITY,
+            workspace: Workspace::default(),
+        }
+    }
+
+    /// What goes on when the IMU falls silent.
+    pub(super) fn carried(&self) -> Option<Carried> {
+        let state = *self.nominal.states().last()?;
+        Some(Carried { state, biases: self.biases, gravity: self.gravity, clock: self.clock })
+    }
+
+    /// Goes on with the clock as it was known before the IMU fell silent.
+    pub(super) fn take_over(&mut self, carried: &Carried) {
+        self.clock = carried.clock.told_from(self.start.u_s);
+    }
+
+    /// Turns the window about its beginning, the shortest way that makes gravity what it is in `carried`'s map.
+    pub(super) fn level_as(&mut self, carried: &Carried) {
+        let turn = Rotation::rotation_between(&self.gravity, &carried.gravity).unwrap_or_else(Rotation::identity);
+        self.nominal.turn(&turn, &carried.state.position);
+        self.gravity = carried.gravity;
+    }
+
+    pub(super) fn matcher(&self) -> &Matcher {
+        &self.matcher
+    }
+
+    /// Appends a stretch: integrates its intervals, and makes surfels of its beams.
+    pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) {
+        for (_, interval) in intervals.iter() {
+            self.nominal.extend(*interval, &self.biases, &self.gravity);
+            self.rest = self.rest.filter(|rest| rest.goes_on(interval));
+            if self.rest.is_some() {
+                self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
+            }
+        }
+        let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
+        self.stretches.push_back(Stretch { end_tau_s, beams, surfels });
+        // The clock is told from the middle of the window, where offset and rate are least correlated.
+        let length_s = self.spec.step_s * self.stretches.len() as f64;
+        let middle_s = end_tau_s - 0.5 * length_s;
+        self.border.clock_told_from(middle_s - self.clock.at_s);
+        self.clock = self.clock.told_from(middle_s);
+    }
+
+    /// Makes the newest stretch's surfels again, with the trajectory as it has become.
+    pub(super) fn remake_newest(&mut self) {
+        if let Some(newest) = self.stretches.back_mut() {
+            newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
+            newest.beams = Vec::new();
+        }
+    }
+
+    /// Whether the oldest stretch is to leave: without it the window still holds `window_s` of stretches that swept over
+    /// surfaces. While the head is held still it sees lines alone, which need the patches seen before.
+    pub(super) fn is_full(&self) -> bool {
+        let richest = self.stretches.iter().map(|stretch| stretch.surfels.patches.len()).max().unwrap_or(0);
+        let enough = (richest as f64 * SWEPT) as usize;
+        let swept = self.stretches.iter().filter(|stretch| stretch.surfels.patches.len() >= enough).count();
+        let of_window = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s;
+        of_window(swept) > 1.0 - 1e-9 || of_window(self.stretches.len()) > LONGEST
+    }
+
+    /// Where the window will begin when its oldest stretch has gone, IMU time, s.
+    pub(super) fn next_start_s(&self) -> Option<f64> {
+        Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).max(self.start.u_s))
+    }
+
+    /// Lets the oldest stretch go: what is before its end is final. Its patches as they stand in the map.
+    pub(super) fn let_go(&mut self) -> Option<Vec<Patch>> {
+        let start_s = self.next_start_s()?;
+        let oldest = self.stretches.pop_front()?;
+        let spacing = self.spec.knot_spacing_s;
+        let place = |surfel: &Surfel| surfel.place(&self.nominal, &self.clock, &self.biases, spacing).patch;
+        let placed = oldest.surfels.patches.iter().map(place).collect();
+        self.start = Start::held(start_s);
+        let share = 1.0 / (self.stretches.len() + 1) as f64;
+        self.border.remember(share, self.spec.step_s);
+        Some(placed)
+    }
+}

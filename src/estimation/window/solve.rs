@@ -1,0 +1,133 @@
+//! The window's iterations: place the surfels, match, solve; again until nothing moves.
+
+use super::Window;
+use super::correspondence::{Matches, Neighbours};
+use super::equations::Robust;
+use super::uncertainty::Linearised;
+use crate::estimation::nominal::Correction;
+use crate::estimation::residual::matched::Plane;
+use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
+use crate::estimation::views::Views;
+use crate::geometry::{Matrix, Rotation, Vector};
+
+/// A correction beyond this (m, rad) in one solve is not believed.
+const BELIEVABLE: (f64, f64) = (2.0, 0.8);
+/// A turn moves a surfel by so much, m a rad: what is farther away is in larger cells.
+const ARM_M: f64 = 5.0;
+/// A normal that leans to a direction by less than this sine may do so by its error alone.
+const LEANING: f64 = 0.3;
+
+/// How a window's solution came out.
+#[derive(Debug, Clone, Default)]
+pub(in crate::estimation) struct Solved {
+    pub surfels: usize,
+    pub matches: usize,
+    pub view_matches: usize,
+    pub views: usize,
+    pub residual_rms_m: f64,
+    pub iterations: usize,
+    pub last_correction_m: f64,
+    pub conditioning: f64,
+    pub trouble: Option<&'static str>,
+}
+
+impl Window {
+    /// Solves the window; what it was linearised at, where its solution is believed.
+    pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
+        let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
+        let layout = self.layout(first);
+        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity);
+        self.border.begin_window();
+        let mut total = vec![0.0; layout.border()];
+        let mut solved = Solved::default();
+        let mut neighbours = Neighbours::default();
+        let mut chosen = None;
+        let mut linearised = None;
+        for iteration in 0..self.spec.solve.max_iterations {
+            let scene = self.scene();
+            let chosen = chosen.get_or_insert_with(|| views.choose(&scene.placed[..scene.patches]));
+            let matches = self.match_up(&scene, (views, chosen), &mut neighbours, iteration);
+            let robust = Robust::of(&self.spec.solve, iteration);
+            solved.describe(&matches, &robust);
+            (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.placed.len(), chosen.len());
+            let few = matches.len() < self.spec.solve.min_matches;
+            let matches = if few { Matches::default() } else { matches };
+            self.assemble_inertial(first, &layout, &total);
+            let Some(x) = self.solve_robustly(&scene, &matches, &layout, &robust) else {
+                solved.trouble = Some("its equations are singular");
+                break;
+            };
+            let (shift, turn) = greatest(&x[..layout.border()]);
+            if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
+                solved.trouble = Some("its correction is too large");
+                break;
+            }
+            self.apply(&x, first, &layout, &mut total);
+            neighbours.moved(shift + ARM_M * turn);
+            solved.last_correction_m = shift.max(turn);
+            linearised = Some(Linearised { layout, scene, matches, robust });
+            if solved.last_correction_m < self.spec.solve.settled_m {
+                break;
+            }
+        }
+        if solved.trouble.is_some() {
+            (self.nominal, self.clock, self.biases, self.gravity) = backup;
+            self.border.begin_window();
+            linearised = None;
+        }
+        (solved, linearised)
+    }
+
+    /// Moves the window's unknowns by a solution.
+    fn apply(&mut self, x: &[f64], first: usize, layout: &Layout, total: &mut [f64]) {
+        let bases = &self.workspace.bases;
+        self.nominal.correct(first, |node| Correction::of_spline(&bases[node - first], layout.first_knot, x));
+        for (sum, term) in total.iter_mut().zip(x) {
+            *sum += term;
+        }
+        let border = &x[layout.border()..];
+        let three = |at: usize| Vector::new(border[at], border[at + 1], border[at + 2]);
+        self.biases.gyro += three(GYRO_BIAS);
+        self.biases.accel += three(ACCEL_BIAS);
+        let tilt = Vector::new(border[GRAVITY], border[GRAVITY + 1], 0.0);
+        self.gravity = Rotation::from_scaled_axis(tilt) * self.gravity;
+        self.clock.offset_s += border[CLOCK];
+        self.clock.rate += border[CLOCK_RATE];
+        self.border.moved(border, &self.workspace.factor);
+    }
+}
+
+/// Greatest translation and rotation of a knot.
+fn greatest(knots: &[f64]) -> (f64, f64) {
+    let norm = |v: &[f64]| Vector::new(v[0], v[1], v[2]).norm();
+    knots.chunks_exact(6).fold((0.0, 0.0), |(shift, turn): (f64, f64), knot| {
+        // NaN must not pass for small.
+        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
+        (larger(shift, norm(&knot[3..])), larger(turn, norm(&knot[..3])))
+    })
+}
+
+impl Solved {
+    /// Number, residual and conditioning of a set of matches.
+    fn describe(&mut self, matches: &Matches, robust: &Robust) {
+        (self.matches, self.view_matches) = (matches.pairs.len(), matches.fixed.len());
+        let (mut weights, mut squares, mut information) = (0.0, 0.0, Matrix::zeros());
+        for plane in matches.planes() {
+            let weight = robust.weight(plane, plane.distance_m);
+            weights += weight;
+            squares += weight * plane.distance_m * plane.distance_m;
+            information += plane.normal * plane.normal.transpose() * weight;
+        }
+        self.residual_rms_m = if weights > 0.0 { (squares / weights).sqrt() } else { 0.0 };
+        self.conditioning = 0.0;
+        if weights > 0.0 {
+            let eigen = information.symmetric_eigen();
+            let weakest = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+            // In a smooth tunnel no normal leans along it, but for errors: together they would pass for information.
+            let along = |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|lean| lean.abs() > LEANING);
+            let held = |plane: &Plane| along(plane).map(|lean| robust.weight(plane, plane.distance_m) * lean * lean);
+            let least: f64 = matches.planes().filter_map(held).sum();
+            self.conditioning = least / eigen.eigenvalues.max();
+        }
+    }
+}

@@ -1,0 +1,85 @@
+use super::Pairs;
+use crate::geometry::{Matrix, Pose, PoseCovariance, Vector};
+use crate::time::{Span, Stamp};
+
+/// Time between the samples; errors change slowly, and more samples would only repeat each other.
+const EVERY: Span = Span::from_nanos(1_000_000_000);
+
+/// Whether the errors are as large as the estimator says.
+///
+/// The normalised estimation error squared `e^T P^-1 e` (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to
+/// Tracking and Navigation, 2001, section 5.4) is chi-squared with three degrees of freedom, 3 on average, where the covariance
+/// P is right; above that the estimator believes too much. Errors are told in the map, against the first pose of both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Consistency {
+    /// Mean over the run, of the position.
+    pub position_nees: f64,
+    /// Mean over the run, of the attitude.
+    pub attitude_nees: f64,
+    /// The same at the end.
+    pub end: [f64; 2],
+}
+
+/// Holds the errors of `pairs` against the covariances that the estimator gave at some of their stamps, in order of time.
+/// `None` where no covariance says anything.
+pub fn consistency(pairs: &Pairs, covariances: &[(Stamp, PoseCovariance)]) -> Option<Consistency> {
+    let map_from_world = pairs.estimate().first()? * pairs.truth().first()?.inverse();
+    let mut next = *pairs.stamps().first()?;
+    let mut told: Vec<[f64; 2]> = Vec::new();
+    let mut rest = covariances.iter().peekable();
+    for ((stamp, estimate), truth) in pairs.stamps().iter().zip(pairs.estimate()).zip(pairs.truth()) {
+        while rest.next_if(|(at, _)| at < stamp).is_some() {}
+        let Some((_, covariance)) = rest.peek().filter(|(at, _)| at == stamp && *stamp >= next) else { continue };
+        if let Some(nees) = nees(estimate, &(map_from_world * truth), covariance) {
+            told.push(nees);
+            next = *stamp + EVERY;
+        }
+    }
+    let mean = |of: usize| told.iter().map(|nees| nees[of]).sum::<f64>() / told.len() as f64;
+    Some(Consistency { end: *told.last()?, position_nees: mean(0), attitude_nees: mean(1) })
+}
+
+/// Of position and attitude; `None` where a covariance is not positive definite: nothing is claimed.
+fn nees(estimate: &Pose, truth: &Pose, covariance: &PoseCovariance) -> Option<[f64; 2]> {
+    let shift = estimate.translation.vector - truth.translation.vector;
+    let turn = (estimate.rotation * truth.rotation.inverse()).scaled_axis();
+    let of = |error: Vector, at: usize| {
+        let block: Matrix = covariance.fixed_view::<3, 3>(at, at).into_owned();
+        Some(error.dot(&block.cholesky()?.solve(&error)))
+    };
+    Some([of(shift, 0)?, of(turn, 3)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Rotation, Trajectory};
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn an_error_of_one_standard_deviation_on_each_axis_is_three() {
+        let stamp = |k: i64| Stamp::from_nanos(k * 1_000_000_000);
+        let truth = Trajectory::from_poses((0..5).map(|k| (stamp(k), Pose::translation(k as f64, 0.0, 0.0)))).unwrap();
+        // From the second pose on it is 2, 3, 4 cm off, and turned by 1, 2, 2 mrad.
+        let off = Pose::from_parts(
+            Vector::new(0.02, 0.03, 0.04).into(),
+            Rotation::from_scaled_axis(Vector::new(1e-3, 2e-3, 2e-3)),
+        );
+        let moved = |k: i64| {
+            if k == 0 {
+                Pose::identity()
+            } else {
+                Pose::from_parts((Vector::x() * k as f64 + off.translation.vector).into(), off.rotation)
+            }
+        };
+        let estimate = Trajectory::from_poses((0..5).map(|k| (stamp(k), moved(k)))).unwrap();
+        let pairs = Pairs::associate(&estimate, &truth).unwrap();
+        let sigmas = [0.02, 0.03, 0.04, 1e-3, 2e-3, 2e-3];
+        let covariance = PoseCovariance::from_diagonal(&sigmas.map(|s: f64| s * s).into());
+        let covariances: Vec<_> = (1..5).map(|k| (stamp(k), covariance)).collect();
+        let found = consistency(&pairs, &covariances).unwrap();
+        assert_relative_eq!(found.position_nees, 3.0, epsilon = 1e-9);
+        assert_relative_eq!(found.attitude_nees, 3.0, epsilon = 1e-9);
+        assert_eq!(consistency(&pairs, &[(stamp(2), PoseCovariance::zeros())]), None);
+    }
+}
