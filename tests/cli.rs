@@ -55,6 +55,10 @@ fn the_whole_journey_leaves_everything_and_threads_change_nothing() {
     assert_eq!((one["scene"].as_str(), one["duration_s"].as_f64()), (Some("mocap_room"), Some(8.0)));
     assert!(one["open_loop"]["position_rmse_m"].as_f64().unwrap() < 0.1);
     assert!(one["cloud"]["sigma_by_truth_m"].as_f64().unwrap() < 0.02);
+    // The operator is seen at the edge of the scans, and is no wall put in the wrong place.
+    assert!((1e-4..0.1).contains(&one["cloud"]["on_carrier_fraction"].as_f64().unwrap()));
+    assert_eq!(one["cloud"]["on_movers_fraction"].as_f64(), Some(0.0));
+    assert!(one["cloud"]["sigma_m"].as_f64().unwrap() < 0.03);
     assert!(one["closed_loop"]["position_rmse_m"].is_null());
     for name in [
         "manifest.ron",

@@ -13,6 +13,8 @@ use crate::truth::ClockTruth;
 pub enum Truth {
     /// Where the head was, at a time on the lidar's clock.
     Head(Stamp, Pose),
+    /// Where the base that carries it was, at a time on the lidar's clock.
+    Base(Stamp, Pose),
     /// What the clocks said, at a true time.
     Clock(Stamp, ClockTruth),
 }
@@ -20,7 +22,8 @@ pub enum Truth {
 /// Reads the truth in the order in which it was written.
 pub struct Truths<'r> {
     messages: Messages<'r>,
-    poses: Vec<u16>,
+    heads: Vec<u16>,
+    bases: Vec<u16>,
     clocks: Vec<u16>,
     lidar: Option<clock::Reading<'static>>,
     loss: Loss,
@@ -31,11 +34,13 @@ pub struct Truths<'r> {
 impl Reader {
     /// The truth under `/ground_truth/`; nothing in a recording of the real world.
     pub fn truth(&self) -> Truths<'_> {
-        let (poses, clocks) = (self.ids_of(Topic::TruthPose.name()), self.ids_of(Topic::TruthClock.name()));
+        let ids = |topic: Topic| self.ids_of(topic.name());
+        let (heads, bases, clocks) = (ids(Topic::TruthPose), ids(Topic::TruthBase), ids(Topic::TruthClock));
         Truths {
             messages: self.messages(),
-            ended: poses.is_empty() && clocks.is_empty(),
-            poses,
+            ended: heads.is_empty() && bases.is_empty() && clocks.is_empty(),
+            heads,
+            bases,
             clocks,
             lidar: None,
             loss: self.loss().clone(),
@@ -71,8 +76,13 @@ impl Truths<'_> {
                 self.loss.add_pass(&self.messages, self.expected);
                 return Ok(None);
             };
-            let read = if self.poses.contains(&message.channel) {
-                pose::decode(message.data).map(|(stamp, pose)| Some(Truth::Head(stamp, pose))).ok()
+            let posed = |truth: fn(Stamp, Pose) -> Truth| {
+                pose::decode(message.data).map(|(stamp, pose)| Some(truth(stamp, pose))).ok()
+            };
+            let read = if self.heads.contains(&message.channel) {
+                posed(Truth::Head)
+            } else if self.bases.contains(&message.channel) {
+                posed(Truth::Base)
             } else if self.clocks.contains(&message.channel) {
                 pair(&mut self.lidar, &message)
             } else {

@@ -115,8 +115,13 @@ pub struct CloudMetrics {
     pub sigma_m: Option<f64>,
     /// 95 % of the points are no farther from a surface, m.
     pub p95_m: Option<f64>,
-    /// Share of the points more than a metre from any surface, which are in none of the other figures.
+    /// Share of the points more than a metre from any surface, which are in none of the figures of distance.
     pub far_fraction: Option<f64>,
+    /// Share of the beams that truly ended on what carries the lidar. They are in the cloud, and in none of the figures of
+    /// distance, as none of them is of a surface that stands.
+    pub on_carrier_fraction: Option<f64>,
+    /// Share of the beams that truly ended on what moves through the scene; left out likewise.
+    pub on_movers_fraction: Option<f64>,
     /// Standard deviation for the same beams, projected by the true trajectory, m.
     pub sigma_by_truth_m: Option<f64>,
 }
@@ -176,6 +181,8 @@ mod tests {
             "bias_m",
             "sigma_m",
             "p95_m",
+            "on_carrier_fraction",
+            "on_movers_fraction",
             "sigma_by_truth_m",
             "peak_rss_mib",
         ];

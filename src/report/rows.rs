@@ -105,6 +105,8 @@ fn cloud(metrics: &Metrics) -> Group {
     rows.add("sigma by the true trajectory", m.sigma_by_truth_m, length);
     rows.add("95 % within", m.p95_m, length);
     rows.add("farther than 1 m", m.far_fraction, percent);
+    rows.add("on the carrier", m.on_carrier_fraction, percent);
+    rows.add("on what moves", m.on_movers_fraction, percent);
     rows.titled("cloud")
 }
 

@@ -15,6 +15,15 @@ pub struct Cylinder {
 }
 
 impl Cylinder {
+    /// How far a point of the base's frame is from its surface, m, from inside as from outside.
+    pub fn distance_m(&self, point_in_base: &Vector) -> f64 {
+        let from_foot = point_in_base - self.foot_in_base;
+        let beyond_side = from_foot.xy().norm() - self.radius_m;
+        let beyond_end = (from_foot.z - 0.5 * self.height_m).abs() - 0.5 * self.height_m;
+        let nearest_from_inside = -beyond_side.max(beyond_end);
+        if nearest_from_inside >= 0.0 { nearest_from_inside } else { beyond_side.max(0.0).hypot(beyond_end.max(0.0)) }
+    }
+
     /// The first of its surfaces that a ray of the base's frame meets in front of its origin.
     fn first_hit(&self, origin: &Vector, direction: &Vector) -> Option<SurfaceHit> {
         let from = origin - self.foot_in_base;
@@ -112,6 +121,22 @@ mod tests {
         );
         assert!(hit(Vector::zeros(), Vector::new(-0.3, 0.0, 0.3 * 3_f64.sqrt())).is_none());
         assert!(hit(Vector::zeros(), Vector::x()).is_none() && hit(Vector::y() * 0.21, -Vector::x()).is_none());
+    }
+
+    #[test]
+    fn a_point_is_as_far_from_a_cylinder_as_from_its_nearest_side_or_end() {
+        let far = |x: f64, y: f64, z: f64| operator().distance_m(&Vector::new(x, y, z));
+        // The axis is at x = -0.5, from z = -1.2 to 0.5; the radius is 0.2.
+        assert_relative_eq!(far(0.0, 0.0, 0.0), 0.3, epsilon = 1e-12);
+        assert_relative_eq!(far(-0.5, 0.1, 0.9), 0.4, epsilon = 1e-12);
+        assert_relative_eq!(far(-0.5, 0.0, -1.3), 0.1, epsilon = 1e-12);
+        // Beyond the upper edge by 0.3 and 0.4; inside, 0.05 from the side; on the axis, 0.1 below the top.
+        assert_relative_eq!(far(0.0, 0.0, 0.9), 0.5, epsilon = 1e-12);
+        assert_relative_eq!(far(-0.5, 0.15, 0.0), 0.05, epsilon = 1e-12);
+        assert_relative_eq!(far(-0.5, 0.0, 0.4), 0.1, epsilon = 1e-12);
+        let hit = operator().first_hit(&Vector::zeros(), &Vector::new(-1.0, 0.2, 0.3).normalize()).unwrap();
+        let end = Vector::new(-1.0, 0.2, 0.3).normalize() * hit.range_m;
+        assert_relative_eq!(far(end.x, end.y, end.z), 0.0, epsilon = 1e-12);
     }
 
     #[test]

@@ -17,7 +17,7 @@ mod summary;
 
 pub use error::SimulationError;
 pub use motion::{HeadMotion, STEP_S};
-pub use prepared::Simulation;
+pub use prepared::{Simulation, carrier_of};
 pub use rig::{EPOCH, Rig};
 pub use run::simulate;
 pub use scenario::{Scenario, Sources, Specs};

@@ -1,5 +1,5 @@
 use super::{EPOCH, Rig, STEP_S, Scenario, SimulationError, SimulationSummary, Sources, Specs, simulate};
-use crate::dynamics::{CarrierSpec, HeadModel, HeadSimulation};
+use crate::dynamics::{CarrierSpec, HeadModel, HeadSimulation, HeadSpec};
 use crate::geometry::{Route, Vector};
 use crate::measurement::{Calibration, Sink};
 use crate::motion::BaseMotion;
@@ -38,7 +38,7 @@ impl Simulation {
     pub fn build(scenario: &Scenario, specs: Specs, sources: &Sources) -> Result<Self, SimulationError> {
         let world = World::build(&specs.scene, &sources.scene)?;
         let head = HeadModel::new(&specs.head, &sources.head)?;
-        let carrier = specs.head.carrier.iter().map(cylinder).collect();
+        let carrier = carrier_of(&specs.head);
         let route = route(scenario, &world)?;
         let motion = specs.motion.build(&sources.motion, route, scenario.duration_s, scenario.seed)?;
         let lidar = Lidar::new(&specs.lidar, &sources.lidar)?;
@@ -122,14 +122,15 @@ impl Simulation {
     }
 }
 
-/// A part of the carrier as the lidar sees it.
-fn cylinder(part: &CarrierSpec) -> Cylinder {
-    Cylinder {
+/// What of a head's carrier the lidar may see, in the base's frame.
+pub fn carrier_of(head: &HeadSpec) -> Vec<Cylinder> {
+    let cylinder = |part: &CarrierSpec| Cylinder {
         foot_in_base: Vector::from(part.foot_in_base_m),
         radius_m: part.radius_m,
         height_m: part.height_m,
         reflectance: part.reflectance as f32,
-    }
+    };
+    head.carrier.iter().map(cylinder).collect()
 }
 
 /// The way that is asked for: the named one, or the scene's default, if it has any.

@@ -2,7 +2,7 @@
 
 use super::judge::Known;
 use super::open_loop::OpenLoopRun;
-use super::register::Beam;
+use super::register::Judged;
 use super::{Manifest, StudyError};
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report::plot::Figure;
@@ -22,11 +22,11 @@ pub(super) struct Plot {
 }
 
 /// The plots of an estimate.
-pub(super) fn plots(run: &OpenLoopRun, known: Option<&Known>, beams: &[Beam]) -> Vec<Plot> {
+pub(super) fn plots(run: &OpenLoopRun, known: Option<&Known>, sample: &[Judged]) -> Vec<Plot> {
     let world_from_map = known.and_then(|known| known.world_from_map).unwrap_or_else(Pose::identity);
     let estimate = run.map_from_head.transformed(&world_from_map);
     let truth = known.map(true_trajectory).unwrap_or_default();
-    let outline = outline(beams, &world_from_map, &estimate);
+    let outline = outline(sample, &world_from_map, &estimate);
     let plot = |name, title: &str, figure: Figure| Plot { name, section: Section { title: title.to_owned(), figure } };
 
     let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_from_above(&truth, &estimate, &outline))];
@@ -45,12 +45,12 @@ fn true_trajectory(known: &Known) -> Trajectory {
 }
 
 /// What of the cloud lies at the head's height: the walls, from above, one point a cell.
-fn outline(beams: &[Beam], world_from_map: &Pose, estimate: &Trajectory) -> Vec<Vector> {
+fn outline(sample: &[Judged], world_from_map: &Pose, estimate: &Trajectory) -> Vec<Vector> {
     let heights = estimate.poses().iter().map(|pose| pose.translation.z);
     let height = heights.sum::<f64>() / estimate.len().max(1) as f64;
-    let at_height = beams
+    let at_height = sample
         .iter()
-        .map(|beam| world_from_map.rotation * beam.point + world_from_map.translation.vector)
+        .map(|judged| world_from_map.rotation * judged.in_map.point + world_from_map.translation.vector)
         .filter(|point| (point.z - height).abs() < CUT_M);
     let cells: BTreeSet<(i64, i64)> =
         at_height.map(|point| ((point.x / CELL_M).round() as i64, (point.y / CELL_M).round() as i64)).collect();

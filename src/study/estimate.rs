@@ -1,14 +1,14 @@
 //! From a recording to a judged estimate.
 
 use super::calibration::calibration;
+use super::cloud::{Surroundings, cloud_metrics};
 use super::open_loop::{OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
 use crate::estimation::EstimatorSpec;
-use crate::geometry::Surface;
 use crate::recording::{FoundCalibration, Preference, Reader, Selection};
 use crate::report::{Metrics, OpenLoopMetrics};
-use crate::simulation::SimulationSummary;
+use crate::simulation::{SimulationSummary, carrier_of};
 use crate::spec::Source;
 use crate::world::World;
 use std::path::Path;
@@ -61,8 +61,9 @@ pub fn estimate_recording(
     let reader = Reader::open(path)?;
     let manifest = Manifest::within(&reader).unwrap_or_else(Manifest::of_recording_by_others);
     let world = world_of(&manifest, watch);
-    let surface = world.as_ref().map(|world| world as &dyn Surface);
-    let origin = Origin { manifest: &manifest.with_estimator(&wishes.estimator), surface, simulation: None };
+    let carrier = manifest.specs.as_ref().map(|specs| carrier_of(&specs.head)).unwrap_or_default();
+    let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
+    let origin = Origin { manifest: &manifest.with_estimator(&wishes.estimator), surroundings, simulation: None };
     estimate_in(&reader, folder, wishes, &origin, watch)
 }
 
@@ -70,8 +71,8 @@ pub fn estimate_recording(
 pub(super) struct Origin<'a> {
     /// Its manifest, with the estimator's settings.
     pub manifest: &'a Manifest,
-    /// The surfaces that the beams met.
-    pub surface: Option<&'a dyn Surface>,
+    /// What the beams met.
+    pub surroundings: Option<Surroundings<'a>>,
     /// The simulation, where it has just been.
     pub simulation: Option<&'a SimulationSummary>,
 }
@@ -121,7 +122,7 @@ pub(super) fn estimate_in(
         open_loop: OpenLoopMetrics { fixed_views, ..open_loop },
         ..metrics(origin, &run, &registered, known.as_ref())
     };
-    let plots = artefacts::plots(&run, known.as_ref(), &registered.in_map);
+    let plots = artefacts::plots(&run, known.as_ref(), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
     Ok(Outcome { metrics, losses: run.losses })
 }
@@ -137,7 +138,7 @@ fn metrics(origin: &Origin, run: &OpenLoopRun, registered: &Registered, known: O
         duration_s: origin.simulation.map_or(run.acquisition_s, |summary| summary.duration_s),
         simulation: origin.simulation.map(judge::simulation_metrics).unwrap_or_default(),
         clock: judge::clock_metrics(run, known),
-        cloud: judge::cloud_metrics(registered, world_from_map.as_ref(), origin.surface),
+        cloud: cloud_metrics(registered, world_from_map.as_ref(), origin.surroundings),
         peak_rss_mib: memory::peak_rss_mib(),
         ..Metrics::default()
     }

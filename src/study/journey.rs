@@ -1,5 +1,6 @@
 //! The whole journey.
 
+use super::cloud::Surroundings;
 use super::estimate::{Origin, estimate_in};
 use super::{Manifest, Outcome, StudyError, Watch, Wishes, record};
 use crate::recording::Reader;
@@ -28,6 +29,7 @@ pub fn journey(
 
     // From here on there is only the file: estimate, register, judge by the truth that is kept apart in it, report.
     let reader = Reader::open(&recording)?;
-    let origin = Origin { manifest: &manifest, surface: Some(simulation.world()), simulation: Some(&summary) };
+    let surroundings = Some(Surroundings { world: simulation.world(), carrier: simulation.carrier() });
+    let origin = Origin { manifest: &manifest, surroundings, simulation: Some(&summary) };
     estimate_in(&reader, folder, wishes, &origin, watch)
 }

@@ -1,17 +1,13 @@
 //! An estimate against the truth, where the recording has it.
 
 use super::open_loop::OpenLoopRun;
-use super::register::{Beam, Registered};
 use super::{StudyError, Watch};
-use crate::evaluation::{CloudErrors, Errors, EvaluationError, Pairs, clock_error, consistency, drift, relative_error};
-use crate::geometry::{Pose, Surface, Trajectory, Vector};
+use crate::evaluation::{Errors, EvaluationError, Pairs, clock_error, consistency, drift, relative_error};
+use crate::geometry::{Pose, Trajectory};
 use crate::recording::{Reader, RecordingError, Truth};
-use crate::report::{ClockMetrics, CloudMetrics, OpenLoopMetrics, SimulationMetrics};
+use crate::report::{ClockMetrics, OpenLoopMetrics, SimulationMetrics};
 use crate::simulation::SimulationSummary;
 use crate::time::{Span, Stamp};
-
-/// How far from a point a surface is looked for, m.
-const REACH_M: f64 = 1.0;
 
 /// The truth as far as an estimate asks for it.
 pub(super) struct Known {
@@ -37,6 +33,7 @@ pub(super) fn truth_of(
             clock_offsets.push((now + clock.lidar_ahead, clock.imu_after_lidar().seconds()));
             None
         }
+        Ok(Truth::Base(..)) => None,
         Err(error) => Some(Err::<(Stamp, Pose), RecordingError>(error)),
     });
     let pairs = Pairs::gather(map_from_head, heads)?;
@@ -108,7 +105,7 @@ pub(super) fn imu_only(
     let Some(map_from_head) = known(told, watch) else { return Ok(None) };
     let heads = reader.truth().filter_map(|told| match told {
         Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
-        Ok(Truth::Clock(..)) => None,
+        Ok(Truth::Base(..) | Truth::Clock(..)) => None,
         Err(error) => Some(Err(error)),
     });
     let pairs = Pairs::gather(map_from_head, heads)?;
@@ -121,32 +118,5 @@ pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Known>) -> ClockMe
     ClockMetrics {
         offset_rmse_s: error.map(|error| error.offset_rmse_s),
         offset_end_error_s: error.map(|error| error.offset_end_error_s),
-    }
-}
-
-/// The cloud's figures: its sample against the true surfaces, where both they and the alignment are known.
-pub(super) fn cloud_metrics(
-    registered: &Registered,
-    world_from_map: Option<&Pose>,
-    surface: Option<&dyn Surface>,
-) -> CloudMetrics {
-    let points = Some(registered.points);
-    let (Some(world_from_map), Some(surface)) = (world_from_map, surface) else {
-        return CloudMetrics { points, ..CloudMetrics::default() };
-    };
-    let errors = |beams: &[Beam], world_from: &Pose| {
-        let moved = |at: &Vector| world_from.rotation * at + world_from.translation.vector;
-        let seen: Vec<_> = beams.iter().map(|beam| (moved(&beam.point), Some(moved(&beam.origin)))).collect();
-        CloudErrors::to_surface(surface, &seen, REACH_M).summary()
-    };
-    let estimated = errors(&registered.in_map, world_from_map);
-    let by_truth = errors(&registered.by_truth, &Pose::identity());
-    CloudMetrics {
-        points,
-        bias_m: estimated.map(|cloud| cloud.bias_m),
-        sigma_m: estimated.map(|cloud| cloud.sigma_m),
-        p95_m: estimated.map(|cloud| cloud.p95_m),
-        far_fraction: estimated.map(|cloud| cloud.beyond_reach),
-        sigma_by_truth_m: by_truth.map(|cloud| cloud.sigma_m),
     }
 }

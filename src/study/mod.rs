@@ -9,6 +9,7 @@
 mod artefacts;
 mod cadence;
 mod calibration;
+mod cloud;
 pub mod coverage;
 mod error;
 mod estimate;

@@ -1,6 +1,6 @@
 //! Beams become a cloud: in a file, for viewers, and a sample of it to be judged.
 
-use super::truth_near::TruthNear;
+use super::truth_near::{TrueInstant, TruthNear};
 use super::{Stage, StudyError, Watch};
 use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
@@ -22,14 +22,21 @@ pub(super) struct Beam {
     pub origin: Vector,
 }
 
+/// A beam of the sample, to be judged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Judged {
+    /// By the estimate, in the map.
+    pub in_map: Beam,
+    /// By the true pose, in the world, and what else is true at its instant; `None` where there is no truth.
+    pub by_truth: Option<(Beam, TrueInstant)>,
+}
+
 /// The cloud, and what else a second reading of the recording gave.
 pub(super) struct Registered {
     /// Points in the cloud.
     pub points: u64,
-    /// A sample of the beams, in the map.
-    pub in_map: Vec<Beam>,
-    /// The same beams by the true trajectory, in the world; none where there is no truth.
-    pub by_truth: Vec<Beam>,
+    /// A sample of the beams.
+    pub sample: Vec<Judged>,
     /// What the IMU alone says.
     pub dead_reckoning: Result<Trajectory, EvaluationError>,
 }
@@ -63,8 +70,7 @@ impl Registration<'_> {
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
             points: 0,
-            in_map: Vec::new(),
-            by_truth: Vec::new(),
+            sample: Vec::new(),
             failure: None,
             watch,
         };
@@ -73,12 +79,7 @@ impl Registration<'_> {
         if let Some(failure) = beams.failure {
             return Err(failure);
         }
-        Ok(Registered {
-            points: beams.points as u64,
-            in_map: beams.in_map,
-            by_truth: beams.by_truth,
-            dead_reckoning: beams.reckoning.finish(),
-        })
+        Ok(Registered { points: beams.points as u64, sample: beams.sample, dead_reckoning: beams.reckoning.finish() })
     }
 }
 
@@ -95,8 +96,7 @@ struct Beams<'a, 'w, 's> {
     ready: std::vec::IntoIter<CloudPoint>,
     span: Option<(Stamp, Stamp)>,
     points: usize,
-    in_map: Vec<Beam>,
-    by_truth: Vec<Beam>,
+    sample: Vec<Judged>,
     failure: Option<StudyError>,
     watch: &'w mut Watch<'s>,
 }
@@ -161,12 +161,10 @@ impl Beams<'_, '_, '_> {
             if !self.judged.keeps(index) {
                 continue;
             }
-            self.in_map.push(in_map);
-            if let Some(truth) = &mut self.truth
-                && let Some(world_from_head) = truth.at(stamp)?
-            {
-                self.by_truth.push(self.end_and_origin(&world_from_head, &point_in_laser));
-            }
+            let instant = self.truth.as_mut().map(|truth| truth.at(stamp)).transpose()?.flatten();
+            let by_truth =
+                instant.map(|instant| (self.end_and_origin(&instant.world_from_head, &point_in_laser), instant));
+            self.sample.push(Judged { in_map, by_truth });
         }
         Ok(shown)
     }

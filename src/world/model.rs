@@ -73,6 +73,13 @@ impl World {
         Some(Hit { distance_m: hit.distance_m + skipped, ..hit })
     }
 
+    /// How far a point is from the nearest of what moves at `t_s`, seconds of true time since the run's start, m; `None` where
+    /// that is more than `reach_m`. [`Surface::nearest`] knows what stands alone.
+    pub fn distance_to_movers_m(&self, point_in_world: &Vector, reach_m: f64, t_s: f64) -> Option<f64> {
+        let distances = self.movers.iter().filter_map(|mover| mover.distance(point_in_world, reach_m, t_s));
+        distances.min_by(f64::total_cmp)
+    }
+
     /// A material of this world.
     pub fn material(&self, id: MaterialId) -> &Material {
         &self.materials[usize::from(id.0)]

@@ -34,6 +34,16 @@ impl Mover {
         crossing.normal = world_from_body * crossing.normal;
         Some(crossing)
     }
+
+    /// How far a point is at time `time_s` from its surfaces, where that is within `reach`.
+    pub fn distance(&self, point: &Vector, reach: f64, time_s: f64) -> Option<f64> {
+        let world_from_body = self.path.at(time_s);
+        if (point - world_from_body.translation.vector).norm() > self.radius + reach {
+            return None;
+        }
+        let in_body = world_from_body.inverse_transform_point(&(*point).into()).coords;
+        Some((self.surfaces.nearest(&in_body, reach)?.point_in_world - in_body).norm())
+    }
 }
 
 /// Poses at increasing times.

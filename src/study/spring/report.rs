@@ -171,7 +171,9 @@ fn fallen(spec: &HeadSpec, heaviest_head_kg: Option<f64>, because: String) -> Re
             mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
             ..Design::unmounted()
         },
-        LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } | LinkageSpec::Suspension { .. } => Design::unmounted(),
+        LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } | LinkageSpec::Suspension { .. } => {
+            Design::unmounted()
+        }
     };
     Ok(SpringReport {
         head_mass_kg,
