@@ -28,7 +28,7 @@ pub struct Points {
 }
 
 /// A local maximum of a gain curve.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Peak {
     /// Where, Hz.
     pub freq_hz: f64,
@@ -149,9 +149,10 @@ impl FrequencyResponse {
         let column = index(input);
         let start = self.stuck.column(column).map(|x| Complex::new(x, 0.0));
         let amplitudes = self.amplitudes(column, TAU * freq_hz);
-        self.terms.iter().zip(&amplitudes).fold(start.into_owned(), |sum, (term, amplitude)| {
-            sum + term.shape.map(|x| amplitude * x)
-        })
+        self.terms
+            .iter()
+            .zip(&amplitudes)
+            .fold(start.into_owned(), |sum, (term, amplitude)| sum + term.shape.map(|x| amplitude * x))
     }
 
     /// How much of each mode the base's displacement along `input` calls up at `omega`; nought beyond the last mode.
@@ -187,9 +188,10 @@ impl FrequencyResponse {
         };
         let start = Complex::new(sees(&|k| self.stuck[(k, row)]), 0.0);
         let amplitudes = self.amplitudes(row, omega);
-        self.terms.iter().zip(&amplitudes).fold(start, |sum, (term, amplitude)| {
-            sum + amplitude * sees(&|k| term.shape[k])
-        })
+        self.terms
+            .iter()
+            .zip(&amplitudes)
+            .fold(start, |sum, (term, amplitude)| sum + amplitude * sees(&|k| term.shape[k]))
     }
 
     /// The modulus of [`FrequencyResponse::along`].
@@ -220,9 +222,8 @@ impl FrequencyResponse {
     /// Frequencies from 0 to `up_to_hz`, dense by half a bandwidth about the modes that `axis` calls up.
     fn grid(&self, axis: Axis, up_to_hz: f64) -> Vec<f64> {
         let column = index(axis);
-        let part = |term: &Term| {
-            term.force(column, term.omega).norm() * term.shape[column].abs() / (term.omega * term.omega)
-        };
+        let part =
+            |term: &Term| term.force(column, term.omega).norm() * term.shape[column].abs() / (term.omega * term.omega);
         let greatest = self.terms.iter().map(part).fold(0.0, f64::max);
         let mut grid: Vec<f64> = (0..=64).map(|k| up_to_hz * f64::from(k) / 64.0).collect();
         for term in self.terms.iter().filter(|term| part(term) > 1e-9 * greatest) {

@@ -30,4 +30,4 @@ pub use estimate::{Outcome, Wishes, estimate_recording};
 pub use journey::journey;
 pub use manifest::Manifest;
 pub use record::record;
-pub use watch::{News, Stage, Watch};
+pub use watch::{Hear, News, Stage, Watch};
