@@ -2,7 +2,9 @@
 
 use super::figures::Design;
 use super::{Figures, Shake, closed_form, simulated};
-use crate::dynamics::{Bearing, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg};
+use crate::dynamics::{
+    Bearing, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg,
+};
 use crate::elasticity::{Coil, Matrix6, SpringDesign, buckling_load_n, loaded_stiffness};
 use crate::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2, roll_pitch_yaw};
 use crate::sensors::Lidar;
