@@ -1,6 +1,6 @@
 //! `zsim check`: are these scenes and specs right?
 
-use super::arguments::Global;
+use super::arguments::{Global, any_route};
 use super::{End, failure, output};
 use clap::Args;
 use serde_json::json;
@@ -8,7 +8,6 @@ use std::path::Path;
 use zsim::dynamics::{HeadModel, HeadSpec};
 use zsim::elasticity::{ElasticityError, SpringSpec};
 use zsim::estimation::{EstimationError, EstimatorSpec};
-use zsim::geometry::{Route, Vector};
 use zsim::motion::MotionSpec;
 use zsim::random::Seed;
 use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
@@ -160,10 +159,4 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
         },
         Kind::Experiment => parse_as(kind, source),
     }
-}
-
-/// A way that any motion can follow: round a hall of 20 m by 10 m.
-fn any_route() -> Route {
-    let corners = [(0.0, 0.0), (20.0, 0.0), (20.0, 10.0), (0.0, 10.0)];
-    Route { points_in_world: corners.map(|(x, y)| Vector::new(x, y, 0.0)).to_vec(), closed: true }
 }

@@ -7,6 +7,8 @@ mod arguments;
 mod bars;
 mod check;
 mod completions;
+mod coverage;
+mod coverage_words;
 mod estimate;
 mod evaluate;
 mod failure;
@@ -52,6 +54,7 @@ enum Verb {
     Evaluate(evaluate::Arguments),
     Gains(gains::Arguments),
     Spring(spring::Arguments),
+    Coverage(coverage::Arguments),
     Check(check::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
@@ -92,6 +95,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Evaluate(arguments) => evaluate::run(arguments, global),
         Verb::Gains(arguments) => gains::run(arguments, global),
         Verb::Spring(arguments) => spring::run(arguments, global),
+        Verb::Coverage(arguments) => coverage::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),
         Verb::Info(arguments) => info::run(arguments, global),
         Verb::Completions(arguments) => completions::run(arguments),
