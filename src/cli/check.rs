@@ -14,11 +14,12 @@ use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
 use zsim::simulation::EPOCH;
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::StudyError;
+use zsim::study::reproduction::ExperimentSpec;
 use zsim::study::spring::design::{DesignSpec, Search};
 use zsim::world::{SceneSpec, World, WorldError};
 
 /// The kinds that there is a check for.
-const KINDS: [Kind; 9] = [
+const KINDS: [Kind; 10] = [
     Kind::Scene,
     Kind::Head,
     Kind::Spring,
@@ -28,6 +29,7 @@ const KINDS: [Kind; 9] = [
     Kind::Clock,
     Kind::Estimator,
     Kind::Study,
+    Kind::Experiment,
 ];
 
 /// Check scenes and specs: line and column of what is wrong
@@ -117,7 +119,7 @@ fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
         Kind::Estimator => parse::<EstimatorSpec>(source).map(drop),
         Kind::Spring => parse::<SpringSpec>(source).map(drop),
         Kind::Study => parse::<DesignSpec>(source).map(drop),
-        Kind::Experiment => Err(SpecError::plain(source.name.clone(), format!("a {} cannot be checked", kind.noun()))),
+        Kind::Experiment => parse::<ExperimentSpec>(source).map(drop),
     }
 }
 
@@ -157,6 +159,6 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
             Err(StudyError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),
         },
-        Kind::Experiment => parse_as(kind, source),
+        Kind::Experiment => parse::<ExperimentSpec>(source)?.check(source),
     }
 }

@@ -17,6 +17,7 @@ mod info;
 mod journey;
 mod output;
 mod quantity;
+mod reproduce;
 mod simulate;
 mod spring;
 mod spring_words;
@@ -55,6 +56,7 @@ enum Verb {
     Gains(gains::Arguments),
     Spring(spring::Arguments),
     Coverage(coverage::Arguments),
+    Reproduce(reproduce::Arguments),
     Check(check::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
@@ -96,6 +98,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Gains(arguments) => gains::run(arguments, global),
         Verb::Spring(arguments) => spring::run(arguments, global),
         Verb::Coverage(arguments) => coverage::run(arguments, global),
+        Verb::Reproduce(arguments) => reproduce::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),
         Verb::Info(arguments) => info::run(arguments, global),
         Verb::Completions(arguments) => completions::run(arguments),

@@ -83,8 +83,7 @@ impl Cord {
         let relative = now.relative_twist();
         let (velocity, turning) = split(&relative);
         let damping = self.damping_n_s_per_m * tautness;
-        let tension_n =
-            self.stiffness_n_per_m * stretch + damping * along.dot(&(velocity + turning.cross(&lever)));
+        let tension_n = self.stiffness_n_per_m * stretch + damping * along.dot(&(velocity + turning.cross(&lever)));
         // A damper that would push lets go.
         if tension_n > 0.0 {
             forces.add_force(&lever, &(along * -tension_n));

@@ -39,8 +39,10 @@ impl UniversalJoint {
 
     /// The axes of the two turns: the base's and the head's, in the frame in which the poses are.
     fn axes(&self, base: &Pose, head: &Pose) -> [Vector; 2] {
-        [base.rotation * self.ends.base_from_foot.rotation * Vector::x(),
-         head.rotation * self.ends.head_from_top.rotation * Vector::y()]
+        [
+            base.rotation * self.ends.base_from_foot.rotation * Vector::x(),
+            head.rotation * self.ends.head_from_top.rotation * Vector::y(),
+        ]
     }
 
     /// Adds the torsion springs' torque.

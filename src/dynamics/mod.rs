@@ -28,7 +28,8 @@ mod statics;
 pub use body::Body;
 pub use capacity::heaviest_kg;
 pub use elements::{
-    CableSpec, CordSpec, CordStiffnessSpec, ElementSpec, FloatSpec, SpringElementSpec, SpringMassSpec, UniversalJointSpec,
+    CableSpec, CordSpec, CordStiffnessSpec, ElementSpec, FloatSpec, SpringElementSpec, SpringMassSpec,
+    UniversalJointSpec,
 };
 pub use error::DynamicsError;
 pub use head::HeadModel;

@@ -74,12 +74,7 @@ impl MountedSpring {
     ///
     /// # Errors
     /// When a segmented spring finds no equilibrium.
-    pub fn push(
-        &self,
-        state: &mut SpringState,
-        now: &Instant<'_>,
-        forces: &mut Forces,
-    ) -> Result<(), ElasticityError> {
+    pub fn push(&self, state: &mut SpringState, now: &Instant<'_>, forces: &mut Forces) -> Result<(), ElasticityError> {
         let between = self.ends.at(now);
         let on_top = self.spring.wrench(state, &between.foot_from_top, &between.deformation)?;
         forces.wrench += between.to_centre(&on_top);

@@ -146,8 +146,7 @@ impl<'a> SprungMotion<'a> {
     ) -> Result<Kinematics, DynamicsError> {
         let twist = self.engine.twist();
         let gravity_in_world = gravity_in_world();
-        let now =
-            Instant { base, world_from_head: &self.pose, twist: &twist, body: self.body, hold, gravity_in_world };
+        let now = Instant { base, world_from_head: &self.pose, twist: &twist, body: self.body, hold, gravity_in_world };
         let forces = self.sprung.law.forces(&mut self.state, &now)?;
         check_bounds(t_s, forces.turn_rad, &twist)?;
         let rotation = self.pose.rotation.to_rotation_matrix().into_inner();

@@ -84,8 +84,7 @@ impl<'a> Mount<'a> {
                 spring, segments, base_from_spring, head_from_spring, spring_mass, cable, ..
             } => {
                 let ends = Ends { base_from_foot: base_from_spring.pose(), head_from_top: head_from_spring.pose() };
-                let written =
-                    Written { spring, segments: *segments, ends, mass: *spring_mass, cable: cable.as_ref() };
+                let written = Written { spring, segments: *segments, ends, mass: *spring_mass, cable: cable.as_ref() };
                 site.add_spring(&written, source)?;
             }
             LinkageSpec::Suspension { elements, base_from_head, .. } => {
@@ -105,11 +104,15 @@ impl Site<'_> {
     fn add(&mut self, element: &ElementSpec, source: &Source) -> Result<(), SpecError> {
         match element {
             ElementSpec::Spring(SpringElementSpec {
-                spring, segments, base_from_spring, head_from_spring, spring_mass, cable,
+                spring,
+                segments,
+                base_from_spring,
+                head_from_spring,
+                spring_mass,
+                cable,
             }) => {
                 let ends = Ends { base_from_foot: base_from_spring.pose(), head_from_top: head_from_spring.pose() };
-                let written =
-                    Written { spring, segments: *segments, ends, mass: *spring_mass, cable: cable.as_ref() };
+                let written = Written { spring, segments: *segments, ends, mass: *spring_mass, cable: cable.as_ref() };
                 self.add_spring(&written, source)?;
             }
             ElementSpec::Cord(cord) => self.cords.push(Cord::of(cord)),

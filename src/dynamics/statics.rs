@@ -117,7 +117,9 @@ impl Statics<'_> {
                 let turn_deg = start.rotation.angle_to(&pose.rotation).to_degrees();
                 let least = eigen.eigenvalues.imin();
                 return match eigen.eigenvalues[least] {
-                    square if square.abs() < LOOSE => Err(Unrest::Loose(NAMES[eigen.eigenvectors.column(least).iamax()])),
+                    square if square.abs() < LOOSE => {
+                        Err(Unrest::Loose(NAMES[eigen.eigenvectors.column(least).iamax()]))
+                    }
                     square if square < 0.0 => Err(Unrest::Falls),
                     _ if turn_deg < 45.0 => Ok(pose),
                     _ => Err(Unrest::Elsewhere { turn_deg }),

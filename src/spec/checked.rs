@@ -63,7 +63,9 @@ where
 {
     let numbers = <[f64; N]>::deserialize(deserializer)?;
     match numbers.iter().find(|x| !(x.is_finite() && **x >= 0.0)) {
-        Some(bad) => Err(D::Error::custom(format!("expected {N} finite numbers of at least 0, found {bad} among them"))),
+        Some(bad) => {
+            Err(D::Error::custom(format!("expected {N} finite numbers of at least 0, found {bad} among them")))
+        }
         None => Ok(numbers),
     }
 }
