@@ -7,7 +7,7 @@ use crate::geometry::{Matrix, Pose, Vector};
 use nalgebra::Point3;
 
 /// Stretch over which a cord goes from slack to taut, in parts of its length: fibres that come to bear one by one.
-const TOE: f64 = 1e-3;
+const TOE: f64 = 1e-4;
 
 /// A cord without mass.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -135,3 +135,67 @@ impl Float {
         self.spec.density_kg_per_m3 * gravity_in_base.norm() * self.submerged(&up, &surface).0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::Body;
+    use crate::geometry::{Kinematics, gravity_in_world};
+    use approx::assert_relative_eq;
+
+    const SPEC: FloatSpec = FloatSpec {
+        base_surface_m: [0.0, 0.0, 1.0],
+        head_bottom_m: [0.0, 0.0, -0.02],
+        radius_m: 0.05,
+        height_m: 0.04,
+        density_kg_per_m3: 1000.0,
+        drag_n_s_per_m: 2.0,
+        drag_n_s2_per_m2: 30.0,
+        drag_nm_s_per_rad: 0.01,
+        added_mass_kg: 0.0,
+    };
+
+    fn body() -> Body {
+        Body { mass_kg: 0.1, centre_of_mass_in_head: Vector::zeros(), inertia_in_head: Matrix::identity() * 1e-4 }
+    }
+
+    fn forces(head: &Pose, twist: &Vector6) -> Forces {
+        let now = Instant {
+            base: &Kinematics::at_rest(Pose::identity()),
+            world_from_head: head,
+            twist,
+            body: &body(),
+            hold: 0.0,
+            gravity_in_world: gravity_in_world(),
+        };
+        let mut forces = Forces::none();
+        Float::of(&SPEC).push(&now, &mut forces);
+        forces
+    }
+
+    #[test]
+    fn a_float_under_water_rises_at_its_terminal_velocity() {
+        // rho g V - m g = c v + q v^2 with V = pi r^2 h: 3.081 - 0.981 = 2.100 N, v = 0.2334 m/s.
+        let lift = 9.80665 * (1000.0 * PI * 0.05 * 0.05 * 0.04 - 0.1);
+        let v = (-2.0 + (4.0 + 120.0 * lift).sqrt()) / 60.0;
+        let forces = forces(&Pose::identity(), &Vector6::new(0.0, 0.0, v, 0.0, 0.0, 0.0));
+        assert_relative_eq!(forces.wrench[2], 0.1 * 9.80665, max_relative = 1e-12);
+        assert_relative_eq!(forces.damping[(2, 2)], 2.0 + 60.0 * v, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn buoyancy_is_the_slope_of_its_energy_at_any_lean() {
+        let float = Float::of(&SPEC);
+        let turn = crate::geometry::Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.2));
+        for depth_m in [0.99, 1.0, 1.02, 0.5, 1.2] {
+            let pose = Pose::from_parts(Vector::new(0.1, -0.2, depth_m).into(), turn);
+            let energy =
+                |d: &Vector6| float.potential_j(&Pose::identity(), &body().displaced(&pose, d), &gravity_in_world());
+            let wrench = forces(&pose, &Vector6::zeros()).wrench;
+            for k in 0..6 {
+                let d = Vector6::ith(k, 1e-6);
+                assert_relative_eq!((energy(&-d) - energy(&d)) / 2e-6, wrench[k], epsilon = 1e-6, max_relative = 1e-4);
+            }
+        }
+    }
+}

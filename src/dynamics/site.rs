@@ -15,6 +15,7 @@ use crate::geometry::{Pose, Rotation, gravity_in_world};
 use crate::spec::{Source, SpecError};
 
 /// What holds a head, before any load.
+#[expect(clippy::large_enum_variant, reason = "there is one a head, for a moment")]
 pub(super) enum Mount<'a> {
     /// Nothing gives: `base_from_head`.
     Rigid(Pose),
@@ -144,7 +145,7 @@ impl Site<'_> {
         if let Some(cable) = written.cable {
             let cord = Cord::through(cable, &written.ends).ok_or_else(|| {
                 let message = format!(
-                    "a cable of {} m under {} N would be {} m long without its tension, by its stiffness of {} N/m",
+                    "a cable of {} m under {} N would be {:.3} m long without its tension, by its stiffness of {} N/m",
                     cable.length_m,
                     cable.tension_n,
                     cable.length_m - cable.tension_n / cable.stiffness_n_per_m,

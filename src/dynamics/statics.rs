@@ -18,6 +18,10 @@ const LOCKED: [usize; 4] = [0, 1, 2, 5];
 /// Square of the angular frequency below which nothing holds a head, (rad/s)^2: a swing of three minutes.
 const LOOSE: f64 = 1e-3;
 
+/// A rest that is farther than these from where the spec puts the head is not the one that is meant.
+const FAR_MM: f64 = 200.0;
+const FAR_DEG: f64 = 45.0;
+
 /// The head's motions, in order.
 const NAMES: [&str; 6] =
     ["shift along x", "shift along y", "shift along z", "turn about x", "turn about y", "turn about z"];
@@ -44,8 +48,8 @@ pub(super) enum Unrest {
     Falls,
     #[error("it finds no rest near where the spec puts it: it falls, sinks or turns over")]
     Nowhere,
-    #[error("it rests only {turn_deg:.0} degrees from where the spec puts it")]
-    Elsewhere { turn_deg: f64 },
+    #[error("it rests only {shift_mm:.0} mm and {turn_deg:.0} degrees from where base_from_head puts it")]
+    Elsewhere { shift_mm: f64, turn_deg: f64 },
     #[error("nothing holds it against a {0}")]
     Loose(&'static str),
 }
@@ -115,14 +119,16 @@ impl Statics<'_> {
             }
             if size < 1e-7 {
                 let turn_deg = start.rotation.angle_to(&pose.rotation).to_degrees();
+                let centre = nalgebra::Point3::from(self.body.centre_of_mass_in_head);
+                let shift_mm = 1e3 * (pose * centre - start * centre).norm();
                 let least = eigen.eigenvalues.imin();
                 return match eigen.eigenvalues[least] {
                     square if square.abs() < LOOSE => {
                         Err(Unrest::Loose(NAMES[eigen.eigenvectors.column(least).iamax()]))
                     }
                     square if square < 0.0 => Err(Unrest::Falls),
-                    _ if turn_deg < 45.0 => Ok(pose),
-                    _ => Err(Unrest::Elsewhere { turn_deg }),
+                    _ if turn_deg < FAR_DEG && (shift_mm < FAR_MM || self.law.joint.is_some()) => Ok(pose),
+                    _ => Err(Unrest::Elsewhere { shift_mm, turn_deg }),
                 };
             }
             step *= (0.2 / size).min(1.0);

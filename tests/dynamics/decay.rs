@@ -1,4 +1,4 @@
-use crate::heads::{Table, Twitch, displacement, shipped, states};
+use crate::heads::{Table, Twitch, built, displacement, jointed, shipped, states, suspended, upright_spring};
 use approx::assert_relative_eq;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
@@ -52,6 +52,32 @@ fn each_mode_decays_with_the_frequency_and_damping_of_the_linear_model() {
             let (frequency_hz, damping_ratio) = decay_of(&model, mode);
             assert_relative_eq!(frequency_hz, mode.frequency_hz, max_relative = 0.01);
             assert_relative_eq!(damping_ratio, mode.damping_ratio, max_relative = 0.01);
+        }
+    }
+}
+
+#[test]
+fn modes_of_other_linkages_decay_as_the_linear_model_says_too() {
+    let damped = |text: String| {
+        let ratios = "rocking: 0.02, sway: 0.03, bounce: 0.04, yaw: 0.05";
+        built(&text.replace("rocking: 0.0, sway: 0.0, bounce: 0.0, yaw: 0.0", ratios)).unwrap()
+    };
+    let springs: String = [[0.04, 0.0], [-0.02, 0.03], [-0.02, -0.03]]
+        .map(|[x, y]| {
+            upright_spring([x, y, 0.0], [x, y, -0.04]).replace("segments: 1,", "segments: 1, spring_mass: included,")
+        })
+        .concat();
+    let wire = Table { damping: [0.02, 0.03, 0.04, 0.05], more: "spring_mass: included,", ..Table::default() };
+    let heads = [
+        ("springs", damped(suspended([0.0, 0.0, 0.12], &springs))),
+        ("joint", damped(suspended([0.0, 0.0, 0.07], &jointed(0.7)))),
+        ("wire", wire.model()),
+    ];
+    for (name, model) in heads {
+        for mode in model.linear_modes().iter().filter(|mode| mode.frequency_hz < 30.0) {
+            let (frequency_hz, damping_ratio) = decay_of(&model, mode);
+            assert!((frequency_hz / mode.frequency_hz - 1.0).abs() < 0.01, "{name}: {frequency_hz} Hz of {mode:?}");
+            assert!((damping_ratio / mode.damping_ratio - 1.0).abs() < 0.01, "{name}: {damping_ratio} of {mode:?}");
         }
     }
 }

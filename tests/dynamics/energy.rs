@@ -1,4 +1,4 @@
-use crate::heads::{Nodding, Table, Twitch, states};
+use crate::heads::{Nodding, Table, Twitch, built, cord, floating, jointed, moored, states, suspended};
 use approx::assert_relative_eq;
 use zsim::dynamics::{HeadModel, HeadSimulation};
 use zsim::geometry::Vector;
@@ -51,6 +51,33 @@ fn energy_has_no_trend_in_a_segmented_spring_either() {
     assert!((55.0..70.0).contains(&lean), "leans by {lean} degrees");
     let (trend, excursion) = trend_and_excursion(&energy);
     assert!(trend.abs() < 1e-5 && excursion < 1e-3, "a trend of {trend:.1e}, excursions of {excursion:.1e}");
+}
+
+#[test]
+fn energy_has_no_trend_in_any_other_linkage() {
+    let ropes = cord([0.03, 0.0, 0.0], [0.03, 0.0, 0.05], 0.4, 800.0)
+        + &cord([-0.03, 0.0, 0.0], [-0.03, 0.0, 0.05], 0.4, 800.0);
+    let cable = "spring_mass: included, cable: (length_m: 0.12, tension_n: 3.0, stiffness_n_per_m: 500.0, damping_n_s_per_m: 0.0),";
+    let heads = [
+        ("ropes", built(&suspended([0.0, 0.0, -0.46], &ropes)).unwrap(), 0.08, 1.2),
+        ("joint", built(&suspended([0.0, 0.0, 0.07], &jointed(0.7))).unwrap(), 0.08, 0.6),
+        (
+            "float",
+            built(&suspended([0.0, 0.0, 0.05], &(floating([0.0, 0.0, 0.0, 0.1]) + &moored()))).unwrap(),
+            0.01,
+            0.6,
+        ),
+        ("wire and cable", Table { more: cable, ..Table::default() }.model(), 0.06, 0.6),
+    ];
+    for (name, model, amount, period_s) in heads {
+        let (energy, lean) = energies(&model, &Twitch { axis: 0, amount, period_s }, 1e-3, 60.0);
+        let (trend, excursion) = trend_and_excursion(&energy);
+        assert!(lean > 1.0, "{name} leans by {lean} degrees");
+        assert!(
+            trend.abs() < 2e-4 && excursion < 1e-2,
+            "{name}: a trend of {trend:.1e}, excursions of {excursion:.1e}, {lean}"
+        );
+    }
 }
 
 #[test]

@@ -59,6 +59,76 @@ impl Table {
     }
 }
 
+/// A head of 0.40 kg, 9e-4 kg m^2 about x and y and 4e-4 about z, its centre of mass at its origin, in a suspension of
+/// `elements` near `place` in the base; no damping but its elements'.
+pub fn suspended(place: [f64; 3], elements: &str) -> String {
+    let [x, y, z] = place;
+    format!(
+        "(
+    parts: [body(
+        name: \"head\",
+        mass_kg: 0.40,
+        centre_of_mass_m: (0.0, 0.0, 0.0),
+        inertia_kg_m2: (xx: 9e-4, yy: 9e-4, zz: 4e-4),
+    )],
+    head_from_laser: (position_m: (0.0, 0.0, 0.0)),
+    head_from_imu: (position_m: (0.0, 0.0, 0.0)),
+    linkage: suspension(
+        base_from_head: (position_m: ({x:?}, {y:?}, {z:?})),
+        elements: [{elements}],
+        damping_ratio: (rocking: 0.0, sway: 0.0, bounce: 0.0, yaw: 0.0),
+    ),
+)"
+    )
+}
+
+/// A cord between a point of the base and one of the head.
+pub fn cord(base: [f64; 3], head: [f64; 3], length_m: f64, ea_n: f64) -> String {
+    format!(
+        "cord((base_point_m: ({:?}, {:?}, {:?}), head_point_m: ({:?}, {:?}, {:?}), length_m: {length_m:?},
+            stiffness: ea_n({ea_n:?}), damping_n_s_per_m: 0.0)),",
+        base[0], base[1], base[2], head[0], head[1], head[2]
+    )
+}
+
+/// A spring of 20/2.5/8/80 mm from a point of the base straight up to one of the head.
+pub fn upright_spring(base: [f64; 3], head: [f64; 3]) -> String {
+    format!(
+        "spring((spring: coil(coil_diameter_mm: 20.0, wire_diameter_mm: 2.5, active_coils: 8.0, free_length_mm: 80.0,
+            material: spring_steel), segments: 1,
+            base_from_spring: (position_m: ({:?}, {:?}, {:?})), head_from_spring: (position_m: ({:?}, {:?}, {:?})))),",
+        base[0], base[1], base[2], head[0], head[1], head[2]
+    )
+}
+
+/// A float of 80 mm radius and 60 mm height whose bottom is 70 mm below the head's origin, in water, without drag.
+pub fn floating(more: [f64; 4]) -> String {
+    let [linear, squared, turning, added] = more;
+    format!(
+        "float((base_surface_m: (0.0, 0.0, 0.0), head_bottom_m: (0.0, 0.0, -0.07), radius_m: 0.08, height_m: 0.06,
+            density_kg_per_m3: 1000.0, drag_n_s_per_m: {linear:?}, drag_n_s2_per_m2: {squared:?},
+            drag_nm_s_per_rad: {turning:?}, added_mass_kg: {added:?})),"
+    )
+}
+
+/// A universal joint 70 mm below the head's origin.
+pub fn jointed(stiffness_nm_per_rad: f64) -> String {
+    format!(
+        "universal_joint((base_from_joint: (position_m: (0.0, 0.0, 0.0)), head_from_joint: (position_m: (0.0, 0.0, -0.07)),
+            stiffness_nm_per_rad: ({stiffness_nm_per_rad:?}, {stiffness_nm_per_rad:?}))),"
+    )
+}
+
+/// Three soft cords that keep a float in the middle.
+pub fn moored() -> String {
+    [0.0_f64, 120.0, 240.0]
+        .map(|degrees| {
+            let (s, c) = degrees.to_radians().sin_cos();
+            cord([0.3 * c, 0.3 * s, 0.02], [0.08 * c, 0.08 * s, -0.03], 0.15, 0.06)
+        })
+        .concat()
+}
+
 pub fn built(text: &str) -> Result<HeadModel, DynamicsError> {
     let source = Source::in_memory("head.ron", text);
     let spec: HeadSpec = parse(&source)?;

@@ -2,10 +2,13 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod decay;
+mod elements;
 mod energy;
 mod heads;
 mod imu;
 mod invariance;
 mod linkage;
 mod rest;
+mod shipped;
+mod wire;
 mod wrong;

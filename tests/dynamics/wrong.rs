@@ -1,4 +1,4 @@
-use crate::heads::{Table, built};
+use crate::heads::{Table, built, cord, floating, jointed, moored, suspended};
 
 /// The error of the table's head with one piece of its text replaced.
 fn error_with(from: &str, to: &str) -> String {
@@ -87,4 +87,46 @@ fn a_stop_that_the_head_leans_on_already_is_refused() {
     let stop = "end_stop: (angle_deg: 175.0, stiffness_nm_per_rad: 20.0, damping_nm_s_per_rad: 0.02),";
     let error = built(&Table { more: stop, ..Table::default() }.text()).unwrap_err().to_string();
     assert!(error.starts_with("head.ron:19:") && error.contains("below 170"), "{error}");
+}
+
+/// The error of a suspension.
+fn refused(place: [f64; 3], elements: &str) -> String {
+    built(&suspended(place, elements)).unwrap_err().to_string()
+}
+
+#[test]
+fn a_suspension_that_holds_nothing_says_so_in_a_sentence() {
+    let none = refused([0.0; 3], "");
+    assert!(none.starts_with("head.ron:") && none.contains("at least one element"), "{none}");
+    let rope = |x: f64| cord([x, 0.0, 0.0], [x, 0.0, 0.05], 0.4, 800.0);
+    let zero = refused([0.0; 3], &rope(0.0).replace("length_m: 0.4", "length_m: 0.0"));
+    assert!(zero.starts_with("head.ron:") && zero.contains("above 0, found 0"), "{zero}");
+    // On a single rope the head turns about it as it likes.
+    let loose = refused([0.0, 0.0, -0.45], &rope(0.0));
+    assert!(loose.contains("nothing holds it against a turn about z"), "{loose}");
+    // Ropes that would have to push: the head goes through and hangs below.
+    let above = refused([0.0, 0.0, 0.45], &(rope(0.03) + &rope(-0.03)));
+    assert!(above.contains("from where base_from_head puts it"), "{above}");
+    let joints = refused([0.0, 0.0, 0.07], &jointed(0.7).repeat(2));
+    assert!(joints.contains("at most one universal_joint"), "{joints}");
+    // 0.40 kg 70 mm above a joint need 0.27 N m/rad.
+    let falls = refused([0.0, 0.0, 0.07], &jointed(0.2));
+    assert!(falls.contains("cannot stand on its elements") && falls.contains("they carry at most"), "{falls}");
+    // A cylinder of 1.2 litres does not carry it in a fluid of a third of water's density.
+    let sinks = floating([0.0; 4]).replace("density_kg_per_m3: 1000.0", "density_kg_per_m3: 300.0");
+    let sinks = refused([0.0, 0.0, 0.05], &(sinks + &moored()));
+    assert!(sinks.contains("at most 0.3") || sinks.contains("sinks"), "{sinks}");
+}
+
+#[test]
+fn a_wire_or_a_cable_that_is_none_is_refused() {
+    let cable = "cable: (length_m: 0.1, tension_n: 50.0, stiffness_n_per_m: 400.0, damping_n_s_per_m: 0.0),";
+    let error = built(&Table { more: cable, ..Table::default() }.text()).unwrap_err().to_string();
+    assert!(error.starts_with("head.ron:") && error.contains("-0.025 m long without its tension"), "{error}");
+    let text = Table { more: "spring_mass: included,", ..Table::default() }.text();
+    let unknown = text.replace("spring_steel", "moduli(youngs_gpa: 206.0, shear_gpa: 79.3)");
+    let error = built(&unknown).unwrap_err().to_string();
+    assert!(error.contains("density_kg_per_m3"), "{error}");
+    let known = text.replace("spring_steel", "moduli(youngs_gpa: 206.0, shear_gpa: 79.3, density_kg_per_m3: 7850.0)");
+    assert_eq!(built(&known).unwrap().linear_modes(), built(&text).unwrap().linear_modes());
 }

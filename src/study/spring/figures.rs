@@ -4,7 +4,7 @@ use super::{Mounting, Shake, Wire};
 use crate::dynamics::{FrequencyResponse, HeadModel, HeadSpec, HeadState, LinkageSpec, Points, Quantity};
 use crate::elasticity::{SpringDesign, split};
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
-use crate::motion::{Axis, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
+use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
 use crate::random::Seed;
 use crate::sensors::Lidar;
 use crate::spec::Source;
@@ -50,10 +50,8 @@ pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<Fi
     let response = head.frequency_response(&points);
     let swing = Swing { head: &head, response: &response, foot, omega: TAU * frequency_hz, shake };
     let pitch = swing.amplitude()[4].norm();
-    let stress = design.wire.zip(design.mounting).map(|(wire, mounting)| {
-        let phases = (0..12).map(|k| f64::from(k) * TAU / 12.0);
-        phases.map(|phase| mounting.stress_pa(&wire, &swing.state(phase))).fold(0.0, f64::max)
-    });
+    let phases = (0..12).map(|k| f64::from(k) * TAU / 12.0);
+    let stress = phases.filter_map(|phase| design.stress_pa(&swing.state(phase))).reduce(f64::max);
     Ok(design.figures(
         &head,
         &Swung {
@@ -83,21 +81,31 @@ pub fn simulated(
     let drives = vec![DriveSpec { axis: Axis::Pitch, signal }];
     let shaker = MotionSpec::Shaker(ShakerSpec { height_m: 1.1, still_s: 0.5, onset_s: 2.0, drives });
     let duration_s = plan.from_s + plan.duration_s;
-    let motion = shaker.build(&Source::in_memory("the hand's shake", ""), None, duration_s, Seed(1))?;
-    let (mut stress, mut step) = (0.0, 0_usize);
-    let seen = coverage(&head, motion.as_ref(), lidar, plan, |state| {
+    let shake = shaker.build(&Source::in_memory("the hand's shake", ""), None, duration_s, Seed(1))?;
+    let base_from_shaken = Pose::from_parts(head.usual_points().base_in_base.into(), Rotation::identity());
+    let motion = AboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
+    let (mut stress, mut step) = (None, 0_usize);
+    let seen = coverage(&head, &motion, lidar, plan, |state| {
         step += 1;
         // A swing takes hundreds of steps: a tenth of them will do.
-        if let (Some(wire), Some(mounting), true) = (&design.wire, &design.mounting, step.is_multiple_of(10)) {
-            stress = f64::max(stress, mounting.stress_pa(wire, state));
+        if step.is_multiple_of(10) {
+            stress = [stress, design.stress_pa(state)].into_iter().flatten().reduce(f64::max);
         }
     })?;
-    let swung = Swung {
-        field_of_view_deg: seen.field_of_view_deg,
-        rate_deg_per_s: seen.gyro.most_deg_per_s,
-        stress: design.wire.map(|_| stress),
-    };
+    let swung = Swung { field_of_view_deg: seen.field_of_view_deg, rate_deg_per_s: seen.gyro.most_deg_per_s, stress };
     Ok((design.figures(&head, &swung), seen))
+}
+
+/// A base that is shaken at the spring's foot.
+struct AboutFoot<'a> {
+    shake: &'a dyn BaseMotion,
+    shaken_from_base: Pose,
+}
+
+impl BaseMotion for AboutFoot<'_> {
+    fn at(&self, t_s: f64) -> Kinematics {
+        self.shake.at(t_s).of_frame(&self.shaken_from_base)
+    }
 }
 
 /// What differs between the linear swing and the simulated one.
@@ -111,6 +119,8 @@ struct Swung {
 pub(super) struct Design {
     pub wire: Option<Wire>,
     pub mounting: Option<Mounting>,
+    /// Whether the spring bears the head alone, without a cable: then its stress follows from the head's motion.
+    pub is_alone: bool,
     pub free_length_m: Option<f64>,
     pub mass_kg: Option<f64>,
 }
@@ -118,7 +128,7 @@ pub(super) struct Design {
 impl Design {
     pub fn of(spec: &HeadSpec, head: &HeadModel) -> Result<Self, StudyError> {
         let mounting = Mounting::of(spec, head.body());
-        let LinkageSpec::Spring { spring, .. } = &spec.linkage else {
+        let LinkageSpec::Spring { spring, cable, .. } = &spec.linkage else {
             return Ok(Self { mounting, ..Self::unmounted() });
         };
         let coil = match spring.design().map_err(crate::dynamics::DynamicsError::from)? {
@@ -128,6 +138,7 @@ impl Design {
         Ok(Self {
             wire: Wire::of(spring)?,
             mounting,
+            is_alone: cable.is_none(),
             free_length_m: coil.map(|coil| coil.free_length_m()),
             mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
         })
@@ -135,7 +146,13 @@ impl Design {
 
     /// Of a head that has no place.
     pub fn unmounted() -> Self {
-        Self { wire: None, mounting: None, free_length_m: None, mass_kg: None }
+        Self { wire: None, mounting: None, is_alone: false, free_length_m: None, mass_kg: None }
+    }
+
+    /// Greatest stress in the wire at an instant, Pa; nothing where there is no one spring that bears the head alone.
+    pub fn stress_pa(&self, state: &HeadState) -> Option<f64> {
+        let (wire, mounting) = self.wire.zip(self.mounting).filter(|_| self.is_alone)?;
+        Some(mounting.stress_pa(&wire, state))
     }
 
     fn figures(&self, head: &HeadModel, swung: &Swung) -> Figures {

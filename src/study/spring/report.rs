@@ -135,7 +135,7 @@ pub fn spring_report(
         head: Kinematics::at_rest(*head.rest_pose_base_from_head()),
         base: Kinematics::at_rest(Pose::identity()),
     };
-    let stress_pa = design.wire.zip(design.mounting).map(|(wire, mounting)| mounting.stress_pa(&wire, &at_rest));
+    let stress_pa = design.stress_pa(&at_rest);
     let coil = coil_of(spec)?.map(|coil| coil_report(&coil, &design, mass_kg, stress_pa));
     let response = head.frequency_response(&head.usual_points());
     let peak = |axis| (axis_name(axis), response.peak(axis, 20.0, Quantity::Kinematic));

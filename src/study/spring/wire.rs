@@ -98,11 +98,9 @@ pub struct Mounting {
 }
 
 impl Mounting {
-    /// That of a head on one spring; `None` for any other, and for one whose spring shares its load with a cable.
+    /// That of a head on one spring; `None` for any other.
     pub fn of(spec: &HeadSpec, body: &Body) -> Option<Self> {
-        let LinkageSpec::Spring { base_from_spring, head_from_spring, cable: None, .. } = &spec.linkage else {
-            return None;
-        };
+        let LinkageSpec::Spring { base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
         Some(Self { base_from_foot: base_from_spring.pose(), head_from_top: head_from_spring.pose(), body: *body })
     }
 

@@ -1,0 +1,87 @@
+//! The shipped heads: each stands, has modes that make sense, swings in a hand, and answers as its linear model.
+
+use crate::heads::shipped;
+use zsim::dynamics::{DampingSpec, HeadModel, HeadSimulation, load};
+use zsim::motion::Axis;
+use zsim::random::Seed;
+use zsim::spec::{Kind, names};
+use zsim::study::gains::{GainPlan, gain_curve};
+
+/// The heads that are not screwed to their base.
+fn sprung() -> Vec<String> {
+    names(Kind::Head).into_iter().filter(|name| !shipped(name).linear_modes().is_empty()).collect()
+}
+
+#[test]
+fn the_product_ships_a_head_for_every_linkage() {
+    let all = names(Kind::Head);
+    for name in [
+        "handheld",
+        "handheld_2",
+        "vehicle_three_springs",
+        "vehicle_stiff_spring",
+        "backpack",
+        "hanging",
+        "rope_pendulum",
+        "elastic_cables",
+        "float",
+        "universal_joint",
+        "rigid",
+    ] {
+        assert!(all.iter().any(|known| known == name), "{name} is not among {all:?}");
+    }
+}
+
+#[test]
+fn shipped_heads_are_light_and_their_modes_are_a_heads() {
+    for name in sprung() {
+        let model = shipped(&name);
+        assert!(model.body().mass_kg < 0.5, "{name} has {} kg", model.body().mass_kg);
+        for mode in model.linear_modes() {
+            assert!((0.2..60.0).contains(&mode.frequency_hz), "{name}: {} Hz", mode.frequency_hz);
+            assert!((0.0005..1.0).contains(&mode.damping_ratio), "{name}: a ratio of {}", mode.damping_ratio);
+        }
+    }
+}
+
+#[test]
+fn shipped_heads_swing_in_a_hand_for_ten_seconds() {
+    let (spec, source) = zsim::motion::load("wave").unwrap();
+    let motion = spec.build(&source, None, 12.0, Seed(1)).unwrap();
+    for name in sprung() {
+        let model = shipped(&name);
+        let mut lean = 0.0_f64;
+        for state in HeadSimulation::new(&model, motion.as_ref(), 1e-3).unwrap().take(10_000) {
+            let state = state.unwrap_or_else(|error| panic!("{name}: {error}"));
+            let seen = state.base.world_from_body.inv_mul(&state.head.world_from_body);
+            lean = lean.max(seen.rotation.angle_to(&model.rest_pose_base_from_head().rotation).to_degrees());
+        }
+        assert!((0.1..120.0).contains(&lean), "{name} leans by {lean} degrees");
+    }
+}
+
+/// A shipped head whose modes ring down in a simulation's time.
+fn calmed(name: &str) -> HeadModel {
+    let (mut spec, source) = load(name).unwrap();
+    if let Some(ratio) = spec.linkage.damping_ratio_mut() {
+        *ratio = DampingSpec { rocking: 0.04, sway: 0.04, bounce: 0.04, yaw: 0.04 };
+    }
+    HeadModel::new(&spec, &source).unwrap()
+}
+
+#[test]
+fn small_gains_of_shipped_heads_are_those_of_the_closed_form() {
+    let plan = GainPlan { up_to_hz: 12.0, realisations: 2, period_s: Some(20.0), ..GainPlan::default() };
+    for name in sprung().iter().filter(|name| *name != "handheld") {
+        let head = calmed(name);
+        for axis in [Axis::Pitch, Axis::Z] {
+            let curve = gain_curve(&head, axis, &plan).unwrap();
+            let coherent = curve.points.iter().filter(|p| p.coherence > 0.95);
+            for p in coherent.clone() {
+                let allowed = f64::max(0.03 * p.gain_model, 3.0 * p.gain_sigma).max(1e-3);
+                assert!((p.gain - p.gain_model).abs() < allowed, "{name} {axis:?}: {p:?}");
+            }
+            assert!(coherent.count() * 10 > curve.points.len() * 9, "{name} {axis:?}");
+        }
+    }
+}
