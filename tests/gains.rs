@@ -86,15 +86,15 @@ fn curves_are_the_same_bytes_for_any_number_of_threads() {
 fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
     let (mut spec, source) = load("handheld").unwrap();
     let joint = format!(
-        "stiffness(length_mm: 1, rows: [(1e5,0,0,0,0,0),(0,1e5,0,0,0,0),(0,0,1e5,0,0,0),(0,0,0,{k},0,0),(0,0,0,0,{k},0),\
-         (0,0,0,0,0,50)])",
+        "stiffness(length_mm: 1, rows: ((1e5,0,0,0,0,0),(0,1e5,0,0,0,0),(0,0,1e5,0,0,0),(0,0,0,{k},0,0),(0,0,0,0,{k},0),\
+         (0,0,0,0,0,50)))",
         k = stiffness_nm_per_rad
     );
     if let LinkageSpec::Spring { spring, segments, base_from_spring, end_stop, hold, damping_ratio, .. } =
         &mut spec.linkage
     {
         *spring = parse(&Source::in_memory("a joint", joint)).unwrap();
-        *damping_ratio = DampingSpec { rocking: 0.03, sway: 0.03, bounce: 0.03, yaw: 0.03 };
+        *damping_ratio = DampingSpec { rocking: 0.08, sway: 0.08, bounce: 0.08, yaw: 0.08 };
         base_from_spring.roll_pitch_yaw_deg = [if hangs { 180.0 } else { 0.0 }, 0.0, 0.0];
         (*segments, *end_stop, *hold) = (1, None, None);
     }
@@ -105,7 +105,8 @@ fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
 fn a_large_swing_hardens_an_upright_head_and_softens_a_hanging_one() {
     // A pendulum of weight torque w = m g l on a joint k: upright k a - w sin a = (k - w) a + w a^3 / 6, hanging
     // (k + w) a - w a^3 / 6. Under many sines of random phase its swing is normal, and by statistical linearisation a^3 counts
-    // as 3 sigma^2 a: the frequency changes by +- w / (4 (k -+ w)) sigma^2.
+    // as 3 sigma^2 a: the frequency changes by +- w / (4 (k -+ w)) sigma^2. The base is shaken along x: one that turned would
+    // tell the spring's angle from gravity's.
     let (spec, _) = load("handheld").unwrap();
     let lever_m = on_a_joint(1.0, false).body().centre_of_mass_in_head.z
         - match spec.linkage {
@@ -113,15 +114,15 @@ fn a_large_swing_hardens_an_upright_head_and_softens_a_hanging_one() {
             _ => panic!("the handheld head has one spring"),
         };
     let weight_nm = 0.35 * 9.80665 * lever_m;
-    let plan = GainPlan { up_to_hz: 4.0, realisations: 4, ..plan() };
+    let plan = GainPlan { up_to_hz: 4.0, realisations: 6, ..plan() };
     for (hangs, sign) in [(false, 1.0), (true, -1.0)] {
         let stiffness = if hangs { 0.6 * weight_nm } else { 1.6 * weight_nm };
-        let study = swing_study(&on_a_joint(stiffness, hangs), Axis::Pitch, &[0.2, 14.0], &plan, &|_| ()).unwrap();
+        let study = swing_study(&on_a_joint(stiffness, hangs), Axis::X, &[0.2, 12.0], &plan, &|_| ()).unwrap();
         let [small, large] = study.points[..] else { panic!("{study:?}") };
         let sigma = large.swing_rms_deg.to_radians();
         let shift = sign * weight_nm / (4.0 * (stiffness - sign * weight_nm)) * sigma * sigma;
         let measured = large.peak.unwrap().freq_hz / small.peak.unwrap().freq_hz - 1.0;
-        assert!((measured / shift - 1.0).abs() < 0.35, "{measured} for {shift}: {study:?}");
+        assert!((measured / shift - 1.0).abs() < 0.4, "{measured} for {shift}: {study:?}");
     }
 }
 

@@ -39,6 +39,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let (extent, stem) = if arguments.quick { (Extent::Quick, "paper-quick") } else { (Extent::Whole, "paper") };
     let folder = arguments.out.join(stem);
     let mut found = Vec::new();
+    table(arguments, extent, &folder, &found)?;
     for experiment in &wanted {
         let bar = WorkBar::new(global, "reproducing");
         bar.say(experiment.name.clone());
@@ -78,6 +79,7 @@ fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[(String,
         options += &format!(" --out {}", arguments.out.display());
     }
     let path = folder.with_extension("md");
+    std::fs::create_dir_all(&arguments.out).with_context(|| format!("{} cannot be made", arguments.out.display()))?;
     std::fs::write(&path, paper_table(&findings, extent, &options))
         .with_context(|| format!("{} cannot be written", path.display()))
 }
