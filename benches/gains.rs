@@ -34,7 +34,7 @@ fn studies(c: &mut Criterion) {
     group.bench_function("10,000 designs and their Pareto set", |b| {
         let search = Search::new(&spec, &source).unwrap();
         b.iter(|| {
-            let (found, _) = search.explore();
+            let (found, _) = search.explore(&|_| ());
             let costs: Vec<Vec<f64>> = found.iter().map(|c| c.costs.clone()).collect();
             zsim::study::spring::design::pareto_set(&costs)
         });
@@ -42,7 +42,7 @@ fn studies(c: &mut Criterion) {
     let (spec, source) = load("handheld").unwrap();
     let head = HeadModel::new(&spec, &source).unwrap();
     group.bench_function("gain curves of the handheld head, six axes", |b| {
-        b.iter(|| gain_curves(&head, &GainPlan::default()).unwrap());
+        b.iter(|| gain_curves(&head, &GainPlan::default(), &|_| ()).unwrap());
     });
     group.finish();
 }

@@ -4,6 +4,7 @@
 
 use zsim::dynamics::{DampingSpec, HeadModel, LinkageSpec, Quantity, load};
 use zsim::motion::Axis;
+use zsim::spec::{Source, parse};
 use zsim::study::gains::{GainCurve, GainPlan, GainPoint, csv, gain_curve, gain_curves, swing_study};
 
 /// The handheld head with one damping ratio for all modes.
@@ -31,7 +32,7 @@ fn worst(curve: &GainCurve) -> (f64, &GainPoint) {
 
 #[test]
 fn small_gains_of_all_six_axes_are_those_of_the_closed_form() {
-    let curves = gain_curves(&handheld(0.02), &plan()).unwrap();
+    let curves = gain_curves(&handheld(0.02), &plan(), &|_| ()).unwrap();
     assert_eq!(curves.len(), 6);
     for curve in &curves {
         let (peak, model) = (curve.peak.unwrap(), curve.peak_model.unwrap());
@@ -49,8 +50,9 @@ fn small_gains_of_all_six_axes_are_those_of_the_closed_form() {
 fn half_the_time_step_changes_the_peak_by_less_than_a_hundredth() {
     let head = handheld(0.06);
     let plan = GainPlan { up_to_hz: 5.0, ..plan() };
-    let peak =
-        |step_s: f64| gain_curve(&head, Axis::Pitch, &GainPlan { step_s, ..plan.clone() }).unwrap().peak.unwrap();
+    let peak = |step_s: f64| {
+        gain_curve(&head, Axis::Pitch, &GainPlan { step_s, ..plan.clone() }, &|_| ()).unwrap().peak.unwrap()
+    };
     let (whole, half) = (peak(1e-3), peak(0.5e-3));
     assert!((whole.gain / half.gain - 1.0).abs() < 0.01, "{whole:?} {half:?}");
 }
@@ -60,7 +62,7 @@ fn specific_force_is_measured_as_its_closed_form_says() {
     let head = handheld(0.06);
     let plan = GainPlan { quantity: Quantity::SpecificForce, up_to_hz: 5.0, ..plan() };
     for axis in [Axis::X, Axis::Y] {
-        let curve = gain_curve(&head, axis, &plan).unwrap();
+        let curve = gain_curve(&head, axis, &plan, &|_| ()).unwrap();
         let (deviation, point) = worst(&curve);
         assert!(deviation < 1.0, "{axis:?}: {point:?}");
     }
@@ -72,7 +74,7 @@ fn curves_are_the_same_bytes_for_any_number_of_threads() {
     let plan = GainPlan { up_to_hz: 2.0, period_s: Some(2.0), ..plan() };
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        csv(&pool.install(|| gain_curves(&head, &plan).unwrap()))
+        csv(&pool.install(|| gain_curves(&head, &plan, &|_| ()).unwrap()))
     };
     let text = with(1);
     assert_eq!(text, with(2));
@@ -80,10 +82,54 @@ fn curves_are_the_same_bytes_for_any_number_of_threads() {
     assert_eq!(text.lines().count(), 1 + 6 * 4);
 }
 
+/// The handheld head on a joint of this stiffness a millimetre long, with all else stiff; upright or hanging.
+fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
+    let (mut spec, source) = load("handheld").unwrap();
+    let joint = format!(
+        "stiffness(length_mm: 1, rows: ((1e5,0,0,0,0,0),(0,1e5,0,0,0,0),(0,0,1e5,0,0,0),(0,0,0,{k},0,0),(0,0,0,0,{k},0),\
+         (0,0,0,0,0,50)))",
+        k = stiffness_nm_per_rad
+    );
+    if let LinkageSpec::Spring { spring, segments, base_from_spring, end_stop, hold, damping_ratio, .. } =
+        &mut spec.linkage
+    {
+        *spring = parse(&Source::in_memory("a joint", joint)).unwrap();
+        *damping_ratio = DampingSpec { rocking: 0.08, sway: 0.08, bounce: 0.08, yaw: 0.08 };
+        base_from_spring.roll_pitch_yaw_deg = [if hangs { 180.0 } else { 0.0 }, 0.0, 0.0];
+        (*segments, *end_stop, *hold) = (1, None, None);
+    }
+    HeadModel::new(&spec, &source).unwrap()
+}
+
+#[test]
+fn a_large_swing_hardens_an_upright_head_and_softens_a_hanging_one() {
+    // A pendulum of weight torque w = m g l on a joint k: upright k a - w sin a = (k - w) a + w a^3 / 6, hanging
+    // (k + w) a - w a^3 / 6. Under many sines of random phase its swing is normal, and by statistical linearisation a^3 counts
+    // as 3 sigma^2 a: the frequency changes by +- w / (4 (k -+ w)) sigma^2. The base is shaken along x: one that turned would
+    // tell the spring's angle from gravity's.
+    let (spec, _) = load("handheld").unwrap();
+    let lever_m = on_a_joint(1.0, false).body().centre_of_mass_in_head.z
+        - match spec.linkage {
+            LinkageSpec::Spring { head_from_spring, .. } => head_from_spring.position_m[2],
+            _ => panic!("the handheld head has one spring"),
+        };
+    let weight_nm = 0.35 * 9.80665 * lever_m;
+    let plan = GainPlan { up_to_hz: 4.0, realisations: 6, ..plan() };
+    for (hangs, sign) in [(false, 1.0), (true, -1.0)] {
+        let stiffness = if hangs { 0.6 * weight_nm } else { 1.6 * weight_nm };
+        let study = swing_study(&on_a_joint(stiffness, hangs), Axis::X, &[0.2, 12.0], &plan, &|_| ()).unwrap();
+        let [small, large] = study.points[..] else { panic!("{study:?}") };
+        let sigma = large.swing_rms_deg.to_radians();
+        let shift = sign * weight_nm / (4.0 * (stiffness - sign * weight_nm)) * sigma * sigma;
+        let measured = large.peak.unwrap().freq_hz / small.peak.unwrap().freq_hz - 1.0;
+        assert!((measured / shift - 1.0).abs() < 0.4, "{measured} for {shift}: {study:?}");
+    }
+}
+
 #[test]
 fn a_large_swing_moves_the_resonance_and_shows_in_the_coherence() {
     let plan = GainPlan { up_to_hz: 3.0, realisations: 3, ..plan() };
-    let study = swing_study(&handheld(0.06), Axis::Pitch, &[0.1, 15.0], &plan).unwrap();
+    let study = swing_study(&handheld(0.06), Axis::Pitch, &[0.1, 15.0], &plan, &|_| ()).unwrap();
     let [small, large] = study.points[..] else { panic!("{study:?}") };
     let (at_small, at_large) = (small.peak.unwrap(), large.peak.unwrap());
     assert!((at_small.freq_hz / study.peak_model.unwrap().freq_hz - 1.0).abs() < 0.005);

@@ -61,6 +61,23 @@ fn spring_tells_of_a_head_and_of_a_bare_spring() {
 }
 
 #[test]
+fn coverage_tells_of_a_motion_without_a_scene() {
+    let here = tempfile::tempdir().unwrap();
+    let out = here.path().join("seen");
+    let walked = ["coverage", "--motion", "hand", "--duration", "3s", "--json", "--out", out.to_str().unwrap()];
+    let seen = json(&walked);
+    assert!(seen["fraction_seen"].as_f64().unwrap() > 0.1, "{seen}");
+    assert_eq!(seen["gyro"]["limit_deg_per_s"], 600.0);
+    assert_eq!(seen["out"], out.to_str().unwrap());
+    let lines = |name: &str| std::fs::read_to_string(out.join(name)).unwrap().lines().count();
+    // 40 scans a second; 32 by 64 cells.
+    assert_eq!((lines("coverage.csv"), lines("density.csv")), (1 + 120, 1 + 2048));
+    assert!(out.join("coverage.png").is_file());
+    let still = ["coverage", "--head", "rigid", "--motion", "stand", "--duration", "1s"];
+    zsim(&still).assert().success().stdout(predicate::str::contains("share of the sphere seen"));
+}
+
+#[test]
 fn wrong_usage_has_code_2_and_a_sentence() {
     for (arguments, sentence) in [
         (&["gains", "--head", "nowhere"][..], "no such head"),
@@ -69,6 +86,9 @@ fn wrong_usage_has_code_2_and_a_sentence() {
         (&["spring", "nowhere"][..], "no such head"),
         (&["spring", "design", "nowhere"][..], "no such study"),
         (&["spring", "handheld", "--pitch", "0"][..], "--pitch 0"),
+        (&["coverage", "--motion", "nowhere"][..], "no such motion"),
+        (&["coverage", "--duration", "0s"][..], "above zero"),
+        (&["coverage", "--duration", "10ms"][..], "less than two scans"),
     ] {
         zsim(arguments).assert().code(2).stderr(predicate::str::contains(sentence));
     }

@@ -6,6 +6,7 @@ use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use zsim::estimation;
+use zsim::geometry::{Route, Vector};
 use zsim::random::Seed;
 use zsim::simulation::Scenario;
 use zsim::spec::{Source, parse};
@@ -112,4 +113,10 @@ pub(super) fn calibration(path: Option<&Path>) -> anyhow::Result<CalibrationSpec
         Some(path) => Ok(parse(&Source::read(path)?)?),
         None => Ok(CalibrationSpec::default()),
     }
+}
+
+/// A way that any motion can follow: round a hall of 20 m by 10 m.
+pub(super) fn any_route() -> Route {
+    let corners = [(0.0, 0.0), (20.0, 0.0), (20.0, 10.0), (0.0, 10.0)];
+    Route { points_in_world: corners.map(|(x, y)| Vector::new(x, y, 0.0)).to_vec(), closed: true }
 }

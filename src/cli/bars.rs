@@ -68,10 +68,8 @@ impl Bars {
     fn bar_of(&mut self, stage: Stage, has_end: bool) -> &ProgressBar {
         if self.shown.as_ref().is_none_or(|(shown, _)| *shown != stage) {
             self.finish();
-            let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
-            bar.set_style(style(has_end));
+            let bar = bar(has_end);
             bar.set_prefix(name(stage));
-            bar.enable_steady_tick(Duration::from_millis(200));
             return &self.shown.insert((stage, bar)).1;
         }
         &self.shown.get_or_insert_with(|| (stage, ProgressBar::hidden())).1
@@ -83,6 +81,45 @@ impl Bars {
             bar.finish_and_clear();
         }
     }
+}
+
+/// A progress bar on a terminal for work that threads do in pieces; gone when it is dropped.
+pub(super) struct WorkBar(ProgressBar);
+
+impl WorkBar {
+    /// A bar that is called `name`; none when the command is to be quiet.
+    pub(super) fn new(global: &Global, name: &'static str) -> Self {
+        if global.quiet {
+            return Self(ProgressBar::hidden());
+        }
+        let bar = bar(true);
+        bar.set_prefix(name);
+        Self(bar)
+    }
+
+    /// What the work is at.
+    pub(super) fn say(&self, what: String) {
+        self.0.set_message(what);
+    }
+
+    /// Shows which share of the work is done.
+    pub(super) fn show(&self, share: f64) {
+        self.0.set_position((share * STEPS as f64) as u64);
+    }
+}
+
+impl Drop for WorkBar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// A bar on stderr, which draws on terminals alone.
+fn bar(has_end: bool) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+    bar.set_style(style(has_end));
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
 }
 
 fn style(has_end: bool) -> ProgressStyle {

@@ -1,6 +1,6 @@
 //! `zsim check`: are these scenes and specs right?
 
-use super::arguments::Global;
+use super::arguments::{Global, any_route};
 use super::{End, failure, output};
 use clap::Args;
 use serde_json::json;
@@ -8,18 +8,18 @@ use std::path::Path;
 use zsim::dynamics::{HeadModel, HeadSpec};
 use zsim::elasticity::{ElasticityError, SpringSpec};
 use zsim::estimation::{EstimationError, EstimatorSpec};
-use zsim::geometry::{Route, Vector};
 use zsim::motion::MotionSpec;
 use zsim::random::Seed;
 use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
 use zsim::simulation::EPOCH;
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::StudyError;
+use zsim::study::reproduction::ExperimentSpec;
 use zsim::study::spring::design::{DesignSpec, Search};
 use zsim::world::{SceneSpec, World, WorldError};
 
 /// The kinds that there is a check for.
-const KINDS: [Kind; 9] = [
+const KINDS: [Kind; 10] = [
     Kind::Scene,
     Kind::Head,
     Kind::Spring,
@@ -29,6 +29,7 @@ const KINDS: [Kind; 9] = [
     Kind::Clock,
     Kind::Estimator,
     Kind::Study,
+    Kind::Experiment,
 ];
 
 /// Check scenes and specs: line and column of what is wrong
@@ -118,7 +119,7 @@ fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
         Kind::Estimator => parse::<EstimatorSpec>(source).map(drop),
         Kind::Spring => parse::<SpringSpec>(source).map(drop),
         Kind::Study => parse::<DesignSpec>(source).map(drop),
-        Kind::Experiment => Err(SpecError::plain(source.name.clone(), format!("a {} cannot be checked", kind.noun()))),
+        Kind::Experiment => parse::<ExperimentSpec>(source).map(drop),
     }
 }
 
@@ -158,12 +159,6 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
             Err(StudyError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),
         },
-        Kind::Experiment => parse_as(kind, source),
+        Kind::Experiment => parse::<ExperimentSpec>(source)?.check(source),
     }
-}
-
-/// A way that any motion can follow: round a hall of 20 m by 10 m.
-fn any_route() -> Route {
-    let corners = [(0.0, 0.0), (20.0, 0.0), (20.0, 10.0), (0.0, 10.0)];
-    Route { points_in_world: corners.map(|(x, y)| Vector::new(x, y, 0.0)).to_vec(), closed: true }
 }

@@ -1,6 +1,7 @@
 //! `zsim gains`: gain curves of a head.
 
 use super::arguments::{Global, OutArguments};
+use super::bars::WorkBar;
 use super::failure::Usage;
 use super::{End, output};
 use anyhow::Context;
@@ -13,7 +14,7 @@ use zsim::random::Seed;
 use zsim::report;
 use zsim::study::gains::{
     AXES, GainCurve, GainPlan, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure, swing_csv,
-    swing_figure, swing_study,
+    swing_figure, swing_study, with_damping,
 };
 
 /// Measure a head's gain curves: the head's motion over its base's by frequency, from simulation and in closed form
@@ -37,7 +38,7 @@ pub(super) struct Arguments {
     /// What is compared along x, y and z
     #[arg(long, value_enum, default_value_t = Along::Acceleration)]
     along: Along,
-    /// Damp all modes by this ratio instead of the head's own; what its elements take comes on top
+    /// Damp all modes by this ratio instead of the head's own
     #[arg(long, value_name = "RATIO")]
     damping: Option<f64>,
     /// How many realisations, alike but for their phases, are averaged
@@ -67,8 +68,10 @@ enum Along {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
     let head = head(arguments)?;
     let plan = plan(arguments)?;
-    let curves = gain_curves(&head, &plan)?;
-    let swings = arguments.swing.as_ref().map(|degrees| swings(&head, degrees, &plan)).transpose()?;
+    let bar = WorkBar::new(global, "shaking");
+    let curves = gain_curves(&head, &plan, &|share| bar.show(share))?;
+    let swings = arguments.swing.as_ref().map(|degrees| swings(&head, degrees, &plan, &bar)).transpose()?;
+    drop(bar);
 
     let wanted =
         arguments.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/gains-{}", name(arguments))));
@@ -94,11 +97,11 @@ fn name(arguments: &Arguments) -> String {
 
 fn head(arguments: &Arguments) -> anyhow::Result<HeadModel> {
     let (mut spec, source) = load(&arguments.head)?;
-    if let (Some(ratio), Some(damping_ratio)) = (arguments.damping, spec.linkage.damping_ratio_mut()) {
+    if let Some(ratio) = arguments.damping {
         if !(ratio.is_finite() && ratio >= 0.0) {
             return Err(Usage(format!("--damping {ratio}: a damping ratio is a number of at least 0")).into());
         }
-        *damping_ratio = DampingSpec { rocking: ratio, sway: ratio, bounce: ratio, yaw: ratio };
+        spec = with_damping(&spec, DampingSpec { rocking: ratio, sway: ratio, bounce: ratio, yaw: ratio });
     }
     Ok(HeadModel::new(&spec, &source)?)
 }
@@ -124,7 +127,7 @@ fn plan(arguments: &Arguments) -> anyhow::Result<GainPlan> {
     })
 }
 
-fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan) -> anyhow::Result<Vec<SwingStudy>> {
+fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> anyhow::Result<Vec<SwingStudy>> {
     if let Some(wrong) = degrees.iter().find(|x| !(x.is_finite() && **x > 0.0)) {
         return Err(Usage(format!("--swing {wrong}: expected degrees above 0")).into());
     }
@@ -132,7 +135,12 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan) -> anyhow::Result<
     // The resonance of interest is the slowest; above it a hard shake has little to say.
     let slowest_hz = head.linear_modes().first().map_or(plan.up_to_hz, |mode| mode.frequency_hz);
     let plan = GainPlan { up_to_hz: plan.up_to_hz.min(3.0 * slowest_hz), ..plan.clone() };
-    axes.iter().map(|axis| Ok(swing_study(head, *axis, degrees, &plan)?)).collect()
+    let study = |(before, axis): (usize, &Axis)| {
+        bar.say(format!("swinging, {}", axis_name(*axis)));
+        let hear = |share: f64| bar.show((before as f64 + share) / axes.len() as f64);
+        Ok(swing_study(head, *axis, degrees, &plan, &hear)?)
+    };
+    axes.iter().enumerate().map(study).collect()
 }
 
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {

@@ -7,6 +7,8 @@ mod arguments;
 mod bars;
 mod check;
 mod completions;
+mod coverage;
+mod coverage_words;
 mod estimate;
 mod evaluate;
 mod failure;
@@ -15,6 +17,7 @@ mod info;
 mod journey;
 mod output;
 mod quantity;
+mod reproduce;
 mod simulate;
 mod spring;
 mod spring_words;
@@ -52,6 +55,8 @@ enum Verb {
     Evaluate(evaluate::Arguments),
     Gains(gains::Arguments),
     Spring(spring::Arguments),
+    Coverage(coverage::Arguments),
+    Reproduce(reproduce::Arguments),
     Check(check::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
@@ -92,6 +97,8 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Evaluate(arguments) => evaluate::run(arguments, global),
         Verb::Gains(arguments) => gains::run(arguments, global),
         Verb::Spring(arguments) => spring::run(arguments, global),
+        Verb::Coverage(arguments) => coverage::run(arguments, global),
+        Verb::Reproduce(arguments) => reproduce::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),
         Verb::Info(arguments) => info::run(arguments, global),
         Verb::Completions(arguments) => completions::run(arguments),

@@ -1,6 +1,7 @@
 //! `zsim spring`: all about a spring, and the search for one.
 
 use super::arguments::{Global, OutArguments};
+use super::bars::WorkBar;
 use super::{End, output, spring_words};
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -132,7 +133,9 @@ fn head_of(file: &str, head: &str) -> anyhow::Result<(HeadSpec, Source)> {
 fn search(design: &Design, global: &Global) -> anyhow::Result<End> {
     let source = find(Kind::Study, &design.file)?;
     let spec: DesignSpec = parse(&source)?;
-    let study = Search::new(&spec, &source)?.run()?;
+    let bar = WorkBar::new(global, "searching");
+    let study = Search::new(&spec, &source)?.run(&|share| bar.show(share))?;
+    drop(bar);
     let stem = Path::new(&design.file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{stem}")));
     let folder = output::folder(&wanted, design.out.force)?;

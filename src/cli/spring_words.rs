@@ -1,5 +1,6 @@
 //! What `zsim spring` says.
 
+use super::coverage_words;
 use zsim::dynamics::{Bearing, BearingKind, ModeKind};
 use zsim::report::table;
 use zsim::study::spring::design::DesignStudy;
@@ -13,7 +14,7 @@ pub(super) fn report(report: &SpringReport) -> String {
     rows.push(row("heaviest head of this shape", heaviest));
     if let Some(rest) = &report.rest {
         rows.extend(rest.sag_mm.map(|mm| row("sag", format!("{mm:.2} mm"))));
-        let [x, y, z] = rest.position_m.map(|m| m * 1e3);
+        let [x, y, z] = rest.position_m.map(|m| (m * 1e4).round() * 0.1 + 0.0);
         rows.push(row("head at rest", format!("{x:.1}, {y:.1}, {z:.1} mm")));
         let [roll, pitch, yaw] = rest.roll_pitch_yaw_deg;
         rows.push(row("roll, pitch, yaw", format!("{}, {}, {} deg", rounded(roll), rounded(pitch), rounded(yaw))));
@@ -116,15 +117,8 @@ fn under_shake(shaken: &UnderShake) -> String {
         line("peak gain of the pitch rate", |f| Some(f.peak_gain), 2),
     ];
     if let Some(seen) = &shaken.coverage {
-        let mut add = |name: &str, value: String| rows.push(vec![name.to_owned(), "-".to_owned(), value]);
-        let or_dash = |x: Option<f64>, decimals: usize| x.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
-        add("share of the sphere seen", format!("{:.3}", seen.fraction_seen));
-        add("in a sweep", or_dash(seen.fraction_in_a_sweep, 3));
-        add("time of a sweep, s", or_dash(seen.sweep_s, 3));
-        add("beams per sr in a sweep", or_dash(seen.density_in_a_sweep_per_sr, 0));
-        add("beams per sr and s", format!("{:.0}", seen.density_per_sr_s.median));
-        add("time to nine tenths of it, s", format!("{:.2}", seen.covered_s));
-        add("share of time beyond the gyro's range", format!("{:.4}", seen.gyro.saturated));
+        let of_lidar = coverage_words::rows(seen).into_iter();
+        rows.extend(of_lidar.map(|(name, value)| vec![name.to_owned(), "-".to_owned(), value]));
     }
     let failed = shaken.failed.as_ref().map(|why| format!("no simulation: {why}\n")).unwrap_or_default();
     format!("\n{}{failed}", table(&header, &rows, true))

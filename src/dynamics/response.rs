@@ -28,7 +28,7 @@ pub struct Points {
 }
 
 /// A local maximum of a gain curve.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Peak {
     /// Where, Hz.
     pub freq_hz: f64,

@@ -11,4 +11,4 @@ mod table;
 pub use figures::{clock_offset, errors_over_time, head_pitch, trajectory_from_above};
 pub use metrics::{ClockMetrics, ClosedLoopMetrics, CloudMetrics, Metrics, OpenLoopMetrics, SimulationMetrics};
 pub use page::{Section, page};
-pub use table::{summary, table};
+pub use table::{markdown, summary, table};

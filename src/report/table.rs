@@ -34,6 +34,16 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     text.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
 }
 
+/// A table in Markdown.
+pub fn markdown(header: &[&str], rows: &[Vec<String>]) -> String {
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        cells.fold("|".to_owned(), |line, cell| line + " " + &cell.replace('|', "\\|").replace('\n', " ") + " |") + "\n"
+    };
+    let rule = "|".to_owned() + &"---|".repeat(header.len()) + "\n";
+    let body = rows.iter().map(|row| line(&mut row.iter().map(String::as_str)));
+    line(&mut header.iter().copied()) + &rule + &body.collect::<String>()
+}
+
 /// The figures of a run, as they close a command.
 pub fn summary(metrics: &Metrics) -> String {
     let mut cells = Vec::new();

@@ -54,6 +54,16 @@ pub enum StudyError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// A folder holds something else than the beginning of the work that was to go on in it.
+    #[error(
+        "{} holds other work than this (another spec, extent or version, or somebody's files): give another folder with \
+         --out, or begin anew in one of ours with --force",
+        folder.display()
+    )]
+    OtherWork {
+        /// Which folder.
+        folder: PathBuf,
+    },
     /// Somebody stopped it.
     #[error("stopped; what is complete can be read")]
     Stopped,
@@ -68,7 +78,7 @@ impl StudyError {
     /// Whether what was asked for is wrong (a spec, a setting), rather than something on the way.
     pub fn is_wrong_input(&self) -> bool {
         match self {
-            Self::Spec(_) | Self::Motion(_) | Self::Plan { .. } => true,
+            Self::Spec(_) | Self::Motion(_) | Self::Plan { .. } | Self::OtherWork { .. } => true,
             Self::Dynamics(error) => !matches!(error, DynamicsError::Diverged { .. }),
             Self::Estimation(error) => {
                 matches!(error, EstimationError::Setting { .. } | EstimationError::Calibration(_))

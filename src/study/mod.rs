@@ -3,6 +3,8 @@
 //! [`journey()`] is the one that everything else varies: simulate and record, estimate from the recording, judge, report.
 //! [`estimate_recording`] is its second half, for anybody's recording.
 //!
+//! The paper's experiments are run again by [`reproduction`].
+//!
 //! A head by itself is characterised by its [`gains`], by what its [`spring`] bears and how it moves, and by the
 //! [`coverage`] of its lidar.
 
@@ -21,6 +23,7 @@ mod memory;
 mod open_loop;
 mod record;
 mod register;
+pub mod reproduction;
 pub mod spring;
 mod truth_near;
 mod watch;
@@ -31,4 +34,4 @@ pub use estimate::{Outcome, Wishes, estimate_recording};
 pub use journey::journey;
 pub use manifest::Manifest;
 pub use record::record;
-pub use watch::{News, Stage, Watch};
+pub use watch::{Hear, News, Stage, Watch};

@@ -1,4 +1,4 @@
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// What an experiment is at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,5 +49,27 @@ impl Watch<'_> {
 
     pub(super) fn note(&mut self, text: &str) {
         (self.tell)(News::Note(text));
+    }
+}
+
+/// Hears which share of some work is done, from 0 to 1, on whatever thread did it.
+pub type Hear<'a> = &'a (dyn Fn(f64) + Sync);
+
+/// Work in equal pieces that threads finish in any order.
+pub(super) struct Pieces<'a> {
+    whole: usize,
+    done: AtomicUsize,
+    hear: Hear<'a>,
+}
+
+impl<'a> Pieces<'a> {
+    pub(super) fn new(whole: usize, hear: Hear<'a>) -> Self {
+        Self { whole, done: AtomicUsize::new(0), hear }
+    }
+
+    /// Counts a piece that is done.
+    pub(super) fn finish_one(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        (self.hear)(done as f64 / self.whole.max(1) as f64);
     }
 }

@@ -85,7 +85,7 @@ fn small_gains_of_shipped_heads_are_those_of_the_closed_form() {
     for name in sprung().iter().filter(|name| *name != "handheld") {
         let head = calmed(name);
         for axis in [Axis::Pitch, Axis::Z] {
-            let curve = gain_curve(&head, axis, &plan).unwrap();
+            let curve = gain_curve(&head, axis, &plan, &|_| ()).unwrap();
             let coherent = curve.points.iter().filter(|p| p.coherence > 0.95);
             for p in coherent.clone() {
                 let allowed = f64::max(0.03 * p.gain_model, 3.0 * p.gain_sigma).max(1e-3);

@@ -56,6 +56,15 @@ fn decimals_of(step: f64) -> usize {
     (0..12).find(|d| ((step * 10_f64.powi(*d)).round() - step * 10_f64.powi(*d)).abs() < 1e-6).unwrap_or(12) as usize
 }
 
+/// A number in as few digits as tell it to a hundredth of itself.
+pub(super) fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return label(value, 0);
+    }
+    let decimals = (1 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    label(value, decimals)
+}
+
 /// The number with a proper minus, and no minus before zero.
 fn label(value: f64, decimals: usize) -> String {
     let digits = format!("{:.decimals$}", value.abs());

@@ -105,6 +105,12 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
         self.area.draw(&Polygon::new(units, rgb(colour).mix(opacity).filled())).map_err(PlotError::drawing)
     }
 
+    /// A filled rectangle from its upper left to its lower right corner.
+    pub(super) fn rectangle(&self, from: At, to: At, colour: Rgb) -> Result<(), PlotError> {
+        let filled = Rectangle::new([self.unit(from), self.unit(to)], rgb(colour).filled());
+        self.area.draw(&filled).map_err(PlotError::drawing)
+    }
+
     /// A square dot of this size about `at`: for many small ones, which no one tells from discs.
     pub(super) fn dot(&self, at: At, colour: Rgb, size: f64) -> Result<(), PlotError> {
         let corner = self.unit((at.0 - size / 2.0, at.1 - size / 2.0));

@@ -58,6 +58,28 @@ impl Series {
     }
 }
 
+/// A rectangle of a [`Cells`] map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// From left to right, in the abscissa's unit.
+    pub x: (f64, f64),
+    /// From below to above, in the ordinate's unit.
+    pub y: (f64, f64),
+    /// The amount that its colour shows; one that is no number is not drawn.
+    pub value: f64,
+}
+
+/// Amounts as colours, behind all series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cells {
+    /// What the amounts are, with their unit.
+    pub unit: String,
+    /// The amounts of the lightest and the darkest colour.
+    pub range: (f64, f64),
+    /// The rectangles.
+    pub cells: Vec<Cell>,
+}
+
 /// One pair of axes with what is drawn on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
@@ -71,6 +93,10 @@ pub struct Chart {
     pub equal_axes: bool,
     /// Whether the ordinate begins at zero at the latest.
     pub from_zero: bool,
+    /// Ends of abscissa and ordinate; without, those of what is drawn.
+    pub range: Option<[(f64, f64); 2]>,
+    /// Amounts as colours.
+    pub cells: Option<Cells>,
     /// What is drawn, from the back to the front.
     pub series: Vec<Series>,
 }
@@ -84,6 +110,8 @@ impl Chart {
             y_label: y_label.to_owned(),
             equal_axes: false,
             from_zero: false,
+            range: None,
+            cells: None,
             series: Vec::new(),
         }
     }
@@ -92,6 +120,20 @@ impl Chart {
     #[must_use]
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
+        self
+    }
+
+    /// The same with amounts as colours behind its series.
+    #[must_use]
+    pub fn with_cells(mut self, cells: Cells) -> Self {
+        self.cells = Some(cells);
+        self
+    }
+
+    /// The same with abscissa and ordinate between these ends.
+    #[must_use]
+    pub fn between(mut self, x: (f64, f64), y: (f64, f64)) -> Self {
+        self.range = Some([x, y]);
         self
     }
 
@@ -112,7 +154,9 @@ impl Chart {
     /// Least and greatest abscissa and ordinate of all that is drawn; a unit square where nothing is.
     pub(super) fn extent(&self) -> [(f64, f64); 2] {
         let mut ends = [(f64::INFINITY, f64::NEG_INFINITY); 2];
-        for (x, y) in self.series.iter().flat_map(Series::extent) {
+        let corners = |cell: &Cell| [(cell.x.0, cell.y.0), (cell.x.1, cell.y.1)];
+        let cells = self.cells.iter().flat_map(|cells| cells.cells.iter().flat_map(corners));
+        for (x, y) in self.series.iter().flat_map(Series::extent).chain(cells) {
             for (end, value) in ends.iter_mut().zip([x, y]) {
                 *end = (end.0.min(value), end.1.max(value));
             }

@@ -10,29 +10,41 @@ const PNG_PIXELS: u32 = 2;
 /// Pixels are averaged from so many drawn ones each way: the pen does not smooth its edges.
 const OVERSAMPLED: u32 = 2;
 
-/// Charts below each other.
+/// Charts below each other, or in columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Width, points.
     pub width: f64,
     /// Height of each chart that is no map, points; a map has the height it needs.
     pub chart_height: f64,
-    /// The charts, from the top.
+    /// How many charts stand beside each other.
+    pub columns: usize,
+    /// The charts, row by row from the top.
     pub charts: Vec<Chart>,
 }
 
 impl Figure {
     /// A figure as wide as a page, with these charts.
     pub fn of(charts: Vec<Chart>) -> Self {
-        Self { width: 720.0, chart_height: 250.0, charts }
+        Self { width: 720.0, chart_height: 250.0, columns: 1, charts }
     }
 
-    fn heights(&self) -> Vec<f64> {
-        self.charts.iter().map(|chart| frame::height_of(chart, self.width, self.chart_height)).collect()
+    /// The same with so many charts in a row, at least one.
+    #[must_use]
+    pub fn in_columns(mut self, columns: usize) -> Self {
+        self.columns = columns.max(1);
+        self
+    }
+
+    fn rows(&self) -> impl Iterator<Item = (&[Chart], f64)> {
+        let width = self.width / self.columns as f64;
+        let height = move |chart| frame::height_of(chart, width, self.chart_height);
+        self.charts.chunks(self.columns).map(move |row| (row, row.iter().map(height).fold(0.0, f64::max)))
     }
 
     fn size(&self) -> (u32, u32) {
-        (self.width.ceil() as u32, self.heights().iter().sum::<f64>().ceil().max(1.0) as u32)
+        let height: f64 = self.rows().map(|(_, height)| height).sum();
+        (self.width.ceil() as u32, height.ceil().max(1.0) as u32)
     }
 
     fn draw<DB: DrawingBackend>(&self, backend: DB, scale: u32, pen: Pen) -> Result<(), PlotError> {
@@ -41,8 +53,11 @@ impl Figure {
         let canvas = Canvas { area: &area, scale: f64::from(scale), pen };
         canvas.clear()?;
         let mut top = 0.0;
-        for (chart, height) in self.charts.iter().zip(self.heights()) {
-            frame::draw(&canvas, chart, (0.0, top), (self.width, height))?;
+        let width = self.width / self.columns as f64;
+        for (row, height) in self.rows() {
+            for (column, chart) in row.iter().enumerate() {
+                frame::draw(&canvas, chart, (column as f64 * width, top), (width, height))?;
+            }
             top += height;
         }
         area.present().map_err(PlotError::drawing)

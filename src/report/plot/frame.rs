@@ -2,13 +2,16 @@
 
 use super::axis::Axis;
 use super::canvas::{Anchor, At, Canvas};
-use super::palette::{GRID, INK};
+use super::legend::Header;
+use super::palette::{GRID, INK, shade};
+use super::stroke::dashes;
 use super::{Chart, Mark, PlotError, Series};
 use plotters::prelude::DrawingBackend;
 
-const TEXT: f64 = 12.0;
-const SMALL: f64 = 11.0;
-/// Room for title and legend, below the axis for numbers and label, and left and right of it.
+/// Sizes of letters, points.
+pub(super) const TEXT: f64 = 12.0;
+pub(super) const SMALL: f64 = 11.0;
+/// Room for one line of title and legend, below the axis for numbers and label, and left and right of it.
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;
 const LEFT: f64 = 68.0;
@@ -16,8 +19,8 @@ const RIGHT: f64 = 18.0;
 /// Points from one tick to the next, at least about.
 const TICK_X: f64 = 85.0;
 const TICK_Y: f64 = 28.0;
-/// Length of a line in the legend.
-const SAMPLE: f64 = 20.0;
+/// However narrow a chart is, its scale is told by about so many.
+const LEAST_TICKS: usize = 3;
 
 /// Where a chart's axes stand on the sheet.
 struct Frame {
@@ -60,18 +63,24 @@ pub(super) fn draw<DB: DrawingBackend>(
     corner: At,
     size: (f64, f64),
 ) -> Result<(), PlotError> {
-    let frame = place(chart, corner, size);
+    let header = Header::of(canvas, chart, size.0 - LEFT - RIGHT)?;
+    let more = header.more_height();
+    let frame = place(chart, (corner.0, corner.1 + more), (size.0, size.1 - more));
     grid(canvas, &frame, chart)?;
+    cells(canvas, &frame, chart)?;
     for series in &chart.series {
         band(canvas, &frame, series)?;
     }
     for series in &chart.series {
         points(canvas, &frame, series)?;
     }
-    header(canvas, &frame, chart)
+    header.draw(canvas, (frame.left, frame.right()), frame.top)
 }
 
 fn ranges(chart: &Chart) -> [Axis; 2] {
+    if let Some([x, y]) = chart.range {
+        return [x, y].map(|(low, high)| Axis { low, high });
+    }
     let [x, mut y] = chart.extent();
     if chart.from_zero {
         y = (y.0.min(0.0), y.1.max(0.0));
@@ -101,7 +110,7 @@ fn place(chart: &Chart, corner: At, size: (f64, f64)) -> Frame {
 }
 
 fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
-    for (value, label) in frame.x.ticks((frame.width / TICK_X) as usize) {
+    for (value, label) in frame.x.ticks(((frame.width / TICK_X) as usize).max(LEAST_TICKS)) {
         let (x, _) = frame.at((value, frame.y.low));
         canvas.line(&[(x, frame.top), (x, frame.bottom())], GRID, 0.8)?;
         canvas.line(&[(x, frame.bottom()), (x, frame.bottom() + 4.0)], INK, 0.8)?;
@@ -119,23 +128,13 @@ fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -
     canvas.text(&chart.y_label, (frame.left - LEFT + 14.0, frame.top + frame.height / 2.0), Anchor::Sideways, TEXT)
 }
 
-/// The title at the left, and the legend at the right, above the axes.
-fn header<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
-    let y = frame.top - 13.0;
-    canvas.text(&chart.title, (frame.left, y), Anchor::Left, TEXT)?;
-    let mut right = frame.right();
-    for series in chart.series.iter().rev().filter(|series| !series.name.is_empty()) {
-        let start = right - canvas.width_of(&series.name, SMALL)?;
-        canvas.text(&series.name, (start, y), Anchor::Left, SMALL)?;
-        let sample = [(start - SAMPLE - 6.0, y), (start - 6.0, y)];
-        match series.mark {
-            Mark::Line(width) => canvas.line(&sample, series.colour.rgb(), width.max(1.5))?,
-            Mark::Dashes(width) => dashes(canvas, &sample, series, width.max(1.5))?,
-            Mark::Dots(_) => canvas.dot((start - 6.0 - SAMPLE / 2.0, y), series.colour.rgb(), 6.0)?,
-        }
-        right = start - SAMPLE - 24.0;
-    }
-    Ok(())
+fn cells<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
+    let Some(cells) = &chart.cells else { return Ok(()) };
+    let (least, most) = cells.range;
+    cells.cells.iter().filter(|cell| cell.value.is_finite()).try_for_each(|cell| {
+        let (upper_left, lower_right) = (frame.at((cell.x.0, cell.y.1)), frame.at((cell.x.1, cell.y.0)));
+        canvas.rectangle(upper_left, lower_right, shade((cell.value - least) / (most - least)))
+    })
 }
 
 fn band<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series) -> Result<(), PlotError> {
@@ -160,32 +159,6 @@ fn points<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Serie
         }
     }
     Ok(())
-}
-
-fn dashes<DB: DrawingBackend>(canvas: &Canvas<DB>, path: &[At], series: &Series, width: f64) -> Result<(), PlotError> {
-    const DASH: f64 = 5.0;
-    const GAP: f64 = 3.0;
-    let mut along = 0.0;
-    let mut dash = Vec::new();
-    for pair in path.windows(2) {
-        let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
-        let length = (x1 - x0).hypot(y1 - y0);
-        let mut done = 0.0;
-        while done < length {
-            let phase = along % (DASH + GAP);
-            let drawing = phase < DASH;
-            let step = (if drawing { DASH } else { DASH + GAP } - phase).min(length - done).max(1e-6);
-            let at = |s: f64| (x0 + (x1 - x0) * s / length, y0 + (y1 - y0) * s / length);
-            if drawing {
-                dash.extend([at(done), at(done + step)]);
-            } else if !dash.is_empty() {
-                canvas.line(&std::mem::take(&mut dash), series.colour.rgb(), width)?;
-            }
-            done += step;
-            along += step;
-        }
-    }
-    canvas.line(&dash, series.colour.rgb(), width)
 }
 
 /// The path without what a print would not show: of all points within half a point's width, first, least, greatest, last.

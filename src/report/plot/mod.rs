@@ -9,9 +9,11 @@ mod chart;
 mod figure;
 mod font;
 mod frame;
+mod legend;
 mod palette;
+mod stroke;
 
-pub use chart::{Chart, Mark, Series};
+pub use chart::{Cell, Cells, Chart, Mark, Series};
 pub use figure::Figure;
 pub use palette::Colour;
 

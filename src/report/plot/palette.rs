@@ -10,6 +10,27 @@ pub(super) const GRID: Rgb = (228, 228, 228);
 /// What stands behind the data.
 pub(super) const BACKDROP: Rgb = (196, 200, 204);
 
+/// From light to dark, for amounts: ColorBrewer's YlGnBu (Harrower and Brewer 2003) without its lightest colour.
+const SHADES: [Rgb; 8] = [
+    (237, 248, 177),
+    (199, 233, 180),
+    (127, 205, 187),
+    (65, 182, 196),
+    (29, 145, 192),
+    (34, 94, 168),
+    (37, 52, 148),
+    (8, 29, 88),
+];
+
+/// The colour of an amount, from 0 to 1; what is beyond has the end's.
+pub(super) fn shade(share: f64) -> Rgb {
+    let place = share.clamp(0.0, 1.0) * (SHADES.len() - 1) as f64;
+    let below = (place as usize).min(SHADES.len() - 2);
+    let (a, b, u) = (SHADES[below], SHADES[below + 1], place - below as f64);
+    let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * u).round() as u8;
+    (mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
+}
+
 /// What a series shows, which decides its colour in every figure alike.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colour {

@@ -74,7 +74,7 @@ impl Lidar {
     }
 
     /// By what the beams of scan `scan` are turned against those of scan 0, where the pattern does not repeat.
-    fn turned(&self, scan: u64) -> Option<Rotation> {
+    pub fn turned(&self, scan: u64) -> Option<Rotation> {
         let turns = (self.turns_per_scan.fract() * scan as f64).fract();
         (self.turns_per_scan != 0.0).then(|| Rotation::from_axis_angle(&Vector::z_axis(), TAU * turns))
     }

@@ -5,11 +5,14 @@
 
 mod figure;
 mod sphere;
+mod table;
 mod track;
 
 pub use figure::coverage_figure;
+pub use table::{density_csv, over_time_csv};
 
 use crate::dynamics::{HeadModel, HeadState};
+use crate::geometry::Rotation;
 use crate::motion::BaseMotion;
 use crate::sensors::Lidar;
 use crate::study::StudyError;
@@ -64,6 +67,20 @@ pub struct Coverage {
     pub by_elevation: Vec<(f64, f64)>,
     /// Share of the sphere seen by time (s).
     pub over_time: Vec<(f64, f64)>,
+    /// How densely beams lie in each cell of the sphere, from below.
+    #[serde(skip)]
+    pub cells: Vec<SeenCell>,
+}
+
+/// A cell of the sphere of directions; all are equally large.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenCell {
+    /// Left and right end, degrees from where the base heads; positive to the left.
+    pub azimuth_deg: (f64, f64),
+    /// Lower and upper end, degrees above the horizon.
+    pub elevation_deg: (f64, f64),
+    /// Beams per steradian and second; 0 where none was seen.
+    pub beams_per_sr_s: f64,
 }
 
 /// How densely beams lie.
@@ -117,8 +134,10 @@ pub fn coverage(
         while next.next_if(|t| *t <= start_s).is_some() {
             sweeps.end(&mut sphere);
         }
+        let turned = lidar.turned(scan as u64).unwrap_or_else(Rotation::identity);
         for beam in lidar.beams() {
-            sphere.see(&(track.heading_from_laser(start_s + beam.offset_s) * beam.direction_in_laser));
+            let heading_from_laser = track.heading_from_laser(start_s + beam.offset_s);
+            sphere.see(&(heading_from_laser * (turned * beam.direction_in_laser)));
         }
         over_time.push((start_s + lidar.period_s(), sphere.fraction_seen()));
     }
@@ -139,6 +158,7 @@ pub fn coverage(
         most_tilt_deg: track.most_tilt_rad.to_degrees(),
         gyro: track.gyro_use(plan.rate_limit_deg_per_s),
         by_elevation: sphere.by_elevation(looked_s),
+        cells: sphere.cells(looked_s),
         over_time,
     })
 }

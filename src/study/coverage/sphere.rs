@@ -1,6 +1,6 @@
 //! The sphere of directions in cells of equal size.
 
-use super::Density;
+use super::{Density, SeenCell};
 use crate::geometry::Vector;
 use std::f64::consts::{PI, TAU};
 
@@ -59,6 +59,21 @@ impl Sphere {
         let at = |share: f64| counts.get((share * counts.len() as f64) as usize).map_or(0.0, |n| f64::from(*n) * scale);
         let mean = counts.iter().map(|n| f64::from(*n)).sum::<f64>() / counts.len().max(1) as f64 * scale;
         Density { mean, p10: at(0.1), median: at(0.5) }
+    }
+
+    /// Every cell with its beams per steradian and second, from below.
+    pub fn cells(&self, looked_s: f64) -> Vec<SeenCell> {
+        let cell = |(index, beams): (usize, &u32)| {
+            let edge = |band: usize| (2.0 * band as f64 / BANDS as f64 - 1.0).asin().to_degrees();
+            let side = |cell: usize| (cell as f64 / CELLS as f64 - 0.5) * 360.0;
+            let (band, place) = (index / CELLS, index % CELLS);
+            SeenCell {
+                azimuth_deg: (side(place), side(place + 1)),
+                elevation_deg: (edge(band), edge(band + 1)),
+                beams_per_sr_s: f64::from(*beams) / (CELL_SR * looked_s),
+            }
+        };
+        self.beams.iter().enumerate().map(cell).collect()
     }
 
     /// Beams per steradian and second by elevation, degrees.

@@ -10,9 +10,6 @@ use crate::study::StudyError;
 /// How long the shaker takes to reach its full strength, s.
 const ONSET_S: f64 = 1.0;
 
-/// The longest settling that is waited for, s. A head that takes longer shows it in its coherence.
-const LONGEST_SETTLING_S: f64 = 200.0;
-
 /// What is left of the settling when recording begins.
 const LEFT_OF_SETTLING: f64 = 1e-5;
 
@@ -34,7 +31,7 @@ impl Schedule {
         let modes = head.linear_modes();
         let decay = modes.iter().map(|mode| mode.decay_per_s());
         let settling_s = decay.fold(0.0, |most, rate| f64::max(most, -LEFT_OF_SETTLING.ln() / rate));
-        let settling_s = ONSET_S + settling_s.min(LONGEST_SETTLING_S);
+        let settling_s = ONSET_S + settling_s.min(plan.longest_settling_s);
         let within = modes.iter().filter(|m| m.frequency_hz < plan.up_to_hz);
         let narrowest_hz = within.map(|m| m.frequency_hz * m.damping_ratio).fold(f64::INFINITY, f64::min);
         let period_s = plan.period_s.unwrap_or_else(|| (1.0 / narrowest_hz).ceil().clamp(20.0, 100.0));

@@ -19,13 +19,21 @@ const BAND: f64 = 1.96;
 
 /// The gains in three panels as in the paper: measured ones as dots with their 95 % band, over the closed form.
 pub fn gain_figure(curves: &[GainCurve]) -> Figure {
+    Figure::of(gain_panels(curves))
+}
+
+/// The charts of [`gain_figure`], rotations first.
+pub fn gain_panels(curves: &[GainCurve]) -> Vec<Chart> {
     let panels = PANELS.iter().map(|(title, label, axes)| {
         let shown = curves.iter().filter(|curve| axes.contains(&curve.axis));
         shown.fold(Chart::new(title, "Frequency (Hz)", label).starting_at_zero(), |chart, curve| {
             let (name, colour) = named(curve.axis);
             // x and y of a round spring lie on each other: the one behind has the larger dots.
             let size = if colour == Colour::Estimate { 4.5 } else { 2.5 };
-            let model = curve.points.iter().map(|p| (p.freq_hz, p.gain_model)).collect();
+            // The peak may stand between two lines.
+            let top = curve.peak_model.map(|peak| (peak.freq_hz, peak.gain));
+            let mut model: Vec<_> = curve.points.iter().map(|p| (p.freq_hz, p.gain_model)).chain(top).collect();
+            model.sort_by(|a, b| a.0.total_cmp(&b.0));
             let measured = |p: &&GainPoint| p.coherence >= LEAST_COHERENCE;
             let dots = curve.points.iter().filter(measured).map(|p| (p.freq_hz, p.gain)).collect();
             let ends =
@@ -36,11 +44,16 @@ pub fn gain_figure(curves: &[GainCurve]) -> Figure {
                 .with(Series::dots(name, colour, dots).marked(Mark::Dots(size)).with_band(band))
         })
     });
-    Figure::of(panels.collect())
+    panels.collect()
 }
 
 /// The coherence in the same panels.
 pub fn coherence_figure(curves: &[GainCurve]) -> Figure {
+    Figure::of(coherence_panels(curves))
+}
+
+/// The charts of [`coherence_figure`], rotations first.
+pub fn coherence_panels(curves: &[GainCurve]) -> Vec<Chart> {
     let panels = PANELS.iter().map(|(_, label, axes)| {
         let title = label.replace("Gain", "Coherence");
         let shown = curves.iter().filter(|curve| axes.contains(&curve.axis));
@@ -49,7 +62,7 @@ pub fn coherence_figure(curves: &[GainCurve]) -> Figure {
             chart.with(Series::line(name, colour, curve.points.iter().map(|p| (p.freq_hz, p.coherence)).collect()))
         })
     });
-    Figure::of(panels.collect())
+    panels.collect()
 }
 
 /// How resonance and gain move with the swing.
@@ -58,9 +71,10 @@ pub fn swing_figure(studies: &[SwingStudy]) -> Figure {
         let empty = Chart::new("", "Swing of the head (degrees rms)", label);
         studies.iter().fold(empty, |chart, study| {
             let (name, colour) = named(study.axis);
-            let points = study.points.iter().filter_map(|p| Some((p.swing_rms_deg, value(p)?))).collect();
+            let points: Vec<_> = study.points.iter().filter_map(|p| Some((p.swing_rms_deg, value(p)?))).collect();
             let mark = if study.axis.is_rotation() { Mark::Line(1.5) } else { Mark::Dashes(1.5) };
-            chart.with(Series::line(name, colour, points).marked(mark))
+            let dots = Series::dots("", colour, points.clone()).marked(Mark::Dots(4.0));
+            chart.with(Series::line(name, colour, points).marked(mark)).with(dots)
         })
     };
     Figure::of(vec![

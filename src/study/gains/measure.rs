@@ -6,31 +6,42 @@ use crate::dynamics::{HeadModel, HeadSimulation, HeadState, Peak, Points, Quanti
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::motion::Axis;
 use crate::signal::{Segments, TransferPoint, transfer_function};
-use crate::study::StudyError;
+use crate::study::watch::Pieces;
+use crate::study::{Hear, StudyError};
 use rayon::prelude::*;
 
 /// The gains of `head` along and about all six axes, in the order of [`AXES`].
 ///
-/// Realisations run in parallel; the result is the same for any number of threads.
+/// Realisations run in parallel; the result is the same for any number of threads. `hear` is told after each of them.
 ///
 /// # Errors
 /// When the plan cannot be carried out, or the head's simulation fails.
-pub fn gain_curves(head: &HeadModel, plan: &GainPlan) -> Result<Vec<GainCurve>, StudyError> {
+pub fn gain_curves(head: &HeadModel, plan: &GainPlan, hear: Hear<'_>) -> Result<Vec<GainCurve>, StudyError> {
     let schedule = checked(head, plan)?;
     let tasks: Vec<_> = AXES.iter().flat_map(|axis| (0..plan.realisations).map(|k| (*axis, k))).collect();
-    let records = tasks.par_iter().map(|(axis, k)| record(head, *axis, *k, plan, schedule));
+    let pieces = Pieces::new(tasks.len(), hear);
+    let records = tasks.par_iter().map(|(axis, k)| {
+        let record = record(head, *axis, *k, plan, schedule);
+        pieces.finish_one();
+        record
+    });
     let records = records.collect::<Result<Vec<_>, _>>()?;
     let of_axes = AXES.iter().zip(records.chunks(plan.realisations));
     of_axes.map(|(axis, records)| curve(head, *axis, records, plan, schedule)).collect()
 }
 
-/// The gain of `head` along or about `axis`.
+/// The gain of `head` along or about `axis`; `hear` is told after each realisation.
 ///
 /// # Errors
 /// When the plan cannot be carried out, or the head's simulation fails.
-pub fn gain_curve(head: &HeadModel, axis: Axis, plan: &GainPlan) -> Result<GainCurve, StudyError> {
+pub fn gain_curve(head: &HeadModel, axis: Axis, plan: &GainPlan, hear: Hear<'_>) -> Result<GainCurve, StudyError> {
     let schedule = checked(head, plan)?;
-    let records = (0..plan.realisations).into_par_iter().map(|k| record(head, axis, k, plan, schedule));
+    let pieces = Pieces::new(plan.realisations, hear);
+    let records = (0..plan.realisations).into_par_iter().map(|k| {
+        let record = record(head, axis, k, plan, schedule);
+        pieces.finish_one();
+        record
+    });
     curve(head, axis, &records.collect::<Result<Vec<_>, _>>()?, plan, schedule)
 }
 

@@ -13,14 +13,15 @@ mod measure;
 mod swing;
 mod table;
 
-pub use figure::{coherence_figure, gain_figure, swing_figure};
+pub use figure::{coherence_figure, coherence_panels, gain_figure, gain_panels, swing_figure};
 pub use measure::{gain_curve, gain_curves};
 pub use swing::{SwingPoint, SwingStudy, swing_study};
 pub use table::{csv, swing_csv};
 
-use crate::dynamics::{Peak, Points, Quantity};
+use crate::dynamics::{DampingSpec, HeadSpec, Peak, Points, Quantity};
 use crate::motion::Axis;
 use crate::random::Seed;
+use serde::{Deserialize, Serialize};
 
 /// How gains are measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +40,8 @@ pub struct GainPlan {
     pub acceleration_m_per_s2: f64,
     /// How many realisations are averaged.
     pub realisations: usize,
+    /// The longest settling that is waited for, s. A head that takes longer shows it in its coherence.
+    pub longest_settling_s: f64,
     /// The simulation's time step, s.
     pub step_s: f64,
     /// From which the phases are drawn.
@@ -56,6 +59,7 @@ impl Default for GainPlan {
             rotation_deg_per_s: 0.2,
             acceleration_m_per_s2: 0.02,
             realisations: 4,
+            longest_settling_s: 200.0,
             step_s: 1e-3,
             seed: Seed(1),
         }
@@ -63,7 +67,7 @@ impl Default for GainPlan {
 }
 
 /// The gain at one frequency.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GainPoint {
     /// Frequency, Hz.
     pub freq_hz: f64,
@@ -78,7 +82,7 @@ pub struct GainPoint {
 }
 
 /// The gain along or about one axis.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GainCurve {
     /// The axis: of rate for a rotation, of acceleration for a translation.
     pub axis: Axis,
@@ -92,6 +96,30 @@ pub struct GainCurve {
     pub swing_rms_deg: f64,
     /// Greatest, degrees.
     pub swing_most_deg: f64,
+}
+
+impl GainCurve {
+    /// Its part up to a frequency, with the peaks that lie there.
+    #[must_use]
+    pub fn up_to(&self, freq_hz: f64) -> Self {
+        let below = |peak: Option<Peak>| peak.filter(|peak| peak.freq_hz <= freq_hz);
+        Self {
+            points: self.points.iter().filter(|p| p.freq_hz <= freq_hz * (1.0 + 1e-9)).copied().collect(),
+            peak: below(self.peak),
+            peak_model: below(self.peak_model),
+            ..*self
+        }
+    }
+}
+
+/// The head with its modes damped by these ratios; one that does not move stays as it is.
+#[must_use]
+pub fn with_damping(spec: &HeadSpec, ratios: DampingSpec) -> HeadSpec {
+    let mut damped = spec.clone();
+    if let Some(own) = damped.linkage.damping_ratio_mut() {
+        *own = ratios;
+    }
+    damped
 }
 
 /// What an axis is called in tables: `x_rot` is the rate about x, `x` the acceleration along it.

@@ -3,6 +3,7 @@
 pub mod design;
 mod figure;
 mod figures;
+mod outline;
 mod report;
 mod wire;
 

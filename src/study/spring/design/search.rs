@@ -6,9 +6,10 @@ use crate::elasticity::Material;
 use crate::random::{Seed, Stream};
 use crate::sensors::Lidar;
 use crate::spec::{Kind, Source, SpecError, find, parse};
-use crate::study::StudyError;
 use crate::study::coverage::CoveragePlan;
 use crate::study::spring::{Figures, closed_form, simulated};
+use crate::study::watch::Pieces;
+use crate::study::{Hear, StudyError};
 use cmaes::{CMAESOptions, DVector};
 use rand::RngExt;
 use rayon::prelude::*;
@@ -124,20 +125,27 @@ impl Search {
         Ok(Self { spec: spec.clone(), head, source: head_source, lidar, space })
     }
 
-    /// Tries the space, and returns every design within all limits, and how many were tried.
-    pub fn explore(&self) -> (Vec<Candidate>, usize) {
+    /// Tries the space, and returns every design within all limits, and how many were tried; `hear` is told after each.
+    pub fn explore(&self, hear: Hear<'_>) -> (Vec<Candidate>, usize) {
+        let whole = match &self.space {
+            Space::Catalogue(springs) => springs.len(),
+            Space::Coil { .. } => self.spec.evaluations,
+        };
+        let pieces = Pieces::new(whole, hear);
+        let judge = |coil: &CoilDesign| {
+            let outcome = self.judge(coil);
+            pieces.finish_one();
+            outcome
+        };
         match &self.space {
-            Space::Catalogue(springs) => {
-                let outcomes: Vec<Outcome> = springs.par_iter().map(|coil| self.judge(coil)).collect();
-                (fitting(outcomes), springs.len())
-            }
+            Space::Catalogue(springs) => (fitting(springs.par_iter().map(judge).collect::<Vec<_>>()), springs.len()),
             Space::Coil { bounds, material } => {
-                let coil = |place: &[f64]| coil_at(place, bounds, *material);
+                let judge = |place: &[f64]| judge(&coil_at(place, bounds, *material));
                 let mut stream = Seed(self.spec.seed).stream("design/samples");
                 let samples = ((self.spec.evaluations as f64 * SAMPLED) as usize).max(1);
                 let places: Vec<[f64; 4]> =
                     (0..samples).map(|_| std::array::from_fn(|_| stream.random::<f64>())).collect();
-                let outcomes: Vec<Outcome> = places.par_iter().map(|place| self.judge(&coil(place))).collect();
+                let outcomes: Vec<Outcome> = places.par_iter().map(|place| judge(place)).collect();
                 let mut evaluated = samples;
                 let scales = Scales::of(&outcomes, self.spec.goals.len());
                 let each = (self.spec.evaluations - samples) / DESCENTS;
@@ -148,46 +156,13 @@ impl Search {
                     let start = (0..samples).min_by(|a, b| value(&outcomes[*a]).total_cmp(&value(&outcomes[*b])));
                     let start = start.map_or([0.5; 4], |k| places[k]);
                     let seed = Seed(self.spec.seed).child(&format!("design/{k}")).0;
-                    self.descend(&start, each, seed, &coil, &value)
+                    descend(&start, (each, seed), &judge, &value)
                 });
                 let descended: Vec<Vec<Outcome>> = descents.collect();
                 evaluated += descended.iter().map(Vec::len).sum::<usize>();
                 (fitting(outcomes.into_iter().chain(descended.into_iter().flatten())), evaluated)
             }
         }
-    }
-
-    /// One run of CMA-ES from `start`; everything it met.
-    fn descend(
-        &self,
-        start: &[f64; 4],
-        evaluations: usize,
-        seed: u64,
-        coil: &(dyn Fn(&[f64]) -> CoilDesign + Sync),
-        value: &dyn Fn(&Outcome) -> f64,
-    ) -> Vec<Outcome> {
-        let mut met = Vec::with_capacity(evaluations);
-        let population = 8;
-        if evaluations < population {
-            return met;
-        }
-        let objective = |place: &DVector<f64>| {
-            let outside: f64 = place.iter().map(|x| (x - x.clamp(0.0, 1.0)).powi(2)).sum();
-            let inside: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
-            let outcome = self.judge(&coil(&inside));
-            let cost = value(&outcome) + outside;
-            met.push(outcome);
-            cost
-        };
-        let options = CMAESOptions::new(start.to_vec(), 0.15)
-            .population_size(population)
-            .max_function_evals(evaluations - population + 1)
-            .seed(seed);
-        // The options are sound by construction: a positive step, a population of eight.
-        if let Ok(mut descent) = options.build(objective) {
-            descent.run();
-        }
-        met
     }
 
     fn judge(&self, coil: &CoilDesign) -> Outcome {
@@ -214,17 +189,24 @@ impl Search {
         head
     }
 
-    /// Explores, takes the Pareto set, and verifies as much of it as the spec says.
+    /// Explores, takes the Pareto set, and verifies as much of it as the spec says. `hear` is told as designs are tried (the
+    /// first half) and verified.
     ///
     /// # Errors
     /// When the verification cannot be set up. A design whose simulation fails is a result.
-    pub fn run(&self) -> Result<DesignStudy, StudyError> {
-        let (feasible, evaluated) = self.explore();
+    pub fn run(&self, hear: Hear<'_>) -> Result<DesignStudy, StudyError> {
+        let (feasible, evaluated) = self.explore(&|share| hear(0.5 * share));
         let costs: Vec<Vec<f64>> = feasible.iter().map(|candidate| candidate.costs.clone()).collect();
         let front = pareto_set(&costs);
         let of_front: Vec<Vec<f64>> = front.iter().map(|k| costs[*k].clone()).collect();
         let chosen = spread(&of_front, self.spec.candidates);
-        let verified = chosen.par_iter().map(|k| self.verify(&feasible[front[*k]]));
+        let second_half = |share: f64| hear(0.5 + 0.5 * share);
+        let pieces = Pieces::new(chosen.len(), &second_half);
+        let verified = chosen.par_iter().map(|k| {
+            let verified = self.verify(&feasible[front[*k]]);
+            pieces.finish_one();
+            verified
+        });
         let figure = |k: usize| self.spec.goals.get(k).or(self.spec.goals.first()).map(|goal| goal.figure);
         let cloud = figure(0)
             .zip(figure(1))
@@ -262,6 +244,37 @@ impl Search {
             Err(error) => Err(error),
         }
     }
+}
+
+/// One run of CMA-ES from `start`; everything it met.
+fn descend(
+    start: &[f64; 4],
+    (evaluations, seed): (usize, u64),
+    judge: &dyn Fn(&[f64]) -> Outcome,
+    value: &dyn Fn(&Outcome) -> f64,
+) -> Vec<Outcome> {
+    let mut met = Vec::with_capacity(evaluations);
+    let population = 8;
+    if evaluations < population {
+        return met;
+    }
+    let objective = |place: &DVector<f64>| {
+        let outside: f64 = place.iter().map(|x| (x - x.clamp(0.0, 1.0)).powi(2)).sum();
+        let inside: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+        let outcome = judge(&inside);
+        let cost = value(&outcome) + outside;
+        met.push(outcome);
+        cost
+    };
+    let options = CMAESOptions::new(start.to_vec(), 0.15)
+        .population_size(population)
+        .max_function_evals(evaluations - population + 1)
+        .seed(seed);
+    // The options are sound by construction: a positive step, a population of eight.
+    if let Ok(mut descent) = options.build(objective) {
+        descent.run();
+    }
+    met
 }
 
 /// The coil at a place of the unit cube.

@@ -1,0 +1,99 @@
+//! `zsim coverage`: what a lidar on a moving head sees of the sphere about it.
+
+use super::arguments::{Global, OutArguments, any_route};
+use super::bars::WorkBar;
+use super::{End, coverage_words, output, quantity};
+use anyhow::Context;
+use clap::Args;
+use std::path::Path;
+use zsim::dynamics::{self, HeadModel};
+use zsim::motion;
+use zsim::random::Seed;
+use zsim::report;
+use zsim::sensors::{Imu, Lidar};
+use zsim::spec::{Kind, find, parse};
+use zsim::study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
+
+/// Tell what a lidar on a moving head sees of the sphere: how much, how densely, how soon; and the gyroscope's range
+///
+/// Needs no scene: directions alone count, as seen from the base's heading. A motion that walks goes round a hall of 20 m by
+/// 10 m. With --out, writes coverage.csv (by time), density.csv (by direction), and a plot.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim coverage --head handheld --motion hand --duration 30s --out results/coverage")]
+pub(super) struct Arguments {
+    /// The head and its spring, a name under specs/heads/ or a file
+    #[arg(long, value_name = "NAME|FILE", default_value = "handheld")]
+    head: String,
+    /// How the base moves, under specs/motions/
+    #[arg(long, value_name = "NAME|FILE", default_value = "hand")]
+    motion: String,
+    /// The lidar, under specs/lidars/
+    #[arg(long, value_name = "NAME|FILE", default_value = "utm30lx")]
+    lidar: String,
+    /// The IMU whose range the gyroscope's rate is held against, under specs/imus/
+    #[arg(long, value_name = "NAME|FILE", default_value = "3dm_gx2")]
+    imu: String,
+    /// How long is looked: 30s, 2min, 90
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = quantity::seconds)]
+    duration: f64,
+    /// When looking begins: after the motion's first seconds at rest
+    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = quantity::seconds)]
+    from: f64,
+    /// The seed from which the motion's chance follows
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    out: OutArguments,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let (head, head_source) = dynamics::load(&arguments.head)?;
+    let head = HeadModel::new(&head, &head_source)?;
+    let lidar_source = find(Kind::Lidar, &arguments.lidar)?;
+    let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
+    let imu_source = find(Kind::Imu, &arguments.imu)?;
+    let imu = Imu::new(&parse(&imu_source)?, &imu_source)?;
+    let (motion, motion_source) = motion::load(&arguments.motion)?;
+    let until_s = arguments.from + arguments.duration;
+    let motion = motion.build(&motion_source, Some(&any_route()), until_s, Seed(arguments.seed))?;
+    let plan = CoveragePlan {
+        from_s: arguments.from,
+        duration_s: arguments.duration,
+        rate_limit_deg_per_s: imu.spec().gyro.limit_deg_per_s,
+        ..CoveragePlan::default()
+    };
+    let bar = WorkBar::new(global, "swinging");
+    let seen = coverage(&head, motion.as_ref(), &lidar, &plan, |state| bar.show(state.t_s / until_s))?;
+    drop(bar);
+
+    let folder = arguments.out.out.as_ref().map(|wanted| leave(&seen, wanted, arguments.out.force)).transpose()?;
+    output::tell(global, &words(&seen), serde_json::to_value(&seen)?, folder.as_deref())?;
+    Ok(End::Done)
+}
+
+fn leave(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<std::path::PathBuf> {
+    let folder = output::folder(wanted, force)?;
+    for (name, text) in [("coverage.csv", over_time_csv(seen)), ("density.csv", density_csv(seen))] {
+        let path = folder.join(name);
+        std::fs::write(&path, text).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    coverage_figure(seen).save(&folder, "coverage")?;
+    Ok(folder)
+}
+
+fn words(seen: &Coverage) -> String {
+    let gyro = &seen.gyro;
+    let mut rows = coverage_words::rows(seen);
+    rows.extend([
+        ("time to half of it, s", format!("{:.2}", seen.half_covered_s)),
+        ("beams per sr and s: mean, a tenth below", {
+            format!("{:.0}, {:.0}", seen.density_per_sr_s.mean, seen.density_per_sr_s.p10)
+        }),
+        ("elevation of the forward beam, deg", format!("{:.1} (95 % of the time)", seen.field_of_view_deg)),
+        ("greatest tilt of the scan's plane, deg", format!("{:.1}", seen.most_tilt_deg)),
+        ("greatest rate on an axis, deg/s", format!("{:.0} of {:.0}", gyro.most_deg_per_s, gyro.limit_deg_per_s)),
+        ("rate not exceeded in 99 % of the time", format!("{:.0}", gyro.p99_deg_per_s)),
+    ]);
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
+    report::table(&[], &rows, false)
+}

@@ -1,0 +1,85 @@
+//! `zsim reproduce`: the paper's experiments.
+
+use super::arguments::Global;
+use super::bars::WorkBar;
+use super::{End, output};
+use anyhow::Context;
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use zsim::report;
+use zsim::study::reproduction::{Experiment, Extent, Finding, paper_table};
+
+/// Run the paper's experiments again: what it found, what we find
+///
+/// Each leaves its figures in DIR/paper/NAME/, and DIR/paper.md is the table of all that are finished. What was stopped goes
+/// on where it was.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  zsim reproduce\n  zsim reproduce fig3 --out results")]
+pub(super) struct Arguments {
+    /// Experiments, names under specs/experiments/ or files [default: all]
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    /// The folder in which all of it goes
+    #[arg(long, short, value_name = "DIR", default_value = "results")]
+    out: PathBuf,
+    /// Do so little of each that it takes seconds, in DIR/paper-quick/: to see that it runs; its figures are no results
+    #[arg(long)]
+    quick: bool,
+    /// Begin anew even if a folder holds work by another spec or version
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let all = Experiment::all();
+    let names = if arguments.names.is_empty() { &all } else { &arguments.names };
+    // A wrong name shows before hours of work on another.
+    let wanted = names.iter().map(|name| Ok(Experiment::load(name)?)).collect::<anyhow::Result<Vec<_>>>()?;
+    let (extent, stem) = if arguments.quick { (Extent::Quick, "paper-quick") } else { (Extent::Whole, "paper") };
+    let folder = arguments.out.join(stem);
+    let mut found = Vec::new();
+    table(arguments, extent, &folder, &found)?;
+    for experiment in &wanted {
+        let bar = WorkBar::new(global, "reproducing");
+        bar.say(experiment.name.clone());
+        let finding =
+            experiment.run(&folder.join(&experiment.name), extent, arguments.force, &|share| bar.show(share))?;
+        found.push((experiment.given.clone(), finding));
+        table(arguments, extent, &folder, &found)?;
+    }
+    let rows: Vec<Vec<String>> = found
+        .iter()
+        .flat_map(|(_, finding)| &finding.rows)
+        .map(|row| vec![format!("{} {}", row.figure, row.what), row.paper.clone(), row.ours.clone()])
+        .collect();
+    let words = report::table(&["figure", "the paper", "ours"], &rows, false);
+    let figures =
+        found.iter().map(|(name, finding)| json!({ "name": name, "rows": finding.rows, "notes": finding.notes }));
+    output::tell(global, &words, json!({ "experiments": figures.collect::<Vec<_>>() }), Some(&folder))?;
+    Ok(End::Done)
+}
+
+/// Writes the table of what was found now and by earlier runs.
+fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[(String, Finding)]) -> anyhow::Result<()> {
+    let mut findings: Vec<(String, Option<Finding>)> = Vec::new();
+    for name in Experiment::all() {
+        let earlier = || Experiment::load(&name)?.finished(&folder.join(&name), extent);
+        let finding = match found.iter().find(|(other, _)| *other == name) {
+            Some((_, finding)) => Some(finding.clone()),
+            None => earlier()?,
+        };
+        findings.push((name, finding));
+    }
+    let is_built_in = |name: &String| findings.iter().any(|(other, _)| other == name);
+    let others: Vec<_> = found.iter().filter(|(name, _)| !is_built_in(name)).collect();
+    findings.extend(others.into_iter().map(|(name, finding)| (name.clone(), Some(finding.clone()))));
+    let mut options = if arguments.quick { " --quick".to_owned() } else { String::new() };
+    if arguments.out != Path::new("results") {
+        options += &format!(" --out {}", arguments.out.display());
+    }
+    let path = folder.with_extension("md");
+    std::fs::create_dir_all(&arguments.out).with_context(|| format!("{} cannot be made", arguments.out.display()))?;
+    std::fs::write(&path, paper_table(&findings, extent, &options))
+        .with_context(|| format!("{} cannot be written", path.display()))
+}
