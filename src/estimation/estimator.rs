@@ -198,7 +198,7 @@ impl Estimator {
         });
         let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let specs = (&self.spec.inertial, &self.spec.clock);
+        let specs = (&self.spec.inertial, &self.spec.clock, self.spec.surfels.range_offset_sigma_m);
         let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, specs);
         self.window = Some(match &self.carried {
             Some(carried) => {
@@ -224,6 +224,7 @@ impl Estimator {
             noise: self.calibration.lidar,
             scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
             laser_in_imu: imu_from_laser.translation.vector,
+            longer_m: 0.0,
         };
         let border = Border::new(beginning.information, &self.calibration.imu);
         Window::new(&self.spec, maker, beginning, start_s, border)

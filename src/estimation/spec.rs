@@ -62,6 +62,9 @@ pub struct SurfelSpec {
     /// Nearest range used, m: what is nearer is the carrier.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_range_m: f64,
+    /// Standard deviation of an offset common to all ranges, which is estimated, m; 0 for none.
+    #[serde(deserialize_with = "crate::spec::checked::non_negative")]
+    pub range_offset_sigma_m: f64,
     /// Farthest range used, m.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_range_m: f64,
@@ -133,10 +136,13 @@ pub struct InertialSpec {
     /// Multiple of the calibrated noise densities: scale factors and misalignment are not white.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub noise_inflation: f64,
-    /// Error of the gyroscope in proportion to its reading (scale, misalignment), 0..1.
+    /// Standard deviation of the gyroscope's scale factors and misalignment, which are estimated, 0..1; 0 for none.
+    #[serde(deserialize_with = "crate::spec::checked::fraction")]
+    pub gyro_matrix_sigma: f64,
+    /// Error of the gyroscope in proportion to its reading that is left, and counts as noise, 0..1.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub gyro_scale_error: f64,
-    /// Error of the accelerometer in proportion to its reading, 0..1.
+    /// Error of the accelerometer in proportion to its reading, which counts as noise, 0..1.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub accel_scale_error: f64,
     /// Longest stretch without IMU samples that is bridged, s; behind a longer one the estimate begins again.

@@ -17,7 +17,7 @@ use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::strapdown::{Biases, Interval};
 use super::surfel::{Beam, Patch, Surfel, SurfelMaker, Surfels};
-use crate::geometry::{Rotation, Vector};
+use crate::geometry::{Matrix, Rotation, Vector};
 use equations::Workspace;
 use std::collections::VecDeque;
 
@@ -46,6 +46,8 @@ pub(super) struct Window {
     pub(super) clock: Clock,
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
+    /// By how much the gyroscope exaggerates, as far as it is known.
+    gyro_exaggerates: Matrix,
     border: Border,
     stretches: VecDeque<Stretch>,
     start: Start,
@@ -74,6 +76,7 @@ impl Window {
             clock,
             biases: beginning.biases,
             gravity: crate::geometry::gravity_in_world(),
+            gyro_exaggerates: Matrix::zeros(),
             border,
             stretches: VecDeque::new(),
             start: Start::first(start_u_s, beginning.velocity_sigma),
@@ -86,12 +89,22 @@ impl Window {
     /// What goes on when the IMU falls silent.
     pub(super) fn carried(&self) -> Option<Carried> {
         let state = *self.nominal.states().last()?;
-        Some(Carried { state, biases: self.biases, gravity: self.gravity, clock: self.clock })
+        let (gyro_exaggerates, longer_m) = (self.gyro_exaggerates, self.maker.longer_m);
+        Some(Carried {
+            state,
+            biases: self.biases,
+            gravity: self.gravity,
+            clock: self.clock,
+            gyro_exaggerates,
+            longer_m,
+        })
     }
 
-    /// Goes on with the clock as it was known before the IMU fell silent.
+    /// Goes on with clock and sensors as they were known before the IMU fell silent.
     pub(super) fn take_over(&mut self, carried: &Carried) {
         self.clock = carried.clock.told_from(self.start.u_s);
+        self.gyro_exaggerates = carried.gyro_exaggerates;
+        self.maker.longer_m = carried.longer_m;
     }
 
     /// Turns the window about its beginning, the shortest way that makes gravity what it is in `carried`'s map.
@@ -108,7 +121,7 @@ impl Window {
     /// Appends a stretch: integrates its intervals, and makes surfels of its beams.
     pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) {
         for (_, interval) in intervals.iter() {
-            self.nominal.extend(*interval, &self.biases, &self.gravity);
+            self.nominal.extend(interval.without(&self.gyro_exaggerates), &self.biases, &self.gravity);
             self.rest = self.rest.filter(|rest| rest.goes_on(interval));
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
@@ -157,5 +170,13 @@ impl Window {
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
         Some(placed)
+    }
+
+    /// All ranges, of surfels and of beams to come, become longer by `by_m`.
+    fn lengthen(&mut self, by_m: f64) {
+        self.maker.longer_m += by_m;
+        for Surfels { patches, streaks } in self.stretches.iter_mut().map(|stretch| &mut stretch.surfels) {
+            patches.iter_mut().chain(streaks).for_each(|surfel| surfel.lengthen(by_m));
+        }
     }
 }

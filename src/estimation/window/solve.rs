@@ -6,7 +6,7 @@ use super::equations::Robust;
 use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
+use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout, RANGE};
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
 
@@ -36,7 +36,8 @@ impl Window {
     pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
-        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity);
+        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.gyro_exaggerates);
+        let longer_m = self.maker.longer_m;
         self.border.begin_window();
         let mut total = vec![0.0; layout.border()];
         let mut solved = Solved::default();
@@ -71,7 +72,8 @@ impl Window {
             }
         }
         if solved.trouble.is_some() {
-            (self.nominal, self.clock, self.biases, self.gravity) = backup;
+            (self.nominal, self.clock, self.biases, self.gravity, self.gyro_exaggerates) = backup;
+            self.lengthen(longer_m - self.maker.longer_m);
             self.border.begin_window();
             linearised = None;
         }
@@ -94,6 +96,10 @@ impl Window {
         self.clock.offset_s += border[CLOCK];
         self.clock.rate += border[CLOCK_RATE];
         self.border.moved(border, &self.workspace.factor);
+        let more = Matrix::from_fn(|r, c| border[GYRO_MATRIX + 3 * r + c]);
+        self.nominal.measured_without(&more);
+        self.gyro_exaggerates += more;
+        self.lengthen(border[RANGE]);
     }
 }
 
