@@ -15,7 +15,8 @@ use std::time::Instant;
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
 /// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it: `window_s` plus
-/// `step_s` after its instant, plus 0.1 s in which late measurements may still come.
+/// `step_s` after its instant, plus 0.1 s in which late measurements may still come. While the head is held still, windows
+/// grow to three times `window_s` at most.
 #[derive(Debug)]
 pub struct Estimator {
     spec: EstimatorSpec,

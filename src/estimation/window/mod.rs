@@ -145,13 +145,15 @@ impl Window {
     }
 
     /// Whether the oldest stretch is to leave: without it the window still holds `window_s` of stretches that swept over
-    /// surfaces. While the head is held still it sees lines alone, which need the patches seen before.
+    /// surfaces, or it has none to give. While the head is held still it sees lines alone, which need the patches seen before.
     pub(super) fn is_full(&self) -> bool {
         let richest = self.stretches.iter().map(|stretch| stretch.surfels.patches.len()).max().unwrap_or(0);
         let enough = (richest as f64 * SWEPT) as usize;
-        let swept = self.stretches.iter().filter(|stretch| stretch.surfels.patches.len() >= enough).count();
-        let of_window = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s;
-        of_window(swept) > 1.0 - 1e-9 || of_window(self.stretches.len()) > LONGEST
+        let is_swept = |stretch: &Stretch| stretch.surfels.patches.len() >= enough;
+        let swept = self.stretches.iter().filter(|stretch| is_swept(stretch)).count();
+        let windows = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
+        let all = windows(self.stretches.len());
+        windows(swept) > 1.0 || all > LONGEST || (all > 1.0 && !self.stretches.front().is_some_and(is_swept))
     }
 
     /// Where the window will begin when its oldest stretch has gone, IMU time, s.
