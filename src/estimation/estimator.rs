@@ -10,6 +10,7 @@ use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, Wa
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, Measurement};
 use crate::time::Stamp;
+use std::mem::discriminant;
 use std::time::Instant;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
@@ -36,7 +37,8 @@ pub struct Estimator {
     clock_offsets: Vec<(Stamp, f64)>,
     windows: Vec<WindowReport>,
     warnings: Vec<Warning>,
-    lost: bool,
+    /// What was wrong with the newest window.
+    trouble: Option<WarningKind>,
 }
 
 impl Estimator {
@@ -62,7 +64,7 @@ impl Estimator {
             clock_offsets: Vec::new(),
             windows: Vec::new(),
             warnings: Vec::new(),
-            lost: false,
+            trouble: None,
         })
     }
 
@@ -137,11 +139,13 @@ impl Estimator {
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
         let trouble = trouble(&solved, &self.spec, moving);
-        // Said once, until a window is well again.
-        if let (Some(kind), false) = (&trouble, self.lost) {
+        // Said once, until a window is well again or something else is wrong.
+        let is_new =
+            |kind: &WarningKind| self.trouble.as_ref().is_none_or(|before| discriminant(before) != discriminant(kind));
+        if let Some(kind) = trouble.as_ref().filter(|kind| is_new(kind)) {
             self.warnings.push(Warning { stamp: self.intake.stamp(stretch.end_s), kind: kind.clone() });
         }
-        self.lost = trouble.is_some();
+        self.trouble = trouble;
         if let Some(until_s) = final_until_s {
             self.hand_out(until_s);
             let Some(window) = &mut self.window else { return };
@@ -314,7 +318,7 @@ fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<Warn
     } else if expected && matches < spec.solve.min_matches {
         Some(WarningKind::FewMatches { matches })
     } else if expected && solved.conditioning < spec.solve.weak_conditioning {
-        Some(WarningKind::WeakGeometry { conditioning: solved.conditioning })
+        Some(WarningKind::WeakGeometry { conditioning: solved.conditioning, direction_in_map: solved.weakest })
     } else {
         None
     }

@@ -18,7 +18,9 @@ use crate::geometry::{Matrix, Vector};
 pub(in crate::estimation) struct Plane {
     /// Unit normal of the surface.
     pub(in crate::estimation) normal: Vector,
-    /// Distance along it, m.
+    /// From the second centre to the first, m.
+    apart: Vector,
+    /// Distance along the normal, m.
     pub(in crate::estimation) distance_m: f64,
     /// Variance of that distance, m^2.
     pub(in crate::estimation) variance: f64,
@@ -33,9 +35,16 @@ impl Plane {
     /// The plane of a patch, as a streak in it sees it too.
     pub(in crate::estimation) fn around(streak: &Patch, patch: &Patch, sigma_m: f64) -> Self {
         let plane = Self::towards(patch.normal, streak, patch, sigma_m);
-        let within = streak.centre - patch.centre - plane.normal * plane.distance_m;
+        let within = plane.apart - plane.normal * plane.distance_m;
         let extrapolated = patch.variance_of_extrapolation(&plane.normal, &within);
         Self { variance: plane.variance + extrapolated, ..plane }
+    }
+
+    /// Says nothing any more along `direction`, a unit vector.
+    pub(in crate::estimation) fn forget(&mut self, direction: &Vector) {
+        let left = self.normal - direction * self.normal.dot(direction);
+        self.normal = left.try_normalize(1e-3).unwrap_or(self.normal);
+        self.distance_m = self.normal.dot(&self.apart);
     }
 
     fn towards(start: Vector, a: &Patch, b: &Patch, sigma_m: f64) -> Self {
@@ -45,8 +54,9 @@ impl Plane {
         let normal = adjugate(&both) * start;
         let normal = normal.try_normalize(0.0).or_else(|| start.try_normalize(0.0)).unwrap_or(b.normal);
         let lambda = normal.dot(&(both * normal));
-        let distance_m = normal.dot(&(a.centre - b.centre));
-        Self { normal, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) }
+        let apart = a.centre - b.centre;
+        let distance_m = normal.dot(&apart);
+        Self { normal, apart, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) }
     }
 }
 

@@ -88,6 +88,15 @@ pub(super) struct Placed {
 }
 
 impl Patch {
+    /// Variance of how far the patch's normal leans to a direction: of a plane fitted to `N` points of thickness `lambda` and
+    /// spread `s^2` along it, `lambda / (N s^2)`.
+    pub(super) fn variance_of_lean(&self, direction: &Vector) -> f64 {
+        let along = direction - self.normal * self.normal.dot(direction);
+        let spread = along.dot(&(self.covariance * along)) / along.norm_squared();
+        let thin = self.normal.dot(&(self.covariance * self.normal)).max(0.0);
+        if spread > 0.0 { thin / (self.points * spread) } else { 0.0 }
+    }
+
     /// Variance of the height above the patch's centre, along its `normal`, of its plane at `within` from there, m^2.
     ///
     /// The prediction of a plane fitted to `N` points of thickness `lambda` and moment `S`: `lambda / N x^T S^-1 x`, the inverse

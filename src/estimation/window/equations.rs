@@ -141,7 +141,7 @@ impl Window {
                 let weight = robust.weight(plane, residual(&placed[a], Some(&placed[b]), plane));
                 matched::add_pair((equations, own), layout, (placed, a, b), plane, (weight, at_s));
             }
-            for (a, _, plane) in part_of(&matches.fixed, part) {
+            for (a, .., plane) in part_of(&matches.fixed, part) {
                 let a = *a as usize;
                 let weight = robust.weight(plane, residual(&placed[a], None, plane));
                 matched::add_fixed(&mut own[a], &placed[a], plane, weight);

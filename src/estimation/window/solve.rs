@@ -28,6 +28,8 @@ pub(in crate::estimation) struct Solved {
     pub iterations: usize,
     pub last_correction_m: f64,
     pub conditioning: f64,
+    /// The direction about which the matches say least, in the map.
+    pub weakest: Vector,
     pub trouble: Option<&'static str>,
 }
 
@@ -47,9 +49,12 @@ impl Window {
         for iteration in 0..self.spec.solve.max_iterations {
             let scene = self.scene();
             let chosen = chosen.get_or_insert_with(|| views.choose(&scene.placed[..scene.patches]));
-            let matches = self.match_up(&scene, (views, chosen), &mut neighbours, iteration);
+            let mut matches = self.match_up(&scene, (views, chosen), &mut neighbours, iteration);
             let robust = Robust::of(&self.spec.solve, iteration);
             solved.describe(&matches, &robust);
+            if solved.conditioning < self.spec.solve.weak_conditioning {
+                self.straighten(&mut matches, &scene, views, &solved.weakest);
+            }
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.placed.len(), chosen.len());
             let few = matches.len() < self.spec.solve.min_matches;
             let matches = if few { Matches::default() } else { matches };
@@ -128,12 +133,12 @@ impl Solved {
         self.conditioning = 0.0;
         if weights > 0.0 {
             let eigen = information.symmetric_eigen();
-            let weakest = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+            let weakest: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
             // In a smooth tunnel no normal leans along it, but for errors: together they would pass for information.
             let along = |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|lean| lean.abs() > LEANING);
             let held = |plane: &Plane| along(plane).map(|lean| robust.weight(plane, plane.distance_m) * lean * lean);
             let least: f64 = matches.planes().filter_map(held).sum();
-            self.conditioning = least / eigen.eigenvalues.max();
+            (self.conditioning, self.weakest) = (least / eigen.eigenvalues.max(), weakest);
         }
     }
 }
