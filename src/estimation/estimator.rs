@@ -1,11 +1,12 @@
 use super::border::Border;
 use super::initial::{self, Beginning, Carried};
 use super::intake::{Intake, Stretch};
+use super::spent::Stopwatch;
 use super::strapdown::Interval;
 use super::surfel::SurfelMaker;
 use super::views::Views;
 use super::window::{Solved, Window};
-use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
+use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, Measurement};
 use crate::time::Stamp;
@@ -14,7 +15,8 @@ use std::time::Instant;
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
 /// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it: `window_s` plus
-/// `step_s` after its instant, plus 0.1 s in which late measurements may still come.
+/// `step_s` after its instant, plus 0.1 s in which late measurements may still come. While the head is held still the
+/// window grows until `window_s` of it were swept, to three times `window_s` at most: a pose then waits as long.
 #[derive(Debug)]
 pub struct Estimator {
     spec: EstimatorSpec,
@@ -108,9 +110,12 @@ impl Estimator {
         let Some(window) = &mut self.window else { return };
         for stretch in std::mem::take(&mut self.waiting) {
             let started = Instant::now();
-            window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
+            let mut spent = window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
             let solved = window.solve(&self.views);
+            spent += solved.spent;
+            let mut watch = Stopwatch::start();
             window.remake_newest();
+            spent.surfels_s += watch.lap_s();
             if window.is_full()
                 && let Some(carried) = self.carried.take()
             {
@@ -123,7 +128,9 @@ impl Estimator {
                 self.views.take(&patches, self.spec.step_s, window.matcher());
                 final_until_s = Some(window.start_s());
             }
-            self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, started));
+            spent.views_s += watch.lap_s();
+            let took = (started.elapsed().as_secs_f64(), spent);
+            self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, took));
             self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
             let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
             let trouble = trouble(&solved, &self.spec, moving);
@@ -196,7 +203,7 @@ impl Estimator {
             scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
             laser_in_imu: imu_from_laser.translation.vector,
         };
-        let border = Border::new(beginning.information, &self.calibration.imu);
+        let border = Border::new(beginning.information, &self.calibration.imu, self.spec.clock.estimated);
         Window::new(&self.spec, maker, beginning, start_s, border)
     }
 
@@ -260,7 +267,8 @@ fn pose_at(window: &Window, imu_from_head: &Pose, stamp: Stamp, (tau_s, u_s): (f
     }
 }
 
-fn report(solved: &Solved, stamp: Stamp, window: &Window, started: Instant) -> WindowReport {
+fn report(solved: &Solved, stamp: Stamp, window: &Window, took: (f64, TimeSpent)) -> WindowReport {
+    let (elapsed_s, spent) = took;
     WindowReport {
         stamp,
         surfels: solved.surfels,
@@ -272,7 +280,8 @@ fn report(solved: &Solved, stamp: Stamp, window: &Window, started: Instant) -> W
         last_correction_m: solved.last_correction_m,
         conditioning: solved.conditioning,
         clock_offset_s: window.clock.offset_s,
-        elapsed_s: started.elapsed().as_secs_f64(),
+        elapsed_s,
+        spent,
     }
 }
 
