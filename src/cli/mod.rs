@@ -18,6 +18,7 @@ mod quantity;
 mod simulate;
 mod spring;
 mod spring_words;
+mod study;
 
 use arguments::Global;
 use clap::error::ErrorKind;
@@ -52,6 +53,7 @@ enum Verb {
     Evaluate(evaluate::Arguments),
     Gains(gains::Arguments),
     Spring(spring::Arguments),
+    Study(study::Arguments),
     Check(check::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
@@ -92,6 +94,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Evaluate(arguments) => evaluate::run(arguments, global),
         Verb::Gains(arguments) => gains::run(arguments, global),
         Verb::Spring(arguments) => spring::run(arguments, global),
+        Verb::Study(arguments) => study::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),
         Verb::Info(arguments) => info::run(arguments, global),
         Verb::Completions(arguments) => completions::run(arguments),

@@ -2,11 +2,12 @@ use super::border::Border;
 use super::consider::{Consider, Sensitivity};
 use super::initial::{self, Beginning, Carried};
 use super::intake::{Intake, Stretch};
+use super::spent::Stopwatch;
 use super::strapdown::Interval;
 use super::surfel::SurfelMaker;
 use super::views::Views;
 use super::window::{Linearised, Solved, Window};
-use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
+use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, Measurement};
 use crate::time::Stamp;
@@ -16,8 +17,8 @@ use std::time::Instant;
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
 /// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it: `window_s` plus
-/// `step_s` after its instant, plus 0.1 s in which late measurements may still come. While the head is held still, windows
-/// grow to three times `window_s` at most.
+/// `step_s` after its instant, plus 0.1 s in which late measurements may still come. While the head is held still the
+/// window grows until `window_s` of it were swept, to three times `window_s` at most: a pose then waits as long.
 #[derive(Debug)]
 pub struct Estimator {
     spec: EstimatorSpec,
@@ -125,17 +126,22 @@ impl Estimator {
     fn take_in(&mut self, stretch: Stretch) {
         let Some(window) = &mut self.window else { return };
         let started = Instant::now();
-        window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
+        let mut spent = window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
         let (solved, linearised) = window.solve(&self.views);
+        spent += solved.spent;
+        let mut watch = Stopwatch::start();
         window.remake_newest();
+        spent.surfels_s += watch.lap_s();
         if window.is_full()
             && let Some(carried) = self.carried.take()
         {
             window.level_as(&carried);
         }
         let final_until_s = self.let_go(linearised.as_ref());
+        spent.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return };
-        self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, started));
+        let took = (started.elapsed().as_secs_f64(), spent);
+        self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, took));
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
         let trouble = trouble(&solved, &self.spec, moving);
@@ -231,7 +237,7 @@ impl Estimator {
             laser_in_imu: imu_from_laser.translation.vector,
             longer_m: 0.0,
         };
-        let border = Border::new(beginning.information, &self.calibration.imu);
+        let border = Border::new(beginning.information, &self.calibration.imu, self.spec.clock.estimated);
         Window::new(&self.spec, maker, beginning, start_s, border)
     }
 
@@ -294,7 +300,8 @@ impl Estimator {
     }
 }
 
-fn report(solved: &Solved, stamp: Stamp, window: &Window, started: Instant) -> WindowReport {
+fn report(solved: &Solved, stamp: Stamp, window: &Window, took: (f64, TimeSpent)) -> WindowReport {
+    let (elapsed_s, spent) = took;
     WindowReport {
         stamp,
         surfels: solved.surfels,
@@ -306,7 +313,8 @@ fn report(solved: &Solved, stamp: Stamp, window: &Window, started: Instant) -> W
         last_correction_m: solved.last_correction_m,
         conditioning: solved.conditioning,
         clock_offset_s: window.clock.offset_s,
-        elapsed_s: started.elapsed().as_secs_f64(),
+        elapsed_s,
+        spent,
     }
 }
 

@@ -8,6 +8,9 @@ use crate::geometry::{Matrix, Pose, Rotation, Vector, gravity_in_world, roll_pit
 use crate::measurement::ImuNoise;
 use nalgebra::SMatrix;
 
+/// Standard deviations of offset (s) and rate of a clock that is not estimated: nothing moves them.
+const HELD_CLOCK: (f64, f64) = (1e-9, 1e-12);
+
 /// A sample's deviation from the mean, as a multiple of its noise, up to which the head is at rest.
 const REST_SIGMAS: f64 = 6.0;
 
@@ -130,8 +133,8 @@ fn information(
     sigmas[GYRO_BIAS..GYRO_BIAS + 3].fill(gyro_sigma);
     sigmas[ACCEL_BIAS..ACCEL_BIAS + 3].fill(noise.accel_turn_on_bias_m_per_s2.max(1e-4));
     sigmas[GRAVITY..GRAVITY + 2].fill(tilt_sigma);
-    sigmas[CLOCK] = clock.start_sigma_s;
-    sigmas[CLOCK_RATE] = (clock.drift_ppm * 1e-6).max(1e-9);
+    (sigmas[CLOCK], sigmas[CLOCK_RATE]) =
+        if clock.estimated { (clock.start_sigma_s, (clock.drift_ppm * 1e-6).max(1e-9)) } else { HELD_CLOCK };
     // What is left at zero is held there.
     sigmas[RANGE] = range_offset_sigma_m.max(1e-9);
     sigmas[GYRO_MATRIX..GYRO_MATRIX + 9].fill(inertial.gyro_matrix_sigma.max(1e-9));

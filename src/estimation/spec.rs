@@ -59,6 +59,8 @@ pub struct SurfelSpec {
     /// Least velocity of a planar scan's beams out of their plane, by rotation, degrees/s.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_sweep_deg_per_s: f64,
+    /// Whether lines in surfaces that are not swept (the head is held still) are used too.
+    pub streaks: bool,
     /// Nearest range used, m: what is nearer is the carrier.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_range_m: f64,
@@ -157,6 +159,8 @@ pub struct InertialSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClockSpec {
+    /// Whether offset and rate are estimated; if not, the offset stays at `start_s`.
+    pub estimated: bool,
     /// How much later the IMU stamps an instant, at the start, s: zero, or where an earlier run settled.
     #[serde(deserialize_with = "crate::spec::checked::finite")]
     pub start_s: f64,

@@ -34,6 +34,15 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     text.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
 }
 
+/// The same for a page in Markdown: numbers right, the first column left.
+pub fn markdown(header: &[&str], rows: &[Vec<String>]) -> String {
+    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let header: Vec<String> = header.iter().map(|cell| (*cell).to_owned()).collect();
+    let rule: Vec<String> = (0..header.len()).map(|k| if k == 0 { "---" } else { "---:" }.to_owned()).collect();
+    let rows: String = rows.iter().map(|row| line(row)).collect();
+    line(&header) + &line(&rule) + &rows
+}
+
 /// The figures of a run, as they close a command.
 pub fn summary(metrics: &Metrics) -> String {
     let mut cells = Vec::new();

@@ -54,6 +54,9 @@ pub enum StudyError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// There is no thread to work on.
+    #[error("a thread could not be begun: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// Somebody stopped it.
     #[error("stopped; what is complete can be read")]
     Stopped,

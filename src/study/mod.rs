@@ -4,11 +4,12 @@
 //! [`estimate_recording`] is its second half, for anybody's recording.
 //!
 //! A head by itself is characterised by its [`gains`], by what its [`spring`] bears and how it moves, and by the
-//! [`coverage`] of its lidar.
+//! [`coverage`] of its lidar. Many estimates tell by [`comparison`] which of the estimator's ingredients matter.
 
 mod artefacts;
 mod cadence;
 mod calibration;
+pub mod comparison;
 pub mod coverage;
 mod error;
 mod estimate;

@@ -125,7 +125,7 @@ impl SurfelMaker {
         let planarity = 2.0 * (l2 - l1) / (l1 + l2 + l3).max(f64::MIN_POSITIVE);
         let thick2 = self.spec.max_thickness_sigmas.powi(2) * moments.mean_noise2();
         let edge_m = self.spec.finest_voxel_m * f64::from(1_u32 << level);
-        let is_line = level > 0 && l2 <= thick2 && l3 >= (STREAK_LENGTH * edge_m).powi(2);
+        let is_line = self.spec.streaks && level > 0 && l2 <= thick2 && l3 >= (STREAK_LENGTH * edge_m).powi(2);
         let is_plane = planarity >= self.spec.min_planarity && l1 <= thick2;
         if !is_plane && !is_line {
             return None;

@@ -59,7 +59,8 @@ impl Neighbours {
         self.moved_m += by_m;
     }
 
-    fn are_good_for(&self, scene: &Scene) -> bool {
+    /// Whether they need not be looked for again.
+    pub fn are_good_for(&self, scene: &Scene) -> bool {
         self.of == (scene.placed.len(), scene.patches) && self.moved_m < MOVED_M
     }
 }
@@ -84,18 +85,9 @@ impl Window {
         Scene { placed, patches }
     }
 
-    /// The matches of `scene`; `neighbours` are looked for again where they have moved too far.
-    pub(super) fn match_up(
-        &self,
-        scene: &Scene,
-        (views, chosen): (&Views, &[usize]),
-        neighbours: &mut Neighbours,
-        iteration: usize,
-    ) -> Matches {
+    /// Those `neighbours` in `scene` that match.
+    pub(super) fn match_up(&self, scene: &Scene, views: &Views, neighbours: &Neighbours, iteration: usize) -> Matches {
         let gate_m = self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
-        if !neighbours.are_good_for(scene) {
-            *neighbours = self.look_around(scene, (views, chosen));
-        }
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, patch: &Patch| {
             let surfel = &scene.placed[a as usize].patch;
@@ -140,7 +132,8 @@ impl Window {
         }
     }
 
-    fn look_around(&self, scene: &Scene, (views, chosen): (&Views, &[usize])) -> Neighbours {
+    /// The neighbours in `scene` and in the `chosen` views.
+    pub(super) fn look_around(&self, scene: &Scene, (views, chosen): (&Views, &[usize])) -> Neighbours {
         let patches: Vec<Patch> = scene.placed[..scene.patches].iter().map(|surfel| surfel.patch).collect();
         let forest = self.matcher.plant(&patches);
         let mut pairs = self.matcher.among(&scene.placed[..scene.patches], &forest);

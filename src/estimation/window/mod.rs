@@ -15,6 +15,7 @@ use super::matching::Matcher;
 use super::nominal::Nominal;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
+use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Interval};
 use super::surfel::{Beam, Patch, Surfel, SurfelMaker, Surfels};
 use crate::geometry::{Matrix, Rotation, Vector};
@@ -118,8 +119,9 @@ impl Window {
         &self.matcher
     }
 
-    /// Appends a stretch: integrates its intervals, and makes surfels of its beams.
-    pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) {
+    /// Appends a stretch: integrates its intervals, and makes surfels of its beams. The time it took.
+    pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) -> TimeSpent {
+        let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
             self.nominal.extend(interval.without(&self.gyro_exaggerates), &self.biases, &self.gravity);
             self.rest = self.rest.filter(|rest| rest.goes_on(interval));
@@ -127,13 +129,16 @@ impl Window {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
             }
         }
+        let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         self.stretches.push_back(Stretch { end_tau_s, beams, surfels });
+        let surfels_s = watch.lap_s();
         // The clock is told from the middle of the window, where offset and rate are least correlated.
         let length_s = self.spec.step_s * self.stretches.len() as f64;
         let middle_s = end_tau_s - 0.5 * length_s;
         self.border.clock_told_from(middle_s - self.clock.at_s);
         self.clock = self.clock.told_from(middle_s);
+        TimeSpent { integration_s, surfels_s, ..TimeSpent::default() }
     }
 
     /// Makes the newest stretch's surfels again, with the trajectory as it has become.

@@ -7,6 +7,7 @@ use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout, RANGE};
+use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
 
@@ -31,6 +32,7 @@ pub(in crate::estimation) struct Solved {
     /// The direction about which the matches say least, in the map.
     pub weakest: Vector,
     pub trouble: Option<&'static str>,
+    pub spent: TimeSpent,
 }
 
 impl Window {
@@ -46,10 +48,17 @@ impl Window {
         let mut neighbours = Neighbours::default();
         let mut chosen = None;
         let mut linearised = None;
+        let mut watch = Stopwatch::start();
         for iteration in 0..self.spec.solve.max_iterations {
             let scene = self.scene();
+            solved.spent.placing_s += watch.lap_s();
             let chosen = chosen.get_or_insert_with(|| views.choose(&scene.placed[..scene.patches]));
-            let mut matches = self.match_up(&scene, (views, chosen), &mut neighbours, iteration);
+            solved.spent.views_s += watch.lap_s();
+            if !neighbours.are_good_for(&scene) {
+                neighbours = self.look_around(&scene, (views, chosen));
+            }
+            solved.spent.neighbours_s += watch.lap_s();
+            let mut matches = self.match_up(&scene, views, &neighbours, iteration);
             let robust = Robust::of(&self.spec.solve, iteration);
             solved.describe(&matches, &robust);
             if solved.conditioning < self.spec.solve.weak_conditioning {
@@ -58,11 +67,14 @@ impl Window {
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.placed.len(), chosen.len());
             let few = matches.len() < self.spec.solve.min_matches;
             let matches = if few { Matches::default() } else { matches };
+            solved.spent.matches_s += watch.lap_s();
             self.assemble_inertial(first, &layout, &total);
-            let Some(x) = self.solve_robustly(&scene, &matches, &layout, &robust) else {
+            solved.spent.equations_s += watch.lap_s();
+            let Some(x) = self.solve_robustly(&scene, &matches, &layout, &robust, &mut solved.spent) else {
                 solved.trouble = Some("its equations are singular");
                 break;
             };
+            watch.lap_s(); // told by the solver itself
             let (shift, turn) = greatest(&x[..layout.border()]);
             if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
                 solved.trouble = Some("its correction is too large");
@@ -70,6 +82,7 @@ impl Window {
             }
             self.apply(&x, first, &layout, &mut total);
             neighbours.moved(shift + ARM_M * turn);
+            solved.spent.correction_s += watch.lap_s();
             solved.last_correction_m = shift.max(turn);
             linearised = Some(Linearised { layout, scene, matches, robust });
             if solved.last_correction_m < self.spec.solve.settled_m {

@@ -71,6 +71,10 @@ pub struct Chart {
     pub equal_axes: bool,
     /// Whether the ordinate begins at zero at the latest.
     pub from_zero: bool,
+    /// Marks of the abscissa with their words, instead of round numbers; those beyond the data are left out.
+    pub x_marks: Vec<(f64, String)>,
+    /// The same of the ordinate.
+    pub y_marks: Vec<(f64, String)>,
     /// What is drawn, from the back to the front.
     pub series: Vec<Series>,
 }
@@ -84,6 +88,8 @@ impl Chart {
             y_label: y_label.to_owned(),
             equal_axes: false,
             from_zero: false,
+            x_marks: Vec::new(),
+            y_marks: Vec::new(),
             series: Vec::new(),
         }
     }
@@ -92,6 +98,20 @@ impl Chart {
     #[must_use]
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
+        self
+    }
+
+    /// The same with marks of its own on the abscissa.
+    #[must_use]
+    pub fn with_x_marks(mut self, marks: Vec<(f64, String)>) -> Self {
+        self.x_marks = marks;
+        self
+    }
+
+    /// The same with marks of its own on the ordinate.
+    #[must_use]
+    pub fn with_y_marks(mut self, marks: Vec<(f64, String)>) -> Self {
+        self.y_marks = marks;
         self
     }
 
