@@ -85,6 +85,9 @@ pub(super) struct EstimatorArguments {
     /// Stop before the global registration
     #[arg(long)]
     open_loop: bool,
+    /// Tell where the open loop's time went
+    #[arg(long)]
+    pub profile: bool,
 }
 
 impl EstimatorArguments {

@@ -14,6 +14,7 @@ use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
 use zsim::simulation::EPOCH;
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::StudyError;
+use zsim::study::comparison::{Comparison, ComparisonSpec};
 use zsim::study::reproduction::ExperimentSpec;
 use zsim::study::spring::design::{DesignSpec, Search};
 use zsim::world::{SceneSpec, World, WorldError};
@@ -118,8 +119,35 @@ fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
         Kind::Clock => parse::<ClocksSpec>(source).map(drop),
         Kind::Estimator => parse::<EstimatorSpec>(source).map(drop),
         Kind::Spring => parse::<SpringSpec>(source).map(drop),
-        Kind::Study => parse::<DesignSpec>(source).map(drop),
+        Kind::Study => study(source).map(drop),
         Kind::Experiment => parse::<ExperimentSpec>(source).map(drop),
+    }
+}
+
+/// The kinds of studies.
+enum Study {
+    Design(DesignSpec),
+    Comparison(ComparisonSpec),
+}
+
+/// The study in a text; if it is none, the error of the kind that came farther in reading it.
+fn study(source: &Source) -> Result<Study, SpecError> {
+    match (parse(source), parse(source)) {
+        (Ok(design), _) => Ok(Study::Design(design)),
+        (_, Ok(comparison)) => Ok(Study::Comparison(comparison)),
+        (Err(design), Err(comparison)) => {
+            let is_comparison = comparison.line_and_column() > design.line_and_column();
+            Err(if is_comparison { comparison } else { design })
+        }
+    }
+}
+
+impl Study {
+    fn build(&self, source: &Source) -> Result<(), StudyError> {
+        match self {
+            Self::Design(spec) => Search::new(spec, source).map(drop),
+            Self::Comparison(spec) => Comparison::new(spec, source).map(drop),
+        }
     }
 }
 
@@ -154,8 +182,8 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
             Err(ElasticityError::Spec(error)) => Err(error),
             Err(error) => Err(SpecError::plain(source.name.clone(), error.to_string())),
         },
-        Kind::Study => match Search::new(&parse::<DesignSpec>(source)?, source) {
-            Ok(_) => Ok(()),
+        Kind::Study => match study(source)?.build(source) {
+            Ok(()) => Ok(()),
             Err(StudyError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),
         },

@@ -55,5 +55,6 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
     let outcome = study::estimate_recording(&arguments.recording, &folder, &wishes, &mut watch);
     bars.finish();
-    journey::close(global, &outcome.inspect_err(|_| journey::left_behind(&folder))?, &folder)
+    let outcome = outcome.inspect_err(|_| journey::left_behind(&folder))?;
+    journey::close(global, &outcome, arguments.estimator.profile, &folder)
 }

@@ -36,7 +36,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
     let outcome = study::journey(&simulation, &wishes, &folder, &mut watch);
     bars.finish();
-    close(global, &outcome.inspect_err(|_| left_behind(&folder))?, &folder)
+    let outcome = outcome.inspect_err(|_| left_behind(&folder))?;
+    close(global, &outcome, arguments.estimator.profile, &folder)
 }
 
 /// Where results go unless somebody says otherwise.
@@ -49,13 +50,28 @@ pub(super) fn left_behind(folder: &Path) {
     eprintln!("what is complete is in {}", folder.display());
 }
 
-/// Prints the figures of an estimate, and says what was lost.
-pub(super) fn close(global: &Global, outcome: &Outcome, folder: &Path) -> anyhow::Result<End> {
+/// What each part of the estimator took, s, and the whole open loop with them.
+fn seconds_by_part(outcome: &Outcome) -> Value {
+    let parts = outcome.spent.parts().into_iter().map(|(name, seconds)| (format!("{name}_s"), json!(seconds)));
+    let whole = ("open_loop_s".to_owned(), json!(outcome.metrics.open_loop.wall_s));
+    Value::Object(parts.chain([whole]).collect())
+}
+
+/// Prints the figures of an estimate, with `profile` where its time went, and says what was lost.
+pub(super) fn close(global: &Global, outcome: &Outcome, profile: bool, folder: &Path) -> anyhow::Result<End> {
     let mut figures = serde_json::to_value(&outcome.metrics)?;
     if let Value::Object(object) = &mut figures {
         object.insert("losses".to_owned(), json!(outcome.losses));
+        if profile {
+            object.insert("profile".to_owned(), seconds_by_part(outcome));
+        }
     }
-    output::tell(global, &report::summary(&outcome.metrics), figures, Some(folder))?;
+    let mut words = report::summary(&outcome.metrics);
+    if let (true, Some(wall_s)) = (profile, outcome.metrics.open_loop.wall_s) {
+        words += "\n";
+        words += &report::time_spent(&outcome.spent, wall_s);
+    }
+    output::tell(global, &words, figures, Some(folder))?;
     if outcome.losses.is_empty() {
         return Ok(End::Done);
     }

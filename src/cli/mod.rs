@@ -21,6 +21,7 @@ mod reproduce;
 mod simulate;
 mod spring;
 mod spring_words;
+mod study;
 
 use arguments::Global;
 use clap::error::ErrorKind;
@@ -57,6 +58,7 @@ enum Verb {
     Spring(spring::Arguments),
     Coverage(coverage::Arguments),
     Reproduce(reproduce::Arguments),
+    Study(study::Arguments),
     Check(check::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
@@ -99,6 +101,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Spring(arguments) => spring::run(arguments, global),
         Verb::Coverage(arguments) => coverage::run(arguments, global),
         Verb::Reproduce(arguments) => reproduce::run(arguments, global),
+        Verb::Study(arguments) => study::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),
         Verb::Info(arguments) => info::run(arguments, global),
         Verb::Completions(arguments) => completions::run(arguments),

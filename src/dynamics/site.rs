@@ -16,7 +16,6 @@ use crate::geometry::{Pose, Rotation, gravity_in_world};
 use crate::spec::{Source, SpecError};
 
 /// What holds a head, before any load.
-#[expect(clippy::large_enum_variant, reason = "there is one a head, for a moment")]
 pub(super) enum Mount<'a> {
     /// Nothing gives: `base_from_head`.
     Rigid(Pose),

@@ -24,13 +24,16 @@ pub(super) struct Border {
 }
 
 impl Border {
-    pub(super) fn new(prior: SMatrix<f64, BORDER, BORDER>, noise: &ImuNoise) -> Self {
+    /// Knows `prior` at first; a clock that is not estimated does not wander.
+    pub(super) fn new(prior: SMatrix<f64, BORDER, BORDER>, noise: &ImuNoise, clock_wanders: bool) -> Self {
         let mut walks = [0.0; BORDER];
         walks[GYRO_BIAS..GYRO_BIAS + 3].fill(noise.gyro_bias_walk_rad_per_s_per_sqrt_s);
         walks[ACCEL_BIAS..ACCEL_BIAS + 3].fill(noise.accel_bias_walk_m_per_s2_per_sqrt_s);
         walks[GRAVITY..GRAVITY + 2].fill(1e-6);
-        walks[CLOCK] = CLOCK_WALK;
-        walks[CLOCK_RATE] = RATE_WALK;
+        if clock_wanders {
+            walks[CLOCK] = CLOCK_WALK;
+            walks[CLOCK_RATE] = RATE_WALK;
+        }
         Self { prior, posterior: prior, moved: SVector::zeros(), walks }
     }
 

@@ -1,3 +1,4 @@
+use crate::geometry::Vector;
 use crate::time::Stamp;
 use std::fmt;
 
@@ -91,6 +92,8 @@ pub enum WarningKind {
     WeakGeometry {
         /// Least over greatest information about the position, 0..1.
         conditioning: f64,
+        /// The direction, a unit vector in the map.
+        direction_in_map: Vector,
     },
     /// A window's solution was not believed, and the IMU's prediction kept.
     NotSolved {
@@ -127,10 +130,18 @@ impl fmt::Display for WarningKind {
             Self::FewMatches { matches } => {
                 write!(f, "only {matches} surfaces seen again; carried by the IMU alone")
             }
-            Self::WeakGeometry { conditioning } => write!(
-                f,
-                "the surfaces in view leave a direction undetermined (conditioning {conditioning:.1e}); held by the IMU"
-            ),
+            Self::WeakGeometry { conditioning, direction_in_map: d } => {
+                let along = if d.z.abs() > 0.9 {
+                    "the vertical".to_owned()
+                } else {
+                    format!("({:.2}, {:.2}, {:.2})", d.x, d.y, d.z)
+                };
+                write!(
+                    f,
+                    "the surfaces in view say next to nothing of the motion along {along} of the map (conditioning \
+                     {conditioning:.1e}); the IMU alone holds it"
+                )
+            }
             Self::NotSolved { reason } => write!(f, "the window's solution was not believed ({reason})"),
             Self::Saturated { samples } => write!(f, "{samples} IMU samples at the end of the sensor's range"),
         }

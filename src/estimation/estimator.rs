@@ -2,20 +2,23 @@ use super::border::Border;
 use super::consider::{Consider, Sensitivity};
 use super::initial::{self, Beginning, Carried};
 use super::intake::{Intake, Stretch};
+use super::spent::Stopwatch;
 use super::strapdown::Interval;
 use super::surfel::SurfelMaker;
 use super::views::Views;
 use super::window::{Linearised, Solved, Window};
-use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
+use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, Measurement};
 use crate::time::Stamp;
+use std::mem::discriminant;
 use std::time::Instant;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
 /// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it: `window_s` plus
-/// `step_s` after its instant, plus 0.1 s in which late measurements may still come.
+/// `step_s` after its instant, plus 0.1 s in which late measurements may still come. While the head is held still the
+/// window grows until `window_s` of it were swept, to three times `window_s` at most: a pose then waits as long.
 #[derive(Debug)]
 pub struct Estimator {
     spec: EstimatorSpec,
@@ -35,7 +38,8 @@ pub struct Estimator {
     clock_offsets: Vec<(Stamp, f64)>,
     windows: Vec<WindowReport>,
     warnings: Vec<Warning>,
-    lost: bool,
+    /// What was wrong with the newest window.
+    trouble: Option<WarningKind>,
 }
 
 impl Estimator {
@@ -61,7 +65,7 @@ impl Estimator {
             clock_offsets: Vec::new(),
             windows: Vec::new(),
             warnings: Vec::new(),
-            lost: false,
+            trouble: None,
         })
     }
 
@@ -122,25 +126,32 @@ impl Estimator {
     fn take_in(&mut self, stretch: Stretch) {
         let Some(window) = &mut self.window else { return };
         let started = Instant::now();
-        window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
+        let mut spent = window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
         let (solved, linearised) = window.solve(&self.views);
+        spent += solved.spent;
+        let mut watch = Stopwatch::start();
         window.remake_newest();
+        spent.surfels_s += watch.lap_s();
         if window.is_full()
             && let Some(carried) = self.carried.take()
         {
             window.level_as(&carried);
         }
         let final_until_s = self.let_go(linearised.as_ref());
+        spent.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return };
-        self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, started));
+        let took = (started.elapsed().as_secs_f64(), spent);
+        self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, took));
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
         let trouble = trouble(&solved, &self.spec, moving);
-        // Said once, until a window is well again.
-        if let (Some(kind), false) = (&trouble, self.lost) {
+        // Said once, until a window is well again or something else is wrong.
+        let is_new =
+            |kind: &WarningKind| self.trouble.as_ref().is_none_or(|before| discriminant(before) != discriminant(kind));
+        if let Some(kind) = trouble.as_ref().filter(|kind| is_new(kind)) {
             self.warnings.push(Warning { stamp: self.intake.stamp(stretch.end_s), kind: kind.clone() });
         }
-        self.lost = trouble.is_some();
+        self.trouble = trouble;
         if let Some(until_s) = final_until_s {
             self.hand_out(until_s);
             let Some(window) = &mut self.window else { return };
@@ -198,7 +209,7 @@ impl Estimator {
         });
         let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let specs = (&self.spec.inertial, &self.spec.clock);
+        let specs = (&self.spec.inertial, &self.spec.clock, self.spec.surfels.range_offset_sigma_m);
         let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, specs);
         self.window = Some(match &self.carried {
             Some(carried) => {
@@ -224,8 +235,9 @@ impl Estimator {
             noise: self.calibration.lidar,
             scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
             laser_in_imu: imu_from_laser.translation.vector,
+            longer_m: 0.0,
         };
-        let border = Border::new(beginning.information, &self.calibration.imu);
+        let border = Border::new(beginning.information, &self.calibration.imu, self.spec.clock.estimated);
         Window::new(&self.spec, maker, beginning, start_s, border)
     }
 
@@ -288,7 +300,8 @@ impl Estimator {
     }
 }
 
-fn report(solved: &Solved, stamp: Stamp, window: &Window, started: Instant) -> WindowReport {
+fn report(solved: &Solved, stamp: Stamp, window: &Window, took: (f64, TimeSpent)) -> WindowReport {
+    let (elapsed_s, spent) = took;
     WindowReport {
         stamp,
         surfels: solved.surfels,
@@ -300,7 +313,8 @@ fn report(solved: &Solved, stamp: Stamp, window: &Window, started: Instant) -> W
         last_correction_m: solved.last_correction_m,
         conditioning: solved.conditioning,
         clock_offset_s: window.clock.offset_s,
-        elapsed_s: started.elapsed().as_secs_f64(),
+        elapsed_s,
+        spent,
     }
 }
 
@@ -312,7 +326,7 @@ fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<Warn
     } else if expected && matches < spec.solve.min_matches {
         Some(WarningKind::FewMatches { matches })
     } else if expected && solved.conditioning < spec.solve.weak_conditioning {
-        Some(WarningKind::WeakGeometry { conditioning: solved.conditioning })
+        Some(WarningKind::WeakGeometry { conditioning: solved.conditioning, direction_in_map: solved.weakest })
     } else {
         None
     }

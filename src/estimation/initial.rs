@@ -1,12 +1,15 @@
 //! Where an estimate begins: level, biases, and whether the head rested.
 
 use super::clock::Clock;
-use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
+use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, RANGE};
 use super::spec::{ClockSpec, InertialSpec};
 use super::strapdown::{Biases, Interval, State};
-use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
+use crate::geometry::{Matrix, Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
 use crate::measurement::ImuNoise;
 use nalgebra::SMatrix;
+
+/// Standard deviations of offset (s) and rate of a clock that is not estimated: nothing moves them.
+const HELD_CLOCK: (f64, f64) = (1e-9, 1e-12);
 
 /// A sample's deviation from the mean, as a multiple of its noise, up to which the head is at rest.
 const REST_SIGMAS: f64 = 6.0;
@@ -38,6 +41,10 @@ pub(super) struct Carried {
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
     pub(super) clock: Clock,
+    /// By how much the gyroscope exaggerates.
+    pub(super) gyro_exaggerates: Matrix,
+    /// By how much ranges are lengthened, m.
+    pub(super) longer_m: f64,
 }
 
 impl Beginning {
@@ -69,7 +76,7 @@ pub(super) fn begin(
     intervals: &[Interval],
     head_from_imu: &Pose,
     noise: &ImuNoise,
-    spec: (&InertialSpec, &ClockSpec),
+    spec: (&InertialSpec, &ClockSpec, f64),
 ) -> Beginning {
     let duration: f64 = intervals.iter().map(|i| i.h).sum();
     let mean = |of: fn(&Interval) -> Vector| intervals.iter().map(|i| of(i) * i.h).sum::<Vector>() / duration;
@@ -118,7 +125,7 @@ fn information(
     gyro_sigma: f64,
     at_rest: bool,
     noise: &ImuNoise,
-    (_, clock): (&InertialSpec, &ClockSpec),
+    (inertial, clock, range_offset_sigma_m): (&InertialSpec, &ClockSpec, f64),
 ) -> SMatrix<f64, BORDER, BORDER> {
     // A level found in motion is off by the mean acceleration over g, one found at rest by the bias over g.
     let tilt_sigma = if at_rest { 0.02 } else { 0.2 };
@@ -126,7 +133,10 @@ fn information(
     sigmas[GYRO_BIAS..GYRO_BIAS + 3].fill(gyro_sigma);
     sigmas[ACCEL_BIAS..ACCEL_BIAS + 3].fill(noise.accel_turn_on_bias_m_per_s2.max(1e-4));
     sigmas[GRAVITY..GRAVITY + 2].fill(tilt_sigma);
-    sigmas[CLOCK] = clock.start_sigma_s;
-    sigmas[CLOCK_RATE] = (clock.drift_ppm * 1e-6).max(1e-9);
+    (sigmas[CLOCK], sigmas[CLOCK_RATE]) =
+        if clock.estimated { (clock.start_sigma_s, (clock.drift_ppm * 1e-6).max(1e-9)) } else { HELD_CLOCK };
+    // What is left at zero is held there.
+    sigmas[RANGE] = range_offset_sigma_m.max(1e-9);
+    sigmas[GYRO_MATRIX..GYRO_MATRIX + 9].fill(inertial.gyro_matrix_sigma.max(1e-9));
     SMatrix::from_diagonal(&nalgebra::SVector::from(sigmas.map(|sigma| sigma.powi(-2))))
 }

@@ -86,6 +86,16 @@ impl Nominal {
         }
     }
 
+    /// Takes the gyroscope's exaggeration by `m` out of what was measured; where the trajectory stands does not change.
+    pub(super) fn measured_without(&mut self, m: &Matrix) {
+        for interval in &mut self.intervals {
+            *interval = interval.without(m);
+        }
+        for rate in &mut self.rates {
+            *rate -= m * *rate;
+        }
+    }
+
     /// Turns the whole trajectory about `pivot`.
     pub(super) fn turn(&mut self, turn: &Rotation, pivot: &Vector) {
         for state in &mut self.states {

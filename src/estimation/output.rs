@@ -1,6 +1,6 @@
 //! What comes out of the estimator.
 
-use super::Warning;
+use super::{TimeSpent, Warning};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::time::Stamp;
 
@@ -46,8 +46,10 @@ pub struct WindowReport {
     pub conditioning: f64,
     /// Clock offset after the window, s.
     pub clock_offset_s: f64,
-    /// Time it took, s. The one figure that differs from run to run.
+    /// Time it took, s. With its parts the one figure that differs from run to run.
     pub elapsed_s: f64,
+    /// The parts of that time; what they leave of it is the bookkeeping between them.
+    pub spent: TimeSpent,
 }
 
 /// An open-loop estimate.

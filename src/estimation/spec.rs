@@ -59,9 +59,14 @@ pub struct SurfelSpec {
     /// Least velocity of a planar scan's beams out of their plane, by rotation, degrees/s.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_sweep_deg_per_s: f64,
+    /// Whether lines in surfaces that are not swept (the head is held still) are used too.
+    pub streaks: bool,
     /// Nearest range used, m: what is nearer is the carrier.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_range_m: f64,
+    /// Standard deviation of an offset common to all ranges, which is estimated, m; 0 for none.
+    #[serde(deserialize_with = "crate::spec::checked::non_negative")]
+    pub range_offset_sigma_m: f64,
     /// Farthest range used, m.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_range_m: f64,
@@ -133,10 +138,13 @@ pub struct InertialSpec {
     /// Multiple of the calibrated noise densities: scale factors and misalignment are not white.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub noise_inflation: f64,
-    /// Error of the gyroscope in proportion to its reading (scale, misalignment), 0..1.
+    /// Standard deviation of the gyroscope's scale factors and misalignment, which are estimated, 0..1; 0 for none.
+    #[serde(deserialize_with = "crate::spec::checked::fraction")]
+    pub gyro_matrix_sigma: f64,
+    /// Error of the gyroscope in proportion to its reading that is left, and counts as noise, 0..1.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub gyro_scale_error: f64,
-    /// Error of the accelerometer in proportion to its reading, 0..1.
+    /// Error of the accelerometer in proportion to its reading, which counts as noise, 0..1.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub accel_scale_error: f64,
     /// Longest stretch without IMU samples that is bridged, s; behind a longer one the estimate begins again.
@@ -151,6 +159,8 @@ pub struct InertialSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClockSpec {
+    /// Whether offset and rate are estimated; if not, the offset stays at `start_s`.
+    pub estimated: bool,
     /// How much later the IMU stamps an instant, at the start, s: zero, or where an earlier run settled.
     #[serde(deserialize_with = "crate::spec::checked::finite")]
     pub start_s: f64,

@@ -11,7 +11,7 @@
 //!
 //! At 400 degrees/s and 100 Hz the last term alone is 2 mm/s^2: leaving it out would look like a bias.
 
-use crate::geometry::{Rotation, Vector};
+use crate::geometry::{Matrix, Rotation, Vector};
 
 /// What the IMU said about one interval of time, in the IMU's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +44,12 @@ pub(super) struct Biases {
 }
 
 impl Interval {
+    /// The same interval with a gyroscope that exaggerates less by `m`: the truth is `(1 - m) reading`. Scale factors on the
+    /// diagonal, misalignment beside it.
+    pub(super) fn without(&self, m: &Matrix) -> Self {
+        Self { gyro: self.gyro - m * self.gyro, gyro_slope: self.gyro_slope - m * self.gyro_slope, ..*self }
+    }
+
     /// The rotation vector from the interval's start to its end, in the body.
     pub(super) fn turn(&self, biases: &Biases) -> Vector {
         let rate = self.gyro - biases.gyro;

@@ -34,14 +34,17 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     text.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
 }
 
-/// A table in Markdown.
+/// The same for a page in Markdown: the first column left, and of the others those of numbers right.
 pub fn markdown(header: &[&str], rows: &[Vec<String>]) -> String {
     let line = |cells: &mut dyn Iterator<Item = &str>| {
         cells.fold("|".to_owned(), |line, cell| line + " " + &cell.replace('|', "\\|").replace('\n', " ") + " |") + "\n"
     };
-    let rule = "|".to_owned() + &"---|".repeat(header.len()) + "\n";
+    let is_number =
+        |cell: &String| cell.is_empty() || cell.starts_with(|c: char| c.is_ascii_digit() || "+-\u{2212}".contains(c));
+    let is_right = |k: usize| k > 0 && rows.iter().filter_map(|row| row.get(k)).all(is_number);
+    let rule: String = (0..header.len()).map(|k| if is_right(k) { " ---: |" } else { " --- |" }).collect();
     let body = rows.iter().map(|row| line(&mut row.iter().map(String::as_str)));
-    line(&mut header.iter().copied()) + &rule + &body.collect::<String>()
+    line(&mut header.iter().copied()) + "|" + &rule + "\n" + &body.collect::<String>()
 }
 
 /// The figures of a run, as they close a command.

@@ -39,6 +39,16 @@ impl SpecError {
         }
     }
 
+    /// An error about the first place in a spec's text that says `words` after it says `anchor`; about `anchor` where it
+    /// does not. For what stands in one of several alike parts.
+    pub fn about_after(source: &Source, anchor: &str, words: &str, message: impl Into<String>) -> Self {
+        let Some(start) = source.text.find(anchor) else { return Self::plain(source.name.clone(), message) };
+        let place = source.text[start..].find(words).map_or(start, |after| start + after);
+        let before = &source.text[..place];
+        let col = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        Self::at(source, ron::error::Position { line: before.matches('\n').count() + 1, col }, message)
+    }
+
     /// The same error, with what to do about it.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {

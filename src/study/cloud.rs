@@ -105,7 +105,7 @@ mod tests {
             materials: { "grey": (reflectance: 0.5) },
             templates: { "box": [Solid(shape: Box(size_m: (0.4, 0.4, 2)), material: "grey")] },
             items: [Solid(shape: Box(size_m: (20, 20, 0.1)), material: "grey", at_m_deg: [(0, 0, -0.1)])],
-            movers: [(template: "box", waypoints: [(time_s: 0, at_m_deg: (0, 3)), (time_s: 8, at_m_deg: (8, 3))])],
+            movers: [(template: "box", repeats: false, waypoints: [(time_s: 0, at_m_deg: (0, 3)), (time_s: 8, at_m_deg: (8, 3))])],
         )"#;
         let source = Source::in_memory("floor.ron", text);
         World::build(&parse(&source).unwrap(), &source).unwrap()

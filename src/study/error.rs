@@ -25,7 +25,7 @@ pub enum StudyError {
     Spec(#[from] SpecError),
     /// The head cannot be modelled, or its simulation failed.
     #[error(transparent)]
-    Dynamics(#[from] DynamicsError),
+    Dynamics(Box<DynamicsError>),
     /// The motion cannot be built.
     #[error(transparent)]
     Motion(#[from] MotionError),
@@ -54,6 +54,9 @@ pub enum StudyError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// There is no thread to work on.
+    #[error("a thread could not be begun: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// A folder holds something else than the beginning of the work that was to go on in it.
     #[error(
         "{} holds other work than this (another spec, extent or version, or somebody's files): give another folder with \
@@ -69,6 +72,12 @@ pub enum StudyError {
     Stopped,
 }
 
+impl From<DynamicsError> for StudyError {
+    fn from(error: DynamicsError) -> Self {
+        Self::Dynamics(Box::new(error))
+    }
+}
+
 impl StudyError {
     pub(super) fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
         let path = path.to_owned();
@@ -79,7 +88,7 @@ impl StudyError {
     pub fn is_wrong_input(&self) -> bool {
         match self {
             Self::Spec(_) | Self::Motion(_) | Self::Plan { .. } | Self::OtherWork { .. } => true,
-            Self::Dynamics(error) => !matches!(error, DynamicsError::Diverged { .. }),
+            Self::Dynamics(error) => !matches!(**error, DynamicsError::Diverged { .. }),
             Self::Estimation(error) => {
                 matches!(error, EstimationError::Setting { .. } | EstimationError::Calibration(_))
             }

@@ -5,7 +5,7 @@ use super::cloud::{Surroundings, cloud_metrics};
 use super::open_loop::{OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
-use crate::estimation::EstimatorSpec;
+use crate::estimation::{EstimatorSpec, TimeSpent};
 use crate::recording::{FoundCalibration, Preference, Reader, Selection};
 use crate::report::{Metrics, OpenLoopMetrics};
 use crate::simulation::{SimulationSummary, carrier_of};
@@ -44,6 +44,8 @@ pub struct Outcome {
     pub metrics: Metrics,
     /// What of the recording was lost or left out, a sentence each; nothing, as a rule.
     pub losses: Vec<String>,
+    /// Of the open loop's time, what the parts of the estimator took.
+    pub spent: TimeSpent,
 }
 
 /// Estimates from the recording at `path`, whoever made it, and writes to `folder`: `manifest.ron`, `open_loop.tum`,
@@ -92,7 +94,7 @@ pub(super) fn estimate_in(
 
     let how = (&wishes.estimator, &found.calibration);
     let expected_s = origin.simulation.map(|summary| summary.duration_s);
-    let run = run_open_loop(reader, &selection, how, &folder.join("open_loop.tum"), expected_s, watch)?;
+    let run = run_open_loop(reader, &selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
     run.remarks.iter().for_each(|remark| watch.note(remark));
 
     let known = match found.body_frame == TRUE_FRAME {
@@ -124,7 +126,7 @@ pub(super) fn estimate_in(
     };
     let plots = artefacts::plots(&run, known.as_ref(), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
-    Ok(Outcome { metrics, losses: run.losses })
+    Ok(Outcome { metrics, losses: run.losses, spent: run.spent })
 }
 
 /// All figures but those of the open loop.

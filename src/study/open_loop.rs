@@ -2,7 +2,7 @@
 
 use super::cadence::Cadence;
 use super::{Stage, StudyError, Watch};
-use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Warning, WarningKind};
+use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, TimeSpent, Warning, WarningKind};
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, Measurement};
 use crate::recording::{Reader, RecordingError, Selection, TumWriter};
@@ -36,22 +36,24 @@ pub(super) struct OpenLoopRun {
     pub acquisition_s: f64,
     /// Time it took, reading included, s.
     pub wall_s: f64,
+    /// Of that, what the parts of the estimator took.
+    pub spent: TimeSpent,
 }
 
-/// Estimates from what `reader` reads; poses go to the TUM file `tum` as they become final.
+/// Estimates from what `reader` reads; poses go to the TUM file `tum`, if one is wanted, as they become final.
 /// `expected_s` is the recording's length, where it is known, for the progress.
 pub(super) fn run_open_loop(
     reader: &Reader,
     selection: &Selection,
     how: (&EstimatorSpec, &Calibration),
-    tum: &Path,
+    tum: Option<&Path>,
     expected_s: Option<f64>,
     watch: &mut Watch,
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
     let mut estimator = Estimator::new(how.0, how.1)?;
-    let mut written =
-        Written { tum: TumWriter::create(tum)?, map_from_head: Trajectory::new(), covariances: Vec::new() };
+    let tum = tum.map(TumWriter::create).transpose()?;
+    let mut written = Written { tum, map_from_head: Trajectory::new(), covariances: Vec::new() };
     let mut heard = Heard::default();
     let mut measurements = reader.measurements(selection);
     for (index, measurement) in measurements.by_ref().enumerate() {
@@ -62,14 +64,14 @@ pub(super) fn run_open_loop(
             written.take(&estimator.take_poses())?;
             watch.progress(Stage::Estimating, heard.seconds(), expected_s);
             if watch.is_stopped() {
-                written.tum.finish()?;
+                written.finish()?;
                 return Err(StudyError::Stopped);
             }
         }
     }
     let result = estimator.finish()?;
     written.take(&result.poses)?;
-    written.tum.finish()?;
+    let (map_from_head, covariances) = written.finish()?;
 
     let mut losses = measurements.loss().sentences();
     losses.extend(heard.imu.missing("IMU samples"));
@@ -77,8 +79,9 @@ pub(super) fn run_open_loop(
     let start = heard.start();
     losses.extend(result.warnings.iter().filter(|warning| is_loss(&warning.kind)).map(|w| since(start, w)));
     Ok(OpenLoopRun {
-        map_from_head: written.map_from_head,
-        covariances: written.covariances,
+        map_from_head,
+        covariances,
+        spent: result.windows.iter().map(|window| window.spent).sum(),
         clock_offsets: result.clock_offsets,
         remarks: result.warnings.iter().filter(|w| !is_loss(&w.kind)).map(|w| since(start, w)).collect(),
         losses,
@@ -104,9 +107,9 @@ fn since(start: Stamp, warning: &Warning) -> String {
     format!("{:.2} s after the start: {}", warning.stamp.seconds_since(start), warning.kind)
 }
 
-/// Poses on disk and in memory.
+/// Poses in memory, and on disk where that is wanted.
 struct Written {
-    tum: TumWriter<BufWriter<File>>,
+    tum: Option<TumWriter<BufWriter<File>>>,
     map_from_head: Trajectory,
     covariances: Vec<(Stamp, PoseCovariance)>,
 }
@@ -114,7 +117,9 @@ struct Written {
 impl Written {
     fn take(&mut self, poses: &[EstimatedPose]) -> Result<(), RecordingError> {
         for pose in poses {
-            self.tum.pose(pose.stamp, &pose.map_from_head)?;
+            if let Some(tum) = &mut self.tum {
+                tum.pose(pose.stamp, &pose.map_from_head)?;
+            }
             let name = "the estimate".to_owned();
             let kept = self.map_from_head.push(pose.stamp, pose.map_from_head);
             kept.map_err(|source| RecordingError::Trajectory { name, source })?;
@@ -123,6 +128,13 @@ impl Written {
             }
         }
         Ok(())
+    }
+
+    fn finish(self) -> Result<(Trajectory, Vec<(Stamp, PoseCovariance)>), RecordingError> {
+        if let Some(tum) = self.tum {
+            tum.finish()?;
+        }
+        Ok((self.map_from_head, self.covariances))
     }
 }
 

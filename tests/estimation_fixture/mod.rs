@@ -11,5 +11,5 @@ mod sensors;
 
 pub use motion::Walk;
 pub use room::Room;
-pub use score::Score;
-pub use sensors::{Run, calibration};
+pub use score::{Score, growth_m};
+pub use sensors::{Run, Scanner, calibration};

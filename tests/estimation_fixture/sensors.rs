@@ -30,6 +30,37 @@ pub fn calibration() -> Calibration {
     }
 }
 
+/// Which lidar the head carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scanner {
+    /// As a UTM-30LX: 1081 beams of a plane over three quarters of a turn, forty turns a second.
+    Plane,
+    /// As a VLP-16, with half its azimuths: 16 rings from -15 to 15 degrees fired together, ten turns a second.
+    Rings,
+}
+
+impl Scanner {
+    /// How long a turn takes, s, and each beam with its time within it.
+    fn beams(self) -> (f64, Vec<(f64, Vector)>) {
+        let beam = |azimuth: f64, elevation: f64| {
+            let (sin, cos) = elevation.sin_cos();
+            Vector::new(azimuth.cos() * cos, azimuth.sin() * cos, sin)
+        };
+        match self {
+            Self::Plane => {
+                let angle = |k: i32| (-135.0 + 0.25 * f64::from(k)).to_radians();
+                (0.025, (0..1081).map(|k| (f64::from(k) * 0.025 / 1440.0, beam(angle(k), 0.0))).collect())
+            }
+            Self::Rings => {
+                let rings = (0..16).map(|ring| (2.0 * f64::from(ring) - 15.0).to_radians());
+                let fired = |k: i32| (f64::from(k) * 0.1 / 900.0, f64::from(k) * std::f64::consts::TAU / 900.0);
+                let firing = |(after_s, azimuth)| rings.clone().map(move |up| (after_s, beam(azimuth, up)));
+                (0.1, (0..900).map(fired).flat_map(firing).collect())
+            }
+        }
+    }
+}
+
 /// One run through a room.
 #[derive(Debug, Clone)]
 pub struct Run {
@@ -43,6 +74,7 @@ pub struct Run {
     pub clock_drift: f64,
     pub jitter_s: f64,
     pub imu_rate_hz: f64,
+    pub scanner: Scanner,
 }
 
 fn normal(stream: &mut Stream) -> f64 {
@@ -65,6 +97,7 @@ impl Run {
             clock_drift: 1e-3 / 60.0,
             jitter_s: 1e-4,
             imu_rate_hz: 100.0,
+            scanner: Scanner::Plane,
         }
     }
 
@@ -136,17 +169,13 @@ impl Run {
         let mut stream = self.seed.stream("lidar");
         let (noise, head_from_laser) = (calibration().lidar, calibration().head_from_laser);
         let bias_m = 0.005 * normal(&mut stream) * self.noise;
-        let (scan_s, beam_s) = (0.025, 0.025 / 1440.0);
-        let step = 0.25_f64.to_radians();
+        let (scan_s, beams) = self.scanner.beams();
         let room_from_world = self.walk.world_from_room.inverse();
         let mut scans = Vec::new();
         for k in 0..(self.duration_s / scan_s) as usize {
             let start_s = k as f64 * scan_s;
-            let mut returns = Vec::with_capacity(1081);
-            for beam in 0..1081 {
-                let after_s = beam as f64 * beam_s;
-                let angle = -135_f64.to_radians() + f64::from(beam) * step;
-                let direction = Vector::new(angle.cos(), angle.sin(), 0.0);
+            let mut returns = Vec::with_capacity(beams.len());
+            for (after_s, direction) in beams.iter().copied() {
                 let room_from_laser = room_from_world * self.walk.pose(start_s + after_s) * head_from_laser;
                 let true_range =
                     self.room.cast(&room_from_laser.translation.vector, &(room_from_laser.rotation * direction));
@@ -165,15 +194,16 @@ impl Run {
             let stamp = Stamp::from_nanos(0) + Span::from_seconds(start_s);
             let planar = PlanarScan {
                 angle_min_rad: -135_f64.to_radians(),
-                angle_increment_rad: step,
-                time_increment_s: beam_s,
+                angle_increment_rad: 0.25_f64.to_radians(),
+                time_increment_s: scan_s / 1440.0,
                 scan_time_s: scan_s,
                 range_min_m: 0.1,
                 range_max_m: 30.0,
                 ranges_m: Vec::new(),
                 intensities: Vec::new(),
             };
-            scans.push((start_s + scan_s, Measurement::Lidar(LidarScan { stamp, returns, planar: Some(planar) })));
+            let planar = (self.scanner == Scanner::Plane).then_some(planar);
+            scans.push((start_s + scan_s, Measurement::Lidar(LidarScan { stamp, returns, planar })));
         }
         scans
     }

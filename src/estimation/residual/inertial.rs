@@ -11,10 +11,11 @@
 //! ```text
 //! de_w / d(dr_(k+1) - dr_k) = R_(k+1)^T / h      de_w / db_w = 1
 //! de_a / d(dv_(k+1) - dv_k) = R_mid^T / h        de_a / d dr_mid = R_mid^T [x]x,  x = (v_(k+1) - v_k) / h - g
+//! de_w / dM = w^T, row by row, M the gyroscope's exaggeration
 //! de_a / db_a = 1                                de_a / dgamma = R_mid^T [g]x (e_x, e_y),  g' = exp(gamma) g
 //! ```
 
-use super::{ACCEL_BIAS, GRAVITY, GYRO_BIAS, Layout};
+use super::{ACCEL_BIAS, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::estimation::strapdown::{Biases, Interval, State};
@@ -89,7 +90,7 @@ impl Inertial {
         interval: &Interval,
     ) {
         let weight = interval.gyro_sigma.powi(-2);
-        let bias = layout.border() + GYRO_BIAS;
+        let errors = Errors::of_gyro(layout.border(), &interval.gyro);
         // The derivative by a knot is a multiple of a rotation, so its square is that multiple of the identity.
         let right = self.end_from_map.transpose() * self.rate;
         for a in 0..spread.used {
@@ -102,14 +103,12 @@ impl Inertial {
             for axis in 0..3 {
                 equations.add_right(first + 6 * a + axis, -scaled * right[axis]);
                 for row in 0..3 {
-                    equations.add_entry(bias + row, first + 6 * a + axis, scaled * self.end_from_map[(row, axis)]);
+                    let by = scaled * self.end_from_map[(row, axis)];
+                    errors.add_beside(equations, row, first + 6 * a + axis, by);
                 }
             }
         }
-        for axis in 0..3 {
-            equations.add_entry(bias + axis, bias + axis, weight);
-            equations.add_right(bias + axis, -weight * self.rate[axis]);
-        }
+        errors.add_own(equations, &self.rate, weight);
     }
 
     fn add_force(
@@ -120,7 +119,8 @@ impl Inertial {
         (interval, gravity): (&Interval, &Vector),
     ) {
         let weight = interval.accel_sigma.powi(-2);
-        let (bias, tilt) = (layout.border() + ACCEL_BIAS, layout.border() + GRAVITY);
+        let errors = Errors::of_accel(layout.border());
+        let tilt = layout.border() + GRAVITY;
         let (by_turn, by_shift, by_tilt) = (self.force_by_turn(), self.middle_from_map, self.force_by_tilt(gravity));
         let turn_turn = by_turn.transpose() * by_turn;
         let turn_shift = by_turn.transpose() * by_shift;
@@ -147,8 +147,8 @@ impl Inertial {
                     }
                 }
                 for j in 0..3 {
-                    equations.add_entry(bias + j, turn + i, m * by_turn[(j, i)]);
-                    equations.add_entry(bias + j, shift + i, s * by_shift[(j, i)]);
+                    errors.add_beside(equations, j, turn + i, m * by_turn[(j, i)]);
+                    errors.add_beside(equations, j, shift + i, s * by_shift[(j, i)]);
                 }
                 for j in 0..2 {
                     equations.add_entry(tilt + j, turn + i, m * tilt_turn[(j, i)]);
@@ -156,29 +156,74 @@ impl Inertial {
                 }
             }
         }
-        self.add_force_border(equations, (bias, tilt), &by_tilt, weight);
+        self.add_force_border(equations, (&errors, tilt), &by_tilt, weight);
     }
 
     fn add_force_border(
         &self,
         equations: &mut NormalEquations,
-        (bias, tilt): (usize, usize),
+        (errors, tilt): (&Errors<1>, usize),
         by_tilt: &nalgebra::Matrix3x2<f64>,
         weight: f64,
     ) {
         let square = by_tilt.transpose() * by_tilt;
         let right = by_tilt.transpose() * self.force;
         for i in 0..3 {
-            equations.add_entry(bias + i, bias + i, weight);
-            equations.add_right(bias + i, -weight * self.force[i]);
             for j in 0..2 {
-                equations.add_entry(tilt + j, bias + i, weight * by_tilt[(i, j)]);
+                errors.add_beside(equations, i, tilt + j, weight * by_tilt[(i, j)]);
             }
         }
+        errors.add_own(equations, &self.force, weight);
         for i in 0..2 {
             equations.add_right(tilt + i, -weight * right[i]);
             for j in 0..=i {
                 equations.add_entry(tilt + i, tilt + j, weight * square[(i, j)]);
+            }
+        }
+    }
+}
+
+/// A sensor's own errors among the unknowns: component `i` of its residual hangs on `unknowns[i][k]` by `by[k]`.
+struct Errors<const N: usize> {
+    unknowns: [[usize; N]; 3],
+    by: [f64; N],
+}
+
+impl Errors<4> {
+    /// The bias by 1, and row `i` of the exaggeration by the reading.
+    fn of_gyro(border: usize, reading: &Vector) -> Self {
+        let row = |i: usize| {
+            let matrix = border + GYRO_MATRIX + 3 * i;
+            [border + GYRO_BIAS + i, matrix, matrix + 1, matrix + 2]
+        };
+        Self { unknowns: [row(0), row(1), row(2)], by: [1.0, reading.x, reading.y, reading.z] }
+    }
+}
+
+impl Errors<1> {
+    /// The bias.
+    fn of_accel(border: usize) -> Self {
+        let bias = border + ACCEL_BIAS;
+        Self { unknowns: [[bias], [bias + 1], [bias + 2]], by: [1.0] }
+    }
+}
+
+impl<const N: usize> Errors<N> {
+    /// Adds the products with another unknown, by which component `i` changes `by` times.
+    fn add_beside(&self, equations: &mut NormalEquations, i: usize, unknown: usize, by: f64) {
+        for (own, factor) in self.unknowns[i].iter().zip(self.by) {
+            equations.add_entry(*own, unknown, by * factor);
+        }
+    }
+
+    /// Adds the products among themselves, and the right-hand side.
+    fn add_own(&self, equations: &mut NormalEquations, residual: &Vector, weight: f64) {
+        for (i, unknowns) in self.unknowns.iter().enumerate() {
+            for (a, (row, by)) in unknowns.iter().zip(self.by).enumerate() {
+                equations.add_right(*row, -weight * by * residual[i]);
+                for (column, other) in unknowns.iter().zip(self.by).take(a + 1) {
+                    equations.add_entry(*row, *column, weight * by * other);
+                }
             }
         }
     }
@@ -269,9 +314,10 @@ mod tests {
         let border = layout().border();
         let three = |at: usize| Vector::new(x[border + at], x[border + at + 1], x[border + at + 2]);
         let biases = Biases { gyro: case.biases.gyro + three(GYRO_BIAS), accel: case.biases.accel + three(ACCEL_BIAS) };
+        let interval = case.interval.without(&Matrix::from_fn(|r, c| x[border + GYRO_MATRIX + 3 * r + c]));
         let tilt = Vector::new(x[border + GRAVITY], x[border + GRAVITY + 1], 0.0);
         let gravity = Rotation::from_scaled_axis(tilt) * case.gravity;
-        let terms = Inertial::between(&moved(0), &moved(1), &case.interval, &biases, &gravity);
+        let terms = Inertial::between(&moved(0), &moved(1), &interval, &biases, &gravity);
         let (rate, force) = (terms.rate / case.interval.gyro_sigma, terms.force / case.interval.accel_sigma);
         DVector::from_iterator(6, rate.iter().chain(force.iter()).copied())
     }

@@ -1,12 +1,13 @@
 //! How far two matched surfels are apart along the normal of the surface that both belong to.
 //!
 //! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by
-//! `zeta^2 = 1 / (sigma_r^2 + lambda)`. A live surfel's centre moves by `dt + dr x arm + v dl`; one of a fixed view does not.
+//! `zeta^2 = 1 / (sigma_r^2 + lambda)`. A live surfel's centre moves by
+//! `dt + dr x arm + v dl + u dr`, `u` along its beams; one of a fixed view does not.
 //!
 //! A streak takes the patch's plane. It may lie beside the patch's points, where that plane is less certain, so its
 //! `zeta^2 = 1 / (sigma_r^2 + lambda + x)`, see `Patch::variance_of_extrapolation`.
 
-use super::{CLOCK, Layout};
+use super::{CLOCK, CLOCK_RATE, Layout, RANGE};
 use crate::estimation::nominal::Correction;
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::surfel::{Patch, Placed};
@@ -17,7 +18,9 @@ use crate::geometry::{Matrix, Vector};
 pub(in crate::estimation) struct Plane {
     /// Unit normal of the surface.
     pub(in crate::estimation) normal: Vector,
-    /// Distance along it, m.
+    /// From the second centre to the first, m.
+    apart: Vector,
+    /// Distance along the normal, m.
     pub(in crate::estimation) distance_m: f64,
     /// Variance of that distance, m^2.
     pub(in crate::estimation) variance: f64,
@@ -32,9 +35,16 @@ impl Plane {
     /// The plane of a patch, as a streak in it sees it too.
     pub(in crate::estimation) fn around(streak: &Patch, patch: &Patch, sigma_m: f64) -> Self {
         let plane = Self::towards(patch.normal, streak, patch, sigma_m);
-        let within = streak.centre - patch.centre - plane.normal * plane.distance_m;
+        let within = plane.apart - plane.normal * plane.distance_m;
         let extrapolated = patch.variance_of_extrapolation(&plane.normal, &within);
         Self { variance: plane.variance + extrapolated, ..plane }
+    }
+
+    /// Says nothing any more along `direction`, a unit vector.
+    pub(in crate::estimation) fn forget(&mut self, direction: &Vector) {
+        let left = self.normal - direction * self.normal.dot(direction);
+        self.normal = left.try_normalize(1e-3).unwrap_or(self.normal);
+        self.distance_m = self.normal.dot(&self.apart);
     }
 
     fn towards(start: Vector, a: &Patch, b: &Patch, sigma_m: f64) -> Self {
@@ -44,8 +54,9 @@ impl Plane {
         let normal = adjugate(&both) * start;
         let normal = normal.try_normalize(0.0).or_else(|| start.try_normalize(0.0)).unwrap_or(b.normal);
         let lambda = normal.dot(&(both * normal));
-        let distance_m = normal.dot(&(a.centre - b.centre));
-        Self { normal, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) }
+        let apart = a.centre - b.centre;
+        let distance_m = normal.dot(&apart);
+        Self { normal, apart, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) }
     }
 }
 
@@ -54,10 +65,10 @@ fn adjugate(m: &Matrix) -> Matrix {
     Matrix::from_rows(&[b.cross(&c).transpose(), c.cross(&a).transpose(), a.cross(&b).transpose()])
 }
 
-/// The derivative of `e` by what moves a live surfel: its turn, its shift, and the clock offset at its time.
+/// The derivative of `e` by what moves a live surfel: its turn, its shift, the clock offset at its time, the range offset.
 fn by_motion(surfel: &Placed, normal: &Vector) -> [f64; OWN] {
     let turn = surfel.arm.cross(normal);
-    [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z, normal.dot(&surfel.velocity)]
+    [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z, normal.dot(&surfel.velocity), normal.dot(&surfel.beam)]
 }
 
 /// How far a solution `x` moves a live surfel along `normal`, m.
@@ -71,20 +82,28 @@ pub(in crate::estimation) fn moved_m(
     let correction = Correction::of_spline(&surfel.basis, layout.first_knot, x);
     let clock = layout.border() + CLOCK;
     let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - clock_at_s);
-    normal.dot(&(correction.translation + correction.rotation.cross(&surfel.arm) + surfel.velocity * later_s))
+    let longer_m = x[layout.border() + RANGE];
+    let turned = correction.rotation.cross(&surfel.arm);
+    normal.dot(&(correction.translation + turned + surfel.velocity * later_s + surfel.beam * longer_m))
 }
 
-/// The motions of a surfel of its own: turn, shift, clock offset.
-const OWN: usize = 7;
+/// The motions of a surfel of its own: turn, shift, clock offset, range offset.
+const OWN: usize = 8;
 
 /// What all matches of a surfel say about its own motion: `sum w g g^T` and `-sum w e g`, with `g` the derivative of `e`.
 ///
 /// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Own {
     /// Lower triangle by rows.
     square: [f64; OWN * (OWN + 1) / 2],
     right: [f64; OWN],
+}
+
+impl Default for Own {
+    fn default() -> Self {
+        Self { square: [0.0; OWN * (OWN + 1) / 2], right: [0.0; OWN] }
+    }
 }
 
 impl Own {
@@ -122,8 +141,9 @@ impl Own {
         surfel: &Placed,
         clock_at_s: f64,
     ) {
-        let (first, clock) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
-        let by_clock = [1.0, surfel.tau_s - clock_at_s];
+        let (first, border) = (layout.knot(surfel.basis.first), layout.border());
+        // Of each unknown of the border, which motion it is, and how much of it.
+        let beside = [(CLOCK, 6, 1.0), (CLOCK_RATE, 6, surfel.tau_s - clock_at_s), (RANGE, 7, 1.0)];
         for (k, value) in surfel.basis.value.iter().enumerate() {
             for i in 0..6 {
                 let row = first + 6 * k + i;
@@ -133,15 +153,16 @@ impl Own {
                         equations.add_entry(row, first + 6 * l + j, value * other * self.square(i, j));
                     }
                 }
-                for (c, by) in by_clock.iter().enumerate() {
-                    equations.add_entry(clock + c, row, by * value * self.square(6, i));
+                for (unknown, motion, by) in beside {
+                    equations.add_entry(border + unknown, row, by * value * self.square(motion, i));
                 }
             }
         }
-        for (c, by) in by_clock.iter().enumerate() {
-            equations.add_right(clock + c, by * self.right[6]);
-            for (d, other) in by_clock[..=c].iter().enumerate() {
-                equations.add_entry(clock + c, clock + d, by * other * self.square(6, 6));
+        for (a, (unknown, motion, by)) in beside.iter().enumerate() {
+            equations.add_right(border + unknown, by * self.right[*motion]);
+            for (other, other_motion, other_by) in &beside[..=a] {
+                let value = by * other_by * self.square(*motion, *other_motion);
+                equations.add_entry(border + unknown, border + other, value);
             }
         }
     }
@@ -167,10 +188,10 @@ pub(in crate::estimation) fn add_pair(
     };
     let starts = (layout.knot(early.0.basis.first), layout.knot(late.0.basis.first));
     equations.add_product((starts.0, &early.1.knots), (starts.1, &late.1.knots), weight);
-    let clock = layout.border() + CLOCK;
-    equations.add_product((starts.0, &early.1.knots), (clock, &late.1.clock), weight);
-    equations.add_product((starts.1, &late.1.knots), (clock, &early.1.clock), weight);
-    equations.add_product((clock, &early.1.clock), (clock, &late.1.clock), weight);
+    let beside = layout.border() + CLOCK;
+    equations.add_product((starts.0, &early.1.knots), (beside, &late.1.beside), weight);
+    equations.add_product((starts.1, &late.1.knots), (beside, &early.1.beside), weight);
+    equations.add_product((beside, &early.1.beside), (beside, &late.1.beside), weight);
 }
 
 /// Adds a match between a live surfel and one of a fixed view.
@@ -187,21 +208,22 @@ pub(in crate::estimation) fn add_scaled_row(
     clock_at_s: f64,
 ) {
     let row = Row::of(surfel, &by_motion(surfel, normal), clock_at_s);
-    let (first, clock) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
+    let (first, beside) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
     for (column, scale) in columns.iter_mut().zip(scales) {
         for (sum, term) in column[first..first + 24].iter_mut().zip(row.knots) {
             *sum += scale * term;
         }
-        for (sum, term) in column[clock..clock + 2].iter_mut().zip(row.clock) {
+        for (sum, term) in column[beside..beside + 3].iter_mut().zip(row.beside) {
             *sum += scale * term;
         }
     }
 }
 
-/// A row of the Jacobian: the four knots about a surfel, and the clock's offset and rate.
+/// A row of the Jacobian: the four knots about a surfel; the clock's offset and rate and the range offset, which follow each
+/// other in the border.
 struct Row {
     knots: [f64; 24],
-    clock: [f64; 2],
+    beside: [f64; 3],
 }
 
 impl Row {
@@ -212,7 +234,7 @@ impl Row {
                 *entry = value * derivative;
             }
         }
-        Self { knots, clock: [by[6], by[6] * (surfel.tau_s - clock_at_s)] }
+        Self { knots, beside: [by[6], by[6] * (surfel.tau_s - clock_at_s), by[7]] }
     }
 }
 
@@ -242,6 +264,7 @@ mod tests {
             tau_s,
             arm: Vector::new(1.5, 0.2 * seed, -0.4),
             velocity: Vector::new(3.0, -2.0 * seed, 1.0),
+            beam: Vector::new(0.8, 0.1 * seed, -0.3).normalize(),
             basis: Basis::at(tau_s + 0.003, 0.2),
         }
     }
@@ -253,7 +276,8 @@ mod tests {
         let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - AT_S);
         let origin = surfel.patch.centre - surfel.arm;
         let turned = Rotation::from_scaled_axis(correction.rotation) * surfel.arm;
-        origin + correction.translation + turned + surfel.velocity * later_s
+        let longer_m = x[layout.border() + RANGE];
+        origin + correction.translation + turned + surfel.velocity * later_s + surfel.beam * longer_m
     }
 
     fn check(a: &Placed, b: Option<&Placed>) {

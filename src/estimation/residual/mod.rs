@@ -4,14 +4,17 @@ pub(super) mod inertial;
 pub(super) mod matched;
 pub(super) mod prior;
 
-/// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate.
-pub(super) const BORDER: usize = 10;
+/// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate, range
+/// offset, and by how much the gyroscope exaggerates, three by three.
+pub(super) const BORDER: usize = 20;
 /// Where each begins.
 pub(super) const GYRO_BIAS: usize = 0;
 pub(super) const ACCEL_BIAS: usize = 3;
 pub(super) const GRAVITY: usize = 6;
 pub(super) const CLOCK: usize = 8;
 pub(super) const CLOCK_RATE: usize = 9;
+pub(super) const RANGE: usize = 10;
+pub(super) const GYRO_MATRIX: usize = 11;
 
 /// Where the unknowns of a window stand.
 #[derive(Debug, Clone, Copy)]

@@ -26,6 +26,8 @@ pub(in super::super) struct SurfelMaker {
     /// Normal of the scan plane, if the lidar has one plane, and the lidar's place, in the IMU's frame.
     pub(in super::super) scan_normal: Option<Vector>,
     pub(in super::super) laser_in_imu: Vector,
+    /// By how much ranges are lengthened, m: minus the range's offset, as far as it is known.
+    pub(in super::super) longer_m: f64,
 }
 
 /// Consecutive beams that fell in one finest cell.
@@ -100,7 +102,9 @@ impl SurfelMaker {
             let x = (beam.tau_s - start_s) / POSE_SPACING_S;
             let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
             let position = a.position.lerp(&b.position, x);
-            with(beam, rotation * beam.point_in_imu.cast::<f64>() + position);
+            let in_imu = beam.point_in_imu.cast::<f64>();
+            let along = (in_imu - self.laser_in_imu) * (self.longer_m / f64::from(beam.range_m));
+            with(beam, rotation * (in_imu + along) + position);
         }
     }
 
@@ -121,7 +125,7 @@ impl SurfelMaker {
         let planarity = 2.0 * (l2 - l1) / (l1 + l2 + l3).max(f64::MIN_POSITIVE);
         let thick2 = self.spec.max_thickness_sigmas.powi(2) * moments.mean_noise2();
         let edge_m = self.spec.finest_voxel_m * f64::from(1_u32 << level);
-        let is_line = level > 0 && l2 <= thick2 && l3 >= (STREAK_LENGTH * edge_m).powi(2);
+        let is_line = self.spec.streaks && level > 0 && l2 <= thick2 && l3 >= (STREAK_LENGTH * edge_m).powi(2);
         let is_plane = planarity >= self.spec.min_planarity && l1 <= thick2;
         if !is_plane && !is_line {
             return None;
@@ -141,6 +145,7 @@ impl SurfelMaker {
         let surfel = |normal_in_imu: Vector| Surfel {
             tau_s,
             centre_in_imu,
+            beam_in_imu: beam,
             normal_in_imu,
             covariance_in_imu,
             points: moments.count(),

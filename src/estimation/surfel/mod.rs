@@ -43,6 +43,8 @@ pub(super) struct Surfel {
     pub(super) tau_s: f64,
     /// Mean of its points, m.
     pub(super) centre_in_imu: Vector,
+    /// Unit vector from the lidar to that.
+    pub(super) beam_in_imu: Vector,
     /// Unit normal, turned to the lidar; of a streak, the unit vector along it.
     pub(super) normal_in_imu: Vector,
     /// Second central moment of its points, m^2.
@@ -77,6 +79,8 @@ pub(super) struct Placed {
     pub(super) tau_s: f64,
     /// From the IMU to the centre, m.
     pub(super) arm: Vector,
+    /// Unit vector along its beams, away from the lidar.
+    pub(super) beam: Vector,
     /// How the centre would move if the clock offset grew, m/s.
     pub(super) velocity: Vector,
     /// The correction spline's basis at its time.
@@ -84,6 +88,15 @@ pub(super) struct Placed {
 }
 
 impl Patch {
+    /// Variance of how far the patch's normal leans to a direction: of a plane fitted to `N` points of thickness `lambda` and
+    /// spread `s^2` along it, `lambda / (N s^2)`.
+    pub(super) fn variance_of_lean(&self, direction: &Vector) -> f64 {
+        let along = direction - self.normal * self.normal.dot(direction);
+        let spread = along.dot(&(self.covariance * along)) / along.norm_squared();
+        let thin = self.normal.dot(&(self.covariance * self.normal)).max(0.0);
+        if spread > 0.0 { thin / (self.points * spread) } else { 0.0 }
+    }
+
     /// Variance of the height above the patch's centre, along its `normal`, of its plane at `within` from there, m^2.
     ///
     /// The prediction of a plane fitted to `N` points of thickness `lambda` and moment `S`: `lambda / N x^T S^-1 x`, the inverse
@@ -102,6 +115,11 @@ impl Patch {
 }
 
 impl Surfel {
+    /// The same beams, longer by `by_m`.
+    pub(super) fn lengthen(&mut self, by_m: f64) {
+        self.centre_in_imu += self.beam_in_imu * by_m;
+    }
+
     /// The surfel in the map.
     pub(super) fn place(&self, nominal: &Nominal, clock: &Clock, biases: &Biases, knot_spacing_s: f64) -> Placed {
         let u_s = clock.imu_s(self.tau_s);
@@ -115,7 +133,8 @@ impl Surfel {
             points: self.points,
         };
         let velocity = motion.velocity + motion.angular_velocity.cross(&arm);
-        Placed { patch, tau_s: self.tau_s, arm, velocity, basis: Basis::at(u_s, knot_spacing_s) }
+        let beam = motion.rotation * self.beam_in_imu;
+        Placed { patch, tau_s: self.tau_s, arm, beam, velocity, basis: Basis::at(u_s, knot_spacing_s) }
     }
 }
 

@@ -4,10 +4,13 @@ use super::Window;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::surfel::{Patch, Placed, Surfel};
 use crate::estimation::views::Views;
+use crate::geometry::Vector;
 use rayon::prelude::*;
 
 /// Neighbours are looked for again when a surfel may have moved by this since, m: by less, they hardly change.
 const MOVED_M: f64 = 0.02;
+/// A normal leans when it does so by more than this multiple of its error.
+const SIGNIFICANT: f64 = 4.0;
 
 /// The window's surfels in the map.
 #[derive(Debug)]
@@ -36,8 +39,8 @@ pub(super) struct Neighbours {
 pub(super) struct Matches {
     /// Of the window: indices into the scene.
     pub pairs: Vec<(u32, u32, Plane)>,
-    /// With views: an index into the scene, a view.
-    pub fixed: Vec<(u32, u32, Plane)>,
+    /// With views: an index into the scene, a view, a patch of it.
+    pub fixed: Vec<(u32, u32, u32, Plane)>,
 }
 
 impl Matches {
@@ -56,7 +59,8 @@ impl Neighbours {
         self.moved_m += by_m;
     }
 
-    fn are_good_for(&self, scene: &Scene) -> bool {
+    /// Whether they need not be looked for again.
+    pub fn are_good_for(&self, scene: &Scene) -> bool {
         self.of == (scene.placed.len(), scene.patches) && self.moved_m < MOVED_M
     }
 }
@@ -81,18 +85,9 @@ impl Window {
         Scene { placed, patches }
     }
 
-    /// The matches of `scene`; `neighbours` are looked for again where they have moved too far.
-    pub(super) fn match_up(
-        &self,
-        scene: &Scene,
-        (views, chosen): (&Views, &[usize]),
-        neighbours: &mut Neighbours,
-        iteration: usize,
-    ) -> Matches {
+    /// Those `neighbours` in `scene` that match.
+    pub(super) fn match_up(&self, scene: &Scene, views: &Views, neighbours: &Neighbours, iteration: usize) -> Matches {
         let gate_m = self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
-        if !neighbours.are_good_for(scene) {
-            *neighbours = self.look_around(scene, (views, chosen));
-        }
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, patch: &Patch| {
             let surfel = &scene.placed[a as usize].patch;
@@ -109,16 +104,36 @@ impl Window {
             .with_min_len(512)
             .map(|(a, b)| Some((*a, *b, plane(*a, &scene.placed[*b as usize].patch)?)))
             .collect();
-        let fixed: Vec<Option<(u32, u32, Plane)>> = neighbours
+        let fixed: Vec<Option<(u32, u32, u32, Plane)>> = neighbours
             .fixed
             .par_iter()
             .with_min_len(512)
-            .map(|(a, view, k)| Some((*a, *view, plane(*a, &views.view(*view as usize).patches[*k as usize])?)))
+            .map(|(a, view, k)| Some((*a, *view, *k, plane(*a, &views.view(*view as usize).patches[*k as usize])?)))
             .collect();
         Matches { pairs: pairs.into_iter().flatten().collect(), fixed: fixed.into_iter().flatten().collect() }
     }
 
-    fn look_around(&self, scene: &Scene, (views, chosen): (&Views, &[usize])) -> Neighbours {
+    /// Normals that lean to `direction` by no more than they may err lean no more: together, such errors would pass for
+    /// knowledge, and hold the head back.
+    pub(super) fn straighten(&self, matches: &mut Matches, scene: &Scene, views: &Views, direction: &Vector) {
+        let straighten = |a: u32, patch: &Patch, plane: &mut Plane| {
+            let both = [&scene.placed[a as usize].patch, patch];
+            let of_both = if (a as usize) < scene.patches { &both[..] } else { &both[1..] };
+            let variance: f64 = of_both.iter().map(|patch| patch.variance_of_lean(direction)).sum();
+            if plane.normal.dot(direction).abs() < SIGNIFICANT * variance.sqrt() {
+                plane.forget(direction);
+            }
+        };
+        for (a, b, plane) in &mut matches.pairs {
+            straighten(*a, &scene.placed[*b as usize].patch, plane);
+        }
+        for (a, view, k, plane) in &mut matches.fixed {
+            straighten(*a, &views.view(*view as usize).patches[*k as usize], plane);
+        }
+    }
+
+    /// The neighbours in `scene` and in the `chosen` views.
+    pub(super) fn look_around(&self, scene: &Scene, (views, chosen): (&Views, &[usize])) -> Neighbours {
         let patches: Vec<Patch> = scene.placed[..scene.patches].iter().map(|surfel| surfel.patch).collect();
         let forest = self.matcher.plant(&patches);
         let mut pairs = self.matcher.among(&scene.placed[..scene.patches], &forest);

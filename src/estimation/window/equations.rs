@@ -8,6 +8,7 @@ use crate::estimation::residual::inertial::Inertial;
 use crate::estimation::residual::matched::{self, Own, Plane};
 use crate::estimation::residual::prior;
 use crate::estimation::spec::SolveSpec;
+use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Placed;
 use rayon::prelude::*;
@@ -97,20 +98,25 @@ impl Window {
         }
     }
 
-    /// Solves the linearised window, with robust weights from the residuals that the solution before leaves.
+    /// Solves the linearised window, with robust weights from the residuals that the solution before leaves; adds the time
+    /// to `spent`.
     pub(super) fn solve_robustly(
         &mut self,
         scene: &Scene,
         matches: &Matches,
         layout: &Layout,
         robust: &Robust,
+        spent: &mut TimeSpent,
     ) -> Option<Vec<f64>> {
         let mut x: Option<Vec<f64>> = None;
+        let mut watch = Stopwatch::start();
         for _ in 0..self.spec.solve.reweightings {
             self.assemble_matches(scene, matches, layout, robust, x.as_deref());
+            spent.equations_s += watch.lap_s();
             let Workspace { sum, factor, .. } = &mut self.workspace;
             sum.factor(factor).ok()?;
             x = Some(sum.solve(factor));
+            spent.solve_s += watch.lap_s();
         }
         x
     }
@@ -141,7 +147,7 @@ impl Window {
                 let weight = robust.weight(plane, residual(&placed[a], Some(&placed[b]), plane));
                 matched::add_pair((equations, own), layout, (placed, a, b), plane, (weight, at_s));
             }
-            for (a, _, plane) in part_of(&matches.fixed, part) {
+            for (a, .., plane) in part_of(&matches.fixed, part) {
                 let a = *a as usize;
                 let weight = robust.weight(plane, residual(&placed[a], None, plane));
                 matched::add_fixed(&mut own[a], &placed[a], plane, weight);

@@ -15,9 +15,10 @@ use super::matching::Matcher;
 use super::nominal::Nominal;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
+use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Interval};
 use super::surfel::{Beam, Patch, Surfel, SurfelMaker, Surfels};
-use crate::geometry::{Rotation, Vector};
+use crate::geometry::{Matrix, Rotation, Vector};
 use equations::Workspace;
 use std::collections::VecDeque;
 
@@ -46,6 +47,8 @@ pub(super) struct Window {
     pub(super) clock: Clock,
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
+    /// By how much the gyroscope exaggerates, as far as it is known.
+    gyro_exaggerates: Matrix,
     border: Border,
     stretches: VecDeque<Stretch>,
     start: Start,
@@ -74,6 +77,7 @@ impl Window {
             clock,
             biases: beginning.biases,
             gravity: crate::geometry::gravity_in_world(),
+            gyro_exaggerates: Matrix::zeros(),
             border,
             stretches: VecDeque::new(),
             start: Start::first(start_u_s, beginning.velocity_sigma),
@@ -86,12 +90,22 @@ impl Window {
     /// What goes on when the IMU falls silent.
     pub(super) fn carried(&self) -> Option<Carried> {
         let state = *self.nominal.states().last()?;
-        Some(Carried { state, biases: self.biases, gravity: self.gravity, clock: self.clock })
+        let (gyro_exaggerates, longer_m) = (self.gyro_exaggerates, self.maker.longer_m);
+        Some(Carried {
+            state,
+            biases: self.biases,
+            gravity: self.gravity,
+            clock: self.clock,
+            gyro_exaggerates,
+            longer_m,
+        })
     }
 
-    /// Goes on with the clock as it was known before the IMU fell silent.
+    /// Goes on with clock and sensors as they were known before the IMU fell silent.
     pub(super) fn take_over(&mut self, carried: &Carried) {
         self.clock = carried.clock.told_from(self.start.u_s);
+        self.gyro_exaggerates = carried.gyro_exaggerates;
+        self.maker.longer_m = carried.longer_m;
     }
 
     /// Turns the window about its beginning, the shortest way that makes gravity what it is in `carried`'s map.
@@ -105,22 +119,26 @@ impl Window {
         &self.matcher
     }
 
-    /// Appends a stretch: integrates its intervals, and makes surfels of its beams.
-    pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) {
+    /// Appends a stretch: integrates its intervals, and makes surfels of its beams. The time it took.
+    pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) -> TimeSpent {
+        let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
-            self.nominal.extend(*interval, &self.biases, &self.gravity);
+            self.nominal.extend(interval.without(&self.gyro_exaggerates), &self.biases, &self.gravity);
             self.rest = self.rest.filter(|rest| rest.goes_on(interval));
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
             }
         }
+        let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         self.stretches.push_back(Stretch { end_tau_s, beams, surfels });
+        let surfels_s = watch.lap_s();
         // The clock is told from the middle of the window, where offset and rate are least correlated.
         let length_s = self.spec.step_s * self.stretches.len() as f64;
         let middle_s = end_tau_s - 0.5 * length_s;
         self.border.clock_told_from(middle_s - self.clock.at_s);
         self.clock = self.clock.told_from(middle_s);
+        TimeSpent { integration_s, surfels_s, ..TimeSpent::default() }
     }
 
     /// Makes the newest stretch's surfels again, with the trajectory as it has become.
@@ -132,13 +150,15 @@ impl Window {
     }
 
     /// Whether the oldest stretch is to leave: without it the window still holds `window_s` of stretches that swept over
-    /// surfaces. While the head is held still it sees lines alone, which need the patches seen before.
+    /// surfaces, or it has none to give. While the head is held still it sees lines alone, which need the patches seen before.
     pub(super) fn is_full(&self) -> bool {
         let richest = self.stretches.iter().map(|stretch| stretch.surfels.patches.len()).max().unwrap_or(0);
         let enough = (richest as f64 * SWEPT) as usize;
-        let swept = self.stretches.iter().filter(|stretch| stretch.surfels.patches.len() >= enough).count();
-        let of_window = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s;
-        of_window(swept) > 1.0 - 1e-9 || of_window(self.stretches.len()) > LONGEST
+        let is_swept = |stretch: &Stretch| stretch.surfels.patches.len() >= enough;
+        let swept = self.stretches.iter().filter(|stretch| is_swept(stretch)).count();
+        let windows = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
+        let all = windows(self.stretches.len());
+        windows(swept) > 1.0 || all > LONGEST || (all > 1.0 && !self.stretches.front().is_some_and(is_swept))
     }
 
     /// Where the window will begin when its oldest stretch has gone, IMU time, s.
@@ -157,5 +177,13 @@ impl Window {
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
         Some(placed)
+    }
+
+    /// All ranges, of surfels and of beams to come, become longer by `by_m`.
+    fn lengthen(&mut self, by_m: f64) {
+        self.maker.longer_m += by_m;
+        for Surfels { patches, streaks } in self.stretches.iter_mut().map(|stretch| &mut stretch.surfels) {
+            patches.iter_mut().chain(streaks).for_each(|surfel| surfel.lengthen(by_m));
+        }
     }
 }

@@ -6,7 +6,8 @@ use super::equations::Robust;
 use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
+use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout, RANGE};
+use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
 
@@ -28,7 +29,10 @@ pub(in crate::estimation) struct Solved {
     pub iterations: usize,
     pub last_correction_m: f64,
     pub conditioning: f64,
+    /// The direction about which the matches say least, in the map.
+    pub weakest: Vector,
     pub trouble: Option<&'static str>,
+    pub spent: TimeSpent,
 }
 
 impl Window {
@@ -36,27 +40,41 @@ impl Window {
     pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
-        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity);
+        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.gyro_exaggerates);
+        let longer_m = self.maker.longer_m;
         self.border.begin_window();
         let mut total = vec![0.0; layout.border()];
         let mut solved = Solved::default();
         let mut neighbours = Neighbours::default();
         let mut chosen = None;
         let mut linearised = None;
+        let mut watch = Stopwatch::start();
         for iteration in 0..self.spec.solve.max_iterations {
             let scene = self.scene();
+            solved.spent.placing_s += watch.lap_s();
             let chosen = chosen.get_or_insert_with(|| views.choose(&scene.placed[..scene.patches]));
-            let matches = self.match_up(&scene, (views, chosen), &mut neighbours, iteration);
+            solved.spent.views_s += watch.lap_s();
+            if !neighbours.are_good_for(&scene) {
+                neighbours = self.look_around(&scene, (views, chosen));
+            }
+            solved.spent.neighbours_s += watch.lap_s();
+            let mut matches = self.match_up(&scene, views, &neighbours, iteration);
             let robust = Robust::of(&self.spec.solve, iteration);
             solved.describe(&matches, &robust);
+            if solved.conditioning < self.spec.solve.weak_conditioning {
+                self.straighten(&mut matches, &scene, views, &solved.weakest);
+            }
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.placed.len(), chosen.len());
             let few = matches.len() < self.spec.solve.min_matches;
             let matches = if few { Matches::default() } else { matches };
+            solved.spent.matches_s += watch.lap_s();
             self.assemble_inertial(first, &layout, &total);
-            let Some(x) = self.solve_robustly(&scene, &matches, &layout, &robust) else {
+            solved.spent.equations_s += watch.lap_s();
+            let Some(x) = self.solve_robustly(&scene, &matches, &layout, &robust, &mut solved.spent) else {
                 solved.trouble = Some("its equations are singular");
                 break;
             };
+            watch.lap_s(); // told by the solver itself
             let (shift, turn) = greatest(&x[..layout.border()]);
             if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
                 solved.trouble = Some("its correction is too large");
@@ -64,6 +82,7 @@ impl Window {
             }
             self.apply(&x, first, &layout, &mut total);
             neighbours.moved(shift + ARM_M * turn);
+            solved.spent.correction_s += watch.lap_s();
             solved.last_correction_m = shift.max(turn);
             linearised = Some(Linearised { layout, scene, matches, robust });
             if solved.last_correction_m < self.spec.solve.settled_m {
@@ -71,7 +90,8 @@ impl Window {
             }
         }
         if solved.trouble.is_some() {
-            (self.nominal, self.clock, self.biases, self.gravity) = backup;
+            (self.nominal, self.clock, self.biases, self.gravity, self.gyro_exaggerates) = backup;
+            self.lengthen(longer_m - self.maker.longer_m);
             self.border.begin_window();
             linearised = None;
         }
@@ -94,6 +114,10 @@ impl Window {
         self.clock.offset_s += border[CLOCK];
         self.clock.rate += border[CLOCK_RATE];
         self.border.moved(border, &self.workspace.factor);
+        let more = Matrix::from_fn(|r, c| border[GYRO_MATRIX + 3 * r + c]);
+        self.nominal.measured_without(&more);
+        self.gyro_exaggerates += more;
+        self.lengthen(border[RANGE]);
     }
 }
 
@@ -122,12 +146,12 @@ impl Solved {
         self.conditioning = 0.0;
         if weights > 0.0 {
             let eigen = information.symmetric_eigen();
-            let weakest = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+            let weakest: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
             // In a smooth tunnel no normal leans along it, but for errors: together they would pass for information.
             let along = |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|lean| lean.abs() > LEANING);
             let held = |plane: &Plane| along(plane).map(|lean| robust.weight(plane, plane.distance_m) * lean * lean);
             let least: f64 = matches.planes().filter_map(held).sum();
-            self.conditioning = least / eigen.eigenvalues.max();
+            (self.conditioning, self.weakest) = (least / eigen.eigenvalues.max(), weakest);
         }
     }
 }

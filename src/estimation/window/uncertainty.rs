@@ -71,7 +71,7 @@ impl Window {
     /// What the right-hand side gains when a view is turned about its pivot and shifted, for each view in use.
     fn columns_of_views(&self, at: &Linearised, views: &Views) -> Vec<(u64, [Vec<f64>; 6])> {
         let mut columns: Vec<(u32, [Vec<f64>; 6])> = Vec::new();
-        for (a, index, plane) in &at.matches.fixed {
+        for (a, index, _, plane) in &at.matches.fixed {
             let found = columns.iter().position(|(other, _)| other == index);
             let place = found.unwrap_or_else(|| {
                 columns.push((*index, std::array::from_fn(|_| vec![0.0; at.layout.size()])));

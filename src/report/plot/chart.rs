@@ -97,6 +97,10 @@ pub struct Chart {
     pub range: Option<[(f64, f64); 2]>,
     /// Amounts as colours.
     pub cells: Option<Cells>,
+    /// Marks of the abscissa with their words, instead of round numbers; those beyond the data are left out.
+    pub x_marks: Vec<(f64, String)>,
+    /// The same of the ordinate.
+    pub y_marks: Vec<(f64, String)>,
     /// What is drawn, from the back to the front.
     pub series: Vec<Series>,
 }
@@ -112,6 +116,8 @@ impl Chart {
             from_zero: false,
             range: None,
             cells: None,
+            x_marks: Vec::new(),
+            y_marks: Vec::new(),
             series: Vec::new(),
         }
     }
@@ -134,6 +140,20 @@ impl Chart {
     #[must_use]
     pub fn between(mut self, x: (f64, f64), y: (f64, f64)) -> Self {
         self.range = Some([x, y]);
+        self
+    }
+
+    /// The same with marks of its own on the abscissa.
+    #[must_use]
+    pub fn with_x_marks(mut self, marks: Vec<(f64, String)>) -> Self {
+        self.x_marks = marks;
+        self
+    }
+
+    /// The same with marks of its own on the ordinate.
+    #[must_use]
+    pub fn with_y_marks(mut self, marks: Vec<(f64, String)>) -> Self {
+        self.y_marks = marks;
         self
     }
 

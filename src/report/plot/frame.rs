@@ -63,9 +63,10 @@ pub(super) fn draw<DB: DrawingBackend>(
     corner: At,
     size: (f64, f64),
 ) -> Result<(), PlotError> {
-    let header = Header::of(canvas, chart, size.0 - LEFT - RIGHT)?;
+    let left = left_of(canvas, chart)?;
+    let header = Header::of(canvas, chart, size.0 - left - RIGHT)?;
     let more = header.more_height();
-    let frame = place(chart, (corner.0, corner.1 + more), (size.0, size.1 - more));
+    let frame = place(chart, (corner.0, corner.1 + more), (size.0, size.1 - more), left);
     grid(canvas, &frame, chart)?;
     cells(canvas, &frame, chart)?;
     for series in &chart.series {
@@ -94,10 +95,10 @@ fn ranges(chart: &Chart) -> [Axis; 2] {
 }
 
 /// Axes that fill their rectangle; for a map, the shorter axis is made longer until a metre is as long on both.
-fn place(chart: &Chart, corner: At, size: (f64, f64)) -> Frame {
+fn place(chart: &Chart, corner: At, size: (f64, f64), left: f64) -> Frame {
     let [x, y] = ranges(chart);
-    let (width, height) = (size.0 - LEFT - RIGHT, size.1 - TOP - BOTTOM);
-    let mut frame = Frame { left: corner.0 + LEFT, top: corner.1 + TOP, width, height, x, y };
+    let (width, height) = (size.0 - left - RIGHT, size.1 - TOP - BOTTOM);
+    let mut frame = Frame { left: corner.0 + left, top: corner.1 + TOP, width, height, x, y };
     if chart.equal_axes {
         let per_point = ((x.high - x.low) / width).max((y.high - y.low) / height);
         let widened = |axis: Axis, points: f64| {
@@ -109,14 +110,27 @@ fn place(chart: &Chart, corner: At, size: (f64, f64)) -> Frame {
     frame
 }
 
+/// Room left of the axes: words need more than numbers.
+fn left_of<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &Chart) -> Result<f64, PlotError> {
+    chart.y_marks.iter().try_fold(LEFT, |room, (_, words)| Ok(room.max(canvas.width_of(words, SMALL)? + 16.0)))
+}
+
+/// The marks that a chart asks for, where they are on its axis; else about `wanted` round numbers.
+fn marks(axis: &Axis, asked: &[(f64, String)], wanted: f64) -> Vec<(f64, String)> {
+    if asked.is_empty() {
+        return axis.ticks((wanted as usize).max(LEAST_TICKS));
+    }
+    asked.iter().filter(|(value, _)| (axis.low..=axis.high).contains(value)).cloned().collect()
+}
+
 fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
-    for (value, label) in frame.x.ticks(((frame.width / TICK_X) as usize).max(LEAST_TICKS)) {
+    for (value, label) in marks(&frame.x, &chart.x_marks, frame.width / TICK_X) {
         let (x, _) = frame.at((value, frame.y.low));
         canvas.line(&[(x, frame.top), (x, frame.bottom())], GRID, 0.8)?;
         canvas.line(&[(x, frame.bottom()), (x, frame.bottom() + 4.0)], INK, 0.8)?;
         canvas.text(&label, (x, frame.bottom() + 7.0), Anchor::Below, SMALL)?;
     }
-    for (value, label) in frame.y.ticks((frame.height / TICK_Y) as usize) {
+    for (value, label) in marks(&frame.y, &chart.y_marks, frame.height / TICK_Y) {
         let (_, y) = frame.at((frame.x.low, value));
         canvas.line(&[(frame.left, y), (frame.right(), y)], GRID, 0.8)?;
         canvas.line(&[(frame.left - 4.0, y), (frame.left, y)], INK, 0.8)?;

@@ -1,0 +1,72 @@
+//! The estimator while the head does not turn: through stops of the swing, and with a lidar that needs none.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod estimation_fixture;
+
+use estimation_fixture::{Room, Run, Scanner, Score, Walk, calibration, growth_m};
+use zsim::estimation::{EstimatorSpec, estimate_all, load};
+
+/// From when to when the head is held, s; it takes a second to come to rest, and another to swing again.
+const HELD_S: (f64, f64) = (7.0, 13.0);
+
+/// A walk round a hall whose swing is held for six seconds while the walk goes on.
+fn walk_with_a_stop(seed: u64) -> Run {
+    let stop = Some((HELD_S.0 - 1.0, HELD_S.1));
+    Run::new(Room::furnished(), Walk { start_s: 1.5, stop, ..Walk::new((1.8, 1.2), 25.0) }, seed, 16.0)
+}
+
+/// By how much the error grows over the stop, until the head swings again, m.
+fn growth_in_the_stop_m(run: &Run, spec: &EstimatorSpec) -> f64 {
+    let result = estimate_all(spec, &calibration(), run.measurements().into_iter()).unwrap();
+    growth_m(&result, run, (HELD_S.0 - 1.0, HELD_S.1 + 1.0))
+}
+
+#[test]
+fn over_a_stop_of_six_seconds_the_error_grows_by_less_than_five_centimetres() {
+    let default = load("default").unwrap();
+    for seed in [21, 22] {
+        let run = walk_with_a_stop(seed);
+        for fixed_views in [0, 2] {
+            let spec = EstimatorSpec { fixed_views, ..default.clone() };
+            let held = growth_in_the_stop_m(&run, &spec);
+            assert!(held < 0.05, "seed {seed}, {fixed_views} views: {held}");
+            // It is the streaks that hold it: patches are not seen while nothing is swept.
+            let mut without = spec;
+            without.surfels.streaks = false;
+            let adrift = growth_in_the_stop_m(&run, &without);
+            println!("seed {seed}, {fixed_views} views: {held:.4} m, without streaks {adrift:.4} m");
+            assert!(adrift > 1.5 * held, "seed {seed}, {fixed_views} views: {held}, without streaks {adrift}");
+        }
+    }
+}
+
+#[test]
+fn a_lidar_of_many_planes_is_tracked_without_any_swing() {
+    // The head is carried round the hall and never nods: a plane of beams would sweep nothing, 16 rings show patches.
+    let walk = Walk { start_s: 1.5, stop: Some((-10.0, 1000.0)), ..Walk::new((1.8, 1.2), 25.0) };
+    let run = Run { scanner: Scanner::Rings, ..Run::new(Room::furnished(), walk, 23, 10.0) };
+    let result = estimate_all(&load("default").unwrap(), &calibration(), run.measurements().into_iter()).unwrap();
+    let score = Score::of(&result, &run);
+    println!("{score:?}");
+    assert!(score.rmse_m < 0.02, "{score:?}");
+    assert!(result.windows.iter().skip(4).all(|window| window.matches > 200), "{:?}", result.windows.last());
+    for window in &result.windows {
+        let parts: f64 = window.spent.parts().iter().map(|(_, seconds)| seconds).sum();
+        assert!(parts > 0.0 && parts <= window.elapsed_s, "{window:?}");
+    }
+}
+
+#[test]
+fn a_clock_that_is_not_estimated_stays_where_it_was_put() {
+    let mut spec = load("default").unwrap();
+    (spec.clock.estimated, spec.clock.start_s) = (false, 0.002);
+    let run = walk_with_a_stop(24);
+    let measurements = Run { duration_s: 8.0, ..run }.measurements();
+    let result = estimate_all(&spec, &calibration(), measurements.into_iter()).unwrap();
+    assert!(
+        result.clock_offsets.iter().all(|(_, offset_s)| (offset_s - 0.002).abs() < 1e-6),
+        "{:?}",
+        result.clock_offsets
+    );
+}
