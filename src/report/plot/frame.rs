@@ -20,7 +20,7 @@ const RIGHT: f64 = 18.0;
 const TICK_X: f64 = 85.0;
 const TICK_Y: f64 = 28.0;
 /// However narrow a chart is, its scale is told by about so many.
-const LEAST_TICKS: usize = 3;
+const LEAST_TICKS: usize = 4;
 
 /// Where a chart's axes stand on the sheet.
 struct Frame {
