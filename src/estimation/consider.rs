@@ -169,7 +169,8 @@ mod tests {
         let mut beginning = DMatrix::<f64>::zeros(6, sources);
         let mut views: Vec<(u64, DMatrix<f64>)> = Vec::new();
         for step in 0..8 {
-            let used: Vec<u64> = views.iter().map(|view| view.0).filter(|n| (n + step as u64).is_multiple_of(2)).collect();
+            let used: Vec<u64> =
+                views.iter().map(|view| view.0).filter(|n| (n + step as u64).is_multiple_of(2)).collect();
             let by = sensitivity(step, &used);
             consider.advance(&by);
             let mut next = DMatrix::from_fn(6, 6, |r, c| by.beginning[(r, c)]) * &beginning;
