@@ -98,6 +98,8 @@ fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
         base_from_spring.roll_pitch_yaw_deg = [if hangs { 180.0 } else { 0.0 }, 0.0, 0.0];
         (*segments, *end_stop, *hold) = (1, None, None);
     }
+    // Upside down it would hang in its own handle.
+    spec.carrier.clear();
     HeadModel::new(&spec, &source).unwrap()
 }
 

@@ -157,7 +157,7 @@ mod tests {
             pivot: Vector::zeros(),
             beginning: wave(seed),
             views: views.iter().map(|number| (*number, wave(seed + 9 + *number as usize))).collect(),
-            noise: root * root.transpose(),
+            noise: root * root.transpose() + Matrix6::identity() * 0.1,
         }
     }
 

@@ -38,21 +38,22 @@ fn align(from: &[Vector], to: &[Vector]) -> Pose {
     Pose::from_parts((b - rotation * a).into(), rotation)
 }
 
-/// How far an estimate leaves the truth between two instants, m: its greatest error then, aligned over all that came before.
+/// How far an estimate leaves the truth between two instants, m: its greatest error then, with the poses at the first one laid
+/// on each other.
 pub fn growth_m(result: &OpenLoop, run: &Run, (from_s, to_s): (f64, f64)) -> f64 {
-    let position = |pose: &Pose| pose.translation.vector;
-    let pairs: Vec<(f64, Vector, Vector)> = result
+    let mut within = result
         .trajectory
         .iter()
-        .map(|(stamp, pose)| (seconds(stamp), position(pose), position(&run.walk.pose(seconds(stamp)))))
-        .collect();
-    let before = pairs.partition_point(|(t, ..)| *t < from_s);
-    let (estimate, truth): (Vec<_>, Vec<_>) = pairs[..before].iter().map(|(_, a, b)| (*a, *b)).unzip();
-    let aligned = align(&estimate, &truth);
-    let within = pairs[before..].iter().take_while(|(t, ..)| *t <= to_s);
-    within
-        .map(|(_, a, b)| (aligned * nalgebra::Point3::from(*a) - nalgebra::Point3::from(*b)).norm())
-        .fold(0.0, f64::max)
+        .map(|(stamp, pose)| (seconds(stamp), pose))
+        .skip_while(|(t, _)| *t < from_s)
+        .take_while(|(t, _)| *t <= to_s)
+        .peekable();
+    let Some((start_s, start)) = within.peek().copied() else { return f64::INFINITY };
+    let world_from_map = run.walk.pose(start_s) * start.inverse();
+    let error_m = |(t, pose): (f64, &Pose)| {
+        ((world_from_map * pose).translation.vector - run.walk.pose(t).translation.vector).norm()
+    };
+    within.map(error_m).fold(0.0, f64::max)
 }
 
 impl Score {
