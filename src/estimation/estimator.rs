@@ -38,8 +38,8 @@ pub struct Estimator {
     clock_offsets: Vec<(Stamp, f64)>,
     windows: Vec<WindowReport>,
     warnings: Vec<Warning>,
-    /// What was wrong with the newest window.
-    trouble: Option<WarningKind>,
+    /// What was wrong with the newest window, and whether that was said.
+    trouble: Option<(WarningKind, bool)>,
 }
 
 impl Estimator {
@@ -145,18 +145,26 @@ impl Estimator {
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
         let trouble = trouble(&solved, &self.spec, moving);
-        // Said once, until a window is well again or something else is wrong.
-        let is_new =
-            |kind: &WarningKind| self.trouble.as_ref().is_none_or(|before| discriminant(before) != discriminant(kind));
-        if let Some(kind) = trouble.as_ref().filter(|kind| is_new(kind)) {
-            self.warnings.push(Warning { stamp: self.intake.stamp(stretch.end_s), kind: kind.clone() });
-        }
-        self.trouble = trouble;
+        self.say(trouble, stretch.end_s);
         if let Some(until_s) = final_until_s {
             self.hand_out(until_s);
             let Some(window) = &mut self.window else { return };
             window.nominal.forget_before(until_s - 0.2);
         }
+    }
+
+    /// Warns of a trouble when it lasts for two windows, or at once of a solution that was not believed; and once only, until a
+    /// window is well again or something else is wrong.
+    fn say(&mut self, trouble: Option<WarningKind>, end_s: f64) {
+        let before =
+            self.trouble.take().filter(|(kind, _)| Some(discriminant(kind)) == trouble.as_ref().map(discriminant));
+        let Some(kind) = trouble else { return };
+        let was_said = before.as_ref().is_some_and(|(_, said)| *said);
+        let says = !was_said && (before.is_some() || matches!(kind, WarningKind::NotSolved { .. }));
+        if says {
+            self.warnings.push(Warning { stamp: self.intake.stamp(end_s), kind: kind.clone() });
+        }
+        self.trouble = Some((kind, was_said || says));
     }
 
     /// Lets the oldest stretch go if the window is full. Until when, IMU time, the poses are final then, s.
