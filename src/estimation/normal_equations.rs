@@ -74,6 +74,12 @@ impl NormalEquations {
         self.h[row * self.size + column] += value;
     }
 
+    /// The entries of a row from a column on to the diagonal.
+    pub(super) fn row_from(&mut self, row: usize, column: usize) -> &mut [f64] {
+        self.first[row] = self.first[row].min(column);
+        &mut self.h[row * self.size + column..=row * self.size + row]
+    }
+
     /// Adds `value` to the right-hand side.
     pub(super) fn add_right(&mut self, row: usize, value: f64) {
         self.b[row] += value;

@@ -128,6 +128,11 @@ impl Own {
         }
     }
 
+    /// Whether any match said something.
+    pub(in crate::estimation) fn has_matches(&self) -> bool {
+        self.square.iter().any(|entry| *entry != 0.0)
+    }
+
     fn square(&self, i: usize, j: usize) -> f64 {
         let (i, j) = (i.max(j), i.min(j));
         self.square[i * (i + 1) / 2 + j]
@@ -148,9 +153,11 @@ impl Own {
             for i in 0..6 {
                 let row = first + 6 * k + i;
                 equations.add_right(row, value * self.right[i]);
-                for (l, other) in surfel.basis.value[..=k].iter().enumerate() {
-                    for j in 0..if l < k { 6 } else { i + 1 } {
-                        equations.add_entry(row, first + 6 * l + j, value * other * self.square(i, j));
+                let squares: [f64; 6] = std::array::from_fn(|j| value * self.square(i, j));
+                let entries = equations.row_from(row, first);
+                for (knot, other) in entries.chunks_mut(6).zip(surfel.basis.value) {
+                    for (entry, square) in knot.iter_mut().zip(squares) {
+                        *entry += other * square;
                     }
                 }
                 for (unknown, motion, by) in beside {

@@ -159,7 +159,8 @@ impl Window {
             own.iter_mut().zip(part).for_each(|(sum, term)| sum.merge(term));
         }
         parts.par_iter_mut().enumerate().for_each(|(part, (equations, _))| {
-            for (own, surfel) in part_of(own, part).iter().zip(part_of(placed, part)) {
+            let matched = part_of(own, part).iter().zip(part_of(placed, part)).filter(|(own, _)| own.has_matches());
+            for (own, surfel) in matched {
                 own.add_to(equations, layout, surfel, at_s);
             }
         });
