@@ -11,8 +11,10 @@ pub(super) struct NormalEquations {
     size: usize,
     /// First column of each row that is not zero.
     first: Vec<usize>,
-    /// Lower triangle, row-major over the full square; the upper part is not used.
+    /// Lower triangle, row-major over the full square; the upper part is empty, but for products before they settle.
     h: Vec<f64>,
+    /// How far above the diagonal products have reached.
+    above: usize,
     b: Vec<f64>,
 }
 
@@ -31,7 +33,7 @@ pub(super) struct NotDetermined(pub(super) usize);
 impl NormalEquations {
     /// Empty equations of `size` unknowns.
     pub(super) fn new(size: usize) -> Self {
-        Self { size, first: (0..size).collect(), h: vec![0.0; size * size], b: vec![0.0; size] }
+        Self { size, first: (0..size).collect(), h: vec![0.0; size * size], above: 0, b: vec![0.0; size] }
     }
 
     /// Empties them, for `size` unknowns.
@@ -41,6 +43,7 @@ impl NormalEquations {
         self.first.extend(0..size);
         self.h.clear();
         self.h.resize(size * size, 0.0);
+        self.above = 0;
         self.b.clear();
         self.b.resize(size, 0.0);
     }
@@ -50,6 +53,7 @@ impl NormalEquations {
         self.size = other.size;
         self.first.clone_from(&other.first);
         self.h.clone_from(&other.h);
+        self.above = other.above;
         self.b.clone_from(&other.b);
     }
 
@@ -86,16 +90,13 @@ impl NormalEquations {
     }
 
     /// Adds `weight (u v^T + v u^T)` to `H`, with `u` and `v` zero but for consecutive entries from a column on; `u` begins
-    /// no later than `v`.
+    /// no later than `v`. Where the two overlap, entries come to lie above the diagonal: see [`Self::settle`].
     pub(super) fn add_product<const U: usize, const V: usize>(
         &mut self,
         (start_u, u): (usize, &[f64; U]),
         (start_v, v): (usize, &[f64; V]),
         weight: f64,
     ) {
-        if start_v < start_u + U {
-            return self.add_overlapping((start_u, u), (start_v, v), weight);
-        }
         for (r, value) in v.iter().enumerate() {
             let row = start_v + r;
             self.first[row] = self.first[row].min(start_u);
@@ -105,15 +106,21 @@ impl NormalEquations {
                 *sum += scaled * term;
             }
         }
+        for both in start_v..(start_u + U).min(start_v + V) {
+            self.h[both * self.size + both] += weight * u[both - start_u] * v[both - start_v];
+        }
+        self.above = self.above.max((start_u + U).saturating_sub(start_v + 1));
     }
 
-    fn add_overlapping(&mut self, (start_u, u): (usize, &[f64]), (start_v, v): (usize, &[f64]), weight: f64) {
-        for (r, x) in v.iter().enumerate() {
-            for (c, y) in u.iter().enumerate() {
-                let twice = if start_v + r == start_u + c { 2.0 } else { 1.0 };
-                self.add_entry(start_v + r, start_u + c, twice * weight * x * y);
+    /// Brings below the diagonal what products left above it; due once, when all are in.
+    pub(super) fn settle(&mut self) {
+        for row in 0..self.size {
+            for column in row + 1..(row + 1 + self.above).min(self.size) {
+                let entry = std::mem::take(&mut self.h[row * self.size + column]);
+                self.h[column * self.size + row] += entry;
             }
         }
+        self.above = 0;
     }
 
     /// Factors `H` into `into`, whose memory is used again.
@@ -121,6 +128,7 @@ impl NormalEquations {
     /// # Errors
     /// When an unknown is not determined.
     pub(super) fn factor(&self, into: &mut Factor) -> Result<(), NotDetermined> {
+        debug_assert_eq!(self.above, 0, "products have not settled");
         let n = self.size;
         into.size = n;
         into.first.clone_from(&self.first);
@@ -256,6 +264,7 @@ mod tests {
             whole_v.rows_mut(start_v, 2).copy_from_slice(&v);
             dense += (&whole_u * whole_v.transpose() + &whole_v * whole_u.transpose()) * 0.7;
         }
+        equations.settle();
         assert_relative_eq!(equations.dense(), dense, epsilon = 1e-12);
         let mut factor = Factor::default();
         equations.factor(&mut factor).unwrap();
@@ -280,7 +289,10 @@ mod tests {
             add(&mut whole, product);
             add(&mut parts[k % 2], product);
         }
-        let [mut sum, second] = parts;
+        whole.settle();
+        let [mut sum, mut second] = parts;
+        sum.settle();
+        second.settle();
         sum.add(&second);
         let (mut a, mut b) = (Factor::default(), Factor::default());
         whole.factor(&mut a).unwrap();

@@ -7,7 +7,7 @@
 //! A streak takes the patch's plane. It may lie beside the patch's points, where that plane is less certain, so its
 //! `zeta^2 = 1 / (sigma_r^2 + lambda + x)`, see `Patch::variance_of_extrapolation`.
 
-use super::{CLOCK, CLOCK_RATE, Layout, RANGE};
+use super::{CLOCK, Layout, RANGE};
 use crate::estimation::nominal::Correction;
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::surfel::{Patch, Placed};
@@ -65,145 +65,134 @@ fn adjugate(m: &Matrix) -> Matrix {
     Matrix::from_rows(&[b.cross(&c).transpose(), c.cross(&a).transpose(), a.cross(&b).transpose()])
 }
 
-/// The derivative of `e` by what moves a live surfel: its turn, its shift, the clock offset at its time, the range offset.
-fn by_motion(surfel: &Placed, normal: &Vector) -> [f64; OWN] {
-    let turn = surfel.arm.cross(normal);
-    [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z, normal.dot(&surfel.velocity), normal.dot(&surfel.beam)]
+/// The derivative of `e` by what moves a live surfel.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::estimation) struct Side {
+    /// By its turn and its shift.
+    own: [f64; 6],
+    /// By the clock's offset and rate and the range offset, which follow each other in the border.
+    beside: [f64; 3],
 }
 
-/// How far a solution `x` moves a live surfel along `normal`, m.
-pub(in crate::estimation) fn moved_m(
-    surfel: &Placed,
-    normal: &Vector,
-    layout: &Layout,
-    x: &[f64],
-    clock_at_s: f64,
-) -> f64 {
+impl Side {
+    /// Of a surfel that `normal` leads to.
+    pub(in crate::estimation) fn of(surfel: &Placed, normal: &Vector, clock_at_s: f64) -> Self {
+        let turn = surfel.arm.cross(normal);
+        let later = normal.dot(&surfel.velocity);
+        Self {
+            own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z],
+            beside: [later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam)],
+        }
+    }
+
+    /// By the four knots about the surfel.
+    fn knots(&self, surfel: &Placed) -> [f64; 24] {
+        let mut knots = [0.0; 24];
+        for (knot, value) in knots.chunks_exact_mut(6).zip(surfel.basis.value) {
+            for (entry, derivative) in knot.iter_mut().zip(self.own) {
+                *entry = value * derivative;
+            }
+        }
+        knots
+    }
+
+    /// With what the surfel on the other side adds in the border.
+    pub(in crate::estimation) fn together_with(mut self, other: &Self) -> Self {
+        self.beside.iter_mut().zip(other.beside).for_each(|(sum, term)| *sum += term);
+        self
+    }
+}
+
+/// How far a solution `x` moves a live surfel, m.
+pub(in crate::estimation) fn moved(surfel: &Placed, layout: &Layout, x: &[f64], clock_at_s: f64) -> Vector {
     let correction = Correction::of_spline(&surfel.basis, layout.first_knot, x);
     let clock = layout.border() + CLOCK;
     let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - clock_at_s);
     let longer_m = x[layout.border() + RANGE];
     let turned = correction.rotation.cross(&surfel.arm);
-    normal.dot(&(correction.translation + turned + surfel.velocity * later_s + surfel.beam * longer_m))
+    correction.translation + turned + surfel.velocity * later_s + surfel.beam * longer_m
 }
 
-/// The motions of a surfel of its own: turn, shift, clock offset, range offset.
-const OWN: usize = 8;
-
-/// What all matches of a surfel say about its own motion: `sum w g g^T` and `-sum w e g`, with `g` the derivative of `e`.
+/// What all matches of a surfel say about its own motion: `sum w g v^T`, with `g` the derivative of `e` by turn and shift, and
+/// `v = (g, that by the border, e)`.
 ///
 /// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Own {
-    /// Lower triangle by rows.
-    square: [f64; OWN * (OWN + 1) / 2],
-    right: [f64; OWN],
-}
-
-impl Default for Own {
-    fn default() -> Self {
-        Self { square: [0.0; OWN * (OWN + 1) / 2], right: [0.0; OWN] }
-    }
-}
+#[derive(Debug, Default)]
+pub(in crate::estimation) struct Own([[f64; 10]; 6]);
 
 impl Own {
-    fn add(&mut self, by: &[f64; OWN], distance_m: f64, weight: f64) {
-        let mut entries = self.square.iter_mut();
-        for i in 0..OWN {
-            let scaled = weight * by[i];
-            self.right[i] -= scaled * distance_m;
-            for (other, entry) in by[..=i].iter().zip(entries.by_ref()) {
-                *entry += scaled * other;
+    /// Adds a match whose distance grows by `side`.
+    pub(in crate::estimation) fn add(&mut self, side: &Side, distance_m: f64, weight: f64) {
+        let ([a, b, c, d, e, f], [g, h, i]) = (side.own, side.beside);
+        let row = [a, b, c, d, e, f, g, h, i, distance_m];
+        for (sums, by) in self.0.iter_mut().zip(side.own) {
+            let scaled = weight * by;
+            for (sum, term) in sums.iter_mut().zip(row) {
+                *sum += scaled * term;
             }
         }
     }
 
-    /// Adds what another part of the matches says.
-    pub(in crate::estimation) fn merge(&mut self, other: &Self) {
-        for (sum, term) in self.square.iter_mut().zip(other.square) {
-            *sum += term;
-        }
-        for (sum, term) in self.right.iter_mut().zip(other.right) {
-            *sum += term;
-        }
-    }
-
-    /// Whether any match said something.
-    pub(in crate::estimation) fn has_matches(&self) -> bool {
-        self.square.iter().any(|entry| *entry != 0.0)
-    }
-
-    fn square(&self, i: usize, j: usize) -> f64 {
-        let (i, j) = (i.max(j), i.min(j));
-        self.square[i * (i + 1) / 2 + j]
-    }
-
-    /// Adds it to the equations of the window's unknowns, by the surfel's place among the knots and its time.
-    pub(in crate::estimation) fn add_to(
-        &self,
-        equations: &mut NormalEquations,
-        layout: &Layout,
-        surfel: &Placed,
-        clock_at_s: f64,
-    ) {
-        let (first, border) = (layout.knot(surfel.basis.first), layout.border());
-        // Of each unknown of the border, which motion it is, and how much of it.
-        let beside = [(CLOCK, 6, 1.0), (CLOCK_RATE, 6, surfel.tau_s - clock_at_s), (RANGE, 7, 1.0)];
+    /// Adds it to the equations of the window's unknowns, by the surfel's place among the knots.
+    pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, surfel: &Placed) {
+        let (first, beside) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
         for (k, value) in surfel.basis.value.iter().enumerate() {
-            for i in 0..6 {
+            for (i, sums) in self.0.iter().enumerate() {
                 let row = first + 6 * k + i;
-                equations.add_right(row, value * self.right[i]);
-                let squares: [f64; 6] = std::array::from_fn(|j| value * self.square(i, j));
+                let scaled = sums.map(|sum| value * sum);
+                equations.add_right(row, -scaled[9]);
                 let entries = equations.row_from(row, first);
                 for (knot, other) in entries.chunks_mut(6).zip(surfel.basis.value) {
-                    for (entry, square) in knot.iter_mut().zip(squares) {
+                    for (entry, square) in knot.iter_mut().zip(scaled) {
                         *entry += other * square;
                     }
                 }
-                for (unknown, motion, by) in beside {
-                    equations.add_entry(border + unknown, row, by * value * self.square(motion, i));
+                for (unknown, product) in scaled[6..9].iter().enumerate() {
+                    equations.add_entry(beside + unknown, row, *product);
                 }
-            }
-        }
-        for (a, (unknown, motion, by)) in beside.iter().enumerate() {
-            equations.add_right(border + unknown, by * self.right[*motion]);
-            for (other, other_motion, other_by) in &beside[..=a] {
-                let value = by * other_by * self.square(*motion, *other_motion);
-                equations.add_entry(border + unknown, border + other, value);
             }
         }
     }
 }
 
-/// Adds a match between two live surfels: to what each says by itself, and how they hang together.
-pub(in crate::estimation) fn add_pair(
-    (equations, own): (&mut NormalEquations, &mut [Own]),
-    layout: &Layout,
-    (placed, a, b): (&[Placed], usize, usize),
-    plane: &Plane,
-    (weight, clock_at_s): (f64, f64),
-) {
-    let by_a = by_motion(&placed[a], &plane.normal);
-    let by_b = by_motion(&placed[b], &plane.normal).map(|x| -x);
-    own[a].add(&by_a, plane.distance_m, weight);
-    own[b].add(&by_b, plane.distance_m, weight);
-    let (row_a, row_b) = (Row::of(&placed[a], &by_a, clock_at_s), Row::of(&placed[b], &by_b, clock_at_s));
-    let (early, late) = if placed[a].basis.first <= placed[b].basis.first {
-        ((&placed[a], row_a), (&placed[b], row_b))
-    } else {
-        ((&placed[b], row_b), (&placed[a], row_a))
-    };
-    let starts = (layout.knot(early.0.basis.first), layout.knot(late.0.basis.first));
-    equations.add_product((starts.0, &early.1.knots), (starts.1, &late.1.knots), weight);
-    let beside = layout.border() + CLOCK;
-    equations.add_product((starts.0, &early.1.knots), (beside, &late.1.beside), weight);
-    equations.add_product((starts.1, &late.1.knots), (beside, &early.1.beside), weight);
-    equations.add_product((beside, &early.1.beside), (beside, &late.1.beside), weight);
+/// What all matches say about the clock and the range offset: `sum w b v^T`, with `b` the derivative of `e` by them, and
+/// `v = (b, e)`.
+#[derive(Debug, Default)]
+pub(in crate::estimation) struct Beside([[f64; 4]; 3]);
+
+impl Beside {
+    /// Adds a match whose distance grows by `side`, both surfels' part of it.
+    pub(in crate::estimation) fn add(&mut self, side: &Side, distance_m: f64, weight: f64) {
+        let [a, b, c] = side.beside;
+        for (sums, by) in self.0.iter_mut().zip(side.beside) {
+            for (sum, term) in sums.iter_mut().zip([a, b, c, distance_m]) {
+                *sum += weight * by * term;
+            }
+        }
+    }
+
+    /// Adds it to the equations of the window's unknowns.
+    pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
+        let beside = layout.border() + CLOCK;
+        for (i, sums) in self.0.iter().enumerate() {
+            equations.add_right(beside + i, -sums[3]);
+            for (j, sum) in sums.iter().enumerate().take(i + 1) {
+                equations.add_entry(beside + i, beside + j, *sum);
+            }
+        }
+    }
 }
 
-/// Adds a match between a live surfel and one of a fixed view.
-pub(in crate::estimation) fn add_fixed(own: &mut Own, surfel: &Placed, plane: &Plane, weight: f64) {
-    own.add(&by_motion(surfel, &plane.normal), plane.distance_m, weight);
+/// Adds how the knots about two surfels of a match hang together; `early` no later than `late`.
+pub(in crate::estimation) fn add_coupling(
+    equations: &mut NormalEquations,
+    layout: &Layout,
+    (early, early_side): (&Placed, &Side),
+    (late, late_side): (&Placed, &Side),
+    weight: f64,
+) {
+    let (start_u, start_v) = (layout.knot(early.basis.first), layout.knot(late.basis.first));
+    equations.add_product((start_u, &early_side.knots(early)), (start_v, &late_side.knots(late)), weight);
 }
 
 /// Adds the row of the Jacobian of a match of `surfel`, `scales[k]` times to column `k` of six.
@@ -214,34 +203,15 @@ pub(in crate::estimation) fn add_scaled_row(
     scales: &[f64; 6],
     clock_at_s: f64,
 ) {
-    let row = Row::of(surfel, &by_motion(surfel, normal), clock_at_s);
-    let (first, beside) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
+    let side = Side::of(surfel, normal, clock_at_s);
+    let (first, beside, knots) = (layout.knot(surfel.basis.first), layout.border() + CLOCK, side.knots(surfel));
     for (column, scale) in columns.iter_mut().zip(scales) {
-        for (sum, term) in column[first..first + 24].iter_mut().zip(row.knots) {
+        for (sum, term) in column[first..first + 24].iter_mut().zip(knots) {
             *sum += scale * term;
         }
-        for (sum, term) in column[beside..beside + 3].iter_mut().zip(row.beside) {
+        for (sum, term) in column[beside..beside + 3].iter_mut().zip(side.beside) {
             *sum += scale * term;
         }
-    }
-}
-
-/// A row of the Jacobian: the four knots about a surfel; the clock's offset and rate and the range offset, which follow each
-/// other in the border.
-struct Row {
-    knots: [f64; 24],
-    beside: [f64; 3],
-}
-
-impl Row {
-    fn of(surfel: &Placed, by: &[f64; OWN], clock_at_s: f64) -> Self {
-        let mut knots = [0.0; 24];
-        for (knot, value) in knots.chunks_exact_mut(6).zip(surfel.basis.value) {
-            for (entry, derivative) in knot.iter_mut().zip(by) {
-                *entry = value * derivative;
-            }
-        }
-        Self { knots, beside: [by[6], by[6] * (surfel.tau_s - clock_at_s), by[7]] }
     }
 }
 
@@ -300,23 +270,35 @@ mod tests {
             (distance(&step(1e-6)) - distance(&step(-1e-6))) / 2e-6
         });
         let mut equations = NormalEquations::new(layout.size());
-        let placed: Vec<Placed> = std::iter::once(a).chain(b).cloned().collect();
-        let mut own = vec![Own::default(); placed.len()];
-        match b {
-            Some(_) => add_pair((&mut equations, &mut own), &layout, (&placed, 0, 1), &plane, (3.0, AT_S)),
-            None => add_fixed(&mut own[0], a, &plane, 3.0),
-        }
-        for (own, surfel) in own.iter().zip(&placed) {
-            own.add_to(&mut equations, &layout, surfel, AT_S);
-        }
+        let one = Side::of(a, &plane.normal, AT_S);
+        let mut beside = Beside::default();
+        let mut add = |surfel: &Placed, side: &Side| {
+            let mut own = Own::default();
+            own.add(side, plane.distance_m, 3.0);
+            own.add_to(&mut equations, &layout, surfel);
+        };
+        let first = if let Some(b) = b {
+            let other = Side::of(b, &-plane.normal, AT_S);
+            add(b, &other.together_with(&one));
+            add(a, &one.together_with(&other));
+            let (early, late) = if a.tau_s < b.tau_s { ((a, &one), (b, &other)) } else { ((b, &other), (a, &one)) };
+            add_coupling(&mut equations, &layout, early, late, 3.0);
+            one.together_with(&other)
+        } else {
+            add(a, &one);
+            one
+        };
+        beside.add(&first, plane.distance_m, 3.0);
+        beside.add_to(&mut equations, &layout);
+        equations.settle();
         assert_relative_eq!(equations.dense(), jacobian.transpose() * &jacobian * 3.0, epsilon = 1e-7);
         let right = jacobian.transpose() * (-3.0 * distance(&DVector::zeros(layout.size())));
         assert_relative_eq!(equations.right(), right.column(0).into_owned(), epsilon = 1e-7);
         // What a solution moves the surfel by is the same derivative.
         let x = DVector::from_fn(layout.size(), |k, _| 1e-3 * (k as f64).sin());
-        let by = moved_m(a, &plane.normal, &layout, x.as_slice(), AT_S)
-            - b.map_or(0.0, |b| moved_m(b, &plane.normal, &layout, x.as_slice(), AT_S));
-        assert_relative_eq!(by, (jacobian * x)[0], epsilon = 1e-8);
+        let by_solution = |surfel: &Placed| super::moved(surfel, &layout, x.as_slice(), AT_S);
+        let by = by_solution(a) - b.map_or_else(Vector::zeros, by_solution);
+        assert_relative_eq!(plane.normal.dot(&by), (jacobian * x)[0], epsilon = 1e-8);
     }
 
     #[test]

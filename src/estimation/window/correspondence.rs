@@ -34,22 +34,78 @@ pub(super) struct Neighbours {
     moved_m: f64,
 }
 
+/// Two surfels of one surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Match {
+    /// Index into the scene.
+    pub a: u32,
+    /// What it is matched with.
+    pub with: With,
+    /// The surface, its normal from the other surfel to `a`.
+    pub plane: Plane,
+}
+
+/// What a live surfel is matched with.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum With {
+    /// Another of the window: an index into the scene.
+    Live(u32),
+    /// A patch of a fixed view.
+    Fixed { view: u32, patch: u32 },
+}
+
 /// The matches of an iteration.
 #[derive(Debug, Default)]
 pub(super) struct Matches {
-    /// Of the window: indices into the scene.
-    pub pairs: Vec<(u32, u32, Plane)>,
-    /// With views: an index into the scene, a view, a patch of it.
-    pub fixed: Vec<(u32, u32, u32, Plane)>,
+    pub all: Vec<Match>,
+    /// Indices of the matches of each surfel of the scene, one surfel after the other.
+    of_surfels: Vec<u32>,
+    /// Where each surfel's begin in it, and where the last one's end.
+    begins: Vec<usize>,
+}
+
+impl Match {
+    /// The other surfel, where it is live too: an index into the scene.
+    pub fn other(&self) -> Option<usize> {
+        if let With::Live(b) = self.with { Some(b as usize) } else { None }
+    }
 }
 
 impl Matches {
-    pub fn len(&self) -> usize {
-        self.pairs.len() + self.fixed.len()
+    fn of(all: Vec<Match>, surfels: usize) -> Self {
+        let mut begins = vec![0; surfels + 1];
+        let sides = |one: &Match| [Some(one.a as usize), one.other()];
+        for surfel in all.iter().flat_map(sides).flatten() {
+            begins[surfel + 1] += 1;
+        }
+        for surfel in 0..surfels {
+            begins[surfel + 1] += begins[surfel];
+        }
+        let mut next = begins.clone();
+        let mut of_surfels = vec![0; begins[surfels]];
+        for (index, one) in all.iter().enumerate() {
+            for surfel in sides(one).into_iter().flatten() {
+                of_surfels[next[surfel]] = index as u32;
+                next[surfel] += 1;
+            }
+        }
+        Self { all, of_surfels, begins }
+    }
+
+    /// The matches of a surfel of the scene: indices into all.
+    pub fn of_surfel(&self, surfel: usize) -> &[u32] {
+        &self.of_surfels[self.begins[surfel]..self.begins[surfel + 1]]
+    }
+
+    /// The surfels of part `part` of `parts`, of about as many matches each.
+    pub fn part(&self, part: usize, parts: usize) -> std::ops::Range<usize> {
+        let cut = |k: usize| self.begins.partition_point(|begin| begin * parts < self.of_surfels.len() * k);
+        let surfels = self.begins.len().saturating_sub(1);
+        cut(part).min(surfels)..cut(part + 1).min(surfels)
     }
 
     pub fn planes(&self) -> impl Iterator<Item = &Plane> {
-        self.pairs.iter().map(|(.., plane)| plane).chain(self.fixed.iter().map(|(.., plane)| plane))
+        self.all.iter().map(|one| &one.plane)
     }
 }
 
@@ -98,19 +154,17 @@ impl Window {
                 self.matcher.lies_in((surfel, beam), patch, gate_m).then(|| Plane::around(surfel, patch, sigma_m))
             }
         };
-        let pairs: Vec<Option<(u32, u32, Plane)>> = neighbours
-            .pairs
-            .par_iter()
-            .with_min_len(512)
-            .map(|(a, b)| Some((*a, *b, plane(*a, &scene.placed[*b as usize].patch)?)))
-            .collect();
-        let fixed: Vec<Option<(u32, u32, u32, Plane)>> = neighbours
-            .fixed
-            .par_iter()
-            .with_min_len(512)
-            .map(|(a, view, k)| Some((*a, *view, *k, plane(*a, &views.view(*view as usize).patches[*k as usize])?)))
-            .collect();
-        Matches { pairs: pairs.into_iter().flatten().collect(), fixed: fixed.into_iter().flatten().collect() }
+        let live = |(a, b): &(u32, u32)| {
+            let plane = plane(*a, &scene.placed[*b as usize].patch)?;
+            Some(Match { a: *a, with: With::Live(*b), plane })
+        };
+        let fixed = |(a, view, patch): &(u32, u32, u32)| {
+            let plane = plane(*a, &views.view(*view as usize).patches[*patch as usize])?;
+            Some(Match { a: *a, with: With::Fixed { view: *view, patch: *patch }, plane })
+        };
+        let mut all: Vec<Option<Match>> = neighbours.pairs.par_iter().with_min_len(512).map(live).collect();
+        all.par_extend(neighbours.fixed.par_iter().with_min_len(512).map(fixed));
+        Matches::of(all.into_iter().flatten().collect(), scene.placed.len())
     }
 
     /// Normals that lean to `direction` by no more than they may err lean no more: together, such errors would pass for
@@ -124,11 +178,13 @@ impl Window {
                 plane.forget(direction);
             }
         };
-        for (a, b, plane) in &mut matches.pairs {
-            straighten(*a, &scene.placed[*b as usize].patch, plane);
-        }
-        for (a, view, k, plane) in &mut matches.fixed {
-            straighten(*a, &views.view(*view as usize).patches[*k as usize], plane);
+        for Match { a, with, plane } in &mut matches.all {
+            match *with {
+                With::Live(b) => straighten(*a, &scene.placed[b as usize].patch, plane),
+                With::Fixed { view, patch } => {
+                    straighten(*a, &views.view(view as usize).patches[patch as usize], plane);
+                }
+            }
         }
     }
 

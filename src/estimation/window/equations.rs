@@ -1,16 +1,17 @@
 //! The window's normal equations: the IMU's part and what is known before, then the matches with their robust weights.
 
 use super::Window;
-use super::correspondence::{Matches, Scene};
+use super::correspondence::{Match, Matches, Scene};
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
 use crate::estimation::residual::inertial::Inertial;
-use crate::estimation::residual::matched::{self, Own, Plane};
+use crate::estimation::residual::matched::{self, Beside, Own, Plane, Side};
 use crate::estimation::residual::prior;
 use crate::estimation::spec::SolveSpec;
 use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Placed;
+use crate::geometry::Vector;
 use rayon::prelude::*;
 
 /// The normal equations are summed in so many parts, whatever the number of threads, so that sums keep their order.
@@ -23,8 +24,11 @@ const REST_VELOCITY_SIGMA: f64 = 0.003;
 pub(super) struct Workspace {
     inertial: NormalEquations,
     sum: NormalEquations,
-    parts: Vec<(NormalEquations, Vec<Own>)>,
-    own: Vec<Own>,
+    parts: Vec<NormalEquations>,
+    /// How far the solution before moves each surfel, m.
+    moved: Vec<Vector>,
+    /// The weight of each match.
+    weights: Vec<f64>,
     pub factor: Factor,
     pub bases: Vec<Basis>,
 }
@@ -35,8 +39,9 @@ impl Default for Workspace {
         Self {
             inertial: empty(),
             sum: empty(),
-            parts: vec![(empty(), Vec::new()); PARTS],
-            own: Vec::new(),
+            parts: vec![empty(); PARTS],
+            moved: Vec::new(),
+            weights: Vec::new(),
             factor: Factor::default(),
             bases: Vec::new(),
         }
@@ -131,48 +136,72 @@ impl Window {
         x: Option<&[f64]>,
     ) {
         let at_s = self.clock.at_s;
-        let placed = &scene.placed;
-        let residual = |a: &Placed, b: Option<&Placed>, plane: &Plane| {
-            let Some(x) = x else { return plane.distance_m };
-            let moved = |surfel: &Placed| matched::moved_m(surfel, &plane.normal, layout, x, at_s);
-            plane.distance_m + moved(a) - b.map_or(0.0, moved)
+        let Workspace { inertial, sum, parts, moved, weights, .. } = &mut self.workspace;
+        let movement = |surfel: &Placed| x.map_or_else(Vector::zeros, |x| matched::moved(surfel, layout, x, at_s));
+        scene.placed.par_iter().with_min_len(512).map(movement).collect_into_vec(moved);
+        let weigh = |one: &Match| {
+            let apart = moved[one.a as usize] - one.other().map_or_else(Vector::zeros, |b| moved[b]);
+            robust.weight(&one.plane, one.plane.distance_m + one.plane.normal.dot(&apart))
         };
-        let Workspace { inertial, sum, parts, own, .. } = &mut self.workspace;
-        parts.par_iter_mut().enumerate().for_each(|(part, (equations, own))| {
+        matches.all.par_iter().with_min_len(512).map(weigh).collect_into_vec(weights);
+        parts.par_iter_mut().enumerate().for_each(|(part, equations)| {
             equations.reset(layout.size());
-            own.clear();
-            own.resize(placed.len(), Own::default());
-            for (a, b, plane) in part_of(&matches.pairs, part) {
-                let (a, b) = (*a as usize, *b as usize);
-                let weight = robust.weight(plane, residual(&placed[a], Some(&placed[b]), plane));
-                matched::add_pair((equations, own), layout, (placed, a, b), plane, (weight, at_s));
-            }
-            for (a, .., plane) in part_of(&matches.fixed, part) {
-                let a = *a as usize;
-                let weight = robust.weight(plane, residual(&placed[a], None, plane));
-                matched::add_fixed(&mut own[a], &placed[a], plane, weight);
-            }
-        });
-        own.clear();
-        own.resize(placed.len(), Own::default());
-        for (_, part) in parts.iter() {
-            own.iter_mut().zip(part).for_each(|(sum, term)| sum.merge(term));
-        }
-        parts.par_iter_mut().enumerate().for_each(|(part, (equations, _))| {
-            let matched = part_of(own, part).iter().zip(part_of(placed, part)).filter(|(own, _)| own.has_matches());
-            for (own, surfel) in matched {
-                own.add_to(equations, layout, surfel, at_s);
-            }
+            let mut sums = Sums { equations, layout, placed: &scene.placed, matches, weights, at_s };
+            sums.add_surfels(matches.part(part, PARTS));
+            equations.settle();
         });
         sum.copy_from(inertial);
-        for (equations, _) in parts.iter() {
+        for equations in parts.iter() {
             sum.add(equations);
         }
     }
 }
 
-/// Part `part` of a list, the same whatever the number of threads.
-fn part_of<T>(list: &[T], part: usize) -> &[T] {
-    let cut = |k: usize| list.len() * k / PARTS;
-    &list[cut(part)..cut(part + 1)]
+/// The matches of some surfels on their way into the normal equations.
+struct Sums<'a> {
+    equations: &'a mut NormalEquations,
+    layout: &'a Layout,
+    placed: &'a [Placed],
+    matches: &'a Matches,
+    weights: &'a [f64],
+    at_s: f64,
+}
+
+impl Sums<'_> {
+    /// Adds the matches of `surfels`: what each surfel says of itself, and how it hangs together with those no later.
+    fn add_surfels(&mut self, surfels: std::ops::Range<usize>) {
+        let mut beside = Beside::default();
+        for index in surfels {
+            let mut own = Own::default();
+            for k in self.matches.of_surfel(index) {
+                self.add_match((index, &mut own), *k as usize, &mut beside);
+            }
+            own.add_to(self.equations, self.layout, &self.placed[index]);
+        }
+        beside.add_to(self.equations, self.layout);
+    }
+
+    /// Adds match `k`, seen from the surfel `index`.
+    fn add_match(&mut self, (index, own): (usize, &mut Own), k: usize, beside: &mut Beside) {
+        let (one, weight) = (&self.matches.all[k], self.weights[k]);
+        let is_first = one.a as usize == index;
+        let normal = if is_first { one.plane.normal } else { -one.plane.normal };
+        let distance_m = one.plane.distance_m;
+        let surfel = &self.placed[index];
+        let alone = Side::of(surfel, &normal, self.at_s);
+        let Some(other) = (if is_first { one.other() } else { Some(one.a as usize) }) else {
+            own.add(&alone, distance_m, weight);
+            beside.add(&alone, distance_m, weight);
+            return;
+        };
+        let partner = &self.placed[other];
+        let partner_side = Side::of(partner, &-normal, self.at_s);
+        let side = alone.together_with(&partner_side);
+        own.add(&side, distance_m, weight);
+        // Each match is met from both sides; what concerns both is added from the later one.
+        if (partner.basis.first, other) < (surfel.basis.first, index) {
+            beside.add(&side, distance_m, weight);
+            matched::add_coupling(self.equations, self.layout, (partner, &partner_side), (surfel, &side), weight);
+        }
+    }
 }

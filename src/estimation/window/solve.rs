@@ -1,7 +1,7 @@
 //! The window's iterations: place the surfels, match, solve; again until nothing moves.
 
 use super::Window;
-use super::correspondence::{Matches, Neighbours};
+use super::correspondence::{Matches, Neighbours, With};
 use super::equations::Robust;
 use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
@@ -65,7 +65,7 @@ impl Window {
                 self.straighten(&mut matches, &scene, views, &solved.weakest);
             }
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.placed.len(), chosen.len());
-            let few = matches.len() < self.spec.solve.min_matches;
+            let few = matches.all.len() < self.spec.solve.min_matches;
             let matches = if few { Matches::default() } else { matches };
             solved.spent.matches_s += watch.lap_s();
             self.assemble_inertial(first, &layout, &total);
@@ -134,7 +134,8 @@ fn greatest(knots: &[f64]) -> (f64, f64) {
 impl Solved {
     /// Number, residual and conditioning of a set of matches.
     fn describe(&mut self, matches: &Matches, robust: &Robust) {
-        (self.matches, self.view_matches) = (matches.pairs.len(), matches.fixed.len());
+        self.matches = matches.all.iter().filter(|one| matches!(one.with, With::Live(_))).count();
+        self.view_matches = matches.all.len() - self.matches;
         let (mut weights, mut squares, mut information) = (0.0, 0.0, Matrix::zeros());
         for plane in matches.planes() {
             let weight = robust.weight(plane, plane.distance_m);

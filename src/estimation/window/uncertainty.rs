@@ -1,7 +1,7 @@
 //! How a window's solution hangs on what it was given: its beginning, its views, and its own measurements.
 
 use super::Window;
-use super::correspondence::{Matches, Scene};
+use super::correspondence::{Match, Matches, Scene, With};
 use super::equations::Robust;
 use crate::estimation::consider::Sensitivity;
 use crate::estimation::residual::{Layout, matched};
@@ -71,14 +71,15 @@ impl Window {
     /// What the right-hand side gains when a view is turned about its pivot and shifted, for each view in use.
     fn columns_of_views(&self, at: &Linearised, views: &Views) -> Vec<(u64, [Vec<f64>; 6])> {
         let mut columns: Vec<(u32, [Vec<f64>; 6])> = Vec::new();
-        for (a, index, _, plane) in &at.matches.fixed {
-            let found = columns.iter().position(|(other, _)| other == index);
+        for Match { a, with, plane } in &at.matches.all {
+            let With::Fixed { view: index, .. } = *with else { continue };
+            let found = columns.iter().position(|(other, _)| *other == index);
             let place = found.unwrap_or_else(|| {
-                columns.push((*index, std::array::from_fn(|_| vec![0.0; at.layout.size()])));
+                columns.push((index, std::array::from_fn(|_| vec![0.0; at.layout.size()])));
                 columns.len() - 1
             });
             let surfel = &at.scene.placed[*a as usize];
-            let lever = surfel.patch.centre - views.view(*index as usize).pivot;
+            let lever = surfel.patch.centre - views.view(index as usize).pivot;
             let weight = at.robust.weight(plane, plane.distance_m);
             let turn: Vector = lever.cross(&plane.normal) * weight;
             let shift = plane.normal * weight;
