@@ -70,6 +70,32 @@ impl Robust {
     }
 }
 
+/// The most that a solution moves a knot.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moved {
+    /// m.
+    pub shift: f64,
+    /// rad.
+    pub turn: f64,
+}
+
+impl Moved {
+    fn greatest(knots: &[f64]) -> Self {
+        let norm = |v: &[f64]| Vector::new(v[0], v[1], v[2]).norm();
+        // NaN must not pass for small.
+        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
+        knots.chunks_exact(6).fold(Self { shift: 0.0, turn: 0.0 }, |most, knot| Self {
+            shift: larger(most.shift, norm(&knot[3..])),
+            turn: larger(most.turn, norm(&knot[..3])),
+        })
+    }
+
+    /// The larger of both, m or rad.
+    pub fn most(self) -> f64 {
+        self.shift.max(self.turn)
+    }
+}
+
 impl Window {
     /// Where the window's unknowns stand, those from the node `first` on.
     pub(super) fn layout(&mut self, first: usize) -> Layout {
@@ -103,8 +129,8 @@ impl Window {
         }
     }
 
-    /// Solves the linearised window, with robust weights from the residuals that the solution before leaves; adds the time
-    /// to `spent`.
+    /// Solves the linearised window, with robust weights from the residuals that the solution before leaves, and again while
+    /// it moves; adds the time to `spent`. The solution, and by how much it moves a knot.
     pub(super) fn solve_robustly(
         &mut self,
         scene: &Scene,
@@ -112,18 +138,25 @@ impl Window {
         layout: &Layout,
         robust: &Robust,
         spent: &mut TimeSpent,
-    ) -> Option<Vec<f64>> {
-        let mut x: Option<Vec<f64>> = None;
+    ) -> Option<(Vec<f64>, Moved)> {
+        let mut solution: Option<(Vec<f64>, Moved)> = None;
         let mut watch = Stopwatch::start();
         for _ in 0..self.spec.solve.reweightings {
-            self.assemble_matches(scene, matches, layout, robust, x.as_deref());
+            let before = solution.as_ref().map(|(x, _)| x.as_slice());
+            self.assemble_matches(scene, matches, layout, robust, before);
             spent.equations_s += watch.lap_s();
             let Workspace { sum, factor, .. } = &mut self.workspace;
             sum.factor(factor).ok()?;
-            x = Some(sum.solve(factor));
+            let x = sum.solve(factor);
             spent.solve_s += watch.lap_s();
+            let moved = Moved::greatest(&x[..layout.border()]);
+            let settled = moved.most() < self.spec.solve.settled_m;
+            solution = Some((x, moved));
+            if settled {
+                break; // weights would hardly change
+            }
         }
-        x
+        solution
     }
 
     /// Adds the matches to the inertial part, weighted by what the solution `x` leaves of them.

@@ -70,20 +70,19 @@ impl Window {
             solved.spent.matches_s += watch.lap_s();
             self.assemble_inertial(first, &layout, &total);
             solved.spent.equations_s += watch.lap_s();
-            let Some(x) = self.solve_robustly(&scene, &matches, &layout, &robust, &mut solved.spent) else {
+            let Some((x, by)) = self.solve_robustly(&scene, &matches, &layout, &robust, &mut solved.spent) else {
                 solved.trouble = Some("its equations are singular");
                 break;
             };
             watch.lap_s(); // told by the solver itself
-            let (shift, turn) = greatest(&x[..layout.border()]);
-            if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
+            if !(by.shift < BELIEVABLE.0 && by.turn < BELIEVABLE.1) {
                 solved.trouble = Some("its correction is too large");
                 break;
             }
             self.apply(&x, first, &layout, &mut total);
-            neighbours.moved(shift + ARM_M * turn);
+            neighbours.moved(by.shift + ARM_M * by.turn);
             solved.spent.correction_s += watch.lap_s();
-            solved.last_correction_m = shift.max(turn);
+            solved.last_correction_m = by.most();
             linearised = Some(Linearised { layout, scene, matches, robust });
             if solved.last_correction_m < self.spec.solve.settled_m {
                 break;
@@ -119,16 +118,6 @@ impl Window {
         self.gyro_exaggerates += more;
         self.lengthen(border[RANGE]);
     }
-}
-
-/// Greatest translation and rotation of a knot.
-fn greatest(knots: &[f64]) -> (f64, f64) {
-    let norm = |v: &[f64]| Vector::new(v[0], v[1], v[2]).norm();
-    knots.chunks_exact(6).fold((0.0, 0.0), |(shift, turn): (f64, f64), knot| {
-        // NaN must not pass for small.
-        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        (larger(shift, norm(&knot[3..])), larger(turn, norm(&knot[..3])))
-    })
 }
 
 impl Solved {
