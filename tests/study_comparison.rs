@@ -87,15 +87,15 @@ fn a_study_that_makes_no_sense_says_where() {
         let source = Source { text: source.text.replacen(old, new, 1), ..source.clone() };
         Comparison::new(&parse(&source).unwrap(), &source).map(|_| ()).unwrap_err().to_string()
     };
-    let error = wrong("\"surfels.streaks\"", "\"surfels.streak\"");
-    assert!(error.contains("no setting \"surfels.streak\"") && error.contains("surfels.streaks"), "{error}");
-    let line = source.text.lines().position(|line| line.contains("name: \"streaks\"")).unwrap() + 1;
+    let error = wrong("\"matching.reciprocal\"", "\"matching.reciproca\"");
+    assert!(error.contains("no setting \"matching.reciproca\"") && error.contains("matching.reciprocal"), "{error}");
+    let line = source.text.lines().position(|line| line.contains("name: \"one-sided matches\"")).unwrap() + 1;
     assert!(error.contains(&format!(":{line}:")), "{error}");
     assert!(wrong("\"window_s\": 2.0", "\"window_s\": 0.6").contains("more than half of window_s"));
     assert!(wrong("seeds: [1, 2]", "seeds: [1, 1]").contains("more than once"));
     assert!(wrong("seeds: [1, 2]", "seeds: []").contains("at least one"));
-    assert!(wrong("name: \"streaks\"", "name: \"base\"").contains("more than once"));
-    assert!(wrong("name: \"streaks\"", "name: \"a, b\"").contains("commas"));
+    assert!(wrong("name: \"one-sided matches\"", "name: \"base\"").contains("more than once"));
+    assert!(wrong("name: \"one-sided matches\"", "name: \"a, b\"").contains("commas"));
     assert!(wrong("scene: \"mocap_room\"", "scene: \"nowhere\"").contains("no such scene"));
 }
 

@@ -1,29 +1,16 @@
 //! Which surfels show the same surface: near each other in position and normal, from both sides, and at different times.
-//! A streak has no normal: it may lie in any patch that is near, runs along it and faces the lidar.
 
 use super::spec::{MatchingSpec, SurfelSpec};
 use super::surfel::{Patch, Placed};
-use crate::geometry::Vector;
 use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 use rayon::prelude::*;
-use std::sync::OnceLock;
 
-/// A streak lies in a patch only when its beams meet the patch at this cosine or more: a table's top is near to a streak on the
-/// wall behind it, and parallel to it.
-const LEAST_INCIDENCE: f64 = 0.3;
+/// Position in voxel edges and scaled normal.
+#[derive(Debug, Clone, Copy, Default)]
+struct Feature([NotNan<f32>; 6]);
 
-/// Position in voxel edges and, of six dimensions, scaled normal.
-#[derive(Debug, Clone, Copy)]
-struct Feature<const D: usize>([NotNan<f32>; D]);
-
-impl<const D: usize> Default for Feature<D> {
-    fn default() -> Self {
-        Self([NotNan::default(); D])
-    }
-}
-
-impl<const D: usize> Point<f32> for Feature<D> {
-    const DIM: u32 = D as u32;
+impl Point<f32> for Feature {
+    const DIM: u32 = 6;
     fn set(&mut self, i: u32, value: NotNan<f32>) {
         self.0[i as usize] = value;
     }
@@ -40,28 +27,27 @@ pub(super) struct Matcher {
     pub(super) levels: usize,
 }
 
-/// The patches of each resolution in a tree of six dimensions, and of three once a streak asks.
+/// The patches of each resolution in a tree.
 pub(super) struct Forest {
-    levels: Vec<Level<6>>,
-    places: OnceLock<Vec<Level<3>>>,
+    levels: Vec<Level>,
 }
 
-struct Level<const D: usize> {
+struct Level {
     members: Vec<u32>,
-    tree: Option<KDTree<f32, Feature<D>>>,
+    tree: Option<KDTree<f32, Feature>>,
 }
 
-impl<const D: usize> Level<D> {
-    fn of(level: usize, patches: &[Patch], feature: impl Fn(&Patch) -> Feature<D>) -> Self {
+impl Level {
+    fn of(level: usize, patches: &[Patch], feature: impl Fn(&Patch) -> Feature) -> Self {
         let of_level = patches.iter().enumerate().filter(|(_, patch)| patch.level == level);
-        let (members, features): (Vec<u32>, Vec<Feature<D>>) =
+        let (members, features): (Vec<u32>, Vec<Feature>) =
             of_level.map(|(index, patch)| (index as u32, feature(patch))).unzip();
         let tree = (!features.is_empty()).then(|| KDTree::new(&features));
         Self { members, tree }
     }
 
     /// The `count` members nearest to `feature`, nearest first.
-    fn nearest(&self, feature: &Feature<D>, count: usize, max_distance: f64) -> Vec<u32> {
+    fn nearest(&self, feature: &Feature, count: usize, max_distance: f64) -> Vec<u32> {
         let Some(tree) = &self.tree else { return Vec::new() };
         let max_radius = max_distance as f32;
         let parameters = Parameters { epsilon: 0.0, max_radius, allow_self_match: false, sort_results: true };
@@ -81,35 +67,23 @@ impl Matcher {
         Self { spec: spec.clone(), finest_voxel_m: surfels.finest_voxel_m, levels: surfels.levels }
     }
 
-    fn feature(&self, patch: &Patch) -> Feature<6> {
-        let Feature([x, y, z]) = self.place(patch);
+    fn feature(&self, patch: &Patch) -> Feature {
+        let per_edge = 1.0 / (self.finest_voxel_m * f64::from(1_u32 << patch.level));
+        let [x, y, z] = <[f64; 3]>::from(patch.centre * per_edge).map(number);
         let [a, b, c] = <[f64; 3]>::from(patch.normal * self.spec.normal_scale).map(number);
         Feature([x, y, z, a, b, c])
-    }
-
-    fn place(&self, patch: &Patch) -> Feature<3> {
-        let per_edge = 1.0 / (self.finest_voxel_m * f64::from(1_u32 << patch.level));
-        Feature(<[f64; 3]>::from(patch.centre * per_edge).map(number))
     }
 
     /// Plants a tree a resolution.
     pub(super) fn plant(&self, patches: &[Patch]) -> Forest {
         let plant = |level| Level::of(level, patches, |patch| self.feature(patch));
-        Forest { levels: (0..self.levels).map(plant).collect(), places: OnceLock::new() }
+        Forest { levels: (0..self.levels).map(plant).collect() }
     }
 
     /// The `count` patches nearest to `patch` in six dimensions, nearest first.
     pub(super) fn neighbours(&self, forest: &Forest, patch: &Patch, count: usize) -> Vec<u32> {
         let level = forest.levels.get(patch.level);
         level.map_or_else(Vec::new, |level| level.nearest(&self.feature(patch), count, self.spec.max_distance))
-    }
-
-    /// Those of `patches`, planted in `forest`, that are nearest to a streak, nearest first.
-    pub(super) fn around(&self, forest: &Forest, patches: &[Patch], streak: &Patch) -> Vec<u32> {
-        let plant = |level| Level::of(level, patches, |patch| self.place(patch));
-        let places = forest.places.get_or_init(|| (0..self.levels).map(plant).collect());
-        let (count, level) = (self.spec.neighbours, places.get(streak.level));
-        level.map_or_else(Vec::new, |level| level.nearest(&self.place(streak), count, self.spec.max_distance))
     }
 
     /// Pairs among the window's own patches, planted in `forest`, in order: indices `(i, j)`, `i < j`.
@@ -143,13 +117,6 @@ impl Matcher {
         a.normal.dot(&b.normal) > self.spec.max_normal_angle_deg.to_radians().cos()
             && apart.dot(&a.normal).abs().max(apart.dot(&b.normal).abs()) < 3.0 * gate_m
             && apart.dot(&(a.normal + b.normal)).abs() < 2.0 * gate_m
-    }
-
-    /// Whether a streak, with the beam that saw it, can lie in a patch.
-    pub(super) fn lies_in(&self, (streak, beam): (&Patch, &Vector), patch: &Patch, gate_m: f64) -> bool {
-        patch.normal.dot(&streak.normal).abs() < self.spec.max_normal_angle_deg.to_radians().sin()
-            && patch.normal.dot(beam) < -LEAST_INCIDENCE * beam.norm()
-            && (streak.centre - patch.centre).dot(&patch.normal).abs() < gate_m
     }
 }
 

@@ -43,9 +43,9 @@
 //!   errors (in the office and the courtyard the position's error fell to about a third). The accelerometer's scale and
 //!   misalignment were tried too and made it worse: gravity alone tells them, and they take up what is not theirs.
 //! - While the head is held still no patches are seen: the window keeps those it has until as much has been swept again, and
-//!   the IMU carries it (within 3 cm over stops of 2 to 5 s). Matching the *streaks* that a still scan draws with patches is a
-//!   setting, off: it holds the level directions to millimetres, but errors of the patches' normals pass for knowledge of the
-//!   height, by decimetres where the carrier climbs meanwhile.
+//!   the IMU carries it (within 3 cm over stops of 2 to 5 s). Matching the lines that a still scan draws with
+//!   patches was tried: it holds the level directions to millimetres, but errors of the patches' normals pass for knowledge of
+//!   the height, by decimetres where the carrier climbs meanwhile.
 //! - Gravity's direction is unknown rather than the map's level: views once frozen need not be turned when it is learnt.
 
 mod border;

@@ -59,8 +59,6 @@ pub struct SurfelSpec {
     /// Least velocity of a planar scan's beams out of their plane, by rotation, degrees/s.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_sweep_deg_per_s: f64,
-    /// Whether lines in surfaces that are not swept (the head is held still) are used too.
-    pub streaks: bool,
     /// Nearest range used, m: what is nearer is the carrier.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_range_m: f64,

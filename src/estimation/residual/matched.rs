@@ -3,9 +3,6 @@
 //! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by
 //! `zeta^2 = 1 / (sigma_r^2 + lambda)`. A live surfel's centre moves by
 //! `dt + dr x arm + v dl + u dr`, `u` along its beams; one of a fixed view does not.
-//!
-//! A streak takes the patch's plane. It may lie beside the patch's points, where that plane is less certain, so its
-//! `zeta^2 = 1 / (sigma_r^2 + lambda + x)`, see `Patch::variance_of_extrapolation`.
 
 use super::{CLOCK, Layout, RANGE};
 use crate::estimation::nominal::Correction;
@@ -29,26 +26,8 @@ pub(in crate::estimation) struct Plane {
 impl Plane {
     /// The plane common to two patches, `sigma_m` being what a match may be off beside their thickness.
     pub(in crate::estimation) fn of(a: &Patch, b: &Patch, sigma_m: f64) -> Self {
-        Self::towards(a.normal + b.normal, a, b, sigma_m)
-    }
-
-    /// The plane of a patch, as a streak in it sees it too.
-    pub(in crate::estimation) fn around(streak: &Patch, patch: &Patch, sigma_m: f64) -> Self {
-        let plane = Self::towards(patch.normal, streak, patch, sigma_m);
-        let within = plane.apart - plane.normal * plane.distance_m;
-        let extrapolated = patch.variance_of_extrapolation(&plane.normal, &within);
-        Self { variance: plane.variance + extrapolated, ..plane }
-    }
-
-    /// Says nothing any more along `direction`, a unit vector.
-    pub(in crate::estimation) fn forget(&mut self, direction: &Vector) {
-        let left = self.normal - direction * self.normal.dot(direction);
-        self.normal = left.try_normalize(1e-3).unwrap_or(self.normal);
-        self.distance_m = self.normal.dot(&self.apart);
-    }
-
-    fn towards(start: Vector, a: &Patch, b: &Patch, sigma_m: f64) -> Self {
         let both = a.covariance + b.covariance;
+        let start = a.normal + b.normal;
         // One step of inverse iteration from the mean normal: the adjugate is the inverse but for a factor, and exists
         // for a perfectly thin patch as well.
         let normal = adjugate(&both) * start;
@@ -57,6 +36,13 @@ impl Plane {
         let apart = a.centre - b.centre;
         let distance_m = normal.dot(&apart);
         Self { normal, apart, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) }
+    }
+
+    /// Says nothing any more along `direction`, a unit vector.
+    pub(in crate::estimation) fn forget(&mut self, direction: &Vector) {
+        let left = self.normal - direction * self.normal.dot(direction);
+        self.normal = left.try_normalize(1e-3).unwrap_or(self.normal);
+        self.distance_m = self.normal.dot(&self.apart);
     }
 }
 

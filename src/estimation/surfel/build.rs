@@ -1,7 +1,7 @@
 //! From beams to surfels: voxels at several resolutions and on two grids, filled from fine to coarse.
 
 use super::moments::Moments;
-use super::{Beam, Surfel, Surfels};
+use super::{Beam, Surfel};
 use crate::estimation::Clock;
 use crate::estimation::nominal::{Motion, Nominal};
 use crate::estimation::spec::SurfelSpec;
@@ -11,13 +11,6 @@ use crate::measurement::LidarNoise;
 
 /// Poses are computed at this spacing and taken linearly in between, s: at 400 degrees/s the chord is 1.5 um/m from the arc.
 const POSE_SPACING_S: f64 = 0.0005;
-/// A streak is at least this long, as a standard deviation in edges of its cell: shorter ones may be anything. There are none
-/// of the finest resolution, whose patches know their normals too badly to hold them: the error of a normal that leans, say,
-/// upwards would pass for knowledge of the height, which a level scan does not have.
-const STREAK_LENGTH: f64 = 0.1;
-/// A streak that runs along its beams more than this (a cosine) is one whose range errors are its length.
-const GRAZING: f64 = 0.94;
-
 /// What it takes to turn beams into surfels.
 #[derive(Debug, Clone)]
 pub(in super::super) struct SurfelMaker {
@@ -40,9 +33,15 @@ struct Fragment {
 }
 
 impl SurfelMaker {
-    /// The surfels and streaks of a stretch of beams, each in order of resolution, grid, cell and time.
-    pub(in super::super) fn build(&self, beams: &[Beam], nominal: &Nominal, clock: &Clock, biases: &Biases) -> Surfels {
-        let Some(first) = beams.first() else { return Surfels::default() };
+    /// The surfels of a stretch of beams, each in order of resolution, grid, cell and time.
+    pub(in super::super) fn build(
+        &self,
+        beams: &[Beam],
+        nominal: &Nominal,
+        clock: &Clock,
+        biases: &Biases,
+    ) -> Vec<Surfel> {
+        let Some(first) = beams.first() else { return Vec::new() };
         let origin = nominal.at(clock.imu_s(first.tau_s), &biases.gyro).position;
         let edge = self.spec.finest_voxel_m;
         let mut regular = Fragments::new(origin, edge, 0.0);
@@ -55,15 +54,11 @@ impl SurfelMaker {
                 offset.add(&point, beam.tau_s, noise2);
             }
         });
-        let mut surfels = Surfels::default();
+        let mut surfels = Vec::new();
         let mut keyed = Vec::new();
         let mut collect = |fragments: &[Fragment], level: usize, shift: i32| {
             for moments in group(fragments, &mut keyed, level, shift, &self.spec) {
-                match self.shape(&moments, level, &origin, (nominal, clock, biases)) {
-                    Some(Shape::Patch(surfel)) => surfels.patches.push(surfel),
-                    Some(Shape::Streak(surfel)) => surfels.streaks.push(surfel),
-                    None => {}
-                }
+                surfels.extend(self.shape(&moments, level, &origin, (nominal, clock, biases)));
             }
         };
         for level in 0..self.spec.levels {
@@ -108,14 +103,14 @@ impl SurfelMaker {
         }
     }
 
-    /// What a cell's points are, if anything.
+    /// The patch of surface that a cell's points are, if they are one.
     fn shape(
         &self,
         moments: &Moments,
         level: usize,
         origin: &Vector,
         state: (&Nominal, &Clock, &Biases),
-    ) -> Option<Shape> {
+    ) -> Option<Surfel> {
         let (nominal, clock, biases) = state;
         let covariance = moments.covariance();
         let eigen = covariance.symmetric_eigen();
@@ -124,10 +119,7 @@ impl SurfelMaker {
         let [l1, l2, l3] = order.map(|k| eigen.eigenvalues[k].max(0.0));
         let planarity = 2.0 * (l2 - l1) / (l1 + l2 + l3).max(f64::MIN_POSITIVE);
         let thick2 = self.spec.max_thickness_sigmas.powi(2) * moments.mean_noise2();
-        let edge_m = self.spec.finest_voxel_m * f64::from(1_u32 << level);
-        let is_line = self.spec.streaks && level > 0 && l2 <= thick2 && l3 >= (STREAK_LENGTH * edge_m).powi(2);
-        let is_plane = planarity >= self.spec.min_planarity && l1 <= thick2;
-        if !is_plane && !is_line {
+        if planarity < self.spec.min_planarity || l1 > thick2 {
             return None;
         }
         let tau_s = moments.mean_time_s();
@@ -139,30 +131,20 @@ impl SurfelMaker {
         let sweeps = self.scan_normal.is_none_or(|scan_normal| {
             rate_in_imu.cross(&beam).dot(&scan_normal).abs() >= self.spec.min_sweep_deg_per_s.to_radians()
         });
-        let axis = |k: usize| imu_from_map * eigen.eigenvectors.column(order[k]);
-        let (normal, along) = (axis(0), axis(2));
-        let covariance_in_imu = imu_from_map * covariance * motion.rotation;
-        let surfel = |normal_in_imu: Vector| Surfel {
+        if !sweeps {
+            return None;
+        }
+        let normal = imu_from_map * eigen.eigenvectors.column(order[0]);
+        Some(Surfel {
             tau_s,
             centre_in_imu,
             beam_in_imu: beam,
-            normal_in_imu,
-            covariance_in_imu,
+            normal_in_imu: if normal.dot(&beam) > 0.0 { -normal } else { normal },
+            covariance_in_imu: imu_from_map * covariance * motion.rotation,
             points: moments.count(),
             level,
-        };
-        if sweeps {
-            is_plane.then(|| Shape::Patch(surfel(if normal.dot(&beam) > 0.0 { -normal } else { normal })))
-        } else {
-            (is_line && along.dot(&beam).abs() < GRAZING).then(|| Shape::Streak(surfel(along)))
-        }
+        })
     }
-}
-
-/// What the points of a cell look like.
-enum Shape {
-    Patch(Surfel),
-    Streak(Surfel),
 }
 
 /// Fragments of one grid, in the order of time.

@@ -12,24 +12,15 @@ const MOVED_M: f64 = 0.02;
 /// A normal leans when it does so by more than this multiple of its error.
 const SIGNIFICANT: f64 = 4.0;
 
-/// The window's surfels in the map.
-#[derive(Debug)]
-pub(super) struct Scene {
-    /// Patches, then streaks.
-    pub placed: Vec<Placed>,
-    /// How many of them are patches.
-    pub patches: usize,
-}
-
 /// Which surfels may belong together, before anything is said of how far apart they are.
 #[derive(Default)]
 pub(super) struct Neighbours {
-    /// Of the window: indices into the scene, the second a patch.
+    /// Of the window: indices into the scene.
     pairs: Vec<(u32, u32)>,
     /// With views: a surfel of the scene, a view, a patch of the view.
     fixed: Vec<(u32, u32, u32)>,
     /// How many surfels there were.
-    of: (usize, usize),
+    of: usize,
     /// How far surfels may have moved since, m.
     moved_m: f64,
 }
@@ -116,46 +107,41 @@ impl Neighbours {
     }
 
     /// Whether they need not be looked for again.
-    pub fn are_good_for(&self, scene: &Scene) -> bool {
-        self.of == (scene.placed.len(), scene.patches) && self.moved_m < MOVED_M
+    pub fn are_good_for(&self, scene: &[Placed]) -> bool {
+        self.of == scene.len() && self.moved_m < MOVED_M
     }
 }
 
 impl Window {
     /// The window's surfels in the map; those that a change of clock has moved out of the window's knots stay out.
-    pub(super) fn scene(&self) -> Scene {
+    pub(super) fn scene(&self) -> Vec<Placed> {
         let (from, to) = (self.start.u_s, self.nominal.end_s());
         let spacing = self.spec.knot_spacing_s;
-        let place = |surfels: Vec<&Surfel>| -> Vec<Option<Placed>> {
-            let place = |surfel: &&Surfel| {
-                let u_s = self.clock.imu_s(surfel.tau_s);
-                (from..=to).contains(&u_s).then(|| surfel.place(&self.nominal, &self.clock, &self.biases, spacing))
-            };
-            surfels.par_iter().with_min_len(512).map(place).collect()
+        let place = |surfel: &&Surfel| {
+            let u_s = self.clock.imu_s(surfel.tau_s);
+            (from..=to).contains(&u_s).then(|| surfel.place(&self.nominal, &self.clock, &self.biases, spacing))
         };
-        let patches = place(self.stretches.iter().flat_map(|stretch| &stretch.surfels.patches).collect());
-        let streaks = place(self.stretches.iter().flat_map(|stretch| &stretch.surfels.streaks).collect());
-        let mut placed: Vec<Placed> = patches.into_iter().flatten().collect();
-        let patches = placed.len();
-        placed.extend(streaks.into_iter().flatten());
-        Scene { placed, patches }
+        let surfels: Vec<&Surfel> = self.stretches.iter().flat_map(|stretch| &stretch.surfels).collect();
+        let placed: Vec<Option<Placed>> = surfels.par_iter().with_min_len(512).map(place).collect();
+        placed.into_iter().flatten().collect()
     }
 
     /// Those `neighbours` in `scene` that match.
-    pub(super) fn match_up(&self, scene: &Scene, views: &Views, neighbours: &Neighbours, iteration: usize) -> Matches {
+    pub(super) fn match_up(
+        &self,
+        scene: &[Placed],
+        views: &Views,
+        neighbours: &Neighbours,
+        iteration: usize,
+    ) -> Matches {
         let gate_m = self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
         let sigma_m = self.spec.solve.match_sigma_m;
-        let plane = |a: u32, patch: &Patch| {
-            let surfel = &scene.placed[a as usize].patch;
-            if (a as usize) < scene.patches {
-                self.matcher.agree(surfel, patch, gate_m).then(|| Plane::of(surfel, patch, sigma_m))
-            } else {
-                let beam = &scene.placed[a as usize].arm;
-                self.matcher.lies_in((surfel, beam), patch, gate_m).then(|| Plane::around(surfel, patch, sigma_m))
-            }
+        let plane = |a: u32, other: &Patch| {
+            let patch = &scene[a as usize].patch;
+            self.matcher.agree(patch, other, gate_m).then(|| Plane::of(patch, other, sigma_m))
         };
         let live = |(a, b): &(u32, u32)| {
-            let plane = plane(*a, &scene.placed[*b as usize].patch)?;
+            let plane = plane(*a, &scene[*b as usize].patch)?;
             Some(Match { a: *a, with: With::Live(*b), plane })
         };
         let fixed = |(a, view, patch): &(u32, u32, u32)| {
@@ -164,67 +150,37 @@ impl Window {
         };
         let mut all: Vec<Option<Match>> = neighbours.pairs.par_iter().with_min_len(512).map(live).collect();
         all.par_extend(neighbours.fixed.par_iter().with_min_len(512).map(fixed));
-        Matches::of(all.into_iter().flatten().collect(), scene.placed.len())
+        Matches::of(all.into_iter().flatten().collect(), scene.len())
     }
 
     /// Normals that lean to `direction` by no more than they may err lean no more: together, such errors would pass for
     /// knowledge, and hold the head back.
-    pub(super) fn straighten(&self, matches: &mut Matches, scene: &Scene, views: &Views, direction: &Vector) {
-        let straighten = |a: u32, patch: &Patch, plane: &mut Plane| {
-            let both = [&scene.placed[a as usize].patch, patch];
-            let of_both = if (a as usize) < scene.patches { &both[..] } else { &both[1..] };
-            let variance: f64 = of_both.iter().map(|patch| patch.variance_of_lean(direction)).sum();
+    pub(super) fn straighten(&self, matches: &mut Matches, scene: &[Placed], views: &Views, direction: &Vector) {
+        for Match { a, with, plane } in &mut matches.all {
+            let other = match *with {
+                With::Live(b) => &scene[b as usize].patch,
+                With::Fixed { view, patch } => &views.view(view as usize).patches[patch as usize],
+            };
+            let variance = scene[*a as usize].patch.variance_of_lean(direction) + other.variance_of_lean(direction);
             if plane.normal.dot(direction).abs() < SIGNIFICANT * variance.sqrt() {
                 plane.forget(direction);
-            }
-        };
-        for Match { a, with, plane } in &mut matches.all {
-            match *with {
-                With::Live(b) => straighten(*a, &scene.placed[b as usize].patch, plane),
-                With::Fixed { view, patch } => {
-                    straighten(*a, &views.view(view as usize).patches[patch as usize], plane);
-                }
             }
         }
     }
 
     /// The neighbours in `scene` and in the `chosen` views.
-    pub(super) fn look_around(&self, scene: &Scene, (views, chosen): (&Views, &[usize])) -> Neighbours {
-        let patches: Vec<Patch> = scene.placed[..scene.patches].iter().map(|surfel| surfel.patch).collect();
-        let forest = self.matcher.plant(&patches);
-        let mut pairs = self.matcher.among(&scene.placed[..scene.patches], &forest);
-        let streaks = scene.placed.iter().enumerate().skip(scene.patches).collect::<Vec<_>>();
-        let lying: Vec<Vec<(u32, u32)>> = streaks
-            .par_iter()
-            .with_min_len(64)
-            .map(|(a, streak)| {
-                let near = self.matcher.around(&forest, &patches, &streak.patch);
-                let apart = near.into_iter().filter(|b| self.matcher.apart(streak, &scene.placed[*b as usize]));
-                apart.map(|b| (*a as u32, b)).collect()
-            })
-            .collect();
-        pairs.extend(lying.into_iter().flatten());
+    pub(super) fn look_around(&self, scene: &[Placed], (views, chosen): (&Views, &[usize])) -> Neighbours {
+        let patches: Vec<Patch> = scene.iter().map(|surfel| surfel.patch).collect();
+        let pairs = self.matcher.among(scene, &self.matcher.plant(&patches));
         let count = self.spec.views.neighbours;
-        let fixed: Vec<Vec<(u32, u32, u32)>> = scene
-            .placed
-            .par_iter()
-            .enumerate()
-            .with_min_len(256)
-            .map(|(a, surfel)| {
-                let mut found = Vec::new();
-                for index in chosen {
-                    let view = views.view(*index);
-                    let near = if a < scene.patches {
-                        self.matcher.neighbours(&view.forest, &surfel.patch, count)
-                    } else {
-                        self.matcher.around(&view.forest, &view.patches, &surfel.patch)
-                    };
-                    found.extend(near.into_iter().map(|k| (a as u32, *index as u32, k)));
-                }
-                found
-            })
-            .collect();
-        let of = (scene.placed.len(), scene.patches);
-        Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), of, moved_m: 0.0 }
+        let in_views = |(a, patch): (usize, &Patch)| {
+            let near = |index: &usize| {
+                let found = self.matcher.neighbours(&views.view(*index).forest, patch, count);
+                found.into_iter().map(|k| (a as u32, *index as u32, k)).collect::<Vec<_>>()
+            };
+            chosen.iter().flat_map(near).collect::<Vec<_>>()
+        };
+        let fixed: Vec<_> = patches.par_iter().enumerate().with_min_len(256).map(in_views).collect();
+        Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), of: scene.len(), moved_m: 0.0 }
     }
 }

@@ -1,7 +1,7 @@
 //! The window's normal equations: the IMU's part and what is known before, then the matches with their robust weights.
 
 use super::Window;
-use super::correspondence::{Match, Matches, Scene};
+use super::correspondence::{Match, Matches};
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
 use crate::estimation::residual::inertial::Inertial;
@@ -133,7 +133,7 @@ impl Window {
     /// it moves; adds the time to `spent`. The solution, and by how much it moves a knot.
     pub(super) fn solve_robustly(
         &mut self,
-        scene: &Scene,
+        scene: &[Placed],
         matches: &Matches,
         layout: &Layout,
         robust: &Robust,
@@ -162,7 +162,7 @@ impl Window {
     /// Adds the matches to the inertial part, weighted by what the solution `x` leaves of them.
     fn assemble_matches(
         &mut self,
-        scene: &Scene,
+        scene: &[Placed],
         matches: &Matches,
         layout: &Layout,
         robust: &Robust,
@@ -171,7 +171,7 @@ impl Window {
         let at_s = self.clock.at_s;
         let Workspace { inertial, sum, parts, moved, weights, .. } = &mut self.workspace;
         let movement = |surfel: &Placed| x.map_or_else(Vector::zeros, |x| matched::moved(surfel, layout, x, at_s));
-        scene.placed.par_iter().with_min_len(512).map(movement).collect_into_vec(moved);
+        scene.par_iter().with_min_len(512).map(movement).collect_into_vec(moved);
         let weigh = |one: &Match| {
             let apart = moved[one.a as usize] - one.other().map_or_else(Vector::zeros, |b| moved[b]);
             robust.weight(&one.plane, one.plane.distance_m + one.plane.normal.dot(&apart))
@@ -179,7 +179,7 @@ impl Window {
         matches.all.par_iter().with_min_len(512).map(weigh).collect_into_vec(weights);
         parts.par_iter_mut().enumerate().for_each(|(part, equations)| {
             equations.reset(layout.size());
-            let mut sums = Sums { equations, layout, placed: &scene.placed, matches, weights, at_s };
+            let mut sums = Sums { equations, layout, placed: scene, matches, weights, at_s };
             sums.add_surfels(matches.part(part, PARTS));
             equations.settle();
         });

@@ -17,7 +17,7 @@ use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Interval};
-use super::surfel::{Beam, Patch, Surfel, SurfelMaker, Surfels};
+use super::surfel::{Beam, Patch, Surfel, SurfelMaker};
 use crate::geometry::{Matrix, Rotation, Vector};
 use equations::Workspace;
 use std::collections::VecDeque;
@@ -34,7 +34,7 @@ const SWEPT: f64 = 0.25;
 struct Stretch {
     end_tau_s: f64,
     beams: Vec<Beam>,
-    surfels: Surfels,
+    surfels: Vec<Surfel>,
 }
 
 /// The state of the estimator: trajectory, biases, gravity, clock, and the surfels of the last few seconds.
@@ -152,9 +152,9 @@ impl Window {
     /// Whether the oldest stretch is to leave: without it the window still holds `window_s` of stretches that swept over
     /// surfaces, or it has none to give. While the head is held still it sees lines alone, which need the patches seen before.
     pub(super) fn is_full(&self) -> bool {
-        let richest = self.stretches.iter().map(|stretch| stretch.surfels.patches.len()).max().unwrap_or(0);
+        let richest = self.stretches.iter().map(|stretch| stretch.surfels.len()).max().unwrap_or(0);
         let enough = (richest as f64 * SWEPT) as usize;
-        let is_swept = |stretch: &Stretch| stretch.surfels.patches.len() >= enough;
+        let is_swept = |stretch: &Stretch| stretch.surfels.len() >= enough;
         let swept = self.stretches.iter().filter(|stretch| is_swept(stretch)).count();
         let windows = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
         let all = windows(self.stretches.len());
@@ -172,7 +172,7 @@ impl Window {
         let oldest = self.stretches.pop_front()?;
         let spacing = self.spec.knot_spacing_s;
         let place = |surfel: &Surfel| surfel.place(&self.nominal, &self.clock, &self.biases, spacing).patch;
-        let placed = oldest.surfels.patches.iter().map(place).collect();
+        let placed = oldest.surfels.iter().map(place).collect();
         self.start = Start::held(start_s);
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
@@ -182,8 +182,8 @@ impl Window {
     /// All ranges, of surfels and of beams to come, become longer by `by_m`.
     fn lengthen(&mut self, by_m: f64) {
         self.maker.longer_m += by_m;
-        for Surfels { patches, streaks } in self.stretches.iter_mut().map(|stretch| &mut stretch.surfels) {
-            patches.iter_mut().chain(streaks).for_each(|surfel| surfel.lengthen(by_m));
+        for surfel in self.stretches.iter_mut().flat_map(|stretch| &mut stretch.surfels) {
+            surfel.lengthen(by_m);
         }
     }
 }

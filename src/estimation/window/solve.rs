@@ -52,7 +52,7 @@ impl Window {
         for iteration in 0..self.spec.solve.max_iterations {
             let scene = self.scene();
             solved.spent.placing_s += watch.lap_s();
-            let chosen = chosen.get_or_insert_with(|| views.choose(&scene.placed[..scene.patches]));
+            let chosen = chosen.get_or_insert_with(|| views.choose(&scene));
             solved.spent.views_s += watch.lap_s();
             if !neighbours.are_good_for(&scene) {
                 neighbours = self.look_around(&scene, (views, chosen));
@@ -64,7 +64,7 @@ impl Window {
             if solved.conditioning < self.spec.solve.weak_conditioning {
                 self.straighten(&mut matches, &scene, views, &solved.weakest);
             }
-            (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.placed.len(), chosen.len());
+            (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
             let few = matches.all.len() < self.spec.solve.min_matches;
             let matches = if few { Matches::default() } else { matches };
             solved.spent.matches_s += watch.lap_s();

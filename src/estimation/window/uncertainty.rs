@@ -1,11 +1,12 @@
 //! How a window's solution hangs on what it was given: its beginning, its views, and its own measurements.
 
 use super::Window;
-use super::correspondence::{Match, Matches, Scene, With};
+use super::correspondence::{Match, Matches, With};
 use super::equations::Robust;
 use crate::estimation::consider::Sensitivity;
 use crate::estimation::residual::{Layout, matched};
 use crate::estimation::spline::Basis;
+use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
 use crate::geometry::{Vector, skew};
 use nalgebra::Matrix6;
@@ -14,7 +15,7 @@ use nalgebra::Matrix6;
 #[derive(Debug)]
 pub(in crate::estimation) struct Linearised {
     pub(super) layout: Layout,
-    pub(super) scene: Scene,
+    pub(super) scene: Vec<Placed>,
     pub(super) matches: Matches,
     pub(super) robust: Robust,
 }
@@ -78,7 +79,7 @@ impl Window {
                 columns.push((index, std::array::from_fn(|_| vec![0.0; at.layout.size()])));
                 columns.len() - 1
             });
-            let surfel = &at.scene.placed[*a as usize];
+            let surfel = &at.scene[*a as usize];
             let lever = surfel.patch.centre - views.view(index as usize).pivot;
             let weight = at.robust.weight(plane, plane.distance_m);
             let turn: Vector = lever.cross(&plane.normal) * weight;

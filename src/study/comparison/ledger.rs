@@ -82,7 +82,7 @@ mod tests {
     fn row(seed: u64) -> Row {
         let name = |text: &str| text.to_owned();
         let figures = [(Measure::PositionRmseM, 0.1 + 0.2), (Measure::WallS, 1.5)].into();
-        Row { variant: name("no streaks"), scene: name("office"), motion: name("hand"), seed, figures }
+        Row { variant: name("no offset grids"), scene: name("office"), motion: name("hand"), seed, figures }
     }
 
     #[test]
@@ -96,7 +96,7 @@ mod tests {
         drop(ledger);
         // The kill came in the middle of a line.
         let mut file = OpenOptions::new().append(true).open(&path).unwrap();
-        file.write_all(b"no streaks,office,hand,3,0.0").unwrap();
+        file.write_all(b"no offset grids,office,hand,3,0.0").unwrap();
         let mut ledger = Ledger::open(&path).unwrap();
         assert_eq!(ledger.rows(), [row(2), row(1)]);
         ledger.add(row(3)).unwrap();

@@ -64,7 +64,7 @@ mod tests {
         assert!(wrong("window_s.x", Setting::Count(1)).contains("none below"));
         // Out of its range, and of another kind.
         assert!(wrong("window_s", Setting::Number(-1.0)).contains("above 0"));
-        assert!(wrong("surfels.streaks", Setting::Number(0.5)).contains("boolean"));
+        assert!(wrong("matching.reciprocal", Setting::Number(0.5)).contains("boolean"));
         assert!(wrong("surfels.levels", Setting::Number(0.5)).contains("usize"));
     }
 }
