@@ -6,6 +6,7 @@ mod estimation_fixture;
 
 use estimation_fixture::{Room, Run, Scanner, Score, Walk, calibration, growth_m};
 use zsim::estimation::{EstimatorSpec, estimate_all, load};
+use zsim::geometry::{Rotation, Vector};
 
 /// From when to when the head is held, s; it takes a second to come to rest, and another to swing again.
 const HELD_S: (f64, f64) = (7.0, 13.0);
@@ -63,4 +64,28 @@ fn a_clock_that_is_not_estimated_stays_where_it_was_put() {
         "{:?}",
         result.clock_offsets
     );
+}
+
+#[test]
+fn how_the_lidar_sits_beside_the_imu_is_found_from_a_wrong_calibration() {
+    let run = Run::new(Room::furnished(), Walk { start_s: 1.5, ..Walk::new((1.8, 1.2), 25.0) }, 25, 30.0);
+    let (shift, turn) = (Vector::new(0.010, -0.008, 0.006), Vector::new(0.5, -0.4, 0.6).map(f64::to_radians));
+    let mut wrong = calibration();
+    let mut imu_from_laser = wrong.head_from_imu.inverse() * wrong.head_from_laser;
+    imu_from_laser.translation.vector += shift;
+    imu_from_laser.rotation = Rotation::from_scaled_axis(turn) * imu_from_laser.rotation;
+    wrong.head_from_laser = wrong.head_from_imu * imu_from_laser;
+    let estimate = |estimated: bool| {
+        let mut spec = load("default").unwrap();
+        spec.extrinsics.estimated = estimated;
+        estimate_all(&spec, &wrong, run.measurements().into_iter()).unwrap()
+    };
+    let found = estimate(true).lidar;
+    println!("{found:?}");
+    let turned_back = found.turn * Rotation::from_scaled_axis(turn);
+    assert!(turned_back.angle().to_degrees() < 0.1, "{turned_back}");
+    assert!((found.shift + shift).norm() < 0.004, "{found:?}");
+    // Taken as calibrated, it stays where it is.
+    let held = estimate(false).lidar;
+    assert!(held.turn.angle() < 1e-6 && held.shift.norm() < 1e-6, "{held:?}");
 }

@@ -85,6 +85,9 @@ pub(super) struct EstimatorArguments {
     /// Stop before the global registration
     #[arg(long)]
     open_loop: bool,
+    /// Estimate also how the lidar sits beside the IMU, from where the calibration puts it
+    #[arg(long)]
+    refine_extrinsics: bool,
     /// Tell where the open loop's time went
     #[arg(long)]
     pub profile: bool,
@@ -94,6 +97,7 @@ impl EstimatorArguments {
     pub(super) fn wishes(&self) -> anyhow::Result<Wishes> {
         let mut estimator = estimation::load(&self.estimator)?;
         estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
+        estimator.extrinsics.estimated |= self.refine_extrinsics;
         estimator.check().map_err(|error| Usage(error.to_string()))?;
         Ok(Wishes::with(estimator))
     }

@@ -9,7 +9,7 @@ use super::views::Views;
 use super::window::{Linearised, Solved, Window};
 use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
-use crate::measurement::{Calibration, Measurement};
+use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::time::Stamp;
 use std::mem::discriminant;
 use std::time::Instant;
@@ -99,12 +99,13 @@ impl Estimator {
         self.warnings.extend(self.intake.take_warnings());
         let Some(window) = &self.window else { return Err(self.why_nothing()) };
         let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
+        let lidar = window.lidar();
         self.consider_the_end();
         self.hand_out(end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
         let Self { poses, clock_offsets, windows, warnings, .. } = self;
-        Ok(OpenLoop { trajectory, poses, clock_offsets, windows, warnings })
+        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, windows, warnings })
     }
 
     /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and its
@@ -217,8 +218,7 @@ impl Estimator {
         });
         let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let specs = (&self.spec.inertial, &self.spec.clock, self.spec.surfels.range_offset_sigma_m);
-        let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, specs);
+        let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, &self.spec);
         self.window = Some(match &self.carried {
             Some(carried) => {
                 let beginning = beginning.going_on_from(carried);
@@ -243,7 +243,7 @@ impl Estimator {
             noise: self.calibration.lidar,
             scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
             laser_in_imu: imu_from_laser.translation.vector,
-            longer_m: 0.0,
+            lidar: LidarCorrection::default(),
         };
         let border = Border::new(beginning.information, &self.calibration.imu, self.spec.clock.estimated);
         Window::new(&self.spec, maker, beginning, start_s, border)

@@ -1,15 +1,20 @@
 //! Where an estimate begins: level, biases, and whether the head rested.
 
 use super::clock::Clock;
-use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, RANGE};
-use super::spec::{ClockSpec, InertialSpec};
+use super::residual::{
+    ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN, RANGE,
+};
+use super::spec::EstimatorSpec;
 use super::strapdown::{Biases, Interval, State};
 use crate::geometry::{Matrix, Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
-use crate::measurement::ImuNoise;
-use nalgebra::SMatrix;
+use crate::measurement::{ImuNoise, LidarCorrection};
+use nalgebra::{SMatrix, SVector};
 
 /// Standard deviations of offset (s) and rate of a clock that is not estimated: nothing moves them.
 const HELD_CLOCK: (f64, f64) = (1e-9, 1e-12);
+
+/// How exactly the gyroscope's axes are the IMU's when the lidar's attitude is estimated, rad.
+const GYRO_AXES_SIGMA: f64 = 1e-6;
 
 /// A sample's deviation from the mean, as a multiple of its noise, up to which the head is at rest.
 const REST_SIGMAS: f64 = 6.0;
@@ -43,8 +48,8 @@ pub(super) struct Carried {
     pub(super) clock: Clock,
     /// By how much the gyroscope exaggerates.
     pub(super) gyro_exaggerates: Matrix,
-    /// By how much ranges are lengthened, m.
-    pub(super) longer_m: f64,
+    /// What is known of the lidar beyond its calibration.
+    pub(super) lidar: LidarCorrection,
 }
 
 impl Beginning {
@@ -72,12 +77,7 @@ impl Rest {
 /// accelerations cancel), with little trust.
 ///
 /// The map's origin is the head's first position, and its x axis points where the head's does.
-pub(super) fn begin(
-    intervals: &[Interval],
-    head_from_imu: &Pose,
-    noise: &ImuNoise,
-    spec: (&InertialSpec, &ClockSpec, f64),
-) -> Beginning {
+pub(super) fn begin(intervals: &[Interval], head_from_imu: &Pose, noise: &ImuNoise, spec: &EstimatorSpec) -> Beginning {
     let duration: f64 = intervals.iter().map(|i| i.h).sum();
     let mean = |of: fn(&Interval) -> Vector| intervals.iter().map(|i| of(i) * i.h).sum::<Vector>() / duration;
     let (gyro, force) = (mean(|i| i.gyro), mean(|i| i.accel));
@@ -125,7 +125,7 @@ fn information(
     gyro_sigma: f64,
     at_rest: bool,
     noise: &ImuNoise,
-    (inertial, clock, range_offset_sigma_m): (&InertialSpec, &ClockSpec, f64),
+    EstimatorSpec { inertial, clock, surfels, extrinsics, .. }: &EstimatorSpec,
 ) -> SMatrix<f64, BORDER, BORDER> {
     // A level found in motion is off by the mean acceleration over g, one found at rest by the bias over g.
     let tilt_sigma = if at_rest { 0.02 } else { 0.2 };
@@ -136,7 +136,19 @@ fn information(
     (sigmas[CLOCK], sigmas[CLOCK_RATE]) =
         if clock.estimated { (clock.start_sigma_s, (clock.drift_ppm * 1e-6).max(1e-9)) } else { HELD_CLOCK };
     // What is left at zero is held there.
-    sigmas[RANGE] = range_offset_sigma_m.max(1e-9);
+    sigmas[RANGE] = surfels.range_offset_sigma_m.max(1e-9);
+    let (turn, shift) = extrinsics.sigmas();
+    sigmas[LIDAR_TURN..LIDAR_TURN + 3].fill(turn.max(1e-9));
+    sigmas[LIDAR_SHIFT..LIDAR_SHIFT + 3].fill(shift.max(1e-9));
     sigmas[GYRO_MATRIX..GYRO_MATRIX + 9].fill(inertial.gyro_matrix_sigma.max(1e-9));
-    SMatrix::from_diagonal(&nalgebra::SVector::from(sigmas.map(|sigma| sigma.powi(-2))))
+    let mut information = SMatrix::from_diagonal(&SVector::from(sigmas.map(|sigma| sigma.powi(-2))));
+    if extrinsics.estimated {
+        // Against what is the lidar turned? The IMU's axes are then by definition those about which the gyroscope measures.
+        for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+            let mut turn = SVector::<f64, BORDER>::zeros();
+            (turn[GYRO_MATRIX + 3 * i + j], turn[GYRO_MATRIX + 3 * j + i]) = (1.0, -1.0);
+            information += turn * turn.transpose() * GYRO_AXES_SIGMA.powi(-2);
+        }
+    }
+    information
 }

@@ -2,6 +2,7 @@
 
 use super::{TimeSpent, Warning};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
+use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
 
 /// The head at an instant, and what the estimator thought of its sensors then.
@@ -61,6 +62,8 @@ pub struct OpenLoop {
     pub poses: Vec<EstimatedPose>,
     /// The clock offset after each window: how much later the IMU stamps an instant than the lidar, s, by lidar time.
     pub clock_offsets: Vec<(Stamp, f64)>,
+    /// What was learnt of the lidar beyond its calibration, at the end.
+    pub lidar: LidarCorrection,
     /// A report a window.
     pub windows: Vec<WindowReport>,
     /// What degraded the estimate; empty when nothing did.

@@ -27,6 +27,8 @@ pub struct EstimatorSpec {
     pub inertial: InertialSpec,
     /// What is believed of the two clocks.
     pub clock: ClockSpec,
+    /// How well it is known how the lidar sits beside the IMU.
+    pub extrinsics: ExtrinsicsSpec,
     /// Choice and keeping of fixed views.
     pub views: ViewSpec,
 }
@@ -171,6 +173,27 @@ pub struct ClockSpec {
     /// Jitter of the sensors' stamps, s, by which their smoothing starts; 0 takes every stamp as it is.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub jitter_s: f64,
+}
+
+/// How well it is known how the lidar sits beside the IMU.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExtrinsicsSpec {
+    /// Whether the lidar's attitude and place are estimated; if not, they are taken as calibrated.
+    pub estimated: bool,
+    /// Standard deviation of its attitude on each axis, degrees.
+    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    pub rotation_sigma_deg: f64,
+    /// Standard deviation of its place on each axis, m.
+    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    pub translation_sigma_m: f64,
+}
+
+impl ExtrinsicsSpec {
+    /// Standard deviations of attitude (rad) and place (m): none where they are taken as calibrated.
+    pub(super) fn sigmas(&self) -> (f64, f64) {
+        if self.estimated { (self.rotation_sigma_deg.to_radians(), self.translation_sigma_m) } else { (0.0, 0.0) }
+    }
 }
 
 /// Choice and keeping of fixed views.

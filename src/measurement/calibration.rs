@@ -1,4 +1,4 @@
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 /// How the sensors sit in the head, and how well they measure.
@@ -12,6 +12,40 @@ pub struct Calibration {
     pub imu: ImuNoise,
     /// The lidar's noise.
     pub lidar: LidarNoise,
+}
+
+/// By how much a lidar is not what its calibration says, along the IMU's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LidarCorrection {
+    /// To be added to every range, m.
+    pub range_m: f64,
+    /// Turn of the lidar about its own place.
+    pub turn: Rotation,
+    /// Shift of its place, m.
+    pub shift: Vector,
+}
+
+impl Default for LidarCorrection {
+    fn default() -> Self {
+        Self { range_m: 0.0, turn: Rotation::identity(), shift: Vector::zeros() }
+    }
+}
+
+impl LidarCorrection {
+    /// The way from the lidar to a point, m, which its calibration takes for `reach`.
+    pub fn reach(&self, reach: &Vector) -> Vector {
+        self.turn * (reach * (1.0 + self.range_m / reach.norm()))
+    }
+}
+
+impl Calibration {
+    /// Pose of the lidar in the head, corrected.
+    pub fn head_from_corrected_laser(&self, correction: &LidarCorrection) -> Pose {
+        let mut imu_from_laser = self.head_from_imu.inverse() * self.head_from_laser;
+        imu_from_laser.rotation = correction.turn * imu_from_laser.rotation;
+        imu_from_laser.translation.vector += correction.shift;
+        self.head_from_imu * imu_from_laser
+    }
 }
 
 /// Noise of an IMU as Kalibr writes it: densities of white noise, and of the walks of the biases.

@@ -6,7 +6,7 @@ mod calibration;
 mod imu;
 mod lidar;
 
-pub use calibration::{Calibration, ImuNoise, LidarNoise};
+pub use calibration::{Calibration, ImuNoise, LidarCorrection, LidarNoise};
 pub use imu::ImuSample;
 pub use lidar::{LidarReturn, LidarScan, PlanarScan};
 

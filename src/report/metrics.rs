@@ -23,6 +23,8 @@ pub struct Metrics {
     pub closed_loop: ClosedLoopMetrics,
     /// The clock offset.
     pub clock: ClockMetrics,
+    /// What was learnt of the lidar.
+    pub lidar: LidarMetrics,
     /// The cloud.
     pub cloud: CloudMetrics,
     /// Most memory that the process ever had, MiB.
@@ -103,6 +105,18 @@ pub struct ClockMetrics {
     pub offset_end_error_s: Option<f64>,
 }
 
+/// By how much the lidar is not what its calibration says, along the IMU's axes, as the estimator has it at the end.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LidarMetrics {
+    /// To be added to every range, m.
+    pub range_correction_m: Option<f64>,
+    /// Turn of the lidar about its own place, as a rotation vector, degrees; nothing where it was not estimated.
+    pub rotation_correction_deg: Option<[f64; 3]>,
+    /// Shift of its place, m.
+    pub translation_correction_m: Option<[f64; 3]>,
+}
+
 /// The registered cloud.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -176,6 +190,10 @@ mod tests {
             "clock",
             "offset_rmse_s",
             "offset_end_error_s",
+            "lidar",
+            "range_correction_m",
+            "rotation_correction_deg",
+            "translation_correction_m",
             "cloud",
             "points",
             "bias_m",

@@ -10,7 +10,9 @@ mod rows;
 mod table;
 
 pub use figures::{clock_offset, errors_over_time, head_pitch, trajectory_from_above};
-pub use metrics::{ClockMetrics, ClosedLoopMetrics, CloudMetrics, Metrics, OpenLoopMetrics, SimulationMetrics};
+pub use metrics::{
+    ClockMetrics, ClosedLoopMetrics, CloudMetrics, LidarMetrics, Metrics, OpenLoopMetrics, SimulationMetrics,
+};
 pub use page::{Section, page};
 pub use profile::time_spent;
 pub use table::{markdown, summary, table};

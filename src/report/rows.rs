@@ -31,6 +31,7 @@ pub(super) fn groups(metrics: &Metrics) -> Vec<Group> {
         open_loop(metrics),
         closed_loop(metrics),
         clock(metrics),
+        lidar(metrics),
         cloud(metrics),
         memory(metrics),
     ];
@@ -94,6 +95,16 @@ fn clock(metrics: &Metrics) -> Group {
     rows.add("offset RMSE", metrics.clock.offset_rmse_s, time);
     rows.add("offset error at the end", metrics.clock.offset_end_error_s, time);
     rows.titled("clock")
+}
+
+fn lidar(metrics: &Metrics) -> Group {
+    let m = &metrics.lidar;
+    let each = |by: [f64; 3], words: fn(f64) -> String| by.map(words).join(", ");
+    let mut rows = Rows(Vec::new());
+    rows.add("ranges corrected by", m.range_correction_m, length);
+    rows.add("turned (x, y, z) by", m.rotation_correction_deg, |deg| each(deg, degrees));
+    rows.add("shifted (x, y, z) by", m.translation_correction_m, |by_m| each(by_m, length));
+    rows.titled("lidar")
 }
 
 fn cloud(metrics: &Metrics) -> Group {

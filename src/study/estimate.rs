@@ -108,6 +108,7 @@ pub(super) fn estimate_in(
         body_frame: &found.body_frame,
         map_from_head: &run.map_from_head,
         covariances: &run.covariances,
+        lidar: &run.lidar,
         returns: run.returns,
         with_truth: known.is_some(),
     };
@@ -122,6 +123,7 @@ pub(super) fn estimate_in(
     let fixed_views = Some(wishes.estimator.fixed_views as u64);
     let metrics = Metrics {
         open_loop: OpenLoopMetrics { fixed_views, ..open_loop },
+        lidar: judge::lidar_metrics(&run.lidar, &wishes.estimator),
         ..metrics(origin, &run, &registered, known.as_ref())
     };
     let plots = artefacts::plots(&run, known.as_ref(), &registered.sample);

@@ -2,10 +2,12 @@
 
 use super::open_loop::OpenLoopRun;
 use super::{StudyError, Watch};
+use crate::estimation::EstimatorSpec;
 use crate::evaluation::{Errors, EvaluationError, Pairs, clock_error, consistency, drift, relative_error};
 use crate::geometry::{Pose, Trajectory};
+use crate::measurement::LidarCorrection;
 use crate::recording::{Reader, RecordingError, Truth};
-use crate::report::{ClockMetrics, OpenLoopMetrics, SimulationMetrics};
+use crate::report::{ClockMetrics, LidarMetrics, OpenLoopMetrics, SimulationMetrics};
 use crate::simulation::SimulationSummary;
 use crate::time::{Span, Stamp};
 
@@ -118,5 +120,15 @@ pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Known>) -> ClockMe
     ClockMetrics {
         offset_rmse_s: error.map(|error| error.offset_rmse_s),
         offset_end_error_s: error.map(|error| error.offset_end_error_s),
+    }
+}
+
+/// What was learnt of the lidar, as far as it was asked for.
+pub(super) fn lidar_metrics(lidar: &LidarCorrection, spec: &EstimatorSpec) -> LidarMetrics {
+    let (refined, ranged) = (spec.extrinsics.estimated, spec.surfels.range_offset_sigma_m > 0.0);
+    LidarMetrics {
+        range_correction_m: ranged.then_some(lidar.range_m),
+        rotation_correction_deg: refined.then(|| (lidar.turn.scaled_axis() * 1_f64.to_degrees()).into()),
+        translation_correction_m: refined.then(|| lidar.shift.into()),
     }
 }

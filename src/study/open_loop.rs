@@ -4,7 +4,7 @@ use super::cadence::Cadence;
 use super::{Stage, StudyError, Watch};
 use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, TimeSpent, Warning, WarningKind};
 use crate::geometry::{PoseCovariance, Trajectory};
-use crate::measurement::{Calibration, Measurement};
+use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::recording::{Reader, RecordingError, Selection, TumWriter};
 use crate::time::{Span, Stamp};
 use std::fs::File;
@@ -26,6 +26,8 @@ pub(super) struct OpenLoopRun {
     pub covariances: Vec<(Stamp, PoseCovariance)>,
     /// The estimated clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
+    /// What was learnt of the lidar beyond its calibration.
+    pub lidar: LidarCorrection,
     /// What the estimator has to say of it beside the losses, a sentence each.
     pub remarks: Vec<String>,
     /// What of the recording was lost or left out, a sentence each.
@@ -83,6 +85,7 @@ pub(super) fn run_open_loop(
         covariances,
         spent: result.windows.iter().map(|window| window.spent).sum(),
         clock_offsets: result.clock_offsets,
+        lidar: result.lidar,
         remarks: result.warnings.iter().filter(|w| !is_loss(&w.kind)).map(|w| since(start, w)).collect(),
         losses,
         returns: heard.returns,

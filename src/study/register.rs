@@ -4,7 +4,7 @@ use super::truth_near::{TrueInstant, TruthNear};
 use super::{Stage, StudyError, Watch};
 use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
-use crate::measurement::{Calibration, LidarScan, Measurement};
+use crate::measurement::{Calibration, LidarCorrection, LidarScan, Measurement};
 use crate::recording::{CloudPoint, Measurements, PlyWriter, Reader, RecordingError, Selection, write_result};
 use crate::time::Stamp;
 use std::fs::File;
@@ -49,6 +49,8 @@ pub(super) struct Registration<'a> {
     pub body_frame: &'a str,
     pub map_from_head: &'a Trajectory,
     pub covariances: &'a [(Stamp, PoseCovariance)],
+    /// What is known of the lidar beyond its calibration.
+    pub lidar: &'a LidarCorrection,
     /// Echoes in the recording.
     pub returns: usize,
     /// Whether to project a sample by the truth too.
@@ -62,7 +64,11 @@ impl Registration<'_> {
             measurements: self.reader.measurements(self.selection),
             cursor: SmoothCursor::new(self.map_from_head),
             truth: self.with_truth.then(|| TruthNear::new(self.reader.truth())),
-            head_from_laser: self.calibration.head_from_laser,
+            calibrated: Lidar { head_from_laser: self.calibration.head_from_laser, range_m: 0.0 },
+            corrected: Lidar {
+                head_from_laser: self.calibration.head_from_corrected_laser(self.lidar),
+                range_m: self.lidar.range_m,
+            },
             ply: PlyWriter::create(ply)?,
             judged: Thinning::to(JUDGED, self.returns),
             shown: Thinning::to(SHOWN, self.returns),
@@ -88,7 +94,8 @@ struct Beams<'a, 'w, 's> {
     measurements: Measurements<'a>,
     cursor: SmoothCursor<'a>,
     truth: Option<TruthNear<'a>>,
-    head_from_laser: Pose,
+    calibrated: Lidar,
+    corrected: Lidar,
     ply: PlyWriter<File>,
     judged: Thinning,
     shown: Thinning,
@@ -151,7 +158,7 @@ impl Beams<'_, '_, '_> {
             let index = self.points;
             self.points += 1;
             let point_in_laser: Vector = beam.point_in_laser.cast();
-            let in_map = self.end_and_origin(&map_from_head, &point_in_laser);
+            let in_map = self.corrected.beam(&map_from_head, &point_in_laser);
             let point =
                 CloudPoint { point_in_map: in_map.point.cast(), intensity: beam.intensity, stamp, error_m: f32::NAN };
             self.ply.point(&point)?;
@@ -163,15 +170,25 @@ impl Beams<'_, '_, '_> {
             }
             let instant = self.truth.as_mut().map(|truth| truth.at(stamp)).transpose()?.flatten();
             let by_truth =
-                instant.map(|instant| (self.end_and_origin(&instant.world_from_head, &point_in_laser), instant));
+                instant.map(|instant| (self.calibrated.beam(&instant.world_from_head, &point_in_laser), instant));
             self.sample.push(Judged { in_map, by_truth });
         }
         Ok(shown)
     }
+}
 
-    fn end_and_origin(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> Beam {
+/// How the lidar sits in the head, and what its ranges lack.
+struct Lidar {
+    head_from_laser: Pose,
+    range_m: f64,
+}
+
+impl Lidar {
+    /// A beam that measured `point_in_laser`, where the head is at `frame_from_head`.
+    fn beam(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> Beam {
         let frame_from_laser = frame_from_head * self.head_from_laser;
         let origin = frame_from_laser.translation.vector;
-        Beam { point: frame_from_laser.rotation * point_in_laser + origin, origin }
+        let longer = 1.0 + self.range_m / point_in_laser.norm();
+        Beam { point: frame_from_laser.rotation * point_in_laser * longer + origin, origin }
     }
 }

@@ -2,9 +2,10 @@
 //!
 //! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by
 //! `zeta^2 = 1 / (sigma_r^2 + lambda)`. A live surfel's centre moves by
-//! `dt + dr x arm + v dl + u dr`, `u` along its beams; one of a fixed view does not.
+//! `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the way from the lidar, `u` along it, and the lidar turned by `e` and
+//! shifted by `s` along the IMU's axes; one of a fixed view does not.
 
-use super::{CLOCK, Layout, RANGE};
+use super::{CLOCK, LIDAR_SHIFT, LIDAR_TURN, Layout, RANGE};
 use crate::estimation::nominal::Correction;
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::surfel::{Patch, Placed};
@@ -56,18 +57,25 @@ fn adjugate(m: &Matrix) -> Matrix {
 pub(in crate::estimation) struct Side {
     /// By its turn and its shift.
     own: [f64; 6],
-    /// By the clock's offset and rate and the range offset, which follow each other in the border.
-    beside: [f64; 3],
+    /// By what it shares with all others, which follow each other in the border.
+    beside: [f64; BESIDE],
 }
+
+/// The clock's offset and rate, and the lidar's range, turn and shift.
+const BESIDE: usize = 9;
 
 impl Side {
     /// Of a surfel that `normal` leads to.
     pub(in crate::estimation) fn of(surfel: &Placed, normal: &Vector, clock_at_s: f64) -> Self {
         let turn = surfel.arm.cross(normal);
         let later = normal.dot(&surfel.velocity);
+        let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.reach().cross(normal));
+        let lidar_shift = surfel.map_from_imu.tr_mul(normal);
+        let [a, b, c] = lidar_turn.into();
+        let [d, e, f] = lidar_shift.into();
         Self {
             own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z],
-            beside: [later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam)],
+            beside: [later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam), a, b, c, d, e, f],
         }
     }
 
@@ -96,7 +104,9 @@ pub(in crate::estimation) fn moved(surfel: &Placed, layout: &Layout, x: &[f64], 
     let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - clock_at_s);
     let longer_m = x[layout.border() + RANGE];
     let turned = correction.rotation.cross(&surfel.arm);
-    correction.translation + turned + surfel.velocity * later_s + surfel.beam * longer_m
+    let three = |at: usize| surfel.map_from_imu * Vector::from_column_slice(&x[layout.border() + at..][..3]);
+    let by_lidar = three(LIDAR_TURN).cross(&surfel.reach()) + three(LIDAR_SHIFT) + surfel.beam * longer_m;
+    correction.translation + turned + surfel.velocity * later_s + by_lidar
 }
 
 /// What all matches of a surfel say about its own motion: `sum w g v^T`, with `g` the derivative of `e` by turn and shift, and
@@ -104,13 +114,14 @@ pub(in crate::estimation) fn moved(surfel: &Placed, layout: &Layout, x: &[f64], 
 ///
 /// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
 #[derive(Debug, Default)]
-pub(in crate::estimation) struct Own([[f64; 10]; 6]);
+pub(in crate::estimation) struct Own([[f64; 6 + BESIDE + 1]; 6]);
 
 impl Own {
     /// Adds a match whose distance grows by `side`.
     pub(in crate::estimation) fn add(&mut self, side: &Side, distance_m: f64, weight: f64) {
-        let ([a, b, c, d, e, f], [g, h, i]) = (side.own, side.beside);
-        let row = [a, b, c, d, e, f, g, h, i, distance_m];
+        let mut row = [distance_m; 6 + BESIDE + 1];
+        row[..6].copy_from_slice(&side.own);
+        row[6..6 + BESIDE].copy_from_slice(&side.beside);
         for (sums, by) in self.0.iter_mut().zip(side.own) {
             let scaled = weight * by;
             for (sum, term) in sums.iter_mut().zip(row) {
@@ -126,14 +137,14 @@ impl Own {
             for (i, sums) in self.0.iter().enumerate() {
                 let row = first + 6 * k + i;
                 let scaled = sums.map(|sum| value * sum);
-                equations.add_right(row, -scaled[9]);
+                equations.add_right(row, -scaled[6 + BESIDE]);
                 let entries = equations.row_from(row, first);
                 for (knot, other) in entries.chunks_mut(6).zip(surfel.basis.value) {
                     for (entry, square) in knot.iter_mut().zip(scaled) {
                         *entry += other * square;
                     }
                 }
-                for (unknown, product) in scaled[6..9].iter().enumerate() {
+                for (unknown, product) in scaled[6..6 + BESIDE].iter().enumerate() {
                     equations.add_entry(beside + unknown, row, *product);
                 }
             }
@@ -141,17 +152,18 @@ impl Own {
     }
 }
 
-/// What all matches say about the clock and the range offset: `sum w b v^T`, with `b` the derivative of `e` by them, and
+/// What all matches say about what surfels share: `sum w b v^T`, with `b` the derivative of `e` by them, and
 /// `v = (b, e)`.
 #[derive(Debug, Default)]
-pub(in crate::estimation) struct Beside([[f64; 4]; 3]);
+pub(in crate::estimation) struct Beside([[f64; BESIDE + 1]; BESIDE]);
 
 impl Beside {
     /// Adds a match whose distance grows by `side`, both surfels' part of it.
     pub(in crate::estimation) fn add(&mut self, side: &Side, distance_m: f64, weight: f64) {
-        let [a, b, c] = side.beside;
+        let mut row = [distance_m; BESIDE + 1];
+        row[..BESIDE].copy_from_slice(&side.beside);
         for (sums, by) in self.0.iter_mut().zip(side.beside) {
-            for (sum, term) in sums.iter_mut().zip([a, b, c, distance_m]) {
+            for (sum, term) in sums.iter_mut().zip(row) {
                 *sum += weight * by * term;
             }
         }
@@ -161,7 +173,7 @@ impl Beside {
     pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
         let beside = layout.border() + CLOCK;
         for (i, sums) in self.0.iter().enumerate() {
-            equations.add_right(beside + i, -sums[3]);
+            equations.add_right(beside + i, -sums[BESIDE]);
             for (j, sum) in sums.iter().enumerate().take(i + 1) {
                 equations.add_entry(beside + i, beside + j, *sum);
             }
@@ -195,7 +207,7 @@ pub(in crate::estimation) fn add_scaled_row(
         for (sum, term) in column[first..first + 24].iter_mut().zip(knots) {
             *sum += scale * term;
         }
-        for (sum, term) in column[beside..beside + 3].iter_mut().zip(side.beside) {
+        for (sum, term) in column[beside..beside + BESIDE].iter_mut().zip(side.beside) {
             *sum += scale * term;
         }
     }
@@ -203,6 +215,7 @@ pub(in crate::estimation) fn add_scaled_row(
 
 #[cfg(test)]
 mod tests {
+    use super::super::BORDER;
     use super::*;
     use crate::estimation::spline::Basis;
     use crate::geometry::{Rotation, from_roll_pitch_yaw};
@@ -228,6 +241,8 @@ mod tests {
             arm: Vector::new(1.5, 0.2 * seed, -0.4),
             velocity: Vector::new(3.0, -2.0 * seed, 1.0),
             beam: Vector::new(0.8, 0.1 * seed, -0.3).normalize(),
+            range_m: 2.5,
+            map_from_imu: turn.transpose(),
             basis: Basis::at(tau_s + 0.003, 0.2),
         }
     }
@@ -239,8 +254,12 @@ mod tests {
         let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - AT_S);
         let origin = surfel.patch.centre - surfel.arm;
         let turned = Rotation::from_scaled_axis(correction.rotation) * surfel.arm;
-        let longer_m = x[layout.border() + RANGE];
-        origin + correction.translation + turned + surfel.velocity * later_s + surfel.beam * longer_m
+        let border = x.rows(layout.border(), BORDER);
+        let lidar_turn = Rotation::from_scaled_axis(border.fixed_rows::<3>(LIDAR_TURN).into_owned());
+        let reach_in_imu = surfel.map_from_imu.transpose() * surfel.beam * surfel.range_m;
+        let moved_in_imu = lidar_turn * reach_in_imu - reach_in_imu + border.fixed_rows::<3>(LIDAR_SHIFT);
+        let by_lidar = surfel.map_from_imu * moved_in_imu + surfel.beam * border[RANGE];
+        origin + correction.translation + turned + surfel.velocity * later_s + by_lidar
     }
 
     fn check(a: &Placed, b: Option<&Placed>) {

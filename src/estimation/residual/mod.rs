@@ -4,9 +4,9 @@ pub(super) mod inertial;
 pub(super) mod matched;
 pub(super) mod prior;
 
-/// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate, range
-/// offset, and by how much the gyroscope exaggerates, three by three.
-pub(super) const BORDER: usize = 20;
+/// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate,
+/// correction of the ranges, of the lidar's attitude and of its place, and by how much the gyroscope exaggerates, three by three.
+pub(super) const BORDER: usize = 26;
 /// Where each begins.
 pub(super) const GYRO_BIAS: usize = 0;
 pub(super) const ACCEL_BIAS: usize = 3;
@@ -14,7 +14,9 @@ pub(super) const GRAVITY: usize = 6;
 pub(super) const CLOCK: usize = 8;
 pub(super) const CLOCK_RATE: usize = 9;
 pub(super) const RANGE: usize = 10;
-pub(super) const GYRO_MATRIX: usize = 11;
+pub(super) const LIDAR_TURN: usize = 11;
+pub(super) const LIDAR_SHIFT: usize = 14;
+pub(super) const GYRO_MATRIX: usize = 17;
 
 /// Where the unknowns of a window stand.
 #[derive(Debug, Clone, Copy)]

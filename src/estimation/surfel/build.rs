@@ -7,7 +7,7 @@ use crate::estimation::nominal::{Motion, Nominal};
 use crate::estimation::spec::SurfelSpec;
 use crate::estimation::strapdown::Biases;
 use crate::geometry::{Matrix, Vector};
-use crate::measurement::LidarNoise;
+use crate::measurement::{LidarCorrection, LidarNoise};
 
 /// Poses are computed at this spacing and taken linearly in between, s: at 400 degrees/s the chord is 1.5 um/m from the arc.
 const POSE_SPACING_S: f64 = 0.0005;
@@ -19,8 +19,8 @@ pub(in super::super) struct SurfelMaker {
     /// Normal of the scan plane, if the lidar has one plane, and the lidar's place, in the IMU's frame.
     pub(in super::super) scan_normal: Option<Vector>,
     pub(in super::super) laser_in_imu: Vector,
-    /// By how much ranges are lengthened, m: minus the range's offset, as far as it is known.
-    pub(in super::super) longer_m: f64,
+    /// What is known of the lidar beyond its calibration.
+    pub(in super::super) lidar: LidarCorrection,
 }
 
 /// Consecutive beams that fell in one finest cell.
@@ -87,6 +87,8 @@ impl SurfelMaker {
         let mut start_s = f64::NEG_INFINITY;
         let mut end_s = f64::NEG_INFINITY;
         let mut ends: Option<(Motion, Motion)> = None;
+        let turn = self.lidar.turn.to_rotation_matrix();
+        let laser_in_imu = self.laser_in_imu + self.lidar.shift;
         for beam in beams {
             if beam.tau_s >= end_s || ends.is_none() {
                 start_s = beam.tau_s;
@@ -97,9 +99,9 @@ impl SurfelMaker {
             let x = (beam.tau_s - start_s) / POSE_SPACING_S;
             let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
             let position = a.position.lerp(&b.position, x);
-            let in_imu = beam.point_in_imu.cast::<f64>();
-            let along = (in_imu - self.laser_in_imu) * (self.longer_m / f64::from(beam.range_m));
-            with(beam, rotation * (in_imu + along) + position);
+            let reach = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
+            let reach = turn * (reach * (1.0 + self.lidar.range_m / f64::from(beam.range_m)));
+            with(beam, rotation * (laser_in_imu + reach) + position);
         }
     }
 
@@ -126,21 +128,23 @@ impl SurfelMaker {
         let motion = nominal.at(clock.imu_s(tau_s), &biases.gyro);
         let imu_from_map = motion.rotation.transpose();
         let centre_in_imu = imu_from_map * (moments.mean() + origin - motion.position);
-        let beam = (centre_in_imu - self.laser_in_imu).normalize();
-        let rate_in_imu = imu_from_map * motion.angular_velocity;
+        let corrected = centre_in_imu - self.laser_in_imu - self.lidar.shift;
+        let range_m = corrected.norm();
+        let calibrated_from_map = self.lidar.turn.inverse().to_rotation_matrix() * imu_from_map;
+        let beam = self.lidar.turn.inverse() * corrected / range_m;
+        let rate = calibrated_from_map * motion.angular_velocity;
         let sweeps = self.scan_normal.is_none_or(|scan_normal| {
-            rate_in_imu.cross(&beam).dot(&scan_normal).abs() >= self.spec.min_sweep_deg_per_s.to_radians()
+            rate.cross(&beam).dot(&scan_normal).abs() >= self.spec.min_sweep_deg_per_s.to_radians()
         });
         if !sweeps {
             return None;
         }
-        let normal = imu_from_map * eigen.eigenvectors.column(order[0]);
+        let normal = calibrated_from_map * eigen.eigenvectors.column(order[0]);
         Some(Surfel {
             tau_s,
-            centre_in_imu,
-            beam_in_imu: beam,
+            reach_in_imu: beam * (range_m - self.lidar.range_m),
             normal_in_imu: if normal.dot(&beam) > 0.0 { -normal } else { normal },
-            covariance_in_imu: imu_from_map * covariance * motion.rotation,
+            covariance_in_imu: calibrated_from_map * covariance * calibrated_from_map.transpose(),
             points: moments.count(),
             level,
         })

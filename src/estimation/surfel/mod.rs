@@ -14,6 +14,7 @@ use super::nominal::Nominal;
 use super::spline::Basis;
 use super::strapdown::Biases;
 use crate::geometry::{Matrix, Vector};
+use crate::measurement::LidarCorrection;
 
 /// A beam that came back.
 #[derive(Debug, Clone, Copy)]
@@ -26,18 +27,17 @@ pub(super) struct Beam {
     pub(super) range_m: f32,
 }
 
-/// A patch of surface as the IMU saw it at the patch's mean time.
+/// A patch of surface as the lidar saw it at the patch's mean time, along the axes of the IMU; what is known of the lidar beyond its
+/// calibration is applied where it is placed.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Surfel {
     /// Mean time of its points, lidar time, s.
     pub(super) tau_s: f64,
-    /// Mean of its points, m.
-    pub(super) centre_in_imu: Vector,
-    /// Unit vector from the lidar to that.
-    pub(super) beam_in_imu: Vector,
-    /// Unit normal, turned to the lidar.
+    /// From the lidar to the mean of its points, as calibrated, m.
+    pub(super) reach_in_imu: Vector,
+    /// Unit normal, turned to the lidar, as calibrated.
     pub(super) normal_in_imu: Vector,
-    /// Second central moment of its points, m^2.
+    /// Second central moment of its points, as calibrated, m^2.
     pub(super) covariance_in_imu: Matrix,
     /// Number of its points.
     pub(super) points: f64,
@@ -71,6 +71,10 @@ pub(super) struct Placed {
     pub(super) arm: Vector,
     /// Unit vector along its beams, away from the lidar.
     pub(super) beam: Vector,
+    /// Length of its beams, m.
+    pub(super) range_m: f64,
+    /// Attitude of the IMU at its time.
+    pub(super) map_from_imu: Matrix,
     /// How the centre would move if the clock offset grew, m/s.
     pub(super) velocity: Vector,
     /// The correction spline's basis at its time.
@@ -88,26 +92,50 @@ impl Patch {
     }
 }
 
-impl Surfel {
-    /// The same beams, longer by `by_m`.
-    pub(super) fn lengthen(&mut self, by_m: f64) {
-        self.centre_in_imu += self.beam_in_imu * by_m;
+impl Placed {
+    /// From the lidar to the centre, m.
+    pub(super) fn reach(&self) -> Vector {
+        self.beam * self.range_m
     }
+}
 
+/// By what surfels are placed in the map.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placing<'a> {
+    pub(super) nominal: &'a Nominal,
+    pub(super) clock: &'a Clock,
+    pub(super) biases: &'a Biases,
+    /// Where the lidar is calibrated to be, m.
+    pub(super) laser_in_imu: &'a Vector,
+    pub(super) lidar: &'a LidarCorrection,
+    pub(super) knot_spacing_s: f64,
+}
+
+impl Surfel {
     /// The surfel in the map.
-    pub(super) fn place(&self, nominal: &Nominal, clock: &Clock, biases: &Biases, knot_spacing_s: f64) -> Placed {
-        let u_s = clock.imu_s(self.tau_s);
-        let motion = nominal.at(u_s, &biases.gyro);
-        let arm = motion.rotation * self.centre_in_imu;
+    pub(super) fn place(&self, by: &Placing<'_>) -> Placed {
+        let u_s = by.clock.imu_s(self.tau_s);
+        let motion = by.nominal.at(u_s, &by.biases.gyro);
+        let reach_in_imu = by.lidar.reach(&self.reach_in_imu);
+        let arm = motion.rotation * (by.laser_in_imu + by.lidar.shift + reach_in_imu);
+        let map_from_calibrated = motion.rotation * by.lidar.turn.to_rotation_matrix().matrix();
         let patch = Patch {
             centre: motion.position + arm,
-            normal: motion.rotation * self.normal_in_imu,
-            covariance: motion.rotation * self.covariance_in_imu * motion.rotation.transpose(),
+            normal: map_from_calibrated * self.normal_in_imu,
+            covariance: map_from_calibrated * self.covariance_in_imu * map_from_calibrated.transpose(),
             level: self.level,
             points: self.points,
         };
-        let velocity = motion.velocity + motion.angular_velocity.cross(&arm);
-        let beam = motion.rotation * self.beam_in_imu;
-        Placed { patch, tau_s: self.tau_s, arm, beam, velocity, basis: Basis::at(u_s, knot_spacing_s) }
+        let range_m = reach_in_imu.norm();
+        Placed {
+            patch,
+            tau_s: self.tau_s,
+            arm,
+            beam: motion.rotation * reach_in_imu / range_m,
+            range_m,
+            map_from_imu: motion.rotation,
+            velocity: motion.velocity + motion.angular_velocity.cross(&arm),
+            basis: Basis::at(u_s, by.knot_spacing_s),
+        }
     }
 }

@@ -116,10 +116,10 @@ impl Window {
     /// The window's surfels in the map; those that a change of clock has moved out of the window's knots stay out.
     pub(super) fn scene(&self) -> Vec<Placed> {
         let (from, to) = (self.start.u_s, self.nominal.end_s());
-        let spacing = self.spec.knot_spacing_s;
+        let placing = self.placing();
         let place = |surfel: &&Surfel| {
             let u_s = self.clock.imu_s(surfel.tau_s);
-            (from..=to).contains(&u_s).then(|| surfel.place(&self.nominal, &self.clock, &self.biases, spacing))
+            (from..=to).contains(&u_s).then(|| surfel.place(&placing))
         };
         let surfels: Vec<&Surfel> = self.stretches.iter().flat_map(|stretch| &stretch.surfels).collect();
         let placed: Vec<Option<Placed>> = surfels.par_iter().with_min_len(512).map(place).collect();

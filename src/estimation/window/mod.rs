@@ -17,8 +17,9 @@ use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Interval};
-use super::surfel::{Beam, Patch, Surfel, SurfelMaker};
+use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
 use crate::geometry::{Matrix, Rotation, Vector};
+use crate::measurement::LidarCorrection;
 use equations::Workspace;
 use std::collections::VecDeque;
 
@@ -90,22 +91,15 @@ impl Window {
     /// What goes on when the IMU falls silent.
     pub(super) fn carried(&self) -> Option<Carried> {
         let state = *self.nominal.states().last()?;
-        let (gyro_exaggerates, longer_m) = (self.gyro_exaggerates, self.maker.longer_m);
-        Some(Carried {
-            state,
-            biases: self.biases,
-            gravity: self.gravity,
-            clock: self.clock,
-            gyro_exaggerates,
-            longer_m,
-        })
+        let (gyro_exaggerates, lidar) = (self.gyro_exaggerates, self.maker.lidar);
+        Some(Carried { state, biases: self.biases, gravity: self.gravity, clock: self.clock, gyro_exaggerates, lidar })
     }
 
     /// Goes on with clock and sensors as they were known before the IMU fell silent.
     pub(super) fn take_over(&mut self, carried: &Carried) {
         self.clock = carried.clock.told_from(self.start.u_s);
         self.gyro_exaggerates = carried.gyro_exaggerates;
-        self.maker.longer_m = carried.longer_m;
+        self.maker.lidar = carried.lidar;
     }
 
     /// Turns the window about its beginning, the shortest way that makes gravity what it is in `carried`'s map.
@@ -170,20 +164,27 @@ impl Window {
     pub(super) fn let_go(&mut self) -> Option<Vec<Patch>> {
         let start_s = self.next_start_s()?;
         let oldest = self.stretches.pop_front()?;
-        let spacing = self.spec.knot_spacing_s;
-        let place = |surfel: &Surfel| surfel.place(&self.nominal, &self.clock, &self.biases, spacing).patch;
-        let placed = oldest.surfels.iter().map(place).collect();
+        let placed = oldest.surfels.iter().map(|surfel| surfel.place(&self.placing()).patch).collect();
         self.start = Start::held(start_s);
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
         Some(placed)
     }
 
-    /// All ranges, of surfels and of beams to come, become longer by `by_m`.
-    fn lengthen(&mut self, by_m: f64) {
-        self.maker.longer_m += by_m;
-        for surfel in self.stretches.iter_mut().flat_map(|stretch| &mut stretch.surfels) {
-            surfel.lengthen(by_m);
+    /// What is known of the lidar beyond its calibration.
+    pub(super) fn lidar(&self) -> LidarCorrection {
+        self.maker.lidar
+    }
+
+    /// By what surfels are placed, as it is known now.
+    fn placing(&self) -> Placing<'_> {
+        Placing {
+            nominal: &self.nominal,
+            clock: &self.clock,
+            biases: &self.biases,
+            laser_in_imu: &self.maker.laser_in_imu,
+            lidar: &self.maker.lidar,
+            knot_spacing_s: self.spec.knot_spacing_s,
         }
     }
 }

@@ -6,7 +6,9 @@ use super::equations::Robust;
 use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout, RANGE};
+use crate::estimation::residual::{
+    ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN, Layout, RANGE,
+};
 use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
@@ -40,8 +42,8 @@ impl Window {
     pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
+        let lidar = self.maker.lidar;
         let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.gyro_exaggerates);
-        let longer_m = self.maker.longer_m;
         self.border.begin_window();
         let mut total = vec![0.0; layout.border()];
         let mut solved = Solved::default();
@@ -90,7 +92,7 @@ impl Window {
         }
         if solved.trouble.is_some() {
             (self.nominal, self.clock, self.biases, self.gravity, self.gyro_exaggerates) = backup;
-            self.lengthen(longer_m - self.maker.longer_m);
+            self.maker.lidar = lidar;
             self.border.begin_window();
             linearised = None;
         }
@@ -116,7 +118,9 @@ impl Window {
         let more = Matrix::from_fn(|r, c| border[GYRO_MATRIX + 3 * r + c]);
         self.nominal.measured_without(&more);
         self.gyro_exaggerates += more;
-        self.lengthen(border[RANGE]);
+        self.maker.lidar.range_m += border[RANGE];
+        self.maker.lidar.turn = Rotation::from_scaled_axis(three(LIDAR_TURN)) * self.maker.lidar.turn;
+        self.maker.lidar.shift += three(LIDAR_SHIFT);
     }
 }
 
