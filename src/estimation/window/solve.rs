@@ -144,7 +144,7 @@ impl Solved {
             // In a smooth tunnel no normal leans along it, but for errors: together they would pass for information.
             let along = |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|lean| lean.abs() > LEANING);
             let held = |plane: &Plane| along(plane).map(|lean| robust.weight(plane, plane.distance_m) * lean * lean);
-            let least: f64 = matches.planes().filter_map(held).sum();
+            let least = matches.planes().filter_map(held).fold(0.0, |sum, term| sum + term);
             (self.conditioning, self.weakest) = (least / eigen.eigenvalues.max(), weakest);
         }
     }
