@@ -31,6 +31,12 @@ pub enum DynamicsError {
         /// Frequency of the fastest oscillation, Hz.
         fastest_hz: f64,
     },
+    /// A head whose motion does not tell what its base does.
+    #[error("the head is held by {holder}, and its motion does not tell where its base is: take the rigid link")]
+    BaseUnknown {
+        /// What holds it.
+        holder: &'static str,
+    },
     /// A head that left all bounds.
     #[error("the simulation diverged {t_s:.3} s after the start: {what}")]
     Diverged {

@@ -26,6 +26,7 @@ mod site;
 mod spec;
 mod sprung;
 mod statics;
+mod under;
 
 pub use actuated::{MotorSpec, TurnSpec};
 pub use body::Body;

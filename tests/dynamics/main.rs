@@ -11,5 +11,6 @@ mod invariance;
 mod linkage;
 mod rest;
 mod shipped;
+mod under;
 mod wire;
 mod wrong;
