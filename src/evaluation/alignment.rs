@@ -13,6 +13,27 @@ const LINE: f64 = 1e-12;
 /// # Errors
 /// When there are fewer than three pairs, or all points lie on a line.
 pub fn align(to: &[Vector], from: &[Vector]) -> Result<Pose, EvaluationError> {
+    nearest(to, from, &Matrix::zeros())
+}
+
+/// The rigid transform that brings the poses `from` nearest to `to`, pair by pair, positions and attitudes alike: a turn by an
+/// angle counts as a shift by `lever_m` times the angle.
+///
+/// The squared distance of two rotation matrices is twice the squared angle between them, so attitudes enter the cross
+/// covariance as `lever_m^2 / 2 R_to R_from^T`.
+///
+/// # Errors
+/// When there are fewer than three pairs, or nothing that tells a direction.
+pub fn align_poses(to: &[Pose], from: &[Pose], lever_m: f64) -> Result<Pose, EvaluationError> {
+    let turn = |(a, b): (&Pose, &Pose)| (a.rotation * b.rotation.inverse()).to_rotation_matrix().into_inner();
+    let turns: Matrix = to.iter().zip(from).map(turn).sum();
+    let positions = |poses: &[Pose]| poses.iter().map(|pose| pose.translation.vector).collect::<Vec<Vector>>();
+    let each = 0.5 * lever_m * lever_m / to.len().min(from.len()).max(1) as f64;
+    nearest(&positions(to), &positions(from), &(turns * each))
+}
+
+/// As [`align`], with what attitudes add to the mean cross covariance.
+fn nearest(to: &[Vector], from: &[Vector], turns: &Matrix) -> Result<Pose, EvaluationError> {
     let pairs = to.len().min(from.len());
     if pairs < 3 {
         return Err(EvaluationError::TooFew { pairs });
@@ -22,7 +43,7 @@ pub fn align(to: &[Vector], from: &[Vector]) -> Result<Pose, EvaluationError> {
     let scatter = to
         .iter()
         .zip(from)
-        .fold(Matrix::zeros(), |sum, (a, b)| sum + (a - to_mean) * (b - from_mean).transpose() / pairs as f64);
+        .fold(*turns, |sum, (a, b)| sum + (a - to_mean) * (b - from_mean).transpose() / pairs as f64);
 
     let svd = scatter.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Err(EvaluationError::OnALine) };
@@ -55,6 +76,18 @@ mod tests {
             let found = align(&moved, &points).unwrap();
             assert_relative_eq!(found.to_homogeneous(), planted.to_homogeneous(), epsilon = 1e-12);
         }
+    }
+
+    #[test]
+    fn attitudes_tell_the_turn_about_a_line_that_its_points_do_not() {
+        let line =
+            |k: i32| Pose::from_parts(Vector::x().scale(f64::from(k)).into(), from_roll_pitch_yaw(0.1, 0.2, 0.3));
+        let from: Vec<Pose> = (0..10).map(line).collect();
+        let planted = Pose::from_parts(Vector::new(1.0, -2.0, 0.5).into(), from_roll_pitch_yaw(0.7, -0.4, 2.0));
+        let to: Vec<Pose> = from.iter().map(|pose| planted * pose).collect();
+        let found = align_poses(&to, &from, 0.3).unwrap();
+        assert_relative_eq!(found.to_homogeneous(), planted.to_homogeneous(), epsilon = 1e-12);
+        assert_eq!(align_poses(&to, &from, 0.0), Err(EvaluationError::OnALine));
     }
 
     #[test]

@@ -20,7 +20,7 @@ mod pairs;
 mod relative;
 
 pub use absolute::Errors;
-pub use alignment::align;
+pub use alignment::{align, align_poses};
 pub use clock::{ClockError, clock_error};
 pub use cloud::{CloudErrors, CloudSummary, Thinning};
 pub use consistency::{Consistency, consistency};
