@@ -95,7 +95,7 @@ impl EstimatorArguments {
         let mut estimator = estimation::load(&self.estimator)?;
         estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
         estimator.check().map_err(|error| Usage(error.to_string()))?;
-        Ok(Wishes::with(estimator))
+        Ok(Wishes { closed_loop: !self.open_loop, ..Wishes::with(estimator) })
     }
 }
 

@@ -5,7 +5,7 @@ mod equations;
 mod solve;
 mod uncertainty;
 
-pub(super) use solve::Solved;
+pub(super) use solve::{Solved, greatest};
 pub(super) use uncertainty::Linearised;
 
 use super::border::Border;
@@ -18,6 +18,7 @@ use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Interval};
 use super::surfel::{Beam, Patch, Surfel, SurfelMaker, Surfels};
+use super::survey::Sighting;
 use crate::geometry::{Matrix, Rotation, Vector};
 use equations::Workspace;
 use std::collections::VecDeque;
@@ -42,6 +43,8 @@ struct Stretch {
 pub(super) struct Window {
     spec: EstimatorSpec,
     maker: SurfelMaker,
+    /// Makes the surfels of the survey, where one is asked for.
+    surveyor: Option<SurfelMaker>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
     pub(super) clock: Clock,
@@ -73,6 +76,7 @@ impl Window {
             spec: spec.clone(),
             matcher: Matcher::new(&spec.matching, &spec.surfels),
             maker,
+            surveyor: None,
             nominal: Nominal::beginning(start_u_s, beginning.state),
             clock,
             biases: beginning.biases,
@@ -115,6 +119,11 @@ impl Window {
         self.gravity = carried.gravity;
     }
 
+    /// The same window, which also tells what it saw by the surfels of `surveyor`.
+    pub(super) fn surveyed_by(self, surveyor: SurfelMaker) -> Self {
+        Self { surveyor: Some(surveyor), ..self }
+    }
+
     pub(super) fn matcher(&self) -> &Matcher {
         &self.matcher
     }
@@ -145,7 +154,9 @@ impl Window {
     pub(super) fn remake_newest(&mut self) {
         if let Some(newest) = self.stretches.back_mut() {
             newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
-            newest.beams = Vec::new();
+            if self.surveyor.is_none() {
+                newest.beams = Vec::new();
+            }
         }
     }
 
@@ -166,13 +177,32 @@ impl Window {
         Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).max(self.start.u_s))
     }
 
+    /// What the oldest stretch saw, by the surfels of the survey, as they stand in the map.
+    pub(super) fn survey_oldest(&self) -> Vec<Sighting> {
+        self.stretches.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
+    }
+
+    /// What all stretches of the window saw, likewise.
+    pub(super) fn survey_all(&self) -> Vec<Sighting> {
+        self.stretches.iter().flat_map(|stretch| self.survey(stretch)).collect()
+    }
+
+    fn survey(&self, stretch: &Stretch) -> Vec<Sighting> {
+        let Some(surveyor) = &self.surveyor else { return Vec::new() };
+        let surveyor = SurfelMaker { longer_m: self.maker.longer_m, ..surveyor.clone() };
+        let seen = surveyor.build(&stretch.beams, &self.nominal, &self.clock, &self.biases);
+        seen.patches.iter().map(|surfel| Sighting { tau_s: surfel.tau_s, patch: self.place(surfel) }).collect()
+    }
+
+    fn place(&self, surfel: &Surfel) -> Patch {
+        surfel.place(&self.nominal, &self.clock, &self.biases, self.spec.knot_spacing_s).patch
+    }
+
     /// Lets the oldest stretch go: what is before its end is final. Its patches as they stand in the map.
     pub(super) fn let_go(&mut self) -> Option<Vec<Patch>> {
         let start_s = self.next_start_s()?;
         let oldest = self.stretches.pop_front()?;
-        let spacing = self.spec.knot_spacing_s;
-        let place = |surfel: &Surfel| surfel.place(&self.nominal, &self.clock, &self.biases, spacing).patch;
-        let placed = oldest.surfels.patches.iter().map(place).collect();
+        let placed = oldest.surfels.patches.iter().map(|surfel| self.place(surfel)).collect();
         self.start = Start::held(start_s);
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);

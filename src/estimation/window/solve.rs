@@ -122,7 +122,7 @@ impl Window {
 }
 
 /// Greatest translation and rotation of a knot.
-fn greatest(knots: &[f64]) -> (f64, f64) {
+pub(in crate::estimation) fn greatest(knots: &[f64]) -> (f64, f64) {
     let norm = |v: &[f64]| Vector::new(v[0], v[1], v[2]).norm();
     knots.chunks_exact(6).fold((0.0, 0.0), |(shift, turn): (f64, f64), knot| {
         // NaN must not pass for small.
