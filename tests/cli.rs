@@ -28,6 +28,7 @@ fn steady(mut figures: Value) -> Value {
     for (group, keys) in [
         ("simulation", &["wall_s", "physics_wall_s", "rays_wall_s"][..]),
         ("open_loop", &["wall_s", "fraction_of_acquisition"]),
+        ("closed_loop", &["wall_s", "fraction_of_acquisition"]),
     ] {
         let group = figures[group].as_object_mut().unwrap();
         keys.iter().for_each(|key| assert!(group.remove(*key).unwrap().as_f64().unwrap() > 0.0));
@@ -59,15 +60,18 @@ fn the_whole_journey_leaves_everything_and_threads_change_nothing() {
     assert!((1e-4..0.1).contains(&one["cloud"]["on_carrier_fraction"].as_f64().unwrap()));
     assert_eq!(one["cloud"]["on_movers_fraction"].as_f64(), Some(0.0));
     assert!(one["cloud"]["sigma_m"].as_f64().unwrap() < 0.03);
-    assert!(one["closed_loop"]["position_rmse_m"].is_null());
+    let [open, closed] = ["open_loop", "closed_loop"].map(|loops| one[loops]["position_rmse_m"].as_f64().unwrap());
+    assert!(closed < 1.05 * open, "{open} m open, {closed} m closed");
     for name in [
         "manifest.ron",
         "truth.tum",
         "open_loop.tum",
+        "closed_loop.tum",
         "result.mcap",
         "cloud.ply",
         "report.html",
         "plots/errors.svg",
+        "plots/loops.svg",
         "plots/trajectory.png",
         "plots/pitch.svg",
         "plots/clock.png",
@@ -94,7 +98,7 @@ fn a_recording_is_told_estimated_and_cut_short_with_loss() {
     std::fs::write(here.path().join("cut.mcap"), &bytes[..bytes.len() * 2 / 3]).unwrap();
     let (code, _, talk) = run(here.path(), "info cut.mcap --json");
     assert_eq!(code, 3, "{talk}");
-    let (code, out, talk) = run(here.path(), "estimate cut.mcap --fixed-views 0 --quiet");
+    let (code, out, talk) = run(here.path(), "estimate cut.mcap --fixed-views 0 --open-loop --quiet");
     assert_eq!((code, out.lines().last()), (3, Some("results/cut")), "{talk}");
     assert!(talk.contains("ends without its summary"), "{talk}");
     let judged = "evaluate --estimate results/cut/open_loop.tum --truth a.tum --cloud results/cut/cloud.ply --scene \
@@ -106,6 +110,7 @@ fn a_recording_is_told_estimated_and_cut_short_with_loss() {
     let told: Value = serde_json::from_str(&told).unwrap();
     let [again, told] =
         [&figures["position_rmse_m"], &told["open_loop"]["position_rmse_m"]].map(|x| x.as_f64().unwrap());
+    assert!(!here.path().join("results/cut/closed_loop.tum").exists());
     assert!((again / told - 1.0).abs() < 1e-3, "{again} and {told}");
     assert!(figures["sigma_m"].as_f64().unwrap() < 0.05);
 }

@@ -99,7 +99,7 @@ impl EstimatorArguments {
         estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
         estimator.extrinsics.estimated |= self.refine_extrinsics;
         estimator.check().map_err(|error| Usage(error.to_string()))?;
-        Ok(Wishes::with(estimator))
+        Ok(Wishes { closed_loop: !self.open_loop, ..Wishes::with(estimator) })
     }
 }
 

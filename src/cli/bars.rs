@@ -132,6 +132,7 @@ fn name(stage: Stage) -> &'static str {
     match stage {
         Stage::Simulating => "simulating",
         Stage::Estimating => "estimating",
+        Stage::ClosingLoops => "closing loops",
         Stage::Registering => "registering",
         Stage::Reporting => "reporting",
     }

@@ -5,6 +5,7 @@ use super::intake::{Intake, Stretch};
 use super::spent::Stopwatch;
 use super::strapdown::Interval;
 use super::surfel::SurfelMaker;
+use super::survey::{Sighting, Survey};
 use super::views::Views;
 use super::window::{Linearised, Solved, Window};
 use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
@@ -30,6 +31,8 @@ pub struct Estimator {
     /// What was known when the IMU last fell silent, until the window behind it is level with it.
     carried: Option<Carried>,
     views: Views,
+    /// What was seen, where that is asked for.
+    survey: Option<Survey>,
     consider: Consider,
     /// How the newest window's end hangs on its beginning.
     at_end: Option<Sensitivity>,
@@ -58,6 +61,7 @@ impl Estimator {
             window: None,
             carried: None,
             views: Views::new(&spec.views, spec.fixed_views),
+            survey: None,
             consider: Consider::new(Vector::zeros()),
             at_end: None,
             next_pose: None,
@@ -67,6 +71,11 @@ impl Estimator {
             warnings: Vec::new(),
             trouble: None,
         })
+    }
+
+    /// The same estimator, which also keeps what it sees for [`super::register`]: its memory then grows with the recording.
+    pub fn surveying(self) -> Self {
+        Self { survey: Some(Survey::default()), ..self }
     }
 
     /// Takes a measurement, in about the order of time; when a stretch of time is complete, the window moves over it.
@@ -102,10 +111,12 @@ impl Estimator {
         let lidar = window.lidar();
         self.consider_the_end();
         self.hand_out(end_s);
+        self.survey_window(Window::survey_all);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        let Self { poses, clock_offsets, windows, warnings, .. } = self;
-        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, windows, warnings })
+        let Self { poses, clock_offsets, windows, warnings, survey, .. } = self;
+        let survey = survey.unwrap_or_default();
+        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, windows, warnings, survey })
     }
 
     /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and its
@@ -138,10 +149,15 @@ impl Estimator {
         {
             window.level_as(&carried);
         }
+        let elapsed_s = started.elapsed().as_secs_f64();
+        if window.is_full() {
+            self.survey_window(Window::survey_oldest);
+        }
+        watch.lap_s(); // told by the survey itself
         let final_until_s = self.let_go(linearised.as_ref());
         spent.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return };
-        let took = (started.elapsed().as_secs_f64(), spent);
+        let took = (elapsed_s + spent.views_s, spent);
         self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, took));
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
@@ -194,6 +210,7 @@ impl Estimator {
         self.carried = window.carried();
         self.consider_the_end();
         self.hand_out(end_s);
+        self.survey_window(Window::survey_all);
         self.consider = Consider::lost(self.consider.pivot());
         self.window = None;
         self.next_pose = None;
@@ -246,7 +263,18 @@ impl Estimator {
             lidar: LidarCorrection::default(),
         };
         let border = Border::new(beginning.information, &self.calibration.imu, self.spec.clock.estimated);
-        Window::new(&self.spec, maker, beginning, start_s, border)
+        let surveyor = SurfelMaker { spec: self.spec.registration.surfels(&self.spec.surfels), ..maker.clone() };
+        let window = Window::new(&self.spec, maker, beginning, start_s, border);
+        if self.survey.is_some() { window.surveyed_by(surveyor) } else { window }
+    }
+
+    /// Adds what the window saw, as far as `seen` tells it, to the survey, where one is asked for.
+    fn survey_window(&mut self, seen: fn(&Window) -> Vec<Sighting>) {
+        if let (Some(window), Some(survey)) = (&self.window, &mut self.survey) {
+            let mut watch = Stopwatch::start();
+            survey.extend(self.intake.origin(), seen(window));
+            survey.took_s += watch.lap_s();
+        }
     }
 
     /// What the window still holds is final: it is as uncertain as its end.

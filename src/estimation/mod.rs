@@ -12,6 +12,7 @@
 //!    sides, at different times) and with those of *fixed views*, stretches of the past that stand still.
 //! 4. The window's corrections are solved for, and 3 begins again, until nothing moves.
 //! 5. The oldest stretch leaves: its poses are final, its surfels may become a fixed view.
+//! 6. Behind the open loop, [`register`] lays all that was seen on what was seen of it at other times.
 //!
 //! # The problem
 //!
@@ -61,6 +62,7 @@ mod matching;
 mod nominal;
 mod normal_equations;
 mod output;
+mod registration;
 mod residual;
 mod spec;
 mod spent;
@@ -68,6 +70,7 @@ mod spline;
 mod stamps;
 mod strapdown;
 mod surfel;
+mod survey;
 mod views;
 mod window;
 
@@ -75,5 +78,7 @@ use clock::Clock;
 pub use error::{EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use output::{EstimatedPose, OpenLoop, WindowReport};
+pub use registration::{ClosedLoop, RegistrationReport, RegistrationSpec, register};
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
 pub use spent::TimeSpent;
+pub use survey::Survey;

@@ -1,6 +1,6 @@
 //! What comes out of the estimator.
 
-use super::{TimeSpent, Warning};
+use super::{Survey, TimeSpent, Warning};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
@@ -68,4 +68,6 @@ pub struct OpenLoop {
     pub windows: Vec<WindowReport>,
     /// What degraded the estimate; empty when nothing did.
     pub warnings: Vec<Warning>,
+    /// What was seen on the way, where that was asked for.
+    pub survey: Survey,
 }

@@ -1,4 +1,4 @@
-use super::EstimationError;
+use super::{EstimationError, RegistrationSpec};
 use crate::spec::{Kind, SpecError};
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,8 @@ pub struct EstimatorSpec {
     pub extrinsics: ExtrinsicsSpec,
     /// Choice and keeping of fixed views.
     pub views: ViewSpec,
+    /// The global registration behind the open loop.
+    pub registration: RegistrationSpec,
 }
 
 /// How surfels are made.
@@ -247,7 +249,8 @@ impl EstimatorSpec {
         require(self.solve.max_iterations >= 1, "max_iterations", "must be at least 1".into())?;
         require(self.solve.reweightings >= 1, "reweightings", "must be at least 1".into())?;
         require(self.views.max_kept >= self.fixed_views, "max_kept", "must be at least fixed_views".into())?;
-        require(self.views.length_s >= step, "length_s", format!("must be at least step_s = {step} s"))
+        require(self.views.length_s >= step, "length_s", format!("must be at least step_s = {step} s"))?;
+        self.registration.check()
     }
 }
 

@@ -120,7 +120,7 @@ impl Views {
 }
 
 /// The cells in which patches lie, sorted; the side from which they are seen counts.
-fn cells_of<'a>(patches: impl Iterator<Item = &'a Patch>) -> Vec<u64> {
+pub(super) fn cells_of<'a>(patches: impl Iterator<Item = &'a Patch>) -> Vec<u64> {
     let part = |x: f64| (((x / CELL_M).floor() as i64).wrapping_add(1 << 19)) as u64 & 0xf_ffff;
     let facing = |patch: &Patch| {
         let axis = patch.normal.iamax();

@@ -47,6 +47,20 @@ pub fn errors_over_time(errors: &Errors) -> Figure {
     ])
 }
 
+/// Size of the position's error over time, of the open loop and of the closed one, each after an alignment of its own.
+pub fn errors_of_both_loops(open: &Errors, closed: &Errors) -> Figure {
+    let greatest = open.position_m.iter().chain(&closed.position_m).map(Vector::norm).fold(0.0, f64::max);
+    let (unit, per_m) = length_unit(greatest);
+    let curve = |errors: &Errors| -> Vec<(f64, f64)> {
+        seconds_of(&errors.stamps).into_iter().zip(errors.position_m.iter().map(|e| e.norm() * per_m)).collect()
+    };
+    let chart = Chart::new("Position error, after alignment", TIME, &format!("Error ({unit})"))
+        .starting_at_zero()
+        .with(Series::line("open loop", Colour::Second, curve(open)).marked(Mark::Line(1.0)))
+        .with(Series::line("closed loop", Colour::Estimate, curve(closed)).marked(Mark::Line(1.4)));
+    Figure::of(vec![chart])
+}
+
 fn with_axes(mut chart: Chart, stamps: &[Stamp], vectors: &[Vector], factor: f64) -> Chart {
     let seconds = seconds_of(stamps);
     let curve = |value: &dyn Fn(&Vector) -> f64| -> Vec<(f64, f64)> {

@@ -9,7 +9,7 @@ mod quantity;
 mod rows;
 mod table;
 
-pub use figures::{clock_offset, errors_over_time, head_pitch, trajectory_from_above};
+pub use figures::{clock_offset, errors_of_both_loops, errors_over_time, head_pitch, trajectory_from_above};
 pub use metrics::{
     ClockMetrics, ClosedLoopMetrics, CloudMetrics, LidarMetrics, Metrics, OpenLoopMetrics, SimulationMetrics,
 };

@@ -1,9 +1,11 @@
 //! What a run leaves for people: plots and a page.
 
+use super::estimate::Best;
 use super::judge::Known;
 use super::open_loop::OpenLoopRun;
 use super::register::Judged;
 use super::{Manifest, StudyError};
+use crate::evaluation::Errors;
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report::plot::Figure;
 use crate::report::{self, Metrics, Section};
@@ -21,10 +23,11 @@ pub(super) struct Plot {
     section: Section,
 }
 
-/// The plots of an estimate.
-pub(super) fn plots(run: &OpenLoopRun, known: Option<&Known>, sample: &[Judged]) -> Vec<Plot> {
+/// The plots of an estimate; `open_errors` are those that the open loop had, where loops were closed.
+pub(super) fn plots(run: &OpenLoopRun, best: &Best, open_errors: Option<&Errors>, sample: &[Judged]) -> Vec<Plot> {
+    let known = best.known;
     let world_from_map = known.and_then(|known| known.world_from_map).unwrap_or_else(Pose::identity);
-    let estimate = run.map_from_head.transformed(&world_from_map);
+    let estimate = best.map_from_head.transformed(&world_from_map);
     let truth = known.map(true_trajectory).unwrap_or_default();
     let outline = outline(sample, &world_from_map, &estimate);
     let plot = |name, title: &str, figure: Figure| Plot { name, section: Section { title: title.to_owned(), figure } };
@@ -32,6 +35,9 @@ pub(super) fn plots(run: &OpenLoopRun, known: Option<&Known>, sample: &[Judged])
     let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_from_above(&truth, &estimate, &outline))];
     if let Some(errors) = known.and_then(|known| known.errors.as_ref()) {
         plots.push(plot("errors", "Errors over time", report::errors_over_time(errors)));
+        if let Some(open) = open_errors {
+            plots.push(plot("loops", "What closing loops is good for", report::errors_of_both_loops(open, errors)));
+        }
     }
     plots.push(plot("pitch", "Pitch of the head", report::head_pitch(&truth, &estimate)));
     let true_offsets = known.map_or(&[][..], |known| &known.clock_offsets);

@@ -1,11 +1,13 @@
 //! From a recording to a judged estimate.
 
 use super::calibration::calibration;
+use super::closed_loop::{ClosedLoopRun, run_closed_loop, write_tum};
 use super::cloud::{Surroundings, cloud_metrics};
-use super::open_loop::{OpenLoopRun, run_open_loop};
+use super::open_loop::{How, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
 use crate::estimation::{EstimatorSpec, TimeSpent};
+use crate::geometry::Trajectory;
 use crate::recording::{FoundCalibration, Preference, Reader, Selection};
 use crate::report::{Metrics, OpenLoopMetrics};
 use crate::simulation::{SimulationSummary, carrier_of};
@@ -27,13 +29,15 @@ pub struct Wishes {
     pub body_frame: Option<String>,
     /// Topics to read; those not named are found.
     pub topics: Preference,
+    /// Whether to register the whole behind the open loop.
+    pub closed_loop: bool,
 }
 
 impl Wishes {
-    /// An estimate with these settings, and no further wish.
+    /// An estimate with these settings, loops closed, and no further wish.
     pub fn with(estimator: EstimatorSpec) -> Self {
         let (calibration, topics) = (CalibrationSpec::default(), Preference::default());
-        Self { estimator, calibration, body_frame: None, topics }
+        Self { estimator, calibration, body_frame: None, topics, closed_loop: true }
     }
 }
 
@@ -49,7 +53,8 @@ pub struct Outcome {
 }
 
 /// Estimates from the recording at `path`, whoever made it, and writes to `folder`: `manifest.ron`, `open_loop.tum`,
-/// `result.mcap`, `cloud.ply`, `metrics.json`, `plots/`, `report.html`. Where the recording has the truth the estimate is
+/// `closed_loop.tum`, `result.mcap`, `cloud.ply`, `metrics.json`, `plots/`, `report.html`; cloud and result are the closed
+/// loop's unless that is not wanted. Where the recording has the truth the estimate is
 /// judged by it, and where it has the scene the cloud is.
 ///
 /// # Errors
@@ -92,21 +97,33 @@ pub(super) fn estimate_in(
     let found = calibration(reader, &selection, &wishes.calibration, wishes.body_frame.as_deref())?;
     notes_on(&selection, &found, wishes, watch);
 
-    let how = (&wishes.estimator, &found.calibration);
+    let (estimator, calibration) = (&wishes.estimator, &found.calibration);
+    let how = How { estimator, calibration, surveying: wishes.closed_loop };
     let expected_s = origin.simulation.map(|summary| summary.duration_s);
     let run = run_open_loop(reader, &selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
     run.remarks.iter().for_each(|remark| watch.note(remark));
 
-    let known = match found.body_frame == TRUE_FRAME {
-        true => judge::truth_of(reader, &run.map_from_head, watch)?,
+    let closed = match wishes.closed_loop {
+        true => Some(close_loops(&run, folder, estimator, watch)?),
         false => None,
+    };
+
+    let mut truth_of = |map_from_head: &Trajectory| match found.body_frame == TRUE_FRAME {
+        true => judge::truth_of(reader, map_from_head, watch),
+        false => Ok(None),
+    };
+    let known = truth_of(&run.map_from_head)?;
+    let closed_known = closed.as_ref().map(|closed| truth_of(&closed.map_from_head)).transpose()?.flatten();
+    let best = Best {
+        map_from_head: closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head),
+        known: if closed.is_some() { closed_known.as_ref() } else { known.as_ref() },
     };
     let registration = Registration {
         reader,
         selection: &selection,
         calibration: &found.calibration,
         body_frame: &found.body_frame,
-        map_from_head: &run.map_from_head,
+        map_from_head: best.map_from_head,
         covariances: &run.covariances,
         lidar: &run.lidar,
         returns: run.returns,
@@ -121,17 +138,42 @@ pub(super) fn estimate_in(
     };
     let open_loop = judge::open_loop_metrics(&run, known.as_ref(), drifting);
     let fixed_views = Some(wishes.estimator.fixed_views as u64);
+    let closed_metrics = |closed| judge::closed_loop_metrics(closed, closed_known.as_ref(), run.acquisition_s);
     let metrics = Metrics {
         open_loop: OpenLoopMetrics { fixed_views, ..open_loop },
+        closed_loop: closed.as_ref().map(closed_metrics).unwrap_or_default(),
+        clock: judge::clock_metrics(&run, known.as_ref()),
         lidar: judge::lidar_metrics(&run.lidar, &wishes.estimator),
-        ..metrics(origin, &run, &registered, known.as_ref())
+        ..metrics(origin, &run, &registered, best.known)
     };
-    let plots = artefacts::plots(&run, known.as_ref(), &registered.sample);
+    let open_errors = known.as_ref().filter(|_| closed.is_some()).and_then(|known| known.errors.as_ref());
+    let plots = artefacts::plots(&run, &best, open_errors, &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
     Ok(Outcome { metrics, losses: run.losses, spent: run.spent })
 }
 
-/// All figures but those of the open loop.
+/// The estimate that goes into cloud, result and plots: the closed loop's where loops were closed.
+pub(super) struct Best<'a> {
+    pub map_from_head: &'a Trajectory,
+    /// What the truth says of it.
+    pub known: Option<&'a judge::Known>,
+}
+
+/// Closes loops, and writes the trajectory.
+fn close_loops(
+    run: &OpenLoopRun,
+    folder: &Path,
+    estimator: &EstimatorSpec,
+    watch: &mut Watch,
+) -> Result<ClosedLoopRun, StudyError> {
+    watch.progress(Stage::ClosingLoops, 0.0, None);
+    let closed = run_closed_loop(run, estimator);
+    closed.remarks.iter().for_each(|remark| watch.note(remark));
+    write_tum(&folder.join("closed_loop.tum"), &closed.map_from_head)?;
+    if watch.is_stopped() { Err(StudyError::Stopped) } else { Ok(closed) }
+}
+
+/// All figures but those of the two loops and the clock.
 fn metrics(origin: &Origin, run: &OpenLoopRun, registered: &Registered, known: Option<&judge::Known>) -> Metrics {
     let Manifest { scenario, specs, .. } = origin.manifest;
     let world_from_map = known.and_then(|known| known.world_from_map);
@@ -141,7 +183,6 @@ fn metrics(origin: &Origin, run: &OpenLoopRun, registered: &Registered, known: O
         seed: scenario.as_ref().map(|scenario| scenario.seed.0),
         duration_s: origin.simulation.map_or(run.acquisition_s, |summary| summary.duration_s),
         simulation: origin.simulation.map(judge::simulation_metrics).unwrap_or_default(),
-        clock: judge::clock_metrics(run, known),
         cloud: cloud_metrics(registered, world_from_map.as_ref(), origin.surroundings),
         peak_rss_mib: memory::peak_rss_mib(),
         ..Metrics::default()

@@ -1,5 +1,6 @@
 //! An estimate against the truth, where the recording has it.
 
+use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use super::{StudyError, Watch};
 use crate::estimation::EstimatorSpec;
@@ -7,7 +8,7 @@ use crate::evaluation::{Errors, EvaluationError, Pairs, clock_error, consistency
 use crate::geometry::{Pose, Trajectory};
 use crate::measurement::LidarCorrection;
 use crate::recording::{Reader, RecordingError, Truth};
-use crate::report::{ClockMetrics, LidarMetrics, OpenLoopMetrics, SimulationMetrics};
+use crate::report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, OpenLoopMetrics, SimulationMetrics};
 use crate::simulation::SimulationSummary;
 use crate::time::{Span, Stamp};
 
@@ -88,6 +89,18 @@ pub(super) fn open_loop_metrics(
         imu_only_drift_m_per_min: dead_reckoning.map(|drifting| drifting.0),
         position_nees: consistent.map(|found| found.position_nees),
         attitude_nees: consistent.map(|found| found.attitude_nees),
+    }
+}
+
+/// The closed loop's figures.
+pub(super) fn closed_loop_metrics(run: &ClosedLoopRun, known: Option<&Known>, acquisition_s: f64) -> ClosedLoopMetrics {
+    let errors = known.and_then(|known| known.errors.as_ref());
+    ClosedLoopMetrics {
+        wall_s: Some(run.wall_s),
+        fraction_of_acquisition: Some(run.wall_s / acquisition_s).filter(|share| share.is_finite()),
+        position_rmse_m: errors.map(Errors::position_rmse_m),
+        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad().to_degrees()),
+        bound_rmse_m: None,
     }
 }
 

@@ -11,6 +11,7 @@
 mod artefacts;
 mod cadence;
 mod calibration;
+mod closed_loop;
 mod cloud;
 pub mod comparison;
 pub mod coverage;

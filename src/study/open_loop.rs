@@ -2,7 +2,7 @@
 
 use super::cadence::Cadence;
 use super::{Stage, StudyError, Watch};
-use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, TimeSpent, Warning, WarningKind};
+use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Survey, TimeSpent, Warning, WarningKind};
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::recording::{Reader, RecordingError, Selection, TumWriter};
@@ -36,10 +36,21 @@ pub(super) struct OpenLoopRun {
     pub returns: usize,
     /// From the recording's first stamp to its last, s.
     pub acquisition_s: f64,
-    /// Time it took, reading included, s.
+    /// What was seen, where that is asked for.
+    pub survey: Survey,
+    /// Time it took, reading included but not the survey, s.
     pub wall_s: f64,
     /// Of that, what the parts of the estimator took.
     pub spent: TimeSpent,
+}
+
+/// How to estimate.
+#[derive(Clone, Copy)]
+pub(super) struct How<'a> {
+    pub estimator: &'a EstimatorSpec,
+    pub calibration: &'a Calibration,
+    /// Whether what is seen is kept, for the closed loop.
+    pub surveying: bool,
 }
 
 /// Estimates from what `reader` reads; poses go to the TUM file `tum`, if one is wanted, as they become final.
@@ -47,13 +58,14 @@ pub(super) struct OpenLoopRun {
 pub(super) fn run_open_loop(
     reader: &Reader,
     selection: &Selection,
-    how: (&EstimatorSpec, &Calibration),
+    how: How,
     tum: Option<&Path>,
     expected_s: Option<f64>,
     watch: &mut Watch,
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
-    let mut estimator = Estimator::new(how.0, how.1)?;
+    let estimator = Estimator::new(how.estimator, how.calibration)?;
+    let mut estimator = if how.surveying { estimator.surveying() } else { estimator };
     let tum = tum.map(TumWriter::create).transpose()?;
     let mut written = Written { tum, map_from_head: Trajectory::new(), covariances: Vec::new() };
     let mut heard = Heard::default();
@@ -90,7 +102,8 @@ pub(super) fn run_open_loop(
         losses,
         returns: heard.returns,
         acquisition_s: heard.seconds(),
-        wall_s: started.elapsed().as_secs_f64(),
+        wall_s: started.elapsed().as_secs_f64() - result.survey.took_s(),
+        survey: result.survey,
     })
 }
 

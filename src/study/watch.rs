@@ -7,6 +7,8 @@ pub enum Stage {
     Simulating,
     /// The open loop.
     Estimating,
+    /// The closed loop.
+    ClosingLoops,
     /// Beams become a cloud.
     Registering,
     /// Errors, plots, the page.

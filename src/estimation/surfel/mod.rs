@@ -46,7 +46,7 @@ pub(super) struct Surfel {
 }
 
 /// A patch of surface in the map.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Patch {
     /// Centre, m.
     pub(super) centre: Vector,

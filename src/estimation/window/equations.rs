@@ -72,7 +72,7 @@ impl Robust {
 
 /// The most that a solution moves a knot.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moved {
+pub(in crate::estimation) struct Moved {
     /// m.
     pub shift: f64,
     /// rad.
@@ -80,7 +80,8 @@ pub(super) struct Moved {
 }
 
 impl Moved {
-    fn greatest(knots: &[f64]) -> Self {
+    /// Of six unknowns a knot.
+    pub fn greatest(knots: &[f64]) -> Self {
         let norm = |v: &[f64]| Vector::new(v[0], v[1], v[2]).norm();
         // NaN must not pass for small.
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };

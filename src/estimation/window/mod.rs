@@ -5,6 +5,7 @@ mod equations;
 mod solve;
 mod uncertainty;
 
+pub(super) use equations::Moved;
 pub(super) use solve::Solved;
 pub(super) use uncertainty::Linearised;
 
@@ -18,6 +19,7 @@ use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Interval};
 use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
+use super::survey::Sighting;
 use crate::geometry::{Matrix, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use equations::Workspace;
@@ -43,6 +45,8 @@ struct Stretch {
 pub(super) struct Window {
     spec: EstimatorSpec,
     maker: SurfelMaker,
+    /// Makes the surfels of the survey, where one is asked for.
+    surveyor: Option<SurfelMaker>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
     pub(super) clock: Clock,
@@ -74,6 +78,7 @@ impl Window {
             spec: spec.clone(),
             matcher: Matcher::new(&spec.matching, &spec.surfels),
             maker,
+            surveyor: None,
             nominal: Nominal::beginning(start_u_s, beginning.state),
             clock,
             biases: beginning.biases,
@@ -109,6 +114,11 @@ impl Window {
         self.gravity = carried.gravity;
     }
 
+    /// The same window, which also tells what it saw by the surfels of `surveyor`.
+    pub(super) fn surveyed_by(self, surveyor: SurfelMaker) -> Self {
+        Self { surveyor: Some(surveyor), ..self }
+    }
+
     pub(super) fn matcher(&self) -> &Matcher {
         &self.matcher
     }
@@ -139,7 +149,9 @@ impl Window {
     pub(super) fn remake_newest(&mut self) {
         if let Some(newest) = self.stretches.back_mut() {
             newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
-            newest.beams = Vec::new();
+            if self.surveyor.is_none() {
+                newest.beams = Vec::new();
+            }
         }
     }
 
@@ -158,6 +170,24 @@ impl Window {
     /// Where the window will begin when its oldest stretch has gone, IMU time, s.
     pub(super) fn next_start_s(&self) -> Option<f64> {
         Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).max(self.start.u_s))
+    }
+
+    /// What the oldest stretch saw, by the surfels of the survey, as they stand in the map.
+    pub(super) fn survey_oldest(&self) -> Vec<Sighting> {
+        self.stretches.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
+    }
+
+    /// What all stretches of the window saw, likewise.
+    pub(super) fn survey_all(&self) -> Vec<Sighting> {
+        self.stretches.iter().flat_map(|stretch| self.survey(stretch)).collect()
+    }
+
+    fn survey(&self, stretch: &Stretch) -> Vec<Sighting> {
+        let Some(surveyor) = &self.surveyor else { return Vec::new() };
+        let surveyor = SurfelMaker { lidar: self.maker.lidar, ..surveyor.clone() };
+        let seen = surveyor.build(&stretch.beams, &self.nominal, &self.clock, &self.biases);
+        let placing = self.placing();
+        seen.iter().map(|surfel| Sighting { tau_s: surfel.tau_s, patch: surfel.place(&placing).patch }).collect()
     }
 
     /// Lets the oldest stretch go: what is before its end is final. Its patches as they stand in the map.

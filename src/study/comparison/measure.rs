@@ -17,18 +17,21 @@ pub enum Measure {
     YawDriftDegPerMin,
     /// Error of the clock offset over the whole run, its beginning included, root mean square, s.
     ClockRmseS,
-    /// Time that the estimate took on one thread, with others beside it, reading included, s.
+    /// Position error of the closed loop, likewise; loops are closed only where this is asked for.
+    ClosedPositionRmseM,
+    /// Time that the open loop took on one thread, with others beside it, reading included, s.
     WallS,
 }
 
 impl Measure {
     /// Every measure, in the order of the columns of `runs.csv`.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
         Self::YawDriftDegPerMin,
         Self::ClockRmseS,
+        Self::ClosedPositionRmseM,
         Self::WallS,
     ];
 
@@ -40,6 +43,7 @@ impl Measure {
             Self::DriftMPerMin => "drift_m_per_min",
             Self::YawDriftDegPerMin => "yaw_drift_deg_per_min",
             Self::ClockRmseS => "clock_rmse_s",
+            Self::ClosedPositionRmseM => "closed_position_rmse_m",
             Self::WallS => "wall_s",
         }
     }
@@ -52,6 +56,7 @@ impl Measure {
             Self::DriftMPerMin => "drift",
             Self::YawDriftDegPerMin => "yaw drift",
             Self::ClockRmseS => "clock",
+            Self::ClosedPositionRmseM => "closed loop",
             Self::WallS => "time",
         }
     }
@@ -59,7 +64,7 @@ impl Measure {
     /// The unit in which people read it, and how many of it make one of the file's.
     pub(super) fn unit(self) -> (&'static str, f64) {
         match self {
-            Self::PositionRmseM => ("mm", 1e3),
+            Self::PositionRmseM | Self::ClosedPositionRmseM => ("mm", 1e3),
             Self::RotationRmseDeg => ("deg", 1.0),
             Self::DriftMPerMin => ("mm/min", 1e3),
             Self::YawDriftDegPerMin => ("deg/min", 1.0),

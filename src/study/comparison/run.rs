@@ -3,12 +3,14 @@
 use super::ledger::Ledger;
 use super::{BASE, ComparisonSpec, Measure, PlaceSpec, Row, Setting, Summary, with_setting};
 use crate::estimation::{self, EstimationError, EstimatorSpec};
+use crate::evaluation::Errors;
 use crate::random::Seed;
 use crate::recording::{Preference, Reader};
 use crate::simulation::{Scenario, Simulation};
 use crate::spec::{Source, SpecError, to_text};
 use crate::study::calibration::calibration;
-use crate::study::open_loop::run_open_loop;
+use crate::study::closed_loop::run_closed_loop;
+use crate::study::open_loop::{How, run_open_loop};
 use crate::study::{CalibrationSpec, Stage, StudyError, Watch, judge, record};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -148,13 +150,14 @@ impl Comparison {
             simulate(&self.scenario(place, seed), &recording, watch)?;
         }
         let (stop, next) = (watch.stop, AtomicUsize::new(0));
+        let closes_loops = self.spec.measures.contains(&Measure::ClosedPositionRmseM);
         let (tell, hear) = mpsc::channel();
         std::thread::scope(|scope| {
             for _ in 0..rayon::current_num_threads().min(missing.len()) {
                 let (tell, next, missing, recording) = (tell.clone(), &next, &missing, &recording);
                 scope.spawn(move || {
                     while let Some(variant) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let figures = estimate(recording, &variant.estimator, stop);
+                        let figures = estimate(recording, &variant.estimator, closes_loops, stop);
                         if tell.send((variant.name.clone(), figures)).is_err() {
                             return; // nobody listens: another one failed
                         }
@@ -242,6 +245,7 @@ fn simulate(scenario: &Scenario, recording: &Path, watch: &mut Watch) -> Result<
 fn estimate(
     recording: &Path,
     estimator: &EstimatorSpec,
+    closes_loops: bool,
     stop: &AtomicBool,
 ) -> Result<BTreeMap<Measure, f64>, StudyError> {
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
@@ -250,10 +254,16 @@ fn estimate(
         let reader = Reader::open(recording)?;
         let selection = reader.select(&Preference::default())?;
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
-        let run = run_open_loop(&reader, &selection, (estimator, &found.calibration), None, None, &mut watch)?;
+        let how = How { estimator, calibration: &found.calibration, surveying: closes_loops };
+        let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
         let known = judge::truth_of(&reader, &run.map_from_head, &mut watch)?;
         let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);
         let clock = judge::clock_metrics(&run, known.as_ref());
+        let closed_errors = match closes_loops {
+            true => judge::truth_of(&reader, &run_closed_loop(&run, estimator).map_from_head, &mut watch)?,
+            false => None,
+        }
+        .and_then(|known| known.errors);
         let figures = Measure::ALL.map(|measure| {
             let figure = match measure {
                 Measure::PositionRmseM => open_loop.position_rmse_m,
@@ -261,6 +271,7 @@ fn estimate(
                 Measure::DriftMPerMin => open_loop.drift_m_per_min,
                 Measure::YawDriftDegPerMin => open_loop.yaw_drift_deg_per_min,
                 Measure::ClockRmseS => clock.offset_rmse_s,
+                Measure::ClosedPositionRmseM => closed_errors.as_ref().map(Errors::position_rmse_m),
                 Measure::WallS => open_loop.wall_s,
             };
             Some((measure, figure.filter(|figure| figure.is_finite())?))

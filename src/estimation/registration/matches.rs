@@ -1,0 +1,105 @@
+//! What matched surfels say of the corrections.
+//!
+//! `e = n^T (mu_i - mu_j)`, `n` the normal of the plane that both have in common. A surfel's centre moves by
+//! `dt + dr x arm` with the correction at its time. There are many more matches than unknowns: they are summed first by the
+//! slots (halves of knot intervals) in which their two surfels were seen, as if in their middle, then spread to the knots.
+//! Residuals are exact; their derivatives are those of an instant at most a quarter of an interval away.
+
+use super::RegistrationSpec;
+use super::equations::{Equations, Link, Own};
+use super::neighbours::InUse;
+use super::scene::Scene;
+use crate::estimation::matching::Matcher;
+use crate::estimation::residual::matched::Plane;
+use crate::geometry::Vector;
+use nalgebra::Vector6;
+use rayon::prelude::*;
+
+/// So many sums are made before they are spread to the knots: the bound of their memory.
+const AT_ONCE: usize = 4096;
+
+/// What was matched, in figures.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Tally {
+    pub(super) matches: usize,
+    /// Sums of weights, and of weighted squares of distances, m^2.
+    pub(super) weights: f64,
+    pub(super) squares: f64,
+}
+
+impl Tally {
+    fn merge(&mut self, other: &Self) {
+        self.matches += other.matches;
+        self.weights += other.weights;
+        self.squares += other.squares;
+    }
+
+    /// Weighted root mean square of the matches' distances, m.
+    pub(super) fn rms_m(&self) -> f64 {
+        if self.weights > 0.0 { (self.squares / self.weights).sqrt() } else { 0.0 }
+    }
+}
+
+/// The matches of an iteration: which neighbours agree, and how much each counts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Matches<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) neighbours: &'a InUse,
+    pub(super) matcher: &'a Matcher,
+    pub(super) spec: &'a RegistrationSpec,
+    /// Greatest distance along the normal, m.
+    pub(super) gate_m: f64,
+}
+
+impl Matches<'_> {
+    /// Adds what all matches say to the equations.
+    pub(super) fn add_to(&self, equations: &mut Equations) -> Tally {
+        let mut tally = Tally::default();
+        let mut own = vec![Own::default(); self.scene.middles.len()];
+        for runs in self.neighbours.runs.chunks(AT_ONCE) {
+            let links: Vec<(Link, Tally)> =
+                runs.par_iter().map(|run| self.sum(&self.neighbours.pairs[run.clone()])).collect();
+            for (run, (link, of_run)) in runs.iter().zip(&links).filter(|(_, (_, tally))| tally.matches > 0) {
+                let (i, j) = self.neighbours.pairs[run.start];
+                let slots = (self.scene.slots[i as usize] as usize, self.scene.slots[j as usize] as usize);
+                own[slots.0].merge(&link.first);
+                own[slots.1].merge(&link.second);
+                equations.add_cross(&self.scene.middles[slots.0], &self.scene.middles[slots.1], &link.cross);
+                tally.merge(of_run);
+            }
+        }
+        for (own, middle) in own.iter().zip(&self.scene.middles) {
+            equations.add_own(middle, own);
+        }
+        tally
+    }
+
+    /// What the matches among `pairs`, of the same two slots, say.
+    pub(super) fn sum(&self, pairs: &[(u32, u32)]) -> (Link, Tally) {
+        let (mut link, mut tally) = (Link::default(), Tally::default());
+        for (i, j) in pairs.iter().map(|(i, j)| (*i as usize, *j as usize)) {
+            let (a, b) = (&self.scene.patches[i], &self.scene.patches[j]);
+            if !self.matcher.agree(a, b, self.gate_m) {
+                continue;
+            }
+            let plane = Plane::of(a, b, self.spec.match_sigma_m);
+            let weight = self.weight(&plane, (i, j));
+            let by = |arm: &Vector, normal: &Vector| {
+                let turn = arm.cross(normal);
+                Vector6::new(turn.x, turn.y, turn.z, normal.x, normal.y, normal.z)
+            };
+            let (by_a, by_b) = (by(&self.scene.arms[i], &plane.normal), -by(&self.scene.arms[j], &plane.normal));
+            link.add((&by_a, &by_b), plane.distance_m, weight);
+            tally.merge(&Tally { matches: 1, weights: weight, squares: weight * plane.distance_m.powi(2) });
+        }
+        (link, tally)
+    }
+
+    /// Cauchy's weight of a match. A surfel's error is in all its matches: together they count as one.
+    fn weight(&self, plane: &Plane, (i, j): (usize, usize)) -> f64 {
+        let share = |k: usize| 1.0 / f64::from(self.neighbours.counts[k].max(1));
+        let normalised2 = plane.distance_m * plane.distance_m / plane.variance;
+        let robust = 1.0 / (1.0 + normalised2 / (self.spec.cauchy * self.spec.cauchy));
+        self.spec.match_weight * (share(i) + share(j)) * robust / plane.variance
+    }
+}

@@ -1,0 +1,178 @@
+//! The global registration: behind the open loop, what was seen at one time is laid on what was seen of it at any other.
+//!
+//! After Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012), whose global optimisation minimises match errors,
+//! deviations from the open loop's velocities and deviations from gravity, and takes biases and latency from the open loop.
+//! Unknown is a correction of the whole trajectory, a cubic B-spline of coarse knots, as in a window: `R' = exp(dr) R`,
+//! `t' = t + dt`. Minimised is
+//!
+//! ```text
+//! sum over matches      rho(zeta n^T (mu_i - mu_j))           between any two times, see `matches`
+//! + sum over intervals  |e_r / sigma_r|^2 + |e_t / sigma_t|^2  against the open loop's relative motion, see `course`
+//! + sum over instants   |e_l / sigma_l|^2                      against its roll and pitch
+//! ```
+//!
+//! 1. The open loop's *survey* brings surfels of four resolutions, a passing of the beams each, made of all beams by the
+//!    trajectory as it became final.
+//! 2. They are shelved by chapters, and chapters that saw the same places are compared: `chapters`.
+//! 3. From the coarsest resolution on: neighbours in six dimensions, found from both sides; match; solve; move the trajectory
+//!    and the surfels; until nothing moves. Then the next finer resolution joins in.
+//! 4. A solution that is not believed, or leaves the matches no nearer to each other, is dropped, and the open loop stays.
+
+mod chapters;
+mod course;
+mod equations;
+mod matches;
+mod neighbours;
+mod scene;
+mod spec;
+#[cfg(test)]
+mod tests;
+
+pub use spec::RegistrationSpec;
+
+use super::EstimatorSpec;
+use super::matching::Matcher;
+use super::survey::Survey;
+use super::window::Moved;
+use crate::geometry::{PoseCovariance, Trajectory};
+use crate::time::Stamp;
+use course::Course;
+use equations::Equations;
+use matches::{Matches, Tally};
+use neighbours::Neighbours;
+use scene::Scene;
+
+/// A correction beyond this (m, rad) in one solve is not believed.
+const BELIEVABLE: (f64, f64) = (20.0, 1.0);
+
+/// The whole, registered.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ClosedLoop {
+    /// `map_from_head` over lidar time, at the open loop's stamps.
+    pub trajectory: Trajectory,
+    /// What it rests on.
+    pub report: RegistrationReport,
+}
+
+/// What a registration rested on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RegistrationReport {
+    /// Surfels of the survey.
+    pub surfels: usize,
+    /// Chapters, and pairs of them that were compared.
+    pub chapters: (usize, usize),
+    /// Knots of the correction.
+    pub knots: usize,
+    /// Matches of the last iteration.
+    pub matches: usize,
+    /// Weighted root mean square of the matches' distances along their normals in the last iteration, m.
+    pub residual_rms_m: f64,
+    /// Iterations of match and solve.
+    pub iterations: usize,
+    /// Size of the last correction, m.
+    pub last_correction_m: f64,
+    /// By how much the trajectory moved at most, m and rad.
+    pub moved: (f64, f64),
+    /// Why the open loop's trajectory stayed, where it did.
+    pub left: Option<&'static str>,
+}
+
+/// Registers the whole of what an open loop saw: its trajectory, its covariances at some of the poses' stamps, and its survey.
+///
+/// The same for any number of threads.
+pub fn register(
+    map_from_head: &Trajectory,
+    covariances: &[(Stamp, PoseCovariance)],
+    survey: &Survey,
+    spec: &EstimatorSpec,
+) -> ClosedLoop {
+    let left = |report: RegistrationReport, why| ClosedLoop {
+        trajectory: map_from_head.clone(),
+        report: RegistrationReport { left: Some(why), ..report },
+    };
+    let of_all = &spec.registration;
+    let Some(course) = Course::new(map_from_head, covariances, survey.origin, of_all) else {
+        return left(RegistrationReport::default(), "there is no trajectory");
+    };
+    let scene = Scene::new(survey, &course, of_all);
+    let matcher = Matcher::new(&of_all.matching(&spec.matching), &of_all.surfels(&spec.surfels));
+    let mut registration = Registration { spec: of_all, matcher, course, scene, report: RegistrationReport::default() };
+    match registration.run() {
+        Ok(()) => ClosedLoop {
+            trajectory: registration.course.into_trajectory(map_from_head.stamps()),
+            report: registration.report,
+        },
+        Err(why) => left(registration.report, why),
+    }
+}
+
+/// A registration under way.
+struct Registration<'a> {
+    spec: &'a RegistrationSpec,
+    matcher: Matcher,
+    course: Course,
+    scene: Scene,
+    report: RegistrationReport,
+}
+
+impl Registration<'_> {
+    /// From coarse to fine.
+    fn run(&mut self) -> Result<(), &'static str> {
+        let (first_knot, knots) = self.course.knots();
+        self.report.surfels = self.scene.patches.len();
+        self.report.chapters = (self.scene.chapters.len(), self.scene.pairs.len());
+        self.report.knots = knots;
+        let farthest_m = self.scene.farthest_m();
+        let mut neighbours = Neighbours::unknown(self.spec.levels);
+        let mut equations: Option<Equations> = None;
+        for finest in (0..self.spec.levels).rev() {
+            let coarser = f64::from(1_u32 << finest);
+            for _ in 0..self.spec.max_iterations {
+                let changed = neighbours.use_from(finest, &self.scene, &self.matcher, self.spec.neighbours);
+                let equations = match &mut equations {
+                    Some(same) if !changed => {
+                        same.clear();
+                        same
+                    }
+                    other => other.insert(self.empty_equations(&neighbours)),
+                };
+                let tally = self.assemble(&neighbours, self.spec.max_plane_distance_m * coarser, equations);
+                let x = equations.solve().ok_or("its equations are singular")?;
+                let Moved { shift, turn } = Moved::greatest(&x);
+                if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
+                    return Err("its correction is too large");
+                }
+                self.course.correct(&x);
+                self.scene.correct(first_knot, &x);
+                neighbours.moved(shift + farthest_m * turn);
+                self.report.iterations += 1;
+                (self.report.matches, self.report.residual_rms_m) = (tally.matches, tally.rms_m());
+                self.report.last_correction_m = shift;
+                if shift < self.spec.settled_m * coarser {
+                    break;
+                }
+            }
+        }
+        self.report.moved = self.course.moved();
+        if self.report.matches == 0 { Err("nothing was seen twice") } else { Ok(()) }
+    }
+
+    fn empty_equations(&self, neighbours: &Neighbours) -> Equations {
+        let (first_knot, knots) = self.course.knots();
+        let pairs = &neighbours.in_use.pairs;
+        let segment = |surfel: u32| self.scene.middles[self.scene.slots[surfel as usize] as usize].first;
+        let linked =
+            neighbours.in_use.runs.iter().map(|run| (segment(pairs[run.start].0), segment(pairs[run.start].1)));
+        Equations::new(first_knot, knots, linked)
+    }
+
+    fn assemble(&self, neighbours: &Neighbours, gate_m: f64, equations: &mut Equations) -> Tally {
+        let (scene, matcher, spec) = (&self.scene, &self.matcher, self.spec);
+        let matches = Matches { scene, neighbours: &neighbours.in_use, matcher, spec, gate_m };
+        let tally = matches.add_to(equations);
+        self.course.add_to(equations, spec.level_sigma_deg.to_radians());
+        // A metre and a radian keep the outermost knots where nothing else does.
+        equations.add_diagonal(1.0);
+        tally
+    }
+}

@@ -1,0 +1,79 @@
+//! The surfels of the whole recording in the map.
+
+use super::course::Course;
+use super::{RegistrationSpec, chapters};
+use crate::estimation::matching::Matcher;
+use crate::estimation::nominal::Correction;
+use crate::estimation::spline::Basis;
+use crate::estimation::surfel::Patch;
+use crate::estimation::survey::Survey;
+use crate::geometry::{Rotation, Vector};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// All surfels in the order of time, and the chapters that are compared.
+#[derive(Debug)]
+pub(super) struct Scene {
+    spacing_s: f64,
+    times_s: Vec<f64>,
+    pub(super) patches: Vec<Patch>,
+    /// From the head to each surfel's centre, m.
+    pub(super) arms: Vec<Vector>,
+    /// In which slot each was seen.
+    pub(super) slots: Vec<u32>,
+    /// Slots are halves of knot intervals: the spline's basis in the middle of each.
+    pub(super) middles: Vec<Basis>,
+    pub(super) chapters: Vec<Range<usize>>,
+    /// Chapters whose surfels are to be matched.
+    pub(super) pairs: Vec<(usize, usize)>,
+}
+
+impl Scene {
+    /// What was seen while `course` lasts.
+    pub(super) fn new(survey: &Survey, course: &Course, spec: &RegistrationSpec) -> Self {
+        let (start_s, end_s) = course.span_s();
+        let within = |k: &usize| (start_s..=end_s).contains(&survey.sightings[*k].tau_s);
+        let mut order: Vec<usize> = (0..survey.len()).filter(within).collect();
+        order.sort_by(|a, b| survey.sightings[*a].tau_s.total_cmp(&survey.sightings[*b].tau_s));
+        let sightings = || order.iter().map(|k| &survey.sightings[*k]);
+        let times_s: Vec<f64> = sightings().map(|sighting| sighting.tau_s).collect();
+        let patches: Vec<Patch> = sightings().map(|sighting| sighting.patch).collect();
+        let arms = sightings().map(|sighting| sighting.patch.centre - course.position_at(sighting.tau_s)).collect();
+        let length_s = 0.5 * spec.knot_spacing_s;
+        let slots = times_s.iter().map(|tau_s| ((tau_s - start_s) / length_s) as u32).collect();
+        let middle = |slot: u32| {
+            let middle_s = start_s + length_s * (f64::from(slot) + 0.5);
+            Basis::at(middle_s.min(end_s), spec.knot_spacing_s)
+        };
+        let middles = (0..=((end_s - start_s) / length_s) as u32).map(middle).collect();
+        let chapters = chapters::chapters(&times_s, spec.chapter_s);
+        let pairs = chapters::pairs(&patches, &chapters, spec);
+        Self { spacing_s: spec.knot_spacing_s, times_s, patches, arms, slots, middles, chapters, pairs }
+    }
+
+    /// Whether two surfels were seen at times different enough.
+    pub(super) fn apart(&self, (i, j): (u32, u32), matcher: &Matcher) -> bool {
+        let (early, late) = (self.times_s[i as usize], self.times_s[j as usize]);
+        late - early >= matcher.spec.min_time_difference_s
+    }
+
+    /// Moves every surfel with the trajectory at its time.
+    pub(super) fn correct(&mut self, first_knot: i64, x: &[f64]) {
+        let spacing_s = self.spacing_s;
+        let surfels = self.times_s.par_iter().zip(&mut self.patches).zip(&mut self.arms).with_min_len(512);
+        surfels.for_each(|((tau_s, patch), arm)| {
+            let by = Correction::of_spline(&Basis::at(*tau_s, spacing_s), first_knot, x);
+            let turn = Rotation::from_scaled_axis(by.rotation).to_rotation_matrix().into_inner();
+            let turned = turn * *arm;
+            patch.centre += turned - *arm + by.translation;
+            patch.normal = turn * patch.normal;
+            patch.covariance = turn * patch.covariance * turn.transpose();
+            *arm = turned;
+        });
+    }
+
+    /// The farthest that a surfel is from the head, m.
+    pub(super) fn farthest_m(&self) -> f64 {
+        self.arms.iter().map(Vector::norm).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,46 @@
+//! What the open loop saw, for the registration of the whole.
+
+use super::surfel::Patch;
+use crate::time::Stamp;
+
+/// Patches of surface that the open loop saw, where its trajectory puts them in the map, each at its time. Made by
+/// [`super::Estimator::surveying`], taken by [`super::register`].
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Survey {
+    /// From when the sightings' seconds count.
+    pub(super) origin: Stamp,
+    pub(super) sightings: Vec<Sighting>,
+    /// Time that making it took, s.
+    pub(super) took_s: f64,
+}
+
+/// A patch at the mean time of its points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sighting {
+    /// Lidar time, s from the survey's origin.
+    pub(super) tau_s: f64,
+    pub(super) patch: Patch,
+}
+
+impl Survey {
+    /// How many patches.
+    pub fn len(&self) -> usize {
+        self.sightings.len()
+    }
+
+    /// Whether nothing was seen, or nobody asked.
+    pub fn is_empty(&self) -> bool {
+        self.sightings.is_empty()
+    }
+
+    /// Time that making it took, s: like every wall of time it differs from run to run.
+    pub fn took_s(&self) -> f64 {
+        self.took_s
+    }
+
+    /// Adds what was seen further, its seconds counting from `origin`.
+    pub(super) fn extend(&mut self, origin: Stamp, sightings: Vec<Sighting>) {
+        self.origin = origin;
+        self.sightings.extend(sightings);
+    }
+}

@@ -1,0 +1,40 @@
+//! The closed loop over what the open loop saw.
+
+use super::open_loop::OpenLoopRun;
+use crate::estimation::{EstimatorSpec, register};
+use crate::geometry::Trajectory;
+use crate::recording::{RecordingError, TumWriter};
+use std::path::Path;
+use std::time::Instant;
+
+/// What the global registration made of an open loop.
+pub(super) struct ClosedLoopRun {
+    /// The estimate, at the open loop's stamps.
+    pub map_from_head: Trajectory,
+    /// What it has to say, a sentence each.
+    pub remarks: Vec<String>,
+    /// Time it took, that of the survey included, s.
+    pub wall_s: f64,
+}
+
+/// Registers the whole of what `run` saw.
+pub(super) fn run_closed_loop(run: &OpenLoopRun, estimator: &EstimatorSpec) -> ClosedLoopRun {
+    let started = Instant::now();
+    let closed = register(&run.map_from_head, &run.covariances, &run.survey, estimator);
+    let left = |why| format!("the global registration left the open loop as it was: {why}");
+    ClosedLoopRun {
+        map_from_head: closed.trajectory,
+        remarks: closed.report.left.map(left).into_iter().collect(),
+        wall_s: started.elapsed().as_secs_f64() + run.survey.took_s(),
+    }
+}
+
+/// Writes a trajectory as TUM.
+pub(super) fn write_tum(path: &Path, map_from_head: &Trajectory) -> Result<(), RecordingError> {
+    let mut tum = TumWriter::create(path)?;
+    for (stamp, pose) in map_from_head.iter() {
+        tum.pose(stamp, pose)?;
+    }
+    tum.finish()?;
+    Ok(())
+}
