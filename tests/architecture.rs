@@ -45,7 +45,7 @@ const BELOW_CLI: &[&str] = &[
 const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
 
 /// Crates that one room keeps to itself (or a few, at the door), and what each is kept for.
-const KEPT: [(&str, &[&str]); 10] = [
+const KEPT: [(&str, &[&str]); 14] = [
     ("parry3d", &["world"]),
     ("rapier3d_f64", &["dynamics"]),
     ("mcap", &["recording"]),
@@ -56,6 +56,10 @@ const KEPT: [(&str, &[&str]); 10] = [
     ("indicatif", &["cli"]),
     ("include_dir", &["spec"]),
     ("cmaes", &["study"]),
+    ("parquet", &["study"]),
+    ("rustix", &["study"]),
+    ("sha2", &["study"]),
+    ("sobol", &["study"]),
 ];
 
 /// Words that no file of the library says: the clock on the wall, and the order of a hash.

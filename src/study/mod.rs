@@ -26,6 +26,7 @@ mod record;
 mod register;
 pub mod reproduction;
 pub mod spring;
+pub mod sweep;
 mod truth_near;
 mod watch;
 
