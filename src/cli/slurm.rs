@@ -74,7 +74,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
 /// The array's script.
 fn text(sweep: &Sweep, folder: &Path, elements: u64, threads: usize) -> anyhow::Result<String> {
     let program = std::env::current_exe().context("this program's own path is not known")?;
-    let memory_mib = sweep.limit().map_or(MEMORY_BESIDE_MIB, |limit| limit.memory_mib * threads as u64) + MEMORY_BESIDE_MIB;
+    let memory_mib =
+        sweep.limit().map_or(MEMORY_BESIDE_MIB, |limit| limit.memory_mib * threads as u64) + MEMORY_BESIDE_MIB;
     let mut text = "#!/bin/sh\n".to_owned();
     for option in [
         format!("--job-name=zsim-{}", sweep.plan().name()),

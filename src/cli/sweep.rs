@@ -57,7 +57,9 @@ struct PlanArguments {
 ///
 /// In a Slurm array or a Kubernetes Indexed Job the index is taken from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  zsim sweep run results/springs --threads 8\n  zsim sweep run results/springs --index 3 --count 16")]
+#[command(
+    after_help = "Examples:\n  zsim sweep run results/springs --threads 8\n  zsim sweep run results/springs --index 3 --count 16"
+)]
 struct RunArguments {
     /// The folder of the plan
     #[arg(value_name = "DIR")]
@@ -162,11 +164,13 @@ fn run_task(arguments: &TaskArguments) -> anyhow::Result<End> {
     Ok(End::Done)
 }
 
-/// Merges what is done.
+/// Merges what is done, and tells what it says.
 pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<End> {
-    let status = sweep.merge()?;
-    tell(global, &status, folder)?;
-    Ok(if status.missing == 0 { End::Done } else { End::WithLoss })
+    let merged = sweep.tell()?;
+    let words = format!("{}\n{}", merged.words, status_words(&merged.status));
+    let figures = json!({ "status": merged.status, "summary": merged.summary });
+    output::tell(global, &words, figures, Some(folder))?;
+    Ok(if merged.status.missing == 0 { End::Done } else { End::WithLoss })
 }
 
 fn tell(global: &Global, status: &Status, folder: &Path) -> anyhow::Result<End> {

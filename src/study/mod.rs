@@ -6,13 +6,12 @@
 //! The paper's experiments are run again by [`reproduction`].
 //!
 //! A head by itself is characterised by its [`gains`], by what its [`spring`] bears and how it moves, and by the
-//! [`coverage`] of its lidar. Many estimates tell by [`comparison`] which of the estimator's ingredients matter.
+//! [`coverage`] of its lidar. A [`sweep`] varies any of it, and tells what matters.
 
 mod artefacts;
 mod cadence;
 mod calibration;
 mod cloud;
-pub mod comparison;
 pub mod coverage;
 mod error;
 mod estimate;

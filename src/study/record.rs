@@ -39,17 +39,16 @@ pub fn record(
 pub(super) fn record_together(
     simulations: &[Simulation],
     recordings: Vec<Writer>,
-    watch: &mut Watch,
+    watch: &Watch,
 ) -> Result<(), StudyError> {
-    for (simulation, recording) in simulations.iter().zip(recordings) {
-        let mut files = Files { recording, truth: None, stop: watch.stop };
-        let ran = simulation.run(&mut files, &mut |_| ());
-        files.finish()?;
-        if watch.is_stopped() {
-            return Err(StudyError::Stopped);
-        }
-        ran?;
+    let files = |recording| Files { recording, truth: None, stop: watch.stop };
+    let mut all: Vec<Files> = recordings.into_iter().map(files).collect();
+    let ran = Simulation::run_together(simulations, &mut all.iter_mut().collect::<Vec<_>>(), &mut |_| ());
+    all.into_iter().try_for_each(Files::finish)?;
+    if watch.is_stopped() {
+        return Err(StudyError::Stopped);
     }
+    ran?;
     Ok(())
 }
 

@@ -117,7 +117,9 @@ impl Axis {
                 let range = Levels::Range { setting, from: *from, to: *to, logarithmic };
                 match (sampling, steps) {
                     (Sampling::Grid, Some(steps)) if *steps >= 2 => range.stepped(*steps),
-                    (Sampling::Grid, _) => return Err(about("from", "needs `steps` of 2 or more in a grid".to_owned())),
+                    (Sampling::Grid, _) => {
+                        return Err(about("from", "needs `steps` of 2 or more in a grid".to_owned()));
+                    }
                     (_, None) => range,
                     (_, Some(_)) => return Err(about("steps", "has `steps`, which only a grid takes".to_owned())),
                 }
@@ -148,7 +150,9 @@ impl Axis {
         use super::design::Place::{Along, Level as At};
         match (&self.levels, place) {
             (Levels::Some(levels), At(index)) => levels[index].clone(),
-            (Levels::Some(levels), Along(u)) => levels[((u * levels.len() as f64) as usize).min(levels.len() - 1)].clone(),
+            (Levels::Some(levels), Along(u)) => {
+                levels[((u * levels.len() as f64) as usize).min(levels.len() - 1)].clone()
+            }
             (range @ Levels::Range { .. }, Along(u)) => range.at(u),
             (range @ Levels::Range { .. }, At(_)) => range.at(0.0),
         }

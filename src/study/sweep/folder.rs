@@ -3,7 +3,7 @@
 //! ```text
 //! plan.ron         the spec, the specs that it names, whole, and the version of zsim
 //! points.parquet   the runs: number, what is varied, seed, identity, and which task does it
-//! parts/           what is done: a table a run, or a thousand closed forms, named by what it is
+//! parts/           what is done: a table a run, or some hundred closed forms, named by what it is
 //! tmp/             what is being written
 //! ```
 
@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Closed forms in a part: some tenths of a second.
-const BLOCK: u64 = 1000;
+/// Closed forms in a part: what a kill loses at most on each thread.
+const BLOCK: u64 = 250;
 
 /// Rows in a stretch of a table.
 pub(super) const STRETCH: u64 = 16_384;
@@ -150,7 +150,8 @@ impl Plan {
         };
         let mut columns: Vec<Column> = self.axes().iter().enumerate().map(column).collect();
         if !self.spec().seeds.is_empty() {
-            columns.push(Column::Counts(numbers.iter().map(|index| self.seed(*index).map(|seed| seed as i64)).collect()));
+            columns
+                .push(Column::Counts(numbers.iter().map(|index| self.seed(*index).map(|seed| seed as i64)).collect()));
         }
         columns
     }

@@ -48,10 +48,7 @@ pub(super) fn tapes(
         writers.push(Writer::new(open()?, description(simulation, false)?)?);
         // The name goes here; the handles keep what is behind it.
     }
-    within(limit, |stop| {
-        let mut watch = Watch { stop, tell: &mut |_| {} };
-        record_together(&simulations, writers, &mut watch)
-    })?;
+    within(limit, |stop| record_together(&simulations, writers, &Watch { stop, tell: &mut |_| {} }))?;
     Ok(simulations.into_iter().zip(handles).map(|(simulation, handles)| Tape { simulation, handles }).collect())
 }
 

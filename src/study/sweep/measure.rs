@@ -133,6 +133,11 @@ impl Measure {
         (self.names().3, self.names().4)
     }
 
+    /// What a figure that is not there counts as: an estimate that was lost is infinitely wrong.
+    pub(super) fn when_lost(self) -> f64 {
+        if self.told() == Told::ByEstimate { f64::INFINITY } else { f64::NAN }
+    }
+
     pub(super) fn told(self) -> Told {
         match self {
             Self::PositionRmseM

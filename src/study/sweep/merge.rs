@@ -36,7 +36,7 @@ impl Sweep {
         Ok(tally.status())
     }
 
-    /// Makes `table.parquet`, `table.csv` and `times.csv` of what is done, a row a run in the order of the plan. The two
+    /// Makes `table.parquet`, `table.csv` and `times.parquet` of what is done, a row a run in the order of the plan. The two
     /// tables depend on the plan and on which of its runs are done, and on nothing else; times are kept apart. Memory holds a
     /// stretch of rows.
     ///
@@ -63,8 +63,13 @@ impl Sweep {
     }
 
     /// The table of results.
-    pub fn table(&self) -> PathBuf {
+    pub(super) fn table(&self) -> PathBuf {
         self.folder.join("table.parquet")
+    }
+
+    /// The table of the times that runs took.
+    pub(super) fn times(&self) -> PathBuf {
+        self.folder.join("times.parquet")
     }
 
     fn table_columns(&self) -> Vec<(String, Held)> {
@@ -107,23 +112,19 @@ impl Stretch {
 struct Tables {
     parquet: TableWriter,
     csv: BufWriter<Beside>,
-    times: BufWriter<Beside>,
+    times: TableWriter,
 }
 
 impl Tables {
     fn create(sweep: &Sweep) -> Result<Self, StudyError> {
-        let temporary = sweep.temporary();
-        let beside = |name: &str| Beside::new(&temporary, &sweep.folder.join(name)).map(BufWriter::new);
-        let columns = sweep.table_columns();
-        let mut tables = Self {
-            parquet: TableWriter::create(&temporary, &sweep.table(), &columns)?,
-            csv: beside("table.csv")?,
-            times: beside("times.csv")?,
-        };
+        let (temporary, columns) = (sweep.temporary(), sweep.table_columns());
+        let parquet = TableWriter::create(&temporary, &sweep.table(), &columns)?;
+        let mut csv = BufWriter::new(Beside::new(&temporary, &sweep.folder.join("table.csv"))?);
         let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
-        let header = writeln!(tables.csv, "{}", names.join(","));
-        header.and_then(|()| writeln!(tables.times, "point,{}", Measure::WallS.key())).map_err(sweep.unwritten())?;
-        Ok(tables)
+        writeln!(csv, "{}", names.join(",")).map_err(StudyError::file(csv.get_ref().place()))?;
+        let of_times = [("point".to_owned(), Held::Counts), (Measure::WallS.key().to_owned(), Held::Numbers)];
+        let times = TableWriter::create(&temporary, &sweep.times(), &of_times)?;
+        Ok(Self { parquet, csv, times })
     }
 
     fn write(&mut self, sweep: &Sweep, stretch: Stretch) -> Result<(), StudyError> {
@@ -134,29 +135,21 @@ impl Tables {
         columns.push(Column::Words(stretch.errors));
         columns.push(Column::Words(stretch.numbers.iter().map(identity).collect()));
         self.parquet.write(&columns)?;
-        let times = Column::Numbers(stretch.times);
-        for (row, index) in stretch.numbers.iter().enumerate() {
+        self.times.write(&[columns[0].clone(), Column::Numbers(stretch.times)])?;
+        for row in 0..stretch.numbers.len() {
             let cells: Vec<String> = columns.iter().map(|column| column.cell(row)).collect();
             let line = writeln!(self.csv, "{}", cells.join(","));
-            line.and_then(|()| writeln!(self.times, "{index},{}", times.cell(row))).map_err(sweep.unwritten())?;
+            line.map_err(StudyError::file(self.csv.get_ref().place()))?;
         }
         Ok(())
     }
 
     fn finish(self) -> Result<(), StudyError> {
         self.parquet.finish()?;
-        for file in [self.csv, self.times] {
-            let place = file.get_ref().place().to_owned();
-            let flushed = file.into_inner().map_err(std::io::IntoInnerError::into_error);
-            flushed.map_err(StudyError::file(&place))?.finish()?;
-        }
-        Ok(())
-    }
-}
-
-impl Sweep {
-    fn unwritten(&self) -> impl FnOnce(std::io::Error) -> StudyError + use<> {
-        StudyError::file(&self.folder)
+        self.times.finish()?;
+        let place = self.csv.get_ref().place().to_owned();
+        let flushed = self.csv.into_inner().map_err(std::io::IntoInnerError::into_error);
+        flushed.map_err(StudyError::file(&place))?.finish()
     }
 }
 

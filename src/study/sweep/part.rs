@@ -28,11 +28,7 @@ impl Row {
 impl Sweep {
     fn part_columns(&self) -> Vec<(String, Held)> {
         let told = self.plan.told().into_iter().map(|measure| (measure.key().to_owned(), Held::Numbers));
-        told.chain([
-            ("error".to_owned(), Held::Words),
-            (Measure::WallS.key().to_owned(), Held::Numbers),
-        ])
-        .collect()
+        told.chain([("error".to_owned(), Held::Words), (Measure::WallS.key().to_owned(), Held::Numbers)]).collect()
     }
 
     /// Writes a unit's rows, whole or not at all.

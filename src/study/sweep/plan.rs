@@ -1,10 +1,10 @@
 //! A sweep whose specs are found and checked: which runs there are, and what each of them is.
 
 use super::axis::{Axis, Change, Level, Shelf, composed};
+use super::check::{MOST_POINTS, check};
 use super::component::{Component, Kept, Nod, Slot, Walk};
 use super::design::{Design, Extent};
 use super::identity::{Identities, Identity};
-use super::check::{MOST_POINTS, check};
 use super::{BaseSpec, LimitSpec, Measure, Setting, SweepSpec};
 use crate::random::Seed;
 use crate::simulation::{Scenario, Simulation, Sources, Specs};
@@ -50,12 +50,7 @@ impl Plan {
     }
 
     /// The same with specs that were found before.
-    pub(super) fn with(
-        name: &str,
-        spec: &SweepSpec,
-        shelf: &mut Shelf,
-        source: &Source,
-    ) -> Result<Self, StudyError> {
+    pub(super) fn with(name: &str, spec: &SweepSpec, shelf: &mut Shelf, source: &Source) -> Result<Self, StudyError> {
         check(spec, source)?;
         let axes = spec.axes.iter().map(|axis| Axis::new(axis, spec.sampling, shelf, source));
         let axes: Vec<Axis> = axes.collect::<Result<_, _>>()?;
@@ -65,8 +60,7 @@ impl Plan {
         let design = design.ok_or_else(|| about(format!("more than {MOST_POINTS} runs")))?;
         let of = |(slot, kept): (&Slot, &Kept)| Ok((*slot, Identities::of(*slot, kept)?));
         let identities = shelf.base.iter().map(of).collect::<Result<_, StudyError>>()?;
-        let plan =
-            Self { name: name.to_owned(), spec: spec.clone(), shelf: shelf.clone(), identities, axes, design };
+        let plan = Self { name: name.to_owned(), spec: spec.clone(), shelf: shelf.clone(), identities, axes, design };
         if plan.points() > MOST_POINTS {
             return Err(about(format!("{} runs with all seeds; {MOST_POINTS} at most", plan.points())).into());
         }

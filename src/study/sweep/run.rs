@@ -83,7 +83,8 @@ impl Sweep {
                 }
                 let worker = Worker { sweep: self, task: *task, runner, failed: &failed, pieces: &pieces };
                 // With fewer tasks than threads each has several: estimates of one recording run beside each other.
-                self.see_through(&worker, (threads / at_once).max(1)).inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
+                self.see_through(&worker, (threads / at_once).max(1))
+                    .inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
             }
             Ok(())
         };

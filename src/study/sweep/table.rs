@@ -130,8 +130,11 @@ impl TableWriter {
     pub fn create(folder: &Path, place: &Path, columns: &[(String, Held)]) -> Result<Self, StudyError> {
         let mut beside = Beside::new(folder, place)?;
         let wrong = |error| StudyError::table(place)(error);
-        let fields: Vec<Arc<Type>> =
-            columns.iter().map(|(name, held)| Ok(Arc::new(field(name, *held)?))).collect::<Result<_, _>>().map_err(wrong)?;
+        let fields: Vec<Arc<Type>> = columns
+            .iter()
+            .map(|(name, held)| Ok(Arc::new(field(name, *held)?)))
+            .collect::<Result<_, _>>()
+            .map_err(wrong)?;
         let schema = Type::group_type_builder("zsim").with_fields(fields).build().map_err(wrong)?;
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)

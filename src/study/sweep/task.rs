@@ -110,12 +110,7 @@ impl Sweep {
         self.keep(unit, &rows)
     }
 
-    fn run_shared(
-        &self,
-        shared: &[Shared],
-        limit: LimitSpec,
-        tell: &(dyn Fn(Word) + Sync),
-    ) -> Result<(), StudyError> {
+    fn run_shared(&self, shared: &[Shared], limit: LimitSpec, tell: &(dyn Fn(Word) + Sync)) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
         let told = self.plan.told();
         let recorded = told.iter().any(|measure| measure.told() == Told::ByEstimate);

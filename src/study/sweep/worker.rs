@@ -1,8 +1,8 @@
 //! A process that does a task.
 
+use super::Sweep;
 use super::run::Runner;
 use super::task::Word;
-use super::Sweep;
 use crate::study::StudyError;
 use crate::study::watch::Pieces;
 use std::collections::BTreeSet;
