@@ -8,9 +8,10 @@
 //! ```
 
 use super::axis::Shelf;
+use super::beside::write_text;
 use super::component::{Kept, Slot};
 use super::identity::Identity;
-use super::table::{Column, Held, Table, TableWriter, write_text};
+use super::table::{Column, Held, Table, TableWriter};
 use super::{BaseSpec, Plan, SweepSpec};
 use crate::spec::{self, Source, SpecError, to_text};
 use crate::study::StudyError;

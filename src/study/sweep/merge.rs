@@ -1,7 +1,8 @@
 //! Parts become one table: the same bytes, whoever did them, when, and in which order.
 
+use super::beside::Beside;
 use super::folder::{STRETCH, Unit};
-use super::table::{Beside, Column, Held, TableWriter, quoted};
+use super::table::{Column, Held, TableWriter, quoted};
 use super::{Measure, Sweep};
 use crate::study::StudyError;
 use serde::Serialize;

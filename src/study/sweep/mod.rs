@@ -10,6 +10,7 @@
 //! its error; journeys run in processes of their own, so that one that breaks breaks no other.
 
 mod axis;
+mod beside;
 mod check;
 mod closed_form;
 mod component;
@@ -25,6 +26,7 @@ mod part;
 mod pictures;
 mod plan;
 mod run;
+mod runs;
 mod settings;
 mod spec;
 mod summary;

@@ -1,6 +1,7 @@
 //! A sweep in pictures: curves of each axis, maps of two, the front of what nothing beats.
 
-use super::summary::{Line, Runs, Summary, level_of, levels_of, quantile};
+use super::runs::{Runs, level_of, levels_of};
+use super::summary::{Line, Summary, quantile};
 use super::{Aim, Measure, Plan, Sweep};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Mark, Series};
 use crate::study::StudyError;
@@ -97,37 +98,49 @@ impl Sweep {
             text += &(cells.join(",") + "\n");
         }
         let path = self.folder.join("front.csv");
-        super::table::write_text(&self.temporary(), &path, &text)
+        super::beside::write_text(&self.temporary(), &path, &text)
     }
 }
 
-/// A curve of each axis: the median, and a band between the quartiles, over all else.
+/// A curve of each axis, over all else: the median, and a band between the quartiles.
 fn effects(plan: &Plan, summary: &Summary, measure: Measure) -> Figure {
     let (_, per_unit) = measure.unit();
-    let charts = plan.axes().iter().enumerate().map(|(k, axis)| {
+    let charts = plan.axes().iter().map(|axis| {
         let lines: Vec<&Line> = summary.of_axis(&axis.name, None, measure).collect();
-        let x = |k: usize, line: &Line| line.value.filter(|_| axis.is_number()).unwrap_or(k as f64);
-        let finite = |y: f64| if y.is_finite() { y * per_unit } else { f64::NAN };
-        let points = lines.iter().enumerate().map(|(k, line)| (x(k, line), finite(line.median))).collect();
-        let ends = |line: &Line| (finite(line.quarter), finite(line.three_quarters));
-        let band = lines.iter().enumerate().map(|(k, line)| (x(k, line), ends(line).0, ends(line).1)).collect();
-        let title = if k == 0 { "Median and quartiles over all else" } else { "" };
-        let chart = Chart::new(title, &axis.name, measure.label());
         if axis.is_number() {
-            return chart.with(Series::line("", Colour::Estimate, points).with_band(band));
+            let at = |line: &&Line| (line.value.unwrap_or(f64::NAN), line.median * per_unit);
+            let ends = |line: &&Line| {
+                let [low, high] = [line.quarter, line.three_quarters].map(|x| x * per_unit);
+                (line.value.unwrap_or(f64::NAN), low, high)
+            };
+            let band = lines.iter().map(ends).filter(|(_, low, high)| low.is_finite() && high.is_finite()).collect();
+            let curve = Series::line("", Colour::Estimate, lines.iter().map(at).collect()).with_band(band);
+            return Chart::new(&format!("By {}", axis.name), &axis.name, measure.label()).with(curve);
         }
-        // Words have no order that a line might follow.
-        let bars = lines.iter().enumerate().flat_map(|(k, line)| {
-            let (low, high) = ends(line);
-            [(k as f64, low), (k as f64, high), (f64::NAN, f64::NAN)]
-        });
-        let marks = lines.iter().enumerate().map(|(k, line)| (k as f64, line.level.clone())).collect();
-        chart
-            .with(Series::line("", Colour::Backdrop, bars.collect()).marked(Mark::Line(4.0)))
-            .with(Series::dots("", Colour::Estimate, points).marked(Mark::Dots(6.0)))
-            .with_x_marks(marks)
+        by_words(&axis.name, measure, &lines)
     });
-    Figure::of(charts.collect()).in_columns(if plan.axes().len() > 1 { 2 } else { 1 })
+    let charts: Vec<Chart> = charts.collect();
+    let most = charts.iter().map(|chart| chart.y_marks.len()).max().unwrap_or_default();
+    let columns = if charts.len() > 1 { 2 } else { 1 };
+    let mut figure = Figure::of(charts).in_columns(columns);
+    figure.chart_height = figure.chart_height.max(76.0 + ROW_HEIGHT * most as f64);
+    figure
+}
+
+/// Median and quartiles of levels that are words, which have no order that a line might follow: below each other.
+fn by_words(axis: &str, measure: Measure, lines: &[&Line]) -> Chart {
+    let (_, per_unit) = measure.unit();
+    let height = |index: usize| lines.len() as f64 - 1.0 - index as f64;
+    let bars = lines.iter().enumerate().flat_map(|(k, line)| {
+        let ends = [line.quarter, line.three_quarters].map(|x| (x * per_unit, height(k)));
+        [ends[0], ends[1], (f64::NAN, f64::NAN)]
+    });
+    let dots = lines.iter().enumerate().map(|(k, line)| (line.median * per_unit, height(k)));
+    let marks = lines.iter().enumerate().map(|(k, line)| (height(k), line.level.clone()));
+    Chart::new(&format!("By {axis}"), measure.label(), "")
+        .with(Series::line("", Colour::Backdrop, bars.collect()).marked(Mark::Line(4.0)))
+        .with(Series::dots("", Colour::Estimate, dots.collect()).marked(Mark::Dots(6.0)))
+        .with_y_marks(marks.collect())
 }
 
 /// A measure's median over two axes, and all else.

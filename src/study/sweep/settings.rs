@@ -62,9 +62,10 @@ fn leads_to(keys: &[&str], path: &[String]) -> bool {
     wanted.peek().is_none() && keys.last().copied() == path.last().map(String::as_str)
 }
 
-/// The settings that share the longest beginning with `keys`, or their last key.
+/// The settings whose last key is nearly that of `keys`, or else those that share the longest beginning.
 fn near<'a>(all: &'a [Vec<String>], keys: &[&str]) -> Vec<&'a Vec<String>> {
-    let alike = |path: &&Vec<String>| keys.last().copied() == path.last().map(String::as_str);
+    let last = keys.last().copied().unwrap_or_default();
+    let alike = |path: &&Vec<String>| path.last().is_some_and(|key| key.contains(last) || last.contains(key.as_str()));
     let same_end: Vec<_> = all.iter().filter(alike).collect();
     if !same_end.is_empty() {
         return same_end;

@@ -1,7 +1,7 @@
 //! What a merged sweep leaves for people.
 
+use super::beside::write_text;
 use super::output::{csv, markdown, trends_csv, words};
-use super::table::write_text;
 use super::{Status, Summary, Sweep};
 use crate::study::StudyError;
 

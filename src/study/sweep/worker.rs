@@ -21,6 +21,9 @@ const GRACE: (f64, f64) = (0.5, 10.0);
 /// Most of what a worker said on stderr that is read, bytes.
 const LAST_WORDS: u64 = 4096;
 
+/// What a process says whose memory has come to its end: of an allocation, of the system, of a thread's stack.
+const OUT_OF_MEMORY: [&str; 3] = ["memory allocation of", "Cannot allocate memory", "failed to spawn thread"];
+
 /// A task, to be done by a process.
 pub(super) struct Worker<'a> {
     pub sweep: &'a Sweep,
@@ -117,7 +120,8 @@ impl Worker<'_> {
         if let (true, Some(limit)) = (too_long, limit) {
             return Ok(StudyError::TooLong { time_s: limit.time_s }.to_string());
         }
-        if let (true, Some(limit)) = (words.contains("memory allocation of"), limit) {
+        let starved = OUT_OF_MEMORY.iter().any(|sign| words.contains(sign));
+        if let (true, Some(limit)) = (starved, limit) {
             return Ok(format!("needed more than {} MiB of memory", limit.memory_mib));
         }
         if let Some(signal) = signal_of(status) {
