@@ -45,7 +45,7 @@ const BELOW_CLI: &[&str] = &[
 const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
 
 /// Crates that one room keeps to itself (or a few, at the door), and what each is kept for.
-const KEPT: [(&str, &[&str]); 11] = [
+const KEPT: [(&str, &[&str]); 15] = [
     ("parry3d", &["world"]),
     ("rapier3d_f64", &["dynamics"]),
     ("mcap", &["recording"]),
@@ -57,6 +57,10 @@ const KEPT: [(&str, &[&str]); 11] = [
     ("include_dir", &["spec"]),
     ("cmaes", &["study"]),
     ("faer", &["estimation"]),
+    ("parquet", &["study"]),
+    ("rustix", &["study"]),
+    ("sha2", &["study"]),
+    ("sobol", &["study"]),
 ];
 
 /// Words that no file of the library says: the clock on the wall, and the order of a hash.

@@ -14,9 +14,9 @@ use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
 use zsim::simulation::EPOCH;
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::StudyError;
-use zsim::study::comparison::{Comparison, ComparisonSpec};
 use zsim::study::reproduction::ExperimentSpec;
 use zsim::study::spring::design::{DesignSpec, Search};
+use zsim::study::sweep::{Plan, SweepSpec};
 use zsim::world::{SceneSpec, World, WorldError};
 
 /// The kinds that there is a check for.
@@ -127,17 +127,17 @@ fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
 /// The kinds of studies.
 enum Study {
     Design(DesignSpec),
-    Comparison(ComparisonSpec),
+    Sweep(SweepSpec),
 }
 
 /// The study in a text; if it is none, the error of the kind that came farther in reading it.
 fn study(source: &Source) -> Result<Study, SpecError> {
     match (parse(source), parse(source)) {
         (Ok(design), _) => Ok(Study::Design(design)),
-        (_, Ok(comparison)) => Ok(Study::Comparison(comparison)),
-        (Err(design), Err(comparison)) => {
-            let is_comparison = comparison.line_and_column() > design.line_and_column();
-            Err(if is_comparison { comparison } else { design })
+        (_, Ok(sweep)) => Ok(Study::Sweep(sweep)),
+        (Err(design), Err(sweep)) => {
+            let is_sweep = sweep.line_and_column() > design.line_and_column();
+            Err(if is_sweep { sweep } else { design })
         }
     }
 }
@@ -146,7 +146,7 @@ impl Study {
     fn build(&self, source: &Source) -> Result<(), StudyError> {
         match self {
             Self::Design(spec) => Search::new(spec, source).map(drop),
-            Self::Comparison(spec) => Comparison::new(spec, source).map(drop),
+            Self::Sweep(spec) => Plan::new("study", spec, source).map(drop),
         }
     }
 }

@@ -20,9 +20,12 @@ mod output;
 mod quantity;
 mod reproduce;
 mod simulate;
+mod slurm;
 mod spring;
 mod spring_words;
 mod study;
+mod sweep;
+mod sweep_words;
 
 use arguments::Global;
 use clap::error::ErrorKind;
@@ -61,6 +64,7 @@ enum Verb {
     Coverage(coverage::Arguments),
     Reproduce(reproduce::Arguments),
     Study(study::Arguments),
+    Sweep(sweep::Arguments),
     Check(check::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
@@ -105,6 +109,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Coverage(arguments) => coverage::run(arguments, global),
         Verb::Reproduce(arguments) => reproduce::run(arguments, global),
         Verb::Study(arguments) => study::run(arguments, global),
+        Verb::Sweep(arguments) => sweep::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),
         Verb::Info(arguments) => info::run(arguments, global),
         Verb::Completions(arguments) => completions::run(arguments),

@@ -35,6 +35,9 @@ pub enum SimulationError {
         /// The longest run, s.
         most_s: f64,
     },
+    /// Simulations that were to share physics and rays do not.
+    #[error("simulations run together differ in more than the IMU and the lidar's errors")]
+    Apart,
     /// Whoever takes the measurements could not.
     #[error("the simulation stopped, because what it makes could not be kept")]
     Sink(#[source] SinkError),

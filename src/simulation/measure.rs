@@ -42,23 +42,23 @@ impl<'a> Sensors<'a> {
         }
     }
 
-    /// Takes all samples that are over by the end of `window`; counts them in `summary`.
-    pub fn measure(&mut self, window: Window, summary: &mut SimulationSummary) -> Option<Events> {
-        let Window { first, heads, bases, until_s } = window;
-        let head = Track::new(first, STEP_S, heads)?;
-        let base = Track::new(first, STEP_S, bases)?;
+    /// Takes all but the scans that is over by `until_s`; counts it in `summary`.
+    fn measure_but_scans(
+        &mut self,
+        head: &Track,
+        base: &Track,
+        until_s: f64,
+        summary: &mut SimulationSummary,
+    ) -> Events {
         let samples = self.schedule.samples(until_s);
-        let events = Events {
-            truth: self.schedule.truths(until_s).iter().map(|at| self.truth(&head, &base, *at)).collect(),
+        summary.imu_samples += samples.len() as u64;
+        Events {
+            truth: self.schedule.truths(until_s).iter().map(|at| self.truth(head, base, *at)).collect(),
             clocks: self.schedule.clocks(until_s).iter().map(|t_s| self.clock(*t_s)).collect(),
-            samples: samples.iter().map(|interval| self.sample(&head, interval, summary)).collect(),
-            scans: self.scans((&head, &base), until_s, summary),
+            samples: samples.iter().map(|interval| self.sample(head, interval, summary)).collect(),
+            scans: Vec::new(),
             until_s,
-        };
-        summary.scans += events.scans.len() as u64;
-        summary.imu_samples += events.samples.len() as u64;
-        summary.returns += events.scans.iter().map(|(_, scan)| scan.returns.len() as u64).sum::<u64>();
-        Some(events)
+        }
     }
 
     fn truth(&self, head: &Track, base: &Track, (t_s, lidar_stamp): (f64, Stamp)) -> (Stamp, TruthSample) {
@@ -84,28 +84,61 @@ impl<'a> Sensors<'a> {
             ImuSample { stamp: interval.stamp, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force };
         (self.rig.true_stamp(interval.to_s), sample)
     }
+}
 
-    fn scans(
-        &mut self,
-        (head, base): (&Track, &Track),
-        until_s: f64,
-        summary: &mut SimulationSummary,
-    ) -> Vec<(Stamp, LidarScan)> {
-        let laser = head.of_frame(&self.rig.head_from_laser);
-        let firings = self.schedule.scans(until_s);
-        let Rig { lidar, scenery, carrier, .. } = *self.rig;
-        let carried = Carried { scenery, carrier, base };
-        let scenery: &dyn Scenery = if carrier.is_empty() { scenery } else { &carried };
-        let started = Instant::now();
-        let scan = |firing: &Firing| {
-            let sweep = lidar.sweep(scenery, &laser, firing);
-            let over_s = firing.start_s + lidar.sweep_span().seconds() / firing.pace;
-            (self.rig.true_stamp(over_s), lidar.measure(&sweep, &self.lidar_errors))
-        };
-        let scans: Vec<(Stamp, LidarScan)> = firings.par_iter().map(scan).collect();
-        summary.rays_wall_s += started.elapsed().as_secs_f64();
-        summary.beams += (scans.len() * lidar.beams().len()) as u64;
-        summary.rays += (scans.len() * lidar.beams().len() * lidar.rays_per_beam()) as u64;
-        scans
+/// Takes all samples that are over by the end of `window`, by sensors that differ in the IMU and the lidar's errors alone:
+/// what each of them delivers. Counts them in `summaries`.
+pub(super) fn measure(
+    sensors: &mut [Sensors],
+    window: Window,
+    summaries: &mut [SimulationSummary],
+) -> Option<Vec<Events>> {
+    let Window { first, heads, bases, until_s } = window;
+    let head = Track::new(first, STEP_S, heads)?;
+    let base = Track::new(first, STEP_S, bases)?;
+    let each = sensors.iter_mut().zip(summaries.iter_mut());
+    let mut events: Vec<Events> =
+        each.map(|(sensors, summary)| sensors.measure_but_scans(&head, &base, until_s, summary)).collect();
+    let scans = scans(sensors, (&head, &base), until_s, summaries);
+    for ((events, scans), summary) in events.iter_mut().zip(scans).zip(summaries) {
+        summary.scans += scans.len() as u64;
+        summary.returns += scans.iter().map(|(_, scan)| scan.returns.len() as u64).sum::<u64>();
+        events.scans = scans;
     }
+    Some(events)
+}
+
+/// The scans of each of `sensors`, from rays that are cast once.
+fn scans(
+    sensors: &mut [Sensors],
+    (head, base): (&Track, &Track),
+    until_s: f64,
+    summaries: &mut [SimulationSummary],
+) -> Vec<Vec<(Stamp, LidarScan)>> {
+    let firings: Vec<Vec<Firing>> = sensors.iter_mut().map(|one| one.schedule.scans(until_s)).collect();
+    let (Some(first), Some(firings)) = (sensors.first(), firings.first()) else { return Vec::new() };
+    let Rig { lidar, scenery, carrier, head_from_laser, .. } = *first.rig;
+    let laser = head.of_frame(&head_from_laser);
+    let carried = Carried { scenery, carrier, base };
+    let scenery: &dyn Scenery = if carrier.is_empty() { scenery } else { &carried };
+    let started = Instant::now();
+    let sensors = &*sensors;
+    let scan = |firing: &Firing| {
+        let sweep = lidar.sweep(scenery, &laser, firing);
+        let over = first.rig.true_stamp(firing.start_s + lidar.sweep_span().seconds() / firing.pace);
+        let said = |one: &Sensors| (over, one.rig.lidar.measure(&sweep, &one.lidar_errors));
+        sensors.iter().map(said).collect::<Vec<_>>()
+    };
+    let by_firing: Vec<Vec<(Stamp, LidarScan)>> = firings.par_iter().map(scan).collect();
+    let wall_s = started.elapsed().as_secs_f64();
+    for summary in summaries {
+        summary.rays_wall_s += wall_s;
+        summary.beams += (firings.len() * lidar.beams().len()) as u64;
+        summary.rays += (firings.len() * lidar.beams().len() * lidar.rays_per_beam()) as u64;
+    }
+    let mut by_sensors: Vec<Vec<_>> = sensors.iter().map(|_| Vec::with_capacity(by_firing.len())).collect();
+    for scans in by_firing {
+        by_sensors.iter_mut().zip(scans).for_each(|(all, scan)| all.push(scan));
+    }
+    by_sensors
 }

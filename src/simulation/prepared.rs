@@ -1,3 +1,4 @@
+use super::run::simulate_together;
 use super::{EPOCH, Rig, STEP_S, Scenario, SimulationError, SimulationSummary, Sources, Specs, simulate};
 use crate::dynamics::{CarrierSpec, HeadModel, HeadSimulation, HeadSpec};
 use crate::geometry::{Route, Vector};
@@ -105,6 +106,39 @@ impl Simulation {
     ) -> Result<SimulationSummary, SimulationError> {
         let mut motion = HeadSimulation::new(&self.head, self.motion.as_ref(), STEP_S)?;
         simulate(&self.rig(), &mut motion, sink, progress)
+    }
+
+    /// Runs simulations that [share their rays](Self::shares_rays_with), each into a sink of its own, which is given the same
+    /// as from a run alone: physics and rays are done once.
+    ///
+    /// # Errors
+    /// When they do not share them, the head's motion fails, or a sink refuses.
+    pub fn run_together<S: Sink + TruthSink + ?Sized>(
+        simulations: &[Self],
+        sinks: &mut [&mut S],
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Vec<SimulationSummary>, SimulationError> {
+        let Some(first) = simulations.first() else { return Ok(Vec::new()) };
+        if !simulations.iter().all(|other| first.shares_rays_with(other)) {
+            return Err(SimulationError::Apart);
+        }
+        let rigs: Vec<Rig> = simulations.iter().map(Self::rig).collect();
+        let mut motion = HeadSimulation::new(&first.head, first.motion.as_ref(), STEP_S)?;
+        simulate_together(&rigs, &mut motion, sinks, progress)
+    }
+
+    /// Whether physics and rays of `other` are the same: it differs in the IMU and the lidar's errors at most.
+    pub fn shares_rays_with(&self, other: &Self) -> bool {
+        let without_noise = |simulation: &Self| {
+            let mut specs = simulation.specs.clone();
+            (specs.imu, specs.lidar.errors) = (self.specs.imu.clone(), self.specs.lidar.errors.clone());
+            specs.lidar.noise = self.specs.lidar.noise;
+            specs
+        };
+        let walk = |simulation: &Self| {
+            (simulation.scenario.route.clone(), simulation.scenario.duration_s, simulation.scenario.seed)
+        };
+        walk(self) == walk(other) && self.specs == without_noise(other)
     }
 
     fn rig(&self) -> Rig<'_> {

@@ -6,6 +6,7 @@ use crate::report::plot::PlotError;
 use crate::signal::SignalError;
 use crate::simulation::SimulationError;
 use crate::spec::SpecError;
+use parquet::errors::ParquetError;
 use std::path::{Path, PathBuf};
 
 /// Why an experiment did not come to its end.
@@ -54,6 +55,26 @@ pub enum StudyError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// A table could not be written or read.
+    #[error("{}: {source}", path.display())]
+    Table {
+        /// Which one.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<ParquetError>,
+    },
+    /// A run of a sweep took longer than it may.
+    #[error("took longer than {time_s} s")]
+    TooLong {
+        /// What it may take, s.
+        time_s: f64,
+    },
+    /// A process that was to do a part of the work could not.
+    #[error("a worker could not work: {message}")]
+    Worker {
+        /// What it said.
+        message: String,
+    },
     /// There is no thread to work on.
     #[error("a thread could not be begun: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -82,6 +103,11 @@ impl StudyError {
     pub(super) fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
         let path = path.to_owned();
         move |source| Self::File { path, source }
+    }
+
+    pub(super) fn table(path: &Path) -> impl FnOnce(ParquetError) -> Self + use<> {
+        let path = path.to_owned();
+        move |source| Self::Table { path, source: Box::new(source) }
     }
 
     /// Whether what was asked for is wrong (a spec, a setting), rather than something on the way.

@@ -6,14 +6,13 @@
 //! The paper's experiments are run again by [`reproduction`].
 //!
 //! A head by itself is characterised by its [`gains`], by what its [`spring`] bears and how it moves, and by the
-//! [`coverage`] of its lidar. Many estimates tell by [`comparison`] which of the estimator's ingredients matter.
+//! [`coverage`] of its lidar. A [`sweep`] varies any of it, and tells what matters.
 
 mod artefacts;
 mod cadence;
 mod calibration;
 mod closed_loop;
 mod cloud;
-pub mod comparison;
 pub mod coverage;
 mod error;
 mod estimate;
@@ -27,6 +26,7 @@ mod record;
 mod register;
 pub mod reproduction;
 pub mod spring;
+pub mod sweep;
 mod truth_near;
 mod watch;
 

@@ -23,31 +23,58 @@ pub fn record(
     truth_tf: bool,
     watch: &mut Watch,
 ) -> Result<SimulationSummary, StudyError> {
-    let run = RunDescription {
-        calibration: simulation.calibration(),
-        imu_rate_hz: 1.0 / simulation.imu().period_s(),
-        manifest: Manifest::of(simulation).text()?,
-        truth_tf,
-    };
-    let mut files =
-        Files { recording: Writer::create(recording, run)?, truth: TumWriter::create(truth)?, stop: watch.stop };
+    let recording = Writer::create(recording, description(simulation, truth_tf)?)?;
+    let mut files = Files { recording, truth: Some(TumWriter::create(truth)?), stop: watch.stop };
     let duration_s = simulation.scenario().duration_s;
     let mut progress = |fraction: f64| watch.progress(Stage::Simulating, fraction * duration_s, Some(duration_s));
     let ran = simulation.run(&mut files, &mut progress);
-    let Files { recording, truth, .. } = files;
-    recording.finish()?;
-    truth.finish()?;
+    files.finish()?;
     if watch.is_stopped() {
         return Err(StudyError::Stopped);
     }
     Ok(ran?)
 }
 
+/// Runs simulations that share physics and rays, each to its recording.
+pub(super) fn record_together(
+    simulations: &[Simulation],
+    recordings: Vec<Writer>,
+    watch: &Watch,
+) -> Result<(), StudyError> {
+    let files = |recording| Files { recording, truth: None, stop: watch.stop };
+    let mut all: Vec<Files> = recordings.into_iter().map(files).collect();
+    let ran = Simulation::run_together(simulations, &mut all.iter_mut().collect::<Vec<_>>(), &mut |_| ());
+    all.into_iter().try_for_each(Files::finish)?;
+    if watch.is_stopped() {
+        return Err(StudyError::Stopped);
+    }
+    ran?;
+    Ok(())
+}
+
+/// What the recording of a simulation says of it.
+pub(super) fn description(simulation: &Simulation, truth_tf: bool) -> Result<RunDescription, StudyError> {
+    Ok(RunDescription {
+        calibration: simulation.calibration(),
+        imu_rate_hz: 1.0 / simulation.imu().period_s(),
+        manifest: Manifest::of(simulation).text()?,
+        truth_tf,
+    })
+}
+
 /// Takes all of a run to its files.
 struct Files<'a> {
     recording: Writer,
-    truth: TumWriter<BufWriter<File>>,
+    truth: Option<TumWriter<BufWriter<File>>>,
     stop: &'a AtomicBool,
+}
+
+impl Files<'_> {
+    fn finish(self) -> Result<(), StudyError> {
+        self.recording.finish()?;
+        self.truth.map_or(Ok(()), TumWriter::finish)?;
+        Ok(())
+    }
 }
 
 impl Sink for Files<'_> {
@@ -65,7 +92,9 @@ impl Sink for Files<'_> {
 
 impl TruthSink for Files<'_> {
     fn truth(&mut self, now: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
-        self.truth.pose(sample.lidar_stamp, &sample.head.world_from_body)?;
+        if let Some(truth) = &mut self.truth {
+            truth.pose(sample.lidar_stamp, &sample.head.world_from_body)?;
+        }
         self.recording.truth(now, sample)
     }
 

@@ -1,0 +1,115 @@
+//! `zsim sweep submit`: a sweep as a Slurm job array.
+
+use super::arguments::Global;
+use super::failure::Usage;
+use super::{End, output};
+use anyhow::{Context, bail};
+use clap::Args;
+use serde_json::json;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use zsim::study::sweep::Sweep;
+
+/// Runs that an array's element has at least: a scheduler takes about a second for each.
+const RUNS_IN_AN_ELEMENT: u64 = 20;
+/// Most elements: Slurm's own default is 1001.
+const MOST_ELEMENTS: u64 = 1000;
+/// Memory beside what a run's limit allows, MiB: the process that watches over the runs.
+const MEMORY_BESIDE_MIB: u64 = 256;
+
+/// Hand a sweep to a scheduler: a job array whose elements do a share each
+///
+/// The folder must be one that all nodes see. Merge when the array is done; submit again to do what is missing then.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim sweep submit results/springs --slurm --elements 16")]
+pub(super) struct Arguments {
+    /// The folder of the plan
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// As a Slurm job array
+    #[arg(long, required = true)]
+    slurm: bool,
+    /// How many elements the array has [default: one for 20 runs, 1000 at most]
+    #[arg(long, value_name = "M")]
+    elements: Option<u64>,
+    /// Options for sbatch, such as "--partition=long --time=2:00:00"
+    #[arg(long, value_name = "OPTIONS", default_value = "", allow_hyphen_values = true)]
+    sbatch: String,
+    /// Write DIR/slurm/array.sh and do not submit it
+    #[arg(long)]
+    dry_run: bool,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let folder = arguments.folder.canonicalize();
+    let folder = folder.with_context(|| format!("{} cannot be found", arguments.folder.display()))?;
+    let sweep = Sweep::open(&folder)?;
+    let status = sweep.status()?;
+    if status.missing == 0 {
+        output::tell(global, "nothing is missing", json!({ "job": null, "elements": 0 }), Some(&folder))?;
+        return Ok(End::Done);
+    }
+    let wanted = arguments.elements.unwrap_or_else(|| status.missing.div_ceil(RUNS_IN_AN_ELEMENT).min(MOST_ELEMENTS));
+    if wanted == 0 {
+        return Err(Usage("--elements 0: an array has at least one".to_owned()).into());
+    }
+    let elements = wanted.min(sweep.tasks() as u64).max(1);
+    let logs = folder.join("slurm");
+    std::fs::create_dir_all(&logs).with_context(|| format!("{} cannot be made", logs.display()))?;
+    let script = logs.join("array.sh");
+    let threads = global.threads.map_or(1, std::num::NonZeroUsize::get);
+    std::fs::write(&script, text(&sweep, &folder, elements, threads)?)
+        .with_context(|| format!("{} cannot be written", script.display()))?;
+    if arguments.dry_run {
+        output::tell(global, "", json!({ "job": null, "elements": elements }), Some(&script))?;
+        return Ok(End::Done);
+    }
+    let job = submitted(&script, &arguments.sbatch)?;
+    let words = format!("job {job}: {elements} elements for {} runs; then: zsim sweep merge", status.missing);
+    output::tell(global, &words, json!({ "job": job, "elements": elements }), Some(&folder))?;
+    Ok(End::Done)
+}
+
+/// The array's script.
+fn text(sweep: &Sweep, folder: &Path, elements: u64, threads: usize) -> anyhow::Result<String> {
+    let program = std::env::current_exe().context("this program's own path is not known")?;
+    let memory_mib =
+        sweep.limit().map_or(MEMORY_BESIDE_MIB, |limit| limit.memory_mib * threads as u64) + MEMORY_BESIDE_MIB;
+    let mut text = "#!/bin/sh\n".to_owned();
+    for option in [
+        format!("--job-name=zsim-{}", sweep.plan().name()),
+        format!("--array=0-{}", elements - 1),
+        format!("--cpus-per-task={threads}"),
+        format!("--mem={memory_mib}M"),
+        format!("--output={}", quoted(&folder.join("slurm/%A_%a.log"))),
+    ] {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "#SBATCH {option}");
+    }
+    let (program, folder) = (quoted(&program), quoted(folder));
+    let _ = writeln!(
+        text,
+        "exec {program} sweep run {folder} --index \"$SLURM_ARRAY_TASK_ID\" --count {elements} --threads {threads} --quiet"
+    );
+    Ok(text)
+}
+
+/// A path as a shell reads it.
+fn quoted(path: &Path) -> String {
+    format!("'{}'", path.display().to_string().replace('\'', "'\\''"))
+}
+
+/// Hands the script to sbatch; the job's number.
+fn submitted(script: &Path, options: &str) -> anyhow::Result<u64> {
+    let mut sbatch = Command::new("sbatch");
+    sbatch.arg("--parsable").args(options.split_whitespace()).arg(script);
+    let output = sbatch.output().context("sbatch cannot be run: is Slurm installed here?")?;
+    if !output.status.success() {
+        bail!("sbatch refused: {}", String::from_utf8_lossy(&output.stderr).trim());
+    }
+    // `number` or `number;cluster`.
+    let said = String::from_utf8_lossy(&output.stdout);
+    let number = said.trim().split(';').next().and_then(|number| number.parse().ok());
+    number.with_context(|| format!("sbatch said \"{}\", which is no job's number", said.trim()))
+}

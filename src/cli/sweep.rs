@@ -1,0 +1,179 @@
+//! `zsim sweep`: plan, run, status, merge, submit.
+
+use super::arguments::Global;
+use super::bars::{WorkBar, stop_flag};
+use super::failure::Usage;
+use super::sweep_words::{plan_words, status_words};
+use super::{End, output, slurm};
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use serde_json::json;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use zsim::spec::{Kind, find, parse};
+use zsim::study::sweep::{Plan, Runner, Share, Status, Sweep, confine};
+
+/// Run a design again and again with other parameters: plan, run in any number of pieces anywhere, merge
+///
+/// A sweep is a spec under specs/studies/: a run, what is varied, what is told. `plan` leaves it in a folder; `run` does what is
+/// missing there, on this machine's threads or as one of many processes on many machines; `merge` makes one table, the same
+/// bytes however it came about, with plots. Whatever stops it, what is done stays done.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  zsim sweep plan spring_sweep -o results/springs\n  zsim sweep run results/springs\n  zsim sweep merge results/springs"
+)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Plan(PlanArguments),
+    Run(RunArguments),
+    Status(FolderArguments),
+    Merge(FolderArguments),
+    Submit(slurm::Arguments),
+    #[command(hide = true)]
+    Task(TaskArguments),
+}
+
+/// Find and check all that a spec names, and leave the plan in a folder
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim sweep plan spring_sweep -o results/springs")]
+struct PlanArguments {
+    /// The sweep, a name under specs/studies/ or a file
+    #[arg(value_name = "SPEC")]
+    spec: String,
+    /// The folder, in which a sweep that was begun goes on [default: results/<name>]
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Replace another plan in the folder; runs that are in both stay done
+    #[arg(long)]
+    force: bool,
+}
+
+/// Do what is missing, or a share of it
+///
+/// In a Slurm array or a Kubernetes Indexed Job the index is taken from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  zsim sweep run results/springs --threads 8\n  zsim sweep run results/springs --index 3 --count 16"
+)]
+struct RunArguments {
+    /// The folder of the plan
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Which of the shares, from 0
+    #[arg(long, value_name = "I")]
+    index: Option<usize>,
+    /// How many shares there are
+    #[arg(long, value_name = "M")]
+    count: Option<usize>,
+}
+
+/// A folder that holds a sweep
+#[derive(Args)]
+#[command(after_help = "Examples:\n  zsim sweep status results/springs --json\n  zsim sweep merge results/springs")]
+struct FolderArguments {
+    /// The folder of the plan
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+}
+
+/// Do one task, confined, telling of each run on stdout: how `run` works through journeys
+#[derive(Args)]
+struct TaskArguments {
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    #[arg(long)]
+    task: usize,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    match &arguments.verb {
+        Verb::Plan(plan) => plan_in(plan, global),
+        Verb::Run(run) => run_share(run, global),
+        Verb::Status(folder) => tell(global, &Sweep::open(&folder.folder)?.status()?, &folder.folder),
+        Verb::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
+        Verb::Submit(submit) => slurm::run(submit, global),
+        Verb::Task(task) => run_task(task),
+    }
+}
+
+/// The plan that a spec describes.
+pub(super) fn plan_of(name: &str) -> anyhow::Result<Plan> {
+    let source = find(Kind::Study, name)?;
+    let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Plan::new(&stem, &parse(&source)?, &source)?)
+}
+
+fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<End> {
+    let plan = plan_of(&arguments.spec)?;
+    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(plan.name()));
+    let sweep = plan.write(&folder, arguments.force)?;
+    let figures = json!({ "points": plan.points(), "tasks": sweep.tasks() });
+    output::tell(global, &plan_words(&sweep), figures, Some(&folder))?;
+    Ok(End::Done)
+}
+
+fn run_share(arguments: &RunArguments, global: &Global) -> anyhow::Result<End> {
+    let sweep = Sweep::open(&arguments.folder)?;
+    run_sweep(&sweep, share(arguments)?, global)?;
+    tell(global, &sweep.status()?, &arguments.folder)
+}
+
+/// Does what is missing of a share, with a progress bar.
+pub(super) fn run_sweep(sweep: &Sweep, share: Share, global: &Global) -> anyhow::Result<()> {
+    let program = std::env::current_exe().context("this program's own path is not known")?;
+    let bar = WorkBar::new(global, "sweeping");
+    let hear = |share: f64| bar.show(share);
+    sweep.run(share, &Runner { program: &program, stop: stop_flag(), hear: &hear })?;
+    Ok(())
+}
+
+/// The share that is asked for, or that the scheduler gave.
+fn share(arguments: &RunArguments) -> anyhow::Result<Share> {
+    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<usize>().ok());
+    let slurm = number("SLURM_ARRAY_TASK_ID");
+    let given = arguments.index.or(slurm).or_else(|| number("JOB_COMPLETION_INDEX"));
+    match (given, arguments.count) {
+        (None, None) => Ok(Share::WHOLE),
+        (Some(index), Some(count)) => Ok(Share { index, count }),
+        (Some(index), None) if arguments.index.is_none() && slurm.is_some() => {
+            let (first, step) = (number("SLURM_ARRAY_TASK_MIN"), number("SLURM_ARRAY_TASK_STEP"));
+            let index = index.saturating_sub(first.unwrap_or(0)) / step.unwrap_or(1).max(1);
+            let count = number("SLURM_ARRAY_TASK_COUNT");
+            let count = count.ok_or_else(|| Usage("SLURM_ARRAY_TASK_COUNT is not set: say --count".to_owned()))?;
+            Ok(Share { index, count })
+        }
+        (Some(index), None) => Err(Usage(format!("share {index} of how many? say --count")).into()),
+        (None, Some(count)) => Err(Usage(format!("which of the {count} shares? say --index")).into()),
+    }
+}
+
+fn run_task(arguments: &TaskArguments) -> anyhow::Result<End> {
+    let sweep = Sweep::open(&arguments.folder)?;
+    confine(sweep.limit())?;
+    sweep.run_task(arguments.task, &|word| {
+        // Nobody who listens, nobody who works: the process that began this one ends it too.
+        if writeln!(std::io::stdout().lock(), "{word}").is_err() {
+            std::process::exit(1);
+        }
+    })?;
+    Ok(End::Done)
+}
+
+/// Merges what is done, and tells what it says.
+pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<End> {
+    let merged = sweep.tell()?;
+    let words = format!("{}\n{}", merged.words, status_words(&merged.status));
+    let figures = json!({ "status": merged.status, "summary": merged.summary });
+    output::tell(global, &words, figures, Some(folder))?;
+    Ok(if merged.status.missing == 0 { End::Done } else { End::WithLoss })
+}
+
+fn tell(global: &Global, status: &Status, folder: &Path) -> anyhow::Result<End> {
+    output::tell(global, &status_words(status), serde_json::to_value(status)?, Some(folder))?;
+    Ok(End::Done)
+}

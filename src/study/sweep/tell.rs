@@ -1,0 +1,43 @@
+//! What a merged sweep leaves for people.
+
+use super::beside::write_text;
+use super::output::{csv, markdown, trends_csv, words};
+use super::{Status, Summary, Sweep};
+use crate::study::StudyError;
+
+/// A merged sweep.
+#[derive(Debug, Clone)]
+pub struct Merged {
+    /// How far it was.
+    pub status: Status,
+    /// What its runs say together.
+    pub summary: Summary,
+    /// The same in words.
+    pub words: String,
+}
+
+impl Sweep {
+    /// [Merges](Self::merge) what is done, sums it up in `summary.csv`, `trends.csv` (of sampled axes) and `study.md`, and draws
+    /// `plots/`.
+    ///
+    /// # Errors
+    /// When nothing is done yet, or a file cannot be read or written.
+    pub fn tell(&self) -> Result<Merged, StudyError> {
+        let status = self.merge()?;
+        if status.done == 0 {
+            let message = "no run is done yet: zsim sweep run".to_owned();
+            return Err(StudyError::Plan { what: "the sweep", message });
+        }
+        let summary = self.summary()?;
+        let mut files = vec![("summary.csv", csv(&summary)), ("study.md", markdown(&summary, &self.plan, &status))];
+        if !summary.trends.is_empty() {
+            files.push(("trends.csv", trends_csv(&summary)));
+        }
+        for (name, text) in files {
+            write_text(&self.temporary(), &self.folder.join(name), &text)?;
+        }
+        self.draw(&summary)?;
+        let words = words(&summary, &self.plan);
+        Ok(Merged { status, summary, words })
+    }
+}

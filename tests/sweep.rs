@@ -1,0 +1,264 @@
+//! Sweeps: the same bytes however they came about, and failures that are rows.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use assert_cmd::Command;
+use rand::RngExt;
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command as Process, Stdio};
+use std::time::Duration;
+use zsim::random::Seed;
+
+const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
+
+/// Exit code, stdout and stderr.
+fn run(folder: &Path, arguments: &str) -> (i32, String, String) {
+    let output = Command::new(ZSIM).current_dir(folder).args(arguments.split_whitespace()).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap_or(-1), text(output.stdout), text(output.stderr))
+}
+
+fn well(folder: &Path, arguments: &str) -> String {
+    let (code, out, talk) = run(folder, arguments);
+    assert_eq!(code, 0, "`{arguments}`: {talk}");
+    out
+}
+
+/// The tables of results, to the byte.
+fn tables(folder: &Path) -> [Vec<u8>; 2] {
+    ["table.parquet", "table.csv"].map(|name| std::fs::read(folder.join(name)).unwrap())
+}
+
+/// The cells of a column.
+fn column(folder: &Path, name: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(folder.join("table.csv")).unwrap();
+    let mut lines = text.lines();
+    let place = lines.next().unwrap().split(',').position(|cell| cell == name).unwrap();
+    lines.map(|line| line.split(',').nth(place).unwrap().to_owned()).collect()
+}
+
+fn numbers(folder: &Path, name: &str) -> Vec<f64> {
+    column(folder, name).iter().map(|cell| cell.parse().unwrap()).collect()
+}
+
+/// Begins `run` in a process and kills it after a while; whether it had ended by itself.
+fn killed(folder: &Path, after: Duration) -> bool {
+    let mut child = Process::new(ZSIM)
+        .args(["sweep", "run", "--quiet", "--threads", "2", "swept"])
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(after);
+    let ended = child.try_wait().unwrap().is_some();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    ended
+}
+
+const SPRINGS: &str = r#"(
+    base: spring(head: "handheld", shake: (pitch_deg: 2.0)),
+    axes: [
+        linear(path: "head.coil_diameter_mm", from: 18.0, to: 34.0),
+        log(path: "head.wire_diameter_mm", from: 1.6, to: 4.0),
+        values(path: "head.material", values: ["spring_steel", "stainless"]),
+    ],
+    sampling: sobol(count: 4096),
+    measures: [rocking_hz, spring_mass_g, field_of_view_deg],
+    front: [(measure: spring_mass_g, aim: least), (measure: field_of_view_deg, aim: most)],
+)"#;
+
+#[test]
+fn a_sweep_is_the_same_in_one_go_in_shares_and_killed_ten_times() {
+    let here = tempfile::tempdir().unwrap();
+    let at = |name: &str| here.path().join(name);
+    std::fs::write(at("springs.ron"), SPRINGS).unwrap();
+    well(here.path(), "sweep plan springs.ron -o whole");
+    well(here.path(), "sweep run whole --threads 1");
+    well(here.path(), "sweep merge whole");
+
+    well(here.path(), "sweep plan springs.ron -o shares");
+    for index in [2, 0, 1] {
+        well(here.path(), &format!("sweep run shares --threads 2 --index {index} --count 3"));
+    }
+    let (code, _, talk) = run(here.path(), "sweep run shares --index 3 --count 3");
+    assert!(code == 2 && talk.contains("counted from 0"), "{talk}");
+    well(here.path(), "sweep merge shares");
+    assert!(tables(&at("whole")) == tables(&at("shares")));
+
+    well(here.path(), "sweep plan springs.ron -o swept");
+    let mut stream = Seed(7).stream("kills");
+    let mut kills = 0;
+    while kills < 10 && !killed(here.path(), Duration::from_millis(stream.random_range(20..400))) {
+        kills += 1;
+    }
+    assert!(kills > 2, "it was done before it was killed");
+    let (code, out, _) = run(here.path(), "sweep merge swept --json");
+    let left = serde_json::from_str::<Value>(&out).map_or(1, |told| told["status"]["missing"].as_u64().unwrap());
+    assert!(code == 3 && left > 0 || code == 0 && left == 0 || code == 2, "{code} {left}");
+    well(here.path(), "sweep run swept");
+    well(here.path(), "sweep merge swept");
+    assert!(tables(&at("whole")) == tables(&at("swept")));
+
+    // A light spring of a given geometry is one of thin wire: the law m = rho pi^2 D d^2 n / 4.
+    let [coil, wire, mass] =
+        ["coil_diameter_mm", "wire_diameter_mm", "spring_mass_g"].map(|name| column(&at("whole"), name));
+    let material = column(&at("whole"), "material");
+    let mut told = 0;
+    for row in (0..4096).filter(|row| !mass[*row].is_empty()) {
+        let [coil, wire, mass] = [&coil, &wire, &mass].map(|cells| cells[row].parse::<f64>().unwrap());
+        let density = if material[row] == "stainless" { 7900.0 } else { 7850.0 };
+        let law = density * std::f64::consts::PI.powi(2) / 4.0 * coil * wire * wire * 12.0 * 1e-6;
+        assert!((mass / law - 1.0).abs() < 0.02, "{mass} g, {law} g");
+        told += 1;
+    }
+    assert!(told > 1000, "{told} heads stand");
+    let failed = column(&at("whole"), "error").iter().filter(|error| !error.is_empty()).count();
+    assert_eq!(told + failed, 4096, "a head that falls is a row with its error");
+    for name in ["study.md", "trends.csv", "front.csv", "plots/front.png", "plots/effects_rocking_hz.svg"] {
+        assert!(at("whole").join(name).metadata().unwrap().len() > 100, "{name}");
+    }
+}
+
+#[test]
+fn a_plan_is_kept_gone_on_with_and_replaced_only_when_asked() {
+    let here = tempfile::tempdir().unwrap();
+    let few = SPRINGS.replace("4096", "256");
+    std::fs::write(here.path().join("a.ron"), &few).unwrap();
+    std::fs::write(here.path().join("b.ron"), few.replace("to: 34.0", "to: 33.0")).unwrap();
+    well(here.path(), "sweep plan a.ron -o swept");
+    well(here.path(), "sweep run swept");
+    well(here.path(), "sweep plan a.ron -o swept");
+    let out = well(here.path(), "sweep status swept --json");
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 256);
+    let (code, _, talk) = run(here.path(), "sweep plan b.ron -o swept");
+    assert!(code == 2 && talk.contains("other work"), "{talk}");
+    well(here.path(), "sweep plan b.ron -o swept --force");
+    let out = well(here.path(), "sweep status swept --json");
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 0);
+    // Back again: what was done is found by what it is.
+    well(here.path(), "sweep plan a.ron -o swept --force");
+    let out = well(here.path(), "sweep status swept --json");
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 256);
+    let (code, _, talk) = run(here.path(), "sweep run nowhere");
+    assert!(code == 2 && talk.contains("holds no sweep"), "{talk}");
+}
+
+const WALKS: &str = r#"(
+    base: journey(
+        scene: "mocap_room", head: "handheld", motion: "hand", lidar: "utm30lx", imu: "3dm_gx2", clock: "drifting",
+        estimator: "default", duration_s: 7.0, limit: (time_s: 300.0, memory_mib: 2048),
+    ),
+    axes: [
+        values(path: "imu", values: ["3dm_gx2", "tactical"]),
+        levels(name: "variant", levels: [
+            (name: "base"),
+            (name: "the same"),
+            (name: "no offset grids", set: { "estimator.offset_grids": false }),
+        ]),
+    ],
+    sampling: grid,
+    seeds: [3],
+    measures: [position_rmse_m, drift_m_per_min, fraction_seen, wall_s],
+)"#;
+
+#[test]
+fn journeys_share_their_work_and_give_what_each_gives_alone() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("walks.ron"), WALKS).unwrap();
+    let out = well(here.path(), "sweep plan walks.ron -o swept --json");
+    let planned: Value = serde_json::from_str(&out).unwrap();
+    // Six runs, of which two are the same as another, on one swing through the room.
+    assert_eq!((planned["points"].as_u64(), planned["tasks"].as_u64()), (Some(6), Some(1)));
+    let mut kills = 0;
+    while kills < 3 && !killed(here.path(), Duration::from_millis(1500)) {
+        kills += 1;
+    }
+    well(here.path(), "sweep run swept --threads 2");
+    well(here.path(), "sweep merge swept");
+    assert_eq!(std::fs::read_dir(here.path().join("swept/parts")).unwrap().count(), 4);
+    well(here.path(), "study walks.ron -o again --threads 1");
+    assert!(tables(&here.path().join("swept")) == tables(&here.path().join("again")));
+
+    let errors = numbers(&here.path().join("swept"), "position_rmse_m");
+    assert_eq!(errors[0], errors[1]);
+    assert!(errors[0] != errors[2] && errors[0] != errors[3], "{errors:?}");
+    // Runs of seven seconds have no drift to tell.
+    assert!(column(&here.path().join("swept"), "drift_m_per_min").iter().all(String::is_empty));
+    for (row, imu) in [(0, "3dm_gx2"), (3, "tactical")] {
+        let alone = format!("--scene mocap_room --duration 7s --seed 3 --imu {imu} --out {imu} --json");
+        let told: Value = serde_json::from_str(&well(here.path(), &alone)).unwrap();
+        assert_eq!(told["open_loop"]["position_rmse_m"].as_f64(), Some(errors[row]));
+    }
+}
+
+#[test]
+fn a_run_that_fails_is_a_row_and_the_others_go_on() {
+    let here = tempfile::tempdir().unwrap();
+    let spec = WALKS
+        .replace(
+            r#"values(path: "imu", values: ["3dm_gx2", "tactical"])"#,
+            r#"values(path: "head.parts.0.mass_kg", values: [0.21, 2.0])"#,
+        )
+        .replace(r#"(name: "the same"),"#, "");
+    std::fs::write(here.path().join("falls.ron"), &spec).unwrap();
+    well(here.path(), "study falls.ron -o falls --threads 2");
+    let errors = column(&here.path().join("falls"), "error");
+    assert!(errors[0].is_empty() && errors[1].is_empty(), "{errors:?}");
+    assert!(errors[2].contains("carries at most") && errors[3] == errors[2], "{errors:?}");
+
+    std::fs::write(here.path().join("late.ron"), spec.replace("time_s: 300.0", "time_s: 0.01")).unwrap();
+    well(here.path(), "study late.ron -o late");
+    assert!(column(&here.path().join("late"), "error")[0].contains("took longer than 0.01 s"));
+
+    if cfg!(target_os = "linux") {
+        std::fs::write(here.path().join("large.ron"), spec.replace("memory_mib: 2048", "memory_mib: 24")).unwrap();
+        well(here.path(), "study large.ron -o large");
+        let errors = column(&here.path().join("large"), "error");
+        assert!(errors[0].contains("24 MiB"), "{errors:?}");
+    }
+}
+
+#[test]
+fn what_makes_no_sense_is_told_with_its_line() {
+    let here = tempfile::tempdir().unwrap();
+    let wrong = |spec: &str, old: &str, new: &str, words: &[&str]| {
+        assert!(spec.contains(old), "{old}");
+        let text = spec.replacen(old, new, 1);
+        std::fs::write(here.path().join("bad.ron"), &text).unwrap();
+        let (code, _, talk) = run(here.path(), "sweep plan bad.ron -o bad");
+        assert_eq!(code, 2, "{new}: {talk}");
+        words.iter().for_each(|word| assert!(talk.contains(word), "{new}: {talk}"));
+        let (checked, _, _) = run(here.path(), "check bad.ron");
+        assert_eq!(checked, 2, "{new}");
+        assert!(!here.path().join("bad").exists());
+    };
+    wrong(SPRINGS, "head.coil_diameter_mm", "head.coil_diameter", &["bad.ron:4:", "coil_diameter_mm", "axis"]);
+    wrong(SPRINGS, "head.coil_diameter_mm", "head.mass_kg", &["may be any of", "parts.0.block.mass_kg"]);
+    wrong(SPRINGS, "head.coil_diameter_mm", "lidar.rate_hz", &["bad.ron:4:", "no setting"]);
+    wrong(SPRINGS, "from: 18.0", "from: -1.0", &["bad.ron:4:", "above 0"]);
+    wrong(SPRINGS, "from: 1.6", "from: 0.0", &["bad.ron:5:"]);
+    wrong(SPRINGS, "\"stainless\"", "\"wood\"", &["bad.ron:6:", "wood"]);
+    wrong(SPRINGS, "sobol(count: 4096)", "grid", &["steps"]);
+    wrong(SPRINGS, "count: 4096", "count: 0", &["count"]);
+    wrong(SPRINGS, "[rocking_hz", "[position_rmse_m", &["does not tell position_rmse_m"]);
+    wrong(SPRINGS, "[rocking_hz", "[rocking_hz, rocking_hz", &["more than once"]);
+    wrong(WALKS, "seeds: [3]", "seeds: []", &["at least one"]);
+    wrong(WALKS, "seeds: [3]", "seeds: [3, 3]", &["more than once"]);
+    wrong(WALKS, "\"tactical\"", "\"nosuch\"", &["no such IMU"]);
+    wrong(WALKS, "(name: \"the same\")", "(name: \"base\")", &["more than once"]);
+    wrong(WALKS, "(name: \"the same\")", "(name: \"a, b\")", &["commas"]);
+    wrong(WALKS, "estimator.offset_grids", "estimator.offset_grid", &["bad.ron:11:", "offset_grid"]);
+    wrong(WALKS, "\"mocap_room\"", "\"nowhere\"", &["no such scene"]);
+    wrong(WALKS, "memory_mib: 2048", "memory_mib: 2048, cores: 2", &["cores"]);
+}
+
+#[test]
+fn every_shipped_study_is_right() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let files = std::fs::read_dir(root.join("specs/studies")).unwrap();
+    let files: Vec<_> = files.map(|entry| entry.unwrap().path()).collect();
+    let output = Command::new(ZSIM).current_dir(root).arg("check").args(&files).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
