@@ -76,3 +76,4 @@ pub use estimator::{Estimator, estimate_all};
 pub use output::{EstimatedPose, OpenLoop, WindowReport};
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
 pub use spent::TimeSpent;
+pub use stamps::smoothed_stamps;
