@@ -15,6 +15,7 @@ mod failure;
 mod gains;
 mod info;
 mod journey;
+mod latency;
 mod output;
 mod quantity;
 mod reproduce;
@@ -57,6 +58,7 @@ enum Verb {
     Gains(gains::Arguments),
     Spring(spring::Arguments),
     Coverage(coverage::Arguments),
+    Latency(latency::Arguments),
     Reproduce(reproduce::Arguments),
     Study(study::Arguments),
     Check(check::Arguments),
@@ -100,6 +102,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Gains(arguments) => gains::run(arguments, global),
         Verb::Spring(arguments) => spring::run(arguments, global),
         Verb::Coverage(arguments) => coverage::run(arguments, global),
+        Verb::Latency(arguments) => latency::run(arguments, global),
         Verb::Reproduce(arguments) => reproduce::run(arguments, global),
         Verb::Study(arguments) => study::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),

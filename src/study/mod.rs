@@ -19,6 +19,7 @@ mod estimate;
 pub mod gains;
 mod journey;
 mod judge;
+pub mod latency;
 mod manifest;
 mod memory;
 mod open_loop;
@@ -26,6 +27,7 @@ mod record;
 mod register;
 pub mod reproduction;
 pub mod spring;
+mod true_clock;
 mod truth_near;
 mod watch;
 
