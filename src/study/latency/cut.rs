@@ -6,9 +6,9 @@ use nalgebra::Matrix2;
 
 /// Half the thickness of the cut, m.
 const HALF_THICKNESS_M: f64 = 0.12;
-/// Half of what is shown of it, level and upright, m.
-const HALF_LENGTH_M: f64 = 3.2;
-const HALF_HEIGHT_M: f64 = 1.9;
+/// Half its length and height, m.
+const HALF_LENGTH_M: f64 = 5.0;
+const HALF_HEIGHT_M: f64 = 2.4;
 /// Time over which a rate of rotation is taken, both ways.
 const EITHER_WAY: Span = Span::from_nanos(5_000_000);
 
@@ -45,8 +45,8 @@ impl Cut {
         Some(Self { centre_in_world, normal_in_world, along_in_world: normal_in_world.cross(&Vector::z()), from, to })
     }
 
-    /// Whether it shows a point that truly is at `point_in_world`, seen at `stamp`.
-    pub(super) fn shows(&self, point_in_world: &Vector, stamp: Stamp) -> bool {
+    /// Whether it has a point that truly is at `point_in_world`, seen at `stamp`.
+    pub(super) fn has(&self, point_in_world: &Vector, stamp: Stamp) -> bool {
         let from_centre = point_in_world - self.centre_in_world;
         (self.from..=self.to).contains(&stamp)
             && from_centre.dot(&self.normal_in_world).abs() < HALF_THICKNESS_M
@@ -94,8 +94,8 @@ mod tests {
         let cut = Cut::through(&truth, 4.0).unwrap();
         let middle = Stamp::from_nanos(10_000_000_000);
         // The cut goes through (1, 2, 1), along x.
-        assert!(cut.shows(&Vector::new(3.0, 2.1, 0.0), middle) && !cut.shows(&Vector::new(3.0, 2.2, 0.0), middle));
-        assert!(!cut.shows(&Vector::new(3.0, 2.0, 0.0), Stamp::from_nanos(7_900_000_000)));
+        assert!(cut.has(&Vector::new(3.0, 2.1, 0.0), middle) && !cut.has(&Vector::new(3.0, 2.2, 0.0), middle));
+        assert!(!cut.has(&Vector::new(3.0, 2.0, 0.0), Stamp::from_nanos(7_900_000_000)));
         let (along, up) = cut.place(&Vector::new(3.0, 2.0, 0.5));
         assert_relative_eq!(along.abs(), 2.0, epsilon = 1e-9);
         assert_relative_eq!(up, -0.5, epsilon = 1e-9);

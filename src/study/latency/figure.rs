@@ -3,8 +3,6 @@
 use super::{Banded, ClockState, Disturbance, Study, StudyRun};
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series, SignedDots};
 
-/// Half of what a panel shows, along the cut and up, m.
-const HALF_SHOWN_M: (f64, f64) = (3.2, 1.9);
 /// Rates of rotation beyond this have the colours' ends, degrees/s.
 const FULL_COLOUR_DEG_PER_S: f64 = 150.0;
 /// Width of a panel, points.
@@ -42,15 +40,13 @@ fn panel(study: &Study, (disturbance, clock): (Disturbance, ClockState), title: 
     let points = study.run(disturbance, clock).map(|run| run.cut_m.as_slice()).unwrap_or_default();
     let dots = points.iter().zip(&study.cut_rates_deg_per_s);
     let unit = if is_first { "\u{b0}/s" } else { "" };
-    let (along, up) = HALF_SHOWN_M;
-    Chart::new(title, "Along the cut (m)", "Up (m)").as_map().between((-along, along), (-up, up)).with_signed_dots(
-        SignedDots {
-            unit: unit.to_owned(),
-            limit: FULL_COLOUR_DEG_PER_S,
-            size: 1.3,
-            dots: dots.map(|((x, y), rate)| (f64::from(*x), f64::from(*y), *rate)).collect(),
-        },
-    )
+    let (along, up) = study.cut_range_m;
+    Chart::new(title, "Along the cut (m)", "Up (m)").as_map().between(along, up).with_signed_dots(SignedDots {
+        unit: unit.to_owned(),
+        limit: FULL_COLOUR_DEG_PER_S,
+        size: 1.6,
+        dots: dots.map(|((x, y), rate)| (f64::from(*x), f64::from(*y), *rate)).collect(),
+    })
 }
 
 /// Spread of the cloud and error of the position over the latency, and over the noise: with the clock state off and on, each
@@ -60,14 +56,20 @@ pub fn curve_figure(study: &Study) -> Figure {
     let over_noise = |run: &StudyRun| run.disturbance.noise_ms;
     let (sigma, rmse): (fn(&StudyRun) -> Banded, fn(&StudyRun) -> Banded) =
         (|run| run.cloud_sigma_m, |run| run.position_rmse_m);
-    let (cloud, position) = ("Cloud about the true surfaces, sigma (mm)", "Position RMSE (mm)");
+    let (cloud, position) = ("Cloud, sigma (mm)", "Position RMSE (mm)");
     let (latency, noise) = ("Latency of the IMU's stamps (ms)", "Noise on the scans' stamps, sigma (ms)");
     let chart = |labels: (&str, &str), of: &dyn Fn(ClockState) -> Vec<(f64, Banded)>| {
         let series = |name: &str, clock, colour| banded(name, colour, &of(clock));
+        let dots = |clock, colour| {
+            let points = of(clock).iter().map(|(x, y)| (*x, y.value * 1e3)).collect();
+            Series::dots("", colour, points).marked(Mark::Dots(4.0))
+        };
         Chart::new("", labels.0, labels.1)
             .starting_at_zero()
             .with(series("clock state off", ClockState::Off, Colour::Second))
             .with(series("clock state on", ClockState::On, Colour::Estimate))
+            .with(dots(ClockState::Off, Colour::Second))
+            .with(dots(ClockState::On, Colour::Estimate))
     };
     let latencies = |figure: fn(&StudyRun) -> Banded| {
         move |clock| study.latencies(clock).iter().map(|run| (over_latency(run), figure(run))).collect()

@@ -52,7 +52,7 @@ impl Bench<'_> {
         stop: &AtomicBool,
     ) -> Result<Judged, StudyError> {
         let timing = Timing::new(disturbance, &self.probe.clock, &self.probe.scan_stamps, self.seed);
-        let estimator = self.settings(clock);
+        let estimator = self.settings(clock, disturbance.noise_ms * 1e-3);
         let estimate = self.estimate(&estimator, &timing, stop)?;
         // The cloud is made with the times that the estimator took the scans for.
         let scan_stamps = smoothed_stamps(timing.scan_stamps(), &estimator);
@@ -79,15 +79,14 @@ impl Bench<'_> {
         })
     }
 
-    fn settings(&self, clock: ClockState) -> EstimatorSpec {
-        let own = self.estimator;
-        match clock {
-            ClockState::On => own.clone(),
-            ClockState::Off => EstimatorSpec {
-                clock: ClockSpec { estimated: false, start_s: 0.0, jitter_s: 0.0, ..own.clock.clone() },
-                ..own.clone()
-            },
-        }
+    /// The estimator's settings for a clock state; who lets it smooth stamps tells it by how much they jitter.
+    fn settings(&self, clock: ClockState, noise_s: f64) -> EstimatorSpec {
+        let own = &self.estimator.clock;
+        let clock = match clock {
+            ClockState::On => ClockSpec { jitter_s: own.jitter_s.max(noise_s), ..own.clone() },
+            ClockState::Off => ClockSpec { estimated: false, start_s: 0.0, jitter_s: 0.0, ..own.clone() },
+        };
+        EstimatorSpec { clock, ..self.estimator.clone() }
     }
 
     fn estimate(&self, spec: &EstimatorSpec, timing: &Timing<'_>, stop: &AtomicBool) -> Result<OpenLoop, StudyError> {

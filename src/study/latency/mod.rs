@@ -5,7 +5,7 @@
 //! lidar's scans ([`Disturbance`]). Both are put on between the recording and the estimator; nothing is simulated again. First
 //! the clocks' true offset is taken away, which a simulation knows, so that no latency is none. Each disturbance is estimated
 //! with the clock state off (offset held at zero, every stamp believed: what the paper shows) and on (offset and rate
-//! estimated, stamps smoothed: what an estimator can recover, [`ClockState`]).
+//! estimated, stamps smoothed from the noise that was put on them: what an estimator can recover, [`ClockState`]).
 //!
 //! A run is judged by the spread of its cloud about the true surfaces and by the error of its trajectory. Their bands are of
 //! 95 %, by drawing blocks of the run's time again and again; a parabola through the squared error over the latency tells at
@@ -51,6 +51,6 @@ impl Disturbance {
 pub enum ClockState {
     /// Nothing: the clocks are taken to be one, and every stamp is believed.
     Off,
-    /// It estimates offset and rate, and smooths stamps, by its settings.
+    /// It estimates offset and rate by its settings, and smooths stamps, told by how much they jitter.
     On,
 }

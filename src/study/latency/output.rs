@@ -39,7 +39,7 @@ pub fn words(study: &Study) -> String {
     let noises = study.noises(ClockState::Off);
     let noise = |run: &&StudyRun| row(format!("noise {} ms", run.disturbance.noise_ms), run.disturbance);
     let rows: Vec<Vec<String>> = latencies.iter().map(latency).chain(noises.iter().skip(1).map(noise)).collect();
-    let header = ["timing", "cloud", "position", "cloud, clock on", "position, on", "clock ms"];
+    let header = ["timing", "cloud", "position", "cloud, on", "position, on", "clock ms"];
     format!(
         "{}\nMillimetres: standard deviation of the cloud about the true surfaces, and position RMSE; the clock state off, then \
          on, with the error of the offset that it ends with. Bands: 95 %, blocks of {} s.\n\n{}\n",

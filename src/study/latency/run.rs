@@ -87,7 +87,10 @@ pub struct Study {
     /// The head's true rate of rotation in the cut's plane for each of its points, degrees/s.
     #[serde(skip)]
     pub cut_rates_deg_per_s: Vec<f64>,
-    /// What is shown of the cuts, latencies first.
+    /// What of the cut is shown, along it and up, m.
+    #[serde(skip)]
+    pub cut_range_m: ((f64, f64), (f64, f64)),
+    /// Which disturbances' cuts are shown, latencies first.
     #[serde(skip)]
     pub shown: [Vec<Disturbance>; 2],
 }
@@ -245,6 +248,7 @@ impl Latency {
             recovery: Recovery { cloud_sigma_departs_by: f64::NAN, cloud_sigma_departs_by_off: f64::NAN },
             runs,
             cut_rates_deg_per_s: probe.shown_rates_deg_per_s,
+            cut_range_m: probe.range_m,
             shown,
         };
         study.recovery = Recovery {
