@@ -133,6 +133,7 @@ fn name(stage: Stage) -> &'static str {
         Stage::Simulating => "simulating",
         Stage::Estimating => "estimating",
         Stage::Registering => "registering",
+        Stage::Bounding => "bounding",
         Stage::Reporting => "reporting",
     }
 }

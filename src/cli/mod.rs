@@ -5,6 +5,7 @@
 
 mod arguments;
 mod bars;
+mod bound;
 mod check;
 mod completions;
 mod coverage;
@@ -55,6 +56,7 @@ enum Verb {
     Simulate(simulate::Arguments),
     Estimate(estimate::Arguments),
     Evaluate(evaluate::Arguments),
+    Bound(bound::Arguments),
     Gains(gains::Arguments),
     Spring(spring::Arguments),
     Coverage(coverage::Arguments),
@@ -99,6 +101,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Simulate(arguments) => simulate::run(arguments, global),
         Verb::Estimate(arguments) => estimate::run(arguments, global),
         Verb::Evaluate(arguments) => evaluate::run(arguments, global),
+        Verb::Bound(arguments) => bound::run(arguments, global),
         Verb::Gains(arguments) => gains::run(arguments, global),
         Verb::Spring(arguments) => spring::run(arguments, global),
         Verb::Coverage(arguments) => coverage::run(arguments, global),

@@ -9,7 +9,7 @@ mod quantity;
 mod rows;
 mod table;
 
-pub use figures::{clock_offset, errors_over_time, head_pitch, trajectory_from_above};
+pub use figures::{bound_over_time, clock_offset, errors_over_time, head_pitch, trajectory_from_above};
 pub use metrics::{ClockMetrics, ClosedLoopMetrics, CloudMetrics, Metrics, OpenLoopMetrics, SimulationMetrics};
 pub use page::{Section, page};
 pub use profile::time_spent;

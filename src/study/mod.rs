@@ -9,6 +9,7 @@
 //! [`coverage`] of its lidar. Many estimates tell by [`comparison`] which of the estimator's ingredients matter.
 
 mod artefacts;
+mod bound;
 mod cadence;
 mod calibration;
 mod cloud;
@@ -31,6 +32,7 @@ mod true_clock;
 mod truth_near;
 mod watch;
 
+pub use bound::{Bounded, information_bound};
 pub use calibration::CalibrationSpec;
 pub use error::StudyError;
 pub use estimate::{Outcome, Wishes, estimate_recording};

@@ -9,6 +9,8 @@ pub enum Stage {
     Estimating,
     /// Beams become a cloud.
     Registering,
+    /// What the measurements could tell at best.
+    Bounding,
     /// Errors, plots, the page.
     Reporting,
 }
