@@ -134,6 +134,7 @@ fn name(stage: Stage) -> &'static str {
         Stage::Estimating => "estimating",
         Stage::ClosingLoops => "closing loops",
         Stage::Registering => "registering",
+        Stage::Bounding => "bounding",
         Stage::Reporting => "reporting",
     }
 }

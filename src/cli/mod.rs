@@ -6,6 +6,7 @@
 mod arguments;
 mod bars;
 mod base;
+mod bound;
 mod check;
 mod completions;
 mod coverage;
@@ -16,6 +17,7 @@ mod failure;
 mod gains;
 mod info;
 mod journey;
+mod latency;
 mod output;
 mod quantity;
 mod reproduce;
@@ -59,9 +61,11 @@ enum Verb {
     Estimate(estimate::Arguments),
     Evaluate(evaluate::Arguments),
     Base(base::Arguments),
+    Bound(bound::Arguments),
     Gains(gains::Arguments),
     Spring(spring::Arguments),
     Coverage(coverage::Arguments),
+    Latency(latency::Arguments),
     Reproduce(reproduce::Arguments),
     Study(study::Arguments),
     Sweep(sweep::Arguments),
@@ -104,9 +108,11 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Estimate(arguments) => estimate::run(arguments, global),
         Verb::Evaluate(arguments) => evaluate::run(arguments, global),
         Verb::Base(arguments) => base::run(arguments, global),
+        Verb::Bound(arguments) => bound::run(arguments, global),
         Verb::Gains(arguments) => gains::run(arguments, global),
         Verb::Spring(arguments) => spring::run(arguments, global),
         Verb::Coverage(arguments) => coverage::run(arguments, global),
+        Verb::Latency(arguments) => latency::run(arguments, global),
         Verb::Reproduce(arguments) => reproduce::run(arguments, global),
         Verb::Study(arguments) => study::run(arguments, global),
         Verb::Sweep(arguments) => sweep::run(arguments, global),

@@ -81,4 +81,5 @@ pub use output::{EstimatedPose, OpenLoop, WindowReport};
 pub use registration::{ClosedLoop, RegistrationReport, RegistrationSpec, register};
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
 pub use spent::TimeSpent;
+pub use stamps::smoothed_stamps;
 pub use survey::Survey;

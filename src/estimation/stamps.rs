@@ -4,6 +4,9 @@
 //! counting than by any single stamp. A Kalman filter over (time of the last sample, period) follows the count: with jitter
 //! `s` and a rate that wanders slowly, the smoothed stamps are good to a few hundredths of `s` within a minute.
 
+use super::EstimatorSpec;
+use crate::time::{Span, Stamp};
+
 /// Wander of a sensor's rate, relative, per square root of a second: 0.2 ppm, a quartz in a room.
 const RATE_WALK_PER_SQRT_S: f64 = 2e-7;
 /// So many stamps in a row far from the count mean that the count is wrong.
@@ -109,6 +112,17 @@ pub(super) fn period_of(stamps_s: &[f64]) -> Option<f64> {
     let determinant = n * sxx - sx * sx;
     let slope = (n * sxy - sx * sy) / determinant;
     (determinant > 0.0 && slope > 0.0).then_some(slope)
+}
+
+/// When the samples of a regular sensor were really taken, as the estimator takes it: their stamps, in the order in which they
+/// came, smoothed by these settings. Whoever projects beams by an estimate needs the times that it used.
+pub fn smoothed_stamps(stamps: &[Stamp], spec: &EstimatorSpec) -> Vec<Stamp> {
+    let Some(first) = stamps.first() else { return Vec::new() };
+    let seconds: Vec<f64> = stamps.iter().map(|stamp| stamp.seconds_since(*first)).collect();
+    let learning = seconds.partition_point(|s| *s <= spec.inertial.rest_s + spec.step_s);
+    let Some(period_s) = period_of(&seconds[..learning]) else { return stamps.to_vec() };
+    let mut filter = StampFilter::new(period_s, spec.clock.jitter_s);
+    seconds.iter().map(|raw_s| *first + Span::from_seconds(filter.smooth(*raw_s))).collect()
 }
 
 #[cfg(test)]

@@ -4,12 +4,14 @@
 //! ([`align`], Umeyama without scale, as `evo_ape -a`): the absolute errors over time ([`Errors`]), the drift out of an
 //! alignment over the first seconds alone ([`drift()`]), the error of the motion within a minute ([`relative_error`]). A
 //! clock offset is judged by [`clock_error`], a cloud by its distances to the true surfaces ([`CloudErrors`]). Beside the
-//! estimate stands what the raw IMU alone would have said ([`DeadReckoning`]).
+//! estimate stands what the raw IMU alone would have said ([`DeadReckoning`]), and the least error that the measurements allow
+//! ([`Information`]).
 //!
 //! Everything here is pure: numbers in, numbers out.
 
 mod absolute;
 mod alignment;
+mod bound;
 mod clock;
 mod cloud;
 mod consistency;
@@ -21,6 +23,7 @@ mod relative;
 
 pub use absolute::Errors;
 pub use alignment::{align, align_poses};
+pub use bound::{BoundModel, Information, InformationBound, Sight};
 pub use clock::{ClockError, clock_error};
 pub use cloud::{CloudErrors, CloudSummary, Thinning};
 pub use consistency::{Consistency, consistency};

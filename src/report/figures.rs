@@ -1,7 +1,7 @@
 //! The figures of a run.
 
 use super::plot::{Chart, Colour, Figure, Mark, Series};
-use crate::evaluation::Errors;
+use crate::evaluation::{Errors, InformationBound};
 use crate::geometry::{Rotation, Trajectory, Vector};
 use crate::time::Stamp;
 
@@ -72,6 +72,18 @@ fn with_axes(mut chart: Chart, stamps: &[Stamp], vectors: &[Vector], factor: f64
         chart = chart.with(Series::line(name, colour, curve(&|v| v[axis])).marked(Mark::Line(1.0)));
     }
     chart.with(Series::line("magnitude", Colour::Truth, curve(&|v| v.norm())).marked(Mark::Line(1.5)))
+}
+
+/// The least standard deviation that position and attitude can be told with, along and about each axis of the world.
+pub fn bound_over_time(bound: &InformationBound) -> Figure {
+    let most = bound.position_sigma_m.iter().map(Vector::norm).fold(0.0, f64::max);
+    let (unit, per_m) = length_unit(most);
+    let position = Chart::new("Information bound on the position", TIME, &format!("Sigma ({unit})"));
+    let attitude = Chart::new("Information bound on the attitude", TIME, "Sigma (\u{b0})");
+    Figure::of(vec![
+        with_axes(position.starting_at_zero(), &bound.stamps, &bound.position_sigma_m, per_m),
+        with_axes(attitude.starting_at_zero(), &bound.stamps, &bound.attitude_sigma_rad, 1_f64.to_degrees()),
+    ])
 }
 
 /// Pitch of the head over the run, and closer over ten seconds in its middle.

@@ -9,7 +9,9 @@ mod quantity;
 mod rows;
 mod table;
 
-pub use figures::{clock_offset, errors_of_both_loops, errors_over_time, head_pitch, trajectory_from_above};
+pub use figures::{
+    bound_over_time, clock_offset, errors_of_both_loops, errors_over_time, head_pitch, trajectory_from_above,
+};
 pub use metrics::{
     ClockMetrics, ClosedLoopMetrics, CloudMetrics, LidarMetrics, Metrics, OpenLoopMetrics, SimulationMetrics,
 };

@@ -33,6 +33,11 @@ enum Target {
 }
 
 impl Surroundings<'_> {
+    /// Whether a beam ended on what stands, whose end, projected by the true pose, is at `end_in_world`.
+    pub(super) fn ends_on_what_stands(&self, end_in_world: &Vector, instant: &TrueInstant) -> bool {
+        self.target(end_in_world, instant) == Target::Still
+    }
+
     /// What a beam ended on whose end, projected by the true pose, is at `end_in_world`: whatever is nearest to that.
     ///
     /// Noise takes the end off what the beam met by centimetres, so one is taken for another only where both are within

@@ -1,5 +1,6 @@
 use crate::dynamics::DynamicsError;
 use crate::estimation::EstimationError;
+use crate::evaluation::EvaluationError;
 use crate::motion::MotionError;
 use crate::recording::RecordingError;
 use crate::report::plot::PlotError;
@@ -18,6 +19,9 @@ pub enum StudyError {
     /// A file could not be written or read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// An estimate, or a run, cannot be judged.
+    #[error(transparent)]
+    Evaluation(#[from] EvaluationError),
     /// There is no estimate.
     #[error(transparent)]
     Estimation(#[from] EstimationError),

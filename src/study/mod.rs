@@ -9,6 +9,7 @@
 //! [`coverage`] of its lidar. A [`sweep`] varies any of it, and tells what matters.
 
 mod artefacts;
+mod bound;
 mod cadence;
 mod calibration;
 mod closed_loop;
@@ -19,6 +20,7 @@ mod estimate;
 pub mod gains;
 mod journey;
 mod judge;
+pub mod latency;
 mod manifest;
 mod memory;
 mod open_loop;
@@ -27,9 +29,11 @@ mod register;
 pub mod reproduction;
 pub mod spring;
 pub mod sweep;
+mod true_clock;
 mod truth_near;
 mod watch;
 
+pub use bound::{Bounded, information_bound};
 pub use calibration::CalibrationSpec;
 pub use error::StudyError;
 pub use estimate::{Outcome, Wishes, estimate_recording};

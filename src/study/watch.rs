@@ -11,6 +11,8 @@ pub enum Stage {
     ClosingLoops,
     /// Beams become a cloud.
     Registering,
+    /// What the measurements could tell at best.
+    Bounding,
     /// Errors, plots, the page.
     Reporting,
 }

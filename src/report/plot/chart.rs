@@ -80,6 +80,19 @@ pub struct Cells {
     pub cells: Vec<Cell>,
 }
 
+/// Dots whose colour shows an amount of either sign, in front of all series. Those beyond the axes are not drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SignedDots {
+    /// What the amounts are, with their unit, for the legend; empty for none.
+    pub unit: String,
+    /// The amount, of either sign, from which on the colour is the end's.
+    pub limit: f64,
+    /// Diameter in points.
+    pub size: f64,
+    /// Abscissa, ordinate, amount.
+    pub dots: Vec<(f64, f64, f64)>,
+}
+
 /// One pair of axes with what is drawn on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
@@ -97,6 +110,8 @@ pub struct Chart {
     pub range: Option<[(f64, f64); 2]>,
     /// Amounts as colours.
     pub cells: Option<Cells>,
+    /// Dots coloured by an amount.
+    pub signed_dots: Option<SignedDots>,
     /// Marks of the abscissa with their words, instead of round numbers; those beyond the data are left out.
     pub x_marks: Vec<(f64, String)>,
     /// The same of the ordinate.
@@ -116,6 +131,7 @@ impl Chart {
             from_zero: false,
             range: None,
             cells: None,
+            signed_dots: None,
             x_marks: Vec::new(),
             y_marks: Vec::new(),
             series: Vec::new(),
@@ -133,6 +149,13 @@ impl Chart {
     #[must_use]
     pub fn with_cells(mut self, cells: Cells) -> Self {
         self.cells = Some(cells);
+        self
+    }
+
+    /// The same with dots coloured by an amount in front.
+    #[must_use]
+    pub fn with_signed_dots(mut self, dots: SignedDots) -> Self {
+        self.signed_dots = Some(dots);
         self
     }
 
@@ -176,7 +199,8 @@ impl Chart {
         let mut ends = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         let corners = |cell: &Cell| [(cell.x.0, cell.y.0), (cell.x.1, cell.y.1)];
         let cells = self.cells.iter().flat_map(|cells| cells.cells.iter().flat_map(corners));
-        for (x, y) in self.series.iter().flat_map(Series::extent).chain(cells) {
+        let dots = self.signed_dots.iter().flat_map(|dots| dots.dots.iter().map(|(x, y, _)| (*x, *y)));
+        for (x, y) in self.series.iter().flat_map(Series::extent).chain(cells).chain(dots) {
             for (end, value) in ends.iter_mut().zip([x, y]) {
                 *end = (end.0.min(value), end.1.max(value));
             }

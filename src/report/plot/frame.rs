@@ -3,9 +3,9 @@
 use super::axis::Axis;
 use super::canvas::{Anchor, At, Canvas};
 use super::legend::Header;
-use super::palette::{GRID, INK, shade};
+use super::palette::{GRID, INK, shade, signed_shade};
 use super::stroke::dashes;
-use super::{Chart, Mark, PlotError, Series};
+use super::{Chart, Mark, PlotError, Series, SignedDots};
 use plotters::prelude::DrawingBackend;
 
 /// Sizes of letters, points.
@@ -75,6 +75,7 @@ pub(super) fn draw<DB: DrawingBackend>(
     for series in &chart.series {
         points(canvas, &frame, series)?;
     }
+    signed_dots(canvas, &frame, chart)?;
     header.draw(canvas, (frame.left, frame.right()), frame.top)
 }
 
@@ -149,6 +150,14 @@ fn cells<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) 
         let (upper_left, lower_right) = (frame.at((cell.x.0, cell.y.1)), frame.at((cell.x.1, cell.y.0)));
         canvas.rectangle(upper_left, lower_right, shade((cell.value - least) / (most - least)))
     })
+}
+
+fn signed_dots<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
+    let Some(SignedDots { limit, size, dots, .. }) = &chart.signed_dots else { return Ok(()) };
+    let within = |axis: &Axis, value: f64| (axis.low..=axis.high).contains(&value);
+    dots.iter()
+        .filter(|(x, y, amount)| within(&frame.x, *x) && within(&frame.y, *y) && amount.is_finite())
+        .try_for_each(|(x, y, amount)| canvas.dot(frame.at((*x, *y)), signed_shade(0.5 + 0.5 * amount / limit), *size))
 }
 
 fn band<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series) -> Result<(), PlotError> {

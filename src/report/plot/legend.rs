@@ -1,9 +1,8 @@
 //! What stands above a chart's axes: its title, and what its series and colours mean.
 
 use super::canvas::{Anchor, At, Canvas};
-use super::chart::Cells;
 use super::frame::{SMALL, TEXT};
-use super::palette::{INK, shade};
+use super::palette::{INK, Rgb, shade, signed_shade};
 use super::{Chart, Mark, PlotError, Series, axis, stroke};
 use plotters::prelude::DrawingBackend;
 
@@ -35,7 +34,7 @@ struct Entry<'a> {
 
 enum What<'a> {
     Series(&'a Series),
-    Colours { least: String, most: String },
+    Colours { least: String, most: String, shade: fn(f64) -> Rgb },
 }
 
 impl<'a> Header<'a> {
@@ -47,7 +46,10 @@ impl<'a> Header<'a> {
             entries.push(Entry { of: What::Series(series), width: wide });
         }
         if let Some(cells) = &chart.cells {
-            entries.push(colours(canvas, cells)?);
+            entries.push(colours(canvas, cells.range, &cells.unit, shade)?);
+        }
+        if let Some(dots) = chart.signed_dots.as_ref().filter(|dots| !dots.unit.is_empty()) {
+            entries.push(colours(canvas, (-dots.limit, dots.limit), &dots.unit, signed_shade)?);
         }
         let mut lines: Vec<Vec<Entry<'a>>> = Vec::new();
         for entry in entries {
@@ -91,10 +93,15 @@ fn width_of(line: &[Entry<'_>]) -> f64 {
     line.iter().map(|entry| entry.width).sum::<f64>() + BETWEEN * line.len().saturating_sub(1) as f64
 }
 
-fn colours<'a, DB: DrawingBackend>(canvas: &Canvas<DB>, cells: &Cells) -> Result<Entry<'a>, PlotError> {
-    let (least, most) = (axis::short(cells.range.0), format!("{} {}", axis::short(cells.range.1), cells.unit));
+fn colours<'a, DB: DrawingBackend>(
+    canvas: &Canvas<DB>,
+    (least, most): (f64, f64),
+    unit: &str,
+    shade: fn(f64) -> Rgb,
+) -> Result<Entry<'a>, PlotError> {
+    let (least, most) = (axis::short(least), format!("{} {unit}", axis::short(most)));
     let words = canvas.width_of(&least, SMALL)? + canvas.width_of(&most, SMALL)?;
-    Ok(Entry { of: What::Colours { least, most }, width: words + STRIP + 2.0 * TO_NAME })
+    Ok(Entry { of: What::Colours { least, most, shade }, width: words + STRIP + 2.0 * TO_NAME })
 }
 
 impl Entry<'_> {
@@ -109,7 +116,7 @@ impl Entry<'_> {
                 }
                 canvas.text(&series.name, (x + SAMPLE + TO_NAME, y), Anchor::Left, SMALL)
             }
-            What::Colours { least, most } => {
+            What::Colours { least, most, shade } => {
                 canvas.text(least, (x, y), Anchor::Left, SMALL)?;
                 let start = x + canvas.width_of(least, SMALL)? + TO_NAME;
                 let steps = STRIP as u32;

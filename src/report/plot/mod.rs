@@ -13,7 +13,7 @@ mod legend;
 mod palette;
 mod stroke;
 
-pub use chart::{Cell, Cells, Chart, Mark, Series};
+pub use chart::{Cell, Cells, Chart, Mark, Series, SignedDots};
 pub use figure::Figure;
 pub use palette::Colour;
 

@@ -22,11 +22,23 @@ const SHADES: [Rgb; 8] = [
     (8, 29, 88),
 ];
 
+/// From one sign over little to the other: blue, grey, vermilion.
+const SIGNED_SHADES: [Rgb; 3] = [(0, 114, 178), (206, 206, 200), (213, 94, 0)];
+
 /// The colour of an amount, from 0 to 1; what is beyond has the end's.
 pub(super) fn shade(share: f64) -> Rgb {
-    let place = share.clamp(0.0, 1.0) * (SHADES.len() - 1) as f64;
-    let below = (place as usize).min(SHADES.len() - 2);
-    let (a, b, u) = (SHADES[below], SHADES[below + 1], place - below as f64);
+    between(&SHADES, share)
+}
+
+/// The colour of an amount that has a sign: 0 for the most negative, 1 for the most positive.
+pub(super) fn signed_shade(share: f64) -> Rgb {
+    between(&SIGNED_SHADES, share)
+}
+
+fn between(shades: &[Rgb], share: f64) -> Rgb {
+    let place = share.clamp(0.0, 1.0) * (shades.len() - 1) as f64;
+    let below = (place as usize).min(shades.len() - 2);
+    let (a, b, u) = (shades[below], shades[below + 1], place - below as f64);
     let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * u).round() as u8;
     (mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
 }

@@ -14,7 +14,7 @@ const MADE_FROM: &str = "made_from.ron";
 ///
 /// A file appears there whole or not at all, so that the work may be stopped at any instant.
 #[derive(Debug)]
-pub(super) struct Kept {
+pub(in crate::study) struct Kept {
     folder: PathBuf,
 }
 

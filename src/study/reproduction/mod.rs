@@ -8,13 +8,15 @@ mod damping;
 mod finding;
 mod gain_curves;
 mod gain_plots;
-mod kept;
+pub(super) mod kept;
 mod spec;
+mod timing;
 
 pub use damping::{Fit, FittedPeak, fit_damping};
 pub use finding::{Finding, Row, paper_table};
 pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec};
 
+use super::latency::Latency;
 use super::{Hear, StudyError};
 use crate::dynamics::HeadSpec;
 use crate::spec::{Kind, Source, find, names, parse};
@@ -72,25 +74,50 @@ impl Experiment {
     /// When the folder holds another experiment's work (or this one's by another spec or version) and `anew` does not
     /// allow to throw it away, something cannot be simulated, or a file not be written.
     pub fn run(&self, folder: &Path, extent: Extent, anew: bool, hear: Hear<'_>) -> Result<Finding, StudyError> {
-        let ExperimentSpec::GainCurves(spec) = &self.spec;
-        let heads = spec.heads(&self.source)?;
-        let kept = Kept::open(folder, &self.made_from(extent, &heads), anew)?;
-        kept.part(FINDING, || gain_curves::run(spec, &heads, extent, &kept, hear))
+        match self.work(extent)? {
+            Work::GainCurves(spec, heads) => {
+                let kept = Kept::open(folder, &made_from(extent, spec, &heads), anew)?;
+                kept.part(FINDING, || gain_curves::run(spec, &heads, extent, &kept, hear))
+            }
+            Work::Latency(latency) => {
+                let kept = Kept::open(folder, &latency.made_from(), anew)?;
+                kept.part(FINDING, || timing::run(&latency, &kept, hear))
+            }
+        }
     }
 
     /// What an earlier run found and left in `folder`; `None` where this experiment is not finished there.
     ///
     /// # Errors
-    /// When a head is gone, or the folder cannot be read.
+    /// When a spec is gone, or the folder cannot be read.
     pub fn finished(&self, folder: &Path, extent: Extent) -> Result<Option<Finding>, StudyError> {
-        let ExperimentSpec::GainCurves(spec) = &self.spec;
-        let heads = spec.heads(&self.source)?;
-        let kept = Kept::existing(folder, &self.made_from(extent, &heads))?;
+        let kept = match self.work(extent)? {
+            Work::GainCurves(spec, heads) => Kept::existing(folder, &made_from(extent, spec, &heads))?,
+            Work::Latency(latency) => Kept::existing(folder, &latency.made_from())?,
+        };
         kept.filter(|kept| kept.has(FINDING)).map(|kept| kept.get(FINDING)).transpose()
     }
 
-    /// All that the work depends on.
-    fn made_from<'a>(&'a self, extent: Extent, heads: &'a [HeadSpec]) -> impl Serialize + use<'a> {
-        (env!("CARGO_PKG_VERSION"), extent, &self.spec, heads)
+    fn work(&self, extent: Extent) -> Result<Work<'_>, StudyError> {
+        Ok(match (&self.spec, extent) {
+            (ExperimentSpec::GainCurves(spec), _) => Work::GainCurves(spec, spec.heads(&self.source)?),
+            (ExperimentSpec::Latency(spec), Extent::Whole) => {
+                Work::Latency(Box::new(Latency::new(spec, &self.source)?))
+            }
+            (ExperimentSpec::Latency(spec), Extent::Quick) => {
+                Work::Latency(Box::new(Latency::new(&spec.shortened(), &self.source)?))
+            }
+        })
     }
+}
+
+/// An experiment with what its spec names.
+enum Work<'a> {
+    GainCurves(&'a GainCurvesSpec, Vec<HeadSpec>),
+    Latency(Box<Latency>),
+}
+
+/// All that the work on gain curves depends on.
+fn made_from(extent: Extent, spec: &GainCurvesSpec, heads: &[HeadSpec]) -> impl Serialize {
+    (env!("CARGO_PKG_VERSION"), extent, ExperimentSpec::GainCurves(spec.clone()), heads.to_vec())
 }

@@ -4,6 +4,7 @@ use crate::dynamics::{self, HeadSpec};
 use crate::motion::Axis;
 use crate::spec::{Source, SpecError, checked};
 use crate::study::gains::AXES;
+use crate::study::latency::LatencySpec;
 use serde::{Deserialize, Serialize};
 
 /// An experiment of the paper.
@@ -12,6 +13,8 @@ use serde::{Deserialize, Serialize};
 pub enum ExperimentSpec {
     /// Gain curves of several heads, their damping fitted to the paper's peaks.
     GainCurves(GainCurvesSpec),
+    /// Maps of one recording under errors of timing.
+    Latency(LatencySpec),
 }
 
 /// Gain curves of several heads.
@@ -86,6 +89,7 @@ impl ExperimentSpec {
     pub fn check(&self, source: &Source) -> Result<(), SpecError> {
         match self {
             ExperimentSpec::GainCurves(spec) => spec.heads(source).map(drop),
+            ExperimentSpec::Latency(spec) => spec.check(source),
         }
     }
 }

@@ -1,0 +1,113 @@
+//! `zsim bound`: how accurate an estimate of a recording could be.
+
+use super::arguments::Global;
+use super::bars::{Bars, stop_flag};
+use super::failure::Usage;
+use super::{End, output};
+use anyhow::Context;
+use clap::Args;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use zsim::recording::Reader;
+use zsim::report;
+use zsim::spec::Source;
+use zsim::study::{Bounded, Manifest, Watch, information_bound};
+use zsim::world::World;
+
+/// Tell how accurate any estimate of a recording could be: the Cramer-Rao bound of its beams and its IMU
+///
+/// Every beam that met a surface of the scene counts with its noise and incidence, and the IMU with its noise, biases, scale
+/// errors and clock; surfaces are taken to be known. Needs a recording with its truth. With --out, writes bound.csv (by time)
+/// and a plot.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim bound run.mcap --scene office.ron --out results/bound")]
+pub(super) struct Arguments {
+    /// The recording
+    #[arg(value_name = "FILE.mcap")]
+    recording: PathBuf,
+    /// The world, a name under scenes/ or a file [default: that in the recording's manifest]
+    #[arg(long, value_name = "NAME|FILE")]
+    scene: Option<String>,
+    /// The folder for results; if it exists and is not empty, one with a number after its name [default: none is written]
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write into the folder even if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let reader = Reader::open(&arguments.recording)?;
+    let world = world(arguments, &reader)?;
+    let mut bars = Bars::new(global);
+    let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
+    let bounded = information_bound(&reader, &world, &mut watch);
+    bars.finish();
+    let bounded = bounded?;
+    let folder = arguments.out.as_ref().map(|wanted| leave(&bounded, wanted, arguments.force)).transpose()?;
+    output::tell(global, &words(&bounded), figures(&bounded, world.name()), folder.as_deref())?;
+    Ok(End::Done)
+}
+
+fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
+    if let Some(scene) = &arguments.scene {
+        return Ok(World::load(scene)?);
+    }
+    let Some(specs) = Manifest::within(reader).and_then(|manifest| manifest.specs) else {
+        let message = format!("{} does not say in which scene it was made: name it with --scene", reader.name());
+        return Err(Usage(message).into());
+    };
+    Ok(World::build(&specs.scene, &Source::in_memory("the recording's scene", ""))?)
+}
+
+fn leave(bounded: &Bounded, wanted: &Path, force: bool) -> anyhow::Result<PathBuf> {
+    let folder = output::folder(wanted, force)?;
+    let path = folder.join("bound.csv");
+    std::fs::write(&path, csv(bounded)).with_context(|| format!("{} cannot be written", path.display()))?;
+    report::bound_over_time(&bounded.bound).save(&folder, "bound")?;
+    Ok(folder)
+}
+
+/// Standard deviations by time: along and about each axis of the world.
+fn csv(bounded: &Bounded) -> String {
+    let bound = &bounded.bound;
+    let mut text = "stamp_ns,x_m,y_m,z_m,about_x_rad,about_y_rad,about_z_rad\n".to_owned();
+    for ((stamp, position), attitude) in bound.stamps.iter().zip(&bound.position_sigma_m).zip(&bound.attitude_sigma_rad)
+    {
+        let numbers = position.iter().chain(attitude.iter()).map(|sigma| format!("{sigma:e}"));
+        text += &format!("{},{}\n", stamp.nanos(), numbers.collect::<Vec<_>>().join(","));
+    }
+    text
+}
+
+fn words(bounded: &Bounded) -> String {
+    let bound = &bounded.bound;
+    let mm = |m: f64| format!("{:.3} mm", m * 1e3);
+    let axes = bound.axis_rmse_m;
+    let rows = [
+        ("position RMSE, aligned", mm(bound.aligned_position_rmse_m)),
+        ("position RMSE, in the world", mm(bound.position_rmse_m)),
+        ("along x, y, z", format!("{}, {}, {}", mm(axes.x), mm(axes.y), mm(axes.z))),
+        ("attitude RMSE", format!("{:.4} deg", bound.attitude_rmse_rad.to_degrees())),
+        ("clock offset at the end", format!("{:.3} us", bound.clock_offset_s * 1e6)),
+        ("offset of the ranges", mm(bound.range_offset_m)),
+        ("beams", format!("{} ({} left out)", bounded.beams, bounded.left_out)),
+    ];
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
+    format!("No unbiased estimate can be better than:\n{}", report::table(&[], &rows, false))
+}
+
+fn figures(bounded: &Bounded, scene: &str) -> Value {
+    let bound = &bounded.bound;
+    json!({
+        "scene": scene,
+        "bound_rmse_m": bound.aligned_position_rmse_m,
+        "position_rmse_m": bound.position_rmse_m,
+        "axis_rmse_m": bound.axis_rmse_m.as_slice(),
+        "attitude_rmse_deg": bound.attitude_rmse_rad.to_degrees(),
+        "clock_offset_s": bound.clock_offset_s,
+        "range_offset_m": bound.range_offset_m,
+        "beams": bounded.beams,
+        "left_out": bounded.left_out,
+    })
+}

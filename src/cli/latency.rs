@@ -1,0 +1,71 @@
+//! `zsim latency`: what errors of timing do to a map.
+
+use super::arguments::{Global, ScenarioArguments};
+use super::bars::{WorkBar, stop_flag};
+use super::{End, output};
+use anyhow::Context;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use zsim::spec::{Kind, SpecError, find, parse};
+use zsim::study::latency::{ClockState, Latency, LatencySpec, Study, csv, curve_figure, map_figure, words};
+use zsim::study::reproduction::ExperimentSpec;
+
+/// The experiment whose latencies and noises are taken.
+const FIGURE_4: &str = "fig4";
+
+/// Put latency and timing noise on one recording: maps as in the paper's figure 4, and curves of error with their bands
+///
+/// Each latency and noise is estimated with the clock state off (what the paper shows) and on (what it recovers). Writes
+/// latency.csv, metrics.json and plots. What is in the folder already is not done again: a study that was stopped goes on.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim latency --scene office.ron --out results/latency")]
+pub(super) struct Arguments {
+    /// The world, a name under scenes/ or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    scene: String,
+    #[command(flatten)]
+    scenario: ScenarioArguments,
+    /// The estimator's settings, a name under specs/estimators/ or a file
+    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    estimator: String,
+    /// The folder for results, in which a study that was stopped goes on [default: results/latency]
+    #[arg(long, short, value_name = "DIR", default_value = "results/latency")]
+    out: PathBuf,
+    /// Begin anew even if the folder holds another study of this kind
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let source = find(Kind::Experiment, FIGURE_4)?;
+    let ExperimentSpec::Latency(shipped) = parse(&source)? else {
+        return Err(SpecError::plain(source.name, "is no study of latency").into());
+    };
+    let scenario = arguments.scenario.scenario(&arguments.scene);
+    let spec = LatencySpec { scenario, estimator: arguments.estimator.clone(), ..shipped };
+    let latency = Latency::new(&spec, &source)?;
+    let bar = WorkBar::new(global, "estimating");
+    let ran = latency.run(&arguments.out, arguments.force, stop_flag(), &|share| bar.show(share));
+    drop(bar);
+    let study = ran.inspect_err(|_| {
+        if arguments.out.exists() {
+            super::journey::left_behind(&arguments.out);
+        }
+    })?;
+    leave(&study, &arguments.out)?;
+    output::tell(global, &words(&study), serde_json::to_value(&study)?, Some(&arguments.out))?;
+    Ok(End::Done)
+}
+
+fn leave(study: &Study, folder: &Path) -> anyhow::Result<()> {
+    for (name, text) in [("latency.csv", csv(study)), ("metrics.json", serde_json::to_string_pretty(study)? + "\n")] {
+        let path = folder.join(name);
+        std::fs::write(&path, text).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    let plots = folder.join("plots");
+    std::fs::create_dir_all(&plots).with_context(|| format!("{} cannot be made", plots.display()))?;
+    map_figure(study, ClockState::Off).save(&plots, "maps")?;
+    map_figure(study, ClockState::On).save(&plots, "maps_clock_on")?;
+    curve_figure(study).save(&plots, "curves")?;
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! What is put on the timing of which recording.
+
+use super::{ClockState, Disturbance};
+use crate::simulation::Scenario;
+use crate::spec::{Source, SpecError, checked};
+use serde::{Deserialize, Serialize};
+
+/// Greatest latency and noise, ms: what follows the clocks looks no further.
+const MOST_MS: f64 = 20.0;
+
+/// A study of latency and timing noise, as it is written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LatencySpec {
+    /// The paper's figure.
+    pub figure: String,
+    /// What is recorded, once.
+    pub scenario: Scenario,
+    /// The estimator's settings, a name under `specs/estimators/` or a file.
+    pub estimator: String,
+    /// Constant errors of the IMU's stamps, ms; positive where it stamps an instant later than the lidar does.
+    pub latencies_ms: Vec<f64>,
+    /// Standard deviations of noise on the stamps of the lidar's scans, ms.
+    pub noises_ms: Vec<f64>,
+    /// Latencies whose maps are shown, ms.
+    pub shown_latencies_ms: Vec<f64>,
+    /// Noises whose maps are shown, ms.
+    pub shown_noises_ms: Vec<f64>,
+    /// The map is shown as it was seen for so long, about the middle of the run, s.
+    #[serde(deserialize_with = "checked::positive")]
+    pub shown_s: f64,
+    /// Length of the stretches of the run that are drawn again and again for the confidence bands, s.
+    #[serde(deserialize_with = "checked::positive")]
+    pub block_s: f64,
+}
+
+impl LatencySpec {
+    /// Whether what it says fits together.
+    ///
+    /// # Errors
+    /// At the key that does not.
+    pub fn check(&self, source: &Source) -> Result<(), SpecError> {
+        let wrong = |key: &str, message: String| Err(SpecError::about(source, key, message));
+        let lists = [("latencies_ms", &self.latencies_ms, -MOST_MS), ("noises_ms", &self.noises_ms, 0.0)];
+        for (key, list, least) in lists {
+            if let Some(outside) = list.iter().find(|ms| !(least..=MOST_MS).contains(*ms)) {
+                return wrong(key, format!("{outside} ms: expected {least} to {MOST_MS}"));
+            }
+            if !list.contains(&0.0) {
+                return wrong(key, format!("`{key}` needs a 0 to compare with"));
+            }
+        }
+        if self.latencies_ms.len() < 3 {
+            return wrong("latencies_ms", "a curve with a minimum needs at least 3 latencies".to_owned());
+        }
+        let shown = [
+            ("shown_latencies_ms", &self.shown_latencies_ms, &self.latencies_ms),
+            ("shown_noises_ms", &self.shown_noises_ms, &self.noises_ms),
+        ];
+        for (key, list, of) in shown {
+            if let Some(missing) = list.iter().find(|ms| !of.contains(ms)) {
+                return wrong(key, format!("{missing} ms is shown, and not among those that are studied"));
+            }
+        }
+        if self.scenario.duration_s < 2.0 * self.block_s {
+            let message = format!("two blocks of {} s do not fit into {} s", self.block_s, self.scenario.duration_s);
+            return wrong("block_s", message);
+        }
+        Ok(())
+    }
+
+    /// The same with so little to do that it takes seconds; its figures are no results.
+    #[must_use]
+    pub fn shortened(&self) -> Self {
+        let ends = |list: &[f64]| {
+            let least = list.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = list.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let mut ends = vec![least, 0.0, most];
+            ends.dedup();
+            ends
+        };
+        let (latencies_ms, noises_ms) = (ends(&self.latencies_ms), ends(&self.noises_ms));
+        Self {
+            scenario: Scenario { duration_s: self.scenario.duration_s.min(10.0), ..self.scenario.clone() },
+            shown_latencies_ms: latencies_ms.clone(),
+            shown_noises_ms: noises_ms.clone(),
+            latencies_ms,
+            noises_ms,
+            block_s: self.block_s.min(1.0),
+            ..self.clone()
+        }
+    }
+
+    /// All runs: each disturbance once, with the clock state off and on.
+    pub(super) fn runs(&self) -> Vec<(Disturbance, ClockState)> {
+        let latencies = self.latencies_ms.iter().map(|ms| Disturbance { latency_ms: *ms, noise_ms: 0.0 });
+        let noises = self.noises_ms.iter().filter(|ms| **ms > 0.0);
+        let noises = noises.map(|ms| Disturbance { latency_ms: 0.0, noise_ms: *ms });
+        let both = |disturbance| [ClockState::Off, ClockState::On].map(|clock| (disturbance, clock));
+        latencies.chain(noises).flat_map(both).collect()
+    }
+}

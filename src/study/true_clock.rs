@@ -1,0 +1,39 @@
+use crate::recording::{Reader, RecordingError, Truth};
+use crate::time::{Span, Stamp};
+
+/// How much later the IMU's clock truly stamps an instant than the lidar's, over lidar time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct TrueClock(Vec<(Stamp, f64)>);
+
+impl TrueClock {
+    /// What a recording tells.
+    pub(super) fn read(reader: &Reader) -> Result<Self, RecordingError> {
+        let mut offsets = Vec::new();
+        for told in reader.truth() {
+            if let Truth::Clock(now, clock) = told? {
+                offsets.push((now + clock.lidar_ahead, clock.imu_after_lidar().seconds()));
+            }
+        }
+        Ok(Self(offsets))
+    }
+
+    /// Offsets, s, in order of time.
+    #[cfg(test)]
+    pub(super) fn told(offsets: Vec<(Stamp, f64)>) -> Self {
+        Self(offsets)
+    }
+
+    /// What the lidar's clock says when the IMU's says `imu_stamp`.
+    ///
+    /// The offset is linear between those told, and that of the end beyond them. It is looked up by the IMU's stamp: the clocks
+    /// differ by milliseconds, in which it changes by nanoseconds.
+    pub(super) fn on_lidar_clock(&self, imu_stamp: Stamp) -> Stamp {
+        let after = self.0.partition_point(|(at, _)| *at <= imu_stamp);
+        let offset_s = match (after.checked_sub(1).map(|before| self.0[before]), self.0.get(after)) {
+            (Some((t0, l0)), Some((t1, l1))) => l0 + (l1 - l0) * imu_stamp.seconds_since(t0) / t1.seconds_since(t0),
+            (Some((_, offset_s)), None) | (None, Some(&(_, offset_s))) => offset_s,
+            (None, None) => 0.0,
+        };
+        imu_stamp - Span::from_seconds(offset_s)
+    }
+}
