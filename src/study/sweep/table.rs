@@ -94,7 +94,7 @@ impl TableWriter {
 
     /// Adds rows: a stretch of each column, equally long.
     pub fn write(&mut self, columns: &[Column]) -> Result<(), StudyError> {
-        let place = self.beside.place.clone();
+        let place = self.beside.place().to_owned();
         self.group(columns).map_err(StudyError::table(&place))
     }
 
@@ -125,7 +125,7 @@ impl TableWriter {
     /// Closes the table and moves it to its place.
     pub fn finish(self) -> Result<(), StudyError> {
         let Self { writer, beside } = self;
-        writer.close().map_err(StudyError::table(&beside.place))?;
+        writer.close().map_err(StudyError::table(beside.place()))?;
         beside.finish()
     }
 }
