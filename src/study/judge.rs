@@ -91,11 +91,7 @@ pub(super) fn open_loop_metrics(
 }
 
 /// The closed loop's figures.
-pub(super) fn closed_loop_metrics(
-    run: &ClosedLoopRun,
-    known: Option<&Known>,
-    acquisition_s: f64,
-) -> ClosedLoopMetrics {
+pub(super) fn closed_loop_metrics(run: &ClosedLoopRun, known: Option<&Known>, acquisition_s: f64) -> ClosedLoopMetrics {
     let errors = known.and_then(|known| known.errors.as_ref());
     ClosedLoopMetrics {
         wall_s: Some(run.wall_s),

@@ -45,7 +45,8 @@ pub(super) fn pairs(patches: &[Patch], chapters: &[Range<usize>], spec: &Registr
                 *common.entry(*b).or_default() += 1;
             }
             let enough = |b: usize, count: usize| count as f64 >= COMMON * own.len().min(cells[b].len()) as f64;
-            let mut partners: Vec<(usize, usize)> = common.into_iter().filter(|(b, count)| enough(*b, *count)).collect();
+            let mut partners: Vec<(usize, usize)> =
+                common.into_iter().filter(|(b, count)| enough(*b, *count)).collect();
             partners.sort_by_key(|(b, count)| (std::cmp::Reverse(*count), *b));
             partners.truncate(spec.partners);
             partners.into_iter().map(move |(b, _)| (a.min(b), a.max(b)))

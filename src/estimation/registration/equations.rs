@@ -65,7 +65,8 @@ impl Equations {
     /// segments of `linked` (indices of their first knots).
     pub(super) fn new(first_knot: i64, knots: usize, linked: impl Iterator<Item = (i64, i64)>) -> Self {
         // Every segment has four knots, and residuals link neighbouring segments.
-        let mut columns: Vec<Vec<u32>> = (0..knots).map(|k| (k.saturating_sub(4) as u32..=k as u32).collect()).collect();
+        let mut columns: Vec<Vec<u32>> =
+            (0..knots).map(|k| (k.saturating_sub(4) as u32..=k as u32).collect()).collect();
         let mut segments: Vec<(i64, i64)> = linked.map(|(a, b)| (a.min(b), a.max(b))).collect();
         segments.sort_unstable();
         segments.dedup();
@@ -109,7 +110,8 @@ impl Equations {
 
     /// Adds what is said of the correction where `basis` is.
     pub(super) fn add_own(&mut self, basis: &Basis, own: &Own) {
-        let knots: [(usize, f64); 4] = std::array::from_fn(|a| ((basis.first - self.first_knot) as usize + a, basis.value[a]));
+        let knots: [(usize, f64); 4] =
+            std::array::from_fn(|a| ((basis.first - self.first_knot) as usize + a, basis.value[a]));
         for (k, (row, value)) in knots.iter().enumerate() {
             for (sum, term) in self.right[6 * row..6 * row + 6].iter_mut().zip(own.right.iter()) {
                 *sum += value * term;
@@ -186,17 +188,17 @@ mod tests {
     /// Against the definition: a dense Jacobian of every residual, and `(J^T W J + I) x = -J^T W e` by another solver.
     #[test]
     fn the_solution_is_that_of_the_dense_equations() {
-        let (h, knots, first_knot) = (0.7, 12, -1);
+        let (h, knots, first_knot) = (0.7, 13, -1);
         let instants = [(0.1, 5.9), (0.2, 0.4), (3.0, 3.6), (5.5, 1.2), (2.2, 4.1)];
         let bases = instants.map(|(a, b)| (Basis::at(a, h), Basis::at(b, h)));
         let mut equations = Equations::new(first_knot, knots, bases.iter().map(|(a, b)| (a.first, b.first)));
-        let (mut dense, mut right) = (DMatrix::<f64>::identity(72, 72), DVector::<f64>::zeros(72));
+        let (mut dense, mut right) = (DMatrix::<f64>::identity(78, 78), DVector::<f64>::zeros(78));
         for (k, (a, b)) in bases.iter().enumerate() {
             let mut link = Link::default();
             for m in 0..5 {
                 let (by_a, by_b, e, weight) = (wave(k + 9 * m), wave(k + 50 + m), 0.3 * m as f64 - 0.5, 2.0 + k as f64);
                 link.add((&by_a, &by_b), e, weight);
-                let mut row = DVector::<f64>::zeros(72);
+                let mut row = DVector::<f64>::zeros(78);
                 for (basis, by) in [(a, by_a), (b, by_b)] {
                     for (c, value) in basis.value.iter().enumerate() {
                         let at = 6 * ((basis.first - first_knot) as usize + c);

@@ -41,7 +41,10 @@ pub struct RegistrationSpec {
     /// Weight of a surfel's matches together against one that stood alone.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub match_weight: f64,
-    /// Drift of the open loop's position beside the growth of its covariance, a random walk, m/sqrt(s).
+    /// Time in which the open loop's error, of the size that its covariance tells, becomes another, s.
+    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    pub correlation_s: f64,
+    /// Drift of the open loop's position beside what its covariance tells, a random walk, m/sqrt(s).
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub drift_m_per_sqrt_s: f64,
     /// Likewise of its attitude, degrees/sqrt(s).
@@ -83,7 +86,11 @@ impl RegistrationSpec {
         };
         require((1..=6).contains(&self.levels), "registration.levels", "must be 1 to 6")?;
         require(self.min_points >= 4, "registration.min_points", "must be at least 4: fewer are no plane")?;
-        require(self.chapter_s >= self.knot_spacing_s, "registration.chapter_s", "must be at least its knot_spacing_s")?;
+        require(
+            self.chapter_s >= self.knot_spacing_s,
+            "registration.chapter_s",
+            "must be at least its knot_spacing_s",
+        )?;
         for (key, count) in [
             ("registration.references", self.references),
             ("registration.partners", self.partners),

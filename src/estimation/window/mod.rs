@@ -5,7 +5,7 @@ mod equations;
 mod solve;
 mod uncertainty;
 
-pub(super) use solve::{Solved, greatest};
+pub(super) use solve::{LEANING, Solved, greatest};
 pub(super) use uncertainty::Linearised;
 
 use super::border::Border;
