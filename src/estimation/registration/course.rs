@@ -65,7 +65,7 @@ impl Course {
             let tau_s = (start_s + step_s * k as f64).min(end_s);
             let stamp = (origin + Span::from_seconds(tau_s)).clamp(first, last);
             let before = map_from_head.at(stamp)?.translation.vector;
-            let (shift, twist) = growth(covariances, stamp - Span::from_seconds(step_s), stamp);
+            let (shift, twist) = drift(covariances, stamp - Span::from_seconds(step_s), stamp, spec.correlation_s);
             let variances = (walk * step_s + shift, turn * step_s + twist);
             let basis = Basis::at(tau_s, spec.knot_spacing_s);
             Some(Post { basis, before, position: before, turn: Rotation::identity(), variances })
@@ -190,16 +190,19 @@ impl Deviation {
     }
 }
 
-/// By how much the open loop's variances grew between two instants, of position and attitude on an axis, m^2 and rad^2; zero
-/// where they shrank, as they do where it comes back to what it has seen.
-fn growth(covariances: &[(Stamp, PoseCovariance)], from: Stamp, to: Stamp) -> (f64, f64) {
+/// Variances of the open loop's drift between two instants, of position and attitude on an axis, m^2 and rad^2: by how much its
+/// error grew, and how much of it was exchanged for another. An error that stays of variance `s^2` and is forgotten in `tau`
+/// (Gauss-Markov) changes in `h` by `2 s^2 h / tau`, as that of an open loop does which goes from view to view.
+fn drift(covariances: &[(Stamp, PoseCovariance)], from: Stamp, to: Stamp, tau_s: f64) -> (f64, f64) {
     let at = |stamp: Stamp| {
         let index = covariances.partition_point(|(s, _)| *s <= stamp).saturating_sub(1);
         let mean = |c: &PoseCovariance, k: usize| (c[(k, k)] + c[(k + 1, k + 1)] + c[(k + 2, k + 2)]) / 3.0;
         covariances.get(index).map_or((0.0, 0.0), |(_, c)| (mean(c, 0), mean(c, 3)))
     };
     let (before, after) = (at(from), at(to));
-    ((after.0 - before.0).max(0.0), (after.1 - before.1).max(0.0))
+    let exchanged = 2.0 * to.seconds_since(from) / tau_s;
+    let drift = |before: f64, after: f64| (after - before).max(0.0) + before.min(after) * exchanged;
+    (drift(before.0, after.0), drift(before.1, after.1))
 }
 
 fn unit(axis: usize) -> Vector6<f64> {
@@ -255,13 +258,14 @@ mod tests {
     }
 
     #[test]
-    fn variances_that_shrink_do_not_stiffen() {
+    fn drift_is_growth_and_what_is_forgotten() {
         let covariance =
             |k: i64, variance: f64| (Stamp::from_nanos(k * 1_000_000_000), PoseCovariance::identity() * variance);
         let covariances = [covariance(0, 0.0), covariance(1, 2e-6), covariance(2, 1e-6)];
         let at = |k: i64| Stamp::from_nanos(k * 1_000_000_000);
-        assert_relative_eq!(growth(&covariances, at(0), at(1)).0, 2e-6);
-        assert_eq!(growth(&covariances, at(1), at(2)), (0.0, 0.0));
-        assert_eq!(growth(&[], at(0), at(1)), (0.0, 0.0));
+        assert_relative_eq!(drift(&covariances, at(0), at(1), 20.0).0, 2e-6);
+        // Shrunk: what is left of it is forgotten by 2 h / tau.
+        assert_relative_eq!(drift(&covariances, at(1), at(2), 20.0).0, 1e-7, max_relative = 1e-12);
+        assert_eq!(drift(&[], at(0), at(1), 20.0), (0.0, 0.0));
     }
 }

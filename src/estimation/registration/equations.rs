@@ -188,17 +188,17 @@ mod tests {
     /// Against the definition: a dense Jacobian of every residual, and `(J^T W J + I) x = -J^T W e` by another solver.
     #[test]
     fn the_solution_is_that_of_the_dense_equations() {
-        let (h, knots, first_knot) = (0.7, 12, -1);
+        let (h, knots, first_knot) = (0.7, 13, -1);
         let instants = [(0.1, 5.9), (0.2, 0.4), (3.0, 3.6), (5.5, 1.2), (2.2, 4.1)];
         let bases = instants.map(|(a, b)| (Basis::at(a, h), Basis::at(b, h)));
         let mut equations = Equations::new(first_knot, knots, bases.iter().map(|(a, b)| (a.first, b.first)));
-        let (mut dense, mut right) = (DMatrix::<f64>::identity(72, 72), DVector::<f64>::zeros(72));
+        let (mut dense, mut right) = (DMatrix::<f64>::identity(78, 78), DVector::<f64>::zeros(78));
         for (k, (a, b)) in bases.iter().enumerate() {
             let mut link = Link::default();
             for m in 0..5 {
                 let (by_a, by_b, e, weight) = (wave(k + 9 * m), wave(k + 50 + m), 0.3 * m as f64 - 0.5, 2.0 + k as f64);
                 link.add((&by_a, &by_b), e, weight);
-                let mut row = DVector::<f64>::zeros(72);
+                let mut row = DVector::<f64>::zeros(78);
                 for (basis, by) in [(a, by_a), (b, by_b)] {
                     for (c, value) in basis.value.iter().enumerate() {
                         let at = 6 * ((basis.first - first_knot) as usize + c);

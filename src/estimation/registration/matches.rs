@@ -11,7 +11,8 @@ use super::neighbours::InUse;
 use super::scene::Scene;
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
-use crate::geometry::Vector;
+use crate::estimation::window::LEANING;
+use crate::geometry::{Matrix, Vector};
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
@@ -25,13 +26,30 @@ pub(super) struct Tally {
     /// Sums of weights, and of weighted squares of distances, m^2.
     pub(super) weights: f64,
     pub(super) squares: f64,
+    /// What the matches know of the position: `sum w n n^T`.
+    pub(super) information: Matrix,
+    /// What they know of it along the weakest direction so far, by normals that lean to it.
+    pub(super) held: f64,
 }
 
 impl Tally {
+    fn count(&mut self, plane: &Plane, weight: f64, weakest: &Vector) {
+        self.matches += 1;
+        self.weights += weight;
+        self.squares += weight * plane.distance_m * plane.distance_m;
+        self.information += plane.normal * plane.normal.transpose() * weight;
+        let lean = plane.normal.dot(weakest);
+        if lean.abs() > LEANING {
+            self.held += weight * lean * lean;
+        }
+    }
+
     fn merge(&mut self, other: &Self) {
         self.matches += other.matches;
         self.weights += other.weights;
         self.squares += other.squares;
+        self.information += other.information;
+        self.held += other.held;
     }
 
     /// Weighted root mean square of the matches' distances, m.
@@ -49,6 +67,8 @@ pub(super) struct Matches<'a> {
     pub(super) spec: &'a RegistrationSpec,
     /// Greatest distance along the normal, m.
     pub(super) gate_m: f64,
+    /// The direction of which the matches before said least.
+    pub(super) weakest: Vector,
 }
 
 impl Matches<'_> {
@@ -90,7 +110,7 @@ impl Matches<'_> {
             };
             let (by_a, by_b) = (by(&self.scene.arms[i], &plane.normal), -by(&self.scene.arms[j], &plane.normal));
             link.add((&by_a, &by_b), plane.distance_m, weight);
-            tally.merge(&Tally { matches: 1, weights: weight, squares: weight * plane.distance_m.powi(2) });
+            tally.count(&plane, weight, &self.weakest);
         }
         (link, tally)
     }

@@ -34,7 +34,7 @@ use super::EstimatorSpec;
 use super::matching::Matcher;
 use super::survey::Survey;
 use super::window::Moved;
-use crate::geometry::{PoseCovariance, Trajectory};
+use crate::geometry::{PoseCovariance, Trajectory, Vector};
 use crate::time::Stamp;
 use course::Course;
 use equations::Equations;
@@ -73,6 +73,8 @@ pub struct RegistrationReport {
     pub last_correction_m: f64,
     /// By how much the trajectory moved at most, m and rad.
     pub moved: (f64, f64),
+    /// Least over greatest information that the matches hold about the position along any direction, 0..1.
+    pub conditioning: f64,
     /// Why the open loop's trajectory stayed, where it did.
     pub left: Option<&'static str>,
 }
@@ -96,8 +98,12 @@ pub fn register(
     };
     let scene = Scene::new(survey, &course, of_all);
     let matcher = Matcher::new(&of_all.matching(&spec.matching), &of_all.surfels(&spec.surfels));
-    let mut registration = Registration { spec: of_all, matcher, course, scene, report: RegistrationReport::default() };
-    match registration.run() {
+    let (report, weakest) = (RegistrationReport::default(), Vector::z());
+    let mut registration = Registration { spec: of_all, matcher, course, scene, weakest, report };
+    let run = registration.run();
+    let is_weak = registration.report.conditioning < spec.solve.weak_conditioning;
+    match run {
+        Ok(()) if is_weak => left(registration.report, "the surfaces seen say next to nothing of a direction"),
         Ok(()) => ClosedLoop {
             trajectory: registration.course.into_trajectory(map_from_head.stamps()),
             report: registration.report,
@@ -112,6 +118,8 @@ struct Registration<'a> {
     matcher: Matcher,
     course: Course,
     scene: Scene,
+    /// The direction in the map of which the matches of the last iteration said least.
+    weakest: Vector,
     report: RegistrationReport,
 }
 
@@ -146,7 +154,7 @@ impl Registration<'_> {
                 self.scene.correct(first_knot, &x);
                 neighbours.moved(shift + farthest_m * turn);
                 self.report.iterations += 1;
-                (self.report.matches, self.report.residual_rms_m) = (tally.matches, tally.rms_m());
+                self.describe(&tally);
                 self.report.last_correction_m = shift;
                 if shift < self.spec.settled_m * coarser {
                     break;
@@ -155,6 +163,14 @@ impl Registration<'_> {
         }
         self.report.moved = self.course.moved();
         if self.report.matches == 0 { Err("nothing was seen twice") } else { Ok(()) }
+    }
+
+    fn describe(&mut self, tally: &Tally) {
+        (self.report.matches, self.report.residual_rms_m) = (tally.matches, tally.rms_m());
+        let eigen = tally.information.symmetric_eigen();
+        let greatest = eigen.eigenvalues.max();
+        self.report.conditioning = if greatest > 0.0 { tally.held / greatest } else { 0.0 };
+        self.weakest = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     }
 
     fn empty_equations(&self, neighbours: &Neighbours) -> Equations {
@@ -168,7 +184,8 @@ impl Registration<'_> {
 
     fn assemble(&self, neighbours: &Neighbours, gate_m: f64, equations: &mut Equations) -> Tally {
         let (scene, matcher, spec) = (&self.scene, &self.matcher, self.spec);
-        let matches = Matches { scene, neighbours: &neighbours.in_use, matcher, spec, gate_m };
+        let (neighbours, weakest) = (&neighbours.in_use, self.weakest);
+        let matches = Matches { scene, neighbours, matcher, spec, gate_m, weakest };
         let tally = matches.add_to(equations);
         self.course.add_to(equations, spec.level_sigma_deg.to_radians());
         // A metre and a radian keep the outermost knots where nothing else does.

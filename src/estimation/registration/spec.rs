@@ -41,7 +41,10 @@ pub struct RegistrationSpec {
     /// Weight of a surfel's matches together against one that stood alone.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub match_weight: f64,
-    /// Drift of the open loop's position beside the growth of its covariance, a random walk, m/sqrt(s).
+    /// Time in which the open loop's error, of the size that its covariance tells, becomes another, s.
+    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    pub correlation_s: f64,
+    /// Drift of the open loop's position beside what its covariance tells, a random walk, m/sqrt(s).
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub drift_m_per_sqrt_s: f64,
     /// Likewise of its attitude, degrees/sqrt(s).

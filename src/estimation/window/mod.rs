@@ -6,7 +6,7 @@ mod solve;
 mod uncertainty;
 
 pub(super) use equations::Moved;
-pub(super) use solve::Solved;
+pub(super) use solve::{LEANING, Solved};
 pub(super) use uncertainty::Linearised;
 
 use super::border::Border;

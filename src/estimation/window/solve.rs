@@ -18,7 +18,7 @@ const BELIEVABLE: (f64, f64) = (2.0, 0.8);
 /// A turn moves a surfel by so much, m a rad: what is farther away is in larger cells.
 const ARM_M: f64 = 5.0;
 /// A normal that leans to a direction by less than this sine may do so by its error alone.
-const LEANING: f64 = 0.3;
+pub(in crate::estimation) const LEANING: f64 = 0.3;
 
 /// How a window's solution came out.
 #[derive(Debug, Clone, Default)]
