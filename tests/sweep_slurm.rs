@@ -26,15 +26,15 @@ impl Cluster {
         let folder = tempfile::tempdir().unwrap();
         let output = script("up", folder.path());
         let talk = String::from_utf8_lossy(&output.stderr).into_owned();
-        let cluster = Self { folder, conf: String::new() };
+        let mut cluster = Self { folder, conf: String::new() };
         if output.status.code() == Some(SKIPPED) {
             println!("{}", talk.trim());
             return None;
         }
         assert!(output.status.success(), "{talk}");
         let said = String::from_utf8(output.stdout).unwrap();
-        let conf = said.lines().find_map(|line| line.strip_prefix("SLURM_CONF=")).unwrap().to_owned();
-        Some(Self { conf, ..cluster })
+        cluster.conf = said.lines().find_map(|line| line.strip_prefix("SLURM_CONF=")).unwrap().to_owned();
+        Some(cluster)
     }
 
     fn command(&self, program: &str) -> Command {
