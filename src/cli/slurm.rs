@@ -9,7 +9,7 @@ use serde_json::json;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use zsim::study::sweep::Sweep;
+use zsim::study::sweep::{Share, Sweep};
 
 /// Runs that an array's element has at least: a scheduler takes about a second for each.
 const RUNS_IN_AN_ELEMENT: u64 = 20;
@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let folder = arguments.folder.canonicalize();
     let folder = folder.with_context(|| format!("{} cannot be found", arguments.folder.display()))?;
     let sweep = Sweep::open(&folder)?;
-    let status = sweep.status()?;
+    let status = sweep.status(Share::WHOLE)?;
     if status.missing == 0 {
         output::tell(global, "nothing is missing", json!({ "job": null, "elements": 0 }), Some(&folder))?;
         return Ok(End::Done);

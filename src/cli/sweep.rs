@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     match &arguments.verb {
         Verb::Plan(plan) => plan_in(plan, global),
         Verb::Run(run) => run_share(run, global),
-        Verb::Status(folder) => tell(global, &Sweep::open(&folder.folder)?.status()?, &folder.folder),
+        Verb::Status(folder) => tell(global, &Sweep::open(&folder.folder)?.status(Share::WHOLE)?, &folder.folder),
         Verb::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
         Verb::Submit(submit) => slurm::run(submit, global),
         Verb::Task(task) => run_task(task),
@@ -119,8 +119,9 @@ fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<End> {
 
 fn run_share(arguments: &RunArguments, global: &Global) -> anyhow::Result<End> {
     let sweep = Sweep::open(&arguments.folder)?;
-    run_sweep(&sweep, share(arguments)?, global)?;
-    tell(global, &sweep.status()?, &arguments.folder)
+    let share = share(arguments)?;
+    run_sweep(&sweep, share, global)?;
+    tell(global, &sweep.status(share)?, &arguments.folder)
 }
 
 /// Does what is missing of a share, with a progress bar.

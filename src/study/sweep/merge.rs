@@ -3,7 +3,7 @@
 use super::beside::Beside;
 use super::folder::{STRETCH, Unit};
 use super::table::{Column, Held, TableWriter, quoted};
-use super::{Measure, Sweep};
+use super::{Measure, Share, Sweep};
 use crate::study::StudyError;
 use serde::Serialize;
 use std::io::{BufWriter, Write};
@@ -25,13 +25,14 @@ pub struct Status {
 }
 
 impl Sweep {
-    /// How far it is.
+    /// How far it is, or a share of it.
     ///
     /// # Errors
     /// When a part cannot be read.
-    pub fn status(&self) -> Result<Status, StudyError> {
+    pub fn status(&self, share: Share) -> Result<Status, StudyError> {
         let mut tally = Tally::default();
-        for unit in &self.units {
+        for unit in share.of(&self.tasks).flatten() {
+            let unit = &self.units[*unit as usize];
             tally.take(unit, self.kept(unit)?.as_deref());
         }
         Ok(tally.status())

@@ -15,7 +15,7 @@ const MARKS: [f64; 15] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1.0, 1.4, 2.0, 5
 /// Most pairs of axes that have maps.
 const MOST_MAPS: usize = 6;
 /// Most dots in a plot: of more every so many-th is drawn.
-const MOST_DOTS: usize = 20_000;
+const MOST_DOTS: usize = 5_000;
 
 impl Sweep {
     /// Draws all into `plots/`; what was chosen for the front goes to `front.csv`.

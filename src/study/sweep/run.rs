@@ -25,6 +25,11 @@ impl Share {
     fn has(self, task: usize) -> bool {
         task % self.count == self.index
     }
+
+    /// Those of `tasks` that are in it.
+    pub(super) fn of<T>(self, tasks: &[T]) -> impl Iterator<Item = &T> {
+        tasks.iter().enumerate().filter(move |(task, _)| self.has(*task)).map(|(_, task)| task)
+    }
 }
 
 /// How a sweep is run.
