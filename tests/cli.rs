@@ -60,6 +60,9 @@ fn the_whole_journey_leaves_everything_and_threads_change_nothing() {
     assert_eq!(one["cloud"]["on_movers_fraction"].as_f64(), Some(0.0));
     assert!(one["cloud"]["sigma_m"].as_f64().unwrap() < 0.03);
     assert!(one["closed_loop"]["position_rmse_m"].is_null());
+    // No estimate is better than what its measurements allow, and in eight seconds of a small room they allow a lot.
+    let bound_m = one["closed_loop"]["bound_rmse_m"].as_f64().unwrap();
+    assert!(bound_m > 1e-5 && bound_m < one["open_loop"]["position_rmse_m"].as_f64().unwrap(), "{bound_m}");
     for name in [
         "manifest.ron",
         "truth.tum",
@@ -68,6 +71,7 @@ fn the_whole_journey_leaves_everything_and_threads_change_nothing() {
         "cloud.ply",
         "report.html",
         "plots/errors.svg",
+        "plots/bound.svg",
         "plots/trajectory.png",
         "plots/pitch.svg",
         "plots/clock.png",

@@ -4,6 +4,7 @@ use super::judge::Known;
 use super::open_loop::OpenLoopRun;
 use super::register::Judged;
 use super::{Manifest, StudyError};
+use crate::evaluation::InformationBound;
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report::plot::Figure;
 use crate::report::{self, Metrics, Section};
@@ -22,7 +23,12 @@ pub(super) struct Plot {
 }
 
 /// The plots of an estimate.
-pub(super) fn plots(run: &OpenLoopRun, known: Option<&Known>, sample: &[Judged]) -> Vec<Plot> {
+pub(super) fn plots(
+    run: &OpenLoopRun,
+    known: Option<&Known>,
+    bound: Option<&InformationBound>,
+    sample: &[Judged],
+) -> Vec<Plot> {
     let world_from_map = known.and_then(|known| known.world_from_map).unwrap_or_else(Pose::identity);
     let estimate = run.map_from_head.transformed(&world_from_map);
     let truth = known.map(true_trajectory).unwrap_or_default();
@@ -33,6 +39,7 @@ pub(super) fn plots(run: &OpenLoopRun, known: Option<&Known>, sample: &[Judged])
     if let Some(errors) = known.and_then(|known| known.errors.as_ref()) {
         plots.push(plot("errors", "Errors over time", report::errors_over_time(errors)));
     }
+    plots.extend(bound.map(|bound| plot("bound", "Information bound", report::bound_over_time(bound))));
     plots.push(plot("pitch", "Pitch of the head", report::head_pitch(&truth, &estimate)));
     let true_offsets = known.map_or(&[][..], |known| &known.clock_offsets);
     plots.push(plot("clock", "Clock offset", report::clock_offset(true_offsets, &run.clock_offsets)));

@@ -1,5 +1,6 @@
 //! From a recording to a judged estimate.
 
+use super::bound::information_bound;
 use super::calibration::calibration;
 use super::cloud::{Surroundings, cloud_metrics};
 use super::open_loop::{OpenLoopRun, run_open_loop};
@@ -7,7 +8,7 @@ use super::register::{Registered, Registration};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
 use crate::estimation::{EstimatorSpec, TimeSpent};
 use crate::recording::{FoundCalibration, Preference, Reader, Selection};
-use crate::report::{Metrics, OpenLoopMetrics};
+use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::{SimulationSummary, carrier_of};
 use crate::spec::Source;
 use crate::world::World;
@@ -119,12 +120,18 @@ pub(super) fn estimate_in(
         None => None,
     };
     let open_loop = judge::open_loop_metrics(&run, known.as_ref(), drifting);
+    let bound = match (&known, origin.surroundings) {
+        (Some(_), Some(Surroundings { world, .. })) => Some(information_bound(reader, world, watch)?.bound),
+        _ => None,
+    };
     let fixed_views = Some(wishes.estimator.fixed_views as u64);
+    let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
     let metrics = Metrics {
         open_loop: OpenLoopMetrics { fixed_views, ..open_loop },
+        closed_loop: ClosedLoopMetrics { bound_rmse_m, ..ClosedLoopMetrics::default() },
         ..metrics(origin, &run, &registered, known.as_ref())
     };
-    let plots = artefacts::plots(&run, known.as_ref(), &registered.sample);
+    let plots = artefacts::plots(&run, known.as_ref(), bound.as_ref(), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
     Ok(Outcome { metrics, losses: run.losses, spent: run.spent })
 }
