@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         return Err(SpecError::plain(source.name, "is no study of latency").into());
     };
     let scenario = arguments.scenario.scenario(&arguments.scene);
-    let spec = LatencySpec { scenario, estimator: arguments.estimator.clone(), ..shipped };
+    let spec = LatencySpec { scenario, estimator: arguments.estimator.clone(), ..*shipped };
     let latency = Latency::new(&spec, &source)?;
     let bar = WorkBar::new(global, "estimating");
     let ran = latency.run(&arguments.out, arguments.force, stop_flag(), &|share| bar.show(share));

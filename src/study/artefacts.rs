@@ -5,7 +5,7 @@ use super::judge::Known;
 use super::open_loop::OpenLoopRun;
 use super::register::Judged;
 use super::{Manifest, StudyError};
-use crate::evaluation::Errors;
+use crate::evaluation::{Errors, InformationBound};
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report::plot::Figure;
 use crate::report::{self, Metrics, Section};
@@ -24,7 +24,12 @@ pub(super) struct Plot {
 }
 
 /// The plots of an estimate; `open_errors` are those that the open loop had, where loops were closed.
-pub(super) fn plots(run: &OpenLoopRun, best: &Best, open_errors: Option<&Errors>, sample: &[Judged]) -> Vec<Plot> {
+pub(super) fn plots(
+    run: &OpenLoopRun,
+    best: &Best,
+    (open_errors, bound): (Option<&Errors>, Option<&InformationBound>),
+    sample: &[Judged],
+) -> Vec<Plot> {
     let known = best.known;
     let world_from_map = known.and_then(|known| known.world_from_map).unwrap_or_else(Pose::identity);
     let estimate = best.map_from_head.transformed(&world_from_map);
@@ -39,6 +44,7 @@ pub(super) fn plots(run: &OpenLoopRun, best: &Best, open_errors: Option<&Errors>
             plots.push(plot("loops", "What closing loops is good for", report::errors_of_both_loops(open, errors)));
         }
     }
+    plots.extend(bound.map(|bound| plot("bound", "Information bound", report::bound_over_time(bound))));
     plots.push(plot("pitch", "Pitch of the head", report::head_pitch(&truth, &estimate)));
     let true_offsets = known.map_or(&[][..], |known| &known.clock_offsets);
     plots.push(plot("clock", "Clock offset", report::clock_offset(true_offsets, &run.clock_offsets)));

@@ -1,5 +1,6 @@
 //! From a recording to a judged estimate.
 
+use super::bound::information_bound;
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop, write_tum};
 use super::cloud::{Surroundings, cloud_metrics};
@@ -9,7 +10,7 @@ use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judg
 use crate::estimation::{EstimatorSpec, TimeSpent};
 use crate::geometry::Trajectory;
 use crate::recording::{FoundCalibration, Preference, Reader, Selection};
-use crate::report::{Metrics, OpenLoopMetrics};
+use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::{SimulationSummary, carrier_of};
 use crate::spec::Source;
 use crate::world::World;
@@ -137,17 +138,23 @@ pub(super) fn estimate_in(
         None => None,
     };
     let open_loop = judge::open_loop_metrics(&run, known.as_ref(), drifting);
+    let bound = match (&known, origin.surroundings) {
+        (Some(_), Some(Surroundings { world, .. })) => Some(information_bound(reader, world, watch)?.bound),
+        _ => None,
+    };
     let fixed_views = Some(wishes.estimator.fixed_views as u64);
+    let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
     let closed_metrics = |closed| judge::closed_loop_metrics(closed, closed_known.as_ref(), run.acquisition_s);
+    let closed_loop = closed.as_ref().map(closed_metrics).unwrap_or_default();
     let metrics = Metrics {
         open_loop: OpenLoopMetrics { fixed_views, ..open_loop },
-        closed_loop: closed.as_ref().map(closed_metrics).unwrap_or_default(),
+        closed_loop: ClosedLoopMetrics { bound_rmse_m, ..closed_loop },
         clock: judge::clock_metrics(&run, known.as_ref()),
         lidar: judge::lidar_metrics(&run.lidar, &wishes.estimator),
         ..metrics(origin, &run, &registered, best.known)
     };
     let open_errors = known.as_ref().filter(|_| closed.is_some()).and_then(|known| known.errors.as_ref());
-    let plots = artefacts::plots(&run, &best, open_errors, &registered.sample);
+    let plots = artefacts::plots(&run, &best, (open_errors, bound.as_ref()), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
     Ok(Outcome { metrics, losses: run.losses, spent: run.spent })
 }

@@ -8,6 +8,9 @@ const FULL_COLOUR_DEG_PER_S: f64 = 150.0;
 /// Width of a panel, points.
 const PANEL_WIDTH: f64 = 330.0;
 
+/// A figure of a run.
+type Told = fn(&StudyRun) -> Banded;
+
 /// The vertical cut through the map under each disturbance that is shown, coloured by the rate of rotation at which a point was
 /// seen: a row of latencies and a row of noises, as in the paper.
 pub fn map_figure(study: &Study, clock: ClockState) -> Figure {
@@ -54,8 +57,7 @@ fn panel(study: &Study, (disturbance, clock): (Disturbance, ClockState), title: 
 pub fn curve_figure(study: &Study) -> Figure {
     let over_latency = |run: &StudyRun| run.disturbance.latency_ms;
     let over_noise = |run: &StudyRun| run.disturbance.noise_ms;
-    let (sigma, rmse): (fn(&StudyRun) -> Banded, fn(&StudyRun) -> Banded) =
-        (|run| run.cloud_sigma_m, |run| run.position_rmse_m);
+    let (sigma, rmse): (Told, Told) = (|run| run.cloud_sigma_m, |run| run.position_rmse_m);
     let (cloud, position) = ("Cloud, sigma (mm)", "Position RMSE (mm)");
     let (latency, noise) = ("Latency of the IMU's stamps (ms)", "Noise on the scans' stamps, sigma (ms)");
     let chart = |labels: (&str, &str), of: &dyn Fn(ClockState) -> Vec<(f64, Banded)>| {
@@ -71,12 +73,10 @@ pub fn curve_figure(study: &Study) -> Figure {
             .with(dots(ClockState::Off, Colour::Second))
             .with(dots(ClockState::On, Colour::Estimate))
     };
-    let latencies = |figure: fn(&StudyRun) -> Banded| {
-        move |clock| study.latencies(clock).iter().map(|run| (over_latency(run), figure(run))).collect()
-    };
-    let noises = |figure: fn(&StudyRun) -> Banded| {
-        move |clock| study.noises(clock).iter().map(|run| (over_noise(run), figure(run))).collect()
-    };
+    let latencies =
+        |figure: Told| move |clock| study.latencies(clock).iter().map(|run| (over_latency(run), figure(run))).collect();
+    let noises =
+        |figure: Told| move |clock| study.noises(clock).iter().map(|run| (over_noise(run), figure(run))).collect();
     let mut figure = Figure::of(vec![
         chart((latency, cloud), &latencies(sigma)),
         chart((noise, cloud), &noises(sigma)),

@@ -208,7 +208,12 @@ impl Latency {
             let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
             while let Some((disturbance, clock)) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
                 let make = || alone.install(|| bench.run(*disturbance, *clock, stop));
-                kept.part::<Judged>(&part_name(*disturbance, *clock), make)?;
+                let made = kept.part::<Judged>(&part_name(*disturbance, *clock), make);
+                if made.is_err() {
+                    // What is left would be done for nothing.
+                    next.store(runs.len(), Ordering::Relaxed);
+                }
+                made?;
                 pieces.finish_one();
             }
             Ok(())
@@ -216,8 +221,10 @@ impl Latency {
         let threads = rayon::current_num_threads().min(runs.len());
         std::thread::scope(|scope| {
             let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-            let ends = workers.into_iter().map(|worker| worker.join());
-            ends.map(|end| end.unwrap_or(Err(StudyError::Stopped))).collect::<Result<(), StudyError>>()
+            let end = |worker: std::thread::ScopedJoinHandle<'_, Result<(), StudyError>>| {
+                worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            };
+            workers.into_iter().try_for_each(end)
         })?;
         runs.iter().map(|(disturbance, clock)| kept.get(&part_name(*disturbance, *clock))).collect()
     }

@@ -14,7 +14,7 @@ pub enum ExperimentSpec {
     /// Gain curves of several heads, their damping fitted to the paper's peaks.
     GainCurves(GainCurvesSpec),
     /// Maps of one recording under errors of timing.
-    Latency(LatencySpec),
+    Latency(Box<LatencySpec>),
 }
 
 /// Gain curves of several heads.
