@@ -12,10 +12,18 @@ const MOVED_EDGES: f64 = 0.05;
 /// Neighbours among the surfels of each resolution.
 #[derive(Debug)]
 pub(super) struct Neighbours {
-    /// Of each resolution, once they were looked for, and how far its surfels may have moved since, m.
-    levels: Vec<Option<(Vec<(u32, u32)>, f64)>>,
+    /// Of each resolution, once they were looked for.
+    levels: Vec<Option<Found>>,
     finest: usize,
     pub(super) in_use: InUse,
+}
+
+/// The neighbours of one resolution.
+#[derive(Debug)]
+struct Found {
+    pairs: Vec<(u32, u32)>,
+    /// How far the surfels may have moved since, m.
+    moved_m: f64,
 }
 
 /// The neighbours of the resolutions in use.
@@ -39,7 +47,7 @@ struct Shelf {
 impl Neighbours {
     /// Nobody has looked for any yet, at any of `levels` resolutions.
     pub(super) fn unknown(levels: usize) -> Self {
-        Self { levels: vec![None; levels], finest: levels, in_use: InUse::default() }
+        Self { levels: (0..levels).map(|_| None).collect(), finest: levels, in_use: InUse::default() }
     }
 
     /// Uses those of the resolutions from `finest` on, and looks for them where need be; whether they have changed.
@@ -47,14 +55,14 @@ impl Neighbours {
         let mut changed = self.finest != finest;
         for (level, found) in self.levels.iter_mut().enumerate().skip(finest) {
             let edge_m = matcher.finest_voxel_m * f64::from(1_u32 << level);
-            if found.as_ref().is_none_or(|(_, moved_m)| *moved_m > MOVED_EDGES * edge_m) {
-                *found = Some((look_around(level, scene, matcher, count), 0.0));
+            if found.as_ref().is_none_or(|found| found.moved_m > MOVED_EDGES * edge_m) {
+                *found = Some(Found { pairs: look_around(level, scene, matcher, count), moved_m: 0.0 });
                 changed = true;
             }
         }
         if changed {
             self.finest = finest;
-            let pairs = self.levels[finest..].iter().flatten().flat_map(|(pairs, _)| pairs).copied().collect();
+            let pairs = self.levels[finest..].iter().flatten().flat_map(|found| &found.pairs).copied().collect();
             self.in_use = InUse::of(pairs, scene);
         }
         changed
@@ -62,7 +70,7 @@ impl Neighbours {
 
     /// Surfels have moved by at most `by_m`.
     pub(super) fn moved(&mut self, by_m: f64) {
-        self.levels.iter_mut().flatten().for_each(|(_, moved_m)| *moved_m += by_m);
+        self.levels.iter_mut().flatten().for_each(|found| found.moved_m += by_m);
     }
 }
 
