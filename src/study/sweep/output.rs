@@ -47,7 +47,7 @@ fn cell(number: f64) -> String {
 
 /// Tables for the terminal: every axis over all runs.
 pub(super) fn words(summary: &Summary, plan: &Plan) -> String {
-    let tables = tables(summary, plan).into_iter().map(|(title, header, rows)| {
+    let tables = tables(summary, plan, false).into_iter().map(|(title, header, rows)| {
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         format!("{title}\n{}\n", report::table(&header, &rows, true))
     });
@@ -65,7 +65,7 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -
         status.failed,
         status.missing
     );
-    let mut all = tables(summary, plan);
+    let mut all = tables(summary, plan, true);
     if let Some(by) = &plan.spec().by {
         let mut levels: Vec<&String> = summary.lines.iter().filter_map(|line| line.within.as_ref()).collect();
         levels.dedup();
@@ -76,7 +76,7 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -
             }
         });
         for axis in summary.axes.iter().filter(|axis| *axis != by) {
-            all.extend(told.iter().map(|level| level_table(summary, axis, Some((by, level)))));
+            all.extend(told.iter().map(|level| level_table(summary, axis, Some((by, level)), true)));
         }
     }
     for (title, header, rows) in all {
@@ -88,12 +88,12 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -
 
 type TableOfWords = (String, Vec<String>, Vec<Vec<String>>);
 
-fn tables(summary: &Summary, plan: &Plan) -> Vec<TableOfWords> {
+fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TableOfWords> {
     if !summary.trends.is_empty() {
         return vec![trend_table(summary)];
     }
     let axes = plan.axes().iter().filter(|axis| matches!(axis.extent(), super::design::Extent::Levels(1..=SHOWN)));
-    axes.map(|axis| level_table(summary, &axis.name, None)).collect()
+    axes.map(|axis| level_table(summary, &axis.name, None, bands)).collect()
 }
 
 /// Axes by measures: rank correlations.
@@ -112,8 +112,8 @@ fn trend_table(summary: &Summary) -> TableOfWords {
     ("Rank correlation of each measure with each axis".to_owned(), header, summary.axes.iter().map(row).collect())
 }
 
-/// Levels by measures: median, band, and the ratio to the first level.
-fn level_table(summary: &Summary, axis: &str, within: Option<(&str, &str)>) -> TableOfWords {
+/// Levels by measures: median, with `bands` the quartiles too, and the ratio to the first level.
+fn level_table(summary: &Summary, axis: &str, within: Option<(&str, &str)>, bands: bool) -> TableOfWords {
     let mut header = vec![axis.to_owned()];
     for measure in &summary.measures {
         header.extend([format!("{} {}", measure.short(), measure.unit().0), "ratio".to_owned()]);
@@ -124,7 +124,7 @@ fn level_table(summary: &Summary, axis: &str, within: Option<(&str, &str)>) -> T
         let mut cells = vec![line.level.clone()];
         for measure in &summary.measures {
             match summary.line(axis, &line.level, level_of, *measure) {
-                Some(line) => cells.extend([figures(line), ratio(line)]),
+                Some(line) => cells.extend([figures(line, bands), ratio(line)]),
                 None => cells.extend([String::new(), String::new()]),
             }
         }
@@ -135,11 +135,11 @@ fn level_table(summary: &Summary, axis: &str, within: Option<(&str, &str)>) -> T
     (format!("By {axis}, {place}"), header, rows)
 }
 
-/// Median and quartiles in the unit that people read.
-fn figures(line: &Line) -> String {
+/// Median, with `bands` the quartiles too, in the unit that people read.
+fn figures(line: &Line, bands: bool) -> String {
     let (_, per_unit) = line.measure.unit();
     let [median, low, high] = [line.median, line.quarter, line.three_quarters].map(|x| digits(x * per_unit));
-    if low == high { median } else { format!("{median} ({low}..{high})") }
+    if low == high || !bands { median } else { format!("{median} ({low}..{high})") }
 }
 
 fn ratio(line: &Line) -> String {
@@ -167,7 +167,7 @@ fn legend(summary: &Summary) -> String {
         );
     }
     format!(
-        "Median (quartiles). Ratios are medians over runs that are alike in all else, to the axis's first level. * p < \
+        "Medians, in study.md with quartiles. Ratios are medians over runs that are alike in all else, to the axis's first level. * p < \
          {SIGNIFICANT} by Wilcoxon's signed-rank test of their logarithms, two-sided, corrected for all levels by Holm's method."
     )
 }

@@ -137,7 +137,13 @@ fn by_words(axis: &str, measure: Measure, lines: &[&Line]) -> Chart {
     });
     let dots = lines.iter().enumerate().map(|(k, line)| (line.median * per_unit, height(k)));
     let marks = lines.iter().enumerate().map(|(k, line)| (height(k), line.level.clone()));
+    // Half a row is left free above and below.
+    let finite = lines.iter().flat_map(|line| [line.quarter, line.three_quarters]).filter(|x| x.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    let middle = if low <= high { 0.5 * (low + high) * per_unit } else { 0.0 };
+    let room = vec![(middle, -0.5), (f64::NAN, f64::NAN), (middle, lines.len() as f64 - 0.5)];
     Chart::new(&format!("By {axis}"), measure.label(), "")
+        .with(Series::line("", Colour::Backdrop, room))
         .with(Series::line("", Colour::Backdrop, bars.collect()).marked(Mark::Line(4.0)))
         .with(Series::dots("", Colour::Estimate, dots.collect()).marked(Mark::Dots(6.0)))
         .with_y_marks(marks.collect())
