@@ -23,7 +23,7 @@ fn small() -> LatencySpec {
     let mut small = LatencySpec {
         latencies_ms: vec![-5.0, 0.0, 5.0],
         noises_ms: vec![0.0, 5.0],
-        shown_latencies_ms: vec![-5.0, 0.0, 5.0],
+        shown_latencies_ms: vec![-5.0, 0.0],
         shown_noises_ms: vec![0.0, 5.0],
         block_s: 2.0,
         ..spec
@@ -79,7 +79,7 @@ fn a_latency_blurs_the_cloud_both_ways_the_clock_state_recovers_it_and_a_stop_ch
 
     assert_eq!(csv(&study).lines().count(), 9);
     assert!(words(&study).contains("noise 5 ms"));
-    assert!(map_figure(&study, ClockState::Off).svg().unwrap().contains("ms latency error"));
+    assert!(map_figure(&study, ClockState::Off).svg().unwrap().contains("ms latency"));
     assert!(curve_figure(&study).svg().unwrap().contains("clock state on"));
 }
 
@@ -96,8 +96,11 @@ fn a_study_that_makes_no_sense_says_where() {
     let (_, source) = shipped();
     for (old, new, sentence) in [
         ("latencies_ms: [-5.0, -2.0, -1.0, -0.5, 0.0,", "latencies_ms: [-5.0,", "needs a 0"),
+        ("latencies_ms: [-5.0, -2.0, -1.0, -0.5, 0.0,", "latencies_ms: [0.0,", "on each side of 0"),
+        ("latencies_ms: [-5.0, -2.0,", "latencies_ms: [-5.0, -5.0,", "more than once"),
         ("noises_ms: [0.0, 1.0,", "noises_ms: [0.0, -1.0,", "expected 0 to 20"),
         ("shown_noises_ms: [0.0,", "shown_noises_ms: [0.0, 3.0,", "not among those"),
+        ("shown_noises_ms: [0.0, 1.0,", "shown_noises_ms: [0.0,", "show as many"),
         ("block_s: 5.0", "block_s: 70.0", "do not fit"),
         ("scene: \"office\"", "scene: \"nowhere\"", "no such scene"),
     ] {

@@ -6,7 +6,7 @@ use crate::report::plot::{Chart, Colour, Figure, Mark, Series, SignedDots};
 /// Rates of rotation beyond this have the colours' ends, degrees/s.
 const FULL_COLOUR_DEG_PER_S: f64 = 150.0;
 /// Width of a panel, points.
-const PANEL_WIDTH: f64 = 330.0;
+const PANEL_WIDTH: f64 = 400.0;
 
 /// A figure of a run.
 type Told = fn(&StudyRun) -> Banded;
@@ -15,7 +15,7 @@ type Told = fn(&StudyRun) -> Banded;
 /// seen: a row of latencies and a row of noises, as in the paper.
 pub fn map_figure(study: &Study, clock: ClockState) -> Figure {
     let [latencies, noises] = &study.shown;
-    let columns = latencies.len().max(noises.len());
+    let columns = latencies.len();
     let mut letters = 'a'..;
     let mut charts = Vec::new();
     for row in [latencies, noises] {
@@ -23,8 +23,6 @@ pub fn map_figure(study: &Study, clock: ClockState) -> Figure {
             let title = format!("({}) {}", letters.next().unwrap_or(' '), said(*disturbance, row == noises));
             charts.push(panel(study, (*disturbance, clock), &title, charts.is_empty()));
         }
-        // A row that is shorter ends early.
-        charts.extend((row.len()..columns).map(|_| Chart::new("", "", "")));
     }
     let mut figure = Figure::of(charts).in_columns(columns);
     figure.width = PANEL_WIDTH * columns as f64;
@@ -35,7 +33,7 @@ fn said(disturbance: Disturbance, is_noise: bool) -> String {
     if is_noise {
         format!("{} ms added noise", disturbance.noise_ms)
     } else {
-        format!("{} ms latency error", disturbance.latency_ms).replace('-', "\u{2212}")
+        format!("{} ms latency", disturbance.latency_ms).replace('-', "\u{2212}")
     }
 }
 

@@ -49,9 +49,12 @@ impl LatencySpec {
             if !list.contains(&0.0) {
                 return wrong(key, format!("`{key}` needs a 0 to compare with"));
             }
-        }
-        if self.latencies_ms.len() < 3 {
-            return wrong("latencies_ms", "a curve with a minimum needs at least 3 latencies".to_owned());
+            if let Some((_, twice)) = list.iter().enumerate().find(|(k, ms)| list[..*k].contains(ms)) {
+                return wrong(key, format!("`{key}` has {twice} more than once"));
+            }
+            if !list.iter().any(|ms| *ms > 0.0) || (least < 0.0 && !list.iter().any(|ms| *ms < 0.0)) {
+                return wrong(key, format!("`{key}` needs something on each side of 0 that it may have"));
+            }
         }
         let shown = [
             ("shown_latencies_ms", &self.shown_latencies_ms, &self.latencies_ms),
@@ -61,6 +64,11 @@ impl LatencySpec {
             if let Some(missing) = list.iter().find(|ms| !of.contains(ms)) {
                 return wrong(key, format!("{missing} ms is shown, and not among those that are studied"));
             }
+        }
+        if self.shown_noises_ms.len() != self.shown_latencies_ms.len() {
+            let counts = (self.shown_noises_ms.len(), self.shown_latencies_ms.len());
+            let message = format!("a row of {} noises under one of {} latencies; show as many", counts.0, counts.1);
+            return wrong("shown_noises_ms", message);
         }
         if self.scenario.duration_s < 2.0 * self.block_s {
             let message = format!("two blocks of {} s do not fit into {} s", self.block_s, self.scenario.duration_s);
@@ -72,14 +80,10 @@ impl LatencySpec {
     /// The same with so little to do that it takes seconds; its figures are no results.
     #[must_use]
     pub fn shortened(&self) -> Self {
-        let ends = |list: &[f64]| {
-            let least = list.iter().copied().fold(f64::INFINITY, f64::min);
-            let most = list.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let mut ends = vec![least, 0.0, most];
-            ends.dedup();
-            ends
-        };
-        let (latencies_ms, noises_ms) = (ends(&self.latencies_ms), ends(&self.noises_ms));
+        let most = |list: &[f64]| list.iter().copied().fold(0.0, f64::max);
+        let least = self.latencies_ms.iter().copied().fold(0.0, f64::min);
+        let latencies_ms = vec![least, 0.0, most(&self.latencies_ms)];
+        let noises_ms = vec![0.0, 0.5 * most(&self.noises_ms), most(&self.noises_ms)];
         Self {
             scenario: Scenario { duration_s: self.scenario.duration_s.min(10.0), ..self.scenario.clone() },
             shown_latencies_ms: latencies_ms.clone(),
