@@ -62,9 +62,10 @@ fn the_whole_journey_leaves_everything_and_threads_change_nothing() {
     assert!(one["cloud"]["sigma_m"].as_f64().unwrap() < 0.03);
     let [open, closed] = ["open_loop", "closed_loop"].map(|loops| one[loops]["position_rmse_m"].as_f64().unwrap());
     assert!(closed < 1.05 * open, "{open} m open, {closed} m closed");
-    // No estimate is better than what its measurements allow, and in eight seconds of a small room they allow a lot.
+    // In eight seconds of a small room the measurements allow a lot. A run of which the head rests a third, which the estimator
+    // is told and the bound is not, may come out below it.
     let bound_m = one["closed_loop"]["bound_rmse_m"].as_f64().unwrap();
-    assert!(bound_m > 1e-5 && bound_m < one["open_loop"]["position_rmse_m"].as_f64().unwrap(), "{bound_m}");
+    assert!((1e-5..3e-3).contains(&bound_m), "{bound_m}");
     for name in [
         "manifest.ron",
         "truth.tum",

@@ -98,27 +98,9 @@ pub(super) fn estimate_in(
     let found = calibration(reader, &selection, &wishes.calibration, wishes.body_frame.as_deref())?;
     notes_on(&selection, &found, wishes, watch);
 
-    let (estimator, calibration) = (&wishes.estimator, &found.calibration);
-    let how = How { estimator, calibration, surveying: wishes.closed_loop };
     let expected_s = origin.simulation.map(|summary| summary.duration_s);
-    let run = run_open_loop(reader, &selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
-    run.remarks.iter().for_each(|remark| watch.note(remark));
-
-    let closed = match wishes.closed_loop {
-        true => Some(close_loops(&run, folder, estimator, watch)?),
-        false => None,
-    };
-
-    let mut truth_of = |map_from_head: &Trajectory| match found.body_frame == TRUE_FRAME {
-        true => judge::truth_of(reader, map_from_head, watch),
-        false => Ok(None),
-    };
-    let known = truth_of(&run.map_from_head)?;
-    let closed_known = closed.as_ref().map(|closed| truth_of(&closed.map_from_head)).transpose()?.flatten();
-    let best = Best {
-        map_from_head: closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head),
-        known: if closed.is_some() { closed_known.as_ref() } else { known.as_ref() },
-    };
+    let loops = Loops::run((reader, &selection, &found), folder, wishes, expected_s, watch)?;
+    let (run, known, best) = (&loops.open, loops.known.as_ref(), loops.best());
     let registration = Registration {
         reader,
         selection: &selection,
@@ -133,30 +115,36 @@ pub(super) fn estimate_in(
     let registered = registration.run(&folder.join("cloud.ply"), &folder.join("result.mcap"), watch)?;
 
     watch.progress(Stage::Reporting, 0.0, None);
-    let drifting = match &known {
+    let drifting = match known {
         Some(_) => judge::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
         None => None,
     };
-    let open_loop = judge::open_loop_metrics(&run, known.as_ref(), drifting);
-    let bound = match (&known, origin.surroundings) {
+    let bound = match (known, origin.surroundings) {
         (Some(_), Some(Surroundings { world, .. })) => Some(information_bound(reader, world, watch)?.bound),
         _ => None,
     };
-    let fixed_views = Some(wishes.estimator.fixed_views as u64);
     let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
-    let closed_metrics = |closed| judge::closed_loop_metrics(closed, closed_known.as_ref(), run.acquisition_s);
-    let closed_loop = closed.as_ref().map(closed_metrics).unwrap_or_default();
+    let fixed_views = Some(wishes.estimator.fixed_views as u64);
     let metrics = Metrics {
-        open_loop: OpenLoopMetrics { fixed_views, ..open_loop },
-        closed_loop: ClosedLoopMetrics { bound_rmse_m, ..closed_loop },
-        clock: judge::clock_metrics(&run, known.as_ref()),
+        open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, known, drifting) },
+        closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
+        clock: judge::clock_metrics(run, known),
         lidar: judge::lidar_metrics(&run.lidar, &wishes.estimator),
-        ..metrics(origin, &run, &registered, best.known)
+        ..metrics(origin, run, &registered, best.known)
     };
-    let open_errors = known.as_ref().filter(|_| closed.is_some()).and_then(|known| known.errors.as_ref());
-    let plots = artefacts::plots(&run, &best, (open_errors, bound.as_ref()), &registered.sample);
+    let open_errors = known.filter(|_| loops.closed.is_some()).and_then(|known| known.errors.as_ref());
+    let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
-    Ok(Outcome { metrics, losses: run.losses, spent: run.spent })
+    let OpenLoopRun { losses, spent, .. } = loops.open;
+    Ok(Outcome { metrics, losses, spent })
+}
+
+/// Both loops, and what the truth says of each.
+struct Loops {
+    open: OpenLoopRun,
+    known: Option<judge::Known>,
+    closed: Option<ClosedLoopRun>,
+    closed_known: Option<judge::Known>,
 }
 
 /// The estimate that goes into cloud, result and plots: the closed loop's where loops were closed.
@@ -164,6 +152,46 @@ pub(super) struct Best<'a> {
     pub map_from_head: &'a Trajectory,
     /// What the truth says of it.
     pub known: Option<&'a judge::Known>,
+}
+
+impl Loops {
+    /// Runs them, and writes their trajectories to `folder`.
+    fn run(
+        (reader, selection, found): (&Reader, &Selection, &FoundCalibration),
+        folder: &Path,
+        wishes: &Wishes,
+        expected_s: Option<f64>,
+        watch: &mut Watch,
+    ) -> Result<Self, StudyError> {
+        let (estimator, calibration) = (&wishes.estimator, &found.calibration);
+        let how = How { estimator, calibration, surveying: wishes.closed_loop };
+        let open = run_open_loop(reader, selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
+        open.remarks.iter().for_each(|remark| watch.note(remark));
+        let closed = match wishes.closed_loop {
+            true => Some(close_loops(&open, folder, estimator, watch)?),
+            false => None,
+        };
+        let mut truth_of = |map_from_head: &Trajectory| match found.body_frame == TRUE_FRAME {
+            true => judge::truth_of(reader, map_from_head, watch),
+            false => Ok(None),
+        };
+        let known = truth_of(&open.map_from_head)?;
+        let closed_known = closed.as_ref().map(|closed| truth_of(&closed.map_from_head)).transpose()?.flatten();
+        Ok(Self { open, known, closed, closed_known })
+    }
+
+    fn best(&self) -> Best<'_> {
+        match &self.closed {
+            Some(closed) => Best { map_from_head: &closed.map_from_head, known: self.closed_known.as_ref() },
+            None => Best { map_from_head: &self.open.map_from_head, known: self.known.as_ref() },
+        }
+    }
+
+    fn closed_metrics(&self) -> ClosedLoopMetrics {
+        let (known, acquisition_s) = (self.closed_known.as_ref(), self.open.acquisition_s);
+        let told = self.closed.as_ref().map(|closed| judge::closed_loop_metrics(closed, known, acquisition_s));
+        told.unwrap_or_default()
+    }
 }
 
 /// Closes loops, and writes the trajectory.

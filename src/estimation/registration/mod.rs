@@ -16,7 +16,7 @@
 //! 2. They are shelved by chapters, and chapters that saw the same places are compared: `chapters`.
 //! 3. From the coarsest resolution on: neighbours in six dimensions, found from both sides; match; solve; move the trajectory
 //!    and the surfels; until nothing moves. Then the next finer resolution joins in.
-//! 4. A solution that is not believed, or leaves the matches no nearer to each other, is dropped, and the open loop stays.
+//! 4. A solution that is not believed, or that rests on too little, is dropped, and the open loop stays.
 
 mod chapters;
 mod course;

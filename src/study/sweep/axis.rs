@@ -8,6 +8,7 @@ use crate::spec::{Source, SpecError};
 use crate::study::StudyError;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// What is varied, ready to be applied.
 #[derive(Debug, Clone)]
@@ -58,9 +59,8 @@ pub(super) struct Shelf {
 impl Shelf {
     /// The spec `name` of `slot`, loaded when it is not there yet.
     fn load(&mut self, slot: Slot, name: &str) -> Result<(), StudyError> {
-        let key = Self::key(slot, name);
-        if !self.others.contains_key(&key) {
-            self.others.insert(key, Kept::load(slot, name)?);
+        if let Entry::Vacant(free) = self.others.entry(Self::key(slot, name)) {
+            free.insert(Kept::load(slot, name)?);
         }
         Ok(())
     }

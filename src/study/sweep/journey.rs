@@ -74,11 +74,11 @@ impl Tape {
     ) -> Result<Vec<Option<f64>>, StudyError> {
         let limit = plan.limit().ok_or_else(|| wrong_kind("limit"))?;
         let is_of = |told_by: Told| told.iter().any(|measure| measure.told() == told_by);
-        let swing = match is_of(Told::BySwing) || is_of(Told::BySwingOrClosedForm) {
+        let swing = match is_of(Told::Swing) || is_of(Told::SwingOrClosedForm) {
             true => Some(self.swing()?),
             false => None,
         };
-        let estimated = match self.handles.get(reader).filter(|_| is_of(Told::ByEstimate)) {
+        let estimated = match self.handles.get(reader).filter(|_| is_of(Told::Estimate)) {
             Some(handle) => {
                 let Component::Estimator(estimator) = &plan.filled(&point.changed, Slot::Estimator)?.component else {
                     return Err(wrong_kind("estimator"));

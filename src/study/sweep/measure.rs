@@ -52,15 +52,15 @@ pub enum Measure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Told {
     /// An estimate from a recording.
-    ByEstimate,
+    Estimate,
     /// A swing of the head, without rays.
-    BySwing,
+    Swing,
     /// A closed form.
-    ByClosedForm,
+    ClosedForm,
     /// Either of a swing and a closed form.
-    BySwingOrClosedForm,
+    SwingOrClosedForm,
     /// A clock on the wall.
-    ByClock,
+    Clock,
 }
 
 impl Measure {
@@ -141,7 +141,7 @@ impl Measure {
 
     /// What a figure that is not there counts as: an estimate that was lost is infinitely wrong.
     pub(super) fn when_lost(self) -> f64 {
-        if self.told() == Told::ByEstimate { f64::INFINITY } else { f64::NAN }
+        if self.told() == Told::Estimate { f64::INFINITY } else { f64::NAN }
     }
 
     pub(super) fn told(self) -> Told {
@@ -151,24 +151,22 @@ impl Measure {
             | Self::DriftMPerMin
             | Self::YawDriftDegPerMin
             | Self::ClockRmseS
-            | Self::ClosedPositionRmseM => Told::ByEstimate,
+            | Self::ClosedPositionRmseM => Told::Estimate,
             Self::FractionSeen | Self::CoveredS | Self::DensityPerSrS | Self::RateP99DegPerS | Self::Saturated => {
-                Told::BySwing
+                Told::Swing
             }
-            Self::FieldOfViewDeg | Self::RateDegPerS => Told::BySwingOrClosedForm,
-            Self::RockingHz | Self::PeakGain | Self::SagMm | Self::SpringMassG | Self::StressShare => {
-                Told::ByClosedForm
-            }
-            Self::WallS => Told::ByClock,
+            Self::FieldOfViewDeg | Self::RateDegPerS => Told::SwingOrClosedForm,
+            Self::RockingHz | Self::PeakGain | Self::SagMm | Self::SpringMassG | Self::StressShare => Told::ClosedForm,
+            Self::WallS => Told::Clock,
         }
     }
 
     /// Whether a run of this base tells it.
     pub(super) fn is_of(self, base: &BaseSpec) -> bool {
         match self.told() {
-            Told::ByClock | Told::BySwingOrClosedForm => true,
-            Told::ByClosedForm => matches!(base, BaseSpec::Spring { .. }),
-            Told::ByEstimate | Told::BySwing => matches!(base, BaseSpec::Journey { .. }),
+            Told::Clock | Told::SwingOrClosedForm => true,
+            Told::ClosedForm => matches!(base, BaseSpec::Spring { .. }),
+            Told::Estimate | Told::Swing => matches!(base, BaseSpec::Journey { .. }),
         }
     }
 }

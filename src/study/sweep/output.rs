@@ -72,7 +72,7 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -
         let mut told: Vec<&String> = Vec::new();
         levels.into_iter().for_each(|level| {
             if !told.contains(&level) {
-                told.push(level)
+                told.push(level);
             }
         });
         for axis in summary.axes.iter().filter(|axis| *axis != by) {

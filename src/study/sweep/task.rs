@@ -113,7 +113,7 @@ impl Sweep {
     fn run_shared(&self, shared: &[Shared], limit: LimitSpec, tell: &(dyn Fn(Word) + Sync)) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
         let told = self.plan.told();
-        let recorded = told.iter().any(|measure| measure.told() == Told::ByEstimate);
+        let recorded = told.iter().any(|measure| measure.told() == Told::Estimate);
         let mut built: Vec<Simulation> = Vec::new();
         let mut standing: Vec<&Shared> = Vec::new();
         for each in shared {
