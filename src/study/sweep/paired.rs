@@ -90,12 +90,20 @@ mod tests {
 
     #[test]
     fn many_pairs_go_on_where_counting_ends() {
-        // So many tenths of the signs negative, evenly among the ranks. Far out the normal law has other tails than the count.
+        // So many tenths of the signs negative, evenly among the ranks.
         let pairs = |count: i32, tenths: i32| -> Vec<f64> {
             (1..=count).map(|k| if k % 10 < tenths { -f64::from(k) } else { f64::from(k) }).collect()
         };
-        let (counted, normal) = (signed_rank_p(&pairs(200, 4)).ln(), signed_rank_p(&pairs(201, 4)).ln());
-        assert_relative_eq!(counted, normal, max_relative = 0.05);
+        // The normal law of Wilcoxon's sum: mean n (n + 1) / 4, variance n (n + 1) (2 n + 1) / 24.
+        let by_normal_law = |differences: &[f64]| {
+            let n = differences.len() as f64;
+            let negative: f64 = differences.iter().filter(|x| **x < 0.0).map(|x| -x).sum();
+            let sigma = (n * (n + 1.0) * (2.0 * n + 1.0) / 24.0).sqrt();
+            libm::erfc((n * (n + 1.0) / 4.0 - negative) / sigma / std::f64::consts::SQRT_2)
+        };
+        let (counted, beyond) = (pairs(200, 4), pairs(201, 4));
+        assert_relative_eq!(signed_rank_p(&counted).ln(), by_normal_law(&counted).ln(), max_relative = 0.01);
+        assert_relative_eq!(signed_rank_p(&beyond), by_normal_law(&beyond), max_relative = 1e-9);
         assert!(signed_rank_p(&pairs(2000, 3)) < 1e-20);
     }
 
