@@ -3,8 +3,6 @@
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{EstimatorSpec, register};
 use crate::geometry::Trajectory;
-use crate::recording::{RecordingError, TumWriter};
-use std::path::Path;
 use std::time::Instant;
 
 /// What the global registration made of an open loop.
@@ -27,14 +25,4 @@ pub(super) fn run_closed_loop(run: &OpenLoopRun, estimator: &EstimatorSpec) -> C
         remarks: closed.report.left.map(left).into_iter().collect(),
         wall_s: started.elapsed().as_secs_f64() + run.survey.took_s(),
     }
-}
-
-/// Writes a trajectory as TUM.
-pub(super) fn write_tum(path: &Path, map_from_head: &Trajectory) -> Result<(), RecordingError> {
-    let mut tum = TumWriter::create(path)?;
-    for (stamp, pose) in map_from_head.iter() {
-        tum.pose(stamp, pose)?;
-    }
-    tum.finish()?;
-    Ok(())
 }

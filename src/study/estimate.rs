@@ -2,14 +2,14 @@
 
 use super::bound::information_bound;
 use super::calibration::calibration;
-use super::closed_loop::{ClosedLoopRun, run_closed_loop, write_tum};
+use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
 use super::open_loop::{How, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
 use crate::estimation::{EstimatorSpec, TimeSpent};
 use crate::geometry::Trajectory;
-use crate::recording::{FoundCalibration, Preference, Reader, Selection};
+use crate::recording::{FoundCalibration, Preference, Reader, Selection, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::{SimulationSummary, carrier_of};
 use crate::spec::Source;

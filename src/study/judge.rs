@@ -2,6 +2,7 @@
 
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
+use super::true_clock::true_offset;
 use super::{StudyError, Watch};
 use crate::estimation::EstimatorSpec;
 use crate::evaluation::{Errors, EvaluationError, Pairs, clock_error, consistency, drift, relative_error};
@@ -33,7 +34,7 @@ pub(super) fn truth_of(
     let heads = reader.truth().filter_map(|told| match told {
         Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
         Ok(Truth::Clock(now, clock)) => {
-            clock_offsets.push((now + clock.lidar_ahead, clock.imu_after_lidar().seconds()));
+            clock_offsets.push(true_offset(now, &clock));
             None
         }
         Ok(Truth::Base(..)) => None,

@@ -9,6 +9,7 @@
 //! [`coverage`] of its lidar. A [`sweep`] varies any of it, and tells what matters.
 
 mod artefacts;
+mod beside;
 mod bound;
 mod cadence;
 mod calibration;

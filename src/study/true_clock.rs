@@ -1,5 +1,12 @@
 use crate::recording::{Reader, RecordingError, Truth};
 use crate::time::{Span, Stamp};
+use crate::truth::ClockTruth;
+
+/// How much later the IMU's clock truly stamps an instant than the lidar's, s, at lidar time; the clocks tell it at the true time
+/// `now`.
+pub(super) fn true_offset(now: Stamp, clock: &ClockTruth) -> (Stamp, f64) {
+    (now + clock.lidar_ahead, clock.imu_after_lidar().seconds())
+}
 
 /// How much later the IMU's clock truly stamps an instant than the lidar's, over lidar time.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -11,7 +18,7 @@ impl TrueClock {
         let mut offsets = Vec::new();
         for told in reader.truth() {
             if let Truth::Clock(now, clock) = told? {
-                offsets.push((now + clock.lidar_ahead, clock.imu_after_lidar().seconds()));
+                offsets.push(true_offset(now, &clock));
             }
         }
         Ok(Self(offsets))

@@ -2,6 +2,7 @@
 
 use crate::spec::{self, Source};
 use crate::study::StudyError;
+use crate::study::beside::{PARTIAL, write_text};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io::ErrorKind;
@@ -85,7 +86,7 @@ impl Kept {
         self.folder.join("parts").join(format!("{name}.ron"))
     }
 
-    /// Writes a file of the folder at once: under another name first.
+    /// Writes a file of the folder, whole or not at all.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -93,15 +94,8 @@ impl Kept {
         let path = self.folder.join(name);
         let parent = path.parent().unwrap_or(&self.folder);
         std::fs::create_dir_all(parent).map_err(StudyError::file(parent))?;
-        replace(&path, text)
+        write_text(parent, &path, text)
     }
-}
-
-/// Writes a file so that it is there whole or not at all.
-pub(super) fn replace(path: &Path, text: &str) -> Result<(), StudyError> {
-    let partial = path.with_extension("partial");
-    std::fs::write(&partial, text).map_err(StudyError::file(&partial))?;
-    std::fs::rename(&partial, path).map_err(StudyError::file(path))
 }
 
 /// What the work in a folder was made from; `None` where there is none.
@@ -115,7 +109,7 @@ fn made_from(folder: &Path) -> Result<Option<String>, StudyError> {
 }
 
 fn is_occupied(folder: &Path) -> bool {
-    let of_ours = |name: &std::ffi::OsStr| name == "made_from.partial";
+    let of_ours = |name: &std::ffi::OsStr| name.to_string_lossy().starts_with(PARTIAL);
     std::fs::read_dir(folder)
         .is_ok_and(|mut entries| entries.any(|e| e.map_or(true, |entry| !of_ours(&entry.file_name()))))
 }
@@ -130,8 +124,12 @@ mod tests {
         let folder = here.path().join("work");
         let kept = Kept::open(&folder, &"one", false).unwrap();
         assert_eq!(kept.part("a", || Ok(0.1 + 0.2)).unwrap(), 0.1 + 0.2);
-        // A run that was stopped leaves a partial file; it is no part.
-        std::fs::write(folder.join("parts/b.partial"), "half of").unwrap();
+        // A run that was killed leaves a file that is not whole; it is no part, and no other work.
+        std::fs::write(folder.join(format!("parts/{PARTIAL}b")), "half of").unwrap();
+        let begun = here.path().join("begun");
+        std::fs::create_dir(&begun).unwrap();
+        std::fs::write(begun.join(format!("{PARTIAL}c")), "half of").unwrap();
+        Kept::open(&begun, &"one", false).unwrap();
         let again = Kept::open(&folder, &"one", false).unwrap();
         assert_eq!(again.part("a", || Ok(7.0)).unwrap(), 0.1 + 0.2);
         assert_eq!(again.part("b", || Ok(7.0)).unwrap(), 7.0);

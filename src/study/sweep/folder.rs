@@ -8,13 +8,13 @@
 //! ```
 
 use super::axis::Shelf;
-use super::beside::write_text;
 use super::component::{Kept, Slot};
 use super::identity::Identity;
 use super::table::{Column, Held, Table, TableWriter};
 use super::{BaseSpec, Plan, SweepSpec};
 use crate::spec::{self, Source, SpecError, to_text};
 use crate::study::StudyError;
+use crate::study::beside::write_text;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

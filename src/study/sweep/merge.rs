@@ -1,10 +1,10 @@
 //! Parts become one table: the same bytes, whoever did them, when, and in which order.
 
-use super::beside::Beside;
 use super::folder::{STRETCH, Unit};
 use super::table::{Column, Held, TableWriter, quoted};
 use super::{Measure, Share, Sweep};
 use crate::study::StudyError;
+use crate::study::beside::Beside;
 use serde::Serialize;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;

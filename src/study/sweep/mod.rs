@@ -10,7 +10,6 @@
 //! its error; journeys run in processes of their own, so that one that breaks breaks no other.
 
 mod axis;
-mod beside;
 mod check;
 mod closed_form;
 mod component;

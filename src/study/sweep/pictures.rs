@@ -5,6 +5,7 @@ use super::summary::{Line, Summary, quantile};
 use super::{Aim, Measure, Plan, Sweep};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Mark, Series};
 use crate::study::StudyError;
+use crate::study::beside::write_text;
 use crate::study::spring::design::pareto_set;
 use std::path::Path;
 
@@ -98,7 +99,7 @@ impl Sweep {
             text += &(cells.join(",") + "\n");
         }
         let path = self.folder.join("front.csv");
-        super::beside::write_text(&self.temporary(), &path, &text)
+        write_text(&self.temporary(), &path, &text)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Tables on disk: Parquet, there whole or not at all.
 
-use super::beside::Beside;
 use crate::study::StudyError;
+use crate::study::beside::Beside;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::get_typed_column_reader;
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};

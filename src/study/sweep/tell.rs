@@ -1,9 +1,9 @@
 //! What a merged sweep leaves for people.
 
-use super::beside::write_text;
 use super::output::{csv, markdown, trends_csv, words};
 use super::{Status, Summary, Sweep};
 use crate::study::StudyError;
+use crate::study::beside::write_text;
 
 /// A merged sweep.
 #[derive(Debug, Clone)]

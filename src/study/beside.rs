@@ -1,10 +1,13 @@
 //! Files that are there whole or not at all.
 
-use crate::study::StudyError;
+use super::StudyError;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
+
+/// How the names begin of files that are not whole yet: what a kill leaves of them is nobody's work.
+pub(super) const PARTIAL: &str = ".partial-";
 
 /// A file that is written beside its place, and moved there when it is whole.
 pub(super) struct Beside {
@@ -16,6 +19,7 @@ impl Beside {
     /// A file for `place`, until it is whole in `folder` of the same file system.
     pub fn new(folder: &Path, place: &Path) -> Result<Self, StudyError> {
         let mut builder = tempfile::Builder::new();
+        builder.prefix(PARTIAL);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
