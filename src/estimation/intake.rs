@@ -2,7 +2,7 @@
 
 use super::inertial::InertialStream;
 use super::spec::EstimatorSpec;
-use super::stamps::{StampFilter, period_of};
+use super::stamps::{Regularity, StampFilter};
 use super::strapdown::Interval;
 use super::surfel::Beam;
 use super::{EstimationError, Warning, WarningKind};
@@ -221,8 +221,8 @@ impl Intake {
         let stamps: Vec<f64> = self.samples.iter().map(|(s, _)| *s).filter(|s| *s <= enough_s).collect();
         let scan_stamps: Vec<f64> = self.scans.iter().map(|(s, _)| *s).filter(|s| *s <= enough_s).collect();
         let jitter_s = self.spec.clock.jitter_s;
-        let imu = StampFilter::new(period_of(&stamps)?, jitter_s);
-        let lidar = StampFilter::new(period_of(&scan_stamps)?, jitter_s);
+        let imu = StampFilter::new(Regularity::of(&stamps)?, jitter_s);
+        let lidar = StampFilter::new(Regularity::of(&scan_stamps)?, jitter_s);
         // The IMU must cover the first beam whatever the clock offset.
         self.next_start_s = start_s + MARGIN_S;
         self.streams = Some((InertialStream::new(imu, self.calibration.imu, self.spec.inertial.clone()), lidar));

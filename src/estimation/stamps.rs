@@ -25,8 +25,11 @@ pub(super) struct StampFilter {
 }
 
 impl StampFilter {
-    /// A filter for a sensor of about `period_s`; `jitter_s = 0` passes every stamp as it is.
-    pub(super) fn new(period_s: f64, jitter_s: f64) -> Self {
+    /// A filter for a sensor whose first stamps showed `regularity`, and that jitters by at least `jitter_s`; zero passes
+    /// every stamp as it is.
+    pub(super) fn new(Regularity { period_s, jitter_s: seen_s }: Regularity, jitter_s: f64) -> Self {
+        let off = jitter_s <= 0.0;
+        let jitter_s = jitter_s.max(seen_s);
         Self {
             last_s: 0.0,
             period_s,
@@ -34,7 +37,7 @@ impl StampFilter {
             jitter2: jitter_s * jitter_s,
             strikes: 0,
             started: false,
-            off: jitter_s <= 0.0,
+            off,
         }
     }
 
@@ -58,6 +61,8 @@ impl StampFilter {
         self.predict(periods);
         let innovation = raw_s - self.last_s;
         if innovation.abs() > tolerance {
+            // One such stamp is a chance, many are a jitter that has grown.
+            self.jitter2 += 0.01 * (tolerance * tolerance - self.jitter2);
             self.strikes += 1;
             if self.strikes >= STRIKES || innovation.abs() > 20.0 * tolerance {
                 self.strikes = 0;
@@ -91,27 +96,49 @@ impl StampFilter {
     }
 }
 
-/// The period of a regular sensor from its first stamps, in order: the median interval gives each stamp its count, a line
-/// through stamps over counts the period. `None` for fewer than three stamps, or for stamps that do not advance.
-pub(super) fn period_of(stamps_s: &[f64]) -> Option<f64> {
-    let first = *stamps_s.first()?;
-    let mut intervals: Vec<f64> = stamps_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|dt| *dt > 0.0).collect();
-    if intervals.len() < 2 {
-        return None;
+/// What the first stamps of a regular sensor show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Regularity {
+    /// From sample to sample, s.
+    pub(super) period_s: f64,
+    /// Standard deviation of the stamps about a line through them, s.
+    pub(super) jitter_s: f64,
+}
+
+impl Regularity {
+    /// Of stamps in order: a line through stamps over counts, the counts being such that the stamps lie closest to it. Where
+    /// samples were lost, the intervals tell the count; where stamps jitter by as much as the period, only their number does.
+    /// `None` for fewer than three stamps, or for stamps that do not advance.
+    pub(super) fn of(stamps_s: &[f64]) -> Option<Self> {
+        let mut intervals: Vec<f64> = stamps_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let without_losses = Self::about_line(stamps_s.iter().copied().zip(0..).map(|(s, k)| (f64::from(k), s)));
+        intervals.retain(|dt| *dt > 0.0);
+        if intervals.len() < 2 {
+            return None;
+        }
+        intervals.sort_by(f64::total_cmp);
+        let median = intervals[intervals.len() / 2];
+        let (mut count, mut before) = (-1.0, stamps_s[0]);
+        let counted = stamps_s.iter().map(|stamp| {
+            count += ((stamp - before) / median).round().max(1.0);
+            before = *stamp;
+            (count, *stamp)
+        });
+        let by_intervals = Self::about_line(counted);
+        [by_intervals, without_losses].into_iter().flatten().min_by(|a, b| a.jitter_s.total_cmp(&b.jitter_s))
     }
-    intervals.sort_by(f64::total_cmp);
-    let median = intervals[intervals.len() / 2];
-    let (mut n, mut sx, mut sy, mut sxx, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    let (mut count, mut before) = (0.0, first);
-    for stamp in stamps_s {
-        count += ((stamp - before) / median).round().max(if n > 0.0 { 1.0 } else { 0.0 });
-        before = *stamp;
-        let y = stamp - first;
-        (n, sx, sy, sxx, sxy) = (n + 1.0, sx + count, sy + y, sxx + count * count, sxy + count * y);
+
+    /// The line through points (count, stamp), if it rises.
+    fn about_line(points: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
+        let points: Vec<(f64, f64)> = points.collect();
+        let n = points.len() as f64;
+        let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
+        let (mx, my) = (mean(|p| p.0), mean(|p| p.1));
+        let sum = |of: &dyn Fn(f64, f64) -> f64| points.iter().map(|(x, y)| of(x - mx, y - my)).sum::<f64>();
+        let period_s = sum(&|x, y| x * y) / sum(&|x, _| x * x);
+        let jitter_s = (sum(&|x, y| (y - period_s * x).powi(2)) / n).sqrt();
+        (points.len() > 2 && period_s > 0.0 && jitter_s.is_finite()).then_some(Self { period_s, jitter_s })
     }
-    let determinant = n * sxx - sx * sx;
-    let slope = (n * sxy - sx * sy) / determinant;
-    (determinant > 0.0 && slope > 0.0).then_some(slope)
 }
 
 /// When the samples of a regular sensor were really taken, as the estimator takes it: their stamps, in the order in which they
@@ -120,8 +147,8 @@ pub fn smoothed_stamps(stamps: &[Stamp], spec: &EstimatorSpec) -> Vec<Stamp> {
     let Some(first) = stamps.first() else { return Vec::new() };
     let seconds: Vec<f64> = stamps.iter().map(|stamp| stamp.seconds_since(*first)).collect();
     let learning = seconds.partition_point(|s| *s <= spec.inertial.rest_s + spec.step_s);
-    let Some(period_s) = period_of(&seconds[..learning]) else { return stamps.to_vec() };
-    let mut filter = StampFilter::new(period_s, spec.clock.jitter_s);
+    let Some(regularity) = Regularity::of(&seconds[..learning]) else { return stamps.to_vec() };
+    let mut filter = StampFilter::new(regularity, spec.clock.jitter_s);
     seconds.iter().map(|raw_s| *first + Span::from_seconds(filter.smooth(*raw_s))).collect()
 }
 
@@ -139,7 +166,7 @@ mod tests {
 
     fn error_after(stamps: &[(f64, f64)], from: usize) -> f64 {
         let raw: Vec<f64> = stamps.iter().take(100).map(|(_, raw)| *raw).collect();
-        let mut filter = StampFilter::new(period_of(&raw).unwrap(), 5e-4);
+        let mut filter = StampFilter::new(Regularity::of(&raw).unwrap(), 5e-4);
         let errors = stamps.iter().map(|(t, raw)| filter.smooth(*raw) - t);
         let late: Vec<f64> = errors.skip(from).collect();
         (late.iter().map(|e| e * e).sum::<f64>() / late.len() as f64).sqrt()
@@ -150,6 +177,26 @@ mod tests {
         // A line through 3000 stamps would know its end to 2 * 2 ms / sqrt(3000) = 0.07 ms.
         assert!(error_after(&stamps(6000, 2e-3), 3000) < 1.5e-4);
         assert!(error_after(&stamps(6000, 1e-4), 500) < 2e-5);
+    }
+
+    #[test]
+    fn jitter_as_long_as_the_period_is_smoothed_too() {
+        // A driver passes samples on in order, with stamps that increase.
+        let mut noisy = stamps(6000, 1e-2);
+        let mut raw: Vec<f64> = noisy.iter().map(|(_, raw)| *raw).collect();
+        raw.sort_by(f64::total_cmp);
+        noisy.iter_mut().zip(raw).for_each(|(stamp, raw)| stamp.1 = raw);
+        // A line through 3000 stamps would know its end to 2 * 10 ms / sqrt(3000) = 0.37 ms.
+        let error_s = error_after(&noisy, 3000);
+        assert!(error_s < 7e-4, "{error_s}");
+    }
+
+    #[test]
+    fn jitter_that_grows_is_followed() {
+        let (calm, wild) = (stamps(1000, 1e-4), stamps(6000, 8e-3));
+        let grown: Vec<(f64, f64)> = calm.into_iter().chain(wild.into_iter().skip(1000)).collect();
+        let error_s = error_after(&grown, 4000);
+        assert!(error_s < 7e-4, "{error_s}");
     }
 
     #[test]
@@ -177,7 +224,7 @@ mod tests {
     fn the_period_is_found_in_spite_of_losses() {
         let mut kept: Vec<f64> = stamps(200, 1e-4).iter().map(|(_, raw)| *raw).collect();
         kept.retain(|raw| ((raw / 0.01) as usize) % 7 != 2);
-        assert!((period_of(&kept).unwrap() - 0.01).abs() < 2e-6);
-        assert_eq!(period_of(&[1.0, 1.0, 1.0]), None);
+        assert!((Regularity::of(&kept).unwrap().period_s - 0.01).abs() < 2e-6);
+        assert_eq!(Regularity::of(&[1.0, 1.0, 1.0]), None);
     }
 }

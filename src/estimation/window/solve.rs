@@ -40,6 +40,10 @@ pub(in crate::estimation) struct Solved {
 impl Window {
     /// Solves the window; what it was linearised at, where its solution is believed.
     pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
+        if self.nominal.end_s() <= self.start.u_s {
+            let trouble = Some("the IMU's samples do not reach it");
+            return (Solved { trouble, ..Solved::default() }, None);
+        }
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
         let lidar = self.maker.lidar;
