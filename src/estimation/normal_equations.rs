@@ -91,6 +91,7 @@ impl NormalEquations {
 
     /// Adds `weight (u v^T + v u^T)` to `H`, with `u` and `v` zero but for consecutive entries from a column on; `u` begins
     /// no later than `v`. Where the two overlap, entries come to lie above the diagonal: see [`Self::settle`].
+    #[inline(always)]
     pub(super) fn add_product<const U: usize, const V: usize>(
         &mut self,
         (start_u, u): (usize, &[f64; U]),

@@ -25,6 +25,7 @@ pub mod latency;
 mod manifest;
 mod memory;
 mod open_loop;
+mod read_ahead;
 mod record;
 mod register;
 pub mod reproduction;

@@ -1,6 +1,7 @@
 //! The open loop over a recording, as it would run while recording.
 
 use super::cadence::Cadence;
+use super::read_ahead::{Coming, read_ahead};
 use super::{Stage, StudyError, Watch};
 use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Survey, TimeSpent, Warning, WarningKind};
 use crate::geometry::{PoseCovariance, Trajectory};
@@ -69,25 +70,19 @@ pub(super) fn run_open_loop(
     let tum = tum.map(TumWriter::create).transpose()?;
     let mut written = Written { tum, map_from_head: Trajectory::new(), covariances: Vec::new() };
     let mut heard = Heard::default();
-    let mut measurements = reader.measurements(selection);
-    for (index, measurement) in measurements.by_ref().enumerate() {
-        let measurement = measurement?;
-        heard.take(&measurement);
-        estimator.push(measurement)?;
-        if index % TELL_EVERY == 0 {
-            written.take(&estimator.take_poses())?;
-            watch.progress(Stage::Estimating, heard.seconds(), expected_s);
-            if watch.is_stopped() {
-                written.finish()?;
-                return Err(StudyError::Stopped);
-            }
-        }
+    let (pushed, loss) = read_ahead(reader, selection, |measurements| {
+        push_all(measurements, &mut estimator, (&mut heard, &mut written), expected_s, watch)
+    });
+    if let Err(StudyError::Stopped) = pushed {
+        written.finish()?;
+        return Err(StudyError::Stopped);
     }
+    pushed?;
     let result = estimator.finish()?;
     written.take(&result.poses)?;
     let (map_from_head, covariances) = written.finish()?;
 
-    let mut losses = measurements.loss().sentences();
+    let mut losses = loss.sentences();
     losses.extend(heard.imu.missing("IMU samples"));
     losses.extend(heard.lidar.missing("scans"));
     let start = heard.start();
@@ -105,6 +100,29 @@ pub(super) fn run_open_loop(
         wall_s: started.elapsed().as_secs_f64() - result.survey.took_s(),
         survey: result.survey,
     })
+}
+
+/// Gives `estimator` all that comes; what it hands out is written as it becomes final.
+fn push_all(
+    measurements: &mut Coming,
+    estimator: &mut Estimator,
+    (heard, written): (&mut Heard, &mut Written),
+    expected_s: Option<f64>,
+    watch: &mut Watch,
+) -> Result<(), StudyError> {
+    for (index, measurement) in measurements.enumerate() {
+        let measurement = measurement?;
+        heard.take(&measurement);
+        estimator.push(measurement)?;
+        if index % TELL_EVERY == 0 {
+            written.take(&estimator.take_poses())?;
+            watch.progress(Stage::Estimating, heard.seconds(), expected_s);
+            if watch.is_stopped() {
+                return Err(StudyError::Stopped);
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Whether a warning says that measurements were not there, or not used: an estimate with loss.

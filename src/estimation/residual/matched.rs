@@ -2,8 +2,11 @@
 //!
 //! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by
 //! `zeta^2 = 1 / (sigma_r^2 + lambda)`. A live surfel's centre moves by
-//! `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the way from the lidar, `u` along it, and the lidar turned by `e` and
-//! shifted by `s` along the IMU's axes; one of a fixed view does not.
+//! `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the way from the lidar, `u` along it, and the lidar turned by `e`
+//! and shifted by `s` along the IMU's axes; one of a fixed view does not.
+//!
+//! What all surfels share stands in the border: `B` unknowns of it are carried, [`SHARED`] or, where the lidar's place on the
+//! IMU is not estimated, only the [`ALWAYS`] first.
 
 use super::{CLOCK, LIDAR_SHIFT, LIDAR_TURN, Layout, RANGE};
 use crate::estimation::nominal::Correction;
@@ -52,34 +55,39 @@ fn adjugate(m: &Matrix) -> Matrix {
     Matrix::from_rows(&[b.cross(&c).transpose(), c.cross(&a).transpose(), a.cross(&b).transpose()])
 }
 
+/// The clock's offset and rate, and the lidar's range.
+pub(in crate::estimation) const ALWAYS: usize = 3;
+/// Those, and the lidar's turn and shift.
+pub(in crate::estimation) const SHARED: usize = 9;
+
 /// The derivative of `e` by what moves a live surfel.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Side {
+pub(in crate::estimation) struct Side<const B: usize> {
     /// By its turn and its shift.
     own: [f64; 6],
     /// By what it shares with all others, which follow each other in the border.
-    beside: [f64; BESIDE],
+    beside: [f64; B],
 }
 
-/// The clock's offset and rate, and the lidar's range, turn and shift.
-const BESIDE: usize = 9;
-
-impl Side {
+impl<const B: usize> Side<B> {
     /// Of a surfel that `normal` leads to.
+    #[inline(always)]
     pub(in crate::estimation) fn of(surfel: &Placed, normal: &Vector, clock_at_s: f64) -> Self {
         let turn = surfel.arm.cross(normal);
         let later = normal.dot(&surfel.velocity);
-        let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.reach().cross(normal));
-        let lidar_shift = surfel.map_from_imu.tr_mul(normal);
-        let [a, b, c] = lidar_turn.into();
-        let [d, e, f] = lidar_shift.into();
-        Self {
-            own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z],
-            beside: [later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam), a, b, c, d, e, f],
+        let mut beside = [0.0; B];
+        beside[..ALWAYS].copy_from_slice(&[later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam)]);
+        if B == SHARED {
+            let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.reach().cross(normal));
+            let lidar_shift = surfel.map_from_imu.tr_mul(normal);
+            beside[ALWAYS..ALWAYS + 3].copy_from_slice(lidar_turn.as_slice());
+            beside[ALWAYS + 3..].copy_from_slice(lidar_shift.as_slice());
         }
+        Self { own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], beside }
     }
 
     /// By the four knots about the surfel.
+    #[inline(always)]
     fn knots(&self, surfel: &Placed) -> [f64; 24] {
         let mut knots = [0.0; 24];
         for (knot, value) in knots.chunks_exact_mut(6).zip(surfel.basis.value) {
@@ -91,6 +99,7 @@ impl Side {
     }
 
     /// With what the surfel on the other side adds in the border.
+    #[inline(always)]
     pub(in crate::estimation) fn together_with(mut self, other: &Self) -> Self {
         self.beside.iter_mut().zip(other.beside).for_each(|(sum, term)| *sum += term);
         self
@@ -110,83 +119,102 @@ pub(in crate::estimation) fn moved(surfel: &Placed, layout: &Layout, x: &[f64], 
 }
 
 /// What all matches of a surfel say about its own motion: `sum w g v^T`, with `g` the derivative of `e` by turn and shift, and
-/// `v = (g, that by the border, e)`.
+/// `v` in turn `g`, that by the border, and `e`.
 ///
 /// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
-#[derive(Debug, Default)]
-pub(in crate::estimation) struct Own([[f64; 6 + BESIDE + 1]; 6]);
+#[derive(Debug)]
+pub(in crate::estimation) struct Own<const B: usize> {
+    square: [[f64; 6]; 6],
+    beside: [[f64; 6]; B],
+    right: [f64; 6],
+}
 
-impl Own {
+impl<const B: usize> Own<B> {
+    /// No match yet.
+    pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; 6]; 6], beside: [[0.0; 6]; B], right: [0.0; 6] };
+
     /// Adds a match whose distance grows by `side`.
-    pub(in crate::estimation) fn add(&mut self, side: &Side, distance_m: f64, weight: f64) {
-        let mut row = [distance_m; 6 + BESIDE + 1];
-        row[..6].copy_from_slice(&side.own);
-        row[6..6 + BESIDE].copy_from_slice(&side.beside);
-        for (sums, by) in self.0.iter_mut().zip(side.own) {
-            let scaled = weight * by;
-            for (sum, term) in sums.iter_mut().zip(row) {
-                *sum += scaled * term;
-            }
+    #[inline(always)]
+    pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
+        for (square, by) in self.square.iter_mut().zip(side.own) {
+            add_scaled(square, &side.own, weight * by);
         }
+        for (sums, by) in self.beside.iter_mut().zip(side.beside) {
+            add_scaled(sums, &side.own, weight * by);
+        }
+        add_scaled(&mut self.right, &side.own, weight * distance_m);
     }
 
     /// Adds it to the equations of the window's unknowns, by the surfel's place among the knots.
+    #[inline(always)]
     pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, surfel: &Placed) {
         let (first, beside) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
         for (k, value) in surfel.basis.value.iter().enumerate() {
-            for (i, sums) in self.0.iter().enumerate() {
+            for (i, square) in self.square.iter().enumerate() {
                 let row = first + 6 * k + i;
-                let scaled = sums.map(|sum| value * sum);
-                equations.add_right(row, -scaled[6 + BESIDE]);
+                equations.add_right(row, -value * self.right[i]);
                 let entries = equations.row_from(row, first);
                 for (knot, other) in entries.chunks_mut(6).zip(surfel.basis.value) {
-                    for (entry, square) in knot.iter_mut().zip(scaled) {
-                        *entry += other * square;
-                    }
+                    add_scaled(knot, square, value * other);
                 }
-                for (unknown, product) in scaled[6..6 + BESIDE].iter().enumerate() {
-                    equations.add_entry(beside + unknown, row, *product);
-                }
+            }
+        }
+        for (unknown, sums) in self.beside.iter().enumerate() {
+            let entries = equations.row_from(beside + unknown, first);
+            for (knot, value) in entries.chunks_exact_mut(6).zip(surfel.basis.value) {
+                add_scaled(knot, sums, value);
             }
         }
     }
 }
 
-/// What all matches say about what surfels share: `sum w b v^T`, with `b` the derivative of `e` by them, and
-/// `v = (b, e)`.
-#[derive(Debug, Default)]
-pub(in crate::estimation) struct Beside([[f64; BESIDE + 1]; BESIDE]);
+/// What all matches say about what surfels share: `sum w b v^T`, with `b` the derivative of `e` by them, and `v` in turn `b`
+/// and `e`.
+#[derive(Debug)]
+pub(in crate::estimation) struct Beside<const B: usize> {
+    square: [[f64; B]; B],
+    right: [f64; B],
+}
 
-impl Beside {
+impl<const B: usize> Beside<B> {
+    /// No match yet.
+    pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; B]; B], right: [0.0; B] };
+
     /// Adds a match whose distance grows by `side`, both surfels' part of it.
-    pub(in crate::estimation) fn add(&mut self, side: &Side, distance_m: f64, weight: f64) {
-        let mut row = [distance_m; BESIDE + 1];
-        row[..BESIDE].copy_from_slice(&side.beside);
-        for (sums, by) in self.0.iter_mut().zip(side.beside) {
-            for (sum, term) in sums.iter_mut().zip(row) {
-                *sum += weight * by * term;
-            }
+    #[inline(always)]
+    pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
+        for (square, by) in self.square.iter_mut().zip(side.beside) {
+            add_scaled(square, &side.beside, weight * by);
         }
+        add_scaled(&mut self.right, &side.beside, weight * distance_m);
     }
 
     /// Adds it to the equations of the window's unknowns.
     pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
         let beside = layout.border() + CLOCK;
-        for (i, sums) in self.0.iter().enumerate() {
-            equations.add_right(beside + i, -sums[BESIDE]);
-            for (j, sum) in sums.iter().enumerate().take(i + 1) {
+        for (i, square) in self.square.iter().enumerate() {
+            equations.add_right(beside + i, -self.right[i]);
+            for (j, sum) in square.iter().enumerate().take(i + 1) {
                 equations.add_entry(beside + i, beside + j, *sum);
             }
         }
     }
 }
 
+#[inline(always)]
+fn add_scaled(sums: &mut [f64], terms: &[f64], scale: f64) {
+    for (sum, term) in sums.iter_mut().zip(terms) {
+        *sum += scale * term;
+    }
+}
+
 /// Adds how the knots about two surfels of a match hang together; `early` no later than `late`.
-pub(in crate::estimation) fn add_coupling(
+#[inline(always)]
+pub(in crate::estimation) fn add_coupling<const B: usize>(
     equations: &mut NormalEquations,
     layout: &Layout,
-    (early, early_side): (&Placed, &Side),
-    (late, late_side): (&Placed, &Side),
+    (early, early_side): (&Placed, &Side<B>),
+    (late, late_side): (&Placed, &Side<B>),
     weight: f64,
 ) {
     let (start_u, start_v) = (layout.knot(early.basis.first), layout.knot(late.basis.first));
@@ -201,15 +229,11 @@ pub(in crate::estimation) fn add_scaled_row(
     scales: &[f64; 6],
     clock_at_s: f64,
 ) {
-    let side = Side::of(surfel, normal, clock_at_s);
+    let side = Side::<SHARED>::of(surfel, normal, clock_at_s);
     let (first, beside, knots) = (layout.knot(surfel.basis.first), layout.border() + CLOCK, side.knots(surfel));
     for (column, scale) in columns.iter_mut().zip(scales) {
-        for (sum, term) in column[first..first + 24].iter_mut().zip(knots) {
-            *sum += scale * term;
-        }
-        for (sum, term) in column[beside..beside + BESIDE].iter_mut().zip(side.beside) {
-            *sum += scale * term;
-        }
+        add_scaled(&mut column[first..first + 24], &knots, *scale);
+        add_scaled(&mut column[beside..beside + SHARED], &side.beside, *scale);
     }
 }
 
@@ -275,10 +299,10 @@ mod tests {
             (distance(&step(1e-6)) - distance(&step(-1e-6))) / 2e-6
         });
         let mut equations = NormalEquations::new(layout.size());
-        let one = Side::of(a, &plane.normal, AT_S);
-        let mut beside = Beside::default();
-        let mut add = |surfel: &Placed, side: &Side| {
-            let mut own = Own::default();
+        let one = Side::<SHARED>::of(a, &plane.normal, AT_S);
+        let mut beside = Beside::NONE;
+        let mut add = |surfel: &Placed, side: &Side<SHARED>| {
+            let mut own = Own::NONE;
             own.add(side, plane.distance_m, 3.0);
             own.add_to(&mut equations, &layout, surfel);
         };

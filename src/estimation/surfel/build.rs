@@ -8,6 +8,7 @@ use crate::estimation::spec::SurfelSpec;
 use crate::estimation::strapdown::Biases;
 use crate::geometry::{Matrix, Vector};
 use crate::measurement::{LidarCorrection, LidarNoise};
+use rayon::prelude::*;
 
 /// Poses are computed at this spacing and taken linearly in between, s: at 400 degrees/s the chord is 1.5 um/m from the arc.
 const POSE_SPACING_S: f64 = 0.0005;
@@ -54,23 +55,23 @@ impl SurfelMaker {
                 offset.add(&point, beam.tau_s, noise2);
             }
         });
-        let mut surfels = Vec::new();
-        let mut keyed = Vec::new();
-        let mut collect = |fragments: &[Fragment], level: usize, shift: i32| {
-            for moments in group(fragments, &mut keyed, level, shift, &self.spec) {
-                surfels.extend(self.shape(&moments, level, &origin, (nominal, clock, biases)));
-            }
-        };
+        let (regular, offset) = (regular.done(), offset.done());
+        let mut grids = Vec::new();
         for level in 0..self.spec.levels {
-            collect(regular.done(), level, 0);
+            grids.push((regular, level, 0));
             match (self.spec.offset_grids, level) {
                 (false, _) => {}
-                (true, 0) => collect(offset.done(), 0, 0),
+                (true, 0) => grids.push((offset, 0, 0)),
                 // A coarse cell of the offset grid is made of regular cells of the resolution below.
-                (true, _) => collect(regular.done(), level, 1 << (level - 1)),
+                (true, _) => grids.push((regular, level, 1 << (level - 1))),
             }
         }
-        surfels
+        let surfels_of = |(fragments, level, shift): &(&[Fragment], usize, i32)| -> Vec<Surfel> {
+            let cells = group(fragments, *level, *shift, &self.spec);
+            cells.iter().filter_map(|cell| self.shape(cell, *level, &origin, (nominal, clock, biases))).collect()
+        };
+        let surfels: Vec<Vec<Surfel>> = grids.par_iter().map(surfels_of).collect();
+        surfels.concat()
     }
 
     /// Calls `with` for each beam and its point in the map.
@@ -190,22 +191,16 @@ fn key(cell: &[i32; 3], level: usize, shift: i32) -> u64 {
 }
 
 /// Merges the fragments of each cell, split where their times leave a gap or last too long; those with enough points.
-fn group(
-    fragments: &[Fragment],
-    keyed: &mut Vec<(u64, u32)>,
-    level: usize,
-    shift: i32,
-    spec: &SurfelSpec,
-) -> Vec<Moments> {
-    keyed.clear();
-    keyed.extend(fragments.iter().enumerate().map(|(k, f)| (key(&f.cell, level, shift), k as u32)));
+fn group(fragments: &[Fragment], level: usize, shift: i32, spec: &SurfelSpec) -> Vec<Moments> {
+    let keyed = fragments.iter().enumerate().map(|(k, f)| (key(&f.cell, level, shift), k as u32));
+    let mut keyed: Vec<(u64, u32)> = keyed.collect();
     keyed.sort_unstable();
     let mut groups: Vec<Moments> = Vec::new();
     let mut open: Option<(u64, f64, f64, Moments)> = None;
-    for (cell, k) in keyed.iter() {
-        let fragment = &fragments[*k as usize];
+    for (cell, k) in keyed {
+        let fragment = &fragments[k as usize];
         let joins = |(at, first_s, last_s, _): &(u64, f64, f64, Moments)| {
-            at == cell
+            *at == cell
                 && fragment.first_s - last_s <= spec.split_gap_s
                 && fragment.last_s - first_s <= spec.max_duration_s
         };
@@ -216,7 +211,7 @@ fn group(
             }
             None => {
                 groups.extend(open.take().map(|(.., moments)| moments));
-                open = Some((*cell, fragment.first_s, fragment.last_s, fragment.moments));
+                open = Some((cell, fragment.first_s, fragment.last_s, fragment.moments));
             }
         }
     }

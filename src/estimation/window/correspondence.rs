@@ -1,6 +1,7 @@
 //! Which of the window's surfels show what others show, or what a fixed view shows.
 
-use super::Window;
+use super::{Stretch, Window};
+use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::surfel::{Patch, Placed, Surfel};
 use crate::estimation::views::Views;
@@ -23,6 +24,15 @@ pub(super) struct Neighbours {
     of: usize,
     /// How far surfels may have moved since, m.
     moved_m: f64,
+}
+
+/// Where a surfel was when it was last looked for in fixed views, and what was near it there. Views stand still, and a surfel
+/// hardly moves once its stretch has been solved: so most are looked for once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Remembered {
+    centre: Vector,
+    /// By the views' numbers: indices of patches.
+    near: Vec<(u64, Vec<u32>)>,
 }
 
 /// Two surfels of one surface.
@@ -115,15 +125,24 @@ impl Neighbours {
 impl Window {
     /// The window's surfels in the map; those that a change of clock has moved out of the window's knots stay out.
     pub(super) fn scene(&self) -> Vec<Placed> {
-        let (from, to) = (self.start.u_s, self.nominal.end_s());
         let placing = self.placing();
-        let place = |surfel: &&Surfel| {
-            let u_s = self.clock.imu_s(surfel.tau_s);
-            (from..=to).contains(&u_s).then(|| surfel.place(&placing))
+        let homes = self.homes();
+        homes
+            .par_iter()
+            .with_min_len(512)
+            .map(|(k, index)| self.stretches[*k].surfels[*index].place(&placing))
+            .collect()
+    }
+
+    /// Where the surfels of the scene are at home: a stretch, and an index into its surfels.
+    fn homes(&self) -> Vec<(usize, usize)> {
+        let (from, to) = (self.start.u_s, self.nominal.end_s());
+        let is_within = |surfel: &Surfel| (from..=to).contains(&self.clock.imu_s(surfel.tau_s));
+        let of_stretch = |(k, stretch): (usize, &'_ Stretch)| {
+            let within = stretch.surfels.iter().enumerate().filter(|(_, surfel)| is_within(surfel));
+            within.map(|(index, _)| (k, index)).collect::<Vec<_>>()
         };
-        let surfels: Vec<&Surfel> = self.stretches.iter().flat_map(|stretch| &stretch.surfels).collect();
-        let placed: Vec<Option<Placed>> = surfels.par_iter().with_min_len(512).map(place).collect();
-        placed.into_iter().flatten().collect()
+        self.stretches.iter().enumerate().flat_map(of_stretch).collect()
     }
 
     /// Those `neighbours` in `scene` that match.
@@ -169,18 +188,47 @@ impl Window {
     }
 
     /// The neighbours in `scene` and in the `chosen` views.
-    pub(super) fn look_around(&self, scene: &[Placed], (views, chosen): (&Views, &[usize])) -> Neighbours {
+    pub(super) fn look_around(&mut self, scene: &[Placed], (views, chosen): (&Views, &[usize])) -> Neighbours {
         let patches: Vec<Patch> = scene.iter().map(|surfel| surfel.patch).collect();
         let pairs = self.matcher.among(scene, &self.matcher.plant(&patches));
-        let count = self.spec.views.neighbours;
-        let in_views = |(a, patch): (usize, &Patch)| {
+        let homes = self.homes();
+        let mut remembered: Vec<Remembered> =
+            homes.iter().map(|(k, index)| std::mem::take(&mut self.stretches[*k].remembered[*index])).collect();
+        let look = |(a, (patch, remembered)): (usize, (&Patch, &mut Remembered))| {
+            remembered.look(patch, (views, chosen), &self.matcher, self.spec.views.neighbours);
             let near = |index: &usize| {
-                let found = self.matcher.neighbours(&views.view(*index).forest, patch, count);
-                found.into_iter().map(|k| (a as u32, *index as u32, k)).collect::<Vec<_>>()
+                let found = remembered.near_in(views.view(*index).number);
+                found.iter().map(|patch| (a as u32, *index as u32, *patch)).collect::<Vec<_>>()
             };
             chosen.iter().flat_map(near).collect::<Vec<_>>()
         };
-        let fixed: Vec<_> = patches.par_iter().enumerate().with_min_len(256).map(in_views).collect();
+        let both = patches.par_iter().zip(remembered.par_iter_mut()).enumerate();
+        let fixed: Vec<_> = both.with_min_len(256).map(look).collect();
+        for ((k, index), remembered) in homes.into_iter().zip(remembered) {
+            self.stretches[k].remembered[index] = remembered;
+        }
         Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), of: scene.len(), moved_m: 0.0 }
+    }
+}
+
+impl Remembered {
+    /// Looks for `patch` in the `chosen` views, where that has not been done from about here.
+    fn look(&mut self, patch: &Patch, (views, chosen): (&Views, &[usize]), matcher: &Matcher, count: usize) {
+        let is_chosen = |number: u64| chosen.iter().any(|index| views.view(*index).number == number);
+        let moved = (patch.centre - self.centre).norm() > MOVED_M;
+        self.near.retain(|(number, _)| !moved && is_chosen(*number));
+        if self.near.is_empty() {
+            self.centre = patch.centre;
+        }
+        for view in chosen.iter().map(|index| views.view(*index)) {
+            if self.near.iter().all(|(number, _)| *number != view.number) {
+                self.near.push((view.number, matcher.neighbours(&view.forest, patch, count)));
+            }
+        }
+    }
+
+    /// What was near in the view of a number.
+    fn near_in(&self, view: u64) -> &[u32] {
+        self.near.iter().find(|(number, _)| *number == view).map_or(&[], |(_, near)| near)
     }
 }

@@ -5,13 +5,14 @@ use super::correspondence::{Match, Matches};
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
 use crate::estimation::residual::inertial::Inertial;
-use crate::estimation::residual::matched::{self, Beside, Own, Plane, Side};
+use crate::estimation::residual::matched::{self, ALWAYS, Beside, Own, Plane, SHARED, Side};
 use crate::estimation::residual::prior;
 use crate::estimation::spec::SolveSpec;
 use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Placed;
 use crate::geometry::Vector;
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// The normal equations are summed in so many parts, whatever the number of threads, so that sums keep their order.
@@ -23,8 +24,8 @@ const REST_VELOCITY_SIGMA: f64 = 0.003;
 #[derive(Debug)]
 pub(super) struct Workspace {
     inertial: NormalEquations,
-    sum: NormalEquations,
-    parts: Vec<NormalEquations>,
+    /// Each with its share of the matches, the first with the inertial part as well; all are added to the first.
+    parts: [NormalEquations; PARTS],
     /// How far the solution before moves each surfel, m.
     moved: Vec<Vector>,
     /// The weight of each match.
@@ -35,11 +36,9 @@ pub(super) struct Workspace {
 
 impl Default for Workspace {
     fn default() -> Self {
-        let empty = || NormalEquations::new(0);
         Self {
-            inertial: empty(),
-            sum: empty(),
-            parts: vec![empty(); PARTS],
+            inertial: NormalEquations::new(0),
+            parts: std::array::from_fn(|_| NormalEquations::new(0)),
             moved: Vec::new(),
             weights: Vec::new(),
             factor: Factor::default(),
@@ -146,7 +145,7 @@ impl Window {
             let before = solution.as_ref().map(|(x, _)| x.as_slice());
             self.assemble_matches(scene, matches, layout, robust, before);
             spent.equations_s += watch.lap_s();
-            let Workspace { sum, factor, .. } = &mut self.workspace;
+            let Workspace { parts: [sum, ..], factor, .. } = &mut self.workspace;
             sum.factor(factor).ok()?;
             let x = sum.solve(factor);
             spent.solve_s += watch.lap_s();
@@ -169,8 +168,8 @@ impl Window {
         robust: &Robust,
         x: Option<&[f64]>,
     ) {
-        let at_s = self.clock.at_s;
-        let Workspace { inertial, sum, parts, moved, weights, .. } = &mut self.workspace;
+        let (at_s, extrinsics) = (self.clock.at_s, self.spec.extrinsics.estimated);
+        let Workspace { inertial, parts, moved, weights, .. } = &mut self.workspace;
         let movement = |surfel: &Placed| x.map_or_else(Vector::zeros, |x| matched::moved(surfel, layout, x, at_s));
         scene.par_iter().with_min_len(512).map(movement).collect_into_vec(moved);
         let weigh = |one: &Match| {
@@ -179,13 +178,21 @@ impl Window {
         };
         matches.all.par_iter().with_min_len(512).map(weigh).collect_into_vec(weights);
         parts.par_iter_mut().enumerate().for_each(|(part, equations)| {
-            equations.reset(layout.size());
+            if part == 0 {
+                equations.copy_from(inertial)
+            } else {
+                equations.reset(layout.size())
+            }
             let mut sums = Sums { equations, layout, placed: scene, matches, weights, at_s };
-            sums.add_surfels(matches.part(part, PARTS));
+            let surfels = matches.part(part, PARTS);
+            // The widest vector units of the machine: the order of the sums, and so each bit, is the same on all.
+            Arch::new().dispatch(|| {
+                if extrinsics { sums.add_surfels::<SHARED>(surfels) } else { sums.add_surfels::<ALWAYS>(surfels) }
+            });
             equations.settle();
         });
-        sum.copy_from(inertial);
-        for equations in parts.iter() {
+        let [sum, others @ ..] = parts;
+        for equations in others {
             sum.add(equations);
         }
     }
@@ -203,10 +210,11 @@ struct Sums<'a> {
 
 impl Sums<'_> {
     /// Adds the matches of `surfels`: what each surfel says of itself, and how it hangs together with those no later.
-    fn add_surfels(&mut self, surfels: std::ops::Range<usize>) {
-        let mut beside = Beside::default();
+    #[inline(always)]
+    fn add_surfels<const B: usize>(&mut self, surfels: std::ops::Range<usize>) {
+        let mut beside = Beside::<B>::NONE;
         for index in surfels {
-            let mut own = Own::default();
+            let mut own = Own::NONE;
             for k in self.matches.of_surfel(index) {
                 self.add_match((index, &mut own), *k as usize, &mut beside);
             }
@@ -216,7 +224,8 @@ impl Sums<'_> {
     }
 
     /// Adds match `k`, seen from the surfel `index`.
-    fn add_match(&mut self, (index, own): (usize, &mut Own), k: usize, beside: &mut Beside) {
+    #[inline(always)]
+    fn add_match<const B: usize>(&mut self, (index, own): (usize, &mut Own<B>), k: usize, beside: &mut Beside<B>) {
         let (one, weight) = (&self.matches.all[k], self.weights[k]);
         let is_first = one.a as usize == index;
         let normal = if is_first { one.plane.normal } else { -one.plane.normal };

@@ -22,6 +22,7 @@ use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
 use super::survey::Sighting;
 use crate::geometry::{Matrix, Rotation, Vector};
 use crate::measurement::LidarCorrection;
+use correspondence::Remembered;
 use equations::Workspace;
 use std::collections::VecDeque;
 
@@ -38,6 +39,8 @@ struct Stretch {
     end_tau_s: f64,
     beams: Vec<Beam>,
     surfels: Vec<Surfel>,
+    /// What each surfel found in fixed views.
+    remembered: Vec<Remembered>,
 }
 
 /// The state of the estimator: trajectory, biases, gravity, clock, and the surfels of the last few seconds.
@@ -135,7 +138,8 @@ impl Window {
         }
         let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
-        self.stretches.push_back(Stretch { end_tau_s, beams, surfels });
+        let remembered = vec![Remembered::default(); surfels.len()];
+        self.stretches.push_back(Stretch { end_tau_s, beams, surfels, remembered });
         let surfels_s = watch.lap_s();
         // The clock is told from the middle of the window, where offset and rate are least correlated.
         let length_s = self.spec.step_s * self.stretches.len() as f64;
@@ -149,6 +153,7 @@ impl Window {
     pub(super) fn remake_newest(&mut self) {
         if let Some(newest) = self.stretches.back_mut() {
             newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
+            newest.remembered = vec![Remembered::default(); newest.surfels.len()];
             if self.surveyor.is_none() {
                 newest.beams = Vec::new();
             }
