@@ -5,7 +5,7 @@
 mod estimation_fixture;
 
 use estimation_fixture::{Room, Run, Score, Walk, calibration};
-use zsim::estimation::{Estimator, OpenLoop, load, register};
+use zsim::estimation::{Estimator, OpenLoop, Travelled, load, register};
 
 /// A recording that ends before loops have much to say, and one that comes round.
 fn runs() -> [Run; 3] {
@@ -25,7 +25,9 @@ fn surveyed(run: &Run) -> OpenLoop {
 
 fn closed(open: &OpenLoop) -> OpenLoop {
     let covariances: Vec<_> = open.poses.iter().map(|pose| (pose.stamp, pose.covariance)).collect();
-    let closed = register(&open.trajectory, &covariances, &open.survey, &load("default").unwrap());
+    let OpenLoop { trajectory, lidar, survey, .. } = open;
+    let travelled = Travelled { map_from_head: trajectory, covariances: &covariances, lidar, survey };
+    let closed = register(travelled, &calibration(), &load("default").unwrap());
     assert_eq!(closed.report.left, None, "{:?}", closed.report);
     OpenLoop { trajectory: closed.trajectory, ..open.clone() }
 }

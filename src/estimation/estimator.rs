@@ -4,8 +4,8 @@ use super::initial::{self, Beginning, Carried};
 use super::intake::{Intake, Stretch};
 use super::spent::Stopwatch;
 use super::strapdown::Interval;
-use super::surfel::SurfelMaker;
-use super::survey::{Sighting, Survey};
+use super::surfel::{Patch, SurfelMaker};
+use super::survey::Survey;
 use super::views::Views;
 use super::window::{Linearised, Solved, Window};
 use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
@@ -269,10 +269,10 @@ impl Estimator {
     }
 
     /// Adds what the window saw, as far as `seen` tells it, to the survey, where one is asked for.
-    fn survey_window(&mut self, seen: fn(&Window) -> Vec<Sighting>) {
+    fn survey_window(&mut self, seen: fn(&Window) -> Vec<(f64, Patch)>) {
         if let (Some(window), Some(survey)) = (&self.window, &mut self.survey) {
             let mut watch = Stopwatch::start();
-            survey.extend(self.intake.origin(), seen(window));
+            survey.extend(self.intake.origin(), seen(window).into_iter(), window.lidar());
             survey.took_s += watch.lap_s();
         }
     }

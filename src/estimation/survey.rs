@@ -1,6 +1,7 @@
 //! What the open loop saw, for the registration of the whole.
 
 use super::surfel::Patch;
+use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
 
 /// Patches of surface that the open loop saw, where its trajectory puts them in the map, each at its time. Made by
@@ -10,6 +11,8 @@ pub struct Survey {
     /// From when the sightings' seconds count.
     pub(super) origin: Stamp,
     pub(super) sightings: Vec<Sighting>,
+    /// What was known of the lidar when sightings were made.
+    pub(super) lidars: Vec<LidarCorrection>,
     /// Time that making it took, s.
     pub(super) took_s: f64,
 }
@@ -20,6 +23,8 @@ pub(super) struct Sighting {
     /// Lidar time, s from the survey's origin.
     pub(super) tau_s: f64,
     pub(super) patch: Patch,
+    /// By which of the survey's corrections of the lidar it was made.
+    pub(super) lidar: u32,
 }
 
 impl Survey {
@@ -38,9 +43,18 @@ impl Survey {
         self.took_s
     }
 
-    /// Adds what was seen further, its seconds counting from `origin`.
-    pub(super) fn extend(&mut self, origin: Stamp, sightings: Vec<Sighting>) {
+    /// Adds what was seen further, its seconds counting from `origin`, made by `lidar`.
+    pub(super) fn extend(
+        &mut self,
+        origin: Stamp,
+        patches: impl Iterator<Item = (f64, Patch)>,
+        lidar: LidarCorrection,
+    ) {
         self.origin = origin;
-        self.sightings.extend(sightings);
+        if self.lidars.last() != Some(&lidar) {
+            self.lidars.push(lidar);
+        }
+        let lidar = (self.lidars.len() - 1) as u32;
+        self.sightings.extend(patches.map(|(tau_s, patch)| Sighting { tau_s, patch, lidar }));
     }
 }

@@ -1,14 +1,17 @@
 //! The closed loop over what the open loop saw.
 
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{EstimatorSpec, register};
+use crate::estimation::{EstimatorSpec, Travelled, register};
 use crate::geometry::Trajectory;
+use crate::measurement::{Calibration, LidarCorrection};
 use std::time::Instant;
 
 /// What the global registration made of an open loop.
 pub(super) struct ClosedLoopRun {
     /// The estimate, at the open loop's stamps.
     pub map_from_head: Trajectory,
+    /// What was learnt of the lidar beyond its calibration.
+    pub lidar: LidarCorrection,
     /// What it has to say, a sentence each.
     pub remarks: Vec<String>,
     /// Time it took, that of the survey included, s.
@@ -16,12 +19,18 @@ pub(super) struct ClosedLoopRun {
 }
 
 /// Registers the whole of what `run` saw.
-pub(super) fn run_closed_loop(run: &OpenLoopRun, estimator: &EstimatorSpec) -> ClosedLoopRun {
+pub(super) fn run_closed_loop(
+    run: &OpenLoopRun,
+    calibration: &Calibration,
+    estimator: &EstimatorSpec,
+) -> ClosedLoopRun {
     let started = Instant::now();
-    let closed = register(&run.map_from_head, &run.covariances, &run.survey, estimator);
+    let OpenLoopRun { map_from_head, covariances, lidar, survey, .. } = run;
+    let closed = register(Travelled { map_from_head, covariances, lidar, survey }, calibration, estimator);
     let left = |why| format!("the global registration left the open loop as it was: {why}");
     ClosedLoopRun {
         map_from_head: closed.trajectory,
+        lidar: closed.lidar,
         remarks: closed.report.left.map(left).into_iter().collect(),
         wall_s: started.elapsed().as_secs_f64() + run.survey.took_s(),
     }

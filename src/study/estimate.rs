@@ -9,6 +9,7 @@ use super::register::{Registered, Registration};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
 use crate::estimation::{EstimatorSpec, TimeSpent};
 use crate::geometry::Trajectory;
+use crate::measurement::LidarCorrection;
 use crate::recording::{FoundCalibration, Preference, Reader, Selection, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::{SimulationSummary, carrier_of};
@@ -108,7 +109,7 @@ pub(super) fn estimate_in(
         body_frame: &found.body_frame,
         map_from_head: best.map_from_head,
         covariances: &run.covariances,
-        lidar: &run.lidar,
+        lidar: best.lidar,
         returns: run.returns,
         with_truth: known.is_some(),
     };
@@ -129,7 +130,7 @@ pub(super) fn estimate_in(
         open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, known, drifting) },
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
         clock: judge::clock_metrics(run, known),
-        lidar: judge::lidar_metrics(&run.lidar, &wishes.estimator),
+        lidar: judge::lidar_metrics(best.lidar, &wishes.estimator),
         ..metrics(origin, run, &registered, best.known)
     };
     let open_errors = known.filter(|_| loops.closed.is_some()).and_then(|known| known.errors.as_ref());
@@ -150,6 +151,8 @@ struct Loops {
 /// The estimate that goes into cloud, result and plots: the closed loop's where loops were closed.
 pub(super) struct Best<'a> {
     pub map_from_head: &'a Trajectory,
+    /// What was learnt of the lidar beyond its calibration.
+    pub lidar: &'a LidarCorrection,
     /// What the truth says of it.
     pub known: Option<&'a judge::Known>,
 }
@@ -168,7 +171,7 @@ impl Loops {
         let open = run_open_loop(reader, selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
         open.remarks.iter().for_each(|remark| watch.note(remark));
         let closed = match wishes.closed_loop {
-            true => Some(close_loops(&open, folder, estimator, watch)?),
+            true => Some(close_loops(&open, folder, how, watch)?),
             false => None,
         };
         let mut truth_of = |map_from_head: &Trajectory| match found.body_frame == TRUE_FRAME {
@@ -182,8 +185,12 @@ impl Loops {
 
     fn best(&self) -> Best<'_> {
         match &self.closed {
-            Some(closed) => Best { map_from_head: &closed.map_from_head, known: self.closed_known.as_ref() },
-            None => Best { map_from_head: &self.open.map_from_head, known: self.known.as_ref() },
+            Some(ClosedLoopRun { map_from_head, lidar, .. }) => {
+                Best { map_from_head, lidar, known: self.closed_known.as_ref() }
+            }
+            None => {
+                Best { map_from_head: &self.open.map_from_head, lidar: &self.open.lidar, known: self.known.as_ref() }
+            }
         }
     }
 
@@ -195,14 +202,9 @@ impl Loops {
 }
 
 /// Closes loops, and writes the trajectory.
-fn close_loops(
-    run: &OpenLoopRun,
-    folder: &Path,
-    estimator: &EstimatorSpec,
-    watch: &mut Watch,
-) -> Result<ClosedLoopRun, StudyError> {
+fn close_loops(run: &OpenLoopRun, folder: &Path, how: How, watch: &mut Watch) -> Result<ClosedLoopRun, StudyError> {
     watch.progress(Stage::ClosingLoops, 0.0, None);
-    let closed = run_closed_loop(run, estimator);
+    let closed = run_closed_loop(run, how.calibration, how.estimator);
     closed.remarks.iter().for_each(|remark| watch.note(remark));
     write_tum(&folder.join("closed_loop.tum"), &closed.map_from_head)?;
     if watch.is_stopped() { Err(StudyError::Stopped) } else { Ok(closed) }

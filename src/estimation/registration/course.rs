@@ -87,12 +87,14 @@ impl Course {
         (first, (Basis::at(end_s, self.spacing_s).first + 4 - first) as usize)
     }
 
-    /// Where the head is at `tau_s`, on a straight line between poses.
-    pub(super) fn position_at(&self, tau_s: f64) -> Vector {
+    /// `map_from_head` at `tau_s`, on a straight line between poses.
+    pub(super) fn pose_at(&self, tau_s: f64) -> Pose {
         let after = self.times_s.partition_point(|t| *t <= tau_s).clamp(1, self.times_s.len() - 1);
         let (t0, t1) = (self.times_s[after - 1], self.times_s[after]);
-        let place = |k: usize| self.poses[k].translation.vector;
-        place(after - 1).lerp(&place(after), ((tau_s - t0) / (t1 - t0)).clamp(0.0, 1.0))
+        let (a, b, x) = (&self.poses[after - 1], &self.poses[after], ((tau_s - t0) / (t1 - t0)).clamp(0.0, 1.0));
+        let turn = (a.rotation.inverse() * b.rotation).scaled_axis() * x;
+        let position = a.translation.vector.lerp(&b.translation.vector, x);
+        Pose::from_parts(position.into(), a.rotation * Rotation::from_scaled_axis(turn))
     }
 
     /// Adds what the open loop says against a correction.

@@ -1,12 +1,13 @@
 //! Normal equations of the whole trajectory: blocks of six by six, knot by knot, where knots hang together; solved by a
 //! sparse Cholesky factor with a fill-reducing order.
 
+use super::lidar::{SHARED, Shared};
 use crate::estimation::spline::Basis;
 use faer::Side;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, SMatrix, Vector6};
 
 /// What a residual, or the sum of many, says of the corrections at two instants: `J^T W J` and `-J^T W e`.
 #[derive(Debug, Clone, Default)]
@@ -22,6 +23,15 @@ pub(super) struct Link {
 pub(super) struct Own {
     pub(super) square: Matrix6<f64>,
     pub(super) right: Vector6<f64>,
+    /// With what is shared, in columns.
+    shared: SMatrix<f64, 6, SHARED>,
+}
+
+/// What is said of what all share.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Beside {
+    square: SMatrix<f64, SHARED, SHARED>,
+    right: Shared,
 }
 
 impl Link {
@@ -42,6 +52,27 @@ impl Own {
         self.right -= scaled * e;
     }
 
+    /// Adds that a residual hangs on the correction and on what is shared.
+    pub(super) fn add_shared(&mut self, by: &Vector6<f64>, by_shared: &Shared, weight: f64) {
+        self.shared += by * (by_shared * weight).transpose();
+    }
+
+    /// Adds what another says.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.square += other.square;
+        self.right += other.right;
+        self.shared += other.shared;
+    }
+}
+
+impl Beside {
+    /// Adds a residual `e` with its derivative by what is shared.
+    pub(super) fn add(&mut self, by: &Shared, e: f64, weight: f64) {
+        let scaled = by * weight;
+        self.square += scaled * by.transpose();
+        self.right -= scaled * e;
+    }
+
     /// Adds what another says.
     pub(super) fn merge(&mut self, other: &Self) {
         self.square += other.square;
@@ -49,7 +80,7 @@ impl Own {
     }
 }
 
-/// `H x = b` over the knots' corrections, each `[dr, dt]`.
+/// `H x = b` over the knots' corrections, each `[dr, dt]`, and beside them what is shared.
 #[derive(Debug, Clone)]
 pub(super) struct Equations {
     first_knot: i64,
@@ -58,6 +89,9 @@ pub(super) struct Equations {
     /// One block each, rows of the later knot.
     blocks: Vec<Vec<Matrix6<f64>>>,
     right: Vec<f64>,
+    /// Of each knot, with what is shared, in columns.
+    shared: Vec<SMatrix<f64, 6, SHARED>>,
+    pub(super) beside: Beside,
 }
 
 impl Equations {
@@ -81,13 +115,16 @@ impl Equations {
             row.dedup();
         }
         let blocks = columns.iter().map(|row| vec![Matrix6::zeros(); row.len()]).collect();
-        Self { first_knot, columns, blocks, right: vec![0.0; 6 * knots] }
+        let shared = vec![SMatrix::zeros(); knots];
+        Self { first_knot, columns, blocks, right: vec![0.0; 6 * knots], shared, beside: Beside::default() }
     }
 
     /// Sets all numbers to zero.
     pub(super) fn clear(&mut self) {
         self.blocks.iter_mut().flatten().for_each(|block| block.fill(0.0));
         self.right.fill(0.0);
+        self.shared.fill(SMatrix::zeros());
+        self.beside = Beside::default();
     }
 
     fn knots_of<'a>(&self, basis: &'a Basis) -> impl Iterator<Item = (usize, f64)> + 'a {
@@ -121,6 +158,7 @@ impl Equations {
                 let by = value * other * if row == column { 0.5 } else { 1.0 };
                 self.add_block(*row, *column, &(own.square * by));
             }
+            self.shared[*row] += own.shared * *value;
         }
     }
 
@@ -144,17 +182,36 @@ impl Equations {
         }
     }
 
-    /// The solution, or nothing where the equations do not determine one.
-    pub(super) fn solve(&self) -> Option<Vec<f64>> {
+    /// The solution, of the knots and of what is shared, or nothing where the equations do not determine one. What is shared is
+    /// few and hangs on all: it is solved for last, by the Schur complement of the knots.
+    pub(super) fn solve(&self) -> Option<(Vec<f64>, Shared)> {
         let (starts, rows, values) = self.upper_by_columns();
         let size = self.right.len();
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, &starts, None, &rows);
         let symbolic = SymbolicLlt::try_new(pattern, Side::Upper).ok()?;
         let matrix = SparseColMatRef::new(pattern, &values);
         let factor = Llt::try_new_with_symbolic(symbolic, matrix, Side::Upper).ok()?;
-        let mut x = self.right.clone();
-        factor.solve_in_place(faer::MatMut::from_column_major_slice_mut(&mut x, size, 1));
-        x.iter().all(|value| value.is_finite()).then_some(x)
+        let mut solved = self.right.clone();
+        for column in 0..SHARED {
+            solved.extend(self.shared.iter().flat_map(|of_knot| of_knot.column(column).into_iter().copied()));
+        }
+        factor.solve_in_place(faer::MatMut::from_column_major_slice_mut(&mut solved, size, 1 + SHARED));
+        let (x, by_shared) = solved.split_at_mut(size);
+        let transposed = |column: &[f64]| -> Shared {
+            let knots = self.shared.iter().zip(column.chunks_exact(6));
+            knots.map(|(of_knot, part)| of_knot.tr_mul(&Vector6::from_column_slice(part))).sum()
+        };
+        let mut left = self.beside.square;
+        for (k, column) in by_shared.chunks_exact(size).enumerate() {
+            let mut into = left.column_mut(k);
+            into -= transposed(column);
+        }
+        let shared = left.cholesky()?.solve(&(self.beside.right - transposed(x)));
+        for (k, column) in by_shared.chunks_exact(size).enumerate() {
+            x.iter_mut().zip(column).for_each(|(sum, term)| *sum -= shared[k] * term);
+        }
+        let is_finite = x.iter().chain(shared.iter()).all(|value| value.is_finite());
+        is_finite.then(|| (x.to_vec(), shared))
     }
 
     /// `H` on and above its diagonal, column by column: where each column begins, rows, values. A row of blocks below the
@@ -189,16 +246,23 @@ mod tests {
     #[test]
     fn the_solution_is_that_of_the_dense_equations() {
         let (h, knots, first_knot) = (0.7, 13, -1);
+        let of_knots = 6 * knots;
         let instants = [(0.1, 5.9), (0.2, 0.4), (3.0, 3.6), (5.5, 1.2), (2.2, 4.1)];
         let bases = instants.map(|(a, b)| (Basis::at(a, h), Basis::at(b, h)));
         let mut equations = Equations::new(first_knot, knots, bases.iter().map(|(a, b)| (a.first, b.first)));
-        let (mut dense, mut right) = (DMatrix::<f64>::identity(78, 78), DVector::<f64>::zeros(78));
+        let size = of_knots + SHARED;
+        let (mut dense, mut right) = (DMatrix::<f64>::identity(size, size), DVector::<f64>::zeros(size));
         for (k, (a, b)) in bases.iter().enumerate() {
             let mut link = Link::default();
             for m in 0..5 {
                 let (by_a, by_b, e, weight) = (wave(k + 9 * m), wave(k + 50 + m), 0.3 * m as f64 - 0.5, 2.0 + k as f64);
+                let by_shared = Shared::from_fn(|r, _| ((k * 5 + r * 3 + m) as f64 * 0.7).cos());
                 link.add((&by_a, &by_b), e, weight);
-                let mut row = DVector::<f64>::zeros(78);
+                link.first.add_shared(&by_a, &by_shared, weight);
+                link.second.add_shared(&by_b, &by_shared, weight);
+                equations.beside.add(&by_shared, e, weight);
+                let mut row = DVector::<f64>::zeros(size);
+                row.rows_mut(of_knots, SHARED).copy_from(&by_shared);
                 for (basis, by) in [(a, by_a), (b, by_b)] {
                     for (c, value) in basis.value.iter().enumerate() {
                         let at = 6 * ((basis.first - first_knot) as usize + c);
@@ -214,8 +278,10 @@ mod tests {
             equations.add_cross(a, b, &link.cross);
         }
         equations.add_diagonal(1.0);
+        (0..SHARED).for_each(|k| equations.beside.add(&Shared::from_fn(|r, _| f64::from(u8::from(r == k))), 0.0, 1.0));
         let expected = dense.lu().solve(&right).unwrap();
-        for (x, y) in equations.solve().unwrap().iter().zip(expected.iter()) {
+        let (x, shared) = equations.solve().unwrap();
+        for (x, y) in x.iter().chain(shared.iter()).zip(expected.iter()) {
             assert_relative_eq!(x, y, epsilon = 1e-10);
         }
     }

@@ -1,12 +1,12 @@
 //! What matched surfels say of the corrections.
 //!
 //! `e = n^T (mu_i - mu_j)`, `n` the normal of the plane that both have in common. A surfel's centre moves by
-//! `dt + dr x arm` with the correction at its time. There are many more matches than unknowns: they are summed first by the
+//! `dt + dr x arm` with the correction at its time, and with what the lidar is found to be: `lidar`. There are many more matches than unknowns: they are summed first by the
 //! slots (halves of knot intervals) in which their two surfels were seen, as if in their middle, then spread to the knots.
 //! Residuals are exact; their derivatives are those of an instant at most a quarter of an interval away.
 
 use super::RegistrationSpec;
-use super::equations::{Equations, Link, Own};
+use super::equations::{Beside, Equations, Link, Own};
 use super::neighbours::InUse;
 use super::scene::Scene;
 use crate::estimation::matching::Matcher;
@@ -58,6 +58,14 @@ impl Tally {
     }
 }
 
+/// What some matches say, summed.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sum {
+    pub(super) link: Link,
+    pub(super) beside: Beside,
+    pub(super) tally: Tally,
+}
+
 /// The matches of an iteration: which neighbours agree, and how much each counts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Matches<'a> {
@@ -77,14 +85,16 @@ impl Matches<'_> {
         let mut tally = Tally::default();
         let mut own = vec![Own::default(); self.scene.middles.len()];
         for runs in self.neighbours.runs.chunks(AT_ONCE) {
-            let links: Vec<(Link, Tally)> =
-                runs.par_iter().map(|run| self.sum(&self.neighbours.pairs[run.clone()])).collect();
-            for (run, (link, of_run)) in runs.iter().zip(&links).filter(|(_, (_, tally))| tally.matches > 0) {
+            let sums: Vec<Sum> = runs.par_iter().map(|run| self.sum(&self.neighbours.pairs[run.clone()])).collect();
+            for (run, Sum { link, beside, tally: of_run }) in
+                runs.iter().zip(&sums).filter(|(_, sum)| sum.tally.matches > 0)
+            {
                 let (i, j) = self.neighbours.pairs[run.start];
                 let slots = (self.scene.slots[i as usize] as usize, self.scene.slots[j as usize] as usize);
                 own[slots.0].merge(&link.first);
                 own[slots.1].merge(&link.second);
                 equations.add_cross(&self.scene.middles[slots.0], &self.scene.middles[slots.1], &link.cross);
+                equations.beside.merge(beside);
                 tally.merge(of_run);
             }
         }
@@ -95,8 +105,8 @@ impl Matches<'_> {
     }
 
     /// What the matches among `pairs`, of the same two slots, say.
-    pub(super) fn sum(&self, pairs: &[(u32, u32)]) -> (Link, Tally) {
-        let (mut link, mut tally) = (Link::default(), Tally::default());
+    pub(super) fn sum(&self, pairs: &[(u32, u32)]) -> Sum {
+        let mut sum = Sum::default();
         for (i, j) in pairs.iter().map(|(i, j)| (*i as usize, *j as usize)) {
             let (a, b) = (&self.scene.patches[i], &self.scene.patches[j]);
             if !self.matcher.agree(a, b, self.gate_m) {
@@ -109,10 +119,14 @@ impl Matches<'_> {
                 Vector6::new(turn.x, turn.y, turn.z, normal.x, normal.y, normal.z)
             };
             let (by_a, by_b) = (by(&self.scene.arms[i], &plane.normal), -by(&self.scene.arms[j], &plane.normal));
-            link.add((&by_a, &by_b), plane.distance_m, weight);
-            tally.count(&plane, weight, &self.weakest);
+            let by_shared = self.scene.sights[i].by(&plane.normal) - self.scene.sights[j].by(&plane.normal);
+            sum.link.add((&by_a, &by_b), plane.distance_m, weight);
+            sum.link.first.add_shared(&by_a, &by_shared, weight);
+            sum.link.second.add_shared(&by_b, &by_shared, weight);
+            sum.beside.add(&by_shared, plane.distance_m, weight);
+            sum.tally.count(&plane, weight, &self.weakest);
         }
-        (link, tally)
+        sum
     }
 
     /// Cauchy's weight of a match. A surfel's error is in all its matches: together they count as one.

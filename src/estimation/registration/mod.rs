@@ -3,12 +3,14 @@
 //! After Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012), whose global optimisation minimises match errors,
 //! deviations from the open loop's velocities and deviations from gravity, and takes biases and latency from the open loop.
 //! Unknown is a correction of the whole trajectory, a cubic B-spline of coarse knots, as in a window: `R' = exp(dr) R`,
-//! `t' = t + dt`. Minimised is
+//! `t' = t + dt`; and of the lidar what the window has it unknown: an offset of its ranges, its attitude and place on the IMU.
+//! Minimised is
 //!
 //! ```text
 //! sum over matches      rho(zeta n^T (mu_i - mu_j))           between any two times, see `matches`
 //! + sum over intervals  |e_r / sigma_r|^2 + |e_t / sigma_t|^2  against the open loop's relative motion, see `course`
 //! + sum over instants   |e_l / sigma_l|^2                      against its roll and pitch
+//! + |lidar / sigma|^2                                          against the lidar's calibration
 //! ```
 //!
 //! 1. The open loop's *survey* brings surfels of four resolutions, a passing of the beams each, made of all beams by the
@@ -21,6 +23,7 @@
 mod chapters;
 mod course;
 mod equations;
+mod lidar;
 mod matches;
 mod neighbours;
 mod scene;
@@ -35,9 +38,11 @@ use super::matching::Matcher;
 use super::survey::Survey;
 use super::window::Moved;
 use crate::geometry::{PoseCovariance, Trajectory, Vector};
+use crate::measurement::{Calibration, LidarCorrection};
 use crate::time::Stamp;
 use course::Course;
 use equations::Equations;
+use lidar::Mount;
 use matches::{Matches, Tally};
 use neighbours::Neighbours;
 use scene::Scene;
@@ -50,6 +55,8 @@ const BELIEVABLE: (f64, f64) = (20.0, 1.0);
 pub struct ClosedLoop {
     /// `map_from_head` over lidar time, at the open loop's stamps.
     pub trajectory: Trajectory,
+    /// What was learnt of the lidar beyond its calibration.
+    pub lidar: LidarCorrection,
     /// What it rests on.
     pub report: RegistrationReport,
 }
@@ -79,33 +86,45 @@ pub struct RegistrationReport {
     pub left: Option<&'static str>,
 }
 
-/// Registers the whole of what an open loop saw: its trajectory, its covariances at some of the poses' stamps, and its survey.
+/// What an open loop leaves to the registration.
+#[derive(Debug, Clone, Copy)]
+pub struct Travelled<'a> {
+    /// Its trajectory, `map_from_head`.
+    pub map_from_head: &'a Trajectory,
+    /// Its covariances at some of the poses' stamps.
+    pub covariances: &'a [(Stamp, PoseCovariance)],
+    /// What it learnt of the lidar.
+    pub lidar: &'a LidarCorrection,
+    /// What it saw.
+    pub survey: &'a Survey,
+}
+
+/// Registers the whole of what an open loop saw with the sensors of `calibration`.
 ///
 /// The same for any number of threads.
-pub fn register(
-    map_from_head: &Trajectory,
-    covariances: &[(Stamp, PoseCovariance)],
-    survey: &Survey,
-    spec: &EstimatorSpec,
-) -> ClosedLoop {
+pub fn register(travelled: Travelled, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
+    let Travelled { map_from_head, covariances, lidar, survey } = travelled;
     let left = |report: RegistrationReport, why| ClosedLoop {
         trajectory: map_from_head.clone(),
+        lidar: *lidar,
         report: RegistrationReport { left: Some(why), ..report },
     };
     let of_all = &spec.registration;
     let Some(course) = Course::new(map_from_head, covariances, survey.origin, of_all) else {
         return left(RegistrationReport::default(), "there is no trajectory");
     };
-    let scene = Scene::new(survey, &course, of_all);
+    let mount = Mount::new(calibration, lidar, spec);
+    let scene = Scene::new(survey, &course, &mount, of_all);
     let matcher = Matcher::new(&of_all.matching(&spec.matching), &of_all.surfels(&spec.surfels));
     let (report, weakest) = (RegistrationReport::default(), Vector::z());
-    let mut registration = Registration { spec: of_all, matcher, course, scene, weakest, report };
+    let mut registration = Registration { spec: of_all, matcher, course, mount, scene, weakest, report };
     let run = registration.run();
     let is_weak = registration.report.conditioning < spec.solve.weak_conditioning;
     match run {
         Ok(()) if is_weak => left(registration.report, "the surfaces seen say next to nothing of a direction"),
         Ok(()) => ClosedLoop {
             trajectory: registration.course.into_trajectory(map_from_head.stamps()),
+            lidar: registration.mount.lidar,
             report: registration.report,
         },
         Err(why) => left(registration.report, why),
@@ -117,6 +136,7 @@ struct Registration<'a> {
     spec: &'a RegistrationSpec,
     matcher: Matcher,
     course: Course,
+    mount: Mount,
     scene: Scene,
     /// The direction in the map of which the matches of the last iteration said least.
     weakest: Vector,
@@ -145,18 +165,20 @@ impl Registration<'_> {
                     other => other.insert(self.empty_equations(&neighbours)),
                 };
                 let tally = self.assemble(&neighbours, self.spec.max_plane_distance_m * coarser, equations);
-                let x = equations.solve().ok_or("its equations are singular")?;
+                let (x, step) = equations.solve().ok_or("its equations are singular")?;
                 let Moved { shift, turn } = Moved::greatest(&x);
                 if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
                     return Err("its correction is too large");
                 }
                 self.course.correct(&x);
-                self.scene.correct(first_knot, &x);
-                neighbours.moved(shift + farthest_m * turn);
+                self.mount.correct(&step);
+                self.scene.correct(first_knot, &x, &step);
+                let by_lidar_m = lidar::farthest_moved(&step, farthest_m);
+                neighbours.moved(shift + farthest_m * turn + by_lidar_m);
                 self.report.iterations += 1;
                 self.describe(&tally);
                 self.report.last_correction_m = shift;
-                if shift < self.spec.settled_m * coarser {
+                if shift.max(by_lidar_m) < self.spec.settled_m * coarser {
                     break;
                 }
             }
@@ -188,6 +210,7 @@ impl Registration<'_> {
         let matches = Matches { scene, neighbours, matcher, spec, gate_m, weakest };
         let tally = matches.add_to(equations);
         self.course.add_to(equations, spec.level_sigma_deg.to_radians());
+        self.mount.add_to(&mut equations.beside);
         // A metre and a radian keep the outermost knots where nothing else does.
         equations.add_diagonal(1.0);
         tally

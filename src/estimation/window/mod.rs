@@ -19,7 +19,6 @@ use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Interval};
 use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
-use super::survey::Sighting;
 use crate::geometry::{Matrix, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::Remembered;
@@ -177,22 +176,22 @@ impl Window {
         Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).max(self.start.u_s))
     }
 
-    /// What the oldest stretch saw, by the surfels of the survey, as they stand in the map.
-    pub(super) fn survey_oldest(&self) -> Vec<Sighting> {
+    /// What the oldest stretch saw, by the surfels of the survey, as they stand in the map, each with its time, s.
+    pub(super) fn survey_oldest(&self) -> Vec<(f64, Patch)> {
         self.stretches.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
     }
 
     /// What all stretches of the window saw, likewise.
-    pub(super) fn survey_all(&self) -> Vec<Sighting> {
+    pub(super) fn survey_all(&self) -> Vec<(f64, Patch)> {
         self.stretches.iter().flat_map(|stretch| self.survey(stretch)).collect()
     }
 
-    fn survey(&self, stretch: &Stretch) -> Vec<Sighting> {
+    fn survey(&self, stretch: &Stretch) -> Vec<(f64, Patch)> {
         let Some(surveyor) = &self.surveyor else { return Vec::new() };
         let surveyor = SurfelMaker { lidar: self.maker.lidar, ..surveyor.clone() };
         let seen = surveyor.build(&stretch.beams, &self.nominal, &self.clock, &self.biases);
         let placing = self.placing();
-        seen.iter().map(|surfel| Sighting { tau_s: surfel.tau_s, patch: surfel.place(&placing).patch }).collect()
+        seen.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
     }
 
     /// Lets the oldest stretch go: what is before its end is final. Its patches as they stand in the map.

@@ -166,7 +166,10 @@ fn estimate(
         let known = judge::truth_of(&reader, &run.map_from_head, &mut watch)?;
         let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);
         let closed = match closes_loops {
-            true => judge::truth_of(&reader, &run_closed_loop(&run, estimator).map_from_head, &mut watch)?,
+            true => {
+                let closed = run_closed_loop(&run, &found.calibration, estimator);
+                judge::truth_of(&reader, &closed.map_from_head, &mut watch)?
+            }
             false => None,
         };
         let closed_position_rmse_m = closed.and_then(|known| known.errors).map(|errors| errors.position_rmse_m());
