@@ -13,6 +13,7 @@
 //! 4. The window's corrections are solved for, and 3 begins again, until nothing moves.
 //! 5. The oldest stretch leaves: its poses are final, its surfels may become a fixed view.
 //! 6. Behind the open loop, [`register`] lays all that was seen on what was seen of it at other times.
+//! 7. Beams become a cloud by the trajectory; [`CloudFilter`] tells which of them are no surface.
 //!
 //! # The problem
 //!
@@ -52,6 +53,7 @@
 
 mod border;
 mod clock;
+mod cloud;
 mod consider;
 mod error;
 mod estimator;
@@ -75,6 +77,7 @@ mod views;
 mod window;
 
 use clock::Clock;
+pub use cloud::{CloudFilter, Fate, Hit, point_sigma_m};
 pub use error::{EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use output::{EstimatedPose, OpenLoop, WindowReport};

@@ -17,7 +17,7 @@
 //!
 //! Stamps are the sensors' own (those of poses the lidar's); a message's log time is its arrival, in true time.
 //!
-//! [`TumWriter`], [`read_tum`] keep trajectories, [`PlyWriter`], [`PlyReader`] clouds, and [`write_result`] an estimate as
+//! [`TumWriter`], [`read_tum`] keep trajectories, [`PlyWriter`], [`PlyReader`] and [`LasWriter`] clouds, and [`write_result`] an estimate as
 //! a recording for viewers.
 
 mod cdr;
@@ -26,6 +26,7 @@ mod container;
 mod error;
 mod extrinsics;
 mod info;
+mod las;
 mod loss;
 mod measurements;
 mod message;
@@ -45,6 +46,7 @@ pub use cloud::CloudPoint;
 pub use error::RecordingError;
 pub use extrinsics::FoundCalibration;
 pub use info::{ClockStatistics, RecordingInfo, TopicInfo};
+pub use las::LasWriter;
 pub use loss::Loss;
 pub use measurements::Measurements;
 pub use ply::{PlyReader, PlyWriter};

@@ -4,6 +4,7 @@ use super::bound::information_bound;
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
+use super::cloud_files::CloudWishes;
 use super::open_loop::{How, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
@@ -32,13 +33,16 @@ pub struct Wishes {
     pub topics: Preference,
     /// Whether to register the whole behind the open loop.
     pub closed_loop: bool,
+    /// What is asked of the cloud.
+    pub cloud: CloudWishes,
 }
 
 impl Wishes {
     /// An estimate with these settings, loops closed, and no further wish.
     pub fn with(estimator: EstimatorSpec) -> Self {
         let (calibration, topics) = (CalibrationSpec::default(), Preference::default());
-        Self { estimator, calibration, body_frame: None, topics, closed_loop: true }
+        let cloud = CloudWishes::default();
+        Self { estimator, calibration, body_frame: None, topics, closed_loop: true, cloud }
     }
 }
 
@@ -54,7 +58,7 @@ pub struct Outcome {
 }
 
 /// Estimates from the recording at `path`, whoever made it, and writes to `folder`: `manifest.ron`, `open_loop.tum`,
-/// `closed_loop.tum`, `result.mcap`, `cloud.ply`, `metrics.json`, `plots/`, `report.html`; cloud and result are the closed
+/// `closed_loop.tum`, `result.mcap`, `cloud.ply` or `cloud.las`, `metrics.json`, `plots/`, `report.html`; cloud and result are the closed
 /// loop's unless that is not wanted. Where the recording has the truth the estimate is
 /// judged by it, and where it has the scene the cloud is.
 ///
@@ -111,8 +115,9 @@ pub(super) fn estimate_in(
         lidar: &run.lidar,
         returns: run.returns,
         with_truth: known.is_some(),
+        wishes: wishes.cloud,
     };
-    let registered = registration.run(&folder.join("cloud.ply"), &folder.join("result.mcap"), watch)?;
+    let registered = registration.run(folder, watch)?;
 
     watch.progress(Stage::Reporting, 0.0, None);
     let drifting = match known {

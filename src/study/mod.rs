@@ -15,6 +15,7 @@ mod cadence;
 mod calibration;
 mod closed_loop;
 mod cloud;
+mod cloud_files;
 pub mod coverage;
 mod error;
 mod estimate;
@@ -36,6 +37,7 @@ mod watch;
 
 pub use bound::{Bounded, information_bound};
 pub use calibration::CalibrationSpec;
+pub use cloud_files::{CloudFormat, CloudWishes};
 pub use error::StudyError;
 pub use estimate::{Outcome, Wishes, estimate_recording};
 pub use journey::journey;
