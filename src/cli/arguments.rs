@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use zsim::estimation;
-use zsim::geometry::{Route, Vector};
+use zsim::geometry::{Pose, Rotation, Route, Vector};
 use zsim::random::Seed;
 use zsim::simulation::Scenario;
 use zsim::spec::{Source, parse};
@@ -145,6 +145,20 @@ pub(super) fn calibration(path: Option<&Path>) -> anyhow::Result<CalibrationSpec
         Some(path) => Ok(parse(&Source::read(path)?)?),
         None => Ok(CalibrationSpec::default()),
     }
+}
+
+/// A place on a map, `x,y,z,yaw`: metres, and degrees about the vertical.
+pub(super) fn start(text: &str) -> Result<Pose, String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+        .collect::<Option<_>>()
+        .ok_or_else(|| format!("`{text}` is not four numbers x,y,z,yaw"))?;
+    let [x, y, z, yaw_deg] = numbers[..] else {
+        return Err(format!("four numbers x,y,z,yaw are needed; here are {}", numbers.len()));
+    };
+    let turn = Rotation::from_axis_angle(&Vector::z_axis(), yaw_deg.to_radians());
+    Ok(Pose::from_parts(Vector::new(x, y, z).into(), turn))
 }
 
 /// A way that any motion can follow: round a hall of 20 m by 10 m.

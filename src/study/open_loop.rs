@@ -1,7 +1,7 @@
 //! The open loop over a recording, as it would run while recording.
 
 use super::cadence::Cadence;
-use super::{Stage, StudyError, Watch};
+use super::{MapWishes, Stage, StudyError, Watch};
 use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Survey, TimeSpent, Warning, WarningKind};
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
@@ -49,8 +49,10 @@ pub(super) struct OpenLoopRun {
 pub(super) struct How<'a> {
     pub estimator: &'a EstimatorSpec,
     pub calibration: &'a Calibration,
-    /// Whether what is seen is kept, for the closed loop.
+    /// Whether what is seen is kept, for the closed loop and the map.
     pub surveying: bool,
+    /// The map in which the head is, where there is one.
+    pub map: Option<&'a MapWishes>,
 }
 
 /// Estimates from what `reader` reads; poses go to the TUM file `tum`, if one is wanted, as they become final.
@@ -65,7 +67,11 @@ pub(super) fn run_open_loop(
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
     let estimator = Estimator::new(how.estimator, how.calibration)?;
-    let mut estimator = if how.surveying { estimator.surveying() } else { estimator };
+    let estimator = if how.surveying { estimator.surveying() } else { estimator };
+    let mut estimator = match how.map {
+        Some(within) => estimator.in_map(&within.map, &within.map_from_head),
+        None => estimator,
+    };
     let tum = tum.map(TumWriter::create).transpose()?;
     let mut written = Written { tum, map_from_head: Trajectory::new(), covariances: Vec::new() };
     let mut heard = Heard::default();
