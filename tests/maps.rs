@@ -110,7 +110,7 @@ impl Mapped {
     }
 
     /// Where `other`'s map truly is in this one.
-    fn from_map_of(&self, other: &Self) -> Pose {
+    fn place_of(&self, other: &Self) -> Pose {
         self.world_from_map.inverse() * other.world_from_map
     }
 }
@@ -206,7 +206,7 @@ fn a_map_that_goes_on_and_one_that_is_put_together_are_as_exact_as_their_parts()
     let of = |map: &SurfelMap, at: &Pose| off_surfaces_m(map, at, &world);
     let parts = [of(&first.map, &first.world_from_map), of(&second.map, &second.world_from_map)];
     // Put together, from a guess.
-    let truly = first.from_map_of(second);
+    let truly = first.place_of(second);
     let found =
         locate_map(&first.map, &second.map, &aside(&truly, Vector::new(-0.5, 0.5, 0.0), -12.0), &spec()).unwrap();
     let apart = truly.inverse() * found.map_from_seen;

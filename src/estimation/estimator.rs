@@ -127,9 +127,10 @@ impl Estimator {
         self.survey_window(Window::survey_all);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        let Self { poses, clock_offsets, windows, warnings, survey, .. } = self;
+        let Self { poses, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
         let survey = survey.unwrap_or_default();
-        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, windows, warnings, survey })
+        let located = whereabouts.and_then(|whereabouts| whereabouts.found().cloned());
+        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, located, windows, warnings, survey })
     }
 
     /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and its
@@ -199,7 +200,7 @@ impl Estimator {
         let (Some(whereabouts), Some(window)) = (&mut self.whereabouts, &mut self.window) else { return Ok(false) };
         let found = match whereabouts.find(window, &self.calibration.head_from_imu) {
             Some(Ok(found)) => found,
-            Some(Err(_)) if whereabouts.was_found() => {
+            Some(Err(_)) if whereabouts.found().is_some() => {
                 let stamp = self.intake.stamp(window.nominal.end_s());
                 self.warnings.push(Warning { stamp, kind: WarningKind::LostInMap });
                 return Ok(false);

@@ -15,8 +15,8 @@ pub(super) struct Whereabouts {
     covariance: Matrix6<f64>,
     /// Where it is about, until it is looked for.
     about: Option<Pose>,
-    /// Whether it was found once.
-    found: bool,
+    /// Where it was found at first.
+    found: Option<Located>,
 }
 
 impl Whereabouts {
@@ -24,7 +24,7 @@ impl Whereabouts {
     pub(super) fn about(map: &SurfelMap, map_from_head: Pose, spec: &EstimatorSpec) -> Self {
         let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
         let locator = Locator::new(map, (&spec.matching, &spec.surfels), certainty);
-        Self { locator, covariance: covariance_of(map), about: Some(map_from_head), found: false }
+        Self { locator, covariance: covariance_of(map), about: Some(map_from_head), found: None }
     }
 
     /// The map's patches.
@@ -37,9 +37,9 @@ impl Whereabouts {
         self.covariance
     }
 
-    /// Whether the head was found once.
-    pub(super) fn was_found(&self) -> bool {
-        self.found
+    /// Where the head was found at first.
+    pub(super) fn found(&self) -> Option<&Located> {
+        self.found.as_ref()
     }
 
     /// The head is to be looked for again, about at `map_from_head`.
@@ -59,7 +59,9 @@ impl Whereabouts {
         let shift = about.translation.vector - rotation * here_from_head.translation.vector;
         let start = Pose::from_parts(shift.into(), rotation);
         let located = self.locator.find(&window.patches(), &begins.translation.vector, &start);
-        self.found |= located.is_ok();
+        if let (None, Ok(located)) = (&self.found, &located) {
+            self.found = Some(located.clone());
+        }
         Some(located)
     }
 }

@@ -67,11 +67,11 @@ pub(super) fn cloud_metrics(
     world_from_map: Option<&Pose>,
     surroundings: Option<Surroundings>,
 ) -> CloudMetrics {
-    let counted = CloudMetrics {
-        points: Some(registered.fates.all()),
-        filter: registered.filtered.then(|| filter_metrics(&registered.fates)).unwrap_or_default(),
-        ..CloudMetrics::default()
+    let filter = match registered.filtered {
+        true => filter_metrics(&registered.fates),
+        false => FilterMetrics::default(),
     };
+    let counted = CloudMetrics { points: Some(registered.fates.all()), filter, ..CloudMetrics::default() };
     let (Some(world_from_map), Some(surroundings)) = (world_from_map, surroundings) else {
         return counted;
     };

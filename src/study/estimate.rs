@@ -173,8 +173,10 @@ impl Loops {
     ) -> Result<Self, StudyError> {
         let (estimator, calibration) = (&wishes.estimator, &found.calibration);
         let within = wishes.map.as_ref();
-        // The registration of the whole knows nothing of a map that holds the trajectory already.
         let closes = wishes.closed_loop && within.is_none();
+        if wishes.closed_loop && !closes {
+            watch.note("the map holds the trajectory; the global registration, which knows nothing of it, is left out");
+        }
         let makes_map = within.map_or(wishes.closed_loop, |within| within.extend);
         let how = How { estimator, calibration, surveying: closes || makes_map, map: within };
         let open = run_open_loop(reader, selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;

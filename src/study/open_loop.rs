@@ -2,7 +2,7 @@
 
 use super::cadence::Cadence;
 use super::{MapWishes, Stage, StudyError, Watch};
-use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Survey, TimeSpent, Warning, WarningKind};
+use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WarningKind};
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::recording::{Reader, RecordingError, Selection, TumWriter};
@@ -98,13 +98,18 @@ pub(super) fn run_open_loop(
     losses.extend(heard.lidar.missing("scans"));
     let start = heard.start();
     losses.extend(result.warnings.iter().filter(|warning| is_loss(&warning.kind)).map(|w| since(start, w)));
+    let remarks =
+        result.located.iter().map(found).chain(
+            result.warnings.iter().filter(|warning| !is_loss(&warning.kind)).map(|warning| since(start, warning)),
+        );
+    let remarks = remarks.collect();
     Ok(OpenLoopRun {
         map_from_head,
         covariances,
         spent: result.windows.iter().map(|window| window.spent).sum(),
         clock_offsets: result.clock_offsets,
         lidar: result.lidar,
-        remarks: result.warnings.iter().filter(|w| !is_loss(&w.kind)).map(|w| since(start, w)).collect(),
+        remarks,
         losses,
         returns: heard.returns,
         acquisition_s: heard.seconds(),
@@ -121,6 +126,15 @@ fn is_loss(kind: &WarningKind) -> bool {
             | WarningKind::LidarGap { .. }
             | WarningKind::BeganAgain { .. }
             | WarningKind::LeftOut { .. }
+    )
+}
+
+/// Where in the map the head was found.
+fn found(located: &Located) -> String {
+    format!(
+        "found in the map: {:.0} % of what the first window shows lies on it, to {:.1} mm",
+        100.0 * located.share,
+        1e3 * located.residual_rms_m
     )
 }
 
