@@ -45,10 +45,11 @@ const BELOW_CLI: &[&str] = &[
 const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
 
 /// Crates that one room keeps to itself (or a few, at the door), and what each is kept for.
-const KEPT: [(&str, &[&str]); 15] = [
+const KEPT: [(&str, &[&str]); 16] = [
     ("parry3d", &["world"]),
     ("rapier3d_f64", &["dynamics"]),
     ("mcap", &["recording"]),
+    ("las", &["recording"]),
     ("cdr_encoding", &["recording"]),
     ("plotters", &["report"]),
     ("clap", &["cli", "main"]),

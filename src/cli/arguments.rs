@@ -2,15 +2,15 @@
 
 use super::failure::Usage;
 use super::quantity;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use zsim::estimation;
-use zsim::geometry::{Route, Vector};
+use zsim::geometry::{Pose, Rotation, Route, Vector};
 use zsim::random::Seed;
 use zsim::simulation::Scenario;
 use zsim::spec::{Source, parse};
-use zsim::study::{CalibrationSpec, Wishes};
+use zsim::study::{CalibrationSpec, CloudFormat, CloudWishes, Wishes};
 
 /// What every command understands.
 #[derive(Args)]
@@ -88,9 +88,33 @@ pub(super) struct EstimatorArguments {
     /// Estimate also how the lidar sits beside the IMU, from where the calibration puts it
     #[arg(long)]
     refine_extrinsics: bool,
+    /// The cloud's files: cloud.ply, cloud.las, or both
+    #[arg(long, value_name = "FORMAT", value_enum, default_value = "ply")]
+    cloud_format: CloudFormatArgument,
+    /// Leave in the cloud what is no surface that stands: echoes of two surfaces, isolated ones, what moved
+    #[arg(long)]
+    keep_outliers: bool,
     /// Tell where the open loop's time went
     #[arg(long)]
     pub profile: bool,
+}
+
+/// In which formats the cloud is written.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum CloudFormatArgument {
+    Ply,
+    Las,
+    Both,
+}
+
+impl From<CloudFormatArgument> for CloudFormat {
+    fn from(format: CloudFormatArgument) -> Self {
+        match format {
+            CloudFormatArgument::Ply => Self::Ply,
+            CloudFormatArgument::Las => Self::Las,
+            CloudFormatArgument::Both => Self::Both,
+        }
+    }
 }
 
 impl EstimatorArguments {
@@ -99,7 +123,8 @@ impl EstimatorArguments {
         estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
         estimator.extrinsics.estimated |= self.refine_extrinsics;
         estimator.check().map_err(|error| Usage(error.to_string()))?;
-        Ok(Wishes { closed_loop: !self.open_loop, ..Wishes::with(estimator) })
+        let cloud = CloudWishes { format: self.cloud_format.into(), keep_outliers: self.keep_outliers };
+        Ok(Wishes { closed_loop: !self.open_loop, cloud, ..Wishes::with(estimator) })
     }
 }
 
@@ -120,6 +145,20 @@ pub(super) fn calibration(path: Option<&Path>) -> anyhow::Result<CalibrationSpec
         Some(path) => Ok(parse(&Source::read(path)?)?),
         None => Ok(CalibrationSpec::default()),
     }
+}
+
+/// A place on a map, `x,y,z,yaw`: metres, and degrees about the vertical.
+pub(super) fn start(text: &str) -> Result<Pose, String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+        .collect::<Option<_>>()
+        .ok_or_else(|| format!("`{text}` is not four numbers x,y,z,yaw"))?;
+    let [x, y, z, yaw_deg] = numbers[..] else {
+        return Err(format!("four numbers x,y,z,yaw are needed; here are {}", numbers.len()));
+    };
+    let turn = Rotation::from_axis_angle(&Vector::z_axis(), yaw_deg.to_radians());
+    Ok(Pose::from_parts(Vector::new(x, y, z).into(), turn))
 }
 
 /// A way that any motion can follow: round a hall of 20 m by 10 m.

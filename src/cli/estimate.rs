@@ -1,20 +1,24 @@
 //! `zsim estimate`: the estimator on any recording.
 
 use super::End;
-use super::arguments::{EstimatorArguments, Global, OutArguments, calibration};
+use super::arguments::{EstimatorArguments, Global, OutArguments, calibration, start};
 use super::bars::{Bars, stop_flag};
 use super::{journey, output};
 use clap::Args;
 use std::path::PathBuf;
+use zsim::geometry::Pose;
 use zsim::recording::{Preference, Reader};
-use zsim::study::{self, Watch, Wishes};
+use zsim::study::{self, MapWishes, Watch, Wishes};
 
 /// Estimate trajectory and map from a recording, whoever made it
 ///
 /// Lidar and IMU are found among the topics (LaserScan or PointCloud2, and Imu), and where they sit in the head is read
 /// from /tf_static. Where the recording has the truth, the estimate is judged by it.
 #[derive(Args)]
-#[command(after_help = "Example:\n  zsim estimate recording.mcap --out results/recording --fixed-views 2")]
+#[command(
+    after_help = "Examples:\n  zsim estimate recording.mcap --out results/recording --fixed-views 2\n  zsim estimate \
+                        tuesday.mcap --map results/monday/map.ply --start 4.2,0.5,0,90 --extend-map"
+)]
 pub(super) struct Arguments {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
@@ -34,12 +38,24 @@ pub(super) struct Arguments {
     /// The IMU's topic [default: found]
     #[arg(long, value_name = "TOPIC")]
     imu_topic: Option<String>,
+    /// A map of an earlier run (its map.ply), in which the head is to be localised: the trajectory is in the map's frame then
+    #[arg(long, value_name = "MAP.ply")]
+    map: Option<PathBuf>,
+    /// Where in the map the head begins, to a metre and twenty degrees: metres, and degrees about the vertical
+    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = start, default_value = "0,0,0,0", requires = "map",
+        allow_hyphen_values = true)]
+    start: Pose,
+    /// Go on from the map: write it with what the recording shows, as map.ply
+    #[arg(long, requires = "map")]
+    extend_map: bool,
     #[command(flatten)]
     out: OutArguments,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let within = |path: &PathBuf| MapWishes::read(path, arguments.start, arguments.extend_map);
     let wishes = Wishes {
+        map: arguments.map.as_ref().map(within).transpose()?,
         calibration: calibration(arguments.calibration.as_deref())?,
         body_frame: arguments.body_frame.clone(),
         topics: Preference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },

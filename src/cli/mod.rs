@@ -18,6 +18,7 @@ mod gains;
 mod info;
 mod journey;
 mod latency;
+mod map;
 mod output;
 mod quantity;
 mod reproduce;
@@ -66,6 +67,7 @@ enum Verb {
     Spring(spring::Arguments),
     Coverage(coverage::Arguments),
     Latency(latency::Arguments),
+    Map(map::Arguments),
     Reproduce(reproduce::Arguments),
     Study(study::Arguments),
     Sweep(sweep::Arguments),
@@ -113,6 +115,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Spring(arguments) => spring::run(arguments, global),
         Verb::Coverage(arguments) => coverage::run(arguments, global),
         Verb::Latency(arguments) => latency::run(arguments, global),
+        Verb::Map(arguments) => map::run(arguments, global),
         Verb::Reproduce(arguments) => reproduce::run(arguments, global),
         Verb::Study(arguments) => study::run(arguments, global),
         Verb::Sweep(arguments) => sweep::run(arguments, global),

@@ -8,7 +8,7 @@
 //!
 //! An error is six numbers: a small turn (rad) of all that hangs on a part about its pivot, then a shift (m), in the map.
 
-use super::views::Taken;
+use super::views::{MAP, Taken};
 use crate::geometry::{Vector, skew};
 use nalgebra::Matrix6;
 
@@ -57,6 +57,13 @@ impl Consider {
         sigmas[3..].fill(LOST.1);
         let beginning = Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
         Self { beginning, ..Self::new(pivot) }
+    }
+
+    /// Of a head that was found at `pivot` in a map, with an error against it of covariance `found`, the map's own being
+    /// `of_map`.
+    pub(super) fn found(pivot: Vector, found: Matrix6<f64>, of_map: Matrix6<f64>) -> Self {
+        let map = View { number: MAP, with_beginning: of_map, with_views: vec![of_map] };
+        Self { pivot, beginning: found + of_map, views: vec![map] }
     }
 
     /// The window's end is as uncertain as its beginning, which carries it along, and what measurements add by there.
@@ -196,6 +203,26 @@ mod tests {
                 assert_relative_eq!(consider.beginning[(r, c)], expected[(r, c)], epsilon = 1e-12, max_relative = 1e-9);
             }
         }
+    }
+
+    #[test]
+    fn a_head_that_a_map_holds_is_as_uncertain_as_the_map_whatever_it_was_when_it_was_found() {
+        let (found, of_map) = (Matrix6::identity() * 0.3, Matrix6::identity() * 0.02);
+        let by = |beginning: f64, map: f64| Sensitivity {
+            beginning: Matrix6::identity() * beginning,
+            views: vec![(MAP, Matrix6::identity() * map)],
+            ..sensitivity(1, &[])
+        };
+        let noise = sensitivity(1, &[]).noise;
+        let after = |step: &Sensitivity| {
+            let mut consider = Consider::found(Vector::zeros(), found, of_map);
+            consider.advance(step);
+            consider.beginning
+        };
+        assert_relative_eq!(after(&by(0.0, 1.0)), of_map + noise, epsilon = 1e-12);
+        assert_relative_eq!(after(&by(1.0, 0.0)), found + of_map + noise, epsilon = 1e-12);
+        // Half and half: the map's error is in both halves, that of the finding in one.
+        assert_relative_eq!(after(&by(0.5, 0.5)), found * 0.25 + of_map + noise, epsilon = 1e-12);
     }
 
     #[test]

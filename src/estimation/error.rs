@@ -16,6 +16,15 @@ pub enum EstimationError {
     /// A calibration that nothing can be computed with.
     #[error("calibration: {0}")]
     Calibration(String),
+    /// What makes no map, or maps that cannot be put together.
+    #[error("map: {0}")]
+    Map(String),
+    /// The head, or another map, is not where in the map it was said to be.
+    #[error(
+        "not found in the map: {0}; it is looked for within a metre and twenty degrees of a start, which `--start x,y,z,yaw` \
+         gives (m, degrees)"
+    )]
+    NotInMap(String),
     /// A measurement with NaN or infinity in it.
     #[error("the {sensor} measurement stamped {stamp_ns} ns is not finite")]
     NotFinite {
@@ -100,6 +109,8 @@ pub enum WarningKind {
         /// Why.
         reason: &'static str,
     },
+    /// After a silence the head was not found again in the map.
+    LostInMap,
     /// IMU samples at the end of the sensor's range, which say only "at least".
     Saturated {
         /// How many.
@@ -143,6 +154,9 @@ impl fmt::Display for WarningKind {
                 )
             }
             Self::NotSolved { reason } => write!(f, "the window's solution was not believed ({reason})"),
+            Self::LostInMap => {
+                write!(f, "behind the silence the head was not found again in the map; it goes on without it")
+            }
             Self::Saturated { samples } => write!(f, "{samples} IMU samples at the end of the sensor's range"),
         }
     }

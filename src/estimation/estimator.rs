@@ -7,10 +7,12 @@ use super::strapdown::Interval;
 use super::surfel::{Patch, SurfelMaker};
 use super::survey::Survey;
 use super::views::Views;
+use super::whereabouts::Whereabouts;
 use super::window::{Linearised, Solved, Window};
 use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
+use crate::surfel_map::SurfelMap;
 use crate::time::Stamp;
 use std::mem::discriminant;
 use std::time::Instant;
@@ -31,6 +33,8 @@ pub struct Estimator {
     /// What was known when the IMU last fell silent, until the window behind it is level with it.
     carried: Option<Carried>,
     views: Views,
+    /// A map in which the head is, where one is given.
+    whereabouts: Option<Whereabouts>,
     /// What was seen, where that is asked for.
     survey: Option<Survey>,
     consider: Consider,
@@ -61,6 +65,7 @@ impl Estimator {
             window: None,
             carried: None,
             views: Views::new(&spec.views, spec.fixed_views),
+            whereabouts: None,
             survey: None,
             consider: Consider::new(Vector::zeros()),
             at_end: None,
@@ -78,14 +83,21 @@ impl Estimator {
         Self { survey: Some(Survey::default()), ..self }
     }
 
+    /// The same estimator, whose trajectory is in the frame of `map`, in which the head begins about at `map_from_head`:
+    /// within a metre on the level and twenty degrees about the vertical. Every window is then matched with the map as
+    /// well. No pose is handed out before the head is found, which is when the first window is full.
+    pub fn in_map(self, map: &SurfelMap, map_from_head: &Pose) -> Self {
+        Self { whereabouts: Some(Whereabouts::about(map, *map_from_head, &self.spec)), ..self }
+    }
+
     /// Takes a measurement, in about the order of time; when a stretch of time is complete, the window moves over it.
     ///
     /// # Errors
-    /// When the measurement is not finite.
+    /// When the measurement is not finite, or the head is not found in the map that was given.
     pub fn push(&mut self, measurement: Measurement) -> Result<(), EstimationError> {
         self.intake.take(measurement)?;
         while let Some(stretch) = self.intake.next_stretch(false) {
-            self.advance(stretch);
+            self.advance(stretch)?;
         }
         Ok(())
     }
@@ -98,12 +110,13 @@ impl Estimator {
     /// Solves what is left; the result holds the poses not taken yet, and the reports of all windows.
     ///
     /// # Errors
-    /// When there was no IMU, no lidar, or too little of both to start.
+    /// When there was no IMU, no lidar, or too little of both to start, or the head is not found in the map that was given.
     pub fn finish(mut self) -> Result<OpenLoop, EstimationError> {
         while let Some(stretch) = self.intake.next_stretch(true) {
-            self.advance(stretch);
+            self.advance(stretch)?;
         }
         self.begin(true);
+        self.find_in_map()?;
         self.intake.close();
         self.warnings.extend(self.intake.take_warnings());
         let Some(window) = &self.window else { return Err(self.why_nothing()) };
@@ -114,32 +127,35 @@ impl Estimator {
         self.survey_window(Window::survey_all);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        let Self { poses, clock_offsets, windows, warnings, survey, .. } = self;
+        let Self { poses, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
         let survey = survey.unwrap_or_default();
-        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, windows, warnings, survey })
+        let located = whereabouts.and_then(|whereabouts| whereabouts.found().cloned());
+        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, located, windows, warnings, survey })
     }
 
     /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and its
     /// surfels may become a fixed view.
-    fn advance(&mut self, stretch: Stretch) {
+    fn advance(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
         self.warnings.extend(self.intake.take_warnings());
         if stretch.after_silence {
+            self.find_in_map()?;
             self.pause();
         }
         self.waiting.push(stretch);
         self.begin(false);
         if self.window.is_some() {
             for stretch in std::mem::take(&mut self.waiting) {
-                self.take_in(stretch);
+                self.take_in(stretch)?;
             }
         }
+        Ok(())
     }
 
-    fn take_in(&mut self, stretch: Stretch) {
-        let Some(window) = &mut self.window else { return };
+    fn take_in(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
+        let Some(window) = &mut self.window else { return Ok(()) };
         let started = Instant::now();
         let mut spent = window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
-        let (solved, linearised) = window.solve(&self.views);
+        let (mut solved, mut linearised) = window.solve(&self.views);
         spent += solved.spent;
         let mut watch = Stopwatch::start();
         window.remake_newest();
@@ -149,6 +165,14 @@ impl Estimator {
         {
             window.level_as(&carried);
         }
+        if window.is_full() && self.find_in_map()? {
+            // Once more, with what the map shows.
+            let Some(window) = &mut self.window else { return Ok(()) };
+            (solved, linearised) = window.solve(&self.views);
+            spent += solved.spent;
+            watch.lap_s();
+        }
+        let Some(window) = &self.window else { return Ok(()) };
         let elapsed_s = started.elapsed().as_secs_f64();
         if window.is_full() {
             self.survey_window(Window::survey_oldest);
@@ -156,7 +180,7 @@ impl Estimator {
         watch.lap_s(); // told by the survey itself
         let final_until_s = self.let_go(linearised.as_ref());
         spent.views_s += watch.lap_s();
-        let Some(window) = &mut self.window else { return };
+        let Some(window) = &mut self.window else { return Ok(()) };
         let took = (elapsed_s + spent.views_s, spent);
         self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, took));
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
@@ -165,9 +189,31 @@ impl Estimator {
         self.say(trouble, stretch.end_s);
         if let Some(until_s) = final_until_s {
             self.hand_out(until_s);
-            let Some(window) = &mut self.window else { return };
+            let Some(window) = &mut self.window else { return Ok(()) };
             window.nominal.forget_before(until_s - 0.2);
         }
+        Ok(())
+    }
+
+    /// Puts the window into the map where one is given and the head is not found in it yet; whether it is found now.
+    fn find_in_map(&mut self) -> Result<bool, EstimationError> {
+        let (Some(whereabouts), Some(window)) = (&mut self.whereabouts, &mut self.window) else { return Ok(false) };
+        let found = match whereabouts.find(window, &self.calibration.head_from_imu) {
+            Some(Ok(found)) => found,
+            Some(Err(_)) if whereabouts.found().is_some() => {
+                let stamp = self.intake.stamp(window.nominal.end_s());
+                self.warnings.push(Warning { stamp, kind: WarningKind::LostInMap });
+                return Ok(false);
+            }
+            Some(Err(error)) => return Err(error),
+            None => return Ok(false),
+        };
+        window.found_at(&found.map_from_seen);
+        let place = window.begins().translation.vector;
+        let views = Views::new(&self.spec.views, self.spec.fixed_views);
+        self.views = views.in_map(whereabouts.patches(), window.matcher(), place);
+        self.consider = Consider::found(place, found.covariance, whereabouts.covariance());
+        Ok(true)
     }
 
     /// Warns of a trouble when it lasts for two windows, or at once of a solution that was not believed; and once only, until a
@@ -216,6 +262,9 @@ impl Estimator {
         self.next_pose = None;
         // Where the head is now in the old views is unknown: matched by chance, they would bend the new stretch.
         self.views = Views::new(&self.spec.views, self.spec.fixed_views);
+        if let (Some(whereabouts), Some(last)) = (&mut self.whereabouts, self.poses.last()) {
+            whereabouts.look_again(last.map_from_head);
+        }
     }
 
     /// Begins, when enough of the start is there to tell rest from motion; with `last`, with whatever there is.

@@ -13,6 +13,7 @@
 //! 4. The window's corrections are solved for, and 3 begins again, until nothing moves.
 //! 5. The oldest stretch leaves: its poses are final, its surfels may become a fixed view.
 //! 6. Behind the open loop, [`register`] lays all that was seen on what was seen of it at other times.
+//! 7. Beams become a cloud by the trajectory; [`CloudFilter`] tells which of them are no surface.
 //!
 //! # The problem
 //!
@@ -52,12 +53,14 @@
 
 mod border;
 mod clock;
+mod cloud;
 mod consider;
 mod error;
 mod estimator;
 mod inertial;
 mod initial;
 mod intake;
+mod map;
 mod matching;
 mod nominal;
 mod normal_equations;
@@ -72,11 +75,14 @@ mod strapdown;
 mod surfel;
 mod survey;
 mod views;
+mod whereabouts;
 mod window;
 
 use clock::Clock;
+pub use cloud::{CloudFilter, Fate, Hit, point_sigma_m};
 pub use error::{EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
+pub use map::{Located, locate_map, map_of, merge_maps};
 pub use output::{EstimatedPose, OpenLoop, WindowReport};
 pub use registration::{ClosedLoop, RegistrationReport, RegistrationSpec, Travelled, register};
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};

@@ -2,7 +2,7 @@
 
 use super::spline::Basis;
 use super::strapdown::{Biases, Interval, State};
-use crate::geometry::{Matrix, Rotation, Vector};
+use crate::geometry::{Matrix, Pose, Rotation, Vector};
 
 /// Nodes at the boundaries of the IMU's intervals, in IMU time, and the intervals between them.
 ///
@@ -102,6 +102,15 @@ impl Nominal {
             state.rotation = turn * state.rotation;
             state.position = pivot + turn * (state.position - pivot);
             state.velocity = turn * state.velocity;
+        }
+    }
+
+    /// Puts the whole trajectory where `a_from_b` has it.
+    pub(super) fn move_by(&mut self, a_from_b: &Pose) {
+        for state in &mut self.states {
+            state.rotation = a_from_b.rotation * state.rotation;
+            state.position = a_from_b.rotation * state.position + a_from_b.translation.vector;
+            state.velocity = a_from_b.rotation * state.velocity;
         }
     }
 

@@ -1,6 +1,6 @@
 //! What comes out of the estimator.
 
-use super::{Survey, TimeSpent, Warning};
+use super::{Located, Survey, TimeSpent, Warning};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
@@ -64,6 +64,8 @@ pub struct OpenLoop {
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// What was learnt of the lidar beyond its calibration, at the end.
     pub lidar: LidarCorrection,
+    /// Where in a map the head was found at first, where one was given.
+    pub located: Option<Located>,
     /// A report a window.
     pub windows: Vec<WindowReport>,
     /// What degraded the estimate; empty when nothing did.

@@ -15,7 +15,10 @@ const ABOUT_EQUAL: f64 = 0.7;
 /// A view that adds less than this fraction of the window's cells is not worth its matches.
 const WORTHWHILE: f64 = 0.02;
 
-/// A stretch of the past.
+/// The number of the view that is a map.
+pub(super) const MAP: u64 = u64::MAX;
+
+/// A stretch of the past, or a map.
 #[derive(Debug)]
 pub(super) struct View {
     pub(super) patches: Vec<Patch>,
@@ -52,6 +55,18 @@ impl Views {
         Self { spec: spec.clone(), active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
     }
 
+    /// The same views, and a map, which every window matches and which is never forgotten.
+    pub(super) fn in_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
+        let (forest, cells) = (matcher.plant(patches), cells_of(patches.iter()));
+        self.kept.insert(0, View { patches: patches.to_vec(), forest, cells, number: MAP, pivot });
+        self
+    }
+
+    /// How many of those kept are a map: the first, or none.
+    fn maps(&self) -> usize {
+        usize::from(self.kept.first().is_some_and(|view| view.number == MAP))
+    }
+
     /// Takes the patches of a stretch of `seconds` that has left the window, the IMU being at `pivot` in the end.
     pub(super) fn take(&mut self, patches: &[Patch], seconds: f64, (matcher, pivot): (&Matcher, Vector)) -> Taken {
         if self.active == 0 {
@@ -73,7 +88,7 @@ impl Views {
         if cells.is_empty() || covered >= self.spec.keep_below_coverage {
             return Taken::default();
         }
-        let forgotten = if self.kept.len() >= self.spec.max_kept { self.forget_one() } else { None };
+        let forgotten = if self.kept.len() - self.maps() >= self.spec.max_kept { self.forget_one() } else { None };
         let (forest, number) = (matcher.plant(&patches), self.next);
         self.next += 1;
         self.kept.push(View { patches, forest, cells, number, pivot });
@@ -91,7 +106,7 @@ impl Views {
             }
             cells.len()
         };
-        let least = (0..self.kept.len()).min_by_key(|index| own(*index))?;
+        let least = (self.maps()..self.kept.len()).min_by_key(|index| own(*index))?;
         Some(self.kept.remove(least).number)
     }
 
@@ -99,8 +114,10 @@ impl Views {
     pub(super) fn choose(&self, placed: &[Placed]) -> Vec<usize> {
         let mut missing = cells_of(placed.iter().map(|surfel| &surfel.patch));
         let worthwhile = ((missing.len() as f64 * WORTHWHILE) as usize).max(1);
-        let mut chosen = Vec::new();
-        while chosen.len() < self.active.min(self.kept.len()) {
+        let mut chosen: Vec<usize> = (0..self.maps()).collect();
+        chosen.iter().for_each(|map| remove(&mut missing, &self.kept[*map].cells));
+        let most = self.maps() + self.active.min(self.kept.len() - self.maps());
+        while chosen.len() < most {
             let adds: Vec<usize> = self.kept.iter().map(|view| common(&missing, &view.cells)).collect();
             let best = adds.iter().copied().max().unwrap_or(0);
             if best < worthwhile {

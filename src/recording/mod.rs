@@ -17,8 +17,8 @@
 //!
 //! Stamps are the sensors' own (those of poses the lidar's); a message's log time is its arrival, in true time.
 //!
-//! [`TumWriter`], [`read_tum`] keep trajectories, [`PlyWriter`], [`PlyReader`] clouds, and [`write_result`] an estimate as
-//! a recording for viewers.
+//! [`TumWriter`], [`read_tum`] keep trajectories, [`PlyWriter`], [`PlyReader`] and [`LasWriter`] clouds,
+//! [`write_surfel_map`] and [`read_surfel_map`] maps, and [`write_result`] an estimate as a recording for viewers.
 
 mod cdr;
 mod cloud;
@@ -26,7 +26,9 @@ mod container;
 mod error;
 mod extrinsics;
 mod info;
+mod las;
 mod loss;
+mod map;
 mod measurements;
 mod message;
 mod ply;
@@ -45,7 +47,9 @@ pub use cloud::CloudPoint;
 pub use error::RecordingError;
 pub use extrinsics::FoundCalibration;
 pub use info::{ClockStatistics, RecordingInfo, TopicInfo};
+pub use las::LasWriter;
 pub use loss::Loss;
+pub use map::{parse_surfel_map, read_surfel_map, write_surfel_map};
 pub use measurements::Measurements;
 pub use ply::{PlyReader, PlyWriter};
 pub use reader::Reader;

@@ -2,7 +2,7 @@
 //!
 //! PLY is a text header that names elements and their properties, then the elements, one after the other (Turk 1994).
 
-mod header;
+pub(super) mod header;
 mod reader;
 mod writer;
 

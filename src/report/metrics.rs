@@ -121,8 +121,10 @@ pub struct LidarMetrics {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudMetrics {
-    /// Points in it.
+    /// Echoes that were projected, those included that the filter dropped.
     pub points: Option<u64>,
+    /// Of which of them the figures of distance are, in words.
+    pub judged: Option<String>,
     /// Mean signed distance to the true surfaces, positive in front of them, m.
     pub bias_m: Option<f64>,
     /// Standard deviation of the signed distance, m.
@@ -138,6 +140,28 @@ pub struct CloudMetrics {
     pub on_movers_fraction: Option<f64>,
     /// Standard deviation for the same beams, projected by the true trajectory, m.
     pub sigma_by_truth_m: Option<f64>,
+    /// What was kept of them.
+    pub filter: FilterMetrics,
+}
+
+/// What the filter made of the cloud; nothing where it was not asked.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FilterMetrics {
+    /// Points in the cloud's files.
+    pub kept: Option<u64>,
+    /// Echoes of two surfaces at once, left out.
+    pub dropped_mixed: Option<u64>,
+    /// Echoes with next to nothing beside them, left out.
+    pub dropped_isolated: Option<u64>,
+    /// Echoes of what moved, left out.
+    pub dropped_moving: Option<u64>,
+    /// As `sigma_m` of the cloud, of those echoes of what stands that were kept, m.
+    pub kept_sigma_m: Option<f64>,
+    /// Share of the echoes of what stands that were left out.
+    pub standing_dropped_fraction: Option<f64>,
+    /// Share of the echoes of what moves that were left out.
+    pub movers_dropped_fraction: Option<f64>,
 }
 
 impl Metrics {
@@ -154,58 +178,69 @@ impl Metrics {
 mod tests {
     use super::*;
 
+    /// In the file's order; groups before their keys.
+    const KEYS: &[&str] = &[
+        "version",
+        "scene",
+        "seed",
+        "duration_s",
+        "simulation",
+        "wall_s",
+        "beams",
+        "returns",
+        "rays",
+        "physics_wall_s",
+        "rays_wall_s",
+        "open_loop",
+        "wall_s",
+        "fraction_of_acquisition",
+        "fixed_views",
+        "position_rmse_m",
+        "rotation_rmse_deg",
+        "drift_m_per_min",
+        "yaw_drift_deg_per_min",
+        "end_error_m",
+        "imu_only_drift_m_per_min",
+        "position_nees",
+        "attitude_nees",
+        "closed_loop",
+        "wall_s",
+        "fraction_of_acquisition",
+        "position_rmse_m",
+        "rotation_rmse_deg",
+        "bound_rmse_m",
+        "clock",
+        "offset_rmse_s",
+        "offset_end_error_s",
+        "lidar",
+        "range_correction_m",
+        "rotation_correction_deg",
+        "translation_correction_m",
+        "cloud",
+        "points",
+        "judged",
+        "bias_m",
+        "sigma_m",
+        "p95_m",
+        "on_carrier_fraction",
+        "on_movers_fraction",
+        "sigma_by_truth_m",
+        "filter",
+        "kept",
+        "dropped_mixed",
+        "dropped_isolated",
+        "dropped_moving",
+        "kept_sigma_m",
+        "standing_dropped_fraction",
+        "movers_dropped_fraction",
+        "peak_rss_mib",
+    ];
+
     #[test]
     fn the_file_has_the_keys_that_scripts_read_in_their_order() {
         let json = Metrics { scene: Some("office".to_owned()), seed: Some(1), ..Metrics::default() }.to_json().unwrap();
-        let keys = [
-            "version",
-            "scene",
-            "seed",
-            "duration_s",
-            "simulation",
-            "wall_s",
-            "beams",
-            "returns",
-            "rays",
-            "physics_wall_s",
-            "rays_wall_s",
-            "open_loop",
-            "wall_s",
-            "fraction_of_acquisition",
-            "fixed_views",
-            "position_rmse_m",
-            "rotation_rmse_deg",
-            "drift_m_per_min",
-            "yaw_drift_deg_per_min",
-            "end_error_m",
-            "imu_only_drift_m_per_min",
-            "position_nees",
-            "attitude_nees",
-            "closed_loop",
-            "wall_s",
-            "fraction_of_acquisition",
-            "position_rmse_m",
-            "rotation_rmse_deg",
-            "bound_rmse_m",
-            "clock",
-            "offset_rmse_s",
-            "offset_end_error_s",
-            "lidar",
-            "range_correction_m",
-            "rotation_correction_deg",
-            "translation_correction_m",
-            "cloud",
-            "points",
-            "bias_m",
-            "sigma_m",
-            "p95_m",
-            "on_carrier_fraction",
-            "on_movers_fraction",
-            "sigma_by_truth_m",
-            "peak_rss_mib",
-        ];
         let mut rest = json.as_str();
-        for key in keys {
+        for key in KEYS {
             let at = rest.find(&format!("\"{key}\":")).unwrap_or_else(|| panic!("{key} is missing in:\n{json}"));
             rest = &rest[at + key.len()..];
         }

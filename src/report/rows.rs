@@ -118,6 +118,13 @@ fn cloud(metrics: &Metrics) -> Group {
     rows.add("farther than 1 m", m.far_fraction, percent);
     rows.add("on the carrier", m.on_carrier_fraction, percent);
     rows.add("on what moves", m.on_movers_fraction, percent);
+    let share = |dropped: Option<u64>| dropped.zip(m.points).map(|(dropped, all)| dropped as f64 / all.max(1) as f64);
+    rows.add("left out, of two surfaces", share(m.filter.dropped_mixed), percent);
+    rows.add("left out, isolated", share(m.filter.dropped_isolated), percent);
+    rows.add("left out, moving", share(m.filter.dropped_moving), percent);
+    rows.add("left out of what stands", m.filter.standing_dropped_fraction, percent);
+    rows.add("left out of what moves", m.filter.movers_dropped_fraction, percent);
+    rows.add("sigma of what is kept", m.filter.kept_sigma_m, length);
     rows.titled("cloud")
 }
 

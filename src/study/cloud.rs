@@ -1,16 +1,20 @@
 //! The registered cloud against what the beams truly met.
 
-use super::register::{Beam, Judged, Registered};
+use super::register::{Beam, Fates, Judged, Registered};
 use super::truth_near::TrueInstant;
-use crate::evaluation::CloudErrors;
+use crate::estimation::Fate;
+use crate::evaluation::{CloudErrors, CloudSummary};
 use crate::geometry::{Pose, Surface, Vector};
-use crate::report::CloudMetrics;
+use crate::report::{CloudMetrics, FilterMetrics};
 use crate::sensors::Cylinder;
 use crate::world::World;
 use rayon::prelude::*;
 
 /// How far from a point a surface is looked for, m.
 const REACH_M: f64 = 1.0;
+
+/// What the figures of distance are of.
+const JUDGED: &str = "every echo of what stands, filtered or not";
 
 /// What stands around a lidar, what moves there, and what carries it.
 #[derive(Clone, Copy)]
@@ -56,16 +60,20 @@ impl Surroundings<'_> {
     }
 }
 
-/// The cloud's figures: of its sample the beams that ended on what stands, against the true surfaces, where both they and the
-/// alignment are known; and how many beams ended on something else.
+/// The cloud's figures: of its sample the beams that ended on what stands, whatever the filter made of them, against the true
+/// surfaces, where both they and the alignment are known; and how many beams ended on something else.
 pub(super) fn cloud_metrics(
     registered: &Registered,
     world_from_map: Option<&Pose>,
     surroundings: Option<Surroundings>,
 ) -> CloudMetrics {
-    let points = Some(registered.points);
+    let filter = match registered.filtered {
+        true => filter_metrics(&registered.fates),
+        false => FilterMetrics::default(),
+    };
+    let counted = CloudMetrics { points: Some(registered.fates.all()), filter, ..CloudMetrics::default() };
     let (Some(world_from_map), Some(surroundings)) = (world_from_map, surroundings) else {
-        return CloudMetrics { points, ..CloudMetrics::default() };
+        return counted;
     };
     let target = |beam: &Judged| beam.by_truth.map_or(Target::Still, |(by, at)| surroundings.target(&by.point, &at));
     let targets: Vec<Target> = registered.sample.par_iter().map(target).collect();
@@ -78,8 +86,14 @@ pub(super) fn cloud_metrics(
     let estimated = errors(still().map(|(beam, _)| seen(&beam.in_map, world_from_map)).collect());
     let by_truth = still().filter_map(|(beam, _)| beam.by_truth.map(|(by, _)| seen(&by, &Pose::identity())));
     let by_truth = errors(by_truth.collect());
+    let filter = match registered.filtered {
+        true => {
+            judged_filter(registered, &targets, |kept| errors(kept.map(|k| seen(&k.in_map, world_from_map)).collect()))
+        }
+        false => FilterMetrics::default(),
+    };
     CloudMetrics {
-        points,
+        judged: estimated.map(|_| JUDGED.to_owned()),
         bias_m: estimated.map(|cloud| cloud.bias_m),
         sigma_m: estimated.map(|cloud| cloud.sigma_m),
         p95_m: estimated.map(|cloud| cloud.p95_m),
@@ -87,6 +101,42 @@ pub(super) fn cloud_metrics(
         on_carrier_fraction: share(Target::Carrier),
         on_movers_fraction: share(Target::Mover),
         sigma_by_truth_m: by_truth.map(|cloud| cloud.sigma_m),
+        filter,
+        ..counted
+    }
+}
+
+/// What the filter did to echoes of what stands, and of what moves.
+fn judged_filter<'a>(
+    registered: &'a Registered,
+    targets: &'a [Target],
+    errors: impl Fn(&mut dyn Iterator<Item = &'a Judged>) -> Option<CloudSummary>,
+) -> FilterMetrics {
+    let of = |target: Target| {
+        let all = registered.sample.iter().zip(targets);
+        all.filter(move |(_, on)| **on == target).map(|(beam, _)| beam)
+    };
+    let kept = |beam: &&Judged| beam.fate == Fate::Kept;
+    let dropped = |target: Target| {
+        let (all, left) = (of(target).count(), of(target).filter(kept).count());
+        (all > 0).then(|| (all - left) as f64 / all as f64)
+    };
+    FilterMetrics {
+        kept_sigma_m: errors(&mut of(Target::Still).filter(kept)).map(|cloud| cloud.sigma_m),
+        standing_dropped_fraction: dropped(Target::Still),
+        movers_dropped_fraction: dropped(Target::Mover),
+        ..filter_metrics(&registered.fates)
+    }
+}
+
+/// How many echoes the filter kept, and how many it dropped and why.
+fn filter_metrics(fates: &Fates) -> FilterMetrics {
+    FilterMetrics {
+        kept: Some(fates.kept),
+        dropped_mixed: Some(fates.mixed),
+        dropped_isolated: Some(fates.isolated),
+        dropped_moving: Some(fates.moving),
+        ..FilterMetrics::default()
     }
 }
 
@@ -154,10 +204,14 @@ mod tests {
         ends.extend([0.5, 0.7, 0.9].map(|z| Vector::new(3.7, 0.0, z)));
         ends.push(Vector::new(4.0, 2.8, 1.0));
         let beam = |point: Vector| Beam { point, origin: Vector::new(4.0, 0.0, 1.4) };
-        let judged =
-            |end: &Vector| Judged { in_map: beam(end + Vector::z() * 0.01), by_truth: Some((beam(*end), at(4.0))) };
+        let judged = |end: &Vector| Judged {
+            in_map: beam(end + Vector::z() * 0.01),
+            by_truth: Some((beam(*end), at(4.0))),
+            fate: if end.x == 6.0 { Fate::Kept } else { Fate::Moving },
+        };
         let registered = Registered {
-            points: 20,
+            fates: Fates { kept: 16, moving: 4, ..Fates::default() },
+            filtered: true,
             sample: ends.iter().map(judged).collect(),
             dead_reckoning: Err(EvaluationError::OnALine),
         };
@@ -171,5 +225,12 @@ mod tests {
         let empty = Surroundings { carrier: &[], ..surroundings };
         let judged_all = cloud_metrics(&registered, Some(&Pose::identity()), Some(empty));
         assert!(judged_all.sigma_m.unwrap() > 0.2, "{judged_all:?}");
+        // What the filter dropped is counted, and judged all the same.
+        assert_eq!((metrics.filter.kept, metrics.filter.dropped_moving), (Some(16), Some(4)));
+        assert_eq!(metrics.filter.standing_dropped_fraction, Some(0.0));
+        assert_eq!(metrics.filter.movers_dropped_fraction, Some(1.0));
+        assert_relative_eq!(judged_all.filter.kept_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
+        let unfiltered = cloud_metrics(&Registered { filtered: false, ..registered }, None, None);
+        assert_eq!((unfiltered.points, unfiltered.filter), (Some(20), FilterMetrics::default()));
     }
 }

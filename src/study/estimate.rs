@@ -4,6 +4,8 @@ use super::bound::information_bound;
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
+use super::cloud_files::CloudWishes;
+use super::map::{MapWishes, write_map_of};
 use super::open_loop::{How, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
@@ -33,13 +35,18 @@ pub struct Wishes {
     pub topics: Preference,
     /// Whether to register the whole behind the open loop.
     pub closed_loop: bool,
+    /// What is asked of the cloud.
+    pub cloud: CloudWishes,
+    /// The map in which the recording is to be localised, where there is one.
+    pub map: Option<MapWishes>,
 }
 
 impl Wishes {
     /// An estimate with these settings, loops closed, and no further wish.
     pub fn with(estimator: EstimatorSpec) -> Self {
         let (calibration, topics) = (CalibrationSpec::default(), Preference::default());
-        Self { estimator, calibration, body_frame: None, topics, closed_loop: true }
+        let cloud = CloudWishes::default();
+        Self { estimator, calibration, body_frame: None, topics, closed_loop: true, cloud, map: None }
     }
 }
 
@@ -55,9 +62,9 @@ pub struct Outcome {
 }
 
 /// Estimates from the recording at `path`, whoever made it, and writes to `folder`: `manifest.ron`, `open_loop.tum`,
-/// `closed_loop.tum`, `result.mcap`, `cloud.ply`, `metrics.json`, `plots/`, `report.html`; cloud and result are the closed
-/// loop's unless that is not wanted. Where the recording has the truth the estimate is
-/// judged by it, and where it has the scene the cloud is.
+/// `closed_loop.tum`, `map.ply`, `result.mcap`, `cloud.ply` or `cloud.las`, `metrics.json`, `plots/`, `report.html`; map, cloud
+/// and result are the closed loop's unless that is not wanted, or a map holds the trajectory already. Where the recording has
+/// the truth the estimate is judged by it, and where it has the scene the cloud is.
 ///
 /// # Errors
 /// When the recording cannot be read, there is no estimate, a file cannot be written, or somebody stops it.
@@ -112,8 +119,9 @@ pub(super) fn estimate_in(
         lidar: best.lidar,
         returns: run.returns,
         with_truth: known.is_some(),
+        wishes: wishes.cloud,
     };
-    let registered = registration.run(&folder.join("cloud.ply"), &folder.join("result.mcap"), watch)?;
+    let registered = registration.run(folder, watch)?;
 
     watch.progress(Stage::Reporting, 0.0, None);
     let drifting = match known {
@@ -167,10 +175,16 @@ impl Loops {
         watch: &mut Watch,
     ) -> Result<Self, StudyError> {
         let (estimator, calibration) = (&wishes.estimator, &found.calibration);
-        let how = How { estimator, calibration, surveying: wishes.closed_loop };
+        let within = wishes.map.as_ref();
+        let closes = wishes.closed_loop && within.is_none();
+        if wishes.closed_loop && !closes {
+            watch.note("the map holds the trajectory; the global registration, which knows nothing of it, is left out");
+        }
+        let makes_map = within.map_or(wishes.closed_loop, |within| within.extend);
+        let how = How { estimator, calibration, surveying: closes || makes_map, map: within };
         let open = run_open_loop(reader, selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
         open.remarks.iter().for_each(|remark| watch.note(remark));
-        let closed = match wishes.closed_loop {
+        let closed = match closes {
             true => Some(close_loops(&open, folder, how, watch)?),
             false => None,
         };
@@ -180,7 +194,11 @@ impl Loops {
         };
         let known = truth_of(&open.map_from_head)?;
         let closed_known = closed.as_ref().map(|closed| truth_of(&closed.map_from_head)).transpose()?.flatten();
-        Ok(Self { open, known, closed, closed_known })
+        let loops = Self { open, known, closed, closed_known };
+        if makes_map && !loops.open.survey.is_empty() {
+            write_map_of(&loops.open, &loops.best(), (estimator, within), folder)?;
+        }
+        Ok(loops)
     }
 
     fn best(&self) -> Best<'_> {

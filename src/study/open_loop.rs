@@ -2,8 +2,8 @@
 
 use super::cadence::Cadence;
 use super::read_ahead::{Coming, read_ahead};
-use super::{Stage, StudyError, Watch};
-use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Survey, TimeSpent, Warning, WarningKind};
+use super::{MapWishes, Stage, StudyError, Watch};
+use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WarningKind};
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::recording::{Reader, RecordingError, Selection, TumWriter};
@@ -50,8 +50,10 @@ pub(super) struct OpenLoopRun {
 pub(super) struct How<'a> {
     pub estimator: &'a EstimatorSpec,
     pub calibration: &'a Calibration,
-    /// Whether what is seen is kept, for the closed loop.
+    /// Whether what is seen is kept, for the closed loop and the map.
     pub surveying: bool,
+    /// The map in which the head is, where there is one.
+    pub map: Option<&'a MapWishes>,
 }
 
 /// Estimates from what `reader` reads; poses go to the TUM file `tum`, if one is wanted, as they become final.
@@ -66,7 +68,11 @@ pub(super) fn run_open_loop(
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
     let estimator = Estimator::new(how.estimator, how.calibration)?;
-    let mut estimator = if how.surveying { estimator.surveying() } else { estimator };
+    let estimator = if how.surveying { estimator.surveying() } else { estimator };
+    let mut estimator = match how.map {
+        Some(within) => estimator.in_map(&within.map, &within.map_from_head),
+        None => estimator,
+    };
     let tum = tum.map(TumWriter::create).transpose()?;
     let mut written = Written { tum, map_from_head: Trajectory::new(), covariances: Vec::new() };
     let mut heard = Heard::default();
@@ -87,13 +93,18 @@ pub(super) fn run_open_loop(
     losses.extend(heard.lidar.missing("scans"));
     let start = heard.start();
     losses.extend(result.warnings.iter().filter(|warning| is_loss(&warning.kind)).map(|w| since(start, w)));
+    let remarks =
+        result.located.iter().map(found).chain(
+            result.warnings.iter().filter(|warning| !is_loss(&warning.kind)).map(|warning| since(start, warning)),
+        );
+    let remarks = remarks.collect();
     Ok(OpenLoopRun {
         map_from_head,
         covariances,
         spent: result.windows.iter().map(|window| window.spent).sum(),
         clock_offsets: result.clock_offsets,
         lidar: result.lidar,
-        remarks: result.warnings.iter().filter(|w| !is_loss(&w.kind)).map(|w| since(start, w)).collect(),
+        remarks,
         losses,
         returns: heard.returns,
         acquisition_s: heard.seconds(),
@@ -133,6 +144,15 @@ fn is_loss(kind: &WarningKind) -> bool {
             | WarningKind::LidarGap { .. }
             | WarningKind::BeganAgain { .. }
             | WarningKind::LeftOut { .. }
+    )
+}
+
+/// Where in the map the head was found.
+fn found(located: &Located) -> String {
+    format!(
+        "found in the map: {:.0} % of what the first window shows lies on it, to {:.1} mm",
+        100.0 * located.share,
+        1e3 * located.residual_rms_m
     )
 }
 

@@ -1,18 +1,19 @@
-//! Beams become a cloud: in a file, for viewers, and a sample of it to be judged.
+//! Beams become a cloud: in files, for viewers, and a sample of it to be judged.
 
+use super::cloud_files::{CloudFiles, CloudWishes};
 use super::truth_near::{TrueInstant, TruthNear};
 use super::{Stage, StudyError, Watch};
+use crate::estimation::{CloudFilter, Fate, Hit, point_sigma_m};
 use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
-use crate::measurement::{Calibration, LidarCorrection, LidarScan, Measurement};
-use crate::recording::{CloudPoint, Measurements, PlyWriter, Reader, RecordingError, Selection, write_result};
+use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
+use crate::recording::{CloudPoint, Measurements, Reader, RecordingError, Selection, write_result};
 use crate::time::Stamp;
-use std::fs::File;
 use std::path::Path;
 
 /// Most points that are judged.
 const JUDGED: usize = 100_000;
-/// Most points for viewers; `cloud.ply` has them all.
+/// Most points for viewers; the cloud's files have them all.
 const SHOWN: usize = 1_000_000;
 
 /// A beam of the sample: where it ended and began.
@@ -29,13 +30,42 @@ pub(super) struct Judged {
     pub in_map: Beam,
     /// By the true pose, in the world, and what else is true at its instant; `None` where there is no truth.
     pub by_truth: Option<(Beam, TrueInstant)>,
+    /// What became of it.
+    pub fate: Fate,
+}
+
+/// How many echoes there were, and what became of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Fates {
+    pub kept: u64,
+    pub mixed: u64,
+    pub isolated: u64,
+    pub moving: u64,
+}
+
+impl Fates {
+    /// All echoes.
+    pub(super) fn all(&self) -> u64 {
+        self.kept + self.mixed + self.isolated + self.moving
+    }
+
+    fn count(&mut self, fate: Fate) {
+        *match fate {
+            Fate::Kept => &mut self.kept,
+            Fate::Mixed => &mut self.mixed,
+            Fate::Isolated => &mut self.isolated,
+            Fate::Moving => &mut self.moving,
+        } += 1;
+    }
 }
 
 /// The cloud, and what else a second reading of the recording gave.
 pub(super) struct Registered {
-    /// Points in the cloud.
-    pub points: u64,
-    /// A sample of the beams.
+    /// What became of the echoes.
+    pub fates: Fates,
+    /// Whether the cloud was filtered.
+    pub filtered: bool,
+    /// A sample of the beams, whatever became of them.
     pub sample: Vec<Judged>,
     /// What the IMU alone says.
     pub dead_reckoning: Result<Trajectory, EvaluationError>,
@@ -55,11 +85,14 @@ pub(super) struct Registration<'a> {
     pub returns: usize,
     /// Whether to project a sample by the truth too.
     pub with_truth: bool,
+    /// What is asked of the cloud.
+    pub wishes: CloudWishes,
 }
 
 impl Registration<'_> {
-    /// Projects every beam by the estimate, into the cloud `ply` and the recording `result`.
-    pub(super) fn run(&self, ply: &Path, result: &Path, watch: &mut Watch) -> Result<Registered, StudyError> {
+    /// Projects every beam by the estimate, into the cloud's files and `result.mcap` in `folder`.
+    pub(super) fn run(&self, folder: &Path, watch: &mut Watch) -> Result<Registered, StudyError> {
+        let noise = self.calibration.lidar;
         let mut beams = Beams {
             measurements: self.reader.measurements(self.selection),
             cursor: SmoothCursor::new(self.map_from_head),
@@ -69,40 +102,62 @@ impl Registration<'_> {
                 head_from_laser: self.calibration.head_from_corrected_laser(self.lidar),
                 range_m: self.lidar.range_m,
             },
-            ply: PlyWriter::create(ply)?,
+            noise,
+            covariances: self.covariances,
+            filter: (!self.wishes.keep_outliers).then(|| CloudFilter::new(noise)),
+            files: CloudFiles::create(folder, self.wishes.format)?,
             judged: Thinning::to(JUDGED, self.returns),
             shown: Thinning::to(SHOWN, self.returns),
             reckoning: DeadReckoning::new(&self.calibration.head_from_imu, Rest::default()),
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
-            points: 0,
+            echoes: 0,
+            fates: Fates::default(),
             sample: Vec::new(),
             failure: None,
             watch,
         };
-        write_result(result, self.body_frame, (self.map_from_head, self.covariances), beams.by_ref())?;
-        beams.ply.finish()?;
+        let (result, poses) = (folder.join("result.mcap"), (self.map_from_head, self.covariances));
+        write_result(&result, self.body_frame, poses, beams.by_ref())?;
         if let Some(failure) = beams.failure {
             return Err(failure);
         }
-        Ok(Registered { points: beams.points as u64, sample: beams.sample, dead_reckoning: beams.reckoning.finish() })
+        beams.files.finish()?;
+        let filtered = !self.wishes.keep_outliers;
+        let dead_reckoning = beams.reckoning.finish();
+        Ok(Registered { fates: beams.fates, filtered, sample: beams.sample, dead_reckoning })
     }
 }
 
-/// Reads scan by scan, writes every point, and gives those for viewers as an iterator.
+/// An echo whose fate is not known yet.
+struct Pending {
+    point: CloudPoint,
+    /// Whether viewers are to see it.
+    shown: bool,
+    /// Its ends by the estimate and by the truth, where it is of the sample.
+    judged: Option<(Beam, Option<(Beam, TrueInstant)>)>,
+}
+
+/// Reads scan by scan, writes the points that are kept, and gives those for viewers as an iterator.
 struct Beams<'a, 'w, 's> {
     measurements: Measurements<'a>,
     cursor: SmoothCursor<'a>,
     truth: Option<TruthNear<'a>>,
     calibrated: Lidar,
     corrected: Lidar,
-    ply: PlyWriter<File>,
+    noise: LidarNoise,
+    /// Those of the poses from here on.
+    covariances: &'a [(Stamp, PoseCovariance)],
+    filter: Option<CloudFilter<Pending>>,
+    files: CloudFiles,
     judged: Thinning,
     shown: Thinning,
     reckoning: DeadReckoning,
     ready: std::vec::IntoIter<CloudPoint>,
     span: Option<(Stamp, Stamp)>,
-    points: usize,
+    /// Echoes so far.
+    echoes: usize,
+    fates: Fates,
     sample: Vec<Judged>,
     failure: Option<StudyError>,
     watch: &'w mut Watch<'s>,
@@ -133,7 +188,10 @@ impl Beams<'_, '_, '_> {
     fn next_scan(&mut self) -> Result<Option<Vec<CloudPoint>>, StudyError> {
         loop {
             match self.measurements.next().transpose()? {
-                None => return Ok(None),
+                None => {
+                    let Some(filter) = self.filter.take() else { return Ok(None) };
+                    return Ok(Some(self.settle(filter.finish())?));
+                }
                 Some(Measurement::Imu(sample)) => self.reckoning.push(&sample),
                 Some(Measurement::Lidar(scan)) => {
                     if self.watch.is_stopped() {
@@ -149,29 +207,67 @@ impl Beams<'_, '_, '_> {
         }
     }
 
+    /// Projects a scan; the points for viewers that are known to be kept by now.
     fn register(&mut self, scan: &LidarScan) -> Result<Vec<CloudPoint>, RecordingError> {
-        let mut shown = Vec::new();
+        let mut pending = Vec::with_capacity(scan.returns.len());
         for beam in &scan.returns {
             let stamp = scan.stamp + beam.offset;
             // The estimate begins after the recording and ends before it.
             let Some(map_from_head) = self.cursor.at(stamp) else { continue };
-            let index = self.points;
-            self.points += 1;
-            let point_in_laser: Vector = beam.point_in_laser.cast();
-            let in_map = self.corrected.beam(&map_from_head, &point_in_laser);
-            let point =
-                CloudPoint { point_in_map: in_map.point.cast(), intensity: beam.intensity, stamp, error_m: f32::NAN };
-            self.ply.point(&point)?;
-            if self.shown.keeps(index) {
-                shown.push(point);
-            }
-            if !self.judged.keeps(index) {
-                continue;
-            }
+            pending.push(self.project(&map_from_head, beam, stamp)?);
+        }
+        let told = match &mut self.filter {
+            Some(filter) => filter.push(pending),
+            None => pending.into_iter().map(|(_, pending)| (pending, Fate::Kept)).collect(),
+        };
+        self.settle(told)
+    }
+
+    fn project(
+        &mut self,
+        map_from_head: &Pose,
+        beam: &LidarReturn,
+        stamp: Stamp,
+    ) -> Result<(Hit, Pending), RecordingError> {
+        let index = self.echoes;
+        self.echoes += 1;
+        let point_in_laser: Vector = beam.point_in_laser.cast();
+        let in_map = self.corrected.beam(map_from_head, &point_in_laser);
+        let arm = in_map.point - map_from_head.translation.vector;
+        let range_sigma_m = self.noise.sigma_m(point_in_laser.norm());
+        let error_m = self.covariance_at(stamp).map_or(f64::NAN, |c| point_sigma_m(range_sigma_m, c, &arm)) as f32;
+        let point = CloudPoint { point_in_map: in_map.point.cast(), intensity: beam.intensity, stamp, error_m };
+        let mut judged = None;
+        if self.judged.keeps(index) {
             let instant = self.truth.as_mut().map(|truth| truth.at(stamp)).transpose()?.flatten();
             let by_truth =
                 instant.map(|instant| (self.calibrated.beam(&instant.world_from_head, &point_in_laser), instant));
-            self.sample.push(Judged { in_map, by_truth });
+            judged = Some((in_map, by_truth));
+        }
+        let hit = Hit { stamp, point_in_map: in_map.point, origin_in_map: in_map.origin };
+        Ok((hit, Pending { point, shown: self.shown.keeps(index), judged }))
+    }
+
+    /// The covariance of the last pose before `stamp` that has one; of the first, where there is none before.
+    fn covariance_at(&mut self, stamp: Stamp) -> Option<&'_ PoseCovariance> {
+        while let [_, (next, _), ..] = self.covariances
+            && *next <= stamp
+        {
+            self.covariances = &self.covariances[1..];
+        }
+        self.covariances.first().map(|(_, covariance)| covariance)
+    }
+
+    /// Writes the points that are kept, and counts the others; those for viewers.
+    fn settle(&mut self, told: Vec<(Pending, Fate)>) -> Result<Vec<CloudPoint>, RecordingError> {
+        let mut shown = Vec::new();
+        for (pending, fate) in told {
+            self.fates.count(fate);
+            self.sample.extend(pending.judged.map(|(in_map, by_truth)| Judged { in_map, by_truth, fate }));
+            if fate == Fate::Kept {
+                self.files.point(&pending.point)?;
+                shown.extend(pending.shown.then_some(pending.point));
+            }
         }
         Ok(shown)
     }

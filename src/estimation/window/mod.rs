@@ -19,7 +19,7 @@ use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Interval};
 use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
-use crate::geometry::{Matrix, Rotation, Vector};
+use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::Remembered;
 use equations::Workspace;
@@ -31,6 +31,9 @@ const REST_MARGIN_S: f64 = 0.3;
 const LONGEST: f64 = 3.0;
 /// A stretch counts as swept when it shows this fraction of the patches of the window's richest.
 const SWEPT: f64 = 0.25;
+
+/// How exactly a window is put into a map before it is matched with it, rad and m.
+const FOUND: [f64; 2] = [0.05, 0.2];
 
 /// A stretch of time in the window.
 #[derive(Debug)]
@@ -114,6 +117,25 @@ impl Window {
         let turn = Rotation::rotation_between(&self.gravity, &carried.gravity).unwrap_or_else(Rotation::identity);
         self.nominal.turn(&turn, &carried.state.position);
         self.gravity = carried.gravity;
+    }
+
+    /// All patches of the window as they stand.
+    pub(super) fn patches(&self) -> Vec<Patch> {
+        self.scene().into_iter().map(|placed| placed.patch).collect()
+    }
+
+    /// Puts the window where it was found in a map, to which the map holds it from now on.
+    pub(super) fn found_at(&mut self, map_from_here: &Pose) {
+        self.nominal.move_by(map_from_here);
+        self.gravity = map_from_here.rotation * self.gravity;
+        self.start.sigmas[0] = FOUND;
+    }
+
+    /// Where the IMU is at the window's beginning.
+    pub(super) fn begins(&self) -> Pose {
+        let motion = self.nominal.at(self.start.u_s, &self.biases.gyro);
+        let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
+        Pose::from_parts(motion.position.into(), rotation)
     }
 
     /// The same window, which also tells what it saw by the surfels of `surveyor`.

@@ -88,6 +88,8 @@ pub struct Header {
     pub count: u64,
     /// The numbers of each, in order.
     pub properties: Vec<Property>,
+    /// What its comments say.
+    pub comments: Vec<String>,
     /// Lines of the header.
     pub lines: usize,
 }
@@ -97,7 +99,7 @@ pub type Problem = (usize, String);
 
 /// Reads a header; the points must be the file's first element.
 pub fn read(input: &mut impl BufRead) -> Result<Header, Problem> {
-    let mut header = Header { form: Form::Ascii, count: 0, properties: Vec::new(), lines: 0 };
+    let mut header = Header { form: Form::Ascii, count: 0, properties: Vec::new(), comments: Vec::new(), lines: 0 };
     let (mut form, mut elements) = (None, 0);
     loop {
         let text = next_line(input, &mut header)?;
@@ -106,7 +108,8 @@ pub fn read(input: &mut impl BufRead) -> Result<Header, Problem> {
         match words.as_slice() {
             ["ply"] if header.lines == 1 => {}
             _ if header.lines == 1 => return problem("this is not a PLY file: it does not begin with `ply`"),
-            ["comment" | "obj_info", ..] | [] => {}
+            ["comment", ..] => header.comments.push(text.trim().trim_start_matches("comment").trim().to_owned()),
+            ["obj_info", ..] | [] => {}
             ["format", name, "1.0"] => form = form_named(name),
             ["element", "vertex", count] if elements == 0 => {
                 elements = 1;

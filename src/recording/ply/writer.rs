@@ -8,7 +8,7 @@ use std::path::Path;
 const POINT_BYTES: usize = 4 * 4 + 8 + 4;
 
 /// The header up to the number of points, which is written when it is known.
-const BEFORE_COUNT: &str = "ply\nformat binary_little_endian 1.0\ncomment metres, seconds; error: metres from the true surface\nelement vertex ";
+const BEFORE_COUNT: &str = "ply\nformat binary_little_endian 1.0\ncomment metres, seconds; error: standard deviation of the place, metres\nelement vertex ";
 
 /// Digits that are kept free for the number of points.
 const COUNT_DIGITS: usize = 20;

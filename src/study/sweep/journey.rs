@@ -161,7 +161,7 @@ fn estimate(
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&Preference::default())?;
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
-        let how = How { estimator, calibration: &found.calibration, surveying: closes_loops };
+        let how = How { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
         let known = judge::truth_of(&reader, &run.map_from_head, &mut watch)?;
         let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);

@@ -1,0 +1,80 @@
+//! `zsim map`: maps that last.
+
+use super::arguments::{Global, start};
+use super::{End, output};
+use clap::{Args, Subcommand};
+use serde_json::json;
+use std::path::PathBuf;
+use zsim::estimation;
+use zsim::geometry::{Pose, roll_pitch_yaw};
+use zsim::report;
+use zsim::study;
+
+/// Put maps together
+///
+/// `zsim estimate` leaves a map, map.ply: surfels with their uncertainty. Another recording is localised in it with `zsim
+/// estimate --map`, and goes on from it with --extend-map.
+#[derive(Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Merge(MergeArguments),
+}
+
+/// Put two maps together by what both show
+///
+/// The second is looked for in the first within a metre and twenty degrees of where its origin is said to be.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --start 4.2,0.5,0,90 --out both.ply")]
+struct MergeArguments {
+    /// The map whose frame is kept
+    #[arg(value_name = "A.ply")]
+    first: PathBuf,
+    /// The map that is put into it
+    #[arg(value_name = "B.ply")]
+    second: PathBuf,
+    /// Where the second map's origin is in the first: metres, and degrees about the vertical
+    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = start, default_value = "0,0,0,0", allow_hyphen_values = true)]
+    start: Pose,
+    /// The estimator's settings, a name under specs/estimators/ or a file
+    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    estimator: String,
+    /// The file for both; if it exists, one with a number in its name
+    #[arg(long, short, value_name = "C.ply")]
+    out: PathBuf,
+    /// Write the file even if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    let Verb::Merge(merge) = &arguments.verb;
+    let estimator = estimation::load(&merge.estimator)?;
+    let out = output::file(&merge.out, merge.force)?;
+    let merged = study::merge_map_files((&merge.first, &merge.second), &merge.start, &estimator, &out)?;
+    let [first, second, both] = merged.surfels;
+    let at = merged.located.map_from_seen;
+    let (place, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());
+    let (share, residual_m) = (merged.located.share, merged.located.residual_rms_m);
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let rows = [
+        row("surfels of the first", first.to_string()),
+        row("surfels of the second", second.to_string()),
+        row("surfels of both", both.to_string()),
+        row("the second's origin", format!("{:.3}, {:.3}, {:.3} m, {yaw_deg:.3}\u{b0}", place.x, place.y, place.z)),
+        row("of the second on the first", format!("{:.0} %", 100.0 * share)),
+        row("apart there, RMS", format!("{:.1} mm", 1e3 * residual_m)),
+    ];
+    let figures = json!({
+        "surfels": { "first": first, "second": second, "both": both },
+        "first_from_second": { "position_m": [place.x, place.y, place.z], "yaw_deg": yaw_deg },
+        "share_on_first": share,
+        "residual_rms_m": residual_m,
+    });
+    output::tell(global, &report::table(&[], &rows, true), figures, Some(&out))?;
+    Ok(End::Done)
+}

@@ -1,0 +1,63 @@
+//! The commands about maps and clouds: what they leave, and how they fail.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::Path;
+
+/// Exit code, stdout and stderr.
+fn run(folder: &Path, arguments: &str) -> (i32, String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_zsim"));
+    let output = command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn a_recording_is_localised_in_the_map_of_another_and_maps_are_put_together() {
+    let here = tempfile::tempdir().unwrap();
+    let done = |arguments: &str| {
+        let (code, out, talk) = run(here.path(), arguments);
+        assert_eq!(code, 0, "{arguments}: {talk}");
+        out
+    };
+    let has = |file: &str| here.path().join(file).exists();
+    for (name, seed) in [("a", 3), ("b", 4)] {
+        done(&format!("simulate --scene mocap_room --duration 12s --seed {seed} --out {name}.mcap"));
+        done(&format!("estimate {name}.mcap --out {name} --quiet"));
+        assert!(has(&format!("{name}/map.ply")) && has(&format!("{name}/cloud.ply")));
+    }
+    let told =
+        done("estimate b.mcap --map a/map.ply --start 0.3,0.2,0,5 --extend-map --cloud-format las --out c --json");
+    assert!(has("c/map.ply") && has("c/cloud.las") && !has("c/cloud.ply") && !has("c/closed_loop.tum"));
+    let told: Value = serde_json::from_str(&told).unwrap();
+    assert!(told["open_loop"]["position_rmse_m"].as_f64().unwrap() < 0.01, "{told}");
+    let cloud = &told["cloud"];
+    let count = |key: &str| cloud["filter"][key].as_u64().unwrap();
+    let dropped = count("dropped_mixed") + count("dropped_isolated") + count("dropped_moving");
+    assert_eq!(count("kept") + dropped, cloud["points"].as_u64().unwrap());
+    assert!(cloud["judged"].as_str().unwrap().contains("filtered or not"));
+    assert!(cloud["filter"]["standing_dropped_fraction"].as_f64().unwrap() < 0.02, "{cloud}");
+
+    let merged: Value = serde_json::from_str(&done("map merge a/map.ply b/map.ply --out both.ply --json")).unwrap();
+    assert!(has("both.ply") && merged["residual_rms_m"].as_f64().unwrap() < 0.02, "{merged}");
+    let surfels = |which: &str| merged["surfels"][which].as_u64().unwrap();
+    assert!(surfels("both") < surfels("first") + surfels("second"), "{merged}");
+}
+
+#[test]
+fn what_is_no_map_and_no_place_is_said_and_leaves_no_folder() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("broken.ply"), "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n").unwrap();
+    std::fs::write(here.path().join("a.mcap"), "").unwrap();
+    let (code, _, talk) = run(here.path(), "estimate a.mcap --map broken.ply --out out");
+    assert!(code == 1 && talk.contains("broken.ply:4: this is a PLY file, and no map of ours"), "{code} {talk}");
+    let (code, _, talk) = run(here.path(), "map merge broken.ply absent.ply --out both.ply");
+    assert!(code == 1 && talk.contains("broken.ply:4"), "{code} {talk}");
+    let (code, _, talk) = run(here.path(), "estimate a.mcap --map broken.ply --start 1,2");
+    assert!(code == 2 && talk.contains("four numbers x,y,z,yaw are needed; here are 2"), "{code} {talk}");
+    let (code, _, _) = run(here.path(), "estimate a.mcap --extend-map");
+    assert_eq!(code, 2, "without a map there is nothing to extend");
+    assert!(!here.path().join("out").exists() && !here.path().join("both.ply").exists());
+}
