@@ -78,7 +78,7 @@ use clock::Clock;
 pub use error::{EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use output::{EstimatedPose, OpenLoop, WindowReport};
-pub use registration::{ClosedLoop, RegistrationReport, RegistrationSpec, register};
+pub use registration::{ClosedLoop, LoopReport, PlacesSpec, RegistrationReport, RegistrationSpec, register};
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
 pub use spent::TimeSpent;
 pub use stamps::smoothed_stamps;

@@ -13,7 +13,8 @@ pub use figures::{
     bound_over_time, clock_offset, errors_of_both_loops, errors_over_time, head_pitch, trajectory_from_above,
 };
 pub use metrics::{
-    ClockMetrics, ClosedLoopMetrics, CloudMetrics, LidarMetrics, Metrics, OpenLoopMetrics, SimulationMetrics,
+    ClockMetrics, ClosedLoopMetrics, CloudMetrics, LidarMetrics, LoopMetrics, Metrics, OpenLoopMetrics,
+    SimulationMetrics,
 };
 pub use page::{Section, page};
 pub use profile::time_spent;

@@ -1,7 +1,7 @@
 //! The closed loop over what the open loop saw.
 
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{EstimatorSpec, register};
+use crate::estimation::{EstimatorSpec, LoopReport, register};
 use crate::geometry::Trajectory;
 use std::time::Instant;
 
@@ -9,6 +9,10 @@ use std::time::Instant;
 pub(super) struct ClosedLoopRun {
     /// The estimate, at the open loop's stamps.
     pub map_from_head: Trajectory,
+    /// Places recognised.
+    pub loops: LoopReport,
+    /// Why the open loop stayed, where it did.
+    pub left: Option<&'static str>,
     /// What it has to say, a sentence each.
     pub remarks: Vec<String>,
     /// Time it took, that of the survey included, s.
@@ -19,10 +23,15 @@ pub(super) struct ClosedLoopRun {
 pub(super) fn run_closed_loop(run: &OpenLoopRun, estimator: &EstimatorSpec) -> ClosedLoopRun {
     let started = Instant::now();
     let closed = register(&run.map_from_head, &run.covariances, &run.survey, estimator);
-    let left = |why| format!("the global registration left the open loop as it was: {why}");
+    let (loops, left) = (closed.report.loops, closed.report.left);
+    let stayed = left.map(|why| format!("the global registration left the open loop as it was: {why}"));
+    let bent = (loops.closed > 0)
+        .then(|| format!("the open loop had drifted out of reach; it was bent to {} recognised places", loops.closed));
     ClosedLoopRun {
         map_from_head: closed.trajectory,
-        remarks: closed.report.left.map(left).into_iter().collect(),
+        loops,
+        left,
+        remarks: bent.into_iter().chain(stayed).collect(),
         wall_s: started.elapsed().as_secs_f64() + run.survey.took_s(),
     }
 }

@@ -39,20 +39,28 @@ fn wall(origin: &Vector, direction: &Vector) -> (Vector, Vector) {
     (origin + direction * leaves(axis), normal)
 }
 
+/// A trajectory, its covariances, its survey, and the true trajectory.
+type Walked = (Trajectory, Vec<(Stamp, PoseCovariance)>, Survey, Trajectory);
+
 /// An open loop bent by `bend`, with patches on the walls known to a millimetre, and the true trajectory.
-fn bent(bend: impl Fn(f64) -> (Rotation, Vector)) -> (Trajectory, Vec<(Stamp, PoseCovariance)>, Survey, Trajectory) {
+fn bent(bend: impl Fn(f64) -> (Rotation, Vector)) -> Walked {
+    walked(bend, (DURATION_S, 200.0), 1)
+}
+
+/// The same with so many seconds, and patches a second, of three resolutions from `finest` on.
+fn walked(bend: impl Fn(f64) -> (Rotation, Vector), (duration_s, per_s): (f64, f64), finest: usize) -> Walked {
     let stamp = |t_s: f64| Stamp::from_nanos((t_s * 1e9).round() as i64);
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let estimated = |t_s: f64| {
         let (pose, (turn, shift)) = (truth(t_s), bend(t_s));
         Pose::from_parts((pose.translation.vector + shift).into(), turn * pose.rotation)
     };
-    let times = || (0..(DURATION_S * 100.0) as usize).map(|k| k as f64 * 0.01);
+    let times = || (0..(duration_s * 100.0) as usize).map(|k| k as f64 * 0.01);
     let sighting = |k: usize| {
-        let tau_s = k as f64 / 200.0;
+        let tau_s = k as f64 / per_s;
         let mut normal_number = || random.sample::<f64, _>(StandardNormal);
         let direction = Vector::new(normal_number(), normal_number(), normal_number());
-        let level = 1 + k % 3;
+        let level = finest + k % 3;
         let origin = truth(tau_s).translation.vector;
         let (centre, normal) = wall(&origin, &direction);
         let arm = centre + normal * (1e-3 * normal_number()) - origin;
@@ -65,7 +73,7 @@ fn bent(bend: impl Fn(f64) -> (Rotation, Vector)) -> (Trajectory, Vec<(Stamp, Po
             Patch { centre: origin + shift + turn * arm, normal: turn * normal, points: 100.0, covariance, level };
         Sighting { tau_s, patch }
     };
-    let sightings = (0..(DURATION_S * 200.0) as usize - 10).map(sighting).collect();
+    let sightings = (0..((duration_s - 0.05) * per_s) as usize).map(sighting).collect();
     let covariances = times().step_by(10).map(|t| (stamp(t), PoseCovariance::identity() * (1e-5 * t))).collect();
     let trajectory = |pose: &dyn Fn(f64) -> Pose| Trajectory::from_poses(times().map(|t| (stamp(t), pose(t)))).unwrap();
     let survey = Survey { sightings, ..Survey::default() };
@@ -88,6 +96,34 @@ fn a_walk_that_was_bent_is_straightened() {
     assert_eq!(closed.report.left, None);
     // The first second, on which the map hangs, was seen by 200 patches from all sides: what it errs, all err.
     assert!(before > 0.02 && after < 0.002, "{before} m before, {after} m after: {:?}", closed.report);
+}
+
+/// A drift that begins and ends gently, of 5 m and 10 degrees over `duration_s`.
+fn drift(t_s: f64, duration_s: f64) -> (Rotation, Vector) {
+    let x = t_s / duration_s;
+    let grown = x * x * (3.0 - 2.0 * x);
+    let turn = Rotation::from_scaled_axis(Vector::z() * (10.0_f64.to_radians() * grown));
+    (turn, Vector::new(4.0, 2.8, 1.0).normalize() * (5.0 * grown))
+}
+
+#[test]
+fn a_drift_of_5_m_and_10_degrees_is_recovered() {
+    let spec = load("default").unwrap();
+    let length = (120.0, 400.0);
+    let (open, covariances, survey, truth) = walked(|t_s| drift(t_s, length.0), length, 0);
+    let recovered = register(&open, &covariances, &survey, &spec);
+    let (before, after) = (apart_m(&open, &truth), apart_m(&recovered.trajectory, &truth));
+    assert!(recovered.report.loops.closed > 5, "{:?}", recovered.report);
+    // As near as a walk that was bent by centimetres comes.
+    assert!(before > 2.0 && after < 0.005, "{before} m before, {after} m after: {:?}", recovered.report);
+}
+
+#[test]
+fn a_walk_that_did_not_drift_has_no_use_for_loops() {
+    let spec = load("default").unwrap();
+    let (open, covariances, survey, _) = walked(|_| (Rotation::identity(), Vector::zeros()), (60.0, 400.0), 0);
+    let closed = register(&open, &covariances, &survey, &spec);
+    assert_eq!((closed.report.loops.verified, closed.report.loops.closed), (0, 0), "{:?}", closed.report);
 }
 
 #[test]
