@@ -107,15 +107,15 @@ pub fn register(
             let report = RegistrationReport { moved: moved(map_from_head, &trajectory), ..report };
             ClosedLoop { trajectory, report }
         }
-        Err((report, why)) => {
-            let report = RegistrationReport { left: Some(why), ..report };
+        Err(left) => {
+            let report = RegistrationReport { left: Some(left.1), ..left.0 };
             ClosedLoop { trajectory: map_from_head.clone(), report }
         }
     }
 }
 
 /// What came of it and what it rests on, or that, and why it is not believed.
-type Told<T> = Result<(T, RegistrationReport), (RegistrationReport, &'static str)>;
+type Told<T> = Result<(T, RegistrationReport), Box<(RegistrationReport, &'static str)>>;
 
 /// An open loop to be closed.
 #[derive(Clone, Copy)]
@@ -131,7 +131,7 @@ impl OpenLoop<'_> {
     fn close(&self, survey: &Survey) -> Told<Trajectory> {
         let nothing = RegistrationReport::default();
         let course = Course::new(self.map_from_head, self.covariances, survey.origin, self.spec);
-        let course = course.ok_or((nothing, "there is no trajectory"))?;
+        let course = course.ok_or_else(|| Box::new((nothing, "there is no trajectory")))?;
         let (loops, bent) = places::into_reach((self.map_from_head, survey), &course, self.matcher, self.spec);
         let report = RegistrationReport { loops, ..nothing };
         if let Some(bent) = bent {
@@ -139,7 +139,7 @@ impl OpenLoop<'_> {
         }
         let (course, report) = Registration::run(self, course, survey, report)?;
         if report.conditioning < self.spec.weak_conditioning {
-            return Err((report, "what was seen again says too little of a direction"));
+            return Err(Box::new((report, "what was seen again says too little of a direction")));
         }
         Ok((course.into_trajectory(self.map_from_head.stamps()), report))
     }
@@ -149,7 +149,7 @@ impl OpenLoop<'_> {
     fn close_bent(&self, mut bent: Bent, mut report: RegistrationReport) -> Told<Trajectory> {
         for _ in 0..ROUNDS {
             let course = Course::new(&bent.trajectory, self.covariances, bent.survey.origin, self.spec);
-            let course = course.ok_or((report, "there is no trajectory"))?;
+            let course = course.ok_or_else(|| Box::new((report, "there is no trajectory")))?;
             let course = course.levelled_as(self.map_from_head, &bent.trajectory);
             let registered = Registration::run(self, course, &bent.survey, report)?;
             report = registered.1;
@@ -192,7 +192,7 @@ impl<'a> Registration<'a> {
         let mut registration = Self { spec, matcher, course, scene, weakest: Vector::z(), report };
         match registration.refine() {
             Ok(()) => Ok((registration.course, registration.report)),
-            Err(why) => Err((registration.report, why)),
+            Err(why) => Err(Box::new((registration.report, why))),
         }
     }
 
