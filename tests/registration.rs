@@ -5,7 +5,13 @@
 mod estimation_fixture;
 
 use estimation_fixture::{Room, Run, Score, Walk, calibration};
-use zsim::estimation::{Estimator, OpenLoop, Travelled, load, register};
+use zsim::estimation::{ClosedLoop, Estimator, OpenLoop, Travelled, load, register};
+use zsim::evaluation::{Errors, Pairs};
+use zsim::geometry::{Pose, Rotation, Trajectory, Vector};
+use zsim::measurement::Calibration;
+use zsim::recording::{Preference, Reader, RunDescription, Writer};
+use zsim::simulation::{Scenario, Simulation};
+use zsim::spec::{Kind, names};
 
 /// A recording that ends before loops have much to say, and one that comes round.
 fn runs() -> [Run; 3] {
@@ -23,11 +29,15 @@ fn surveyed(run: &Run) -> OpenLoop {
     estimator.finish().unwrap()
 }
 
-fn closed(open: &OpenLoop) -> OpenLoop {
+fn registered(open: &OpenLoop, calibration: &Calibration) -> ClosedLoop {
     let covariances: Vec<_> = open.poses.iter().map(|pose| (pose.stamp, pose.covariance)).collect();
     let OpenLoop { trajectory, lidar, survey, .. } = open;
     let travelled = Travelled { map_from_head: trajectory, covariances: &covariances, lidar, survey };
-    let closed = register(travelled, &calibration(), &load("default").unwrap());
+    register(travelled, calibration, &load("default").unwrap())
+}
+
+fn closed(open: &OpenLoop) -> OpenLoop {
+    let closed = registered(open, &calibration());
     assert_eq!(closed.report.left, None, "{:?}", closed.report);
     OpenLoop { trajectory: closed.trajectory, ..open.clone() }
 }
@@ -49,4 +59,70 @@ fn keeping_what_is_seen_changes_nothing_of_the_open_loop() {
     let (plain, with_survey) = (plain.finish().unwrap(), surveyed(&run));
     assert!(plain.poses == with_survey.poses);
     assert!(plain.survey.is_empty() && with_survey.survey.len() > 1000, "{}", with_survey.survey.len());
+}
+
+/// The open loop of a short run through a shipped scene, the true trajectory, and the head's calibration.
+fn through(scene: &str, duration_s: f64) -> (OpenLoop, Trajectory, Calibration) {
+    let scenario = Scenario { duration_s, ..Scenario::in_scene(scene) };
+    let simulation = Simulation::prepare(&scenario).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording.mcap");
+    let calibration = simulation.calibration();
+    let manifest = zsim::spec::to_text(&scenario).unwrap();
+    let run = RunDescription { calibration, imu_rate_hz: 100.0, manifest, truth_tf: false };
+    let mut writer = Writer::create(&path, run).unwrap();
+    simulation.run(&mut writer, &mut |_| ()).unwrap();
+    writer.finish().unwrap();
+    let reader = Reader::open(&path).unwrap();
+    let selection = reader.select(&Preference::default()).unwrap();
+    let mut estimator = Estimator::new(&load("default").unwrap(), &simulation.calibration()).unwrap().surveying();
+    reader.measurements(&selection).for_each(|measurement| estimator.push(measurement.unwrap()).unwrap());
+    (estimator.finish().unwrap(), reader.truth_trajectory().unwrap(), simulation.calibration())
+}
+
+fn rmse_m(trajectory: &Trajectory, truth: &Trajectory) -> f64 {
+    let pairs = Pairs::associate(trajectory, truth).unwrap();
+    Errors::after(&pairs, &pairs.world_from_map().unwrap()).position_rmse_m()
+}
+
+#[test]
+fn closing_loops_costs_no_scene_more_than_a_twentieth() {
+    let scenes = names(Kind::Scene);
+    assert!(scenes.len() >= 7, "{scenes:?}");
+    for scene in &scenes {
+        let (open, truth, calibration) = through(scene, 20.0);
+        let closed = registered(&open, &calibration);
+        let (before, after) = (rmse_m(&open.trajectory, &truth), rmse_m(&closed.trajectory, &truth));
+        assert!(after < 1.05 * before, "{scene}: {before} m before, {after} m after: {:?}", closed.report);
+    }
+}
+
+/// `trajectory` as one would have it that drifts, gently at either end, by 5 m and 10 degrees.
+fn spoiled(trajectory: &Trajectory) -> Trajectory {
+    let (first, last) = trajectory.span().unwrap();
+    let drifted = |(stamp, pose): (_, &Pose)| {
+        let x = last.seconds_since(stamp) / last.seconds_since(first);
+        let grown = 1.0 - x * x * (3.0 - 2.0 * x);
+        let turn = Rotation::from_scaled_axis(Vector::z() * (10.0_f64.to_radians() * grown));
+        let shift = Vector::new(4.0, 2.8, 1.0).normalize() * (5.0 * grown);
+        (stamp, Pose::from_parts(shift.into(), turn) * pose)
+    };
+    Trajectory::from_poses(trajectory.iter().map(drifted)).unwrap()
+}
+
+#[test]
+fn an_open_loop_spoiled_by_5_m_and_10_degrees_is_recovered() {
+    let walk = Walk { start_s: 1.5, ..Walk::new((1.8, 1.2), 12.0) };
+    let run = Run::new(Room::furnished(), walk, 25, 60.0);
+    let open = surveyed(&run);
+    let trajectory = spoiled(&open.trajectory);
+    let survey = open.survey.along(&open.trajectory, &trajectory);
+    let spoiled = OpenLoop { trajectory, survey, ..open.clone() };
+    let recovered = registered(&spoiled, &calibration());
+    let score =
+        |trajectory: &Trajectory| Score::of(&OpenLoop { trajectory: trajectory.clone(), ..open.clone() }, &run).rmse_m;
+    let (before, after) = (score(&spoiled.trajectory), score(&recovered.trajectory));
+    assert!(before > 1.0, "{before} m");
+    assert!(recovered.report.loops.closed >= 2, "{:?}", recovered.report);
+    assert!(after < 0.03, "{before} m before, {after} m after: {:?}", recovered.report);
 }

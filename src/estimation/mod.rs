@@ -84,7 +84,7 @@ pub use error::{EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use map::{Located, locate_map, map_of, merge_maps};
 pub use output::{EstimatedPose, OpenLoop, WindowReport};
-pub use registration::{ClosedLoop, RegistrationReport, RegistrationSpec, Travelled, register};
+pub use registration::{ClosedLoop, LoopReport, PlacesSpec, RegistrationReport, RegistrationSpec, Travelled, register};
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
 pub use spent::TimeSpent;
 pub use stamps::smoothed_stamps;

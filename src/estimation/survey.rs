@@ -1,8 +1,10 @@
 //! What the open loop saw, for the registration of the whole.
 
 use super::surfel::Patch;
+use crate::geometry::Trajectory;
 use crate::measurement::LidarCorrection;
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
+use rayon::prelude::*;
 
 /// Patches of surface that the open loop saw, where its trajectory puts them in the map, each at its time. Made by
 /// [`super::Estimator::surveying`], taken by [`super::register`].
@@ -41,6 +43,20 @@ impl Survey {
     /// Time that making it took, s: like every wall of time it differs from run to run.
     pub fn took_s(&self) -> f64 {
         self.took_s
+    }
+
+    /// What was seen along the trajectory `from`, where `to` puts it, both `map_from_head`.
+    pub fn along(&self, from: &Trajectory, to: &Trajectory) -> Self {
+        let within = |stamp: Stamp, trajectory: &Trajectory| {
+            let (first, last) = trajectory.span()?;
+            trajectory.at(stamp.clamp(first, last))
+        };
+        let moved = |sighting: &Sighting| {
+            let stamp = self.origin + Span::from_seconds(sighting.tau_s);
+            let there_from_here = within(stamp, to)? * within(stamp, from)?.inverse();
+            Some(Sighting { patch: sighting.patch.moved_by(&there_from_here), ..*sighting })
+        };
+        Self { sightings: self.sightings.par_iter().filter_map(moved).collect(), ..self.clone() }
     }
 
     /// Adds what was seen further, its seconds counting from `origin`, made by `lidar`.

@@ -93,6 +93,22 @@ pub struct ClosedLoopMetrics {
     pub rotation_rmse_deg: Option<f64>,
     /// The information bound on the position error, m.
     pub bound_rmse_m: Option<f64>,
+    /// Places recognised.
+    pub loops: LoopMetrics,
+    /// Why the open loop is told as the closed one, where the registration was not believed.
+    pub left: Option<String>,
+}
+
+/// Places that were seen twice, where the open loop had them out of the matches' reach.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LoopMetrics {
+    /// Pairs that look alike.
+    pub proposed: Option<u64>,
+    /// Of those, verified by their surfaces.
+    pub verified: Option<u64>,
+    /// Pairs that the trajectory was bent to.
+    pub closed: Option<u64>,
 }
 
 /// The estimated offset between the clocks.
@@ -209,6 +225,11 @@ mod tests {
         "position_rmse_m",
         "rotation_rmse_deg",
         "bound_rmse_m",
+        "loops",
+        "proposed",
+        "verified",
+        "closed",
+        "left",
         "clock",
         "offset_rmse_s",
         "offset_end_error_s",

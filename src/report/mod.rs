@@ -13,7 +13,7 @@ pub use figures::{
     bound_over_time, clock_offset, errors_of_both_loops, errors_over_time, head_pitch, trajectory_from_above,
 };
 pub use metrics::{
-    ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, Metrics, OpenLoopMetrics,
+    ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, LoopMetrics, Metrics, OpenLoopMetrics,
     SimulationMetrics,
 };
 pub use page::{Section, page};

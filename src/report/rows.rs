@@ -87,6 +87,11 @@ fn closed_loop(metrics: &Metrics) -> Group {
     rows.add("position RMSE", m.position_rmse_m, length);
     rows.add("rotation RMSE", m.rotation_rmse_deg, degrees);
     rows.add("information bound", m.bound_rmse_m, length);
+    let loops = m.loops.proposed.zip(m.loops.verified).zip(m.loops.closed).filter(|((proposed, _), _)| *proposed > 0);
+    rows.add("places recognised", loops, |((proposed, verified), closed)| {
+        format!("{} ({} proposed, {} verified)", count(closed), count(proposed), count(verified))
+    });
+    rows.add("left as the open loop", m.left.as_deref(), str::to_owned);
     rows.titled("closed loop")
 }
 

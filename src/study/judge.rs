@@ -9,7 +9,7 @@ use crate::evaluation::{Errors, EvaluationError, Pairs, clock_error, consistency
 use crate::geometry::{Pose, Trajectory};
 use crate::measurement::LidarCorrection;
 use crate::recording::{Reader, RecordingError, Truth};
-use crate::report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, OpenLoopMetrics, SimulationMetrics};
+use crate::report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, OpenLoopMetrics, SimulationMetrics};
 use crate::simulation::SimulationSummary;
 use crate::time::{Span, Stamp};
 
@@ -102,6 +102,12 @@ pub(super) fn closed_loop_metrics(run: &ClosedLoopRun, known: Option<&Known>, ac
         position_rmse_m: errors.map(Errors::position_rmse_m),
         rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad().to_degrees()),
         bound_rmse_m: None,
+        loops: LoopMetrics {
+            proposed: Some(run.loops.proposed as u64),
+            verified: Some(run.loops.verified as u64),
+            closed: Some(run.loops.closed as u64),
+        },
+        left: run.left.map(str::to_owned),
     }
 }
 

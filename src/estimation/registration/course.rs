@@ -3,10 +3,11 @@
 //! ```text
 //! e_r = log(C_b C_a^-1)                             deviation from the open loop's turn between two instants
 //! e_t = (t'_b - t'_a) - C (t_b - t_a)               and from its shift, as its attitude sees it
-//! e_l = [log C]_(x, y)                              deviation of roll and pitch, which gravity held
+//! e_l = (-(C z)_y, (C z)_x)                         deviation of roll and pitch, which gravity held
 //! ```
 //!
-//! with `C = R' R^T` the correction so far, in the middle where nothing else is said. With `d` the next corrections and
+//! with `C = R' R^T` the correction so far, in the middle where nothing else is said; in `e_l` that since the open loop, where
+//! the course was bent before. With `d` the next corrections and
 //! `v = C (t_b - t_a)`,
 //!
 //! ```text
@@ -36,6 +37,7 @@ pub(super) struct Course {
 /// An instant at which the corrected trajectory is compared with the open loop's.
 #[derive(Debug, Clone)]
 struct Post {
+    stamp: Stamp,
     basis: Basis,
     /// Where the open loop is then, m.
     before: Vector,
@@ -43,6 +45,8 @@ struct Post {
     position: Vector,
     /// `C`.
     turn: Rotation,
+    /// What `C` was already when the course was new.
+    bent: Rotation,
     /// Variances of the open loop's shift and turn since the post before, on an axis, m^2 and rad^2.
     variances: (f64, f64),
 }
@@ -60,15 +64,16 @@ impl Course {
         let (start_s, end_s) = (seconds(first), seconds(last));
         let intervals = ((end_s - start_s) / (0.5 * spec.knot_spacing_s)).ceil().max(1.0) as usize;
         let step_s = (end_s - start_s) / intervals as f64;
-        let (walk, turn) = (spec.drift_m_per_sqrt_s.powi(2), spec.turn_deg_per_sqrt_s.to_radians().powi(2));
+        let (walk, twists) = (spec.drift_m_per_sqrt_s.powi(2), spec.turn_deg_per_sqrt_s.to_radians().powi(2));
         let post = |k: usize| {
             let tau_s = (start_s + step_s * k as f64).min(end_s);
             let stamp = (origin + Span::from_seconds(tau_s)).clamp(first, last);
             let before = map_from_head.at(stamp)?.translation.vector;
             let (shift, twist) = drift(covariances, stamp - Span::from_seconds(step_s), stamp, spec.correlation_s);
-            let variances = (walk * step_s + shift, turn * step_s + twist);
+            let variances = (walk * step_s + shift, twists * step_s + twist);
             let basis = Basis::at(tau_s, spec.knot_spacing_s);
-            Some(Post { basis, before, position: before, turn: Rotation::identity(), variances })
+            let (turn, bent) = (Rotation::identity(), Rotation::identity());
+            Some(Post { stamp, basis, before, position: before, turn, bent, variances })
         };
         let posts = (0..=intervals).map(post).collect::<Option<_>>()?;
         let times_s = map_from_head.stamps().iter().map(|stamp| seconds(*stamp)).collect();
@@ -85,6 +90,21 @@ impl Course {
         let (start_s, end_s) = self.span_s();
         let first = Basis::at(start_s, self.spacing_s).first;
         (first, (Basis::at(end_s, self.spacing_s).first + 4 - first) as usize)
+    }
+
+    /// The correction spline's basis at `tau_s`.
+    pub(super) fn basis_at(&self, tau_s: f64) -> Basis {
+        Basis::at(tau_s, self.spacing_s)
+    }
+
+    /// Keeps the roll and pitch of `open_loop`, from which the course was bent before it was made of `bent`.
+    pub(super) fn levelled_as(mut self, open_loop: &Trajectory, bent: &Trajectory) -> Self {
+        for post in &mut self.posts {
+            if let (Some(before), Some(now)) = (open_loop.at(post.stamp), bent.at(post.stamp)) {
+                post.bent = now.rotation * before.rotation.inverse();
+            }
+        }
+        self
     }
 
     /// `map_from_head` at `tau_s`, on a straight line between poses.
@@ -106,10 +126,10 @@ impl Course {
             equations.add_cross(&pair[0].basis, &pair[1].basis, &link.cross);
         }
         for post in &self.posts {
-            let tilt = post.turn.scaled_axis();
+            let up = post.turn * post.bent * Vector::z();
             let mut own = Own::default();
-            for axis in 0..2 {
-                own.add(&unit(axis), tilt[axis], level_sigma_rad.powi(-2));
+            for (axis, tilt) in [-up.y, up.x].into_iter().enumerate() {
+                own.add(&unit(axis), tilt, level_sigma_rad.powi(-2));
             }
             equations.add_own(&post.basis, &own);
         }
@@ -142,13 +162,6 @@ impl Course {
             post.turn = Rotation::from_scaled_axis(by.rotation) * post.turn;
             post.position += by.translation;
         }
-    }
-
-    /// The greatest shift and turn so far, m and rad.
-    pub(super) fn moved(&self) -> (f64, f64) {
-        self.posts.iter().fold((0.0, 0.0), |(shift, turn): (f64, f64), post| {
-            (shift.max((post.position - post.before).norm()), turn.max(post.turn.angle()))
-        })
     }
 
     /// The corrected trajectory, at the open loop's stamps.
@@ -222,6 +235,8 @@ mod tests {
     fn post(seed: f64) -> Post {
         let wave = |k: f64| (seed * 1.7 + k).sin();
         Post {
+            stamp: Stamp::from_nanos(0),
+            bent: Rotation::identity(),
             basis: Basis::at(0.3, 1.0),
             before: Vector::new(wave(0.0), wave(1.0), wave(2.0)) * 3.0,
             position: Vector::new(wave(3.0), wave(4.0), wave(5.0)) * 3.0,

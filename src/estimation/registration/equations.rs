@@ -180,6 +180,7 @@ impl Equations {
                 *diagonal += Matrix6::identity() * value;
             }
         }
+        self.beside.square += SMatrix::identity() * value;
     }
 
     /// The solution, of the knots and of what is shared, or nothing where the equations do not determine one. What is shared is
@@ -278,7 +279,6 @@ mod tests {
             equations.add_cross(a, b, &link.cross);
         }
         equations.add_diagonal(1.0);
-        (0..SHARED).for_each(|k| equations.beside.add(&Shared::from_fn(|r, _| f64::from(u8::from(r == k))), 0.0, 1.0));
         let expected = dense.lu().solve(&right).unwrap();
         let (x, shared) = equations.solve().unwrap();
         for (x, y) in x.iter().chain(shared.iter()).zip(expected.iter()) {

@@ -15,10 +15,12 @@
 //!
 //! 1. The open loop's *survey* brings surfels of four resolutions, a passing of the beams each, made of all beams by the
 //!    trajectory as it became final.
-//! 2. They are shelved by chapters, and chapters that saw the same places are compared: `chapters`.
-//! 3. From the coarsest resolution on: neighbours in six dimensions, found from both sides; match; solve; move the trajectory
+//! 2. Where the open loop has drifted out of the matches' reach, places are recognised and the trajectory is bent to the loops
+//!    found: `places`.
+//! 3. Surfels are shelved by chapters, and chapters that saw the same places are compared: `chapters`.
+//! 4. From the coarsest resolution on: neighbours in six dimensions, found from both sides; match; solve; move the trajectory
 //!    and the surfels; until nothing moves. Then the next finer resolution joins in.
-//! 4. A solution that is not believed, or that rests on too little, is dropped, and the open loop stays.
+//! 5. A solution that is not believed, or that rests on too little, is dropped, and the open loop stays.
 
 mod chapters;
 mod course;
@@ -26,11 +28,13 @@ mod equations;
 mod lidar;
 mod matches;
 mod neighbours;
+mod places;
 mod scene;
 mod spec;
 #[cfg(test)]
 mod tests;
 
+pub use places::{LoopReport, PlacesSpec};
 pub use spec::RegistrationSpec;
 
 use super::EstimatorSpec;
@@ -45,10 +49,15 @@ use equations::Equations;
 use lidar::Mount;
 use matches::{Matches, Tally};
 use neighbours::Neighbours;
+use places::Bent;
 use scene::Scene;
 
 /// A correction beyond this (m, rad) in one solve is not believed.
 const BELIEVABLE: (f64, f64) = (20.0, 1.0);
+/// A course that was bent to loops is registered at most so often, each time as if it were the open loop, until it moves by
+/// less, m.
+const ROUNDS: usize = 6;
+const STAYS_M: f64 = 0.002;
 
 /// The whole, registered.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -66,6 +75,8 @@ pub struct ClosedLoop {
 pub struct RegistrationReport {
     /// Surfels of the survey.
     pub surfels: usize,
+    /// Places recognised.
+    pub loops: LoopReport,
     /// Chapters, and pairs of them that were compared.
     pub chapters: (usize, usize),
     /// Knots of the correction.
@@ -103,38 +114,93 @@ pub struct Travelled<'a> {
 ///
 /// The same for any number of threads.
 pub fn register(travelled: Travelled, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
-    let Travelled { map_from_head, covariances, lidar, survey } = travelled;
-    let left = |report: RegistrationReport, why| ClosedLoop {
-        trajectory: map_from_head.clone(),
-        lidar: *lidar,
-        report: RegistrationReport { left: Some(why), ..report },
-    };
     let of_all = &spec.registration;
-    let Some(course) = Course::new(map_from_head, covariances, survey.origin, of_all) else {
-        return left(RegistrationReport::default(), "there is no trajectory");
-    };
-    let mount = Mount::new(calibration, lidar, spec);
-    let scene = Scene::new(survey, &course, &mount, of_all);
     let matcher = Matcher::new(&of_all.matching(&spec.matching), &of_all.surfels(&spec.surfels));
-    let (report, weakest) = (RegistrationReport::default(), Vector::z());
-    let mut registration = Registration { spec: of_all, matcher, course, mount, scene, weakest, report };
-    let run = registration.run();
-    let is_weak = registration.report.conditioning < spec.solve.weak_conditioning;
-    match run {
-        Ok(()) if is_weak => left(registration.report, "the surfaces seen say next to nothing of a direction"),
-        Ok(()) => ClosedLoop {
-            trajectory: registration.course.into_trajectory(map_from_head.stamps()),
-            lidar: registration.mount.lidar,
-            report: registration.report,
-        },
-        Err(why) => left(registration.report, why),
+    let open = OpenLoop { travelled, spec: of_all, matcher: &matcher };
+    let Travelled { map_from_head, lidar, .. } = travelled;
+    match open.close(Mount::new(calibration, lidar, spec)) {
+        Ok((Closed { trajectory, mount }, report)) => {
+            let report = RegistrationReport { moved: moved(map_from_head, &trajectory), ..report };
+            ClosedLoop { trajectory, lidar: mount.lidar, report }
+        }
+        Err(left) => {
+            let report = RegistrationReport { left: Some(left.1), ..left.0 };
+            ClosedLoop { trajectory: map_from_head.clone(), lidar: *lidar, report }
+        }
     }
+}
+
+/// What came of it and what it rests on, or that, and why it is not believed.
+type Told<T> = Result<(T, RegistrationReport), Box<(RegistrationReport, &'static str)>>;
+
+/// An open loop to be closed.
+#[derive(Clone, Copy)]
+struct OpenLoop<'a> {
+    travelled: Travelled<'a>,
+    spec: &'a RegistrationSpec,
+    matcher: &'a Matcher,
+}
+
+/// By what what was seen lies on itself.
+struct Closed {
+    trajectory: Trajectory,
+    mount: Mount,
+}
+
+impl OpenLoop<'_> {
+    /// The trajectory and the lidar by which what was seen lies on itself.
+    fn close(&self, mount: Mount) -> Told<Closed> {
+        let nothing = RegistrationReport::default();
+        let Travelled { map_from_head, covariances, survey, .. } = self.travelled;
+        let course = Course::new(map_from_head, covariances, survey.origin, self.spec);
+        let course = course.ok_or_else(|| Box::new((nothing, "there is no trajectory")))?;
+        let (loops, bent) = places::into_reach((map_from_head, survey), &course, self.matcher, self.spec);
+        let report = RegistrationReport { loops, ..nothing };
+        if let Some(bent) = bent {
+            return self.close_bent(bent, mount, report);
+        }
+        let ((course, mount), report) = Registration::run(self, (course, mount), survey, report)?;
+        if report.conditioning < self.spec.weak_conditioning {
+            return Err(Box::new((report, "what was seen again says too little of a direction")));
+        }
+        Ok((Closed { trajectory: course.into_trajectory(map_from_head.stamps()), mount }, report))
+    }
+
+    /// The same of a course that was bent to loops. It is registered again and again, each time as if it were the open loop,
+    /// until it stays: of the open loop's drift some is left in it, as firmly believed as the open loop.
+    fn close_bent(&self, mut bent: Bent, mut mount: Mount, mut report: RegistrationReport) -> Told<Closed> {
+        let Travelled { map_from_head, covariances, .. } = self.travelled;
+        for _ in 0..ROUNDS {
+            let course = Course::new(&bent.trajectory, covariances, bent.survey.origin, self.spec);
+            let course = course.ok_or_else(|| Box::new((report, "there is no trajectory")))?;
+            let course = course.levelled_as(map_from_head, &bent.trajectory);
+            let registered = Registration::run(self, (course, mount), &bent.survey, report)?;
+            let ((course, found), told) = registered;
+            (mount, report) = (found, told);
+            let next = course.into_trajectory(map_from_head.stamps());
+            let (shift_m, _) = moved(&bent.trajectory, &next);
+            let survey = bent.survey.along(&bent.trajectory, &next);
+            bent = Bent { trajectory: next, survey };
+            if shift_m < STAYS_M {
+                break;
+            }
+        }
+        Ok((Closed { trajectory: bent.trajectory, mount }, report))
+    }
+}
+
+/// By how much a trajectory moved at most, m and rad.
+fn moved(from: &Trajectory, to: &Trajectory) -> (f64, f64) {
+    from.poses().iter().zip(to.poses()).fold((0.0, 0.0), |(shift, turn): (f64, f64), (from, to)| {
+        let apart = to.translation.vector - from.translation.vector;
+        (shift.max(apart.norm()), turn.max(from.rotation.angle_to(&to.rotation)))
+    })
 }
 
 /// A registration under way.
 struct Registration<'a> {
     spec: &'a RegistrationSpec,
-    matcher: Matcher,
+    matcher: &'a Matcher,
     course: Course,
     mount: Mount,
     scene: Scene,
@@ -143,9 +209,25 @@ struct Registration<'a> {
     report: RegistrationReport,
 }
 
-impl Registration<'_> {
+impl<'a> Registration<'a> {
+    /// Registers `survey`, seen along `course` by the lidar of `mount`: both as they became.
+    fn run(
+        of: &OpenLoop<'a>,
+        (course, mount): (Course, Mount),
+        survey: &Survey,
+        report: RegistrationReport,
+    ) -> Told<(Course, Mount)> {
+        let (spec, matcher) = (of.spec, of.matcher);
+        let scene = Scene::new(survey, &course, &mount, spec);
+        let mut registration = Self { spec, matcher, course, mount, scene, weakest: Vector::z(), report };
+        match registration.refine() {
+            Ok(()) => Ok(((registration.course, registration.mount), registration.report)),
+            Err(why) => Err(Box::new((registration.report, why))),
+        }
+    }
+
     /// From coarse to fine.
-    fn run(&mut self) -> Result<(), &'static str> {
+    fn refine(&mut self) -> Result<(), &'static str> {
         let (first_knot, knots) = self.course.knots();
         self.report.surfels = self.scene.patches.len();
         self.report.chapters = (self.scene.chapters.len(), self.scene.pairs.len());
@@ -156,7 +238,7 @@ impl Registration<'_> {
         for finest in (0..self.spec.levels).rev() {
             let coarser = f64::from(1_u32 << finest);
             for _ in 0..self.spec.max_iterations {
-                let changed = neighbours.use_from(finest, &self.scene, &self.matcher, self.spec.neighbours);
+                let changed = neighbours.use_from(finest, &self.scene, self.matcher, self.spec.neighbours);
                 let equations = match &mut equations {
                     Some(same) if !changed => {
                         same.clear();
@@ -183,7 +265,6 @@ impl Registration<'_> {
                 }
             }
         }
-        self.report.moved = self.course.moved();
         if self.report.matches == 0 { Err("nothing was seen twice") } else { Ok(()) }
     }
 
@@ -205,7 +286,7 @@ impl Registration<'_> {
     }
 
     fn assemble(&self, neighbours: &Neighbours, gate_m: f64, equations: &mut Equations) -> Tally {
-        let (scene, matcher, spec) = (&self.scene, &self.matcher, self.spec);
+        let (scene, matcher, spec) = (&self.scene, self.matcher, self.spec);
         let (neighbours, weakest) = (&neighbours.in_use, self.weakest);
         let matches = Matches { scene, neighbours, matcher, spec, gate_m, weakest };
         let tally = matches.add_to(equations);

@@ -1,3 +1,4 @@
+use super::PlacesSpec;
 use crate::estimation::EstimationError;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
 use serde::{Deserialize, Serialize};
@@ -58,6 +59,12 @@ pub struct RegistrationSpec {
     /// Iterations end when no knot moves by more than this, m.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub settled_m: f64,
+    /// Least over greatest information that the matches hold about the position along any direction, 0..1: with less the open
+    /// loop stays, whose windows and IMU know that direction better.
+    #[serde(deserialize_with = "crate::spec::checked::fraction")]
+    pub weak_conditioning: f64,
+    /// How places are recognised.
+    pub places: PlacesSpec,
 }
 
 impl RegistrationSpec {
@@ -95,6 +102,9 @@ impl RegistrationSpec {
             ("registration.partners", self.partners),
             ("registration.neighbours", self.neighbours),
             ("registration.max_iterations", self.max_iterations),
+            ("registration.places.candidates", self.places.candidates),
+            ("registration.places.tries", self.places.tries),
+            ("registration.places.min_loops", self.places.min_loops),
         ] {
             require(count >= 1, key, "must be at least 1")?;
         }

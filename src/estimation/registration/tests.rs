@@ -90,18 +90,28 @@ fn bent(bend: impl Fn(f64) -> (Rotation, Vector)) -> Left {
 
 /// The same by a lidar that is not as calibrated, but needs `lidar` for a correction.
 fn bent_and_seen(bend: impl Fn(f64) -> (Rotation, Vector), lidar: &LidarCorrection) -> Left {
+    walked(bend, lidar, (DURATION_S, 200.0), 1)
+}
+
+/// The same with so many seconds, and patches a second, of three resolutions from `finest` on.
+fn walked(
+    bend: impl Fn(f64) -> (Rotation, Vector),
+    lidar: &LidarCorrection,
+    (duration_s, per_s): (f64, f64),
+    finest: usize,
+) -> Left {
     let stamp = |t_s: f64| Stamp::from_nanos((t_s * 1e9).round() as i64);
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let estimated = |t_s: f64| {
         let (pose, (turn, shift)) = (truth(t_s), bend(t_s));
         Pose::from_parts((pose.translation.vector + shift).into(), turn * pose.rotation)
     };
-    let times = || (0..(DURATION_S * 100.0) as usize).map(|k| k as f64 * 0.01);
+    let times = || (0..(duration_s * 100.0) as usize).map(|k| k as f64 * 0.01);
     let sighting = |k: usize| {
-        let tau_s = k as f64 / 200.0;
+        let tau_s = k as f64 / per_s;
         let mut normal_number = || random.sample::<f64, _>(StandardNormal);
         let direction = Vector::new(normal_number(), normal_number(), normal_number());
-        let level = 1 + k % 3;
+        let level = finest + k % 3;
         let head = truth(tau_s);
         let origin = (head * nalgebra::Point3::from(LASER_IN_HEAD + lidar.shift)).coords;
         let (centre, normal) = wall(&origin, &direction);
@@ -122,7 +132,7 @@ fn bent_and_seen(bend: impl Fn(f64) -> (Rotation, Vector), lidar: &LidarCorrecti
         };
         Sighting { tau_s, patch, lidar: 0 }
     };
-    let sightings = (0..(DURATION_S * 200.0) as usize - 10).map(sighting).collect();
+    let sightings = (0..((duration_s - 0.05) * per_s) as usize).map(sighting).collect();
     let covariances = times().step_by(10).map(|t| (stamp(t), PoseCovariance::identity() * (1e-5 * t))).collect();
     let trajectory = |pose: &dyn Fn(f64) -> Pose| Trajectory::from_poses(times().map(|t| (stamp(t), pose(t)))).unwrap();
     let survey = Survey { sightings, lidars: vec![LidarCorrection::default()], ..Survey::default() };
@@ -151,6 +161,32 @@ fn a_walk_that_was_bent_is_straightened() {
         "{before:?} m before, {after:?} m after: {:?}",
         closed.report
     );
+}
+
+/// A drift that begins and ends gently, of 5 m and 10 degrees over `duration_s`.
+fn drift(t_s: f64, duration_s: f64) -> (Rotation, Vector) {
+    let x = t_s / duration_s;
+    let grown = x * x * (3.0 - 2.0 * x);
+    let turn = Rotation::from_scaled_axis(Vector::z() * (10.0_f64.to_radians() * grown));
+    (turn, Vector::new(4.0, 2.8, 1.0).normalize() * (5.0 * grown))
+}
+
+#[test]
+fn a_drift_of_5_m_and_10_degrees_is_recovered() {
+    let length = (120.0, 400.0);
+    let left = walked(|t_s| drift(t_s, length.0), &LidarCorrection::default(), length, 0);
+    let recovered = left.registered();
+    let (before, after) = (apart_m(&left.open, &left.truth).0, apart_m(&recovered.trajectory, &left.truth).0);
+    assert!(recovered.report.loops.closed > 5, "{:?}", recovered.report);
+    // As near as a walk that was bent by centimetres comes.
+    assert!(before > 2.0 && after < 0.005, "{before} m before, {after} m after: {:?}", recovered.report);
+}
+
+#[test]
+fn a_walk_that_did_not_drift_has_no_use_for_loops() {
+    let straight = |_| (Rotation::identity(), Vector::zeros());
+    let closed = walked(straight, &LidarCorrection::default(), (60.0, 400.0), 0).registered();
+    assert_eq!((closed.report.loops.verified, closed.report.loops.closed), (0, 0), "{:?}", closed.report);
 }
 
 #[test]
