@@ -15,6 +15,7 @@ use zsim::study;
 /// `zsim estimate` leaves a map, map.ply: surfels with their uncertainty. Another recording is localised in it with `zsim
 /// estimate --map`, and goes on from it with --extend-map.
 #[derive(Args)]
+#[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --start 4.2,0.5,0,90 --out both.ply")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     verb: Verb,

@@ -179,9 +179,9 @@ impl Window {
         matches.all.par_iter().with_min_len(512).map(weigh).collect_into_vec(weights);
         parts.par_iter_mut().enumerate().for_each(|(part, equations)| {
             if part == 0 {
-                equations.copy_from(inertial)
+                equations.copy_from(inertial);
             } else {
-                equations.reset(layout.size())
+                equations.reset(layout.size());
             }
             let mut sums = Sums { equations, layout, placed: scene, matches, weights, at_s };
             let surfels = matches.part(part, PARTS);

@@ -10,6 +10,7 @@ use crate::estimation::residual::{
     ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN, Layout, RANGE,
 };
 use crate::estimation::spent::{Stopwatch, TimeSpent};
+use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
 
@@ -64,15 +65,11 @@ impl Window {
                 neighbours = self.look_around(&scene, (views, chosen));
             }
             solved.spent.neighbours_s += watch.lap_s();
-            let mut matches = self.match_up(&scene, views, &neighbours, iteration);
+            let matches = self.match_up(&scene, views, &neighbours, iteration);
             let robust = Robust::of(&self.spec.solve, iteration);
             solved.describe(&matches, &robust);
-            if solved.conditioning < self.spec.solve.weak_conditioning {
-                self.straighten(&mut matches, &scene, views, &solved.weakest);
-            }
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
-            let few = matches.all.len() < self.spec.solve.min_matches;
-            let matches = if few { Matches::default() } else { matches };
+            let matches = self.believed(matches, &solved, &scene, views);
             solved.spent.matches_s += watch.lap_s();
             self.assemble_inertial(first, &layout, &total);
             solved.spent.equations_s += watch.lap_s();
@@ -101,6 +98,17 @@ impl Window {
             linearised = None;
         }
         (solved, linearised)
+    }
+
+    /// The matches as far as they tell more than their errors; none of so few that they may all be wrong.
+    fn believed(&self, mut matches: Matches, solved: &Solved, scene: &[Placed], views: &Views) -> Matches {
+        if matches.all.len() < self.spec.solve.min_matches {
+            return Matches::default();
+        }
+        if solved.conditioning < self.spec.solve.weak_conditioning {
+            self.straighten(&mut matches, scene, views, &solved.weakest);
+        }
+        matches
     }
 
     /// Moves the window's unknowns by a solution.
