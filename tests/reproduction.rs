@@ -118,7 +118,7 @@ fn an_experiment_that_was_stopped_goes_on_and_ends_alike() {
     for name in ["made_from.ron", "parts/a-fit.ron", "parts/a-x_rot.ron", "parts/a-y.ron"] {
         std::fs::copy(whole.join(name), stopped.join(name)).unwrap();
     }
-    std::fs::write(stopped.join("parts/a-z.partial"), "(axis: Z, poi").unwrap();
+    std::fs::write(stopped.join("parts/.partial-a-z"), "(axis: Z, poi").unwrap();
     let kept = std::fs::metadata(stopped.join("parts/a-y.ron")).unwrap().modified().unwrap();
     assert!(experiment.finished(&stopped, Extent::Quick).unwrap().is_none());
     assert_eq!(pool(2).install(|| run(&stopped)), finding);

@@ -29,7 +29,10 @@ impl Kept {
         let kept = Self { folder: folder.to_owned() };
         let text = spec::to_text(from)? + "\n";
         match made_from(folder)? {
-            Some(found) if found == text && !anew => return Ok(kept),
+            Some(found) if found == text && !anew => {
+                kept.clear_of_unfinished()?;
+                return Ok(kept);
+            }
             Some(_) if anew => std::fs::remove_dir_all(folder).map_err(StudyError::file(folder))?,
             Some(_) => return Err(StudyError::OtherWork { folder: folder.to_owned() }),
             None if is_occupied(folder) => return Err(StudyError::OtherWork { folder: folder.to_owned() }),
@@ -37,6 +40,20 @@ impl Kept {
         }
         kept.write(MADE_FROM, &text)?;
         Ok(kept)
+    }
+
+    /// Removes what a killed run left of files that were not whole.
+    fn clear_of_unfinished(&self) -> Result<(), StudyError> {
+        for folder in [self.folder.clone(), self.folder.join("parts")] {
+            let Ok(entries) = std::fs::read_dir(&folder) else { continue };
+            for entry in entries {
+                let path = entry.map_err(StudyError::file(&folder))?.path();
+                if is_unfinished(&path) {
+                    std::fs::remove_file(&path).map_err(StudyError::file(&path))?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The folder, if it holds work made from `from`.
@@ -109,9 +126,13 @@ fn made_from(folder: &Path) -> Result<Option<String>, StudyError> {
 }
 
 fn is_occupied(folder: &Path) -> bool {
-    let of_ours = |name: &std::ffi::OsStr| name.to_string_lossy().starts_with(PARTIAL);
-    std::fs::read_dir(folder)
-        .is_ok_and(|mut entries| entries.any(|e| e.map_or(true, |entry| !of_ours(&entry.file_name()))))
+    let is_work = |entry: std::io::Result<std::fs::DirEntry>| entry.map_or(true, |entry| !is_unfinished(&entry.path()));
+    std::fs::read_dir(folder).is_ok_and(|mut entries| entries.any(is_work))
+}
+
+/// Whether a file was not whole when its writer ended.
+fn is_unfinished(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(PARTIAL))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ pub(super) fn row(plan: &Plan, told: &[Measure], index: u64) -> Row {
     let started = Instant::now();
     let row = match figures(plan, index) {
         Ok(of) => Row { figures: told.iter().map(|measure| figure(*measure, &of)).collect(), ..Row::default() },
-        Err(error) => Row::failed(told.len(), &error.to_string()),
+        Err(error) => Row::failed_by(told.len(), &error),
     };
     Row { wall_s: Some(started.elapsed().as_secs_f64()), ..row }
 }

@@ -60,7 +60,7 @@ impl Tape {
         let started = Instant::now();
         let row = match self.figures(plan, point, &told, reader) {
             Ok(figures) => Row { figures, ..Row::default() },
-            Err(error) => Row::failed(told.len(), &error.to_string()),
+            Err(error) => Row::failed_by(told.len(), &error),
         };
         Row { wall_s: Some(started.elapsed().as_secs_f64()), ..row }
     }

@@ -4,6 +4,7 @@ use super::folder::Unit;
 use super::table::{Column, Held, Table, TableWriter};
 use super::{Measure, Sweep};
 use crate::study::StudyError;
+use std::error::Error;
 
 /// What came of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -17,6 +18,20 @@ pub(super) struct Row {
 }
 
 impl Row {
+    /// That of a run that failed by an error, which is told with its causes.
+    pub fn failed_by(measures: usize, error: &StudyError) -> Self {
+        let mut told = vec![error.to_string()];
+        let mut cause = error.source();
+        while let Some(error) = cause {
+            let text = error.to_string();
+            if !told.last().is_some_and(|last| last.contains(&text)) {
+                told.push(text);
+            }
+            cause = error.source();
+        }
+        Self::failed(measures, &told.join(": "))
+    }
+
     /// That of a run that failed.
     pub fn failed(measures: usize, error: &str) -> Self {
         // One line: a spec's error shows its place below it.

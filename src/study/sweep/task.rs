@@ -170,7 +170,7 @@ impl Sweep {
     }
 
     fn fail(&self, shared: &Shared, error: &StudyError, tell: &(dyn Fn(Word) + Sync)) -> Result<(), StudyError> {
-        let row = Row::failed(self.plan.told().len(), &error.to_string());
+        let row = Row::failed_by(self.plan.told().len(), error);
         shared.runs.iter().try_for_each(|(unit, _)| {
             self.keep(&self.units[*unit], std::slice::from_ref(&row))?;
             tell(Word::Done(*unit));
