@@ -129,13 +129,16 @@ impl Registration<'_> {
     }
 }
 
+/// Where a beam begins and ends by the estimate, and by the truth.
+type Ends = (Beam, Option<(Beam, TrueInstant)>);
+
 /// An echo whose fate is not known yet.
 struct Pending {
     point: CloudPoint,
     /// Whether viewers are to see it.
     shown: bool,
-    /// Its ends by the estimate and by the truth, where it is of the sample.
-    judged: Option<(Beam, Option<(Beam, TrueInstant)>)>,
+    /// Its ends by the estimate and by the truth, where it is of the sample, as one in fifty is.
+    judged: Option<Box<Ends>>,
 }
 
 /// Reads scan by scan, writes the points that are kept, and gives those for viewers as an iterator.
@@ -242,7 +245,7 @@ impl Beams<'_, '_, '_> {
             let instant = self.truth.as_mut().map(|truth| truth.at(stamp)).transpose()?.flatten();
             let by_truth =
                 instant.map(|instant| (self.calibrated.beam(&instant.world_from_head, &point_in_laser), instant));
-            judged = Some((in_map, by_truth));
+            judged = Some(Box::new((in_map, by_truth)));
         }
         let hit = Hit { stamp, point_in_map: in_map.point, origin_in_map: in_map.origin };
         Ok((hit, Pending { point, shown: self.shown.keeps(index), judged }))
@@ -263,7 +266,7 @@ impl Beams<'_, '_, '_> {
         let mut shown = Vec::new();
         for (pending, fate) in told {
             self.fates.count(fate);
-            self.sample.extend(pending.judged.map(|(in_map, by_truth)| Judged { in_map, by_truth, fate }));
+            self.sample.extend(pending.judged.map(|ends| Judged { in_map: ends.0, by_truth: ends.1, fate }));
             if fate == Fate::Kept {
                 self.files.point(&pending.point)?;
                 shown.extend(pending.shown.then_some(pending.point));

@@ -10,6 +10,7 @@ use super::MaterialId;
 use super::shape::Triangle;
 use crate::geometry::{SurfacePoint, Vector};
 use face::{Plane, SingleFace};
+use glamx::Vec3A;
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
@@ -113,33 +114,26 @@ impl Caster {
 struct SingleRay {
     origin: Vec3,
     direction: Vec3,
-    inverse: Vec3,
+    from: Vec3A,
+    inverse: Vec3A,
 }
 
 impl SingleRay {
     fn new(origin: &Vector, direction: &Vector) -> Self {
-        let direction = single(direction);
+        let (origin, direction) = (single(origin), single(direction));
         // Finite for a ray along an axis, so that no product with it is NaN.
         let inverse = direction.map(|x| 1.0 / if x.abs() < 1e-20 { 1e-20_f32.copysign(x) } else { x });
-        Self { origin: single(origin), direction, inverse }
+        Self { origin, direction, from: origin.into(), inverse: inverse.into() }
     }
 
-    /// How far along the ray it enters a node's box, by slabs; the largest number if it does not. parry has this test too,
-    /// but of minima that look for NaN; without them a cast takes a tenth less.
+    /// How far along the ray it enters a node's box, by slabs, the three at once; the largest number if it does not. parry has
+    /// this test too, number by number.
     #[inline]
     fn enters(&self, node: &BvhNode) -> f32 {
-        let lesser = |a: f32, b: f32| if a < b { a } else { b };
-        let greater = |a: f32, b: f32| if a > b { a } else { b };
-        let to_lower = (node.mins() - self.origin) * self.inverse;
-        let to_upper = (node.maxs() - self.origin) * self.inverse;
-        let enter = greater(
-            greater(lesser(to_lower.x, to_upper.x), lesser(to_lower.y, to_upper.y)),
-            lesser(to_lower.z, to_upper.z),
-        );
-        let leave = lesser(
-            lesser(greater(to_lower.x, to_upper.x), greater(to_lower.y, to_upper.y)),
-            greater(to_lower.z, to_upper.z),
-        );
+        let to_lower = (Vec3A::from(node.mins()) - self.from) * self.inverse;
+        let to_upper = (Vec3A::from(node.maxs()) - self.from) * self.inverse;
+        let enter = to_lower.min(to_upper).max_element();
+        let leave = to_lower.max(to_upper).min_element();
         if leave >= enter && leave >= 0.0 { enter } else { f32::MAX }
     }
 }
