@@ -60,6 +60,13 @@ pub struct SurfelSpec {
     /// Greatest thickness (standard deviation along the normal), as a multiple of the range's noise.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_thickness_sigmas: f64,
+    /// A patch is flat whose variance along the normal exceeds what noise makes of a plane by less than this multiple of its own
+    /// standard deviation, `sqrt(2 / N)` of it for `N` points.
+    #[serde(deserialize_with = "crate::spec::checked::non_negative")]
+    pub flat_within_sigmas: f64,
+    /// The variance of a patch's place along the normal, as a multiple of that excess; 0 to take all patches for flat.
+    #[serde(deserialize_with = "crate::spec::checked::non_negative")]
+    pub excess_doubt: f64,
     /// Least velocity of a planar scan's beams out of their plane, by rotation, degrees/s.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_sweep_deg_per_s: f64,

@@ -238,7 +238,7 @@ mod tests {
                 let (u, v) = (along / wide, up / high);
                 let flat = (u * u.transpose() + v * v.transpose()) * (edge_m * edge_m / 12.0);
                 let covariance: Matrix = flat + normal * normal.transpose() * 1e-4;
-                patches.push(Patch { centre, normal, points: 100.0, covariance, level });
+                patches.push(Patch { centre, normal, points: 100.0, covariance, doubt: 0.0, level });
             }
         };
         let (x, y, z) = (Vector::x(), Vector::y(), Vector::z());

@@ -118,6 +118,7 @@ impl Patch {
             normal: surfel.normal_in_map,
             points: surfel.points,
             covariance: surfel.covariance_in_map,
+            doubt: 0.0,
             level: surfel.level,
         }
     }
@@ -126,7 +127,7 @@ impl Patch {
         MapSurfel {
             centre_in_map: self.centre,
             normal_in_map: self.normal.normalize(),
-            covariance_in_map: self.covariance,
+            covariance_in_map: self.covariance + self.normal * self.normal.transpose() * self.doubt,
             points: self.points,
             sigma_m,
             level: self.level,

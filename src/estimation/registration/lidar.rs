@@ -171,7 +171,7 @@ mod tests {
 
     fn patch(centre: Vector) -> Patch {
         let covariance = Matrix::from_diagonal(&Vector::new(0.02, 0.05, 1e-4));
-        Patch { centre, normal: Vector::z(), points: 50.0, covariance, level: 0 }
+        Patch { centre, normal: Vector::z(), points: 50.0, covariance, doubt: 0.0, level: 0 }
     }
 
     fn correction(scale: f64) -> LidarCorrection {

@@ -1,8 +1,8 @@
 //! How far two matched surfels are apart along the normal of the surface that both belong to.
 //!
 //! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by
-//! `zeta^2 = 1 / (sigma_r^2 + lambda)`. A live surfel's centre moves by
-//! `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the way from the lidar, `u` along it, and the lidar turned by `e`
+//! `zeta^2 = 1 / (sigma_r^2 + lambda + d_i + d_j)`, with `d` what a patch that is not flat is in doubt by. A live surfel's
+//! centre moves by `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the way from the lidar, `u` along it, and the lidar turned by `e`
 //! and shifted by `s` along the IMU's axes; one of a fixed view does not.
 //!
 //! What all surfels share stands in the border: `B` unknowns of it are carried, [`SHARED`] or, where the lidar's place on the
@@ -28,7 +28,7 @@ pub(in crate::estimation) struct Plane {
 }
 
 impl Plane {
-    /// The plane common to two patches, `sigma_m` being what a match may be off beside their thickness.
+    /// The plane common to two patches, `sigma_m` being what a match may be off beside their thickness and doubt.
     pub(in crate::estimation) fn of(a: &Patch, b: &Patch, sigma_m: f64) -> Self {
         let both = a.covariance + b.covariance;
         let start = a.normal + b.normal;
@@ -39,7 +39,7 @@ impl Plane {
         let lambda = normal.dot(&(both * normal));
         let apart = a.centre - b.centre;
         let distance_m = normal.dot(&apart);
-        Self { normal, apart, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) }
+        Self { normal, apart, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) + a.doubt + b.doubt }
     }
 
     /// Says nothing any more along `direction`, a unit vector.
@@ -257,6 +257,7 @@ mod tests {
             normal: turn * Vector::z(),
             points: 50.0,
             covariance,
+            doubt: 0.0,
             level: 0,
         };
         Placed {

@@ -1,5 +1,6 @@
 //! From beams to surfels: voxels at several resolutions and on two grids, filled from fine to coarse.
 
+use super::flat::{self, Shaped};
 use super::moments::Moments;
 use super::{Beam, Surfel};
 use crate::estimation::Clock;
@@ -12,6 +13,9 @@ use rayon::prelude::*;
 
 /// Poses are computed at this spacing and taken linearly in between, s: at 400 degrees/s the chord is 1.5 um/m from the arc.
 const POSE_SPACING_S: f64 = 0.0005;
+/// A surface is upright, a wall rather than ground, when its normal leans less than this to the vertical: its cosine.
+const UPRIGHT: f64 = 0.7;
+
 /// What it takes to turn beams into surfels.
 #[derive(Debug, Clone)]
 pub(in super::super) struct SurfelMaker {
@@ -66,12 +70,12 @@ impl SurfelMaker {
                 (true, _) => grids.push((regular, level, 1 << (level - 1))),
             }
         }
-        let surfels_of = |(fragments, level, shift): &(&[Fragment], usize, i32)| -> Vec<Surfel> {
+        let surfels_of = |(fragments, level, shift): &(&[Fragment], usize, i32)| -> Vec<Shaped> {
             let cells = group(fragments, *level, *shift, &self.spec);
             cells.iter().filter_map(|cell| self.shape(cell, *level, &origin, (nominal, clock, biases))).collect()
         };
-        let surfels: Vec<Vec<Surfel>> = grids.par_iter().map(surfels_of).collect();
-        surfels.concat()
+        let shaped: Vec<Vec<Shaped>> = grids.par_iter().map(surfels_of).collect();
+        flat::doubted(shaped.concat(), &self.spec)
     }
 
     /// Calls `with` for each beam and its point in the map.
@@ -113,7 +117,7 @@ impl SurfelMaker {
         level: usize,
         origin: &Vector,
         state: (&Nominal, &Clock, &Biases),
-    ) -> Option<Surfel> {
+    ) -> Option<Shaped> {
         let (nominal, clock, biases) = state;
         let covariance = moments.covariance();
         let eigen = covariance.symmetric_eigen();
@@ -141,13 +145,20 @@ impl SurfelMaker {
             return None;
         }
         let normal = calibrated_from_map * eigen.eigenvectors.column(order[0]);
-        Some(Surfel {
+        let surfel = Surfel {
             tau_s,
             reach_in_imu: beam * (range_m - self.lidar.range_m),
             normal_in_imu: if normal.dot(&beam) > 0.0 { -normal } else { normal },
             covariance_in_imu: calibrated_from_map * covariance * calibrated_from_map.transpose(),
             points: moments.count(),
+            doubt: 0.0,
             level,
+        };
+        Some(Shaped {
+            surfel,
+            is_upright: eigen.eigenvectors.column(order[0]).z.abs() < UPRIGHT,
+            variance: l1,
+            by_noise: flat::noise_across(moments.mean_noise2(), normal.dot(&beam)),
         })
     }
 }

@@ -5,6 +5,7 @@
 //! shape of the trajectory is left to the IMU.
 
 mod build;
+mod flat;
 mod moments;
 
 pub(super) use build::SurfelMaker;
@@ -39,6 +40,8 @@ pub(super) struct Surfel {
     pub(super) normal_in_imu: Vector,
     /// Second central moment of its points, as calibrated, m^2.
     pub(super) covariance_in_imu: Matrix,
+    /// What its place along the normal is in doubt by because it is not flat: a variance, m^2.
+    pub(super) doubt: f64,
     /// Number of its points.
     pub(super) points: f64,
     /// Resolution, 0 the finest.
@@ -56,6 +59,8 @@ pub(super) struct Patch {
     pub(super) points: f64,
     /// Second central moment, m^2.
     pub(super) covariance: Matrix,
+    /// What its place along the normal is in doubt by because it is not flat: a variance, m^2.
+    pub(super) doubt: f64,
     /// Resolution, 0 the finest.
     pub(super) level: usize,
 }
@@ -123,6 +128,7 @@ impl Surfel {
             centre: motion.position + arm,
             normal: map_from_calibrated * self.normal_in_imu,
             covariance: map_from_calibrated * self.covariance_in_imu * map_from_calibrated.transpose(),
+            doubt: self.doubt,
             level: self.level,
             points: self.points,
         };

@@ -139,7 +139,8 @@ mod tests {
             let centre = Vector::new(angle.cos(), angle.sin(), 0.0) * (10.0 + 8.0 * wave);
             let centre = centre + Vector::z() * (1.0 + (3.0 * wave).cos());
             let covariance = Matrix::identity() * 1e-4;
-            Patch { centre: rotation * centre, normal: rotation * normal, points: 50.0, covariance, level: 0 }
+            let (centre, normal) = (rotation * centre, rotation * normal);
+            Patch { centre, normal, points: 50.0, covariance, doubt: 0.0, level: 0 }
         };
         (0..90).map(post).collect()
     }
