@@ -10,6 +10,7 @@ use zsim::random::Seed;
 use zsim::sensors::{Firing, Lidar, LidarErrors, LidarSpec, Rays, Scenery, SurfaceHit, Switch, Track};
 use zsim::spec::{self, Kind, Source};
 use zsim::time::Stamp;
+use zsim::world::World;
 
 fn spec_of(name: &str) -> LidarSpec {
     spec::load(Kind::Lidar, name).unwrap()
@@ -130,6 +131,33 @@ fn beams_projected_by_poses_at_1_khz_lie_on_the_surface() {
             assert!((point.coords.norm() - 10.0).abs() < 2e-4, "{name}: {}", point.coords.norm());
         }
     }
+}
+
+#[test]
+fn a_sweep_meets_first_what_each_ray_meets_alone() {
+    // Rays are sought where the one before them ended; the office has edges, glass and open doors.
+    let office = World::load("office").unwrap();
+    let mut spec = spec_of("utm30lx");
+    spec.range_max_m = 12.0;
+    let lidar = lidar(&spec);
+    let at = |x: f64, y: f64, pitch: f64| {
+        Pose::from_parts(Vector::new(x, y, 1.2).into(), from_roll_pitch_yaw(0.1, pitch, x + y))
+    };
+    let mut met = 0;
+    for k in 0..60 {
+        let (x, y) = (1.0 + 0.3 * f64::from(k), 1.0 + 0.17 * f64::from(k));
+        let pose = at(x, y, 0.7 * f64::from(k).sin());
+        let track = Track::new(0, 1e-3, vec![Kinematics::at_rest(pose); 101]).unwrap();
+        let sweep = lidar.sweep(&office, &track, &firing(0));
+        for (ray, beam) in lidar.beams().iter().enumerate() {
+            let world_from_laser = track.pose(beam.offset_s);
+            let direction = world_from_laser.rotation * beam.direction_in_laser;
+            let alone = office.first_hit(&world_from_laser.translation.vector, &direction, 12.0, beam.offset_s);
+            assert_eq!(sweep.surfaces(ray).first(), alone.as_ref(), "{k}: ray {ray}");
+            met += usize::from(alone.is_some());
+        }
+    }
+    assert!((1..60 * lidar.beams().len()).contains(&met), "some rays meet nothing within reach: {met}");
 }
 
 #[test]

@@ -8,6 +8,8 @@ use rand_distr::{Distribution, StandardNormal};
 const WHITE: f64 = 0.9;
 /// Echoes whose chance of being missed is less than one in this many are taken as seen.
 const SURELY: f64 = 1e6;
+/// Odds, most draws' are less, at which the power that passes the threshold is worked out once.
+const MOST_ODDS: f64 = 100.0;
 
 /// What a seed makes of a lidar's errors.
 #[derive(Debug, Clone)]
@@ -21,6 +23,8 @@ pub struct LidarErrors {
     half_power: f64,
     /// Power that is surely detected, 1/m^2.
     sure_power: f64,
+    /// Power that is detected at odds of [`MOST_ODDS`], 1/m^2.
+    most_power: f64,
     cos_grazing: f64,
     on: bool,
 }
@@ -53,6 +57,7 @@ impl LidarErrors {
             sigma: lidar.noise(),
             half_power,
             sure_power: half_power * SURELY.powf(spec.detection.softness),
+            most_power: half_power * MOST_ODDS.powf(spec.detection.softness),
             cos_grazing: spec.grazing.from_deg.to_radians().cos(),
             on: lidar.spec().noise == Switch::On,
             spec,
@@ -77,11 +82,12 @@ impl LidarErrors {
 
     /// Whether an echo passes the detector's threshold at its draw, uniform in 0..1.
     pub(super) fn detects(&self, echo: &Echo, draw: f64) -> bool {
-        if echo.power >= self.sure_power {
+        let odds = draw / (1.0 - draw);
+        if echo.power >= self.sure_power || (echo.power > self.most_power && odds <= MOST_ODDS) {
             return true;
         }
         // P(power > half_power (u / (1 - u))^softness) is logistic in ln(power / half_power) / softness.
-        echo.power > self.half_power * (draw / (1.0 - draw)).powf(self.spec.detection.softness)
+        echo.power > self.half_power * odds.powf(self.spec.detection.softness)
     }
 
     /// The range that is reported for an echo, m, before rounding; `z` is standard normal.

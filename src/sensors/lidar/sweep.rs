@@ -1,5 +1,5 @@
 use super::Lidar;
-use crate::geometry::Rotation;
+use crate::geometry::{Rotation, Vector};
 use crate::sensors::{Scenery, SurfaceHit, Track};
 use crate::time::Stamp;
 
@@ -7,6 +7,11 @@ use crate::time::Stamp;
 const MAX_GLASS: usize = 8;
 /// Beyond a surface of glass, a ray goes on from here, m.
 const BEYOND_GLASS_M: f64 = 1e-4;
+
+/// A ray is sought first up to where the one before it ended, and this much further: fraction of the range, and m.
+///
+/// Rays that follow each other mostly end on one surface, and a search that need not look behind it is a quarter faster.
+const FURTHER: (f64, f64) = (0.05, 0.1);
 
 /// When a scan is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +61,7 @@ impl Lidar {
             surfaces: Vec::with_capacity(self.rays.len() + self.rays.len() / 8),
             ends: Vec::with_capacity(self.rays.len()),
         };
+        let mut last_m = self.spec.range_max_m;
         for (beam, rays) in self.beams.iter().zip(self.rays.chunks_exact(self.rays_per_beam())) {
             let t_s = firing.start_s + beam.offset_s / firing.pace;
             let world_from_laser = laser.pose(t_s);
@@ -64,26 +70,33 @@ impl Lidar {
                 sweep.turned.map_or(world_from_laser.rotation, |turn| world_from_laser.rotation * turn);
             for ray in rays {
                 let direction = world_from_beams * ray;
-                self.follow(scenery, (&origin, &direction, t_s), &mut sweep.surfaces);
+                self.follow(scenery, (&origin, &direction, t_s), &mut last_m, &mut sweep.surfaces);
                 sweep.ends.push(sweep.surfaces.len() as u32);
             }
         }
         sweep
     }
 
-    /// Follows a ray through glass to where it ends.
+    /// Follows a ray through glass to where it ends; `last_m` is how far the ray before it went, and becomes how far this one did.
     fn follow(
         &self,
         scenery: &dyn Scenery,
-        (origin, direction, t_s): (&crate::geometry::Vector, &crate::geometry::Vector, f64),
+        (origin, direction, t_s): (&Vector, &Vector, f64),
+        last_m: &mut f64,
         surfaces: &mut Vec<SurfaceHit>,
     ) {
+        let seek = |from: &Vector, reach_m: f64| scenery.first_hit(from, direction, reach_m, t_s);
+        let near_m = *last_m * (1.0 + FURTHER.0) + FURTHER.1;
+        *last_m = self.spec.range_max_m;
         let (mut from, mut gone_m) = (*origin, 0.0);
         for _ in 0..MAX_GLASS {
-            let Some(hit) = scenery.first_hit(&from, direction, self.spec.range_max_m - gone_m, t_s) else { return };
+            let (near_m, reach_m) = (near_m - gone_m, self.spec.range_max_m - gone_m);
+            let near = if (0.0..reach_m).contains(&near_m) { seek(&from, near_m) } else { None };
+            let Some(hit) = near.or_else(|| seek(&from, reach_m)) else { return };
             let range_m = gone_m + hit.range_m;
             surfaces.push(SurfaceHit { range_m, ..hit });
             if !hit.is_glass() {
+                *last_m = range_m;
                 return;
             }
             gone_m = range_m + BEYOND_GLASS_M;
