@@ -6,14 +6,17 @@
 //! ```
 //!
 //! Both compare means over the interval, so the rate belongs to its middle and no second difference of positions is taken:
-//! `v` is the integrated velocity, corrected by the spline's exact derivative. With `R' = exp(dr) R`, `t' = t + dt`:
+//! `v` is the integrated velocity, corrected by the spline's exact derivative. With `R' = exp(dr) R`, `t' = t + dt`, in the
+//! map's axes:
 //!
 //! ```text
-//! de_w / d(dr_(k+1) - dr_k) = R_(k+1)^T / h      de_w / db_w = 1
-//! de_a / d(dv_(k+1) - dv_k) = R_mid^T / h        de_a / d dr_mid = R_mid^T [x]x,  x = (v_(k+1) - v_k) / h - g
-//! de_w / dM = w^T, row by row, M the gyroscope's exaggeration
-//! de_a / db_a = 1                                de_a / dgamma = R_mid^T [g]x (e_x, e_y),  g' = exp(gamma) g
+//! d R_(k+1) e_w / d(dr_(k+1) - dr_k) = 1 / h      d R_(k+1) e_w / db_w = R_(k+1)
+//! d R_mid e_a / d(dv_(k+1) - dv_k) = 1 / h        d R_mid e_a / d dr_mid = [x]x,  x = (v_(k+1) - v_k) / h - g
+//! d R_(k+1) e_w / dM = R_(k+1) w^T, row by row, M the gyroscope's exaggeration
+//! d R_mid e_a / db_a = R_mid                      d R_mid e_a / dgamma = [g]x (e_x, e_y),  g' = exp(gamma) g
 //! ```
+//!
+//! The equations take them summed over a knot's spacing ([`add_inertial`]): so far the correction can follow what a bias does.
 
 use super::{ACCEL_BIAS, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::estimation::normal_equations::NormalEquations;
@@ -21,238 +24,246 @@ use crate::estimation::spline::Basis;
 use crate::estimation::strapdown::{Biases, Interval, State};
 use crate::geometry::{Matrix, Rotation, Vector, skew};
 
+/// Knots about a sum from one middle of a span to the next, and one for an interval that reaches beyond.
+const KNOTS: usize = 6;
+/// Sigmas that differ by this factor are not summed.
+const UNLIKE: f64 = 3.0;
+/// By how much a single sample of the accelerometer may be off, beyond its noise, since the correction cannot follow it within a
+/// knot's span. None at all, and a correction could swing between the sums' ends.
+const WITHIN_SPAN: f64 = 3.0;
+
 /// The residuals of an interval and what their derivatives are made of.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Inertial {
+struct Inertial {
     /// `e_w`, rad/s.
-    pub(in crate::estimation) rate: Vector,
+    rate: Vector,
     /// `e_a`, m/s^2.
-    pub(in crate::estimation) force: Vector,
-    end_from_map: Matrix,
-    middle_from_map: Matrix,
+    force: Vector,
+    map_from_end: Matrix,
+    map_from_middle: Matrix,
     acceleration: Vector,
 }
 
 impl Inertial {
     /// The residuals between the states at an interval's ends.
-    pub(in crate::estimation) fn between(
-        a: &State,
-        b: &State,
-        interval: &Interval,
-        biases: &Biases,
-        gravity: &Vector,
-    ) -> Self {
+    fn between((a, b): (&State, &State), interval: &Interval, biases: &Biases, gravity: &Vector) -> Self {
         let turn = a.rotation.inverse() * b.rotation;
         let measured = Rotation::from_scaled_axis(interval.turn(biases));
         let bend = interval.gyro_slope * (interval.h * interval.h / 8.0);
         let middle = a.rotation * Rotation::from_scaled_axis(turn.scaled_axis() * 0.5 - bend);
-        let middle_from_map = middle.inverse().to_rotation_matrix().into_inner();
+        let map_from_middle = middle.to_rotation_matrix().into_inner();
         let acceleration = (b.velocity - a.velocity) / interval.h - gravity;
         Self {
             rate: (measured.inverse() * turn).scaled_axis() / interval.h,
-            force: middle_from_map * acceleration - interval.force_in_middle(biases),
-            end_from_map: b.rotation.inverse().to_rotation_matrix().into_inner(),
-            middle_from_map,
+            force: map_from_middle.tr_mul(&acceleration) - interval.force_in_middle(biases),
+            map_from_end: b.rotation.to_rotation_matrix().into_inner(),
+            map_from_middle,
             acceleration,
         }
     }
-
-    /// `de_a / d dr` at the middle.
-    pub(in crate::estimation) fn force_by_turn(&self) -> Matrix {
-        self.middle_from_map * skew(&self.acceleration)
-    }
-
-    /// `de_a / dgamma`: a tilt of gravity about the map's x and y.
-    pub(in crate::estimation) fn force_by_tilt(&self, gravity: &Vector) -> nalgebra::Matrix3x2<f64> {
-        (self.middle_from_map * skew(gravity)).fixed_columns::<2>(0).into_owned()
-    }
-
-    /// Adds the interval's part of the normal equations; `bases` at its two ends.
-    pub(in crate::estimation) fn add_to(
-        &self,
-        equations: &mut NormalEquations,
-        layout: &Layout,
-        bases: (&Basis, &Basis),
-        interval: &Interval,
-        gravity: &Vector,
-    ) {
-        let spread = Spread::of(bases, interval.h);
-        let first = layout.knot(bases.0.first);
-        self.add_rate(equations, layout, (first, &spread), interval);
-        self.add_force(equations, layout, (first, &spread), (interval, gravity));
-    }
-
-    fn add_rate(
-        &self,
-        equations: &mut NormalEquations,
-        layout: &Layout,
-        (first, spread): (usize, &Spread),
-        interval: &Interval,
-    ) {
-        let weight = interval.gyro_sigma.powi(-2);
-        let errors = Errors::of_gyro(layout.border(), &interval.gyro);
-        // The derivative by a knot is a multiple of a rotation, so its square is that multiple of the identity.
-        let right = self.end_from_map.transpose() * self.rate;
-        for a in 0..spread.used {
-            let scaled = weight * spread.turn[a];
-            for c in 0..=a {
-                for axis in 0..3 {
-                    equations.add_entry(first + 6 * a + axis, first + 6 * c + axis, scaled * spread.turn[c]);
-                }
-            }
-            for axis in 0..3 {
-                equations.add_right(first + 6 * a + axis, -scaled * right[axis]);
-                for row in 0..3 {
-                    let by = scaled * self.end_from_map[(row, axis)];
-                    errors.add_beside(equations, row, first + 6 * a + axis, by);
-                }
-            }
-        }
-        errors.add_own(equations, &self.rate, weight);
-    }
-
-    fn add_force(
-        &self,
-        equations: &mut NormalEquations,
-        layout: &Layout,
-        (first, spread): (usize, &Spread),
-        (interval, gravity): (&Interval, &Vector),
-    ) {
-        let weight = interval.accel_sigma.powi(-2);
-        let errors = Errors::of_accel(layout.border());
-        let tilt = layout.border() + GRAVITY;
-        let (by_turn, by_shift, by_tilt) = (self.force_by_turn(), self.middle_from_map, self.force_by_tilt(gravity));
-        let turn_turn = by_turn.transpose() * by_turn;
-        let turn_shift = by_turn.transpose() * by_shift;
-        let (tilt_turn, tilt_shift) = (by_tilt.transpose() * by_turn, by_tilt.transpose() * by_shift);
-        let (right_turn, right_shift) = (by_turn.transpose() * self.force, by_shift.transpose() * self.force);
-        for a in 0..spread.used {
-            let (m, s) = (weight * spread.middle[a], weight * spread.shift[a]);
-            let (turn, shift) = (first + 6 * a, first + 6 * a + 3);
-            for i in 0..3 {
-                equations.add_right(turn + i, -m * right_turn[i]);
-                equations.add_right(shift + i, -s * right_shift[i]);
-                for c in 0..=a {
-                    let (turn_c, shift_c) = (first + 6 * c, first + 6 * c + 3);
-                    equations.add_entry(shift + i, shift_c + i, s * spread.shift[c]);
-                    for j in 0..3 {
-                        // Within one knot the lower triangle alone; between two, the whole block.
-                        if c < a || j <= i {
-                            equations.add_entry(turn + i, turn_c + j, m * spread.middle[c] * turn_turn[(i, j)]);
-                        }
-                        equations.add_entry(shift + i, turn_c + j, s * spread.middle[c] * turn_shift[(j, i)]);
-                        if c < a {
-                            equations.add_entry(turn + i, shift_c + j, m * spread.shift[c] * turn_shift[(i, j)]);
-                        }
-                    }
-                }
-                for j in 0..3 {
-                    errors.add_beside(equations, j, turn + i, m * by_turn[(j, i)]);
-                    errors.add_beside(equations, j, shift + i, s * by_shift[(j, i)]);
-                }
-                for j in 0..2 {
-                    equations.add_entry(tilt + j, turn + i, m * tilt_turn[(j, i)]);
-                    equations.add_entry(tilt + j, shift + i, s * tilt_shift[(j, i)]);
-                }
-            }
-        }
-        self.add_force_border(equations, (&errors, tilt), &by_tilt, weight);
-    }
-
-    fn add_force_border(
-        &self,
-        equations: &mut NormalEquations,
-        (errors, tilt): (&Errors<1>, usize),
-        by_tilt: &nalgebra::Matrix3x2<f64>,
-        weight: f64,
-    ) {
-        let square = by_tilt.transpose() * by_tilt;
-        let right = by_tilt.transpose() * self.force;
-        for i in 0..3 {
-            for j in 0..2 {
-                errors.add_beside(equations, i, tilt + j, weight * by_tilt[(i, j)]);
-            }
-        }
-        errors.add_own(equations, &self.force, weight);
-        for i in 0..2 {
-            equations.add_right(tilt + i, -weight * right[i]);
-            for j in 0..=i {
-                equations.add_entry(tilt + i, tilt + j, weight * square[(i, j)]);
-            }
-        }
-    }
 }
 
-/// A sensor's own errors among the unknowns: component `i` of its residual hangs on `unknowns[i][k]` by `by[k]`.
-struct Errors<const N: usize> {
-    unknowns: [[usize; N]; 3],
-    by: [f64; N],
-}
-
-impl Errors<4> {
-    /// The bias by 1, and row `i` of the exaggeration by the reading.
-    fn of_gyro(border: usize, reading: &Vector) -> Self {
-        let row = |i: usize| {
-            let matrix = border + GYRO_MATRIX + 3 * i;
-            [border + GYRO_BIAS + i, matrix, matrix + 1, matrix + 2]
-        };
-        Self { unknowns: [row(0), row(1), row(2)], by: [1.0, reading.x, reading.y, reading.z] }
-    }
-}
-
-impl Errors<1> {
-    /// The bias.
-    fn of_accel(border: usize) -> Self {
-        let bias = border + ACCEL_BIAS;
-        Self { unknowns: [[bias], [bias + 1], [bias + 2]], by: [1.0] }
-    }
-}
-
-impl<const N: usize> Errors<N> {
-    /// Adds the products with another unknown, by which component `i` changes `by` times.
-    fn add_beside(&self, equations: &mut NormalEquations, i: usize, unknown: usize, by: f64) {
-        for (own, factor) in self.unknowns[i].iter().zip(self.by) {
-            equations.add_entry(*own, unknown, by * factor);
+/// Adds to the equations what `intervals` between `states` say, with the splines' bases at the states.
+///
+/// A head that rocks turns a change of its accelerometer's bias into a changing acceleration. The correction, whose second
+/// derivative is straight between knots, follows it in the mean over a knot's spacing, and not from sample to sample: taken
+/// sample by sample, the difference would pass for knowledge and hold the bias wherever it is. So speeds count in full when
+/// summed from one middle of a knot's span to the next, and sample by sample for less ([`WITHIN_SPAN`]). Where sigmas
+/// change, as where a sensor is silent, another sum begins, so that the better part keeps its worth.
+pub(in crate::estimation) fn add_inertial(
+    equations: &mut NormalEquations,
+    layout: &Layout,
+    (states, bases): (&[State], &[Basis]),
+    intervals: &[Interval],
+    (biases, gravity): (&Biases, &Vector),
+) {
+    let mut speed = Speed::default();
+    for (k, interval) in intervals.iter().enumerate() {
+        let terms = Inertial::between((&states[k], &states[k + 1]), interval, biases, gravity);
+        let bases = (&bases[k], &bases[k + 1]);
+        Turn::of(&terms, bases, interval).add_to(equations, layout);
+        let mut alone = Speed::beginning(bases.0, interval);
+        alone.add(&terms, bases, interval, gravity);
+        if !speed.takes(bases.0, interval) {
+            speed.add_to(equations, layout);
+            speed = Speed::beginning(bases.0, interval);
         }
+        speed.add(&terms, bases, interval, gravity);
+        alone.sum.variance *= WITHIN_SPAN * WITHIN_SPAN;
+        alone.add_to(equations, layout);
     }
-
-    /// Adds the products among themselves, and the right-hand side.
-    fn add_own(&self, equations: &mut NormalEquations, residual: &Vector, weight: f64) {
-        for (i, unknowns) in self.unknowns.iter().enumerate() {
-            for (a, (row, by)) in unknowns.iter().zip(self.by).enumerate() {
-                equations.add_right(*row, -weight * by * residual[i]);
-                for (column, other) in unknowns.iter().zip(self.by).take(a + 1) {
-                    equations.add_entry(*row, *column, weight * by * other);
-                }
-            }
-        }
-    }
+    speed.add_to(equations, layout);
 }
 
-/// How an interval's differences hang on the (at most five) knots about it.
-struct Spread {
+/// Speeds are summed from one middle of a knot's span to the next.
+fn span_of(basis: &Basis) -> i64 {
+    basis.first + i64::from(basis.value[3] > basis.value[0])
+}
+
+/// A deviation on three axes, rad or m/s, with its variance, and the knots that it hangs on.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    /// Index of the first knot.
+    first: i64,
+    /// How many knots; none before the first interval.
     used: usize,
-    /// Of the mean rate of rotation, 1/s.
-    turn: [f64; 5],
-    /// Of the rotation in the middle.
-    middle: [f64; 5],
-    /// Of the mean acceleration, 1/s^2.
-    shift: [f64; 5],
+    deviation: Vector,
+    variance: f64,
 }
 
-impl Spread {
-    fn of((a, b): (&Basis, &Basis), h: f64) -> Self {
-        let late = (b.first - a.first).clamp(0, 1) as usize;
-        let mut spread = Self { used: 4 + late, turn: [0.0; 5], middle: [0.0; 5], shift: [0.0; 5] };
-        for k in 0..4 {
-            spread.turn[k] -= a.value[k] / h;
-            spread.turn[k + late] += b.value[k] / h;
-            spread.middle[k] += 0.5 * a.value[k];
-            spread.middle[k + late] += 0.5 * b.value[k];
-            spread.shift[k] -= a.rate[k] / h;
-            spread.shift[k + late] += b.rate[k] / h;
+impl Sum {
+    fn beginning(basis: &Basis) -> Self {
+        Self { first: basis.first, ..Self::default() }
+    }
+
+    /// Adds a mean deviation over `h`.
+    fn add(&mut self, deviation: &Vector, sigma: f64, h: f64) {
+        self.deviation += deviation * h;
+        self.variance += (sigma * h).powi(2);
+    }
+
+    /// The place of a basis's first knot among those of the sum.
+    fn place(&mut self, basis: &Basis) -> usize {
+        let place = ((basis.first - self.first).max(0) as usize).min(KNOTS - 4);
+        self.used = self.used.max(place + 4);
+        place
+    }
+}
+
+/// What the gyroscope says over an interval, and how that hangs on the unknowns.
+#[derive(Debug, Clone, Copy)]
+struct Turn {
+    sum: Sum,
+    by_turn: [f64; KNOTS],
+    /// By the bias, and by the columns of the exaggeration.
+    by_gyro: [Matrix; 4],
+}
+
+impl Turn {
+    fn of(terms: &Inertial, (a, b): (&Basis, &Basis), interval: &Interval) -> Self {
+        let h = interval.h;
+        let mut sum = Sum::beginning(a);
+        sum.add(&(terms.map_from_end * terms.rate), interval.gyro_sigma, h);
+        let mut by_turn = [0.0; KNOTS];
+        for (basis, sign) in [(a, -1.0), (b, 1.0)] {
+            let place = sum.place(basis);
+            for (sum, value) in by_turn[place..].iter_mut().zip(basis.value) {
+                *sum += sign * value;
+            }
         }
-        spread
+        let w = &interval.gyro;
+        let by_gyro = [1.0, w.x, w.y, w.z].map(|reading| terms.map_from_end * (h * reading));
+        Self { sum, by_turn, by_gyro }
+    }
+
+    fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
+        let Sum { first, used, deviation, variance } = self.sum;
+        let (first, border) = (layout.knot(first), layout.border());
+        for axis in 0..3 {
+            let mut row = Row::default();
+            for (knot, by) in self.by_turn[..used].iter().enumerate() {
+                row.push(first + 6 * knot + axis, *by);
+            }
+            for i in 0..3 {
+                row.push(border + GYRO_BIAS + i, self.by_gyro[0][(axis, i)]);
+            }
+            for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
+                row.push(border + GYRO_MATRIX + 3 * i + j, self.by_gyro[1 + j][(axis, i)]);
+            }
+            row.add_to(equations, deviation[axis], variance.recip());
+        }
+    }
+}
+
+/// What the accelerometer says over some intervals, and how that hangs on the unknowns.
+#[derive(Debug, Clone, Copy, Default)]
+struct Speed {
+    span: i64,
+    sigma: f64,
+    sum: Sum,
+    by_shift: [f64; KNOTS],
+    by_turn: [Matrix; KNOTS],
+    by_bias: Matrix,
+    by_tilt: Matrix,
+}
+
+impl Speed {
+    fn beginning(basis: &Basis, interval: &Interval) -> Self {
+        let sum = Sum::beginning(basis);
+        Self { span: span_of(basis), sigma: interval.accel_sigma, sum, ..Self::default() }
+    }
+
+    /// Whether an interval that begins at `basis` belongs to the same span, and is about as good.
+    fn takes(&self, basis: &Basis, interval: &Interval) -> bool {
+        let sigma = interval.accel_sigma;
+        self.sum.used > 0 && span_of(basis) == self.span && sigma < UNLIKE * self.sigma && self.sigma < UNLIKE * sigma
+    }
+
+    fn add(&mut self, terms: &Inertial, (a, b): (&Basis, &Basis), interval: &Interval, gravity: &Vector) {
+        let h = interval.h;
+        self.sum.add(&(terms.map_from_middle * terms.force), interval.accel_sigma, h);
+        let by_turn = skew(&terms.acceleration) * (0.5 * h);
+        for (basis, sign) in [(a, -1.0), (b, 1.0)] {
+            let place = self.sum.place(basis);
+            for k in 0..4 {
+                self.by_shift[place + k] += sign * basis.rate[k];
+                self.by_turn[place + k] += by_turn * basis.value[k];
+            }
+        }
+        self.by_bias += terms.map_from_middle * h;
+        self.by_tilt += skew(gravity) * h;
+    }
+
+    fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
+        let Sum { first, used, deviation, variance } = self.sum;
+        if used == 0 {
+            return;
+        }
+        let (first, border) = (layout.knot(first), layout.border());
+        for axis in 0..3 {
+            let mut row = Row::default();
+            for knot in 0..used {
+                for i in 0..3 {
+                    row.push(first + 6 * knot + i, self.by_turn[knot][(axis, i)]);
+                }
+                row.push(first + 6 * knot + 3 + axis, self.by_shift[knot]);
+            }
+            for i in 0..3 {
+                row.push(border + ACCEL_BIAS + i, self.by_bias[(axis, i)]);
+            }
+            // Gravity tilts about the map's x and y.
+            for i in 0..2 {
+                row.push(border + GRAVITY + i, self.by_tilt[(axis, i)]);
+            }
+            row.add_to(equations, deviation[axis], variance.recip());
+        }
+    }
+}
+
+/// The derivatives of one residual, by unknowns in rising order.
+#[derive(Default)]
+struct Row {
+    by: [(usize, f64); Row::MOST],
+    count: usize,
+}
+
+impl Row {
+    /// All knots with four unknowns each, a bias and a tilt.
+    const MOST: usize = 4 * KNOTS + 5;
+
+    fn push(&mut self, unknown: usize, derivative: f64) {
+        self.by[self.count] = (unknown, derivative);
+        self.count += 1;
+    }
+
+    fn add_to(&self, equations: &mut NormalEquations, residual: f64, weight: f64) {
+        let by = &self.by[..self.count];
+        for (place, (row, a)) in by.iter().enumerate() {
+            equations.add_right(*row, -weight * a * residual);
+            for (column, b) in &by[..=place] {
+                equations.add_entry(*row, *column, weight * a * b);
+            }
+        }
     }
 }
 
@@ -260,73 +271,125 @@ impl Spread {
 mod tests {
     use super::*;
     use crate::estimation::nominal::Correction;
+    use crate::estimation::normal_equations::Factor;
+    use crate::estimation::residual::BORDER;
+    use crate::estimation::residual::prior::Start;
     use crate::geometry::{from_roll_pitch_yaw, gravity_in_world};
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
+    use std::f64::consts::TAU;
 
     const SPACING_S: f64 = 0.2;
+    const H_S: f64 = 0.01;
 
     struct Case {
-        states: [State; 2],
-        interval: Interval,
+        states: Vec<State>,
+        intervals: Vec<Interval>,
         biases: Biases,
         gravity: Vector,
-        times_s: [f64; 2],
+        start_s: f64,
     }
 
-    /// An interval of 10 ms across a knot, at a few rad/s, with states that do not quite fit it.
-    fn case() -> Case {
-        let interval = Interval {
-            h: 0.01,
-            gyro: Vector::new(0.5, 5.0, -1.0),
-            gyro_slope: Vector::new(10.0, -20.0, 5.0),
-            accel: Vector::new(2.0, -1.0, 9.0),
-            accel_slope: Vector::new(-30.0, 10.0, 20.0),
-            gyro_sigma: 0.006,
-            accel_sigma: 0.01,
-            bridged: false,
-        };
+    impl Case {
+        fn bases(&self) -> Vec<Basis> {
+            (0..self.states.len()).map(|k| Basis::at(self.start_s + k as f64 * H_S, SPACING_S)).collect()
+        }
+
+        fn equations(&self, layout: &Layout) -> NormalEquations {
+            let mut equations = NormalEquations::new(layout.size());
+            let (bases, known) = (self.bases(), (&self.biases, &self.gravity));
+            add_inertial(&mut equations, layout, (&self.states, &bases), &self.intervals, known);
+            equations
+        }
+
+        /// The deviations, whitened: of the turn and of the speed, sample by sample, and of the speed over all intervals.
+        fn whitened(&self) -> Vec<f64> {
+            let mut whole = Sum::default();
+            let mut each = Vec::new();
+            for (states, interval) in self.states.windows(2).zip(&self.intervals) {
+                let terms = Inertial::between((&states[0], &states[1]), interval, &self.biases, &self.gravity);
+                let speed = terms.map_from_middle * terms.force;
+                whole.add(&speed, interval.accel_sigma, interval.h);
+                each.push(terms.map_from_end * terms.rate / interval.gyro_sigma);
+                each.push(speed / (interval.accel_sigma * WITHIN_SPAN));
+            }
+            each.push(whole.deviation / whole.variance.sqrt());
+            each.iter().flatten().copied().collect()
+        }
+    }
+
+    /// A head that pitches by 40 degrees at 1.2 Hz, from `start_s` on.
+    fn rocking(start_s: f64, count: usize) -> Case {
+        let w = 1.2 * TAU;
         let biases = Biases { gyro: Vector::new(0.01, -0.02, 0.005), accel: Vector::new(0.03, 0.01, -0.02) };
         let gravity = gravity_in_world();
-        let rotation = from_roll_pitch_yaw(0.2, -0.6, 1.4);
-        let start = State { rotation, position: Vector::new(1.0, 2.0, 3.0), velocity: Vector::new(0.3, -0.2, 0.1) };
-        let mut end = start.after(&interval, &biases, &gravity);
-        end.rotation = Rotation::from_scaled_axis(Vector::new(1e-4, -2e-4, 1e-4)) * end.rotation;
-        end.velocity += Vector::new(1e-3, 2e-3, -1e-3);
-        Case { states: [start, end], interval, biases, gravity, times_s: [0.595, 0.605] }
+        let rotation = from_roll_pitch_yaw(0.2, 0.7 * (w * start_s).sin(), 1.4);
+        let mut states =
+            vec![State { rotation, position: Vector::new(1.0, 2.0, 3.0), velocity: Vector::new(0.3, -0.2, 0.1) }];
+        let mut intervals = Vec::new();
+        for k in 0..count {
+            let phase = w * (start_s + (k as f64 + 0.5) * H_S);
+            let interval = Interval {
+                h: H_S,
+                gyro: Vector::new(0.5, 0.7 * w * phase.cos(), -1.0),
+                gyro_slope: Vector::new(0.0, -0.7 * w * w * phase.sin(), 0.0),
+                accel: Vector::new(2.0, -1.0 + phase.sin(), 9.0),
+                accel_slope: Vector::new(0.0, w * phase.cos(), 0.0),
+                gyro_sigma: 0.006,
+                accel_sigma: 0.01,
+                bridged: false,
+            };
+            states.push(states[k].after(&interval, &biases, &gravity));
+            intervals.push(interval);
+        }
+        Case { states, intervals, biases, gravity, start_s }
+    }
+
+    /// 200 ms from one middle of a span across a knot to the next, which are summed, with states that do not quite fit.
+    fn misfit() -> Case {
+        let mut case = rocking(0.505, 20);
+        for (k, state) in case.states.iter_mut().enumerate() {
+            let off = 1e-4 * (k as f64).sin();
+            state.rotation = Rotation::from_scaled_axis(Vector::new(1.0, -2.0, 1.0) * off) * state.rotation;
+            state.velocity += Vector::new(10.0, 20.0, -10.0) * off;
+        }
+        case
     }
 
     fn layout() -> Layout {
         Layout { first_knot: 2, knots: 5 }
     }
 
-    /// Both residuals, whitened, after a step `x` of the window's unknowns.
+    /// Residuals of `case`, whitened, after a step `x` of the window's unknowns.
     fn whitened(case: &Case, x: &DVector<f64>) -> DVector<f64> {
-        let moved = |k: usize| {
-            let correction = Correction::of_spline(&Basis::at(case.times_s[k], SPACING_S), 2, x.as_slice());
-            let state = &case.states[k];
+        let border = layout().border();
+        let three = |at: usize| Vector::new(x[border + at], x[border + at + 1], x[border + at + 2]);
+        let moved = |(state, basis): (&State, Basis)| {
+            let correction = Correction::of_spline(&basis, 2, x.as_slice());
             State {
                 rotation: Rotation::from_scaled_axis(correction.rotation) * state.rotation,
                 position: state.position + correction.translation,
                 velocity: state.velocity + correction.velocity,
             }
         };
-        let border = layout().border();
-        let three = |at: usize| Vector::new(x[border + at], x[border + at + 1], x[border + at + 2]);
-        let biases = Biases { gyro: case.biases.gyro + three(GYRO_BIAS), accel: case.biases.accel + three(ACCEL_BIAS) };
-        let interval = case.interval.without(&Matrix::from_fn(|r, c| x[border + GYRO_MATRIX + 3 * r + c]));
+        let exaggerates = Matrix::from_fn(|r, c| x[border + GYRO_MATRIX + 3 * r + c]);
         let tilt = Vector::new(x[border + GRAVITY], x[border + GRAVITY + 1], 0.0);
-        let gravity = Rotation::from_scaled_axis(tilt) * case.gravity;
-        let terms = Inertial::between(&moved(0), &moved(1), &interval, &biases, &gravity);
-        let (rate, force) = (terms.rate / case.interval.gyro_sigma, terms.force / case.interval.accel_sigma);
-        DVector::from_iterator(6, rate.iter().chain(force.iter()).copied())
+        let moved = Case {
+            states: case.states.iter().zip(case.bases()).map(moved).collect(),
+            intervals: case.intervals.iter().map(|interval| interval.without(&exaggerates)).collect(),
+            biases: Biases { gyro: case.biases.gyro + three(GYRO_BIAS), accel: case.biases.accel + three(ACCEL_BIAS) },
+            gravity: Rotation::from_scaled_axis(tilt) * case.gravity,
+            start_s: case.start_s,
+        };
+        DVector::from_vec(moved.whitened())
     }
 
     #[test]
     fn the_derivatives_are_those_of_the_residuals() {
-        let (case, layout) = (case(), layout());
+        let (case, layout) = (misfit(), layout());
         let zero = DVector::zeros(layout.size());
-        let mut jacobian = DMatrix::zeros(6, layout.size());
+        let residual = whitened(&case, &zero);
+        let mut jacobian = DMatrix::zeros(residual.len(), layout.size());
         let step = 1e-6;
         for k in 0..layout.size() {
             let mut x = zero.clone();
@@ -335,35 +398,40 @@ mod tests {
             x[k] = -step;
             jacobian.set_column(k, &((forward - whitened(&case, &x)) / (2.0 * step)));
         }
-        let residual = whitened(&case, &zero);
-        let mut equations = NormalEquations::new(layout.size());
-        let [a, b] = &case.states;
-        let bases = case.times_s.map(|t| Basis::at(t, SPACING_S));
-        Inertial::between(a, b, &case.interval, &case.biases, &case.gravity).add_to(
-            &mut equations,
-            &layout,
-            (&bases[0], &bases[1]),
-            &case.interval,
-            &case.gravity,
-        );
+        let equations = case.equations(&layout);
         // Left out on purpose: what the biases do through terms of order h (a turn of 0.05 rad within the interval).
         let (dense, numeric) = (equations.dense(), jacobian.transpose() * &jacobian);
         let scale = numeric.amax();
         assert_relative_eq!(dense, numeric, epsilon = 1e-2 * scale, max_relative = 2e-2);
         let knots = layout.border();
         let block = |m: &DMatrix<f64>| m.view((0, 0), (knots, knots)).into_owned();
-        assert_relative_eq!(block(&dense), block(&numeric), epsilon = 2e-4 * block(&numeric).amax());
+        assert_relative_eq!(block(&dense), block(&numeric), epsilon = 2e-3 * block(&numeric).amax());
         let right = -jacobian.transpose() * residual;
-        assert_relative_eq!(equations.right(), right, epsilon = 5e-3 * right.amax());
+        assert_relative_eq!(equations.right(), right, epsilon = 1e-2 * right.amax());
     }
 
     #[test]
     fn integration_leaves_no_residual() {
-        let case = case();
-        let end = case.states[0].after(&case.interval, &case.biases, &case.gravity);
-        let terms = Inertial::between(&case.states[0], &end, &case.interval, &case.biases, &case.gravity);
-        assert!(terms.rate.norm() < 1e-12, "{}", terms.rate);
-        // The middle is found from the turn here and from the rate there: they differ by the coning term, h^3 small.
-        assert!(terms.force.norm() < 1e-3, "{}", terms.force);
+        // Rounding, and the coning term, h^3 small: the middle is found from the turn here and from the rate there.
+        let largest = rocking(0.0, 100).whitened().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        assert!(largest < 0.1, "{largest}");
+    }
+
+    #[test]
+    fn an_imu_alone_says_next_to_nothing_of_its_bias() {
+        // Any bias of the accelerometer goes with some trajectory that begins as this one does. So four seconds of rocking, which
+        // would know a constant to 10 mm/s^2 / sqrt(400), leave it unknown to 25 times that.
+        let case = rocking(0.013, 400);
+        let layout = Layout { first_knot: 0, knots: 24 };
+        let mut equations = case.equations(&layout);
+        Start::held(0.013).add_to(&mut equations, &layout, &vec![0.0; layout.border()], SPACING_S);
+        (0..layout.size()).for_each(|unknown| equations.add_entry(unknown, unknown, 1e-3));
+        let mut factor = Factor::default();
+        equations.factor(&mut factor).unwrap();
+        let information = factor.information_of_last::<BORDER>();
+        for unknown in ACCEL_BIAS..ACCEL_BIAS + 3 {
+            let sigma = information[(unknown, unknown)].recip().sqrt();
+            assert!(sigma > 25.0 * 0.01 / 400_f64.sqrt(), "{unknown}: {sigma}");
+        }
     }
 }

@@ -16,9 +16,10 @@ pub(in crate::estimation) struct Start {
 }
 
 impl Start {
-    /// A beginning from which the window goes on smoothly: pose, velocity and acceleration are those of the window before.
+    /// A beginning from which the window goes on smoothly: pose and velocity are those of the window before, and nearly the
+    /// acceleration, which a bias that has become better known changes at once.
     pub(in crate::estimation) fn held(u_s: f64) -> Self {
-        Self { u_s, sigmas: [[1e-5, 1e-5], [1e-4, 1e-4], [1e-2, 1e-2]] }
+        Self { u_s, sigmas: [[1e-5, 1e-5], [1e-4, 1e-4], [1e-2, 0.3]] }
     }
 
     /// The very beginning: the pose is the map's origin by definition, the velocity known to `velocity_sigma` (m/s).

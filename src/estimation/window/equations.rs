@@ -4,7 +4,7 @@ use super::Window;
 use super::correspondence::{Match, Matches};
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
-use crate::estimation::residual::inertial::Inertial;
+use crate::estimation::residual::inertial::add_inertial;
 use crate::estimation::residual::matched::{self, ALWAYS, Beside, Own, Plane, SHARED, Side};
 use crate::estimation::residual::prior;
 use crate::estimation::spec::SolveSpec;
@@ -112,11 +112,8 @@ impl Window {
         let Workspace { inertial, bases, .. } = &mut self.workspace;
         inertial.reset(layout.size());
         let states = self.nominal.states();
-        for (k, interval) in self.nominal.intervals().iter().enumerate().skip(first) {
-            let terms = Inertial::between(&states[k], &states[k + 1], interval, &self.biases, &self.gravity);
-            let ends = (&bases[k - first], &bases[k + 1 - first]);
-            terms.add_to(inertial, layout, ends, interval, &self.gravity);
-        }
+        let known = (&self.biases, &self.gravity);
+        add_inertial(inertial, layout, (&states[first..], bases), &self.nominal.intervals()[first..], known);
         self.start.add_to(inertial, layout, total, self.spec.knot_spacing_s);
         self.border.add_to(inertial, layout);
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);
