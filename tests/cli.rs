@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod command;
+
 use assert_cmd::Command;
+use command::run;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -10,13 +13,6 @@ fn zsim(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_zsim"));
     command.current_dir(folder);
     command
-}
-
-/// Exit code, stdout and stderr.
-fn run(folder: &Path, arguments: &str) -> (i32, String, String) {
-    let output = zsim(folder).args(arguments.split_whitespace()).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
 
 fn root() -> PathBuf {

@@ -2,17 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
-use assert_cmd::Command;
-use serde_json::Value;
-use std::path::Path;
+mod command;
 
-/// Exit code, stdout and stderr.
-fn run(folder: &Path, arguments: &str) -> (i32, String, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_zsim"));
-    let output = command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
-}
+use command::run;
+use serde_json::Value;
 
 #[test]
 fn a_recording_is_localised_in_the_map_of_another_and_maps_are_put_together() {

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod command;
+
 use assert_cmd::Command;
+use command::run;
 use rand::RngExt;
 use serde_json::Value;
 use std::path::Path;
@@ -11,13 +14,6 @@ use std::time::Duration;
 use zsim::random::Seed;
 
 const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
-
-/// Exit code, stdout and stderr.
-fn run(folder: &Path, arguments: &str) -> (i32, String, String) {
-    let output = Command::new(ZSIM).current_dir(folder).args(arguments.split_whitespace()).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (output.status.code().unwrap_or(-1), text(output.stdout), text(output.stderr))
-}
 
 fn well(folder: &Path, arguments: &str) -> String {
     let (code, out, talk) = run(folder, arguments);
