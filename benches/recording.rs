@@ -63,7 +63,7 @@ fn sweep(stamp: Stamp, stream: &mut Stream) -> LidarScan {
         ranges_m,
         intensities,
     };
-    LidarScan { stamp, returns, planar: Some(planar) }
+    LidarScan { stamp, stamped_after: Span::ZERO, returns, planar: Some(planar) }
 }
 
 /// All that is recorded, made beforehand.

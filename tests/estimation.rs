@@ -230,7 +230,64 @@ fn a_lidar_that_sees_nothing_leaves_the_imu_and_a_warning() {
     let result = estimate(measurements);
     assert!(result.trajectory.len() > 700);
     assert!(result.windows.iter().all(|window| window.matches == 0));
-    assert!(!result.warnings.is_empty());
+    let lost = |kind: &WarningKind| matches!(kind, WarningKind::Lost { seconds, of_seconds } if seconds <= of_seconds);
+    assert!(result.warnings.iter().any(|w| lost(&w.kind)), "{:?}", result.warnings);
+}
+
+/// Outdoors the first beams of a turn often meet the sky: the first that comes back is fired at an uneven pace, while the
+/// sensor's stamps are even. The stamps are what is smoothed.
+#[test]
+fn beams_that_do_not_come_back_move_no_others_in_time() {
+    let run = hall(20, 7.0);
+    let estimated = |by_first_return: bool| {
+        let mut measurements = run.measurements();
+        for (k, measurement) in measurements.iter_mut().enumerate() {
+            let Measurement::Lidar(scan) = measurement else { continue };
+            scan.returns.drain(..scan.returns.len() * (k * 7 % 10) / 20);
+            if by_first_return {
+                let late = scan.returns[0].offset;
+                scan.returns.iter_mut().for_each(|hit| hit.offset = hit.offset - late);
+                (scan.stamp, scan.stamped_after) = (scan.stamp + late, Span::ZERO - late);
+            }
+        }
+        estimate(measurements).trajectory
+    };
+    let (even, uneven) = (estimated(false), estimated(true));
+    assert!(even.len() > 600);
+    for ((_, a), (_, b)) in even.iter().zip(uneven.iter()) {
+        assert!((a.translation.vector - b.translation.vector).norm() < 1e-6, "{a} {b}");
+    }
+}
+
+/// A cheap IMU: its rates are off by 3 degrees/s, and it is five times noisier than its calibration says. The head rests for
+/// 1.5 s, which shows both.
+#[test]
+fn an_imu_that_is_worse_than_it_was_told_is_found_out_at_rest() {
+    let run = hall(19, 12.0);
+    let (mut measurements, mut chance) = (run.measurements(), 1_u64);
+    // Of sums of uniform numbers (Irwin and Hall), by Knuth's generator.
+    let mut normal = || {
+        let mut uniform = || {
+            chance = chance.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (chance >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    };
+    let sigma = 5.0 * calibration().imu.gyro_density_rad_per_s_per_sqrt_hz * run.imu_rate_hz.sqrt();
+    for measurement in &mut measurements {
+        if let Measurement::Imu(sample) = measurement {
+            let noise = Vector::new(normal(), normal(), normal()) * sigma;
+            sample.angular_velocity_rad_per_s += Vector::new(0.03, -0.03, 0.03) + noise;
+        }
+    }
+    let mut told = calibration();
+    told.imu.gyro_turn_on_bias_rad_per_s = 0.02;
+    let result = estimate_all(&spec(), &told, measurements.into_iter()).unwrap();
+    let noisy = |kind: &WarningKind| matches!(kind, WarningKind::NoisyImu { gyro, .. } if (2.0..6.0).contains(gyro));
+    assert!(result.warnings.iter().any(|w| noisy(&w.kind)), "{:?}", result.warnings);
+    assert!(!result.warnings.iter().any(|w| w.kind == WarningKind::StartedInMotion), "{:?}", result.warnings);
+    let score = Score::of(&result, &run);
+    assert!(score.worst_m < 0.05, "{score:?}");
 }
 
 #[test]

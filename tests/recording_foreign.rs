@@ -185,6 +185,22 @@ fn extrinsics_are_found_along_any_way_through_the_tree() {
 }
 
 #[test]
+fn of_several_lidars_one_is_taken_that_stands_beside_the_imu() {
+    let mut foreign = Foreign::new(mcap::WriteOptions::new());
+    foreign.message("/tf_static", TF, 0, &vec![transform("imu", "laser", 0.25)]);
+    // First by name, and better timed: but nobody knows where it is.
+    let times: Vec<_> = (0..3_u32).map(|k| k.to_le_bytes().to_vec()).collect();
+    foreign.message("/front/points", POINTS, 0, &cloud(0, ("t", UINT32), &times));
+    foreign.message("/scan", SCAN, 0, &scan(0, 0.0, 0.1)).message("/imu", IMU, 0, &imu(0, "imu"));
+    let reader = foreign.reader();
+    let selection = select(&reader);
+    assert_eq!(selection.lidar_topic, "/scan");
+    let lost = Preference { lidar_topic: Some("/front/points".into()), imu_topic: None };
+    let error = reader.calibration(&reader.select(&lost).unwrap(), &recordings::calibration(), None).unwrap_err();
+    assert!(error.to_string().contains("--lidar-topic"), "{error}");
+}
+
+#[test]
 fn a_tree_that_goes_in_a_circle_or_forks_upwards_is_an_error() {
     let with_tree = |tree: Vec<TransformStamped>| {
         let mut foreign = Foreign::new(mcap::WriteOptions::new());

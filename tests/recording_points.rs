@@ -54,6 +54,7 @@ fn a_cloud_stamped_at_its_end_begins_with_its_first_point() {
     let zs: Vec<_> = scan.returns.iter().map(|r| r.point_in_laser.z).collect();
     assert_eq!(zs, [6.0, 3.0, 4.0, 7.0, 5.0]);
     assert_eq!(scan.returns[0].offset, Span::ZERO);
+    assert_eq!(scan.stamp + scan.stamped_after, Stamp::from_nanos(stamp_ns));
 }
 
 #[test]

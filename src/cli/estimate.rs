@@ -26,7 +26,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     estimator: EstimatorArguments,
     /// A RON file that says where the sensors sit and how well they measure, for what the recording does not say:
-    /// (head_from_laser: (position_m: (0, 0, 0)), head_from_imu: (position_m: (0, 0, -0.08)))
+    /// (head_from_laser: (position_m: (0, 0, 0)), head_from_imu: (position_m: (0, 0, -0.08), roll_pitch_yaw_deg: (0, 0, 180)));
+    /// docs/recordings.md has all keys, noise among them
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// The frame whose pose is written [default: head where /tf_static has it, else the IMU's]

@@ -69,6 +69,13 @@ pub struct Warning {
 pub enum WarningKind {
     /// The estimator started while the head moved, so level and gyro bias began less well known.
     StartedInMotion,
+    /// At rest the IMU is noisier than it was told, by these factors, and taken for so noisy.
+    NoisyImu {
+        /// Of the gyroscope's noise, 1 or more.
+        gyro: f64,
+        /// Of the accelerometer's.
+        accel: f64,
+    },
     /// No IMU sample for `seconds`; the motion was bridged at constant rates.
     ImuGap {
         /// How long, s.
@@ -104,6 +111,13 @@ pub enum WarningKind {
         /// The direction, a unit vector in the map.
         direction_in_map: Vector,
     },
+    /// For much of the time too little was seen again to hold the head, which the IMU alone carried: it is lost.
+    Lost {
+        /// How long, s.
+        seconds: f64,
+        /// Of how long, s.
+        of_seconds: f64,
+    },
     /// A window's solution was not believed, and the IMU's prediction kept.
     NotSolved {
         /// Why.
@@ -128,6 +142,16 @@ impl fmt::Display for WarningKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::StartedInMotion => write!(f, "the head moved at the start; level and gyro bias start less certain"),
+            Self::Lost { seconds, of_seconds } => write!(
+                f,
+                "in {seconds:.0} of {of_seconds:.0} s too little was seen again to hold the head, and the IMU alone carried \
+                 it: do not trust this trajectory"
+            ),
+            Self::NoisyImu { gyro, accel } => write!(
+                f,
+                "at rest the IMU is noisier than it was told, the gyroscope {gyro:.1} and the accelerometer {accel:.1} times, \
+                 and is taken for that"
+            ),
             Self::ImuGap { seconds } => write!(f, "no IMU sample for {seconds:.3} s; bridged at constant rates"),
             Self::LidarGap { seconds } => write!(f, "no lidar scan for {seconds:.3} s; carried by the IMU alone"),
             Self::BeganAgain { seconds } => write!(

@@ -1,6 +1,6 @@
 use super::border::Border;
 use super::consider::{Consider, Sensitivity};
-use super::initial::{self, Beginning, Carried};
+use super::initial::{self, Beginning, Carried, Noisier};
 use super::intake::{Intake, Stretch};
 use super::spent::Stopwatch;
 use super::strapdown::Interval;
@@ -16,6 +16,12 @@ use crate::surfel_map::SurfelMap;
 use crate::time::Stamp;
 use std::mem::discriminant;
 use std::time::Instant;
+
+/// The head is lost when the IMU alone carried it for longer than this, s, and for more than this share of the time.
+const LOST: (f64, f64) = (5.0, 0.2);
+
+/// An IMU that is noisier than it was told by more than this factor is told of.
+const TELLING: f64 = 1.5;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
@@ -45,6 +51,8 @@ pub struct Estimator {
     clock_offsets: Vec<(Stamp, f64)>,
     windows: Vec<WindowReport>,
     warnings: Vec<Warning>,
+    /// For how long the IMU alone carried the head through motion, s.
+    carried_s: f64,
     /// What was wrong with the newest window, and whether that was said.
     trouble: Option<(WarningKind, bool)>,
 }
@@ -74,6 +82,7 @@ impl Estimator {
             clock_offsets: Vec::new(),
             windows: Vec::new(),
             warnings: Vec::new(),
+            carried_s: 0.0,
             trouble: None,
         })
     }
@@ -119,6 +128,7 @@ impl Estimator {
         self.find_in_map()?;
         self.intake.close();
         self.warnings.extend(self.intake.take_warnings());
+        self.warn_of_loss();
         let Some(window) = &self.window else { return Err(self.why_nothing()) };
         let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
         let lidar = window.lidar();
@@ -186,6 +196,7 @@ impl Estimator {
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
         let trouble = trouble(&solved, &self.spec, moving);
+        self.carried_s += if trouble.as_ref().is_some_and(leaves_to_the_imu) { self.spec.step_s } else { 0.0 };
         self.say(trouble, stretch.end_s);
         if let Some(until_s) = final_until_s {
             self.hand_out(until_s);
@@ -214,6 +225,14 @@ impl Estimator {
         self.views = views.in_map(whereabouts.patches(), window.matcher(), place);
         self.consider = Consider::found(place, found.covariance, whereabouts.covariance());
         Ok(true)
+    }
+
+    /// Warns where the IMU alone carried the head for too long: what it then tells is no estimate.
+    fn warn_of_loss(&mut self) {
+        let (seconds, of_seconds) = (self.carried_s, self.windows.len() as f64 * self.spec.step_s);
+        if let Some(first) = self.windows.first().filter(|_| seconds > LOST.0 && seconds > LOST.1 * of_seconds) {
+            self.warnings.push(Warning { stamp: first.stamp, kind: WarningKind::Lost { seconds, of_seconds } });
+        }
     }
 
     /// Warns of a trouble when it lasts for two windows, or at once of a solution that was not believed; and once only, until a
@@ -283,37 +302,60 @@ impl Estimator {
             Some(*sum)
         });
         let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
+        let fitting = self.intake.sight().fit(&self.spec);
+        if let Some(survey) = &mut self.survey {
+            survey.ranges_are_held = self.intake.sight().is_one_way();
+        }
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, &self.spec);
+        let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, &fitting);
+        let start_s = *start_s;
+        self.make_noisier(beginning.noisier, start_s);
         self.window = Some(match &self.carried {
             Some(carried) => {
                 let beginning = beginning.going_on_from(carried);
-                let mut window = self.first_window(&beginning, *start_s);
+                let mut window = self.first_window(&fitting, &beginning, start_s);
                 window.take_over(carried);
                 window
             }
             None => {
                 if beginning.rest.is_none() {
-                    let stamp = self.intake.stamp(*start_s);
+                    let stamp = self.intake.stamp(start_s);
                     self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
                 }
-                self.first_window(&beginning, *start_s)
+                self.first_window(&fitting, &beginning, start_s)
             }
         });
     }
 
-    fn first_window(&self, beginning: &Beginning, start_s: f64) -> Window {
+    /// Takes the IMU for so much noisier than it was told from now on, and what waits with it.
+    fn make_noisier(&mut self, noisier: Noisier, start_s: f64) {
+        if noisier == Noisier::NOT {
+            return;
+        }
+        noisier.raise(&mut self.calibration.imu);
+        self.intake.make_noisier(noisier);
+        for (_, interval) in self.waiting.iter_mut().flat_map(|stretch| &mut stretch.intervals) {
+            *interval = noisier.of(*interval);
+        }
+        let Noisier { gyro, accel } = noisier;
+        if gyro.max(accel) > TELLING {
+            let stamp = self.intake.stamp(start_s);
+            self.warnings.push(Warning { stamp, kind: WarningKind::NoisyImu { gyro, accel } });
+        }
+    }
+
+    fn first_window(&self, spec: &EstimatorSpec, beginning: &Beginning, start_s: f64) -> Window {
         let imu_from_laser = self.calibration.head_from_imu.inverse() * self.calibration.head_from_laser;
         let maker = SurfelMaker {
-            spec: self.spec.surfels.clone(),
+            spec: spec.surfels.clone(),
             noise: self.calibration.lidar,
             scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
             laser_in_imu: imu_from_laser.translation.vector,
             lidar: LidarCorrection::default(),
         };
         let border = Border::new(beginning.information, &self.calibration.imu, self.spec.clock.estimated);
-        let surveyor = SurfelMaker { spec: self.spec.registration.surfels(&self.spec.surfels), ..maker.clone() };
-        let window = Window::new(&self.spec, maker, beginning, start_s, border);
+        let surveyor = SurfelMaker { spec: spec.registration.surfels(&spec.surfels), ..maker.clone() };
+        let window = Window::new(spec, maker, beginning, start_s, border);
         if self.survey.is_some() { window.surveyed_by(surveyor) } else { window }
     }
 
@@ -414,6 +456,15 @@ fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<Warn
         Some(WarningKind::WeakGeometry { conditioning: solved.conditioning, direction_in_map: solved.weakest })
     } else {
         None
+    }
+}
+
+/// Whether a trouble means that the IMU alone told how the head went on.
+fn leaves_to_the_imu(trouble: &WarningKind) -> bool {
+    match trouble {
+        WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
+        WarningKind::WeakGeometry { conditioning, .. } => *conditioning <= 0.0,
+        _ => false,
     }
 }
 

@@ -1,5 +1,6 @@
 //! From IMU samples to intervals without holes: smoothed stamps, one interval about every 10 ms, gaps bridged.
 
+use super::initial::Noisier;
 use super::spec::InertialSpec;
 use super::stamps::StampFilter;
 use super::strapdown::Interval;
@@ -49,6 +50,11 @@ impl InertialStream {
     /// The period of the samples, s.
     pub(super) fn period_s(&self) -> f64 {
         self.filter.period_s()
+    }
+
+    /// The IMU is so many times noisier than it was told.
+    pub(super) fn make_noisier(&mut self, noisier: Noisier) {
+        noisier.raise(&mut self.noise);
     }
 
     /// Samples at the end of the sensor's range since the last call.

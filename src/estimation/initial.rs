@@ -18,6 +18,8 @@ const GYRO_AXES_SIGMA: f64 = 1e-6;
 
 /// A sample's deviation from the mean, as a multiple of its noise, up to which the head is at rest.
 const REST_SIGMAS: f64 = 6.0;
+/// No IMU at rest is noisier than it was told by more than this factor: what scatters more moves.
+const MOST_NOISIER: f64 = 20.0;
 
 /// The state at the first instant, and what is believed of it.
 #[derive(Debug, Clone)]
@@ -30,6 +32,15 @@ pub(super) struct Beginning {
     pub(super) information: SMatrix<f64, BORDER, BORDER>,
     /// What the IMU says while the head rests, if it does.
     pub(super) rest: Option<Rest>,
+    /// How many times noisier than it was told the IMU is at rest; 1 of one that is not.
+    pub(super) noisier: Noisier,
+}
+
+/// By how much the noise of gyroscope and accelerometer exceeds what was told of it: factors, 1 or more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Noisier {
+    pub(super) gyro: f64,
+    pub(super) accel: f64,
 }
 
 /// The head at rest: what the IMU says then, by which the end of the rest is seen.
@@ -64,6 +75,36 @@ impl Beginning {
     }
 }
 
+impl Noisier {
+    /// As it was told.
+    pub(super) const NOT: Self = Self { gyro: 1.0, accel: 1.0 };
+
+    /// By the differences of successive intervals, which motion hardly changes (von Neumann's estimate of the variance).
+    fn seen_in(intervals: &[Interval]) -> Self {
+        let factor = |of: fn(&Interval) -> (Vector, f64)| {
+            let square = |pair: &[Interval]| {
+                let ((a, a_sigma), (b, b_sigma)) = (of(&pair[0]), of(&pair[1]));
+                (b - a).norm_squared() / (3.0 * (a_sigma.powi(2) + b_sigma.powi(2)))
+            };
+            let mean = intervals.windows(2).map(square).sum::<f64>() / (intervals.len() as f64 - 1.0).max(1.0);
+            mean.sqrt().clamp(1.0, MOST_NOISIER)
+        };
+        Self { gyro: factor(|i| (i.gyro, i.gyro_sigma)), accel: factor(|i| (i.accel, i.accel_sigma)) }
+    }
+
+    /// The noise of an IMU that is so much noisier.
+    pub(super) fn raise(self, noise: &mut ImuNoise) {
+        noise.gyro_density_rad_per_s_per_sqrt_hz *= self.gyro;
+        noise.accel_density_m_per_s2_per_sqrt_hz *= self.accel;
+    }
+
+    /// An interval of an IMU that is so much noisier.
+    pub(super) fn of(self, interval: Interval) -> Interval {
+        let (gyro_sigma, accel_sigma) = (interval.gyro_sigma * self.gyro, interval.accel_sigma * self.accel);
+        Interval { gyro_sigma, accel_sigma, ..interval }
+    }
+}
+
 impl Rest {
     /// Whether an interval says the same, within its noise.
     pub(super) fn goes_on(&self, interval: &Interval) -> bool {
@@ -82,7 +123,8 @@ pub(super) fn begin(intervals: &[Interval], head_from_imu: &Pose, noise: &ImuNoi
     let mean = |of: fn(&Interval) -> Vector| intervals.iter().map(|i| of(i) * i.h).sum::<Vector>() / duration;
     let (gyro, force) = (mean(|i| i.gyro), mean(|i| i.accel));
     let rest = Rest { gyro, force };
-    let at_rest = intervals.iter().all(|interval| rest.goes_on(interval))
+    let seen = Noisier::seen_in(intervals);
+    let at_rest = intervals.iter().all(|interval| rest.goes_on(&seen.of(*interval)))
         && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
     let upward = if at_rest { force } else { mean_force_at_start(intervals) };
     let up = Rotation::rotation_between(&upward, &Vector::z()).unwrap_or_else(Rotation::identity);
@@ -94,8 +136,9 @@ pub(super) fn begin(intervals: &[Interval], head_from_imu: &Pose, noise: &ImuNoi
     // At rest, what the force is more than gravity is bias; the rest of the bias hides in the level.
     let excess = force.norm() - gravity_in_world().norm();
     let accel_bias = if at_rest { force.normalize() * excess } else { Vector::zeros() };
+    let noisier = if at_rest { seen } else { Noisier::NOT };
     let gyro_sigma = if at_rest {
-        3.0 * noise.gyro_density_rad_per_s_per_sqrt_hz / duration.sqrt()
+        3.0 * noisier.gyro * noise.gyro_density_rad_per_s_per_sqrt_hz / duration.sqrt()
     } else {
         noise.gyro_turn_on_bias_rad_per_s
     };
@@ -103,6 +146,7 @@ pub(super) fn begin(intervals: &[Interval], head_from_imu: &Pose, noise: &ImuNoi
         state,
         biases: Biases { gyro: gyro_bias, accel: accel_bias },
         rest: at_rest.then_some(rest),
+        noisier,
         velocity_sigma: if at_rest { 0.01 } else { 2.0 },
         information: information(gyro_sigma, at_rest, noise, spec),
     }

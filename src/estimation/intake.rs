@@ -1,6 +1,8 @@
 //! Takes measurements as they come, and hands out stretches of time in which both sensors have spoken.
 
 use super::inertial::InertialStream;
+use super::initial::Noisier;
+use super::sight::Sight;
 use super::spec::EstimatorSpec;
 use super::stamps::{Regularity, StampFilter};
 use super::strapdown::Interval;
@@ -46,6 +48,8 @@ pub(super) struct Intake {
     /// Raw stamps of the last sample and scan that were used; what comes before is late.
     used_s: (f64, f64),
     counts: (usize, usize),
+    /// How the lidar looks about, as far as its first scans have shown.
+    sight: Sight,
     /// Whether all points so far lay in the lidar's x-y plane.
     planar: bool,
     late: (usize, usize),
@@ -69,6 +73,7 @@ impl Intake {
             scans: VecDeque::new(),
             used_s: (f64::NEG_INFINITY, f64::NEG_INFINITY),
             counts: (0, 0),
+            sight: Sight::default(),
             planar: true,
             late: (0, 0),
             streams: None,
@@ -98,9 +103,21 @@ impl Intake {
         std::mem::take(&mut self.warnings)
     }
 
+    /// The IMU is so many times noisier than it was told.
+    pub(super) fn make_noisier(&mut self, noisier: Noisier) {
+        if let Some((imu, _)) = &mut self.streams {
+            imu.make_noisier(noisier);
+        }
+    }
+
     /// Whether the lidar scans in one plane, as far as its scans have shown.
     pub(super) fn is_planar(&self) -> bool {
         self.planar
+    }
+
+    /// How the lidar looks about, as far as its first scans have shown.
+    pub(super) fn sight(&self) -> Sight {
+        self.sight
     }
 
     /// How many IMU samples and lidar scans came.
@@ -219,7 +236,9 @@ impl Intake {
         }
         // What came by now beyond the needed does not count, so that the order of arrivals does not.
         let stamps: Vec<f64> = self.samples.iter().map(|(s, _)| *s).filter(|s| *s <= enough_s).collect();
-        let scan_stamps: Vec<f64> = self.scans.iter().map(|(s, _)| *s).filter(|s| *s <= enough_s).collect();
+        let first_scans = || self.scans.iter().filter(|(s, _)| *s <= enough_s);
+        let scan_stamps: Vec<f64> = first_scans().map(|(s, scan)| s + scan.stamped_after.seconds()).collect();
+        self.sight = Sight::of(first_scans().map(|(_, scan)| scan), enough_s - first_scan);
         let jitter_s = self.spec.clock.jitter_s;
         let imu = StampFilter::new(Regularity::of(&stamps)?, jitter_s);
         let lidar = StampFilter::new(Regularity::of(&scan_stamps)?, jitter_s);
@@ -264,7 +283,8 @@ impl Intake {
         while self.scans.front().is_some_and(|(seconds, _)| *seconds < end_s) {
             let Some((seconds, scan)) = self.scans.pop_front() else { return };
             self.used_s.1 = seconds;
-            let start_s = lidar.smooth(seconds);
+            let after_s = scan.stamped_after.seconds();
+            let start_s = lidar.smooth(seconds + after_s) - after_s;
             let (least, most) = (self.spec.surfels.min_range_m, self.spec.surfels.max_range_m);
             for hit in &scan.returns {
                 let point = hit.point_in_laser.cast::<f64>();

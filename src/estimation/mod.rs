@@ -67,6 +67,7 @@ mod normal_equations;
 mod output;
 mod registration;
 mod residual;
+mod sight;
 mod spec;
 mod spent;
 mod spline;

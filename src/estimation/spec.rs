@@ -249,6 +249,14 @@ impl EstimatorSpec {
             "knot_spacing_s",
             format!("{} s is more than step_s = {step} s", self.knot_spacing_s),
         )?;
+        require(
+            self.knot_spacing_s >= 0.03,
+            "knot_spacing_s",
+            format!(
+                "{} s is less than 0.03 s; between two knots there must be samples of the IMU",
+                self.knot_spacing_s
+            ),
+        )?;
         require(window / self.knot_spacing_s <= 400.0, "knot_spacing_s", "makes over 400 knots a window".into())?;
         require((1..=6).contains(&self.surfels.levels), "levels", "must be 1 to 6".into())?;
         require(self.surfels.min_points >= 4, "min_points", "must be at least 4: fewer are no plane".into())?;

@@ -15,6 +15,8 @@ pub struct Survey {
     pub(super) sightings: Vec<Sighting>,
     /// What was known of the lidar when sightings were made.
     pub(super) lidars: Vec<LidarCorrection>,
+    /// Whether the lidar looks one way, so that nothing tells an offset of its ranges.
+    pub(super) ranges_are_held: bool,
     /// Time that making it took, s.
     pub(super) took_s: f64,
 }

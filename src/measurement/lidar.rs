@@ -5,6 +5,9 @@ use crate::time::{Span, Stamp};
 pub struct LidarScan {
     /// When the first beam was fired, on the lidar's clock.
     pub stamp: Stamp,
+    /// How much later than that the sensor's own stamp is, which comes at an even pace where the first beam that came back
+    /// does not: zero of a sensor that stamps the start.
+    pub stamped_after: Span,
     /// The beams that came back, in the order in which they were fired.
     pub returns: Vec<LidarReturn>,
     /// The scan in polar form, with the beams that did not come back, for a lidar that scans a plane.

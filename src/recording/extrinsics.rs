@@ -45,7 +45,11 @@ impl Reader {
         let find = |frame: &str| {
             tree.target_from_source(body, frame).ok_or_else(|| RecordingError::Frames {
                 name: self.name().to_owned(),
-                problem: format!("does not connect frame {frame} to {body}; it has {}", tree.names()),
+                problem: format!(
+                    "does not connect frame {frame} to {body}; it has {}. Name another sensor with --lidar-topic or --imu-topic, \
+                     or tell both poses with --calibration; a lidar that a motor turns, by /tf, cannot be estimated with",
+                    tree.names()
+                ),
             })
         };
         calibration.head_from_laser = find(&selection.lidar_frame)?;
@@ -53,8 +57,15 @@ impl Reader {
         Ok(FoundCalibration { calibration, body_frame: body.to_owned(), from_recording: true })
     }
 
+    /// Whether `/tf_static` connects two frames, or there is none to say so.
+    pub(super) fn connects(&self, target: &str, source: &str) -> bool {
+        // What is wrong with the tree is said where poses are asked of it.
+        let tree = self.frames().unwrap_or_default();
+        tree.is_empty() || tree.target_from_source(target, source).is_some()
+    }
+
     /// The tree of `/tf_static`.
-    fn frames(&self) -> Result<FrameTree, RecordingError> {
+    pub(super) fn frames(&self) -> Result<FrameTree, RecordingError> {
         let is_static = |topic: &str| topic.trim_start_matches('/') == "tf_static";
         let channels =
             self.channels().iter().filter(|c| is_static(&c.topic) && MessageType::Transforms.is_named(&c.type_name));
@@ -84,7 +95,7 @@ impl Reader {
 
 /// Frames, each in its parent.
 #[derive(Debug, Clone, Default)]
-struct FrameTree {
+pub(super) struct FrameTree {
     parents: BTreeMap<String, (String, Pose)>,
 }
 
@@ -117,7 +128,7 @@ impl FrameTree {
     }
 
     /// `target_from_source`, where both hang from one root.
-    fn target_from_source(&self, target: &str, source: &str) -> Option<Pose> {
+    pub(super) fn target_from_source(&self, target: &str, source: &str) -> Option<Pose> {
         let (target_root, root_from_target) = self.root_of(target)?;
         let (source_root, root_from_source) = self.root_of(source)?;
         (target_root == source_root).then(|| root_from_target.inverse() * root_from_source)

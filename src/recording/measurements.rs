@@ -5,10 +5,11 @@ use crate::recording::cdr::DecodeError;
 use crate::recording::container::{Messages, RawMessage};
 use crate::recording::message::scan::Projector;
 use crate::recording::message::{imu, points, scan};
+use crate::recording::order::InOrder;
 use crate::recording::selection::LidarKind;
 use crate::recording::{Loss, Reader, RecordingError, Selection};
 
-/// Reads measurements in the order of their log time.
+/// Reads measurements in the order of their stamps, whenever they were logged: half a second of them waits for its turn.
 ///
 /// An item is an error only where the file cannot be read on. Messages that cannot be used are left out and counted in
 /// [`loss`](Self::loss).
@@ -20,11 +21,12 @@ pub struct Measurements<'r> {
     projector: Projector,
     loss: Loss,
     expected: Option<u64>,
+    order: InOrder,
     ended: bool,
 }
 
 impl Reader {
-    /// The measurements of the selected sensors, in the order of their log time.
+    /// The measurements of the selected sensors, in the order of their stamps.
     pub fn measurements(&self, selection: &Selection) -> Measurements<'_> {
         Measurements {
             messages: self.messages(),
@@ -34,6 +36,7 @@ impl Reader {
             projector: Projector::default(),
             loss: self.loss().clone(),
             expected: self.expected_messages(),
+            order: InOrder::default(),
             ended: false,
         }
     }
@@ -75,7 +78,7 @@ fn lidar(kind: LidarKind, projector: &mut Projector, message: &RawMessage<'_>) -
     }
 }
 
-fn is_finite(sample: &ImuSample) -> bool {
+pub(super) fn is_finite(sample: &ImuSample) -> bool {
     let numbers = sample.angular_velocity_rad_per_s.iter().chain(sample.specific_force_m_per_s2.iter());
     numbers.into_iter().all(|x| x.is_finite())
 }
@@ -84,11 +87,21 @@ impl Iterator for Measurements<'_> {
     type Item = Result<Measurement, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
+        loop {
+            if let Some(measurement) = self.order.take(self.ended) {
+                return Some(Ok(measurement));
+            }
+            if self.ended {
+                return None;
+            }
+            match self.next_measurement().transpose() {
+                Some(Ok(measurement)) => self.order.put(measurement),
+                Some(Err(error)) => {
+                    self.ended = true;
+                    return Some(Err(error));
+                }
+                None => self.ended = true,
+            }
         }
-        let item = self.next_measurement().transpose();
-        self.ended = !matches!(item, Some(Ok(_)));
-        item
     }
 }

@@ -31,6 +31,7 @@ mod loss;
 mod map;
 mod measurements;
 mod message;
+mod order;
 mod ply;
 mod poses;
 mod reader;

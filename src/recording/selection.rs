@@ -53,9 +53,9 @@ enum BeamTimes {
 }
 
 /// A topic that may be chosen: what its first message tells.
-struct Candidate {
+pub(super) struct Candidate {
     topic: String,
-    frame: String,
+    pub(super) frame: String,
     kind: Option<LidarKind>,
     times: BeamTimes,
 }
@@ -66,7 +66,7 @@ const LIDAR_TYPES: [MessageType; 2] = [MessageType::LaserScan, MessageType::Poin
 const IMU_ENDINGS: [&str; 3] = ["imu/data_raw", "imu/data", "imu"];
 
 impl Reader {
-    /// Finds the lidar and the IMU. A `LaserScan` whose beams' times are told is taken first, then a `PointCloud2` whose
+    /// Finds the lidar and the IMU: of lidars one that `/tf_static`, where there is one, puts beside the IMU. A `LaserScan` whose beams' times are told is taken first, then a `PointCloud2` whose
     /// points have times; of several the first by name. Truth, the recording's own, is never a candidate.
     ///
     /// # Errors
@@ -74,8 +74,10 @@ impl Reader {
     pub fn select(&self, preference: &Preference) -> Result<Selection, RecordingError> {
         let lidars = self.candidates(&LIDAR_TYPES, preference.lidar_topic.as_deref(), lidar_candidate)?;
         let imus = self.candidates(&[MessageType::Imu], preference.imu_topic.as_deref(), imu_candidate)?;
-        let lidar = lidars.iter().min_by_key(|c| (c.times, c.kind == Some(LidarKind::Points), &c.topic));
         let imu = imus.iter().min_by_key(|c| (imu_rank(&c.topic), &c.topic));
+        let stands_beside = |lidar: &Candidate| imu.is_none_or(|imu| self.connects(&imu.frame, &lidar.frame));
+        let lidar =
+            lidars.iter().min_by_key(|c| (!stands_beside(c), c.times, c.kind == Some(LidarKind::Points), &c.topic));
         let (lidar, lidar_kind) = lidar
             .and_then(|lidar| Some((lidar, lidar.kind?)))
             .ok_or_else(|| self.no_sensor("lidar", "sensor_msgs/msg/LaserScan or sensor_msgs/msg/PointCloud2"))?;
@@ -97,7 +99,7 @@ impl Reader {
     }
 
     /// Topics of `types` that have a message which `look` understands; of one topic alone, where it is asked for.
-    fn candidates(
+    pub(super) fn candidates(
         &self,
         types: &[MessageType],
         asked: Option<&str>,
@@ -159,7 +161,7 @@ fn lidar_candidate(message: &RawMessage<'_>, kind: MessageType, topic: &str) -> 
     Some(Candidate { topic: topic.to_owned(), frame, kind: Some(kind), times })
 }
 
-fn imu_candidate(message: &RawMessage<'_>, _: MessageType, topic: &str) -> Option<Candidate> {
+pub(super) fn imu_candidate(message: &RawMessage<'_>, _: MessageType, topic: &str) -> Option<Candidate> {
     let frame = frame_of(message)?;
     Some(Candidate { topic: topic.to_owned(), frame, kind: None, times: BeamTimes::Told })
 }

@@ -9,8 +9,8 @@ use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use crate::spec::{Kind, Source, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
 
-/// A calibration as a user writes it; what is left out is taken from the recording, or else from the data sheets of the
-/// UTM-30LX and the 3DM-GX2.
+/// A calibration as a user writes it; what is left out is taken from the recording, or else is that of the UTM-30LX
+/// and of an ordinary IMU (`specs/imus/unknown.ron`).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CalibrationSpec {
@@ -24,7 +24,7 @@ pub struct CalibrationSpec {
     pub lidar: Option<LidarNoise>,
 }
 
-/// The calibration for an estimate: the user's word first, then the recording's, then the data sheets'.
+/// The calibration for an estimate: the user's word first, then the recording's, then what is usual.
 pub(super) fn calibration(
     reader: &Reader,
     selection: &Selection,
@@ -57,7 +57,13 @@ fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
         let source = Source::in_memory("the recording's manifest", "");
         return Ok((Imu::new(&specs.imu, &source)?.noise(), Lidar::new(&specs.lidar, &source)?.noise()));
     }
-    let (imu, lidar) = (find(Kind::Imu, "3dm_gx2")?, find(Kind::Lidar, "utm30lx")?);
-    let (imu_spec, lidar_spec): (ImuSpec, LidarSpec) = (parse(&imu)?, parse(&lidar)?);
-    Ok((Imu::new(&imu_spec, &imu)?.noise(), Lidar::new(&lidar_spec, &lidar)?.noise()))
+    let lidar = find(Kind::Lidar, "utm30lx")?;
+    let lidar_spec: LidarSpec = parse(&lidar)?;
+    Ok((ordinary_imu()?, Lidar::new(&lidar_spec, &lidar)?.noise()))
+}
+
+fn ordinary_imu() -> Result<ImuNoise, SpecError> {
+    let imu = find(Kind::Imu, "unknown")?;
+    let spec: ImuSpec = parse(&imu)?;
+    Ok(Imu::new(&spec, &imu)?.noise())
 }

@@ -104,7 +104,7 @@ pub(super) fn estimate_in(
     origin.manifest.write(&folder.join("manifest.ron"))?;
     let selection = reader.select(&wishes.topics)?;
     let found = calibration(reader, &selection, &wishes.calibration, wishes.body_frame.as_deref())?;
-    notes_on(&selection, &found, wishes, watch);
+    notes_on(&selection, &found, (wishes, origin), watch);
 
     let expected_s = origin.simulation.map(|summary| summary.duration_s);
     let loops = Loops::run((reader, &selection, &found), folder, wishes, expected_s, watch)?;
@@ -251,13 +251,19 @@ fn world_of(manifest: &Manifest, watch: &mut Watch) -> Option<World> {
     built.inspect_err(|error| watch.note(&format!("the cloud is not judged: {error}"))).ok()
 }
 
-fn notes_on(selection: &Selection, found: &FoundCalibration, wishes: &Wishes, watch: &mut Watch) {
+fn notes_on(selection: &Selection, found: &FoundCalibration, (wishes, origin): (&Wishes, &Origin), watch: &mut Watch) {
     selection.notes.iter().for_each(|note| watch.note(note));
     let given = wishes.calibration.head_from_laser.is_some() && wishes.calibration.head_from_imu.is_some();
     if !found.from_recording && !given {
         watch.note(
             "the recording has no /tf_static: lidar and IMU are taken to sit in one place with the same axes; if they do \
              not, say so with --calibration",
+        );
+    }
+    if origin.manifest.specs.is_none() && wishes.calibration.imu.is_none() {
+        watch.note(
+            "nothing tells how noisy the IMU is; an ordinary one is assumed (specs/imus/unknown.ron): where its data sheet is at \
+             hand, say so with --calibration",
         );
     }
 }

@@ -23,7 +23,7 @@ pub(super) fn read_ahead<T>(reader: &Reader, selection: &Selection, take: impl F
         let (ahead, coming) = sync_channel(WAITING);
         let reading = scope.spawn(move || {
             // Whoever takes them may stop before the end.
-            let _ = measurements.by_ref().try_for_each(|measurement| ahead.send(measurement));
+            let _ = measurements.by_ref().all(|measurement| ahead.send(measurement).is_ok());
             measurements.loss().clone()
         });
         let taken = take(&mut coming.into_iter());

@@ -203,7 +203,10 @@ impl Run {
                 intensities: Vec::new(),
             };
             let planar = (self.scanner == Scanner::Plane).then_some(planar);
-            scans.push((start_s + scan_s, Measurement::Lidar(LidarScan { stamp, returns, planar })));
+            scans.push((
+                start_s + scan_s,
+                Measurement::Lidar(LidarScan { stamp, stamped_after: Span::ZERO, returns, planar }),
+            ));
         }
         scans
     }

@@ -107,7 +107,7 @@ pub fn with_returns(stamp: Stamp, planar: PlanarScan) -> LidarScan {
             intensity: *intensity,
         }
     });
-    LidarScan { stamp, returns: returns.collect(), planar: Some(planar) }
+    LidarScan { stamp, stamped_after: Span::ZERO, returns: returns.collect(), planar: Some(planar) }
 }
 
 /// How the head moves: round a circle of 1 m, nodding.
@@ -141,6 +141,15 @@ pub fn record_all(run: RunDescription, samples: i64) -> Vec<u8> {
     }
     writer.finish().unwrap();
     bytes.take()
+}
+
+/// The measurements in the order in which they are read, that of their stamps; of two with the same one the IMU's first.
+pub fn in_order(mut measurements: Vec<Measurement>) -> Vec<Measurement> {
+    measurements.sort_by_key(|measurement| match measurement {
+        Measurement::Imu(sample) => (sample.stamp, 0),
+        Measurement::Lidar(scan) => (scan.stamp, 1),
+    });
+    measurements
 }
 
 /// Records `samples` IMU samples at 100 Hz with scans at 40 Hz between them; the file, and what was written.

@@ -38,11 +38,16 @@ pub(super) struct Sight {
 }
 
 impl Mount {
-    /// As the open loop left it.
-    pub(super) fn new(calibration: &Calibration, lidar: &LidarCorrection, spec: &EstimatorSpec) -> Self {
+    /// As the open loop left it, with the ranges held where nothing tells their offset.
+    pub(super) fn new(
+        calibration: &Calibration,
+        (lidar, ranges_are_held): (&LidarCorrection, bool),
+        spec: &EstimatorSpec,
+    ) -> Self {
         let imu_from_laser = calibration.head_from_imu.inverse() * calibration.head_from_laser;
         let (turn, shift) = spec.extrinsics.sigmas();
-        let sigmas = [spec.surfels.range_offset_sigma_m, turn, turn, turn, shift, shift, shift];
+        let range = if ranges_are_held { 0.0 } else { spec.surfels.range_offset_sigma_m };
+        let sigmas = [range, turn, turn, turn, shift, shift, shift];
         Self {
             head_from_imu: calibration.head_from_imu,
             laser_in_imu: imu_from_laser.translation.vector,
@@ -154,7 +159,7 @@ mod tests {
             },
             lidar: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
         };
-        Mount::new(&calibration, &lidar, &load("default").unwrap())
+        Mount::new(&calibration, (&lidar, false), &load("default").unwrap())
     }
 
     fn map_from_head() -> Pose {

@@ -117,8 +117,8 @@ pub fn register(travelled: Travelled, calibration: &Calibration, spec: &Estimato
     let of_all = &spec.registration;
     let matcher = Matcher::new(&of_all.matching(&spec.matching), &of_all.surfels(&spec.surfels));
     let open = OpenLoop { travelled, spec: of_all, matcher: &matcher };
-    let Travelled { map_from_head, lidar, .. } = travelled;
-    match open.close(Mount::new(calibration, lidar, spec)) {
+    let Travelled { map_from_head, lidar, survey, .. } = travelled;
+    match open.close(Mount::new(calibration, (lidar, survey.ranges_are_held), spec)) {
         Ok((Closed { trajectory, mount }, report)) => {
             let report = RegistrationReport { moved: moved(map_from_head, &trajectory), ..report };
             ClosedLoop { trajectory, lidar: mount.lidar, report }

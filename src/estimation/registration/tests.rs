@@ -278,7 +278,7 @@ fn derivatives_of_a_match_are_those_of_differences() {
     let survey = Survey { sightings: vec![sighting(0), sighting(1)], ..survey };
     let course = Course::new(&open, &covariances, survey.origin, &spec.registration).unwrap();
     let matcher = Matcher::new(&spec.registration.matching(&spec.matching), &spec.registration.surfels(&spec.surfels));
-    let mount = Mount::new(&calibration(), &LidarCorrection::default(), &spec);
+    let mount = Mount::new(&calibration(), (&LidarCorrection::default(), false), &spec);
     let scene = Scene::new(&survey, &course, &mount, &spec.registration);
     let (first_knot, knots) = course.knots();
     let sum = |scene: &Scene| {

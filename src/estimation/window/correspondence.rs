@@ -10,6 +10,8 @@ use rayon::prelude::*;
 
 /// Neighbours are looked for again when a surfel may have moved by this since, m: by less, they hardly change.
 const MOVED_M: f64 = 0.02;
+/// Surfaces match from so many times farther off in a first window that was begun in motion.
+const GROPING: f64 = 3.0;
 /// A normal leans when it does so by more than this multiple of its error.
 const SIGNIFICANT: f64 = 4.0;
 
@@ -153,7 +155,8 @@ impl Window {
         neighbours: &Neighbours,
         iteration: usize,
     ) -> Matches {
-        let gate_m = self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
+        let wider = if self.gropes { GROPING } else { 1.0 };
+        let gate_m = wider * self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, other: &Patch| {
             let patch = &scene[a as usize].patch;

@@ -62,6 +62,8 @@ pub(super) struct Window {
     border: Border,
     stretches: VecDeque<Stretch>,
     start: Start,
+    /// Whether it is the first one, begun in motion: level and biases are guesses, and surfaces match from farther off.
+    gropes: bool,
     /// While the head has not moved yet: what the IMU says at rest.
     rest: Option<Rest>,
     /// Until when it rested, IMU time, s.
@@ -92,6 +94,7 @@ impl Window {
             border,
             stretches: VecDeque::new(),
             start: Start::first(start_u_s, beginning.velocity_sigma),
+            gropes: beginning.rest.is_none(),
             rest: beginning.rest,
             rested_until_s: f64::NEG_INFINITY,
             workspace: Workspace::default(),
@@ -222,6 +225,7 @@ impl Window {
         let oldest = self.stretches.pop_front()?;
         let placed = oldest.surfels.iter().map(|surfel| surfel.place(&self.placing()).patch).collect();
         self.start = Start::held(start_s);
+        self.gropes = false;
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
         Some(placed)

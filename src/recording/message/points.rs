@@ -172,8 +172,8 @@ pub fn decode(message: &[u8]) -> Result<LidarScan, DecodeError> {
         };
         returns.push(LidarReturn { offset, point_in_laser, intensity: intensity.map_or(0.0, number) });
     }
-    let stamp = from_earliest(cloud.stamp, &mut returns);
-    Ok(LidarScan { stamp, returns, planar: None })
+    let stamped_after = from_earliest(&mut returns);
+    Ok(LidarScan { stamp: cloud.stamp - stamped_after, stamped_after, returns, planar: None })
 }
 
 /// The name of the field that tells a point's time, `None` where the points carry none.

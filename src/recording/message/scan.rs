@@ -97,8 +97,8 @@ impl Projector {
                 });
             }
         }
-        let stamp = if step_s < 0.0 { from_earliest(stamp, &mut returns) } else { stamp };
-        LidarScan { stamp, returns, planar: Some(planar) }
+        let stamped_after = if step_s < 0.0 { from_earliest(&mut returns) } else { Span::ZERO };
+        LidarScan { stamp: stamp - stamped_after, stamped_after, returns, planar: Some(planar) }
     }
 
     fn prepare(&mut self, planar: &PlanarScan) {
@@ -114,8 +114,9 @@ impl Projector {
     }
 }
 
-/// Puts returns in the order in which they were fired, offsets counted from the earliest; gives that one's stamp.
-pub fn from_earliest(stamp: Stamp, returns: &mut [LidarReturn]) -> Stamp {
+/// Puts returns in the order in which they were fired, offsets counted from the earliest where that was fired before the
+/// message's stamp: by how much before, or zero.
+pub fn from_earliest(returns: &mut [LidarReturn]) -> Span {
     if !returns.is_sorted_by_key(|r| r.offset) {
         returns.sort_by_key(|r| r.offset);
     }
@@ -125,5 +126,5 @@ pub fn from_earliest(stamp: Stamp, returns: &mut [LidarReturn]) -> Stamp {
             r.offset = r.offset - first;
         }
     }
-    stamp + first
+    Span::ZERO - first
 }

@@ -4,6 +4,7 @@ use super::errors::ScanDraws;
 use super::{Beam, Lidar, LidarErrors, Sweep};
 use crate::geometry::Vector;
 use crate::measurement::{LidarReturn, LidarScan, PlanarScan};
+use crate::time::Span;
 
 impl Lidar {
     /// The scan that the sensor makes of what its rays met.
@@ -20,7 +21,7 @@ impl Lidar {
                 scan.intensities.push(intensity);
             }
         }
-        LidarScan { stamp: sweep.firing.stamp, returns, planar }
+        LidarScan { stamp: sweep.firing.stamp, stamped_after: Span::ZERO, returns, planar }
     }
 
     /// Appends the returns of a beam; gives range and intensity of its strongest, as REP-117 writes them.

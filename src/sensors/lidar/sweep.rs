@@ -10,7 +10,7 @@ const BEYOND_GLASS_M: f64 = 1e-4;
 
 /// A ray is sought first up to where the one before it ended, and this much further: fraction of the range, and m.
 ///
-/// Rays that follow each other mostly end on one surface, and a search that need not look behind it is a quarter faster.
+/// Rays that follow each other mostly end on one surface, and a search need not look behind it.
 const FURTHER: (f64, f64) = (0.05, 0.1);
 
 /// When a scan is taken.

@@ -92,7 +92,12 @@ mod tests {
         let clock = TrueClock::told(vec![(at(0), 3e-3), (at(2_000_000), 5e-3)]);
         let latency = Disturbance { latency_ms: -2.0, noise_ms: 0.0 };
         let timing = Timing::new(latency, &clock, &[at(1_000_000)], Seed(1));
-        let scan = Measurement::Lidar(LidarScan { stamp: at(1_000_000), returns: Vec::new(), planar: None });
+        let scan = Measurement::Lidar(LidarScan {
+            stamp: at(1_000_000),
+            stamped_after: Span::ZERO,
+            returns: Vec::new(),
+            planar: None,
+        });
         let seen = stamps(&timing, vec![imu(1_004_000), scan]);
         // 1.004 s is 4 us of drift late for the offset: 4 ms + 4 us are taken away.
         assert!((seen[0] - at(998_000)).seconds().abs() < 5e-6, "{:?}", seen[0]);
