@@ -1,7 +1,7 @@
 use crate::time::Stamp;
 
 /// Intervals from which the rhythm is learned.
-const LEARNING: usize = 200;
+const LEARNING: usize = 1000;
 /// The share of missing messages that is passed over: stamps are rounded, and a run may end within a turn.
 const PASSED_OVER: f64 = 0.005;
 
@@ -38,12 +38,14 @@ impl Cadence {
         told.then(|| format!("{missing:.0} of about {expected:.0} {what} are missing"))
     }
 
-    /// The mean of the intervals that are no gaps, as the median tells gaps.
+    /// The mean of the intervals that are no gaps, as the median tells gaps, and how far jitter spreads the others.
     fn period_s(&self) -> Option<f64> {
         let mut sorted = self.intervals_s.clone();
         sorted.sort_unstable_by(f64::total_cmp);
-        let median = *sorted.get(sorted.len() / 2)?;
-        let whole: Vec<f64> = sorted.into_iter().filter(|s| *s < 1.5 * median).collect();
+        let quarter = |quarters: usize| sorted.get(sorted.len() * quarters / 4).copied();
+        let (median, spread) = (quarter(2)?, quarter(3)? - quarter(1)?);
+        let gap = median + (0.5 * median).max(4.0 * spread);
+        let whole: Vec<f64> = sorted.into_iter().filter(|s| *s < gap).collect();
         Some(whole.iter().sum::<f64>() / whole.len() as f64).filter(|period| *period > 0.0)
     }
 }
@@ -66,5 +68,9 @@ mod tests {
         // 30 Hz in whole milliseconds: 33, 33, 34.
         assert_eq!(missing((0..4000).map(|k| k * 1000 / 30)), None);
         assert_eq!(missing([5_i64].into_iter()), None);
+        // Jitter of more than a period, in the order of stamps.
+        let mut jittered: Vec<i64> = (0..4000).map(|k| k * 5 + (k * 7919 % 97) * 8 / 97).collect();
+        jittered.sort_unstable();
+        assert_eq!(missing(jittered.into_iter()), None);
     }
 }
