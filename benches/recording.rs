@@ -29,7 +29,7 @@ fn run() -> RunDescription {
     let lidar = LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 };
     let (head_from_laser, head_from_imu) = (Pose::identity(), Pose::identity());
     let calibration = Calibration { head_from_laser, head_from_imu, imu, lidar };
-    RunDescription { calibration, imu_rate_hz: 100.0, manifest: String::new(), truth_tf: false }
+    RunDescription { calibration, imu_rate_hz: 100.0, base_imu: None, manifest: String::new(), truth_tf: false }
 }
 
 fn normal(stream: &mut Stream) -> f64 {

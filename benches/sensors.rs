@@ -81,6 +81,7 @@ fn whole(criterion: &mut Criterion) {
     let run = RunDescription {
         calibration: office.calibration(),
         imu_rate_hz: office.imu().spec().rate_hz,
+        base_imu: None,
         manifest: String::new(),
         truth_tf: false,
     };

@@ -24,6 +24,7 @@
 //! let run = RunDescription {
 //!     calibration: simulation.calibration(),
 //!     imu_rate_hz: 100.0,
+//!     base_imu: None,
 //!     manifest: zsim::spec::to_text(&scenario)?,
 //!     truth_tf: false,
 //! };

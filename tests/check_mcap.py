@@ -20,6 +20,7 @@ TYPES = {
     "/scan": "sensor_msgs/msg/LaserScan",
     "/points": "sensor_msgs/msg/PointCloud2",
     "/imu/data_raw": "sensor_msgs/msg/Imu",
+    "/base/imu": "sensor_msgs/msg/Imu",
     "/tf_static": "tf2_msgs/msg/TFMessage",
     "/ground_truth/odom": "nav_msgs/msg/Odometry",
     "/ground_truth/pose": "geometry_msgs/msg/PoseStamped",
@@ -53,9 +54,19 @@ def points_on_scan(scan, cloud):
     return len(rows) == len(back) and near and np.abs(rows["t"] - back * scan.time_increment * 1e9).max() < 10
 
 
+def roots(parents, frames):
+    """The frames that those of `frames` hang from."""
+    found = set()
+    for frame in frames:
+        while frame in parents:
+            frame = parents[frame]
+        found.add(frame)
+    return found
+
+
 def main(path):
     store = get_typestore(Stores.ROS2_HUMBLE)
-    wrong, counts, last, qos = set(), {}, {}, {}
+    wrong, counts, last, qos, parents, frames = set(), {}, {}, {}, {}, set()
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         if reader.get_header().profile != "ros2":
@@ -75,6 +86,10 @@ def main(path):
                 wrong.add(f"{topic}: the definition in the file decodes to something else")
             if bytes(store.serialize_cdr(own, schema.name))[4:] != message.data[4:]:
                 wrong.add(f"{topic}: rosbags writes other bytes")
+            if not topic.startswith("/ground_truth/") and topic != "/tf_static":
+                frames.add(decoded.header.frame_id)
+            if topic == "/tf_static":
+                parents |= {link.child_frame_id: link.header.frame_id for link in decoded.transforms}
             if topic == "/scan":
                 scan = decoded
             if topic == "/points" and not points_on_scan(scan, decoded):
@@ -83,6 +98,8 @@ def main(path):
     wrong |= {f"{topic}: no quality of service" for topic in counts if "durability" not in qos[topic]}
     if "durability: 1" not in qos.get("/tf_static", ""):
         wrong.add("/tf_static is not transient_local")
+    if roots(parents, frames) != {"head"}:
+        wrong.add(f"frames of measurements hang from {sorted(roots(parents, frames))}, not all from head")
     if summary is None or summary.statistics.message_count != sum(counts.values()):
         wrong.add("the summary counts other messages")
     if wrong:

@@ -33,6 +33,7 @@ impl Session {
         let run = RunDescription {
             calibration: calibration.clone(),
             imu_rate_hz: 100.0,
+            base_imu: None,
             manifest: String::new(),
             truth_tf: false,
         };

@@ -17,6 +17,7 @@ fn recorded(folder: &Path) -> Simulation {
     let run = RunDescription {
         calibration: simulation.calibration(),
         imu_rate_hz: 100.0,
+        base_imu: None,
         manifest: String::new(),
         truth_tf: false,
     };

@@ -6,11 +6,17 @@ mod recordings;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use zsim::geometry::Pose;
+use zsim::recording::{BaseImuDescription, RunDescription};
 
 /// A recording with a message of every topic in it.
 fn recording_in(folder: &Path) -> PathBuf {
     let path = folder.join("run.mcap");
-    std::fs::write(&path, recordings::record_all(recordings::run(), 200)).unwrap();
+    let run = recordings::run();
+    let head_from_base = Pose::translation(0.0, 0.0, -0.16);
+    let imu = BaseImuDescription { noise: run.calibration.imu, rate_hz: 100.0, head_from_base };
+    let run = RunDescription { base_imu: Some(imu), ..run };
+    std::fs::write(&path, recordings::record_all(run, 200)).unwrap();
     path
 }
 

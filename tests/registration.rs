@@ -69,7 +69,7 @@ fn through(scene: &str, duration_s: f64) -> (OpenLoop, Trajectory, Calibration) 
     let path = folder.path().join("recording.mcap");
     let calibration = simulation.calibration();
     let manifest = zsim::spec::to_text(&scenario).unwrap();
-    let run = RunDescription { calibration, imu_rate_hz: 100.0, manifest, truth_tf: false };
+    let run = RunDescription { calibration, imu_rate_hz: 100.0, base_imu: None, manifest, truth_tf: false };
     let mut writer = Writer::create(&path, run).unwrap();
     simulation.run(&mut writer, &mut |_| ()).unwrap();
     writer.finish().unwrap();

@@ -74,6 +74,7 @@ fn run(lidar: &str, imu: &str, clock: &str) {
         carrier: &[],
         lidar: &lidar_model,
         imu: &imu_model,
+        base_imu: None,
         clocks: Clocks::new(&parse(&of_clock).unwrap(), &of_clock, EPOCH).unwrap(),
         head_from_laser: Pose::identity(),
         head_from_imu: Pose::identity(),

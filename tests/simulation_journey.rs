@@ -13,6 +13,7 @@ use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 #[derive(Default, PartialEq, Debug)]
 struct Kept {
     samples: Vec<ImuSample>,
+    base_samples: Vec<ImuSample>,
     scans: Vec<LidarScan>,
     truth: Vec<TruthSample>,
     clocks: Vec<ClockTruth>,
@@ -21,6 +22,11 @@ struct Kept {
 impl Sink for Kept {
     fn imu(&mut self, _: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
         self.samples.push(*sample);
+        Ok(())
+    }
+
+    fn base_imu(&mut self, _: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
+        self.base_samples.push(*sample);
         Ok(())
     }
 
@@ -142,6 +148,36 @@ fn the_ideal_imu_integrates_to_the_head_on_its_spring() {
     let end = imu(16_000).world_from_body;
     assert!((position - end.translation.vector).norm() < 2e-3, "{}", position - end.translation.vector);
     assert!(rotation.angle_to(&end.rotation).to_degrees() < 0.02);
+}
+
+#[test]
+fn an_imu_on_the_base_says_how_the_base_moves_and_changes_nothing_else() {
+    let with = Scenario { base_imu: Some("ideal_1khz".to_owned()), ..exact_office(6.0) };
+    let mut with = kept(&Simulation::prepare(&with).unwrap());
+    let said = std::mem::take(&mut with.base_samples);
+    assert!(with == kept(&Simulation::prepare(&exact_office(6.0)).unwrap()));
+    // Truth is of each whole millisecond, a sample of that which follows it.
+    assert!(said.len() + 2 >= with.truth.len() && said.len() > 5900, "{}", said.len());
+    for (sample, pair) in said.iter().zip(with.truth.windows(2)) {
+        let [from, to] = [&pair[0].base, &pair[1].base];
+        let turning = (from.angular_velocity_in_body() + to.angular_velocity_in_body()) * 0.5;
+        let force = (from.specific_force_in_body() + to.specific_force_in_body()) * 0.5;
+        assert!((sample.angular_velocity_rad_per_s - turning).norm() < 1e-3, "{sample:?}");
+        assert!((sample.specific_force_m_per_s2 - force).norm() < 0.02, "{sample:?}");
+    }
+}
+
+#[test]
+fn two_imus_alike_err_apart() {
+    let like = Scenario { base_imu: Some("3dm_gx2".to_owned()), duration_s: 3.0, ..Scenario::in_scene("office") };
+    let rigid = Scenario { head: "rigid".to_owned(), motion: "stand".to_owned(), ..like };
+    let kept = kept(&Simulation::prepare(&rigid).unwrap());
+    let mean = |samples: &[ImuSample]| {
+        samples.iter().map(|sample| sample.angular_velocity_rad_per_s).sum::<Vector>() / samples.len() as f64
+    };
+    // At rest the mean is the bias, 0.2 degrees/s (3.5e-3 rad/s) an axis when switched on, to 5.2e-4 / sqrt(3 s) rad/s.
+    let apart = mean(&kept.samples) - mean(&kept.base_samples);
+    assert!((1e-3..2e-2).contains(&apart.norm()), "{apart}");
 }
 
 #[test]

@@ -41,6 +41,9 @@ pub(super) struct ScenarioArguments {
     /// The IMU, under specs/imus/ [default: 3dm_gx2]
     #[arg(long, value_name = "NAME|FILE")]
     imu: Option<String>,
+    /// A second IMU, under specs/imus/, on the base (the handle, the vehicle): for `zsim base` [default: none]
+    #[arg(long, value_name = "NAME|FILE")]
+    base_imu: Option<String>,
     /// The clocks, under specs/clocks/ [default: drifting]
     #[arg(long, value_name = "NAME|FILE")]
     clock: Option<String>,
@@ -66,6 +69,7 @@ impl ScenarioArguments {
             lidar: or(&self.lidar, default.lidar),
             imu: or(&self.imu, default.imu),
             clock: or(&self.clock, default.clock),
+            base_imu: self.base_imu.clone(),
             route: self.route.clone(),
             duration_s: self.duration.unwrap_or(default.duration_s),
             seed: self.seed.map_or(default.seed, Seed),

@@ -4,23 +4,26 @@ use super::arguments::{Global, OutArguments};
 use super::{End, output};
 use anyhow::Context;
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim::dynamics::{self, HeadModel};
+use zsim::estimation::BaseEstimate;
 use zsim::evaluation::{Errors, Pairs};
-use zsim::geometry::Trajectory;
-use zsim::recording::{Reader, Truth, read_tum, write_tum};
+use zsim::geometry::{Trajectory, Vector};
+use zsim::recording::{Loss, Reader, Truth, read_tum, write_tum};
 use zsim::report;
+use zsim::study;
 
 /// Tell where the base (the handle, the vehicle) was, from the trajectory of the head on its spring
 ///
 /// Twice: as if the head were screwed to the base as it rests (base_rigid_link.tum), and by the spring's own law: the base
 /// that pushes the head as it is seen to accelerate (base_spring.tum). The trajectory, a TUM file, has z up and is of the
-/// head's frame, at an IMU's rate or more, as estimates and the truth of zsim are.
+/// head's frame, at an IMU's rate or more, as estimates and the truth of zsim are. With a recording of an IMU on the base a
+/// third time: that IMU and the spring's law, smoothed together (base_imu.tum).
 #[derive(Args)]
-#[command(
-    after_help = "Example:\n  zsim base results/office/closed_loop.tum --head handheld --truth results/office/recording.mcap"
-)]
+#[command(after_help = "Examples:\n  zsim base results/office/closed_loop.tum --head handheld --truth \
+                        results/office/recording.mcap\n  zsim base results/office/closed_loop.tum --head handheld \
+                        --base-imu results/office/recording.mcap")]
 pub(super) struct Arguments {
     /// The head's trajectory
     #[arg(value_name = "HEAD.tum")]
@@ -31,8 +34,26 @@ pub(super) struct Arguments {
     /// The base's true trajectory: a TUM file, or a recording that has it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
+    /// A recording of an IMU on the base, as `zsim simulate --base-imu` makes them; where /tf_static has it not in the frame
+    /// base, it is at the base's origin and along its axes
+    #[arg(long, value_name = "FILE.mcap")]
+    base_imu: Option<PathBuf>,
+    /// The topic of that IMU [default: /base/imu]
+    #[arg(long, value_name = "TOPIC", requires = "base_imu")]
+    base_imu_topic: Option<String>,
+    /// How much later that IMU stamps an instant than the trajectory does, to a millisecond or two [default: found by how both
+    /// turn, and followed as it drifts]
+    #[arg(long, value_name = "MS", requires = "base_imu", allow_hyphen_values = true)]
+    clock_offset_ms: Option<f64>,
     #[command(flatten)]
     out: OutArguments,
+}
+
+/// One of the ways to tell the base.
+struct Way {
+    key: &'static str,
+    name: &'static str,
+    base: Trajectory,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
@@ -40,17 +61,57 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let head = HeadModel::new(&head, &source)?;
     let seen = read_tum(&arguments.trajectory)?;
     let truth = arguments.truth.as_deref().map(true_base).transpose()?;
-    let ways = [
-        ("rigid_link", "rigid link", Trajectory::from_poses(head.base_on_rigid_link(&seen))?),
-        ("spring", "spring's law", Trajectory::from_poses(head.base_under(&seen)?)?),
-    ];
+    let by_spring = match &arguments.base_imu {
+        Some(_) => study::base_by_law(&head, &seen)?,
+        None => head.base_under(&seen)?,
+    };
+    let by_imu = arguments.base_imu.as_deref().map(|recording| by_imu(recording, arguments, &head, &seen));
+    let by_imu = by_imu.transpose()?;
 
+    let way = |key, name, base| Way { key, name, base };
+    let mut ways = vec![
+        way("rigid_link", "rigid link", Trajectory::from_poses(head.base_on_rigid_link(&seen))?),
+        way("spring", "spring's law", Trajectory::from_poses(by_spring)?),
+    ];
+    let (estimate, loss) = by_imu.unzip();
+    ways.extend(estimate.as_ref().map(|imu| way("imu", "with the base's IMU", imu.trajectory.clone())));
     let wanted = arguments.out.out.clone().unwrap_or_else(|| PathBuf::from("results/base"));
     let folder = output::folder(&wanted, arguments.out.force)?;
+    let (mut words, mut figures) = tell(&ways, truth.as_ref(), &folder)?;
+    if let Some(imu) = &estimate {
+        let (offset_ms, sigma_ms) = (imu.clock_offset_s * 1e3, imu.clock_offset_sigma_s * 1e3);
+        let tilt_deg = imu.up_in_world.angle(&Vector::z()).to_degrees();
+        words += &format!("\nclock of the base's IMU ahead by {offset_ms:.2} ms at the end (sigma {sigma_ms:.2} ms)");
+        words += &format!("\nthe trajectory's world leans by {tilt_deg:.2}\u{b0}\n");
+        figures["imu"]["tilt_deg"] = json!(tilt_deg);
+        figures["imu"]["clock_offset_ms"] = json!(offset_ms);
+        figures["imu"]["clock_offset_sigma_ms"] = json!(sigma_ms);
+    }
+    output::tell(global, &words, figures, Some(&folder))?;
+    let Some(loss) = loss.filter(|loss| !loss.is_none()) else { return Ok(End::Done) };
+    loss.sentences().iter().for_each(|loss| eprintln!("loss: {loss}"));
+    Ok(End::WithLoss)
+}
+
+fn by_imu(
+    recording: &Path,
+    arguments: &Arguments,
+    head: &HeadModel,
+    seen: &Trajectory,
+) -> anyhow::Result<(BaseEstimate, Loss)> {
+    let reader = Reader::open(recording)?;
+    let record = reader.base_imu(arguments.base_imu_topic.as_deref())?;
+    let offset_s = arguments.clock_offset_ms.map(|ms| ms * 1e-3);
+    let estimate = study::base_by_imu(head, seen, (&reader, &record), offset_s);
+    Ok((estimate.with_context(|| recording.display().to_string())?, record.loss))
+}
+
+/// Writes the trajectories to `folder`; their table, and their figures.
+fn tell(ways: &[Way], truth: Option<&Trajectory>, folder: &Path) -> anyhow::Result<(String, Value)> {
     let (mut rows, mut figures) = (Vec::new(), json!({}));
-    for (key, name, base) in &ways {
+    for Way { key, name, base } in ways {
         write_tum(&folder.join(format!("base_{key}.tum")), base)?;
-        let errors = truth.as_ref().map(|truth| errors(base, truth)).transpose()?;
+        let errors = truth.filter(|_| !base.is_empty()).map(|truth| errors(base, truth)).transpose()?;
         let told = errors.as_ref().map(|e| (e.position_rmse_m(), e.rotation_rmse_rad().to_degrees()));
         figures[*key] = json!({
             "poses": base.len(),
@@ -63,8 +124,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         rows.push(vec![(*name).to_owned(), base.len().to_string(), position, rotation]);
     }
     let heading = ["base by", "poses", "position RMSE (mm)", "rotation RMSE (\u{b0})"];
-    output::tell(global, &report::table(&heading, &rows, true), figures, Some(&folder))?;
-    Ok(End::Done)
+    Ok((report::table(&heading, &rows, true), figures))
 }
 
 /// Errors after rigid alignment.

@@ -26,11 +26,11 @@ impl HeadModel {
     /// The poses of the base by the linkage's own law: at each of the head's poses but the first and the last, the base
     /// that pushes the head as it is seen to accelerate. The head's poses are about evenly spaced, as an estimator's or the
     /// truth's are; its world has z up. A hand that holds the head is not known of, and what moves along with a spring is
-    /// taken to move as with a base at rest.
+    /// taken to move as with a base at rest. Where no base explains what the head does, as where it shakes faster than its
+    /// poses follow each other, none is told.
     ///
     /// # Errors
-    /// When a motor or a joint holds the head, whose pushes its motion does not tell; when the linkage's law fails, or no base
-    /// explains what the head does.
+    /// When a motor or a joint holds the head, whose pushes its motion does not tell; when no base explains anything.
     pub fn base_under(&self, world_from_head: &Trajectory) -> Result<Vec<(Stamp, Pose)>, DynamicsError> {
         let sprung = match &self.linkage {
             Linkage::Rigid { .. } => return Ok(self.base_on_rigid_link(world_from_head)),
@@ -40,13 +40,16 @@ impl HeadModel {
         };
         let mut under = Under::new(&self.body, sprung);
         let (stamps, poses) = (world_from_head.stamps(), world_from_head.poses());
-        let inner = 1..poses.len().saturating_sub(1);
-        let base_at = |k: usize| {
+        let mut bases = Vec::new();
+        for k in 1..poses.len().saturating_sub(1) {
             let steps_s = [stamps[k].seconds_since(stamps[k - 1]), stamps[k + 1].seconds_since(stamps[k])];
             let seen = Seen::between([&poses[k - 1], &poses[k], &poses[k + 1]], steps_s, &self.body);
-            Ok((stamps[k], under.follow(&seen, steps_s[0], stamps[k].seconds_since(stamps[0]))?))
-        };
-        inner.map(base_at).collect()
+            bases.extend(under.follow(&seen, steps_s[0]).map(|base| (stamps[k], base)));
+        }
+        if bases.is_empty() && poses.len() > 2 {
+            return Err(DynamicsError::Diverged { t_s: 0.0, what: "no base explains how the head moves".to_owned() });
+        }
+        Ok(bases)
     }
 }
 
@@ -82,31 +85,41 @@ struct Under<'a> {
     body: &'a Body,
     sprung: &'a Sprung,
     state: LawState,
-    base: Option<Pose>,
+    /// Head and base at the pose before, where that told its base.
+    before: Option<[Pose; 2]>,
 }
 
 impl<'a> Under<'a> {
     fn new(body: &'a Body, sprung: &'a Sprung) -> Self {
-        Self { body, sprung, state: sprung.law.state(), base: None }
+        Self { body, sprung, state: sprung.law.state(), before: None }
     }
 
     /// The base under the head as it is `seen`, `step_s` after the pose before.
-    fn follow(&mut self, seen: &Seen, step_s: f64, t_s: f64) -> Result<Pose, DynamicsError> {
-        let start = self.base.unwrap_or_else(|| seen.pose * self.sprung.rest.inverse());
-        let before = self.base;
+    fn follow(&mut self, seen: &Seen, step_s: f64) -> Option<Pose> {
+        let before = self.before.take();
+        // Sought first where it would be, had the spring kept its shape; else where the head rests on it.
+        let kept = before.map(|[head, base]| seen.pose * (head.inverse() * base));
+        let rest = seen.pose * self.sprung.rest.inverse();
+        let base_before = before.map(|[_, base]| base);
+        let starts = kept.into_iter().chain([rest]);
+        let base = starts.into_iter().find_map(|start| self.sought(seen, start, base_before.as_ref(), step_s))?;
+        self.before = Some([seen.pose, base]);
+        Some(base)
+    }
+
+    /// The base that explains what is `seen`, by Newton's steps from `start`; `None` where they do not settle.
+    fn sought(&mut self, seen: &Seen, start: Pose, before: Option<&Pose>, step_s: f64) -> Option<Pose> {
         let mut base = start;
         for _ in 0..MOST_STEPS {
-            let missing = self.missing(seen, &base, before.as_ref(), step_s)?;
-            let slope = self.slope(seen, &base, before.as_ref(), step_s)?;
-            let step = slope.lu().solve(&missing).filter(|step| step.iter().all(|x| x.is_finite()));
-            let Some(step) = step else { break };
+            let missing = self.missing(seen, &base, before, step_s).ok()?;
+            let slope = self.slope(seen, &base, before, step_s).ok()?;
+            let step = slope.lu().solve(&missing).filter(|step| step.iter().all(|x| x.is_finite()))?;
             base = displaced(&base, &-step);
             if step.amax() < SETTLED {
-                self.base = Some(base);
-                return Ok(base);
+                return Some(base);
             }
         }
-        Err(DynamicsError::Diverged { t_s, what: "no base explains how the head moves".to_owned() })
+        None
     }
 
     /// The wrench about the head's centre of mass that its motion asks for and the linkage does not give.

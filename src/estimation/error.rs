@@ -19,6 +19,9 @@ pub enum EstimationError {
     /// What makes no map, or maps that cannot be put together.
     #[error("map: {0}")]
     Map(String),
+    /// A base that nothing can be said of.
+    #[error("base: {0}")]
+    Base(String),
     /// The head, or another map, is not where in the map it was said to be.
     #[error(
         "not found in the map: {0}; it is looked for within a metre and twenty degrees of a start, which `--start x,y,z,yaw` \

@@ -14,6 +14,7 @@
 //! 5. The oldest stretch leaves: its poses are final, its surfels may become a fixed view.
 //! 6. Behind the open loop, [`register`] lays all that was seen on what was seen of it at other times.
 //! 7. Beams become a cloud by the trajectory; [`CloudFilter`] tells which of them are no surface.
+//! 8. Where the base was that carries the head, an IMU on it tells beside the head's trajectory: [`smooth_base`].
 //!
 //! # The problem
 //!
@@ -51,6 +52,7 @@
 //!   the height, by decimetres where the carrier climbs meanwhile.
 //! - Gravity's direction is unknown rather than the map's level: views once frozen need not be turned when it is learnt.
 
+mod base;
 mod border;
 mod clock;
 mod cloud;
@@ -79,6 +81,7 @@ mod views;
 mod whereabouts;
 mod window;
 
+pub use base::{BaseEstimate, BaseFix, BaseImu, FixSigmas, smooth_base};
 use clock::Clock;
 pub use cloud::{CloudFilter, Fate, Hit, point_sigma_m};
 pub use error::{EstimationError, Warning, WarningKind};

@@ -34,6 +34,14 @@ pub trait Sink {
     /// When the sink cannot keep it.
     fn imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError>;
 
+    /// Takes a sample of the base's IMU, in that IMU's frame; a sink that has no use for it lets it pass.
+    ///
+    /// # Errors
+    /// When the sink cannot keep it.
+    fn base_imu(&mut self, _arrival: Stamp, _sample: &ImuSample) -> Result<(), SinkError> {
+        Ok(())
+    }
+
     /// Takes a lidar scan.
     ///
     /// # Errors

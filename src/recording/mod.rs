@@ -20,6 +20,7 @@
 //! [`TumWriter`], [`read_tum`] keep trajectories, [`PlyWriter`], [`PlyReader`] and [`LasWriter`] clouds,
 //! [`write_surfel_map`] and [`read_surfel_map`] maps, and [`write_result`] an estimate as a recording for viewers.
 
+mod base_imu;
 mod cdr;
 mod cloud;
 mod container;
@@ -44,6 +45,7 @@ mod truth;
 mod tum;
 mod writer;
 
+pub use base_imu::BaseImuRecord;
 pub use cloud::CloudPoint;
 pub use error::RecordingError;
 pub use extrinsics::FoundCalibration;
@@ -58,4 +60,4 @@ pub use result::write_result;
 pub use selection::{Preference, Selection};
 pub use truth::{Truth, Truths};
 pub use tum::{TumWriter, parse_tum, read_tum, write_tum};
-pub use writer::{RunDescription, Writer};
+pub use writer::{BaseImuDescription, RunDescription, Writer};

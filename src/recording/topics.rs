@@ -8,6 +8,10 @@ pub const LASER: &str = "laser";
 pub const IMU: &str = "imu_link";
 /// Frame of the rigid body that carries both.
 pub const HEAD: &str = "head";
+/// Frame of the body that carries the head on its spring.
+pub const BASE: &str = "base";
+/// Frame of the base's IMU.
+pub const BASE_IMU: &str = "base_imu";
 /// Frame of the world as an estimate has it.
 pub const MAP: &str = "map";
 /// Frame of the true world.
@@ -27,6 +31,8 @@ pub enum Topic {
     Points,
     /// `/imu/data_raw`.
     Imu,
+    /// `/base/imu`.
+    BaseImu,
     /// `/tf_static`.
     TfStatic,
     /// `/tf`.
@@ -49,7 +55,7 @@ pub enum Topic {
 
 impl Topic {
     /// How many topics there are.
-    pub const COUNT: usize = 12;
+    pub const COUNT: usize = 13;
 
     /// The topic's name.
     pub fn name(self) -> &'static str {
@@ -57,6 +63,7 @@ impl Topic {
             Self::Scan => "/scan",
             Self::Points => "/points",
             Self::Imu => "/imu/data_raw",
+            Self::BaseImu => "/base/imu",
             Self::TfStatic => "/tf_static",
             Self::Tf => "/tf",
             Self::TruthOdometry => "/ground_truth/odom",
@@ -74,7 +81,7 @@ impl Topic {
         match self {
             Self::Scan => MessageType::LaserScan,
             Self::Points | Self::Cloud => MessageType::PointCloud2,
-            Self::Imu => MessageType::Imu,
+            Self::Imu | Self::BaseImu => MessageType::Imu,
             Self::TfStatic | Self::Tf => MessageType::Transforms,
             Self::TruthOdometry => MessageType::Odometry,
             Self::TruthPose | Self::TruthBase => MessageType::PoseStamped,

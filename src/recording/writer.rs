@@ -1,7 +1,7 @@
 //! The recording of a simulated run.
 
 use crate::geometry::Pose;
-use crate::measurement::{Calibration, ImuSample, LidarScan, Sink, SinkError};
+use crate::measurement::{Calibration, ImuNoise, ImuSample, LidarScan, Sink, SinkError};
 use crate::recording::RecordingError;
 use crate::recording::message::clock::{self, Reading};
 use crate::recording::message::imu::Variances;
@@ -18,6 +18,18 @@ use std::path::Path;
 /// Time between messages of `/ground_truth/odom` and `/tf`: 100 a second.
 const ODOMETRY_PERIOD: Span = Span::from_nanos(10_000_000);
 
+/// The IMU on the base, at its origin and along its axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BaseImuDescription {
+    /// Its noise.
+    pub noise: ImuNoise,
+    /// Its rate, Hz.
+    pub rate_hz: f64,
+    /// Where the base is when nothing moves. `/tf_static` says this of it, as a robot's description does of a joint without
+    /// an encoder: where the spring has it since, nobody measures.
+    pub head_from_base: Pose,
+}
+
 /// What a recording says of the run beside its measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunDescription {
@@ -25,6 +37,8 @@ pub struct RunDescription {
     pub calibration: Calibration,
     /// Rate of the IMU, Hz.
     pub imu_rate_hz: f64,
+    /// The base's IMU, where it has one.
+    pub base_imu: Option<BaseImuDescription>,
     /// The run's manifest, kept under the name `zsim`, key `manifest`.
     pub manifest: String,
     /// Whether `/tf` shows the true head in `map`, for looking; an estimate of one's own would contradict it.
@@ -39,6 +53,7 @@ pub struct Writer {
     spool: Spool,
     run: RunDescription,
     variances: Variances,
+    base_variances: Variances,
     began: bool,
     next_odometry: Stamp,
 }
@@ -62,8 +77,12 @@ impl Writer {
         let version = ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
         let metadata = BTreeMap::from([("manifest".to_owned(), run.manifest.clone()), version]);
         let variances = Variances::of(&run.calibration.imu, run.imu_rate_hz);
+        // Zeros, where nothing is known of it: that is how `sensor_msgs/Imu` says so.
+        let unknown = Variances { gyro: 0.0, accel: 0.0 };
+        let base_variances = run.base_imu.map_or(unknown, |imu| Variances::of(&imu.noise, imu.rate_hz));
         let next_odometry = Stamp::from_nanos(i64::MIN);
-        Ok(Self { spool: Spool::new(file, metadata)?, run, variances, began: false, next_odometry })
+        let spool = Spool::new(file, metadata)?;
+        Ok(Self { spool, run, variances, base_variances, began: false, next_odometry })
     }
 
     /// Writes what is left, then the summary and the index.
@@ -80,15 +99,19 @@ impl Writer {
             return Ok(());
         }
         self.began = true;
-        let in_head = |child: &str, parent_from_child: Pose| Transform {
-            parent: topics::HEAD.to_owned(),
+        let within = |parent: &str, child: &str, parent_from_child: Pose| Transform {
+            parent: parent.to_owned(),
             child: child.to_owned(),
             parent_from_child,
         };
-        let sensors = [
-            in_head(topics::LASER, self.run.calibration.head_from_laser),
-            in_head(topics::IMU, self.run.calibration.head_from_imu),
+        let mut sensors = vec![
+            within(topics::HEAD, topics::LASER, self.run.calibration.head_from_laser),
+            within(topics::HEAD, topics::IMU, self.run.calibration.head_from_imu),
         ];
+        if let Some(imu) = &self.run.base_imu {
+            sensors.push(within(topics::HEAD, topics::BASE, imu.head_from_base));
+            sensors.push(within(topics::BASE, topics::BASE_IMU, Pose::identity()));
+        }
         self.spool.message(Topic::TfStatic, now, |out| transforms::encode(out, now, &sensors))
     }
 
@@ -131,6 +154,12 @@ impl Writer {
         self.spool.message(Topic::Imu, arrival, |out| imu::encode(out, topics::IMU, sample, &variances))
     }
 
+    fn write_base_imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), RecordingError> {
+        self.begin(arrival)?;
+        let variances = self.base_variances;
+        self.spool.message(Topic::BaseImu, arrival, |out| imu::encode(out, topics::BASE_IMU, sample, &variances))
+    }
+
     fn write_clock(&mut self, now: Stamp, clock: &ClockTruth) -> Result<(), RecordingError> {
         self.begin(now)?;
         let readings = [(topics::LASER, "lidar", clock.lidar_ahead), (topics::IMU, "imu", clock.imu_ahead)];
@@ -145,6 +174,10 @@ impl Writer {
 impl Sink for Writer {
     fn imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
         Ok(self.write_imu(arrival, sample)?)
+    }
+
+    fn base_imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
+        Ok(self.write_base_imu(arrival, sample)?)
     }
 
     fn lidar(&mut self, arrival: Stamp, scan: &LidarScan) -> Result<(), SinkError> {

@@ -6,12 +6,18 @@ use crate::measurement::Sink;
 use crate::time::Stamp;
 use crate::truth::TruthSink;
 
-/// Delivers all events; of one instant truth comes first, then the clocks, the IMU, the lidar.
+/// Delivers all events; of one instant truth comes first, then the clocks, the IMUs, the lidar.
 pub(super) fn deliver<S: Sink + TruthSink + ?Sized>(events: &Events, sink: &mut S) -> Result<(), SimulationError> {
-    let Events { truth, clocks, samples, scans, .. } = events;
-    let mut at = [0_usize; 4];
+    let Events { truth, clocks, samples, base_samples, scans, .. } = events;
+    let mut at = [0_usize; 5];
     loop {
-        let next = [time_of(truth, at[0]), time_of(clocks, at[1]), time_of(samples, at[2]), time_of(scans, at[3])];
+        let next = [
+            time_of(truth, at[0]),
+            time_of(clocks, at[1]),
+            time_of(samples, at[2]),
+            time_of(base_samples, at[3]),
+            time_of(scans, at[4]),
+        ];
         let Some((kind, now)) = earliest(&next) else { return Ok(()) };
         let index = at[kind];
         at[kind] += 1;
@@ -19,6 +25,7 @@ pub(super) fn deliver<S: Sink + TruthSink + ?Sized>(events: &Events, sink: &mut 
             0 => sink.truth(now, &truth[index].1),
             1 => sink.clock(now, &clocks[index].1),
             2 => sink.imu(now, &samples[index].1),
+            3 => sink.base_imu(now, &base_samples[index].1),
             _ => sink.lidar(now, &scans[index].1),
         }
         .map_err(SimulationError::Sink)?;

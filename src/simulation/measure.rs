@@ -1,11 +1,12 @@
 //! What the sensors make of a window of motion.
 
 use super::motion::{STEP_S, Window};
-use super::schedule::{ImuInterval, Schedule};
+use super::schedule::{ImuInterval, Samples, Schedule};
 use super::{Rig, SimulationSummary};
-use crate::geometry::Vector;
-use crate::measurement::{ImuSample, LidarScan};
-use crate::sensors::{Carried, Firing, ImuErrors, LidarErrors, Scenery, Track, mean_motion};
+use crate::geometry::{Pose, Vector};
+use crate::measurement::{ImuNoise, ImuSample, LidarScan};
+use crate::random::Seed;
+use crate::sensors::{Carried, Clock, Firing, Imu, ImuErrors, LidarErrors, Scenery, Track, mean_motion};
 use crate::time::{Span, Stamp};
 use crate::truth::{ClockTruth, TruthSample};
 use rayon::prelude::*;
@@ -17,6 +18,7 @@ pub(super) struct Events {
     pub truth: Vec<(Stamp, TruthSample)>,
     pub clocks: Vec<(Stamp, ClockTruth)>,
     pub samples: Vec<(Stamp, ImuSample)>,
+    pub base_samples: Vec<(Stamp, ImuSample)>,
     pub scans: Vec<(Stamp, LidarScan)>,
     pub until_s: f64,
 }
@@ -26,19 +28,58 @@ pub(super) struct Sensors<'a> {
     rig: &'a Rig<'a>,
     schedule: Schedule,
     lidar_errors: LidarErrors,
-    imu_errors: ImuErrors,
-    limits: (f64, f64),
+    imu: InertialUnit,
+    base_imu: Option<InertialUnit>,
+}
+
+/// An IMU on a body, with what changes in it from sample to sample.
+struct InertialUnit {
+    samples: Samples,
+    errors: ImuErrors,
+    noise: ImuNoise,
+    body_from_imu: Pose,
+}
+
+impl InertialUnit {
+    fn new(imu: &Imu, body_from_imu: Pose, schedule: &Schedule, clock: Clock, seed: Seed) -> Self {
+        let samples = schedule.samples(imu, clock, seed);
+        Self { samples, errors: ImuErrors::new(imu, seed), noise: imu.noise(), body_from_imu }
+    }
+
+    /// Takes the samples that are over by `until_s`, each with the instant at which it is over, s.
+    fn take(&mut self, body: &Track, until_s: f64) -> Vec<(f64, ImuSample)> {
+        self.samples.until(until_s).iter().map(|interval| (interval.to_s, self.sample(body, interval))).collect()
+    }
+
+    fn sample(&mut self, body: &Track, interval: &ImuInterval) -> ImuSample {
+        let at = |t_s: f64| body.kinematics(t_s).of_frame(&self.body_from_imu);
+        let ideal = mean_motion(&at(interval.from_s), &at(interval.to_s), interval.to_s - interval.from_s);
+        let said = self.errors.measure(&ideal);
+        ImuSample {
+            stamp: interval.stamp,
+            angular_velocity_rad_per_s: said.angular_velocity_rad_per_s,
+            specific_force_m_per_s2: said.specific_force_m_per_s2,
+        }
+    }
+
+    /// Whether an axis of the sample is at its limit.
+    fn is_at_limit(&self, sample: &ImuSample) -> bool {
+        let beyond = |v: &Vector, limit: f64| v.amax() >= limit;
+        beyond(&sample.angular_velocity_rad_per_s, self.noise.gyro_limit_rad_per_s)
+            || beyond(&sample.specific_force_m_per_s2, self.noise.accel_limit_m_per_s2)
+    }
 }
 
 impl<'a> Sensors<'a> {
     pub fn new(rig: &'a Rig<'a>) -> Self {
-        let noise = rig.imu.noise();
+        let schedule = Schedule::new(rig);
+        let unit = |imu, body_from_imu, seed| InertialUnit::new(imu, body_from_imu, &schedule, rig.clocks.imu, seed);
         Self {
             rig,
-            schedule: Schedule::new(rig),
             lidar_errors: LidarErrors::new(rig.lidar, rig.seed),
-            imu_errors: ImuErrors::new(rig.imu, rig.seed),
-            limits: (noise.gyro_limit_rad_per_s, noise.accel_limit_m_per_s2),
+            imu: unit(rig.imu, rig.head_from_imu, rig.seed),
+            base_imu: rig.base_imu.map(|imu| unit(imu, Pose::identity(), rig.seed.child("base"))),
+            schedule,
         }
     }
 
@@ -50,12 +91,20 @@ impl<'a> Sensors<'a> {
         until_s: f64,
         summary: &mut SimulationSummary,
     ) -> Events {
-        let samples = self.schedule.samples(until_s);
+        let samples = self.imu.take(head, until_s);
+        let base_samples = self.base_imu.as_mut().map_or_else(Vec::new, |imu| imu.take(base, until_s));
         summary.imu_samples += samples.len() as u64;
+        summary.imu_samples_at_limit +=
+            samples.iter().filter(|(_, sample)| self.imu.is_at_limit(sample)).count() as u64;
+        let arrived = |samples: Vec<(f64, ImuSample)>| {
+            samples.into_iter().map(|(over_s, sample)| (self.rig.true_stamp(over_s), sample)).collect()
+        };
+        let (samples, base_samples) = (arrived(samples), arrived(base_samples));
         Events {
             truth: self.schedule.truths(until_s).iter().map(|at| self.truth(head, base, *at)).collect(),
             clocks: self.schedule.clocks(until_s).iter().map(|t_s| self.clock(*t_s)).collect(),
-            samples: samples.iter().map(|interval| self.sample(head, interval, summary)).collect(),
+            samples,
+            base_samples,
             scans: Vec::new(),
             until_s,
         }
@@ -72,21 +121,9 @@ impl<'a> Sensors<'a> {
         let truth = ClockTruth { lidar_ahead: lidar.ahead(t_s), imu_ahead: imu.ahead(t_s) + delay };
         (self.rig.true_stamp(t_s), truth)
     }
-
-    fn sample(&mut self, head: &Track, interval: &ImuInterval, summary: &mut SimulationSummary) -> (Stamp, ImuSample) {
-        let at = |t_s: f64| head.kinematics(t_s).of_frame(&self.rig.head_from_imu);
-        let ideal = mean_motion(&at(interval.from_s), &at(interval.to_s), interval.to_s - interval.from_s);
-        let said = self.imu_errors.measure(&ideal);
-        let beyond = |v: &Vector, limit: f64| v.amax() >= limit;
-        let (rate, force) = (said.angular_velocity_rad_per_s, said.specific_force_m_per_s2);
-        summary.imu_samples_at_limit += u64::from(beyond(&rate, self.limits.0) || beyond(&force, self.limits.1));
-        let sample =
-            ImuSample { stamp: interval.stamp, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force };
-        (self.rig.true_stamp(interval.to_s), sample)
-    }
 }
 
-/// Takes all samples that are over by the end of `window`, by sensors that differ in the IMU and the lidar's errors alone:
+/// Takes all samples that are over by the end of `window`, by sensors that differ in the IMUs and the lidar's errors alone:
 /// what each of them delivers. Counts them in `summaries`.
 pub(super) fn measure(
     sensors: &mut [Sensors],

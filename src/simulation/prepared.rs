@@ -19,6 +19,7 @@ pub struct Simulation {
     motion: Box<dyn BaseMotion>,
     lidar: Lidar,
     imu: Imu,
+    base_imu: Option<Imu>,
     clocks: Clocks,
 }
 
@@ -44,8 +45,10 @@ impl Simulation {
         let motion = specs.motion.build(&sources.motion, route, scenario.duration_s, scenario.seed)?;
         let lidar = Lidar::new(&specs.lidar, &sources.lidar)?;
         let imu = Imu::new(&specs.imu, &sources.imu)?;
+        let base_imu = specs.base_imu.as_ref().zip(sources.base_imu.as_ref());
+        let base_imu = base_imu.map(|(spec, source)| Imu::new(spec, source)).transpose()?;
         let clocks = Clocks::new(&specs.clock, &sources.clock, EPOCH)?;
-        Ok(Self { scenario: scenario.clone(), specs, world, head, carrier, motion, lidar, imu, clocks })
+        Ok(Self { scenario: scenario.clone(), specs, world, head, carrier, motion, lidar, imu, base_imu, clocks })
     }
 
     /// What was asked for.
@@ -88,6 +91,11 @@ impl Simulation {
         &self.imu
     }
 
+    /// The inertial measurement unit on the base, where it has one.
+    pub fn base_imu(&self) -> Option<&Imu> {
+        self.base_imu.as_ref()
+    }
+
     /// How the sensors sit in the head, and how well they measure.
     pub fn calibration(&self) -> Calibration {
         self.rig().calibration()
@@ -127,12 +135,13 @@ impl Simulation {
         simulate_together(&rigs, &mut motion, sinks, progress)
     }
 
-    /// Whether physics and rays of `other` are the same: it differs in the IMU and the lidar's errors at most.
+    /// Whether physics and rays of `other` are the same: it differs in the IMUs and the lidar's errors at most.
     pub fn shares_rays_with(&self, other: &Self) -> bool {
         let without_noise = |simulation: &Self| {
             let mut specs = simulation.specs.clone();
             (specs.imu, specs.lidar.errors) = (self.specs.imu.clone(), self.specs.lidar.errors.clone());
             specs.lidar.noise = self.specs.lidar.noise;
+            specs.base_imu = self.specs.base_imu.clone();
             specs
         };
         let walk = |simulation: &Self| {
@@ -147,6 +156,7 @@ impl Simulation {
             carrier: &self.carrier,
             lidar: &self.lidar,
             imu: &self.imu,
+            base_imu: self.base_imu.as_ref(),
             clocks: self.clocks,
             head_from_laser: *self.head.head_from_laser(),
             head_from_imu: *self.head.head_from_imu(),

@@ -19,6 +19,8 @@ pub struct Rig<'a> {
     pub lidar: &'a Lidar,
     /// The inertial measurement unit.
     pub imu: &'a Imu,
+    /// A second inertial measurement unit, at the origin of the base and along its axes, on the first one's clock.
+    pub base_imu: Option<&'a Imu>,
     /// Their clocks, started at [`EPOCH`].
     pub clocks: Clocks,
     /// Pose of the lidar in the head.
@@ -49,7 +51,8 @@ impl Rig<'_> {
 
     /// Instants of motion that a sample may reach back to before a window: the longest sample, and one step on either side.
     pub(super) fn overlap(&self) -> usize {
-        let longest_s = self.imu.period_s().max(self.lidar.period_s());
+        let base_imu_s = self.base_imu.map_or(0.0, Imu::period_s);
+        let longest_s = self.imu.period_s().max(self.lidar.period_s()).max(base_imu_s);
         (longest_s * 1.2 / STEP_S).ceil() as usize + 3
     }
 }

@@ -32,7 +32,7 @@ pub fn simulate<S: Sink + TruthSink + ?Sized>(
     Ok(summaries.into_iter().next().unwrap_or_default())
 }
 
-/// The same for rigs that differ in the IMU and the lidar's errors alone, each with a sink of its own: physics and rays are
+/// The same for rigs that differ in the IMUs and the lidar's errors alone, each with a sink of its own: physics and rays are
 /// done once. Each sink is given what it would be given alone.
 pub(super) fn simulate_together<S: Sink + TruthSink + ?Sized>(
     rigs: &[Rig],

@@ -23,6 +23,9 @@ pub struct Scenario {
     pub imu: String,
     /// The sensors' clocks.
     pub clock: String,
+    /// A second inertial measurement unit, at the origin of the base and along its axes; `None` for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_imu: Option<String>,
     /// The scene's way to walk; `None` for its default one.
     pub route: Option<String>,
     /// How long, s.
@@ -42,6 +45,7 @@ impl Scenario {
             lidar: "utm30lx".to_owned(),
             imu: "3dm_gx2".to_owned(),
             clock: "drifting".to_owned(),
+            base_imu: None,
             route: None,
             duration_s: 120.0,
             seed: Seed(1),
@@ -65,6 +69,9 @@ pub struct Specs {
     pub imu: ImuSpec,
     /// The sensors' clocks.
     pub clock: ClocksSpec,
+    /// The base's inertial measurement unit, where it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_imu: Option<ImuSpec>,
 }
 
 /// The texts that the specs of a run came from, for errors about them and for the folder of a scene's meshes.
@@ -82,6 +89,8 @@ pub struct Sources {
     pub imu: Source,
     /// The clocks'.
     pub clock: Source,
+    /// The base's IMU's, where it has one.
+    pub base_imu: Option<Source>,
 }
 
 impl Specs {
@@ -97,6 +106,7 @@ impl Specs {
             lidar: find(Kind::Lidar, &scenario.lidar)?,
             imu: find(Kind::Imu, &scenario.imu)?,
             clock: find(Kind::Clock, &scenario.clock)?,
+            base_imu: scenario.base_imu.as_deref().map(|name| find(Kind::Imu, name)).transpose()?,
         };
         let specs = Self::parse(&sources)?;
         Ok((specs, sources))
@@ -110,6 +120,7 @@ impl Specs {
             lidar: parse(&sources.lidar)?,
             imu: parse(&sources.imu)?,
             clock: parse(&sources.clock)?,
+            base_imu: sources.base_imu.as_ref().map(parse).transpose()?,
         })
     }
 }

@@ -1,7 +1,8 @@
 //! When each sensor takes its samples, and when truth is written.
 
 use super::Rig;
-use crate::sensors::{Clock, Firing, Stamper};
+use crate::random::Seed;
+use crate::sensors::{Clock, Firing, Imu, Stamper};
 use crate::time::{Span, Stamp};
 
 /// Truth is written at whole milliseconds of the lidar's time, so that poses estimated at such stamps find theirs.
@@ -49,13 +50,44 @@ pub(super) struct ImuInterval {
     pub stamp: Stamp,
 }
 
+/// When an IMU takes its samples, handed out block by block.
+pub(super) struct Samples {
+    instants: Even,
+    stamps: Stamper,
+    end_s: f64,
+}
+
+impl Samples {
+    /// Those of `imu` on `clock` that are over at `end_s`; `seed` makes the stamps' jitter.
+    fn new(imu: &Imu, clock: Clock, seed: Seed, end_s: f64) -> Self {
+        // A sample is stamped `delay` after the middle of its interval.
+        let stamped_after = Span::from_seconds(0.5 * imu.period_s() + imu.delay_s());
+        let first_stamp = clock.half_tick_from(clock.crystal(0.0) + stamped_after);
+        Self {
+            instants: Even::new(clock, first_stamp - stamped_after, imu.period_s()),
+            stamps: Stamper::new(clock, first_stamp, imu.period_s(), seed.stream("imu/clock")),
+            end_s,
+        }
+    }
+
+    /// The samples that are over at `until_s`, and were not handed out before.
+    pub fn until(&mut self, until_s: f64) -> Vec<ImuInterval> {
+        let until_s = until_s.min(self.end_s);
+        let mut intervals = Vec::new();
+        let period_s = self.instants.period_s / self.instants.clock.pace();
+        while let Some(index) = self.instants.take_until(period_s, until_s) {
+            let (from_s, to_s) = (self.instants.true_s(index), self.instants.true_s(index + 1));
+            intervals.extend(self.stamps.next().map(|stamp| ImuInterval { from_s, to_s, stamp }));
+        }
+        intervals
+    }
+}
+
 /// What happens when, each kind in its order, handed out block by block.
 pub(super) struct Schedule {
     scans: Even,
     scan_stamps: Stamper,
     sweep_s: f64,
-    samples: Even,
-    sample_stamps: Stamper,
     truth: Even,
     first_truth: Stamp,
     clocks: u64,
@@ -64,24 +96,17 @@ pub(super) struct Schedule {
 
 impl Schedule {
     pub fn new(rig: &Rig) -> Self {
-        let (lidar, imu, seed) = (rig.clocks.lidar, rig.clocks.imu, rig.seed);
+        let (lidar, seed) = (rig.clocks.lidar, rig.seed);
         let first_truth = lidar.first_multiple(TRUTH_STEP);
         let last_truth = lidar.stamp_of(rig.duration_s).floor_to(TRUTH_STEP);
         // The crystal's reading at the first whole millisecond of the lidar's mean time: stamps lag it by half a tick.
         let first_instant = lidar.crystal(lidar.true_s(first_truth));
         let first_scan = lidar.half_tick_from(first_instant);
         let scan_period_s = rig.lidar.period_s();
-
-        // A sample is stamped `delay` after the middle of its interval.
-        let stamped_after = Span::from_seconds(0.5 * rig.imu.period_s() + rig.imu.delay_s());
-        let first_stamp = imu.half_tick_from(imu.crystal(0.0) + stamped_after);
-        let first_sample = first_stamp - stamped_after;
         Self {
             scans: Even::new(lidar, first_scan, scan_period_s),
             scan_stamps: Stamper::new(lidar, first_scan, scan_period_s, seed.stream("lidar/clock")),
             sweep_s: rig.lidar.sweep_span().seconds() / lidar.pace(),
-            samples: Even::new(imu, first_sample, rig.imu.period_s()),
-            sample_stamps: Stamper::new(imu, first_stamp, rig.imu.period_s(), seed.stream("imu/clock")),
             truth: Even::new(lidar, first_instant, TRUTH_STEP.seconds()),
             first_truth,
             clocks: 0,
@@ -100,16 +125,9 @@ impl Schedule {
         firings
     }
 
-    /// The samples of the IMU that are over at `until_s`, and were not handed out before.
-    pub fn samples(&mut self, until_s: f64) -> Vec<ImuInterval> {
-        let until_s = until_s.min(self.end_s);
-        let mut intervals = Vec::new();
-        let period_s = self.samples.period_s / self.samples.clock.pace();
-        while let Some(index) = self.samples.take_until(period_s, until_s) {
-            let (from_s, to_s) = (self.samples.true_s(index), self.samples.true_s(index + 1));
-            intervals.extend(self.sample_stamps.next().map(|stamp| ImuInterval { from_s, to_s, stamp }));
-        }
-        intervals
+    /// When `imu` takes its samples on `clock`, within the time that truth covers; `seed` makes the stamps' jitter.
+    pub fn samples(&self, imu: &Imu, clock: Clock, seed: Seed) -> Samples {
+        Samples::new(imu, clock, seed, self.end_s)
     }
 
     /// The instants at which truth is written up to `until_s`, and was not before: true seconds, and the lidar's stamp.

@@ -51,7 +51,14 @@ pub(super) fn calibration(
     Ok(found)
 }
 
-/// The noise of the sensors that a recording of ours was made with; of others, that of the paper's sensors.
+/// The noise of the base's IMU that a recording of ours was made with; of others, that of an ordinary one.
+pub(super) fn base_imu_noise(reader: &Reader) -> Result<ImuNoise, SpecError> {
+    let specs = Manifest::within(reader).and_then(|manifest| manifest.specs);
+    let Some(spec) = specs.and_then(|specs| specs.base_imu) else { return ordinary_imu() };
+    Ok(Imu::new(&spec, &Source::in_memory("the recording's manifest", ""))?.noise())
+}
+
+/// The noise of the sensors that a recording of ours was made with; of others, that of an ordinary IMU and of the paper's lidar.
 fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
     if let Some(specs) = Manifest::within(reader).and_then(|manifest| manifest.specs) {
         let source = Source::in_memory("the recording's manifest", "");

@@ -9,6 +9,7 @@
 //! [`coverage`] of its lidar. A [`sweep`] varies any of it, and tells what matters.
 
 mod artefacts;
+mod base;
 mod beside;
 mod bound;
 mod cadence;
@@ -37,6 +38,7 @@ mod true_clock;
 mod truth_near;
 mod watch;
 
+pub use base::{base_by_imu, base_by_law};
 pub use bound::{Bounded, information_bound};
 pub use calibration::CalibrationSpec;
 pub use cloud_files::{CloudFormat, CloudWishes};

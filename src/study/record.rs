@@ -2,7 +2,7 @@
 
 use super::{Manifest, Stage, StudyError, Watch};
 use crate::measurement::{ImuSample, LidarScan, Sink, SinkError};
-use crate::recording::{RunDescription, TumWriter, Writer};
+use crate::recording::{BaseImuDescription, RunDescription, TumWriter, Writer};
 use crate::simulation::{Simulation, SimulationSummary};
 use crate::time::Stamp;
 use crate::truth::{ClockTruth, TruthSample, TruthSink};
@@ -57,6 +57,11 @@ pub(super) fn description(simulation: &Simulation, truth_tf: bool) -> Result<Run
     Ok(RunDescription {
         calibration: simulation.calibration(),
         imu_rate_hz: 1.0 / simulation.imu().period_s(),
+        base_imu: simulation.base_imu().map(|imu| BaseImuDescription {
+            noise: imu.noise(),
+            rate_hz: 1.0 / imu.period_s(),
+            head_from_base: simulation.head().rest_pose_base_from_head().inverse(),
+        }),
         manifest: Manifest::of(simulation).text()?,
         truth_tf,
     })
@@ -83,6 +88,10 @@ impl Sink for Files<'_> {
             return Err(Box::new(StudyError::Stopped));
         }
         self.recording.imu(arrival, sample)
+    }
+
+    fn base_imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
+        self.recording.base_imu(arrival, sample)
     }
 
     fn lidar(&mut self, arrival: Stamp, scan: &LidarScan) -> Result<(), SinkError> {

@@ -58,6 +58,23 @@ fn differences_at_an_imus_rate_lose_little() {
 }
 
 #[test]
+fn a_pose_that_no_base_explains_costs_its_neighbours_alone() {
+    let (model, heads, _) = walk("handheld", 100);
+    let whole = model.base_under(&heads).unwrap();
+    let thrown = heads.iter().enumerate().map(|(k, (stamp, pose))| {
+        let shift = if k == 500 { Vector::x() * 2.0 } else { Vector::zeros() };
+        (stamp, Pose::from_parts((pose.translation.vector + shift).into(), pose.rotation))
+    });
+    let told = model.base_under(&Trajectory::from_poses(thrown).unwrap()).unwrap();
+    assert!((whole.len() - 10..whole.len()).contains(&told.len()), "{} of {}", told.len(), whole.len());
+    let far = |stamp: Stamp| stamp.seconds_since(Stamp::default()) > 5.1 || stamp.seconds_since(Stamp::default()) < 4.9;
+    let whole = Trajectory::from_poses(whole).unwrap();
+    let told: Vec<_> = told.into_iter().filter(|(stamp, _)| far(*stamp)).collect();
+    let (shift, turn) = apart(&told, &whole);
+    assert!(shift < 1e-3 && turn < 0.1, "{shift} m, {turn} degrees");
+}
+
+#[test]
 fn a_motor_does_not_tell_its_base() {
     let error = model("spinning").base_under(&Trajectory::new()).unwrap_err();
     assert!(matches!(error, DynamicsError::BaseUnknown { .. }), "{error}");

@@ -57,7 +57,13 @@ pub fn calibration() -> Calibration {
 }
 
 pub fn run() -> RunDescription {
-    RunDescription { calibration: calibration(), imu_rate_hz: 100.0, manifest: "(seed: 1)".to_owned(), truth_tf: false }
+    RunDescription {
+        calibration: calibration(),
+        imu_rate_hz: 100.0,
+        base_imu: None,
+        manifest: "(seed: 1)".to_owned(),
+        truth_tf: false,
+    }
 }
 
 pub fn imu_sample(stamp: Stamp) -> ImuSample {
@@ -126,6 +132,7 @@ pub fn truth_sample(now: Stamp, clock: &ClockTruth) -> TruthSample {
 /// Records `samples` IMU samples at 100 Hz, scans at 40 Hz and truth at 1 kHz; the file.
 pub fn record_all(run: RunDescription, samples: i64) -> Vec<u8> {
     let (file, bytes) = shared_file();
+    let has_base_imu = run.base_imu.is_some();
     let mut writer = Writer::new(file, run).unwrap();
     let clock = ClockTruth { lidar_ahead: Span::ZERO, imu_ahead: Span::from_nanos(3_000_000) };
     for k in 0..samples * 10 {
@@ -134,6 +141,9 @@ pub fn record_all(run: RunDescription, samples: i64) -> Vec<u8> {
         if k % 10 == 0 {
             writer.clock(now, &clock).unwrap();
             writer.imu(now, &imu_sample(now + clock.imu_ahead)).unwrap();
+            if has_base_imu {
+                writer.base_imu(now, &imu_sample(now + clock.imu_ahead)).unwrap();
+            }
         }
         if k % 25 == 0 {
             writer.lidar(now, &planar_scan(now)).unwrap();

@@ -200,6 +200,7 @@ impl Plan {
             lidar: lidar.name.clone(),
             imu: imu.name.clone(),
             clock: clock.name.clone(),
+            base_imu: None,
             route: route.clone(),
             duration_s: *duration_s,
             seed: Seed(seed),
@@ -211,6 +212,7 @@ impl Plan {
             lidar: (**lidar_spec).clone(),
             imu: (**imu_spec).clone(),
             clock: (**clock_spec).clone(),
+            base_imu: None,
         };
         let sources = Sources {
             scene: scene.source(),
@@ -219,6 +221,7 @@ impl Plan {
             lidar: lidar.source(),
             imu: imu.source(),
             clock: clock.source(),
+            base_imu: None,
         };
         Ok(Simulation::build(&scenario, specs, &sources)?)
     }
