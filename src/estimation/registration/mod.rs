@@ -22,9 +22,11 @@
 //!    and the surfels; until nothing moves. Then the next finer resolution joins in.
 //! 5. A solution that is not believed, or that rests on too little, is dropped, and the open loop stays.
 
+mod blocks;
 mod chapters;
 mod course;
 mod equations;
+mod gradients;
 mod lidar;
 mod matches;
 mod neighbours;

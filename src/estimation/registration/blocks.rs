@@ -1,0 +1,100 @@
+//! Symmetric matrices of blocks, six by six, of which most are zero.
+
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use nalgebra::{Matrix6, Vector6};
+
+/// On and below the diagonal, row by row.
+#[derive(Debug, Clone)]
+pub(super) struct Blocks {
+    /// Of each row the columns that are not zero, in order.
+    columns: Vec<Vec<u32>>,
+    /// One block each.
+    blocks: Vec<Vec<Matrix6<f64>>>,
+}
+
+impl Blocks {
+    /// Zeros at `columns`, which are those of each row up to itself, in any order and more than once.
+    pub(super) fn new(mut columns: Vec<Vec<u32>>) -> Self {
+        for row in &mut columns {
+            row.sort_unstable();
+            row.dedup();
+        }
+        let blocks = columns.iter().map(|row| vec![Matrix6::zeros(); row.len()]).collect();
+        Self { columns, blocks }
+    }
+
+    /// Sets all numbers to zero.
+    pub(super) fn clear(&mut self) {
+        self.blocks.iter_mut().flatten().for_each(|block| block.fill(0.0));
+    }
+
+    /// Adds `block` at (`row`, `column`), which is not always zero, and its transpose at (`column`, `row`); both, where the two
+    /// are one.
+    pub(super) fn add(&mut self, row: usize, column: usize, block: &Matrix6<f64>) {
+        let (late, early) = (row.max(column), row.min(column));
+        if let Ok(at) = self.columns[late].binary_search(&(early as u32)) {
+            let into = &mut self.blocks[late][at];
+            match row.cmp(&column) {
+                std::cmp::Ordering::Greater => *into += block,
+                std::cmp::Ordering::Less => *into += block.transpose(),
+                std::cmp::Ordering::Equal => *into += block + block.transpose(),
+            }
+        }
+    }
+
+    /// Adds `value` to every diagonal entry.
+    pub(super) fn add_diagonal(&mut self, value: f64) {
+        for (row, blocks) in self.blocks.iter_mut().enumerate() {
+            if let Ok(at) = self.columns[row].binary_search(&(row as u32)) {
+                blocks[at] += Matrix6::identity() * value;
+            }
+        }
+    }
+
+    /// Adds the product with `x` to `sum`.
+    pub(super) fn add_product(&self, x: &[f64], sum: &mut [f64]) {
+        let at = |knot: usize| Vector6::from_column_slice(&x[6 * knot..6 * knot + 6]);
+        for (row, (columns, blocks)) in self.columns.iter().zip(&self.blocks).enumerate() {
+            let own = at(row);
+            let mut product = Vector6::zeros();
+            for (column, block) in columns.iter().map(|k| *k as usize).zip(blocks) {
+                product += block * at(column);
+                if column != row {
+                    add_to(&mut sum[6 * column..6 * column + 6], &block.tr_mul(&own));
+                }
+            }
+            add_to(&mut sum[6 * row..6 * row + 6], &product);
+        }
+    }
+
+    /// The Cholesky factor, or nothing where the matrix is not positive definite.
+    pub(super) fn factor(&self) -> Option<Llt<usize, f64>> {
+        let (starts, rows, values) = self.upper_by_columns();
+        let size = 6 * self.columns.len();
+        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &starts, None, &rows);
+        let symbolic = SymbolicLlt::try_new(pattern, faer::Side::Upper).ok()?;
+        Llt::try_new_with_symbolic(symbolic, SparseColMatRef::new(pattern, &values), faer::Side::Upper).ok()
+    }
+
+    /// On and above the diagonal, column by column: where each column begins, rows, values. A row of blocks below the diagonal
+    /// is a column above it.
+    fn upper_by_columns(&self) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
+        let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+        for (row, (columns, blocks)) in self.columns.iter().zip(&self.blocks).enumerate() {
+            for axis in 0..6 {
+                for (other, block) in columns.iter().map(|k| *k as usize).zip(blocks) {
+                    let until = if other == row { axis + 1 } else { 6 };
+                    rows.extend((0..until).map(|k| 6 * other + k));
+                    values.extend((0..until).map(|k| block[(axis, k)]));
+                }
+                starts.push(rows.len());
+            }
+        }
+        (starts, rows, values)
+    }
+}
+
+fn add_to(sum: &mut [f64], terms: &Vector6<f64>) {
+    sum.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+}
