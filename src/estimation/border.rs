@@ -49,6 +49,11 @@ impl Border {
         self.posterior = factor.information_of_last::<BORDER>();
     }
 
+    /// How far it has moved in this window.
+    pub(super) fn moved_so_far(&self) -> &SVector<f64, BORDER> {
+        &self.moved
+    }
+
     pub(super) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
         add_border(equations, layout, &self.prior, &self.moved);
     }

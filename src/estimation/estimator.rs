@@ -134,7 +134,7 @@ impl Estimator {
         let lidar = window.lidar();
         self.consider_the_end();
         self.hand_out(end_s);
-        self.survey_window(Window::survey_all);
+        self.survey_window(Window::survey_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
         let Self { poses, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
@@ -185,7 +185,7 @@ impl Estimator {
         let Some(window) = &self.window else { return Ok(()) };
         let elapsed_s = started.elapsed().as_secs_f64();
         if window.is_full() {
-            self.survey_window(Window::survey_oldest);
+            self.survey_window(Window::survey_oldest, Window::oldest_end_s);
         }
         watch.lap_s(); // told by the survey itself
         let final_until_s = self.let_go(linearised.as_ref());
@@ -261,7 +261,7 @@ impl Estimator {
         if let Some(at) = linearised {
             self.consider.advance(&window.sensitivity_at(until_s, at, &self.views));
         }
-        let patches = window.let_go()?;
+        let patches = window.let_go(linearised)?;
         let taken = self.views.take(&patches, self.spec.step_s, (window.matcher(), self.consider.pivot()));
         self.consider.take(taken);
         Some(until_s)
@@ -275,7 +275,7 @@ impl Estimator {
         self.carried = window.carried();
         self.consider_the_end();
         self.hand_out(end_s);
-        self.survey_window(Window::survey_all);
+        self.survey_window(Window::survey_all, Window::end_s);
         self.consider = Consider::lost(self.consider.pivot());
         self.window = None;
         self.next_pose = None;
@@ -359,11 +359,11 @@ impl Estimator {
         if self.survey.is_some() { window.surveyed_by(surveyor) } else { window }
     }
 
-    /// Adds what the window saw, as far as `seen` tells it, to the survey, where one is asked for.
-    fn survey_window(&mut self, seen: fn(&Window) -> Vec<(f64, Patch)>) {
+    /// Adds what the window saw, as far as `seen` tells it and until `until`, to the survey, where one is asked for.
+    fn survey_window(&mut self, seen: fn(&Window) -> Vec<(f64, Patch)>, until: fn(&Window) -> f64) {
         if let (Some(window), Some(survey)) = (&self.window, &mut self.survey) {
             let mut watch = Stopwatch::start();
-            survey.extend(self.intake.origin(), seen(window).into_iter(), window.lidar());
+            survey.extend(self.intake.origin(), seen(window).into_iter(), window.lidar(), until(window));
             survey.took_s += watch.lap_s();
         }
     }

@@ -45,7 +45,8 @@
 //! - Offset of the ranges, scale and misalignment of the gyroscope are unknowns: in trials they were the greatest
 //!   errors (in the office and the courtyard the position's error fell to about a third). The accelerometer's scale and
 //!   misalignment were tried too and made it worse: gravity alone tells them, and they take up what is not theirs.
-//! - Attitude and place of the lidar beside the IMU are unknowns too, when asked: then the IMU's axes are the gyroscope's.
+//! - Attitude and place of the lidar beside the IMU are unknowns too, when asked: then the IMU's axes are the gyroscope's, and the
+//!   beginning of a window is held to where the lidar, as it is found to sit, would have put it.
 //! - While the head is held still no patches are seen: the window keeps those it has until as much has been swept again, and
 //!   the IMU carries it (within 3 cm over stops of 2 to 5 s). Matching the lines that a still scan draws with
 //!   patches was tried: it holds the level directions to millimetres, but errors of the patches' normals pass for knowledge of

@@ -13,12 +13,20 @@ pub struct Survey {
     /// From when the sightings' seconds count.
     pub(super) origin: Stamp,
     pub(super) sightings: Vec<Sighting>,
-    /// What was known of the lidar when sightings were made.
-    pub(super) lidars: Vec<LidarCorrection>,
+    /// What was known of the lidar when sightings were made, in the order of time.
+    pub(super) lidars: Vec<KnownLidar>,
     /// Whether the lidar looks one way, so that nothing tells an offset of its ranges.
     pub(super) ranges_are_held: bool,
     /// Time that making it took, s.
     pub(super) took_s: f64,
+}
+
+/// What was known of the lidar for a while.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct KnownLidar {
+    pub(super) lidar: LidarCorrection,
+    /// Until when the trajectory became final with it, lidar time, s from the survey's origin.
+    pub(super) until_s: f64,
 }
 
 /// A patch at the mean time of its points.
@@ -61,16 +69,25 @@ impl Survey {
         Self { sightings: self.sightings.par_iter().filter_map(moved).collect(), ..self.clone() }
     }
 
-    /// Adds what was seen further, its seconds counting from `origin`, made by `lidar`.
+    /// What was known of the lidar when the trajectory at `stamp` became final; behind the end, at the end.
+    pub(super) fn lidar_at(&self, stamp: Stamp) -> Option<&LidarCorrection> {
+        let tau_s = stamp.seconds_since(self.origin);
+        let known = self.lidars.partition_point(|known| known.until_s < tau_s);
+        self.lidars.get(known).or(self.lidars.last()).map(|known| &known.lidar)
+    }
+
+    /// Adds what was seen further up to `until_s`, its seconds counting from `origin`, made by `lidar`.
     pub(super) fn extend(
         &mut self,
         origin: Stamp,
         patches: impl Iterator<Item = (f64, Patch)>,
         lidar: LidarCorrection,
+        until_s: f64,
     ) {
         self.origin = origin;
-        if self.lidars.last() != Some(&lidar) {
-            self.lidars.push(lidar);
+        match self.lidars.last_mut().filter(|last| last.lidar == lidar) {
+            Some(last) => last.until_s = until_s,
+            None => self.lidars.push(KnownLidar { lidar, until_s }),
         }
         let lidar = (self.lidars.len() - 1) as u32;
         self.sightings.extend(patches.map(|(tau_s, patch)| Sighting { tau_s, patch, lidar }));

@@ -12,6 +12,8 @@ pub(super) struct ClosedLoopRun {
     pub map_from_head: Trajectory,
     /// What was learnt of the lidar beyond its calibration.
     pub lidar: LidarCorrection,
+    /// The open loop's trajectory told anew by how the lidar was found to sit, where that was estimated.
+    pub open_loop_told_anew: Option<Trajectory>,
     /// Places recognised.
     pub loops: LoopReport,
     /// Why the open loop stayed, where it did.
@@ -38,6 +40,7 @@ pub(super) fn run_closed_loop(
     ClosedLoopRun {
         map_from_head: closed.trajectory,
         lidar: closed.lidar,
+        open_loop_told_anew: closed.open_loop_told_anew,
         loops,
         left,
         remarks: bent.into_iter().chain(stayed).collect(),

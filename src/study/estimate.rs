@@ -159,6 +159,8 @@ struct Loops {
 /// The estimate that goes into cloud, result and plots: the closed loop's where loops were closed.
 pub(super) struct Best<'a> {
     pub map_from_head: &'a Trajectory,
+    /// From where what was seen was seen, by the open loop.
+    pub seen_from: &'a Trajectory,
     /// What was learnt of the lidar beyond its calibration.
     pub lidar: &'a LidarCorrection,
     /// What the truth says of it.
@@ -202,13 +204,15 @@ impl Loops {
     }
 
     fn best(&self) -> Best<'_> {
+        let open = &self.open.map_from_head;
         match &self.closed {
-            Some(ClosedLoopRun { map_from_head, lidar, .. }) => {
-                Best { map_from_head, lidar, known: self.closed_known.as_ref() }
-            }
-            None => {
-                Best { map_from_head: &self.open.map_from_head, lidar: &self.open.lidar, known: self.known.as_ref() }
-            }
+            Some(ClosedLoopRun { map_from_head, lidar, open_loop_told_anew, .. }) => Best {
+                map_from_head,
+                seen_from: open_loop_told_anew.as_ref().unwrap_or(open),
+                lidar,
+                known: self.closed_known.as_ref(),
+            },
+            None => Best { map_from_head: open, seen_from: open, lidar: &self.open.lidar, known: self.known.as_ref() },
         }
     }
 

@@ -66,7 +66,7 @@ pub(super) fn write_map_of(
     (estimator, within): (&EstimatorSpec, Option<&MapWishes>),
     folder: &Path,
 ) -> Result<(), StudyError> {
-    let trajectories = (&run.map_from_head, best.map_from_head);
+    let trajectories = (best.seen_from, best.map_from_head);
     let seen = map_of(&run.survey, trajectories, &run.covariances, &estimator.registration)?;
     let map = match within {
         Some(within) => merge_maps(&within.map, &seen, &Pose::identity())?,

@@ -3,7 +3,8 @@
 //! After Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012), whose global optimisation minimises match errors,
 //! deviations from the open loop's velocities and deviations from gravity, and takes biases and latency from the open loop.
 //! Unknown is a correction of the whole trajectory, a cubic B-spline of coarse knots, as in a window: `R' = exp(dr) R`,
-//! `t' = t + dt`; and of the lidar what the window has it unknown: an offset of its ranges, its attitude and place on the IMU.
+//! `t' = t + dt`; and of the lidar an offset of its ranges. How it sits on the IMU is as the open loop has found it, see
+//! `lidar`.
 //! Minimised is
 //!
 //! ```text
@@ -68,6 +69,9 @@ pub struct ClosedLoop {
     pub trajectory: Trajectory,
     /// What was learnt of the lidar beyond its calibration.
     pub lidar: LidarCorrection,
+    /// The open loop's trajectory as it would have been had it known from the start how the lidar sits on the IMU: what was seen
+    /// was seen from there. `None` where the two are the same.
+    pub open_loop_told_anew: Option<Trajectory>,
     /// What it rests on.
     pub report: RegistrationReport,
 }
@@ -118,16 +122,18 @@ pub struct Travelled<'a> {
 pub fn register(travelled: Travelled, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
     let of_all = &spec.registration;
     let matcher = Matcher::new(&of_all.matching(&spec.matching), &of_all.surfels(&spec.surfels));
-    let open = OpenLoop { travelled, spec: of_all, matcher: &matcher };
     let Travelled { map_from_head, lidar, survey, .. } = travelled;
+    let told_anew = spec.extrinsics.estimated.then(|| lidar::remounted(map_from_head, survey, (calibration, lidar)));
+    let map_from_head = told_anew.as_ref().unwrap_or(map_from_head);
+    let open = OpenLoop { travelled: Travelled { map_from_head, ..travelled }, spec: of_all, matcher: &matcher };
     match open.close(Mount::new(calibration, (lidar, survey.ranges_are_held), spec)) {
         Ok((Closed { trajectory, mount }, report)) => {
             let report = RegistrationReport { moved: moved(map_from_head, &trajectory), ..report };
-            ClosedLoop { trajectory, lidar: mount.lidar, report }
+            ClosedLoop { trajectory, lidar: mount.lidar, open_loop_told_anew: told_anew, report }
         }
         Err(left) => {
             let report = RegistrationReport { left: Some(left.1), ..left.0 };
-            ClosedLoop { trajectory: map_from_head.clone(), lidar: *lidar, report }
+            ClosedLoop { trajectory: travelled.map_from_head.clone(), lidar: *lidar, report, ..ClosedLoop::default() }
         }
     }
 }
@@ -257,7 +263,7 @@ impl<'a> Registration<'a> {
                 self.course.correct(&x);
                 self.mount.correct(&step);
                 self.scene.correct(first_knot, &x, &step);
-                let by_lidar_m = lidar::farthest_moved(&step, farthest_m);
+                let by_lidar_m = step[0].abs();
                 neighbours.moved(shift + farthest_m * turn + by_lidar_m);
                 self.report.iterations += 1;
                 self.describe(&tally);

@@ -45,7 +45,7 @@ impl Scene {
         let mut arms = Vec::with_capacity(patches.len());
         for (sighting, patch) in sightings().zip(&mut patches) {
             let map_from_head = course.pose_at(sighting.tau_s);
-            sights.push(mount.sight(&map_from_head, patch, &survey.lidars[sighting.lidar as usize]));
+            sights.push(mount.sight(&map_from_head, patch, &survey.lidars[sighting.lidar as usize].lidar));
             arms.push(patch.centre - map_from_head.translation.vector);
         }
         let length_s = 0.5 * spec.knot_spacing_s;

@@ -283,7 +283,7 @@ mod tests {
     use crate::estimation::residual::prior::Start;
     use crate::geometry::{from_roll_pitch_yaw, gravity_in_world};
     use approx::assert_relative_eq;
-    use nalgebra::{DMatrix, DVector};
+    use nalgebra::{DMatrix, DVector, SVector};
     use std::f64::consts::TAU;
 
     const SPACING_S: f64 = 0.2;
@@ -432,7 +432,7 @@ mod tests {
         let case = rocking(0.013, 400);
         let layout = Layout { first_knot: 0, knots: 24 };
         let mut equations = case.equations(&layout);
-        Start::held(0.013).add_to(&mut equations, &layout, &vec![0.0; layout.border()], SPACING_S);
+        Start::held(0.013).add_to(&mut equations, &layout, (&vec![0.0; layout.border()], &SVector::zeros()), SPACING_S);
         (0..layout.size()).for_each(|unknown| equations.add_entry(unknown, unknown, 1e-3));
         let mut factor = Factor::default();
         equations.factor(&mut factor).unwrap();

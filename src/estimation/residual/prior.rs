@@ -1,51 +1,72 @@
 //! What is known before the window's own measurements: where it begins, and the border.
 
-use super::{BORDER, Layout};
+use super::{BORDER, LIDAR_TURN, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::geometry::Vector;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix6, SMatrix, SVector};
 
-/// How firmly the correction is held to zero where the window begins, so that it goes on from the one before.
+/// How firmly the correction is held where the window begins, so that it goes on from the one before.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Start {
     /// Where the window begins, IMU time, s.
     pub(in crate::estimation) u_s: f64,
     /// Standard deviations of rotation and translation (rad, m), of their first (1/s) and second derivative (1/s^2).
     pub(in crate::estimation) sigmas: [[f64; 2]; 3],
+    /// On what it hangs how the lidar sits, where that is estimated.
+    pub(in crate::estimation) by_lidar: Option<ByLidar>,
 }
+
+/// By how much the correction (rows: turn, shift), its first and its second derivative where a window begins would be others, had
+/// the window before taken the lidar to be turned and shifted on the IMU (columns).
+///
+/// What was seen tells the way of the lidar, and the IMU's only through where the lidar sits. So the IMU where a window begins is
+/// as uncertain as that. Held regardless, it would hold the lidar where it was thought to be: each window would know that
+/// anew, and from nothing.
+pub(in crate::estimation) type ByLidar = [Matrix6<f64>; 3];
 
 impl Start {
     /// A beginning from which the window goes on smoothly: pose and velocity are those of the window before, and nearly the
     /// acceleration, which a bias that has become better known changes at once.
     pub(in crate::estimation) fn held(u_s: f64) -> Self {
-        Self { u_s, sigmas: [[1e-5, 1e-5], [1e-4, 1e-4], [1e-2, 0.3]] }
+        Self { u_s, sigmas: [[1e-5, 1e-5], [1e-4, 1e-4], [1e-2, 0.3]], by_lidar: None }
     }
 
     /// The very beginning: the pose is the map's origin by definition, the velocity known to `velocity_sigma` (m/s).
     pub(in crate::estimation) fn first(u_s: f64, velocity_sigma: f64) -> Self {
-        Self { u_s, sigmas: [[1e-5, 1e-5], [0.1, velocity_sigma], [10.0, 10.0]] }
+        Self { u_s, sigmas: [[1e-5, 1e-5], [0.1, velocity_sigma], [10.0, 10.0]], by_lidar: None }
     }
 
-    /// Adds the conditions, `total` being the coefficients of the corrections made in this window so far.
+    /// Adds the conditions, `total` being the coefficients of the corrections made in this window so far, and `moved` how far
+    /// the border has moved in it.
     pub(in crate::estimation) fn add_to(
         &self,
         equations: &mut NormalEquations,
         layout: &Layout,
-        total: &[f64],
+        (total, moved): (&[f64], &SVector<f64, BORDER>),
         knot_spacing_s: f64,
     ) {
         let basis = Basis::at(self.u_s, knot_spacing_s);
         let first = layout.knot(basis.first);
-        for (by, sigmas) in [basis.value, basis.rate, basis.acceleration].iter().zip(self.sigmas) {
+        for (order, by) in [basis.value, basis.rate, basis.acceleration].iter().enumerate() {
             for axis in 0..6 {
-                let weight = sigmas[axis / 3].powi(-2);
+                let weight = self.sigmas[order][axis / 3].powi(-2);
                 let column = |a: usize| first + 6 * a + axis;
-                let residual: f64 = (0..4).map(|a| by[a] * total[column(a)]).sum();
+                let by_lidar = self.by_lidar.map(|by_lidar| -by_lidar[order].row(axis));
+                let asked = by_lidar.map_or(0.0, |by_lidar| (by_lidar * moved.fixed_rows::<6>(LIDAR_TURN))[0]);
+                let residual = (0..4).map(|a| by[a] * total[column(a)]).sum::<f64>() + asked;
                 for a in 0..4 {
                     equations.add_right(column(a), -weight * by[a] * residual);
                     for c in 0..=a {
                         equations.add_entry(column(a), column(c), weight * by[a] * by[c]);
+                    }
+                }
+                for (k, by_unknown) in by_lidar.iter().flat_map(|by| by.iter().enumerate()) {
+                    let row = layout.border() + LIDAR_TURN + k;
+                    equations.add_right(row, -weight * by_unknown * residual);
+                    (0..4).for_each(|a| equations.add_entry(row, column(a), weight * by_unknown * by[a]));
+                    for (other, by_other) in by_lidar.iter().flat_map(|by| by.iter().enumerate()).take(k + 1) {
+                        equations.add_entry(row, layout.border() + LIDAR_TURN + other, weight * by_unknown * by_other);
                     }
                 }
             }
@@ -65,11 +86,14 @@ impl Start {
         let basis = Basis::at(self.u_s, knot_spacing_s);
         let first = layout.knot(basis.first);
         let mut right = vec![0.0; layout.size()];
-        for (by, asked, sigmas) in [(basis.value, value, self.sigmas[0]), (basis.rate, rate, self.sigmas[1])] {
+        for (order, (by, asked)) in [(basis.value, value), (basis.rate, rate)].into_iter().enumerate() {
             for axis in 0..6 {
-                let weight = sigmas[axis / 3].powi(-2);
+                let weight = self.sigmas[order][axis / 3].powi(-2);
                 for a in 0..4 {
                     right[first + 6 * a + axis] += weight * by[a] * asked[axis];
+                }
+                for (k, by_lidar) in (0..6).filter_map(|k| Some((k, self.by_lidar?[order][(axis, k)]))) {
+                    right[layout.border() + LIDAR_TURN + k] -= weight * by_lidar * asked[axis];
                 }
             }
         }
@@ -111,5 +135,64 @@ pub(in crate::estimation) fn add_border(
         for column in 0..=row {
             equations.add_entry(layout.border() + row, layout.border() + column, information[(row, column)]);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Against the definition: the residuals of the correction, less what the lidar's change asks for, differentiated by steps.
+    #[test]
+    fn a_beginning_that_hangs_on_the_lidar_is_held_to_where_the_lidar_would_have_put_it() {
+        const SPACING_S: f64 = 0.2;
+        let layout = Layout { first_knot: 2, knots: 6 };
+        let by_lidar: ByLidar =
+            std::array::from_fn(|order| Matrix6::from_fn(|r, c| 0.3 * ((7 * order + 3 * r + r * c) as f64).sin()));
+        let sigmas = [[0.1, 0.2], [0.3, 0.5], [0.7, 0.9]];
+        let start = Start { u_s: 0.53, sigmas, by_lidar: Some(by_lidar) };
+        let wave = |size: usize| DVector::from_fn(size, |k, _| 0.01 * (1.3 * k as f64).cos());
+        let total = wave(layout.border());
+        let moved = SVector::<f64, BORDER>::from_fn(|k, _| 0.02 * (k as f64).sin());
+        let basis = Basis::at(start.u_s, SPACING_S);
+        let whitened = |x: &DVector<f64>| {
+            let mut all = Vec::new();
+            for (order, by) in [basis.value, basis.rate, basis.acceleration].iter().enumerate() {
+                let lidar = moved.fixed_rows::<6>(LIDAR_TURN) + x.rows(layout.border() + LIDAR_TURN, 6);
+                let asked = by_lidar[order] * lidar;
+                for axis in 0..6 {
+                    let knot = |a: usize| layout.knot(basis.first) + 6 * a + axis;
+                    let is: f64 = (0..4).map(|a| by[a] * (total[knot(a)] + x[knot(a)])).sum();
+                    all.push((is - asked[axis]) / sigmas[order][axis / 3]);
+                }
+            }
+            DVector::from_vec(all)
+        };
+        let zero = DVector::zeros(layout.size());
+        let residual = whitened(&zero);
+        let mut jacobian = DMatrix::zeros(residual.len(), layout.size());
+        for unknown in 0..layout.size() {
+            let mut step = zero.clone();
+            step[unknown] = 1.0; // it is linear
+            jacobian.set_column(unknown, &(whitened(&step) - &residual));
+        }
+        let mut equations = NormalEquations::new(layout.size());
+        start.add_to(&mut equations, &layout, (total.as_slice(), &moved), SPACING_S);
+        let square = jacobian.transpose() * &jacobian;
+        assert_relative_eq!(equations.dense(), square, epsilon = 1e-9 * square.amax());
+        let right = jacobian.transpose() * -residual;
+        assert_relative_eq!(equations.right(), right, epsilon = 1e-9 * right.amax());
+        // Asked for elsewhere, it is held there.
+        let (value, rate) = ([0.1, -0.2, 0.3, 0.5, -0.4, 0.2], [0.3, 0.1, -0.2, 0.6, 0.2, -0.1]);
+        let whitened = |k: usize, axis: usize| match k {
+            0 => value[axis] / sigmas[0][axis / 3],
+            1 => rate[axis] / sigmas[1][axis / 3],
+            _ => 0.0,
+        };
+        let asked = jacobian.transpose() * DVector::from_fn(18, |k, _| whitened(k / 6, k % 6));
+        let right = DVector::from_vec(start.right_hand_side(&layout, (&value, &rate), SPACING_S));
+        assert_relative_eq!(right, asked, epsilon = 1e-9 * asked.amax());
     }
 }

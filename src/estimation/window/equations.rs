@@ -114,7 +114,7 @@ impl Window {
         let states = self.nominal.states();
         let known = (&self.biases, &self.gravity);
         add_inertial(inertial, layout, (&states[first..], bases), &self.nominal.intervals()[first..], known);
-        self.start.add_to(inertial, layout, total, self.spec.knot_spacing_s);
+        self.start.add_to(inertial, layout, (total, self.border.moved_so_far()), self.spec.knot_spacing_s);
         self.border.add_to(inertial, layout);
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);
         for ((_, state), basis) in nodes.zip(&*bases).take_while(|((time, _), _)| **time < self.rested_until_s) {

@@ -211,6 +211,16 @@ impl Window {
         self.stretches.iter().flat_map(|stretch| self.survey(stretch)).collect()
     }
 
+    /// When the oldest stretch ends, lidar time, s.
+    pub(super) fn oldest_end_s(&self) -> f64 {
+        self.stretches.front().map_or(f64::NEG_INFINITY, |oldest| oldest.end_tau_s)
+    }
+
+    /// When the newest stretch ends, likewise.
+    pub(super) fn end_s(&self) -> f64 {
+        self.stretches.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
+    }
+
     fn survey(&self, stretch: &Stretch) -> Vec<(f64, Patch)> {
         let Some(surveyor) = &self.surveyor else { return Vec::new() };
         let surveyor = SurfelMaker { lidar: self.maker.lidar, ..surveyor.clone() };
@@ -220,11 +230,12 @@ impl Window {
     }
 
     /// Lets the oldest stretch go: what is before its end is final. Its patches as they stand in the map.
-    pub(super) fn let_go(&mut self) -> Option<Vec<Patch>> {
+    pub(super) fn let_go(&mut self, linearised: Option<&Linearised>) -> Option<Vec<Patch>> {
         let start_s = self.next_start_s()?;
         let oldest = self.stretches.pop_front()?;
         let placed = oldest.surfels.iter().map(|surfel| surfel.place(&self.placing()).patch).collect();
-        self.start = Start::held(start_s);
+        let by_lidar = linearised.and_then(|at| self.hangs_on_lidar(start_s, at));
+        self.start = Start { by_lidar, ..Start::held(start_s) };
         self.gropes = false;
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);

@@ -4,7 +4,8 @@ use super::Window;
 use super::correspondence::{Match, Matches, With};
 use super::equations::Robust;
 use crate::estimation::consider::Sensitivity;
-use crate::estimation::residual::{Layout, matched};
+use crate::estimation::residual::prior::ByLidar;
+use crate::estimation::residual::{LIDAR_TURN, Layout, matched};
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
@@ -37,6 +38,34 @@ impl Window {
             views: by_views.iter().map(|(number, columns)| (*number, times(columns))).collect(),
             noise: times(&by_pose) * self.spec.solve.covariance_inflation,
         }
+    }
+
+    /// How the corrections at `u_s`, IMU time, and their derivatives hang on how the lidar sits on the IMU, all else being solved
+    /// for: `P_xl P_ll^-1` of the covariances `P`. Nothing where that is not estimated.
+    pub(super) fn hangs_on_lidar(&self, u_s: f64, at: &Linearised) -> Option<ByLidar> {
+        if !self.spec.extrinsics.estimated {
+            return None;
+        }
+        let lidar = at.layout.border() + LIDAR_TURN;
+        let covariances: [Vec<f64>; 6] = std::array::from_fn(|k| {
+            let mut column = vec![0.0; at.layout.size()];
+            column[lidar + k] = 1.0;
+            self.workspace.factor.solve(&column)
+        });
+        // In standard deviations: radians and metres are of different size.
+        let sigma = |k: usize| covariances[k][lidar + k].sqrt();
+        let of_lidar = Matrix6::from_fn(|r, c| covariances[c][lidar + r] / (sigma(r) * sigma(c)));
+        let information = of_lidar.try_inverse()?;
+        let basis = Basis::at(u_s, self.spec.knot_spacing_s);
+        let first = at.layout.knot(basis.first);
+        let by_lidar = |by: [f64; 4]| {
+            let with_lidar = Matrix6::from_fn(|axis, k| {
+                (0..4).map(|a| by[a] * covariances[k][first + 6 * a + axis]).sum::<f64>() / sigma(k)
+            });
+            let by_sigmas = with_lidar * information;
+            Matrix6::from_fn(|axis, k| by_sigmas[(axis, k)] / sigma(k))
+        };
+        Some([basis.value, basis.rate, basis.acceleration].map(by_lidar))
     }
 
     /// The six corrections at `u_s`, turn then shift, as rows over the window's unknowns.
