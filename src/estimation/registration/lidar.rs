@@ -1,9 +1,9 @@
 //! The lidar among the unknowns: how its ranges differ from what the open loop took them for.
 //!
-//! Common to all that was seen, it stands beside the knots' corrections: a range longer by `o` moves a surfel's centre by `u o`, with
-//! `u` the unit vector to it from the lidar.
+//! Common to all that was seen, it stands beside the knots' corrections: a range longer by `o` moves a surfel's centre by `u o`,
+//! with `u` the unit vector to it from the lidar.
 //!
-//! How the lidar sits on the IMU no longer is among the unknowns: the open loop has told it by the IMU, and what was seen says
+//! How the lidar sits on the IMU is not among the unknowns: the open loop has told it by the IMU, and what was seen says
 //! nothing more of it. As the open loop went on it learnt better, so what it then took the head's poses for is told anew:
 //! [`remounted`].
 
