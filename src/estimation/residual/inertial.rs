@@ -18,14 +18,13 @@
 //!
 //! The equations take them summed over a knot's spacing ([`add_inertial`]): so far the correction can follow what a bias does.
 
+use super::rows::{KNOTS, Row, Rows};
 use super::{ACCEL_BIAS, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::estimation::strapdown::{Biases, Interval, State};
 use crate::geometry::{Matrix, Rotation, Vector, skew};
 
-/// Knots about a sum from one middle of a span to the next, and one for an interval that reaches beyond.
-const KNOTS: usize = 6;
 /// Sigmas that differ by this factor are not summed.
 const UNLIKE: f64 = 3.0;
 /// By how much a single sample of the accelerometer may be off, beyond its noise, since the correction cannot follow it within a
@@ -77,22 +76,25 @@ pub(in crate::estimation) fn add_inertial(
     intervals: &[Interval],
     (biases, gravity): (&Biases, &Vector),
 ) {
+    let (mut each, mut whole) = (Rows::none(), Rows::none());
     let mut sum: Option<Speed> = None;
     for (k, interval) in intervals.iter().enumerate() {
         let terms = Inertial::between((&states[k], &states[k + 1]), interval, biases, gravity);
         let bases = (&bases[k], &bases[k + 1]);
-        Turn::of(&terms, bases, interval).add_to(equations, layout);
+        Turn::of(&terms, bases, interval).add_to(&mut each, equations, layout);
         let alone = Speed::of(&terms, bases, interval, gravity);
-        alone.add_to(equations, layout, WITHIN_SPAN);
+        alone.add_to(WITHIN_SPAN, &mut each, equations, layout);
         if let Some(sum) = sum.as_mut().filter(|sum| sum.goes_on_with(&alone)) {
             sum.join(&alone);
-        } else if let Some(whole) = sum.replace(alone) {
-            whole.add_to(equations, layout, 1.0);
+        } else if let Some(done) = sum.replace(alone) {
+            done.add_to(1.0, &mut whole, equations, layout);
         }
     }
     if let Some(last) = sum {
-        last.add_to(equations, layout, 1.0);
+        last.add_to(1.0, &mut whole, equations, layout);
     }
+    each.move_to(equations, layout);
+    whole.move_to(equations, layout);
 }
 
 /// Speeds are summed from one middle of a knot's span to the next.
@@ -148,21 +150,20 @@ impl Turn {
         Self { sum, by_turn, by_gyro }
     }
 
-    fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
+    fn add_to(&self, rows: &mut Rows, equations: &mut NormalEquations, layout: &Layout) {
         let Sum { first, used, deviation, variance } = self.sum;
-        let (first, border) = (layout.knot(first), layout.border());
         for axis in 0..3 {
-            let mut row = Row::default();
+            let mut row = Row::from(first);
             for (knot, by) in self.by_turn[..used].iter().enumerate() {
-                row.push(first + 6 * knot + axis, *by);
+                *row.knot(knot, axis) = *by;
             }
             for i in 0..3 {
-                row.push(border + GYRO_BIAS + i, self.by_gyro[0][(axis, i)]);
+                *row.border(GYRO_BIAS + i) = self.by_gyro[0][(axis, i)];
             }
             for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
-                row.push(border + GYRO_MATRIX + 3 * i + j, self.by_gyro[1 + j][(axis, i)]);
+                *row.border(GYRO_MATRIX + 3 * i + j) = self.by_gyro[1 + j][(axis, i)];
             }
-            row.add_to(equations, deviation[axis], variance.recip());
+            rows.add(&row, (deviation[axis], variance.recip()), equations, layout);
         }
     }
 }
@@ -222,54 +223,26 @@ impl Speed {
         self.sum.variance += next.sum.variance;
     }
 
-    /// Adds its part of the equations, with its sigma taken `looser` times.
-    fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, looser: f64) {
+    /// Adds what it says, with its sigma taken `looser` times.
+    fn add_to(&self, looser: f64, rows: &mut Rows, equations: &mut NormalEquations, layout: &Layout) {
         let Sum { first, used, deviation, variance } = self.sum;
         let weight = (variance * looser * looser).recip();
-        let (first, border) = (layout.knot(first), layout.border());
         for axis in 0..3 {
-            let mut row = Row::default();
+            let mut row = Row::from(first);
             for knot in 0..used {
                 for i in 0..3 {
-                    row.push(first + 6 * knot + i, self.by_turn[knot][(axis, i)]);
+                    *row.knot(knot, i) = self.by_turn[knot][(axis, i)];
                 }
-                row.push(first + 6 * knot + 3 + axis, self.by_shift[knot]);
+                *row.knot(knot, 3 + axis) = self.by_shift[knot];
             }
             for i in 0..3 {
-                row.push(border + ACCEL_BIAS + i, self.by_bias[(axis, i)]);
+                *row.border(ACCEL_BIAS + i) = self.by_bias[(axis, i)];
             }
             // Gravity tilts about the map's x and y.
             for i in 0..2 {
-                row.push(border + GRAVITY + i, self.by_tilt[(axis, i)]);
+                *row.border(GRAVITY + i) = self.by_tilt[(axis, i)];
             }
-            row.add_to(equations, deviation[axis], weight);
-        }
-    }
-}
-
-/// The derivatives of one residual, by unknowns in rising order.
-#[derive(Default)]
-struct Row {
-    by: [(usize, f64); Row::MOST],
-    count: usize,
-}
-
-impl Row {
-    /// All knots with four unknowns each, a bias and a tilt.
-    const MOST: usize = 4 * KNOTS + 5;
-
-    fn push(&mut self, unknown: usize, derivative: f64) {
-        self.by[self.count] = (unknown, derivative);
-        self.count += 1;
-    }
-
-    fn add_to(&self, equations: &mut NormalEquations, residual: f64, weight: f64) {
-        let by = &self.by[..self.count];
-        for (place, (row, a)) in by.iter().enumerate() {
-            equations.add_right(*row, -weight * a * residual);
-            for (column, b) in &by[..=place] {
-                equations.add_entry(*row, *column, weight * a * b);
-            }
+            rows.add(&row, (deviation[axis], weight), equations, layout);
         }
     }
 }
