@@ -11,10 +11,8 @@ pub(super) struct NormalEquations {
     size: usize,
     /// First column of each row that is not zero.
     first: Vec<usize>,
-    /// Lower triangle, row-major over the full square; the upper part is empty, but for products before they settle.
+    /// Lower triangle, row-major over the full square; the upper part is empty.
     h: Vec<f64>,
-    /// How far above the diagonal products have reached.
-    above: usize,
     b: Vec<f64>,
 }
 
@@ -33,7 +31,7 @@ pub(super) struct NotDetermined(pub(super) usize);
 impl NormalEquations {
     /// Empty equations of `size` unknowns.
     pub(super) fn new(size: usize) -> Self {
-        Self { size, first: (0..size).collect(), h: vec![0.0; size * size], above: 0, b: vec![0.0; size] }
+        Self { size, first: (0..size).collect(), h: vec![0.0; size * size], b: vec![0.0; size] }
     }
 
     /// Empties them, for `size` unknowns.
@@ -43,32 +41,8 @@ impl NormalEquations {
         self.first.extend(0..size);
         self.h.clear();
         self.h.resize(size * size, 0.0);
-        self.above = 0;
         self.b.clear();
         self.b.resize(size, 0.0);
-    }
-
-    /// Becomes a copy of `other`.
-    pub(super) fn copy_from(&mut self, other: &Self) {
-        self.size = other.size;
-        self.first.clone_from(&other.first);
-        self.h.clone_from(&other.h);
-        self.above = other.above;
-        self.b.clone_from(&other.b);
-    }
-
-    /// Adds `other`, of the same size.
-    pub(super) fn add(&mut self, other: &Self) {
-        for (row, (first, others)) in self.first.iter_mut().zip(&other.first).enumerate() {
-            *first = (*first).min(*others);
-            let span = row * self.size + *others..=row * self.size + row;
-            for (sum, term) in self.h[span.clone()].iter_mut().zip(&other.h[span]) {
-                *sum += term;
-            }
-        }
-        for (sum, term) in self.b.iter_mut().zip(&other.b) {
-            *sum += term;
-        }
     }
 
     /// Adds `value` to `H` at (`row`, `column`) and, by symmetry, (`column`, `row`).
@@ -78,10 +52,15 @@ impl NormalEquations {
         self.h[row * self.size + column] += value;
     }
 
-    /// The entries of a row from a column on to the diagonal.
-    pub(super) fn row_from(&mut self, row: usize, column: usize) -> &mut [f64] {
+    /// Adds entries of a row of `H` from a column on, none of them beyond the diagonal.
+    #[inline]
+    pub(super) fn add_row(&mut self, row: usize, column: usize, entries: &[f64]) {
+        debug_assert!(column + entries.len() <= row + 1, "the upper triangle is empty");
+        if entries.is_empty() {
+            return;
+        }
         self.first[row] = self.first[row].min(column);
-        &mut self.h[row * self.size + column..=row * self.size + row]
+        axpy(&mut self.h[row * self.size + column..][..entries.len()], entries, 1.0);
     }
 
     /// Adds `value` to the right-hand side.
@@ -89,47 +68,11 @@ impl NormalEquations {
         self.b[row] += value;
     }
 
-    /// Adds `weight (u v^T + v u^T)` to `H`, with `u` and `v` zero but for consecutive entries from a column on; `u` begins
-    /// no later than `v`. Where the two overlap, entries come to lie above the diagonal: see [`Self::settle`].
-    #[inline(always)]
-    pub(super) fn add_product<const U: usize, const V: usize>(
-        &mut self,
-        (start_u, u): (usize, &[f64; U]),
-        (start_v, v): (usize, &[f64; V]),
-        weight: f64,
-    ) {
-        for (r, value) in v.iter().enumerate() {
-            let row = start_v + r;
-            self.first[row] = self.first[row].min(start_u);
-            let from = row * self.size + start_u;
-            let scaled = weight * value;
-            for (sum, term) in self.h[from..from + U].iter_mut().zip(u) {
-                *sum += scaled * term;
-            }
-        }
-        for both in start_v..(start_u + U).min(start_v + V) {
-            self.h[both * self.size + both] += weight * u[both - start_u] * v[both - start_v];
-        }
-        self.above = self.above.max((start_u + U).saturating_sub(start_v + 1));
-    }
-
-    /// Brings below the diagonal what products left above it; due once, when all are in.
-    pub(super) fn settle(&mut self) {
-        for row in 0..self.size {
-            for column in row + 1..(row + 1 + self.above).min(self.size) {
-                let entry = std::mem::take(&mut self.h[row * self.size + column]);
-                self.h[column * self.size + row] += entry;
-            }
-        }
-        self.above = 0;
-    }
-
     /// Factors `H` into `into`, whose memory is used again.
     ///
     /// # Errors
     /// When an unknown is not determined.
     pub(super) fn factor(&self, into: &mut Factor) -> Result<(), NotDetermined> {
-        debug_assert_eq!(self.above, 0, "products have not settled");
         let n = self.size;
         into.size = n;
         into.first.clone_from(&self.first);
@@ -240,7 +183,15 @@ mod tests {
     }
 
     fn add(equations: &mut NormalEquations, (start_u, u, start_v, v): &(usize, [f64; 3], usize, [f64; 2])) {
-        equations.add_product((*start_u, u), (*start_v, v), 0.7);
+        for (row, by) in v.iter().enumerate().map(|(r, by)| (start_v + r, 0.7 * by)) {
+            if start_u + u.len() <= row {
+                equations.add_row(row, *start_u, &u.map(|entry| entry * by));
+                continue;
+            }
+            for (column, entry) in u.iter().enumerate().map(|(c, entry)| (start_u + c, entry * by)) {
+                equations.add_entry(row, column, if row == column { 2.0 * entry } else { entry });
+            }
+        }
     }
 
     fn with_diagonal(size: usize) -> NormalEquations {
@@ -265,7 +216,6 @@ mod tests {
             whole_v.rows_mut(start_v, 2).copy_from_slice(&v);
             dense += (&whole_u * whole_v.transpose() + &whole_v * whole_u.transpose()) * 0.7;
         }
-        equations.settle();
         assert_relative_eq!(equations.dense(), dense, epsilon = 1e-12);
         let mut factor = Factor::default();
         equations.factor(&mut factor).unwrap();
@@ -283,31 +233,10 @@ mod tests {
     }
 
     #[test]
-    fn parts_add_up_to_the_whole() {
-        let mut whole = with_diagonal(23);
-        let mut parts = [with_diagonal(23), NormalEquations::new(23)];
-        for (k, product) in products().iter().enumerate() {
-            add(&mut whole, product);
-            add(&mut parts[k % 2], product);
-        }
-        whole.settle();
-        let [mut sum, mut second] = parts;
-        sum.settle();
-        second.settle();
-        sum.add(&second);
-        let (mut a, mut b) = (Factor::default(), Factor::default());
-        whole.factor(&mut a).unwrap();
-        sum.factor(&mut b).unwrap();
-        for (x, y) in whole.solve(&a).iter().zip(sum.solve(&b)) {
-            assert_relative_eq!(*x, y, epsilon = 1e-9);
-        }
-    }
-
-    #[test]
     fn an_unknown_that_nothing_measures_is_named() {
         let mut equations = NormalEquations::new(3);
         equations.add_entry(0, 0, 1.0);
-        equations.add_product((0, &[0.3]), (1, &[0.5]), 1.0);
+        equations.add_entry(1, 0, 0.15);
         equations.add_entry(1, 1, 1.0);
         assert_eq!(equations.factor(&mut Factor::default()), Err(NotDetermined(2)));
     }

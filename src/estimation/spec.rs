@@ -112,9 +112,7 @@ pub struct MatchingSpec {
 pub struct SolveSpec {
     /// Most iterations of place, match, solve.
     pub max_iterations: usize,
-    /// Solves with new robust weights within an iteration.
-    pub reweightings: usize,
-    /// Iterations end when no knot moves by more than this, m.
+    /// Iterations end when the head moves by no more than this anywhere, m.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub settled_m: f64,
     /// Cauchy threshold of the first iteration, in standard deviations.
@@ -262,7 +260,6 @@ impl EstimatorSpec {
         require(self.surfels.min_points >= 4, "min_points", "must be at least 4: fewer are no plane".into())?;
         require(self.matching.neighbours >= 1, "neighbours", "must be at least 1".into())?;
         require(self.solve.max_iterations >= 1, "max_iterations", "must be at least 1".into())?;
-        require(self.solve.reweightings >= 1, "reweightings", "must be at least 1".into())?;
         require(self.views.max_kept >= self.fixed_views, "max_kept", "must be at least fixed_views".into())?;
         require(self.views.length_s >= step, "length_s", format!("must be at least step_s = {step} s"))?;
         self.registration.check()

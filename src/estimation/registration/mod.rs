@@ -256,7 +256,9 @@ impl<'a> Registration<'a> {
                 };
                 let tally = self.assemble(&neighbours, self.spec.max_plane_distance_m * coarser, equations);
                 let (x, step) = equations.solve().ok_or("its equations are singular")?;
-                let Moved { shift, turn } = Moved::greatest(&x);
+                let three = Vector::from_column_slice;
+                let knots = x.chunks_exact(6).map(|knot| (three(&knot[..3]), three(&knot[3..])));
+                let Moved { shift, turn } = Moved::greatest(knots);
                 if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
                     return Err("its correction is too large");
                 }

@@ -8,9 +8,8 @@
 //! What all surfels share stands in the border: `B` unknowns of it are carried, [`SHARED`] or, where the lidar's place on the
 //! IMU is not estimated, only the [`ALWAYS`] first.
 
-use super::{CLOCK, LIDAR_SHIFT, LIDAR_TURN, Layout, RANGE};
-use crate::estimation::nominal::Correction;
-use crate::estimation::normal_equations::NormalEquations;
+use super::sums::{OF_SPAN, add_scaled, over_knots};
+use super::{CLOCK, Layout};
 use crate::estimation::surfel::{Patch, Placed};
 use crate::geometry::{Matrix, Vector};
 
@@ -64,9 +63,9 @@ pub(in crate::estimation) const SHARED: usize = 9;
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Side<const B: usize> {
     /// By its turn and its shift.
-    own: [f64; 6],
+    pub(super) own: [f64; 6],
     /// By what it shares with all others, which follow each other in the border.
-    beside: [f64; B],
+    pub(super) beside: [f64; B],
 }
 
 impl<const B: usize> Side<B> {
@@ -86,139 +85,12 @@ impl<const B: usize> Side<B> {
         Self { own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], beside }
     }
 
-    /// By the four knots about the surfel.
-    #[inline(always)]
-    fn knots(&self, surfel: &Placed) -> [f64; 24] {
-        let mut knots = [0.0; 24];
-        for (knot, value) in knots.chunks_exact_mut(6).zip(surfel.basis.value) {
-            for (entry, derivative) in knot.iter_mut().zip(self.own) {
-                *entry = value * derivative;
-            }
-        }
-        knots
-    }
-
     /// With what the surfel on the other side adds in the border.
     #[inline(always)]
     pub(in crate::estimation) fn together_with(mut self, other: &Self) -> Self {
         self.beside.iter_mut().zip(other.beside).for_each(|(sum, term)| *sum += term);
         self
     }
-}
-
-/// How far a solution `x` moves a live surfel, m.
-pub(in crate::estimation) fn moved(surfel: &Placed, layout: &Layout, x: &[f64], clock_at_s: f64) -> Vector {
-    let correction = Correction::of_spline(&surfel.basis, layout.first_knot, x);
-    let clock = layout.border() + CLOCK;
-    let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - clock_at_s);
-    let longer_m = x[layout.border() + RANGE];
-    let turned = correction.rotation.cross(&surfel.arm);
-    let three = |at: usize| surfel.map_from_imu * Vector::from_column_slice(&x[layout.border() + at..][..3]);
-    let by_lidar = three(LIDAR_TURN).cross(&surfel.reach()) + three(LIDAR_SHIFT) + surfel.beam * longer_m;
-    correction.translation + turned + surfel.velocity * later_s + by_lidar
-}
-
-/// What all matches of a surfel say about its own motion: `sum w g v^T`, with `g` the derivative of `e` by turn and shift, and
-/// `v` in turn `g`, that by the border, and `e`.
-///
-/// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
-#[derive(Debug)]
-pub(in crate::estimation) struct Own<const B: usize> {
-    square: [[f64; 6]; 6],
-    beside: [[f64; 6]; B],
-    right: [f64; 6],
-}
-
-impl<const B: usize> Own<B> {
-    /// No match yet.
-    pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; 6]; 6], beside: [[0.0; 6]; B], right: [0.0; 6] };
-
-    /// Adds a match whose distance grows by `side`.
-    #[inline(always)]
-    pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
-        for (square, by) in self.square.iter_mut().zip(side.own) {
-            add_scaled(square, &side.own, weight * by);
-        }
-        for (sums, by) in self.beside.iter_mut().zip(side.beside) {
-            add_scaled(sums, &side.own, weight * by);
-        }
-        add_scaled(&mut self.right, &side.own, weight * distance_m);
-    }
-
-    /// Adds it to the equations of the window's unknowns, by the surfel's place among the knots.
-    #[inline(always)]
-    pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, surfel: &Placed) {
-        let (first, beside) = (layout.knot(surfel.basis.first), layout.border() + CLOCK);
-        for (k, value) in surfel.basis.value.iter().enumerate() {
-            for (i, square) in self.square.iter().enumerate() {
-                let row = first + 6 * k + i;
-                equations.add_right(row, -value * self.right[i]);
-                let entries = equations.row_from(row, first);
-                for (knot, other) in entries.chunks_mut(6).zip(surfel.basis.value) {
-                    add_scaled(knot, square, value * other);
-                }
-            }
-        }
-        for (unknown, sums) in self.beside.iter().enumerate() {
-            let entries = equations.row_from(beside + unknown, first);
-            for (knot, value) in entries.chunks_exact_mut(6).zip(surfel.basis.value) {
-                add_scaled(knot, sums, value);
-            }
-        }
-    }
-}
-
-/// What all matches say about what surfels share: `sum w b v^T`, with `b` the derivative of `e` by them, and `v` in turn `b`
-/// and `e`.
-#[derive(Debug)]
-pub(in crate::estimation) struct Beside<const B: usize> {
-    square: [[f64; B]; B],
-    right: [f64; B],
-}
-
-impl<const B: usize> Beside<B> {
-    /// No match yet.
-    pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; B]; B], right: [0.0; B] };
-
-    /// Adds a match whose distance grows by `side`, both surfels' part of it.
-    #[inline(always)]
-    pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
-        for (square, by) in self.square.iter_mut().zip(side.beside) {
-            add_scaled(square, &side.beside, weight * by);
-        }
-        add_scaled(&mut self.right, &side.beside, weight * distance_m);
-    }
-
-    /// Adds it to the equations of the window's unknowns.
-    pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
-        let beside = layout.border() + CLOCK;
-        for (i, square) in self.square.iter().enumerate() {
-            equations.add_right(beside + i, -self.right[i]);
-            for (j, sum) in square.iter().enumerate().take(i + 1) {
-                equations.add_entry(beside + i, beside + j, *sum);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn add_scaled(sums: &mut [f64], terms: &[f64], scale: f64) {
-    for (sum, term) in sums.iter_mut().zip(terms) {
-        *sum += scale * term;
-    }
-}
-
-/// Adds how the knots about two surfels of a match hang together; `early` no later than `late`.
-#[inline(always)]
-pub(in crate::estimation) fn add_coupling<const B: usize>(
-    equations: &mut NormalEquations,
-    layout: &Layout,
-    (early, early_side): (&Placed, &Side<B>),
-    (late, late_side): (&Placed, &Side<B>),
-    weight: f64,
-) {
-    let (start_u, start_v) = (layout.knot(early.basis.first), layout.knot(late.basis.first));
-    equations.add_product((start_u, &early_side.knots(early)), (start_v, &late_side.knots(late)), weight);
 }
 
 /// Adds the row of the Jacobian of a match of `surfel`, `scales[k]` times to column `k` of six.
@@ -230,17 +102,21 @@ pub(in crate::estimation) fn add_scaled_row(
     clock_at_s: f64,
 ) {
     let side = Side::<SHARED>::of(surfel, normal, clock_at_s);
-    let (first, beside, knots) = (layout.knot(surfel.basis.first), layout.border() + CLOCK, side.knots(surfel));
+    let (first, beside, knots) =
+        (layout.knot(surfel.basis.first), layout.border() + CLOCK, over_knots(&side.own, &surfel.basis));
     for (column, scale) in columns.iter_mut().zip(scales) {
-        add_scaled(&mut column[first..first + 24], &knots, *scale);
+        add_scaled(&mut column[first..first + OF_SPAN], &knots, *scale);
         add_scaled(&mut column[beside..beside + SHARED], &side.beside, *scale);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::BORDER;
+    use super::super::sums::{Coupling, OfSpan, Own};
+    use super::super::{BORDER, LIDAR_SHIFT, LIDAR_TURN, RANGE};
     use super::*;
+    use crate::estimation::nominal::Correction;
+    use crate::estimation::normal_equations::NormalEquations;
     use crate::estimation::spline::Basis;
     use crate::geometry::{Rotation, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
@@ -301,34 +177,26 @@ mod tests {
         });
         let mut equations = NormalEquations::new(layout.size());
         let one = Side::<SHARED>::of(a, &plane.normal, AT_S);
-        let mut beside = Beside::NONE;
-        let mut add = |surfel: &Placed, side: &Side<SHARED>| {
-            let mut own = Own::NONE;
-            own.add(side, plane.distance_m, 3.0);
-            own.add_to(&mut equations, &layout, surfel);
-        };
-        let first = if let Some(b) = b {
-            let other = Side::of(b, &-plane.normal, AT_S);
-            add(b, &other.together_with(&one));
-            add(a, &one.together_with(&other));
+        let other = b.map(|b| (b, Side::of(b, &-plane.normal, AT_S)));
+        let both = other.as_ref().map_or(one, |(_, other)| one.together_with(other));
+        for (surfel, side) in [(a, both)].into_iter().chain(other.map(|(b, side)| (b, side.together_with(&one)))) {
+            let (mut own, mut of_span) = (Own::NONE, OfSpan::NONE);
+            own.add(&side, plane.distance_m, 3.0);
+            of_span.add(&own, &surfel.basis);
+            if std::ptr::eq(surfel, a) {
+                of_span.beside.add(&side, plane.distance_m, 3.0);
+            }
+            of_span.add_to(&mut equations, &layout, surfel.basis.first);
+        }
+        if let Some((b, other)) = other {
             let (early, late) = if a.tau_s < b.tau_s { ((a, &one), (b, &other)) } else { ((b, &other), (a, &one)) };
-            add_coupling(&mut equations, &layout, early, late, 3.0);
-            one.together_with(&other)
-        } else {
-            add(a, &one);
-            one
-        };
-        beside.add(&first, plane.distance_m, 3.0);
-        beside.add_to(&mut equations, &layout);
-        equations.settle();
+            let mut coupling = Coupling::NONE;
+            coupling.add(early, late, 3.0);
+            coupling.add_to(&mut equations, &layout, (early.0.basis.first, late.0.basis.first));
+        }
         assert_relative_eq!(equations.dense(), jacobian.transpose() * &jacobian * 3.0, epsilon = 1e-7);
         let right = jacobian.transpose() * (-3.0 * distance(&DVector::zeros(layout.size())));
         assert_relative_eq!(equations.right(), right.column(0).into_owned(), epsilon = 1e-7);
-        // What a solution moves the surfel by is the same derivative.
-        let x = DVector::from_fn(layout.size(), |k, _| 1e-3 * (k as f64).sin());
-        let by_solution = |surfel: &Placed| super::moved(surfel, &layout, x.as_slice(), AT_S);
-        let by = by_solution(a) - b.map_or_else(Vector::zeros, by_solution);
-        assert_relative_eq!(plane.normal.dot(&by), (jacobian * x)[0], epsilon = 1e-8);
     }
 
     #[test]

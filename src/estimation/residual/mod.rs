@@ -4,6 +4,7 @@ pub(super) mod inertial;
 pub(super) mod matched;
 pub(super) mod prior;
 mod rows;
+pub(super) mod sums;
 
 /// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate,
 /// correction of the ranges, of the lidar's attitude and of its place, and by how much the gyroscope exaggerates, three by three.

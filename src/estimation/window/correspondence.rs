@@ -61,10 +61,21 @@ pub(super) enum With {
 #[derive(Debug, Default)]
 pub(super) struct Matches {
     pub all: Vec<Match>,
+    /// The matches of each surfel of the scene that has any, by the span between knots in which it was seen.
+    pub spans: Runs<i64>,
+    /// Those of two live surfels, by the earlier and the later one's span.
+    pub couplings: Runs<(i64, i64)>,
     /// Indices of the matches of each surfel of the scene, one surfel after the other.
     of_surfels: Vec<u32>,
     /// Where each surfel's begin in it, and where the last one's end.
     begins: Vec<usize>,
+}
+
+/// Indices in runs of one key each, in the order of keys.
+#[derive(Debug)]
+pub(super) struct Runs<K> {
+    members: Vec<(K, u32)>,
+    ends: Vec<usize>,
 }
 
 impl Match {
@@ -74,37 +85,65 @@ impl Match {
     }
 }
 
+impl<K: Ord> Runs<K> {
+    fn of(mut members: Vec<(K, u32)>) -> Self {
+        members.sort_unstable();
+        let ends = members.chunk_by(|a, b| a.0 == b.0).scan(0, |end, run| {
+            *end += run.len();
+            Some(*end)
+        });
+        Self { ends: ends.collect(), members }
+    }
+}
+
+impl<K> Default for Runs<K> {
+    fn default() -> Self {
+        Self { members: Vec::new(), ends: Vec::new() }
+    }
+}
+
+impl<K: Copy + Send + Sync> Runs<K> {
+    /// Each run's key and indices.
+    pub fn par_iter(&self) -> impl IndexedParallelIterator<Item = (K, impl Iterator<Item = usize>)> {
+        (0..self.ends.len()).into_par_iter().map(|k| {
+            let from = k.checked_sub(1).map_or(0, |before| self.ends[before]);
+            let run = &self.members[from..self.ends[k]];
+            (run[0].0, run.iter().map(|(_, index)| *index as usize))
+        })
+    }
+}
+
 impl Matches {
-    fn of(all: Vec<Match>, surfels: usize) -> Self {
-        let mut begins = vec![0; surfels + 1];
+    fn of(all: Vec<Match>, scene: &[Placed]) -> Self {
+        let mut begins = vec![0; scene.len() + 1];
         let sides = |one: &Match| [Some(one.a as usize), one.other()];
         for surfel in all.iter().flat_map(sides).flatten() {
             begins[surfel + 1] += 1;
         }
-        for surfel in 0..surfels {
+        for surfel in 0..scene.len() {
             begins[surfel + 1] += begins[surfel];
         }
         let mut next = begins.clone();
-        let mut of_surfels = vec![0; begins[surfels]];
+        let mut of_surfels = vec![0; begins[scene.len()]];
         for (index, one) in all.iter().enumerate() {
             for surfel in sides(one).into_iter().flatten() {
                 of_surfels[next[surfel]] = index as u32;
                 next[surfel] += 1;
             }
         }
-        Self { all, of_surfels, begins }
+        let span = |surfel: usize| scene[surfel].basis.first;
+        let matched = (0..scene.len()).filter(|surfel| begins[*surfel] < begins[surfel + 1]);
+        let spans = Runs::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
+        let coupled = all.iter().enumerate().filter_map(|(index, one)| {
+            let (a, b) = (span(one.a as usize), span(one.other()?));
+            Some(((a.min(b), a.max(b)), index as u32))
+        });
+        Self { spans, couplings: Runs::of(coupled.collect()), all, of_surfels, begins }
     }
 
     /// The matches of a surfel of the scene: indices into all.
     pub fn of_surfel(&self, surfel: usize) -> &[u32] {
         &self.of_surfels[self.begins[surfel]..self.begins[surfel + 1]]
-    }
-
-    /// The surfels of part `part` of `parts`, of about as many matches each.
-    pub fn part(&self, part: usize, parts: usize) -> std::ops::Range<usize> {
-        let cut = |k: usize| self.begins.partition_point(|begin| begin * parts < self.of_surfels.len() * k);
-        let surfels = self.begins.len().saturating_sub(1);
-        cut(part).min(surfels)..cut(part + 1).min(surfels)
     }
 
     pub fn planes(&self) -> impl Iterator<Item = &Plane> {
@@ -172,7 +211,7 @@ impl Window {
         };
         let mut all: Vec<Option<Match>> = neighbours.pairs.par_iter().with_min_len(512).map(live).collect();
         all.par_extend(neighbours.fixed.par_iter().with_min_len(512).map(fixed));
-        Matches::of(all.into_iter().flatten().collect(), scene.len())
+        Matches::of(all.into_iter().flatten().collect(), scene)
     }
 
     /// Normals that lean to `direction` by no more than they may err lean no more: together, such errors would pass for

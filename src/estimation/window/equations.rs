@@ -2,11 +2,13 @@
 
 use super::Window;
 use super::correspondence::{Match, Matches};
+use crate::estimation::nominal::Correction;
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
 use crate::estimation::residual::inertial::add_inertial;
-use crate::estimation::residual::matched::{self, ALWAYS, Beside, Own, Plane, SHARED, Side};
+use crate::estimation::residual::matched::{ALWAYS, Plane, SHARED, Side};
 use crate::estimation::residual::prior;
+use crate::estimation::residual::sums::{Coupling, OfSpan, Own};
 use crate::estimation::spec::SolveSpec;
 use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::spline::Basis;
@@ -15,35 +17,20 @@ use crate::geometry::Vector;
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// The normal equations are summed in so many parts, whatever the number of threads, so that sums keep their order.
-const PARTS: usize = 4;
 /// How still the head is at rest, m/s.
 const REST_VELOCITY_SIGMA: f64 = 0.003;
 
 /// Memory that is used again from solve to solve.
 #[derive(Debug)]
 pub(super) struct Workspace {
-    inertial: NormalEquations,
-    /// Each with its share of the matches, the first with the inertial part as well; all are added to the first.
-    parts: [NormalEquations; PARTS],
-    /// How far the solution before moves each surfel, m.
-    moved: Vec<Vector>,
-    /// The weight of each match.
-    weights: Vec<f64>,
+    equations: NormalEquations,
     pub factor: Factor,
     pub bases: Vec<Basis>,
 }
 
 impl Default for Workspace {
     fn default() -> Self {
-        Self {
-            inertial: NormalEquations::new(0),
-            parts: std::array::from_fn(|_| NormalEquations::new(0)),
-            moved: Vec::new(),
-            weights: Vec::new(),
-            factor: Factor::default(),
-            bases: Vec::new(),
-        }
+        Self { equations: NormalEquations::new(0), factor: Factor::default(), bases: Vec::new() }
     }
 }
 
@@ -69,7 +56,7 @@ impl Robust {
     }
 }
 
-/// The most that a solution moves a knot.
+/// The most that a correction moves the trajectory anywhere.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Moved {
     /// m.
@@ -79,14 +66,13 @@ pub(in crate::estimation) struct Moved {
 }
 
 impl Moved {
-    /// Of six unknowns a knot.
-    pub fn greatest(knots: &[f64]) -> Self {
-        let norm = |v: &[f64]| Vector::new(v[0], v[1], v[2]).norm();
+    /// Of some corrections, turn and shift.
+    pub fn greatest(corrections: impl Iterator<Item = (Vector, Vector)>) -> Self {
         // NaN must not pass for small.
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        knots.chunks_exact(6).fold(Self { shift: 0.0, turn: 0.0 }, |most, knot| Self {
-            shift: larger(most.shift, norm(&knot[3..])),
-            turn: larger(most.turn, norm(&knot[..3])),
+        corrections.fold(Self { shift: 0.0, turn: 0.0 }, |most, (turn, shift)| Self {
+            shift: larger(most.shift, shift.norm()),
+            turn: larger(most.turn, turn.norm()),
         })
     }
 
@@ -107,141 +93,126 @@ impl Window {
         Layout { first_knot, knots: (last_knot - first_knot + 1) as usize }
     }
 
-    /// The part of the normal equations that robust weights do not change: IMU and priors.
-    pub(super) fn assemble_inertial(&mut self, first: usize, layout: &Layout, total: &[f64]) {
-        let Workspace { inertial, bases, .. } = &mut self.workspace;
-        inertial.reset(layout.size());
+    /// Solves the linearised window: the solution, and by how much it moves the head; adds the time to `spent`.
+    pub(super) fn solve_linearised(
+        &mut self,
+        (first, total): (usize, &[f64]),
+        scene: &[Placed],
+        (matches, robust): (&Matches, &Robust),
+        layout: &Layout,
+        spent: &mut TimeSpent,
+    ) -> Option<(Vec<f64>, Moved)> {
+        let mut watch = Stopwatch::start();
+        self.assemble_inertial(first, layout, total);
+        let seen = Seen { scene, matches, robust, clock_at_s: self.clock.at_s };
+        seen.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
+        spent.equations_s += watch.lap_s();
+        let Workspace { equations, factor, bases } = &mut self.workspace;
+        equations.factor(factor).ok()?;
+        let x = equations.solve(factor);
+        let moved = Moved::greatest(bases.iter().map(|basis| {
+            let correction = Correction::of_spline(basis, layout.first_knot, &x);
+            (correction.rotation, correction.translation)
+        }));
+        spent.solve_s += watch.lap_s();
+        Some((x, moved))
+    }
+
+    /// Empties the equations, and begins them with what does not hang on matches: IMU and priors.
+    fn assemble_inertial(&mut self, first: usize, layout: &Layout, total: &[f64]) {
+        let Workspace { equations, bases, .. } = &mut self.workspace;
+        equations.reset(layout.size());
         let states = self.nominal.states();
         let known = (&self.biases, &self.gravity);
-        add_inertial(inertial, layout, (&states[first..], bases), &self.nominal.intervals()[first..], known);
-        self.start.add_to(inertial, layout, (total, self.border.moved_so_far()), self.spec.knot_spacing_s);
-        self.border.add_to(inertial, layout);
+        add_inertial(equations, layout, (&states[first..], bases), &self.nominal.intervals()[first..], known);
+        self.start.add_to(equations, layout, (total, self.border.moved_so_far()), self.spec.knot_spacing_s);
+        self.border.add_to(equations, layout);
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);
         for ((_, state), basis) in nodes.zip(&*bases).take_while(|((time, _), _)| **time < self.rested_until_s) {
-            prior::add_standstill(inertial, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
+            prior::add_standstill(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
         }
         // The outermost knots hardly touch the window: a metre and a radian keep them where nothing else does.
         for unknown in 0..layout.border() {
-            inertial.add_entry(unknown, unknown, 1.0);
-        }
-    }
-
-    /// Solves the linearised window, with robust weights from the residuals that the solution before leaves, and again while
-    /// it moves; adds the time to `spent`. The solution, and by how much it moves a knot.
-    pub(super) fn solve_robustly(
-        &mut self,
-        scene: &[Placed],
-        matches: &Matches,
-        layout: &Layout,
-        robust: &Robust,
-        spent: &mut TimeSpent,
-    ) -> Option<(Vec<f64>, Moved)> {
-        let mut solution: Option<(Vec<f64>, Moved)> = None;
-        let mut watch = Stopwatch::start();
-        for _ in 0..self.spec.solve.reweightings {
-            let before = solution.as_ref().map(|(x, _)| x.as_slice());
-            self.assemble_matches(scene, matches, layout, robust, before);
-            spent.equations_s += watch.lap_s();
-            let Workspace { parts: [sum, ..], factor, .. } = &mut self.workspace;
-            sum.factor(factor).ok()?;
-            let x = sum.solve(factor);
-            spent.solve_s += watch.lap_s();
-            let moved = Moved::greatest(&x[..layout.border()]);
-            let settled = moved.most() < self.spec.solve.settled_m;
-            solution = Some((x, moved));
-            if settled {
-                break; // weights would hardly change
-            }
-        }
-        solution
-    }
-
-    /// Adds the matches to the inertial part, weighted by what the solution `x` leaves of them.
-    fn assemble_matches(
-        &mut self,
-        scene: &[Placed],
-        matches: &Matches,
-        layout: &Layout,
-        robust: &Robust,
-        x: Option<&[f64]>,
-    ) {
-        let (at_s, extrinsics) = (self.clock.at_s, self.spec.extrinsics.estimated);
-        let Workspace { inertial, parts, moved, weights, .. } = &mut self.workspace;
-        let movement = |surfel: &Placed| x.map_or_else(Vector::zeros, |x| matched::moved(surfel, layout, x, at_s));
-        scene.par_iter().with_min_len(512).map(movement).collect_into_vec(moved);
-        let weigh = |one: &Match| {
-            let apart = moved[one.a as usize] - one.other().map_or_else(Vector::zeros, |b| moved[b]);
-            robust.weight(&one.plane, one.plane.distance_m + one.plane.normal.dot(&apart))
-        };
-        matches.all.par_iter().with_min_len(512).map(weigh).collect_into_vec(weights);
-        parts.par_iter_mut().enumerate().for_each(|(part, equations)| {
-            if part == 0 {
-                equations.copy_from(inertial);
-            } else {
-                equations.reset(layout.size());
-            }
-            let mut sums = Sums { equations, layout, placed: scene, matches, weights, at_s };
-            let surfels = matches.part(part, PARTS);
-            // The widest vector units of the machine: the order of the sums, and so each bit, is the same on all.
-            Arch::new().dispatch(|| {
-                if extrinsics { sums.add_surfels::<SHARED>(surfels) } else { sums.add_surfels::<ALWAYS>(surfels) }
-            });
-            equations.settle();
-        });
-        let [sum, others @ ..] = parts;
-        for equations in others {
-            sum.add(equations);
+            equations.add_entry(unknown, unknown, 1.0);
         }
     }
 }
 
-/// The matches of some surfels on their way into the normal equations.
-struct Sums<'a> {
-    equations: &'a mut NormalEquations,
-    layout: &'a Layout,
-    placed: &'a [Placed],
+/// What was seen, on its way into the normal equations.
+struct Seen<'a> {
+    scene: &'a [Placed],
     matches: &'a Matches,
-    weights: &'a [f64],
-    at_s: f64,
+    robust: &'a Robust,
+    clock_at_s: f64,
 }
 
-impl Sums<'_> {
-    /// Adds the matches of `surfels`: what each surfel says of itself, and how it hangs together with those no later.
-    #[inline(always)]
-    fn add_surfels<const B: usize>(&mut self, surfels: std::ops::Range<usize>) {
-        let mut beside = Beside::<B>::NONE;
-        for index in surfels {
-            let mut own = Own::NONE;
-            for k in self.matches.of_surfel(index) {
-                self.add_match((index, &mut own), *k as usize, &mut beside);
-            }
-            own.add_to(self.equations, self.layout, &self.placed[index]);
+impl Seen<'_> {
+    /// Adds all matches; with `extrinsics`, with what they say of how the lidar sits.
+    fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, extrinsics: bool) {
+        let weigh = |one: &Match| self.robust.weight(&one.plane, one.plane.distance_m);
+        let weights: Vec<f64> = self.matches.all.iter().map(weigh).collect();
+        if extrinsics {
+            self.add_weighted::<SHARED>(&weights, equations, layout);
+        } else {
+            self.add_weighted::<ALWAYS>(&weights, equations, layout);
         }
-        beside.add_to(self.equations, self.layout);
     }
 
-    /// Adds match `k`, seen from the surfel `index`.
+    /// Sums are taken run by run and added in order: so they are the same bits on any number of threads, and, since vector units of
+    /// any width take them in the same order, on all machines.
+    fn add_weighted<const B: usize>(&self, weights: &[f64], equations: &mut NormalEquations, layout: &Layout) {
+        let spans = self.matches.spans.par_iter();
+        let spans = spans.map(|(span, surfels)| (span, Arch::new().dispatch(|| self.of_span::<B>(surfels, weights))));
+        let pairs = self.matches.couplings.par_iter();
+        let pairs = pairs.map(|(pair, matches)| (pair, Arch::new().dispatch(|| self.coupling::<B>(matches, weights))));
+        let (spans, pairs): (Vec<_>, Vec<_>) = rayon::join(|| spans.collect(), || pairs.collect());
+        spans.iter().for_each(|(span, sum)| sum.add_to(equations, layout, *span));
+        pairs.iter().for_each(|(pair, sum)| sum.add_to(equations, layout, *pair));
+    }
+
+    /// What the matches of the surfels of a span say of each surfel's own motion.
     #[inline(always)]
-    fn add_match<const B: usize>(&mut self, (index, own): (usize, &mut Own<B>), k: usize, beside: &mut Beside<B>) {
-        let (one, weight) = (&self.matches.all[k], self.weights[k]);
-        let is_first = one.a as usize == index;
-        let normal = if is_first { one.plane.normal } else { -one.plane.normal };
-        let distance_m = one.plane.distance_m;
-        let surfel = &self.placed[index];
-        let alone = Side::of(surfel, &normal, self.at_s);
-        let Some(other) = (if is_first { one.other() } else { Some(one.a as usize) }) else {
-            own.add(&alone, distance_m, weight);
-            beside.add(&alone, distance_m, weight);
-            return;
-        };
-        let partner = &self.placed[other];
-        let partner_side = Side::of(partner, &-normal, self.at_s);
-        let side = alone.together_with(&partner_side);
-        own.add(&side, distance_m, weight);
-        // Each match is met from both sides; what concerns both is added from the later one.
-        if (partner.basis.first, other) < (surfel.basis.first, index) {
-            beside.add(&side, distance_m, weight);
-            matched::add_coupling(self.equations, self.layout, (partner, &partner_side), (surfel, &side), weight);
+    fn of_span<const B: usize>(&self, surfels: impl Iterator<Item = usize>, weights: &[f64]) -> OfSpan<B> {
+        let mut sum = OfSpan::NONE;
+        for index in surfels {
+            let surfel = &self.scene[index];
+            let mut own = Own::NONE;
+            for k in self.matches.of_surfel(index).iter().map(|k| *k as usize) {
+                let (one, weight) = (&self.matches.all[k], weights[k]);
+                let is_first = one.a as usize == index;
+                let side = self.side(one, is_first);
+                let side = if one.other().is_some() { side.together_with(&self.side(one, !is_first)) } else { side };
+                own.add(&side, one.plane.distance_m, weight);
+                // Each match of two is met from both sides.
+                if is_first {
+                    sum.beside.add(&side, one.plane.distance_m, weight);
+                }
+            }
+            sum.add(&own, &surfel.basis);
         }
+        sum
+    }
+
+    /// How the surfels of two spans hang together by some matches.
+    #[inline(always)]
+    fn coupling<const B: usize>(&self, matches: impl Iterator<Item = usize>, weights: &[f64]) -> Coupling {
+        let mut sum = Coupling::NONE;
+        for k in matches {
+            let one = &self.matches.all[k];
+            let Some(other) = one.other() else { continue };
+            let (a, b) = (&self.scene[one.a as usize], &self.scene[other]);
+            let (a, b) = ((a, &self.side::<B>(one, true)), (b, &self.side(one, false)));
+            let (early, late) = if a.0.basis.first <= b.0.basis.first { (a, b) } else { (b, a) };
+            sum.add(early, late, weights[k]);
+        }
+        sum
+    }
+
+    /// How a match's distance grows by what moves its first surfel, or the other.
+    #[inline(always)]
+    fn side<const B: usize>(&self, one: &Match, first: bool) -> Side<B> {
+        let normal = if first { one.plane.normal } else { -one.plane.normal };
+        let surfel = if first { one.a as usize } else { one.other().unwrap_or(one.a as usize) };
+        Side::of(&self.scene[surfel], &normal, self.clock_at_s)
     }
 }

@@ -71,9 +71,9 @@ impl Window {
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
             let matches = self.believed(matches, &solved, &scene, views);
             solved.spent.matches_s += watch.lap_s();
-            self.assemble_inertial(first, &layout, &total);
-            solved.spent.equations_s += watch.lap_s();
-            let Some((x, by)) = self.solve_robustly(&scene, &matches, &layout, &robust, &mut solved.spent) else {
+            let seen = (&matches, &robust);
+            let spent = &mut solved.spent;
+            let Some((x, by)) = self.solve_linearised((first, &total), &scene, seen, &layout, spent) else {
                 solved.trouble = Some("its equations are singular");
                 break;
             };

@@ -1,0 +1,175 @@
+//! What matches say, summed by the spans between knots in which their surfels were seen.
+//!
+//! All surfels of a span hang on the same four knots. What they say is summed in small dense blocks, which stay in the
+//! processor's nearest memory, and goes into the equations a block at a time.
+
+use super::matched::Side;
+use super::{CLOCK, Layout};
+use crate::estimation::normal_equations::NormalEquations;
+use crate::estimation::spline::Basis;
+use crate::estimation::surfel::Placed;
+
+/// Unknowns of the four knots about a span.
+pub(super) const OF_SPAN: usize = 24;
+
+/// What all matches of a surfel say about its own motion: `sum w g v^T`, with `g` the derivative of `e` by turn and shift, and
+/// `v` in turn `g`, that by the border, and `e`.
+///
+/// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
+#[derive(Debug)]
+pub(in crate::estimation) struct Own<const B: usize> {
+    square: [[f64; 6]; 6],
+    beside: [[f64; 6]; B],
+    right: [f64; 6],
+}
+
+impl<const B: usize> Own<B> {
+    /// No match yet.
+    pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; 6]; 6], beside: [[0.0; 6]; B], right: [0.0; 6] };
+
+    /// Adds a match whose distance grows by `side`.
+    #[inline(always)]
+    pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
+        for (square, by) in self.square.iter_mut().zip(side.own) {
+            add_scaled(square, &side.own, weight * by);
+        }
+        for (sums, by) in self.beside.iter_mut().zip(side.beside) {
+            add_scaled(sums, &side.own, weight * by);
+        }
+        add_scaled(&mut self.right, &side.own, weight * distance_m);
+    }
+}
+
+/// What the matches of all surfels of a span say about their own motion, and about what all surfels share.
+#[derive(Debug)]
+pub(in crate::estimation) struct OfSpan<const B: usize> {
+    square: [[f64; OF_SPAN]; OF_SPAN],
+    by_border: [[f64; OF_SPAN]; B],
+    right: [f64; OF_SPAN],
+    pub(in crate::estimation) beside: Beside<B>,
+}
+
+impl<const B: usize> OfSpan<B> {
+    /// No surfel yet.
+    pub(in crate::estimation) const NONE: Self = Self {
+        square: [[0.0; OF_SPAN]; OF_SPAN],
+        by_border: [[0.0; OF_SPAN]; B],
+        right: [0.0; OF_SPAN],
+        beside: Beside::NONE,
+    };
+
+    /// Adds what a surfel's matches say of it, `basis` being that of its time.
+    #[inline(always)]
+    pub(in crate::estimation) fn add(&mut self, own: &Own<B>, basis: &Basis) {
+        let square = own.square.map(|row| over_knots(&row, basis));
+        for (rows, value) in self.square.chunks_exact_mut(6).zip(basis.value) {
+            for (sums, row) in rows.iter_mut().zip(&square) {
+                add_scaled(sums, row, value);
+            }
+        }
+        for (sums, row) in self.by_border.iter_mut().zip(&own.beside) {
+            add_scaled(sums, &over_knots(row, basis), 1.0);
+        }
+        add_scaled(&mut self.right, &over_knots(&own.right, basis), -1.0);
+    }
+
+    /// Adds it to the equations of the window's unknowns; `span` is the first of its knots.
+    pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, span: i64) {
+        let (first, beside) = (layout.knot(span), layout.border() + CLOCK);
+        for (row, sums) in self.square.iter().enumerate() {
+            equations.add_row(first + row, first, &sums[..=row]);
+            equations.add_right(first + row, self.right[row]);
+        }
+        for (unknown, sums) in self.by_border.iter().enumerate() {
+            equations.add_row(beside + unknown, first, sums);
+        }
+        self.beside.add_to(equations, beside);
+    }
+}
+
+/// What all matches say about what surfels share: `sum w b v^T`, with `b` the derivative of `e` by them, and `v` in turn `b`
+/// and `e`.
+#[derive(Debug)]
+pub(in crate::estimation) struct Beside<const B: usize> {
+    square: [[f64; B]; B],
+    right: [f64; B],
+}
+
+impl<const B: usize> Beside<B> {
+    const NONE: Self = Self { square: [[0.0; B]; B], right: [0.0; B] };
+
+    /// Adds a match whose distance grows by `side`, both surfels' part of it.
+    #[inline(always)]
+    pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
+        for (square, by) in self.square.iter_mut().zip(side.beside) {
+            add_scaled(square, &side.beside, weight * by);
+        }
+        add_scaled(&mut self.right, &side.beside, -weight * distance_m);
+    }
+
+    /// Adds it to the equations, in which what surfels share begins at `first`.
+    fn add_to(&self, equations: &mut NormalEquations, first: usize) {
+        for (row, sums) in self.square.iter().enumerate() {
+            equations.add_row(first + row, first, &sums[..=row]);
+            equations.add_right(first + row, self.right[row]);
+        }
+    }
+}
+
+/// How the knots about the surfels of two spans hang together by matches between them: rows by the later span's unknowns.
+#[derive(Debug)]
+pub(in crate::estimation) struct Coupling([[f64; OF_SPAN]; OF_SPAN]);
+
+impl Coupling {
+    /// No match yet.
+    pub(in crate::estimation) const NONE: Self = Self([[0.0; OF_SPAN]; OF_SPAN]);
+
+    /// Adds a match of a surfel of the earlier span with one of the later.
+    #[inline(always)]
+    pub(in crate::estimation) fn add<const B: usize>(
+        &mut self,
+        (early, early_side): (&Placed, &Side<B>),
+        (late, late_side): (&Placed, &Side<B>),
+        weight: f64,
+    ) {
+        let row = over_knots(&early_side.own, &early.basis);
+        for (sums, by) in self.0.iter_mut().zip(over_knots(&late_side.own, &late.basis)) {
+            add_scaled(sums, &row, weight * by);
+        }
+    }
+
+    /// Adds it to the equations of the window's unknowns; `early` and `late` are the first knots of the spans.
+    pub(in crate::estimation) fn add_to(
+        &self,
+        equations: &mut NormalEquations,
+        layout: &Layout,
+        (early, late): (i64, i64),
+    ) {
+        let (first_column, first_row) = (layout.knot(early), layout.knot(late));
+        for (row, sums) in self.0.iter().enumerate().map(|(k, sums)| (first_row + k, sums)) {
+            // Where the spans have knots in common, columns reach the diagonal, and beyond it are those of the mirrored block.
+            let below = row.saturating_sub(first_column).min(OF_SPAN);
+            equations.add_row(row, first_column, &sums[..below]);
+            for (column, sum) in sums.iter().enumerate().skip(below).map(|(k, sum)| (first_column + k, sum)) {
+                equations.add_entry(row, column, if row == column { 2.0 * sum } else { *sum });
+            }
+        }
+    }
+}
+
+/// Six derivatives by a surfel's motion as those by the four knots about it.
+#[inline(always)]
+pub(super) fn over_knots(by_motion: &[f64; 6], basis: &Basis) -> [f64; OF_SPAN] {
+    let mut knots = [0.0; OF_SPAN];
+    for (knot, value) in knots.chunks_exact_mut(6).zip(basis.value) {
+        add_scaled(knot, by_motion, value);
+    }
+    knots
+}
+
+#[inline(always)]
+pub(super) fn add_scaled(sums: &mut [f64], terms: &[f64], scale: f64) {
+    for (sum, term) in sums.iter_mut().zip(terms) {
+        *sum += scale * term;
+    }
+}
