@@ -16,13 +16,25 @@ pub struct Errors {
 impl Errors {
     /// The errors that remain when the estimate is moved by `world_from_map`.
     pub fn after(pairs: &Pairs, world_from_map: &Pose) -> Self {
-        let mut errors = Self { stamps: pairs.stamps().to_vec(), ..Self::default() };
+        let (position_m, rotation_rad) = (Vec::with_capacity(pairs.len()), Vec::with_capacity(pairs.len()));
+        let mut errors = Self { stamps: pairs.stamps().to_vec(), position_m, rotation_rad };
         for (map_from_head, world_from_head) in pairs.estimate().iter().zip(pairs.truth()) {
             let estimated = world_from_map * map_from_head;
             errors.position_m.push(estimated.translation.vector - world_from_head.translation.vector);
             errors.rotation_rad.push((estimated.rotation * world_from_head.rotation.inverse()).scaled_axis());
         }
         errors
+    }
+
+    /// Those of every `stride`-th instant.
+    #[must_use]
+    pub fn every(&self, stride: usize) -> Self {
+        let thin = |vectors: &[Vector]| vectors.iter().step_by(stride).copied().collect();
+        Self {
+            stamps: self.stamps.iter().step_by(stride).copied().collect(),
+            position_m: thin(&self.position_m),
+            rotation_rad: thin(&self.rotation_rad),
+        }
     }
 
     /// Root mean square of the distance between estimated and true position, m: the `rmse` of `evo_ape -a`.

@@ -1,8 +1,11 @@
 use super::EvaluationError;
 use crate::geometry::{Pose, Rotation, STANDARD_GRAVITY_M_PER_S2, Trajectory, Vector};
 use crate::measurement::ImuSample;
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use std::collections::VecDeque;
+
+/// Time between poses that are kept.
+const KEPT_EVERY: Span = Span::from_nanos(100_000_000);
 
 /// What counts as rest at the start.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,11 +148,14 @@ impl DeadReckoning {
     fn keep(&mut self, sample: &ImuSample) {
         self.previous = Some(*sample);
         let map_from_imu = Pose::from_parts(self.position_in_map.into(), self.map_from_imu);
+        if self.trajectory.span().is_some_and(|(_, last)| sample.stamp - last < KEPT_EVERY) {
+            return;
+        }
         // Only a run that left all bounds is not finite; its trajectory ends there.
         let _ = self.trajectory.push(sample.stamp, map_from_imu * self.imu_from_head);
     }
 
-    /// `map_from_head` at every sample, on the IMU's clock; a recording that rests to its end lacks the last half second.
+    /// `map_from_head` ten times a second, on the IMU's clock; a recording that rests to its end lacks the last half second.
     ///
     /// # Errors
     /// When the rest at the start was too short.

@@ -33,7 +33,9 @@ impl Pairs {
         estimate: &Trajectory,
         truth: impl IntoIterator<Item = Result<(Stamp, Pose), E>>,
     ) -> Result<Self, E> {
-        let mut pairs = Self::default();
+        let most = estimate.len();
+        let (estimated, truths) = (Vec::with_capacity(most), Vec::with_capacity(most));
+        let mut pairs = Self { stamps: Vec::with_capacity(most), estimate: estimated, truth: truths };
         let mut waiting = estimate.iter().peekable();
         let mut before: Option<(Stamp, Pose)> = None;
         for told in truth {

@@ -9,11 +9,14 @@ use crate::evaluation::{Errors, InformationBound};
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report::plot::Figure;
 use crate::report::{self, Metrics, Section};
+use crate::time::Stamp;
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Side of the cells in which the outline has one dot, m.
 const CELL_M: f64 = 0.05;
+/// Most instants that a curve is drawn of: some dozen to a pixel.
+const DRAWN: usize = 50_000;
 /// The outline is cut from the cloud at the head's height, give or take this, m.
 const CUT_M: f64 = 0.4;
 
@@ -32,16 +35,17 @@ pub(super) fn plots(
 ) -> Vec<Plot> {
     let known = best.known;
     let world_from_map = known.and_then(|known| known.world_from_map).unwrap_or_else(Pose::identity);
-    let estimate = best.map_from_head.transformed(&world_from_map);
+    let estimate = drawn(best.map_from_head.iter().map(|(stamp, pose)| (stamp, world_from_map * pose)));
     let truth = known.map(true_trajectory).unwrap_or_default();
     let outline = outline(sample, &world_from_map, &estimate);
     let plot = |name, title: &str, figure: Figure| Plot { name, section: Section { title: title.to_owned(), figure } };
 
     let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_from_above(&truth, &estimate, &outline))];
     if let Some(errors) = known.and_then(|known| known.errors.as_ref()) {
-        plots.push(plot("errors", "Errors over time", report::errors_over_time(errors)));
-        if let Some(open) = open_errors {
-            plots.push(plot("loops", "What closing loops is good for", report::errors_of_both_loops(open, errors)));
+        let errors = errors.every(stride(errors.stamps.len()));
+        plots.push(plot("errors", "Errors over time", report::errors_over_time(&errors)));
+        if let Some(open) = open_errors.map(|open| open.every(stride(open.stamps.len()))) {
+            plots.push(plot("loops", "What closing loops is good for", report::errors_of_both_loops(&open, &errors)));
         }
     }
     plots.extend(bound.map(|bound| plot("bound", "Information bound", report::bound_over_time(bound))));
@@ -52,8 +56,18 @@ pub(super) fn plots(
 }
 
 fn true_trajectory(known: &Known) -> Trajectory {
-    let stamped = known.pairs.stamps().iter().copied().zip(known.pairs.truth().iter().copied());
-    Trajectory::from_poses(stamped).unwrap_or_default()
+    drawn(known.pairs.stamps().iter().copied().zip(known.pairs.truth().iter().copied()))
+}
+
+/// What is drawn of the poses of a long run.
+fn drawn(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -> Trajectory {
+    let stride = stride(stamped.len());
+    Trajectory::from_poses(stamped.step_by(stride)).unwrap_or_default()
+}
+
+/// One instant in so many is drawn of `count`.
+fn stride(count: usize) -> usize {
+    count.div_ceil(DRAWN).max(1)
 }
 
 /// What of the cloud lies at the head's height: the walls, from above, one point a cell.

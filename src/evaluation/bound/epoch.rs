@@ -31,6 +31,8 @@ const GRAZING: f64 = 0.02;
 
 /// Errors that a beam tells of: attitude, position, clock offset now, offset of the ranges.
 pub(super) type Seen = SMatrix<f64, 8, 8>;
+/// Entries of its lower triangle.
+const TOLD: usize = 36;
 
 /// An instant: how the IMU moved, what it said on average, and what the beams about it say together.
 #[derive(Debug, Clone)]
@@ -42,8 +44,8 @@ pub(super) struct Epoch {
     rate_sum: Vector,
     force_sum: Vector,
     samples: f64,
-    /// Fisher information of the beams.
-    pub seen: Seen,
+    /// Fisher information of the beams: its lower triangle, row by row.
+    told: [f64; TOLD],
 }
 
 impl Epoch {
@@ -57,7 +59,7 @@ impl Epoch {
             rate_sum: Vector::zeros(),
             force_sum: Vector::zeros(),
             samples: 0.0,
-            seen: Seen::zeros(),
+            told: [0.0; TOLD],
         }
     }
 
@@ -90,6 +92,15 @@ impl Epoch {
         row.fixed_rows_mut::<3>(3).copy_from(&by_position);
         (row[6], row[7]) = (by_clock, 1.0);
         row /= sight.range_sigma_m;
-        self.seen.ger(1.0, &row, &row, 1.0);
+        let products = (0..8).flat_map(|i| (0..=i).map(move |j| row[i] * row[j]));
+        self.told.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+    }
+
+    /// Fisher information of the beams.
+    pub(super) fn seen(&self) -> Seen {
+        Seen::from_fn(|i, j| {
+            let (row, column) = (i.max(j), i.min(j));
+            self.told[row * (row + 1) / 2 + column]
+        })
     }
 }

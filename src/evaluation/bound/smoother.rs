@@ -46,7 +46,7 @@ impl Run<'_> {
 
     /// `W` of an epoch's measurements, on the errors that they tell of: `(I + M P)^-1 M` with their information `M`.
     fn weight(&self, index: usize, predicted: &State) -> Measured {
-        let information = with_rate(&self.epochs[index].seen, self.since_start_s(index));
+        let information = with_rate(&self.epochs[index].seen(), self.since_start_s(index));
         let known = Measured::from_fn(|i, j| predicted[(TOLD_OF[i], TOLD_OF[j])]);
         let weight = (Measured::identity() + information * known).lu().solve(&information);
         // I + M P has no eigenvalue below 1.
