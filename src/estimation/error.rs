@@ -79,7 +79,7 @@ pub enum WarningKind {
         /// Of the accelerometer's.
         accel: f64,
     },
-    /// No IMU sample for `seconds`; the motion was bridged at constant rates.
+    /// No IMU sample for `seconds`; the motion was bridged.
     ImuGap {
         /// How long, s.
         seconds: f64,
@@ -155,7 +155,9 @@ impl fmt::Display for WarningKind {
                 "at rest the IMU is noisier than it was told, the gyroscope {gyro:.1} and the accelerometer {accel:.1} times, \
                  and is taken for that"
             ),
-            Self::ImuGap { seconds } => write!(f, "no IMU sample for {seconds:.3} s; bridged at constant rates"),
+            Self::ImuGap { seconds } => {
+                write!(f, "no IMU sample for {seconds:.3} s; bridged by how the head moved before and behind")
+            }
             Self::LidarGap { seconds } => write!(f, "no lidar scan for {seconds:.3} s; carried by the IMU alone"),
             Self::BeganAgain { seconds } => write!(
                 f,

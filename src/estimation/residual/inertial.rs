@@ -31,6 +31,12 @@ const UNLIKE: f64 = 3.0;
 /// knot's span. None at all, and a correction could swing between the sums' ends.
 const WITHIN_SPAN: f64 = 3.0;
 
+/// Gaps no longer than this leave no step that would matter, s.
+const SHORT_GAP_S: f64 = 0.05;
+/// How far to both sides of a gap the correction takes the step, s, and by how much it then differs, rad/s and m/s^2.
+const BESIDE_S: f64 = 0.3;
+const BESIDE: (f64, f64) = (0.5, 3.0);
+
 /// The residuals of an interval and what their derivatives are made of.
 #[derive(Debug, Clone, Copy)]
 struct Inertial {
@@ -78,7 +84,9 @@ pub(in crate::estimation) fn add_inertial(
 ) {
     let (mut each, mut whole) = (Rows::none(), Rows::none());
     let mut sum: Option<Speed> = None;
+    let beside_a_gap = beside_gaps(intervals);
     for (k, interval) in intervals.iter().enumerate() {
+        let interval = &if beside_a_gap[k] { loosened(interval) } else { *interval };
         let terms = Inertial::between((&states[k], &states[k + 1]), interval, biases, gravity);
         let bases = (&bases[k], &bases[k + 1]);
         Turn::of(&terms, bases, interval).add_to(&mut each, equations, layout);
@@ -95,6 +103,36 @@ pub(in crate::estimation) fn add_inertial(
     }
     each.move_to(equations, layout);
     whole.move_to(equations, layout);
+}
+
+/// Which intervals are near a gap that was bridged: the head left it with another velocity and attitude than was thought, a step that
+/// the correction, smooth over some knots' spacings, takes on both sides of the gap. There it contradicts the samples without
+/// their being wrong, and taken at their word they would have biases take the step.
+fn beside_gaps(intervals: &[Interval]) -> Vec<bool> {
+    let mut beside = vec![false; intervals.len()];
+    let (mut bridged_s, mut behind_s) = (0.0, f64::INFINITY);
+    for (k, interval) in intervals.iter().enumerate() {
+        bridged_s = if interval.bridged { bridged_s + interval.h } else { 0.0 };
+        behind_s = if bridged_s > SHORT_GAP_S { 0.0 } else { behind_s + interval.h };
+        beside[k] = behind_s < BESIDE_S;
+        if behind_s == 0.0 {
+            let mut before_s = 0.0;
+            for (earlier, beside) in intervals[..k].iter().zip(&mut beside).rev() {
+                before_s += if earlier.bridged { 0.0 } else { earlier.h };
+                if *beside || before_s > BESIDE_S {
+                    break;
+                }
+                *beside = true;
+            }
+        }
+    }
+    beside
+}
+
+/// The same interval, of which the correction may differ by [`BESIDE`].
+fn loosened(interval: &Interval) -> Interval {
+    let (gyro_sigma, accel_sigma) = (interval.gyro_sigma.hypot(BESIDE.0), interval.accel_sigma.hypot(BESIDE.1));
+    Interval { gyro_sigma, accel_sigma, ..*interval }
 }
 
 /// Speeds are summed from one middle of a knot's span to the next.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// Neighbours are looked for again when a surfel may have moved by this since, m: by less, they hardly change.
 const MOVED_M: f64 = 0.02;
-/// Surfaces match from so many times farther off in a first window that was begun in motion.
+/// Surfaces match from so many times farther off in a first window that was begun in motion, and behind a leap.
 const GROPING: f64 = 3.0;
 /// A normal leans when it does so by more than this multiple of its error.
 const SIGNIFICANT: f64 = 4.0;
@@ -194,7 +194,7 @@ impl Window {
         neighbours: &Neighbours,
         iteration: usize,
     ) -> Matches {
-        let wider = if self.gropes { GROPING } else { 1.0 };
+        let wider = if self.gropes || self.leapt { GROPING } else { 1.0 };
         let gate_m = wider * self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, other: &Patch| {

@@ -32,6 +32,8 @@ const LONGEST: f64 = 3.0;
 /// A stretch counts as swept when it shows this fraction of the patches of the window's richest.
 const SWEPT: f64 = 0.25;
 
+/// A silence of the IMU longer than this leaves the head's place uncertain by more than matches reach, s.
+const LEAP_S: f64 = 0.05;
 /// How exactly a window is put into a map before it is matched with it, rad and m.
 const FOUND: [f64; 2] = [0.05, 0.2];
 
@@ -64,6 +66,8 @@ pub(super) struct Window {
     start: Start,
     /// Whether it is the first one, begun in motion: level and biases are guesses, and surfaces match from farther off.
     gropes: bool,
+    /// Whether the IMU was silent for a while in its newest stretch, so that it leapt.
+    leapt: bool,
     /// While the head has not moved yet: what the IMU says at rest.
     rest: Option<Rest>,
     /// Until when it rested, IMU time, s.
@@ -95,6 +99,7 @@ impl Window {
             stretches: VecDeque::new(),
             start: Start::first(start_u_s, beginning.velocity_sigma),
             gropes: beginning.rest.is_none(),
+            leapt: false,
             rest: beginning.rest,
             rested_until_s: f64::NEG_INFINITY,
             workspace: Workspace::default(),
@@ -160,6 +165,8 @@ impl Window {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
             }
         }
+        let bridged = intervals.iter().filter(|(_, interval)| interval.bridged);
+        self.leapt = bridged.map(|(_, interval)| interval.h).sum::<f64>() > LEAP_S;
         let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         let remembered = vec![Remembered::default(); surfels.len()];
