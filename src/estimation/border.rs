@@ -1,5 +1,6 @@
 //! What is remembered of biases, gravity and clock from window to window.
 
+use super::consider::{AT_IMU, IMU, OfBeginning};
 use super::normal_equations::{Factor, NormalEquations};
 use super::residual::prior::add_border;
 use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
@@ -47,6 +48,18 @@ impl Border {
     pub(super) fn moved(&mut self, by: &[f64], factor: &Factor) {
         self.moved += SVector::from_column_slice(by);
         self.posterior = factor.information_of_last::<BORDER>();
+    }
+
+    /// What the window knew before of the IMU's part, all else being unknown.
+    pub(super) fn imu_information(&self) -> Option<SMatrix<f64, IMU, IMU>> {
+        self.prior.try_inverse()?.fixed_view::<IMU, IMU>(0, 0).try_inverse()
+    }
+
+    /// By how much the IMU's part of what a window begins with wanders in `seconds`.
+    pub(super) fn imu_wanders(&self, seconds: f64) -> OfBeginning {
+        let mut by = OfBeginning::zeros();
+        (0..IMU).for_each(|k| by[(AT_IMU + k, AT_IMU + k)] = self.walks[k].powi(2) * seconds);
+        by
     }
 
     /// How far it has moved in this window.

@@ -6,14 +6,29 @@
 //! and Burdick, 2002, a view that is kept is a copy of the beginning's error at that time). Without views `A` is the identity
 //! and the errors walk away; where an old view is seen again, `A` vanishes and the error is the view's.
 //!
-//! An error is six numbers: a small turn (rad) of all that hangs on a part about its pivot, then a shift (m), in the map.
+//! An error of a view is six numbers: a small turn (rad) of all that hangs on it about its pivot, then a shift (m), in the map.
+//! That of a beginning is the same about where the IMU is, their derivatives by time, and what the window takes over of the IMU:
+//! biases and gravity's tilt. A velocity that is wrong, or a bias, stays so over many windows: left out, a head that for seconds
+//! sees neither floor nor ceiling drifts along the vertical four times as far as its windows, each for itself, would say.
 
+use super::residual::GYRO_BIAS;
 use super::views::{MAP, Taken};
 use crate::geometry::{Vector, skew};
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, SMatrix};
 
 /// How little is known after a silence: turn, rad, and shift, m.
 const LOST: (f64, f64) = (1.0, 1.0);
+
+/// What a window takes over of the IMU: the first of the border's unknowns, its biases and gravity's tilt.
+pub(super) const IMU: usize = 8;
+/// What a window begins with: turn and shift, their derivatives, and [`IMU`].
+pub(super) const CARRIED: usize = 12 + IMU;
+/// Where in it the IMU's part begins.
+pub(super) const AT_IMU: usize = 12;
+const _: () = assert!(GYRO_BIAS == 0, "the border begins with what is carried of it");
+
+/// Of what a window begins with, by itself.
+pub(super) type OfBeginning = SMatrix<f64, CARRIED, CARRIED>;
 
 /// What a window's solution owes to what it held fixed.
 #[derive(Debug, Clone)]
@@ -21,18 +36,18 @@ pub(super) struct Sensitivity {
     /// Where the error is told, IMU's place, m.
     pub(super) pivot: Vector,
     /// `A`: by the error of the window's beginning.
-    pub(super) beginning: Matrix6<f64>,
+    pub(super) beginning: OfBeginning,
     /// `V_k`: by the error of each view in use, by its number.
-    pub(super) views: Vec<(u64, Matrix6<f64>)>,
+    pub(super) views: Vec<(u64, SMatrix<f64, CARRIED, 6>)>,
     /// Covariance of what the window's own measurements add.
-    pub(super) noise: Matrix6<f64>,
+    pub(super) noise: OfBeginning,
 }
 
 /// The joint covariance of the window's beginning and of the views that are kept.
 #[derive(Debug, Clone)]
 pub(super) struct Consider {
     pivot: Vector,
-    beginning: Matrix6<f64>,
+    beginning: OfBeginning,
     views: Vec<View>,
 }
 
@@ -40,48 +55,63 @@ pub(super) struct Consider {
 struct View {
     number: u64,
     /// With the beginning: `E[e_view e_beginning^T]`.
-    with_beginning: Matrix6<f64>,
+    with_beginning: SMatrix<f64, 6, CARRIED>,
     /// With the views before it, then with itself.
     with_views: Vec<Matrix6<f64>>,
 }
 
 impl Consider {
-    /// Of a map that begins at `pivot`: there the error is none, by definition.
-    pub(super) fn new(pivot: Vector) -> Self {
-        Self { pivot, beginning: Matrix6::zeros(), views: Vec::new() }
+    /// Of a map that begins at `pivot`: there the error is none, by definition. `known` is the covariance of what a window
+    /// begins with, but for where it is.
+    pub(super) fn new(pivot: Vector, known: &OfBeginning) -> Self {
+        Self { pivot, beginning: *known, views: Vec::new() }
     }
 
     /// Of a map that goes on at `pivot` after a silence, in which the head went nobody knows where.
-    pub(super) fn lost(pivot: Vector) -> Self {
+    pub(super) fn lost(pivot: Vector, known: &OfBeginning) -> Self {
         let mut sigmas = [LOST.0; 6];
         sigmas[3..].fill(LOST.1);
-        let beginning = Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
-        Self { beginning, ..Self::new(pivot) }
+        let place = Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
+        Self::new(pivot, &somewhere(known, &place))
     }
 
     /// Of a head that was found at `pivot` in a map, with an error against it of covariance `found`, the map's own being
     /// `of_map`.
-    pub(super) fn found(pivot: Vector, found: Matrix6<f64>, of_map: Matrix6<f64>) -> Self {
-        let map = View { number: MAP, with_beginning: of_map, with_views: vec![of_map] };
-        Self { pivot, beginning: found + of_map, views: vec![map] }
+    pub(super) fn found(pivot: Vector, known: &OfBeginning, (found, of_map): (Matrix6<f64>, Matrix6<f64>)) -> Self {
+        let mut with_beginning = SMatrix::<f64, 6, CARRIED>::zeros();
+        with_beginning.fixed_view_mut::<6, 6>(0, 0).copy_from(&of_map);
+        let map = View { number: MAP, with_beginning, with_views: vec![of_map] };
+        Self { views: vec![map], ..Self::new(pivot, &somewhere(known, &(found + of_map))) }
     }
 
     /// The window's end is as uncertain as its beginning, which carries it along, and what measurements add by there.
     pub(super) fn carry(&mut self, end: &Sensitivity) {
-        let mut rigidly = Matrix6::identity();
-        rigidly.fixed_view_mut::<3, 3>(3, 0).copy_from(&-skew(&(end.pivot - self.pivot)));
-        self.advance(&Sensitivity { beginning: rigidly, views: Vec::new(), ..end.clone() });
+        self.go_rigidly(end.pivot, end.noise);
+    }
+
+    /// Behind a silence the head was found again at `pivot`, to a covariance `found`, by what was seen before, which is as
+    /// uncertain as the head was then; `known` as for [`Consider::new`].
+    pub(super) fn find_again(&mut self, pivot: Vector, known: &OfBeginning, found: &Matrix6<f64>) {
+        self.go_rigidly(pivot, somewhere(known, found));
+    }
+
+    /// A turn of the beginning carries `pivot` along; of the rest of it is known what `noise` tells.
+    fn go_rigidly(&mut self, pivot: Vector, noise: OfBeginning) {
+        let mut place = Matrix6::identity();
+        place.fixed_view_mut::<3, 3>(3, 0).copy_from(&-skew(&(pivot - self.pivot)));
+        let beginning = somewhere(&OfBeginning::zeros(), &place);
+        self.advance(&Sensitivity { pivot, beginning, views: Vec::new(), noise });
     }
 
     /// The window moves on: its new beginning is what `by` says of the old one and the views.
     pub(super) fn advance(&mut self, by: &Sensitivity) {
-        let used: Vec<(usize, Matrix6<f64>)> = by
+        let used: Vec<(usize, SMatrix<f64, CARRIED, 6>)> = by
             .views
             .iter()
             .filter_map(|(number, v)| Some((self.views.iter().position(|view| view.number == *number)?, *v)))
             .collect();
         // E[e_view e'^T], then E[e_beginning e'^T].
-        let with_new: Vec<Matrix6<f64>> = (0..self.views.len())
+        let with_new: Vec<SMatrix<f64, 6, CARRIED>> = (0..self.views.len())
             .map(|k| {
                 let start = self.views[k].with_beginning * by.beginning.transpose();
                 used.iter().fold(start, |sum, (other, v)| sum + self.between(k, *other) * v.transpose())
@@ -116,9 +146,10 @@ impl Consider {
 
     /// A view is kept that shares the beginning's error; told about where its pivot is now.
     fn keep(&mut self, number: u64) {
-        let with_beginning = self.beginning;
-        let before = self.views.iter().map(|view| view.with_beginning.transpose());
-        let with_views = before.chain([self.beginning]).collect();
+        let with_beginning = self.beginning.fixed_rows::<6>(0).into_owned();
+        let place = |of: &SMatrix<f64, 6, CARRIED>| of.fixed_columns::<6>(0).into_owned();
+        let before = self.views.iter().map(|view| place(&view.with_beginning).transpose());
+        let with_views = before.chain([place(&with_beginning)]).collect();
         self.views.push(View { number, with_beginning, with_views });
     }
 
@@ -139,7 +170,7 @@ impl Consider {
         by.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(&(place - self.pivot)));
         by.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
         by.fixed_view_mut::<3, 3>(3, 0).fill_with_identity();
-        by * self.beginning * by.transpose()
+        by * self.beginning.fixed_view::<6, 6>(0, 0) * by.transpose()
     }
 
     /// `E[e_a e_b^T]` of two views.
@@ -148,49 +179,59 @@ impl Consider {
     }
 }
 
+/// `known`, and where the window begins to `place`.
+fn somewhere(known: &OfBeginning, place: &Matrix6<f64>) -> OfBeginning {
+    let mut all = *known;
+    all.fixed_view_mut::<6, 6>(0, 0).copy_from(place);
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    fn wave(seed: usize) -> Matrix6<f64> {
-        Matrix6::from_fn(|r, c| 0.4 * ((seed * 7 + r * 5 + c * 3) as f64 * 0.61).sin())
+    fn wave<const C: usize>(seed: usize) -> SMatrix<f64, CARRIED, C> {
+        SMatrix::from_fn(|r, c| 0.2 * ((seed * 7 + r * 5 + c * 3 + r * c) as f64 * 0.61).sin())
     }
 
     fn sensitivity(seed: usize, views: &[u64]) -> Sensitivity {
-        let root = wave(seed + 50);
+        let root = wave::<CARRIED>(seed + 50);
         Sensitivity {
             pivot: Vector::zeros(),
             beginning: wave(seed),
             views: views.iter().map(|number| (*number, wave(seed + 9 + *number as usize))).collect(),
-            noise: root * root.transpose() + Matrix6::identity() * 0.1,
+            noise: root * root.transpose() + OfBeginning::identity() * 0.1,
         }
     }
 
     /// The same by the definition: every error as a row of coefficients of independent noises.
     #[test]
     fn the_joint_covariance_is_that_of_the_errors_written_out() {
-        let mut consider = Consider::new(Vector::zeros());
-        let sources = 6 * 8;
-        let mut beginning = DMatrix::<f64>::zeros(6, sources);
+        // What is known at first, and what eight windows add.
+        let root = wave::<CARRIED>(31);
+        let mut consider = Consider::new(Vector::zeros(), &(root * root.transpose()));
+        let sources = CARRIED * 9;
+        let mut beginning = DMatrix::<f64>::zeros(CARRIED, sources);
+        beginning.view_mut((0, CARRIED * 8), (CARRIED, CARRIED)).copy_from(&root);
         let mut views: Vec<(u64, DMatrix<f64>)> = Vec::new();
         for step in 0..8 {
             let used: Vec<u64> =
                 views.iter().map(|view| view.0).filter(|n| (n + step as u64).is_multiple_of(2)).collect();
             let by = sensitivity(step, &used);
             consider.advance(&by);
-            let mut next = DMatrix::from_fn(6, 6, |r, c| by.beginning[(r, c)]) * &beginning;
+            let mut next = DMatrix::from_fn(CARRIED, CARRIED, |r, c| by.beginning[(r, c)]) * &beginning;
             for (number, v) in &by.views {
                 let view = &views.iter().find(|view| view.0 == *number).unwrap().1;
-                next += DMatrix::from_fn(6, 6, |r, c| v[(r, c)]) * view;
+                next += DMatrix::from_fn(CARRIED, 6, |r, c| v[(r, c)]) * view;
             }
             let root = by.noise.cholesky().unwrap().l();
-            next.view_mut((0, 6 * step), (6, 6)).copy_from(&root);
+            next.view_mut((0, CARRIED * step), (CARRIED, CARRIED)).copy_from(&root);
             beginning = next;
             if step % 2 == 1 {
                 consider.keep(step as u64);
-                views.push((step as u64, beginning.clone()));
+                views.push((step as u64, beginning.rows(0, 6).into_owned()));
             }
             if step == 5 {
                 consider.forget(3);
@@ -198,9 +239,9 @@ mod tests {
             }
         }
         let expected = &beginning * beginning.transpose();
-        for r in 0..6 {
-            for c in 0..6 {
-                assert_relative_eq!(consider.beginning[(r, c)], expected[(r, c)], epsilon = 1e-12, max_relative = 1e-9);
+        for r in 0..CARRIED {
+            for c in 0..CARRIED {
+                assert_relative_eq!(consider.beginning[(r, c)], expected[(r, c)], epsilon = 1e-9, max_relative = 1e-9);
             }
         }
     }
@@ -208,16 +249,17 @@ mod tests {
     #[test]
     fn a_head_that_a_map_holds_is_as_uncertain_as_the_map_whatever_it_was_when_it_was_found() {
         let (found, of_map) = (Matrix6::identity() * 0.3, Matrix6::identity() * 0.02);
+        let place = |m: &OfBeginning| m.fixed_view::<6, 6>(0, 0).into_owned();
         let by = |beginning: f64, map: f64| Sensitivity {
-            beginning: Matrix6::identity() * beginning,
-            views: vec![(MAP, Matrix6::identity() * map)],
+            beginning: OfBeginning::identity() * beginning,
+            views: vec![(MAP, SMatrix::identity() * map)],
             ..sensitivity(1, &[])
         };
-        let noise = sensitivity(1, &[]).noise;
+        let noise = place(&sensitivity(1, &[]).noise);
         let after = |step: &Sensitivity| {
-            let mut consider = Consider::found(Vector::zeros(), found, of_map);
+            let mut consider = Consider::found(Vector::zeros(), &OfBeginning::zeros(), (found, of_map));
             consider.advance(step);
-            consider.beginning
+            place(&consider.beginning)
         };
         assert_relative_eq!(after(&by(0.0, 1.0)), of_map + noise, epsilon = 1e-12);
         assert_relative_eq!(after(&by(1.0, 0.0)), found + of_map + noise, epsilon = 1e-12);
@@ -226,12 +268,33 @@ mod tests {
     }
 
     #[test]
+    fn a_head_that_is_found_again_is_as_uncertain_as_what_was_seen_before_and_as_the_finding() {
+        let root = wave::<CARRIED>(3);
+        let before = root * root.transpose();
+        let mut consider = Consider::new(Vector::zeros(), &before);
+        consider.keep(0);
+        let there = Vector::new(1.0, -2.0, 0.5);
+        let (known, found) = (OfBeginning::identity() * 0.7, Matrix6::identity() * 0.2);
+        consider.find_again(there, &known, &found);
+        // What hung on the old beginning at that place, and the finding's own error.
+        let old = Consider::new(Vector::zeros(), &before);
+        let own = Consider::new(there, &somewhere(&known, &found));
+        let expected = old.covariance_at(&there) + own.covariance_at(&there);
+        assert_relative_eq!(consider.covariance_at(&there), expected, epsilon = 1e-12);
+        // Velocity and biases are as at any beginning, and hang on nothing.
+        assert_relative_eq!(consider.beginning[(7, 7)], 0.7, epsilon = 1e-12);
+        assert_relative_eq!(consider.beginning[(2, 13)], 0.0, epsilon = 1e-12);
+        // The view's error is in it.
+        assert!(consider.views[0].with_beginning.norm() > 0.1);
+    }
+
+    #[test]
     fn what_is_away_from_the_pivot_moves_with_its_turn() {
         // A turn of variance s^2 about z alone, seen 3 m along x: 9 s^2 along y, correlated with the turn.
-        let mut noise = Matrix6::zeros();
+        let mut noise = OfBeginning::zeros();
         noise[(2, 2)] = 1e-6;
-        let mut consider = Consider::new(Vector::zeros());
-        let by = Sensitivity { pivot: Vector::zeros(), beginning: Matrix6::identity(), views: Vec::new(), noise };
+        let mut consider = Consider::new(Vector::zeros(), &OfBeginning::zeros());
+        let by = Sensitivity { pivot: Vector::zeros(), beginning: OfBeginning::identity(), views: Vec::new(), noise };
         consider.advance(&by);
         let there = consider.covariance_at(&Vector::new(3.0, 0.0, 0.0));
         let moved = DVector::from_vec(vec![0.0, 3.0, 0.0, 0.0, 0.0, 1.0]);

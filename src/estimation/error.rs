@@ -89,11 +89,20 @@ pub enum WarningKind {
         /// How long, s.
         seconds: f64,
     },
-    /// No IMU sample for `seconds`, too long to bridge: the estimate began again behind it, where it had stopped, and what
-    /// the head did meanwhile is missing from it.
+    /// No IMU sample for `seconds`, too long to bridge: the estimate began again behind it.
     BeganAgain {
         /// How long the gap was, s.
         seconds: f64,
+    },
+    /// Behind the silence the head was found again in what was seen before it.
+    FoundAgain {
+        /// How far from where it had stopped, m.
+        away_m: f64,
+    },
+    /// It was not: the estimate goes on about where it had stopped, and what the head did meanwhile is missing from it.
+    LostAgain {
+        /// Why it was not.
+        why: String,
     },
     /// Measurements that came too late, or with a stamp that runs backwards, and were left out.
     LeftOut {
@@ -159,10 +168,17 @@ impl fmt::Display for WarningKind {
                 write!(f, "no IMU sample for {seconds:.3} s; bridged by how the head moved before and behind")
             }
             Self::LidarGap { seconds } => write!(f, "no lidar scan for {seconds:.3} s; carried by the IMU alone"),
-            Self::BeganAgain { seconds } => write!(
+            Self::BeganAgain { seconds } => {
+                write!(f, "no IMU sample for {seconds:.3} s, too long to bridge; began again behind it")
+            }
+            Self::FoundAgain { away_m } => write!(
                 f,
-                "no IMU sample for {seconds:.3} s, too long to bridge; began again where the estimate had stopped, so what \
-                 the head did meanwhile is missing"
+                "behind the silence the head was found again in what was seen before, {away_m:.2} m from where it had stopped"
+            ),
+            Self::LostAgain { why } => write!(
+                f,
+                "behind the silence the head was not found again in what was seen before ({why}); it goes on about where it \
+                 had stopped, so what it did meanwhile is missing"
             ),
             Self::LeftOut { what, count } => {
                 write!(f, "{count} {what} came late or ran backwards in time, and were left out")

@@ -1,5 +1,5 @@
 use super::border::Border;
-use super::consider::{Consider, Sensitivity};
+use super::consider::{Consider, OfBeginning, Sensitivity};
 use super::initial::{self, Beginning, Carried, Noisier};
 use super::intake::{Intake, Stretch};
 use super::spent::Stopwatch;
@@ -7,7 +7,7 @@ use super::strapdown::Interval;
 use super::surfel::{Patch, SurfelMaker};
 use super::survey::Survey;
 use super::views::Views;
-use super::whereabouts::Whereabouts;
+use super::whereabouts::{Before, Whereabouts};
 use super::window::{Linearised, Solved, Window};
 use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
@@ -19,6 +19,9 @@ use std::time::Instant;
 
 /// The head is lost when the IMU alone carried it for longer than this, s, and for more than this share of the time.
 const LOST: (f64, f64) = (5.0, 0.2);
+
+/// While the head is not found again behind a silence, the next one is bridged up to so many times as long as otherwise.
+const RELUCTANTLY: f64 = 3.0;
 
 /// An IMU that is noisier than it was told by more than this factor is told of.
 const TELLING: f64 = 1.5;
@@ -41,6 +44,8 @@ pub struct Estimator {
     views: Views,
     /// A map in which the head is, where one is given.
     whereabouts: Option<Whereabouts>,
+    /// What was seen before the IMU fell silent, until the head is looked for in it.
+    before: Option<Before>,
     /// What was seen, where that is asked for.
     survey: Option<Survey>,
     consider: Consider,
@@ -74,8 +79,9 @@ impl Estimator {
             carried: None,
             views: Views::new(&spec.views, spec.fixed_views),
             whereabouts: None,
+            before: None,
             survey: None,
-            consider: Consider::new(Vector::zeros()),
+            consider: Consider::new(Vector::zeros(), &OfBeginning::zeros()),
             at_end: None,
             next_pose: None,
             poses: Vec::new(),
@@ -126,6 +132,7 @@ impl Estimator {
         }
         self.begin(true);
         self.find_in_map()?;
+        self.find_again();
         self.intake.close();
         self.warnings.extend(self.intake.take_warnings());
         self.warn_of_loss();
@@ -146,9 +153,12 @@ impl Estimator {
     /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and its
     /// surfels may become a fixed view.
     fn advance(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
+        // While the head is still to be found, beginning once more would be to lose it.
+        self.intake.bridge(if self.before.is_some() { RELUCTANTLY } else { 1.0 });
         self.warnings.extend(self.intake.take_warnings());
         if stretch.after_silence {
             self.find_in_map()?;
+            self.find_again();
             self.pause();
         }
         self.waiting.push(stretch);
@@ -175,8 +185,8 @@ impl Estimator {
         {
             window.level_as(&carried);
         }
-        if window.is_full() && self.find_in_map()? {
-            // Once more, with what the map shows.
+        if window.is_full() && (self.find_in_map()? || self.find_again()) {
+            // Once more, with what is seen there.
             let Some(window) = &mut self.window else { return Ok(()) };
             (solved, linearised) = window.solve(&self.views);
             spent += solved.spent;
@@ -223,8 +233,27 @@ impl Estimator {
         let place = window.begins().translation.vector;
         let views = Views::new(&self.spec.views, self.spec.fixed_views);
         self.views = views.in_map(whereabouts.patches(), window.matcher(), place);
-        self.consider = Consider::found(place, found.covariance, whereabouts.covariance());
+        let known = window.known_at_start().unwrap_or_default();
+        self.consider = Consider::found(place, &known, (found.covariance, whereabouts.covariance()));
         Ok(true)
+    }
+
+    /// Puts the window where it is in what was seen before a silence, if it is looked for there; whether it was found.
+    fn find_again(&mut self) -> bool {
+        let (Some(window), Some(before)) = (&mut self.window, self.before.take()) else { return false };
+        let stamp = self.intake.stamp(window.nominal.end_s());
+        let (map_from_here, views, consider) = match before.find(window, &self.spec) {
+            Ok(found) => found,
+            Err(why) => {
+                self.warnings.push(Warning { stamp, kind: WarningKind::LostAgain { why } });
+                return false;
+            }
+        };
+        let away_m = (consider.pivot() - self.consider.pivot()).norm();
+        self.warnings.push(Warning { stamp, kind: WarningKind::FoundAgain { away_m } });
+        window.found_at(&map_from_here);
+        (self.views, self.consider) = (views, consider);
+        true
     }
 
     /// Warns where the IMU alone carried the head for too long: what it then tells is no estimate.
@@ -253,13 +282,13 @@ impl Estimator {
     fn let_go(&mut self, linearised: Option<&Linearised>) -> Option<f64> {
         let window = self.window.as_mut()?;
         let end_s = window.nominal.end_s();
-        self.at_end = linearised.map(|at| window.sensitivity_at(end_s, at, &self.views));
+        self.at_end = linearised.and_then(|at| window.sensitivity_at(end_s, at, &self.views));
         if !window.is_full() {
             return None;
         }
         let until_s = window.next_start_s()?;
-        if let Some(at) = linearised {
-            self.consider.advance(&window.sensitivity_at(until_s, at, &self.views));
+        if let Some(by) = linearised.and_then(|at| window.sensitivity_at(until_s, at, &self.views)) {
+            self.consider.advance(&by);
         }
         let patches = window.let_go(linearised)?;
         let taken = self.views.take(&patches, self.spec.step_s, (window.matcher(), self.consider.pivot()));
@@ -276,13 +305,17 @@ impl Estimator {
         self.consider_the_end();
         self.hand_out(end_s);
         self.survey_window(Window::survey_all, Window::end_s);
-        self.consider = Consider::lost(self.consider.pivot());
-        self.window = None;
+        let Some(window) = self.window.take() else { return };
         self.next_pose = None;
         // Where the head is now in the old views is unknown: matched by chance, they would bend the new stretch.
-        self.views = Views::new(&self.spec.views, self.spec.fixed_views);
-        if let (Some(whereabouts), Some(last)) = (&mut self.whereabouts, self.poses.last()) {
-            whereabouts.look_again(last.map_from_head);
+        let mut views = std::mem::replace(&mut self.views, Views::new(&self.spec.views, self.spec.fixed_views));
+        if let Some(whereabouts) = &mut self.whereabouts {
+            self.poses.last().into_iter().for_each(|last| whereabouts.look_again(last.map_from_head));
+        } else {
+            let last = window.patches();
+            let taken = views.take(&last, self.spec.views.length_s, (window.matcher(), self.consider.pivot()));
+            self.consider.take(taken);
+            self.before = Some(Before::new((views, self.consider.clone()), last, window.nominal.end_s()));
         }
     }
 
@@ -310,21 +343,21 @@ impl Estimator {
         let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, &fitting);
         let start_s = *start_s;
         self.make_noisier(beginning.noisier, start_s);
-        self.window = Some(match &self.carried {
-            Some(carried) => {
-                let beginning = beginning.going_on_from(carried);
-                let mut window = self.first_window(&fitting, &beginning, start_s);
-                window.take_over(carried);
-                window
-            }
-            None => {
-                if beginning.rest.is_none() {
-                    let stamp = self.intake.stamp(start_s);
-                    self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
-                }
-                self.first_window(&fitting, &beginning, start_s)
-            }
-        });
+        let (beginning, goes_on) = match &self.carried {
+            Some(carried) => (beginning.going_on_from(carried, start_s), true),
+            None => (beginning, false),
+        };
+        if !goes_on && beginning.rest.is_none() {
+            let stamp = self.intake.stamp(start_s);
+            self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
+        }
+        let mut window = self.first_window(&fitting, &beginning, start_s);
+        if let Some(carried) = &self.carried {
+            window.take_over(carried);
+        }
+        let (pivot, known) = (self.consider.pivot(), window.known_at_start().unwrap_or_default());
+        self.consider = if goes_on { Consider::lost(pivot, &known) } else { Consider::new(pivot, &known) };
+        self.window = Some(window);
     }
 
     /// Takes the IMU for so much noisier than it was told from now on, and what waits with it.

@@ -16,6 +16,9 @@ const HELD_CLOCK: (f64, f64) = (1e-9, 1e-12);
 /// How exactly the gyroscope's axes are the IMU's when the lidar's attitude is estimated, rad.
 const GYRO_AXES_SIGMA: f64 = 1e-6;
 
+/// For so long a head goes on as it went before the IMU fell silent, s.
+const ON_ITS_WAY_S: f64 = 2.0;
+
 /// A sample's deviation from the mean, as a multiple of its noise, up to which the head is at rest.
 const REST_SIGMAS: f64 = 6.0;
 /// No IMU at rest is noisier than it was told by more than this factor: what scatters more moves.
@@ -53,7 +56,11 @@ pub(super) struct Rest {
 /// What an estimate knew when the IMU fell silent, from which it begins again.
 #[derive(Debug, Clone)]
 pub(super) struct Carried {
+    /// When it fell silent, IMU time, s.
+    pub(super) until_s: f64,
     pub(super) state: State,
+    /// Velocity of the window's whole way, m/s: a head that rocks goes where its mean velocity takes it.
+    pub(super) mean_velocity: Vector,
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
     pub(super) clock: Clock,
@@ -64,12 +71,17 @@ pub(super) struct Carried {
 }
 
 impl Beginning {
-    /// The same beginning, where an estimate had stopped: level as the force says now, heading and place as they were.
-    pub(super) fn going_on_from(mut self, carried: &Carried) -> Self {
+    /// The same beginning at `start_s`, IMU time, where an estimate had stopped: level as the force says now, the heading as it
+    /// was, and the place to which it was on its way.
+    pub(super) fn going_on_from(mut self, carried: &Carried, start_s: f64) -> Self {
         let yaw = |rotation: &Rotation| roll_pitch_yaw(rotation).2;
         let turn = yaw(&carried.state.rotation) - yaw(&self.state.rotation);
         self.state.rotation = Rotation::from_axis_angle(&Vector::z_axis(), turn) * self.state.rotation;
-        self.state.position = carried.state.position;
+        let seconds = (start_s - carried.until_s).clamp(0.0, ON_ITS_WAY_S);
+        self.state.position = carried.state.position + carried.mean_velocity * seconds;
+        if self.rest.is_none() {
+            self.state.velocity = carried.mean_velocity;
+        }
         self.biases = carried.biases;
         self
     }

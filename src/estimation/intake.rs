@@ -59,10 +59,17 @@ pub(super) struct Intake {
     next_start_s: f64,
     /// The next stretch is the first after a silence of the IMU.
     after_silence: bool,
+    /// The longest silence that is bridged, s.
+    bridged_s: f64,
     warnings: Vec<Warning>,
 }
 
 impl Intake {
+    /// Bridges silences of up to `times` the longest that the settings have bridged.
+    pub(super) fn bridge(&mut self, times: f64) {
+        self.bridged_s = times * self.spec.inertial.max_gap_s;
+    }
+
     pub(super) fn new(spec: &EstimatorSpec, calibration: &Calibration) -> Self {
         Self {
             spec: spec.clone(),
@@ -80,6 +87,7 @@ impl Intake {
             beams: VecDeque::new(),
             next_start_s: 0.0,
             after_silence: false,
+            bridged_s: spec.inertial.max_gap_s,
             warnings: Vec::new(),
         }
     }
@@ -254,7 +262,7 @@ impl Intake {
         let mut silent_until_s = None;
         while let Some((seconds, sample)) = self.samples.pop_front() {
             let gap_s = seconds - self.used_s.0;
-            if gap_s.is_finite() && gap_s > self.spec.inertial.max_gap_s {
+            if gap_s.is_finite() && gap_s > self.bridged_s {
                 let stamp = self.origin.unwrap_or_default() + Span::from_seconds(self.used_s.0);
                 self.warnings.push(Warning { stamp, kind: WarningKind::BeganAgain { seconds: gap_s } });
                 self.samples.push_front((seconds, sample));

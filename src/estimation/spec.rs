@@ -129,8 +129,8 @@ pub struct SolveSpec {
     pub match_weight: f64,
     /// Fewest matches that a window's solution may rest on.
     pub min_matches: usize,
-    /// Multiple of the covariance that the window's equations give: matches of one surface share their errors, and the
-    /// equations do not know it.
+    /// Multiple of the covariance that a window's own measurements give: matches of one surface share their errors, and windows
+    /// share their measurements, of which the equations do not know.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub covariance_inflation: f64,
     /// Conditioning below which a window is said to have weak geometry.
@@ -154,7 +154,8 @@ pub struct InertialSpec {
     /// Error of the accelerometer in proportion to its reading, which counts as noise, 0..1.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub accel_scale_error: f64,
-    /// Longest stretch without IMU samples that is bridged, s; behind a longer one the estimate begins again.
+    /// Longest stretch without IMU samples that is bridged, s; behind a longer one the estimate begins again, and looks for the
+    /// head in what was seen before.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_gap_s: f64,
     /// How long the head should rest at the start, s.

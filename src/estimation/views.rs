@@ -131,6 +131,11 @@ impl Views {
         chosen
     }
 
+    /// All that the views show.
+    pub(super) fn patches(&self) -> impl Iterator<Item = &Patch> {
+        self.kept.iter().flat_map(|view| &view.patches)
+    }
+
     pub(super) fn view(&self, index: usize) -> &View {
         &self.kept[index]
     }

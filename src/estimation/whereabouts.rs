@@ -1,7 +1,9 @@
-//! A map in which the head is, and whether it was found there.
+//! Where the head is: in a map that was given, or behind a silence in what was seen before it.
 
-use super::map::{Located, Locator, covariance_of};
+use super::consider::Consider;
+use super::map::{IN_MAP, Located, Locator, Search, covariance_of};
 use super::surfel::Patch;
+use super::views::Views;
 use super::window::Window;
 use super::{EstimationError, EstimatorSpec};
 use crate::geometry::{Pose, Rotation, Vector, roll_pitch_yaw};
@@ -58,10 +60,41 @@ impl Whereabouts {
         let rotation = Rotation::from_axis_angle(&Vector::z_axis(), turn);
         let shift = about.translation.vector - rotation * here_from_head.translation.vector;
         let start = Pose::from_parts(shift.into(), rotation);
-        let located = self.locator.find(&window.patches(), &begins.translation.vector, &start);
+        let located = self.locator.find(&window.patches(), (&begins.translation.vector, &start), &IN_MAP);
         if let (None, Ok(located)) = (&self.found, &located) {
             self.found = Some(located.clone());
         }
-        Some(located)
+        Some(located.map_err(EstimationError::NotInMap))
+    }
+}
+
+/// What had been seen when the IMU fell silent for too long, in which the head is looked for behind the silence.
+#[derive(Debug)]
+pub(super) struct Before {
+    views: Views,
+    consider: Consider,
+    /// What the window last showed, beside the views.
+    last: Vec<Patch>,
+    /// When it fell silent, IMU time, s.
+    until_s: f64,
+}
+
+impl Before {
+    pub(super) fn new((views, consider): (Views, Consider), last: Vec<Patch>, until_s: f64) -> Self {
+        Self { views, consider, last, until_s }
+    }
+
+    /// Where the frame of `window`, which was begun about where the silence had, is in what was seen before: that, and the
+    /// views and what is known of them, with the head where it was found; or why it is not found.
+    pub(super) fn find(mut self, window: &Window, spec: &EstimatorSpec) -> Result<(Pose, Views, Consider), String> {
+        self.last.extend(self.views.patches());
+        let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
+        let locator = Locator::among(self.last, (&spec.matching, &spec.surfels), certainty);
+        let begins = window.begins().translation.vector;
+        let search = Search::behind_silence(window.begins_s() - self.until_s, spec.solve.match_sigma_m);
+        let found = locator.find(&window.patches(), (&begins, &Pose::identity()), &search)?;
+        let there = found.map_from_seen.transform_point(&begins.into()).coords;
+        self.consider.find_again(there, &window.known_at_start().unwrap_or_default(), &found.covariance);
+        Ok((found.map_from_seen, self.views, self.consider))
     }
 }

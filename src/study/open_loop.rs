@@ -144,6 +144,7 @@ fn is_loss(kind: &WarningKind) -> bool {
         WarningKind::ImuGap { .. }
             | WarningKind::LidarGap { .. }
             | WarningKind::BeganAgain { .. }
+            | WarningKind::LostAgain { .. }
             | WarningKind::LeftOut { .. }
             | WarningKind::Lost { .. }
     )

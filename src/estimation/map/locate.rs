@@ -5,19 +5,28 @@
 //! resolution to the finest. Of the places found so the one counts in which most of what was seen lies on the map, where no
 //! other is nearly as good.
 
-use crate::estimation::EstimationError;
 use crate::estimation::matching::{Forest, Matcher};
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
 use crate::estimation::surfel::Patch;
-use crate::geometry::{Pose, Rotation, Vector};
+use crate::estimation::window::LEANING;
+use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::surfel_map::SurfelMap;
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 
-/// Starts are tried at these distances on the level from the one given, m, and turned by these angles, degrees: with what the
-/// coarsest surfels reach, they cover a metre and twenty degrees.
-const TRIED: ([f64; 3], [f64; 3]) = ([-0.7, 0.0, 0.7], [-14.0, 0.0, 14.0]);
+/// How far apart starts are, m, and by what angle, rad: what the coarsest surfels reach.
+const APART: (f64, f64) = (0.7, 14.0 / 180.0 * std::f64::consts::PI);
+/// Behind a silence the head is at most so far from where it was expected, m: at once, a second, and at most.
+const AWAY: (f64, f64, f64) = (0.3, 1.0, 2.5);
+/// Starts go no farther, m: what is seen from there reaches the rest.
+const FARTHEST_M: f64 = 1.4;
+/// Behind a longer silence a place must show as much as in a map: it is looked for far about, s.
+const LONG_S: f64 = 1.5;
+/// It is turned by at most so much, degrees: at once, a second, and at most.
+const TURNED_DEG: (f64, f64, f64) = (15.0, 60.0, 90.0);
+/// A direction along which normals lean by less than this share, in the mean of their squares, is not told by them.
+const WEAK: f64 = 0.01;
 /// Most patches of a resolution that are laid upon the map.
 const MOST: usize = 2000;
 /// Iterations a resolution.
@@ -28,10 +37,14 @@ const GATES: (f64, f64) = (0.5, 0.1);
 const ANGLE_DEG: f64 = 30.0;
 /// Both frames are level to this, degrees.
 const LEVEL_DEG: f64 = 1.0;
+/// Of how many directions of a shift nothing may be told: along a corridor of one; over bare ground of two, and of the heading.
+const MOST_UNTOLD: f64 = 1.5;
+/// Information that holds a pose where it is along what is not told, 1/m^2: more than all matches together.
+const UNMOVED: f64 = 1e12;
 /// Fewest finest patches of which a place can be told.
 const FEWEST: usize = 50;
-/// Least share of them that lies on the map.
-const SHARE: f64 = 0.4;
+/// Starts that settled so near to each other, m and rad, are one.
+const SAME: f64 = 0.01;
 /// Another place is another from this distance on, m, or this angle, rad; and as good as the best at this share of what
 /// that has.
 const OTHER: (f64, f64, f64) = (0.3, 0.1, 0.85);
@@ -43,10 +56,74 @@ pub struct Located {
     pub map_from_seen: Pose,
     /// Share of its finest surfels that lie on the map.
     pub share: f64,
+    /// Share of those that have a patch of the map beside them.
+    pub(in crate::estimation) agreement: f64,
     /// Root mean square of their distances along normals, m.
     pub residual_rms_m: f64,
     /// Covariance of a turn (rad) about where it was seen from, and a shift (m), in the map.
     pub(in crate::estimation) covariance: Matrix6<f64>,
+}
+
+/// How far from about where it may be something is looked for, and what is believed.
+#[derive(Debug)]
+pub(in crate::estimation) struct Search {
+    /// On the level, m, and turned, rad.
+    reach: (f64, f64),
+    /// Patches this far apart along their normals lie on each other, m; the share of a voxel's edge where nothing is said.
+    gate_m: Option<f64>,
+    /// Least share of the finest patches that lies on the map.
+    share: f64,
+    /// Least share of those that have a patch of the map beside them.
+    agreement: f64,
+    /// Whether of places that are as good the nearest counts; if not, none of them.
+    nearest: bool,
+}
+
+/// In a map which shows all that is seen: with what the coarsest surfels reach, a metre and twenty degrees.
+pub(in crate::estimation) const IN_MAP: Search =
+    Search { reach: (APART.0, APART.1), gate_m: None, share: 0.4, agreement: 0.0, nearest: false };
+
+impl Search {
+    /// In what was seen before a silence of `seconds`, matches being good to `sigma_m`. It may show little of what is seen
+    /// behind it, but where both show a place, it must be the same; and the head cannot have gone far.
+    pub(in crate::estimation) fn behind_silence(seconds: f64, sigma_m: f64) -> Self {
+        let reach_m = (AWAY.0 + AWAY.1 * seconds).min(AWAY.2);
+        let reach_deg = (TURNED_DEG.0 + TURNED_DEG.1 * seconds).min(TURNED_DEG.2);
+        let reach = (reach_m, reach_deg.to_radians());
+        let share = if seconds > LONG_S { IN_MAP.share } else { 0.1 };
+        Self { reach, gate_m: Some(1.5 * sigma_m), share, agreement: 0.8, nearest: true }
+    }
+
+    /// Each start, twice: as what it began, and as what it becomes.
+    fn starts(&self, map_from_seen: &Pose, from: &Vector) -> Vec<(Pose, Pose)> {
+        let steps = |reach: f64, apart: f64| {
+            let most = (reach / apart).floor() as i32;
+            (-most..=most).map(move |k| f64::from(k) * apart)
+        };
+        let far_m = self.reach.0.min(FARTHEST_M);
+        let mut starts = Vec::new();
+        for yaw in steps(self.reach.1, APART.1) {
+            for (x, y) in steps(far_m, APART.0).flat_map(|x| steps(far_m, APART.0).map(move |y| (x, y))) {
+                let start = tried(map_from_seen, from, yaw, Vector::new(x, y, 0.0));
+                starts.push((start, start));
+            }
+        }
+        starts
+    }
+
+    fn believes(&self, found: &Located) -> bool {
+        found.share >= self.share && found.agreement >= self.agreement
+    }
+
+    /// How likely a head is where it was found, as far as where it was expected says, 0..1.
+    fn likely(&self, found: &Pose, expected: &Pose, from: &Vector) -> f64 {
+        if !self.nearest {
+            return 1.0;
+        }
+        let (far_m, turned) = apart(found, expected, from);
+        let sigmas = 2.0 * (far_m / self.reach.0).max(turned / self.reach.1);
+        if sigmas > 3.0 { 0.0 } else { (-0.5 * sigmas * sigmas).exp() }
+    }
 }
 
 /// A map in which places are looked for.
@@ -65,6 +142,10 @@ struct Tally {
     information: Matrix6<f64>,
     right: Vector6<f64>,
     matched: usize,
+    /// Their normals, each with its weight.
+    normals: Vec<(Vector, f64)>,
+    /// How many had a patch beside them, matched or not.
+    beside: usize,
     squares: f64,
 }
 
@@ -79,12 +160,16 @@ struct Gate {
 impl Locator {
     /// Of things that are seen by surfels of `surfels`; a match is off by `sigma_m` beside its surfels' thickness, and the
     /// covariance is `inflation` times what matches say.
-    pub(in crate::estimation) fn new(
-        map: &SurfelMap,
+    pub(in crate::estimation) fn new(map: &SurfelMap, by: (&MatchingSpec, &SurfelSpec), certainty: (f64, f64)) -> Self {
+        Self::among(map.surfels().iter().map(Patch::of_map).collect(), by, certainty)
+    }
+
+    /// The same among `patches`.
+    pub(in crate::estimation) fn among(
+        patches: Vec<Patch>,
         (matching, surfels): (&MatchingSpec, &SurfelSpec),
         (sigma_m, inflation): (f64, f64),
     ) -> Self {
-        let patches: Vec<Patch> = map.surfels().iter().map(Patch::of_map).collect();
         let forest = Matcher::new(matching, surfels).plant(&patches);
         let wide =
             MatchingSpec { max_normal_angle_deg: ANGLE_DEG.max(matching.max_normal_angle_deg), ..matching.clone() };
@@ -96,77 +181,93 @@ impl Locator {
         &self.patches
     }
 
-    /// Where `seen`, looked at from `from`, is, which is about at `map_from_seen`.
+    /// Where `seen`, looked at from `from`, is, which is about at `map_from_seen`; or why that is not found.
     pub(in crate::estimation) fn find(
         &self,
         seen: &[Patch],
-        from: &Vector,
-        map_from_seen: &Pose,
-    ) -> Result<Located, EstimationError> {
+        (from, map_from_seen): (&Vector, &Pose),
+        search: &Search,
+    ) -> Result<Located, String> {
         let by_level: Vec<Vec<Patch>> = (0..self.matcher.levels).map(|level| some_of(seen, level)).collect();
         let finest = by_level.first().map_or(0, Vec::len);
-        let not_found = |why: String| Err(EstimationError::NotInMap(why));
         if finest < FEWEST {
-            return not_found(format!("it shows {finest} patches of surface, and {FEWEST} at least are needed"));
+            return Err(format!("it shows {finest} patches of surface, and {FEWEST} at least are needed"));
         }
-        let mut starts = Vec::new();
-        for yaw_deg in TRIED.1 {
-            for (x, y) in TRIED.0.iter().flat_map(|x| TRIED.0.iter().map(|y| (*x, *y))) {
-                starts.push(tried(map_from_seen, from, yaw_deg.to_radians(), Vector::new(x, y, 0.0)));
-            }
+        let mut places = search.starts(map_from_seen, from);
+        for (level, seen) in by_level.iter().enumerate().rev().filter(|(_, seen)| !seen.is_empty()) {
+            let settled = places
+                .par_iter()
+                .filter_map(|(start, pose)| Some((*start, self.settle((level, seen), from, start, pose)?)));
+            places = settled.collect();
+            leave_one_of_each(&mut places, from);
         }
-        let mut found: Vec<Located> =
-            starts.par_iter().filter_map(|start| self.settle(&by_level, from, start)).collect();
-        found.sort_by(|a, b| b.share.total_cmp(&a.share));
-        let Some(best) = found.first().filter(|best| best.share >= SHARE) else {
-            let share = 100.0 * found.first().map_or(0.0, |best| best.share);
-            return not_found(format!("at the best place {share:.0} % of what was seen lies on the map"));
+        let gate_m = search.gate_m.unwrap_or(self.matcher.finest_voxel_m * GATES.1);
+        let judged = places.iter().filter_map(|(_, pose)| self.judge(&by_level[0], from, pose, gate_m));
+        // Each with what it is worth.
+        let worth = |found: &Located| found.share.powi(3) * search.likely(&found.map_from_seen, map_from_seen, from);
+        let mut found: Vec<(f64, Located)> = judged.map(|found| (worth(&found), found)).collect();
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let Some((worth, best)) = found.first().filter(|(worth, best)| *worth > 0.0 && best.share >= search.share)
+        else {
+            let share = 100.0 * found.first().map_or(0.0, |(_, best)| best.share);
+            return Err(format!("at the best place {share:.0} % of what was seen lies on the map"));
         };
-        let other = found.iter().find(|other| other.share > OTHER.2 * best.share && is_elsewhere(best, other, from));
-        match other {
-            Some(other) => {
-                let apart = other.map_from_seen.transform_point(&(*from).into()).coords
-                    - best.map_from_seen.transform_point(&(*from).into()).coords;
-                not_found(format!("it may be there as well as {:.1} m from there", apart.norm()))
+        let as_good = found.iter().filter(|(other, found)| *other > OTHER.2 * worth && search.believes(found));
+        let others: Vec<&Located> =
+            as_good.map(|(_, other)| other).filter(|other| is_elsewhere(best, other, from)).collect();
+        match others.first() {
+            Some(other) if !search.nearest => {
+                let (far_m, _) = apart(&best.map_from_seen, &other.map_from_seen, from);
+                Err(format!("it may be there as well as {far_m:.1} m from there"))
             }
-            None => Ok(best.clone()),
+            _ => Ok(best.in_doubt_with(&others, from)),
         }
     }
 
-    /// Where what was seen settles from a start, from coarse to fine; `None` where the matches determine nothing.
-    fn settle(&self, by_level: &[Vec<Patch>], from: &Vector, start: &Pose) -> Option<Located> {
-        let mut pose = *start;
-        for (level, seen) in by_level.iter().enumerate().rev().filter(|(_, seen)| !seen.is_empty()) {
-            let edge_m = self.matcher.finest_voxel_m * f64::from(1_u32 << level);
-            for iteration in 0..ITERATIONS {
-                let late = iteration as f64 / (ITERATIONS - 1) as f64;
-                let gate_m = edge_m * GATES.0 * (GATES.1 / GATES.0).powf(late);
-                let gate = Gate { level, gate_m, sigma_m: gate_m / 3.0 };
-                let pivot = pose.transform_point(&(*from).into()).coords;
-                let mut tally = self.tally(seen, &pose, &pivot, &gate);
-                let tilt = (pose.rotation * start.rotation.inverse()).scaled_axis();
-                // What a resolution does not tell stays as it is.
-                tally.information += Matrix6::identity();
-                let level_weight = LEVEL_DEG.to_radians().powi(-2);
-                for axis in 0..2 {
-                    tally.information[(axis, axis)] += level_weight;
-                    tally.right[axis] -= level_weight * tilt[axis];
-                }
-                let step = (tally.matched >= 6).then(|| tally.information.cholesky())??.solve(&tally.right);
-                pose = corrected(&pose, &pivot, &step);
-                if step.amax() < 1e-5 {
-                    break;
-                }
+    /// Where the patches of a resolution that were seen settle from a pose, as level as they were at `start`; `None` where the matches
+    /// determine nothing.
+    fn settle(&self, (level, seen): (usize, &[Patch]), from: &Vector, start: &Pose, pose: &Pose) -> Option<Pose> {
+        let mut pose = *pose;
+        let edge_m = self.matcher.finest_voxel_m * f64::from(1_u32 << level);
+        for iteration in 0..ITERATIONS {
+            let late = iteration as f64 / (ITERATIONS - 1) as f64;
+            let gate_m = edge_m * GATES.0 * (GATES.1 / GATES.0).powf(late);
+            let gate = Gate { level, gate_m, sigma_m: gate_m / 3.0 };
+            let pivot = pose.transform_point(&(*from).into()).coords;
+            let mut tally = self.tally(seen, &pose, &pivot, &gate);
+            let tilt = (pose.rotation * start.rotation.inverse()).scaled_axis();
+            // What a resolution does not tell stays as it is.
+            tally.information += Matrix6::identity() + tally.untold() * UNMOVED;
+            let level_weight = LEVEL_DEG.to_radians().powi(-2);
+            for axis in 0..2 {
+                tally.information[(axis, axis)] += level_weight;
+                tally.right[axis] -= level_weight * tilt[axis];
+            }
+            let step = (tally.matched >= 6).then(|| tally.information.cholesky())??.solve(&tally.right);
+            pose = corrected(&pose, &pivot, &step);
+            if step.amax() < 1e-5 {
+                break;
             }
         }
-        let seen = by_level.first()?;
+        Some(pose)
+    }
+
+    /// What a pose is worth by the finest patches that were seen; `None` where they determine nothing.
+    fn judge(&self, seen: &[Patch], from: &Vector, pose: &Pose, gate_m: f64) -> Option<Located> {
         let pivot = pose.transform_point(&(*from).into()).coords;
-        let gate_m = self.matcher.finest_voxel_m * GATES.1;
-        let tally = self.tally(seen, &pose, &pivot, &Gate { level: 0, gate_m, sigma_m: self.sigma_m });
-        let covariance = tally.information.try_inverse()? * self.inflation;
+        let tally = self.tally(seen, pose, &pivot, &Gate { level: 0, gate_m, sigma_m: self.sigma_m });
+        let untold = tally.untold();
+        if untold.trace() > MOST_UNTOLD {
+            return None;
+        }
+        // What is not told is known to a metre and a radian.
+        let told = Matrix6::identity() - untold;
+        let information = told * tally.information * told + Matrix6::identity();
+        let covariance = information.try_inverse()? * self.inflation;
         let residual_rms_m = (tally.squares / tally.matched.max(1) as f64).sqrt();
         let share = tally.matched as f64 / seen.len() as f64;
-        Some(Located { map_from_seen: pose, share, residual_rms_m, covariance })
+        let agreement = tally.matched as f64 / tally.beside.max(1) as f64;
+        Some(Located { map_from_seen: *pose, share, agreement, residual_rms_m, covariance })
     }
 
     /// Matches of what was seen at `pose` with the map, for a turn about `pivot` and a shift.
@@ -177,6 +278,7 @@ impl Locator {
             let near = self.matcher.neighbours(&self.forest, &patch, 1);
             let Some(other) = near.first().map(|k| &self.patches[*k as usize]) else { continue };
             debug_assert_eq!(other.level, gate.level);
+            tally.beside += 1;
             if !self.matcher.agree(&patch, other, gate.gate_m) {
                 continue;
             }
@@ -186,6 +288,7 @@ impl Locator {
             let weight = 1.0 / (plane.variance + distance_m * distance_m);
             tally.information += row * row.transpose() * weight;
             tally.right -= row * (weight * distance_m);
+            tally.normals.push((plane.normal, weight));
             tally.matched += 1;
             tally.squares += distance_m * distance_m;
         }
@@ -197,6 +300,21 @@ impl Locator {
 fn some_of(seen: &[Patch], level: usize) -> Vec<Patch> {
     let all: Vec<&Patch> = seen.iter().filter(|patch| patch.level == level).collect();
     all.iter().step_by(all.len().div_ceil(MOST).max(1)).map(|patch| **patch).collect()
+}
+
+/// Of places that are the same, the first.
+fn leave_one_of_each(places: &mut Vec<(Pose, Pose)>, from: &Vector) {
+    let mut left: Vec<(Pose, Pose)> = Vec::new();
+    for (start, pose) in places.drain(..) {
+        let is_other = |(_, other): &(Pose, Pose)| {
+            let (far_m, turned) = apart(&pose, other, from);
+            far_m > SAME || turned > SAME
+        };
+        if left.iter().all(is_other) {
+            left.push((start, pose));
+        }
+    }
+    *places = left;
 }
 
 /// A start turned about the vertical through `from`, and shifted.
@@ -213,17 +331,55 @@ fn corrected(pose: &Pose, pivot: &Vector, step: &Vector6<f64>) -> Pose {
     Pose::from_parts(translation.into(), turn * pose.rotation)
 }
 
+impl Tally {
+    /// Of the directions of a shift those that no normals tell but by their errors: `sum e e^T` in the block of the shift.
+    fn untold(&self) -> Matrix6<f64> {
+        let sum: f64 = self.normals.iter().map(|(_, weight)| weight).sum();
+        let scatter: Matrix = self.normals.iter().map(|(normal, weight)| normal * normal.transpose() * *weight).sum();
+        let mut untold = Matrix6::zeros();
+        for direction in scatter.symmetric_eigen().eigenvectors.column_iter() {
+            let lean = |(normal, weight): &(Vector, f64)| Some((normal.dot(&direction), *weight));
+            let held = self.normals.iter().filter_map(lean).filter(|(lean, _)| lean.abs() > LEANING);
+            if held.map(|(lean, weight)| lean * lean * weight).sum::<f64>() < WEAK * sum {
+                let mut block = untold.fixed_view_mut::<3, 3>(3, 3);
+                block += direction * direction.transpose();
+            }
+        }
+        untold
+    }
+}
+
+impl Located {
+    /// The same place, with the doubt that `others` are as good.
+    fn in_doubt_with(&self, others: &[&Located], from: &Vector) -> Self {
+        let mut covariance = self.covariance;
+        for other in others {
+            let turn = (other.map_from_seen.rotation * self.map_from_seen.rotation.inverse()).scaled_axis();
+            let place = |located: &Located| located.map_from_seen.transform_point(&(*from).into()).coords;
+            let shift = place(other) - place(self);
+            let by = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
+            covariance += by * by.transpose() / (others.len() + 1) as f64;
+        }
+        Self { covariance, ..self.clone() }
+    }
+}
+
 fn is_elsewhere(a: &Located, b: &Located, from: &Vector) -> bool {
-    let place = |located: &Located| located.map_from_seen.transform_point(&(*from).into()).coords;
-    let turn = a.map_from_seen.rotation.angle_to(&b.map_from_seen.rotation);
-    (place(a) - place(b)).norm() > OTHER.0 || turn > OTHER.1
+    let (far_m, turned) = apart(&a.map_from_seen, &b.map_from_seen, from);
+    far_m > OTHER.0 || turned > OTHER.1
+}
+
+/// How far apart two poses put `from`, m, and by what angle they differ, rad.
+fn apart(a: &Pose, b: &Pose, from: &Vector) -> (f64, f64) {
+    let place = |pose: &Pose| pose.transform_point(&(*from).into()).coords;
+    ((place(a) - place(b)).norm(), a.rotation.angle_to(&b.rotation))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::estimation;
-    use crate::geometry::{Matrix, from_roll_pitch_yaw};
+    use crate::geometry::from_roll_pitch_yaw;
 
     /// Patches of a resolution of a room of 6 m by 4 m by 2.5 m with a pillar, seen from within; `at` tells where in its
     /// cell each has its centre.
@@ -279,11 +435,66 @@ mod tests {
                 all_levels(0.37, 0.4).iter().map(|patch| patch.moved_by(&map_from_seen.inverse())).collect();
             let direction = Vector::new(wave(2.3), wave(3.1), 0.3 * wave(4.7)).normalize();
             let start = tried(&map_from_seen, &from, 20_f64.to_radians() * wave(5.3).signum(), direction);
-            let found = locator.find(&seen, &from, &start).unwrap();
+            let found = locator.find(&seen, (&from, &start), &IN_MAP).unwrap();
             let apart = found.map_from_seen.inverse() * map_from_seen;
             assert!(apart.translation.vector.norm() < 2e-3 && apart.rotation.angle() < 1e-3, "{k}: {apart}");
             assert!(found.share > 0.9, "{}", found.share);
         }
+    }
+
+    /// Patches of a resolution of a corridor without ends along x, 2 m wide, between `from_m` and `to_m`.
+    fn corridor(level: usize, (from_m, to_m): (f64, f64)) -> Vec<Patch> {
+        let edge_m = 0.4 * f64::from(1 << level);
+        let mut patches = Vec::new();
+        for i in 0..((to_m - from_m) / edge_m) as usize {
+            let x = Vector::x() * (from_m + (i as f64 + 0.5) * edge_m);
+            let mut wall = |place: Vector, normal: Vector| {
+                let across = Matrix::identity() - normal * normal.transpose();
+                let covariance = across * (edge_m * edge_m / 12.0) + normal * normal.transpose() * 1e-4;
+                let centre = x + place;
+                patches.push(Patch { centre, normal, points: 100.0, covariance, doubt: 0.0, level });
+            };
+            for k in 0..((2.0 / edge_m) as usize).max(1) {
+                let along = (k as f64 + 0.5) * edge_m;
+                wall(Vector::new(0.0, along, 0.0), Vector::z());
+                wall(Vector::new(0.0, 0.0, along), Vector::y());
+                wall(Vector::new(0.0, 2.0, along), -Vector::y());
+            }
+        }
+        patches
+    }
+
+    #[test]
+    fn along_a_corridor_a_head_stays_where_it_is_expected_and_is_in_doubt() {
+        let all = |reach: (f64, f64)| (0..3).flat_map(|level| corridor(level, reach)).collect::<Vec<_>>();
+        let locator = locator(&all((0.0, 24.0)));
+        let from = Vector::new(14.0, 1.0, 1.2);
+        let seen = all((8.0, 20.0));
+        // Expected 0.2 m to the side, and turned by a tenth.
+        let start = tried(&Pose::identity(), &from, 0.1, Vector::new(0.0, 0.2, 0.0));
+        let found = locator.find(&seen, (&from, &start), &Search::behind_silence(1.0, 0.01)).unwrap();
+        let apart = found.map_from_seen.transform_point(&from.into()).coords - from;
+        assert!(apart.y.abs() < 2e-3 && apart.z.abs() < 2e-3 && apart.x.abs() < 0.05, "{apart}");
+        assert!(found.map_from_seen.rotation.angle() < 1e-3, "{}", found.map_from_seen);
+        let sigma = |k: usize| found.covariance[(k, k)].sqrt();
+        assert!(sigma(3) > 0.2 && sigma(4) < 0.01, "{} m along, {} m across", sigma(3), sigma(4));
+        // In a map that should tell where it is, that is no place.
+        assert!(locator.find(&seen, (&from, &start), &IN_MAP).unwrap_err().contains("as well as"));
+    }
+
+    #[test]
+    fn bare_ground_tells_no_place() {
+        let ground = |reach: (f64, f64)| {
+            let all = (0..3).flat_map(|level| corridor(level, reach));
+            all.filter(|patch| patch.normal == Vector::z()).collect::<Vec<_>>()
+        };
+        let (from, start) = (Vector::new(14.0, 1.0, 1.2), Pose::identity());
+        let found = locator(&ground((0.0, 24.0))).find(
+            &ground((8.0, 20.0)),
+            (&from, &start),
+            &Search::behind_silence(0.5, 0.01),
+        );
+        assert!(found.is_err(), "{found:?}");
     }
 
     #[test]
@@ -292,9 +503,9 @@ mod tests {
         let far = Pose::translation(30.0, 0.0, 0.0);
         let seen = all_levels(0.4, 0.5);
         let from = Vector::new(4.0, 2.5, 1.2);
-        assert!(matches!(locator.find(&seen, &from, &far), Err(EstimationError::NotInMap(_))));
+        assert!(locator.find(&seen, (&from, &far), &IN_MAP).unwrap_err().contains("lies on the map"));
         let few: Vec<Patch> = seen.iter().take(20).copied().collect();
-        let said = locator.find(&few, &from, &Pose::identity()).unwrap_err().to_string();
+        let said = locator.find(&few, (&from, &Pose::identity()), &IN_MAP).unwrap_err();
         assert!(said.contains("20 patches"), "{said}");
     }
 }

@@ -4,7 +4,7 @@ mod fuse;
 mod locate;
 
 pub use locate::Located;
-pub(super) use locate::Locator;
+pub(super) use locate::{IN_MAP, Locator, Search};
 
 use super::surfel::Patch;
 use super::survey::{Sighting, Survey};
@@ -57,7 +57,7 @@ pub fn locate_map(
     let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
     let locator = Locator::new(map, (&spec.matching, &surfels), certainty);
     let seen: Vec<Patch> = other.surfels().iter().map(Patch::of_map).collect();
-    locator.find(&seen, &Vector::zeros(), start)
+    locator.find(&seen, (&Vector::zeros(), start), &IN_MAP).map_err(EstimationError::NotInMap)
 }
 
 /// One map of two, in the frame of the first: `map_from_other` puts the second there. What both saw of a surface is put

@@ -110,7 +110,11 @@ impl Window {
     pub(super) fn carried(&self) -> Option<Carried> {
         let state = *self.nominal.states().last()?;
         let (gyro_exaggerates, lidar) = (self.gyro_exaggerates, self.maker.lidar);
-        Some(Carried { state, biases: self.biases, gravity: self.gravity, clock: self.clock, gyro_exaggerates, lidar })
+        let until_s = self.nominal.end_s();
+        let way = state.position - self.begins().translation.vector;
+        let mean_velocity = way / (until_s - self.start.u_s).max(self.spec.step_s);
+        let Self { biases, gravity, clock, .. } = *self;
+        Some(Carried { until_s, state, mean_velocity, biases, gravity, clock, gyro_exaggerates, lidar })
     }
 
     /// Goes on with clock and sensors as they were known before the IMU fell silent.
@@ -144,6 +148,11 @@ impl Window {
         let motion = self.nominal.at(self.start.u_s, &self.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
         Pose::from_parts(motion.position.into(), rotation)
+    }
+
+    /// When that is, IMU time, s.
+    pub(super) fn begins_s(&self) -> f64 {
+        self.start.u_s
     }
 
     /// The same window, which also tells what it saw by the surfels of `surveyor`.

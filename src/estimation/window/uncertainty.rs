@@ -3,14 +3,14 @@
 use super::Window;
 use super::correspondence::{Match, Matches, With};
 use super::equations::Robust;
-use crate::estimation::consider::Sensitivity;
+use crate::estimation::consider::{AT_IMU, CARRIED, IMU, OfBeginning, Sensitivity};
 use crate::estimation::residual::prior::ByLidar;
 use crate::estimation::residual::{LIDAR_TURN, Layout, matched};
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
-use crate::geometry::{Vector, skew};
-use nalgebra::Matrix6;
+use crate::geometry::Vector;
+use nalgebra::{Matrix6, SMatrix};
 
 /// The last linearisation of a window that was solved, whose factor the workspace still holds.
 #[derive(Debug)]
@@ -22,22 +22,45 @@ pub(in crate::estimation) struct Linearised {
 }
 
 impl Window {
-    /// How the pose at `u_s`, IMU time, hangs on what the window held fixed.
-    pub(in crate::estimation) fn sensitivity_at(&self, u_s: f64, at: &Linearised, views: &Views) -> Sensitivity {
+    /// How what a window takes over at `u_s`, IMU time, hangs on what this one held fixed.
+    pub(in crate::estimation) fn sensitivity_at(
+        &self,
+        u_s: f64,
+        at: &Linearised,
+        views: &Views,
+    ) -> Option<Sensitivity> {
         let size = at.layout.size();
-        let by_pose = self.columns_of_pose(u_s, &at.layout);
-        // H^-1 is symmetric: solving for the pose's six rows serves all that is held.
-        let solved: Vec<Vec<f64>> = by_pose.iter().map(|column| self.workspace.factor.solve(column)).collect();
-        let times = |columns: &[Vec<f64>; 6]| {
-            Matrix6::from_fn(|r, c| (0..size).map(|k| solved[r][k] * columns[c][k]).sum::<f64>())
-        };
+        let taken_over = self.columns_at(u_s, &at.layout);
+        // H^-1 is symmetric: solving for its rows serves all that is held.
+        let solved: Vec<Vec<f64>> = taken_over.iter().map(|column| self.workspace.factor.solve(column)).collect();
+        let by = |r: usize, column: &[f64]| (0..size).map(|k| solved[r][k] * column[k]).sum::<f64>();
+        let by_start = self.columns_of_start(&at.layout);
+        let of_start = SMatrix::<f64, CARRIED, 12>::from_fn(|r, c| by(r, &by_start[c]));
+        let imu = self.border.imu_information()?;
+        let of_imu = SMatrix::<f64, CARRIED, IMU>::from_fn(|r, c| solved[r][at.layout.border() + c]) * imu;
+        let mut beginning = OfBeginning::zeros();
+        beginning.fixed_columns_mut::<12>(0).copy_from(&of_start);
+        beginning.fixed_columns_mut::<IMU>(AT_IMU).copy_from(&of_imu);
+        // What is left of the covariance when that of the beginning is taken from it, of which the next windows know.
+        let all = OfBeginning::from_fn(|r, c| by(r, &taken_over[c]));
+        let own = all - beginning * self.known_at_start()? * beginning.transpose();
         let by_views = self.columns_of_views(at, views);
-        Sensitivity {
+        Some(Sensitivity {
             pivot: self.nominal.at(u_s, &self.biases.gyro).position,
-            beginning: times(&self.columns_of_beginning(&at.layout)),
-            views: by_views.iter().map(|(number, columns)| (*number, times(columns))).collect(),
-            noise: times(&by_pose) * self.spec.solve.covariance_inflation,
-        }
+            beginning,
+            views: by_views.iter().map(|(number, c)| (*number, SMatrix::from_fn(|r, k| by(r, &c[k])))).collect(),
+            noise: own * self.spec.solve.covariance_inflation + self.border.imu_wanders(self.spec.step_s),
+        })
+    }
+
+    /// Covariance of what the window begins with, as its equations have it.
+    pub(in crate::estimation) fn known_at_start(&self) -> Option<OfBeginning> {
+        let sigma = |k: usize| self.start.sigmas[k / 6][k % 6 / 3];
+        let mut known = OfBeginning::zeros();
+        (0..12).for_each(|k| known[(k, k)] = sigma(k).powi(2));
+        let imu = self.border.imu_information()?.try_inverse()?;
+        known.fixed_view_mut::<IMU, IMU>(AT_IMU, AT_IMU).copy_from(&imu);
+        Some(known)
     }
 
     /// How the corrections at `u_s`, IMU time, and their derivatives hang on how the lidar sits on the IMU, all else being solved
@@ -68,33 +91,29 @@ impl Window {
         Some([basis.value, basis.rate, basis.acceleration].map(by_lidar))
     }
 
-    /// The six corrections at `u_s`, turn then shift, as rows over the window's unknowns.
-    fn columns_of_pose(&self, u_s: f64, layout: &Layout) -> [Vec<f64>; 6] {
+    /// What the next window takes over at `u_s`, as rows over the window's unknowns: the six corrections, turn then shift, their
+    /// derivatives, and the IMU's part of the border.
+    fn columns_at(&self, u_s: f64, layout: &Layout) -> [Vec<f64>; CARRIED] {
         let basis = Basis::at(u_s, self.spec.knot_spacing_s);
         let first = layout.knot(basis.first);
-        std::array::from_fn(|axis| {
+        std::array::from_fn(|of| {
             let mut column = vec![0.0; layout.size()];
-            for (k, value) in basis.value.iter().enumerate() {
-                column[first + 6 * k + axis] = *value;
+            if of >= AT_IMU {
+                column[layout.border() + of - AT_IMU] = 1.0;
+                return column;
             }
+            let by = if of < 6 { basis.value } else { basis.rate };
+            by.iter().enumerate().for_each(|(k, by)| column[first + 6 * k + of % 6] = *by);
             column
         })
     }
 
-    /// What the right-hand side gains when the window's beginning is turned and shifted: the trajectory begins there, and
-    /// leaves in a direction that turned along.
-    fn columns_of_beginning(&self, layout: &Layout) -> [Vec<f64>; 6] {
-        let motion = self.nominal.at(self.start.u_s, &self.biases.gyro);
-        // The shift's rate under a turn theta is theta x v.
-        let turning = -skew(&motion.velocity);
-        std::array::from_fn(|axis| {
-            let mut value = [0.0; 6];
-            value[axis] = 1.0;
-            let mut rate = [0.0; 6];
-            if axis < 3 {
-                rate[3..].copy_from_slice(turning.column(axis).as_slice());
-            }
-            self.start.right_hand_side(layout, (&value, &rate), self.spec.knot_spacing_s)
+    /// What the right-hand side gains when the window's beginning is turned and shifted, and those are under way.
+    fn columns_of_start(&self, layout: &Layout) -> [Vec<f64>; 12] {
+        std::array::from_fn(|of| {
+            let mut asked = [[0.0; 6]; 2];
+            asked[of / 6][of % 6] = 1.0;
+            self.start.right_hand_side(layout, (&asked[0], &asked[1]), self.spec.knot_spacing_s)
         })
     }
 
