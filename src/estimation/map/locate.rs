@@ -5,6 +5,7 @@
 //! resolution to the finest. Of the places found so the one counts in which most of what was seen lies on the map, where no
 //! other is nearly as good.
 
+use super::search::Search;
 use crate::estimation::matching::{Forest, Matcher};
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
@@ -15,16 +16,6 @@ use crate::surfel_map::SurfelMap;
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 
-/// How far apart starts are, m, and by what angle, rad: what the coarsest surfels reach.
-const APART: (f64, f64) = (0.7, 14.0 / 180.0 * std::f64::consts::PI);
-/// Behind a silence the head is at most so far from where it was expected, m: at once, a second, and at most.
-const AWAY: (f64, f64, f64) = (0.3, 1.0, 2.5);
-/// Starts go no farther, m: what is seen from there reaches the rest.
-const FARTHEST_M: f64 = 1.4;
-/// Behind a longer silence a place must show as much as in a map: it is looked for far about, s.
-const LONG_S: f64 = 1.5;
-/// It is turned by at most so much, degrees: at once, a second, and at most.
-const TURNED_DEG: (f64, f64, f64) = (15.0, 60.0, 90.0);
 /// A direction along which normals lean by less than this share, in the mean of their squares, is not told by them.
 const WEAK: f64 = 0.01;
 /// Most patches of a resolution that are laid upon the map.
@@ -62,68 +53,6 @@ pub struct Located {
     pub residual_rms_m: f64,
     /// Covariance of a turn (rad) about where it was seen from, and a shift (m), in the map.
     pub(in crate::estimation) covariance: Matrix6<f64>,
-}
-
-/// How far from about where it may be something is looked for, and what is believed.
-#[derive(Debug)]
-pub(in crate::estimation) struct Search {
-    /// On the level, m, and turned, rad.
-    reach: (f64, f64),
-    /// Patches this far apart along their normals lie on each other, m; the share of a voxel's edge where nothing is said.
-    gate_m: Option<f64>,
-    /// Least share of the finest patches that lies on the map.
-    share: f64,
-    /// Least share of those that have a patch of the map beside them.
-    agreement: f64,
-    /// Whether of places that are as good the nearest counts; if not, none of them.
-    nearest: bool,
-}
-
-/// In a map which shows all that is seen: with what the coarsest surfels reach, a metre and twenty degrees.
-pub(in crate::estimation) const IN_MAP: Search =
-    Search { reach: (APART.0, APART.1), gate_m: None, share: 0.4, agreement: 0.0, nearest: false };
-
-impl Search {
-    /// In what was seen before a silence of `seconds`, matches being good to `sigma_m`. It may show little of what is seen
-    /// behind it, but where both show a place, it must be the same; and the head cannot have gone far.
-    pub(in crate::estimation) fn behind_silence(seconds: f64, sigma_m: f64) -> Self {
-        let reach_m = (AWAY.0 + AWAY.1 * seconds).min(AWAY.2);
-        let reach_deg = (TURNED_DEG.0 + TURNED_DEG.1 * seconds).min(TURNED_DEG.2);
-        let reach = (reach_m, reach_deg.to_radians());
-        let share = if seconds > LONG_S { IN_MAP.share } else { 0.1 };
-        Self { reach, gate_m: Some(1.5 * sigma_m), share, agreement: 0.8, nearest: true }
-    }
-
-    /// Each start, twice: as what it began, and as what it becomes.
-    fn starts(&self, map_from_seen: &Pose, from: &Vector) -> Vec<(Pose, Pose)> {
-        let steps = |reach: f64, apart: f64| {
-            let most = (reach / apart).floor() as i32;
-            (-most..=most).map(move |k| f64::from(k) * apart)
-        };
-        let far_m = self.reach.0.min(FARTHEST_M);
-        let mut starts = Vec::new();
-        for yaw in steps(self.reach.1, APART.1) {
-            for (x, y) in steps(far_m, APART.0).flat_map(|x| steps(far_m, APART.0).map(move |y| (x, y))) {
-                let start = tried(map_from_seen, from, yaw, Vector::new(x, y, 0.0));
-                starts.push((start, start));
-            }
-        }
-        starts
-    }
-
-    fn believes(&self, found: &Located) -> bool {
-        found.share >= self.share && found.agreement >= self.agreement
-    }
-
-    /// How likely a head is where it was found, as far as where it was expected says, 0..1.
-    fn likely(&self, found: &Pose, expected: &Pose, from: &Vector) -> f64 {
-        if !self.nearest {
-            return 1.0;
-        }
-        let (far_m, turned) = apart(found, expected, from);
-        let sigmas = 2.0 * (far_m / self.reach.0).max(turned / self.reach.1);
-        if sigmas > 3.0 { 0.0 } else { (-0.5 * sigmas * sigmas).exp() }
-    }
 }
 
 /// A map in which places are looked for.
@@ -207,10 +136,12 @@ impl Locator {
         let worth = |found: &Located| found.share.powi(3) * search.likely(&found.map_from_seen, map_from_seen, from);
         let mut found: Vec<(f64, Located)> = judged.map(|found| (worth(&found), found)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let Some((worth, best)) = found.first().filter(|(worth, best)| *worth > 0.0 && best.share >= search.share)
-        else {
-            let share = 100.0 * found.first().map_or(0.0, |(_, best)| best.share);
-            return Err(format!("at the best place {share:.0} % of what was seen lies on the map"));
+        let Some((worth, best)) = found.iter().find(|(worth, found)| *worth > 0.0 && search.believes(found)) else {
+            let best = found.first().map_or((0.0, 0.0), |(_, best)| (100.0 * best.share, 100.0 * best.agreement));
+            let (share, agreement) = best;
+            return Err(format!(
+                "at the best place {share:.0} % of what was seen lies on the map, {agreement:.0} % of what could"
+            ));
         };
         let as_good = found.iter().filter(|(other, found)| *other > OTHER.2 * worth && search.believes(found));
         let others: Vec<&Located> =
@@ -318,7 +249,7 @@ fn leave_one_of_each(places: &mut Vec<(Pose, Pose)>, from: &Vector) {
 }
 
 /// A start turned about the vertical through `from`, and shifted.
-fn tried(map_from_seen: &Pose, from: &Vector, yaw: f64, by: Vector) -> Pose {
+pub(super) fn tried(map_from_seen: &Pose, from: &Vector, yaw: f64, by: Vector) -> Pose {
     let pivot = map_from_seen.transform_point(&(*from).into()).coords;
     corrected(map_from_seen, &pivot, &Vector6::new(0.0, 0.0, yaw, by.x, by.y, by.z))
 }
@@ -370,13 +301,14 @@ fn is_elsewhere(a: &Located, b: &Located, from: &Vector) -> bool {
 }
 
 /// How far apart two poses put `from`, m, and by what angle they differ, rad.
-fn apart(a: &Pose, b: &Pose, from: &Vector) -> (f64, f64) {
+pub(super) fn apart(a: &Pose, b: &Pose, from: &Vector) -> (f64, f64) {
     let place = |pose: &Pose| pose.transform_point(&(*from).into()).coords;
     ((place(a) - place(b)).norm(), a.rotation.angle_to(&b.rotation))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::search::IN_MAP;
     use super::*;
     use crate::estimation;
     use crate::geometry::from_roll_pitch_yaw;

@@ -2,9 +2,11 @@
 
 mod fuse;
 mod locate;
+mod search;
 
 pub use locate::Located;
-pub(super) use locate::{IN_MAP, Locator, Search};
+pub(super) use locate::Locator;
+pub(super) use search::{IN_MAP, Search};
 
 use super::surfel::Patch;
 use super::survey::{Sighting, Survey};
