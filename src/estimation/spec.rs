@@ -70,6 +70,10 @@ pub struct SurfelSpec {
     /// Least velocity of a planar scan's beams out of their plane, by rotation, degrees/s.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_sweep_deg_per_s: f64,
+    /// Greatest angle between a patch's normal and the beams that saw it, degrees: beyond, a patch is not told from the slice that
+    /// a planar scan cuts out of a corner or a pipe.
+    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    pub max_incidence_deg: f64,
     /// Nearest range used, m: what is nearer is the carrier.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_range_m: f64,

@@ -145,6 +145,9 @@ impl SurfelMaker {
             return None;
         }
         let normal = calibrated_from_map * eigen.eigenvectors.column(order[0]);
+        if normal.dot(&beam).abs() < self.spec.max_incidence_deg.to_radians().cos() {
+            return None;
+        }
         let surfel = Surfel {
             tau_s,
             reach_in_imu: beam * (range_m - self.lidar.range_m),
@@ -229,4 +232,65 @@ fn group(fragments: &[Fragment], level: usize, shift: i32, spec: &SurfelSpec) ->
     groups.extend(open.map(|(.., moments)| moments));
     groups.retain(|moments| moments.count() >= spec.min_points as f64);
     groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimation::spec;
+    use crate::estimation::strapdown::{Interval, State};
+    use crate::geometry::Rotation;
+
+    /// Planar scans of a vertical corner, 2.1 m off on both sides, by a lidar that nods at `rate`, rad/s, across the way to it.
+    fn scans_of_a_corner(rate: f64, scans: usize) -> (Nominal, Vec<Beam>) {
+        let nodding = Vector::new(-1.0, 1.0, 0.0).normalize() * rate;
+        let none = Vector::zeros();
+        let start = State { rotation: Rotation::identity(), position: none, velocity: none };
+        let mut nominal = Nominal::beginning(0.0, start);
+        let interval = Interval {
+            h: 0.01,
+            gyro: nodding,
+            gyro_slope: none,
+            accel: none,
+            accel_slope: none,
+            gyro_sigma: 1e-3,
+            accel_sigma: 1e-2,
+            bridged: false,
+        };
+        (0..25).for_each(|_| nominal.extend(interval, &Biases { gyro: none, accel: none }, &none));
+        let beam = |k: usize| {
+            let tau_s = (k / 181) as f64 * 0.025 + (k % 181) as f64 * 5e-5;
+            let angle = ((k % 181) as f64 * 0.5).to_radians();
+            let beam = Vector::new(angle.cos(), angle.sin(), 0.0);
+            let direction = Rotation::from_scaled_axis(nodding * tau_s) * beam;
+            let range = 2.1 / direction.x.max(direction.y);
+            Beam { tau_s, point_in_imu: (beam * range).cast(), range_m: range as f32 }
+        };
+        (nominal, (0..scans * 181).map(beam).collect())
+    }
+
+    /// How steep the normals of the patches are: their vertical parts.
+    fn steepness((nominal, beams): (Nominal, Vec<Beam>), max_incidence_deg: f64) -> Vec<f64> {
+        let shipped = spec::load("default").unwrap().surfels;
+        let maker = SurfelMaker {
+            spec: SurfelSpec { max_incidence_deg, ..shipped },
+            noise: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
+            scan_normal: Some(Vector::z()),
+            laser_in_imu: Vector::zeros(),
+            lidar: LidarCorrection::default(),
+        };
+        let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0 };
+        let still = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
+        maker.build(&beams, &nominal, &clock, &still).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
+    }
+
+    #[test]
+    fn the_slice_of_a_corner_is_no_surface_and_its_walls_are() {
+        let shipped_deg = spec::load("default").unwrap().surfels.max_incidence_deg;
+        let slices = steepness(scans_of_a_corner(0.3, 4), 90.0);
+        assert!(slices.iter().any(|z| *z > 0.9), "no slice passes for a surface: this tests nothing");
+        assert_eq!(steepness(scans_of_a_corner(0.3, 4), shipped_deg), [0.0; 0]);
+        let walls = steepness(scans_of_a_corner(0.8, 8), shipped_deg);
+        assert!(walls.len() > 10 && walls.iter().all(|z| *z < 0.3), "{walls:?}");
+    }
 }
