@@ -269,8 +269,8 @@ impl Tally {
         let scatter: Matrix = self.normals.iter().map(|(normal, weight)| normal * normal.transpose() * *weight).sum();
         let mut untold = Matrix6::zeros();
         for direction in scatter.symmetric_eigen().eigenvectors.column_iter() {
-            let lean = |(normal, weight): &(Vector, f64)| Some((normal.dot(&direction), *weight));
-            let held = self.normals.iter().filter_map(lean).filter(|(lean, _)| lean.abs() > LEANING);
+            let lean = |(normal, weight): &(Vector, f64)| (normal.dot(&direction), *weight);
+            let held = self.normals.iter().map(lean).filter(|(lean, _)| lean.abs() > LEANING);
             if held.map(|(lean, weight)| lean * lean * weight).sum::<f64>() < WEAK * sum {
                 let mut block = untold.fixed_view_mut::<3, 3>(3, 3);
                 block += direction * direction.transpose();

@@ -61,6 +61,7 @@ impl Search {
         starts
     }
 
+    /// Whether enough of what was seen, and of what could, lies on the map where it was found.
     pub(super) fn believes(&self, found: &Located) -> bool {
         found.share >= self.share && found.agreement >= self.agreement
     }

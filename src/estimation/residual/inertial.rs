@@ -31,8 +31,8 @@ const UNLIKE: f64 = 3.0;
 /// knot's span. None at all, and a correction could swing between the sums' ends.
 const WITHIN_SPAN: f64 = 3.0;
 
-/// Gaps no longer than this leave no step that would matter, s.
-const SHORT_GAP_S: f64 = 0.05;
+/// Gaps of the IMU no longer than this leave no step that would matter, and the head's place more certain than matches reach, s.
+pub(in crate::estimation) const SHORT_GAP_S: f64 = 0.05;
 /// How far to both sides of a gap the correction takes the step, s, and by how much it then differs, rad/s and m/s^2.
 const BESIDE_S: f64 = 0.3;
 const BESIDE: (f64, f64) = (0.5, 3.0);

@@ -14,6 +14,7 @@ use super::clock::Clock;
 use super::initial::{Beginning, Carried, Rest};
 use super::matching::Matcher;
 use super::nominal::Nominal;
+use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
@@ -32,8 +33,6 @@ const LONGEST: f64 = 3.0;
 /// A stretch counts as swept when it shows this fraction of the patches of the window's richest.
 const SWEPT: f64 = 0.25;
 
-/// A silence of the IMU longer than this leaves the head's place uncertain by more than matches reach, s.
-const LEAP_S: f64 = 0.05;
 /// How exactly a window is put into a map before it is matched with it, rad and m.
 const FOUND: [f64; 2] = [0.05, 0.2];
 
@@ -175,7 +174,7 @@ impl Window {
             }
         }
         let bridged = intervals.iter().filter(|(_, interval)| interval.bridged);
-        self.leapt = bridged.map(|(_, interval)| interval.h).sum::<f64>() > LEAP_S;
+        self.leapt = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S;
         let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         let remembered = vec![Remembered::default(); surfels.len()];

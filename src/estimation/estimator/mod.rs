@@ -1,16 +1,22 @@
-use super::border::Border;
-use super::consider::{Consider, OfBeginning, Sensitivity};
-use super::initial::{self, Beginning, Carried, Noisier};
-use super::intake::{Intake, Stretch};
-use super::spent::Stopwatch;
-use super::strapdown::Interval;
-use super::surfel::{Patch, SurfelMaker};
-use super::survey::Survey;
-use super::views::Views;
-use super::whereabouts::{Before, Whereabouts};
-use super::window::{Linearised, Solved, Window};
-use super::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, TimeSpent, Warning, WarningKind, WindowReport};
-use crate::geometry::{Pose, Rotation, Trajectory, Vector};
+//! The estimator: measurements in, poses out.
+
+mod poses;
+mod verdict;
+
+use self::verdict::{leaves_to_the_imu, report, trouble};
+use crate::estimation::border::Border;
+use crate::estimation::consider::{Consider, OfBeginning, Sensitivity};
+use crate::estimation::initial::{self, Beginning, Carried, Noisier};
+use crate::estimation::intake::{Intake, Stretch};
+use crate::estimation::spent::Stopwatch;
+use crate::estimation::strapdown::Interval;
+use crate::estimation::surfel::{Patch, SurfelMaker};
+use crate::estimation::survey::Survey;
+use crate::estimation::views::Views;
+use crate::estimation::whereabouts::{Before, Whereabouts};
+use crate::estimation::window::{Linearised, Window};
+use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
+use crate::geometry::{Pose, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::surfel_map::SurfelMap;
 use crate::time::Stamp;
@@ -412,92 +418,12 @@ impl Estimator {
         self.windows.last().map_or(0.0, |report| report.stamp.seconds_since(self.intake.origin()))
     }
 
-    /// Hands out the poses up to `until_u_s` (IMU time) at whole multiples of the IMU's period.
-    fn hand_out(&mut self, until_u_s: f64) {
-        let Some(window) = &self.window else { return };
-        let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
-        let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
-        let mut stamp = self.next_pose.unwrap_or_else(|| {
-            let start_ns = self.intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
-            Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
-        });
-        loop {
-            let tau_s = stamp.seconds_since(self.intake.origin());
-            let u_s = window.clock.imu_s(tau_s);
-            if u_s.is_nan() || u_s > until_u_s {
-                break;
-            }
-            self.poses.push(self.pose_at(window, stamp, (tau_s, u_s)));
-            stamp += crate::time::Span::from_nanos(period_ns);
-        }
-        self.next_pose = Some(stamp);
-    }
-
-    fn pose_at(&self, window: &Window, stamp: Stamp, (tau_s, u_s): (f64, f64)) -> EstimatedPose {
-        let imu_from_head = self.calibration.head_from_imu.inverse();
-        let motion = window.nominal.at(u_s, &window.biases.gyro);
-        let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
-        let map_from_imu = Pose::from_parts(motion.position.into(), rotation);
-        let map_from_head = map_from_imu * imu_from_head;
-        let arm = rotation * imu_from_head.translation.vector;
-        EstimatedPose {
-            stamp,
-            map_from_head,
-            covariance: self.consider.covariance_at(&map_from_head.translation.vector),
-            velocity_in_map_m_per_s: motion.velocity + motion.angular_velocity.cross(&arm),
-            gyro_bias_rad_per_s: window.biases.gyro,
-            accel_bias_m_per_s2: window.biases.accel,
-            clock_offset_s: window.clock.offset_at(tau_s),
-        }
-    }
-
     fn why_nothing(&self) -> EstimationError {
         match self.intake.counts() {
             (0, scans) => EstimationError::NoImu { scans },
             (samples, 0) => EstimationError::NoLidar { samples },
             _ => EstimationError::TooShort { common_s: self.intake.common_s(), needed_s: 2.0 * self.spec.step_s },
         }
-    }
-}
-
-fn report(solved: &Solved, stamp: Stamp, window: &Window, took: (f64, TimeSpent)) -> WindowReport {
-    let (elapsed_s, spent) = took;
-    WindowReport {
-        stamp,
-        surfels: solved.surfels,
-        matches: solved.matches,
-        view_matches: solved.view_matches,
-        views: solved.views,
-        residual_rms_m: solved.residual_rms_m,
-        iterations: solved.iterations,
-        last_correction_m: solved.last_correction_m,
-        conditioning: solved.conditioning,
-        clock_offset_s: window.clock.offset_s,
-        elapsed_s,
-        spent,
-    }
-}
-
-/// What is to be said about a window, if anything; `expected` tells whether it should have found surfaces.
-fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
-    let matches = solved.matches + solved.view_matches;
-    if let Some(reason) = solved.trouble {
-        Some(WarningKind::NotSolved { reason })
-    } else if expected && matches < spec.solve.min_matches {
-        Some(WarningKind::FewMatches { matches })
-    } else if expected && solved.conditioning < spec.solve.weak_conditioning {
-        Some(WarningKind::WeakGeometry { conditioning: solved.conditioning, direction_in_map: solved.weakest })
-    } else {
-        None
-    }
-}
-
-/// Whether a trouble means that the IMU alone told how the head went on.
-fn leaves_to_the_imu(trouble: &WarningKind) -> bool {
-    match trouble {
-        WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
-        WarningKind::WeakGeometry { conditioning, .. } => *conditioning <= 0.0,
-        _ => false,
     }
 }
 

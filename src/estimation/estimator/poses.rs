@@ -1,0 +1,48 @@
+//! The poses that a window no longer changes.
+
+use super::Estimator;
+use crate::estimation::EstimatedPose;
+use crate::estimation::window::Window;
+use crate::geometry::{Pose, Rotation};
+use crate::time::{Span, Stamp};
+
+impl Estimator {
+    /// Hands out the poses up to `until_u_s` (IMU time) at whole multiples of the IMU's period.
+    pub(super) fn hand_out(&mut self, until_u_s: f64) {
+        let Some(window) = &self.window else { return };
+        let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
+        let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
+        let mut stamp = self.next_pose.unwrap_or_else(|| {
+            let start_ns = self.intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
+            Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
+        });
+        loop {
+            let tau_s = stamp.seconds_since(self.intake.origin());
+            let u_s = window.clock.imu_s(tau_s);
+            if u_s.is_nan() || u_s > until_u_s {
+                break;
+            }
+            self.poses.push(self.pose_at(window, stamp, (tau_s, u_s)));
+            stamp += Span::from_nanos(period_ns);
+        }
+        self.next_pose = Some(stamp);
+    }
+
+    fn pose_at(&self, window: &Window, stamp: Stamp, (tau_s, u_s): (f64, f64)) -> EstimatedPose {
+        let imu_from_head = self.calibration.head_from_imu.inverse();
+        let motion = window.nominal.at(u_s, &window.biases.gyro);
+        let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
+        let map_from_imu = Pose::from_parts(motion.position.into(), rotation);
+        let map_from_head = map_from_imu * imu_from_head;
+        let arm = rotation * imu_from_head.translation.vector;
+        EstimatedPose {
+            stamp,
+            map_from_head,
+            covariance: self.consider.covariance_at(&map_from_head.translation.vector),
+            velocity_in_map_m_per_s: motion.velocity + motion.angular_velocity.cross(&arm),
+            gyro_bias_rad_per_s: window.biases.gyro,
+            accel_bias_m_per_s2: window.biases.accel,
+            clock_offset_s: window.clock.offset_at(tau_s),
+        }
+    }
+}
