@@ -38,14 +38,23 @@ fn numbers(folder: &Path, name: &str) -> Vec<f64> {
     column(folder, name).iter().map(|cell| cell.parse().unwrap()).collect()
 }
 
-/// Begins `run` in a process and kills it after a while; whether it had ended by itself.
-fn killed(folder: &Path, after: Duration) -> bool {
+/// How many tasks of the sweep are done and kept.
+fn parts(folder: &Path) -> usize {
+    std::fs::read_dir(folder.join("swept/parts")).map_or(0, Iterator::count)
+}
+
+/// Begins `run` in a process and kills it a while after `enough` tasks are done; whether it had
+/// ended by itself.
+fn killed(folder: &Path, enough: usize, after: Duration) -> bool {
     let mut child = Process::new(ZSIM)
         .args(["sweep", "run", "--quiet", "--threads", "2", "swept"])
         .current_dir(folder)
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
+    while parts(folder) < enough && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
     std::thread::sleep(after);
     let ended = child.try_wait().unwrap().is_some();
     child.kill().unwrap();
@@ -86,7 +95,8 @@ fn a_sweep_is_the_same_in_one_go_in_shares_and_killed_ten_times() {
     well(here.path(), "sweep plan springs.ron -o swept");
     let mut stream = Seed(7).stream("kills");
     let mut kills = 0;
-    while kills < 10 && !killed(here.path(), Duration::from_millis(stream.random_range(20..400))) {
+    // Later by a task each time and never by a time alone: on a fast machine all would be done.
+    while kills < 10 && !killed(here.path(), kills, Duration::from_millis(stream.random_range(0..20))) {
         kills += 1;
     }
     assert!(kills > 2, "it was done before it was killed");
@@ -168,7 +178,7 @@ fn journeys_share_their_work_and_give_what_each_gives_alone() {
     // Six runs, of which two are the same as another, on one swing through the room.
     assert_eq!((planned["points"].as_u64(), planned["tasks"].as_u64()), (Some(6), Some(1)));
     let mut kills = 0;
-    while kills < 3 && !killed(here.path(), Duration::from_millis(1500)) {
+    while kills < 3 && !killed(here.path(), kills, Duration::from_millis(500)) {
         kills += 1;
     }
     well(here.path(), "sweep run swept --threads 2");
