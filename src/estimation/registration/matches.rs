@@ -30,10 +30,12 @@ pub(super) struct Tally {
     pub(super) information: Matrix,
     /// What they know of it along the weakest direction so far, by normals that lean to it.
     pub(super) held: f64,
+    /// So much of that by matches of what was seen again.
+    pub(super) held_again: f64,
 }
 
 impl Tally {
-    fn count(&mut self, plane: &Plane, weight: f64, weakest: &Vector) {
+    fn count(&mut self, plane: &Plane, weight: f64, (weakest, again): (&Vector, bool)) {
         self.matches += 1;
         self.weights += weight;
         self.squares += weight * plane.distance_m * plane.distance_m;
@@ -41,6 +43,7 @@ impl Tally {
         let lean = plane.normal.dot(weakest);
         if lean.abs() > LEANING {
             self.held += weight * lean * lean;
+            self.held_again += if again { weight * lean * lean } else { 0.0 };
         }
     }
 
@@ -50,6 +53,7 @@ impl Tally {
         self.squares += other.squares;
         self.information += other.information;
         self.held += other.held;
+        self.held_again += other.held_again;
     }
 
     /// Weighted root mean square of the matches' distances, m.
@@ -124,7 +128,8 @@ impl Matches<'_> {
             sum.link.first.add_shared(&by_a, &by_shared, weight);
             sum.link.second.add_shared(&by_b, &by_shared, weight);
             sum.beside.add(&by_shared, plane.distance_m, weight);
-            sum.tally.count(&plane, weight, &self.weakest);
+            let again = self.scene.apart_s((i, j)) > self.spec.again_after_s;
+            sum.tally.count(&plane, weight, (&self.weakest, again));
         }
         sum
     }

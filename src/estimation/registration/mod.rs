@@ -99,6 +99,8 @@ pub struct RegistrationReport {
     pub moved: (f64, f64),
     /// Least over greatest information that the matches hold about the position along any direction, 0..1.
     pub conditioning: f64,
+    /// Fraction of what they hold along the weakest one by what was seen again after a while, 0..1.
+    pub seen_again: f64,
     /// Why the open loop's trajectory stayed, where it did.
     pub left: Option<&'static str>,
 }
@@ -168,8 +170,8 @@ impl OpenLoop<'_> {
             return self.close_bent(bent, mount, report);
         }
         let ((course, mount), report) = Registration::run(self, (course, mount), survey, report)?;
-        if report.conditioning < self.spec.weak_conditioning {
-            return Err(Box::new((report, "what was seen again says too little of a direction")));
+        if report.conditioning < self.spec.weak_conditioning && report.seen_again < self.spec.min_seen_again {
+            return Err(Box::new((report, "too little that tells of a direction was seen again")));
         }
         Ok((Closed { trajectory: course.into_trajectory(map_from_head.stamps()), mount }, report))
     }
@@ -283,6 +285,7 @@ impl<'a> Registration<'a> {
         let eigen = tally.information.symmetric_eigen();
         let greatest = eigen.eigenvalues.max();
         self.report.conditioning = if greatest > 0.0 { tally.held / greatest } else { 0.0 };
+        self.report.seen_again = if tally.held > 0.0 { tally.held_again / tally.held } else { 0.0 };
         self.weakest = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     }
 

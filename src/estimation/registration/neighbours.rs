@@ -112,7 +112,8 @@ fn look_around(level: usize, scene: &Scene, matcher: &Matcher, count: usize) -> 
         for (i, patch) in a.patches.iter().enumerate() {
             for j in matcher.neighbours(&b.forest, patch, count) {
                 let pair = (a.members[i], b.members[j as usize]);
-                if back[j as usize].contains(&(i as u32)) && scene.apart(pair, matcher) {
+                let apart_s = scene.apart_s((pair.0 as usize, pair.1 as usize));
+                if back[j as usize].contains(&(i as u32)) && apart_s >= matcher.spec.min_time_difference_s {
                     found.push(pair);
                 }
             }

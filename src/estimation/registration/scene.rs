@@ -3,7 +3,6 @@
 use super::course::Course;
 use super::lidar::{Mount, Shared, Sight, turn_patch};
 use super::{RegistrationSpec, chapters};
-use crate::estimation::matching::Matcher;
 use crate::estimation::nominal::Correction;
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Patch;
@@ -60,10 +59,9 @@ impl Scene {
         Self { spacing_s: spec.knot_spacing_s, times_s, patches, arms, sights, slots, middles, chapters, pairs }
     }
 
-    /// Whether two surfels were seen at times different enough.
-    pub(super) fn apart(&self, (i, j): (u32, u32), matcher: &Matcher) -> bool {
-        let (early, late) = (self.times_s[i as usize], self.times_s[j as usize]);
-        late - early >= matcher.spec.min_time_difference_s
+    /// How much later than surfel `i` surfel `j` was seen, s.
+    pub(super) fn apart_s(&self, (i, j): (usize, usize)) -> f64 {
+        self.times_s[j] - self.times_s[i]
     }
 
     /// Moves every surfel with the trajectory at its time, then by a step of the lidar.

@@ -59,10 +59,17 @@ pub struct RegistrationSpec {
     /// Iterations end when no knot moves by more than this, m.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub settled_m: f64,
-    /// Least over greatest information that the matches hold about the position along any direction, 0..1: with less the open
-    /// loop stays, whose windows and IMU know that direction better.
+    /// Least over greatest information that the matches hold about the position along any direction, 0..1: with less that
+    /// direction is weak.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub weak_conditioning: f64,
+    /// What was seen so long apart was seen again, s: what was seen within it the open loop's windows have weighed.
+    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    pub again_after_s: f64,
+    /// Fraction of what holds a weak direction that must have been seen again, 0..1: with less the open loop stays, whose
+    /// windows and IMU know that direction better.
+    #[serde(deserialize_with = "crate::spec::checked::fraction")]
+    pub min_seen_again: f64,
     /// How places are recognised.
     pub places: PlacesSpec,
 }

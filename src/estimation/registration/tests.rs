@@ -168,6 +168,24 @@ fn a_walk_that_was_bent_is_straightened() {
     );
 }
 
+/// The same walk, in which floor and ceiling were seen at some times alone.
+fn level_seen(when: impl Fn(f64) -> bool) -> ClosedLoop {
+    let mut left = bent(bend);
+    left.survey.sightings.retain(|seen| seen.patch.normal.z.abs() < 0.5 || when(seen.tau_s));
+    left.registered()
+}
+
+#[test]
+fn a_direction_held_weakly_is_closed_where_what_holds_it_was_seen_again() {
+    let passing = level_seen(|t_s| (4.4..5.6).contains(&t_s));
+    assert!(passing.report.conditioning < 0.1 && passing.report.seen_again < 0.01, "{:?}", passing.report);
+    assert!(passing.report.left.is_some_and(|why| why.contains("seen again")), "{:?}", passing.report);
+    // A lap later the head is there again.
+    let again = level_seen(|t_s| (4.4..5.0).contains(&(t_s % 20.0)));
+    assert!(again.report.conditioning < 0.1 && again.report.seen_again > 0.9, "{:?}", again.report);
+    assert_eq!(again.report.left, None);
+}
+
 /// A drift that begins and ends gently, of 5 m and 10 degrees over `duration_s`.
 fn drift(t_s: f64, duration_s: f64) -> (Rotation, Vector) {
     let x = t_s / duration_s;
