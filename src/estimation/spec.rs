@@ -264,6 +264,12 @@ impl EstimatorSpec {
         require((1..=6).contains(&self.surfels.levels), "levels", "must be 1 to 6".into())?;
         require(self.surfels.min_points >= 4, "min_points", "must be at least 4: fewer are no plane".into())?;
         require(self.matching.neighbours >= 1, "neighbours", "must be at least 1".into())?;
+        for (key, degrees) in [
+            ("max_incidence_deg", self.surfels.max_incidence_deg),
+            ("max_normal_angle_deg", self.matching.max_normal_angle_deg),
+        ] {
+            require(degrees <= 90.0, key, format!("{degrees} degrees is more than 90, which is any angle"))?;
+        }
         require(self.solve.max_iterations >= 1, "max_iterations", "must be at least 1".into())?;
         require(self.views.max_kept >= self.fixed_views, "max_kept", "must be at least fixed_views".into())?;
         require(self.views.length_s >= step, "length_s", format!("must be at least step_s = {step} s"))?;
@@ -280,6 +286,16 @@ mod tests {
         let spec = load("default").unwrap();
         spec.check().unwrap();
         assert_eq!(spec.fixed_views, 5);
+    }
+
+    #[test]
+    fn angles_beyond_the_right_angle_are_refused() {
+        let mut spec = load("default").unwrap();
+        spec.surfels.max_incidence_deg = 90.0;
+        spec.check().unwrap();
+        spec.surfels.max_incidence_deg = 120.0;
+        let error = spec.check().unwrap_err();
+        assert!(matches!(error, EstimationError::Setting { key: "max_incidence_deg", .. }), "{error}");
     }
 
     #[test]
