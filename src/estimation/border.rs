@@ -12,14 +12,20 @@ const CLOCK_WALK: f64 = 5e-6;
 /// Wander of the clock's rate, 1 per square root of a second.
 const RATE_WALK: f64 = 2e-7;
 
-/// Prior and posterior information about the border.
+/// So much of what a window adds is believed for good: what its matches err they err together, and in the next windows again.
+const BELIEVED: f64 = 0.1;
+
+/// What is known of the border before a window, and by it.
 ///
 /// Windows overlap: what a window adds to the prior is mostly measured again by the next one. So only the leaving stretch's
-/// share of it is remembered, and the walks of biases and clock wear it down.
+/// share of it is remembered, of mean and of information, and the walks of biases and clock wear it down.
 #[derive(Debug, Clone)]
 pub(super) struct Border {
     prior: SMatrix<f64, BORDER, BORDER>,
-    posterior: SMatrix<f64, BORDER, BORDER>,
+    /// From the values with which the window began to the prior's mean.
+    to_mean: SVector<f64, BORDER>,
+    /// The window's information, whose mean its solution is, where it has one.
+    posterior: Option<SMatrix<f64, BORDER, BORDER>>,
     moved: SVector<f64, BORDER>,
     walks: [f64; BORDER],
 }
@@ -35,19 +41,25 @@ impl Border {
             walks[CLOCK] = CLOCK_WALK;
             walks[CLOCK_RATE] = RATE_WALK;
         }
-        Self { prior, posterior: prior, moved: SVector::zeros(), walks }
+        Self { prior, to_mean: SVector::zeros(), posterior: None, moved: SVector::zeros(), walks }
     }
 
     /// A window begins from the values as they are.
     pub(super) fn begin_window(&mut self) {
+        self.to_mean -= self.moved;
+        self.take_back();
+    }
+
+    /// The values are again those with which the window began.
+    pub(super) fn take_back(&mut self) {
         self.moved = SVector::zeros();
-        self.posterior = self.prior;
+        self.posterior = None;
     }
 
     /// A solve moved the border by `by`; `factor` is that of its equations.
     pub(super) fn moved(&mut self, by: &[f64], factor: &Factor) {
         self.moved += SVector::from_column_slice(by);
-        self.posterior = factor.information_of_last::<BORDER>();
+        self.posterior = Some(factor.information_of_last::<BORDER>());
     }
 
     /// What the window knew before of the IMU's part, all else being unknown.
@@ -68,14 +80,21 @@ impl Border {
     }
 
     pub(super) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
-        add_border(equations, layout, &self.prior, &self.moved);
+        add_border(equations, layout, &self.prior, &(self.moved - self.to_mean));
     }
 
     /// A stretch leaves that was `share` of the window: its share of what the window added becomes prior knowledge, and
     /// the walks of `seconds` wear it.
     pub(super) fn remember(&mut self, share: f64, seconds: f64) {
-        let known = self.prior + (self.posterior - self.prior) * share;
-        let Some(mut covariance) = known.try_inverse() else { return };
+        let share = share * BELIEVED;
+        let pull = self.prior * (self.to_mean - self.moved);
+        let (information, pull) = match self.posterior {
+            // Of two means, weighed by their information, the posterior's is where the values are.
+            Some(posterior) => (self.prior + (posterior - self.prior) * share, pull * (1.0 - share)),
+            None => (self.prior, pull),
+        };
+        let Some(mut covariance) = information.try_inverse() else { return };
+        (self.to_mean, self.moved) = (covariance * pull, SVector::zeros());
         for (k, walk) in self.walks.iter().enumerate() {
             covariance[(k, k)] += walk * walk * seconds;
         }
@@ -90,5 +109,107 @@ impl Border {
         let mut back = SMatrix::<f64, BORDER, BORDER>::identity();
         back[(CLOCK, CLOCK_RATE)] = -later_s;
         self.prior = back.transpose() * self.prior * back;
+        for values in [&mut self.to_mean, &mut self.moved] {
+            values[CLOCK] += values[CLOCK_RATE] * later_s;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    type Information = SMatrix<f64, BORDER, BORDER>;
+    type Values = SVector<f64, BORDER>;
+    const LAYOUT: Layout = Layout { first_knot: 0, knots: 0 };
+
+    /// Some information of full rank.
+    fn wave(seed: usize) -> Information {
+        let root = Information::from_fn(|r, c| ((seed * 7 + r * 5 + c * 3 + r * c) as f64 * 0.61).sin());
+        root * root.transpose() + Information::identity()
+    }
+
+    fn known(prior: Information) -> Border {
+        let noise = ImuNoise {
+            gyro_density_rad_per_s_per_sqrt_hz: 0.0,
+            accel_density_m_per_s2_per_sqrt_hz: 0.0,
+            gyro_bias_walk_rad_per_s_per_sqrt_s: 0.0,
+            accel_bias_walk_m_per_s2_per_sqrt_s: 0.0,
+            gyro_turn_on_bias_rad_per_s: 0.0,
+            accel_turn_on_bias_m_per_s2: 0.0,
+            gyro_limit_rad_per_s: 1.0,
+            accel_limit_m_per_s2: 1.0,
+        };
+        Border::new(prior, &noise, false)
+    }
+
+    /// Solves a window that measures the border itself, to be `measured` with `information`; the values behind it, which
+    /// were `values`.
+    fn solved(border: &mut Border, values: Values, (measured, information): (&Values, &Information)) -> Values {
+        let mut equations = NormalEquations::new(LAYOUT.size());
+        border.begin_window();
+        border.add_to(&mut equations, &LAYOUT);
+        add_border(&mut equations, &LAYOUT, information, &(values - measured));
+        let mut factor = Factor::default();
+        equations.factor(&mut factor).unwrap();
+        let x = equations.solve(&factor);
+        border.moved(&x, &factor);
+        values + Values::from_vec(x)
+    }
+
+    #[test]
+    fn what_a_window_measures_again_moves_nothing() {
+        let (prior, by) = (wave(1), wave(2));
+        let measured = Values::from_fn(|k, _| 0.1 * (k as f64 + 1.0));
+        let mut border = known(prior);
+        let once = solved(&mut border, Values::zeros(), (&measured, &by));
+        assert_relative_eq!(once, (prior + by).lu().solve(&(by * measured)).unwrap(), epsilon = 1e-9);
+        assert_relative_eq!(solved(&mut border, once, (&measured, &by)), once, epsilon = 1e-9);
+    }
+
+    /// As if what is believed of the leaving stretch had been all that was measured.
+    #[test]
+    fn what_is_remembered_is_the_share_of_mean_and_information() {
+        let (prior, by) = (wave(1), wave(2));
+        let measured = Values::from_fn(|k, _| 0.1 * (k as f64 + 1.0));
+        let mut border = known(prior);
+        let values = solved(&mut border, Values::zeros(), (&measured, &by));
+        border.remember(0.25, 0.5);
+        let remembered = by * (0.25 * BELIEVED);
+        let mean = (prior + remembered).lu().solve(&(remembered * measured)).unwrap();
+        let nothing = (&Values::zeros(), &Information::zeros());
+        assert_relative_eq!(solved(&mut border, values, nothing), mean, epsilon = 1e-6);
+        // Worn by the walk of gravity alone.
+        assert_relative_eq!(border.prior, prior + remembered, epsilon = 1e-6, max_relative = 1e-6);
+    }
+
+    #[test]
+    fn a_window_that_came_to_nothing_teaches_nothing() {
+        let (prior, measured) = (wave(1), Values::repeat(0.1));
+        let mut border = known(prior);
+        let values = solved(&mut border, Values::zeros(), (&measured, &wave(2)));
+        solved(&mut border, values, (&Values::repeat(7.0), &wave(3)));
+        border.take_back();
+        border.remember(0.25, 0.0);
+        assert_relative_eq!(border.prior, prior, max_relative = 1e-6);
+        let nothing = (&Values::zeros(), &Information::zeros());
+        assert_relative_eq!(solved(&mut border, values, nothing), Values::zeros(), epsilon = 1e-6);
+    }
+
+    #[test]
+    fn a_clock_told_from_later_is_off_by_its_rates_share_more() {
+        let (prior, measured) = (wave(1), Values::from_fn(|k, _| 0.1 * k as f64));
+        let told = |later_s: f64| {
+            let mut border = known(prior);
+            let mut values = solved(&mut border, Values::zeros(), (&measured, &wave(2)));
+            border.remember(0.5, 0.0);
+            border.clock_told_from(later_s);
+            values[CLOCK] += values[CLOCK_RATE] * later_s;
+            solved(&mut border, values, (&Values::zeros(), &Information::zeros()))
+        };
+        let (before, after) = (told(0.0), told(3.0));
+        assert_relative_eq!(after[CLOCK], before[CLOCK] + 3.0 * before[CLOCK_RATE], epsilon = 1e-6);
+        assert_relative_eq!(after[CLOCK_RATE], before[CLOCK_RATE], epsilon = 1e-6);
     }
 }

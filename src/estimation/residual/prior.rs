@@ -122,14 +122,14 @@ pub(in crate::estimation) fn add_standstill(
     }
 }
 
-/// Adds what is known of the border: `information`, about the values from which it has moved by `moved` in this window.
+/// Adds what is known of the border: `information`, about the values from which it is `from_mean` away.
 pub(in crate::estimation) fn add_border(
     equations: &mut NormalEquations,
     layout: &Layout,
     information: &SMatrix<f64, BORDER, BORDER>,
-    moved: &SVector<f64, BORDER>,
+    from_mean: &SVector<f64, BORDER>,
 ) {
-    let right = information * moved;
+    let right = information * from_mean;
     for row in 0..BORDER {
         equations.add_right(layout.border() + row, -right[row]);
         for column in 0..=row {

@@ -94,7 +94,7 @@ impl Window {
         if solved.trouble.is_some() {
             (self.nominal, self.clock, self.biases, self.gravity, self.gyro_exaggerates) = backup;
             self.maker.lidar = lidar;
-            self.border.begin_window();
+            self.border.take_back();
             linearised = None;
         }
         (solved, linearised)
