@@ -1,7 +1,6 @@
 //! What a run leaves for people: plots and a page.
 
 use super::estimate::Best;
-use super::judge::Known;
 use super::open_loop::OpenLoopRun;
 use super::register::Judged;
 use super::{Manifest, StudyError};
@@ -36,33 +35,34 @@ pub(super) fn plots(
     let known = best.known;
     let world_from_map = known.and_then(|known| known.world_from_map).unwrap_or_else(Pose::identity);
     let estimate = drawn(best.map_from_head.iter().map(|(stamp, pose)| (stamp, world_from_map * pose)));
-    let truth = known.map(true_trajectory).unwrap_or_default();
+    let nothing = Trajectory::new();
+    let truth = known.map_or(&nothing, |known| &known.truth);
     let outline = outline(sample, &world_from_map, &estimate);
     let plot = |name, title: &str, figure: Figure| Plot { name, section: Section { title: title.to_owned(), figure } };
 
-    let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_from_above(&truth, &estimate, &outline))];
-    if let Some(errors) = known.and_then(|known| known.errors.as_ref()) {
-        let errors = errors.every(stride(errors.stamps.len()));
-        plots.push(plot("errors", "Errors over time", report::errors_over_time(&errors)));
-        if let Some(open) = open_errors.map(|open| open.every(stride(open.stamps.len()))) {
-            plots.push(plot("loops", "What closing loops is good for", report::errors_of_both_loops(&open, &errors)));
+    let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_from_above(truth, &estimate, &outline))];
+    if let Some(errors) = known.and_then(|known| known.errors.as_ref()).map(|errors| &errors.drawn) {
+        plots.push(plot("errors", "Errors over time", report::errors_over_time(errors)));
+        if let Some(open) = open_errors {
+            plots.push(plot("loops", "What closing loops is good for", report::errors_of_both_loops(open, errors)));
         }
     }
     plots.extend(bound.map(|bound| plot("bound", "Information bound", report::bound_over_time(bound))));
-    plots.push(plot("pitch", "Pitch of the head", report::head_pitch(&truth, &estimate)));
+    plots.push(plot("pitch", "Pitch of the head", report::head_pitch(truth, &estimate)));
     let true_offsets = known.map_or(&[][..], |known| &known.clock_offsets);
     plots.push(plot("clock", "Clock offset", report::clock_offset(true_offsets, &run.clock_offsets)));
     plots
 }
 
-fn true_trajectory(known: &Known) -> Trajectory {
-    drawn(known.pairs.stamps().iter().copied().zip(known.pairs.truth().iter().copied()))
-}
-
 /// What is drawn of the poses of a long run.
-fn drawn(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -> Trajectory {
+pub(super) fn drawn(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -> Trajectory {
     let stride = stride(stamped.len());
     Trajectory::from_poses(stamped.step_by(stride)).unwrap_or_default()
+}
+
+/// What is drawn of the errors of a long run.
+pub(super) fn drawn_errors(errors: &Errors) -> Errors {
+    errors.every(stride(errors.stamps.len()))
 }
 
 /// One instant in so many is drawn of `count`.

@@ -141,7 +141,8 @@ pub(super) fn estimate_in(
         lidar: judge::lidar_metrics(best.lidar, &wishes.estimator),
         ..metrics(origin, run, &registered, best.known)
     };
-    let open_errors = known.filter(|_| loops.closed.is_some()).and_then(|known| known.errors.as_ref());
+    let open_known = known.filter(|_| loops.closed.is_some());
+    let open_errors = open_known.and_then(|known| Some(&known.errors.as_ref()?.drawn));
     let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
     let OpenLoopRun { losses, spent, .. } = loops.open;
@@ -190,12 +191,12 @@ impl Loops {
             true => Some(close_loops(&open, folder, how, watch)?),
             false => None,
         };
-        let mut truth_of = |map_from_head: &Trajectory| match found.body_frame == TRUE_FRAME {
-            true => judge::truth_of(reader, map_from_head, watch),
+        let mut truth_of = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
+            true => judge::truth_of(reader, (map_from_head, covariances), watch),
             false => Ok(None),
         };
-        let known = truth_of(&open.map_from_head)?;
-        let closed_known = closed.as_ref().map(|closed| truth_of(&closed.map_from_head)).transpose()?.flatten();
+        let known = truth_of(&open.map_from_head, &open.covariances[..])?;
+        let closed_known = closed.as_ref().map(|closed| truth_of(&closed.map_from_head, &[])).transpose()?.flatten();
         let loops = Self { open, known, closed, closed_known };
         if makes_map && !loops.open.survey.is_empty() {
             write_map_of(&loops.open, &loops.best(), (estimator, within), folder)?;

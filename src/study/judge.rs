@@ -1,12 +1,15 @@
 //! An estimate against the truth, where the recording has it.
 
+use super::artefacts::{drawn, drawn_errors};
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use super::true_clock::true_offset;
 use super::{StudyError, Watch};
 use crate::estimation::EstimatorSpec;
-use crate::evaluation::{Errors, EvaluationError, Pairs, clock_error, consistency, drift, relative_error};
-use crate::geometry::{Pose, Trajectory};
+use crate::evaluation::{
+    Consistency, Drift, Errors, EvaluationError, Pairs, RelativeError, clock_error, consistency, drift, relative_error,
+};
+use crate::geometry::{Pose, PoseCovariance, Trajectory};
 use crate::measurement::LidarCorrection;
 use crate::recording::{Reader, RecordingError, Truth};
 use crate::report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, OpenLoopMetrics, SimulationMetrics};
@@ -15,19 +18,40 @@ use crate::time::{Span, Stamp};
 
 /// The truth as far as an estimate asks for it.
 pub(super) struct Known {
-    pub pairs: Pairs,
+    /// The true trajectory, `world_from_head`, as far as it is drawn.
+    pub truth: Trajectory,
     /// The true clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// The alignment of the whole estimate, where its positions determine one.
     pub world_from_map: Option<Pose>,
     /// What remains after it.
-    pub errors: Option<Errors>,
+    pub errors: Option<Remaining>,
+    drift: Option<Drift>,
+    consistency: Option<Consistency>,
+    per_minute: Option<RelativeError>,
 }
 
-/// The truth at the instants of an estimate; `None` where the recording has none.
+/// The errors that remain after alignment.
+pub(super) struct Remaining {
+    pub position_rmse_m: f64,
+    rotation_rmse_rad: f64,
+    /// Over time, as far as they are drawn.
+    pub drawn: Errors,
+}
+
+impl Remaining {
+    fn after(pairs: &Pairs, world_from_map: &Pose) -> Self {
+        let errors = Errors::after(pairs, world_from_map);
+        let (position_rmse_m, rotation_rmse_rad) = (errors.position_rmse_m(), errors.rotation_rmse_rad());
+        Self { position_rmse_m, rotation_rmse_rad, drawn: drawn_errors(&errors) }
+    }
+}
+
+/// An estimate, with the covariances that are known of it, against the truth at its instants; `None` where the recording has
+/// none. What is not asked for afterwards is not kept: poses of an hour are many.
 pub(super) fn truth_of(
     reader: &Reader,
-    map_from_head: &Trajectory,
+    (map_from_head, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),
     watch: &mut Watch,
 ) -> Result<Option<Known>, StudyError> {
     let mut clock_offsets = Vec::new();
@@ -45,8 +69,16 @@ pub(super) fn truth_of(
         return Ok(None);
     }
     let world_from_map = known(pairs.world_from_map(), watch);
-    let errors = world_from_map.map(|world_from_map| Errors::after(&pairs, &world_from_map));
-    Ok(Some(Known { pairs, clock_offsets, world_from_map, errors }))
+    let errors = world_from_map.map(|world_from_map| Remaining::after(&pairs, &world_from_map));
+    Ok(Some(Known {
+        truth: drawn(pairs.stamps().iter().copied().zip(pairs.truth().iter().copied())),
+        clock_offsets,
+        world_from_map,
+        errors,
+        drift: drift(&pairs).ok(),
+        consistency: consistency(&pairs, covariances),
+        per_minute: relative_error(&pairs, Span::from_seconds(60.0)).ok(),
+    }))
 }
 
 /// A measure, or a note on why there is none.
@@ -72,17 +104,16 @@ pub(super) fn open_loop_metrics(
     known: Option<&Known>,
     dead_reckoning: Option<Drifting>,
 ) -> OpenLoopMetrics {
-    let drift_of = |known: &Known| drift(&known.pairs).ok();
-    let drifted = known.and_then(drift_of);
+    let drifted = known.and_then(|known| known.drift);
     let errors = known.and_then(|known| known.errors.as_ref());
-    let consistent = known.and_then(|known| consistency(&known.pairs, &run.covariances));
-    let relative = known.and_then(|known| relative_error(&known.pairs, Span::from_seconds(60.0)).ok());
+    let consistent = known.and_then(|known| known.consistency);
+    let relative = known.and_then(|known| known.per_minute);
     OpenLoopMetrics {
         wall_s: Some(run.wall_s),
         fraction_of_acquisition: Some(run.wall_s / run.acquisition_s).filter(|share| share.is_finite()),
         fixed_views: None,
-        position_rmse_m: errors.map(Errors::position_rmse_m),
-        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad().to_degrees()),
+        position_rmse_m: errors.map(|errors| errors.position_rmse_m),
+        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
         drift_m_per_min: drifted.map(|drift| drift.position_m_per_min),
         yaw_drift_deg_per_min: drifted.map(|drift| drift.yaw_rad_per_min.to_degrees()),
         end_error_m: drifted.map(|drift| drift.end_error_m),
@@ -99,8 +130,8 @@ pub(super) fn closed_loop_metrics(run: &ClosedLoopRun, known: Option<&Known>, ac
     ClosedLoopMetrics {
         wall_s: Some(run.wall_s),
         fraction_of_acquisition: Some(run.wall_s / acquisition_s).filter(|share| share.is_finite()),
-        position_rmse_m: errors.map(Errors::position_rmse_m),
-        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad().to_degrees()),
+        position_rmse_m: errors.map(|errors| errors.position_rmse_m),
+        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
         bound_rmse_m: None,
         loops: LoopMetrics {
             proposed: Some(run.loops.proposed as u64),

@@ -95,39 +95,48 @@ pub(super) fn bound(model: &BoundModel, start: Stamp, epochs: &[Epoch]) -> Infor
         }
     }
     let aligned_away = taken_by_alignment(&run, &predicted);
-    let mut found = back(&run, &kept);
-    found.reverse();
+    let mut found = Variances::of(epochs.len());
+    back(&run, &kept, &mut found);
     let count = epochs.len() as f64;
-    let mean = |of: fn(&Smoothed) -> Vector| found.iter().map(of).sum::<Vector>() / count;
-    let (position, attitude) = (mean(|at| at.position), mean(|at| at.attitude));
-    let end = found.last().map_or((0.0, 0.0), |at| (at.clock, at.range));
+    let mean = |variances: &[Vector]| variances.iter().sum::<Vector>() / count;
+    let (position, attitude) = (mean(&found.position), mean(&found.attitude));
     let root = |variances: &Vector| variances.map(|v| v.max(0.0).sqrt());
+    let roots = |mut variances: Vec<Vector>| {
+        variances.iter_mut().for_each(|of| *of = root(of));
+        variances
+    };
     InformationBound {
         stamps: (0..epochs.len()).map(|k| start + Span::from_nanos(k as i64 * EPOCH.nanos())).collect(),
-        position_sigma_m: found.iter().map(|at| root(&at.position)).collect(),
-        attitude_sigma_rad: found.iter().map(|at| root(&at.attitude)).collect(),
+        position_sigma_m: roots(found.position),
+        attitude_sigma_rad: roots(found.attitude),
         position_rmse_m: position.sum().max(0.0).sqrt(),
         axis_rmse_m: root(&position),
         aligned_position_rmse_m: (position.sum() - aligned_away / count).max(0.0).sqrt(),
         attitude_rmse_rad: attitude.sum().max(0.0).sqrt(),
-        clock_offset_s: end.0.max(0.0).sqrt(),
-        range_offset_m: end.1.max(0.0).sqrt(),
+        clock_offset_s: found.clock.max(0.0).sqrt(),
+        range_offset_m: found.range.max(0.0).sqrt(),
     }
 }
 
-/// Variances at an epoch, given all of the run.
-struct Smoothed {
-    position: Vector,
-    attitude: Vector,
-    /// Of the clock offset at the epoch, s^2.
+/// Variances of all epochs, given all of the run.
+struct Variances {
+    position: Vec<Vector>,
+    attitude: Vec<Vector>,
+    /// Of the clock offset at the end, s^2.
     clock: f64,
     /// Of the offset of the ranges, m^2.
     range: f64,
 }
 
-/// Walks back over the run; the last epoch comes first.
-fn back(run: &Run<'_>, kept: &[State]) -> Vec<Smoothed> {
-    let mut found = Vec::with_capacity(run.epochs.len());
+impl Variances {
+    fn of(epochs: usize) -> Self {
+        let none = vec![Vector::zeros(); epochs];
+        Self { position: none.clone(), attitude: none, clock: 0.0, range: 0.0 }
+    }
+}
+
+/// Walks back over the run.
+fn back(run: &Run<'_>, kept: &[State], found: &mut Variances) {
     let mut behind = State::zeros();
     for (stretch, first) in kept.iter().enumerate().rev() {
         let from = stretch * STRETCH;
@@ -139,14 +148,13 @@ fn back(run: &Run<'_>, kept: &[State]) -> Vec<Smoothed> {
         for index in (from..to).rev() {
             let at = &predicted[index - from];
             let adjoint = updated(&run.weight(index, at), at, &behind);
-            found.push(smoothed(run, index, at, &adjoint));
+            smooth(run, (index, at, &adjoint), found);
             if index > 0 {
                 let transition = run.step(index - 1).transition;
                 behind = symmetric(&(transition.transpose() * adjoint * transition));
             }
         }
     }
-    found
 }
 
 /// `L~` of an epoch, from what comes behind it.
@@ -161,7 +169,8 @@ fn updated(weight: &Measured, predicted: &State, behind: &State) -> State {
     symmetric(&(whole + left * behind * left.transpose()))
 }
 
-fn smoothed(run: &Run<'_>, index: usize, predicted: &State, adjoint: &State) -> Smoothed {
+/// Tells what is known of the epoch at `index`, of which `adjoint` comes from behind.
+fn smooth(run: &Run<'_>, (index, predicted, adjoint): (usize, &State, &State), found: &mut Variances) {
     let (epoch, since_start_s) = (&run.epochs[index], run.since_start_s(index));
     // C (P - P L~ P) C^T, for what is told alone.
     let variances = |told: &Told| -> Vector {
@@ -169,14 +178,13 @@ fn smoothed(run: &Run<'_>, index: usize, predicted: &State, adjoint: &State) -> 
         let covariance: Matrix = across * told.transpose() - across * adjoint * across.transpose();
         covariance.diagonal()
     };
-    let mut constants = Told::zeros();
-    (constants[(0, CLOCK)], constants[(0, CLOCK_RATE)], constants[(1, RANGE)]) = (1.0, since_start_s, 1.0);
-    let constants = variances(&constants);
-    Smoothed {
-        position: variances(&position_told(run.model, epoch, since_start_s)),
-        attitude: variances(&attitude_told(epoch, since_start_s)),
-        clock: constants.x,
-        range: constants.y,
+    found.position[index] = variances(&position_told(run.model, epoch, since_start_s));
+    found.attitude[index] = variances(&attitude_told(epoch, since_start_s));
+    if index + 1 == run.epochs.len() {
+        let mut constants = Told::zeros();
+        (constants[(0, CLOCK)], constants[(0, CLOCK_RATE)], constants[(1, RANGE)]) = (1.0, since_start_s, 1.0);
+        let constants = variances(&constants);
+        (found.clock, found.range) = (constants.x, constants.y);
     }
 }
 

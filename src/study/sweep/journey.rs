@@ -163,16 +163,16 @@ fn estimate(
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
         let how = How { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
-        let known = judge::truth_of(&reader, &run.map_from_head, &mut watch)?;
+        let known = judge::truth_of(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
         let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);
         let closed = match closes_loops {
             true => {
                 let closed = run_closed_loop(&run, &found.calibration, estimator);
-                judge::truth_of(&reader, &closed.map_from_head, &mut watch)?
+                judge::truth_of(&reader, (&closed.map_from_head, &[]), &mut watch)?
             }
             false => None,
         };
-        let closed_position_rmse_m = closed.and_then(|known| known.errors).map(|errors| errors.position_rmse_m());
+        let closed_position_rmse_m = closed.and_then(|known| known.errors).map(|errors| errors.position_rmse_m);
         Ok(Estimated { open_loop, clock: judge::clock_metrics(&run, known.as_ref()), closed_position_rmse_m })
     })
 }
