@@ -5,6 +5,8 @@
 //! envelope (George and Liu 1981), so a band costs a band's work, a dense border its own rows, and a window whose matches
 //! link all times with all others the full triangle, by the same code.
 
+use pulp::Arch;
+
 /// `H x = b`, with `H` symmetric and positive definite.
 #[derive(Debug, Clone)]
 pub(super) struct NormalEquations {
@@ -73,15 +75,28 @@ impl NormalEquations {
     /// # Errors
     /// When an unknown is not determined.
     pub(super) fn factor(&self, into: &mut Factor) -> Result<(), NotDetermined> {
-        let n = self.size;
-        into.size = n;
+        into.size = self.size;
         into.first.clone_from(&self.first);
         into.l.clone_from(&self.h);
+        Arch::new().dispatch(|| into.decompose())
+    }
+
+    /// The solution, by a factor of these equations.
+    pub(super) fn solve(&self, factor: &Factor) -> Vec<f64> {
+        factor.solve(&self.b)
+    }
+}
+
+impl Factor {
+    /// From the lower triangle of `H` to that of `L`, row by row within the envelope.
+    #[inline(always)]
+    fn decompose(&mut self) -> Result<(), NotDetermined> {
+        let n = self.size;
         for i in 0..n {
-            let from = into.first[i];
-            let (above, row) = into.l.split_at_mut(i * n);
+            let from = self.first[i];
+            let (above, row) = self.l.split_at_mut(i * n);
             for j in from..i {
-                let common = from.max(into.first[j]);
+                let common = from.max(self.first[j]);
                 let other = &above[j * n..=j * n + j];
                 let sum = row[j] - dot(&row[common..j], &other[common..j]);
                 row[j] = sum / other[j];
@@ -95,13 +110,6 @@ impl NormalEquations {
         Ok(())
     }
 
-    /// The solution, by a factor of these equations.
-    pub(super) fn solve(&self, factor: &Factor) -> Vec<f64> {
-        factor.solve(&self.b)
-    }
-}
-
-impl Factor {
     /// `H^-1 b`.
     pub(super) fn solve(&self, b: &[f64]) -> Vec<f64> {
         let mut x = b.to_vec();
@@ -151,17 +159,21 @@ fn axpy(into: &mut [f64], from: &[f64], scale: f64) {
     }
 }
 
-/// A dot product in four lanes: the order of its sums is fixed, and vector units can take it.
+/// Sums beside each other: two registers of four, so that one need not wait for the other.
+const LANES: usize = 8;
+
+/// A dot product in lanes: the order of its sums is fixed, and vector units can take it.
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a4.zip(b4) {
-        for lane in 0..4 {
+    let mut lanes = [0.0; LANES];
+    let (whole_a, whole_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = whole_a.remainder().iter().zip(whole_b.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in whole_a.zip(whole_b) {
+        for lane in 0..LANES {
             lanes[lane] += x[lane] * y[lane];
         }
     }
-    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+    lanes.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]
