@@ -2,18 +2,19 @@
 
 use super::clock::Clock;
 use super::residual::{
-    ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN, RANGE,
+    ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN,
+    RANGE,
 };
 use super::spec::EstimatorSpec;
-use super::strapdown::{Biases, Interval, State};
-use crate::geometry::{Matrix, Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
+use super::strapdown::{Biases, Exaggerates, Interval, State};
+use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
 use crate::measurement::{ImuNoise, LidarCorrection};
 use nalgebra::{SMatrix, SVector};
 
 /// Standard deviations of offset (s) and rate of a clock that is not estimated: nothing moves them.
 const HELD_CLOCK: (f64, f64) = (1e-9, 1e-12);
 
-/// How exactly the gyroscope's axes are the IMU's when the lidar's attitude is estimated, rad.
+/// How exactly poses stand along the gyroscope's axes when the lidar's attitude is estimated, rad.
 const GYRO_AXES_SIGMA: f64 = 1e-6;
 
 /// For so long a head goes on as it went before the IMU fell silent, s.
@@ -64,8 +65,8 @@ pub(super) struct Carried {
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
     pub(super) clock: Clock,
-    /// By how much the gyroscope exaggerates.
-    pub(super) gyro_exaggerates: Matrix,
+    /// By how much the IMU exaggerates.
+    pub(super) exaggerates: Exaggerates,
     /// What is known of the lidar beyond its calibration.
     pub(super) lidar: LidarCorrection,
 }
@@ -197,9 +198,10 @@ fn information(
     sigmas[LIDAR_TURN..LIDAR_TURN + 3].fill(turn.max(1e-9));
     sigmas[LIDAR_SHIFT..LIDAR_SHIFT + 3].fill(shift.max(1e-9));
     sigmas[GYRO_MATRIX..GYRO_MATRIX + 9].fill(inertial.gyro_matrix_sigma.max(1e-9));
+    sigmas[ACCEL_MATRIX..ACCEL_MATRIX + 9].fill(inertial.accel_matrix_sigma.max(1e-9));
     let mut information = SMatrix::from_diagonal(&SVector::from(sigmas.map(|sigma| sigma.powi(-2))));
     if extrinsics.estimated {
-        // Against what is the lidar turned? The IMU's axes are then by definition those about which the gyroscope measures.
+        // Against what is the lidar turned? Poses then stand along the axes about which the gyroscope measures.
         for (i, j) in [(0, 1), (0, 2), (1, 2)] {
             let mut turn = SVector::<f64, BORDER>::zeros();
             (turn[GYRO_MATRIX + 3 * i + j], turn[GYRO_MATRIX + 3 * j + i]) = (1.0, -1.0);

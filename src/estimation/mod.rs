@@ -19,7 +19,7 @@
 //! # The problem
 //!
 //! Unknown are a correction of the trajectory, `R' = exp(dr) R`, `t' = t + dt` (paper eq. 1-2), with `dr` and `dt` uniform
-//! cubic B-splines; the biases of gyroscope and accelerometer; the gyroscope's scale and misalignment; the tilt of gravity in
+//! cubic B-splines; the biases of gyroscope and accelerometer; the scale and misalignment of both; the tilt of gravity in
 //! the map; the clock offset and its rate; an offset of all ranges.
 //! Minimised is
 //!
@@ -43,10 +43,10 @@
 //! - The beginning of a window is held (value and two derivatives). Of biases, gravity and clock the leaving stretch's share
 //!   of the information goes on.
 //! - Offset of the ranges, scale and misalignment of the gyroscope are unknowns: in trials they were the greatest
-//!   errors (in the office and the courtyard the position's error fell to about a third). The accelerometer's scale and
-//!   misalignment were tried too and made it worse: gravity alone tells them, and they take up what is not theirs.
-//! - Attitude and place of the lidar beside the IMU are unknowns too, when asked: then the IMU's axes are the gyroscope's, and the
-//!   beginning of a window is held to where the lidar, as it is found to sit, would have put it.
+//!   errors (in the office and the courtyard the position's error fell to about a third). Those of the accelerometer are told by
+//!   gravity nearly alone, and only with their mean remembered; then they help where surfaces say little of the height.
+//! - Attitude and place of the lidar beside the IMU are unknowns too, when asked: then the poses stand along the gyroscope's axes, and
+//!   the beginning of a window is held to where the lidar, as it is found to sit, would have put it.
 //! - While the head is held still no patches are seen: the window keeps those it has until as much has been swept again, and
 //!   the IMU carries it (within 3 cm over stops of 2 to 5 s). Matching the lines that a still scan draws with
 //!   patches was tried: it holds the level directions to millimetres, but errors of the patches' normals pass for knowledge of

@@ -1,7 +1,7 @@
 //! The trajectory of the IMU as it stands: strapdown integration, corrected by every window so far.
 
 use super::spline::Basis;
-use super::strapdown::{Biases, Interval, State};
+use super::strapdown::{Biases, Exaggerates, Interval, State};
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 
 /// Nodes at the boundaries of the IMU's intervals, in IMU time, and the intervals between them.
@@ -86,13 +86,13 @@ impl Nominal {
         }
     }
 
-    /// Takes the gyroscope's exaggeration by `m` out of what was measured; where the trajectory stands does not change.
-    pub(super) fn measured_without(&mut self, m: &Matrix) {
+    /// Takes what the IMU exaggerates out of what was measured; where the trajectory stands does not change.
+    pub(super) fn measured_without(&mut self, exaggerates: &Exaggerates) {
         for interval in &mut self.intervals {
-            *interval = interval.without(m);
+            *interval = interval.without(exaggerates);
         }
         for rate in &mut self.rates {
-            *rate -= m * *rate;
+            *rate -= exaggerates.gyro * *rate;
         }
     }
 

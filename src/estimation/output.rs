@@ -62,8 +62,11 @@ pub struct OpenLoop {
     pub poses: Vec<EstimatedPose>,
     /// The clock offset after each window: how much later the IMU stamps an instant than the lidar, s, by lidar time.
     pub clock_offsets: Vec<(Stamp, f64)>,
-    /// What was learnt of the lidar beyond its calibration, at the end.
+    /// What was learnt of the lidar beyond its calibration, at the end, as the poses go with it.
     pub lidar: LidarCorrection,
+    /// The same as a calibration has it: where it was estimated how the lidar sits, the poses stand along the gyroscope's axes, and
+    /// this along the IMU's, midway between the gyroscope's and the accelerometer's.
+    pub calibrated_lidar: LidarCorrection,
     /// Where in a map the head was found at first, where one was given.
     pub located: Option<Located>,
     /// A report a window.

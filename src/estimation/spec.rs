@@ -152,6 +152,9 @@ pub struct InertialSpec {
     /// Standard deviation of the gyroscope's scale factors and misalignment, which are estimated, 0..1; 0 for none.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub gyro_matrix_sigma: f64,
+    /// The same of the accelerometer.
+    #[serde(deserialize_with = "crate::spec::checked::fraction")]
+    pub accel_matrix_sigma: f64,
     /// Error of the gyroscope in proportion to its reading that is left, and counts as noise, 0..1.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub gyro_scale_error: f64,

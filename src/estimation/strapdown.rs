@@ -43,11 +43,46 @@ pub(super) struct Biases {
     pub(super) accel: Vector,
 }
 
+/// By how much an IMU exaggerates: the truth is `(1 - m) reading`, with scale factors on the diagonal of `m` and misalignment
+/// beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Exaggerates {
+    /// The gyroscope.
+    pub(super) gyro: Matrix,
+    /// The accelerometer.
+    pub(super) accel: Matrix,
+}
+
+impl Exaggerates {
+    /// An IMU that tells what is true.
+    pub(super) fn nothing() -> Self {
+        Self { gyro: Matrix::zeros(), accel: Matrix::zeros() }
+    }
+
+    /// By how much the accelerometer's axes are turned against the gyroscope's, a rotation vector, rad: a misalignment that is no
+    /// symmetric matrix is a turn of the whole.
+    pub(super) fn accel_against_gyro(&self) -> Vector {
+        let m = self.accel - self.gyro;
+        Vector::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]) * 0.5
+    }
+
+    /// Exaggerates more, by `more`.
+    pub(super) fn add(&mut self, more: &Self) {
+        self.gyro += more.gyro;
+        self.accel += more.accel;
+    }
+}
+
 impl Interval {
-    /// The same interval with a gyroscope that exaggerates less by `m`: the truth is `(1 - m) reading`. Scale factors on the
-    /// diagonal, misalignment beside it.
-    pub(super) fn without(&self, m: &Matrix) -> Self {
-        Self { gyro: self.gyro - m * self.gyro, gyro_slope: self.gyro_slope - m * self.gyro_slope, ..*self }
+    /// The same interval by an IMU that exaggerates less, by `of`.
+    pub(super) fn without(&self, of: &Exaggerates) -> Self {
+        Self {
+            gyro: self.gyro - of.gyro * self.gyro,
+            gyro_slope: self.gyro_slope - of.gyro * self.gyro_slope,
+            accel: self.accel - of.accel * self.accel,
+            accel_slope: self.accel_slope - of.accel * self.accel_slope,
+            ..*self
+        }
     }
 
     /// The rotation vector from the interval's start to its end, in the body.
@@ -104,6 +139,18 @@ impl State {
 mod tests {
     use super::*;
     use crate::geometry::gravity_in_world;
+
+    #[test]
+    fn an_accelerometer_that_is_turned_is_told_by_how_much() {
+        // What it reads are the forces along its own axes: the truth is what turns back, (1 - m) reading.
+        let turn = Vector::new(1e-3, -2e-3, 3e-3);
+        let back = Rotation::from_scaled_axis(-turn).to_rotation_matrix().into_inner();
+        let scale = Matrix::from_diagonal(&Vector::new(1e-3, 2e-3, -3e-3));
+        let turned = Exaggerates { accel: Matrix::identity() - back + scale, ..Exaggerates::nothing() };
+        assert!((turned.accel_against_gyro() - turn).norm() < 1e-7, "{}", turned.accel_against_gyro());
+        let both = Exaggerates { gyro: turned.accel, ..turned };
+        assert!(both.accel_against_gyro().norm() < 1e-12);
+    }
 
     /// Body rate and force of a body whose axis cones and whose force turns with it.
     fn signal(t_s: f64) -> (Vector, Vector) {

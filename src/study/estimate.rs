@@ -138,7 +138,7 @@ pub(super) fn estimate_in(
         open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, known, drifting) },
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
         clock: judge::clock_metrics(run, known),
-        lidar: judge::lidar_metrics(best.lidar, &wishes.estimator),
+        lidar: judge::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &wishes.estimator),
         ..metrics(origin, run, &registered, best.known)
     };
     let open_known = known.filter(|_| loops.closed.is_some());

@@ -174,12 +174,12 @@ pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Known>) -> ClockMe
     }
 }
 
-/// What was learnt of the lidar, as far as it was asked for.
-pub(super) fn lidar_metrics(lidar: &LidarCorrection, spec: &EstimatorSpec) -> LidarMetrics {
+/// What was learnt of the lidar, as far as it was asked for: of its ranges, and how it sits.
+pub(super) fn lidar_metrics(range_m: f64, sits: &LidarCorrection, spec: &EstimatorSpec) -> LidarMetrics {
     let (refined, ranged) = (spec.extrinsics.estimated, spec.surfels.range_offset_sigma_m > 0.0);
     LidarMetrics {
-        range_correction_m: ranged.then_some(lidar.range_m),
-        rotation_correction_deg: refined.then(|| (lidar.turn.scaled_axis() * 1_f64.to_degrees()).into()),
-        translation_correction_m: refined.then(|| lidar.shift.into()),
+        range_correction_m: ranged.then_some(range_m),
+        rotation_correction_deg: refined.then(|| (sits.turn.scaled_axis() * 1_f64.to_degrees()).into()),
+        translation_correction_m: refined.then(|| sits.shift.into()),
     }
 }

@@ -29,6 +29,8 @@ pub(super) struct OpenLoopRun {
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// What was learnt of the lidar beyond its calibration.
     pub lidar: LidarCorrection,
+    /// The same along the IMU's axes, as a calibration has it.
+    pub calibrated_lidar: LidarCorrection,
     /// What the estimator has to say of it beside the losses, a sentence each.
     pub remarks: Vec<String>,
     /// What of the recording was lost or left out, a sentence each.
@@ -104,6 +106,7 @@ pub(super) fn run_open_loop(
         spent: result.windows.iter().map(|window| window.spent).sum(),
         clock_offsets: result.clock_offsets,
         lidar: result.lidar,
+        calibrated_lidar: result.calibrated_lidar,
         remarks,
         losses,
         returns: heard.returns,

@@ -144,7 +144,7 @@ impl Estimator {
         self.warn_of_loss();
         let Some(window) = &self.window else { return Err(self.why_nothing()) };
         let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
-        let lidar = window.lidar();
+        let (lidar, calibrated_lidar) = (window.lidar(), window.calibrated_lidar());
         self.consider_the_end();
         self.hand_out(end_s);
         self.survey_window(Window::survey_all, Window::end_s);
@@ -153,7 +153,7 @@ impl Estimator {
         let Self { poses, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
         let survey = survey.unwrap_or_default();
         let located = whereabouts.and_then(|whereabouts| whereabouts.found().cloned());
-        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, located, windows, warnings, survey })
+        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, calibrated_lidar, located, windows, warnings, survey })
     }
 
     /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and its

@@ -13,13 +13,14 @@
 //! d R_(k+1) e_w / d(dr_(k+1) - dr_k) = 1 / h      d R_(k+1) e_w / db_w = R_(k+1)
 //! d R_mid e_a / d(dv_(k+1) - dv_k) = 1 / h        d R_mid e_a / d dr_mid = [x]x,  x = (v_(k+1) - v_k) / h - g
 //! d R_(k+1) e_w / dM = R_(k+1) w^T, row by row, M the gyroscope's exaggeration
+//! d R_mid e_a / dM = R_mid f^T, likewise, M the accelerometer's
 //! d R_mid e_a / db_a = R_mid                      d R_mid e_a / dgamma = [g]x (e_x, e_y),  g' = exp(gamma) g
 //! ```
 //!
 //! The equations take them summed over a knot's spacing ([`add_inertial`]): so far the correction can follow what a bias does.
 
 use super::rows::{KNOTS, Row, Rows};
-use super::{ACCEL_BIAS, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
+use super::{ACCEL_BIAS, ACCEL_MATRIX, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::estimation::strapdown::{Biases, Interval, State};
@@ -214,13 +215,14 @@ struct Speed {
     sum: Sum,
     by_shift: [f64; KNOTS],
     by_turn: [Matrix; KNOTS],
-    by_bias: Matrix,
+    /// By the bias, and by the columns of the exaggeration.
+    by_accel: [Matrix; 4],
     by_tilt: Matrix,
 }
 
 impl Speed {
     fn of(terms: &Inertial, (a, b): (&Basis, &Basis), interval: &Interval, gravity: &Vector) -> Self {
-        let h = interval.h;
+        let (h, f) = (interval.h, &interval.accel);
         let by_middle = skew(&terms.acceleration) * (0.5 * h);
         let (mut by_shift, mut by_turn) = ([0.0; KNOTS], [Matrix::zeros(); KNOTS]);
         for (basis, sign) in [(a, -1.0), (b, 1.0)] {
@@ -236,7 +238,7 @@ impl Speed {
             sum: Sum::over(&(terms.map_from_middle * terms.force), interval.accel_sigma, h, (a, b)),
             by_shift,
             by_turn,
-            by_bias: terms.map_from_middle * h,
+            by_accel: [1.0, f.x, f.y, f.z].map(|reading| terms.map_from_middle * (h * reading)),
             by_tilt: skew(gravity) * h,
         }
     }
@@ -254,7 +256,7 @@ impl Speed {
             self.by_shift[place + knot] += next.by_shift[knot];
             self.by_turn[place + knot] += next.by_turn[knot];
         }
-        self.by_bias += next.by_bias;
+        self.by_accel.iter_mut().zip(&next.by_accel).for_each(|(by, next)| *by += next);
         self.by_tilt += next.by_tilt;
         self.sum.used = self.sum.used.max(place + used);
         self.sum.deviation += next.sum.deviation;
@@ -274,7 +276,10 @@ impl Speed {
                 *row.knot(knot, 3 + axis) = self.by_shift[knot];
             }
             for i in 0..3 {
-                *row.border(ACCEL_BIAS + i) = self.by_bias[(axis, i)];
+                *row.border(ACCEL_BIAS + i) = self.by_accel[0][(axis, i)];
+            }
+            for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
+                *row.border(ACCEL_MATRIX + 3 * i + j) = self.by_accel[1 + j][(axis, i)];
             }
             // Gravity tilts about the map's x and y.
             for i in 0..2 {
@@ -292,6 +297,7 @@ mod tests {
     use crate::estimation::normal_equations::Factor;
     use crate::estimation::residual::BORDER;
     use crate::estimation::residual::prior::Start;
+    use crate::estimation::strapdown::Exaggerates;
     use crate::geometry::{from_roll_pitch_yaw, gravity_in_world};
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector, SVector};
@@ -391,7 +397,8 @@ mod tests {
                 velocity: state.velocity + correction.velocity,
             }
         };
-        let exaggerates = Matrix::from_fn(|r, c| x[border + GYRO_MATRIX + 3 * r + c]);
+        let matrix = |at: usize| Matrix::from_fn(|r, c| x[border + at + 3 * r + c]);
+        let exaggerates = Exaggerates { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
         let tilt = Vector::new(x[border + GRAVITY], x[border + GRAVITY + 1], 0.0);
         let moved = Case {
             states: case.states.iter().zip(case.bases()).map(moved).collect(),

@@ -7,8 +7,9 @@ mod rows;
 pub(super) mod sums;
 
 /// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate,
-/// correction of the ranges, of the lidar's attitude and of its place, and by how much the gyroscope exaggerates, three by three.
-pub(super) const BORDER: usize = 26;
+/// correction of the ranges, of the lidar's attitude and of its place, and by how much gyroscope and accelerometer exaggerate, each
+/// three by three.
+pub(super) const BORDER: usize = 35;
 /// Where each begins.
 pub(super) const GYRO_BIAS: usize = 0;
 pub(super) const ACCEL_BIAS: usize = 3;
@@ -19,6 +20,7 @@ pub(super) const RANGE: usize = 10;
 pub(super) const LIDAR_TURN: usize = 11;
 pub(super) const LIDAR_SHIFT: usize = 14;
 pub(super) const GYRO_MATRIX: usize = 17;
+pub(super) const ACCEL_MATRIX: usize = 26;
 
 /// Where the unknowns of a window stand.
 #[derive(Debug, Clone, Copy)]

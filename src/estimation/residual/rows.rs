@@ -10,8 +10,8 @@ use pulp::Arch;
 pub(super) const KNOTS: usize = 6;
 /// Unknowns of the knots.
 const OF_KNOTS: usize = 6 * KNOTS;
-/// Biases and tilt, which begin the border, then the exaggeration.
-const UNKNOWNS: usize = OF_KNOTS + CLOCK + 9;
+/// Biases and tilt, which begin the border, then both exaggerations, which end it.
+const UNKNOWNS: usize = OF_KNOTS + CLOCK + 18;
 
 /// The derivatives of a residual.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ impl Row {
         &mut self.by[6 * knot + axis]
     }
 
-    /// By an unknown of the border: a bias, the tilt, or the exaggeration.
+    /// By an unknown of the border: a bias, the tilt, or an exaggeration.
     pub(super) fn border(&mut self, unknown: usize) -> &mut f64 {
         let place = if unknown < CLOCK { unknown } else { CLOCK + unknown - GYRO_MATRIX };
         &mut self.by[OF_KNOTS + place]
@@ -89,6 +89,9 @@ impl Rows {
         for row in (0..knots).chain(OF_KNOTS..UNKNOWNS) {
             let unknown = if row < OF_KNOTS { first + row } else { place_in_border(row, layout) };
             let sums = std::mem::replace(&mut self.square[row], [0.0; UNKNOWNS]);
+            if sums[row] == 0.0 {
+                continue; // none hangs on it
+            }
             equations.add_right(unknown, std::mem::take(&mut self.right[row]));
             equations.add_row(unknown, first, &sums[..knots.min(row + 1)]);
             for (other, sum) in sums.iter().enumerate().take(row + 1).skip(OF_KNOTS) {

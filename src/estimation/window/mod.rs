@@ -18,9 +18,9 @@ use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
-use super::strapdown::{Biases, Interval};
+use super::strapdown::{Biases, Exaggerates, Interval};
 use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
-use crate::geometry::{Matrix, Pose, Rotation, Vector};
+use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::Remembered;
 use equations::Workspace;
@@ -58,8 +58,8 @@ pub(super) struct Window {
     pub(super) clock: Clock,
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
-    /// By how much the gyroscope exaggerates, as far as it is known.
-    gyro_exaggerates: Matrix,
+    /// By how much the IMU exaggerates, as far as it is known.
+    exaggerates: Exaggerates,
     border: Border,
     stretches: VecDeque<Stretch>,
     start: Start,
@@ -93,7 +93,7 @@ impl Window {
             clock,
             biases: beginning.biases,
             gravity: crate::geometry::gravity_in_world(),
-            gyro_exaggerates: Matrix::zeros(),
+            exaggerates: Exaggerates::nothing(),
             border,
             stretches: VecDeque::new(),
             start: Start::first(start_u_s, beginning.velocity_sigma),
@@ -108,18 +108,18 @@ impl Window {
     /// What goes on when the IMU falls silent.
     pub(super) fn carried(&self) -> Option<Carried> {
         let state = *self.nominal.states().last()?;
-        let (gyro_exaggerates, lidar) = (self.gyro_exaggerates, self.maker.lidar);
+        let (exaggerates, lidar) = (self.exaggerates, self.maker.lidar);
         let until_s = self.nominal.end_s();
         let way = state.position - self.begins().translation.vector;
         let mean_velocity = way / (until_s - self.start.u_s).max(self.spec.step_s);
         let Self { biases, gravity, clock, .. } = *self;
-        Some(Carried { until_s, state, mean_velocity, biases, gravity, clock, gyro_exaggerates, lidar })
+        Some(Carried { until_s, state, mean_velocity, biases, gravity, clock, exaggerates, lidar })
     }
 
     /// Goes on with clock and sensors as they were known before the IMU fell silent.
     pub(super) fn take_over(&mut self, carried: &Carried) {
         self.clock = carried.clock.told_from(self.start.u_s);
-        self.gyro_exaggerates = carried.gyro_exaggerates;
+        self.exaggerates = carried.exaggerates;
         self.maker.lidar = carried.lidar;
     }
 
@@ -167,7 +167,7 @@ impl Window {
     pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) -> TimeSpent {
         let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
-            self.nominal.extend(interval.without(&self.gyro_exaggerates), &self.biases, &self.gravity);
+            self.nominal.extend(interval.without(&self.exaggerates), &self.biases, &self.gravity);
             self.rest = self.rest.filter(|rest| rest.goes_on(interval));
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
@@ -260,6 +260,19 @@ impl Window {
     /// What is known of the lidar beyond its calibration.
     pub(super) fn lidar(&self) -> LidarCorrection {
         self.maker.lidar
+    }
+
+    /// The same along the axes by which the IMU is calibrated, where how the lidar sits is estimated: midway between those of the
+    /// gyroscope, by which the head's attitude is told then, and those of the accelerometer, either being as good.
+    pub(super) fn calibrated_lidar(&self) -> LidarCorrection {
+        let lidar = self.maker.lidar;
+        if !self.spec.extrinsics.estimated {
+            return lidar;
+        }
+        let imu_from_gyro = Rotation::from_scaled_axis(self.exaggerates.accel_against_gyro() * 0.5);
+        let place = self.maker.laser_in_imu + lidar.shift;
+        let shift = lidar.shift + imu_from_gyro * place - place;
+        LidarCorrection { turn: imu_from_gyro * lidar.turn, shift, ..lidar }
     }
 
     /// By what surfels are placed, as it is known now.

@@ -7,9 +7,11 @@ use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::residual::{
-    ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN, Layout, RANGE,
+    ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN, Layout,
+    RANGE,
 };
 use crate::estimation::spent::{Stopwatch, TimeSpent};
+use crate::estimation::strapdown::Exaggerates;
 use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
@@ -48,7 +50,7 @@ impl Window {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
         let lidar = self.maker.lidar;
-        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.gyro_exaggerates);
+        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.exaggerates);
         self.border.begin_window();
         let mut total = vec![0.0; layout.border()];
         let mut solved = Solved::default();
@@ -92,7 +94,7 @@ impl Window {
             }
         }
         if solved.trouble.is_some() {
-            (self.nominal, self.clock, self.biases, self.gravity, self.gyro_exaggerates) = backup;
+            (self.nominal, self.clock, self.biases, self.gravity, self.exaggerates) = backup;
             self.maker.lidar = lidar;
             self.border.take_back();
             linearised = None;
@@ -127,9 +129,10 @@ impl Window {
         self.clock.offset_s += border[CLOCK];
         self.clock.rate += border[CLOCK_RATE];
         self.border.moved(border, &self.workspace.factor);
-        let more = Matrix::from_fn(|r, c| border[GYRO_MATRIX + 3 * r + c]);
+        let matrix = |at: usize| Matrix::from_fn(|r, c| border[at + 3 * r + c]);
+        let more = Exaggerates { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
         self.nominal.measured_without(&more);
-        self.gyro_exaggerates += more;
+        self.exaggerates.add(&more);
         self.maker.lidar.range_m += border[RANGE];
         self.maker.lidar.turn = Rotation::from_scaled_axis(three(LIDAR_TURN)) * self.maker.lidar.turn;
         self.maker.lidar.shift += three(LIDAR_SHIFT);
