@@ -42,6 +42,31 @@ fn every_way_to_tell_a_points_time_gives_the_same_scan() {
 }
 
 #[test]
+fn a_unit_that_is_not_the_usual_one_is_told_from_how_long_clouds_last() {
+    // 90 ms of points ten times a second; usual are nanoseconds for integers, seconds for floats.
+    type Way<'a> = (&'a str, u8, &'a dyn Fn(usize) -> Vec<u8>);
+    let ways: [Way<'_>; 5] = [
+        ("t", UINT32, &|ms| (ms as u32 * 1_000_000).to_le_bytes().to_vec()),
+        ("t", UINT32, &|ms| (ms as u32 * 1_000).to_le_bytes().to_vec()),
+        ("offset_time", UINT32, &|ms| (ms as u32).to_le_bytes().to_vec()),
+        ("time", FLOAT32, &|ms| (ms as f32 * 1e3).to_le_bytes().to_vec()),
+        ("time", FLOAT64, &|ms| (ms as f64).to_le_bytes().to_vec()),
+    ];
+    for (name, kind, bytes) in ways {
+        let times: Vec<_> = (0..10).map(|k| bytes(10 * k)).collect();
+        let mut foreign = Foreign::new(mcap::WriteOptions::new());
+        foreign.message("/imu", IMU, 0, &imu(0, "imu"));
+        for stamp_ns in (0..8).map(|k| 1_700_000_000_000_000_000 + k * 100_000_000) {
+            foreign.message("/points", POINTS, stamp_ns, &cloud(stamp_ns, (name, kind), &times));
+        }
+        for scan in scans(&foreign.reader()) {
+            let offsets: Vec<_> = scan.returns.iter().map(|point| point.offset.nanos()).collect();
+            assert_eq!(offsets, (0..10).map(|k| k * 10_000_000).collect::<Vec<_>>(), "{name} {kind}");
+        }
+    }
+}
+
+#[test]
 fn a_cloud_stamped_at_its_end_begins_with_its_first_point() {
     // Velodyne's driver stamps the last packet: times are negative seconds. Rows are rings, so times go up and down.
     let times: Vec<_> = [-0.09_f32, -0.05, 0.0, -0.10, -0.04].iter().map(|t| t.to_le_bytes().to_vec()).collect();

@@ -18,6 +18,7 @@ pub struct Measurements<'r> {
     messages: Messages<'r>,
     lidar: Vec<u16>,
     lidar_kind: LidarKind,
+    point_times: Option<points::Unit>,
     imu: Vec<u16>,
     projector: Projector,
     loss: Loss,
@@ -33,6 +34,7 @@ impl Reader {
             messages: self.messages(),
             lidar: self.ids_of(&selection.lidar_topic),
             lidar_kind: selection.lidar_kind,
+            point_times: selection.point_times,
             imu: self.ids_of(&selection.imu_topic),
             projector: Projector::default(),
             loss: self.loss().clone(),
@@ -59,7 +61,7 @@ impl Measurements<'_> {
             let decoded = if self.imu.contains(&message.channel) {
                 imu::decode(message.data).map(Measurement::Imu)
             } else if self.lidar.contains(&message.channel) {
-                lidar(self.lidar_kind, &mut self.projector, &message).map(Measurement::Lidar)
+                lidar((self.lidar_kind, self.point_times), &mut self.projector, &message).map(Measurement::Lidar)
             } else {
                 continue;
             };
@@ -72,9 +74,13 @@ impl Measurements<'_> {
     }
 }
 
-fn lidar(kind: LidarKind, projector: &mut Projector, message: &RawMessage<'_>) -> Result<LidarScan, DecodeError> {
+fn lidar(
+    (kind, point_times): (LidarKind, Option<points::Unit>),
+    projector: &mut Projector,
+    message: &RawMessage<'_>,
+) -> Result<LidarScan, DecodeError> {
     match kind {
-        LidarKind::Points => points::decode(message.data),
+        LidarKind::Points => points::decode(message.data, point_times),
         LidarKind::Scan => scan::decode(message.data).map(|(stamp, planar)| projector.project(stamp, planar)),
     }
 }

@@ -30,6 +30,8 @@ pub struct Selection {
     /// What was chosen among several, and what the choice lacks, a sentence each.
     pub notes: Vec<String>,
     pub(super) lidar_kind: LidarKind,
+    /// In what points' times are counted, where clouds show another unit than the usual one.
+    pub(super) point_times: Option<points::Unit>,
 }
 
 /// How a lidar's messages tell its beams.
@@ -62,6 +64,9 @@ pub(super) struct Candidate {
 
 const LIDAR_TYPES: [MessageType; 2] = [MessageType::LaserScan, MessageType::PointCloud2];
 
+/// Clouds by which the unit of their points' times is told.
+const LOOKED_AT: usize = 20;
+
 /// Endings of IMU topics, preferred first: the raw one is without a filter's opinion.
 const IMU_ENDINGS: [&str; 3] = ["imu/data_raw", "imu/data", "imu"];
 
@@ -83,8 +88,16 @@ impl Reader {
             .and_then(|lidar| Some((lidar, lidar.kind?)))
             .ok_or_else(|| self.no_sensor("lidar", "sensor_msgs/msg/LaserScan or sensor_msgs/msg/PointCloud2"))?;
         let imu = imu.ok_or_else(|| self.no_sensor("IMU", "sensor_msgs/msg/Imu"))?;
-        let notes =
-            [notes_on_choice("lidar", lidar, &lidars), notes_on_choice("IMU", imu, &imus), note_on_times(lidar)];
+        let point_times = match lidar_kind {
+            LidarKind::Points => self.unit_of_point_times(&lidar.topic)?,
+            LidarKind::Scan => None,
+        };
+        let notes = [
+            notes_on_choice("lidar", lidar, &lidars),
+            notes_on_choice("IMU", imu, &imus),
+            note_on_times(lidar),
+            point_times.map(|unit| note_on_unit(lidar, unit)),
+        ];
         Ok(Selection {
             lidar_topic: lidar.topic.clone(),
             lidar_frame: lidar.frame.clone(),
@@ -92,7 +105,23 @@ impl Reader {
             imu_frame: imu.frame.clone(),
             notes: notes.into_iter().flatten().collect(),
             lidar_kind,
+            point_times,
         })
+    }
+
+    /// The unit that a topic's first clouds show, see [`points::Unit::shown_by`].
+    fn unit_of_point_times(&self, topic: &str) -> Result<Option<points::Unit>, RecordingError> {
+        let clouds = self.channels().iter().filter(|channel| channel.topic == topic);
+        let ids: Vec<u16> = clouds.map(|channel| channel.id).collect();
+        let (mut messages, mut lasting) = (self.messages_near(&ids), Vec::new());
+        while lasting.len() < LOOKED_AT {
+            let Some(message) = messages.next()? else { break };
+            if ids.contains(&message.channel) {
+                let Some(cloud) = points::lasting(message.data) else { return Ok(None) };
+                lasting.push(cloud);
+            }
+        }
+        Ok(points::Unit::shown_by(&lasting))
     }
 
     fn no_sensor(&self, sensor: &'static str, needs: &'static str) -> RecordingError {
@@ -178,6 +207,13 @@ fn notes_on_choice(sensor: &str, chosen: &Candidate, all: &[Candidate]) -> Optio
     others.sort_unstable();
     (!others.is_empty())
         .then(|| format!("Of several {sensor} topics, {} is read, not {}.", chosen.topic, others.join(", ")))
+}
+
+fn note_on_unit(lidar: &Candidate, unit: points::Unit) -> String {
+    let (topic, unit) = (&lidar.topic, unit.name());
+    format!(
+        "{topic} counts its points' times in {unit}: as they are usually read, its clouds would last far too long or short."
+    )
 }
 
 fn note_on_times(lidar: &Candidate) -> Option<String> {

@@ -1,6 +1,7 @@
 //! `sensor_msgs/PointCloud2`: points with whatever fields their maker gave them.
 
 mod fields;
+mod unit;
 
 use crate::measurement::{LidarReturn, LidarScan};
 use crate::recording::RecordingError;
@@ -9,6 +10,7 @@ use crate::recording::message::scan::from_earliest;
 use crate::time::Span;
 pub use fields::TimeField;
 use fields::{FLOAT32, Field, UINT32};
+pub use unit::{Lasting, Unit};
 
 /// Bytes of a point as [`encode`] writes it: x, y, z, intensity, t.
 const POINT_STEP: usize = 20;
@@ -139,18 +141,21 @@ impl<'a> Cloud<'a> {
 }
 
 /// Reads a cloud's returns in the order in which they were fired; points that are not finite or lie in the origin are
-/// beams that did not come back.
+/// beams that did not come back. Their times after the stamp are counted in `unit`, where another than the usual one is known.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2` with x, y and z.
-pub fn decode(message: &[u8]) -> Result<LidarScan, DecodeError> {
+pub fn decode(message: &[u8], unit: Option<Unit>) -> Result<LidarScan, DecodeError> {
     let cloud = Cloud::decode(message)?;
     let coordinate = |name| cloud.field(name).ok_or(DecodeError::Contradiction("a cloud has no x, y and z"));
     let (x, y, z) = (coordinate("x")?, coordinate("y")?, coordinate("z")?);
     let intensity = ["intensity", "intensities", "reflectivity", "i"].iter().find_map(|name| cloud.field(name));
     let mut time = TimeField::find(&cloud.fields);
     if let Some(time) = &mut time {
-        time.learn(cloud.stamp, cloud.points(), cloud.big_endian);
+        match unit {
+            Some(unit) => time.count_in(unit),
+            None => time.learn(cloud.stamp, cloud.points(), cloud.big_endian),
+        }
     }
     let mut returns = Vec::with_capacity((cloud.data.len() / cloud.point_step.max(1)).min(MOST_EXPECTED));
     for bytes in cloud.points() {
@@ -183,4 +188,13 @@ pub fn decode(message: &[u8]) -> Result<LidarScan, DecodeError> {
 pub fn time_field(message: &[u8]) -> Result<Option<String>, DecodeError> {
     let cloud = Cloud::decode(message)?;
     Ok(TimeField::find(&cloud.fields).map(|time| time.name().to_owned()))
+}
+
+/// How long a cloud lasts by its points' times; `None` where they carry none, or tell instants.
+pub fn lasting(message: &[u8]) -> Option<Lasting> {
+    let cloud = Cloud::decode(message).ok()?;
+    let mut time = TimeField::find(&cloud.fields)?;
+    time.learn(cloud.stamp, cloud.points(), cloud.big_endian);
+    let (numbers, seconds) = time.spread(cloud.points(), cloud.big_endian)?;
+    Some(Lasting { stamp: cloud.stamp, numbers, seconds })
 }

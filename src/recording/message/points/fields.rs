@@ -1,5 +1,6 @@
 //! What a point's fields are, and how its time is told.
 
+use super::unit::Unit;
 use crate::time::{NANOS_PER_SECOND, Span, Stamp};
 
 /// `PointField.UINT32`.
@@ -10,7 +11,7 @@ pub const FLOAT32: u8 = 7;
 const FLOAT64: u8 = 8;
 
 /// Names under which makers keep a point's time, the first one that is there is taken.
-const TIME_NAMES: [&str; 6] = ["t", "time", "timestamp", "offset_time", "time_stamp", "time_offset"];
+const TIME_NAMES: [&str; 7] = ["t", "time", "timestamp", "offset_time", "time_stamp", "time_offset", "time_offset_ns"];
 
 /// Longest time from a cloud's stamp to a point of it: beyond, the time is not what its field's name says.
 const LONGEST_S: f64 = 60.0;
@@ -76,10 +77,8 @@ fn ordered<const N: usize>(bytes: &[u8], big_endian: bool) -> [u8; N] {
 /// What a field's number means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meaning {
-    /// Nanoseconds after the cloud's stamp.
-    NanosAfterStamp,
-    /// Seconds after the cloud's stamp.
-    SecondsAfterStamp,
+    /// Time after the cloud's stamp.
+    AfterStamp(Unit),
     /// An instant, counted in this many parts of a second.
     Instant(f64),
 }
@@ -94,7 +93,7 @@ impl<'a> TimeField<'a> {
     /// The time field among `fields`.
     pub fn find(fields: &[Field<'a>]) -> Option<Self> {
         let field = TIME_NAMES.iter().find_map(|name| fields.iter().find(|field| field.name == *name))?;
-        Some(Self { field: *field, meaning: Meaning::NanosAfterStamp })
+        Some(Self { field: *field, meaning: Meaning::AfterStamp(Unit::NANOSECOND) })
     }
 
     /// The field's name.
@@ -110,8 +109,7 @@ impl<'a> TimeField<'a> {
         if self.field.kind < FLOAT32 {
             return;
         }
-        let numbers = points.map(|point| self.field.number(point, big_endian)).filter(|x| x.is_finite());
-        let (least, most) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let (least, most) = self.range(points, big_endian);
         let stamp_s = stamp.nanos() as f64 / NANOS_PER_SECOND as f64;
         // Whether all lie within `reach_s` of `centre_s`, counted in `parts` of a second.
         let within = |centre_s: f64, parts: f64, reach_s: f64| {
@@ -122,17 +120,34 @@ impl<'a> TimeField<'a> {
             [1.0, 1e6, 1e9].into_iter().find(|parts| within(stamp_s, *parts, reach(*parts))).map(Meaning::Instant)
         };
         let tight = if within(0.0, 1.0, spread(1.0)) { None } else { instant(&spread) };
-        let seconds = (least >= -MOST_SECONDS && most <= MOST_SECONDS).then_some(Meaning::SecondsAfterStamp);
+        let seconds = (least >= -MOST_SECONDS && most <= MOST_SECONDS).then_some(Meaning::AfterStamp(Unit::SECOND));
         let loose = || instant(&|_| LONGEST_S);
-        self.meaning = tight.or(seconds).or_else(loose).unwrap_or(Meaning::NanosAfterStamp);
+        self.meaning = tight.or(seconds).or_else(loose).unwrap_or(Meaning::AfterStamp(Unit::NANOSECOND));
+    }
+
+    /// Takes a point's number for so much time after the stamp.
+    pub fn count_in(&mut self, unit: Unit) {
+        self.meaning = Meaning::AfterStamp(unit);
+    }
+
+    /// From the least of a cloud's numbers to the greatest, and the same in seconds; `None` where they are instants, or there are none.
+    pub fn spread<'p>(&self, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) -> Option<(f64, f64)> {
+        let Meaning::AfterStamp(unit) = self.meaning else { return None };
+        let (least, most) = self.range(points, big_endian);
+        Some((most - least, (most - least) / unit.in_a_second())).filter(|spread| spread.0.is_finite())
+    }
+
+    fn range<'p>(&self, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) -> (f64, f64) {
+        let numbers = points.map(|point| self.field.number(point, big_endian)).filter(|x| x.is_finite());
+        numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
     }
 
     /// A point's time after the stamp; `None` where it is not finite or too far from it.
     pub fn offset(&self, stamp: Stamp, point: &[u8], big_endian: bool) -> Option<Span> {
         let number = self.field.number(point, big_endian);
         let offset = match self.meaning {
-            Meaning::NanosAfterStamp => Span::from_nanos(number.round() as i64),
-            Meaning::SecondsAfterStamp => Span::from_seconds(number),
+            Meaning::AfterStamp(Unit::NANOSECOND) => Span::from_nanos(number.round() as i64),
+            Meaning::AfterStamp(unit) => Span::from_seconds(number / unit.in_a_second()),
             // Whole and fractional seconds apart: their product in nanoseconds is beyond a double's 53 bits.
             Meaning::Instant(parts) => {
                 let whole = (number / parts).floor();
