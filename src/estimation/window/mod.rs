@@ -142,6 +142,11 @@ impl Window {
         self.start.sigmas[0] = FOUND;
     }
 
+    /// Whether it was put where it was found in a map, and has not gone on from there.
+    fn is_just_found(&self) -> bool {
+        self.start.sigmas[0] == FOUND
+    }
+
     /// Where the IMU is at the window's beginning.
     pub(super) fn begins(&self) -> Pose {
         let motion = self.nominal.at(self.start.u_s, &self.biases.gyro);

@@ -22,6 +22,9 @@ const BELIEVABLE: (f64, f64) = (2.0, 0.8);
 const ARM_M: f64 = 5.0;
 /// A normal that leans to a direction by less than this sine may do so by its error alone.
 pub(in crate::estimation) const LEANING: f64 = 0.3;
+/// Conditioning below which a window that was just found in a map is not moved along the weakest direction: nothing but
+/// a few matches, of which some are false, would hold it there.
+const UNTOLD: f64 = 0.01;
 
 /// How a window's solution came out.
 #[derive(Debug, Clone, Default)]
@@ -107,7 +110,9 @@ impl Window {
         if matches.all.len() < self.spec.solve.min_matches {
             return Matches::default();
         }
-        if solved.conditioning < self.spec.solve.weak_conditioning {
+        if self.is_just_found() && solved.conditioning < UNTOLD {
+            matches.all.iter_mut().for_each(|found| found.plane.forget(&solved.weakest));
+        } else if solved.conditioning < self.spec.solve.weak_conditioning {
             self.straighten(&mut matches, scene, views, &solved.weakest);
         }
         matches
