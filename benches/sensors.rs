@@ -1,5 +1,5 @@
-//! What a second of simulated sensing costs: rays of a scan, its errors, samples of an IMU, and the whole simulation with and
-//! without its recording.
+//! What a second of simulated sensing costs: rays of a scan, its errors, samples of an IMU, and the whole simulation
+//! with and without its recording.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench fails by panicking; its items are criterion's")]
 

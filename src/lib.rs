@@ -51,10 +51,10 @@
 //!
 //! # The rooms
 //!
-//! The ground floor: [time], [random], [geometry], [signal], [spec], [elasticity], [surfel_map], [measurement], [truth].
-//! The door: [recording]. The wing that makes data: [world], [motion], [dynamics], [sensors], [simulation]. The wing that
-//! makes sense of them: [estimation], [evaluation]. On top: [report] and `study`. The two wings never name each other; a
-//! test (`tests/architecture.rs`) keeps them apart.
+//! The ground floor: [time], [random], [geometry], [signal], [spec], [elasticity], [surfel_map], [measurement],
+//! [truth]. The door: [recording]. The wing that makes data: [world], [motion], [dynamics], [sensors], [simulation].
+//! The wing that makes sense of them: [estimation], [evaluation]. On top: [report] and `study`. The two wings never
+//! name each other; a test (`tests/architecture.rs`) keeps them apart.
 
 pub mod dynamics;
 pub mod elasticity;

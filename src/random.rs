@@ -1,7 +1,7 @@
 //! The run's seed and its named streams.
 //!
-//! Every source of noise draws from a stream of its own, named after what it disturbs (`"imu/gyro/white"`). A stream is a
-//! function of the run's seed and its name alone: adding a source, or drawing more from one, changes no other.
+//! Every source of noise draws from a stream of its own, named after what it disturbs (`"imu/gyro/white"`). A stream is
+//! a function of the run's seed and its name alone: adding a source, or drawing more from one, changes no other.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -61,8 +61,9 @@ impl SurfelMap {
     /// A map of surfels from voxels of `finest_voxel_m`, in `levels` resolutions.
     ///
     /// # Errors
-    /// When the resolutions make no sense, or a surfel has a number that is not finite, a normal that is not of length one,
-    /// a second moment that is none, less than one point, a standard deviation below zero, or a level that the map has not.
+    /// When the resolutions make no sense, or a surfel has a number that is not finite, a normal that is not of length
+    /// one, a second moment that is none, less than one point, a standard deviation below zero, or a level that the map
+    /// has not.
     pub fn new(finest_voxel_m: f64, levels: usize, surfels: Vec<MapSurfel>) -> Result<Self, SurfelMapError> {
         let sound = finest_voxel_m > 0.0 && finest_voxel_m <= 100.0 && (1..=MOST_LEVELS).contains(&levels);
         if !sound {

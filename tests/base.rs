@@ -112,8 +112,8 @@ fn a_walk_in_closed_form_is_found_with_the_clocks_offset() {
 
 #[test]
 fn fixes_that_scatter_are_smoothed_by_the_imu() {
-    // 5 mm and 5 mrad an axis are 8.7 in all. The filter's memory is some tenths of a second, dozens of fixes; a sixth is left
-    // of what they scatter, if not less.
+    // 5 mm and 5 mrad an axis are 8.7 in all. The filter's memory is some tenths of a second, dozens of fixes; a sixth
+    // is left of what they scatter, if not less.
     let estimate = smoothed(&fixes(5e-3, 5e-3), &samples()).unwrap();
     let (way_m, turn_rad) = off_the_walk(&estimate.trajectory);
     assert!(way_m < 1.5e-3 && turn_rad < 1.5e-3, "{way_m} m, {turn_rad} rad");

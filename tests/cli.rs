@@ -58,8 +58,8 @@ fn the_whole_journey_leaves_everything_and_threads_change_nothing() {
     assert!(one["cloud"]["sigma_m"].as_f64().unwrap() < 0.03);
     let [open, closed] = ["open_loop", "closed_loop"].map(|loops| one[loops]["position_rmse_m"].as_f64().unwrap());
     assert!(closed < 1.05 * open, "{open} m open, {closed} m closed");
-    // In eight seconds of a small room the measurements allow a lot. A run of which the head rests a third, which the estimator
-    // is told and the bound is not, may come out below it.
+    // In eight seconds of a small room the measurements allow a lot. A run of which the head rests a third, which the
+    // estimator is told and the bound is not, may come out below it.
     let bound_m = one["closed_loop"]["bound_rmse_m"].as_f64().unwrap();
     assert!((1e-5..3e-3).contains(&bound_m), "{bound_m}");
     for name in [

@@ -85,7 +85,8 @@ fn density_about_a_spin_axis_falls_with_the_sine_of_the_angle_to_it() {
     for cell in &seen.cells {
         let (azimuth, elevation) = (middle(cell.azimuth_deg), middle(cell.elevation_deg));
         let angle = (azimuth.cos() * elevation.cos()).acos();
-        // Neither the axis, where a cell is no small one, nor the rim of the blind cone, nor the narrow cells at the poles.
+        // Neither the axis, where a cell is no small one, nor the rim of the blind cone, nor the narrow cells at the
+        // poles.
         if (0.6..2.0).contains(&angle) && elevation.abs() < 1.0 {
             assert!((cell.beams_per_sr_s / closed(angle) - 1.0).abs() < 0.1, "{cell:?} {}", closed(angle));
             looked_at += 1;

@@ -267,8 +267,8 @@ fn a_lidar_that_sees_nothing_leaves_the_imu_and_a_warning() {
     assert!(result.warnings.iter().any(|w| lost(&w.kind)), "{:?}", result.warnings);
 }
 
-/// Outdoors the first beams of a turn often meet the sky: the first that comes back is fired at an uneven pace, while the
-/// sensor's stamps are even. The stamps are what is smoothed.
+/// Outdoors the first beams of a turn often meet the sky: the first that comes back is fired at an uneven pace, while
+/// the sensor's stamps are even. The stamps are what is smoothed.
 #[test]
 fn beams_that_do_not_come_back_move_no_others_in_time() {
     let run = hall(20, 7.0);
@@ -292,8 +292,8 @@ fn beams_that_do_not_come_back_move_no_others_in_time() {
     }
 }
 
-/// A cheap IMU: its rates are off by 3 degrees/s, and it is five times noisier than its calibration says. The head rests for
-/// 1.5 s, which shows both.
+/// A cheap IMU: its rates are off by 3 degrees/s, and it is five times noisier than its calibration says. The head
+/// rests for 1.5 s, which shows both.
 #[test]
 fn an_imu_that_is_worse_than_it_was_told_is_found_out_at_rest() {
     let run = hall(19, 12.0);

@@ -53,7 +53,8 @@ fn swinging(t: f64) -> (f64, f64, f64) {
     (0.3 * sin, 0.6 * cos, -1.2 * sin)
 }
 
-/// The bound of a head that moves along x for `seconds` in a box of 4 m, with beams straight at the walls that lie `towards`.
+/// The bound of a head that moves along x for `seconds` in a box of 4 m, with beams straight at the walls that lie
+/// `towards`.
 fn bound(model: BoundModel, along: Along, seconds: f64, towards: &[Vector]) -> InformationBound {
     let steps = (seconds * 1e3) as i64;
     let pose = |t_s: f64| Pose::translation(along(t_s).0, 0.0, 0.0);
@@ -93,8 +94,8 @@ fn beams(seconds: f64) -> usize {
     (seconds / BEAM_S) as usize
 }
 
-/// The mean variance, m^2, that the fit of so many unknowns to `n` equal measurements of what is told leaves: `p sigma^2 / n`, the
-/// trace of a projection, whatever the unknowns are.
+/// The mean variance, m^2, that the fit of so many unknowns to `n` equal measurements of what is told leaves: `p
+/// sigma^2 / n`, the trace of a projection, whatever the unknowns are.
 fn left_by(unknowns: f64, n: usize) -> f64 {
     unknowns * SIGMA_M * SIGMA_M / n as f64
 }
@@ -132,8 +133,8 @@ fn an_unknown_offset_of_the_ranges_is_told_from_two_sides_and_not_from_one() {
 
 #[test]
 fn an_unknown_clock_is_one_unknown_more() {
-    // What the beams see is place + velocity t + tilt g t^2 / 2 + velocity of the swing times clock offset, and so is the head's
-    // place in lidar time: four unknowns, or with the clock's rate five.
+    // What the beams see is place + velocity t + tilt g t^2 / 2 + velocity of the swing times clock offset, and so is
+    // the head's place in lidar time: four unknowns, or with the clock's rate five.
     let n = beams(10.0);
     let offset = BoundModel { clock_offset_s: 0.1, ..exact() };
     let found = bound(offset.clone(), swinging, 10.0, &[Vector::x()]);
@@ -147,9 +148,9 @@ fn an_unknown_clock_is_one_unknown_more() {
 
 #[test]
 fn white_noise_of_the_accelerometer_and_beams_make_wieners_filter() {
-    // Along z, where no tilt enters: position is white acceleration (density q) integrated twice, seen in white noise of density
-    // r = sigma^2 * 5 ms. Wiener's smoother leaves the integral over frequency of S r / (S + r), S = q / w^4:
-    // r^(3/4) q^(1/4) / (2 sqrt 2), away from the ends.
+    // Along z, where no tilt enters: position is white acceleration (density q) integrated twice, seen in white noise
+    // of density r = sigma^2 * 5 ms. Wiener's smoother leaves the integral over frequency of S r / (S + r), S = q /
+    // w^4: r^(3/4) q^(1/4) / (2 sqrt 2), away from the ends.
     let density: f64 = 0.05;
     let mut model = exact();
     model.imu.accel_density_m_per_s2_per_sqrt_hz = density;
@@ -174,8 +175,9 @@ fn a_bias_of_the_gyroscope_bends_the_path_by_a_cubic() {
 
 #[test]
 fn beams_askew_tell_of_place_and_yaw_as_geometry_says() {
-    // The same box seen by beams at 60 degrees to the walls: a range tells of the place by 1 / cos 60, of which the information is
-    // fourfold; but such a beam tells of a turn too, so a second one from the other side keeps both apart.
+    // The same box seen by beams at 60 degrees to the walls: a range tells of the place by 1 / cos 60, of which the
+    // information is fourfold; but such a beam tells of a turn too, so a second one from the other side keeps both
+    // apart.
     let askew = |side: f64| Vector::new(0.5, side * 0.75_f64.sqrt(), 0.0);
     let n = beams(4.0);
     let heads = (0..=4000).map(|ms| Ok::<_, Infallible>((stamp(f64::from(ms) * 1e-3), Pose::identity())));

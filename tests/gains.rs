@@ -21,7 +21,8 @@ fn plan() -> GainPlan {
     GainPlan { up_to_hz: 25.0, realisations: 2, ..GainPlan::default() }
 }
 
-/// The greatest deviation from the closed form where coherence is above 0.95, in parts of what is allowed: 3 % or three sigma.
+/// The greatest deviation from the closed form where coherence is above 0.95, in parts of what is allowed: 3 % or three
+/// sigma.
 fn worst(curve: &GainCurve) -> (f64, &GainPoint) {
     let allowed = |p: &GainPoint| f64::max(0.03 * p.gain_model, 3.0 * p.gain_sigma);
     let deviation = |p: &GainPoint| (p.gain - p.gain_model).abs() / allowed(p);
@@ -105,10 +106,10 @@ fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
 
 #[test]
 fn a_large_swing_hardens_an_upright_head_and_softens_a_hanging_one() {
-    // A pendulum of weight torque w = m g l on a joint k: upright k a - w sin a = (k - w) a + w a^3 / 6, hanging
-    // (k + w) a - w a^3 / 6. Under many sines of random phase its swing is normal, and by statistical linearisation a^3 counts
-    // as 3 sigma^2 a: the frequency changes by +- w / (4 (k -+ w)) sigma^2. The base is shaken along x: one that turned would
-    // tell the spring's angle from gravity's.
+    // A pendulum of weight torque w = m g l on a joint k: upright k a - w sin a = (k - w) a + w a^3 / 6, hanging (k +
+    // w) a - w a^3 / 6. Under many sines of random phase its swing is normal, and by statistical linearisation a^3
+    // counts as 3 sigma^2 a: the frequency changes by +- w / (4 (k -+ w)) sigma^2. The base is shaken along x: one that
+    // turned would tell the spring's angle from gravity's.
     let (spec, _) = load("handheld").unwrap();
     let lever_m = on_a_joint(1.0, false).body().centre_of_mass_in_head.z
         - match spec.linkage {

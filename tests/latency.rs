@@ -59,8 +59,8 @@ fn a_latency_blurs_the_cloud_both_ways_the_clock_state_recovers_it_and_a_stop_ch
         study.run(Disturbance { latency_ms, noise_ms }, clock).unwrap().cloud_sigma_m.value
     };
     let without = sigma(0.0, 0.0, ClockState::Off);
-    // Ranges are good to 10 mm, less across a surface that is met askew; a head that nods at 200 degrees/s puts a wall 3 m away
-    // 5 cm off in 5 ms.
+    // Ranges are good to 10 mm, less across a surface that is met askew; a head that nods at 200 degrees/s puts a wall
+    // 3 m away 5 cm off in 5 ms.
     assert!((0.005..0.012).contains(&without), "{without}");
     for (latency_ms, noise_ms) in [(-5.0, 0.0), (5.0, 0.0), (0.0, 5.0)] {
         let (off, on) = (sigma(latency_ms, noise_ms, ClockState::Off), sigma(latency_ms, noise_ms, ClockState::On));

@@ -1,5 +1,5 @@
-//! Maps that last, over two sessions in the same building: the second is localised in the first one's map, goes on from it, and
-//! their maps are put together.
+//! Maps that last, over two sessions in the same building: the second is localised in the first one's map, goes on from
+//! it, and their maps are put together.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -127,8 +127,8 @@ fn aside(pose: &Pose, by: Vector, yaw_deg: f64) -> Pose {
     Pose::from_parts((pose.translation.vector + by).into(), turn * pose.rotation)
 }
 
-/// How far finest surfels are from the true surfaces along their normals, m: root mean square over their points, but for the
-/// worst 5 % of these, which are of edges.
+/// How far finest surfels are from the true surfaces along their normals, m: root mean square over their points, but
+/// for the worst 5 % of these, which are of edges.
 fn off_surfaces_m(map: &SurfelMap, world_from_map: &Pose, world: &World) -> f64 {
     let mut off: Vec<(f64, f64)> = Vec::new();
     for surfel in map.surfels().iter().filter(|surfel| surfel.level == 0) {

@@ -49,8 +49,8 @@ fn distance_to(route: &Route, point: &Vector) -> f64 {
 
 #[test]
 fn the_walk_keeps_to_its_route_and_under_its_speed() {
-    // A right corner at 0.6 m/s changes either component of the velocity by 0.6; smoothed over 0.8 s the walk stays off either
-    // leg by 0.6 * 0.8 * 35/256 = 65.6 mm there. Between corners the walker is on the route at 1 m/s.
+    // A right corner at 0.6 m/s changes either component of the velocity by 0.6; smoothed over 0.8 s the walk stays off
+    // either leg by 0.6 * 0.8 * 35/256 = 65.6 mm there. Between corners the walker is on the route at 1 m/s.
     let square = square();
     let walk = edited("hand", &PLAIN, Some(&square)).unwrap();
     let (mut farthest, mut fastest, mut far): (f64, f64, f64) = (0.0, 0.0, 0.0);

@@ -1,5 +1,5 @@
-//! The motions for characterisation, and those of machines: their spectra against what was asked for, replay against what
-//! was recorded, and sentences for what cannot be.
+//! The motions for characterisation, and those of machines: their spectra against what was asked for, replay against
+//! what was recorded, and sentences for what cannot be.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -52,8 +52,8 @@ fn band_noise_is_flat_within_its_band_on_every_axis() {
     let motion = edited("band_noise", "", "", 700.0).unwrap();
     let samples: Vec<_> = (0..30_000).map(|k| motion.at(5.0 + 0.02 * f64::from(k))).collect();
     for axis in 0..3 {
-        // 0.1 m/s^2 rms from 0.2 to 10 Hz; 1 degree/s. The axes' angles are small: rates about the axes are nearly their
-        // derivatives.
+        // 0.1 m/s^2 rms from 0.2 to 10 Hz; 1 degree/s. The axes' angles are small: rates about the axes are nearly
+        // their derivatives.
         let accelerations: Vec<f64> = samples.iter().map(|now| now.acceleration_in_world[axis]).collect();
         let rates: Vec<f64> = samples.iter().map(|now| now.angular_velocity_in_world[axis]).collect();
         for (signal, rms) in [(accelerations, 0.1_f64), (rates, 1_f64.to_radians())] {

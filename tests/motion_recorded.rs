@@ -58,7 +58,8 @@ fn a_recorded_base_is_played_as_it_moved_and_the_head_as_it_swung() {
     let poses = reader.poses(Some("/ground_truth/base")).unwrap();
     let (distance, angle) = worst(base.as_ref(), &poses);
     assert!(distance < 1e-9 && angle < 1e-7, "{distance} m, {angle} rad");
-    // Not only the recording, but the motion that it came from; the clocks' offset and rate shift it by some milliseconds.
+    // Not only the recording, but the motion that it came from; the clocks' offset and rate shift it by some
+    // milliseconds.
     let (stamp, _) = poses.iter().nth(4_500).unwrap();
     let played = base.at(0.5 + stamp.seconds_since(poses.stamps()[0]));
     let before = simulation.motion().at(4.5);

@@ -1,4 +1,5 @@
-//! Maps as files: they come back bit for bit, another reader finds the surfels, and what is no sound map is one clear error.
+//! Maps as files: they come back bit for bit, another reader finds the surfels, and what is no sound map is one clear
+//! error.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 

@@ -42,7 +42,8 @@ fn the_fit_finds_the_damping_that_made_the_peaks() {
 
 #[test]
 fn a_yaw_peak_alone_is_fitted_exactly_and_the_other_ratios_stay() {
-    // About z a head turns alone: H = (1 + 2 i zeta r) / (1 - r^2 + 2 i zeta r) with r = f / f0; its peak, on a fine grid.
+    // About z a head turns alone: H = (1 + 2 i zeta r) / (1 - r^2 + 2 i zeta r) with r = f / f0; its peak, on a fine
+    // grid.
     let (spec, source) = load("handheld").unwrap();
     let paper = PeaksSpec { z_rot: Some(15.0), ..PeaksSpec::default() };
     let fit = fit_damping(&spec, &source, &paper, RATIOS, 20.0).unwrap();
@@ -58,7 +59,8 @@ fn a_yaw_peak_alone_is_fitted_exactly_and_the_other_ratios_stay() {
 
 #[test]
 fn a_peak_out_of_reach_is_told_as_a_misfit() {
-    // With no less damping than 0.02, no gain about z exceeds 1 / (2 zeta) sqrt(1 + 4 zeta^2) by more than a thousandth.
+    // With no less damping than 0.02, no gain about z exceeds 1 / (2 zeta) sqrt(1 + 4 zeta^2) by more than a
+    // thousandth.
     let (spec, source) = load("handheld").unwrap();
     let paper = PeaksSpec { z_rot: Some(100.0), ..PeaksSpec::default() };
     let fit = fit_damping(&spec, &source, &paper, (0.02, 0.3), 20.0).unwrap();

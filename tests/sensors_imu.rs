@@ -109,8 +109,8 @@ fn on_a_spinning_table_the_arm_feels_the_centripetal_force() {
 
 #[test]
 fn an_accelerometer_on_a_pendulum_feels_the_rod_alone() {
-    // A point pendulum of length L: the rod pulls along itself, with g cos(a) + L a'^2, and nothing across. The state is
-    // integrated by RK4 at 0.05 ms; energy gives a'^2 = 2 g / L (cos a - cos a0).
+    // A point pendulum of length L: the rod pulls along itself, with g cos(a) + L a'^2, and nothing across. The state
+    // is integrated by RK4 at 0.05 ms; energy gives a'^2 = 2 g / L (cos a - cos a0).
     let (length, a0) = (0.8, 1.2_f64);
     let (mut a, mut rate) = (a0, 0.0);
     let swing = |a: f64| -G / length * a.sin();
@@ -187,8 +187,8 @@ impl AllanOfSpec {
     }
 
     /// White noise falls as N^2 / tau, a walk rises as K^2 tau / 3, a Gauss-Markov process of spread s and time T has
-    /// `2 s^2 T / tau (1 - T / (2 tau) (3 - 4 exp(-tau / T) + exp(-2 tau / T)))` (IEEE Std 952); they add. Rounding to q
-    /// adds q^2 / 12 a sample, white where the noise of a sample is no less than q.
+    /// `2 s^2 T / tau (1 - T / (2 tau) (3 - 4 exp(-tau / T) + exp(-2 tau / T)))` (IEEE Std 952); they add. Rounding to
+    /// q adds q^2 / 12 a sample, white where the noise of a sample is no less than q.
     fn variance(&self, tau_s: f64) -> f64 {
         let rounding = self.resolution.powi(2) / 12.0 * self.period_s;
         let wander = self.wander.map_or(0.0, |(sigma, time_s)| {
@@ -321,7 +321,8 @@ fn a_walk_leaves_the_white_noise_as_it_was() {
     let ((a, accel_a), (b, accel_b)) = (still(&spec, 5, 100), still(&without, 5, 100));
     assert_eq!(accel_a, accel_b);
     assert_eq!(a[0], b[0]);
-    // The difference is the walk itself: sigma 5e-5 sqrt(1 s) after 100 samples, and nothing of the white 5e-3 a sample.
+    // The difference is the walk itself: sigma 5e-5 sqrt(1 s) after 100 samples, and nothing of the white 5e-3 a
+    // sample.
     assert!((a[99] - b[99]).abs() < 2.5e-4 && a[99] != b[99]);
 }
 

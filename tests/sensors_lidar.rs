@@ -273,8 +273,8 @@ fn a_divergent_beam_mixes_near_surfaces_and_tells_far_ones_apart() {
     let middle = |spec: &LidarSpec, depth_m: f64| scan(spec, &edge(depth_m), 1, 0).planar.unwrap().ranges_m[540];
     assert!((middle(&spec, 0.3) - 5.3).abs() < 1e-6, "one ray sees one wall");
     spec.beam = Rays::Divergent;
-    // Of seven rays, three of a twelfth fall on the near wall (at 120, 180 and 240 degrees from the left); the powers go
-    // as 1 / r^2: (3 / 25, 9 / 5.3^2) / 12.
+    // Of seven rays, three of a twelfth fall on the near wall (at 120, 180 and 240 degrees from the left); the powers
+    // go as 1 / r^2: (3 / 25, 9 / 5.3^2) / 12.
     let (near, far) = (3.0 / 25.0, 9.0 / (5.3 * 5.3));
     let mixed = (5.0 * near + 5.3 * far) / (near + far);
     assert!((f64::from(middle(&spec, 0.3)) - mixed).abs() < 1e-4, "{} {mixed}", middle(&spec, 0.3));

@@ -188,7 +188,8 @@ fn beams_projected_by_truth_lie_within_a_millimetre_of_the_walls() {
 
 #[test]
 fn what_carries_the_lidar_is_seen_where_it_stands() {
-    // A post of 0.4 m beside the head's circle, from the floor to half a metre above the base, which rests at the origin.
+    // A post of 0.4 m beside the head's circle, from the floor to half a metre above the base, which rests at the
+    // origin.
     let foot_in_base = Vector::new(0.5, -2.0, -HALF[2]);
     let mut run = Run::of("utm30lx_exact", "3dm_gx2", 1.0);
     run.carrier = vec![Cylinder { foot_in_base, radius_m: 0.2, height_m: 3.0, reflectance: 0.4 }];
@@ -206,8 +207,9 @@ fn what_carries_the_lidar_is_seen_where_it_stands() {
             on_post += usize::from(off_the_walls(&point) > 0.1);
         }
     }
-    // From 2.06 m away, later 2.34 m, it is 2 asin(0.2 / 2.06) = 11.1 degrees wide, later 9.8: 45 to 39 beams of each of some
-    // 40 scans, 1,800 at most while they are level. For a part of each nod the beams behind the head pass over its top.
+    // From 2.06 m away, later 2.34 m, it is 2 asin(0.2 / 2.06) = 11.1 degrees wide, later 9.8: 45 to 39 beams of each
+    // of some 40 scans, 1,800 at most while they are level. For a part of each nod the beams behind the head pass over
+    // its top.
     assert!((800..1800).contains(&on_post), "{on_post}");
 }
 
@@ -267,8 +269,8 @@ fn the_clocks_are_as_the_truth_tells() {
         let (first, last) = (of(&kept.clocks[0].1).seconds(), of(&kept.clocks[199].1).seconds());
         first + (last - first) * t_s / kept.clocks[199].0.seconds_since(EPOCH)
     };
-    // A scan arrives with its last beam, 18.75 ms of the lidar's crystal after the stamped one; a sample arrives 5 ms of
-    // the IMU's after the middle of its interval, which is what is stamped.
+    // A scan arrives with its last beam, 18.75 ms of the lidar's crystal after the stamped one; a sample arrives 5 ms
+    // of the IMU's after the middle of its interval, which is what is stamped.
     let scans = kept.scans.iter().map(|(arrival, scan)| {
         let fired_s = arrival.seconds_since(EPOCH) - 0.01875 / (1.0 - 30e-6);
         scan.stamp.seconds_since(EPOCH) - fired_s - ahead_at(fired_s, |clock| clock.lidar_ahead)

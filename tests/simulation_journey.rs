@@ -65,8 +65,8 @@ fn kept(simulation: &Simulation) -> Kept {
     kept
 }
 
-/// How many beams end on the world's surfaces and how many on what carries the laser; projected by the truth, each must end
-/// within a millimetre of one of these.
+/// How many beams end on the world's surfaces and how many on what carries the laser; projected by the truth, each must
+/// end within a millimetre of one of these.
 fn beams_on_surfaces(simulation: &Simulation) -> (usize, usize) {
     let kept = kept(simulation);
     let path = |of: fn(&TruthSample) -> Pose| {
@@ -112,8 +112,8 @@ fn beams_projected_by_truth_lie_within_a_millimetre_of_the_offices_surfaces() {
     let simulation = Simulation::prepare(&exact_office(12.0)).unwrap();
     let (on_world, on_carrier) = beams_on_surfaces(&simulation);
     assert!(on_world > 480 * 1000, "nearly every beam comes back in a room: {on_world}");
-    // The trunk reaches from 1.6 degrees on one side of straight back to 47.2 on the other, where beams end at 45; so a few of
-    // 1081 see it, the more the head turns about its spring.
+    // The trunk reaches from 1.6 degrees on one side of straight back to 47.2 on the other, where beams end at 45; so a
+    // few of 1081 see it, the more the head turns about its spring.
     assert!((1_000..20_000).contains(&on_carrier), "the operator is seen at the edge of the scans: {on_carrier}");
 }
 

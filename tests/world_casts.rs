@@ -53,8 +53,8 @@ fn from_inside_a_box_every_ray_reaches_the_wall_it_points_at() {
 
 #[test]
 fn a_cylinder_is_hit_within_the_sagitta_of_its_sides() {
-    // A regular polygon of n sides in a circle of radius r lies within r (1 - cos(pi / n)) of it; an oblique ray meets it
-    // that much later at most, divided by the cosine of incidence on the circle.
+    // A regular polygon of n sides in a circle of radius r lies within r (1 - cos(pi / n)) of it; an oblique ray meets
+    // it that much later at most, divided by the cosine of incidence on the circle.
     let world = world(
         "Solid(shape: Cylinder(radius_m: 0.5, height_m: 4, sides: 64), material: \"a\", at_m_deg: [(3, 0, -2)])",
         "",
@@ -144,7 +144,8 @@ fn a_door_that_swings_and_a_person_who_walks_are_met_where_they_are_then() {
     for time in [2.0, 6.0] {
         assert_relative_eq!(world.cast(&towards_x(0.5), 30.0, time).unwrap().distance_m, 1.98, epsilon = 1e-9);
     }
-    // At 1 s it stands at 45 degrees: the middle plane is met at x = 2 + y, its face half the thickness x sqrt(2) nearer.
+    // At 1 s it stands at 45 degrees: the middle plane is met at x = 2 + y, its face half the thickness x sqrt(2)
+    // nearer.
     let expected = 2.5 - 0.02 * 2_f64.sqrt();
     assert_relative_eq!(world.cast(&towards_x(0.5), 30.0, 1.0).unwrap().distance_m, expected, epsilon = 1e-9);
     // A ray in front of everything is stopped by the nearer one.

@@ -1,4 +1,5 @@
-//! What moves through the shipped scenes: people who walk through the office, a vehicle that drives round the courtyard.
+//! What moves through the shipped scenes: people who walk through the office, a vehicle that drives round the
+//! courtyard.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 

@@ -16,10 +16,10 @@ use zsim::study;
 
 /// Tell where the base (the handle, the vehicle) was, from the trajectory of the head on its spring
 ///
-/// Twice: as if the head were screwed to the base as it rests (base_rigid_link.tum), and by the spring's own law: the base
-/// that pushes the head as it is seen to accelerate (base_spring.tum). The trajectory, a TUM file, has z up and is of the
-/// head's frame, at an IMU's rate or more, as estimates and the truth of zsim are. With a recording of an IMU on the base a
-/// third time: that IMU and the spring's law, smoothed together (base_imu.tum).
+/// Twice: as if the head were screwed to the base as it rests (base_rigid_link.tum), and by the spring's own law: the
+/// base that pushes the head as it is seen to accelerate (base_spring.tum). The trajectory, a TUM file, has z up and is
+/// of the head's frame, at an IMU's rate or more, as estimates and the truth of zsim are. With a recording of an IMU on
+/// the base a third time: that IMU and the spring's law, smoothed together (base_imu.tum).
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim base results/office/closed_loop.tum --head handheld --truth \
                         results/office/recording.mcap\n  zsim base results/office/closed_loop.tum --head handheld \
@@ -34,15 +34,15 @@ pub(super) struct Arguments {
     /// The base's true trajectory: a TUM file, or a recording that has it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// A recording of an IMU on the base, as `zsim simulate --base-imu` makes them; where /tf_static has it not in the frame
-    /// base, it is at the base's origin and along its axes
+    /// A recording of an IMU on the base, as `zsim simulate --base-imu` makes them; where /tf_static has it not in the
+    /// frame base, it is at the base's origin and along its axes
     #[arg(long, value_name = "FILE.mcap")]
     base_imu: Option<PathBuf>,
     /// The topic of that IMU [default: /base/imu]
     #[arg(long, value_name = "TOPIC", requires = "base_imu")]
     base_imu_topic: Option<String>,
-    /// How much later that IMU stamps an instant than the trajectory does, to a millisecond or two [default: found by how both
-    /// turn, and followed as it drifts]
+    /// How much later that IMU stamps an instant than the trajectory does, to a millisecond or two [default: found by
+    /// how both turn, and followed as it drifts]
     #[arg(long, value_name = "MS", requires = "base_imu", allow_hyphen_values = true)]
     clock_offset_ms: Option<f64>,
     #[command(flatten)]

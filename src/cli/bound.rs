@@ -16,9 +16,9 @@ use zsim::world::World;
 
 /// Tell how accurate any estimate of a recording could be: the Cramer-Rao bound of its beams and its IMU
 ///
-/// Every beam that met a surface of the scene counts with its noise and incidence, and the IMU with its noise, biases, scale
-/// errors and clock; surfaces are taken to be known. Needs a recording with its truth. With --out, writes bound.csv (by time)
-/// and a plot.
+/// Every beam that met a surface of the scene counts with its noise and incidence, and the IMU with its noise, biases,
+/// scale errors and clock; surfaces are taken to be known. Needs a recording with its truth. With --out, writes
+/// bound.csv (by time) and a plot.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim bound run.mcap --scene office.ron --out results/bound")]
 pub(super) struct Arguments {
@@ -28,7 +28,8 @@ pub(super) struct Arguments {
     /// The world, a name under scenes/ or a file [default: that in the recording's manifest]
     #[arg(long, value_name = "NAME|FILE")]
     scene: Option<String>,
-    /// The folder for results; if it exists and is not empty, one with a number after its name [default: none is written]
+    /// The folder for results; if it exists and is not empty, one with a number after its name [default: none is
+    /// written]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write into the folder even if it exists

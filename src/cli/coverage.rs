@@ -16,8 +16,8 @@ use zsim::study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, d
 
 /// Tell what a lidar on a moving head sees of the sphere: how much, how densely, how soon; and the gyroscope's range
 ///
-/// Needs no scene: directions alone count, as seen from the base's heading. A motion that walks goes round a hall of 20 m by
-/// 10 m. With --out, writes coverage.csv (by time), density.csv (by direction), and a plot.
+/// Needs no scene: directions alone count, as seen from the base's heading. A motion that walks goes round a hall of 20
+/// m by 10 m. With --out, writes coverage.csv (by time), density.csv (by direction), and a plot.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim coverage --head handheld --motion hand --duration 30s --out results/coverage")]
 pub(super) struct Arguments {

@@ -26,8 +26,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     estimator: EstimatorArguments,
     /// A RON file that says where the sensors sit and how well they measure, for what the recording does not say:
-    /// (head_from_laser: (position_m: (0, 0, 0)), head_from_imu: (position_m: (0, 0, -0.08), roll_pitch_yaw_deg: (0, 0, 180)));
-    /// docs/recordings.md has all keys, noise among them
+    /// (head_from_laser: (position_m: (0, 0, 0)), head_from_imu: (position_m: (0, 0, -0.08), roll_pitch_yaw_deg: (0, 0,
+    /// 180))); docs/recordings.md has all keys, noise among them
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// The frame whose pose is written [default: head where /tf_static has it, else the IMU's]
@@ -39,7 +39,8 @@ pub(super) struct Arguments {
     /// The IMU's topic [default: found]
     #[arg(long, value_name = "TOPIC")]
     imu_topic: Option<String>,
-    /// A map of an earlier run (its map.ply), in which the head is to be localised: the trajectory is in the map's frame then
+    /// A map of an earlier run (its map.ply), in which the head is to be localised: the trajectory is in the map's
+    /// frame then
     #[arg(long, value_name = "MAP.ply")]
     map: Option<PathBuf>,
     /// Where in the map the head begins, to a metre and twenty degrees: metres, and degrees about the vertical

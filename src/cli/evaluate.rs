@@ -20,9 +20,9 @@ const REACH_M: f64 = 1.0;
 
 /// Judge a trajectory by the true one, and a cloud by the true surfaces
 ///
-/// Trajectories are TUM files (`t x y z qx qy qz qw`) stamped by one clock. The estimate is aligned with the truth first
-/// (rigid, by positions, as evo_ape -a). With both, a cloud in the estimate's map is aligned the same way; without them it
-/// is taken to be in the world's frame.
+/// Trajectories are TUM files (`t x y z qx qy qz qw`) stamped by one clock. The estimate is aligned with the truth
+/// first (rigid, by positions, as evo_ape -a). With both, a cloud in the estimate's map is aligned the same way;
+/// without them it is taken to be in the world's frame.
 #[derive(Args)]
 #[command(
     group = clap::ArgGroup::new("what").required(true).multiple(true).args(["estimate", "cloud"]),

@@ -19,8 +19,8 @@ use zsim::study::gains::{
 
 /// Measure a head's gain curves: the head's motion over its base's by frequency, from simulation and in closed form
 ///
-/// The base is shaken on one axis at a time about the spring's foot by a periodic multisine; the head is watched at its IMU.
-/// Writes gains.csv, swing.csv with --swing, and plots.
+/// The base is shaken on one axis at a time about the spring's foot by a periodic multisine; the head is watched at its
+/// IMU. Writes gains.csv, swing.csv with --swing, and plots.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim gains --head handheld --out results/gains")]
 pub(super) struct Arguments {
@@ -32,7 +32,8 @@ pub(super) struct Arguments {
     /// The highest frequency, Hz
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     up_to: f64,
-    /// The multisine's period, s: the reciprocal of the distance between lines [default: two lines in the narrowest peak]
+    /// The multisine's period, s: the reciprocal of the distance between lines [default: two lines in the narrowest
+    /// peak]
     #[arg(long, value_name = "S")]
     period: Option<f64>,
     /// What is compared along x, y and z

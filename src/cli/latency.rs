@@ -15,8 +15,9 @@ const FIGURE_4: &str = "fig4";
 
 /// Put latency and timing noise on one recording: maps as in the paper's figure 4, and curves of error with their bands
 ///
-/// Each latency and noise is estimated with the clock state off (what the paper shows) and on (what it recovers). Writes
-/// latency.csv, metrics.json and plots. What is in the folder already is not done again: a study that was stopped goes on.
+/// Each latency and noise is estimated with the clock state off (what the paper shows) and on (what it recovers).
+/// Writes latency.csv, metrics.json and plots. What is in the folder already is not done again: a study that was
+/// stopped goes on.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim latency --scene office.ron --out results/latency")]
 pub(super) struct Arguments {

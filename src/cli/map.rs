@@ -12,8 +12,8 @@ use zsim::study;
 
 /// Put maps together
 ///
-/// `zsim estimate` leaves a map, map.ply: surfels with their uncertainty. Another recording is localised in it with `zsim
-/// estimate --map`, and goes on from it with --extend-map.
+/// `zsim estimate` leaves a map, map.ply: surfels with their uncertainty. Another recording is localised in it with
+/// `zsim estimate --map`, and goes on from it with --extend-map.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --start 4.2,0.5,0,90 --out both.ply")]
 pub(super) struct Arguments {

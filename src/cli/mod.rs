@@ -35,8 +35,8 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Design and simulate moving range sensors: a lidar and an IMU on a spring, and the continuous-time SLAM that makes a map
-/// of what they see.
+/// Design and simulate moving range sensors: a lidar and an IMU on a spring, and the continuous-time SLAM that makes a
+/// map of what they see.
 ///
 /// With a scene and no command, the whole journey: simulate, record, estimate, evaluate, report.
 #[derive(Parser)]

@@ -12,8 +12,8 @@ use zsim::study::reproduction::{Experiment, Extent, Finding, paper_table};
 
 /// Run the paper's experiments again: what it found, what we find
 ///
-/// Each leaves its figures in DIR/paper/NAME/, and DIR/paper.md is the table of all that are finished. What was stopped goes
-/// on where it was.
+/// Each leaves its figures in DIR/paper/NAME/, and DIR/paper.md is the table of all that are finished. What was stopped
+/// goes on where it was.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim reproduce\n  zsim reproduce fig3 --out results")]
 pub(super) struct Arguments {

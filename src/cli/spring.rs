@@ -14,7 +14,8 @@ use zsim::study::coverage::{CoveragePlan, coverage_figure};
 use zsim::study::spring::design::{DesignSpec, Search, csv, pareto_figure};
 use zsim::study::spring::{Shake, mode_figure, spring_report};
 
-/// Tell all about a spring, or any other linkage, under its head: stiffness, rest, modes, field of view, limits; or search for one
+/// Tell all about a spring, or any other linkage, under its head: stiffness, rest, modes, field of view, limits; or
+/// search for one
 ///
 /// FILE is a head, or a spring, which is then put under the head given by --head. That the head falls is an answer.
 #[derive(Args)]

@@ -15,9 +15,9 @@ use zsim::study::sweep::{Plan, Runner, Share, Status, Sweep, confine};
 
 /// Run a design again and again with other parameters: plan, run in any number of pieces anywhere, merge
 ///
-/// A sweep is a spec under specs/studies/: a run, what is varied, what is told. `plan` leaves it in a folder; `run` does what is
-/// missing there, on this machine's threads or as one of many processes on many machines; `merge` makes one table, the same
-/// bytes however it came about, with plots. Whatever stops it, what is done stays done.
+/// A sweep is a spec under specs/studies/: a run, what is varied, what is told. `plan` leaves it in a folder; `run`
+/// does what is missing there, on this machine's threads or as one of many processes on many machines; `merge` makes
+/// one table, the same bytes however it came about, with plots. Whatever stops it, what is done stays done.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  zsim sweep plan spring_sweep -o results/springs\n  zsim sweep run results/springs\n  zsim sweep merge results/springs"

@@ -49,8 +49,8 @@ pub enum TurnSpec {
     },
 }
 
-/// Greatest rate of a motor, turns a second: a tenth of a radian in a millisecond, beyond which beams between two instants
-/// of the simulation would be off their course.
+/// Greatest rate of a motor, turns a second: a tenth of a radian in a millisecond, beyond which beams between two
+/// instants of the simulation would be off their course.
 const MOST_TURNS_PER_S: f64 = 15.0;
 
 impl TurnSpec {
@@ -108,8 +108,8 @@ impl Actuated {
 
     /// The head's motion on a base that moves so, `t_s` seconds after the start.
     ///
-    /// About its axis n, fixed in the base, the head turns by phi on top of the base's turn: with the base's angular velocity
-    /// W and acceleration A, `w = W + phi' n` and `a = A + phi'' n + W x phi' n`.
+    /// About its axis n, fixed in the base, the head turns by phi on top of the base's turn: with the base's angular
+    /// velocity W and acceleration A, `w = W + phi' n` and `a = A + phi'' n + W x phi' n`.
     pub fn carried(&self, base: &Kinematics, t_s: f64) -> Kinematics {
         let [angle, rate, gain] = self.motor.angle_rad(t_s);
         let pivot = base.of_frame(&self.base_from_pivot);
@@ -128,10 +128,11 @@ impl Actuated {
 }
 
 impl MotorSpec {
-    /// The angle turned since the start, rad, with its first and second derivative by time: twice continuously differentiable.
+    /// The angle turned since the start, rad, with its first and second derivative by time: twice continuously
+    /// differentiable.
     ///
-    /// The rate of a spin, and the amplitude of a nod, rises as the quintic `s = 10 u^3 - 15 u^4 + 6 u^5`, whose first two
-    /// derivatives vanish at both ends.
+    /// The rate of a spin, and the amplitude of a nod, rises as the quintic `s = 10 u^3 - 15 u^4 + 6 u^5`, whose first
+    /// two derivatives vanish at both ends.
     fn angle_rad(&self, t_s: f64) -> [f64; 3] {
         let after_s = t_s - self.still_s;
         if after_s <= 0.0 {

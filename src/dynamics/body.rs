@@ -36,7 +36,8 @@ impl Body {
         Ok(Self { mass_kg, centre_of_mass_in_head: centre, inertia_in_head: inertia.sum() })
     }
 
-    /// The mass matrix of (velocity of the centre of mass, angular velocity), in axes to which `rotation` turns the head's.
+    /// The mass matrix of (velocity of the centre of mass, angular velocity), in axes to which `rotation` turns the
+    /// head's.
     pub(super) fn mass_matrix(&self, rotation: &Matrix) -> Matrix6 {
         let inertia = rotation * self.inertia_in_head * rotation.transpose();
         blocks(&(Matrix::identity() * self.mass_kg), &Matrix::zeros(), &Matrix::zeros(), &inertia)

@@ -9,8 +9,8 @@ use crate::spec::Source;
 /// The most that is tried, in parts of the head's mass.
 const MOST: f64 = 1024.0;
 
-/// The heaviest head of the shape of `spec`'s that rests in its linkage, kg, to a millionth; `None` where nothing falls: a
-/// rigid head, or one that hangs.
+/// The heaviest head of the shape of `spec`'s that rests in its linkage, kg, to a millionth; `None` where nothing
+/// falls: a rigid head, or one that hangs.
 ///
 /// # Errors
 /// When the spec's numbers are no head's or no spring's.

@@ -101,8 +101,8 @@ pub enum CordStiffnessSpec {
 
 /// An upright cylinder fastened to the head that floats in a fluid; the vessel moves with the base.
 ///
-/// The fluid's surface is level, across the apparent gravity in the vessel, and goes through one point of it: fluid that
-/// sloshes is not modelled. The cylinder's own mass is one of the head's parts.
+/// The fluid's surface is level, across the apparent gravity in the vessel, and goes through one point of it: fluid
+/// that sloshes is not modelled. The cylinder's own mass is one of the head's parts.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct FloatSpec {
@@ -135,8 +135,8 @@ pub struct FloatSpec {
     pub added_mass_kg: f64,
 }
 
-/// A universal joint: the head turns about an axis of the base and one of its own, which cross at right angles, and has no
-/// other motion.
+/// A universal joint: the head turns about an axis of the base and one of its own, which cross at right angles, and has
+/// no other motion.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct UniversalJointSpec {

@@ -8,15 +8,16 @@ use rapier3d_f64::prelude::{MassProperties, PhysicsWorld, RigidBodyBuilder, Rigi
 /// A free rigid body in an empty world without gravity.
 ///
 /// A step takes the velocities on by the wrench over the mass, then the pose by the new velocities. With more than one
-/// solver iteration rapier would do so in as many parts with the same wrench, which adds energy to an oscillation. Its own
-/// gyroscopic term is explicit, hence off: it is a part of the wrench.
+/// solver iteration rapier would do so in as many parts with the same wrench, which adds energy to an oscillation. Its
+/// own gyroscopic term is explicit, hence off: it is a part of the wrench.
 pub(super) struct Engine {
     world: PhysicsWorld,
     handle: RigidBodyHandle,
 }
 
 impl Engine {
-    /// The body at `world_from_head` with `twist`: the velocity of its centre of mass and its angular velocity, in the world.
+    /// The body at `world_from_head` with `twist`: the velocity of its centre of mass and its angular velocity, in the
+    /// world.
     pub fn new(body: &Body, world_from_head: &Pose, twist: &Vector6, step_s: f64) -> Self {
         let mut world = PhysicsWorld::new();
         world.gravity = Default::default();

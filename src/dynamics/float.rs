@@ -10,8 +10,8 @@ use std::f64::consts::{PI, TAU};
 /// Directions in which the cylinder's cross-section is cut into columns.
 const DIRECTIONS: usize = 12;
 
-/// Where the columns of a direction stand, in parts of the squared radius (Gauss-Legendre, two points): with equal shares
-/// of the area that gives area and second moment exactly.
+/// Where the columns of a direction stand, in parts of the squared radius (Gauss-Legendre, two points): with equal
+/// shares of the area that gives area and second moment exactly.
 const SQUARED_RADII: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// A float on the head, and its fluid on the base.
@@ -50,8 +50,8 @@ impl Float {
         })
     }
 
-    /// Volume under water, m^3, its first moment in the head, m^4, and the integral of depth over it, m^4, where `up` and
-    /// the surface are given in the head.
+    /// Volume under water, m^3, its first moment in the head, m^4, and the integral of depth over it, m^4, where `up`
+    /// and the surface are given in the head.
     fn submerged(&self, up: &Vector, surface: &Vector) -> (f64, Vector, f64) {
         let height_m = self.spec.height_m;
         let (mut volume, mut moment, mut depth) = (0.0, Vector::zeros(), 0.0);

@@ -119,7 +119,8 @@ impl HeadModel {
         }
     }
 
-    /// An upper bound on how fast the head oscillates, held by a hand and at its end stop, Hz; zero for one that does not.
+    /// An upper bound on how fast the head oscillates, held by a hand and at its end stop, Hz; zero for one that does
+    /// not.
     pub(super) fn fastest_hz(&self) -> f64 {
         match &self.linkage {
             Linkage::Rigid { .. } | Linkage::Actuated(_) => 0.0,
@@ -127,8 +128,8 @@ impl HeadModel {
         }
     }
 
-    /// Energy of the head: of its motion, its height above the world's zero, and its linkage, J. Masses that move along,
-    /// of wire and fluid, count by their motion relative to the base.
+    /// Energy of the head: of its motion, its height above the world's zero, and its linkage, J. Masses that move
+    /// along, of wire and fluid, count by their motion relative to the base.
     ///
     /// # Errors
     /// When a segmented spring finds no equilibrium there.

@@ -62,8 +62,8 @@ impl UniversalJoint {
         0.5 * (0..2).map(|k| self.stiffness_nm_per_rad[k] * angles[k] * angles[k]).sum::<f64>()
     }
 
-    /// The motions that are left to a head: a turn by one radian about each axis, as displacements of its centre of mass
-    /// and turns.
+    /// The motions that are left to a head: a turn by one radian about each axis, as displacements of its centre of
+    /// mass and turns.
     pub fn directions(&self, base: &Pose, head: &Pose, body: &Body) -> [Vector6; 2] {
         let lever = head.rotation * (body.centre_of_mass_in_head - self.ends.head_from_top.translation.vector);
         self.axes(base, head).map(|axis| stack(&axis.cross(&lever), &axis))
@@ -98,9 +98,9 @@ impl UniversalJoint {
         Matrix6x4::from_columns(&[force(Vector::x()), force(Vector::y()), force(Vector::z()), twist])
     }
 
-    /// The change of the head's twist over a step, `change` without the joint, such that the head is in its joint at the
-    /// step's end (SHAKE; Ryckaert, Ciccotti and Berendsen 1977): the joint's wrench works through `implicit`, the inverse of
-    /// mass and damping.
+    /// The change of the head's twist over a step, `change` without the joint, such that the head is in its joint at
+    /// the step's end (SHAKE; Ryckaert, Ciccotti and Berendsen 1977): the joint's wrench works through `implicit`, the
+    /// inverse of mass and damping.
     ///
     /// `None` where no wrench brings it there.
     pub fn held(

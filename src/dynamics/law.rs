@@ -11,9 +11,9 @@ use crate::geometry::{Kinematics, Pose, Vector};
 
 /// The force law of a linkage: the sum of its elements' pushes, and what is said of the linkage as a whole.
 ///
-/// Damping and the hand work in the [`Deformation`](crate::elasticity::Deformation) coordinates e between two frames, the
-/// *seat*: a force `C e_dot`, taken to the head by the transposed rate of e. A motion of head and base as one body changes
-/// no e, so it meets no damping, and power lost is `e_dot . C e_dot`, never negative.
+/// Damping and the hand work in the [`Deformation`](crate::elasticity::Deformation) coordinates e between two frames,
+/// the *seat*: a force `C e_dot`, taken to the head by the transposed rate of e. A motion of head and base as one body
+/// changes no e, so it meets no damping, and power lost is `e_dot . C e_dot`, never negative.
 #[derive(Debug, Clone)]
 pub(super) struct Law {
     pub springs: Vec<MountedSpring>,
@@ -131,7 +131,8 @@ impl Law {
         Ok(energy_j + in_stop)
     }
 
-    /// The seat's coordinates and their rate by the head's twist about its centre of mass, in the base's axes, at a pose.
+    /// The seat's coordinates and their rate by the head's twist about its centre of mass, in the base's axes, at a
+    /// pose.
     pub fn rate_matrix(&self, base_from_head: &Pose, body: &Body) -> (Vector6, Matrix6) {
         let now = Instant {
             base: &Kinematics::at_rest(Pose::identity()),
@@ -147,8 +148,8 @@ impl Law {
 }
 
 impl EndStop {
-    /// Adds the stop's torque and damping where the axis `to` leans too far from `from`; `turning` is the relative angular
-    /// velocity.
+    /// Adds the stop's torque and damping where the axis `to` leans too far from `from`; `turning` is the relative
+    /// angular velocity.
     fn press(&self, from: &Vector, to: &Vector, turning: &Vector, forces: &mut Forces) {
         let across = from.cross(to);
         let sine = across.norm();

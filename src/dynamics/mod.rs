@@ -1,9 +1,8 @@
 //! The head in its linkage: on a spring, several, cords, a float, or in a joint.
 //!
-//! A [`HeadSpec`] says what a head is made of and what holds it; a [`HeadModel`] is that head checked, at rest, with its
-//! modes; a [`HeadSimulation`] moves it on a base that moves. A linkage is the sum of its
-//! elements. The springs' mechanics are [`crate::elasticity`]'s; the body
-//! is integrated by rapier (see `engine`), which no other room knows.
+//! A [`HeadSpec`] says what a head is made of and what holds it; a [`HeadModel`] is that head checked, at rest, with
+//! its modes; a [`HeadSimulation`] moves it on a base that moves. A linkage is the sum of its elements. The springs'
+//! mechanics are [`crate::elasticity`]'s; the body is integrated by rapier (see `engine`), which no other room knows.
 
 mod actuated;
 mod body;

@@ -26,11 +26,11 @@ pub struct Mode {
     pub kind: ModeKind,
     /// Frequency without damping, Hz.
     pub frequency_hz: f64,
-    /// Damping ratio: what damping takes of this mode by itself, over the critical. Where elements have damping of their own
-    /// it also couples modes, which frequency response and simulation have and this number has not.
+    /// Damping ratio: what damping takes of this mode by itself, over the critical. Where elements have damping of
+    /// their own it also couples modes, which frequency response and simulation have and this number has not.
     pub damping_ratio: f64,
-    /// Displacement of the centre of mass and turn of the head, in the base's axes, scaled to a modal mass of 1: m and rad
-    /// over the square root of kg m^2.
+    /// Displacement of the centre of mass and turn of the head, in the base's axes, scaled to a modal mass of 1: m and
+    /// rad over the square root of kg m^2.
     pub shape: Vector6,
 }
 
@@ -47,11 +47,12 @@ impl Mode {
     }
 }
 
-/// `M x'' + C x' + K x = Mb b'' + Cb b' + Kb b` for small motions about rest: x the head's displacement and b the base's.
+/// `M x'' + C x' + K x = Mb b'' + Cb b' + Kb b` for small motions about rest: x the head's displacement and b the
+/// base's.
 ///
-/// x is the displacement of the head's centre of mass and its turn, b that of the base's origin and its turn, both as seen
-/// in the world, in the axes of the upright base. In a joint x keeps to what the base's motion and the modes' shapes make
-/// of it, and K, Kb say what the linkage does along the shapes alone.
+/// x is the displacement of the head's centre of mass and its turn, b that of the base's origin and its turn, both as
+/// seen in the world, in the axes of the upright base. In a joint x keeps to what the base's motion and the modes'
+/// shapes make of it, and K, Kb say what the linkage does along the shapes alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearModel {
     /// M, with the mass of spring and fluid that moves along: kg, kg m^2.
@@ -100,8 +101,8 @@ struct Bare {
 
 /// The modes of a mass on a positive-definite stiffness, slowest first.
 ///
-/// `rate` is the rate of the seat's coordinates by the head's twist (see `Deformation`); it tells stretch and twist from
-/// bending. In a joint there are neither. `None` when the mass is not positive definite.
+/// `rate` is the rate of the seat's coordinates by the head's twist (see `Deformation`); it tells stretch and twist
+/// from bending. In a joint there are neither. `None` when the mass is not positive definite.
 pub(super) fn modes(mass: &Matrix6, free: &Freedom, rate: &Matrix6, damping: &DampingSpec) -> Option<Vec<Mode>> {
     let bare = bare_modes(mass, free)?;
     let (bounce, yaw) = if bare.len() < 6 { (None, None) } else { stretch_and_twist(mass, &bare, rate)? };

@@ -14,10 +14,10 @@ pub(super) struct MountedSpring {
 
 /// The mass of a spring's wire, as its top feels it.
 ///
-/// Of a motion of the wire as the top's displacement bends, shears and stretches it, the kinetic energy is
-/// `e_dot . M e_dot / 2` in the spring's deformation coordinates e; for a base that does not turn that is exact for large
-/// swings, too. What the base carries along, half of the mass at the top, pulls by gravity less the base's acceleration.
-/// Forces by the base's rate of turn on the wire are left out.
+/// Of a motion of the wire as the top's displacement bends, shears and stretches it, the kinetic energy is `e_dot . M
+/// e_dot / 2` in the spring's deformation coordinates e; for a base that does not turn that is exact for large swings,
+/// too. What the base carries along, half of the mass at the top, pulls by gravity less the base's acceleration. Forces
+/// by the base's rate of turn on the wire are left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct WireMass {
     mass_kg: f64,
@@ -31,9 +31,9 @@ pub(super) struct WireMass {
 impl WireMass {
     /// That of wire of `mass_kg` on a coil of `radius_m`, `length_m` long under its load.
     ///
-    /// The consistent mass matrix of a beam's end (Przemieniecki, Theory of Matrix Structural Analysis, 11.3): 13/35 of the
-    /// mass sideways, 1/105 of it times the length squared for the slope, -11/210 times the length between them; 1/3 along
-    /// and about the axis. Left free to turn, its end feels 33/140.
+    /// The consistent mass matrix of a beam's end (Przemieniecki, Theory of Matrix Structural Analysis, 11.3): 13/35 of
+    /// the mass sideways, 1/105 of it times the length squared for the slope, -11/210 times the length between them;
+    /// 1/3 along and about the axis. Left free to turn, its end feels 33/140.
     pub fn new(mass_kg: f64, radius_m: f64, length_m: f64) -> Self {
         let polar_kg_m2 = mass_kg * radius_m * radius_m;
         let mut at_top = Matrix6::zeros();
@@ -85,8 +85,8 @@ impl MountedSpring {
         Ok(())
     }
 
-    /// The force that its mass feels because the coordinates' rate changes with the pose, `-B^T M B_dot v`, at the twist
-    /// `twist` of the head.
+    /// The force that its mass feels because the coordinates' rate changes with the pose, `-B^T M B_dot v`, at the
+    /// twist `twist` of the head.
     pub fn bend(&self, now: &Instant<'_>, twist: &Vector6) -> Vector6 {
         let Some(mass) = &self.mass else { return Vector6::zeros() };
         let relative = Instant { twist, ..*now }.relative_twist();

@@ -51,8 +51,8 @@ pub(super) struct Forces {
     pub damping: Matrix6,
     /// Mass that moves along, beside the head's own: minus the derivative of the wrench by the head's acceleration.
     pub inertia: Matrix6,
-    /// How far the head has turned from the base in the coordinates of its damping, or the top of one of its springs from
-    /// its foot, rad.
+    /// How far the head has turned from the base in the coordinates of its damping, or the top of one of its springs
+    /// from its foot, rad.
     pub turn_rad: f64,
 }
 
@@ -121,8 +121,8 @@ impl Ends {
 }
 
 impl Between {
-    /// The rate of the deformation's coordinates by the head's twist about its centre of mass, seen from the base, in the
-    /// world's axes.
+    /// The rate of the deformation's coordinates by the head's twist about its centre of mass, seen from the base, in
+    /// the world's axes.
     pub fn rate_by_twist(&self) -> Matrix6 {
         let by_velocity = self.deformation.straight * self.axes.transpose();
         let by_turning = self.deformation.mixed * self.axes.transpose() - by_velocity * skew(&self.lever);

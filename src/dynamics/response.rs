@@ -37,8 +37,8 @@ pub struct Peak {
 }
 
 impl HeadModel {
-    /// The points of the paper's gain curves: the base at the spring's foot (the base's origin where there is not one spring
-    /// alone), the head at its IMU.
+    /// The points of the paper's gain curves: the base at the spring's foot (the base's origin where there is not one
+    /// spring alone), the head at its IMU.
     pub fn usual_points(&self) -> Points {
         let base_in_base = match &self.linkage {
             Linkage::Sprung(sprung) => sprung.foot_in_base(),
@@ -61,16 +61,17 @@ impl HeadModel {
     }
 }
 
-/// The displacement of a point at `to_point` from another of the same body, by that one's displacement and the body's turn.
+/// The displacement of a point at `to_point` from another of the same body, by that one's displacement and the body's
+/// turn.
 fn arm(to_point: &Vector) -> Matrix6 {
     blocks(&Matrix::identity(), &-skew(to_point), &Matrix::zeros(), &Matrix::identity())
 }
 
 /// The answer of a linearised head to its base, as a sum over its modes.
 ///
-/// From `M x'' + C x' + K x = Mb b'' + Cb b' + Kb b` (see [`LinearModel`]) with `x = T b + y`, T what the base carries along
-/// and y the head's own motion in its modes, of shapes `phi_k` with unit modal mass: where damping keeps to the modes, the
-/// head's displacement per that of the base at the angular frequency w is
+/// From `M x'' + C x' + K x = Mb b'' + Cb b' + Kb b` (see [`LinearModel`]) with `x = T b + y`, T what the base carries
+/// along and y the head's own motion in its modes, of shapes `phi_k` with unit modal mass: where damping keeps to the
+/// modes, the head's displacement per that of the base at the angular frequency w is
 ///
 /// `H(w) = T + sum_k phi_k phi_k^T (Kb - K T + i w (Cb - C T) + w^2 (M T - Mb)) / (w_k^2 - w^2 + 2 i zeta_k w_k w)`,
 ///

@@ -27,16 +27,16 @@ pub struct HeadState {
 
 /// The motion of a head on a moving base: an endless iterator of [`HeadState`]s at 0, dt, 2 dt, ...
 ///
-/// At the start the head rests on its base, and moves along if that moves. A rigid head, or one that a motor turns, moves in
-/// closed form. A head that gives is a free body in rapier,
-/// pushed by its linkage's wrench (leapfrog): velocities v live half a step before poses, and at step n
+/// At the start the head rests on its base, and moves along if that moves. A rigid head, or one that a motor turns,
+/// moves in closed form. A head that gives is a free body in rapier, pushed by its linkage's wrench (leapfrog):
+/// velocities v live half a step before poses, and at step n
 ///
 /// `M (v[n+1/2] - v[n-1/2]) / dt = F(q[n]) - C (mean v - v_base) - mean w x I mean w`, `q[n+1] = q[n] + dt v[n+1/2]`,
 ///
-/// where the mean is that of the two half steps. In a joint the wrench that holds it together comes to the right side, such
-/// that `q[n+1]` is in the joint again. The same rule runs backwards in time, so without damping energy has no
-/// trend. What is handed out is of the head's own frame and belongs to the pose: from the steps' mean velocities, which lead
-/// from pose to pose exactly, the velocity at the pose to third order in dt, and the acceleration to second order.
+/// where the mean is that of the two half steps. In a joint the wrench that holds it together comes to the right side,
+/// such that `q[n+1]` is in the joint again. The same rule runs backwards in time, so without damping energy has no
+/// trend. What is handed out is of the head's own frame and belongs to the pose: from the steps' mean velocities, which
+/// lead from pose to pose exactly, the velocity at the pose to third order in dt, and the acceleration to second order.
 ///
 /// It ends after the first error.
 pub struct HeadSimulation<'a> {
@@ -58,7 +58,8 @@ impl<'a> HeadSimulation<'a> {
     /// The motion of `model` on `motion`, in steps of `step_s`.
     ///
     /// # Errors
-    /// When the step is too long for the head's fastest oscillation, or the head finds no rest on the base as that starts.
+    /// When the step is too long for the head's fastest oscillation, or the head finds no rest on the base as that
+    /// starts.
     pub fn new(model: &'a HeadModel, motion: &'a dyn BaseMotion, step_s: f64) -> Result<Self, DynamicsError> {
         let fastest_hz = model.fastest_hz();
         let most_s = if fastest_hz > 0.0 { 1.0 / (TAU * fastest_hz) } else { f64::INFINITY };

@@ -181,8 +181,8 @@ impl Site<'_> {
 
     /// The undamped head at rest with `weight` times its weight, with its stiffness (see [`Statics::settle`]).
     ///
-    /// One spring carries the weight's part along it. Of several elements each spring's load is the one that it is found to
-    /// carry at rest; a spring known by its stiffness has the load of an even share.
+    /// One spring carries the weight's part along it. Of several elements each spring's load is the one that it is
+    /// found to carry at rest; a spring known by its stiffness has the load of an even share.
     pub fn at_rest(&self, weight: f64) -> Result<(Law, Pose, Matrix6), Unrest> {
         let gravity_in_base = gravity_in_world();
         let weight_n = gravity_in_base * (weight * self.body.mass_kg);

@@ -220,7 +220,8 @@ pub struct EndStopSpec {
     pub damping_nm_s_per_rad: f64,
 }
 
-/// A hand that holds the head: a spring and a damper towards the head's rest, as firm as the motion says at each instant.
+/// A hand that holds the head: a spring and a damper towards the head's rest, as firm as the motion says at each
+/// instant.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct HoldSpec {

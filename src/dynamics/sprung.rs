@@ -24,8 +24,8 @@ pub(super) struct Sprung {
 pub struct Bearing {
     /// What it is.
     pub kind: BearingKind,
-    /// The load that presses a spring together (negative: pulls it apart), a cord's tension, or a float's buoyancy, N; none
-    /// of a joint, which bears whatever is left.
+    /// The load that presses a spring together (negative: pulls it apart), a cord's tension, or a float's buoyancy, N;
+    /// none of a joint, which bears whatever is left.
     pub load_n: Option<f64>,
 }
 
@@ -118,7 +118,8 @@ impl Sprung {
         let of_modes = self.linear.modes.iter().map(|mode| mode.frequency_hz).fold(0.0, f64::max);
         let lightest = body.inertia_in_head.symmetric_eigenvalues().min();
         let at_stop = self.law.end_stop.map_or(0.0, |stop| (stop.stiffness_nm_per_rad / lightest).sqrt() / TAU);
-        // A cord that is slack at rest is in no mode. Pulled taut at a lever r it moves a mass of 1 / (1/m + r^2/I) at least.
+        // A cord that is slack at rest is in no mode. Pulled taut at a lever r it moves a mass of 1 / (1/m + r^2/I) at
+        // least.
         let slack = self.law.cords.iter().filter(|cord| cord.tension_n(&self.rest) == 0.0);
         let by_cords = slack.map(|cord| {
             let lever = (cord.point_in_head - body.centre_of_mass_in_head).norm();
@@ -163,7 +164,8 @@ fn damp(modes: &mut [Mode], damping: &Matrix6) {
     }
 }
 
-/// A matrix that does on the two turns what `by_base` says in the places of turns about x and y: `M Z (Z^T M Z)^-1` of them.
+/// A matrix that does on the two turns what `by_base` says in the places of turns about x and y: `M Z (Z^T M Z)^-1` of
+/// them.
 fn of_turns(mass: &Matrix6, turns: &[Vector6; 2], by_base: &Matrix6) -> Option<Matrix6> {
     let directions = nalgebra::Matrix6x2::from_columns(turns);
     let moved = mass * directions;

@@ -12,7 +12,8 @@ const MOST_ITERATIONS: usize = 80;
 /// Step of the central differences, m and rad.
 const DIFFERENCE: f64 = 1e-5;
 
-/// Coordinates of a displacement that a joint does not leave free; its two turns take the places of turns about x and y.
+/// Coordinates of a displacement that a joint does not leave free; its two turns take the places of turns about x and
+/// y.
 const LOCKED: [usize; 4] = [0, 1, 2, 5];
 
 /// Square of the angular frequency below which nothing holds a head, (rad/s)^2: a swing of three minutes.
@@ -64,9 +65,9 @@ pub(super) struct Answer {
 }
 
 impl Statics<'_> {
-    /// The pose `base_from_head` near `start` in which the head rests, and its stiffness there: minus the derivative of the
-    /// wrench about its centre of mass, gravity included, by its displacement, in the base's axes. In a joint the stiffness
-    /// is against its two turns, in the places of those about x and y, and one elsewhere.
+    /// The pose `base_from_head` near `start` in which the head rests, and its stiffness there: minus the derivative of
+    /// the wrench about its centre of mass, gravity included, by its displacement, in the base's axes. In a joint the
+    /// stiffness is against its two turns, in the places of those about x and y, and one elsewhere.
     ///
     /// # Errors
     /// When there is none, or the head would leave it at the slightest push.
@@ -93,8 +94,8 @@ impl Statics<'_> {
         Err(Unrest::Falls)
     }
 
-    /// A pose near which the head rests, found by letting it down from `start`: Newton's method downhill, on the stiffness
-    /// with its negative and vanishing parts made positive, as cords begin slack.
+    /// A pose near which the head rests, found by letting it down from `start`: Newton's method downhill, on the
+    /// stiffness with its negative and vanishing parts made positive, as cords begin slack.
     ///
     /// # Errors
     /// When it goes down and down, or far away.

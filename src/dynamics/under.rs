@@ -24,10 +24,10 @@ impl HeadModel {
     }
 
     /// The poses of the base by the linkage's own law: at each of the head's poses but the first and the last, the base
-    /// that pushes the head as it is seen to accelerate. The head's poses are about evenly spaced, as an estimator's or the
-    /// truth's are; its world has z up. A hand that holds the head is not known of, and what moves along with a spring is
-    /// taken to move as with a base at rest. Where no base explains what the head does, as where it shakes faster than its
-    /// poses follow each other, none is told.
+    /// that pushes the head as it is seen to accelerate. The head's poses are about evenly spaced, as an estimator's or
+    /// the truth's are; its world has z up. A hand that holds the head is not known of, and what moves along with a
+    /// spring is taken to move as with a base at rest. Where no base explains what the head does, as where it shakes
+    /// faster than its poses follow each other, none is told.
     ///
     /// # Errors
     /// When a motor or a joint holds the head, whose pushes its motion does not tell; when no base explains anything.

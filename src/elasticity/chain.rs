@@ -13,8 +13,8 @@ const TOLERANCE: f64 = 1e-12;
 /// The nodes of a chain, from the base (0) to the top (N), and Newton's matrix about where they last were.
 ///
 /// The residual of a node is the wrench on it, about it, written in the base: that of the element below on its top, and
-/// that of the element above on its base. The matrix is block tridiagonal, and is kept from step to step for as long as it
-/// still brings the residual down tenfold.
+/// that of the element above on its base. The matrix is block tridiagonal, and is kept from step to step for as long as
+/// it still brings the residual down tenfold.
 #[derive(Debug, Clone)]
 pub(super) struct Chain {
     nodes: Vec<Pose>,
@@ -25,7 +25,8 @@ pub(super) struct Chain {
     matrix: Option<Matrices>,
 }
 
-/// The elimination of the block tridiagonal matrix: per inner node the inverse of its pivot, and its two neighbours' blocks.
+/// The elimination of the block tridiagonal matrix: per inner node the inverse of its pivot, and its two neighbours'
+/// blocks.
 #[derive(Debug, Clone)]
 struct Matrices {
     pivot: Vec<Matrix6>,
@@ -55,8 +56,8 @@ impl Chain {
         segments.map(|one_from_next| element.potential_j(&Deformation::of(&one_from_next).coordinates)).sum()
     }
 
-    /// Moves the inner nodes to where they are in equilibrium with the top at `base_from_top`: from where they last were, or,
-    /// should that fail, from an arc.
+    /// Moves the inner nodes to where they are in equilibrium with the top at `base_from_top`: from where they last
+    /// were, or, should that fail, from an arc.
     pub(super) fn settle(
         &mut self,
         element: &Element,
@@ -96,7 +97,8 @@ impl Chain {
         Err(ElasticityError::InnerNodes { segments: self.nodes.len() - 1, residual_n: size_n })
     }
 
-    /// Puts the inner nodes on the helix of constant curvature from base to top: close to equilibrium wherever loads are.
+    /// Puts the inner nodes on the helix of constant curvature from base to top: close to equilibrium wherever loads
+    /// are.
     fn lay_along_an_arc(&mut self, coordinates: &Vector6) {
         let segments = self.nodes.len() - 1;
         let (a, theta) = split(coordinates);
@@ -203,7 +205,8 @@ impl Tangent {
             let h = 1e-6;
             by_top.set_column(k, &((moved(h) - moved(-h)) / (2.0 * h)));
         }
-        // A displacement (d, phi) of the base is (-d - phi x p, -phi) of the top seen from it, and turns the wrench by phi.
+        // A displacement (d, phi) of the base is (-d - phi x p, -phi) of the top seen from it, and turns the wrench by
+        // phi.
         let zero = Matrix::zeros();
         let carry = blocks(&-Matrix::identity(), &skew(&p), &zero, &-Matrix::identity());
         let turning = blocks(&zero, &-skew(&force), &zero, &-skew(&torque));

@@ -29,7 +29,8 @@ pub struct Coil {
 }
 
 impl Coil {
-    /// A coil of mean diameter `coil_diameter_m` and free length `free_length_m`, wound of `active_coils` turns of wire.
+    /// A coil of mean diameter `coil_diameter_m` and free length `free_length_m`, wound of `active_coils` turns of
+    /// wire.
     ///
     /// All numbers are finite and above zero.
     ///

@@ -5,15 +5,15 @@ use crate::geometry::{Matrix, Pose, Vector, skew};
 
 /// The logarithm of the top's pose seen from the base, and its rate of change.
 ///
-/// With the top at `p`, turned by the rotation vector `theta`, the six coordinates are `(a, theta)` where
-/// `a = J_l(theta)^-1 p`: the logarithm on SE(3). A spring that bends into an arc of constant curvature keeps `a` at its
+/// With the top at `p`, turned by the rotation vector `theta`, the six coordinates are `(a, theta)` where `a =
+/// J_l(theta)^-1 p`: the logarithm on SE(3). A spring that bends into an arc of constant curvature keeps `a` at its
 /// length along z, so bending, shear, stretch and twist stay apart however far the top has turned, and the frame of the
 /// strains turns with the spring. Good for turns below pi.
 ///
 /// The rate is `a_dot = A v + W w`, `theta_dot = A w` for the top's velocity `v` and angular velocity `w` in the base,
 /// with `A = J_l(theta)^-1` (Barfoot, State Estimation for Robotics, 7.1.5) and `W = (d a / d theta) A`. The power of a
-/// force law `g` in the coordinates is `g . rate`, so the wrench on the top is the transposed rate of `-g`: this is what
-/// makes a potential's force conservative.
+/// force law `g` in the coordinates is `g . rate`, so the wrench on the top is the transposed rate of `-g`: this is
+/// what makes a potential's force conservative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deformation {
     /// `(a, theta)`, m and rad.
@@ -46,7 +46,8 @@ impl Deformation {
         stack(&(self.straight * v + self.mixed * w), &(self.straight * w))
     }
 
-    /// The wrench about the top, written in the base, that does the work of `g` in the coordinates: the rate, transposed.
+    /// The wrench about the top, written in the base, that does the work of `g` in the coordinates: the rate,
+    /// transposed.
     pub fn wrench(&self, g: &Vector6) -> Vector6 {
         let (force, torque) = split(g);
         stack(&self.straight.tr_mul(&force), &(self.mixed.tr_mul(&force) + self.straight.tr_mul(&torque)))

@@ -6,10 +6,10 @@ use crate::geometry::{Matrix, Pose, Vector, skew};
 
 /// A piece of spring between two nodes, straight under an axial load when at rest.
 ///
-/// Its potential is `U = f . e + e . K e / 2` in `e`, the coordinates of [`Deformation`] less those of the straight piece,
-/// with `f` the axial load. `K` is such that the top's stiffness about the straight, loaded piece is exactly the one given:
-/// the coordinates' curvature times the load (the geometric stiffness) is taken out of it. So the softening by the load is
-/// in the force law, and gravity is not.
+/// Its potential is `U = f . e + e . K e / 2` in `e`, the coordinates of [`Deformation`] less those of the straight
+/// piece, with `f` the axial load. `K` is such that the top's stiffness about the straight, loaded piece is exactly the
+/// one given: the coordinates' curvature times the load (the geometric stiffness) is taken out of it. So the softening
+/// by the load is in the force law, and gravity is not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Element {
     rest: Vector6,
@@ -25,8 +25,8 @@ impl Element {
     /// When `at_top` is not symmetric, or the piece would give way with both ends clamped.
     pub fn new(length_m: f64, load_n: f64, at_top: &Matrix6) -> Result<Self, ElasticityError> {
         check_symmetric(at_top)?;
-        // Of the top's displacement (u, theta), a_z = L + u_z + (theta_y u_x - theta_x u_y)/2 - L (theta_x^2 + theta_y^2)/12
-        // to second order; its Hessian times the force -P along it is the geometric stiffness.
+        // Of the top's displacement (u, theta), a_z = L + u_z + (theta_y u_x - theta_x u_y)/2 - L (theta_x^2 +
+        // theta_y^2)/12 to second order; its Hessian times the force -P along it is the geometric stiffness.
         let mut geometric = Matrix6::zeros();
         for (shift, turn, sign) in [(0, 4, 1.0), (1, 3, -1.0)] {
             geometric[(shift, turn)] = -0.5 * sign * load_n;

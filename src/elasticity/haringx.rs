@@ -33,12 +33,12 @@ impl Column {
         }
     }
 
-    /// Stiffness of the top against a lateral force and the moment in its plane, the base clamped: rows (force, moment),
-    /// columns (displacement, rotation that leans the same way).
+    /// Stiffness of the top against a lateral force and the moment in its plane, the base clamped: rows (force,
+    /// moment), columns (displacement, rotation that leans the same way).
     ///
-    /// With the state (y, theta, M, V) along the column: `y' = theta + (V + P theta)/S`, `theta' = M/B`,
-    /// `M' = -(V + P y')`, `V' = 0`; so the state at the top is `exp(A L)` times that at the base, for either sign of P.
-    /// `None` where the column has buckled with its top clamped too.
+    /// With the state (y, theta, M, V) along the column: `y' = theta + (V + P theta)/S`, `theta' = M/B`, `M' = -(V + P
+    /// y')`, `V' = 0`; so the state at the top is `exp(A L)` times that at the base, for either sign of P. `None` where
+    /// the column has buckled with its top clamped too.
     pub fn lateral_stiffness(&self) -> Option<Matrix2<f64>> {
         let (p, b, s) = (self.load_n, self.bending_nm2, self.shear_n);
         let soften = 1.0 + p / s;
@@ -91,8 +91,8 @@ pub fn loaded_stiffness(column: &Column) -> Result<Matrix6, ElasticityError> {
 }
 
 /// The load at which a coil buckles with its base clamped and its top guided (free to move sideways, not to turn), N:
-/// where `q L = pi`, with `q^2 = P (1 + P/S) / B` for the length L under the load. `None` for a coil that can be pressed
-/// together without buckling.
+/// where `q L = pi`, with `q^2 = P (1 + P/S) / B` for the length L under the load. `None` for a coil that can be
+/// pressed together without buckling.
 pub fn buckling_load_n(coil: &Coil) -> Option<f64> {
     let excess = |load_n: f64| {
         let column = coil.under(load_n).ok()?;
@@ -100,7 +100,8 @@ pub fn buckling_load_n(coil: &Coil) -> Option<f64> {
         Some(q * column.length_m - PI)
     };
     let (mut low, mut high) = (0.0, (coil.free_length_m() - coil.solid_length_m()) * coil.axial_n_per_m());
-    // q L first rises with the load and falls towards the end, as L shrinks: walk up to the first crossing, then bisect.
+    // q L first rises with the load and falls towards the end, as L shrinks: walk up to the first crossing, then
+    // bisect.
     let step = high / 1000.0;
     high = (1..1000).map(|k| k as f64 * step).find(|load| excess(*load).is_some_and(|e| e >= 0.0))?;
     low = f64::max(low, high - step);
@@ -138,8 +139,8 @@ mod tests {
 
     #[test]
     fn guided_lateral_stiffness_is_haringxs_and_within_2_percent_of_the_rods() {
-        // D, d, n, L0 in mm, load in N; guided lateral stiffness in N/m of a geometrically exact rod along the helix, and
-        // of the column.
+        // D, d, n, L0 in mm, load in N; guided lateral stiffness in N/m of a geometrically exact rod along the helix,
+        // and of the column.
         let table = [
             ([50.0, 4.0, 10.0, 120.0], 0.0, 979.5, 974.1),
             ([50.0, 4.0, 10.0, 120.0], 60.9, 810.4, 801.0),

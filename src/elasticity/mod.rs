@@ -32,8 +32,8 @@ pub type Vector6 = nalgebra::Vector6<f64>;
 /// A stiffness, a damping, a mass: what takes one [`Vector6`] to another.
 pub type Matrix6 = nalgebra::Matrix6<f64>;
 
-/// The least eigenvalue of a symmetric matrix after its rows and columns are scaled to a unit diagonal, so that metres and
-/// radians compare: from 1 (diagonal) down to 0 (singular) and below.
+/// The least eigenvalue of a symmetric matrix after its rows and columns are scaled to a unit diagonal, so that metres
+/// and radians compare: from 1 (diagonal) down to 0 (singular) and below.
 ///
 /// Meaningful for a positive diagonal alone; an entry of the diagonal at or below zero is returned as minus one.
 pub fn conditioning(matrix: &Matrix6) -> f64 {

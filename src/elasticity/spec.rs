@@ -28,8 +28,8 @@ pub enum SpringSpec {
         /// What the wire is made of.
         material: Material,
     },
-    /// A spring known by the stiffness of its top, its base clamped, under the head's weight: the weight's softening of the
-    /// spring in it, its moment about the base not.
+    /// A spring known by the stiffness of its top, its base clamped, under the head's weight: the weight's softening of
+    /// the spring in it, its moment about the base not.
     Stiffness {
         /// Length under the head's weight, mm.
         #[serde(deserialize_with = "checked::positive")]

@@ -10,8 +10,8 @@ pub const MOST_SEGMENTS: usize = 64;
 
 /// The force law of a spring between its clamped base and its top, for turns of the top below pi.
 ///
-/// The spring has no mass. Cut into segments, its inner nodes are wherever they are in equilibrium; that place is found by
-/// Newton's method from where they last were, which is what a [`SpringState`] remembers.
+/// The spring has no mass. Cut into segments, its inner nodes are wherever they are in equilibrium; that place is found
+/// by Newton's method from where they last were, which is what a [`SpringState`] remembers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spring {
     element: Element,
@@ -26,7 +26,8 @@ pub struct SpringState {
 }
 
 impl Spring {
-    /// A loaded column, cut into `segments` equal elements. Straight, it has the column's stiffness for any number of them.
+    /// A loaded column, cut into `segments` equal elements. Straight, it has the column's stiffness for any number of
+    /// them.
     ///
     /// # Errors
     /// When the load buckles the column, or `segments` is not 1 to [`MOST_SEGMENTS`].

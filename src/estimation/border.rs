@@ -12,13 +12,14 @@ const CLOCK_WALK: f64 = 5e-6;
 /// Wander of the clock's rate, 1 per square root of a second.
 const RATE_WALK: f64 = 2e-7;
 
-/// So much of what a window adds is believed for good: what its matches err they err together, and in the next windows again.
+/// So much of what a window adds is believed for good: what its matches err they err together, and in the next windows
+/// again.
 const BELIEVED: f64 = 0.1;
 
 /// What is known of the border before a window, and by it.
 ///
-/// Windows overlap: what a window adds to the prior is mostly measured again by the next one. So only the leaving stretch's
-/// share of it is remembered, of mean and of information, and the walks of biases and clock wear it down.
+/// Windows overlap: what a window adds to the prior is mostly measured again by the next one. So only the leaving
+/// stretch's share of it is remembered, of mean and of information, and the walks of biases and clock wear it down.
 #[derive(Debug, Clone)]
 pub(super) struct Border {
     prior: SMatrix<f64, BORDER, BORDER>,
@@ -144,8 +145,8 @@ mod tests {
         Border::new(prior, &noise, false)
     }
 
-    /// Solves a window that measures the border itself, to be `measured` with `information`; the values behind it, which
-    /// were `values`.
+    /// Solves a window that measures the border itself, to be `measured` with `information`; the values behind it,
+    /// which were `values`.
     fn solved(border: &mut Border, values: Values, (measured, information): (&Values, &Information)) -> Values {
         let mut equations = NormalEquations::new(LAYOUT.size());
         border.begin_window();

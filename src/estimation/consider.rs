@@ -1,15 +1,17 @@
 //! How uncertain the trajectory is, with all that a window takes for exact.
 //!
-//! A window is solved with its beginning and its fixed views held where they stand. Their errors are its errors too: with the
-//! window's answer linear in them, `e' = A e + sum V_k e_k + q`, the joint covariance of the beginning and of all views that
-//! are kept goes on from window to window (Schmidt's consider covariance, 1966; as in the stochastic cloning of Roumeliotis
-//! and Burdick, 2002, a view that is kept is a copy of the beginning's error at that time). Without views `A` is the identity
-//! and the errors walk away; where an old view is seen again, `A` vanishes and the error is the view's.
+//! A window is solved with its beginning and its fixed views held where they stand. Their errors are its errors too:
+//! with the window's answer linear in them, `e' = A e + sum V_k e_k + q`, the joint covariance of the beginning and of
+//! all views that are kept goes on from window to window (Schmidt's consider covariance, 1966; as in the stochastic
+//! cloning of Roumeliotis and Burdick, 2002, a view that is kept is a copy of the beginning's error at that time).
+//! Without views `A` is the identity and the errors walk away; where an old view is seen again, `A` vanishes and the
+//! error is the view's.
 //!
-//! An error of a view is six numbers: a small turn (rad) of all that hangs on it about its pivot, then a shift (m), in the map.
-//! That of a beginning is the same about where the IMU is, their derivatives by time, and what the window takes over of the IMU:
-//! biases and gravity's tilt. A velocity that is wrong, or a bias, stays so over many windows: left out, a head that for seconds
-//! sees neither floor nor ceiling drifts along the vertical four times as far as its windows, each for itself, would say.
+//! An error of a view is six numbers: a small turn (rad) of all that hangs on it about its pivot, then a shift (m), in
+//! the map. That of a beginning is the same about where the IMU is, their derivatives by time, and what the window
+//! takes over of the IMU: biases and gravity's tilt. A velocity that is wrong, or a bias, stays so over many windows:
+//! left out, a head that for seconds sees neither floor nor ceiling drifts along the vertical four times as far as its
+//! windows, each for itself, would say.
 
 use super::residual::GYRO_BIAS;
 use super::views::{MAP, Taken};
@@ -61,8 +63,8 @@ struct View {
 }
 
 impl Consider {
-    /// Of a map that begins at `pivot`: there the error is none, by definition. `known` is the covariance of what a window
-    /// begins with, but for where it is.
+    /// Of a map that begins at `pivot`: there the error is none, by definition. `known` is the covariance of what a
+    /// window begins with, but for where it is.
     pub(super) fn new(pivot: Vector, known: &OfBeginning) -> Self {
         Self { pivot, beginning: *known, views: Vec::new() }
     }
@@ -75,8 +77,8 @@ impl Consider {
         Self::new(pivot, &somewhere(known, &place))
     }
 
-    /// Of a head that was found at `pivot` in a map, with an error against it of covariance `found`, the map's own being
-    /// `of_map`.
+    /// Of a head that was found at `pivot` in a map, with an error against it of covariance `found`, the map's own
+    /// being `of_map`.
     pub(super) fn found(pivot: Vector, known: &OfBeginning, (found, of_map): (Matrix6<f64>, Matrix6<f64>)) -> Self {
         let mut with_beginning = SMatrix::<f64, 6, CARRIED>::zeros();
         with_beginning.fixed_view_mut::<6, 6>(0, 0).copy_from(&of_map);
@@ -89,8 +91,8 @@ impl Consider {
         self.go_rigidly(end.pivot, end.noise);
     }
 
-    /// Behind a silence the head was found again at `pivot`, to a covariance `found`, by what was seen before, which is as
-    /// uncertain as the head was then; `known` as for [`Consider::new`].
+    /// Behind a silence the head was found again at `pivot`, to a covariance `found`, by what was seen before, which is
+    /// as uncertain as the head was then; `known` as for [`Consider::new`].
     pub(super) fn find_again(&mut self, pivot: Vector, known: &OfBeginning, found: &Matrix6<f64>) {
         self.go_rigidly(pivot, somewhere(known, found));
     }
@@ -162,8 +164,8 @@ impl Consider {
         }
     }
 
-    /// Covariance of position and then attitude, in the map's axes, of what hangs on the beginning at `place`: m^2, m rad,
-    /// rad^2.
+    /// Covariance of position and then attitude, in the map's axes, of what hangs on the beginning at `place`: m^2, m
+    /// rad, rad^2.
     pub(super) fn covariance_at(&self, place: &Vector) -> Matrix6<f64> {
         // shift = t + theta x (place - pivot)
         let mut by = Matrix6::zeros();

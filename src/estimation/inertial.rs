@@ -10,7 +10,8 @@ use std::collections::VecDeque;
 
 /// The spacing that samples of a faster IMU are averaged to, s.
 const SPACING_S: f64 = 0.01;
-/// Standard deviation of a bridged interval's angular velocity, rad/s, and specific force, m/s^2: next to nothing is known.
+/// Standard deviation of a bridged interval's angular velocity, rad/s, and specific force, m/s^2: next to nothing is
+/// known.
 const BRIDGED: (f64, f64) = (2.0, 5.0);
 /// So many means to either side of a gap tell how the head moves there.
 const EDGE: usize = 5;
@@ -184,8 +185,8 @@ impl InertialStream {
         self.filter.period_s() * self.per_group as f64
     }
 
-    /// Bridges the gap that the head has landed behind: its angular velocity by a cubic that leaves as the means before the gap
-    /// go and arrives as those behind it, its specific force evenly along axes that do not turn.
+    /// Bridges the gap that the head has landed behind: its angular velocity by a cubic that leaves as the means before
+    /// the gap go and arrives as those behind it, its specific force evenly along axes that do not turn.
     fn bridge(&mut self, into: &mut Vec<(f64, Interval)>) {
         let landed = std::mem::take(&mut self.landed);
         let (Some(last), Some(first)) = (self.current, landed.first()) else { return };

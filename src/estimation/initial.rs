@@ -72,8 +72,8 @@ pub(super) struct Carried {
 }
 
 impl Beginning {
-    /// The same beginning at `start_s`, IMU time, where an estimate had stopped: level as the force says now, the heading as it
-    /// was, and the place to which it was on its way.
+    /// The same beginning at `start_s`, IMU time, where an estimate had stopped: level as the force says now, the
+    /// heading as it was, and the place to which it was on its way.
     pub(super) fn going_on_from(mut self, carried: &Carried, start_s: f64) -> Self {
         let yaw = |rotation: &Rotation| roll_pitch_yaw(rotation).2;
         let turn = yaw(&carried.state.rotation) - yaw(&self.state.rotation);
@@ -92,7 +92,8 @@ impl Noisier {
     /// As it was told.
     pub(super) const NOT: Self = Self { gyro: 1.0, accel: 1.0 };
 
-    /// By the differences of successive intervals, which motion hardly changes (von Neumann's estimate of the variance).
+    /// By the differences of successive intervals, which motion hardly changes (von Neumann's estimate of the
+    /// variance).
     fn seen_in(intervals: &[Interval]) -> Self {
         let factor = |of: fn(&Interval) -> (Vector, f64)| {
             let square = |pair: &[Interval]| {
@@ -127,8 +128,8 @@ impl Rest {
 }
 
 /// Looks at the first intervals: at rest their mean is the gyroscope's bias and the way up. In motion the mean force is
-/// taken for the way up all the same, turned back by the gyroscope to where the head began (over a second or more a hand's
-/// accelerations cancel), with little trust.
+/// taken for the way up all the same, turned back by the gyroscope to where the head began (over a second or more a
+/// hand's accelerations cancel), with little trust.
 ///
 /// The map's origin is the head's first position, and its x axis points where the head's does.
 pub(super) fn begin(intervals: &[Interval], head_from_imu: &Pose, noise: &ImuNoise, spec: &EstimatorSpec) -> Beginning {

@@ -213,7 +213,8 @@ impl Intake {
         (!stretch.intervals.is_empty()).then_some(stretch)
     }
 
-    /// After a silence of the IMU until `until_s`: scans of the silence are of no use, and intervals do not reach across.
+    /// After a silence of the IMU until `until_s`: scans of the silence are of no use, and intervals do not reach
+    /// across.
     fn begin_again_at(&mut self, until_s: f64) {
         self.next_start_s = until_s + MARGIN_S;
         // The next sample follows at once, and what is older stays late.
@@ -256,7 +257,8 @@ impl Intake {
         Some(())
     }
 
-    /// Uses the samples up to a little after `end_s`; stops where the IMU fell silent for too long, and tells until when.
+    /// Uses the samples up to a little after `end_s`; stops where the IMU fell silent for too long, and tells until
+    /// when.
     fn use_samples(&mut self, end_s: f64, stretch: &mut Stretch) -> Option<f64> {
         let (imu, _) = self.streams.as_mut()?;
         let mut silent_until_s = None;

@@ -1,4 +1,5 @@
-//! Which surfels show the same surface: near each other in position and normal, from both sides, and at different times.
+//! Which surfels show the same surface: near each other in position and normal, from both sides, and at different
+//! times.
 
 use super::spec::{MatchingSpec, SurfelSpec};
 use super::surfel::{Patch, Placed};

@@ -6,8 +6,8 @@ use crate::geometry::{Matrix, Pose, Rotation, Vector};
 
 /// Nodes at the boundaries of the IMU's intervals, in IMU time, and the intervals between them.
 ///
-/// Keeping it in the IMU's time has one reason: when the clock offset changes, the trajectory's fast part, which only the
-/// IMU knows, moves along by itself. Lidar time `tau` is looked up at `u = tau + l(tau)`.
+/// Keeping it in the IMU's time has one reason: when the clock offset changes, the trajectory's fast part, which only
+/// the IMU knows, moves along by itself. Lidar time `tau` is looked up at `u = tau + l(tau)`.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Nominal {
     times_s: Vec<f64>,
@@ -74,8 +74,8 @@ impl Nominal {
         self.intervals.drain(..keep);
     }
 
-    /// Adds a spline of corrections to the nodes from `first` on: `R' = exp(dr) R`, `t' = t + dt` (paper eq. 1-2), and the
-    /// velocity by the spline's derivative.
+    /// Adds a spline of corrections to the nodes from `first` on: `R' = exp(dr) R`, `t' = t + dt` (paper eq. 1-2), and
+    /// the velocity by the spline's derivative.
     pub(super) fn correct(&mut self, first: usize, curve: impl Fn(usize) -> Correction) {
         for (index, state) in self.states.iter_mut().enumerate().skip(first) {
             let correction = curve(index);

@@ -1,9 +1,9 @@
 //! Normal equations of a window, and their solution.
 //!
-//! Unknowns are ordered knots first, in time, then the dense border (biases, gravity, clock). Stored is the lower triangle
-//! by rows with each row's envelope: from its first non-zero column to the diagonal. Cholesky fills nothing outside the
-//! envelope (George and Liu 1981), so a band costs a band's work, a dense border its own rows, and a window whose matches
-//! link all times with all others the full triangle, by the same code.
+//! Unknowns are ordered knots first, in time, then the dense border (biases, gravity, clock). Stored is the lower
+//! triangle by rows with each row's envelope: from its first non-zero column to the diagonal. Cholesky fills nothing
+//! outside the envelope (George and Liu 1981), so a band costs a band's work, a dense border its own rows, and a window
+//! whose matches link all times with all others the full triangle, by the same code.
 
 use pulp::Arch;
 

@@ -43,7 +43,8 @@ pub struct WindowReport {
     pub iterations: usize,
     /// Size of the last iteration's correction: greatest translation of a knot, m.
     pub last_correction_m: f64,
-    /// Least over greatest eigenvalue of the information that the matches hold about the position, 0..1; 0 without matches.
+    /// Least over greatest eigenvalue of the information that the matches hold about the position, 0..1; 0 without
+    /// matches.
     pub conditioning: f64,
     /// Clock offset after the window, s.
     pub clock_offset_s: f64,
@@ -64,8 +65,8 @@ pub struct OpenLoop {
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// What was learnt of the lidar beyond its calibration, at the end, as the poses go with it.
     pub lidar: LidarCorrection,
-    /// The same as a calibration has it: where it was estimated how the lidar sits, the poses stand along the gyroscope's axes, and
-    /// this along the IMU's, midway between the gyroscope's and the accelerometer's.
+    /// The same as a calibration has it: where it was estimated how the lidar sits, the poses stand along the
+    /// gyroscope's axes, and this along the IMU's, midway between the gyroscope's and the accelerometer's.
     pub calibrated_lidar: LidarCorrection,
     /// Where in a map the head was found at first, where one was given.
     pub located: Option<Located>,

@@ -9,8 +9,8 @@ use crate::measurement::LidarScan;
 const DENSE_PER_S: f64 = 28_000.0;
 /// Fewest points of a patch of a sparse lidar.
 const FEWEST_POINTS: usize = 8;
-/// A lidar looks one way when the mean of its beams' directions is longer: that of a cone of 35 degrees to either side is 0.91,
-/// of half a plane 0.64.
+/// A lidar looks one way when the mean of its beams' directions is longer: that of a cone of 35 degrees to either side
+/// is 0.91, of half a plane 0.64.
 const ONE_WAY: f64 = 0.8;
 
 /// What the first scans show of the lidar.

@@ -60,8 +60,8 @@ pub struct SurfelSpec {
     /// Greatest thickness (standard deviation along the normal), as a multiple of the range's noise.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_thickness_sigmas: f64,
-    /// A patch is flat whose variance along the normal exceeds what noise makes of a plane by less than this multiple of its own
-    /// standard deviation, `sqrt(2 / N)` of it for `N` points.
+    /// A patch is flat whose variance along the normal exceeds what noise makes of a plane by less than this multiple
+    /// of its own standard deviation, `sqrt(2 / N)` of it for `N` points.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub flat_within_sigmas: f64,
     /// The variance of a patch's place along the normal, as a multiple of that excess; 0 to take all patches for flat.
@@ -70,8 +70,8 @@ pub struct SurfelSpec {
     /// Least velocity of a planar scan's beams out of their plane, by rotation, degrees/s.
     #[serde(deserialize_with = "crate::spec::checked::non_negative")]
     pub min_sweep_deg_per_s: f64,
-    /// Greatest angle between a patch's normal and the beams that saw it, degrees: beyond, a patch is not told from the slice that
-    /// a planar scan cuts out of a corner or a pipe.
+    /// Greatest angle between a patch's normal and the beams that saw it, degrees: beyond, a patch is not told from the
+    /// slice that a planar scan cuts out of a corner or a pipe.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_incidence_deg: f64,
     /// Nearest range used, m: what is nearer is the carrier.
@@ -133,8 +133,8 @@ pub struct SolveSpec {
     pub match_weight: f64,
     /// Fewest matches that a window's solution may rest on.
     pub min_matches: usize,
-    /// Multiple of the covariance that a window's own measurements give: matches of one surface share their errors, and windows
-    /// share their measurements, of which the equations do not know.
+    /// Multiple of the covariance that a window's own measurements give: matches of one surface share their errors, and
+    /// windows share their measurements, of which the equations do not know.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub covariance_inflation: f64,
     /// Conditioning below which a window is said to have weak geometry.
@@ -161,8 +161,8 @@ pub struct InertialSpec {
     /// Error of the accelerometer in proportion to its reading, which counts as noise, 0..1.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub accel_scale_error: f64,
-    /// Longest stretch without IMU samples that is bridged, s; behind a longer one the estimate begins again, and looks for the
-    /// head in what was seen before.
+    /// Longest stretch without IMU samples that is bridged, s; behind a longer one the estimate begins again, and looks
+    /// for the head in what was seen before.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_gap_s: f64,
     /// How long the head should rest at the start, s.

@@ -60,8 +60,8 @@ mod tests {
 
     #[test]
     fn coefficients_of_a_parabola_give_the_parabola() {
-        // A uniform cubic B-spline reproduces quadratics: for c(u) = u^2 the coefficient of knot k (centre (k - 1) h) is
-        // ((k - 1) h)^2 - h^2 / 3, the blossom of u^2.
+        // A uniform cubic B-spline reproduces quadratics: for c(u) = u^2 the coefficient of knot k (centre (k - 1) h)
+        // is ((k - 1) h)^2 - h^2 / 3, the blossom of u^2.
         let h = 0.15;
         let coefficient = |k: i64| ((k - 1) as f64 * h).powi(2) - h * h / 3.0;
         for u in [-0.4, 0.0, 0.031, 0.15, 1.77] {

@@ -1,8 +1,8 @@
 //! Smoothing of a regular sensor's stamps.
 //!
-//! A sensor that samples at a steady rate but is stamped with jitter (by a host, over a bus) says more about its times by
-//! counting than by any single stamp. A Kalman filter over (time of the last sample, period) follows the count: with jitter
-//! `s` and a rate that wanders slowly, the smoothed stamps are good to a few hundredths of `s` within a minute.
+//! A sensor that samples at a steady rate but is stamped with jitter (by a host, over a bus) says more about its times
+//! by counting than by any single stamp. A Kalman filter over (time of the last sample, period) follows the count: with
+//! jitter `s` and a rate that wanders slowly, the smoothed stamps are good to a few hundredths of `s` within a minute.
 
 use super::EstimatorSpec;
 use crate::time::{Span, Stamp};
@@ -25,8 +25,8 @@ pub(super) struct StampFilter {
 }
 
 impl StampFilter {
-    /// A filter for a sensor whose first stamps showed `regularity`, and that jitters by at least `jitter_s`; zero passes
-    /// every stamp as it is.
+    /// A filter for a sensor whose first stamps showed `regularity`, and that jitters by at least `jitter_s`; zero
+    /// passes every stamp as it is.
     pub(super) fn new(Regularity { period_s, jitter_s: seen_s }: Regularity, jitter_s: f64) -> Self {
         let off = jitter_s <= 0.0;
         let jitter_s = jitter_s.max(seen_s);
@@ -106,9 +106,9 @@ pub(super) struct Regularity {
 }
 
 impl Regularity {
-    /// Of stamps in order: a line through stamps over counts, the counts being such that the stamps lie closest to it. Where
-    /// samples were lost, the intervals tell the count; where stamps jitter by as much as the period, only their number does.
-    /// `None` for fewer than three stamps, or for stamps that do not advance.
+    /// Of stamps in order: a line through stamps over counts, the counts being such that the stamps lie closest to it.
+    /// Where samples were lost, the intervals tell the count; where stamps jitter by as much as the period, only their
+    /// number does. `None` for fewer than three stamps, or for stamps that do not advance.
     pub(super) fn of(stamps_s: &[f64]) -> Option<Self> {
         let mut intervals: Vec<f64> = stamps_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let without_losses = Self::about_line(stamps_s.iter().copied().zip(0..).map(|(s, k)| (f64::from(k), s)));
@@ -141,8 +141,8 @@ impl Regularity {
     }
 }
 
-/// When the samples of a regular sensor were really taken, as the estimator takes it: their stamps, in the order in which they
-/// came, smoothed by these settings. Whoever projects beams by an estimate needs the times that it used.
+/// When the samples of a regular sensor were really taken, as the estimator takes it: their stamps, in the order in
+/// which they came, smoothed by these settings. Whoever projects beams by an estimate needs the times that it used.
 pub fn smoothed_stamps(stamps: &[Stamp], spec: &EstimatorSpec) -> Vec<Stamp> {
     let Some(first) = stamps.first() else { return Vec::new() };
     let seconds: Vec<f64> = stamps.iter().map(|stamp| stamp.seconds_since(*first)).collect();

@@ -1,8 +1,8 @@
 //! Integration of an IMU whose samples are averages over their intervals.
 //!
-//! A sample is the mean of rate and force over an interval of length `h`, its slope taken from the neighbouring samples.
-//! About the interval's middle, w(s) = w0 + w1 s, f(s) = f0 + f1 s, to third order in `h` (Magnus expansion; Savage,
-//! Strapdown Inertial Navigation Integration, 1998):
+//! A sample is the mean of rate and force over an interval of length `h`, its slope taken from the neighbouring
+//! samples. About the interval's middle, w(s) = w0 + w1 s, f(s) = f0 + f1 s, to third order in `h` (Magnus expansion;
+//! Savage, Strapdown Inertial Navigation Integration, 1998):
 //!
 //! ```text
 //! turn       phi = w h + h^3/12 w0 x w1                                            (coning)
@@ -43,8 +43,8 @@ pub(super) struct Biases {
     pub(super) accel: Vector,
 }
 
-/// By how much an IMU exaggerates: the truth is `(1 - m) reading`, with scale factors on the diagonal of `m` and misalignment
-/// beside it.
+/// By how much an IMU exaggerates: the truth is `(1 - m) reading`, with scale factors on the diagonal of `m` and
+/// misalignment beside it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Exaggerates {
     /// The gyroscope.
@@ -59,8 +59,8 @@ impl Exaggerates {
         Self { gyro: Matrix::zeros(), accel: Matrix::zeros() }
     }
 
-    /// By how much the accelerometer's axes are turned against the gyroscope's, a rotation vector, rad: a misalignment that is no
-    /// symmetric matrix is a turn of the whole.
+    /// By how much the accelerometer's axes are turned against the gyroscope's, a rotation vector, rad: a misalignment
+    /// that is no symmetric matrix is a turn of the whole.
     pub(super) fn accel_against_gyro(&self) -> Vector {
         let m = self.accel - self.gyro;
         Vector::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]) * 0.5

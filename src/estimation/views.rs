@@ -1,7 +1,7 @@
 //! Fixed views: stretches of the past whose surfels stand still in the map, for the window's surfels to match.
 //!
-//! A stretch that left the window is kept when it shows cells that the kept ones do not. Of those kept, a window uses the
-//! few that cover most of what it sees now, and the oldest of about equal ones: an old view has drifted less.
+//! A stretch that left the window is kept when it shows cells that the kept ones do not. Of those kept, a window uses
+//! the few that cover most of what it sees now, and the oldest of about equal ones: an old view has drifted less.
 
 use super::matching::{Forest, Matcher};
 use super::spec::ViewSpec;

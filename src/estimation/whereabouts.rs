@@ -84,8 +84,8 @@ impl Before {
         Self { views, consider, last, until_s }
     }
 
-    /// Where the frame of `window`, which was begun about where the silence had, is in what was seen before: that, and the
-    /// views and what is known of them, with the head where it was found; or why it is not found.
+    /// Where the frame of `window`, which was begun about where the silence had, is in what was seen before: that, and
+    /// the views and what is known of them, with the head where it was found; or why it is not found.
     pub(super) fn find(mut self, window: &Window, spec: &EstimatorSpec) -> Result<(Pose, Views, Consider), String> {
         self.last.extend(self.views.patches());
         let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);

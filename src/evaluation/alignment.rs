@@ -7,8 +7,8 @@ const LINE: f64 = 1e-12;
 
 /// The rigid transform `to_from_from` that brings the points `from` nearest to `to`, pair by pair, in least squares.
 ///
-/// Umeyama (1991), eq. 40-42, with its scale held at 1: the rotation is `U S V^T` of the singular value decomposition of
-/// the cross covariance, with the sign in `S` that makes it proper.
+/// Umeyama (1991), eq. 40-42, with its scale held at 1: the rotation is `U S V^T` of the singular value decomposition
+/// of the cross covariance, with the sign in `S` that makes it proper.
 ///
 /// # Errors
 /// When there are fewer than three pairs, or all points lie on a line.
@@ -16,8 +16,8 @@ pub fn align(to: &[Vector], from: &[Vector]) -> Result<Pose, EvaluationError> {
     nearest(to, from, &Matrix::zeros())
 }
 
-/// The rigid transform that brings the poses `from` nearest to `to`, pair by pair, positions and attitudes alike: a turn by an
-/// angle counts as a shift by `lever_m` times the angle.
+/// The rigid transform that brings the poses `from` nearest to `to`, pair by pair, positions and attitudes alike: a
+/// turn by an angle counts as a shift by `lever_m` times the angle.
 ///
 /// The squared distance of two rotation matrices is twice the squared angle between them, so attitudes enter the cross
 /// covariance as `lever_m^2 / 2 R_to R_from^T`.

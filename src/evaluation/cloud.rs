@@ -3,8 +3,8 @@ use rayon::prelude::*;
 
 /// Which points of a cloud are judged: a bounded number, spread evenly over it, always the same ones.
 ///
-/// Point `k` is kept when the Weyl sequence `k / phi mod 1` falls below the wanted share: evenly spread, and out of step
-/// with any period of the scanner.
+/// Point `k` is kept when the Weyl sequence `k / phi mod 1` falls below the wanted share: evenly spread, and out of
+/// step with any period of the scanner.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thinning {
     share: f64,

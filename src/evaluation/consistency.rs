@@ -7,9 +7,10 @@ const EVERY: Span = Span::from_nanos(1_000_000_000);
 
 /// Whether the errors are as large as the estimator says.
 ///
-/// The normalised estimation error squared `e^T P^-1 e` (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to
-/// Tracking and Navigation, 2001, section 5.4) is chi-squared with three degrees of freedom, 3 on average, where the covariance
-/// P is right; above that the estimator believes too much. Errors are told in the map, against the first pose of both.
+/// The normalised estimation error squared `e^T P^-1 e` (Bar-Shalom, Li and Kirubarajan, Estimation with Applications
+/// to Tracking and Navigation, 2001, section 5.4) is chi-squared with three degrees of freedom, 3 on average, where the
+/// covariance P is right; above that the estimator believes too much. Errors are told in the map, against the first
+/// pose of both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Consistency {
     /// Mean over the run, of the position.
@@ -20,8 +21,8 @@ pub struct Consistency {
     pub end: [f64; 2],
 }
 
-/// Holds the errors of `pairs` against the covariances that the estimator gave at some of their stamps, in order of time.
-/// `None` where no covariance says anything.
+/// Holds the errors of `pairs` against the covariances that the estimator gave at some of their stamps, in order of
+/// time. `None` where no covariance says anything.
 pub fn consistency(pairs: &Pairs, covariances: &[(Stamp, PoseCovariance)]) -> Option<Consistency> {
     let map_from_world = pairs.estimate().first()? * pairs.truth().first()?.inverse();
     let mut next = *pairs.stamps().first()?;

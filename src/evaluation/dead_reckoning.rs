@@ -31,7 +31,8 @@ impl Default for Rest {
 ///
 /// The rest gives the gyroscope's bias (its mean) and down (the mean specific force, whose magnitude is taken for
 /// gravity's). From there attitude, velocity and position are integrated by the trapezoidal rule. Samples that run
-/// backwards in time or are not finite are left out. The map's origin is the IMU's place at rest, its heading arbitrary.
+/// backwards in time or are not finite are left out. The map's origin is the IMU's place at rest, its heading
+/// arbitrary.
 #[derive(Debug, Clone)]
 pub struct DeadReckoning {
     rest: Rest,
@@ -155,7 +156,8 @@ impl DeadReckoning {
         let _ = self.trajectory.push(sample.stamp, map_from_imu * self.imu_from_head);
     }
 
-    /// `map_from_head` ten times a second, on the IMU's clock; a recording that rests to its end lacks the last half second.
+    /// `map_from_head` ten times a second, on the IMU's clock; a recording that rests to its end lacks the last half
+    /// second.
     ///
     /// # Errors
     /// When the rest at the start was too short.
@@ -182,7 +184,8 @@ mod tests {
     use crate::geometry::{Kinematics, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
 
-    /// At rest for 2 s, then `x = a (1 - cos w s)^2 / 4` forward while pitching by the same law: smooth, back and forth.
+    /// At rest for 2 s, then `x = a (1 - cos w s)^2 / 4` forward while pitching by the same law: smooth, back and
+    /// forth.
     fn motion(t_s: f64) -> Kinematics {
         let (size, w) = (1.0, 1.5);
         let s = (t_s - 2.0).max(0.0);
@@ -217,7 +220,8 @@ mod tests {
 
     #[test]
     fn a_perfect_imu_finds_its_way_with_its_lever_arm_and_bias() {
-        // 2 mm and 0.02 degrees over 10 s at 1 kHz. The map's origin is the IMU at rest, level and facing as the head does.
+        // 2 mm and 0.02 degrees over 10 s at 1 kHz. The map's origin is the IMU at rest, level and facing as the head
+        // does.
         let head_from_imu = Pose::from_parts(Vector::new(0.02, -0.01, -0.06).into(), Rotation::identity());
         let found = reckon(&head_from_imu, Vector::new(0.01, -0.02, 0.005), 12.0).unwrap();
         let map_from_world = head_from_imu.inverse();

@@ -5,7 +5,8 @@ pub const ALIGNED_S: f64 = 20.0;
 /// Length of the stretch at the end over which the error is averaged, s.
 pub const TAIL_S: f64 = 5.0;
 
-/// A turn counts in the alignment as much as a shift by this times the angle, m: little beside a way that is not straight.
+/// A turn counts in the alignment as much as a shift by this times the angle, m: little beside a way that is not
+/// straight.
 const TURN_LEVER_M: f64 = 0.3;
 
 const SECONDS_PER_MINUTE: f64 = 60.0;
@@ -23,11 +24,11 @@ pub struct Drift {
 
 /// Drift of an estimate that is aligned over its first [`ALIGNED_S`] seconds alone.
 ///
-/// The estimate is aligned with the truth over the first 20 s, all six degrees of freedom: by positions, and by attitudes as
-/// far as positions do not tell (twenty seconds of a straight way leave the turn about it to chance). What counts is then the mean
-/// distance over the last [`TAIL_S`] seconds, by the minutes from the middle of the first stretch (where an even drift was
-/// aligned to nothing) to the middle of the last; for the yaw, the mean error over the last stretch less that over the
-/// first. So a planted, even drift is returned as it was planted.
+/// The estimate is aligned with the truth over the first 20 s, all six degrees of freedom: by positions, and by
+/// attitudes as far as positions do not tell (twenty seconds of a straight way leave the turn about it to chance). What
+/// counts is then the mean distance over the last [`TAIL_S`] seconds, by the minutes from the middle of the first
+/// stretch (where an even drift was aligned to nothing) to the middle of the last; for the yaw, the mean error over the
+/// last stretch less that over the first. So a planted, even drift is returned as it was planted.
 ///
 /// # Errors
 /// When the two stretches overlap, or the first has too little motion to align.
@@ -71,8 +72,8 @@ mod tests {
 
     #[test]
     fn an_even_drift_is_returned_as_planted() {
-        // 6 cm/min upwards. The alignment tilts a little to follow the drift within its 20 s (2 cm over a room of 6 m, of
-        // which what correlates with the path), so to a few per cent.
+        // 6 cm/min upwards. The alignment tilts a little to follow the drift within its 20 s (2 cm over a room of 6 m,
+        // of which what correlates with the path), so to a few per cent.
         let found = drift_of(|minutes| Pose::translation(0.0, 0.0, 0.06 * minutes));
         assert_relative_eq!(found.position_m_per_min, 0.06, max_relative = 0.05);
         assert!(found.yaw_rad_per_min < 1e-4);
@@ -90,7 +91,8 @@ mod tests {
         let pairs = Pairs::associate(&Trajectory::from_poses(turned).unwrap(), &yawed).unwrap();
         let found = drift(&pairs).unwrap();
         assert_relative_eq!(found.yaw_rad_per_min, 0.01, max_relative = 1e-6);
-        // The head's turn over the first 20 s, 1/600 rad from its mean at most, turns the alignment by a hundredth of itself.
+        // The head's turn over the first 20 s, 1/600 rad from its mean at most, turns the alignment by a hundredth of
+        // itself.
         assert!(found.position_m_per_min < 1e-4, "{found:?}");
     }
 

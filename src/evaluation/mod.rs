@@ -2,10 +2,10 @@
 //!
 //! A trajectory is judged by pairs of poses of one instant ([`Pairs`]), after a rigid alignment by their positions
 //! ([`align`], Umeyama without scale, as `evo_ape -a`): the absolute errors over time ([`Errors`]), the drift out of an
-//! alignment over the first seconds alone ([`drift()`]), the error of the motion within a minute ([`relative_error`]). A
-//! clock offset is judged by [`clock_error`], a cloud by its distances to the true surfaces ([`CloudErrors`]). Beside the
-//! estimate stands what the raw IMU alone would have said ([`DeadReckoning`]), and the least error that the measurements allow
-//! ([`Information`]).
+//! alignment over the first seconds alone ([`drift()`]), the error of the motion within a minute ([`relative_error`]).
+//! A clock offset is judged by [`clock_error`], a cloud by its distances to the true surfaces ([`CloudErrors`]). Beside
+//! the estimate stands what the raw IMU alone would have said ([`DeadReckoning`]), and the least error that the
+//! measurements allow ([`Information`]).
 //!
 //! Everything here is pure: numbers in, numbers out.
 

@@ -25,7 +25,8 @@ impl Pairs {
         Ok(pairs)
     }
 
-    /// The same, of a truth that is told pose by pose in order of time, and never held as a whole. There may be no pairs.
+    /// The same, of a truth that is told pose by pose in order of time, and never held as a whole. There may be no
+    /// pairs.
     ///
     /// # Errors
     /// When the truth cannot be told on.

@@ -2,10 +2,10 @@
 //!
 //! # Frames
 //!
-//! A transform is named for what it does: `world_from_head` takes a point's coordinates in the head to its coordinates in
-//! the world, so `point_in_world = world_from_head * point_in_head`, and `world_from_head * head_from_laser` composes. A
-//! vector is named for the frame it is written in: `velocity_in_world`. Frames are right-handed (REP-103): in a body x
-//! points forward, y left, z up; in the world z points up, against gravity.
+//! A transform is named for what it does: `world_from_head` takes a point's coordinates in the head to its coordinates
+//! in the world, so `point_in_world = world_from_head * point_in_head`, and `world_from_head * head_from_laser`
+//! composes. A vector is named for the frame it is written in: `velocity_in_world`. Frames are right-handed (REP-103):
+//! in a body x points forward, y left, z up; in the world z points up, against gravity.
 //!
 //! Positions are metres, angles radians, unless a name says otherwise.
 
@@ -32,8 +32,8 @@ pub type Rotation = nalgebra::UnitQuaternion<f64>;
 /// A rigid transform: rotation, then translation.
 pub type Pose = nalgebra::Isometry3<f64>;
 
-/// Covariance of a pose, of its position (m), then of its attitude (rad): a small turn in the axes of the frame that the pose is
-/// told in. The order of `geometry_msgs/PoseWithCovariance`.
+/// Covariance of a pose, of its position (m), then of its attitude (rad): a small turn in the axes of the frame that
+/// the pose is told in. The order of `geometry_msgs/PoseWithCovariance`.
 pub type PoseCovariance = nalgebra::Matrix6<f64>;
 
 /// Standard gravity, m/s^2 (CGPM 1901), along -z of the world.

@@ -3,12 +3,12 @@
 use super::{Pose, Rotation, Trajectory, Vector};
 use crate::time::Stamp;
 
-/// Tells a trajectory's pose at any instant, smoothly between its poses: for beams that are fired between the poses of an
-/// IMU's rate, where straight lines would cut the corners of a swing.
+/// Tells a trajectory's pose at any instant, smoothly between its poses: for beams that are fired between the poses of
+/// an IMU's rate, where straight lines would cut the corners of a swing.
 ///
-/// Between two poses it is a cubic in position and in the rotation vector from the first of the two, with the slopes that
-/// parabolas through three neighbouring poses have (Bessel tangents): exact for motion with constant acceleration, of
-/// third order in the poses' spacing for any other. Made for instants that go forward in time: the cubic is kept.
+/// Between two poses it is a cubic in position and in the rotation vector from the first of the two, with the slopes
+/// that parabolas through three neighbouring poses have (Bessel tangents): exact for motion with constant acceleration,
+/// of third order in the poses' spacing for any other. Made for instants that go forward in time: the cubic is kept.
 #[derive(Debug, Clone)]
 pub struct SmoothCursor<'a> {
     trajectory: &'a Trajectory,

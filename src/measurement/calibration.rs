@@ -37,7 +37,8 @@ impl LidarCorrection {
         self.turn * (reach * (1.0 + self.range_m / reach.norm()))
     }
 
-    /// What the calibration takes for the way to a point that is `reach` from the lidar, m: the inverse of [`Self::reach`].
+    /// What the calibration takes for the way to a point that is `reach` from the lidar, m: the inverse of
+    /// [`Self::reach`].
     pub fn calibrated(&self, reach: &Vector) -> Vector {
         self.turn.inverse() * (reach * (1.0 - self.range_m / reach.norm()))
     }

@@ -5,8 +5,8 @@ use crate::time::{Span, Stamp};
 pub struct LidarScan {
     /// When the first beam was fired, on the lidar's clock.
     pub stamp: Stamp,
-    /// How much later than that the sensor's own stamp is, which comes at an even pace where the first beam that came back
-    /// does not: zero of a sensor that stamps the start.
+    /// How much later than that the sensor's own stamp is, which comes at an even pace where the first beam that came
+    /// back does not: zero of a sensor that stamps the start.
     pub stamped_after: Span,
     /// The beams that came back, in the order in which they were fired.
     pub returns: Vec<LidarReturn>,

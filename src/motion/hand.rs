@@ -1,10 +1,10 @@
 //! The head carried by hand: where the hand goes, the gait of who walks, the wrist's rhythm that shakes the spring, and
 //! stops in which the hand holds the head.
 //!
-//! The shaking is open loop: the wrist turns at a rhythm whose strength and phase wander, near the head's resonance. A real
-//! hand feels the head and regulates its swing; here the head's damping and the rhythm's wandering phase, which takes it off
-//! resonance before the swing builds up, keep the swing within bounds. The rhythm's frequency is the spec's: for another
-//! head set `frequency_hz` to its rocking frequency.
+//! The shaking is open loop: the wrist turns at a rhythm whose strength and phase wander, near the head's resonance. A
+//! real hand feels the head and regulates its swing; here the head's damping and the rhythm's wandering phase, which
+//! takes it off resonance before the swing builds up, keep the swing within bounds. The rhythm's frequency is the
+//! spec's: for another head set `frequency_hz` to its rocking frequency.
 
 use super::jet::{Jet, PoseJet};
 use super::rhythm::{Rhythm, Wander};
@@ -100,8 +100,8 @@ pub struct ShakeSpec {
     /// Mean amplitude of roll, degrees.
     #[serde(deserialize_with = "non_negative")]
     pub roll_deg: f64,
-    /// Whether roll follows pitch a quarter of a beat later, so that the head circles like a lasso; else roll has a rhythm
-    /// of its own.
+    /// Whether roll follows pitch a quarter of a beat later, so that the head circles like a lasso; else roll has a
+    /// rhythm of its own.
     pub lasso: bool,
     /// Standard deviation of the amplitudes, as a share of their mean.
     #[serde(deserialize_with = "fraction")]

@@ -5,8 +5,8 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// The value of a function of time at an instant, with its first and second derivative by time.
 ///
-/// Sums and products of jets are the jets of sums and products (Leibniz), so that a motion written with them carries exact
-/// derivatives.
+/// Sums and products of jets are the jets of sums and products (Leibniz), so that a motion written with them carries
+/// exact derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Jet {
     /// Value.
@@ -163,8 +163,8 @@ mod tests {
 
     #[test]
     fn a_steady_cone_turns_as_euler_says() {
-        // Yaw at rate w with a constant pitch: omega = w z, no angular acceleration. With a roll rate r on top, the roll axis
-        // is carried round: alpha = w z x r c.
+        // Yaw at rate w with a constant pitch: omega = w z, no angular acceleration. With a roll rate r on top, the
+        // roll axis is carried round: alpha = w z x r c.
         let (w, r, pitch) = (0.8, 1.7, 0.4);
         let cone = PoseJet {
             yaw: Jet::linear(0.3, w, 0.0),

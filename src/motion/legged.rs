@@ -30,7 +30,8 @@ pub struct LeggedSpec {
     /// How far the strides wander off their beat, turns rms, at up to a tenth of their frequency.
     #[serde(deserialize_with = "non_negative")]
     pub irregularity_turns: f64,
-    /// What a stride does to the body, as its harmonics; all grow with the speed, to the amplitudes given at full speed.
+    /// What a stride does to the body, as its harmonics; all grow with the speed, to the amplitudes given at full
+    /// speed.
     pub harmonics: Vec<StrideSpec>,
 }
 

@@ -1,9 +1,9 @@
 //! A small vessel in waves.
 //!
-//! The sea is a sum of plane waves in deep water (`w^2 = g k`), with a JONSWAP spectrum; a peakedness of 1 makes it the one of
-//! Pierson and Moskowitz. The vessel follows the waves that are long against it, and the shorter the less: heave, pitch and
-//! roll are the surface's height and slopes averaged over its waterplane and taken off with depth, roll besides with its own
-//! resonance; surge and sway are those of the water.
+//! The sea is a sum of plane waves in deep water (`w^2 = g k`), with a JONSWAP spectrum; a peakedness of 1 makes it the
+//! one of Pierson and Moskowitz. The vessel follows the waves that are long against it, and the shorter the less:
+//! heave, pitch and roll are the surface's height and slopes averaged over its waterplane and taken off with depth,
+//! roll besides with its own resonance; surge and sway are those of the water.
 
 use super::jet::{Jet, PoseJet};
 use super::sines::{Line, Part, Sines, geometric_parts};
@@ -132,9 +132,9 @@ impl SeaSpec {
 impl HullSpec {
     /// How the hull follows a plane wave: surge, sway, heave (m), roll and pitch (rad).
     ///
-    /// With the height `Re(a exp(i w t - i k (x cos d + y sin d)))` the slopes forward and to the left are `-i k cos d a` and
-    /// `-i k sin d a`, and the water's own displacement is `-i a` along the wave. A slope up forward lifts the bow (pitch is
-    /// its negative), one up to the left lifts that side (roll is it).
+    /// With the height `Re(a exp(i w t - i k (x cos d + y sin d)))` the slopes forward and to the left are `-i k cos d
+    /// a` and `-i k sin d a`, and the water's own displacement is `-i a` along the wave. A slope up forward lifts the
+    /// bow (pitch is its negative), one up to the left lifts that side (roll is it).
     fn follows(&self, (freq_hz, height, direction): (f64, Complex<f64>, f64)) -> Line<5> {
         let rate = TAU * freq_hz;
         let k = rate * rate / STANDARD_GRAVITY_M_PER_S2;

@@ -1,9 +1,9 @@
 //! How the carrier moves: the pose of the base that the spring stands on, as a smooth function of time.
 //!
-//! A motion is data ([`MotionSpec`], the files of `specs/motions/`) until [`MotionSpec::build`] makes a [`BaseMotion`] of it,
-//! which answers for any instant with the pose and its exact first and second derivatives. There is no state and no step: a
-//! motion is a closed form of time (smoothed polylines, sums of sinusoids with seeded phases, splines), so that whoever asks,
-//! at whatever times and on whatever thread, gets the same bits.
+//! A motion is data ([`MotionSpec`], the files of `specs/motions/`) until [`MotionSpec::build`] makes a [`BaseMotion`]
+//! of it, which answers for any instant with the pose and its exact first and second derivatives. There is no state and
+//! no step: a motion is a closed form of time (smoothed polylines, sums of sinusoids with seeded phases, splines), so
+//! that whoever asks, at whatever times and on whatever thread, gets the same bits.
 //!
 //! The base's frame stands where the spring is clamped: x forward, y left, z up (REP-103).
 
@@ -42,8 +42,8 @@ use crate::geometry::Kinematics;
 
 /// The prescribed motion of the base.
 pub trait BaseMotion: Send + Sync {
-    /// How the base moves `t_s` seconds after the start: `world_from_base` with its exact derivatives. Accelerations are
-    /// continuous; at the start the base is at rest.
+    /// How the base moves `t_s` seconds after the start: `world_from_base` with its exact derivatives. Accelerations
+    /// are continuous; at the start the base is at rest.
     fn at(&self, t_s: f64) -> Kinematics;
 
     /// How firmly a hand holds the head still, from 0 (not at all) to 1.

@@ -1,9 +1,10 @@
 //! Sine and cosine by the turn, for sums of many sinusoids.
 //!
-//! Polynomials instead of the system's library: a loop over them is vectorised, and the bits are the same on every machine.
+//! Polynomials instead of the system's library: a loop over them is vectorised, and the bits are the same on every
+//! machine.
 
-/// Sine and cosine of `turns` whole turns, to 1e-15 for a fraction of a turn; an argument of `n` turns has the rounding of
-/// `n`. Below 2^49 turns.
+/// Sine and cosine of `turns` whole turns, to 1e-15 for a fraction of a turn; an argument of `n` turns has the rounding
+/// of `n`. Below 2^49 turns.
 #[inline]
 pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     // Adding 1.5 * 2^52 rounds to the nearest integer, and leaves it in the lowest bits.

@@ -1,8 +1,8 @@
 //! A recorded trajectory played again, from a file of poses or a recording.
 //!
-//! A natural cubic spline leads through the recorded poses, in position and in the components of the quaternion, which is
-//! then normalised: twice continuously differentiable, and through every pose. Play starts and ends by easing the time in
-//! and out, so that the base is at rest before and after, whatever the recording did.
+//! A natural cubic spline leads through the recorded poses, in position and in the components of the quaternion, which
+//! is then normalised: twice continuously differentiable, and through every pose. Play starts and ends by easing the
+//! time in and out, so that the base is at rest before and after, whatever the recording did.
 
 use super::jet::{Jet, PoseJet};
 use super::smooth::Way;
@@ -23,8 +23,8 @@ use std::path::Path;
 pub struct ReplaySpec {
     /// The poses `world_from_base`.
     pub poses: PosesSpec,
-    /// Whether the trajectory is moved and turned, about the vertical, so that it starts where the scene's route begins;
-    /// else it is played where it was recorded.
+    /// Whether the trajectory is moved and turned, about the vertical, so that it starts where the scene's route
+    /// begins; else it is played where it was recorded.
     pub from_route: bool,
     /// How long the base is at rest first, s.
     #[serde(deserialize_with = "non_negative")]
@@ -44,8 +44,8 @@ pub enum PosesSpec {
     Recording {
         /// The file, or the folder that holds it; a relative path is from the spec's folder.
         file: String,
-        /// The topic, of `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`; `/ground_truth/odom`, or the first such topic
-        /// by name, unless it is told.
+        /// The topic, of `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`; `/ground_truth/odom`, or the first such
+        /// topic by name, unless it is told.
         #[serde(default)]
         topic: Option<String>,
     },
@@ -186,8 +186,9 @@ struct Spline<const N: usize> {
 impl<const N: usize> Spline<N> {
     /// Through `values` at increasing times, at least two.
     ///
-    /// The second derivatives m solve `h[i-1] m[i-1] + 2 (h[i-1] + h[i]) m[i] + h[i] m[i+1] = 6 (slope[i] - slope[i-1])`
-    /// with zero at both ends: a tridiagonal system, by elimination (diagonally dominant, so without pivots).
+    /// The second derivatives m solve `h[i-1] m[i-1] + 2 (h[i-1] + h[i]) m[i] + h[i] m[i+1] = 6 (slope[i] -
+    /// slope[i-1])` with zero at both ends: a tridiagonal system, by elimination (diagonally dominant, so without
+    /// pivots).
     fn natural(times_s: Vec<f64>, values: Vec<[f64; N]>) -> Self {
         let count = times_s.len();
         let mut upper = vec![0.0; count];

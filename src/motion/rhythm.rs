@@ -8,8 +8,8 @@ use std::f64::consts::TAU;
 /// Sinusoids in a wander.
 const TERMS: usize = 6;
 
-/// A random process of zero mean and unit variance, with power below a bandwidth alone: few sinusoids of random phase, one
-/// frequency drawn in each of as many equal parts of the band, so that it does not repeat within a run.
+/// A random process of zero mean and unit variance, with power below a bandwidth alone: few sinusoids of random phase,
+/// one frequency drawn in each of as many equal parts of the band, so that it does not repeat within a run.
 #[derive(Debug, Clone)]
 pub(super) struct Wander(Sines<1>);
 
@@ -39,8 +39,8 @@ pub(super) struct Rhythm {
 }
 
 impl Rhythm {
-    /// A carrier at `frequency_hz` whose strength, 1 on average, has the standard deviation `strength_spread`, and whose
-    /// phase wanders by `phase_spread` radians rms, both with power up to `bandwidth_hz`.
+    /// A carrier at `frequency_hz` whose strength, 1 on average, has the standard deviation `strength_spread`, and
+    /// whose phase wanders by `phase_spread` radians rms, both with power up to `bandwidth_hz`.
     pub fn new(frequency_hz: f64, spreads: (f64, f64), bandwidth_hz: f64, stream: &mut Stream) -> Self {
         let (strength_spread, phase_spread) = spreads;
         let strength = Wander::new(bandwidth_hz, stream);

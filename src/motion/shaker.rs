@@ -83,8 +83,8 @@ pub enum SignalSpec {
         /// Amplitude, held over the sweep.
         amplitude: Level,
     },
-    /// Equal sines at the multiples of `1 / period_s` within a band: periodic, so that a spectrum over whole periods does
-    /// not leak.
+    /// Equal sines at the multiples of `1 / period_s` within a band: periodic, so that a spectrum over whole periods
+    /// does not leak.
     Multisine {
         /// The period, s.
         #[serde(deserialize_with = "positive")]
@@ -263,8 +263,8 @@ impl DriveSpec {
     }
 }
 
-/// Equal sines at the multiples `first..=last` of `1 / period_s`, with random phases, or without a stream for them with the
-/// phases `-pi k (k - 1) / n` (Schroeder 1970).
+/// Equal sines at the multiples `first..=last` of `1 / period_s`, with random phases, or without a stream for them with
+/// the phases `-pi k (k - 1) / n` (Schroeder 1970).
 fn multisine((first, last): (u32, u32), period_s: f64, level: Level, mut random: Option<&mut Stream>) -> Sines<1> {
     let count = f64::from(last - first + 1);
     let line = |multiple: u32| {

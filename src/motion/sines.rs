@@ -85,7 +85,8 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// The complex amplitude of a sinusoid with the power of a one-sided `density` over this part: `sqrt(2 density width)`.
+    /// The complex amplitude of a sinusoid with the power of a one-sided `density` over this part: `sqrt(2 density
+    /// width)`.
     pub fn amplitude(&self, density: f64) -> Complex<f64> {
         self.phase * (2.0 * density * self.width).sqrt()
     }

@@ -1,8 +1,9 @@
 //! Piecewise motion made smooth: what is constant or linear in pieces, convolved with a bump.
 //!
-//! The bump is the triweight kernel `k(u) = 35/32 (1 - u^2)^3` on -1..1, stretched over a half-width in time. A smoothed
-//! quantity is a moving average: it never leaves the range (a position: the convex hull) of what it averages, has compact
-//! memory, and a position made of straight pieces gets three continuous derivatives, a level made of steps as many.
+//! The bump is the triweight kernel `k(u) = 35/32 (1 - u^2)^3` on -1..1, stretched over a half-width in time. A
+//! smoothed quantity is a moving average: it never leaves the range (a position: the convex hull) of what it averages,
+//! has compact memory, and a position made of straight pieces gets three continuous derivatives, a level made of steps
+//! as many.
 
 use super::jet::Jet;
 use crate::geometry::Vector;
@@ -121,7 +122,8 @@ impl Steps {
     }
 }
 
-/// A way through space in straight pieces of constant velocity, smoothed; at rest before the first and after the last knot.
+/// A way through space in straight pieces of constant velocity, smoothed; at rest before the first and after the last
+/// knot.
 #[derive(Debug, Clone)]
 pub(super) struct Way {
     half_s: f64,
@@ -252,7 +254,8 @@ mod tests {
 
     #[test]
     fn a_corner_is_cut_by_a_known_distance() {
-        // At the corner the smoothed ramp stands half_s * E[max(0, u)] = half_s * 35/256 off, along the change of velocity.
+        // At the corner the smoothed ramp stands half_s * E[max(0, u)] = half_s * 35/256 off, along the change of
+        // velocity.
         let mut way = Way::new(Vector::zeros(), 0.0, 0.8);
         way.go(Vector::new(2.0, 0.0, 0.0), 2.0);
         way.go(Vector::new(2.0, 2.0, 0.0), 2.0);

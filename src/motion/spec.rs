@@ -48,8 +48,8 @@ impl MotionSpec {
     /// `seed`. `source` is the spec's text, which errors point into.
     ///
     /// # Errors
-    /// When numbers of the spec contradict each other, the route is missing or cannot be followed, or the duration is not
-    /// a length of time.
+    /// When numbers of the spec contradict each other, the route is missing or cannot be followed, or the duration is
+    /// not a length of time.
     pub fn build(
         &self,
         source: &Source,

@@ -9,9 +9,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// How a walker follows a route.
 ///
-/// The walk is the route at piecewise constant speed, convolved with a bump in time ([`super`]): corners are cut by at most
-/// `0.137 smoothing_s |change of velocity|`, and the speed never exceeds `speed_m_per_s`. At the end of an open route the
-/// walker turns round and goes back; a closed one is walked round and round.
+/// The walk is the route at piecewise constant speed, convolved with a bump in time ([`super`]): corners are cut by at
+/// most `0.137 smoothing_s |change of velocity|`, and the speed never exceeds `speed_m_per_s`. At the end of an open
+/// route the walker turns round and goes back; a closed one is walked round and round.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WalkSpec {
@@ -98,8 +98,8 @@ impl WalkSpec {
     }
 }
 
-/// The points that a walker who stands on point 0 visits, each with the one after it, for ever: round a closed route, to and
-/// fro on an open one.
+/// The points that a walker who stands on point 0 visits, each with the one after it, for ever: round a closed route,
+/// to and fro on an open one.
 fn visits(points: usize, closed: bool) -> impl Iterator<Item = (usize, usize)> {
     let period = if closed { points } else { 2 * (points - 1) };
     let point = move |visit: usize| {

@@ -9,7 +9,7 @@ pub struct CloudPoint {
     pub intensity: f32,
     /// When its beam was fired, on the lidar's clock.
     pub stamp: Stamp,
-    /// Standard deviation of its place, m: the root of the mean square of its distance from its true place; NaN where that
-    /// is not known.
+    /// Standard deviation of its place, m: the root of the mean square of its distance from its true place; NaN where
+    /// that is not known.
     pub error_m: f32,
 }

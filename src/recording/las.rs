@@ -21,8 +21,8 @@ const EXTRA_BYTES_RECORD: u16 = 4;
 const ABOUT: &str = "metres in the map; gps_time is seconds on the lidar's clock; intensity in the sensor's unit, rounded; \
                      error (extra bytes) is the standard deviation of the point's place, metres";
 
-/// Writes points as they come: x, y, z to a tenth of a millimetre, intensity rounded to a whole number from 0 to 65535, the
-/// lidar's time in seconds as GPS time, and `error` in metres as an extra dimension.
+/// Writes points as they come: x, y, z to a tenth of a millimetre, intensity rounded to a whole number from 0 to 65535,
+/// the lidar's time in seconds as GPS time, and `error` in metres as an extra dimension.
 pub struct LasWriter<W: Write + Seek + Send + Sync + 'static> {
     writer: las::Writer<Patient<BufWriter<W>>>,
     failure: Arc<OnceLock<io::Error>>,

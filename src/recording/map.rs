@@ -1,6 +1,5 @@
-//! Maps as PLY: surfels with their uncertainty, which CloudCompare and Open3D show as points with normals. The format is
-//! told in
-//! `docs/maps.md`.
+//! Maps as PLY: surfels with their uncertainty, which CloudCompare and Open3D show as points with normals. The format
+//! is told in `docs/maps.md`.
 
 use super::ply::header::{self, Form, Header, Problem, Property, Scalar};
 use crate::geometry::{Matrix, Vector};
@@ -63,8 +62,8 @@ pub fn read_surfel_map(path: &Path) -> Result<SurfelMap, RecordingError> {
 /// Reads a map from `input`, which messages call `name`.
 ///
 /// # Errors
-/// When it is no map of ours, of another version, ends early or goes on, is damaged (by its checksum), or holds what is no
-/// surfel.
+/// When it is no map of ours, of another version, ends early or goes on, is damaged (by its checksum), or holds what is
+/// no surfel.
 pub fn parse_surfel_map(name: &str, input: impl Read) -> Result<SurfelMap, RecordingError> {
     let mut input = BufReader::with_capacity(1 << 16, input);
     read(&mut input).map_err(|(line, problem)| RecordingError::Line { name: name.to_owned(), line, problem })

@@ -9,8 +9,8 @@ use crate::recording::order::InOrder;
 use crate::recording::selection::LidarKind;
 use crate::recording::{Loss, Reader, RecordingError, Selection};
 
-/// Reads measurements in the order of their stamps, whenever they were logged: half a second of them waits for its turn, and where
-/// one of the sensors lags behind the other as much as thirty.
+/// Reads measurements in the order of their stamps, whenever they were logged: half a second of them waits for its
+/// turn, and where one of the sensors lags behind the other as much as thirty.
 ///
 /// An item is an error only where the file cannot be read on. Messages that cannot be used are left out and counted in
 /// [`loss`](Self::loss).

@@ -11,12 +11,13 @@ use crate::recording::{Reader, RecordingError};
 const TYPES: [MessageType; 2] = [MessageType::Odometry, MessageType::PoseStamped];
 
 impl Reader {
-    /// The poses of `topic`, `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`, in the frame and at the stamps that its
-    /// messages tell; unless one is named those of `/ground_truth/odom`, or where that is not, of the first such topic by name.
+    /// The poses of `topic`, `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`, in the frame and at the stamps that
+    /// its messages tell; unless one is named those of `/ground_truth/odom`, or where that is not, of the first such
+    /// topic by name.
     ///
     /// # Errors
-    /// When there is no such topic, its stamps do not increase, or not all of the file could be read: a trajectory with gaps
-    /// would be another one.
+    /// When there is no such topic, its stamps do not increase, or not all of the file could be read: a trajectory with
+    /// gaps would be another one.
     pub fn poses(&self, topic: Option<&str>) -> Result<Trajectory, RecordingError> {
         let (topic, kind) = self.pose_topic(topic)?;
         let ids = self.ids_of(topic);

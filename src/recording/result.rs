@@ -19,9 +19,9 @@ const CLOUD_PERIOD: Span = Span::from_nanos(500_000_000);
 /// Most points in one message of `/cloud`: 20 bytes each.
 const CLOUD_POINTS: usize = 50_000;
 
-/// Writes an estimate to a new MCAP file at `path`: `/path`, `/pose` (with the covariances that are given, each at the stamp
-/// of a pose, in order of time), `/tf` (`map` to `body_frame`, a transform a pose) and
-/// `/cloud` (x, y, z, intensity, error, in `map`), which takes the points in the order in which they come.
+/// Writes an estimate to a new MCAP file at `path`: `/path`, `/pose` (with the covariances that are given, each at the
+/// stamp of a pose, in order of time), `/tf` (`map` to `body_frame`, a transform a pose) and `/cloud` (x, y, z,
+/// intensity, error, in `map`), which takes the points in the order in which they come.
 ///
 /// # Errors
 /// When the file cannot be made or written, or a stamp does not fit a message.

@@ -71,9 +71,9 @@ const LOOKED_AT: usize = 20;
 const IMU_ENDINGS: [&str; 3] = ["imu/data_raw", "imu/data", "imu"];
 
 impl Reader {
-    /// Finds the lidar and the IMU: of lidars one that `/tf_static`, where there is one, puts beside the IMU. A `LaserScan`
-    /// whose beams' times are told is taken first, then a `PointCloud2` whose points have times; of several the first by
-    /// name. Truth, the recording's own, is never a candidate.
+    /// Finds the lidar and the IMU: of lidars one that `/tf_static`, where there is one, puts beside the IMU. A
+    /// `LaserScan` whose beams' times are told is taken first, then a `PointCloud2` whose points have times; of several
+    /// the first by name. Truth, the recording's own, is never a candidate.
     ///
     /// # Errors
     /// When there is no lidar or no IMU, or not the one that is asked for.

@@ -1,8 +1,8 @@
 //! From messages to the file: gathered to chunks here, compressed and written on a thread of their own.
 //!
 //! A batch of messages becomes one chunk, which reaches the system in whole before the next is begun: a process that is
-//! killed loses the batches that were on their way, and nothing before them. At most [`BATCHES`] batches exist, so memory
-//! does not grow with the recording; their bytes do not depend on how threads are scheduled.
+//! killed loses the batches that were on their way, and nothing before them. At most [`BATCHES`] batches exist, so
+//! memory does not grow with the recording; their bytes do not depend on how threads are scheduled.
 
 use crate::recording::RecordingError;
 use crate::recording::cdr::Encoder;

@@ -25,8 +25,8 @@ pub struct BaseImuDescription {
     pub noise: ImuNoise,
     /// Its rate, Hz.
     pub rate_hz: f64,
-    /// Where the base is when nothing moves. `/tf_static` says this of it, as a robot's description does of a joint without
-    /// an encoder: where the spring has it since, nobody measures.
+    /// Where the base is when nothing moves. `/tf_static` says this of it, as a robot's description does of a joint
+    /// without an encoder: where the spring has it since, nobody measures.
     pub head_from_base: Pose,
 }
 

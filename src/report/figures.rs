@@ -111,7 +111,8 @@ fn pitches(trajectory: &Trajectory, origin: Stamp) -> Vec<(f64, f64)> {
     trajectory.iter().map(|(stamp, pose)| (stamp.seconds_since(origin), nose_up(&pose.rotation))).collect()
 }
 
-/// How much later the IMU stamps an instant than the lidar does, over lidar time: estimated, and true where that is known.
+/// How much later the IMU stamps an instant than the lidar does, over lidar time: estimated, and true where that is
+/// known.
 pub fn clock_offset(truth: &[(Stamp, f64)], estimate: &[(Stamp, f64)]) -> Figure {
     let origin = truth.first().or(estimate.first()).map(|(stamp, _)| *stamp).unwrap_or_default();
     let curve = |offsets: &[(Stamp, f64)]| -> Vec<(f64, f64)> {

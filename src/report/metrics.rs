@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// All figures of a run, in SI units but for angles, in degrees. `None` (`null` in the file) is what is not known: there
-/// was no truth, or the capability is not there.
+/// All figures of a run, in SI units but for angles, in degrees. `None` (`null` in the file) is what is not known:
+/// there was no truth, or the capability is not there.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Metrics {
@@ -149,8 +149,8 @@ pub struct CloudMetrics {
     pub p95_m: Option<f64>,
     /// Share of the points more than a metre from any surface, which are in none of the figures of distance.
     pub far_fraction: Option<f64>,
-    /// Share of the beams that truly ended on what carries the lidar. They are in the cloud, and in none of the figures of
-    /// distance, as none of them is of a surface that stands.
+    /// Share of the beams that truly ended on what carries the lidar. They are in the cloud, and in none of the figures
+    /// of distance, as none of them is of a surface that stands.
     pub on_carrier_fraction: Option<f64>,
     /// Share of the beams that truly ended on what moves through the scene; left out likewise.
     pub on_movers_fraction: Option<f64>,

@@ -6,7 +6,8 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle
 /// Widest table, columns.
 const WIDTH: u16 = 80;
 
-/// A table without lines between its rows. The first column is words; the others are aligned right when `numbers` is set.
+/// A table without lines between its rows. The first column is words; the others are aligned right when `numbers` is
+/// set.
 pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     let mut table = Table::new();
     let rule = LineStyle::none().left('\u{2500}').fill('\u{2500}').junction('\u{2500}').right('\u{2500}');

@@ -27,7 +27,8 @@ impl Cylinder {
     /// The first of its surfaces that a ray of the base's frame meets in front of its origin.
     fn first_hit(&self, origin: &Vector, direction: &Vector) -> Option<SurfaceHit> {
         let from = origin - self.foot_in_base;
-        // Along |(from + s direction).xy|^2 = a s^2 + 2 b s + c + radius^2 most rays go away from the axis, or pass it by.
+        // Along |(from + s direction).xy|^2 = a s^2 + 2 b s + c + radius^2 most rays go away from the axis, or pass it
+        // by.
         let a = direction.xy().norm_squared();
         let b = from.xy().dot(&direction.xy());
         let c = from.xy().norm_squared() - self.radius_m * self.radius_m;
@@ -157,7 +158,8 @@ mod tests {
         };
         assert_relative_eq!(range(Vector::x() * 0.7, -Vector::y(), 0.7).unwrap(), 0.3, epsilon = 1e-9);
         assert!(range(Vector::zeros(), -Vector::y(), 0.7).is_none(), "it was there at the start, not any more");
-        // Along x at y = -0.5: the operator stands at 0.7 m, its near side at 0.5, the wall at 3; a wall before it hides it.
+        // Along x at y = -0.5: the operator stands at 0.7 m, its near side at 0.5, the wall at 3; a wall before it
+        // hides it.
         let along = Vector::new(0.0, -0.5, 0.0);
         assert_relative_eq!(range(along, Vector::x(), 0.7).unwrap(), 0.5, epsilon = 1e-9);
         assert_relative_eq!(range(along + Vector::y(), Vector::x(), 0.7).unwrap(), 3.0, epsilon = 1e-9);

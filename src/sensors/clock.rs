@@ -41,9 +41,9 @@ pub struct Clocks {
 
 /// A sensor's clock: what it says at a true time, jitter aside.
 ///
-/// True time `t` is counted in seconds from the start of the run, `epoch`. The crystal says
-/// `epoch + offset + (1 + rate) t`, and the sensor takes its samples by its own crystal. Stamps are the crystal's reading
-/// rounded down to the resolution, so on average they lag by half of that: [`Clock::stamp_of`] is this mean.
+/// True time `t` is counted in seconds from the start of the run, `epoch`. The crystal says `epoch + offset + (1 +
+/// rate) t`, and the sensor takes its samples by its own crystal. Stamps are the crystal's reading rounded down to the
+/// resolution, so on average they lag by half of that: [`Clock::stamp_of`] is this mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
     epoch: Stamp,
@@ -123,8 +123,9 @@ impl Clock {
 
     /// The first instant of the crystal from `stamp` on that lies half-way between two ticks of the resolution.
     ///
-    /// A sensor that starts there, and whose period is a whole number of ticks, loses exactly half a tick by rounding: the
-    /// mean that [`Clock::ahead`] counts with. Started on a tick it would lose nothing, and the mean would be wrong.
+    /// A sensor that starts there, and whose period is a whole number of ticks, loses exactly half a tick by rounding:
+    /// the mean that [`Clock::ahead`] counts with. Started on a tick it would lose nothing, and the mean would be
+    /// wrong.
     pub fn half_tick_from(&self, stamp: Stamp) -> Stamp {
         let half = self.half_tick();
         let tick = (stamp - half).floor_to(self.resolution);

@@ -10,12 +10,12 @@ const CUT: f64 = 5.0;
 
 /// The stamps that a clock gives to samples taken evenly by its crystal: with jitter, rounded down, and in order.
 ///
-/// Jitter changes stamps, never the order of samples: a driver passes them on in the order in which they were taken, with
-/// stamps that increase strictly. Where jitter would put a stamp before its predecessor's, the two stamps are exchanged:
-/// sample `k` gets the `k`-th smallest of all the noisy stamps. Holding each stamp back to its predecessor's instead
-/// would make them late on average; sorting leaves the mean of the stamps as it is, so that the clock's offset is what the
-/// spec says even where jitter exceeds the period (its spread is then less than the spec's). Two stamps that rounding
-/// makes equal are set 1 ns apart.
+/// Jitter changes stamps, never the order of samples: a driver passes them on in the order in which they were taken,
+/// with stamps that increase strictly. Where jitter would put a stamp before its predecessor's, the two stamps are
+/// exchanged: sample `k` gets the `k`-th smallest of all the noisy stamps. Holding each stamp back to its predecessor's
+/// instead would make them late on average; sorting leaves the mean of the stamps as it is, so that the clock's offset
+/// is what the spec says even where jitter exceeds the period (its spread is then less than the spec's). Two stamps
+/// that rounding makes equal are set 1 ns apart.
 #[derive(Debug, Clone)]
 pub struct Stamper {
     clock: Clock,
@@ -49,7 +49,8 @@ impl Iterator for Stamper {
 
     /// The stamp of the next sample; there is always one.
     fn next(&mut self) -> Option<Stamp> {
-        // A later sample comes before this one only if their jitters differ by the time between them, 2 CUT sigma at most.
+        // A later sample comes before this one only if their jitters differ by the time between them, 2 CUT sigma at
+        // most.
         let reach = (2.0 * CUT * self.clock.jitter_s() / self.period_s).ceil() as u64;
         while self.drawn <= self.given + reach {
             let stamp = self.draw();

@@ -3,10 +3,11 @@ use nalgebra::{Quaternion, Unit};
 
 /// How a frame moved during a while: its kinematics at evenly spaced instants, and the pose at any instant between.
 ///
-/// Poses are interpolated by cubic Hermite polynomials in position and in the rotation vector from one instant to the next
-/// (as [`Kinematics::pose_towards`] does), with their coefficients worked out once a step. For a sinusoid of frequency `f`
-/// and amplitude `A` the error is at most `A (2 pi f h)^4 / 384`: at 100 Hz, 1 mm and steps of 1 ms, 0.4 um; a head on
-/// a spring moves at 20 Hz and less. A step turns by less than 0.1 rad, else the series used here lose digits.
+/// Poses are interpolated by cubic Hermite polynomials in position and in the rotation vector from one instant to the
+/// next (as [`Kinematics::pose_towards`] does), with their coefficients worked out once a step. For a sinusoid of
+/// frequency `f` and amplitude `A` the error is at most `A (2 pi f h)^4 / 384`: at 100 Hz, 1 mm and steps of 1 ms, 0.4
+/// um; a head on a spring moves at 20 Hz and less. A step turns by less than 0.1 rad, else the series used here lose
+/// digits.
 #[derive(Debug, Clone)]
 pub struct Track {
     first: u64,

@@ -1,8 +1,8 @@
 //! Overlapping Allan deviation, its equivalent degrees of freedom and its confidence band.
 //!
-//! Formulas: W. J. Riley, Handbook of Frequency Stability Analysis, NIST Special Publication 1065 (2008). A gyroscope's rate
-//! (or an accelerometer's specific force) stands where the handbook has fractional frequency, its integral where it has
-//! phase.
+//! Formulas: W. J. Riley, Handbook of Frequency Stability Analysis, NIST Special Publication 1065 (2008). A gyroscope's
+//! rate (or an accelerometer's specific force) stands where the handbook has fractional frequency, its integral where
+//! it has phase.
 
 use super::chi_squared_quantile;
 
@@ -29,12 +29,13 @@ impl AllanPoint {
 
 /// The overlapping Allan deviation of `samples` taken at `rate_hz`, at the averaging times `averaging[i] / rate_hz`.
 ///
-/// `sigma^2(m tau0) = sum_k (x[k+2m] - 2 x[k+m] + x[k])^2 / (2 (m tau0)^2 (n - 2m))` over the `n` points of the integral x
-/// (SP 1065, eq. 11). An averaging factor of zero, or one that needs more samples than there are (`2 m` of them), has no
-/// point in the result.
+/// `sigma^2(m tau0) = sum_k (x[k+2m] - 2 x[k+m] + x[k])^2 / (2 (m tau0)^2 (n - 2m))` over the `n` points of the
+/// integral x (SP 1065, eq. 11). An averaging factor of zero, or one that needs more samples than there are (`2 m` of
+/// them), has no point in the result.
 ///
-/// The degrees of freedom depend on the kind of noise, which is told at each averaging time from the autocorrelation of the
-/// averaged samples (SP 1065, section 5.5.6), and where they are too few for that, taken from the last time that had enough.
+/// The degrees of freedom depend on the kind of noise, which is told at each averaging time from the autocorrelation of
+/// the averaged samples (SP 1065, section 5.5.6), and where they are too few for that, taken from the last time that
+/// had enough.
 pub fn allan_deviation(samples: &[f64], rate_hz: f64, averaging: &[usize]) -> Vec<AllanPoint> {
     let integral = integral_of(samples);
     let mut noise = Noise::White;
@@ -51,8 +52,8 @@ pub fn allan_deviation(samples: &[f64], rate_hz: f64, averaging: &[usize]) -> Ve
     points
 }
 
-/// The running sum of `samples` about their mean, from 0: their integral in units of a sample's time. The mean, which the
-/// Allan deviation does not see, is taken off so that sums of hours lose no digits.
+/// The running sum of `samples` about their mean, from 0: their integral in units of a sample's time. The mean, which
+/// the Allan deviation does not see, is taken off so that sums of hours lose no digits.
 fn integral_of(samples: &[f64]) -> Vec<f64> {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     let mut sum = 0.0;
@@ -194,8 +195,8 @@ mod tests {
 
     #[test]
     fn white_noise_falls_and_a_random_walk_rises_with_the_root_of_time() {
-        // Unit white samples averaged over m: sigma = 1 / sqrt(m). A walk of unit steps: sigma^2 = (2 m^2 + 1) / (6 m), exact
-        // for sampled averages. Four standard errors of a deviation are 4 / sqrt(2 edf).
+        // Unit white samples averaged over m: sigma = 1 / sqrt(m). A walk of unit steps: sigma^2 = (2 m^2 + 1) / (6 m),
+        // exact for sampled averages. Four standard errors of a deviation are 4 / sqrt(2 edf).
         let within = |point: &AllanPoint, expected: f64| {
             assert_relative_eq!(point.deviation, expected, max_relative = 4.0 / (2.0 * point.edf).sqrt());
         };

@@ -2,8 +2,8 @@
 
 /// The value that a chi-squared variable of `degrees` degrees of freedom stays below with the given `probability`.
 ///
-/// `degrees` need not be whole. Solves `P(degrees / 2, x / 2) = probability` by bisection, to 1e-12 of the value; NaN where
-/// `probability` is outside 0..1 or `degrees` is not above zero.
+/// `degrees` need not be whole. Solves `P(degrees / 2, x / 2) = probability` by bisection, to 1e-12 of the value; NaN
+/// where `probability` is outside 0..1 or `degrees` is not above zero.
 pub fn chi_squared_quantile(probability: f64, degrees: f64) -> f64 {
     if !((0.0..1.0).contains(&probability) && degrees > 0.0 && degrees.is_finite()) {
         return f64::NAN;
@@ -24,8 +24,8 @@ pub fn chi_squared_quantile(probability: f64, degrees: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The regularised lower incomplete gamma function `P(a, x)`: its series below `a + 1`, else the continued fraction of its
-/// complement (Abramowitz & Stegun 6.5.29 and 6.5.31).
+/// The regularised lower incomplete gamma function `P(a, x)`: its series below `a + 1`, else the continued fraction of
+/// its complement (Abramowitz & Stegun 6.5.29 and 6.5.31).
 fn lower_gamma(a: f64, x: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;

@@ -63,8 +63,9 @@ impl Segments {
         Ok((samples - length) / (length - overlap) + 1)
     }
 
-    /// The number of independent averages that `count` overlapping segments of white noise are worth (Welch 1967, eq. 12):
-    /// `count / (1 + 2 sum_j (1 - j / count) rho_j)` with `rho_j` the squared correlation of a window with itself `j` hops on.
+    /// The number of independent averages that `count` overlapping segments of white noise are worth (Welch 1967, eq.
+    /// 12): `count / (1 + 2 sum_j (1 - j / count) rho_j)` with `rho_j` the squared correlation of a window with itself
+    /// `j` hops on.
     pub fn averages(&self, count: usize) -> f64 {
         let weights = self.window.weights(self.length);
         let hop = self.length - self.overlap;
@@ -142,7 +143,8 @@ mod tests {
 
     #[test]
     fn half_overlapped_hann_windows_are_worth_nearly_as_many_averages() {
-        // Welch 1967: Hann windows at 50 % correlate by 1/6, squared 1/36: each is worth 1 / (1 + 2/36) = 0.947 averages.
+        // Welch 1967: Hann windows at 50 % correlate by 1/6, squared 1/36: each is worth 1 / (1 + 2/36) = 0.947
+        // averages.
         let averages = Segments::hann(1024).averages(10_000);
         assert_relative_eq!(averages / 10_000.0, 36.0 / 38.0, epsilon = 1e-5);
         assert_relative_eq!(Segments::periods(100).averages(7), 7.0);

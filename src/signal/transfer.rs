@@ -11,8 +11,8 @@ pub struct TransferPoint {
     pub freq_hz: f64,
     /// Output over input: the modulus is the gain, the argument the phase. NaN where the input has no power.
     pub response: Complex<f64>,
-    /// Share of the output's power that the input explains, 0..1: a gain means little where this is low. Zero where either
-    /// has no power.
+    /// Share of the output's power that the input explains, 0..1: a gain means little where this is low. Zero where
+    /// either has no power.
     pub coherence: f64,
     /// Standard error of the gain, in the gain's unit.
     pub gain_sigma: f64,
@@ -27,11 +27,12 @@ impl TransferPoint {
     }
 }
 
-/// The H1 estimate `S_xy / S_xx` of the transfer function from `input` to `output`, sampled together at `rate_hz`, with the
-/// coherence `|S_xy|^2 / (S_xx S_yy)`: noise on the output does not bias it.
+/// The H1 estimate `S_xy / S_xx` of the transfer function from `input` to `output`, sampled together at `rate_hz`, with
+/// the coherence `|S_xy|^2 / (S_xx S_yy)`: noise on the output does not bias it.
 ///
-/// The gain's relative standard error is `sqrt((1 - c) / (2 n c))` with coherence `c` over `n` averages (Bendat & Piersol,
-/// Random Data, section 9.2). One average alone says nothing of coherence (it is 1 then): average several segments.
+/// The gain's relative standard error is `sqrt((1 - c) / (2 n c))` with coherence `c` over `n` averages (Bendat &
+/// Piersol, Random Data, section 9.2). One average alone says nothing of coherence (it is 1 then): average several
+/// segments.
 ///
 /// # Errors
 /// When the two do not match, there is not one segment, or a sample is not finite.

@@ -123,8 +123,8 @@ impl<'a> Sensors<'a> {
     }
 }
 
-/// Takes all samples that are over by the end of `window`, by sensors that differ in the IMUs and the lidar's errors alone:
-/// what each of them delivers. Counts them in `summaries`.
+/// Takes all samples that are over by the end of `window`, by sensors that differ in the IMUs and the lidar's errors
+/// alone: what each of them delivers. Counts them in `summaries`.
 pub(super) fn measure(
     sensors: &mut [Sensors],
     window: Window,

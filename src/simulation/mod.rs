@@ -1,7 +1,7 @@
 //! From a checked scenario to measurements and truth.
 //!
-//! A [`Scenario`] names specs; a [`Simulation`] is these specs found, checked and built; [`Simulation::run`] moves the head
-//! and gives a sink what the sensors say and what really happened, in the order of true time. Below it stands
+//! A [`Scenario`] names specs; a [`Simulation`] is these specs found, checked and built; [`Simulation::run`] moves the
+//! head and gives a sink what the sensors say and what really happened, in the order of true time. Below it stands
 //! [`simulate`], the same for sensors on a head ([`Rig`]) that moves in any way ([`HeadMotion`]) through any scenery.
 
 mod deliver;

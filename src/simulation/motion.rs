@@ -8,8 +8,8 @@ use std::collections::VecDeque;
 /// Time between the instants of a [`HeadMotion`], s.
 pub const STEP_S: f64 = 1e-3;
 
-/// A head in motion, at 0, [`STEP_S`], 2 [`STEP_S`], ...: a [`HeadSimulation`](crate::dynamics::HeadSimulation) in steps of
-/// [`STEP_S`], or whatever else tells how a head moves.
+/// A head in motion, at 0, [`STEP_S`], 2 [`STEP_S`], ...: a [`HeadSimulation`](crate::dynamics::HeadSimulation) in
+/// steps of [`STEP_S`], or whatever else tells how a head moves.
 pub type HeadMotion<'a> = dyn Iterator<Item = Result<HeadState, DynamicsError>> + Send + 'a;
 
 /// The motion in a while: instants `first`, `first + 1`, ... of [`STEP_S`] each.
@@ -22,8 +22,8 @@ pub(super) struct Window {
     pub until_s: f64,
 }
 
-/// Cuts a motion into windows. Each begins `overlap` instants before the last one's end, so that a scan or a sample which
-/// began then lies in one window.
+/// Cuts a motion into windows. Each begins `overlap` instants before the last one's end, so that a scan or a sample
+/// which began then lies in one window.
 pub(super) struct Windows<'a, 'm> {
     motion: &'a mut HeadMotion<'m>,
     recent: VecDeque<HeadState>,

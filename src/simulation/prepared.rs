@@ -116,8 +116,8 @@ impl Simulation {
         simulate(&self.rig(), &mut motion, sink, progress)
     }
 
-    /// Runs simulations that [share their rays](Self::shares_rays_with), each into a sink of its own, which is given the same
-    /// as from a run alone: physics and rays are done once.
+    /// Runs simulations that [share their rays](Self::shares_rays_with), each into a sink of its own, which is given
+    /// the same as from a run alone: physics and rays are done once.
     ///
     /// # Errors
     /// When they do not share them, the head's motion fails, or a sink refuses.

@@ -49,7 +49,8 @@ impl Rig<'_> {
         EPOCH + Span::from_seconds(t_s)
     }
 
-    /// Instants of motion that a sample may reach back to before a window: the longest sample, and one step on either side.
+    /// Instants of motion that a sample may reach back to before a window: the longest sample, and one step on either
+    /// side.
     pub(super) fn overlap(&self) -> usize {
         let base_imu_s = self.base_imu.map_or(0.0, Imu::period_s);
         let longest_s = self.imu.period_s().max(self.lidar.period_s()).max(base_imu_s);

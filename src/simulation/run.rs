@@ -15,10 +15,10 @@ const DURATION_S: (f64, f64) = (0.1, 1e6);
 
 /// Simulates `rig` carried by `motion`, and gives `sink` what its sensors say and what really happened, in order.
 ///
-/// Three stages work at once on three windows that follow each other: the calling thread delivers one, while rayon's threads
-/// take the samples of the next and move the head through the one after it. What is computed depends on none of this:
-/// each stage sees its windows in order, and scans of one window, computed in parallel, are gathered in order. Memory holds
-/// the windows and no more. `progress` hears the fraction that is delivered.
+/// Three stages work at once on three windows that follow each other: the calling thread delivers one, while rayon's
+/// threads take the samples of the next and move the head through the one after it. What is computed depends on none of
+/// this: each stage sees its windows in order, and scans of one window, computed in parallel, are gathered in order.
+/// Memory holds the windows and no more. `progress` hears the fraction that is delivered.
 ///
 /// # Errors
 /// When the run's duration makes no sense, the motion cannot go on, or the sink refuses.
@@ -32,8 +32,8 @@ pub fn simulate<S: Sink + TruthSink + ?Sized>(
     Ok(summaries.into_iter().next().unwrap_or_default())
 }
 
-/// The same for rigs that differ in the IMUs and the lidar's errors alone, each with a sink of its own: physics and rays are
-/// done once. Each sink is given what it would be given alone.
+/// The same for rigs that differ in the IMUs and the lidar's errors alone, each with a sink of its own: physics and
+/// rays are done once. Each sink is given what it would be given alone.
 pub(super) fn simulate_together<S: Sink + TruthSink + ?Sized>(
     rigs: &[Rig],
     motion: &mut HeadMotion<'_>,

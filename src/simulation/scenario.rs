@@ -36,7 +36,8 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// The paper's head carried by hand for two minutes through `scene`: what is simulated unless something else is asked.
+    /// The paper's head carried by hand for two minutes through `scene`: what is simulated unless something else is
+    /// asked.
     pub fn in_scene(scene: &str) -> Self {
         Self {
             scene: scene.to_owned(),

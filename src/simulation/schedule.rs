@@ -9,7 +9,8 @@ use crate::time::{Span, Stamp};
 const TRUTH_STEP: Span = Span::from_nanos(1_000_000);
 /// Time between two messages about the clocks, s of true time.
 const CLOCK_STEP_S: f64 = 0.1;
-/// Instants this close are one: more than what rounding does to a sum of seconds, less than any clock's nanosecond counts.
+/// Instants this close are one: more than what rounding does to a sum of seconds, less than any clock's nanosecond
+/// counts.
 const SAME_INSTANT_S: f64 = 1e-9;
 
 /// Instants that follow each other evenly on a clock's crystal.

@@ -39,8 +39,8 @@ impl SpecError {
         }
     }
 
-    /// An error about the first place in a spec's text that says `words` after it says `anchor`; about `anchor` where it
-    /// does not. For what stands in one of several alike parts.
+    /// An error about the first place in a spec's text that says `words` after it says `anchor`; about `anchor` where
+    /// it does not. For what stands in one of several alike parts.
     pub fn about_after(source: &Source, anchor: &str, words: &str, message: impl Into<String>) -> Self {
         let Some(start) = source.text.find(anchor) else { return Self::plain(source.name.clone(), message) };
         let place = source.text[start..].find(words).map_or(start, |after| start + after);

@@ -1,4 +1,5 @@
-//! Where specs are found: as a path, in `scenes/` and `specs/` of the working folder, among those built into the binary.
+//! Where specs are found: as a path, in `scenes/` and `specs/` of the working folder, among those built into the
+//! binary.
 
 use super::{MAX_SPEC_BYTES, SpecError};
 use include_dir::{Dir, include_dir};

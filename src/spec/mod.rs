@@ -1,9 +1,9 @@
 //! Specs: RON in and out.
 //!
-//! A spec is a struct that derives `Deserialize` with `#[serde(deny_unknown_fields)]`, a unit in every key and a checked
-//! number in every field (see [`checked`]). [`parse`] turns text into it; whatever is wrong, syntax, a key nobody knows, a
-//! negative mass, is one [`SpecError`] with file, line and column. What concerns several fields is checked when the room
-//! that owns the spec builds its model from it.
+//! A spec is a struct that derives `Deserialize` with `#[serde(deny_unknown_fields)]`, a unit in every key and a
+//! checked number in every field (see [`checked`]). [`parse`] turns text into it; whatever is wrong, syntax, a key
+//! nobody knows, a negative mass, is one [`SpecError`] with file, line and column. What concerns several fields is
+//! checked when the room that owns the spec builds its model from it.
 
 pub mod checked;
 mod error;

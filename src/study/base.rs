@@ -13,13 +13,14 @@ use crate::time::Stamp;
 const LEVEL_RAD: f64 = 1e-4;
 const MOST_PASSES: usize = 8;
 
-/// The base's trajectory from its IMU, which `record` has, and from where the trajectory `world_from_head` puts it: by the
-/// spring's law, and where that tells nothing by the rigid link. The IMU's noise is that in the manifest of `reader`, else
-/// that of an ordinary one; its pose in the base is that in `record`, else it is at the base's origin and along its axes.
+/// The base's trajectory from its IMU, which `record` has, and from where the trajectory `world_from_head` puts it: by
+/// the spring's law, and where that tells nothing by the rigid link. The IMU's noise is that in the manifest of
+/// `reader`, else that of an ordinary one; its pose in the base is that in `record`, else it is at the base's origin
+/// and along its axes.
 ///
 /// The spring bends as gravity pulls, so a map that is not level puts the base wrongly: by half of its tilt, with the
-/// handheld head. The base's IMU tells which way is up, given where the base is: the map is levelled by that, and both are
-/// repeated until it is level. The trajectory told is in the world of `world_from_head` all the same.
+/// handheld head. The base's IMU tells which way is up, given where the base is: the map is levelled by that, and both
+/// are repeated until it is level. The trajectory told is in the world of `world_from_head` all the same.
 ///
 /// # Errors
 /// When the law fails, or the IMU and the trajectory have too little in common or contradict each other.
@@ -70,8 +71,8 @@ fn in_level(
     Ok(smooth_base(&fixes, samples, imu, spec)?)
 }
 
-/// The poses of the base by the spring's law, for one that has an IMU besides: none where a joint holds the head, whose law
-/// tells none.
+/// The poses of the base by the spring's law, for one that has an IMU besides: none where a joint holds the head, whose
+/// law tells none.
 ///
 /// # Errors
 /// When the law fails, or a motor turns the head, which then is nowhere near its rest.

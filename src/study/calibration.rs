@@ -58,7 +58,8 @@ pub(super) fn base_imu_noise(reader: &Reader) -> Result<ImuNoise, SpecError> {
     Ok(Imu::new(&spec, &Source::in_memory("the recording's manifest", ""))?.noise())
 }
 
-/// The noise of the sensors that a recording of ours was made with; of others, that of an ordinary IMU and of the paper's lidar.
+/// The noise of the sensors that a recording of ours was made with; of others, that of an ordinary IMU and of the
+/// paper's lidar.
 fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
     if let Some(specs) = Manifest::within(reader).and_then(|manifest| manifest.specs) {
         let source = Source::in_memory("the recording's manifest", "");

@@ -60,8 +60,8 @@ impl Surroundings<'_> {
     }
 }
 
-/// The cloud's figures: of its sample the beams that ended on what stands, whatever the filter made of them, against the true
-/// surfaces, where both they and the alignment are known; and how many beams ended on something else.
+/// The cloud's figures: of its sample the beams that ended on what stands, whatever the filter made of them, against
+/// the true surfaces, where both they and the alignment are known; and how many beams ended on something else.
 pub(super) fn cloud_metrics(
     registered: &Registered,
     world_from_map: Option<&Pose>,
@@ -198,8 +198,8 @@ mod tests {
     fn what_did_not_stand_is_counted_and_not_judged() {
         let world = world();
         let surroundings = Surroundings { world: &world, carrier: &[OPERATOR] };
-        // At 4 s: 16 beams to 3 cm above the floor, then under it, by turns; 3 to the operator, 1 to the box. The map is 1 cm
-        // too high.
+        // At 4 s: 16 beams to 3 cm above the floor, then under it, by turns; 3 to the operator, 1 to the box. The map
+        // is 1 cm too high.
         let mut ends: Vec<_> = (0..16).map(|k| Vector::new(6.0, k as f64 * 0.1, [0.03, -0.03][k % 2])).collect();
         ends.extend([0.5, 0.7, 0.9].map(|z| Vector::new(3.7, 0.0, z)));
         ends.push(Vector::new(4.0, 2.8, 1.0));

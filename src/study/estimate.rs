@@ -62,9 +62,9 @@ pub struct Outcome {
 }
 
 /// Estimates from the recording at `path`, whoever made it, and writes to `folder`: `manifest.ron`, `open_loop.tum`,
-/// `closed_loop.tum`, `map.ply`, `result.mcap`, `cloud.ply` or `cloud.las`, `metrics.json`, `plots/`, `report.html`; map, cloud
-/// and result are the closed loop's unless that is not wanted, or a map holds the trajectory already. Where the recording has
-/// the truth the estimate is judged by it, and where it has the scene the cloud is.
+/// `closed_loop.tum`, `map.ply`, `result.mcap`, `cloud.ply` or `cloud.las`, `metrics.json`, `plots/`, `report.html`;
+/// map, cloud and result are the closed loop's unless that is not wanted, or a map holds the trajectory already. Where
+/// the recording has the truth the estimate is judged by it, and where it has the scene the cloud is.
 ///
 /// # Errors
 /// When the recording cannot be read, there is no estimate, a file cannot be written, or somebody stops it.

@@ -47,8 +47,8 @@ impl Remaining {
     }
 }
 
-/// An estimate, with the covariances that are known of it, against the truth at its instants; `None` where the recording has
-/// none. What is not asked for afterwards is not kept: poses of an hour are many.
+/// An estimate, with the covariances that are known of it, against the truth at its instants; `None` where the
+/// recording has none. What is not asked for afterwards is not kept: poses of an hour are many.
 pub(super) fn truth_of(
     reader: &Reader,
     (map_from_head, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),

@@ -40,9 +40,8 @@ pub struct Merged {
     pub located: Located,
 }
 
-/// Puts the maps `first` and `second` together, in the frame of the first, and writes the file `out`; the second's origin
-/// is about at
-/// `start` in the first.
+/// Puts the maps `first` and `second` together, in the frame of the first, and writes the file `out`; the second's
+/// origin is about at `start` in the first.
 ///
 /// # Errors
 /// When a map cannot be read, they cannot be brought together, or the file cannot be written.

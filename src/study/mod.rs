@@ -1,7 +1,7 @@
 //! Whole experiments, out of the rooms below.
 //!
-//! [`journey()`] is the one that everything else varies: simulate and record, estimate from the recording, judge, report.
-//! [`estimate_recording`] is its second half, for anybody's recording.
+//! [`journey()`] is the one that everything else varies: simulate and record, estimate from the recording, judge,
+//! report. [`estimate_recording`] is its second half, for anybody's recording.
 //!
 //! The paper's experiments are run again by [`reproduction`].
 //!

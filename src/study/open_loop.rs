@@ -139,8 +139,8 @@ fn push_all(
     Ok(())
 }
 
-/// Whether a warning says that measurements were not there, or not used, or that there was too little in them: an estimate
-/// with loss.
+/// Whether a warning says that measurements were not there, or not used, or that there was too little in them: an
+/// estimate with loss.
 fn is_loss(kind: &WarningKind) -> bool {
     matches!(
         kind,

@@ -11,8 +11,8 @@ const WAITING: usize = 256;
 /// What a recording gives, one after the other.
 pub(super) type Coming<'a> = dyn Iterator<Item = Result<Measurement, RecordingError>> + 'a;
 
-/// Calls `take` with the measurements, in order; what it gives, and what could not be read. They are read ahead where there
-/// is more than one thread to use.
+/// Calls `take` with the measurements, in order; what it gives, and what could not be read. They are read ahead where
+/// there is more than one thread to use.
 pub(super) fn read_ahead<T>(reader: &Reader, selection: &Selection, take: impl FnOnce(&mut Coming) -> T) -> (T, Loss) {
     let mut measurements = reader.measurements(selection);
     if rayon::current_num_threads() < 2 {

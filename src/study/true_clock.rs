@@ -2,8 +2,8 @@ use crate::recording::{Reader, RecordingError, Truth};
 use crate::time::{Span, Stamp};
 use crate::truth::ClockTruth;
 
-/// How much later the IMU's clock truly stamps an instant than the lidar's, s, at lidar time; the clocks tell it at the true time
-/// `now`.
+/// How much later the IMU's clock truly stamps an instant than the lidar's, s, at lidar time; the clocks tell it at the
+/// true time `now`.
 pub(super) fn true_offset(now: Stamp, clock: &ClockTruth) -> (Stamp, f64) {
     (now + clock.lidar_ahead, clock.imu_after_lidar().seconds())
 }
@@ -32,8 +32,8 @@ impl TrueClock {
 
     /// What the lidar's clock says when the IMU's says `imu_stamp`.
     ///
-    /// The offset is linear between those told, and that of the end beyond them. It is looked up by the IMU's stamp: the clocks
-    /// differ by milliseconds, in which it changes by nanoseconds.
+    /// The offset is linear between those told, and that of the end beyond them. It is looked up by the IMU's stamp:
+    /// the clocks differ by milliseconds, in which it changes by nanoseconds.
     pub(super) fn on_lidar_clock(&self, imu_stamp: Stamp) -> Stamp {
         let after = self.0.partition_point(|(at, _)| *at <= imu_stamp);
         let offset_s = match (after.checked_sub(1).map(|before| self.0[before]), self.0.get(after)) {

@@ -126,8 +126,8 @@ impl SingleRay {
         Self { origin, direction, from: origin.into(), inverse: inverse.into() }
     }
 
-    /// How far along the ray it enters a node's box, by slabs, the three at once; the largest number if it does not. parry has
-    /// this test too, number by number.
+    /// How far along the ray it enters a node's box, by slabs, the three at once; the largest number if it does not.
+    /// parry has this test too, number by number.
     #[inline]
     fn enters(&self, node: &BvhNode) -> f32 {
         let to_lower = (Vec3A::from(node.mins()) - self.from) * self.inverse;

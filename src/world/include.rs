@@ -7,21 +7,22 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 impl SceneSpec {
-    /// This scene and those that it includes as one that includes none. `source` is the text it came from: a scene is looked
-    /// for beside it, and then as everywhere.
+    /// This scene and those that it includes as one that includes none. `source` is the text it came from: a scene is
+    /// looked for beside it, and then as everywhere.
     ///
-    /// What is included comes first. The name is this scene's own; so is the default route, if it has one, or else that of
-    /// the first included scene that does.
+    /// What is included comes first. The name is this scene's own; so is the default route, if it has one, or else that
+    /// of the first included scene that does.
     ///
     /// # Errors
-    /// When an included scene is missing, wrong by itself, or includes itself; when two define one name; and when one has
-    /// meshes, which are looked for beside the scene that includes it, in another folder.
+    /// When an included scene is missing, wrong by itself, or includes itself; when two define one name; and when one
+    /// has meshes, which are looked for beside the scene that includes it, in another folder.
     pub fn with_includes(&self, source: &Source) -> Result<Self, WorldError> {
         whole(self, &[source])
     }
 }
 
-/// `spec`, read from the last of `chain`, each of which is included by the one before it, as a scene that includes none.
+/// `spec`, read from the last of `chain`, each of which is included by the one before it, as a scene that includes
+/// none.
 fn whole(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError> {
     let Some(source) = chain.last() else { return Ok(spec.clone()) };
     let own = SceneSpec { include: Vec::new(), ..spec.clone() };

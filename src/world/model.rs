@@ -34,7 +34,8 @@ impl World {
     /// meshes.
     ///
     /// # Errors
-    /// When the scene includes what it cannot, names what it does not have, gives numbers that do not fit together, or names a bad mesh.
+    /// When the scene includes what it cannot, names what it does not have, gives numbers that do not fit together, or
+    /// names a bad mesh.
     pub fn build(spec: &SceneSpec, source: &Source) -> Result<Self, WorldError> {
         let spec = &spec.with_includes(source)?;
         let Parts { materials, still, movers, routes, notes } = build(spec, source)?;
@@ -48,8 +49,8 @@ impl World {
         &self.name
     }
 
-    /// The first surface within `max_range_m` along `ray` at `t_s`, seconds of true time since the run's start. Glass is a
-    /// surface like any other; see [`World::cast_beyond`] for what stands behind it.
+    /// The first surface within `max_range_m` along `ray` at `t_s`, seconds of true time since the run's start. Glass
+    /// is a surface like any other; see [`World::cast_beyond`] for what stands behind it.
     pub fn cast(&self, ray: &Ray, max_range_m: f64, t_s: f64) -> Option<Hit> {
         let (origin, direction) = (&ray.origin_in_world, &ray.direction_in_world);
         let mut first = self.still.cast(origin, direction, max_range_m);
@@ -64,8 +65,8 @@ impl World {
         })
     }
 
-    /// The first surface along `ray` that is further than `beyond_m`, where a hit was. Distances are from the ray's origin
-    /// still; two surfaces within 0.1 mm are one.
+    /// The first surface along `ray` that is further than `beyond_m`, where a hit was. Distances are from the ray's
+    /// origin still; two surfaces within 0.1 mm are one.
     pub fn cast_beyond(&self, ray: &Ray, beyond_m: f64, max_range_m: f64, t_s: f64) -> Option<Hit> {
         let skipped = beyond_m + SAME_SURFACE_M;
         let rest = Ray { origin_in_world: ray.at(skipped), ..*ray };
@@ -73,8 +74,8 @@ impl World {
         Some(Hit { distance_m: hit.distance_m + skipped, ..hit })
     }
 
-    /// How far a point is from the nearest of what moves at `t_s`, seconds of true time since the run's start, m; `None` where
-    /// that is more than `reach_m`. [`Surface::nearest`] knows what stands alone.
+    /// How far a point is from the nearest of what moves at `t_s`, seconds of true time since the run's start, m;
+    /// `None` where that is more than `reach_m`. [`Surface::nearest`] knows what stands alone.
     pub fn distance_to_movers_m(&self, point_in_world: &Vector, reach_m: f64, t_s: f64) -> Option<f64> {
         let distances = self.movers.iter().filter_map(|mover| mover.distance(point_in_world, reach_m, t_s));
         distances.min_by(f64::total_cmp)
@@ -105,7 +106,8 @@ impl World {
         self.still.len()
     }
 
-    /// What the builder of the scene should know, a sentence each: triangles without area that a mesh was built without.
+    /// What the builder of the scene should know, a sentence each: triangles without area that a mesh was built
+    /// without.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }

@@ -73,7 +73,8 @@ pub enum ShapeSpec {
         /// Depth of a step, m.
         #[serde(deserialize_with = "checked::positive")]
         tread_m: f64,
-        /// Thickness below the inner edges of the steps, m, with a soffit along the slope; solid down to z = 0 unless told.
+        /// Thickness below the inner edges of the steps, m, with a soffit along the slope; solid down to z = 0 unless
+        /// told.
         #[serde(default, deserialize_with = "checked::non_negative")]
         slab_m: f64,
     },

@@ -26,7 +26,8 @@ fn text(turn: &str) -> String {
     )
 }
 
-/// Whether the motor's third derivative has no step within central differences: it has one at the start, one at full turn.
+/// Whether the motor's third derivative has no step within central differences: it has one at the start, one at full
+/// turn.
 fn is_smooth(t_s: f64, step_s: f64) -> bool {
     [0.5, 1.3].iter().all(|step_at_s| (t_s - step_at_s).abs() > 1.5 * step_s)
 }
@@ -75,7 +76,8 @@ fn it_starts_at_rest_and_its_acceleration_has_no_steps() {
         for state in &path[..=500] {
             assert_eq!(state.head, Kinematics::at_rest(*model.rest_pose_base_from_head()), "{turn}");
         }
-        // The greatest third derivative of all, at the start: 60 / 0.8^2 times the rate of 8.2 rad/s, and less for the nod.
+        // The greatest third derivative of all, at the start: 60 / 0.8^2 times the rate of 8.2 rad/s, and less for the
+        // nod.
         let most = 60.0 / 0.64 * 1.3 * TAU * 1e-3;
         for pair in path.windows(2) {
             let [a, b] = [&pair[0].head, &pair[1].head];
@@ -127,8 +129,9 @@ fn half_a_turn_of_the_spinning_lms291_covers_the_hemisphere_before_it() {
         }
     }
     assert!(seen.iter().all(|beam| beam.x > -1e-6), "nothing is seen behind it");
-    // A turn in 75 scans: planes lie 360 / 75 = 4.8 degrees apart at most, a beam within 2.4 + 0.5 of any direction; the rim's
-    // beams are fired while the head turns on, by 2.4 degrees in half a mirror's turn, between two ends of the plane.
+    // A turn in 75 scans: planes lie 360 / 75 = 4.8 degrees apart at most, a beam within 2.4 + 0.5 of any direction;
+    // the rim's beams are fired while the head turns on, by 2.4 degrees in half a mirror's turn, between two ends of
+    // the plane.
     let farthest = directions_before(2_000)
         .map(|to| seen.iter().map(|beam| beam.angle(&to)).fold(f64::INFINITY, f64::min).to_degrees())
         .fold(0.0, f64::max);

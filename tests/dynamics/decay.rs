@@ -6,8 +6,8 @@ use zsim::dynamics::{HeadModel, Mode, ModeKind};
 
 /// Frequency (Hz) and damping ratio of a free oscillation sampled every `step_s`.
 ///
-/// A damped oscillation obeys `q[n+1] = a q[n] + b q[n-1]` with `b = -exp(-2 s h)`, `a = 2 exp(-s h) cos(w h)`; a and b by
-/// least squares, then `omega^2 = s^2 + w^2`, `zeta = s / omega`.
+/// A damped oscillation obeys `q[n+1] = a q[n] + b q[n-1]` with `b = -exp(-2 s h)`, `a = 2 exp(-s h) cos(w h)`; a and b
+/// by least squares, then `omega^2 = s^2 + w^2`, `zeta = s / omega`.
 fn fitted(q: &[f64], step_s: f64) -> (f64, f64) {
     let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
     for three in q.windows(3) {

@@ -66,8 +66,9 @@ fn springs_side_by_side_are_parallel_and_turn_by_their_levers() {
         (stiffness(&[[a, 0.0], [-a, 0.0]]), stiffness(&[[0.0; 2]; 2]), 2.0 * a * a),
         (stiffness(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]), stiffness(&[[0.0; 2]; 3]), 1.5 * r * r),
     ] {
-        // Side by side they add up; turned about y each top moves by its lever x along its spring: the sum of k x^2 more.
-        // (An axial rate does not depend on the load, and the loads' own levers are the same wherever the springs stand.)
+        // Side by side they add up; turned about y each top moves by its lever x along its spring: the sum of k x^2
+        // more. (An axial rate does not depend on the load, and the loads' own levers are the same wherever the springs
+        // stand.)
         assert_relative_eq!(apart[(2, 2)], together[(2, 2)], max_relative = 1e-6);
         assert_relative_eq!(apart[(0, 0)], together[(0, 0)], max_relative = 1e-5);
         assert_relative_eq!(apart[(4, 4)] - together[(4, 4)], along * sum_of_squares, max_relative = 1e-4);
@@ -123,7 +124,8 @@ fn a_float_bobs_and_rocks_as_a_ship() {
     assert!(mooring.abs() < 0.05 * 1000.0 * G * area, "{mooring} N/m of mooring");
     let bob = ((1000.0 * G * area + mooring) / (M + added)).sqrt() / TAU;
     assert_relative_eq!(frequency(&model, ModeKind::Bounce), bob, max_relative = 0.01);
-    // Righting: rho g (I_water + V (centre of buoyancy - centre of mass)), the second moment of the water line pi r^4 / 4.
+    // Righting: rho g (I_water + V (centre of buoyancy - centre of mass)), the second moment of the water line pi r^4 /
+    // 4.
     let without_cords = suspended([0.0, 0.0, 0.05], &floating([0.0; 4]));
     let error = built(&without_cords).unwrap_err().to_string();
     assert!(error.contains("nothing holds it against a shift along"), "{error}");
@@ -173,7 +175,8 @@ fn a_vessel_that_turns_takes_its_float_along_by_drag() {
 
 #[test]
 fn a_float_goes_where_its_vessel_goes() {
-    // Fluid that speeds up pushes what it carries as hard as what it has replaced: up and down the head follows at once.
+    // Fluid that speeds up pushes what it carries as hard as what it has replaced: up and down the head follows at
+    // once.
     let model = model([0.0, 0.0, 0.05], &(floating([0.0; 4]) + &moored()));
     let response = model.frequency_response(&model.usual_points());
     for freq_hz in [0.5, 2.0, 5.0, 9.0] {
@@ -201,7 +204,8 @@ fn a_joint_leaves_two_turns_that_rock_by_spring_less_weight() {
         assert_eq!(mode.kind, ModeKind::Rocking);
         assert_relative_eq!(mode.frequency_hz, expected, max_relative = 1e-7);
     }
-    // Tilted slowly, the base lifts the head by k / (k - m g h); shifted and turned about the vertical, it takes it along.
+    // Tilted slowly, the base lifts the head by k / (k - m g h); shifted and turned about the vertical, it takes it
+    // along.
     let response = model.frequency_response(&model.usual_points());
     let gain = |axis| response.gain(axis, 1e-6, zsim::dynamics::Quantity::Kinematic);
     assert_relative_eq!(gain(zsim::motion::Axis::Pitch), k / (k - M * G * h), max_relative = 1e-6);

@@ -6,7 +6,8 @@ use zsim::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw};
 use zsim::motion::BaseMotion;
 use zsim::spec::{Source, parse};
 
-/// The head of the rocking table: 0.40 kg, centre of mass 70 mm above the spring, 9e-4 kg m^2. Its frame is the spring's top.
+/// The head of the rocking table: 0.40 kg, centre of mass 70 mm above the spring, 9e-4 kg m^2. Its frame is the
+/// spring's top.
 pub struct Table {
     /// Mean coil diameter, wire diameter, active coils, free length, mm.
     pub coil: [f64; 4],
@@ -149,8 +150,8 @@ impl BaseMotion for Still {
     }
 }
 
-/// A base that makes one jerk, `amount (1 - cos(2 pi t / T)) / 2` out and back along one of x, y, z, roll, pitch, yaw, and
-/// then stays.
+/// A base that makes one jerk, `amount (1 - cos(2 pi t / T)) / 2` out and back along one of x, y, z, roll, pitch, yaw,
+/// and then stays.
 pub struct Twitch {
     pub axis: usize,
     pub amount: f64,

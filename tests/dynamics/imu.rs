@@ -64,7 +64,8 @@ fn a_noise_free_imu_integrates_to_the_truths_poses() {
 
 #[test]
 fn velocity_and_acceleration_belong_to_the_pose() {
-    // Against differences of five poses, which are of fourth order: (-1, 8, 0, -8, 1) / 12 h and (-1, 16, -30, 16, -1) / 12 h^2.
+    // Against differences of five poses, which are of fourth order: (-1, 8, 0, -8, 1) / 12 h and (-1, 16, -30, 16, -1)
+    // / 12 h^2.
     let step_s = 1e-3;
     let path = states(&shipped("handheld"), &Nodding { amount_rad: 0.05 }, step_s, 3.0);
     for five in path.windows(5) {
@@ -85,8 +86,8 @@ fn velocity_and_acceleration_belong_to_the_pose() {
 
 #[test]
 fn between_two_steps_the_pose_is_where_a_finer_simulation_has_it() {
-    // Halved, the step itself moves the path by its own second-order error; so both are taken from one fine path, of which
-    // every second state is left out and interpolated.
+    // Halved, the step itself moves the path by its own second-order error; so both are taken from one fine path, of
+    // which every second state is left out and interpolated.
     let path = states(&shipped("handheld"), &Nodding { amount_rad: 0.05 }, 5e-4, 3.0);
     for three in path.windows(3).step_by(2) {
         let middle = three[0].head.pose_towards(&three[2].head, 1e-3, 0.5);

@@ -9,7 +9,8 @@ use zsim::spec::{Kind, load, names};
 
 #[test]
 fn a_head_rocks_as_fast_as_the_table_says_for_any_number_of_segments() {
-    // Frequencies of a 0.40 kg head with 9e-4 kg m^2 and its centre of mass 70 mm above the spring, upright and hanging, Hz.
+    // Frequencies of a 0.40 kg head with 9e-4 kg m^2 and its centre of mass 70 mm above the spring, upright and
+    // hanging, Hz.
     let table = [
         ([25.0, 2.5, 10.0, 100.0], true, 1.73),
         ([25.0, 3.0, 12.0, 120.0], false, 0.98),

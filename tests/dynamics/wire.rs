@@ -41,7 +41,8 @@ fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 
 #[test]
 fn a_heavy_spring_bounces_as_a_continuous_one() {
-    // Longitudinal waves in a spring of mass m with a point M: x tan x = m / M, omega^2 = x^2 k / m; without m it is k / M.
+    // Longitudinal waves in a spring of mass m with a point M: x tan x = m / M, omega^2 = x^2 k / m; without m it is k
+    // / M.
     let mass_kg = 0.05;
     let ratio = wire_kg() / mass_kg;
     let x = root(|x| x * x.tan() - ratio, 1e-3, 1.5);
@@ -53,8 +54,8 @@ fn a_heavy_spring_bounces_as_a_continuous_one() {
 
 #[test]
 fn a_heavy_spring_sways_as_a_beam_with_a_tip() {
-    // Euler-Bernoulli cantilever with a point M at its tip: 1 + cos x cosh x + (M/m) x (cos x sinh x - sin x cosh x) = 0,
-    // omega^2 = x^4 E I / (m L^3); without m it is 3 E I / (M L^3). Upright and hung the weight's part cancels.
+    // Euler-Bernoulli cantilever with a point M at its tip: 1 + cos x cosh x + (M/m) x (cos x sinh x - sin x cosh x) =
+    // 0, omega^2 = x^4 E I / (m L^3); without m it is 3 E I / (M L^3). Upright and hung the weight's part cancels.
     let mass_kg = 0.05;
     let ratio = mass_kg / wire_kg();
     let x = root(|x| 1.0 + x.cos() * x.cosh() + ratio * x * (x.cos() * x.sinh() - x.sin() * x.cosh()), 0.1, 1.87);

@@ -50,7 +50,8 @@ impl Jet {
         self.chain(f, f1, f2)
     }
 
-    /// Integral of `((t - start) / duration).smoothstep()` over time up to `self`, which must be time itself plus a shift.
+    /// Integral of `((t - start) / duration).smoothstep()` over time up to `self`, which must be time itself plus a
+    /// shift.
     pub fn ramped_time(self, duration_s: f64) -> Self {
         let x = (self.value / duration_s).clamp(0.0, 1.0);
         let below = x.powi(5) * (7.0 + x * (-14.0 + x * (10.0 - 2.5 * x))) * duration_s;

@@ -38,8 +38,8 @@ fn align(from: &[Vector], to: &[Vector]) -> Pose {
     Pose::from_parts((b - rotation * a).into(), rotation)
 }
 
-/// How far an estimate leaves the truth between two instants, m: its greatest error then, with the poses at the first one laid
-/// on each other.
+/// How far an estimate leaves the truth between two instants, m: its greatest error then, with the poses at the first
+/// one laid on each other.
 pub fn growth_m(result: &OpenLoop, run: &Run, (from_s, to_s): (f64, f64)) -> f64 {
     let mut within = result
         .trajectory

@@ -153,7 +153,8 @@ pub fn record_all(run: RunDescription, samples: i64) -> Vec<u8> {
     bytes.take()
 }
 
-/// The measurements in the order in which they are read, that of their stamps; of two with the same one the IMU's first.
+/// The measurements in the order in which they are read, that of their stamps; of two with the same one the IMU's
+/// first.
 pub fn in_order(mut measurements: Vec<Measurement>) -> Vec<Measurement> {
     measurements.sort_by_key(|measurement| match measurement {
         Measurement::Imu(sample) => (sample.stamp, 0),

@@ -1,7 +1,8 @@
 //! The error-state Kalman filter.
 //!
-//! The error of the attitude is a small turn in the world's axes, `R = exp(theta) R^`; all other errors are differences.
-//! Strapdown integration over an interval `h` with mean rate `w` and force `f` (biases `b`, `c`; `R` in its middle) gives
+//! The error of the attitude is a small turn in the world's axes, `R = exp(theta) R^`; all other errors are
+//! differences. Strapdown integration over an interval `h` with mean rate `w` and force `f` (biases `b`, `c`; `R` in
+//! its middle) gives
 //!
 //! ```text
 //! theta' = theta - R h b        v' = v - [R f h]x theta - R h c - h [g]x tilt        p' = p + h v'(mean)
@@ -17,7 +18,8 @@ use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, skew};
 use crate::measurement::ImuNoise;
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-/// Numbers of the error: attitude, position, velocity, the two biases, offset of the clock and its rate, tilt of gravity.
+/// Numbers of the error: attitude, position, velocity, the two biases, offset of the clock and its rate, tilt of
+/// gravity.
 const STATES: usize = 19;
 const ATTITUDE: usize = 0;
 const POSITION: usize = 3;
@@ -99,8 +101,8 @@ impl Estimate {
     }
 }
 
-/// What fixes say of an epoch, against what the filter expects: the mean of the differences, turn (rad) and shift (m) in the
-/// world's axes.
+/// What fixes say of an epoch, against what the filter expects: the mean of the differences, turn (rad) and shift (m)
+/// in the world's axes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Difference {
     pub(super) turn: Vector,

@@ -1,18 +1,19 @@
 //! The base's trajectory from an IMU of its own.
 //!
-//! Where the base is, the head's trajectory tells by the law of the spring between the two ([`BaseFix`]): well over seconds,
-//! badly from one pose to the next, since the law asks for the head's acceleration. An IMU on the base tells how it turns
-//! and accelerates from one pose to the next, and drifts over seconds. Both together are smoothed here:
+//! Where the base is, the head's trajectory tells by the law of the spring between the two ([`BaseFix`]): well over
+//! seconds, badly from one pose to the next, since the law asks for the head's acceleration. An IMU on the base tells
+//! how it turns and accelerates from one pose to the next, and drifts over seconds. Both together are smoothed here:
 //!
 //! 1. How far the IMU's clock is ahead of the fixes' is sought where the IMU turns most as the fixes do (`offset`).
 //! 2. An error-state Kalman filter goes forwards (`filter`): attitude, position and velocity of the IMU by strapdown
-//!    integration, its biases, offset and rate of its clock, the direction of gravity. Every 50 ms it is corrected by the mean
-//!    of what the fixes say of that time.
-//! 3. A Rauch-Tung-Striebel smoother goes backwards (`smoother`; Rauch, Tung and Striebel 1965), and between its epochs the
-//!    IMU is integrated anew.
+//!    integration, its biases, offset and rate of its clock, the direction of gravity. Every 50 ms it is corrected by
+//!    the mean of what the fixes say of that time.
+//! 3. A Rauch-Tung-Striebel smoother goes backwards (`smoother`; Rauch, Tung and Striebel 1965), and between its epochs
+//!    the IMU is integrated anew.
 //!
-//! In memory are the samples and the fixes, about 100 MB an hour, and the matrices of a minute: the filter is repeated minute
-//! by minute from states that are kept. Where the IMU is silent the fixes alone lead, as loosely as they are believed.
+//! In memory are the samples and the fixes, about 100 MB an hour, and the matrices of a minute: the filter is repeated
+//! minute by minute from states that are kept. Where the IMU is silent the fixes alone lead, as loosely as they are
+//! believed.
 
 mod filter;
 mod fixes;
@@ -44,8 +45,8 @@ pub struct BaseFix {
     pub sigmas: FixSigmas,
 }
 
-/// How well fixes are known: the standard deviation, on each axis, of their mean over 50 ms. Their errors last longer than
-/// that, so it is greater than what their scatter alone would make.
+/// How well fixes are known: the standard deviation, on each axis, of their mean over 50 ms. Their errors last longer
+/// than that, so it is greater than what their scatter alone would make.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixSigmas {
     /// Of the position, m.
@@ -55,13 +56,13 @@ pub struct FixSigmas {
 }
 
 impl FixSigmas {
-    /// Of a base found by the spring's law from an estimated head. Measured on seeds 701 and 702, office and courtyard, by hand
-    /// and on the vehicle, after the map was levelled: on each axis the position errs by 0.1 to 0.2 mm between 0.3 and 1 Hz and
-    /// by 0.5 mm below, the attitude by 0.01 degrees in either band and by 0.05 above 6 Hz. With these sigmas the gyroscope
-    /// leads above some 0.4 Hz.
+    /// Of a base found by the spring's law from an estimated head. Measured on seeds 701 and 702, office and courtyard,
+    /// by hand and on the vehicle, after the map was levelled: on each axis the position errs by 0.1 to 0.2 mm between
+    /// 0.3 and 1 Hz and by 0.5 mm below, the attitude by 0.01 degrees in either band and by 0.05 above 6 Hz. With these
+    /// sigmas the gyroscope leads above some 0.4 Hz.
     pub const SPRING: Self = Self { position_m: 1e-3, rotation_rad: 1e-3 };
-    /// Of a base taken to be where it would be with the head at rest on it: that errs by 20 degrees and 20 mm, by hand, for as
-    /// long as the head swings to one side.
+    /// Of a base taken to be where it would be with the head at rest on it: that errs by 20 degrees and 20 mm, by hand,
+    /// for as long as the head swings to one side.
     pub const RIGID_LINK: Self = Self { position_m: 0.05, rotation_rad: 0.4 };
 }
 
@@ -85,16 +86,17 @@ pub struct BaseImu {
     pub base_from_imu: Pose,
     /// Its noise.
     pub noise: ImuNoise,
-    /// How much later it stamps an instant than the fixes do, to a millisecond or two, s; sought within a second where `None`.
+    /// How much later it stamps an instant than the fixes do, to a millisecond or two, s; sought within a second where
+    /// `None`.
     pub clock_offset_s: Option<f64>,
 }
 
-/// Smooths the trajectory of a base from `samples` of an IMU on it and from `fixes` of its pose, both in the order of their
-/// time. Of `spec` the inertial settings and what is believed of clocks are used.
+/// Smooths the trajectory of a base from `samples` of an IMU on it and from `fixes` of its pose, both in the order of
+/// their time. Of `spec` the inertial settings and what is believed of clocks are used.
 ///
 /// # Errors
-/// When samples or fixes are not finite or not in order, have too little time in common, or the IMU does not turn as the
-/// fixes do.
+/// When samples or fixes are not finite or not in order, have too little time in common, or the IMU does not turn as
+/// the fixes do.
 pub fn smooth_base(
     fixes: &[BaseFix],
     samples: &[ImuSample],

@@ -152,7 +152,8 @@ impl Problem<'_> {
         Ok(poses)
     }
 
-    /// Adds the poses of an epoch between two smoothed estimates at the last of the `untold` stamps, and tells which are left.
+    /// Adds the poses of an epoch between two smoothed estimates at the last of the `untold` stamps, and tells which
+    /// are left.
     fn tell<'s>(
         &self,
         epoch: &Epoch,

@@ -1,4 +1,5 @@
-//! What moved: a cell that was hit at one time, and through which beams went at others, is none of a surface that stands.
+//! What moved: a cell that was hit at one time, and through which beams went at others, is none of a surface that
+//! stands.
 //!
 //! The idea is that of occupancy grids (Moravec and Elfes 1985), kept a second a grid and a few seconds long.
 
@@ -16,10 +17,12 @@ const SHARE: f64 = 0.9;
 const FARTHEST_M: f64 = 50.0;
 /// Fewest beams that make a cell free.
 const BEAMS: usize = 2;
-/// A cell of what moves was free in at least so many blocks, and in so many times the number of those in which it was hit.
+/// A cell of what moves was free in at least so many blocks, and in so many times the number of those in which it was
+/// hit.
 const FREE: (usize, usize) = (3, 2);
 
-/// Cells that a block's beams hit, and those that were free in it: gone through, and not hit, nor beside one that was hit.
+/// Cells that a block's beams hit, and those that were free in it: gone through, and not hit, nor beside one that was
+/// hit.
 #[derive(Debug)]
 pub(super) struct Carved {
     hit: Vec<u64>,
@@ -59,7 +62,8 @@ impl Moving {
     }
 }
 
-/// Of the cells that `block` hit, those that what is `around` it, `block` included, tells to be of something that moved.
+/// Of the cells that `block` hit, those that what is `around` it, `block` included, tells to be of something that
+/// moved.
 pub(super) fn moving(block: &Carved, around: &[&Carved]) -> Moving {
     let count = |list: fn(&Carved) -> &[u64], cell: &u64| {
         around.iter().filter(|carved| list(carved).binary_search(cell).is_ok()).count()

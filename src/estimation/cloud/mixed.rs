@@ -1,8 +1,9 @@
-//! Echoes of two surfaces at once: a beam that is split by an edge may answer from in between (Tuley, Vandapel and Hebert,
-//! ICRA 2005).
+//! Echoes of two surfaces at once: a beam that is split by an edge may answer from in between (Tuley, Vandapel and
+//! Hebert, ICRA 2005).
 //!
-//! Such an echo lies between its neighbours in range, far from both. So does one on a surface that is seen at a grazing angle;
-//! but along a line, `1 / r` is linear in the angle as long as that is small, and two neighbours on one side foretell it.
+//! Such an echo lies between its neighbours in range, far from both. So does one on a surface that is seen at a grazing
+//! angle; but along a line, `1 / r` is linear in the angle as long as that is small, and two neighbours on one side
+//! foretell it.
 
 use super::Hit;
 use crate::geometry::Vector;
@@ -100,8 +101,8 @@ mod tests {
 
     #[test]
     fn a_grazed_floor_is_no_edge_however_far_its_echoes_are_apart() {
-        // A floor 1.2 m below, in a scan that goes up from 9 degrees below the level by a quarter of a degree: at the end its
-        // echoes are 2 m apart.
+        // A floor 1.2 m below, in a scan that goes up from 9 degrees below the level by a quarter of a degree: at the
+        // end its echoes are 2 m apart.
         let at = |k: usize| 1.2 / (9.0 - 0.25 * k as f64).to_radians().sin();
         let ranges: Vec<f64> = (0..24).map(at).collect();
         assert!(ranges[23] - ranges[22] > 1.5);

@@ -6,9 +6,9 @@
 //! | [`Fate::Moving`] | of what moved through the scene | beams went where it was, see `carve` |
 //! | [`Fate::Isolated`] | with next to nothing beside it | by the number of points around it, see `support` |
 //!
-//! Time is cut into blocks of a second, and a point is judged by the blocks up to five seconds before and after its own: a head
-//! that swings about once a second has looked there several times by then. So memory is that of eleven blocks, however long
-//! the recording.
+//! Time is cut into blocks of a second, and a point is judged by the blocks up to five seconds before and after its
+//! own: a head that swings about once a second has looked there several times by then. So memory is that of eleven
+//! blocks, however long the recording.
 
 mod carve;
 mod cell;
@@ -96,8 +96,8 @@ impl<T: Send + Sync> CloudFilter<T> {
         Self { noise, filling: None, whole: VecDeque::new(), judged: 0 }
     }
 
-    /// Takes the echoes of a scan, in the order in which their beams were fired. Those whose fate is known by now, in the
-    /// order in which they came: of a second, six seconds later.
+    /// Takes the echoes of a scan, in the order in which their beams were fired. Those whose fate is known by now, in
+    /// the order in which they came: of a second, six seconds later.
     pub fn push(&mut self, scan: Vec<(Hit, T)>) -> Vec<(T, Fate)> {
         let Some((first, _)) = scan.first() else { return Vec::new() };
         let stamp = first.stamp;
@@ -163,8 +163,8 @@ mod tests {
 
     const NOISE: LidarNoise = LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 };
 
-    /// A scan at `ms` of a wall at x = 4, a hundred beams over 25 degrees, in a plane that nods; `other` is put where beam
-    /// 50 ends.
+    /// A scan at `ms` of a wall at x = 4, a hundred beams over 25 degrees, in a plane that nods; `other` is put where
+    /// beam 50 ends.
     fn scan(ms: i64, other: Option<Vector>) -> Vec<(Hit, (i64, usize))> {
         let height = (ms as f64 * 0.01).sin();
         let hit = |k: usize| {

@@ -2,17 +2,18 @@
 
 use crate::geometry::{PoseCovariance, Vector, skew};
 
-/// Standard deviation of a point's place in the map, m: the root of the mean square of its distance from its true place.
+/// Standard deviation of a point's place in the map, m: the root of the mean square of its distance from its true
+/// place.
 ///
-/// Its range errs by `range_sigma_m` along its beam. The head, from which the point is `arm` away (m, in the map), errs by
-/// `covariance`, position first: `p = t + arm` moves by `dt + theta x arm`, so that
+/// Its range errs by `range_sigma_m` along its beam. The head, from which the point is `arm` away (m, in the map), errs
+/// by `covariance`, position first: `p = t + arm` moves by `dt + theta x arm`, so that
 ///
 /// ```text
 /// sigma^2 = sigma_r^2 + tr(J C J^T),   J = [I, -[arm]_x]
 /// ```
 ///
-/// The incidence is not known of a single point, and does not matter to its distance from its true place: it tells how much of
-/// that lies along the surface's normal, a share of `cos` at most.
+/// The incidence is not known of a single point, and does not matter to its distance from its true place: it tells how
+/// much of that lies along the surface's normal, a share of `cos` at most.
 pub fn point_sigma_m(range_sigma_m: f64, covariance: &PoseCovariance, arm: &Vector) -> f64 {
     let by_turn = -skew(arm);
     let turn = covariance.fixed_view::<3, 3>(3, 3);

@@ -26,7 +26,8 @@ use std::time::Instant;
 /// The head is lost when the IMU alone carried it for longer than this, s, and for more than this share of the time.
 const LOST: (f64, f64) = (5.0, 0.2);
 
-/// While the head is not found again behind a silence, the next one is bridged up to so many times as long as otherwise.
+/// While the head is not found again behind a silence, the next one is bridged up to so many times as long as
+/// otherwise.
 const RELUCTANTLY: f64 = 3.0;
 
 /// An IMU that is noisier than it was told by more than this factor is told of.
@@ -34,9 +35,9 @@ const TELLING: f64 = 1.5;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
-/// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it: `window_s` plus
-/// `step_s` after its instant, plus 0.1 s in which late measurements may still come. While the head is held still the
-/// window grows until `window_s` of it were swept, to three times `window_s` at most: a pose then waits as long.
+/// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it: `window_s`
+/// plus `step_s` after its instant, plus 0.1 s in which late measurements may still come. While the head is held still
+/// the window grows until `window_s` of it were swept, to three times `window_s` at most: a pose then waits as long.
 #[derive(Debug)]
 pub struct Estimator {
     spec: EstimatorSpec,
@@ -99,14 +100,15 @@ impl Estimator {
         })
     }
 
-    /// The same estimator, which also keeps what it sees for [`super::register`]: its memory then grows with the recording.
+    /// The same estimator, which also keeps what it sees for [`super::register`]: its memory then grows with the
+    /// recording.
     pub fn surveying(self) -> Self {
         Self { survey: Some(Survey::default()), ..self }
     }
 
-    /// The same estimator, whose trajectory is in the frame of `map`, in which the head begins about at `map_from_head`:
-    /// within a metre on the level and twenty degrees about the vertical. Every window is then matched with the map as
-    /// well. No pose is handed out before the head is found, which is when the first window is full.
+    /// The same estimator, whose trajectory is in the frame of `map`, in which the head begins about at
+    /// `map_from_head`: within a metre on the level and twenty degrees about the vertical. Every window is then matched
+    /// with the map as well. No pose is handed out before the head is found, which is when the first window is full.
     pub fn in_map(self, map: &SurfelMap, map_from_head: &Pose) -> Self {
         Self { whereabouts: Some(Whereabouts::about(map, *map_from_head, &self.spec)), ..self }
     }
@@ -131,7 +133,8 @@ impl Estimator {
     /// Solves what is left; the result holds the poses not taken yet, and the reports of all windows.
     ///
     /// # Errors
-    /// When there was no IMU, no lidar, or too little of both to start, or the head is not found in the map that was given.
+    /// When there was no IMU, no lidar, or too little of both to start, or the head is not found in the map that was
+    /// given.
     pub fn finish(mut self) -> Result<OpenLoop, EstimationError> {
         while let Some(stretch) = self.intake.next_stretch(true) {
             self.advance(stretch)?;
@@ -156,8 +159,8 @@ impl Estimator {
         Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, calibrated_lidar, located, windows, warnings, survey })
     }
 
-    /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and its
-    /// surfels may become a fixed view.
+    /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and
+    /// its surfels may become a fixed view.
     fn advance(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
         // While the head is still to be found, beginning once more would be to lose it.
         self.intake.bridge(if self.before.is_some() { RELUCTANTLY } else { 1.0 });
@@ -270,8 +273,8 @@ impl Estimator {
         }
     }
 
-    /// Warns of a trouble when it lasts for two windows, or at once of a solution that was not believed; and once only, until a
-    /// window is well again or something else is wrong.
+    /// Warns of a trouble when it lasts for two windows, or at once of a solution that was not believed; and once only,
+    /// until a window is well again or something else is wrong.
     fn say(&mut self, trouble: Option<WarningKind>, end_s: f64) {
         let before =
             self.trouble.take().filter(|(kind, _)| Some(discriminant(kind)) == trouble.as_ref().map(discriminant));

@@ -67,8 +67,8 @@ impl Cluster {
             && apart.dot(&self.normal).abs().max(apart.dot(&surfel.normal_in_map).abs()) < most_m
     }
 
-    /// Adds a surfel's points. The errors of one trajectory go together: what is put together is as uncertain as its parts
-    /// are in the mean.
+    /// Adds a surfel's points. The errors of one trajectory go together: what is put together is as uncertain as its
+    /// parts are in the mean.
     fn take(&mut self, surfel: &MapSurfel) {
         let points = self.points + surfel.points;
         let (ours, theirs) = (self.points / points, surfel.points / points);

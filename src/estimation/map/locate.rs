@@ -1,9 +1,9 @@
 //! Where in a map something was seen: from about where it may be, coarse to fine.
 //!
-//! What was seen is put into the map from several starts, and laid upon it: neighbours in six dimensions, matched as in a
-//! window; a rigid motion that brings matched planes together (Chen and Medioni 1992), robustly; again, from the coarsest
-//! resolution to the finest. Of the places found so the one counts in which most of what was seen lies on the map, where no
-//! other is nearly as good.
+//! What was seen is put into the map from several starts, and laid upon it: neighbours in six dimensions, matched as in
+//! a window; a rigid motion that brings matched planes together (Chen and Medioni 1992), robustly; again, from the
+//! coarsest resolution to the finest. Of the places found so the one counts in which most of what was seen lies on the
+//! map, where no other is nearly as good.
 
 use super::search::Search;
 use crate::estimation::matching::{Forest, Matcher};
@@ -28,7 +28,8 @@ const GATES: (f64, f64) = (0.5, 0.1);
 const ANGLE_DEG: f64 = 30.0;
 /// Both frames are level to this, degrees.
 const LEVEL_DEG: f64 = 1.0;
-/// Of how many directions of a shift nothing may be told: along a corridor of one; over bare ground of two, and of the heading.
+/// Of how many directions of a shift nothing may be told: along a corridor of one; over bare ground of two, and of the
+/// heading.
 const MOST_UNTOLD: f64 = 1.5;
 /// Information that holds a pose where it is along what is not told, 1/m^2: more than all matches together.
 const UNMOVED: f64 = 1e12;
@@ -87,8 +88,8 @@ struct Gate {
 }
 
 impl Locator {
-    /// Of things that are seen by surfels of `surfels`; a match is off by `sigma_m` beside its surfels' thickness, and the
-    /// covariance is `inflation` times what matches say.
+    /// Of things that are seen by surfels of `surfels`; a match is off by `sigma_m` beside its surfels' thickness, and
+    /// the covariance is `inflation` times what matches say.
     pub(in crate::estimation) fn new(map: &SurfelMap, by: (&MatchingSpec, &SurfelSpec), certainty: (f64, f64)) -> Self {
         Self::among(map.surfels().iter().map(Patch::of_map).collect(), by, certainty)
     }
@@ -155,8 +156,8 @@ impl Locator {
         }
     }
 
-    /// Where the patches of a resolution that were seen settle from a pose, as level as they were at `start`; `None` where the matches
-    /// determine nothing.
+    /// Where the patches of a resolution that were seen settle from a pose, as level as they were at `start`; `None`
+    /// where the matches determine nothing.
     fn settle(&self, (level, seen): (usize, &[Patch]), from: &Vector, start: &Pose, pose: &Pose) -> Option<Pose> {
         let mut pose = *pose;
         let edge_m = self.matcher.finest_voxel_m * f64::from(1_u32 << level);
@@ -263,7 +264,8 @@ fn corrected(pose: &Pose, pivot: &Vector, step: &Vector6<f64>) -> Pose {
 }
 
 impl Tally {
-    /// Of the directions of a shift those that no normals tell but by their errors: `sum e e^T` in the block of the shift.
+    /// Of the directions of a shift those that no normals tell but by their errors: `sum e e^T` in the block of the
+    /// shift.
     fn untold(&self) -> Matrix6<f64> {
         let sum: f64 = self.normals.iter().map(|(_, weight)| weight).sum();
         let scatter: Matrix = self.normals.iter().map(|(normal, weight)| normal * normal.transpose() * *weight).sum();
@@ -313,8 +315,8 @@ mod tests {
     use crate::estimation;
     use crate::geometry::from_roll_pitch_yaw;
 
-    /// Patches of a resolution of a room of 6 m by 4 m by 2.5 m with a pillar, seen from within; `at` tells where in its
-    /// cell each has its centre.
+    /// Patches of a resolution of a room of 6 m by 4 m by 2.5 m with a pillar, seen from within; `at` tells where in
+    /// its cell each has its centre.
     fn room(edge_m: f64, level: usize, at: f64) -> Vec<Patch> {
         let mut patches = Vec::new();
         let mut wall = |corner: Vector, along: Vector, up: Vector, normal: Vector| {

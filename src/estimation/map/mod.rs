@@ -16,8 +16,8 @@ use crate::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
 use crate::time::{Span, Stamp};
 use nalgebra::Matrix6;
 
-/// The map that an open loop's `survey` makes: its patches are carried from where the open loop put them to where the final
-/// trajectory, at the same stamps, has them (`open_loop` and `best`), and those of one surface are put together.
+/// The map that an open loop's `survey` makes: its patches are carried from where the open loop put them to where the
+/// final trajectory, at the same stamps, has them (`open_loop` and `best`), and those of one surface are put together.
 /// `covariances` are those of some of the poses.
 ///
 /// # Errors
@@ -44,8 +44,8 @@ pub fn map_of(
     map_from(spec.finest_voxel_m, spec.levels, surfels)
 }
 
-/// Where in `map` another map is, whose origin is about at `start` in it: within a metre on the level and twenty degrees
-/// about the vertical, both maps being level.
+/// Where in `map` another map is, whose origin is about at `start` in it: within a metre on the level and twenty
+/// degrees about the vertical, both maps being level.
 ///
 /// # Errors
 /// When it is not found there, or at several places.
@@ -137,8 +137,8 @@ impl Patch {
     }
 }
 
-/// A map's own error as one of the whole: a shift as large as its surfels are uncertain in the middle (median), and a turn
-/// that makes as much of it at `ARM_M`.
+/// A map's own error as one of the whole: a shift as large as its surfels are uncertain in the middle (median), and a
+/// turn that makes as much of it at `ARM_M`.
 pub(super) fn covariance_of(map: &SurfelMap) -> Matrix6<f64> {
     const ARM_M: f64 = 5.0;
     let mut sigmas: Vec<f64> = map.surfels().iter().map(|surfel| surfel.sigma_m).collect();

@@ -19,7 +19,8 @@ const TURNED_DEG: (f64, f64, f64) = (15.0, 60.0, 90.0);
 pub(in crate::estimation) struct Search {
     /// On the level, m, and turned, rad.
     reach: (f64, f64),
-    /// Patches this far apart along their normals lie on each other, m; the share of a voxel's edge where nothing is said.
+    /// Patches this far apart along their normals lie on each other, m; the share of a voxel's edge where nothing is
+    /// said.
     pub(super) gate_m: Option<f64>,
     /// Least share of the finest patches that lies on the map.
     share: f64,
@@ -34,8 +35,8 @@ pub(in crate::estimation) const IN_MAP: Search =
     Search { reach: (APART.0, APART.1), gate_m: None, share: 0.4, agreement: 0.0, nearest: false };
 
 impl Search {
-    /// In what was seen before a silence of `seconds`, matches being good to `sigma_m`. It may show little of what is seen
-    /// behind it, but where both show a place, it must be the same; and the head cannot have gone far.
+    /// In what was seen before a silence of `seconds`, matches being good to `sigma_m`. It may show little of what is
+    /// seen behind it, but where both show a place, it must be the same; and the head cannot have gone far.
     pub(in crate::estimation) fn behind_silence(seconds: f64, sigma_m: f64) -> Self {
         let reach_m = (AWAY.0 + AWAY.1 * seconds).min(AWAY.2);
         let reach_deg = (TURNED_DEG.0 + TURNED_DEG.1 * seconds).min(TURNED_DEG.2);

@@ -29,8 +29,8 @@ impl Blocks {
         self.blocks.iter_mut().flatten().for_each(|block| block.fill(0.0));
     }
 
-    /// Adds `block` at (`row`, `column`), which is not always zero, and its transpose at (`column`, `row`); both, where the two
-    /// are one.
+    /// Adds `block` at (`row`, `column`), which is not always zero, and its transpose at (`column`, `row`); both, where
+    /// the two are one.
     pub(super) fn add(&mut self, row: usize, column: usize, block: &Matrix6<f64>) {
         let (late, early) = (row.max(column), row.min(column));
         if let Ok(at) = self.columns[late].binary_search(&(early as u32)) {
@@ -77,8 +77,8 @@ impl Blocks {
         Llt::try_new_with_symbolic(symbolic, SparseColMatRef::new(pattern, &values), faer::Side::Upper).ok()
     }
 
-    /// On and above the diagonal, column by column: where each column begins, rows, values. A row of blocks below the diagonal
-    /// is a column above it.
+    /// On and above the diagonal, column by column: where each column begins, rows, values. A row of blocks below the
+    /// diagonal is a column above it.
     fn upper_by_columns(&self) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
         let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
         for (row, (columns, blocks)) in self.columns.iter().zip(&self.blocks).enumerate() {

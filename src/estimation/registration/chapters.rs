@@ -1,9 +1,9 @@
 //! Which stretches of the recording are compared with which.
 //!
-//! The whole is cut into chapters of a few seconds. Some are *references*: enough of them that each place was seen by so many,
-//! chosen from all over the recording. Every chapter's surfels are matched with those of the references that saw the same.
-//! Where the same place is seen for an hour, references do not become more: unknowns of other chapters hang together with
-//! those of the references and of their neighbours in time alone, and their equations stay sparse.
+//! The whole is cut into chapters of a few seconds. Some are *references*: enough of them that each place was seen by
+//! so many, chosen from all over the recording. Every chapter's surfels are matched with those of the references that
+//! saw the same. Where the same place is seen for an hour, references do not become more: unknowns of other chapters
+//! hang together with those of the references and of their neighbours in time alone, and their equations stay sparse.
 
 use super::RegistrationSpec;
 use crate::estimation::surfel::Patch;

@@ -6,9 +6,8 @@
 //! e_l = (-(C z)_y, (C z)_x)                         deviation of roll and pitch, which gravity held
 //! ```
 //!
-//! with `C = R' R^T` the correction so far, in the middle where nothing else is said; in `e_l` that since the open loop, where
-//! the course was bent before. With `d` the next corrections and
-//! `v = C (t_b - t_a)`,
+//! with `C = R' R^T` the correction so far, in the middle where nothing else is said; in `e_l` that since the open
+//! loop, where the course was bent before. With `d` the next corrections and `v = C (t_b - t_a)`,
 //!
 //! ```text
 //! de_r = dr_b - dr_a       de_t = dt_b - dt_a + v x (dr_a + dr_b) / 2       de_l = [dr]_(x, y)
@@ -205,9 +204,10 @@ impl Deviation {
     }
 }
 
-/// Variances of the open loop's drift between two instants, of position and attitude on an axis, m^2 and rad^2: by how much its
-/// error grew, and how much of it was exchanged for another. An error that stays of variance `s^2` and is forgotten in `tau`
-/// (Gauss-Markov) changes in `h` by `2 s^2 h / tau`, as that of an open loop does which goes from view to view.
+/// Variances of the open loop's drift between two instants, of position and attitude on an axis, m^2 and rad^2: by how
+/// much its error grew, and how much of it was exchanged for another. An error that stays of variance `s^2` and is
+/// forgotten in `tau` (Gauss-Markov) changes in `h` by `2 s^2 h / tau`, as that of an open loop does which goes from
+/// view to view.
 fn drift(covariances: &[(Stamp, PoseCovariance)], from: Stamp, to: Stamp, tau_s: f64) -> (f64, f64) {
     let at = |stamp: Stamp| {
         let index = covariances.partition_point(|(s, _)| *s <= stamp).saturating_sub(1);

@@ -1,5 +1,5 @@
-//! Normal equations of the whole trajectory, knot by knot: what hangs together in time apart from what links times that are
-//! far from each other.
+//! Normal equations of the whole trajectory, knot by knot: what hangs together in time apart from what links times that
+//! are far from each other.
 
 use super::blocks::Blocks;
 use super::gradients::{self, System};
@@ -100,8 +100,8 @@ pub(super) struct Equations {
 }
 
 impl Equations {
-    /// Empty equations of `knots` knots from `first_knot` on, where neighbours hang together, and the knots of every two
-    /// segments of `linked` (indices of their first knots).
+    /// Empty equations of `knots` knots from `first_knot` on, where neighbours hang together, and the knots of every
+    /// two segments of `linked` (indices of their first knots).
     pub(super) fn new(first_knot: i64, knots: usize, linked: impl Iterator<Item = (i64, i64)>) -> Self {
         let reach = KNOTS - 1 + NEAR as usize;
         let near = (0..knots).map(|k| (k.saturating_sub(reach) as u32..=k as u32).collect()).collect();

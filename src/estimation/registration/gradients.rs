@@ -1,9 +1,9 @@
 //! Conjugate gradients for equations too linked to be factored.
 //!
-//! Where one place is seen again and again, each stretch of time hangs together with stretches all over the recording, and a
-//! sparse factor fills up: its work grows with the cube of the length. For the same reason such equations are well conditioned
-//! once what hangs together in time is solved for. Conjugate gradients, preconditioned by the factor of that (Hestenes and
-//! Stiefel 1952; Golub and Van Loan 2013, 11.5.2), need some dozens of products with the matrix.
+//! Where one place is seen again and again, each stretch of time hangs together with stretches all over the recording,
+//! and a sparse factor fills up: its work grows with the cube of the length. For the same reason such equations are
+//! well conditioned once what hangs together in time is solved for. Conjugate gradients, preconditioned by the factor
+//! of that (Hestenes and Stiefel 1952; Golub and Van Loan 2013, 11.5.2), need some dozens of products with the matrix.
 
 /// A symmetric positive definite matrix, and one near it that is easily solved.
 pub(super) trait System {
@@ -13,8 +13,8 @@ pub(super) trait System {
     fn solve_near(&self, z: &mut [f64]);
 }
 
-/// Solved, when the residual as the near matrix weighs it is such a part of what it was; and solved well enough, when rounding
-/// permits no more.
+/// Solved, when the residual as the near matrix weighs it is such a part of what it was; and solved well enough, when
+/// rounding permits no more.
 const SOLVED: f64 = 1e-8;
 const PASSABLE: f64 = 1e-4;
 /// So many products with the matrix at most.

@@ -1,11 +1,11 @@
 //! The lidar among the unknowns: how its ranges differ from what the open loop took them for.
 //!
-//! Common to all that was seen, it stands beside the knots' corrections: a range longer by `o` moves a surfel's centre by `u o`,
-//! with `u` the unit vector to it from the lidar.
+//! Common to all that was seen, it stands beside the knots' corrections: a range longer by `o` moves a surfel's centre
+//! by `u o`, with `u` the unit vector to it from the lidar.
 //!
-//! How the lidar sits on the IMU is not among the unknowns: the open loop has told it by the IMU, and what was seen says
-//! nothing more of it. As the open loop went on it learnt better, so what it then took the head's poses for is told anew:
-//! [`remounted`].
+//! How the lidar sits on the IMU is not among the unknowns: the open loop has told it by the IMU, and what was seen
+//! says nothing more of it. As the open loop went on it learnt better, so what it then took the head's poses for is
+//! told anew: [`remounted`].
 
 use super::equations::Beside;
 use crate::estimation::EstimatorSpec;
@@ -53,8 +53,8 @@ impl Mount {
         }
     }
 
-    /// From where `patch`, made by the correction `made_by`, was seen by a head at `map_from_head`; the patch becomes what the
-    /// lidar as it is known now makes of it.
+    /// From where `patch`, made by the correction `made_by`, was seen by a head at `map_from_head`; the patch becomes
+    /// what the lidar as it is known now makes of it.
     pub(super) fn sight(&self, map_from_head: &Pose, patch: &mut Patch, made_by: &LidarCorrection) -> Sight {
         let lidar_at = (map_from_head * self.head_from_laser).translation.vector;
         let seen = patch.centre - lidar_at;
@@ -101,8 +101,8 @@ pub(super) fn turn_patch(patch: &mut Patch, turn: &Rotation) {
     patch.covariance = turn * patch.covariance * turn.transpose();
 }
 
-/// The trajectory of a head whose lidar had been known all along as `lidar`, while what was seen stays where it is: the lidar
-/// was where the survey has it, and the head is told from there.
+/// The trajectory of a head whose lidar had been known all along as `lidar`, while what was seen stays where it is: the
+/// lidar was where the survey has it, and the head is told from there.
 pub(super) fn remounted(
     map_from_head: &Trajectory,
     survey: &Survey,

@@ -1,9 +1,10 @@
 //! What matched surfels say of the corrections.
 //!
-//! `e = n^T (mu_i - mu_j)`, `n` the normal of the plane that both have in common. A surfel's centre moves by
-//! `dt + dr x arm` with the correction at its time, and with what the lidar is found to be: `lidar`. There are many more matches than unknowns: they are summed first by the
-//! slots (halves of knot intervals) in which their two surfels were seen, as if in their middle, then spread to the knots.
-//! Residuals are exact; their derivatives are those of an instant at most a quarter of an interval away.
+//! `e = n^T (mu_i - mu_j)`, `n` the normal of the plane that both have in common. A surfel's centre moves by `dt + dr x
+//! arm` with the correction at its time, and with what the lidar is found to be: `lidar`. There are many more matches
+//! than unknowns: they are summed first by the slots (halves of knot intervals) in which their two surfels were seen,
+//! as if in their middle, then spread to the knots. Residuals are exact; their derivatives are those of an instant at
+//! most a quarter of an interval away.
 
 use super::RegistrationSpec;
 use super::equations::{Beside, Equations, Link, Own};

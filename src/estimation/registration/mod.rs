@@ -1,11 +1,11 @@
-//! The global registration: behind the open loop, what was seen at one time is laid on what was seen of it at any other.
+//! The global registration: behind the open loop, what was seen at one time is laid on what was seen of it at any
+//! other.
 //!
-//! After Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012), whose global optimisation minimises match errors,
-//! deviations from the open loop's velocities and deviations from gravity, and takes biases and latency from the open loop.
-//! Unknown is a correction of the whole trajectory, a cubic B-spline of coarse knots, as in a window: `R' = exp(dr) R`,
-//! `t' = t + dt`; and of the lidar an offset of its ranges. How it sits on the IMU is as the open loop has found it, see
-//! `lidar`.
-//! Minimised is
+//! After Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012), whose global optimisation minimises match
+//! errors, deviations from the open loop's velocities and deviations from gravity, and takes biases and latency from
+//! the open loop. Unknown is a correction of the whole trajectory, a cubic B-spline of coarse knots, as in a window:
+//! `R' = exp(dr) R`, `t' = t + dt`; and of the lidar an offset of its ranges. How it sits on the IMU is as the open
+//! loop has found it, see `lidar`. Minimised is
 //!
 //! ```text
 //! sum over matches      rho(zeta n^T (mu_i - mu_j))           between any two times, see `matches`
@@ -14,13 +14,13 @@
 //! + |lidar / sigma|^2                                          against the lidar's calibration
 //! ```
 //!
-//! 1. The open loop's *survey* brings surfels of four resolutions, a passing of the beams each, made of all beams by the
-//!    trajectory as it became final.
-//! 2. Where the open loop has drifted out of the matches' reach, places are recognised and the trajectory is bent to the loops
-//!    found: `places`.
+//! 1. The open loop's *survey* brings surfels of four resolutions, a passing of the beams each, made of all beams by
+//!    the trajectory as it became final.
+//! 2. Where the open loop has drifted out of the matches' reach, places are recognised and the trajectory is bent to
+//!    the loops found: `places`.
 //! 3. Surfels are shelved by chapters, and chapters that saw the same places are compared: `chapters`.
-//! 4. From the coarsest resolution on: neighbours in six dimensions, found from both sides; match; solve; move the trajectory
-//!    and the surfels; until nothing moves. Then the next finer resolution joins in.
+//! 4. From the coarsest resolution on: neighbours in six dimensions, found from both sides; match; solve; move the
+//!    trajectory and the surfels; until nothing moves. Then the next finer resolution joins in.
 //! 5. A solution that is not believed, or that rests on too little, is dropped, and the open loop stays.
 
 mod blocks;
@@ -57,8 +57,8 @@ use scene::Scene;
 
 /// A correction beyond this (m, rad) in one solve is not believed.
 const BELIEVABLE: (f64, f64) = (20.0, 1.0);
-/// A course that was bent to loops is registered at most so often, each time as if it were the open loop, until it moves by
-/// less, m.
+/// A course that was bent to loops is registered at most so often, each time as if it were the open loop, until it
+/// moves by less, m.
 const ROUNDS: usize = 6;
 const STAYS_M: f64 = 0.002;
 
@@ -69,8 +69,8 @@ pub struct ClosedLoop {
     pub trajectory: Trajectory,
     /// What was learnt of the lidar beyond its calibration.
     pub lidar: LidarCorrection,
-    /// The open loop's trajectory as it would have been had it known from the start how the lidar sits on the IMU: what was seen
-    /// was seen from there. `None` where the two are the same.
+    /// The open loop's trajectory as it would have been had it known from the start how the lidar sits on the IMU: what
+    /// was seen was seen from there. `None` where the two are the same.
     pub open_loop_told_anew: Option<Trajectory>,
     /// What it rests on.
     pub report: RegistrationReport,
@@ -176,8 +176,8 @@ impl OpenLoop<'_> {
         Ok((Closed { trajectory: course.into_trajectory(map_from_head.stamps()), mount }, report))
     }
 
-    /// The same of a course that was bent to loops. It is registered again and again, each time as if it were the open loop,
-    /// until it stays: of the open loop's drift some is left in it, as firmly believed as the open loop.
+    /// The same of a course that was bent to loops. It is registered again and again, each time as if it were the open
+    /// loop, until it stays: of the open loop's drift some is left in it, as firmly believed as the open loop.
     fn close_bent(&self, mut bent: Bent, mut mount: Mount, mut report: RegistrationReport) -> Told<Closed> {
         let Travelled { map_from_head, covariances, .. } = self.travelled;
         for _ in 0..ROUNDS {

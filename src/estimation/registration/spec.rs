@@ -23,14 +23,15 @@ pub struct RegistrationSpec {
     /// Length of the chapters whose surfels are matched with each other's, s.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub chapter_s: f64,
-    /// A chapter becomes a reference, with which others are matched, where fewer references than this have seen the same.
+    /// A chapter becomes a reference, with which others are matched, where fewer references than this have seen the
+    /// same.
     pub references: usize,
     /// Most references that a chapter is matched with.
     pub partners: usize,
     /// Neighbours of a surfel looked up in each of them.
     pub neighbours: usize,
-    /// Greatest distance along the normal of finest surfels, m; of coarser ones, in proportion to their edges, until those are
-    /// settled.
+    /// Greatest distance along the normal of finest surfels, m; of coarser ones, in proportion to their edges, until
+    /// those are settled.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub max_plane_distance_m: f64,
     /// Cauchy threshold, in standard deviations.
@@ -59,15 +60,15 @@ pub struct RegistrationSpec {
     /// Iterations end when no knot moves by more than this, m.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub settled_m: f64,
-    /// Least over greatest information that the matches hold about the position along any direction, 0..1: with less that
-    /// direction is weak.
+    /// Least over greatest information that the matches hold about the position along any direction, 0..1: with less
+    /// that direction is weak.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub weak_conditioning: f64,
     /// What was seen so long apart was seen again, s: what was seen within it the open loop's windows have weighed.
     #[serde(deserialize_with = "crate::spec::checked::positive")]
     pub again_after_s: f64,
-    /// Fraction of what holds a weak direction that must have been seen again, 0..1: with less the open loop stays, whose
-    /// windows and IMU know that direction better.
+    /// Fraction of what holds a weak direction that must have been seen again, 0..1: with less the open loop stays,
+    /// whose windows and IMU know that direction better.
     #[serde(deserialize_with = "crate::spec::checked::fraction")]
     pub min_seen_again: f64,
     /// How places are recognised.

@@ -144,8 +144,8 @@ fn walked(
     Left { open: trajectory(&estimated), covariances, survey, truth: trajectory(&truth) }
 }
 
-/// Root mean square distance of two trajectories' positions, m, and what is left of it but for a shift that is common to all:
-/// the map hangs on its first pose, and what that errs all err.
+/// Root mean square distance of two trajectories' positions, m, and what is left of it but for a shift that is common
+/// to all: the map hangs on its first pose, and what that errs all err.
 fn apart_m(a: &Trajectory, b: &Trajectory) -> (f64, f64) {
     let apart: Vec<Vector> =
         a.poses().iter().zip(b.poses()).map(|(a, b)| a.translation.vector - b.translation.vector).collect();
@@ -235,7 +235,8 @@ fn an_offset_of_the_ranges_is_found() {
 fn a_lidar_that_sits_otherwise_is_as_the_open_loop_found_it_and_the_head_is_told_from_there() {
     let mut spec = load("default").unwrap();
     spec.extrinsics.estimated = true;
-    // Until half of the way the open loop took the lidar for calibrated, then it knew better; what it saw was right throughout.
+    // Until half of the way the open loop took the lidar for calibrated, then it knew better; what it saw was right
+    // throughout.
     let found = LidarCorrection {
         turn: Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.4) * 1_f64.to_radians()),
         shift: Vector::new(0.006, -0.009, 0.004),

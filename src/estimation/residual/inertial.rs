@@ -5,9 +5,9 @@
 //! e_a = R_mid^T ((v_(k+1) - v_k) / h - g) - (f_mid - b_a)
 //! ```
 //!
-//! Both compare means over the interval, so the rate belongs to its middle and no second difference of positions is taken:
-//! `v` is the integrated velocity, corrected by the spline's exact derivative. With `R' = exp(dr) R`, `t' = t + dt`, in the
-//! map's axes:
+//! Both compare means over the interval, so the rate belongs to its middle and no second difference of positions is
+//! taken: `v` is the integrated velocity, corrected by the spline's exact derivative. With `R' = exp(dr) R`, `t' = t +
+//! dt`, in the map's axes:
 //!
 //! ```text
 //! d R_(k+1) e_w / d(dr_(k+1) - dr_k) = 1 / h      d R_(k+1) e_w / db_w = R_(k+1)
@@ -17,7 +17,8 @@
 //! d R_mid e_a / db_a = R_mid                      d R_mid e_a / dgamma = [g]x (e_x, e_y),  g' = exp(gamma) g
 //! ```
 //!
-//! The equations take them summed over a knot's spacing ([`add_inertial`]): so far the correction can follow what a bias does.
+//! The equations take them summed over a knot's spacing ([`add_inertial`]): so far the correction can follow what a
+//! bias does.
 
 use super::rows::{KNOTS, Row, Rows};
 use super::{ACCEL_BIAS, ACCEL_MATRIX, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
@@ -28,11 +29,12 @@ use crate::geometry::{Matrix, Rotation, Vector, skew};
 
 /// Sigmas that differ by this factor are not summed.
 const UNLIKE: f64 = 3.0;
-/// By how much a single sample of the accelerometer may be off, beyond its noise, since the correction cannot follow it within a
-/// knot's span. None at all, and a correction could swing between the sums' ends.
+/// By how much a single sample of the accelerometer may be off, beyond its noise, since the correction cannot follow it
+/// within a knot's span. None at all, and a correction could swing between the sums' ends.
 const WITHIN_SPAN: f64 = 3.0;
 
-/// Gaps of the IMU no longer than this leave no step that would matter, and the head's place more certain than matches reach, s.
+/// Gaps of the IMU no longer than this leave no step that would matter, and the head's place more certain than matches
+/// reach, s.
 pub(in crate::estimation) const SHORT_GAP_S: f64 = 0.05;
 /// How far to both sides of a gap the correction takes the step, s, and by how much it then differs, rad/s and m/s^2.
 const BESIDE_S: f64 = 0.3;
@@ -71,11 +73,12 @@ impl Inertial {
 
 /// Adds to the equations what `intervals` between `states` say, with the splines' bases at the states.
 ///
-/// A head that rocks turns a change of its accelerometer's bias into a changing acceleration. The correction, whose second
-/// derivative is straight between knots, follows it in the mean over a knot's spacing, and not from sample to sample: taken
-/// sample by sample, the difference would pass for knowledge and hold the bias wherever it is. So speeds count in full when
-/// summed from one middle of a knot's span to the next, and sample by sample for less ([`WITHIN_SPAN`]). Where sigmas
-/// change, as where a sensor is silent, another sum begins, so that the better part keeps its worth.
+/// A head that rocks turns a change of its accelerometer's bias into a changing acceleration. The correction, whose
+/// second derivative is straight between knots, follows it in the mean over a knot's spacing, and not from sample to
+/// sample: taken sample by sample, the difference would pass for knowledge and hold the bias wherever it is. So speeds
+/// count in full when summed from one middle of a knot's span to the next, and sample by sample for less
+/// ([`WITHIN_SPAN`]). Where sigmas change, as where a sensor is silent, another sum begins, so that the better part
+/// keeps its worth.
 pub(in crate::estimation) fn add_inertial(
     equations: &mut NormalEquations,
     layout: &Layout,
@@ -106,9 +109,9 @@ pub(in crate::estimation) fn add_inertial(
     whole.move_to(equations, layout);
 }
 
-/// Which intervals are near a gap that was bridged: the head left it with another velocity and attitude than was thought, a step that
-/// the correction, smooth over some knots' spacings, takes on both sides of the gap. There it contradicts the samples without
-/// their being wrong, and taken at their word they would have biases take the step.
+/// Which intervals are near a gap that was bridged: the head left it with another velocity and attitude than was
+/// thought, a step that the correction, smooth over some knots' spacings, takes on both sides of the gap. There it
+/// contradicts the samples without their being wrong, and taken at their word they would have biases take the step.
 fn beside_gaps(intervals: &[Interval]) -> Vec<bool> {
     let mut beside = vec![false; intervals.len()];
     let (mut bridged_s, mut behind_s) = (0.0, f64::INFINITY);
@@ -326,7 +329,8 @@ mod tests {
             equations
         }
 
-        /// The deviations, whitened: of the turn and of the speed, sample by sample, and of the speed over all intervals.
+        /// The deviations, whitened: of the turn and of the speed, sample by sample, and of the speed over all
+        /// intervals.
         fn whitened(&self) -> Vec<f64> {
             let (mut whole, mut variance) = (Vector::zeros(), 0.0);
             let mut each = Vec::new();
@@ -445,8 +449,8 @@ mod tests {
 
     #[test]
     fn an_imu_alone_says_next_to_nothing_of_its_bias() {
-        // Any bias of the accelerometer goes with some trajectory that begins as this one does. So four seconds of rocking, which
-        // would know a constant to 10 mm/s^2 / sqrt(400), leave it unknown to 25 times that.
+        // Any bias of the accelerometer goes with some trajectory that begins as this one does. So four seconds of
+        // rocking, which would know a constant to 10 mm/s^2 / sqrt(400), leave it unknown to 25 times that.
         let case = rocking(0.013, 400);
         let layout = Layout { first_knot: 0, knots: 24 };
         let mut equations = case.equations(&layout);

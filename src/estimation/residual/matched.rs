@@ -1,12 +1,12 @@
 //! How far two matched surfels are apart along the normal of the surface that both belong to.
 //!
-//! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by
-//! `zeta^2 = 1 / (sigma_r^2 + lambda + d_i + d_j)`, with `d` what a patch that is not flat is in doubt by. A live surfel's
-//! centre moves by `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the way from the lidar, `u` along it, and the lidar turned by `e`
-//! and shifted by `s` along the IMU's axes; one of a fixed view does not.
+//! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by `zeta^2 = 1 / (sigma_r^2 +
+//! lambda + d_i + d_j)`, with `d` what a patch that is not flat is in doubt by. A live surfel's centre moves by `dt +
+//! dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the way from the lidar, `u` along it, and the lidar turned by
+//! `e` and shifted by `s` along the IMU's axes; one of a fixed view does not.
 //!
-//! What all surfels share stands in the border: `B` unknowns of it are carried, [`SHARED`] or, where the lidar's place on the
-//! IMU is not estimated, only the [`ALWAYS`] first.
+//! What all surfels share stands in the border: `B` unknowns of it are carried, [`SHARED`] or, where the lidar's place
+//! on the IMU is not estimated, only the [`ALWAYS`] first.
 
 use super::sums::{OF_SPAN, add_scaled, over_knots};
 use super::{CLOCK, Layout};

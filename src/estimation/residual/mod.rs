@@ -6,9 +6,9 @@ pub(super) mod prior;
 mod rows;
 pub(super) mod sums;
 
-/// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate,
-/// correction of the ranges, of the lidar's attitude and of its place, and by how much gyroscope and accelerometer exaggerate, each
-/// three by three.
+/// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and
+/// rate, correction of the ranges, of the lidar's attitude and of its place, and by how much gyroscope and
+/// accelerometer exaggerate, each three by three.
 pub(super) const BORDER: usize = 35;
 /// Where each begins.
 pub(super) const GYRO_BIAS: usize = 0;

@@ -17,17 +17,17 @@ pub(in crate::estimation) struct Start {
     pub(in crate::estimation) by_lidar: Option<ByLidar>,
 }
 
-/// By how much the correction (rows: turn, shift), its first and its second derivative where a window begins would be others, had
-/// the window before taken the lidar to be turned and shifted on the IMU (columns).
+/// By how much the correction (rows: turn, shift), its first and its second derivative where a window begins would be
+/// others, had the window before taken the lidar to be turned and shifted on the IMU (columns).
 ///
-/// What was seen tells the way of the lidar, and the IMU's only through where the lidar sits. So the IMU where a window begins is
-/// as uncertain as that. Held regardless, it would hold the lidar where it was thought to be: each window would know that
-/// anew, and from nothing.
+/// What was seen tells the way of the lidar, and the IMU's only through where the lidar sits. So the IMU where a window
+/// begins is as uncertain as that. Held regardless, it would hold the lidar where it was thought to be: each window
+/// would know that anew, and from nothing.
 pub(in crate::estimation) type ByLidar = [Matrix6<f64>; 3];
 
 impl Start {
-    /// A beginning from which the window goes on smoothly: pose and velocity are those of the window before, and nearly the
-    /// acceleration, which a bias that has become better known changes at once.
+    /// A beginning from which the window goes on smoothly: pose and velocity are those of the window before, and nearly
+    /// the acceleration, which a bias that has become better known changes at once.
     pub(in crate::estimation) fn held(u_s: f64) -> Self {
         Self { u_s, sigmas: [[1e-5, 1e-5], [1e-4, 1e-4], [1e-2, 0.3]], by_lidar: None }
     }
@@ -37,8 +37,8 @@ impl Start {
         Self { u_s, sigmas: [[1e-5, 1e-5], [0.1, velocity_sigma], [10.0, 10.0]], by_lidar: None }
     }
 
-    /// Adds the conditions, `total` being the coefficients of the corrections made in this window so far, and `moved` how far
-    /// the border has moved in it.
+    /// Adds the conditions, `total` being the coefficients of the corrections made in this window so far, and `moved`
+    /// how far the border has moved in it.
     pub(in crate::estimation) fn add_to(
         &self,
         equations: &mut NormalEquations,
@@ -75,8 +75,8 @@ impl Start {
 }
 
 impl Start {
-    /// The right-hand side that asks for these corrections, turn then shift, and their first derivatives where the window
-    /// begins.
+    /// The right-hand side that asks for these corrections, turn then shift, and their first derivatives where the
+    /// window begins.
     pub(in crate::estimation) fn right_hand_side(
         &self,
         layout: &Layout,
@@ -144,7 +144,8 @@ mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    /// Against the definition: the residuals of the correction, less what the lidar's change asks for, differentiated by steps.
+    /// Against the definition: the residuals of the correction, less what the lidar's change asks for, differentiated
+    /// by steps.
     #[test]
     fn a_beginning_that_hangs_on_the_lidar_is_held_to_where_the_lidar_would_have_put_it() {
         const SPACING_S: f64 = 0.2;

@@ -1,6 +1,7 @@
 //! Residuals that hang on a few knots and on what is unknown of the IMU, summed before they go into the equations.
 //!
-//! All samples of a knot's span hang on the same unknowns: as long as they do, their products are summed in a small dense block.
+//! All samples of a knot's span hang on the same unknowns: as long as they do, their products are summed in a small
+//! dense block.
 
 use super::{CLOCK, GYRO_MATRIX, Layout};
 use crate::estimation::normal_equations::NormalEquations;

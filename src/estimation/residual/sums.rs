@@ -12,8 +12,8 @@ use crate::estimation::surfel::Placed;
 /// Unknowns of the four knots about a span.
 pub(super) const OF_SPAN: usize = 24;
 
-/// What all matches of a surfel say about its own motion: `sum w g v^T`, with `g` the derivative of `e` by turn and shift, and
-/// `v` in turn `g`, that by the border, and `e`.
+/// What all matches of a surfel say about its own motion: `sum w g v^T`, with `g` the derivative of `e` by turn and
+/// shift, and `v` in turn `g`, that by the border, and `e`.
 ///
 /// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
 #[derive(Debug)]
@@ -87,8 +87,8 @@ impl<const B: usize> OfSpan<B> {
     }
 }
 
-/// What all matches say about what surfels share: `sum w b v^T`, with `b` the derivative of `e` by them, and `v` in turn `b`
-/// and `e`.
+/// What all matches say about what surfels share: `sum w b v^T`, with `b` the derivative of `e` by them, and `v` in
+/// turn `b` and `e`.
 #[derive(Debug)]
 pub(in crate::estimation) struct Beside<const B: usize> {
     square: [[f64; B]; B],
@@ -116,7 +116,8 @@ impl<const B: usize> Beside<B> {
     }
 }
 
-/// How the knots about the surfels of two spans hang together by matches between them: rows by the later span's unknowns.
+/// How the knots about the surfels of two spans hang together by matches between them: rows by the later span's
+/// unknowns.
 #[derive(Debug)]
 pub(in crate::estimation) struct Coupling([[f64; OF_SPAN]; OF_SPAN]);
 
@@ -147,7 +148,8 @@ impl Coupling {
     ) {
         let (first_column, first_row) = (layout.knot(early), layout.knot(late));
         for (row, sums) in self.0.iter().enumerate().map(|(k, sums)| (first_row + k, sums)) {
-            // Where the spans have knots in common, columns reach the diagonal, and beyond it are those of the mirrored block.
+            // Where the spans have knots in common, columns reach the diagonal, and beyond it are those of the mirrored
+            // block.
             let below = row.saturating_sub(first_column).min(OF_SPAN);
             equations.add_row(row, first_column, &sums[..below]);
             for (column, sum) in sums.iter().enumerate().skip(below).map(|(k, sum)| (first_column + k, sum)) {

@@ -11,7 +11,8 @@ use crate::geometry::{Matrix, Vector};
 use crate::measurement::{LidarCorrection, LidarNoise};
 use rayon::prelude::*;
 
-/// Poses are computed at this spacing and taken linearly in between, s: at 400 degrees/s the chord is 1.5 um/m from the arc.
+/// Poses are computed at this spacing and taken linearly in between, s: at 400 degrees/s the chord is 1.5 um/m from the
+/// arc.
 const POSE_SPACING_S: f64 = 0.0005;
 /// A surface is upright, a wall rather than ground, when its normal leans less than this to the vertical: its cosine.
 const UPRIGHT: f64 = 0.7;
@@ -241,7 +242,8 @@ mod tests {
     use crate::estimation::strapdown::{Interval, State};
     use crate::geometry::Rotation;
 
-    /// Planar scans of a vertical corner, 2.1 m off on both sides, by a lidar that nods at `rate`, rad/s, across the way to it.
+    /// Planar scans of a vertical corner, 2.1 m off on both sides, by a lidar that nods at `rate`, rad/s, across the
+    /// way to it.
     fn scans_of_a_corner(rate: f64, scans: usize) -> (Nominal, Vec<Beam>) {
         let nodding = Vector::new(-1.0, 1.0, 0.0).normalize() * rate;
         let none = Vector::zeros();

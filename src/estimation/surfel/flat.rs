@@ -1,9 +1,10 @@
 //! Which patches are flat, and what those are worth that are not.
 //!
-//! Where a wall has ledges, or books stand on a shelf, the mean of a cell's points hangs on where it was seen from: obliquely, what
-//! juts out hides what lies behind. To one who walks by all such patches shift the same way, and without noise of any kind
-//! this was what the open loop erred by. Such a patch is thicker than noise makes a plane, and by that it is known; its place is
-//! put in doubt, so that the flat ones outweigh it, and it holds where there are no others.
+//! Where a wall has ledges, or books stand on a shelf, the mean of a cell's points hangs on where it was seen from:
+//! obliquely, what juts out hides what lies behind. To one who walks by all such patches shift the same way, and
+//! without noise of any kind this was what the open loop erred by. Such a patch is thicker than noise makes a plane,
+//! and by that it is known; its place is put in doubt, so that the flat ones outweigh it, and it holds where there are
+//! no others.
 
 use super::Surfel;
 use crate::estimation::spec::SurfelSpec;
@@ -38,9 +39,9 @@ pub(super) fn doubted(all: Vec<Shaped>, spec: &SurfelSpec) -> Vec<Surfel> {
     all.into_iter().map(doubted).collect()
 }
 
-/// The variance that a quarter of the finest patches stay below, as a multiple of what noise as it was told makes of planes: how large
-/// noise really is, or how rough this ground. A quarter, and not half: on a staircase most of what lies is the edge of a
-/// step, and would pass for rough ground. 1 if there are none.
+/// The variance that a quarter of the finest patches stay below, as a multiple of what noise as it was told makes of
+/// planes: how large noise really is, or how rough this ground. A quarter, and not half: on a staircase most of what
+/// lies is the edge of a step, and would pass for rough ground. 1 if there are none.
 fn usual_thickness<'a>(all: impl Iterator<Item = &'a Shaped>) -> f64 {
     let mut finest: Vec<f64> = all.filter(|s| s.surfel.level == 0).map(|s| s.variance / s.by_noise).collect();
     if finest.is_empty() {
@@ -51,8 +52,8 @@ fn usual_thickness<'a>(all: impl Iterator<Item = &'a Shaped>) -> f64 {
 }
 
 impl Shaped {
-    /// The variance along the normal beyond that of a plane, `flat`, and beyond `sigmas` of what the number of points leaves
-    /// open, m^2: a variance taken of `N` points has a standard deviation of `sqrt(2 / N)` of itself.
+    /// The variance along the normal beyond that of a plane, `flat`, and beyond `sigmas` of what the number of points
+    /// leaves open, m^2: a variance taken of `N` points has a standard deviation of `sqrt(2 / N)` of itself.
     fn excess(&self, flat: f64, sigmas: f64) -> f64 {
         (self.variance - flat * (1.0 + sigmas * (2.0 / self.surfel.points).sqrt())).max(0.0)
     }

@@ -1,8 +1,8 @@
 //! Surfels: small patches of surface, each seen in one passing of the beams.
 //!
-//! A surfel is made once, from points that the trajectory projected when they were new; from then on it moves as one rigid
-//! piece with the trajectory at its mean time: all its points were measured within a fraction of a second, over which the
-//! shape of the trajectory is left to the IMU.
+//! A surfel is made once, from points that the trajectory projected when they were new; from then on it moves as one
+//! rigid piece with the trajectory at its mean time: all its points were measured within a fraction of a second, over
+//! which the shape of the trajectory is left to the IMU.
 
 mod build;
 mod flat;
@@ -28,8 +28,8 @@ pub(super) struct Beam {
     pub(super) range_m: f32,
 }
 
-/// A patch of surface as the lidar saw it at the patch's mean time, along the axes of the IMU; what is known of the lidar beyond its
-/// calibration is applied where it is placed.
+/// A patch of surface as the lidar saw it at the patch's mean time, along the axes of the IMU; what is known of the
+/// lidar beyond its calibration is applied where it is placed.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Surfel {
     /// Mean time of its points, lidar time, s.
@@ -87,8 +87,8 @@ pub(super) struct Placed {
 }
 
 impl Patch {
-    /// Variance of how far the patch's normal leans to a direction: of a plane fitted to `N` points of thickness `lambda` and
-    /// spread `s^2` along it, `lambda / (N s^2)`.
+    /// Variance of how far the patch's normal leans to a direction: of a plane fitted to `N` points of thickness
+    /// `lambda` and spread `s^2` along it, `lambda / (N s^2)`.
     pub(super) fn variance_of_lean(&self, direction: &Vector) -> f64 {
         let along = direction - self.normal * self.normal.dot(direction);
         let spread = along.dot(&(self.covariance * along)) / along.norm_squared();

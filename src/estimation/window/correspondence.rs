@@ -28,8 +28,8 @@ pub(super) struct Neighbours {
     moved_m: f64,
 }
 
-/// Where a surfel was when it was last looked for in fixed views, and what was near it there. Views stand still, and a surfel
-/// hardly moves once its stretch has been solved: so most are looked for once.
+/// Where a surfel was when it was last looked for in fixed views, and what was near it there. Views stand still, and a
+/// surfel hardly moves once its stretch has been solved: so most are looked for once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Remembered {
     centre: Vector,

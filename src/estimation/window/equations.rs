@@ -158,8 +158,8 @@ impl Seen<'_> {
         }
     }
 
-    /// Sums are taken run by run and added in order: so they are the same bits on any number of threads, and, since vector units of
-    /// any width take them in the same order, on all machines.
+    /// Sums are taken run by run and added in order: so they are the same bits on any number of threads, and, since
+    /// vector units of any width take them in the same order, on all machines.
     fn add_weighted<const B: usize>(&self, weights: &[f64], equations: &mut NormalEquations, layout: &Layout) {
         let spans = self.matches.spans.par_iter();
         let spans = spans.map(|(span, surfels)| (span, Arch::new().dispatch(|| self.of_span::<B>(surfels, weights))));

@@ -204,8 +204,9 @@ impl Window {
         }
     }
 
-    /// Whether the oldest stretch is to leave: without it the window still holds `window_s` of stretches that swept over
-    /// surfaces, or it has none to give. While the head is held still it sees lines alone, which need the patches seen before.
+    /// Whether the oldest stretch is to leave: without it the window still holds `window_s` of stretches that swept
+    /// over surfaces, or it has none to give. While the head is held still it sees lines alone, which need the patches
+    /// seen before.
     pub(super) fn is_full(&self) -> bool {
         let richest = self.stretches.iter().map(|stretch| stretch.surfels.len()).max().unwrap_or(0);
         let enough = (richest as f64 * SWEPT) as usize;
@@ -267,8 +268,9 @@ impl Window {
         self.maker.lidar
     }
 
-    /// The same along the axes by which the IMU is calibrated, where how the lidar sits is estimated: midway between those of the
-    /// gyroscope, by which the head's attitude is told then, and those of the accelerometer, either being as good.
+    /// The same along the axes by which the IMU is calibrated, where how the lidar sits is estimated: midway between
+    /// those of the gyroscope, by which the head's attitude is told then, and those of the accelerometer, either being
+    /// as good.
     pub(super) fn calibrated_lidar(&self) -> LidarCorrection {
         let lidar = self.maker.lidar;
         if !self.spec.extrinsics.estimated {

@@ -63,8 +63,8 @@ impl Window {
         Some(known)
     }
 
-    /// How the corrections at `u_s`, IMU time, and their derivatives hang on how the lidar sits on the IMU, all else being solved
-    /// for: `P_xl P_ll^-1` of the covariances `P`. Nothing where that is not estimated.
+    /// How the corrections at `u_s`, IMU time, and their derivatives hang on how the lidar sits on the IMU, all else
+    /// being solved for: `P_xl P_ll^-1` of the covariances `P`. Nothing where that is not estimated.
     pub(super) fn hangs_on_lidar(&self, u_s: f64, at: &Linearised) -> Option<ByLidar> {
         if !self.spec.extrinsics.estimated {
             return None;
@@ -91,8 +91,8 @@ impl Window {
         Some([basis.value, basis.rate, basis.acceleration].map(by_lidar))
     }
 
-    /// What the next window takes over at `u_s`, as rows over the window's unknowns: the six corrections, turn then shift, their
-    /// derivatives, and the IMU's part of the border.
+    /// What the next window takes over at `u_s`, as rows over the window's unknowns: the six corrections, turn then
+    /// shift, their derivatives, and the IMU's part of the border.
     fn columns_at(&self, u_s: f64, layout: &Layout) -> [Vec<f64>; CARRIED] {
         let basis = Basis::at(u_s, self.spec.knot_spacing_s);
         let first = layout.knot(basis.first);

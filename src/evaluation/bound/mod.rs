@@ -1,29 +1,29 @@
 //! How well a trajectory can be told at all: the Cramer-Rao bound of a recording in its scene.
 //!
-//! Whatever an unbiased estimator does, the covariance of its errors is no less than the inverse of the Fisher information that
-//! its measurements hold. Here these are all beams, of known noise, on surfaces that are known exactly, and an inertial
-//! measurement unit of known noise whose biases walk. An estimator that does not know the map knows less, so the bound holds for
-//! it too; how much less is not told.
+//! Whatever an unbiased estimator does, the covariance of its errors is no less than the inverse of the Fisher
+//! information that its measurements hold. Here these are all beams, of known noise, on surfaces that are known
+//! exactly, and an inertial measurement unit of known noise whose biases walk. An estimator that does not know the map
+//! knows less, so the bound holds for it too; how much less is not told.
 //!
 //! # The model
 //!
-//! Errors of the estimate, all to first order about the truth: attitude `dtheta` (`R' = exp(dtheta) R`), velocity and position
-//! of the IMU in the world, the biases of gyroscope and accelerometer, and what is constant over the run: clock offset `l` and
-//! its rate, an offset of all ranges, and the scale and misalignment of both triads. They move as
+//! Errors of the estimate, all to first order about the truth: attitude `dtheta` (`R' = exp(dtheta) R`), velocity and
+//! position of the IMU in the world, the biases of gyroscope and accelerometer, and what is constant over the run:
+//! clock offset `l` and its rate, an offset of all ranges, and the scale and misalignment of both triads. They move as
 //!
 //! ```text
 //! dtheta' = -R (db_g + dM_g w + n_g)      dv' = -[R f]x dtheta - R (db_a + dM_a f + n_a)      dp' = dv      db' = n_b
 //! ```
 //!
-//! A beam from the head that meets a plane of normal `n` at `rho` from the IMU, along `u`, has the range
-//! `dr = -n (dp + dtheta x rho) / (n u)`, and its time is looked up on the IMU's clock: an error of `l` moves the pose by its
-//! own velocity. The trajectory is told in lidar time, so that `l` is in its error likewise.
+//! A beam from the head that meets a plane of normal `n` at `rho` from the IMU, along `u`, has the range `dr = -n (dp +
+//! dtheta x rho) / (n u)`, and its time is looked up on the IMU's clock: an error of `l` moves the pose by its own
+//! velocity. The trajectory is told in lidar time, so that `l` is in its error likewise.
 //!
 //! # What is left out, to the side of a lower bound
 //!
-//! Rounding of ranges, jitter and rounding of stamps, missed echoes and their biases at grazing incidence, beams that met
-//! anything but what stands, and samples at their limit: as if known. The IMU is taken to be heard continuously, of which
-//! its samples are averages. Gravity is known.
+//! Rounding of ranges, jitter and rounding of stamps, missed echoes and their biases at grazing incidence, beams that
+//! met anything but what stands, and samples at their limit: as if known. The IMU is taken to be heard continuously, of
+//! which its samples are averages. Gravity is known.
 
 mod epoch;
 mod motion;
@@ -83,7 +83,8 @@ pub struct InformationBound {
     pub position_rmse_m: f64,
     /// The same along each axis of the world, m.
     pub axis_rmse_m: Vector,
-    /// Of the position after the rigid alignment by which estimates are judged, m: what an error of that measure is held against.
+    /// Of the position after the rigid alignment by which estimates are judged, m: what an error of that measure is
+    /// held against.
     pub aligned_position_rmse_m: f64,
     /// Of the attitude over the run, in the world, rad.
     pub attitude_rmse_rad: f64,
@@ -94,8 +95,8 @@ pub struct InformationBound {
 }
 
 impl Information {
-    /// Nothing heard yet of a run in which the head was truly at `heads`: `world_from_head` in lidar time, in order, at least
-    /// 50 a second.
+    /// Nothing heard yet of a run in which the head was truly at `heads`: `world_from_head` in lidar time, in order, at
+    /// least 50 a second.
     pub fn new<E>(model: BoundModel, heads: impl Iterator<Item = Result<(Stamp, Pose), E>>) -> Result<Self, E> {
         let mut epochs: Vec<Epoch> = Vec::new();
         let (mut start, mut before): (Option<Stamp>, Option<(Stamp, Pose)>) = (None, None);

@@ -23,7 +23,8 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// The step between two epochs, `middle_in_world` being that of the trajectory, `since_start_s` the first one's time.
+    /// The step between two epochs, `middle_in_world` being that of the trajectory, `since_start_s` the first one's
+    /// time.
     pub(super) fn between(
         model: &BoundModel,
         (from, to): (&Epoch, &Epoch),
@@ -107,9 +108,9 @@ fn with_clock(mut told: Told, velocity: &Vector, since_start_s: f64) -> Told {
     told
 }
 
-/// The covariance of the noise that comes in during a step: white noise `r` before its end has moved attitude by itself,
-/// velocity by `-[Rf]x r` and position by `-[Rf]x r^2 / 2` of it (gyroscope), or velocity by itself and position by `r`
-/// (accelerometer). Integrated over `r` by Gauss' rule of three points, exact to the fifth order.
+/// The covariance of the noise that comes in during a step: white noise `r` before its end has moved attitude by
+/// itself, velocity by `-[Rf]x r` and position by `-[Rf]x r^2 / 2` of it (gyroscope), or velocity by itself and
+/// position by `r` (accelerometer). Integrated over `r` by Gauss' rule of three points, exact to the fifth order.
 fn noise(model: &BoundModel, pull: &Matrix, worse: f64) -> State {
     let h = EPOCH.seconds();
     let imu = &model.imu;

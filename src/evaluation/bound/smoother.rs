@@ -1,14 +1,15 @@
 //! The covariance of every epoch given all of the run.
 //!
-//! A Kalman filter forwards, and the modified Bryson-Frazier smoother backwards (Bierman, Factorization Methods for Discrete
-//! Sequential Estimation, 1977, chapter X): with the predicted covariance `P` and `W = H^T S^-1 H` of an epoch's measurements,
+//! A Kalman filter forwards, and the modified Bryson-Frazier smoother backwards (Bierman, Factorization Methods for
+//! Discrete Sequential Estimation, 1977, chapter X): with the predicted covariance `P` and `W = H^T S^-1 H` of an
+//! epoch's measurements,
 //!
 //! ```text
 //! L~ = W + (I - W P) L^ (I - P W)      P_smoothed = P - P L~ P      L^_before = F^T L~ F
 //! ```
 //!
-//! Nothing is inverted that may be singular. Of the forward pass one covariance in [`STRETCH`] is kept, and the rest of a stretch
-//! computed again on the way back.
+//! Nothing is inverted that may be singular. Of the forward pass one covariance in [`STRETCH`] is kept, and the rest of
+//! a stretch computed again on the way back.
 
 use super::epoch::{Epoch, Seen};
 use super::motion::{Step, Told, attitude_told, head_in_world, position_told};
@@ -188,8 +189,9 @@ fn smooth(run: &Run<'_>, (index, predicted, adjoint): (usize, &State, &State), f
     }
 }
 
-/// What a rigid alignment over all epochs takes from the sum of the squared position errors: with `A` the motion of all positions
-/// by a small rigid one, `tr((A^T A)^-1 A^T S A)`, where `A^T S A` is the covariance of the sums that the state carries.
+/// What a rigid alignment over all epochs takes from the sum of the squared position errors: with `A` the motion of all
+/// positions by a small rigid one, `tr((A^T A)^-1 A^T S A)`, where `A^T S A` is the covariance of the sums that the
+/// state carries.
 fn taken_by_alignment(run: &Run<'_>, last: &State) -> f64 {
     let at_end = run.epochs.len() - 1;
     let across = columns(last);

@@ -9,7 +9,8 @@ pub(super) const N: usize = 42;
 pub(super) const ATTITUDE: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const POSITION: usize = 6;
-/// Sums over the run of the position's error, and of the moment of it about the trajectory's middle: what an alignment takes.
+/// Sums over the run of the position's error, and of the moment of it about the trajectory's middle: what an alignment
+/// takes.
 pub(super) const SUMS: usize = 9;
 /// Biases.
 pub(super) const GYRO_BIAS: usize = 15;

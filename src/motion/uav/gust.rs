@@ -41,9 +41,9 @@ const BAND_HZ: (f64, f64) = (0.005, 5.0);
 const LINES: usize = 150;
 
 impl GustSpec {
-    /// Standard deviation (m/s) and scale (m) of the gusts at a height (MIL-F-8785C, section 3.7.3.4): `L_w = h`,
-    /// `L_u = L_v = h / (0.177 + 0.000823 h)^1.2`, `s_w = 0.1 W`, `s_u = s_v = s_w / (0.177 + 0.000823 h)^0.4` with h in feet,
-    /// from 10 to 1000 of them; below and above, the values there.
+    /// Standard deviation (m/s) and scale (m) of the gusts at a height (MIL-F-8785C, section 3.7.3.4): `L_w = h`, `L_u
+    /// = L_v = h / (0.177 + 0.000823 h)^1.2`, `s_w = 0.1 W`, `s_u = s_v = s_w / (0.177 + 0.000823 h)^0.4` with h in
+    /// feet, from 10 to 1000 of them; below and above, the values there.
     fn scales(&self, axis: Axis, height_m: f64) -> (f64, f64) {
         let h = (height_m / FOOT_M).clamp(10.0, 1000.0);
         let base = 0.177 + 0.000_823 * h;
@@ -74,7 +74,8 @@ impl GustSpec {
     }
 }
 
-/// Displacement for a gust of 1 m/s: the craft is dragged by the air and held by `x'' = -2 z w0 x' - w0^2 x + d (g - x')`.
+/// Displacement for a gust of 1 m/s: the craft is dragged by the air and held by `x'' = -2 z w0 x' - w0^2 x + d (g -
+/// x')`.
 fn displacement(spec: &UavSpec, rate: f64) -> Complex<f64> {
     let natural = TAU * spec.hold_hz;
     let damping = 2.0 * spec.hold_damping * natural + spec.drag_per_s;

@@ -1,7 +1,8 @@
-//! A small multirotor: it flies along the route, tilts to accelerate, is pushed about by gusts, and shaken by its rotors.
+//! A small multirotor: it flies along the route, tilts to accelerate, is pushed about by gusts, and shaken by its
+//! rotors.
 //!
-//! Gusts are Dryden's in the low-altitude form of MIL-F-8785C. The craft holds its place like a damped oscillator; what its
-//! controller commands, it does by tilting: `a / g` for an acceleration a.
+//! Gusts are Dryden's in the low-altitude form of MIL-F-8785C. The craft holds its place like a damped oscillator; what
+//! its controller commands, it does by tilting: `a / g` for an acceleration a.
 
 mod gust;
 mod rotors;
@@ -100,7 +101,8 @@ impl BaseMotion for Uav {
         let mut position = self.flight.way.at(t_s);
         position[2] += Jet::constant(self.height_m);
         let yaw = self.flight.heading.at(t_s);
-        // It leans into its own accelerations: forward to speed up, to the left to turn left (roll is positive to the right).
+        // It leans into its own accelerations: forward to speed up, to the left to turn left (roll is positive to the
+        // right).
         let speed = self.flight.speed_share.at(t_s) * self.speed_m_per_s;
         let ahead = self.flight.speed_share.rate_at(t_s) * self.speed_m_per_s;
         let left = speed * self.flight.heading.rate_at(t_s);

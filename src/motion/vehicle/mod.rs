@@ -1,8 +1,8 @@
-//! A wheeled vehicle: a cart, a robot, a car. It follows the route on a rough road, on springs, with an engine that shakes
-//! it; it squats, dives and leans as it speeds up, brakes and turns.
+//! A wheeled vehicle: a cart, a robot, a car. It follows the route on a rough road, on springs, with an engine that
+//! shakes it; it squats, dives and leans as it speeds up, brakes and turns.
 //!
-//! The road is felt over the distance driven, so that it slows and stops with the vehicle. How the suspension answers is
-//! taken at the cruising speed throughout.
+//! The road is felt over the distance driven, so that it slows and stops with the vehicle. How the suspension answers
+//! is taken at the cruising speed throughout.
 
 mod engine;
 mod road;
@@ -24,7 +24,8 @@ use crate::spec::{Source, SpecError};
 use engine::Engine;
 use serde::{Deserialize, Serialize};
 
-/// A wheeled vehicle that carries the base. It turns on the spot where a route is bent sharply, as a skid-steered one does.
+/// A wheeled vehicle that carries the base. It turns on the spot where a route is bent sharply, as a skid-steered one
+/// does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleSpec {

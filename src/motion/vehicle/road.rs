@@ -2,9 +2,10 @@
 //!
 //! The displacement density of a road of one class is `G_d(n) = G_d(n0) (n / n0)^-2` over the spatial frequency n, with
 //! n0 = 0.1 cycles/m; the standard's classes A to E have the geometric means 16, 64, 256, 1024 and 4096 (x 1e-6 m^3) of
-//! G_d(n0) (ISO 8608:2016, annex C). Two tracks of one road are alike in long waves and not in short ones: for a surface whose
-//! statistics are the same in every direction the coherence between tracks b apart follows from the density alone,
-//! `x K_1(x)` with `x = 2 pi n b` (Kamash and Robson 1978; Basset's integral of the two-dimensional spectrum).
+//! G_d(n0) (ISO 8608:2016, annex C). Two tracks of one road are alike in long waves and not in short ones: for a
+//! surface whose statistics are the same in every direction the coherence between tracks b apart follows from the
+//! density alone, `x K_1(x)` with `x = 2 pi n b` (Kamash and Robson 1978; Basset's integral of the two-dimensional
+//! spectrum).
 
 use crate::motion::sines::{Line, Part, geometric_parts};
 use crate::random::Stream;
@@ -63,10 +64,11 @@ impl RoadSpec {
         at_n0 * 1e-6 * (n_per_m / 0.1).powi(-2)
     }
 
-    /// A random road of two tracks `track_m` apart: heights, m, of the left and the right one over the distance along it, m.
+    /// A random road of two tracks `track_m` apart: heights, m, of the left and the right one over the distance along
+    /// it, m.
     ///
-    /// Either track has the full power in every line; the right one's phase is ahead of the left one's, or behind, by the
-    /// angle whose cosine is the coherence, so that the cross-spectrum is right too.
+    /// Either track has the full power in every line; the right one's phase is ahead of the left one's, or behind, by
+    /// the angle whose cosine is the coherence, so that the cross-spectrum is right too.
     pub(super) fn tracks(self, track_m: f64, stream: &mut Stream) -> Vec<Line<2>> {
         let parts = geometric_parts(BAND_PER_M, LINES, stream);
         let line = |part: &Part| {
@@ -79,8 +81,8 @@ impl RoadSpec {
     }
 }
 
-/// `x K_1(x)`, with the modified Bessel function as `K_1(x) = int_0^inf exp(-x cosh t) cosh t dt` by the trapezoid rule, which
-/// converges faster than any power of the step for this integrand.
+/// `x K_1(x)`, with the modified Bessel function as `K_1(x) = int_0^inf exp(-x cosh t) cosh t dt` by the trapezoid
+/// rule, which converges faster than any power of the step for this integrand.
 fn coherence(x: f64) -> f64 {
     const STEP: f64 = 0.05;
     let term = |k: i32| {
@@ -117,8 +119,8 @@ mod tests {
 
     #[test]
     fn both_tracks_have_the_density_of_the_standard() {
-        // The integral of G_d(n) = 256e-6 m^3 (n / 0.1)^-2, class C, over octaves. An octave has 24 sinusoids, and half of one
-        // more or less.
+        // The integral of G_d(n) = 256e-6 m^3 (n / 0.1)^-2, class C, over octaves. An octave has 24 sinusoids, and half
+        // of one more or less.
         let (tracks, segments) = heights(RoadClass::C);
         for track in tracks {
             let spectrum = power_density(&track, 20.0, segments).unwrap();
@@ -132,8 +134,8 @@ mod tests {
 
     #[test]
     fn tracks_are_alike_in_long_waves_alone() {
-        // The real part of the cross-spectrum over the left track's is x K_1(x): 0.98 at a wave of 90 m (x = 0.105), 0.5 at 7.6 m
-        // (x = 1.24), under 0.01 at 1.5 m.
+        // The real part of the cross-spectrum over the left track's is x K_1(x): 0.98 at a wave of 90 m (x = 0.105),
+        // 0.5 at 7.6 m (x = 1.24), under 0.01 at 1.5 m.
         let (tracks, segments) = heights(RoadClass::A);
         let points = transfer_function(&tracks[0], &tracks[1], 20.0, segments).unwrap();
         for (low, high) in [(0.03, 0.05), (0.1, 0.16), (0.2, 0.3), (0.5, 1.0)] {

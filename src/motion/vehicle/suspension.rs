@@ -1,7 +1,7 @@
 //! A body on four sprung wheels: how it answers to the road, and to its own accelerations.
 //!
-//! The full-car model of the textbooks (Wong, Theory of Ground Vehicles, chapter 7), linear: three coordinates of the body
-//! q = (heave, roll, pitch), one of each wheel, spring and damper between wheel and body, a spring for the tyre.
+//! The full-car model of the textbooks (Wong, Theory of Ground Vehicles, chapter 7), linear: three coordinates of the
+//! body q = (heave, roll, pitch), one of each wheel, spring and damper between wheel and body, a spring for the tyre.
 
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
 use crate::motion::sines::Line;
@@ -56,8 +56,8 @@ impl SuspensionSpec {
         [(self.front_m, half, 0), (self.front_m, -half, 1), (-self.rear_m, half, 0), (-self.rear_m, -half, 1)]
     }
 
-    /// How heave (m), roll and pitch (rad) of the body follow the road at a steady speed: the lines of the road's two tracks,
-    /// over distance, become lines of the three over the distance of the body's centre.
+    /// How heave (m), roll and pitch (rad) of the body follow the road at a steady speed: the lines of the road's two
+    /// tracks, over distance, become lines of the three over the distance of the body's centre.
     pub(super) fn response(&self, road: &[Line<2>], speed_m_per_s: f64) -> Vec<Line<3>> {
         let body = |line: &Line<2>| {
             let height =
@@ -68,12 +68,12 @@ impl SuspensionSpec {
         road.iter().map(body).collect()
     }
 
-    /// Complex amplitudes of heave, roll and pitch at the angular frequency `rate`, where the road under a wheel has the
-    /// amplitude `height(x, track)`.
+    /// Complex amplitudes of heave, roll and pitch at the angular frequency `rate`, where the road under a wheel has
+    /// the amplitude `height(x, track)`.
     ///
-    /// A corner of the body at (x, y) moves by `j q` with `j = (1, y, -x)`. With `s = k + i w c` the wheel's own equation
-    /// `-w^2 m_w z_w = k_t (z_r - z_w) - s (z_w - j q)` gives the force on the body
-    /// `s (z_w - j q) = (s k_t / D) z_r - s (1 - s / D) j q`, where `D = k_t + s - w^2 m_w`.
+    /// A corner of the body at (x, y) moves by `j q` with `j = (1, y, -x)`. With `s = k + i w c` the wheel's own
+    /// equation `-w^2 m_w z_w = k_t (z_r - z_w) - s (z_w - j q)` gives the force on the body `s (z_w - j q) = (s k_t /
+    /// D) z_r - s (1 - s / D) j q`, where `D = k_t + s - w^2 m_w`.
     fn body_at(&self, rate: f64, height: impl Fn(f64, usize) -> Complex<f64>) -> Vector3<Complex<f64>> {
         let real = |x: f64| Complex::new(x, 0.0);
         let s = Complex::new(self.spring_n_per_m, rate * self.damper_n_s_per_m);
@@ -91,8 +91,8 @@ impl SuspensionSpec {
         dynamic.lu().solve(&force).unwrap_or_else(Vector3::zeros)
     }
 
-    /// Roll and pitch, rad, for each m/s^2 to the left and forward, while these are slow against the body's own modes: the
-    /// body leans out of a turn and squats when it speeds up.
+    /// Roll and pitch, rad, for each m/s^2 to the left and forward, while these are slow against the body's own modes:
+    /// the body leans out of a turn and squats when it speeds up.
     pub(super) fn lean(&self) -> (f64, f64) {
         let corner = self.spring_n_per_m * self.tyre_n_per_m / (self.spring_n_per_m + self.tyre_n_per_m);
         let stiffness =
@@ -133,8 +133,8 @@ mod tests {
 
     #[test]
     fn slow_waves_carry_the_body_along() {
-        // A road of one height lifts it, one of a slope pitches it (rising forward: nose up, negative), one higher on the left
-        // rolls it to the right.
+        // A road of one height lifts it, one of a slope pitches it (rising forward: nose up, negative), one higher on
+        // the left rolls it to the right.
         let car = car();
         let one = |x: f64| Complex::new(x, 0.0);
         let lifted = car.body_at(1e-6, |_, _| one(0.01));

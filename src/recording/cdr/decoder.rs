@@ -18,7 +18,8 @@ pub enum DecodeError {
     Contradiction(&'static str),
 }
 
-/// Reads one message. Nothing is allocated on the word of a length field: every length is checked against what is there.
+/// Reads one message. Nothing is allocated on the word of a length field: every length is checked against what is
+/// there.
 pub struct Decoder<'a> {
     rest: &'a [u8],
     whole: usize,
@@ -155,7 +156,8 @@ impl<'a> Decoder<'a> {
         Ok(self.f64s::<3>()?.into())
     }
 
-    /// `geometry_msgs/Pose` (and `Transform`). A quaternion of norm 1 to the last bits is taken as it is, another is normalised.
+    /// `geometry_msgs/Pose` (and `Transform`). A quaternion of norm 1 to the last bits is taken as it is, another is
+    /// normalised.
     ///
     /// # Errors
     /// When the message is cut short, a number is not finite, or the quaternion is far from a unit one.

@@ -100,7 +100,8 @@ mod tests {
 
     #[test]
     fn the_twist_of_odometry_is_in_the_moving_frame() {
-        // Facing left of the world's x (yaw 90 degrees), moving along the world's y: forward. Turning about z is the same in both.
+        // Facing left of the world's x (yaw 90 degrees), moving along the world's y: forward. Turning about z is the
+        // same in both.
         let pose = Pose::from_parts([1.0, 2.0, 3.0].into(), from_roll_pitch_yaw(0.0, 0.0, std::f64::consts::FRAC_PI_2));
         let body = Kinematics {
             velocity_in_world: Vector::new(0.0, 2.0, 0.5),

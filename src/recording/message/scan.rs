@@ -81,7 +81,8 @@ pub struct Projector {
 }
 
 impl Projector {
-    /// The scan of a sweep that began at `stamp`: the beams that came back as points, in the order in which they were fired.
+    /// The scan of a sweep that began at `stamp`: the beams that came back as points, in the order in which they were
+    /// fired.
     pub fn project(&mut self, stamp: Stamp, planar: PlanarScan) -> LidarScan {
         self.prepare(&planar);
         let step_s = time_increment_s(&planar);
@@ -114,8 +115,8 @@ impl Projector {
     }
 }
 
-/// Puts returns in the order in which they were fired, offsets counted from the earliest where that was fired before the
-/// message's stamp: by how much before, or zero.
+/// Puts returns in the order in which they were fired, offsets counted from the earliest where that was fired before
+/// the message's stamp: by how much before, or zero.
 pub fn from_earliest(returns: &mut [LidarReturn]) -> Span {
     if !returns.is_sorted_by_key(|r| r.offset) {
         returns.sort_by_key(|r| r.offset);

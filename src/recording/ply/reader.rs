@@ -37,8 +37,8 @@ impl PlyReader<File> {
 }
 
 impl<R: Read> PlyReader<R> {
-    /// Opens the cloud in `input`, which messages call `name`. Its points are the element `vertex`, with properties x, y,
-    /// z, and as they are there intensity, time and error; others are passed over.
+    /// Opens the cloud in `input`, which messages call `name`. Its points are the element `vertex`, with properties x,
+    /// y, z, and as they are there intensity, time and error; others are passed over.
     ///
     /// # Errors
     /// When the header is not that of a cloud.

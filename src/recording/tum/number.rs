@@ -45,7 +45,8 @@ fn write_digits(out: &mut Vec<u8>, mut value: u64, least: usize) {
     out[start..].reverse();
 }
 
-/// Reads seconds as a decimal, with or without an exponent, to the nearest nanosecond below; exact where a `f64` is not.
+/// Reads seconds as a decimal, with or without an exponent, to the nearest nanosecond below; exact where a `f64` is
+/// not.
 pub fn parse_stamp(text: &str) -> Option<Stamp> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),

@@ -184,7 +184,8 @@ fn points<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Serie
     Ok(())
 }
 
-/// The path without what a print would not show: of all points within half a point's width, first, least, greatest, last.
+/// The path without what a print would not show: of all points within half a point's width, first, least, greatest,
+/// last.
 fn thinned(path: &[At]) -> Vec<At> {
     const COLUMN: f64 = 0.5;
     let mut kept: Vec<At> = Vec::new();

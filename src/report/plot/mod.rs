@@ -1,7 +1,7 @@
 //! Plots as SVG and PNG.
 //!
-//! A [`Figure`] is one or more [`Chart`]s below each other, a chart some [`Series`] on a pair of axes. Legends stand above
-//! the axes, so that they cover no data; labels carry their units. The axes are drawn here; plotters is the pen.
+//! A [`Figure`] is one or more [`Chart`]s below each other, a chart some [`Series`] on a pair of axes. Legends stand
+//! above the axes, so that they cover no data; labels carry their units. The axes are drawn here; plotters is the pen.
 
 mod axis;
 mod canvas;

@@ -31,10 +31,10 @@ impl GaussMarkov {
 
 /// What a seed makes of an IMU's errors: its scale and misalignment in this run, and its biases as they walk.
 ///
-/// A sample over `dt` is `round(clamp((I + S + M) true + bias + white))`, with white noise of `density / sqrt(dt)` and a
-/// bias `b' = b + walk sqrt(dt) w` from one sample to the next, beside an optional wandering part
-/// `b' = phi b + sigma sqrt(1 - phi^2) w`, `phi = exp(-dt / time)`. (Noise as Kalibr's IMU model writes it; the axes' scale
-/// errors `S` are a diagonal, their misalignments `M` the other six entries.)
+/// A sample over `dt` is `round(clamp((I + S + M) true + bias + white))`, with white noise of `density / sqrt(dt)` and
+/// a bias `b' = b + walk sqrt(dt) w` from one sample to the next, beside an optional wandering part `b' = phi b + sigma
+/// sqrt(1 - phi^2) w`, `phi = exp(-dt / time)`. (Noise as Kalibr's IMU model writes it; the axes' scale errors `S` are
+/// a diagonal, their misalignments `M` the other six entries.)
 #[derive(Debug, Clone)]
 pub struct ImuErrors {
     gyro: Triad,

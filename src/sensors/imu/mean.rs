@@ -9,11 +9,12 @@ pub struct MeanMotion {
     pub specific_force_m_per_s2: Vector,
 }
 
-/// What an ideal IMU says of the interval from `start` to `end`, `dt_s` later: the rotation and velocity it went through,
-/// divided by the time, as a strapdown unit that integrates at a high rate inside (coning and sculling included) has them.
+/// What an ideal IMU says of the interval from `start` to `end`, `dt_s` later: the rotation and velocity it went
+/// through, divided by the time, as a strapdown unit that integrates at a high rate inside (coning and sculling
+/// included) has them.
 ///
-/// The angular velocity is `log(R_start^T R_end) / dt`. The specific force is `R_mid^T ((v_end - v_start) / dt - g)`, with
-/// `R_mid` half-way along that rotation. So a user who turns by `exp(angular_velocity dt)` and accelerates by
+/// The angular velocity is `log(R_start^T R_end) / dt`. The specific force is `R_mid^T ((v_end - v_start) / dt - g)`,
+/// with `R_mid` half-way along that rotation. So a user who turns by `exp(angular_velocity dt)` and accelerates by
 /// `R_mid specific_force + g` retraces attitude and velocity exactly, whatever happened in between.
 pub fn mean_motion(start: &Kinematics, end: &Kinematics, dt_s: f64) -> MeanMotion {
     let from = start.world_from_body.rotation;

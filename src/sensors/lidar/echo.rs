@@ -75,8 +75,8 @@ fn mixed(a: &Echo, b: &Echo) -> Echo {
 }
 
 impl Lidar {
-    /// The echoes of beam `beam`. `glass_draw`, uniform in 0..1, decides at which surface of glass it turns back; `None`
-    /// lets it pass every one, unweakened.
+    /// The echoes of beam `beam`. `glass_draw`, uniform in 0..1, decides at which surface of glass it turns back;
+    /// `None` lets it pass every one, unweakened.
     pub(super) fn echoes(&self, sweep: &Sweep, beam: usize, glass_draw: Option<f64>) -> Echoes {
         let per_beam = self.rays_per_beam();
         let mut echoes = Echoes::default();
@@ -103,7 +103,8 @@ impl Lidar {
                 return Some(Echo { range_m, power, cos_incidence: cos });
             }
             if glass_draw.is_some() {
-                // Given that the beam passed, the draw is uniform in turns_back..1: stretched, it serves the next surface.
+                // Given that the beam passed, the draw is uniform in turns_back..1: stretched, it serves the next
+                // surface.
                 draw = (draw - turns_back) / (1.0 - turns_back).max(f64::MIN_POSITIVE);
                 light *= f64::from(surface.transmission).powi(2);
                 late_m += delay_m;

@@ -17,8 +17,8 @@ pub(super) struct Interlaced {
 impl Interlaced {
     /// The beams in the order in which they are fired, of a lidar that completes `rate_hz` scans a second.
     ///
-    /// With `m` mirror turns a scan and `s` slots a turn, the beam that is `i`-th by azimuth is fired in turn `i mod m`,
-    /// when the mirror has gone `i / (m s)` of its way round: at `(i mod m + i / (m s)) / (m rate)`.
+    /// With `m` mirror turns a scan and `s` slots a turn, the beam that is `i`-th by azimuth is fired in turn `i mod
+    /// m`, when the mirror has gone `i / (m s)` of its way round: at `(i mod m + i / (m s)) / (m rate)`.
     pub fn beams(&self, rate_hz: f64, source: &Source) -> Result<Vec<Beam>, SpecError> {
         let &Self { beams, slots_per_turn, mirror_turns, .. } = self;
         let slots = slots_per_turn.saturating_mul(mirror_turns);
@@ -67,7 +67,8 @@ mod tests {
         {
             assert_relative_eq!(azimuth_deg(&beams[k]), azimuth, epsilon = 1e-9);
         }
-        // The mirror turns 75 times a second, by 1 degree in 1 / 27,000 s = 37.037 us, and by 0.25 in a quarter of that.
+        // The mirror turns 75 times a second, by 1 degree in 1 / 27,000 s = 37.037 us, and by 0.25 in a quarter of
+        // that.
         assert_eq!(beams[1].offset.nanos(), 37_037);
         assert_eq!(beams[180].offset.nanos(), 6_666_667);
         assert_eq!(beams[181].offset.nanos(), 13_342_593);

@@ -52,8 +52,8 @@ impl Lidar {
         &self.spec
     }
 
-    /// The beams of scan 0, in the order in which they are fired. Those of other scans are the same, or turned about z where
-    /// the pattern does not repeat.
+    /// The beams of scan 0, in the order in which they are fired. Those of other scans are the same, or turned about z
+    /// where the pattern does not repeat.
     pub fn beams(&self) -> &[Beam] {
         &self.beams
     }

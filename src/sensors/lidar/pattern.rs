@@ -37,15 +37,16 @@ pub enum PatternSpec {
         #[serde(deserialize_with = "checked::positive")]
         round_period_us: f64,
     },
-    /// A mirror that sweeps the plane z = 0 counter-clockwise and takes several turns for a scan, each a step further on
-    /// than the one before. As the time of a beam is not linear in its azimuth, such a scan has no polar form.
+    /// A mirror that sweeps the plane z = 0 counter-clockwise and takes several turns for a scan, each a step further
+    /// on than the one before. As the time of a beam is not linear in its azimuth, such a scan has no polar form.
     Interlaced {
         /// How many beams of the whole scan.
         beams: u32,
         /// Azimuth of the first, degrees from x.
         #[serde(deserialize_with = "checked::finite")]
         first_deg: f64,
-        /// Azimuth between neighbours in the whole scan, degrees: beams of one mirror turn are `mirror_turns` steps apart.
+        /// Azimuth between neighbours in the whole scan, degrees: beams of one mirror turn are `mirror_turns` steps
+        /// apart.
         #[serde(deserialize_with = "checked::positive")]
         step_deg: f64,
         /// How many beams of one mirror turn would fit into a whole turn, the blind part included.

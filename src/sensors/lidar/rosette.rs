@@ -2,14 +2,14 @@ use super::pattern::{Beam, MAX_BEAMS};
 use crate::spec::{Source, SpecError};
 use std::f64::consts::TAU;
 
-/// A pattern that does not repeat from scan to scan: beams spaced evenly in time along a curve that turns about z while it
-/// swings up and down.
+/// A pattern that does not repeat from scan to scan: beams spaced evenly in time along a curve that turns about z while
+/// it swings up and down.
 ///
 /// An approximation: makers of such lidars tell the field of view and the rate, not the curve. Here the azimuth grows
-/// steadily, by `turns` circles a scan, and the elevation is a triangle wave of `waves` periods a scan. As `waves` is whole,
-/// each scan is the one before turned about z by what `turns` has beyond whole circles. Where that is the golden ratio's
-/// 0.618..., scans fall into each other's largest gaps (as the golden angle spaces leaves), and coverage grows for as long
-/// as one looks.
+/// steadily, by `turns` circles a scan, and the elevation is a triangle wave of `waves` periods a scan. As `waves` is
+/// whole, each scan is the one before turned about z by what `turns` has beyond whole circles. Where that is the golden
+/// ratio's 0.618..., scans fall into each other's largest gaps (as the golden angle spaces leaves), and coverage grows
+/// for as long as one looks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rosette {
     pub beams: u32,
@@ -57,7 +57,8 @@ mod tests {
 
     #[test]
     fn the_curve_swings_between_its_elevations_while_it_turns() {
-        // 8 beams, 1 wave, half a turn, 10 Hz: beam k at 12.5 k ms and 22.5 k degrees, up by 10 degrees to beam 4 and down.
+        // 8 beams, 1 wave, half a turn, 10 Hz: beam k at 12.5 k ms and 22.5 k degrees, up by 10 degrees to beam 4 and
+        // down.
         let rosette = Rosette { beams: 8, lowest_deg: -20.0, highest_deg: 20.0, turns: 0.5, waves: 1 };
         let beams = rosette.beams(10.0, &source()).unwrap();
         for (k, elevation_deg) in [-20.0, -10.0, 0.0, 10.0, 20.0, 10.0, 0.0, -10.0_f64].into_iter().enumerate() {

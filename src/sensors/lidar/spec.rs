@@ -96,8 +96,8 @@ pub struct RangeNoiseSpec {
     pub resolution_m: f64,
 }
 
-/// Which echoes are detected. The power of an echo is `reflectance cos(incidence) / range^2`, as of a surface that scatters
-/// evenly and is wider than the beam; whether it passes the detector's threshold is logistic in its logarithm.
+/// Which echoes are detected. The power of an echo is `reflectance cos(incidence) / range^2`, as of a surface that
+/// scatters evenly and is wider than the beam; whether it passes the detector's threshold is logistic in its logarithm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DetectionSpec {
@@ -164,8 +164,8 @@ impl LidarSpec {
     /// The rays of each beam in turn, and the weight of each ray of a beam.
     ///
     /// A divergent beam is a Gaussian one of half angle `d` at 1/e^2: half of it in the axis, a twelfth in each of six
-    /// rays at `d` about it. This rule has the beam's moments up to the fifth order (Stroud's E2 5-1: mean square of the
-    /// radius d^2/2, of its square d^4/2).
+    /// rays at `d` about it. This rule has the beam's moments up to the fifth order (Stroud's E2 5-1: mean square of
+    /// the radius d^2/2, of its square d^4/2).
     pub(super) fn rays_of(&self, beams: &[Beam]) -> (Vec<Vector>, &'static [f64]) {
         const TWELFTH: f64 = 1.0 / 12.0;
         if self.beam == Rays::Single {

@@ -77,7 +77,8 @@ impl Lidar {
         sweep
     }
 
-    /// Follows a ray through glass to where it ends; `last_m` is how far the ray before it went, and becomes how far this one did.
+    /// Follows a ray through glass to where it ends; `last_m` is how far the ray before it went, and becomes how far
+    /// this one did.
     fn follow(
         &self,
         scenery: &dyn Scenery,

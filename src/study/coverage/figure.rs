@@ -1,8 +1,8 @@
 use super::{Coverage, SeenCell};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Series};
 
-/// Share of the cells that are darker than the darkest colour: few directions at the ends of a swing would else make all
-/// others light.
+/// Share of the cells that are darker than the darkest colour: few directions at the ends of a swing would else make
+/// all others light.
 const BEYOND: f64 = 0.02;
 
 /// Density by direction and by elevation, and the share of the sphere seen by time.

@@ -1,7 +1,7 @@
 //! What a swinging lidar sees of the sphere about it, how densely, how soon, and what its gyroscope makes of it.
 //!
-//! Directions are written in the heading's frame: upright, turned with the base's yaw, so that walking round a corner does
-//! not count as seeing more.
+//! Directions are written in the heading's frame: upright, turned with the base's yaw, so that walking round a corner
+//! does not count as seeing more.
 
 mod figure;
 mod sphere;
@@ -45,13 +45,15 @@ impl Default for CoveragePlan {
 pub struct Coverage {
     /// Share of the sphere that was seen at all.
     pub fraction_seen: f64,
-    /// Share of the sphere that a sweep sees, from one turning point of the swing to the next; `None` without two of them.
+    /// Share of the sphere that a sweep sees, from one turning point of the swing to the next; `None` without two of
+    /// them.
     pub fraction_in_a_sweep: Option<f64>,
     /// How long a sweep takes, s.
     pub sweep_s: Option<f64>,
     /// Beams per steradian in a sweep, where it looks at all: the middle one of all places.
     pub density_in_a_sweep_per_sr: Option<f64>,
-    /// Beams per steradian and second over the whole time: mean of all that was seen, the tenth part seen least, the median.
+    /// Beams per steradian and second over the whole time: mean of all that was seen, the tenth part seen least, the
+    /// median.
     pub density_per_sr_s: Density,
     /// Time until half of what was ever seen has been seen, s.
     pub half_covered_s: f64,

@@ -70,8 +70,8 @@ impl SwingTrack {
         quantile(&self.elevations, 0.975) - quantile(&self.elevations, 0.025)
     }
 
-    /// Times at which the forward beam turned back, s after looking began; swings of less than a quarter of the field of
-    /// view, or of 1 degree, do not count.
+    /// Times at which the forward beam turned back, s after looking began; swings of less than a quarter of the field
+    /// of view, or of 1 degree, do not count.
     pub fn turning_points(&self) -> Vec<f64> {
         let least = (0.25 * self.field_of_view_rad()).max(1_f64.to_radians());
         let mut turning = Vec::new();

@@ -194,7 +194,8 @@ mod tests {
 
     #[test]
     fn a_resonance_between_lines_is_found_from_three_of_them() {
-        // 1 / ((f0^2 - f^2)^2 + (2 zeta f0 f)^2): peak at f0 sqrt(1 - 2 zeta^2), height 1 / (2 zeta sqrt(1 - zeta^2) f0^2).
+        // 1 / ((f0^2 - f^2)^2 + (2 zeta f0 f)^2): peak at f0 sqrt(1 - 2 zeta^2), height 1 / (2 zeta sqrt(1 - zeta^2)
+        // f0^2).
         let (f0, zeta) = (1.237_f64, 0.02_f64);
         let point = |k: u32| {
             let f = f64::from(k) * 0.025;

@@ -1,8 +1,8 @@
 //! Gain curves: the amplitude of the head's motion over that of its base, by frequency (the paper's figure 3).
 //!
-//! One axis of the base at a time is shaken by a multisine: sines at the multiples of the reciprocal of a period, so that a
-//! spectrum over that period does not leak. What the head does is simulated, the settling is thrown away, one period is
-//! kept; several realisations that differ in nothing but the sines' phases are averaged (H1, see
+//! One axis of the base at a time is shaken by a multisine: sines at the multiples of the reciprocal of a period, so
+//! that a spectrum over that period does not leak. What the head does is simulated, the settling is thrown away, one
+//! period is kept; several realisations that differ in nothing but the sines' phases are averaged (H1, see
 //! [`transfer_function`](crate::signal::transfer_function)). Whatever is not linear answers differently to each, and so
 //! lowers the coherence and widens the confidence band. Beside each curve stands the closed form of the linearised head
 //! ([`FrequencyResponse`](crate::dynamics::FrequencyResponse)).

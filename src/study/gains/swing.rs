@@ -38,8 +38,8 @@ fn by_name<S: serde::Serializer>(axis: &Axis, serializer: S) -> Result<S::Ok, S:
     serializer.serialize_str(super::axis_name(*axis))
 }
 
-/// Measures the gain about or along `axis` at strengths that would swing the linear head by each of `swings_deg` (root mean
-/// square). Ends early, and says why, where the simulation leaves its bounds. `hear` is told as realisations end.
+/// Measures the gain about or along `axis` at strengths that would swing the linear head by each of `swings_deg` (root
+/// mean square). Ends early, and says why, where the simulation leaves its bounds. `hear` is told as realisations end.
 ///
 /// # Errors
 /// When the plan cannot be carried out at the smallest swing.

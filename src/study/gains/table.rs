@@ -20,7 +20,8 @@ pub fn csv(curves: &[GainCurve]) -> String {
     text
 }
 
-/// `axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,coherence`, a line a strength; nothing where there is none.
+/// `axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,coherence`, a line a strength; nothing where there is
+/// none.
 pub fn swing_csv(studies: &[SwingStudy]) -> String {
     let mut text = "axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,coherence\n".to_owned();
     let or_nothing = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.5}"));

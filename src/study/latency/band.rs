@@ -72,8 +72,8 @@ pub struct Banded {
     pub high: f64,
 }
 
-/// Draws of blocks with replacement (Efron's bootstrap; of blocks, since errors of neighbouring instants are alike, Kuensch
-/// 1989), the same for every run, so that differences between runs keep what they have in common.
+/// Draws of blocks with replacement (Efron's bootstrap; of blocks, since errors of neighbouring instants are alike,
+/// Kuensch 1989), the same for every run, so that differences between runs keep what they have in common.
 #[derive(Debug)]
 pub(super) struct Resampling {
     /// How often each block is in each draw.
@@ -105,8 +105,9 @@ impl Resampling {
         banded(figure(&whole(blocks)), self.figures(blocks, figure).collect())
     }
 
-    /// Where the parabola `a + b x + c x^2` through a variance over `x` has its minimum: fitted to all of `curve` (abscissa,
-    /// blocks), each point weighted by the reciprocal of its own variance over the draws. `None` where there is no minimum.
+    /// Where the parabola `a + b x + c x^2` through a variance over `x` has its minimum: fitted to all of `curve`
+    /// (abscissa, blocks), each point weighted by the reciprocal of its own variance over the draws. `None` where there
+    /// is no minimum.
     pub(super) fn minimum(&self, curve: &[(f64, &[Block])], variance: fn(&Block) -> f64) -> Option<Banded> {
         let drawn: Vec<Vec<f64>> = curve.iter().map(|(_, blocks)| self.figures(blocks, variance).collect()).collect();
         let weights: Vec<f64> = drawn.iter().map(|figures| 1.0 / spread2(figures)).collect();

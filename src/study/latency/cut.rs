@@ -12,8 +12,8 @@ const HALF_HEIGHT_M: f64 = 2.4;
 /// Time over which a rate of rotation is taken, both ways.
 const EITHER_WAY: Span = Span::from_nanos(5_000_000);
 
-/// The vertical plane through the head's place in the middle of a run in which its swing moves beams most: across the level axis
-/// about which it turns most there.
+/// The vertical plane through the head's place in the middle of a run in which its swing moves beams most: across the
+/// level axis about which it turns most there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cut {
     centre_in_world: Vector,

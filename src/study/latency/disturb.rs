@@ -22,9 +22,9 @@ pub(super) struct Timing<'a> {
 impl<'a> Timing<'a> {
     /// A disturbance of clocks that run alike but for it.
     ///
-    /// Noise changes stamps, never the order of scans: a driver passes them on as they were taken, with stamps that increase.
-    /// So scan `k` gets the `k`-th smallest of the noisy stamps, as [`Stamper`](crate::sensors::Stamper) has it. One draw of
-    /// numbers, scaled, serves every standard deviation.
+    /// Noise changes stamps, never the order of scans: a driver passes them on as they were taken, with stamps that
+    /// increase. So scan `k` gets the `k`-th smallest of the noisy stamps, as [`Stamper`](crate::sensors::Stamper) has
+    /// it. One draw of numbers, scaled, serves every standard deviation.
     pub(super) fn new(disturbance: Disturbance, clock: &'a TrueClock, scan_stamps: &[Stamp], seed: Seed) -> Self {
         let mut draws = seed.stream("latency/noise");
         let noise_s = disturbance.noise_ms * 1e-3;
@@ -112,7 +112,8 @@ mod tests {
             |noise_ms| Timing::new(Disturbance { latency_ms: 0.0, noise_ms }, &clock, &scans, Seed(1)).scan_stamps;
         let errors: Vec<f64> = noise(2.0).iter().zip(&scans).map(|(a, b)| a.seconds_since(*b)).collect();
         let sigma = (errors.iter().map(|e| e * e).sum::<f64>() / 1e4).sqrt();
-        // Standard error of a standard deviation: 2 ms / sqrt(2 n); exchanges are rarer than one in a million at 2 of 25 ms.
+        // Standard error of a standard deviation: 2 ms / sqrt(2 n); exchanges are rarer than one in a million at 2 of
+        // 25 ms.
         assert!((sigma - 2e-3).abs() < 4.0 * 2e-3 / 141.0, "{sigma}");
         assert!(noise(10.0).windows(2).all(|pair| pair[0] <= pair[1]));
         assert_eq!(noise(0.0), scans);

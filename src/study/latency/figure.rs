@@ -11,8 +11,8 @@ const PANEL_WIDTH: f64 = 400.0;
 /// A figure of a run.
 type Told = fn(&StudyRun) -> Banded;
 
-/// The vertical cut through the map under each disturbance that is shown, coloured by the rate of rotation at which a point was
-/// seen: a row of latencies and a row of noises, as in the paper.
+/// The vertical cut through the map under each disturbance that is shown, coloured by the rate of rotation at which a
+/// point was seen: a row of latencies and a row of noises, as in the paper.
 pub fn map_figure(study: &Study, clock: ClockState) -> Figure {
     let [latencies, noises] = &study.shown;
     let columns = latencies.len();
@@ -50,8 +50,8 @@ fn panel(study: &Study, (disturbance, clock): (Disturbance, ClockState), title: 
     })
 }
 
-/// Spread of the cloud and error of the position over the latency, and over the noise: with the clock state off and on, each
-/// with its 95 % band.
+/// Spread of the cloud and error of the position over the latency, and over the noise: with the clock state off and on,
+/// each with its 95 % band.
 pub fn curve_figure(study: &Study) -> Figure {
     let over_latency = |run: &StudyRun| run.disturbance.latency_ms;
     let over_noise = |run: &StudyRun| run.disturbance.noise_ms;

@@ -1,15 +1,16 @@
-//! What errors of timing between lidar and IMU do to a map (the paper's figure 4), and what the estimator's clock state makes
-//! good.
+//! What errors of timing between lidar and IMU do to a map (the paper's figure 4), and what the estimator's clock state
+//! makes good.
 //!
-//! One recording is estimated again and again: with a constant latency on the IMU's stamps, or with noise on the stamps of the
-//! lidar's scans ([`Disturbance`]). Both are put on between the recording and the estimator; nothing is simulated again. First
-//! the clocks' true offset is taken away, which a simulation knows, so that no latency is none. Each disturbance is estimated
-//! with the clock state off (offset held at zero, every stamp believed: what the paper shows) and on (offset and rate
-//! estimated, stamps smoothed from the noise that was put on them: what an estimator can recover, [`ClockState`]).
+//! One recording is estimated again and again: with a constant latency on the IMU's stamps, or with noise on the stamps
+//! of the lidar's scans ([`Disturbance`]). Both are put on between the recording and the estimator; nothing is
+//! simulated again. First the clocks' true offset is taken away, which a simulation knows, so that no latency is none.
+//! Each disturbance is estimated with the clock state off (offset held at zero, every stamp believed: what the paper
+//! shows) and on (offset and rate estimated, stamps smoothed from the noise that was put on them: what an estimator can
+//! recover, [`ClockState`]).
 //!
-//! A run is judged by the spread of its cloud about the true surfaces and by the error of its trajectory. Their bands are of
-//! 95 %, by drawing blocks of the run's time again and again; a parabola through the squared error over the latency tells at
-//! which latency the estimate is best, which should be none.
+//! A run is judged by the spread of its cloud about the true surfaces and by the error of its trajectory. Their bands
+//! are of 95 %, by drawing blocks of the run's time again and again; a parabola through the squared error over the
+//! latency tells at which latency the estimate is best, which should be none.
 
 mod band;
 mod cut;

@@ -146,8 +146,8 @@ impl Sampling<'_> {
     }
 }
 
-/// The part of the cut, [`SHOWN_M`] long and high, in which most is seen: most small cells with a point in them, so that a
-/// surface close by does not count for all others. Of equals the first from the left, from below.
+/// The part of the cut, [`SHOWN_M`] long and high, in which most is seen: most small cells with a point in them, so
+/// that a surface close by does not count for all others. Of equals the first from the left, from below.
 fn most_seen(places: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
     let cells: BTreeSet<(i64, i64)> =
         places.iter().map(|(x, y)| ((x / CELL_M).round() as i64, (y / CELL_M).round() as i64)).collect();

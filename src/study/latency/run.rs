@@ -61,7 +61,8 @@ pub struct Minimum {
 /// What the clock state recovers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Recovery {
-    /// Over the constant latencies, the greatest departure of the cloud's sigma from that without latency, as a share of it.
+    /// Over the constant latencies, the greatest departure of the cloud's sigma from that without latency, as a share
+    /// of it.
     pub cloud_sigma_departs_by: f64,
     /// The same with the clock state off.
     pub cloud_sigma_departs_by_off: f64,

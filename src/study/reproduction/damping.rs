@@ -16,7 +16,8 @@ const EVALUATIONS: usize = 1200;
 /// Heads of one generation of the fit.
 const POPULATION: usize = 10;
 
-/// What a ratio costs for each e-fold that it leaves the head's own: enough to keep those there that no peak depends on.
+/// What a ratio costs for each e-fold that it leaves the head's own: enough to keep those there that no peak depends
+/// on.
 const PULL: f64 = 1e-2;
 
 /// A damping, and the peaks it leads to.
@@ -64,11 +65,11 @@ impl Fit {
     }
 }
 
-/// The damping ratios, one a kind of mode and each within `ratios`, by which the closed form's peaks up to `up_to_hz` come
-/// nearest to the paper's: least root mean square of their log ratios.
+/// The damping ratios, one a kind of mode and each within `ratios`, by which the closed form's peaks up to `up_to_hz`
+/// come nearest to the paper's: least root mean square of their log ratios.
 ///
-/// CMA-ES (Hansen 2016) descends on the logarithms of the ratios, from those that the head has; ratios that no peak depends on
-/// stay there.
+/// CMA-ES (Hansen 2016) descends on the logarithms of the ratios, from those that the head has; ratios that no peak
+/// depends on stay there.
 ///
 /// # Errors
 /// When the head does not stand, or has no spring.

@@ -28,8 +28,8 @@ pub struct Finding {
     pub notes: Vec<String>,
 }
 
-/// The table of all experiments, as Markdown; `findings` with the names that find them, `None` for one that is not finished.
-/// `options` belong to the command that makes them.
+/// The table of all experiments, as Markdown; `findings` with the names that find them, `None` for one that is not
+/// finished. `options` belong to the command that makes them.
 pub fn paper_table(findings: &[(String, Option<Finding>)], extent: Extent, options: &str) -> String {
     let mut text = "# The paper's experiments, reproduced\n\n\
         Bosse, Zlot and Flick, \"Zebedee: Design of a Spring-Mounted 3-D Range Sensor with Application to Mobile Mapping\", \

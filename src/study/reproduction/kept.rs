@@ -20,8 +20,8 @@ pub(in crate::study) struct Kept {
 }
 
 impl Kept {
-    /// The folder for work made from `from`: new, or with what is finished of the same work. Work made from something else
-    /// is thrown away if `anew` is set.
+    /// The folder for work made from `from`: new, or with what is finished of the same work. Work made from something
+    /// else is thrown away if `anew` is set.
     ///
     /// # Errors
     /// When other work, or anything else, is there, or the folder cannot be made.

@@ -1,8 +1,8 @@
 //! The paper's experiments again, by name: what it found, what we find, and the command that finds it.
 //!
-//! An experiment is a spec ([`ExperimentSpec`], the files of `specs/experiments/`). [`Experiment::run`] leaves its figures in
-//! a folder of its own, and what each part of the work came to beside them, so that one that was stopped goes on. From
-//! all that is finished [`paper_table`] makes one table.
+//! An experiment is a spec ([`ExperimentSpec`], the files of `specs/experiments/`). [`Experiment::run`] leaves its
+//! figures in a folder of its own, and what each part of the work came to beside them, so that one that was stopped
+//! goes on. From all that is finished [`paper_table`] makes one table.
 
 mod damping;
 mod finding;

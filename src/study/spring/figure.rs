@@ -12,8 +12,8 @@ const SHOWN: f64 = 0.3;
 /// A line on paper, mm; broken where it is no number.
 pub(super) type Line = Vec<(f64, f64)>;
 
-/// The modes beside each other, slowest first, all to one scale: each from the side in its own plane, yaw from above. Grey at
-/// rest, coloured at one end of its swing. A head that does not move has none.
+/// The modes beside each other, slowest first, all to one scale: each from the side in its own plane, yaw from above.
+/// Grey at rest, coloured at one end of its swing. A head that does not move has none.
 pub fn mode_figure(spec: &HeadSpec, head: &HeadModel) -> Figure {
     let pictures: Vec<Picture> = head.linear_modes().iter().map(|mode| Picture::of(spec, head, *mode)).collect();
     let ends = |picture: &Picture| {

@@ -25,7 +25,8 @@ pub struct Figures {
     pub sag_mm: f64,
     /// Mass of the spring's active wire, g; nothing for a spring or a material known by its stiffness alone.
     pub spring_mass_g: Option<f64>,
-    /// Twice the amplitude of the head's pitch, degrees; from a simulation the forward beam's range in 95 % of the time.
+    /// Twice the amplitude of the head's pitch, degrees; from a simulation the forward beam's range in 95 % of the
+    /// time.
     pub field_of_view_deg: f64,
     /// Greatest rate of rotation, degrees/s.
     pub rate_deg_per_s: f64,
@@ -194,8 +195,8 @@ impl Swing<'_> {
         std::array::from_fn(|k| per_base[k] * of_base)
     }
 
-    /// Base and head when the base's pitch is at `phase` of its cosine. Velocities are left out: what they add to forces is
-    /// of second order.
+    /// Base and head when the base's pitch is at `phase` of its cosine. Velocities are left out: what they add to
+    /// forces is of second order.
     fn state(&self, phase: f64) -> HeadState {
         let turning = Complex::from_polar(1.0, phase);
         let now = crate::elasticity::Vector6::from(self.amplitude().map(|a| (a * turning).re));

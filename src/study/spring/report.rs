@@ -52,7 +52,8 @@ pub struct CoilReport {
     pub axial_n_per_m: f64,
     /// Stiffness about the axis, N m/rad.
     pub torsion_nm_per_rad: f64,
-    /// Stiffness of the top, its base clamped, under the head's weight: x, y, z, about x, y, z; nothing beyond its limits.
+    /// Stiffness of the top, its base clamped, under the head's weight: x, y, z, about x, y, z; nothing beyond its
+    /// limits.
     pub stiffness_at_top: Option<[[f64; 6]; 6]>,
     /// Load that buckles it with its top guided, N; nothing for one that never buckles.
     pub buckling_load_n: Option<f64>,

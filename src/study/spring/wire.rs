@@ -49,11 +49,11 @@ impl Wire {
 
     /// Greatest equivalent stress (von Mises) in the wire at a cut, Pa.
     ///
-    /// At the angle where the radius is n, the force and the moment less `R n x F` act on the wire. Its torsion about the
-    /// tangent has the curvature factor `(4C - 1) / (4C - 4)`, to which 1.23 times the mean shear comes: for an axial force
-    /// together Wahl's factor (Wahl, Mechanical Springs, chapter 2). Bending about the coil's axis has that of a curved bar,
-    /// `(4C^2 - C - 1) / (4C (C - 1))`; bending about n has none. The pitch angle counts as small, and the greatest
-    /// torsion and bending as if they met in one point.
+    /// At the angle where the radius is n, the force and the moment less `R n x F` act on the wire. Its torsion about
+    /// the tangent has the curvature factor `(4C - 1) / (4C - 4)`, to which 1.23 times the mean shear comes: for an
+    /// axial force together Wahl's factor (Wahl, Mechanical Springs, chapter 2). Bending about the coil's axis has that
+    /// of a curved bar, `(4C^2 - C - 1) / (4C (C - 1))`; bending about n has none. The pitch angle counts as small, and
+    /// the greatest torsion and bending as if they met in one point.
     pub fn equivalent_stress_pa(&self, section: &Section) -> f64 {
         let c = self.index();
         let (curved_torsion, curved_bending) =
@@ -74,8 +74,9 @@ impl Wire {
 
     /// The stress at which the wire stays bent, Pa; `None` for a material known by its moduli alone.
     ///
-    /// Tensile strength `A / d^m` and the allowable torsion of it, 45 % for music wire and 35 % for stainless 302, taken
-    /// over the square root of 3 to bending (Shigley's Mechanical Engineering Design, 9th edition, tables 10-4 and 10-6).
+    /// Tensile strength `A / d^m` and the allowable torsion of it, 45 % for music wire and 35 % for stainless 302,
+    /// taken over the square root of 3 to bending (Shigley's Mechanical Engineering Design, 9th edition, tables 10-4
+    /// and 10-6).
     pub fn yield_pa(&self) -> Option<f64> {
         let wire_mm = self.diameter_m * 1e3;
         let (strength_mpa, exponent, share) = match self.material {
@@ -110,7 +111,8 @@ impl Mounting {
         (top - self.base_from_foot.translation.vector).norm()
     }
 
-    /// What the spring carries at its foot and at its top: the head's weight less its inertia (d'Alembert), about each end.
+    /// What the spring carries at its foot and at its top: the head's weight less its inertia (d'Alembert), about each
+    /// end.
     pub fn ends(&self, state: &HeadState) -> [Section; 2] {
         let centre =
             state.head.of_frame(&Pose::from_parts(self.body.centre_of_mass_in_head.into(), Default::default()));

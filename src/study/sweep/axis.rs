@@ -158,7 +158,8 @@ impl Axis {
         }
     }
 
-    /// Applies each level, or the ends of a range, to the base. With an error the value that it is about, as it is written.
+    /// Applies each level, or the ends of a range, to the base. With an error the value that it is about, as it is
+    /// written.
     fn check(&self, shelf: &Shelf) -> Result<(), (String, String)> {
         let ends;
         let levels = match &self.levels {

@@ -138,8 +138,8 @@ mod tests {
 
     #[test]
     fn sobols_sequence_fills_evenly() {
-        // The first dimension is van der Corput's sequence in the order of Gray's code (Antonov and Saleev 1979): the bits
-        // of k ^ (k >> 1) behind the point, in reverse.
+        // The first dimension is van der Corput's sequence in the order of Gray's code (Antonov and Saleev 1979): the
+        // bits of k ^ (k >> 1) behind the point, in reverse.
         let design = Design::new(Sampling::Sobol { count: 32 }, vec![Extent::Range; 2]).unwrap();
         let mirrored = |k: u32| f64::from((k ^ (k >> 1)).reverse_bits()) / 2_f64.powi(32);
         assert_eq!(along(&design, 0), (0..32).map(mirrored).collect::<Vec<_>>());

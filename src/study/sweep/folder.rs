@@ -59,8 +59,8 @@ pub struct Sweep {
 }
 
 impl Plan {
-    /// Leaves the plan in `folder`, which is made. One that holds the same is left as it is; with `anew` another plan's is
-    /// replaced, of which all runs that are in both stay done.
+    /// Leaves the plan in `folder`, which is made. One that holds the same is left as it is; with `anew` another plan's
+    /// is replaced, of which all runs that are in both stay done.
     ///
     /// # Errors
     /// When the folder holds another plan or cannot be written, or runs are wrong in their combination.

@@ -29,8 +29,8 @@ pub(super) struct Tape {
     handles: Vec<File>,
 }
 
-/// Runs simulations that share physics and rays, for `readers` threads to read what they recorded. With `recorded` unset
-/// there is nothing to read.
+/// Runs simulations that share physics and rays, for `readers` threads to read what they recorded. With `recorded`
+/// unset there is nothing to read.
 pub(super) fn tapes(
     simulations: Vec<Simulation>,
     (recorded, readers): (bool, usize),

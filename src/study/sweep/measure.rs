@@ -17,7 +17,8 @@ pub enum Measure {
     YawDriftDegPerMin,
     /// Of the estimate: error of the clock offset over the whole run, its beginning included, root mean square, s.
     ClockRmseS,
-    /// Of the closed loop: position error after rigid alignment, root mean square, m; loops are closed only where it is asked for.
+    /// Of the closed loop: position error after rigid alignment, root mean square, m; loops are closed only where it is
+    /// asked for.
     ClosedPositionRmseM,
     /// Share of the sphere that the lidar saw at all.
     FractionSeen,
@@ -25,8 +26,8 @@ pub enum Measure {
     CoveredS,
     /// Beams per steradian and second, mean of all that was seen.
     DensityPerSrS,
-    /// Field of view: of a journey between the 2.5 % and 97.5 % quantiles of the forward beam's elevation, of a closed form
-    /// twice the amplitude of the head's pitch; degrees.
+    /// Field of view: of a journey between the 2.5 % and 97.5 % quantiles of the forward beam's elevation, of a closed
+    /// form twice the amplitude of the head's pitch; degrees.
     FieldOfViewDeg,
     /// Greatest rate of rotation on an axis of the gyroscope, degrees/s.
     RateDegPerS,
@@ -87,8 +88,8 @@ impl Measure {
         Self::WallS,
     ];
 
-    /// Key in files, name in narrow tables, name on an axis of a plot with its unit there, that unit alone, and how many of
-    /// it make one of the key's.
+    /// Key in files, name in narrow tables, name on an axis of a plot with its unit there, that unit alone, and how
+    /// many of it make one of the key's.
     fn names(self) -> (&'static str, &'static str, &'static str, &'static str, f64) {
         match self {
             Self::PositionRmseM => ("position_rmse_m", "position", "Position error (mm rms)", "mm", 1e3),

@@ -38,9 +38,9 @@ impl Sweep {
         Ok(tally.status())
     }
 
-    /// Makes `table.parquet`, `table.csv` and `times.parquet` of what is done, a row a run in the order of the plan. The two
-    /// tables depend on the plan and on which of its runs are done, and on nothing else; times are kept apart. Memory holds a
-    /// stretch of rows.
+    /// Makes `table.parquet`, `table.csv` and `times.parquet` of what is done, a row a run in the order of the plan.
+    /// The two tables depend on the plan and on which of its runs are done, and on nothing else; times are kept apart.
+    /// Memory holds a stretch of rows.
     ///
     /// # Errors
     /// When a part cannot be read, or the tables cannot be written.

@@ -1,16 +1,16 @@
 //! Whether paired figures differ: Wilcoxon's signed-rank test, and Holm's correction for many of them.
 //!
-//! F. Wilcoxon, Individual comparisons by ranking methods, Biometrics Bulletin 1(6), 1945. S. Holm, A simple sequentially
-//! rejective multiple test procedure, Scandinavian Journal of Statistics 6(2), 1979.
+//! F. Wilcoxon, Individual comparisons by ranking methods, Biometrics Bulletin 1(6), 1945. S. Holm, A simple
+//! sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6(2), 1979.
 
 /// Most pairs whose sums of ranks are counted; of more they are normal to three digits.
 const COUNTED: usize = 200;
 
-/// The probability that `differences`, were they as likely positive as negative, lie at least as far to one side: exact up
-/// to 200 of them, two-sided.
+/// The probability that `differences`, were they as likely positive as negative, lie at least as far to one side: exact
+/// up to 200 of them, two-sided.
 ///
-/// Differences of zero say nothing and are left out; equal ones share their mean rank. Infinite ones are the largest. 1 when
-/// nothing is left.
+/// Differences of zero say nothing and are left out; equal ones share their mean rank. Infinite ones are the largest. 1
+/// when nothing is left.
 pub fn signed_rank_p(differences: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = differences.iter().copied().filter(|x| *x != 0.0 && !x.is_nan()).collect();
     sorted.sort_by(|a, b| a.abs().total_cmp(&b.abs()));

@@ -44,11 +44,12 @@ pub struct Runner<'a> {
 }
 
 impl Sweep {
-    /// Does what is missing of `share`, and nothing else, on rayon's number of threads. What is done stays done, whatever
-    /// ends this; any number of processes may do it at once.
+    /// Does what is missing of `share`, and nothing else, on rayon's number of threads. What is done stays done,
+    /// whatever ends this; any number of processes may do it at once.
     ///
     /// # Errors
-    /// When a part cannot be written, a worker not be begun, or somebody stops it. That a run fails is a row of its part.
+    /// When a part cannot be written, a worker not be begun, or somebody stops it. That a run fails is a row of its
+    /// part.
     pub fn run(&self, share: Share, runner: &Runner) -> Result<(), StudyError> {
         if share.index >= share.count {
             let message = format!("{} of {}: shares are counted from 0", share.index, share.count);

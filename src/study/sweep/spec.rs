@@ -80,9 +80,9 @@ pub struct LimitSpec {
 
 /// What is varied.
 ///
-/// A path leads through a spec's keys as they are nested there: `head.linkage.spring.spring.coil.wire_diameter_mm`. Keys that
-/// are not needed to tell it may be left out: `head.wire_diameter_mm`. The name of a spec itself, `imu`, takes names of
-/// specs. A number in it counts from 0 in a list: `head.parts.0.mass_kg`.
+/// A path leads through a spec's keys as they are nested there: `head.linkage.spring.spring.coil.wire_diameter_mm`.
+/// Keys that are not needed to tell it may be left out: `head.wire_diameter_mm`. The name of a spec itself, `imu`,
+/// takes names of specs. A number in it counts from 0 in a list: `head.parts.0.mass_kg`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum AxisSpec {

@@ -17,8 +17,8 @@ pub struct Merged {
 }
 
 impl Sweep {
-    /// [Merges](Self::merge) what is done, sums it up in `summary.csv`, `trends.csv` (of sampled axes) and `study.md`, and draws
-    /// `plots/`.
+    /// [Merges](Self::merge) what is done, sums it up in `summary.csv`, `trends.csv` (of sampled axes) and `study.md`,
+    /// and draws `plots/`.
     ///
     /// # Errors
     /// When nothing is done yet, or a file cannot be read or written.

@@ -1,13 +1,14 @@
 //! Whether a figure rises or falls with a setting: Spearman's rank correlation.
 //!
-//! C. Spearman, The proof and measurement of association between two things, American Journal of Psychology 15(1), 1904.
+//! C. Spearman, The proof and measurement of association between two things, American Journal of Psychology 15(1),
+//! 1904.
 
 /// Fewest pairs of which the level is told.
 const FEWEST: usize = 10;
 
-/// The rank correlation of `pairs`, -1..1, and the probability that it were as far from 0 if there were none, two-sided:
-/// without correlation its variance is 1 / (n - 1), and of ten pairs or more it is nearly normal. `None` of fewer, or when one
-/// side does not vary.
+/// The rank correlation of `pairs`, -1..1, and the probability that it were as far from 0 if there were none,
+/// two-sided: without correlation its variance is 1 / (n - 1), and of ten pairs or more it is nearly normal. `None` of
+/// fewer, or when one side does not vary.
 pub(super) fn rank_correlation(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     if pairs.len() < FEWEST {
         return None;

@@ -5,8 +5,8 @@ use crate::geometry::Vector;
 use crate::world::MaterialId;
 use crate::world::shape::Triangle;
 
-/// How far outside its edges a face still counts, in fractions of its edges. Neighbours overlap by this much, so that no
-/// ray slips between them.
+/// How far outside its edges a face still counts, in fractions of its edges. Neighbours overlap by this much, so that
+/// no ray slips between them.
 const OVERLAP: f32 = 1e-6;
 
 /// Two triangles are one parallelogram when their fourth corner is this close to where it belongs, m.

@@ -1,4 +1,5 @@
-//! glTF 2.0, as `.gltf` with its buffers and as `.glb`: the triangles of the scene, each by the transforms of its nodes.
+//! glTF 2.0, as `.gltf` with its buffers and as `.glb`: the triangles of the scene, each by the transforms of its
+//! nodes.
 //!
 //! In glTF y points up; here z does, so that a model stands as it was made to.
 

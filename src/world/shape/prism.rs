@@ -32,8 +32,8 @@ pub(super) fn cylinder(radius: f64, height: f64, sides: usize) -> Vec<Triangle> 
     (0..sides).flat_map(side).collect()
 }
 
-/// A flight of `steps` that climbs along x; `step` is tread, width, rise. Its underside is `slab` below the inner edges of
-/// the steps, along the slope, or at z = 0 for a slab of 0.
+/// A flight of `steps` that climbs along x; `step` is tread, width, rise. Its underside is `slab` below the inner edges
+/// of the steps, along the slope, or at z = 0 for a slab of 0.
 pub(super) fn stairs(steps: usize, step: Vector, slab: f64) -> Vec<Triangle> {
     let across = Vector::y() * step.y;
     let at = |k: usize, height: f64| Vector::new(k as f64 * step.x, -step.y / 2.0, height);

@@ -1,16 +1,17 @@
 //! The course bent to loops.
 //!
-//! With `C` the correction so far at an instant, and `p` where the head then is, a tie says of its two instants `a` and `b`
+//! With `C` the correction so far at an instant, and `p` where the head then is, a tie says of its two instants `a` and
+//! `b`
 //!
 //! ```text
 //! e_r = [log(C_b^T C_a Rz^T)]_z          de_r = [C_b^T (dr_a - dr_b)]_z
 //! e_t = C_b^T (p_a - p_b) - shift        de_t = C_b^T (dt_a - dt_b + (p_a - p_b) x dr_b)
 //! ```
 //!
-//! Neighbouring places are tied as firmly as what they saw in common says: the course gives way where that is little. Loops
-//! pull gently on it, each by Geman and McClure's weight, whose scale shrinks from step to step (graduated non-convexity: Yang,
-//! Antonante, Tzoumas and Carlone, IEEE Robotics and Automation Letters 5(2), 2020); what they cannot move near is false. Then
-//! those left pull firmly.
+//! Neighbouring places are tied as firmly as what they saw in common says: the course gives way where that is little.
+//! Loops pull gently on it, each by Geman and McClure's weight, whose scale shrinks from step to step (graduated
+//! non-convexity: Yang, Antonante, Tzoumas and Carlone, IEEE Robotics and Automation Letters 5(2), 2020); what they
+//! cannot move near is false. Then those left pull firmly.
 
 use super::{Alignment, Tie};
 use crate::estimation::nominal::Correction;
@@ -56,7 +57,8 @@ struct Stretched {
 
 /// Bends `course` to `loops`, and back where `links` hold it. The instants of those that it then goes through.
 ///
-/// Nothing, and a course to be thrown away, where they contradict what was seen between, or the equations have no solution.
+/// Nothing, and a course to be thrown away, where they contradict what was seen between, or the equations have no
+/// solution.
 pub(in crate::estimation::registration) fn bend(
     course: &mut Course,
     (loops, links): (&[Tie], &[Tie]),
@@ -235,8 +237,8 @@ mod tests {
         assert!((end_m(&course) - before).norm() < 0.05, "{}", end_m(&course));
     }
 
-    /// Between two places nothing was seen in common, and the open loop lost 80 cm there: loops across it are believed, and one
-    /// among them that says something else is not.
+    /// Between two places nothing was seen in common, and the open loop lost 80 cm there: loops across it are believed,
+    /// and one among them that says something else is not.
     #[test]
     fn loops_are_believed_where_nothing_was_seen_between() {
         let (mut course, at_s) = straight();

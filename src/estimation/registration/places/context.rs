@@ -1,8 +1,8 @@
 //! What a place looks like from above: Scan Context (G. Kim and A. Kim, IROS 2018).
 //!
-//! The plane about the head is cut into rings and sectors; of each cell the greatest height of what is seen in it is kept. A
-//! place seen by a head that was turned has the same columns (sectors), shifted; what share of each ring is not empty does
-//! not depend on the turn, and is the key by which alike places are found in a tree.
+//! The plane about the head is cut into rings and sectors; of each cell the greatest height of what is seen in it is
+//! kept. A place seen by a head that was turned has the same columns (sectors), shifted; what share of each ring is not
+//! empty does not depend on the turn, and is the key by which alike places are found in a tree.
 //!
 //! Here heights are those of upright surfaces over the ground: ceilings are alike everywhere. The map's vertical is
 //! gravity's, which the open loop does not lose.

@@ -22,8 +22,8 @@ const FEWEST_FACING: usize = 8;
 /// What a match of two places may err, m: the open loop may have smeared either.
 const MATCH_SIGMA_M: f64 = 0.1;
 
-/// How one place lies beside another. What the first sees at `x` about its head, the second sees at `Rz(yaw) x + shift` about
-/// its own; both along the map's axes.
+/// How one place lies beside another. What the first sees at `x` about its head, the second sees at `Rz(yaw) x + shift`
+/// about its own; both along the map's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::estimation::registration) struct Alignment {
     /// rad.
@@ -135,9 +135,9 @@ fn step(
     (matches > 0).then_some(step)
 }
 
-/// The share of `from`'s surfaces that lie on some of `to`'s, within `gate_m`: the least of those that face the vertical, and
-/// each of two horizontal directions at right angles, which are those that most and least of them face. In a
-/// corridor floor and walls agree wherever along it one is. `None` where too few face a direction to say.
+/// The share of `from`'s surfaces that lie on some of `to`'s, within `gate_m`: the least of those that face the
+/// vertical, and each of two horizontal directions at right angles, which are those that most and least of them face.
+/// In a corridor floor and walls agree wherever along it one is. `None` where too few face a direction to say.
 pub(super) fn agreement(
     from: &Seen,
     to: &Seen,

@@ -1,18 +1,20 @@
-//! Place recognition: where the open loop has drifted farther than matches reach, what was seen twice is known by its looks.
+//! Place recognition: where the open loop has drifted farther than matches reach, what was seen twice is known by its
+//! looks.
 //!
 //! 1. The recording is cut into *places* of a few seconds. Gravity levels them: two of them differ by a turn about the
 //!    vertical and a shift.
-//! 2. *Proposed* are pairs of places, well apart in time, that look alike from above (Scan Context: `context`), where the open
-//!    loop would not have to have drifted more than it can. For each place a tree gives a few: their number grows as the
-//!    recording's length.
-//! 3. A pair that already agrees where the open loop puts it needs no loop. That costs one look, and is all that a run without
-//!    drift pays for.
-//! 4. Others are laid upon each other, plane on plane, from several starts (`shifts`, `fit`). *Verified* is a loop when in
-//!    every direction enough of what one saw lies on what the other saw, and no other alignment comes near: places that
-//!    repeat themselves say nothing.
-//! 5. The course is bent to the loops (`bend`), as stiff as neighbouring places hang together by what they saw in common. Loops
-//!    that this contradicts are dropped. What has drifted is smeared too, so this is repeated until the course stays. Those left
-//!    that were out of the open loop's reach are *closed*; where they are too few the open loop stays as it is.
+//! 2. *Proposed* are pairs of places, well apart in time, that look alike from above (Scan Context: `context`), where
+//!    the open loop would not have to have drifted more than it can. For each place a tree gives a few: their number
+//!    grows as the recording's length.
+//! 3. A pair that already agrees where the open loop puts it needs no loop. That costs one look, and is all that a run
+//!    without drift pays for.
+//! 4. Others are laid upon each other, plane on plane, from several starts (`shifts`, `fit`). *Verified* is a loop when
+//!    in every direction enough of what one saw lies on what the other saw, and no other alignment comes near: places
+//!    that repeat themselves say nothing.
+//! 5. The course is bent to the loops (`bend`), as stiff as neighbouring places hang together by what they saw in
+//!    common. Loops that this contradicts are dropped. What has drifted is smeared too, so this is repeated until the
+//!    course stays. Those left that were out of the open loop's reach are *closed*; where they are too few the open
+//!    loop stays as it is.
 
 mod album;
 mod bend;
@@ -36,7 +38,8 @@ use fit::Alignment;
 use nalgebra::Matrix4;
 use search::{Search, Wanted};
 
-/// How freely the course bends between the loops where nothing else holds it: a random walk of m/sqrt(s), degrees/sqrt(s).
+/// How freely the course bends between the loops where nothing else holds it: a random walk of m/sqrt(s),
+/// degrees/sqrt(s).
 const LOOSE: (f64, f64) = (0.1, 0.3);
 /// The course is bent at most so often, and until it moves by less, m.
 const PASSES: usize = 8;
@@ -100,7 +103,8 @@ pub(super) fn into_reach(
         let ((loops, _), links) = (search.loops(Wanted::All), search.links());
         let level_sigma_rad = spec.level_sigma_deg.to_radians();
         let mut together = course.clone();
-        // Loops that contradict what was seen between may do so because it is smeared: the course is straightened alone.
+        // Loops that contradict what was seen between may do so because it is smeared: the course is straightened
+        // alone.
         let closed = match bend(&mut together, (&loops, &links), level_sigma_rad) {
             Some(closed) => {
                 course = together;
@@ -127,8 +131,8 @@ pub(super) fn into_reach(
     (LoopReport { closed: needed, ..report }, Some(Bent { trajectory, survey }))
 }
 
-/// Whether the open loop puts its poses at two instants, s from `origin`, elsewhere beside each other than `bent` does, farther
-/// than matches reach.
+/// Whether the open loop puts its poses at two instants, s from `origin`, elsewhere beside each other than `bent` does,
+/// farther than matches reach.
 fn is_out_of_reach(open_loop: &Trajectory, bent: &Trajectory, origin: Stamp, (late_s, early_s): (f64, f64)) -> bool {
     let between = |trajectory: &Trajectory| {
         let at = |tau_s: f64| trajectory.at(origin + Span::from_seconds(tau_s));

@@ -1,8 +1,8 @@
 //! How two places may lie beside each other: a search over turns and shifts in the plane.
 //!
-//! After E. Olson, Real-time correlative scan matching (ICRA 2009): the walls of one place are drawn into a grid, and the other's
-//! are counted that fall into it, at every shift within reach and every turn near the one proposed. A wall is drawn with the
-//! octants that its normal is nearest to, and counts where these agree.
+//! After E. Olson, Real-time correlative scan matching (ICRA 2009): the walls of one place are drawn into a grid, and
+//! the other's are counted that fall into it, at every shift within reach and every turn near the one proposed. A wall
+//! is drawn with the octants that its normal is nearest to, and counts where these agree.
 
 use super::context::is_upright;
 use super::fit::Alignment;

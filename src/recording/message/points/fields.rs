@@ -101,10 +101,10 @@ impl<'a> TimeField<'a> {
         self.field.name
     }
 
-    /// Learns from a cloud's numbers what they mean. Integers are nanoseconds after the stamp. Floats are instants where
-    /// they lie as near the stamp as they lie to each other (in seconds, microseconds or nanoseconds), and not as near to
-    /// zero; else seconds after the stamp while they are at most 10, as a frame is shorter; else instants where they lie
-    /// near the stamp at all; else nanoseconds after it.
+    /// Learns from a cloud's numbers what they mean. Integers are nanoseconds after the stamp. Floats are instants
+    /// where they lie as near the stamp as they lie to each other (in seconds, microseconds or nanoseconds), and not as
+    /// near to zero; else seconds after the stamp while they are at most 10, as a frame is shorter; else instants where
+    /// they lie near the stamp at all; else nanoseconds after it.
     pub fn learn<'p>(&mut self, stamp: Stamp, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) {
         if self.field.kind < FLOAT32 {
             return;
@@ -130,7 +130,8 @@ impl<'a> TimeField<'a> {
         self.meaning = Meaning::AfterStamp(unit);
     }
 
-    /// From the least of a cloud's numbers to the greatest, and the same in seconds; `None` where they are instants, or there are none.
+    /// From the least of a cloud's numbers to the greatest, and the same in seconds; `None` where they are instants, or
+    /// there are none.
     pub fn spread<'p>(&self, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) -> Option<(f64, f64)> {
         let Meaning::AfterStamp(unit) = self.meaning else { return None };
         let (least, most) = self.range(points, big_endian);

@@ -5,7 +5,8 @@ use crate::time::{NANOS_PER_SECOND, Stamp};
 /// Fewest clouds that show it.
 const FEWEST: usize = 5;
 
-/// What part of the time from one cloud to the next a cloud may last, as its times are usually counted: sparse clouds less, by far.
+/// What part of the time from one cloud to the next a cloud may last, as its times are usually counted: sparse clouds
+/// less, by far.
 const CREDIBLE: std::ops::RangeInclusive<f64> = 0.003..=30.0;
 
 /// What part of it a cloud lasts whose times are counted rightly.
@@ -37,8 +38,8 @@ impl Unit {
         }
     }
 
-    /// The unit that the first clouds of a lidar show, where as they are usually read they would last far longer or shorter than the
-    /// time from one to the next; `None` where that is credible, or no other unit makes it so.
+    /// The unit that the first clouds of a lidar show, where as they are usually read they would last far longer or
+    /// shorter than the time from one to the next; `None` where that is credible, or no other unit makes it so.
     pub fn shown_by(clouds: &[Lasting]) -> Option<Self> {
         let mut periods_s: Vec<f64> =
             clouds.windows(2).map(|pair| (pair[1].stamp - pair[0].stamp).seconds()).filter(|s| *s > 0.0).collect();

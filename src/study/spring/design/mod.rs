@@ -1,10 +1,10 @@
 //! The search for a spring.
 //!
-//! A design in the space (a coil's geometry within bounds, or the springs of a catalogue) is judged by its closed form in a
-//! fraction of a millisecond. A catalogue is tried through. A geometry is sampled evenly first; then CMA-ES (Hansen 2016,
-//! crate `cmaes`) descends on the goals weighed in several ways (Chebyshev's scalarisation, so that hollow fronts are found
-//! too), and whatever it meets is kept. What no other design beats in every goal is the Pareto set; some of it, spread
-//! evenly, is verified by a full simulation each.
+//! A design in the space (a coil's geometry within bounds, or the springs of a catalogue) is judged by its closed form
+//! in a fraction of a millisecond. A catalogue is tried through. A geometry is sampled evenly first; then CMA-ES
+//! (Hansen 2016, crate `cmaes`) descends on the goals weighed in several ways (Chebyshev's scalarisation, so that
+//! hollow fronts are found too), and whatever it meets is kept. What no other design beats in every goal is the Pareto
+//! set; some of it, spread evenly, is verified by a full simulation each.
 
 mod catalogue;
 mod output;

@@ -16,8 +16,8 @@ const FIGURES: [(&str, FigureName); 7] = [
     ("stress_share", FigureName::StressShare),
 ];
 
-/// A line a verified design: the coil, its figures by the closed form, those by simulation (`simulated_...`), whether they
-/// hold.
+/// A line a verified design: the coil, its figures by the closed form, those by simulation (`simulated_...`), whether
+/// they hold.
 pub fn csv(study: &DesignStudy) -> String {
     let mut text = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material".to_owned();
     for prefix in ["", "simulated_"] {

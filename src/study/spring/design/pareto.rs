@@ -1,7 +1,7 @@
 //! What nothing else beats.
 
-/// The indices of the points that no other beats: none is at most as costly in every goal and less so in one. In the order
-/// of their first cost.
+/// The indices of the points that no other beats: none is at most as costly in every goal and less so in one. In the
+/// order of their first cost.
 pub fn pareto_set(costs: &[Vec<f64>]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
     // After a sort by all costs in turn a point can only be beaten by those before it.
@@ -19,8 +19,8 @@ pub fn pareto_set(costs: &[Vec<f64>]) -> Vec<usize> {
     front
 }
 
-/// At most `count` of `points`, spread evenly: the best in each goal, then whatever is farthest from those chosen, costs
-/// being scaled to their ranges. Indices, in rising order.
+/// At most `count` of `points`, spread evenly: the best in each goal, then whatever is farthest from those chosen,
+/// costs being scaled to their ranges. Indices, in rising order.
 pub fn spread(points: &[Vec<f64>], count: usize) -> Vec<usize> {
     if points.len() <= count {
         return (0..points.len()).collect();

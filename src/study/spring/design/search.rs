@@ -189,8 +189,8 @@ impl Search {
         head
     }
 
-    /// Explores, takes the Pareto set, and verifies as much of it as the spec says. `hear` is told as designs are tried (the
-    /// first half) and verified.
+    /// Explores, takes the Pareto set, and verifies as much of it as the spec says. `hear` is told as designs are tried
+    /// (the first half) and verified.
     ///
     /// # Errors
     /// When the verification cannot be set up. A design whose simulation fails is a result.

@@ -1,5 +1,5 @@
-//! The part of a glTF document that says where surfaces are (glTF 2.0 specification, section 5). Its indices are looked up
-//! where they are used, never trusted.
+//! The part of a glTF document that says where surfaces are (glTF 2.0 specification, section 5). Its indices are looked
+//! up where they are used, never trusted.
 
 use crate::geometry::Vector;
 use serde::Deserialize;
