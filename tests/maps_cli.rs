@@ -40,6 +40,21 @@ fn a_recording_is_localised_in_the_map_of_another_and_maps_are_put_together() {
 }
 
 #[test]
+fn people_are_left_out_of_a_cloud_and_what_they_walk_through_is_not() {
+    let here = tempfile::tempdir().unwrap();
+    let done = |arguments: &str| {
+        let (code, out, talk) = run(here.path(), arguments);
+        assert_eq!(code, 0, "{arguments}: {talk}");
+        out
+    };
+    done("simulate --scene office_people --duration 20s --seed 9 --out people.mcap");
+    let told: Value = serde_json::from_str(&done("estimate people.mcap --open-loop --out a --json")).unwrap();
+    let dropped = |of: &str| told["cloud"]["filter"][of].as_f64().unwrap();
+    assert!(dropped("movers_dropped_fraction") > 0.6, "{told}");
+    assert!(dropped("standing_dropped_fraction") < 0.01, "{told}");
+}
+
+#[test]
 fn what_is_no_map_and_no_place_is_said_and_leaves_no_folder() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("broken.ply"), "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n").unwrap();

@@ -12,6 +12,7 @@
 
 mod carve;
 mod cell;
+mod cells;
 mod mixed;
 mod sigma;
 mod support;
@@ -21,7 +22,7 @@ pub use sigma::point_sigma_m;
 use crate::geometry::Vector;
 use crate::measurement::LidarNoise;
 use crate::time::{Span, Stamp};
-use carve::Carved;
+use carve::{Carved, Moving};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 use support::{Crowd, Support};
@@ -128,7 +129,8 @@ impl<T: Send + Sync> CloudFilter<T> {
     fn close_block(&mut self) {
         let Some((_, seen)) = self.filling.take() else { return };
         let hits: Vec<Hit> = seen.iter().map(|seen| seen.hit).collect();
-        let (crowd, carved) = rayon::join(|| Crowd::of(&hits), || Carved::by(&hits));
+        let crowd = Crowd::of(&hits);
+        let carved = Carved::by(&hits, &crowd);
         self.whole.push_back(Block { seen, crowd, carved });
     }
 
@@ -139,7 +141,7 @@ impl<T: Send + Sync> CloudFilter<T> {
         let support = Support::of(around().map(|block| &block.crowd));
         let carved: Vec<&Carved> = around().map(|block| &block.carved).collect();
         let block = &self.whole[self.judged];
-        let moving = carve::moving(&block.carved, &carved);
+        let moving = Moving::of(&block.crowd, &carved);
         let fate = |seen: &Seen<T>| match seen {
             Seen { mixed: true, .. } => Fate::Mixed,
             Seen { hit, .. } if !support.holds(hit) => Fate::Isolated,

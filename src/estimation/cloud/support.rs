@@ -22,14 +22,19 @@ impl Crowd {
     pub(super) fn of(hits: &[Hit]) -> Self {
         let mut numbers: Vec<u64> = hits.iter().map(|hit| number(coordinates(&hit.point_in_map, 0), 0)).collect();
         numbers.sort_unstable();
-        let mut cells: Vec<(u64, u32)> = Vec::new();
-        for number in numbers {
-            match cells.last_mut() {
-                Some((last, count)) if *last == number => *count += 1,
-                _ => cells.push((number, 1)),
-            }
-        }
-        Self { cells }
+        numbers.chunk_by(|a, b| a == b).map(|cell| (cell[0], cell.len() as u32)).collect()
+    }
+
+    /// Cells by their numbers, in order, and how many points each has.
+    pub(super) fn cells(&self) -> impl Iterator<Item = (u64, u32)> {
+        self.cells.iter().copied()
+    }
+}
+
+impl FromIterator<(u64, u32)> for Crowd {
+    /// Of cells in order.
+    fn from_iter<I: IntoIterator<Item = (u64, u32)>>(cells: I) -> Self {
+        Self { cells: cells.into_iter().collect() }
     }
 }
 
@@ -72,7 +77,7 @@ impl Support {
     }
 
     /// Points in the eight cells of `level` nearest to a point.
-    fn count_about(&self, point: &Vector, level: u32) -> u32 {
+    pub(super) fn count_about(&self, point: &Vector, level: u32) -> u32 {
         let half_m = 0.5 * EDGE_M * f64::from(1_u32 << level);
         let corners = (0..8_u32).map(|corner| {
             let side = |bit: u32| if corner >> bit & 1 == 0 { -half_m } else { half_m };
