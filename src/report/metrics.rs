@@ -115,6 +115,8 @@ pub struct LoopMetrics {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ClockMetrics {
+    /// By how much the IMU stamps an instant later than the lidar at the end, as estimated, s.
+    pub offset_end_s: Option<f64>,
     /// Error over the whole run, root mean square, s.
     pub offset_rmse_s: Option<f64>,
     /// Estimated minus true offset at the end, s.
@@ -231,6 +233,7 @@ mod tests {
         "closed",
         "left",
         "clock",
+        "offset_end_s",
         "offset_rmse_s",
         "offset_end_error_s",
         "lidar",

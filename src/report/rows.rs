@@ -97,6 +97,7 @@ fn closed_loop(metrics: &Metrics) -> Group {
 
 fn clock(metrics: &Metrics) -> Group {
     let mut rows = Rows(Vec::new());
+    rows.add("offset at the end", metrics.clock.offset_end_s, time);
     rows.add("offset RMSE", metrics.clock.offset_rmse_s, time);
     rows.add("offset error at the end", metrics.clock.offset_end_error_s, time);
     rows.titled("clock")

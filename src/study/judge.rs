@@ -169,6 +169,7 @@ pub(super) fn imu_only(
 pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Known>) -> ClockMetrics {
     let error = known.and_then(|known| clock_error(&run.clock_offsets, &known.clock_offsets));
     ClockMetrics {
+        offset_end_s: run.clock_offsets.last().map(|(_, offset_s)| *offset_s),
         offset_rmse_s: error.map(|error| error.offset_rmse_s),
         offset_end_error_s: error.map(|error| error.offset_end_error_s),
     }
