@@ -165,6 +165,32 @@ fn samples_that_are_not_finite_are_left_out_and_counted() {
 }
 
 #[test]
+fn accelerations_in_units_of_gravity_are_told_from_those_in_metres_per_second_squared() {
+    // A head that is swung: what it feels besides gravity comes and goes.
+    for (unit, in_m_per_s2) in [(1.0, false), (9.80665, true)] {
+        let mut foreign = Foreign::new(mcap::WriteOptions::new());
+        for k in 0..50_i64 {
+            let mut sample = imu(k * 10_000_000, "imu");
+            let swing = (k as f64 * 0.3).sin();
+            sample.linear_acceleration = [0.6 * swing * unit, 0.0, (1.0 + 0.3 * swing * swing) * unit];
+            foreign.message("/imu", IMU, k * 10_000_000, &sample);
+        }
+        foreign.message("/scan", SCAN, 0, &scan(0, 0.001, 0.1));
+        let reader = foreign.reader();
+        let selection = select(&reader);
+        assert_eq!(selection.notes.iter().any(|note| note.contains("units of gravity")), !in_m_per_s2);
+        let samples = reader.measurements(&selection).filter_map(|measurement| match measurement.unwrap() {
+            Measurement::Imu(sample) => Some(sample.specific_force_m_per_s2),
+            Measurement::Lidar(_) => None,
+        });
+        for (k, force) in samples.enumerate() {
+            let swing = (k as f64 * 0.3).sin();
+            assert!((force.z / 9.80665 - 1.0 - 0.3 * swing * swing).abs() < 1e-12, "{k}: {force}");
+        }
+    }
+}
+
+#[test]
 fn extrinsics_are_found_along_any_way_through_the_tree() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     // base -> mast -> laser, base -> box -> imu: x adds up along each way.

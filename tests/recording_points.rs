@@ -4,7 +4,7 @@
 
 mod foreign;
 
-use foreign::{FLOAT32, FLOAT64, Foreign, IMU, POINTS, UINT32, cloud, imu, scans};
+use foreign::{FLOAT32, FLOAT64, Foreign, IMU, POINTS, UINT32, cloud, imu, scans, select};
 use zsim::time::{Span, Stamp};
 
 #[test]
@@ -63,6 +63,27 @@ fn a_unit_that_is_not_the_usual_one_is_told_from_how_long_clouds_last() {
             let offsets: Vec<_> = scan.returns.iter().map(|point| point.offset.nanos()).collect();
             assert_eq!(offsets, (0..10).map(|k| k * 10_000_000).collect::<Vec<_>>(), "{name} {kind}");
         }
+    }
+}
+
+#[test]
+fn times_by_another_clock_count_from_the_first_point() {
+    // The lidar's clock: since it was switched on, in TAI, in some parts of a second; the stamp is the computer's.
+    let stamp_ns = 1_700_000_000_250_000_000_i64;
+    let tai_s = 1_700_000_037.0;
+    for (first, parts) in [(1234.5, 1.0), (tai_s, 1.0), (tai_s * 1e6, 1e6), (77.0e9, 1e9), (77.0e3, 1e3)] {
+        let times: Vec<_> = (0..10).map(|k| (first + 0.01 * f64::from(k) * parts).to_le_bytes().to_vec()).collect();
+        let mut foreign = Foreign::new(mcap::WriteOptions::new());
+        foreign.message("/imu", IMU, stamp_ns, &imu(stamp_ns, "imu"));
+        foreign.message("/points", POINTS, stamp_ns, &cloud(stamp_ns, ("timestamp", FLOAT64), &times));
+        let reader = foreign.reader();
+        let scan = &scans(&reader)[0];
+        assert_eq!(scan.stamp.nanos(), stamp_ns, "{first}");
+        for (k, point) in scan.returns.iter().enumerate() {
+            assert!((point.offset.seconds() - 0.01 * k as f64).abs() < 1e-6, "{first}: {point:?}");
+        }
+        let notes = select(&reader).notes;
+        assert!(notes.iter().any(|note| note.contains("another clock")), "{notes:?}");
     }
 }
 

@@ -30,13 +30,14 @@ impl Reader {
         let found = self.candidates(&[MessageType::Imu], Some(topic), imu_candidate)?;
         let frame = found.first().map_or("", |candidate| candidate.frame.as_str());
         let base_from_imu = self.frames()?.target_from_source(BASE, frame);
+        let unit = self.force_unit(topic)?;
         let (ids, mut loss) = (self.ids_of(topic), self.loss().clone());
         let (mut samples, mut messages) = (Vec::new(), self.messages());
         while let Some(message) = messages.next()? {
             if !ids.contains(&message.channel) {
                 continue;
             }
-            match imu::decode(message.data) {
+            match imu::decode(message.data, unit) {
                 Ok(sample) if !is_finite(&sample) => loss.samples_not_finite += 1,
                 Ok(sample) => samples.push(sample),
                 Err(_) => loss.unreadable_messages += 1,

@@ -20,6 +20,7 @@ pub struct Measurements<'r> {
     lidar_kind: LidarKind,
     point_times: Option<points::Unit>,
     imu: Vec<u16>,
+    force_unit: imu::ForceUnit,
     projector: Projector,
     loss: Loss,
     expected: Option<u64>,
@@ -36,6 +37,7 @@ impl Reader {
             lidar_kind: selection.lidar_kind,
             point_times: selection.point_times,
             imu: self.ids_of(&selection.imu_topic),
+            force_unit: selection.force_unit,
             projector: Projector::default(),
             loss: self.loss().clone(),
             expected: self.expected_messages(),
@@ -59,7 +61,7 @@ impl Measurements<'_> {
                 return Ok(None);
             };
             let decoded = if self.imu.contains(&message.channel) {
-                imu::decode(message.data).map(Measurement::Imu)
+                imu::decode(message.data, self.force_unit).map(Measurement::Imu)
             } else if self.lidar.contains(&message.channel) {
                 lidar((self.lidar_kind, self.point_times), &mut self.projector, &message).map(Measurement::Lidar)
             } else {

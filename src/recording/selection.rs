@@ -1,7 +1,8 @@
 //! Which topics of a recording are the lidar and the IMU.
 
 use crate::recording::container::RawMessage;
-use crate::recording::message::{points, scan};
+use crate::recording::measurements::is_finite;
+use crate::recording::message::{imu, points, scan};
 use crate::recording::schema::MessageType;
 use crate::recording::topics::TRUTH_PREFIX;
 use crate::recording::{Reader, RecordingError, cdr::Decoder};
@@ -32,6 +33,8 @@ pub struct Selection {
     pub(super) lidar_kind: LidarKind,
     /// In what points' times are counted, where clouds show another unit than the usual one.
     pub(super) point_times: Option<points::Unit>,
+    /// In what the IMU tells specific force.
+    pub(super) force_unit: imu::ForceUnit,
 }
 
 /// How a lidar's messages tell its beams.
@@ -48,6 +51,8 @@ pub enum LidarKind {
 enum BeamTimes {
     /// Each message tells them.
     Told,
+    /// Each message tells them, by another clock than its stamp.
+    OfOtherClock,
     /// They follow from the time that a turn takes.
     Implied,
     /// All beams seem to be fired at once.
@@ -66,6 +71,8 @@ const LIDAR_TYPES: [MessageType; 2] = [MessageType::LaserScan, MessageType::Poin
 
 /// Clouds by which the unit of their points' times is told.
 const LOOKED_AT: usize = 20;
+/// Samples by which that of an IMU's specific force is.
+const FELT: usize = 200;
 
 /// Endings of IMU topics, preferred first: the raw one is without a filter's opinion.
 const IMU_ENDINGS: [&str; 3] = ["imu/data_raw", "imu/data", "imu"];
@@ -92,11 +99,13 @@ impl Reader {
             LidarKind::Points => self.unit_of_point_times(&lidar.topic)?,
             LidarKind::Scan => None,
         };
+        let force_unit = self.force_unit(&imu.topic)?;
         let notes = [
             notes_on_choice("lidar", lidar, &lidars),
             notes_on_choice("IMU", imu, &imus),
             note_on_times(lidar),
             point_times.map(|unit| note_on_unit(lidar, unit)),
+            (force_unit != imu::ForceUnit::default()).then(|| note_on_force(&imu.topic)),
         ];
         Ok(Selection {
             lidar_topic: lidar.topic.clone(),
@@ -106,13 +115,13 @@ impl Reader {
             notes: notes.into_iter().flatten().collect(),
             lidar_kind,
             point_times,
+            force_unit,
         })
     }
 
     /// The unit that a topic's first clouds show, see [`points::Unit::shown_by`].
     fn unit_of_point_times(&self, topic: &str) -> Result<Option<points::Unit>, RecordingError> {
-        let clouds = self.channels().iter().filter(|channel| channel.topic == topic);
-        let ids: Vec<u16> = clouds.map(|channel| channel.id).collect();
+        let ids = self.ids_of(topic);
         let (mut messages, mut lasting) = (self.messages_near(&ids), Vec::new());
         while lasting.len() < LOOKED_AT {
             let Some(message) = messages.next()? else { break };
@@ -122,6 +131,19 @@ impl Reader {
             }
         }
         Ok(points::Unit::shown_by(&lasting))
+    }
+
+    /// In what an IMU's first samples tell specific force.
+    pub(super) fn force_unit(&self, topic: &str) -> Result<imu::ForceUnit, RecordingError> {
+        let ids = self.ids_of(topic);
+        let (mut messages, mut samples) = (self.messages_near(&ids), Vec::new());
+        while samples.len() < FELT {
+            let Some(message) = messages.next()? else { break };
+            if ids.contains(&message.channel) {
+                samples.extend(imu::decode(message.data, imu::ForceUnit::default()).ok().filter(is_finite));
+            }
+        }
+        Ok(imu::ForceUnit::shown_by(&samples))
     }
 
     fn no_sensor(&self, sensor: &'static str, needs: &'static str) -> RecordingError {
@@ -185,8 +207,12 @@ fn lidar_candidate(message: &RawMessage<'_>, kind: MessageType, topic: &str) -> 
         };
         (LidarKind::Scan, times)
     } else {
-        let told = points::time_field(message.data).ok()?.is_some();
-        (LidarKind::Points, if told { BeamTimes::Told } else { BeamTimes::Unknown })
+        let times = match points::by_other_clock(message.data).ok()? {
+            Some(false) => BeamTimes::Told,
+            Some(true) => BeamTimes::OfOtherClock,
+            None => BeamTimes::Unknown,
+        };
+        (LidarKind::Points, times)
     };
     Some(Candidate { topic: topic.to_owned(), frame, kind: Some(kind), times })
 }
@@ -209,6 +235,10 @@ fn notes_on_choice(sensor: &str, chosen: &Candidate, all: &[Candidate]) -> Optio
         .then(|| format!("Of several {sensor} topics, {} is read, not {}.", chosen.topic, others.join(", ")))
 }
 
+fn note_on_force(imu: &str) -> String {
+    format!("{imu} tells accelerations in units of gravity, not in m/s^2: they are taken times 9.80665.")
+}
+
 fn note_on_unit(lidar: &Candidate, unit: points::Unit) -> String {
     let (topic, unit) = (&lidar.topic, unit.name());
     format!(
@@ -219,6 +249,11 @@ fn note_on_unit(lidar: &Candidate, unit: points::Unit) -> String {
 fn note_on_times(lidar: &Candidate) -> Option<String> {
     match lidar.times {
         BeamTimes::Told => None,
+        BeamTimes::OfOtherClock => Some(format!(
+            "{} tells its points' times by another clock than its clouds' stamps: they are counted from each cloud's first \
+             point, which is taken to be fired at the stamp.",
+            lidar.topic
+        )),
         BeamTimes::Implied => Some(format!(
             "{} tells no time between beams; an even turn of the mirror is assumed, scan_time a turn.",
             lidar.topic

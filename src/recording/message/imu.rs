@@ -23,6 +23,40 @@ impl Variances {
     }
 }
 
+/// In what an IMU's messages tell specific force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ForceUnit {
+    /// As `sensor_msgs/Imu` asks for.
+    #[default]
+    MetresPerSecondSquared,
+    /// As some drivers pass on what the sensor says.
+    StandardGravity,
+}
+
+impl ForceUnit {
+    /// The unit that samples show: in any motion by hand or vehicle, gravity is most of what their median feels.
+    pub fn shown_by(samples: &[ImuSample]) -> Self {
+        let mut norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
+        norms.sort_unstable_by(f64::total_cmp);
+        let median = norms.get(norms.len() / 2).copied().unwrap_or_default();
+        if ONE_G.contains(&median) { Self::StandardGravity } else { Self::default() }
+    }
+
+    /// One of it, m/s^2.
+    fn in_m_per_s2(self) -> f64 {
+        match self {
+            Self::MetresPerSecondSquared => 1.0,
+            Self::StandardGravity => STANDARD_GRAVITY_M_PER_S2,
+        }
+    }
+}
+
+/// Medians of what is told in units of gravity.
+const ONE_G: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+
+/// By definition (3rd CGPM 1901).
+const STANDARD_GRAVITY_M_PER_S2: f64 = 9.806_65;
+
 fn diagonal(variance: f64) -> [f64; 9] {
     let v = variance;
     [v, 0.0, 0.0, 0.0, v, 0.0, 0.0, 0.0, v]
@@ -48,17 +82,17 @@ pub fn encode(
     Ok(())
 }
 
-/// Reads a sample, whatever its numbers are.
+/// Reads a sample whose specific force is told in `unit`, whatever its numbers are.
 ///
 /// # Errors
 /// When the bytes are not an `Imu` message.
-pub fn decode(message: &[u8]) -> Result<ImuSample, DecodeError> {
+pub fn decode(message: &[u8], unit: ForceUnit) -> Result<ImuSample, DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
     input.f64s::<13>()?;
     let angular_velocity_rad_per_s = input.vector()?;
     input.f64s::<9>()?;
-    let specific_force_m_per_s2 = input.vector()?;
+    let specific_force_m_per_s2 = input.vector()? * unit.in_m_per_s2();
     Ok(ImuSample { stamp, angular_velocity_rad_per_s, specific_force_m_per_s2 })
 }
 
@@ -84,7 +118,7 @@ mod tests {
         assert_eq!(input.f64().unwrap(), -1.0);
         input.f64s::<11>().unwrap();
         assert_eq!(input.f64s().unwrap(), [2.5e-5, 0.0, 0.0, 0.0, 2.5e-5, 0.0, 0.0, 0.0, 2.5e-5]);
-        assert_eq!(decode(&bytes).unwrap(), sample);
+        assert_eq!(decode(&bytes, ForceUnit::default()).unwrap(), sample);
     }
 
     #[test]

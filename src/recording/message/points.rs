@@ -182,13 +182,16 @@ pub fn decode(message: &[u8], unit: Option<Unit>) -> Result<LidarScan, DecodeErr
     Ok(LidarScan { stamp: cloud.stamp - stamped_after, stamped_after, returns, planar: None })
 }
 
-/// The name of the field that tells a point's time, `None` where the points carry none.
+/// Whether a cloud's points tell their times by another clock than its stamp, `None` where they tell none.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2`.
-pub fn time_field(message: &[u8]) -> Result<Option<String>, DecodeError> {
+pub fn by_other_clock(message: &[u8]) -> Result<Option<bool>, DecodeError> {
     let cloud = Cloud::decode(message)?;
-    Ok(TimeField::find(&cloud.fields).map(|time| time.name().to_owned()))
+    Ok(TimeField::find(&cloud.fields).map(|mut time| {
+        time.learn(cloud.stamp, cloud.points(), cloud.big_endian);
+        time.is_of_other_clock()
+    }))
 }
 
 /// How long a cloud lasts by its points' times; `None` where they carry none, or tell instants.

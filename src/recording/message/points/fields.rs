@@ -13,6 +13,15 @@ const FLOAT64: u8 = 8;
 /// Names under which makers keep a point's time, the first one that is there is taken.
 const TIME_NAMES: [&str; 7] = ["t", "time", "timestamp", "offset_time", "time_stamp", "time_offset", "time_offset_ns"];
 
+/// Instants that are farther than this from their cloud's stamp are of another clock.
+const SAME_CLOCK_S: f64 = 1.0;
+
+/// A cloud of another clock's instants lasts at most this, s.
+const LONGEST_CLOUD_S: f64 = 1.5;
+
+/// And it lasts so many times less than that clock has run.
+const FAR_FROM_ZERO: f64 = 20.0;
+
 /// Longest time from a cloud's stamp to a point of it: beyond, the time is not what its field's name says.
 const LONGEST_S: f64 = 60.0;
 
@@ -81,6 +90,13 @@ enum Meaning {
     AfterStamp(Unit),
     /// An instant, counted in this many parts of a second.
     Instant(f64),
+    /// An instant of another clock than the stamp's, after the cloud's first one.
+    OfOtherClock {
+        /// Counted in this many parts of a second.
+        parts: f64,
+        /// The first one.
+        first: f64,
+    },
 }
 
 /// The field that tells a point's time, and how to read it.
@@ -96,15 +112,11 @@ impl<'a> TimeField<'a> {
         Some(Self { field: *field, meaning: Meaning::AfterStamp(Unit::NANOSECOND) })
     }
 
-    /// The field's name.
-    pub fn name(&self) -> &'a str {
-        self.field.name
-    }
-
     /// Learns from a cloud's numbers what they mean. Integers are nanoseconds after the stamp. Floats are instants
     /// where they lie as near the stamp as they lie to each other (in seconds, microseconds or nanoseconds), and not as
     /// near to zero; else seconds after the stamp while they are at most 10, as a frame is shorter; else instants where
-    /// they lie near the stamp at all; else nanoseconds after it.
+    /// they lie near the stamp at all; else instants of another clock where they lie far closer to each other than to
+    /// zero; else nanoseconds after it.
     pub fn learn<'p>(&mut self, stamp: Stamp, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) {
         if self.field.kind < FLOAT32 {
             return;
@@ -121,8 +133,21 @@ impl<'a> TimeField<'a> {
         };
         let tight = if within(0.0, 1.0, spread(1.0)) { None } else { instant(&spread) };
         let seconds = (least >= -MOST_SECONDS && most <= MOST_SECONDS).then_some(Meaning::AfterStamp(Unit::SECOND));
-        let loose = || instant(&|_| LONGEST_S);
-        self.meaning = tight.or(seconds).or_else(loose).unwrap_or(Meaning::AfterStamp(Unit::NANOSECOND));
+        let loose = || instant(&|_| SAME_CLOCK_S);
+        let other_clock = || Self::of_other_clock(least, most);
+        let found = tight.or(seconds).or_else(loose).or_else(other_clock);
+        self.meaning = found.unwrap_or(Meaning::AfterStamp(Unit::NANOSECOND));
+    }
+
+    fn of_other_clock(least: f64, most: f64) -> Option<Meaning> {
+        let is_cloud = |parts: &f64| (most - least) / parts <= LONGEST_CLOUD_S;
+        let parts = [1.0, 1e3, 1e6, 1e9].into_iter().find(is_cloud)?;
+        (least > FAR_FROM_ZERO * (most - least)).then_some(Meaning::OfOtherClock { parts, first: least })
+    }
+
+    /// Whether points tell instants of another clock than the stamp's.
+    pub fn is_of_other_clock(&self) -> bool {
+        matches!(self.meaning, Meaning::OfOtherClock { .. })
     }
 
     /// Takes a point's number for so much time after the stamp.
@@ -157,6 +182,7 @@ impl<'a> TimeField<'a> {
                     Stamp::from_nanos((whole as i64).saturating_mul(NANOS_PER_SECOND)) + Span::from_seconds(part);
                 instant - stamp
             }
+            Meaning::OfOtherClock { parts, first } => Span::from_seconds((number - first) / parts),
         };
         (number.is_finite() && offset.seconds().abs() <= LONGEST_S).then_some(offset)
     }
