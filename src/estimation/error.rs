@@ -139,7 +139,7 @@ pub enum WarningKind {
     LostInMap,
     /// IMU samples at the end of the sensor's range, which say only "at least".
     Saturated {
-        /// How many.
+        /// How many so far.
         samples: usize,
     },
 }
@@ -202,7 +202,11 @@ impl fmt::Display for WarningKind {
             Self::LostInMap => {
                 write!(f, "behind the silence the head was not found again in the map; it goes on without it")
             }
-            Self::Saturated { samples } => write!(f, "{samples} IMU samples at the end of the sensor's range"),
+            Self::Saturated { samples } => write!(
+                f,
+                "{samples} IMU samples so far at the end of the sensor's range (read as rad/s and m/s^2; the calibration's \
+                 `gyro_limit_rad_per_s` and `accel_limit_m_per_s2` tell the range)"
+            ),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::inertial::InertialStream;
 use super::initial::Noisier;
-use super::sight::Sight;
+use super::sight::{Sight, is_in_plane};
 use super::spec::EstimatorSpec;
 use super::stamps::{Regularity, StampFilter};
 use super::strapdown::Interval;
@@ -17,8 +17,8 @@ use std::collections::VecDeque;
 pub(super) const MARGIN_S: f64 = 0.05;
 /// Disorder of arrivals that is put right, s.
 const DISORDER_S: f64 = 0.1;
-/// A point whose direction leaves the x-y plane by more than this sine is of no planar lidar.
-const OUT_OF_PLANE: f32 = 0.01;
+/// Samples at the end of the IMU's range are told of when they are so many times more than when they were last.
+const SATURATED_MORE: usize = 10;
 /// A silence of the lidar longer than this is a gap, s.
 const LIDAR_GAP_S: f64 = 0.5;
 
@@ -53,6 +53,8 @@ pub(super) struct Intake {
     /// Whether all points so far lay in the lidar's x-y plane.
     planar: bool,
     late: (usize, usize),
+    /// Samples at the end of the IMU's range, and how many there were when that was said last.
+    saturated: (usize, usize),
     streams: Option<(InertialStream, StampFilter)>,
     /// Beams already placed in time that belong to the next stretches.
     beams: VecDeque<Beam>,
@@ -83,6 +85,7 @@ impl Intake {
             sight: Sight::default(),
             planar: true,
             late: (0, 0),
+            saturated: (0, 0),
             streams: None,
             beams: VecDeque::new(),
             next_start_s: 0.0,
@@ -163,8 +166,7 @@ impl Intake {
             return Err(EstimationError::NotFinite { sensor: "lidar", stamp_ns: scan.stamp.nanos() });
         }
         self.counts.1 += 1;
-        let in_plane = |p: &nalgebra::Vector3<f32>| p.z.abs() <= OUT_OF_PLANE * p.norm();
-        self.planar &= scan.returns.iter().all(|hit| in_plane(&hit.point_in_laser));
+        self.planar &= scan.returns.iter().all(|hit| is_in_plane(&hit.point_in_laser));
         let seconds = scan.stamp.seconds_since(*self.origin.get_or_insert(scan.stamp));
         if seconds <= self.used_s.1 {
             self.late.1 += 1;
@@ -247,10 +249,11 @@ impl Intake {
         let stamps: Vec<f64> = self.samples.iter().map(|(s, _)| *s).filter(|s| *s <= enough_s).collect();
         let first_scans = || self.scans.iter().filter(|(s, _)| *s <= enough_s);
         let scan_stamps: Vec<f64> = first_scans().map(|(s, scan)| s + scan.stamped_after.seconds()).collect();
-        self.sight = Sight::of(first_scans().map(|(_, scan)| scan), enough_s - first_scan);
+        let scanning = Regularity::of(&scan_stamps)?;
+        self.sight = Sight::of(first_scans().map(|(_, scan)| scan), enough_s - first_scan, scanning.period_s);
         let jitter_s = self.spec.clock.jitter_s;
         let imu = StampFilter::new(Regularity::of(&stamps)?, jitter_s);
-        let lidar = StampFilter::new(Regularity::of(&scan_stamps)?, jitter_s);
+        let lidar = StampFilter::new(scanning, jitter_s);
         // The IMU must cover the first beam whatever the clock offset.
         self.next_start_s = start_s + MARGIN_S;
         self.streams = Some((InertialStream::new(imu, self.calibration.imu, self.spec.inertial.clone()), lidar));
@@ -281,9 +284,9 @@ impl Intake {
                 break;
             }
         }
-        let samples = imu.take_saturated();
-        if samples > 0 {
-            self.warnings.push(Warning { stamp: self.stamp(end_s), kind: WarningKind::Saturated { samples } });
+        self.saturated.0 += imu.take_saturated();
+        if self.saturated.0 >= (SATURATED_MORE * self.saturated.1).max(1) {
+            self.warn_of_saturation(end_s);
         }
         silent_until_s
     }
@@ -308,6 +311,12 @@ impl Intake {
         }
     }
 
+    fn warn_of_saturation(&mut self, at_s: f64) {
+        let samples = self.saturated.0;
+        self.saturated.1 = samples;
+        self.warnings.push(Warning { stamp: self.stamp(at_s), kind: WarningKind::Saturated { samples } });
+    }
+
     fn warn_of_silence(&mut self, stretch: &Stretch) {
         let seconds = stretch.end_s - self.used_s.1;
         if stretch.beams.is_empty() && seconds > LIDAR_GAP_S {
@@ -318,6 +327,9 @@ impl Intake {
 
     /// What is to be said when nothing more comes.
     pub(super) fn close(&mut self) {
+        if self.saturated.0 > self.saturated.1 {
+            self.warn_of_saturation(self.next_start_s);
+        }
         let stamp = self.stamp(self.next_start_s);
         for (what, count) in [("IMU samples", self.late.0), ("lidar scans", self.late.1)] {
             if count > 0 {

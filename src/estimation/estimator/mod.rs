@@ -26,6 +26,10 @@ use std::time::Instant;
 /// The head is lost when the IMU alone carried it for longer than this, s, and for more than this share of the time.
 const LOST: (f64, f64) = (5.0, 0.2);
 
+/// A head that is faster than this, m/s, or turns faster than this, rad/s, should see surfaces again; one that does not
+/// is kept by the IMU.
+const MOVING: (f64, f64) = (0.3, 0.5);
+
 /// While the head is not found again behind a silence, the next one is bridged up to so many times as long as
 /// otherwise.
 const RELUCTANTLY: f64 = 3.0;
@@ -213,7 +217,8 @@ impl Estimator {
         let took = (elapsed_s + spent.views_s, spent);
         self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, took));
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
-        let moving = stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > 0.5);
+        let moving =
+            window.speed_m_per_s() > MOVING.0 || stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
         let trouble = trouble(&solved, &self.spec, moving);
         self.carried_s += if trouble.as_ref().is_some_and(leaves_to_the_imu) { self.spec.step_s } else { 0.0 };
         self.say(trouble, stretch.end_s);

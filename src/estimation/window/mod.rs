@@ -154,7 +154,12 @@ impl Window {
         Pose::from_parts(motion.position.into(), rotation)
     }
 
-    /// When that is, IMU time, s.
+    /// How fast the IMU is at the window's end, m/s.
+    pub(super) fn speed_m_per_s(&self) -> f64 {
+        self.nominal.at(self.nominal.end_s(), &self.biases.gyro).velocity.norm()
+    }
+
+    /// When it begins, IMU time, s.
     pub(super) fn begins_s(&self) -> f64 {
         self.start.u_s
     }
