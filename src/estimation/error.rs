@@ -130,6 +130,15 @@ pub enum WarningKind {
         /// Of how long, s.
         of_seconds: f64,
     },
+    /// For much of the time the IMU was farther from what the lidar saw than its noise has it.
+    Contradicted {
+        /// How many times as far, in the median over that time; 0.1 to 0.4 where all is well.
+        times: f64,
+        /// How long, s.
+        seconds: f64,
+        /// Of how long, s.
+        of_seconds: f64,
+    },
     /// A window's solution was not believed, and the IMU's prediction kept.
     NotSolved {
         /// Why.
@@ -150,6 +159,14 @@ impl fmt::Display for Warning {
     }
 }
 
+/// A direction in words.
+fn named(direction: &Vector) -> String {
+    if direction.z.abs() > 0.9 {
+        return "the vertical".to_owned();
+    }
+    format!("({:.2}, {:.2}, {:.2})", direction.x, direction.y, direction.z)
+}
+
 impl fmt::Display for WarningKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -158,6 +175,12 @@ impl fmt::Display for WarningKind {
                 f,
                 "in {seconds:.0} of {of_seconds:.0} s too little was seen again to hold the head, and the IMU alone carried \
                  it: do not trust this trajectory"
+            ),
+            Self::Contradicted { times, seconds, of_seconds } => write!(
+                f,
+                "in {seconds:.0} of {of_seconds:.0} s the IMU contradicts what the lidar saw, by {times:.1} times its noise (0.1 \
+                 to 0.4 are usual): where the sensors sit, the IMU's units and signs, or the times of beams may not be what \
+                 was told"
             ),
             Self::NoisyImu { gyro, accel } => write!(
                 f,
@@ -186,18 +209,12 @@ impl fmt::Display for WarningKind {
             Self::FewMatches { matches } => {
                 write!(f, "only {matches} surfaces seen again; carried by the IMU alone")
             }
-            Self::WeakGeometry { conditioning, direction_in_map: d } => {
-                let along = if d.z.abs() > 0.9 {
-                    "the vertical".to_owned()
-                } else {
-                    format!("({:.2}, {:.2}, {:.2})", d.x, d.y, d.z)
-                };
-                write!(
-                    f,
-                    "the surfaces in view say next to nothing of the motion along {along} of the map (conditioning \
-                     {conditioning:.1e}); the IMU alone holds it"
-                )
-            }
+            Self::WeakGeometry { conditioning, direction_in_map } => write!(
+                f,
+                "the surfaces in view say next to nothing of the motion along {} of the map (conditioning \
+                 {conditioning:.1e}); the IMU alone holds it",
+                named(direction_in_map)
+            ),
             Self::NotSolved { reason } => write!(f, "the window's solution was not believed ({reason})"),
             Self::LostInMap => {
                 write!(f, "behind the silence the head was not found again in the map; it goes on without it")

@@ -46,6 +46,9 @@ pub struct WindowReport {
     /// Least over greatest eigenvalue of the information that the matches hold about the position, 0..1; 0 without
     /// matches.
     pub conditioning: f64,
+    /// How many times as far as their noise has it the IMU's samples are from the trajectory, which follows them: 0.1 to
+    /// 0.4 where all is well.
+    pub imu_contradiction: f64,
     /// Clock offset after the window, s.
     pub clock_offset_s: f64,
     /// Time it took, s. With its parts the one figure that differs from run to run.

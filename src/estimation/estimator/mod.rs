@@ -26,6 +26,10 @@ use std::time::Instant;
 /// The head is lost when the IMU alone carried it for longer than this, s, and for more than this share of the time.
 const LOST: (f64, f64) = (5.0, 0.2);
 
+/// Noise leaves the IMU and the trajectory less apart than this, as a multiple of itself: the trajectory follows it, and
+/// is solved with a noise half as much again. Where they are farther apart for as long as that, one of them is wrong.
+const CONTRADICTED: f64 = 0.6;
+
 /// A head that is faster than this, m/s, or turns faster than this, rad/s, should see surfaces again; one that does not
 /// is kept by the IMU.
 const MOVING: (f64, f64) = (0.3, 0.5);
@@ -149,6 +153,7 @@ impl Estimator {
         self.intake.close();
         self.warnings.extend(self.intake.take_warnings());
         self.warn_of_loss();
+        self.warn_of_contradiction();
         let Some(window) = &self.window else { return Err(self.why_nothing()) };
         let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
         let (lidar, calibrated_lidar) = (window.lidar(), window.calibrated_lidar());
@@ -275,6 +280,18 @@ impl Estimator {
         let (seconds, of_seconds) = (self.carried_s, self.windows.len() as f64 * self.spec.step_s);
         if let Some(first) = self.windows.first().filter(|_| seconds > LOST.0 && seconds > LOST.1 * of_seconds) {
             self.warnings.push(Warning { stamp: first.stamp, kind: WarningKind::Lost { seconds, of_seconds } });
+        }
+    }
+
+    /// Warns where the IMU contradicted what the lidar saw by more than noise leaves.
+    fn warn_of_contradiction(&mut self) {
+        let all = self.windows.iter().map(|window| window.imu_contradiction);
+        let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTED).collect();
+        let [seconds, of_seconds] = [times.len(), self.windows.len()].map(|count| count as f64 * self.spec.step_s);
+        if seconds > LOST.0 && seconds > LOST.1 * of_seconds {
+            times.sort_unstable_by(f64::total_cmp);
+            let kind = WarningKind::Contradicted { times: times[times.len() / 2], seconds, of_seconds };
+            self.warnings.extend(self.windows.first().map(|first| Warning { stamp: first.stamp, kind }));
         }
     }
 

@@ -42,19 +42,19 @@ const BESIDE: (f64, f64) = (0.5, 3.0);
 
 /// The residuals of an interval and what their derivatives are made of.
 #[derive(Debug, Clone, Copy)]
-struct Inertial {
+pub(super) struct Inertial {
     /// `e_w`, rad/s.
-    rate: Vector,
+    pub rate: Vector,
     /// `e_a`, m/s^2.
-    force: Vector,
-    map_from_end: Matrix,
-    map_from_middle: Matrix,
+    pub force: Vector,
+    pub map_from_end: Matrix,
+    pub map_from_middle: Matrix,
     acceleration: Vector,
 }
 
 impl Inertial {
     /// The residuals between the states at an interval's ends.
-    fn between((a, b): (&State, &State), interval: &Interval, biases: &Biases, gravity: &Vector) -> Self {
+    pub fn between((a, b): (&State, &State), interval: &Interval, biases: &Biases, gravity: &Vector) -> Self {
         let turn = a.rotation.inverse() * b.rotation;
         let measured = Rotation::from_scaled_axis(interval.turn(biases));
         let bend = interval.gyro_slope * (interval.h * interval.h / 8.0);

@@ -1,5 +1,6 @@
 //! The terms of the window's cost, each with its derivatives: inertial, matched surfaces, priors.
 
+pub(super) mod contradiction;
 pub(super) mod inertial;
 pub(super) mod matched;
 pub(super) mod prior;

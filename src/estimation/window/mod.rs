@@ -14,6 +14,7 @@ use super::clock::Clock;
 use super::initial::{Beginning, Carried, Rest};
 use super::matching::Matcher;
 use super::nominal::Nominal;
+use super::residual::contradiction::contradiction;
 use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
@@ -152,6 +153,14 @@ impl Window {
         let motion = self.nominal.at(self.start.u_s, &self.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
         Pose::from_parts(motion.position.into(), rotation)
+    }
+
+    /// By how much the IMU contradicts the window's trajectory, as a multiple of its noise.
+    pub(super) fn imu_contradiction(&self) -> f64 {
+        let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
+        let states = self.nominal.states().get(first..).unwrap_or_default();
+        let intervals = self.nominal.intervals().get(first..).unwrap_or_default();
+        contradiction(states, intervals, (&self.biases, &self.gravity))
     }
 
     /// How fast the IMU is at the window's end, m/s.

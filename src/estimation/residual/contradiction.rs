@@ -1,0 +1,106 @@
+//! By how much an IMU contradicts a trajectory.
+
+use super::inertial::Inertial;
+use crate::estimation::strapdown::{Biases, Interval, State};
+use crate::geometry::Vector;
+
+/// Turns and speeds are summed for so long, s: what single samples are off by does not count.
+const SPELL_S: f64 = 0.2;
+
+/// What turn and speed are off by over a spell, rad and m/s, and the variance of each on an axis.
+#[derive(Default)]
+struct Spell {
+    lasts_s: f64,
+    off: [Vector; 2],
+    variances: [f64; 2],
+}
+
+impl Spell {
+    fn add(&mut self, terms: &Inertial, interval: &Interval) {
+        let h = interval.h;
+        self.lasts_s += h;
+        self.off[0] += terms.map_from_end * terms.rate * h;
+        self.off[1] += terms.map_from_middle * terms.force * h;
+        self.variances[0] += (interval.gyro_sigma * h).powi(2);
+        self.variances[1] += (interval.accel_sigma * h).powi(2);
+    }
+
+    /// Both as multiples of their standard deviations.
+    fn times(&self) -> [f64; 2] {
+        [0, 1].map(|k| self.off[k].norm() / (3.0 * self.variances[k]).sqrt())
+    }
+}
+
+/// How many times farther than their noise has it an IMU's samples are from the turns and the speeds between `states`:
+/// the median over spells, of turns or of speeds, whichever is more; about one where samples and states agree.
+pub(in crate::estimation) fn contradiction(
+    states: &[State],
+    intervals: &[Interval],
+    (biases, gravity): (&Biases, &Vector),
+) -> f64 {
+    let (mut spell, mut times) = (Spell::default(), [Vec::new(), Vec::new()]);
+    for (ends, interval) in states.windows(2).zip(intervals) {
+        spell.add(&Inertial::between((&ends[0], &ends[1]), interval, biases, gravity), interval);
+        if spell.lasts_s >= SPELL_S {
+            let told = std::mem::take(&mut spell).times();
+            times.iter_mut().zip(told).for_each(|(all, one)| all.push(one));
+        }
+    }
+    let median = |mut all: Vec<f64>| {
+        all.sort_unstable_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or_default()
+    };
+    times.into_iter().map(median).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::gravity_in_world;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// Forty seconds of an IMU that turns and is shaken, and the states that it tells.
+    fn run(biases: &Biases, gravity: &Vector) -> (Vec<State>, Vec<Interval>) {
+        let mut states =
+            vec![State { rotation: Default::default(), position: Vector::zeros(), velocity: Vector::zeros() }];
+        let mut intervals = Vec::new();
+        for k in 0..4000 {
+            let (sin, cos) = (f64::from(k) * 0.05).sin_cos();
+            let interval = Interval {
+                h: 0.01,
+                gyro: Vector::new(0.5 * cos, 0.2, -sin),
+                gyro_slope: Vector::zeros(),
+                accel: Vector::new(2.0 * sin, -cos, 9.8 + sin),
+                accel_slope: Vector::zeros(),
+                gyro_sigma: 0.006,
+                accel_sigma: 0.02,
+                bridged: false,
+            };
+            states.extend(states.last().map(|last| last.after(&interval, biases, gravity)));
+            intervals.push(interval);
+        }
+        (states, intervals)
+    }
+
+    #[test]
+    fn white_noise_contradicts_by_the_median_of_its_own_norm_and_a_wrong_sign_by_far_more() {
+        let (biases, gravity) = (Biases { gyro: Vector::zeros(), accel: Vector::zeros() }, gravity_in_world());
+        let (states, mut intervals) = run(&biases, &gravity);
+        let told = |intervals: &[Interval]| contradiction(&states, intervals, (&biases, &gravity));
+        assert!(told(&intervals) < 1e-6);
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut noise = |sigma: f64| Vector::from_fn(|_, _| sigma * random.sample::<f64, _>(StandardNormal));
+        for interval in &mut intervals {
+            interval.gyro += noise(interval.gyro_sigma);
+            interval.accel += noise(interval.accel_sigma);
+        }
+        // The median of chi-squared with three degrees of freedom is 2.366; 200 spells know it to 6 %, the more of two
+        // is above it.
+        let expected = (2.366_f64 / 3.0).sqrt();
+        assert!((told(&intervals) / expected - 1.0).abs() < 0.15, "{}", told(&intervals));
+        intervals.iter_mut().for_each(|interval| interval.accel.x *= -1.0);
+        assert!(told(&intervals) > 20.0);
+    }
+}
