@@ -172,10 +172,19 @@ fn what_fails_on_the_way_exits_with_1_and_one_sentence() {
 
 #[test]
 fn every_shipped_scene_and_spec_is_right() {
-    let folders =
-        ["scenes", "specs/heads", "specs/motions", "specs/lidars", "specs/imus", "specs/clocks", "specs/estimators"];
+    let folders = [
+        "scenes",
+        "specs/heads",
+        "specs/motions",
+        "specs/lidars",
+        "specs/imus",
+        "specs/clocks",
+        "specs/faults",
+        "specs/estimators",
+    ];
     let files = folders.iter().flat_map(|folder| std::fs::read_dir(root().join(folder)).unwrap());
-    let files: Vec<_> = files.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some()).collect();
+    let files: Vec<_> =
+        files.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "ron")).collect();
     assert!(files.len() > 10);
     let output = zsim(&root()).arg("check").args(&files).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

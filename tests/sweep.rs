@@ -200,6 +200,29 @@ fn journeys_share_their_work_and_give_what_each_gives_alone() {
 }
 
 #[test]
+fn faults_are_an_axis_whose_runs_share_rays() {
+    let here = tempfile::tempdir().unwrap();
+    let (head, rest) = WALKS.split_once("axes: [").unwrap();
+    let (_, tail) = rest.split_once("sampling:").unwrap();
+    let axis = r#"values(path: "faults", values: ["none", "imu_dropout_50pct"])"#;
+    let spec = format!("{head}axes: [{axis}], sampling:{tail}");
+    let spec = spec.replace(r#"clock: "drifting","#, r#"clock: "drifting", faults: "none","#);
+    std::fs::write(here.path().join("faults.ron"), spec).unwrap();
+    let planned: Value = serde_json::from_str(&well(here.path(), "sweep plan faults.ron -o swept --json")).unwrap();
+    assert_eq!((planned["points"].as_u64(), planned["tasks"].as_u64()), (Some(2), Some(1)));
+    well(here.path(), "sweep run swept --threads 2");
+    well(here.path(), "sweep merge swept");
+    let errors = numbers(&here.path().join("swept"), "position_rmse_m");
+    assert_ne!(errors[0], errors[1]);
+    for (error, faults) in errors.iter().zip(["", " --faults imu_dropout_50pct"]) {
+        let alone = format!("--scene mocap_room --duration 7s --seed 3 --out alone --force --json{faults}");
+        let (_, out, talk) = run(here.path(), &alone);
+        let figures: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{talk}"));
+        assert_eq!(figures["open_loop"]["position_rmse_m"].as_f64(), Some(*error));
+    }
+}
+
+#[test]
 fn a_run_that_fails_is_a_row_and_the_others_go_on() {
     let here = tempfile::tempdir().unwrap();
     let spec = WALKS

@@ -47,6 +47,9 @@ pub(super) struct ScenarioArguments {
     /// The clocks, under specs/clocks/ [default: drifting]
     #[arg(long, value_name = "NAME|FILE")]
     clock: Option<String>,
+    /// Faults of the sensors and of their delivery, under specs/faults/ [default: none]
+    #[arg(long, value_name = "NAME|FILE")]
+    faults: Option<String>,
     /// The route through the scene [default: the scene's own]
     #[arg(long, value_name = "NAME")]
     route: Option<String>,
@@ -70,6 +73,7 @@ impl ScenarioArguments {
             imu: or(&self.imu, default.imu),
             clock: or(&self.clock, default.clock),
             base_imu: self.base_imu.clone(),
+            faults: self.faults.clone(),
             route: self.route.clone(),
             duration_s: self.duration.unwrap_or(default.duration_s),
             seed: self.seed.map_or(default.seed, Seed),

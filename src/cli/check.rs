@@ -11,7 +11,7 @@ use zsim::estimation::{EstimationError, EstimatorSpec};
 use zsim::motion::MotionSpec;
 use zsim::random::Seed;
 use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
-use zsim::simulation::EPOCH;
+use zsim::simulation::{EPOCH, Faults, FaultsSpec};
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::StudyError;
 use zsim::study::reproduction::ExperimentSpec;
@@ -20,7 +20,7 @@ use zsim::study::sweep::{Plan, SweepSpec};
 use zsim::world::{SceneSpec, World, WorldError};
 
 /// The kinds that there is a check for.
-const KINDS: [Kind; 10] = [
+const KINDS: [Kind; 11] = [
     Kind::Scene,
     Kind::Head,
     Kind::Spring,
@@ -28,6 +28,7 @@ const KINDS: [Kind; 10] = [
     Kind::Lidar,
     Kind::Imu,
     Kind::Clock,
+    Kind::Faults,
     Kind::Estimator,
     Kind::Study,
     Kind::Experiment,
@@ -117,6 +118,7 @@ fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
         Kind::Lidar => parse::<LidarSpec>(source).map(drop),
         Kind::Imu => parse::<ImuSpec>(source).map(drop),
         Kind::Clock => parse::<ClocksSpec>(source).map(drop),
+        Kind::Faults => parse::<FaultsSpec>(source).map(drop),
         Kind::Estimator => parse::<EstimatorSpec>(source).map(drop),
         Kind::Spring => parse::<SpringSpec>(source).map(drop),
         Kind::Study => study(source).map(drop),
@@ -172,6 +174,7 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
         Kind::Lidar => Lidar::new(&parse::<LidarSpec>(source)?, source).map(drop),
         Kind::Imu => Imu::new(&parse::<ImuSpec>(source)?, source).map(drop),
         Kind::Clock => Clocks::new(&parse::<ClocksSpec>(source)?, source, EPOCH).map(drop),
+        Kind::Faults => Faults::new(&parse::<FaultsSpec>(source)?.with_files(source)?, source).map(drop),
         Kind::Estimator => match parse::<EstimatorSpec>(source)?.check() {
             Ok(()) => Ok(()),
             Err(EstimationError::Setting { key, message }) => Err(SpecError::about(source, key, message)),

@@ -36,7 +36,7 @@ pub enum SimulationError {
         most_s: f64,
     },
     /// Simulations that were to share physics and rays do not.
-    #[error("simulations run together differ in more than the IMUs and the lidar's errors")]
+    #[error("simulations run together differ in more than the IMUs, the lidar's errors and the faults")]
     Apart,
     /// Whoever takes the measurements could not.
     #[error("the simulation stopped, because what it makes could not be kept")]

@@ -6,6 +6,7 @@
 
 mod deliver;
 mod error;
+mod faults;
 mod measure;
 mod motion;
 mod prepared;
@@ -16,6 +17,7 @@ mod schedule;
 mod summary;
 
 pub use error::SimulationError;
+pub use faults::{FaultKind, FaultSpec, Faults, FaultsSpec, FaultySensor, MissEncoding};
 pub use motion::{HeadMotion, STEP_S};
 pub use prepared::{Simulation, carrier_of};
 pub use rig::{EPOCH, Rig};

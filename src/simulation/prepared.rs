@@ -1,11 +1,12 @@
+use super::faults::Injector;
 use super::run::simulate_together;
-use super::{EPOCH, Rig, STEP_S, Scenario, SimulationError, SimulationSummary, Sources, Specs, simulate};
+use super::{EPOCH, Faults, Rig, STEP_S, Scenario, SimulationError, SimulationSummary, Sources, Specs, simulate};
 use crate::dynamics::{CarrierSpec, HeadModel, HeadSimulation, HeadSpec};
 use crate::geometry::{Route, Vector};
 use crate::measurement::{Calibration, Sink};
 use crate::motion::BaseMotion;
 use crate::sensors::{Clocks, Cylinder, Imu, Lidar};
-use crate::spec::SpecError;
+use crate::spec::{Source, SpecError};
 use crate::truth::TruthSink;
 use crate::world::World;
 
@@ -21,6 +22,7 @@ pub struct Simulation {
     imu: Imu,
     base_imu: Option<Imu>,
     clocks: Clocks,
+    faults: Option<Faults>,
 }
 
 impl Simulation {
@@ -48,7 +50,9 @@ impl Simulation {
         let base_imu = specs.base_imu.as_ref().zip(sources.base_imu.as_ref());
         let base_imu = base_imu.map(|(spec, source)| Imu::new(spec, source)).transpose()?;
         let clocks = Clocks::new(&specs.clock, &sources.clock, EPOCH)?;
-        Ok(Self { scenario: scenario.clone(), specs, world, head, carrier, motion, lidar, imu, base_imu, clocks })
+        let faults = faults(&specs, sources, &lidar)?;
+        let scenario = scenario.clone();
+        Ok(Self { scenario, specs, world, head, carrier, motion, lidar, imu, base_imu, clocks, faults })
     }
 
     /// What was asked for.
@@ -96,9 +100,14 @@ impl Simulation {
         self.base_imu.as_ref()
     }
 
-    /// How the sensors sit in the head, and how well they measure.
+    /// How the sensors sit in the head, and how well they measure, as it is published: with the errors that faults of
+    /// the extrinsics make.
     pub fn calibration(&self) -> Calibration {
-        self.rig().calibration()
+        let calibration = self.rig().calibration();
+        match &self.faults {
+            Some(faults) => faults.published(calibration),
+            None => calibration,
+        }
     }
 
     /// Runs it: `sink` takes what the sensors say and what really happened, `progress` hears the fraction that is done.
@@ -113,7 +122,12 @@ impl Simulation {
         progress: &mut dyn FnMut(f64),
     ) -> Result<SimulationSummary, SimulationError> {
         let mut motion = HeadSimulation::new(&self.head, self.motion.as_ref(), STEP_S)?;
-        simulate(&self.rig(), &mut motion, sink, progress)
+        let rig = self.rig();
+        let Some(faults) = &self.faults else { return simulate(&rig, &mut motion, sink, progress) };
+        let mut injector = Injector::new(Some(faults), &rig, sink);
+        let summary = simulate(&rig, &mut motion, &mut injector, progress)?;
+        injector.finish().map_err(SimulationError::Sink)?;
+        Ok(summary)
     }
 
     /// Runs simulations that [share their rays](Self::shares_rays_with), each into a sink of its own, which is given
@@ -132,16 +146,26 @@ impl Simulation {
         }
         let rigs: Vec<Rig> = simulations.iter().map(Self::rig).collect();
         let mut motion = HeadSimulation::new(&first.head, first.motion.as_ref(), STEP_S)?;
-        simulate_together(&rigs, &mut motion, sinks, progress)
+        if simulations.iter().all(|simulation| simulation.faults.is_none()) {
+            return simulate_together(&rigs, &mut motion, sinks, progress);
+        }
+        let each = simulations.iter().zip(&rigs).zip(sinks.iter_mut());
+        let mut injectors: Vec<_> =
+            each.map(|((simulation, rig), sink)| Injector::new(simulation.faults.as_ref(), rig, &mut **sink)).collect();
+        let mut sinks: Vec<_> = injectors.iter_mut().collect();
+        let summaries = simulate_together(&rigs, &mut motion, &mut sinks, progress)?;
+        injectors.into_iter().try_for_each(Injector::finish).map_err(SimulationError::Sink)?;
+        Ok(summaries)
     }
 
-    /// Whether physics and rays of `other` are the same: it differs in the IMUs and the lidar's errors at most.
+    /// Whether physics and rays of `other` are the same: it differs in the IMUs, the lidar's errors and
+    /// the faults at most.
     pub fn shares_rays_with(&self, other: &Self) -> bool {
         let without_noise = |simulation: &Self| {
             let mut specs = simulation.specs.clone();
             (specs.imu, specs.lidar.errors) = (self.specs.imu.clone(), self.specs.lidar.errors.clone());
             specs.lidar.noise = self.specs.lidar.noise;
-            specs.base_imu = self.specs.base_imu.clone();
+            (specs.base_imu, specs.faults) = (self.specs.base_imu.clone(), self.specs.faults.clone());
             specs
         };
         let walk = |simulation: &Self| {
@@ -164,6 +188,16 @@ impl Simulation {
             seed: self.scenario.seed,
         }
     }
+}
+
+/// The faults of a run, where it has any.
+fn faults(specs: &Specs, sources: &Sources, lidar: &Lidar) -> Result<Option<Faults>, SpecError> {
+    let Some(spec) = &specs.faults else { return Ok(None) };
+    let unnamed = Source::in_memory("faults", "");
+    let source = sources.faults.as_ref().unwrap_or(&unnamed);
+    let faults = Faults::new(spec, source)?;
+    faults.check_with(lidar, source)?;
+    Ok(Some(faults))
 }
 
 /// What of a head's carrier the lidar may see, in the base's frame.

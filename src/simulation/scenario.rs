@@ -1,4 +1,4 @@
-use super::SimulationError;
+use super::{FaultsSpec, SimulationError};
 use crate::dynamics::HeadSpec;
 use crate::motion::MotionSpec;
 use crate::random::Seed;
@@ -26,6 +26,9 @@ pub struct Scenario {
     /// A second inertial measurement unit, at the origin of the base and along its axes; `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_imu: Option<String>,
+    /// Faults of the sensors and of their delivery; `None` for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub faults: Option<String>,
     /// The scene's way to walk; `None` for its default one.
     pub route: Option<String>,
     /// How long, s.
@@ -47,6 +50,7 @@ impl Scenario {
             imu: "3dm_gx2".to_owned(),
             clock: "drifting".to_owned(),
             base_imu: None,
+            faults: None,
             route: None,
             duration_s: 120.0,
             seed: Seed(1),
@@ -73,6 +77,9 @@ pub struct Specs {
     /// The base's inertial measurement unit, where it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_imu: Option<ImuSpec>,
+    /// Faults, with the files that they name read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub faults: Option<FaultsSpec>,
 }
 
 /// The texts that the specs of a run came from, for errors about them and for the folder of a scene's meshes.
@@ -92,6 +99,8 @@ pub struct Sources {
     pub clock: Source,
     /// The base's IMU's, where it has one.
     pub base_imu: Option<Source>,
+    /// The faults'.
+    pub faults: Option<Source>,
 }
 
 impl Specs {
@@ -108,6 +117,7 @@ impl Specs {
             imu: find(Kind::Imu, &scenario.imu)?,
             clock: find(Kind::Clock, &scenario.clock)?,
             base_imu: scenario.base_imu.as_deref().map(|name| find(Kind::Imu, name)).transpose()?,
+            faults: scenario.faults.as_deref().map(|name| find(Kind::Faults, name)).transpose()?,
         };
         let specs = Self::parse(&sources)?;
         Ok((specs, sources))
@@ -122,6 +132,11 @@ impl Specs {
             imu: parse(&sources.imu)?,
             clock: parse(&sources.clock)?,
             base_imu: sources.base_imu.as_ref().map(parse).transpose()?,
+            faults: sources
+                .faults
+                .as_ref()
+                .map(|source| parse::<FaultsSpec>(source)?.with_files(source))
+                .transpose()?,
         })
     }
 }

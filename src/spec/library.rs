@@ -61,6 +61,8 @@ pub enum Kind {
     Imu,
     /// The clocks of the sensors: `specs/clocks/`.
     Clock,
+    /// Faults of the sensors and of their delivery: `specs/faults/`.
+    Faults,
     /// How the base moves: `specs/motions/`.
     Motion,
     /// The estimator's settings: `specs/estimators/`.
@@ -73,13 +75,14 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Kind; 10] = [
+    pub const ALL: [Kind; 11] = [
         Kind::Scene,
         Kind::Head,
         Kind::Spring,
         Kind::Lidar,
         Kind::Imu,
         Kind::Clock,
+        Kind::Faults,
         Kind::Motion,
         Kind::Estimator,
         Kind::Study,
@@ -95,6 +98,7 @@ impl Kind {
             Kind::Lidar => "specs/lidars",
             Kind::Imu => "specs/imus",
             Kind::Clock => "specs/clocks",
+            Kind::Faults => "specs/faults",
             Kind::Motion => "specs/motions",
             Kind::Estimator => "specs/estimators",
             Kind::Study => "specs/studies",
@@ -111,6 +115,7 @@ impl Kind {
             Kind::Lidar => "lidar",
             Kind::Imu => "IMU",
             Kind::Clock => "clock",
+            Kind::Faults => "faults",
             Kind::Motion => "motion",
             Kind::Estimator => "estimator",
             Kind::Study => "study",
@@ -142,6 +147,20 @@ fn built_in(kind: Kind, file: &str) -> Option<Source> {
     let inside = folder_in_binary(kind)?.files().find(|entry| file_name(entry) == Some(file))?;
     let name = format!("{}/{file} (built in)", kind.folder());
     Some(Source::in_memory(name, inside.contents_utf8()?))
+}
+
+/// Finds the text file `name` that a spec of `kind` refers to: next to the spec, or in the binary for one built in.
+///
+/// # Errors
+/// When it is not there, or cannot be read.
+pub fn text_file(kind: Kind, spec: &Source, name: &str) -> Result<Source, SpecError> {
+    if let Some(folder) = &spec.folder {
+        return Source::read(&folder.join(name));
+    }
+    if let Some(source) = built_in(kind, name) {
+        return Ok(source);
+    }
+    Source::read(Path::new(name))
 }
 
 /// The names of the specs of a kind that are built into the binary, sorted.

@@ -10,7 +10,7 @@ mod error;
 mod library;
 
 pub use error::SpecError;
-pub use library::{Kind, Source, find, names};
+pub use library::{Kind, Source, find, names, text_file};
 
 use serde::de::DeserializeOwned;
 

@@ -68,6 +68,11 @@ impl Lidar {
         1.0 / self.spec.rate_hz
     }
 
+    /// Whether it scans a plane, so that its scans have a polar form.
+    pub fn scans_plane(&self) -> bool {
+        self.plane.is_some()
+    }
+
     /// Time from the first beam of a scan to its last.
     pub fn sweep_span(&self) -> Span {
         self.beams.iter().map(|beam| beam.offset).max().unwrap_or(Span::ZERO)

@@ -4,6 +4,7 @@ use crate::dynamics::{HeadSpec, LinkageSpec};
 use crate::estimation::EstimatorSpec;
 use crate::motion::MotionSpec;
 use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
+use crate::simulation::FaultsSpec;
 use crate::spec::{Kind, Source, SpecError, checked, find, parse};
 use crate::study::StudyError;
 use crate::study::spring::Shake;
@@ -24,12 +25,22 @@ pub(super) enum Slot {
     Lidar,
     Imu,
     Clock,
+    Faults,
     Estimator,
 }
 
 impl Slot {
-    const ALL: [Self; 8] =
-        [Self::Run, Self::Scene, Self::Head, Self::Motion, Self::Lidar, Self::Imu, Self::Clock, Self::Estimator];
+    const ALL: [Self; 9] = [
+        Self::Run,
+        Self::Scene,
+        Self::Head,
+        Self::Motion,
+        Self::Lidar,
+        Self::Imu,
+        Self::Clock,
+        Self::Faults,
+        Self::Estimator,
+    ];
 
     /// Its first key in a path; settings of the run itself have none.
     pub(super) fn key(self) -> &'static str {
@@ -39,6 +50,7 @@ impl Slot {
             Kind::Lidar => "lidar",
             Kind::Imu => "imu",
             Kind::Clock => "clock",
+            Kind::Faults => "faults",
             Kind::Estimator => "estimator",
             _ => "scene",
         })
@@ -58,6 +70,7 @@ impl Slot {
             Self::Lidar => Some(Kind::Lidar),
             Self::Imu => Some(Kind::Imu),
             Self::Clock => Some(Kind::Clock),
+            Self::Faults => Some(Kind::Faults),
             Self::Estimator => Some(Kind::Estimator),
         }
     }
@@ -91,6 +104,7 @@ pub(super) enum Component {
     Lidar(Box<LidarSpec>),
     Imu(Box<ImuSpec>),
     Clock(Box<ClocksSpec>),
+    Faults(Box<FaultsSpec>),
     Estimator(Box<EstimatorSpec>),
 }
 
@@ -122,6 +136,7 @@ impl Kept {
             Slot::Lidar => Component::Lidar(Box::new(parse(&source)?)),
             Slot::Imu => Component::Imu(Box::new(parse(&source)?)),
             Slot::Clock => Component::Clock(Box::new(parse(&source)?)),
+            Slot::Faults => Component::Faults(Box::new(parse::<FaultsSpec>(&source)?.with_files(&source)?)),
             Slot::Estimator => Component::Estimator(Box::new(parse(&source)?)),
         };
         let folder = source.folder.map(|folder| folder.canonicalize().unwrap_or(folder));
@@ -154,6 +169,7 @@ impl Component {
             Self::Lidar(spec) => serde_json::to_value(spec),
             Self::Imu(spec) => serde_json::to_value(spec),
             Self::Clock(spec) => serde_json::to_value(spec),
+            Self::Faults(spec) => serde_json::to_value(spec),
             Self::Estimator(spec) => serde_json::to_value(spec),
         }
     }
@@ -169,6 +185,7 @@ impl Component {
             Self::Lidar(_) => from_value(value).map(Self::Lidar),
             Self::Imu(_) => from_value(value).map(Self::Imu),
             Self::Clock(_) => from_value(value).map(Self::Clock),
+            Self::Faults(_) => from_value(value).map(Self::Faults),
             Self::Estimator(_) => from_value(value).map(Self::Estimator),
         };
         let component = read.map_err(|error| error.to_string())?;

@@ -162,7 +162,7 @@ impl Plan {
         Ok(Point {
             identity: of(&|_| true, true, measures.as_bytes()),
             simulation: of(&|slot| slot != Slot::Estimator, true, b"simulation"),
-            rays: of(&|slot| !matches!(slot, Slot::Estimator | Slot::Imu), false, b"rays"),
+            rays: of(&|slot| !matches!(slot, Slot::Estimator | Slot::Imu | Slot::Faults), false, b"rays"),
             changed,
         })
     }
@@ -179,6 +179,11 @@ impl Plan {
         let slots = [Slot::Scene, Slot::Head, Slot::Motion, Slot::Lidar, Slot::Imu, Slot::Clock];
         let [scene, head, motion, lidar, imu, clock] = slots.map(kept);
         let (scene, head, motion, lidar, imu, clock) = (scene?, head?, motion?, lidar?, imu?, clock?);
+        let faults = kept(Slot::Faults).ok();
+        let faults_spec = faults.and_then(|kept| match &kept.component {
+            Component::Faults(spec) => Some((**spec).clone()),
+            _ => None,
+        });
         let components = (
             &kept(Slot::Run)?.component,
             (&scene.component, &head.component, &motion.component),
@@ -201,6 +206,7 @@ impl Plan {
             imu: imu.name.clone(),
             clock: clock.name.clone(),
             base_imu: None,
+            faults: faults.map(|kept| kept.name.clone()),
             route: route.clone(),
             duration_s: *duration_s,
             seed: Seed(seed),
@@ -213,6 +219,7 @@ impl Plan {
             imu: (**imu_spec).clone(),
             clock: (**clock_spec).clone(),
             base_imu: None,
+            faults: faults_spec,
         };
         let sources = Sources {
             scene: scene.source(),
@@ -222,6 +229,7 @@ impl Plan {
             imu: imu.source(),
             clock: clock.source(),
             base_imu: None,
+            faults: faults.map(Kept::source),
         };
         Ok(Simulation::build(&scenario, specs, &sources)?)
     }
@@ -231,9 +239,9 @@ impl Plan {
 fn base(spec: &BaseSpec, source: &Source) -> Result<BTreeMap<Slot, Kept>, StudyError> {
     let (run, named) = match spec {
         BaseSpec::Spring { head, shake } => (Component::Nod(Nod { shake: *shake }), vec![(Slot::Head, head)]),
-        BaseSpec::Journey { scene, head, motion, lidar, imu, clock, estimator, route, duration_s, .. } => (
-            Component::Walk(Walk { route: route.clone(), duration_s: *duration_s }),
-            vec![
+        BaseSpec::Journey { scene, head, motion, lidar, imu, clock, faults, estimator, route, duration_s, .. } => {
+            let run = Component::Walk(Walk { route: route.clone(), duration_s: *duration_s });
+            let mut named = vec![
                 (Slot::Scene, scene),
                 (Slot::Head, head),
                 (Slot::Motion, motion),
@@ -241,8 +249,10 @@ fn base(spec: &BaseSpec, source: &Source) -> Result<BTreeMap<Slot, Kept>, StudyE
                 (Slot::Imu, imu),
                 (Slot::Clock, clock),
                 (Slot::Estimator, estimator),
-            ],
-        ),
+            ];
+            named.extend(faults.as_ref().map(|name| (Slot::Faults, name)));
+            (run, named)
+        }
     };
     let run = Kept { name: source.name.clone(), folder: None, component: run };
     let named = named.into_iter().map(|(slot, name)| Ok((slot, Kept::load(slot, name)?)));

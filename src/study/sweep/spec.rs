@@ -54,6 +54,10 @@ pub enum BaseSpec {
         imu: String,
         /// The sensors' clocks.
         clock: String,
+        /// Faults of the sensors and of their delivery; none unless told. An axis over faults needs them here:
+        /// `"none"` is a list without faults.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faults: Option<String>,
         /// The estimator's settings.
         estimator: String,
         /// The scene's way to walk; its default one unless told.

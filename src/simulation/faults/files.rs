@@ -1,0 +1,52 @@
+//! Files that a spec of faults names.
+
+use super::{FaultKind, FaultsSpec, check};
+use crate::spec::{Kind, Source, SpecError, text_file};
+
+/// Most arrival times in a file.
+const MOST_ARRIVALS: usize = 1_000_000;
+
+impl FaultsSpec {
+    /// The same with the files that it names read: arrival times in the place of the file of `thin`.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or a line is not a number.
+    pub fn with_files(mut self, source: &Source) -> Result<Self, SpecError> {
+        for (index, fault) in self.faults.iter_mut().enumerate() {
+            let FaultKind::Thin { arrivals_s, file, .. } = &mut fault.fault else { continue };
+            if arrivals_s.is_some() {
+                continue;
+            }
+            let Some(name) = file.take() else { continue };
+            let found = text_file(Kind::Faults, source, &name);
+            let text = found.map_err(|error| check::about(source, index, "file", error.to_string()))?;
+            *arrivals_s = Some(arrivals(&text)?);
+        }
+        Ok(self)
+    }
+}
+
+/// The arrival times of a file, s.
+fn arrivals(file: &Source) -> Result<Vec<f64>, SpecError> {
+    let mut arrivals_s: Vec<f64> = Vec::new();
+    for (index, line) in file.text.lines().enumerate() {
+        let number = line.split('#').next().unwrap_or_default().trim();
+        if number.is_empty() {
+            continue;
+        }
+        let wrong = |message: String| {
+            let place = ron::error::Position { line: index + 1, col: 1 };
+            SpecError::at(file, place, message).with_help("one arrival time a line, s, in order; `#` before comments")
+        };
+        let last = arrivals_s.last().copied().unwrap_or(0.0);
+        match number.parse::<f64>() {
+            Ok(s) if s.is_finite() && s >= 0.0 && s >= last => arrivals_s.push(s),
+            Ok(s) => return Err(wrong(format!("an arrival at {s} s, after one at {last} s"))),
+            Err(_) => return Err(wrong(format!("expected a number, found \"{number}\""))),
+        }
+        if arrivals_s.len() > MOST_ARRIVALS {
+            return Err(wrong(format!("more than {MOST_ARRIVALS} arrival times")));
+        }
+    }
+    Ok(arrivals_s)
+}

@@ -1,0 +1,103 @@
+//! Faults of the sensors and of their delivery, for tests of a design or an estimator with imperfect data.
+//!
+//! [`FaultsSpec`] is a list of faults as it is written in `specs/faults/`; [`Faults`] is the same checked; an
+//! [`Injector`] takes what a simulation delivers, applies the faults in the order of the list, and hands the rest to
+//! the sink. Each sensor has a pipeline with one stage a fault. Every fault draws from a stream of its own, and all
+//! stages run on the thread that delivers, in the order of delivery, so that the result does not depend on the number
+//! of threads. Memory holds what is delayed and nothing else.
+
+mod check;
+mod clock;
+mod files;
+mod injector;
+mod interval;
+mod loss;
+mod pipeline;
+mod scan;
+mod spec;
+mod timing;
+mod values;
+
+pub(super) use injector::Injector;
+pub use spec::{FaultKind, FaultSpec, FaultsSpec, FaultySensor, MissEncoding};
+
+use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
+use crate::measurement::Calibration;
+use crate::sensors::Lidar;
+use crate::spec::{Source, SpecError};
+use clock::ClockFaults;
+use interval::Interval;
+
+/// Faults that were checked.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Faults {
+    spec: FaultsSpec,
+}
+
+impl Faults {
+    /// Checks `spec`, read from `source`, whose files were read before ([`FaultsSpec::with_files`]).
+    ///
+    /// # Errors
+    /// When times, values or units of a fault do not go together.
+    pub fn new(spec: &FaultsSpec, source: &Source) -> Result<Self, SpecError> {
+        check::check(spec, source)?;
+        for (index, fault) in spec.faults.iter().enumerate() {
+            match (&fault.fault, fault.sensor) {
+                (FaultKind::Thin { arrivals_s: None, .. }, _) => {
+                    return Err(check::about(source, index, "file", "the arrival times were not read".to_owned()));
+                }
+                (FaultKind::ClockJump { jump_s }, FaultySensor::Lidar | FaultySensor::Both) if *jump_s < 0.0 => {
+                    let message = format!("fault {index} (clock_jump): the lidar's clock jumps back by {} s", -jump_s);
+                    let help = "the truth is stamped by the lidar's clock and must increase: let the lidar's clock jump \
+                                forward, or the IMU's back";
+                    return Err(check::about(source, index, "jump_s", message).with_help(help));
+                }
+                _ => {}
+            }
+        }
+        Ok(Self { spec: spec.clone() })
+    }
+
+    /// Checks that the faults are possible with `lidar`.
+    ///
+    /// # Errors
+    /// When missing returns of a lidar that scans no plane are to be encoded: they are not in its messages.
+    pub(super) fn check_with(&self, lidar: &Lidar, source: &Source) -> Result<(), SpecError> {
+        let is_misses = |fault: &FaultSpec| matches!(fault.fault, FaultKind::Misses { .. });
+        match self.spec.faults.iter().position(is_misses).filter(|_| !lidar.scans_plane()) {
+            Some(index) => {
+                let message = format!("fault {index} (misses): this lidar scans no plane, and has no LaserScan");
+                Err(check::about(source, index, "misses", message).with_help("use a lidar that scans a plane: utm30lx"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The calibration that is published, given the true one.
+    pub(super) fn published(&self, mut calibration: Calibration) -> Calibration {
+        for fault in &self.spec.faults {
+            let FaultKind::Extrinsics { position_m, roll_pitch_yaw_deg } = &fault.fault else { continue };
+            let head_from_sensor = match fault.sensor {
+                FaultySensor::Imu => &mut calibration.head_from_imu,
+                FaultySensor::Lidar | FaultySensor::Both => &mut calibration.head_from_laser,
+            };
+            let [roll, pitch, yaw] = roll_pitch_yaw_deg.unwrap_or_default().map(f64::to_radians);
+            *head_from_sensor = Pose::from_parts(
+                (head_from_sensor.translation.vector + Vector::from(position_m.unwrap_or_default())).into(),
+                head_from_sensor.rotation * from_roll_pitch_yaw(roll, pitch, yaw),
+            );
+        }
+        calibration
+    }
+
+    fn clock(&self) -> ClockFaults {
+        ClockFaults::of(&self.spec)
+    }
+
+    /// The faults of the IMU (or else of the lidar) with their number in the list and their interval.
+    fn of(&self, is_imu: bool) -> impl Iterator<Item = (usize, &FaultKind, Interval)> {
+        let other = if is_imu { FaultySensor::Lidar } else { FaultySensor::Imu };
+        let faults = self.spec.faults.iter().enumerate().filter(move |(_, fault)| fault.sensor != other);
+        faults.map(|(index, fault)| (index, &fault.fault, Interval::of(fault)))
+    }
+}
