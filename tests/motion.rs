@@ -90,11 +90,21 @@ fn accelerations_are_continuous() {
 
 #[test]
 fn the_base_starts_at_rest() {
-    for name in shipped() {
+    for name in shipped().into_iter().filter(|name| name != "vehicle_cruise") {
         for seed in [1, 2] {
             let start = built(&name, seed).at(0.0);
             assert_eq!(start, Kinematics::at_rest(start.world_from_body), "{name}");
         }
+    }
+}
+
+#[test]
+fn a_cruising_base_measures_rest() {
+    let cruise = built("vehicle_cruise", 1);
+    for t in [0.0, 0.5, 7.0] {
+        let now = cruise.at(t);
+        assert!((now.velocity_in_world - Vector::x() * 8.0).norm() < 1e-12);
+        assert_eq!((now.acceleration_in_world, now.angular_velocity_in_world), (Vector::zeros(), Vector::zeros()));
     }
 }
 
@@ -115,7 +125,7 @@ fn one_seed_moves_one_way_and_another_seed_another() {
 /// Whether anything of a motion is left to chance.
 fn has_chance(spec: &MotionSpec) -> bool {
     match spec {
-        MotionSpec::Stand(_) | MotionSpec::Replay(_) => false,
+        MotionSpec::Stand(_) | MotionSpec::Cruise(_) | MotionSpec::Replay(_) => false,
         MotionSpec::Shaker(spec) => {
             spec.drives.iter().any(|drive| matches!(drive.signal, SignalSpec::BandNoise { .. }))
         }
@@ -128,7 +138,11 @@ fn the_hand_is_free_unless_it_stops() {
     for name in shipped() {
         let motion = built(&name, 3);
         let holds = times(9, 2000).into_iter().map(|t| motion.hold(t)).fold(0.0, f64::max);
-        assert_eq!(holds, if name == "hand_stops" { 1.0 } else { 0.0 }, "{name}");
+        assert_eq!(
+            holds,
+            if ["hand_stops", "hand_rest_middle"].contains(&name.as_str()) { 1.0 } else { 0.0 },
+            "{name}"
+        );
     }
 }
 

@@ -167,6 +167,33 @@ fn in_a_stop_the_head_is_held_while_the_walk_goes_on() {
 }
 
 #[test]
+fn in_a_rest_the_walker_stands_and_goes_on_where_the_way_was_left() {
+    let rests = [PLAIN[0], PLAIN[1], PLAIN[2], ("grip_s: 0.5,", "grip_s: 0.5, rests: [(20.0, 40.0)],")];
+    let hand = edited("hand", &rests, Some(&square())).unwrap();
+    let through = edited("hand", &PLAIN, Some(&square())).unwrap();
+    for t in [20.0, 41.3, 60.0] {
+        assert!(hand.at(t).velocity_in_world.norm() < 1e-9 && hand.at(t).angular_velocity_in_world.norm() < 1e-9);
+    }
+    // Behind by the rest and by half of the 1.5 s before and after it.
+    for t in [5.0, 15.0, 70.0, 100.0] {
+        let late_s = if t > 60.0 { 41.5 } else { 0.0 };
+        let (now, then) = (hand.at(t), through.at(t - late_s));
+        assert!((now.world_from_body.translation.vector - then.world_from_body.translation.vector).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn after_a_drop_the_hand_is_lower_by_its_height() {
+    let drop = ("grip_s: 0.5,", "grip_s: 0.5, drops: [(at_s: 15.0, height_m: 0.25, landing_s: 0.035)],");
+    let hand = edited("hand", &[PLAIN[0], PLAIN[1], PLAIN[2], drop], Some(&square())).unwrap();
+    let height = |t: f64| hand.at(t).world_from_body.translation.vector.z;
+    // 0.226 s of free fall from 0.25 m, and 35 ms of landing.
+    assert!((height(14.9) - HEIGHT_M).abs() < 1e-9 && (height(15.27) - HEIGHT_M + 0.25).abs() < 1e-9);
+    let hardest = (0..300).map(|k| hand.at(15.0 + 1e-3 * f64::from(k)).acceleration_in_world.z).fold(0.0, f64::max);
+    assert!((8.0..12.0).contains(&(hardest / 9.81)), "{hardest} m/s^2");
+}
+
+#[test]
 fn random_stops_come_about_as_often_as_told() {
     let (mut held, mut begins, mut before) = (0, 0, 0.0);
     let hand = edited("hand_stops", &[], Some(&square())).unwrap();
@@ -230,6 +257,10 @@ fn what_is_wrong_in_a_spec_is_pointed_at() {
     assert!(fault("At([])", "At([(NaN, 5.0)])").message().contains("not finite"));
     let quick = fault("corner_speed_m_per_s: 0.6", "corner_speed_m_per_s: 1.6");
     assert!(quick.message().contains("faster than the straight"), "{quick}");
+    let rest = |list: &str| fault("grip_s: 0.5,", &format!("grip_s: 0.5, rests: [{list}],"));
+    assert!(rest("(1.0, 5.0)").message().contains("3 s is the earliest"));
+    assert!(rest("(10.0, 5.0), (16.0, 1.0)").message().contains("18 s is the earliest"));
+    assert!(rest("(10.0, NaN)").message().contains("for NaN s"));
     let random = "Random(every_s: 20.0, shortest_s: 5.0, longest_s: 4.0)";
     assert!(fault("At([])", random).message().contains("more than the longest"));
 }

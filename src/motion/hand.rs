@@ -6,7 +6,9 @@
 //! takes it off resonance before the swing builds up, keep the swing within bounds. The rhythm's frequency is the
 //! spec's: for another head set `frequency_hz` to its rocking frequency.
 
+use super::drops::DropSpec;
 use super::jet::{Jet, PoseJet};
+use super::rests::Progress;
 use super::rhythm::{Rhythm, Wander};
 use super::smooth::{Steps, Way};
 use super::stand::standpoint;
@@ -41,6 +43,13 @@ pub struct HandSpec {
     /// How long it takes to grasp the head, and to let it go, s.
     #[serde(deserialize_with = "positive")]
     pub grip_s: f64,
+    /// When the walker stands still in the middle of the way: start and duration of each rest, s. The wrist does not
+    /// shake then; the head swings on its spring unless a stop holds it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rests: Vec<(f64, f64)>,
+    /// Steps down that end in a shock.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drops: Vec<DropSpec>,
 }
 
 /// Where a hand goes.
@@ -127,6 +136,8 @@ pub(super) struct Hand {
     gait: Option<Gait>,
     shake: Shake,
     grip: Steps,
+    progress: Option<Progress>,
+    drops: Vec<DropSpec>,
     wrist_from_base: Pose,
 }
 
@@ -156,24 +167,39 @@ impl Hand {
             gait: spec.gait.as_ref().map(|gait| Gait::new(gait, seed)),
             shake: Shake::new(&spec.shake, spec.still_s, seed),
             grip,
+            progress: Progress::new(&spec.rests, source, duration_s)?,
+            drops: spec.drops.clone(),
             wrist_from_base: Pose::translation(0.0, 0.0, spec.shake.wrist_below_m),
         })
     }
 }
 
+impl Hand {
+    /// Position on the floor, heading and share of the walking speed.
+    fn carried(&self, t_s: f64) -> ([Jet; 3], Jet, Jet) {
+        let at = |s: f64| (self.carry.way.at(s), self.carry.heading.at(s), self.carry.speed_share.at(s));
+        let Some(progress) = &self.progress else { return at(t_s) };
+        let elapsed = progress.at(t_s);
+        let (position, heading, share) = at(elapsed.x);
+        (position.map(|x| x.of(elapsed)), heading.of(elapsed), share.of(elapsed) * progress.moving(t_s))
+    }
+}
+
 impl BaseMotion for Hand {
     fn at(&self, t_s: f64) -> Kinematics {
-        let mut position = self.carry.way.at(t_s);
-        position[2] += Jet::constant(self.height_m);
-        let yaw = self.carry.heading.at(t_s);
+        let ([x, y, z], yaw, speed_share) = self.carried(t_s);
+        let mut position = [x, y, z + Jet::constant(self.height_m)];
         if let Some(gait) = &self.gait {
-            let [surge, sway, bob] = gait.at(t_s, self.carry.speed_share.at(t_s));
+            let [surge, sway, bob] = gait.at(t_s, speed_share);
             let (sin, cos) = yaw.sin_cos();
             position[0] += surge * cos - sway * sin;
             position[1] += surge * sin + sway * cos;
             position[2] += bob;
         }
-        let [roll, pitch] = self.shake.at(t_s, Jet::constant(1.0) - self.grip.at(t_s));
+        self.drops.iter().for_each(|drop| position[2] += drop.at(t_s));
+        let free = Jet::constant(1.0) - self.grip.at(t_s);
+        let moving = self.progress.as_ref().map_or(Jet::constant(1.0), |progress| progress.moving(t_s));
+        let [roll, pitch] = self.shake.at(t_s, free * moving);
         PoseJet { position, roll, pitch, yaw }.kinematics().of_frame(&self.wrist_from_base)
     }
 

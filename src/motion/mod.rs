@@ -7,6 +7,8 @@
 //!
 //! The base's frame stands where the spring is clamped: x forward, y left, z up (REP-103).
 
+mod cruise;
+mod drops;
 mod error;
 mod hand;
 mod jet;
@@ -14,6 +16,7 @@ mod legged;
 mod marine;
 mod phasor;
 mod replay;
+mod rests;
 mod rhythm;
 mod shaker;
 mod sines;
@@ -25,6 +28,8 @@ mod uav;
 mod vehicle;
 mod walk;
 
+pub use cruise::CruiseSpec;
+pub use drops::DropSpec;
 pub use error::MotionError;
 pub use hand::{CarrySpec, GaitSpec, HandSpec, ShakeSpec};
 pub use legged::{LeggedSpec, StrideSpec};
@@ -43,7 +48,7 @@ use crate::geometry::Kinematics;
 /// The prescribed motion of the base.
 pub trait BaseMotion: Send + Sync {
     /// How the base moves `t_s` seconds after the start: `world_from_base` with its exact derivatives. Accelerations
-    /// are continuous; at the start the base is at rest.
+    /// are continuous; at the start the base is at rest, unless it cruises.
     fn at(&self, t_s: f64) -> Kinematics;
 
     /// How firmly a hand holds the head still, from 0 (not at all) to 1.

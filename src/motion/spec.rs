@@ -1,3 +1,4 @@
+use super::cruise::{Cruise, CruiseSpec};
 use super::hand::{Hand, HandSpec};
 use super::legged::{Legged, LeggedSpec};
 use super::marine::{Marine, MarineSpec};
@@ -17,6 +18,8 @@ use serde::{Deserialize, Serialize};
 pub enum MotionSpec {
     /// It stands still.
     Stand(StandSpec),
+    /// It moves straight on at constant velocity.
+    Cruise(CruiseSpec),
     /// A hand carries and shakes it.
     Hand(Box<HandSpec>),
     /// A wheeled vehicle carries it.
@@ -62,6 +65,7 @@ impl MotionSpec {
         }
         Ok(match self {
             MotionSpec::Stand(spec) => Box::new(Stand::new(spec, route)),
+            MotionSpec::Cruise(spec) => Box::new(Cruise::new(spec, route)),
             MotionSpec::Vehicle(spec) => Box::new(Vehicle::new(spec, source, route, duration_s, seed)?),
             MotionSpec::Legged(spec) => Box::new(Legged::new(spec, source, route, duration_s, seed)?),
             MotionSpec::Uav(spec) => Box::new(Uav::new(spec, source, route, duration_s, seed)?),

@@ -1,0 +1,42 @@
+//! A base at constant velocity.
+
+use super::BaseMotion;
+use super::jet::PoseJet;
+use super::stand::standpoint;
+use crate::geometry::{Kinematics, Route, Vector};
+use serde::{Deserialize, Serialize};
+
+/// A base at constant velocity from the first instant on, from where the route begins, along its heading there. It
+/// goes straight on where the route bends: the scene has to be long enough.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CruiseSpec {
+    /// Height of the base above the floor, m.
+    #[serde(deserialize_with = "crate::spec::checked::finite")]
+    pub height_m: f64,
+    /// Speed, m/s.
+    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    pub speed_m_per_s: f64,
+}
+
+/// A base that cruises.
+pub(super) struct Cruise {
+    start: Kinematics,
+    velocity_in_world: Vector,
+}
+
+impl Cruise {
+    pub fn new(spec: &CruiseSpec, route: Option<&Route>) -> Self {
+        let (floor, heading) = standpoint(route);
+        let start = PoseJet::at_rest(&(floor + Vector::z() * spec.height_m), heading).kinematics();
+        Self { start, velocity_in_world: Vector::new(heading.cos(), heading.sin(), 0.0) * spec.speed_m_per_s }
+    }
+}
+
+impl BaseMotion for Cruise {
+    fn at(&self, t_s: f64) -> Kinematics {
+        let mut now = Kinematics { velocity_in_world: self.velocity_in_world, ..self.start };
+        now.world_from_body.translation.vector += self.velocity_in_world * t_s;
+        now
+    }
+}
