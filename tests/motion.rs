@@ -9,7 +9,7 @@ use zsim::motion::{BaseMotion, MotionSpec, SignalSpec, load};
 use zsim::random::Seed;
 use zsim::spec::{Kind, Source, names, parse};
 
-const DURATION_S: f64 = 50.0;
+const DURATION_S: f64 = 80.0;
 
 /// A loop through rooms with right, sharp and blunt corners, and a few steps up and down.
 fn route() -> Route {

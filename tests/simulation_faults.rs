@@ -309,9 +309,9 @@ fn spikes_spoil_so_many_single_samples() {
         assert_eq!(sample.angular_velocity_rad_per_s, Vector::new(30.0, 0.0, -30.0));
         assert_eq!(sample.specific_force_m_per_s2, was.specific_force_m_per_s2);
     }
-    let given = with("(sensor: imu, fault: spike(accel_m_per_s2: (0, 0, 100), times_s: [2.0, 3.141]))");
+    let given = with("(sensor: imu, fault: spike(accel_m_per_s2: (0, 0, 100), times_s: [2.0, 3.333]))");
     let first_after = |s: f64| without().samples.iter().position(|(at, _)| since_start_s(*at) >= s).unwrap();
-    assert_eq!(changed(&given), [first_after(2.0), first_after(3.141)]);
+    assert_eq!(changed(&given), [first_after(2.0), first_after(3.333)]);
 }
 
 #[test]
@@ -327,6 +327,8 @@ fn a_bias_steps_at_its_time() {
     }
 }
 
+type IsEncoded = fn(f32) -> bool;
+
 #[test]
 fn misses_are_encoded_as_asked_and_returns_stay() {
     let outdoors = Scenario { duration_s: 1.0, ..scenario("open_field", "3dm_gx2", 1) };
@@ -335,7 +337,7 @@ fn misses_are_encoded_as_asked_and_returns_stay() {
     let misses =
         |kept: &Kept| kept.scans.iter().flat_map(|(_, s)| s.planar.clone().unwrap().ranges_m).collect::<Vec<_>>();
     assert!(misses(&clean).into_iter().filter(|range| is_miss(*range)).count() > 1000);
-    let checks: [(&str, fn(f32) -> bool); 6] = [
+    let checks: [(&str, IsEncoded); 6] = [
         ("range_max", |range| range == 30.0),
         ("above_max", |range| range == 31.0),
         ("zero", |range| range == 0.0),
@@ -483,7 +485,7 @@ fn a_wrong_fault_is_refused_with_its_place_and_a_remedy() {
         ("(sensor: imu, fault: clock_jump(jump_s: 1))", "2:", "give from_s"),
         ("(sensor: imu, from_s: 1, fault: clock_jump(jump_s: 1e30))", "2:", "at most 1e8"),
         ("(sensor: lidar, from_s: 1, fault: clock_jump(jump_s: -1))", "2:46", "jump forward"),
-        ("(sensor: imu, fault: delay(mean_s: 1e9))", "2:28", "at most 10"),
+        ("(sensor: imu, fault: delay(mean_s: 1e9))", "2:28", "at most 2"),
         ("(sensor: imu, fault: burst(size: 1000000000, spacing_us: 1))", "2:28", "2 to 1000"),
         ("(sensor: imu, fault: cut())", "2:22", "start_s"),
         ("(sensor: imu, fault: thin())", "2:22", "give arrivals_s or file"),

@@ -10,7 +10,7 @@ const MOST_S: f64 = 1e6;
 /// Largest change of a clock, s: three years keep stamps within the 32-bit seconds of ROS messages.
 const MOST_CLOCK_S: f64 = 1e8;
 /// Longest mean delay, s: messages that are on their way are held in memory.
-const MOST_DELAY_S: f64 = 10.0;
+const MOST_DELAY_S: f64 = 2.0;
 /// Largest group of messages.
 const MOST_BURST: usize = 1000;
 /// Longest time between the stamps of a group, us.
@@ -150,7 +150,7 @@ fn check_values(fault: &FaultSpec) -> Result<(), Wrong> {
     match &fault.fault {
         FaultKind::Cut { start_s, end_s } => check_cut(*start_s, *end_s),
         FaultKind::Thin { arrivals_s, file, repeat_s } => check_thin(arrivals_s.as_deref(), file.is_some(), *repeat_s),
-        FaultKind::Delay { mean_s } => at_most("mean_s", *mean_s, MOST_DELAY_S, "s, at most 10"),
+        FaultKind::Delay { mean_s } => at_most("mean_s", *mean_s, MOST_DELAY_S, "s, at most 2"),
         FaultKind::Burst { size, spacing_us } => {
             if !(2..=MOST_BURST).contains(size) {
                 return Err(Wrong("size", format!("groups of {size} messages"), "give 2 to 1000"));

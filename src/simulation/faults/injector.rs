@@ -113,7 +113,7 @@ impl<S: Sink + TruthSink + ?Sized> Sink for Injector<'_, S> {
 impl<S: Sink + TruthSink + ?Sized> TruthSink for Injector<'_, S> {
     fn truth(&mut self, now: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
         if let Some(attitude) = &mut self.attitude {
-            attitude.hear(now, &sample.head.world_from_body);
+            attitude.update(now, &sample.head.world_from_body);
         }
         let lidar_stamp = sample.lidar_stamp + self.clock.lidar_ahead(now - EPOCH);
         self.send(now, Event::Truth(TruthSample { lidar_stamp, ..*sample }));
@@ -121,6 +121,10 @@ impl<S: Sink + TruthSink + ?Sized> TruthSink for Injector<'_, S> {
     }
 
     fn clock(&mut self, now: Stamp, clock: &ClockTruth) -> Result<(), SinkError> {
+        let mut emitted = Vec::new();
+        self.imu.flush_silent(now, &mut emitted);
+        self.lidar.flush_silent(now, &mut emitted);
+        self.send_all(emitted);
         let clock = self.clock.applied(now - EPOCH, clock);
         self.send(now, Event::Clock(clock));
         self.deliver(Some(now))
@@ -140,7 +144,7 @@ impl Attitude {
         Self { head_from_imu: rig.head_from_imu.rotation, period, recent: VecDeque::new() }
     }
 
-    fn hear(&mut self, now: Stamp, world_from_head: &Pose) {
+    fn update(&mut self, now: Stamp, world_from_head: &Pose) {
         while self.recent.front().is_some_and(|(before, _)| *before + self.period < now) {
             self.recent.pop_front();
         }

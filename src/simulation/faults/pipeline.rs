@@ -61,24 +61,35 @@ pub(super) trait Stage {
     }
 }
 
+/// Silence after which a stage emits what it holds: the message that it waits for may never come.
+const SILENCE: Span = Span::from_nanos(5_000_000_000);
+
 /// All faults of a sensor.
 pub(super) struct Pipeline {
-    stages: Vec<(Interval, Box<dyn Stage>)>,
+    stages: Vec<Placed>,
+}
+
+/// A stage with its interval.
+struct Placed {
+    interval: Interval,
+    stage: Box<dyn Stage>,
+    /// When the last message reached it.
+    last: Stamp,
 }
 
 impl Pipeline {
     /// The faults of the IMU, or else of the lidar, in a run of `duration_s`.
     pub fn new(faults: &Faults, is_imu: bool, duration_s: f64, seed: Seed) -> Self {
         let sensor = if is_imu { "imu" } else { "lidar" };
-        let stage = |(index, kind, interval): (usize, &FaultKind, Interval)| {
+        let placed = |(index, kind, interval): (usize, &FaultKind, Interval)| {
             let stream = seed.stream(&format!("faults/{index}/{sensor}"));
             let stage = loss::stage(kind, &stream)
                 .or_else(|| timing::stage(kind, &stream, &interval))
                 .or_else(|| values::stage(kind, stream, interval.limits_s(duration_s)))
                 .or_else(|| scan::stage(kind))?;
-            Some((interval, stage))
+            Some(Placed { interval, stage, last: EPOCH })
         };
-        Self { stages: faults.of(is_imu).filter_map(stage).collect() }
+        Self { stages: faults.of(is_imu).filter_map(placed).collect() }
     }
 
     /// Takes a message from the sensor, and emits what comes of it and of those before.
@@ -86,31 +97,99 @@ impl Pipeline {
         feed(&mut self.stages, message, out);
     }
 
-    /// Emits what is held.
+    /// Emits what is held by stages that no message has reached for long.
+    pub fn flush_silent(&mut self, now: Stamp, out: &mut Vec<Message>) {
+        let mut stages = self.stages.as_mut_slice();
+        while let Some((first, rest)) = stages.split_first_mut() {
+            if first.stage.held().is_some() && now - first.last > SILENCE {
+                flush(first, rest, out);
+            }
+            stages = rest;
+        }
+    }
+
+    /// Emits all that is held.
     pub fn finish(&mut self, out: &mut Vec<Message>) {
-        finish(&mut self.stages, out);
+        let mut stages = self.stages.as_mut_slice();
+        while let Some((first, rest)) = stages.split_first_mut() {
+            flush(first, rest, out);
+            stages = rest;
+        }
     }
 
     /// The earliest arrival of a message that is held.
     pub fn held(&self) -> Option<Stamp> {
-        self.stages.iter().filter_map(|(_, stage)| stage.held()).min()
+        self.stages.iter().filter_map(|placed| placed.stage.held()).min()
     }
 }
 
-fn feed(stages: &mut [(Interval, Box<dyn Stage>)], message: Message, out: &mut Vec<Message>) {
-    let Some(((interval, stage), rest)) = stages.split_first_mut() else { return out.push(message) };
+fn feed(stages: &mut [Placed], message: Message, out: &mut Vec<Message>) {
+    let Some((first, rest)) = stages.split_first_mut() else { return out.push(message) };
+    first.last = message.taken;
     let mut emitted = Vec::new();
-    match interval.contains(message.since_start()) {
-        true => stage.take(message, &mut emitted),
-        false => stage.pass(message, &mut emitted),
+    match first.interval.contains(message.since_start()) {
+        true => first.stage.take(message, &mut emitted),
+        false => first.stage.pass(message, &mut emitted),
     }
     emitted.into_iter().for_each(|message| feed(rest, message, out));
 }
 
-fn finish(stages: &mut [(Interval, Box<dyn Stage>)], out: &mut Vec<Message>) {
-    let Some(((_, stage), rest)) = stages.split_first_mut() else { return };
+fn flush(first: &mut Placed, rest: &mut [Placed], out: &mut Vec<Message>) {
     let mut emitted = Vec::new();
-    stage.finish(&mut emitted);
+    first.stage.finish(&mut emitted);
     emitted.into_iter().for_each(|message| feed(rest, message, out));
-    finish(rest, out);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::ImuSample;
+    use crate::simulation::FaultsSpec;
+    use crate::spec::{Source, parse};
+
+    /// The pipeline of the IMU with `list`.
+    fn pipeline(list: &str) -> Pipeline {
+        let source = Source::in_memory("test", format!("(faults: [{list}])"));
+        let faults = Faults::new(&parse::<FaultsSpec>(&source).unwrap(), &source).unwrap();
+        Pipeline::new(&faults, true, 100.0, Seed(1))
+    }
+
+    /// A message of the IMU that is taken so many ms after the start.
+    fn message(ms: i64) -> Message {
+        let taken = EPOCH + Span::from_nanos(ms * 1_000_000);
+        let still = Vector::zeros();
+        let sample = ImuSample { stamp: taken, angular_velocity_rad_per_s: still, specific_force_m_per_s2: still };
+        Message { taken, arrival: taken, measurement: Measurement::Imu(sample), force_at_rest: still }
+    }
+
+    #[test]
+    fn what_waits_for_a_sensor_that_fell_silent_is_emitted_after_seconds() {
+        let at = |s: i64| EPOCH + Span::from_nanos(s * 1_000_000_000);
+        for waiting in ["burst(size: 4, spacing_us: 0)", "reorder(share: 1)", "thin(arrivals_s: [0.105, 0.18])"] {
+            // Eleven messages to 0.1 s: the last ones are held, and nothing follows.
+            let mut pipeline = pipeline(&format!("(sensor: imu, fault: {waiting})"));
+            let mut out = Vec::new();
+            (0..11).for_each(|k| pipeline.take(message(10 * k), &mut out));
+            let before = out.len();
+            pipeline.flush_silent(at(5), &mut out);
+            assert!(out.len() == before && pipeline.held().is_some(), "{waiting}");
+            pipeline.flush_silent(at(6), &mut out);
+            assert!(out.len() <= 11 && pipeline.held().is_none(), "{waiting}");
+        }
+    }
+
+    #[test]
+    fn what_is_held_goes_through_the_faults_that_follow() {
+        let mut pipeline = pipeline(
+            "(sensor: imu, fault: burst(size: 4, spacing_us: 0)), (sensor: imu, fault: clock_offset(offset_s: 1))",
+        );
+        let mut out = Vec::new();
+        (0..6).for_each(|k| pipeline.take(message(10 * k), &mut out));
+        assert_eq!(out.len(), 4);
+        pipeline.finish(&mut out);
+        let second = Span::from_nanos(1_000_000_000);
+        let stamps: Vec<Stamp> = out.iter().map(Message::stamp).collect();
+        let (first, last) = (message(30).taken + second, message(50).taken + second);
+        assert_eq!(stamps, [first, first, first, first, last, last]);
+    }
 }

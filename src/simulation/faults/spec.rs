@@ -84,7 +84,7 @@ pub enum FaultKind {
     /// Stamps and log times are late by an exponentially distributed delay. Order is kept, as in a queue: a message
     /// waits for the one before it.
     Delay {
-        /// Mean of the distribution, s; at most 10.
+        /// Mean of the distribution, s; at most 2.
         #[serde(deserialize_with = "checked::positive")]
         mean_s: f64,
     },
