@@ -6,7 +6,7 @@ use super::stand::standpoint;
 use crate::geometry::{Kinematics, Route, Vector};
 use serde::{Deserialize, Serialize};
 
-/// A base at constant velocity from the first instant on, from where the route begins, along its heading there. It
+/// A base at constant velocity from the start of the run on, from where the route begins, along its heading there. It
 /// goes straight on where the route bends: the scene has to be long enough.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -83,7 +83,7 @@ mod tests {
         assert!((end.x + 0.25).abs() < 1e-12 && end.d.abs() < 1e-12 && end.dd.abs() < 1e-9, "{end:?}");
         let later = drop.at(1000.0);
         assert!((later.x + 0.25).abs() < 1e-8 && later.d.abs() < 1e-9, "{later:?}");
-        // The pulse alone: half a sine of area g T, so its peak is pi / 2 g T / 35 ms; of gravity half is off by then.
+        // The pulse is half a sine of area g T, so its peak is pi / 2 g T / 35 ms; half of gravity is compensated by then.
         let peak = drop.at(2.0 + fall_s + 0.0175).dd;
         let expected = STANDARD_GRAVITY_M_PER_S2 * (fall_s * PI / 2.0 / 0.035 - 0.5);
         assert!((peak - expected).abs() < 1e-9, "{peak}, {expected}");

@@ -27,12 +27,12 @@ impl Interval {
         within && self.repeated.is_none_or(|(period, lasts)| phase(period) < lasts.nanos())
     }
 
-    /// When it begins.
+    /// Start of the interval.
     pub fn from(&self) -> Span {
         self.from
     }
 
-    /// Its first and last instant in a run of `duration_s`, s.
+    /// Its start and end in a run of `duration_s`, s.
     pub fn limits_s(&self, duration_s: f64) -> (f64, f64) {
         let from_s = self.from.seconds();
         (from_s, self.to.map_or(duration_s, |to| to.seconds().min(duration_s)).max(from_s))

@@ -5,7 +5,7 @@ use super::{FaultKind, MissEncoding};
 use crate::measurement::{LidarReturn, LidarScan, Measurement, PlanarScan};
 use crate::time::Span;
 
-/// By how much `above_max` exceeds the greatest range, m.
+/// By how much `above_max` exceeds the maximum range, m.
 const ABOVE_MAX_M: f32 = 1.0;
 
 /// The stage of a fault of this group.

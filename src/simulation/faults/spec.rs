@@ -62,10 +62,10 @@ pub enum FaultKind {
     Gap,
     /// The sensor starts late or ends early.
     Cut {
-        /// First instant with measurements, s.
+        /// Time of the first measurement, s.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         start_s: Option<f64>,
-        /// Last instant with measurements, s.
+        /// Time of the last measurement, s.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         end_s: Option<f64>,
     },
@@ -99,13 +99,13 @@ pub enum FaultKind {
     /// The IMU saturates below the limits of its data sheet. The noise model that is published with the recording
     /// keeps those of the data sheet.
     Clip {
-        /// Greatest rate on an axis, rad/s.
+        /// Maximum rate on an axis, rad/s.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         gyro_rad_per_s: Option<f64>,
-        /// Greatest rate on an axis, deg/s.
+        /// Maximum rate on an axis, deg/s.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         gyro_deg_per_s: Option<f64>,
-        /// Greatest specific force on an axis, m/s^2.
+        /// Maximum specific force on an axis, m/s^2.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         accel_m_per_s2: Option<f64>,
     },
@@ -209,9 +209,9 @@ pub enum FaultKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MissEncoding {
-    /// The greatest range.
+    /// The maximum range.
     RangeMax,
-    /// One metre above the greatest range.
+    /// One metre above the maximum range.
     AboveMax,
     /// Zero.
     Zero,

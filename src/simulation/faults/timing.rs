@@ -91,7 +91,7 @@ impl Stage for Burst {
     }
 }
 
-/// A clock that is set ahead from some instant on.
+/// A clock that is set ahead from some time on.
 struct ClockChange {
     from: Span,
     by: Span,

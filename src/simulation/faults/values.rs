@@ -9,7 +9,7 @@ use crate::time::Span;
 use rand::RngExt;
 use std::collections::VecDeque;
 
-/// The stage of a fault of this group; it acts from and to these instants, s after the start.
+/// The stage of a fault of this group; it acts between these times, s after the start.
 pub(super) fn stage(kind: &FaultKind, stream: Stream, (from_s, to_s): (f64, f64)) -> Option<Box<dyn Stage>> {
     Some(match kind {
         FaultKind::Freeze => Box::new(Freeze { last: None }),
@@ -104,7 +104,7 @@ impl Stage for Clip {
 struct Spike {
     gyro: Option<Vector>,
     accel: Option<Vector>,
-    /// When they are due, in order; each spoils one sample.
+    /// When they are due, in order; each affects one sample.
     times: VecDeque<Span>,
 }
 
