@@ -15,6 +15,8 @@ use std::collections::btree_map::Entry;
 pub(super) struct Axis {
     pub name: String,
     pub levels: Levels,
+    /// Share of the samples at the first level, where it differs from that of the others.
+    first_share: Option<f64>,
 }
 
 /// Where a run can be on an axis.
@@ -125,14 +127,18 @@ impl Axis {
                 }
             }
         };
-        let axis = Self { name: spec.name().to_owned(), levels };
+        let first_share = first_share(spec, sampling).map_err(|error| about("first_share", error))?;
+        let axis = Self { name: spec.name().to_owned(), levels, first_share };
         axis.check(shelf).map_err(|(value, error)| about(&value, error))?;
         Ok(axis)
     }
 
     pub fn extent(&self) -> Extent {
         match &self.levels {
-            Levels::Some(levels) => Extent::Levels(levels.len()),
+            Levels::Some(levels) => match self.first_share {
+                Some(share) => Extent::Weighted(levels.len(), share),
+                None => Extent::Levels(levels.len()),
+            },
             Levels::Range { .. } => Extent::Range,
         }
     }
@@ -199,6 +205,21 @@ impl Levels {
     fn stepped(&self, steps: usize) -> Self {
         Self::Some((0..steps).map(|k| self.at(k as f64 / (steps - 1) as f64)).collect())
     }
+}
+
+/// The share of the first value of an axis, checked.
+fn first_share(spec: &AxisSpec, sampling: Sampling) -> Result<Option<f64>, String> {
+    let AxisSpec::Values { values, first_share: Some(share), .. } = spec else { return Ok(None) };
+    if sampling == Sampling::Grid {
+        return Err("has `first_share`, which a grid does not take: use latin_hypercube or sobol".to_owned());
+    }
+    if values.len() < 2 || !(*share > 0.0 && *share < 1.0) {
+        return Err(format!(
+            "the first of {} values has a share of {share}: between 0 and 1, of two or more",
+            values.len()
+        ));
+    }
+    Ok(Some(*share))
 }
 
 /// What setting `path` to `setting` means.

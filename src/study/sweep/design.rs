@@ -7,9 +7,11 @@ use sobol::Sobol;
 use sobol::params::JoeKuoD6;
 
 /// How long an axis is: so many levels, or any place from 0 to 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Extent {
     Levels(usize),
+    /// So many levels, of which the first has this share of the samples and the others have equal ones.
+    Weighted(usize, f64),
     Range,
 }
 
@@ -41,7 +43,7 @@ impl Design {
             Sampling::Grid => {
                 let count = extents.iter().try_fold(1_u64, |count, extent| match extent {
                     Extent::Levels(levels) => count.checked_mul(*levels as u64),
-                    Extent::Range => None,
+                    Extent::Weighted(..) | Extent::Range => None,
                 })?;
                 (count, Vec::new())
             }
@@ -69,6 +71,12 @@ impl Design {
         let start = index as usize * axes;
         let at = |(extent, u): (&Extent, &f64)| match extent {
             Extent::Levels(levels) => Place::Level(((u * *levels as f64) as usize).min(levels - 1)),
+            Extent::Weighted(_, first_share) if u < first_share => Place::Level(0),
+            Extent::Weighted(levels, first_share) => {
+                let others = levels - 1;
+                let behind = (u - first_share) / (1.0 - first_share);
+                Place::Level(1 + ((behind * others as f64) as usize).min(others - 1))
+            }
             Extent::Range => Place::Along(*u),
         };
         self.extents.iter().zip(&self.places[start..start + axes]).map(at).collect()
@@ -157,6 +165,16 @@ mod tests {
             parts.sort_unstable();
             assert_eq!(parts, (0..16).collect::<Vec<_>>());
         }
+    }
+
+    #[test]
+    fn the_first_level_has_its_share_and_the_others_have_equal_ones() {
+        let sampling = Sampling::LatinHypercube { count: 24, seed: 1 };
+        let design = Design::new(sampling, vec![Extent::Range, Extent::Weighted(4, 0.5)]).unwrap();
+        let level = |sample| if let Place::Level(level) = design.sample(sample)[1] { level } else { 9 };
+        let mut counts = [0; 4];
+        (0..24).for_each(|sample| counts[level(sample)] += 1);
+        assert_eq!(counts, [12, 4, 4, 4]);
     }
 
     #[test]

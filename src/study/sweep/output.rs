@@ -1,5 +1,7 @@
 //! A summary as tables: terminal, Markdown, CSV.
 
+use super::axis::Axis;
+use super::design::Extent;
 use super::summary::{Line, SIGNIFICANT, Summary};
 use super::table::quoted;
 use super::{Measure, Plan};
@@ -92,7 +94,8 @@ fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TableOfWords> {
     if !summary.trends.is_empty() {
         return vec![trend_table(summary)];
     }
-    let axes = plan.axes().iter().filter(|axis| matches!(axis.extent(), super::design::Extent::Levels(1..=SHOWN)));
+    let is_shown = |axis: &&Axis| matches!(axis.extent(), Extent::Levels(1..=SHOWN) | Extent::Weighted(1..=SHOWN, _));
+    let axes = plan.axes().iter().filter(is_shown);
     axes.map(|axis| level_table(summary, &axis.name, None, bands)).collect()
 }
 

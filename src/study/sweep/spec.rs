@@ -96,6 +96,10 @@ pub enum AxisSpec {
         path: String,
         /// Its values.
         values: Vec<Setting>,
+        /// Share of the runs that have the first value, between 0 and 1, where runs are sampled; as many as the others
+        /// have by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        first_share: Option<f64>,
         /// The column's name; the last key of the path unless told.
         #[serde(default)]
         name: Option<String>,
