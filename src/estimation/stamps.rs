@@ -11,6 +11,9 @@ use crate::time::{Span, Stamp};
 const RATE_WALK_PER_SQRT_S: f64 = 2e-7;
 /// So many stamps in a row far from the count mean that the count is wrong.
 const STRIKES: usize = 5;
+/// A sensor may have no period when its stamps scatter about a line by more than this multiple of it, and has none when
+/// the variance of `n` intervals is more than this fraction of `n` times that of one.
+const APERIODIC: (f64, f64) = (0.2, 0.4);
 
 /// Follows the stamps of a regular sensor. Seconds on the sensor's own clock.
 #[derive(Debug, Clone)]
@@ -26,9 +29,9 @@ pub(super) struct StampFilter {
 
 impl StampFilter {
     /// A filter for a sensor whose first stamps showed `regularity`, and that jitters by at least `jitter_s`; zero
-    /// passes every stamp as it is.
-    pub(super) fn new(Regularity { period_s, jitter_s: seen_s }: Regularity, jitter_s: f64) -> Self {
-        let off = jitter_s <= 0.0;
+    /// passes every stamp as it is, and so does a sensor without a period.
+    pub(super) fn new(Regularity { period_s, jitter_s: seen_s, periodic }: Regularity, jitter_s: f64) -> Self {
+        let off = jitter_s <= 0.0 || !periodic;
         let jitter_s = jitter_s.max(seen_s);
         Self {
             last_s: 0.0,
@@ -103,6 +106,8 @@ pub(super) struct Regularity {
     pub(super) period_s: f64,
     /// Standard deviation of the stamps about a line through them, s.
     pub(super) jitter_s: f64,
+    /// Whether the samples follow a period at all; if not, `period_s` is the median interval.
+    pub(super) periodic: bool,
 }
 
 impl Regularity {
@@ -125,7 +130,12 @@ impl Regularity {
             (count, *stamp)
         });
         let by_intervals = Self::about_line(counted);
-        [by_intervals, without_losses].into_iter().flatten().min_by(|a, b| a.jitter_s.total_cmp(&b.jitter_s))
+        let line =
+            [by_intervals, without_losses].into_iter().flatten().min_by(|a, b| a.jitter_s.total_cmp(&b.jitter_s))?;
+        if line.jitter_s > APERIODIC.0 * line.period_s && wanders(stamps_s) {
+            return Some(Self { period_s: median, jitter_s: 0.0, periodic: false });
+        }
+        Some(line)
     }
 
     /// The line through points (count, stamp), if it rises.
@@ -137,8 +147,21 @@ impl Regularity {
         let sum = |of: &dyn Fn(f64, f64) -> f64| points.iter().map(|(x, y)| of(x - mx, y - my)).sum::<f64>();
         let period_s = sum(&|x, y| x * y) / sum(&|x, _| x * x);
         let jitter_s = (sum(&|x, y| (y - period_s * x).powi(2)) / n).sqrt();
-        (points.len() > 2 && period_s > 0.0 && jitter_s.is_finite()).then_some(Self { period_s, jitter_s })
+        let is_line = points.len() > 2 && period_s > 0.0 && jitter_s.is_finite();
+        is_line.then_some(Self { period_s, jitter_s, periodic: true })
     }
+}
+
+/// Whether intervals add up like independent ones: the variance of the time that `n` of them take then grows with `n`,
+/// while jitter of the stamps of a regular sensor leaves it as it is.
+fn wanders(stamps_s: &[f64]) -> bool {
+    let variance = |n: usize| {
+        let times: Vec<f64> = stamps_s.windows(n + 1).map(|run| run[n] - run[0]).collect();
+        let mean = times.iter().sum::<f64>() / times.len() as f64;
+        times.iter().map(|time| (time - mean).powi(2)).sum::<f64>() / times.len() as f64
+    };
+    let many = (stamps_s.len() / 4).min(16);
+    many >= 4 && variance(many) > APERIODIC.1 * many as f64 * variance(1)
 }
 
 /// When the samples of a regular sensor were really taken, as the estimator takes it: their stamps, in the order in

@@ -30,7 +30,7 @@ pub(super) struct Interval {
     pub(super) gyro_sigma: f64,
     /// Standard deviation of `accel` on each axis, m/s^2.
     pub(super) accel_sigma: f64,
-    /// Whether no sample was there and the velocity is held.
+    /// Whether no sample was there: its readings are interpolated.
     pub(super) bridged: bool,
 }
 
@@ -124,8 +124,6 @@ impl State {
         let force = interval.force_in_middle(biases);
         let acceleration = middle * force + gravity;
         let jerk = middle * (interval.accel_slope + (interval.gyro - biases.gyro).cross(&force));
-        let (acceleration, jerk) =
-            if interval.bridged { (Vector::zeros(), Vector::zeros()) } else { (acceleration, jerk) };
         let velocity = self.velocity + acceleration * h;
         // The trapezium of the velocities, less what a linear acceleration bends the velocity in between.
         let position = self.position + (self.velocity + velocity) * (0.5 * h) - jerk * (h.powi(3) / 12.0);

@@ -20,7 +20,7 @@ mod fixes;
 mod offset;
 mod smoother;
 
-use super::inertial::InertialStream;
+use super::inertial::{InertialStream, Screen, Screened};
 use super::stamps::{Regularity, StampFilter};
 use super::strapdown::Interval;
 use super::{EstimationError, EstimatorSpec};
@@ -148,10 +148,17 @@ fn intervals(
     })?;
     let filter = StampFilter::new(regularity, spec.clock.jitter_s);
     let mut stream = InertialStream::new(filter, *noise, spec.inertial.clone());
+    let stamped: Vec<(f64, ImuSample)> = seconds.into_iter().zip(samples.iter().copied()).collect();
+    let mut screen = Screen::new(noise);
     let mut placed = Vec::new();
-    for (sample, raw_s) in samples.iter().zip(&seconds) {
-        stream.push(*raw_s, sample, &mut placed);
+    for (k, (raw_s, sample)) in stamped.iter().enumerate() {
+        match screen.screen((*raw_s, sample), stamped[k + 1..].iter()) {
+            Screened::Measured(clipped) => stream.push(*raw_s, (sample, clipped), &mut placed),
+            Screened::Outlier => stream.leave_out(),
+            Screened::Frozen => {}
+        }
     }
+    stream.flush(&mut placed);
     let start_s = placed.first().map_or(0.0, |(start_s, _)| *start_s);
     Ok((start_s, placed.into_iter().map(|(_, interval)| interval).collect()))
 }

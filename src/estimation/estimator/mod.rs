@@ -67,6 +67,8 @@ pub struct Estimator {
     /// How the newest window's end hangs on its beginning.
     at_end: Option<Sensitivity>,
     next_pose: Option<Stamp>,
+    /// Stamp of the last pose that was handed out.
+    newest_pose: Option<Stamp>,
     poses: Vec<EstimatedPose>,
     clock_offsets: Vec<(Stamp, f64)>,
     windows: Vec<WindowReport>,
@@ -99,6 +101,7 @@ impl Estimator {
             consider: Consider::new(Vector::zeros(), &OfBeginning::zeros()),
             at_end: None,
             next_pose: None,
+            newest_pose: None,
             poses: Vec::new(),
             clock_offsets: Vec::new(),
             windows: Vec::new(),

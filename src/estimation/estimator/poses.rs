@@ -16,6 +16,10 @@ impl Estimator {
             let start_ns = self.intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
             Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
         });
+        // Behind a silence the window may begin before the last pose: poses increase strictly all the same.
+        if let Some(last) = self.newest_pose.filter(|last| stamp <= *last) {
+            stamp = Stamp::from_nanos((last.nanos().div_euclid(period_ns) + 1) * period_ns);
+        }
         loop {
             let tau_s = stamp.seconds_since(self.intake.origin());
             let u_s = window.clock.imu_s(tau_s);
@@ -23,6 +27,7 @@ impl Estimator {
                 break;
             }
             self.poses.push(self.pose_at(window, stamp, (tau_s, u_s)));
+            self.newest_pose = Some(stamp);
             stamp += Span::from_nanos(period_ns);
         }
         self.next_pose = Some(stamp);

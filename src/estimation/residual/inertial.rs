@@ -36,6 +36,10 @@ const WITHIN_SPAN: f64 = 3.0;
 /// Gaps of the IMU no longer than this leave no step that would matter, and the head's place more certain than matches
 /// reach, s.
 pub(in crate::estimation) const SHORT_GAP_S: f64 = 0.05;
+/// An interval whose readings are less certain than this, rad/s and m/s^2, is weakly measured.
+const WEAK: (f64, f64) = (0.3, 1.0);
+/// Behind a run of weakly measured intervals the correction may have to step by this, rad and m/s.
+const STEP: (f64, f64) = (0.03, 0.08);
 /// How far to both sides of a gap the correction takes the step, s, and by how much it then differs, rad/s and m/s^2.
 const BESIDE_S: f64 = 0.3;
 const BESIDE: (f64, f64) = (0.5, 3.0);
@@ -88,9 +92,9 @@ pub(in crate::estimation) fn add_inertial(
 ) {
     let (mut each, mut whole) = (Rows::none(), Rows::none());
     let mut sum: Option<Speed> = None;
-    let beside_a_gap = beside_gaps(intervals);
+    let near_steps = near_steps(intervals);
     for (k, interval) in intervals.iter().enumerate() {
-        let interval = &if beside_a_gap[k] { loosened(interval) } else { *interval };
+        let interval = &if near_steps[k] { loosened(interval) } else { *interval };
         let terms = Inertial::between((&states[k], &states[k + 1]), interval, biases, gravity);
         let bases = (&bases[k], &bases[k + 1]);
         Turn::of(&terms, bases, interval).add_to(&mut each, equations, layout);
@@ -109,28 +113,32 @@ pub(in crate::estimation) fn add_inertial(
     whole.move_to(equations, layout);
 }
 
-/// Which intervals are near a gap that was bridged: the head left it with another velocity and attitude than was
-/// thought, a step that the correction, smooth over some knots' spacings, takes on both sides of the gap. There it
-/// contradicts the samples without their being wrong, and taken at their word they would have biases take the step.
-fn beside_gaps(intervals: &[Interval]) -> Vec<bool> {
-    let mut beside = vec![false; intervals.len()];
-    let (mut bridged_s, mut behind_s) = (0.0, f64::INFINITY);
+/// Which intervals are near a run of weakly measured ones (a bridged gap, clipped readings) behind which velocity or
+/// attitude are uncertain by more than [`STEP`]: there the correction has to make a step. It is smooth over some knots'
+/// spacings and takes the step on both sides of the run, where it contradicts good samples; taken at their word they
+/// would move the biases instead.
+fn near_steps(intervals: &[Interval]) -> Vec<bool> {
+    let mut near = vec![false; intervals.len()];
+    let (mut step2, mut since_s) = ((0.0, 0.0), f64::INFINITY);
     for (k, interval) in intervals.iter().enumerate() {
-        bridged_s = if interval.bridged { bridged_s + interval.h } else { 0.0 };
-        behind_s = if bridged_s > SHORT_GAP_S { 0.0 } else { behind_s + interval.h };
-        beside[k] = behind_s < BESIDE_S;
-        if behind_s == 0.0 {
+        let is_weak = interval.gyro_sigma > WEAK.0 || interval.accel_sigma > WEAK.1;
+        let add = |sum: f64, sigma: f64| if is_weak { sum + (sigma * interval.h).powi(2) } else { 0.0 };
+        step2 = (add(step2.0, interval.gyro_sigma), add(step2.1, interval.accel_sigma));
+        let is_step = step2.0.sqrt() > STEP.0 || step2.1.sqrt() > STEP.1;
+        since_s = if is_step { 0.0 } else { since_s + interval.h };
+        near[k] = since_s < BESIDE_S;
+        if is_step {
             let mut before_s = 0.0;
-            for (earlier, beside) in intervals[..k].iter().zip(&mut beside).rev() {
-                before_s += if earlier.bridged { 0.0 } else { earlier.h };
-                if *beside || before_s > BESIDE_S {
+            for (earlier, near) in intervals[..k].iter().zip(&mut near).rev() {
+                before_s += earlier.h;
+                if *near || before_s > BESIDE_S {
                     break;
                 }
-                *beside = true;
+                *near = true;
             }
         }
     }
-    beside
+    near
 }
 
 /// The same interval, of which the correction may differ by [`BESIDE`].

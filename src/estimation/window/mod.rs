@@ -233,7 +233,9 @@ impl Window {
 
     /// Where the window will begin when its oldest stretch has gone, IMU time, s.
     pub(super) fn next_start_s(&self) -> Option<f64> {
-        Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).max(self.start.u_s))
+        // Behind a gap the IMU's intervals may end before the stretch does.
+        let end_s = self.nominal.end_s();
+        Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
     /// What the oldest stretch saw, by the surfels of the survey, as they stand in the map, each with its time, s.

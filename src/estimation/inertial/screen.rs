@@ -1,0 +1,238 @@
+//! Screening of IMU samples before they are integrated: outliers, frozen readings, clipped axes.
+
+use super::clipping::{Clipped, RangeLimits};
+use crate::geometry::Vector;
+use crate::measurement::{ImuNoise, ImuSample};
+
+/// How far beyond a sample its screening looks, s. The intake holds at least as much when a sample is used.
+pub(in crate::estimation) const LOOKAHEAD_S: f64 = 0.1;
+/// No IMU on a moving head measures more than this: rad/s and m/s^2.
+const ABSURD: (f64, f64) = (100.0, 5000.0);
+/// A sample that differs from both neighbours by more than `floor + factor x` their own difference is an outlier.
+const OUTLIER_GYRO: (f64, f64) = (0.6, 4.0);
+const OUTLIER_ACCEL: (f64, f64) = (30.0, 6.0);
+/// Readings that do not change in any of six numbers for this long, s, and this many samples are frozen: the noise of
+/// a working sensor changes them, even where they are rounded.
+const FROZEN: (f64, usize) = (0.08, 4);
+
+/// What screening makes of a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::estimation) enum Screened {
+    /// A measurement, with the axes on which it is at the end of the range.
+    Measured(Clipped),
+    /// Not a measurement: far from its neighbours, or not a finite number.
+    Outlier,
+    /// The sensor repeats its last reading.
+    Frozen,
+}
+
+/// Screens samples in the order of their stamps.
+#[derive(Debug)]
+pub(in crate::estimation) struct Screen {
+    limits: RangeLimits,
+    /// The two measurements before, the later one first.
+    before: [Option<ImuSample>; 2],
+    /// The last sample, whatever it was, and since when its reading has not changed, s.
+    reading: Option<(ImuSample, f64)>,
+}
+
+fn is_absurd(sample: &ImuSample) -> bool {
+    let exceeds = |v: &Vector, limit: f64| !v.iter().all(|x| x.abs() <= limit);
+    exceeds(&sample.angular_velocity_rad_per_s, ABSURD.0) || exceeds(&sample.specific_force_m_per_s2, ABSURD.1)
+}
+
+fn is_same_reading(a: &ImuSample, b: &ImuSample) -> bool {
+    a.angular_velocity_rad_per_s == b.angular_velocity_rad_per_s
+        && a.specific_force_m_per_s2 == b.specific_force_m_per_s2
+}
+
+impl Screen {
+    pub(in crate::estimation) fn new(noise: &ImuNoise) -> Self {
+        Self { limits: RangeLimits::new(noise), before: [None; 2], reading: None }
+    }
+
+    /// Screens the sample stamped `seconds`; `ahead` are the samples after it, in order, of which those within
+    /// [`LOOKAHEAD_S`] count.
+    pub(in crate::estimation) fn screen<'a>(
+        &mut self,
+        (seconds, sample): (f64, &ImuSample),
+        ahead: impl Iterator<Item = &'a (f64, ImuSample)> + Clone,
+    ) -> Screened {
+        let ahead = ahead.take_while(|(s, _)| *s <= seconds + LOOKAHEAD_S);
+        if is_absurd(sample) {
+            return Screened::Outlier;
+        }
+        if self.is_frozen((seconds, sample), ahead.clone()) {
+            return Screened::Frozen;
+        }
+        let usable = ahead.map(|(_, next)| next).filter(|next| !is_absurd(next));
+        if self.is_outlier(sample, usable.clone()) {
+            return Screened::Outlier;
+        }
+        let clipped = self.limits.clipped(sample, usable);
+        self.before = [Some(*sample), self.before[0]];
+        Screened::Measured(clipped)
+    }
+
+    fn is_frozen<'a>(
+        &mut self,
+        (seconds, sample): (f64, &ImuSample),
+        ahead: impl Iterator<Item = &'a (f64, ImuSample)>,
+    ) -> bool {
+        let unchanged = self.reading.as_ref().filter(|(last, _)| is_same_reading(last, sample));
+        let Some((_, since_s)) = unchanged.copied() else {
+            self.reading = Some((*sample, seconds));
+            return false;
+        };
+        let mut repeated = (seconds, 2);
+        for (s, _) in ahead.take_while(|(_, next)| is_same_reading(next, sample)) {
+            repeated = (*s, repeated.1 + 1);
+        }
+        // Once a reading counts as frozen the rest of its repetitions does too, whatever lies ahead of them.
+        let lasts_s = repeated.0 - since_s;
+        lasts_s >= FROZEN.0 && (repeated.1 >= FROZEN.1 || seconds - since_s >= FROZEN.0)
+    }
+
+    /// Whether a sample is far from the measurement before it and from the median of the next three, compared with how
+    /// far these are from each other.
+    fn is_outlier<'a>(&self, sample: &ImuSample, ahead: impl Iterator<Item = &'a ImuSample>) -> bool {
+        let next: Vec<&ImuSample> = ahead.take(3).collect();
+        let Some(before) = &self.before[0] else { return is_first_outlier(sample, &next) };
+        let far = |of: fn(&ImuSample) -> Vector, (floor, factor): (f64, f64)| {
+            let (x, last) = (of(sample), of(before));
+            let Some(median) = median(&next, of) else { return false };
+            let mut usual = (median - last).norm();
+            if let Some(earlier) = &self.before[1] {
+                usual = usual.max((of(earlier) - last).norm());
+            }
+            (x - last).norm().min((x - median).norm()) > floor + factor * usual
+        };
+        far(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO) || far(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL)
+    }
+}
+
+/// The very first sample has neighbours on one side: those must agree with each other.
+fn is_first_outlier(sample: &ImuSample, next: &[&ImuSample]) -> bool {
+    let far = |of: fn(&ImuSample) -> Vector, (floor, factor): (f64, f64)| {
+        let Some(median) = median(next, of).filter(|_| next.len() == 3) else { return false };
+        let usual = next.iter().map(|other| (of(other) - median).norm()).fold(0.0, f64::max);
+        (of(sample) - median).norm() > floor + factor * usual
+    };
+    far(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO) || far(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL)
+}
+
+/// The median on each axis.
+fn median(samples: &[&ImuSample], of: fn(&ImuSample) -> Vector) -> Option<Vector> {
+    let middle = samples.len().checked_sub(1)? / 2;
+    Some(Vector::from_fn(|axis, _| {
+        let mut values: Vec<f64> = samples.iter().map(|sample| of(sample)[axis]).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        values[middle]
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Stamp;
+
+    /// Ten seconds of a head that swings by 5 rad/s at 1.2 Hz, with noise from a multiplicative generator.
+    fn samples() -> Vec<(f64, ImuSample)> {
+        let mut state = 1_u64;
+        let mut noise = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5) * 0.02
+        };
+        (0..1000)
+            .map(|k| {
+                let t = f64::from(k) * 0.01;
+                let (sin, cos) = (7.5 * t).sin_cos();
+                let gyro = Vector::new(5.0 * cos + noise(), noise(), 0.5 * sin + noise());
+                let accel = Vector::new(4.0 * sin + noise(), noise(), 9.8 + cos + noise());
+                let stamp = Stamp::from_nanos(k as i64 * 10_000_000);
+                (t, ImuSample { stamp, angular_velocity_rad_per_s: gyro, specific_force_m_per_s2: accel })
+            })
+            .collect()
+    }
+
+    fn noise() -> ImuNoise {
+        ImuNoise {
+            gyro_density_rad_per_s_per_sqrt_hz: 5e-4,
+            accel_density_m_per_s2_per_sqrt_hz: 8e-4,
+            gyro_bias_walk_rad_per_s_per_sqrt_s: 0.0,
+            accel_bias_walk_m_per_s2_per_sqrt_s: 0.0,
+            gyro_turn_on_bias_rad_per_s: 0.0,
+            accel_turn_on_bias_m_per_s2: 0.0,
+            gyro_limit_rad_per_s: f64::INFINITY,
+            accel_limit_m_per_s2: f64::INFINITY,
+        }
+    }
+
+    fn screened(samples: &[(f64, ImuSample)]) -> Vec<Screened> {
+        let mut screen = Screen::new(&noise());
+        (0..samples.len()).map(|k| screen.screen((samples[k].0, &samples[k].1), samples[k + 1..].iter())).collect()
+    }
+
+    fn indices(screened: &[Screened], of: impl Fn(&Screened) -> bool) -> Vec<usize> {
+        screened.iter().enumerate().filter(|(_, one)| of(one)).map(|(k, _)| k).collect()
+    }
+
+    #[test]
+    fn a_swinging_head_has_neither_outliers_nor_frozen_nor_clipped_samples() {
+        let all = screened(&samples());
+        assert!(all.iter().all(|one| *one == Screened::Measured(Clipped::NONE)));
+    }
+
+    #[test]
+    fn single_samples_that_no_neighbour_supports_are_outliers_wherever_they_are() {
+        for at in [0, 1, 500, 998, 999] {
+            for (gyro, accel) in [(10.0, 0.0), (0.0, 1e4), (1e30, 0.0), (f64::NAN, 0.0), (0.0, f64::INFINITY)] {
+                let mut samples = samples();
+                samples[at].1.angular_velocity_rad_per_s.y += gyro;
+                samples[at].1.specific_force_m_per_s2.x += accel;
+                let outliers = indices(&screened(&samples), |one| *one == Screened::Outlier);
+                // The last sample has no successor that could disagree: only what is absurd is found there.
+                let expected = if at == 999 && gyro == 10.0 { vec![] } else { vec![at] };
+                assert_eq!(outliers, expected, "{at}: {gyro}, {accel}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_shock_that_lasts_is_no_outlier() {
+        let mut samples = samples();
+        for (k, push) in [(500, 20.0), (501, 60.0), (502, 55.0), (503, 25.0)] {
+            samples[k].1.specific_force_m_per_s2.z += push;
+        }
+        assert!(indices(&screened(&samples), |one| *one == Screened::Outlier).is_empty());
+    }
+
+    #[test]
+    fn a_reading_that_is_repeated_is_frozen_from_its_first_repetition() {
+        let mut samples = samples();
+        let reading = samples[500].1;
+        samples[501..600].iter_mut().for_each(|(_, sample)| *sample = ImuSample { stamp: sample.stamp, ..reading });
+        let frozen = indices(&screened(&samples), |one| *one == Screened::Frozen);
+        assert_eq!(frozen, (501..600).collect::<Vec<_>>());
+        let mut twice = self::samples();
+        twice[501].1 = ImuSample { stamp: twice[501].1.stamp, ..twice[500].1 };
+        assert!(
+            indices(&screened(&twice), |one| *one == Screened::Frozen).is_empty(),
+            "two equal readings are a chance"
+        );
+    }
+
+    #[test]
+    fn a_flat_top_that_recurs_is_clipping_from_its_first_sample() {
+        let mut clipped = samples();
+        let limit = 250.0_f64.to_radians();
+        for (_, sample) in &mut clipped {
+            sample.angular_velocity_rad_per_s = sample.angular_velocity_rad_per_s.map(|x| x.clamp(-limit, limit));
+        }
+        let at_limit: Vec<usize> =
+            (0..1000).filter(|k| clipped[*k].1.angular_velocity_rad_per_s.x.abs() >= limit).collect();
+        assert!(at_limit.len() > 100);
+        let found = indices(&screened(&clipped), |one| matches!(one, Screened::Measured(c) if c.gyro[0]));
+        assert_eq!(found, at_limit);
+    }
+}

@@ -1,0 +1,186 @@
+//! The IMU's part of the intake: samples wait here, are screened, and leave as intervals.
+
+use super::MARGIN_S;
+use crate::estimation::inertial::{InertialStream, Screen, Screened};
+use crate::estimation::initial::Noisier;
+use crate::estimation::strapdown::Interval;
+use crate::measurement::{ImuNoise, ImuSample};
+use std::collections::VecDeque;
+
+/// A sample is used when the newest one is later by this, s: by then those that came out of order are in place, and
+/// those that its screening looks ahead to are there.
+const COMPLETE_AFTER_S: f64 = 0.2;
+
+/// How far the samples reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Reached {
+    /// Intervals cover what was asked for.
+    All,
+    /// More samples are needed.
+    Waits,
+    /// There are no samples from the first time to the second, IMU time, s, for longer than is bridged.
+    Silence(f64, f64),
+}
+
+/// What was left out of an IMU's samples, in numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct LeftOut {
+    pub late: usize,
+    pub outliers: usize,
+    pub frozen: usize,
+}
+
+/// IMU samples on their way into intervals.
+#[derive(Debug)]
+pub(super) struct SampleQueue {
+    waiting: VecDeque<(f64, ImuSample)>,
+    /// Stamp of the last sample that was taken out, whatever became of it; earlier ones are late.
+    taken_s: f64,
+    /// Stamp of the last sample that was used.
+    used_s: f64,
+    pub(super) count: usize,
+    pub(super) left_out: LeftOut,
+    /// Clipped samples so far.
+    pub(super) clipped: usize,
+    /// Silences that were bridged since they were last asked for: when they began and how long they were, s.
+    gaps: Vec<(f64, f64)>,
+    screen: Screen,
+    stream: Option<InertialStream>,
+    intervals: Vec<(f64, Interval)>,
+}
+
+impl SampleQueue {
+    pub(super) fn new(noise: &ImuNoise) -> Self {
+        Self {
+            waiting: VecDeque::new(),
+            taken_s: f64::NEG_INFINITY,
+            used_s: f64::NEG_INFINITY,
+            count: 0,
+            left_out: LeftOut::default(),
+            clipped: 0,
+            gaps: Vec::new(),
+            screen: Screen::new(noise),
+            stream: None,
+            intervals: Vec::new(),
+        }
+    }
+
+    /// Puts a sample in its place among those that wait.
+    pub(super) fn take(&mut self, seconds: f64, sample: ImuSample) {
+        self.count += 1;
+        if seconds <= self.taken_s {
+            self.left_out.late += 1;
+            return;
+        }
+        let at = self.waiting.partition_point(|(s, _)| *s <= seconds);
+        self.waiting.insert(at, (seconds, sample));
+    }
+
+    /// Stamps of the samples that wait, s.
+    pub(super) fn stamps(&self) -> impl Iterator<Item = f64> {
+        self.waiting.iter().map(|(seconds, _)| *seconds)
+    }
+
+    /// First and last stamp of those that wait, s.
+    pub(super) fn span(&self) -> Option<(f64, f64)> {
+        Some((self.waiting.front()?.0, self.waiting.back()?.0))
+    }
+
+    /// The newest stamp, s; minus infinity without any.
+    pub(super) fn newest_s(&self) -> f64 {
+        self.waiting.back().map_or(f64::NEG_INFINITY, |(seconds, _)| *seconds)
+    }
+
+    /// Stamp of the last sample that was used, s.
+    pub(super) fn used_s(&self) -> f64 {
+        self.used_s
+    }
+
+    /// Makes intervals by `stream` from now on.
+    pub(super) fn start(&mut self, stream: InertialStream) {
+        self.stream = Some(stream);
+    }
+
+    /// The samples' period, once known, s.
+    pub(super) fn period_s(&self) -> Option<f64> {
+        self.stream.as_ref().map(InertialStream::period_s)
+    }
+
+    /// The IMU is so many times noisier than its specification.
+    pub(super) fn make_noisier(&mut self, noisier: Noisier) {
+        if let Some(stream) = &mut self.stream {
+            stream.make_noisier(noisier);
+        }
+    }
+
+    /// Uses samples until intervals reach a little beyond `end_s`; silences of up to `bridged_s` are bridged. `last`:
+    /// nothing more comes.
+    pub(super) fn advance(&mut self, end_s: f64, bridged_s: f64, last: bool) -> Reached {
+        let complete_s = if last { f64::INFINITY } else { self.newest_s() - COMPLETE_AFTER_S };
+        let Some(stream) = &mut self.stream else { return Reached::Waits };
+        while let Some((seconds, sample)) = self.waiting.front().copied() {
+            if self.used_s > end_s + MARGIN_S && stream.end_s() > end_s + 0.5 * MARGIN_S {
+                return Reached::All;
+            }
+            if seconds > complete_s && seconds > end_s + 2.0 * MARGIN_S {
+                return Reached::Waits;
+            }
+            let screened = self.screen.screen((seconds, &sample), self.waiting.iter().skip(1));
+            let gap_s = seconds - self.used_s;
+            if let Screened::Measured(_) = screened
+                && gap_s.is_finite()
+                && gap_s > bridged_s
+            {
+                stream.flush(&mut self.intervals);
+                return Reached::Silence(self.used_s, seconds);
+            }
+            self.waiting.pop_front();
+            self.taken_s = seconds;
+            match screened {
+                Screened::Measured(clipped) => {
+                    if gap_s.is_finite() && gap_s > 4.5 * stream.period_s() {
+                        self.gaps.push((self.used_s, gap_s));
+                    }
+                    self.used_s = seconds;
+                    stream.push(seconds, (&sample, clipped), &mut self.intervals);
+                }
+                Screened::Outlier => {
+                    self.left_out.outliers += 1;
+                    stream.leave_out();
+                }
+                Screened::Frozen => self.left_out.frozen += 1,
+            }
+        }
+        self.clipped += stream.take_saturated();
+        if last {
+            stream.flush(&mut self.intervals);
+        }
+        if self.used_s > end_s + MARGIN_S { Reached::All } else { Reached::Waits }
+    }
+
+    /// The intervals that are complete, in order, each with its start.
+    pub(super) fn take_intervals(&mut self) -> Vec<(f64, Interval)> {
+        if let Some(stream) = &mut self.stream {
+            self.clipped += stream.take_saturated();
+        }
+        std::mem::take(&mut self.intervals)
+    }
+
+    /// The silences that were bridged since the last call.
+    pub(super) fn take_gaps(&mut self) -> Vec<(f64, f64)> {
+        std::mem::take(&mut self.gaps)
+    }
+
+    /// Where the intervals end, IMU time, s.
+    pub(super) fn end_s(&self) -> f64 {
+        self.stream.as_ref().map_or(f64::NEG_INFINITY, InertialStream::end_s)
+    }
+
+    /// Begins again behind a silence with the sample stamped `until_s`, which is the next.
+    pub(super) fn begin_again_at(&mut self, until_s: f64) {
+        (self.taken_s, self.used_s) = (until_s - 1e-9, f64::NEG_INFINITY);
+        if let Some(stream) = &mut self.stream {
+            stream.begin_again();
+        }
+    }
+}

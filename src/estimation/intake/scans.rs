@@ -1,0 +1,179 @@
+//! The lidar's part of the intake: scans wait here, and leave as beams with their times.
+
+use crate::estimation::EstimationError;
+use crate::estimation::sight::{Sight, is_in_plane};
+use crate::estimation::spec::EstimatorSpec;
+use crate::estimation::stamps::{Regularity, StampFilter};
+use crate::estimation::surfel::Beam;
+use crate::geometry::Pose;
+use crate::measurement::{Calibration, LidarScan};
+use std::collections::VecDeque;
+
+/// So many scans that equal the one before are frozen: the noise of a working lidar changes some range.
+const FROZEN: usize = 2;
+/// Scans of at least this many returns whose ranges are all equal to this, m, show no world.
+const CONSTANT: (usize, f32) = (20, 1e-4);
+
+/// What a scan's content is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Content {
+    New,
+    /// It equals the scans before it, which only a lidar at rest can see, and only one without noise.
+    Repeated,
+}
+
+/// Scans on their way to beams.
+#[derive(Debug)]
+pub(super) struct ScanQueue {
+    spec: EstimatorSpec,
+    imu_from_laser: Pose,
+    waiting: VecDeque<(f64, LidarScan, Content)>,
+    /// Raw stamp of the last scan that was used; what comes before it is late.
+    used_s: f64,
+    pub(super) count: usize,
+    pub(super) late: usize,
+    /// Scans that were left out since they show nothing new.
+    pub(super) frozen: usize,
+    /// How many scans before the newest equal it, and their fingerprint.
+    repeated: (usize, u64),
+    sight: Sight,
+    /// Whether all points so far lay in the lidar's x-y plane.
+    planar: bool,
+    filter: Option<StampFilter>,
+    /// Beams already placed in time that belong to the next stretches.
+    beams: VecDeque<Beam>,
+}
+
+impl ScanQueue {
+    pub(super) fn new(spec: &EstimatorSpec, calibration: &Calibration) -> Self {
+        Self {
+            spec: spec.clone(),
+            imu_from_laser: calibration.head_from_imu.inverse() * calibration.head_from_laser,
+            waiting: VecDeque::new(),
+            used_s: f64::NEG_INFINITY,
+            count: 0,
+            late: 0,
+            frozen: 0,
+            repeated: (0, 0),
+            sight: Sight::default(),
+            planar: true,
+            filter: None,
+            beams: VecDeque::new(),
+        }
+    }
+
+    /// Puts a scan in its place among those that wait; one that shows nothing new is left out.
+    pub(super) fn take(&mut self, seconds: f64, scan: LidarScan) -> Result<(), EstimationError> {
+        let finite = |p: &nalgebra::Vector3<f32>| p.iter().copied().all(f32::is_finite);
+        if !scan.returns.iter().all(|hit| finite(&hit.point_in_laser)) {
+            return Err(EstimationError::NotFinite { sensor: "lidar", stamp_ns: scan.stamp.nanos() });
+        }
+        self.count += 1;
+        self.planar &= scan.returns.iter().all(|hit| is_in_plane(&hit.point_in_laser));
+        if seconds <= self.used_s {
+            self.late += 1;
+        } else if is_constant(&scan) {
+            self.frozen += 1;
+        } else {
+            let content = self.content(&scan);
+            let at = self.waiting.partition_point(|(s, ..)| *s <= seconds);
+            self.waiting.insert(at, (seconds, scan, content));
+        }
+        Ok(())
+    }
+
+    /// Whether the scans before were the same, point for point.
+    fn content(&mut self, scan: &LidarScan) -> Content {
+        let fingerprint = fingerprint(scan);
+        let times = if fingerprint == self.repeated.1 && !scan.returns.is_empty() { self.repeated.0 + 1 } else { 0 };
+        self.repeated = (times, fingerprint);
+        if times >= FROZEN { Content::Repeated } else { Content::New }
+    }
+
+    /// First and last stamp of those that wait, s.
+    pub(super) fn span(&self) -> Option<(f64, f64)> {
+        Some((self.waiting.front()?.0, self.waiting.back()?.0))
+    }
+
+    /// The newest stamp, s; minus infinity without any.
+    pub(super) fn newest_s(&self) -> f64 {
+        self.waiting.back().map_or(f64::NEG_INFINITY, |(seconds, ..)| *seconds)
+    }
+
+    /// Stamp of the last scan that was used, s.
+    pub(super) fn used_s(&self) -> f64 {
+        self.used_s
+    }
+
+    /// Whether the lidar scans in one plane, as far as its scans have shown.
+    pub(super) fn is_planar(&self) -> bool {
+        self.planar
+    }
+
+    /// How the lidar looks about, as far as its first scans have shown.
+    pub(super) fn sight(&self) -> Sight {
+        self.sight
+    }
+
+    /// Learns the lidar's period and how it looks about, from the scans up to `enough_s`.
+    pub(super) fn start(&mut self, first_scan: f64, enough_s: f64) -> Option<()> {
+        let first_scans = || self.waiting.iter().filter(|(s, ..)| *s <= enough_s);
+        let stamps: Vec<f64> = first_scans().map(|(s, scan, _)| s + scan.stamped_after.seconds()).collect();
+        let scanning = Regularity::of(&stamps)?;
+        self.sight = Sight::of(first_scans().map(|(_, scan, _)| scan), enough_s - first_scan, scanning.period_s);
+        self.filter = Some(StampFilter::new(scanning, self.spec.clock.jitter_s));
+        Some(())
+    }
+
+    /// The beams before `end_s`, lidar time, that were not taken yet; without those of repeated scans if the head moves.
+    pub(super) fn take_until(&mut self, end_s: f64, moves: bool) -> Vec<Beam> {
+        self.use_until(end_s, moves);
+        let before = self.beams.iter().take_while(|beam| beam.tau_s < end_s).count();
+        self.beams.drain(..before).collect()
+    }
+
+    fn use_until(&mut self, end_s: f64, moves: bool) {
+        let Some(filter) = self.filter.as_mut() else { return };
+        let (least, most) = (self.spec.surfels.min_range_m, self.spec.surfels.max_range_m);
+        while self.waiting.front().is_some_and(|(seconds, ..)| *seconds < end_s) {
+            let Some((seconds, scan, content)) = self.waiting.pop_front() else { return };
+            if moves && content == Content::Repeated {
+                self.frozen += 1;
+                continue;
+            }
+            self.used_s = seconds;
+            let after_s = scan.stamped_after.seconds();
+            let start_s = filter.smooth(seconds + after_s) - after_s;
+            for hit in &scan.returns {
+                let point = hit.point_in_laser.cast::<f64>();
+                let range = point.norm();
+                if (least..=most).contains(&range) {
+                    let in_imu = self.imu_from_laser.rotation * point + self.imu_from_laser.translation.vector;
+                    let tau_s = start_s + hit.offset.seconds();
+                    self.beams.push_back(Beam { tau_s, point_in_imu: in_imu.cast(), range_m: range as f32 });
+                }
+            }
+        }
+    }
+
+    /// Forgets scans and beams before `seconds`.
+    pub(super) fn forget_before(&mut self, seconds: f64) {
+        let early = self.waiting.iter().take_while(|(s, ..)| *s < seconds).count();
+        self.waiting.drain(..early);
+        let early = self.beams.iter().take_while(|beam| beam.tau_s < seconds).count();
+        self.beams.drain(..early);
+    }
+}
+
+/// A number that differs for scans that differ (FNV-1a over the bits of all points).
+fn fingerprint(scan: &LidarScan) -> u64 {
+    let bits = scan.returns.iter().flat_map(|hit| hit.point_in_laser.iter().map(|x| x.to_bits()));
+    bits.fold(0xcbf2_9ce4_8422_2325, |hash, word| (hash ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Whether all beams return one and the same range.
+fn is_constant(scan: &LidarScan) -> bool {
+    let Some(first) = scan.returns.first().map(|hit| hit.point_in_laser.norm()) else { return false };
+    scan.returns.len() >= CONSTANT.0
+        && scan.returns.iter().all(|hit| (hit.point_in_laser.norm() - first).abs() <= CONSTANT.1)
+}
