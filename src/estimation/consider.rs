@@ -27,6 +27,8 @@ pub(super) const IMU: usize = 8;
 pub(super) const CARRIED: usize = 12 + IMU;
 /// Where in it the IMU's part begins.
 pub(super) const AT_IMU: usize = 12;
+/// The number under which the gauge is kept as a view.
+const GAUGE: u64 = u64::MAX;
 const _: () = assert!(GYRO_BIAS == 0, "the border begins with what is carried of it");
 
 /// Of what a window begins with, by itself.
@@ -51,6 +53,17 @@ pub(super) struct Consider {
     pivot: Vector,
     beginning: OfBeginning,
     views: Vec<View>,
+    gauge: Option<Gauge>,
+}
+
+/// The mean error of the beginnings so far, kept as a view: against it a pose's error is that of a trajectory which is
+/// aligned with the truth over the first part of the recording.
+#[derive(Debug, Clone, Copy)]
+struct Gauge {
+    /// About what its error turns, m.
+    pivot: Vector,
+    /// Of how many beginnings it is the mean.
+    count: usize,
 }
 
 #[derive(Debug, Clone)]
@@ -66,7 +79,7 @@ impl Consider {
     /// Of a map that begins at `pivot`: there the error is none, by definition. `known` is the covariance of what a
     /// window begins with, but for where it is.
     pub(super) fn new(pivot: Vector, known: &OfBeginning) -> Self {
-        Self { pivot, beginning: *known, views: Vec::new() }
+        Self { pivot, beginning: *known, views: Vec::new(), gauge: None }
     }
 
     /// Of a map that goes on at `pivot` after a silence, in which the head went nobody knows where.
@@ -167,18 +180,70 @@ impl Consider {
     /// Covariance of position and then attitude, in the map's axes, of what hangs on the beginning at `place`: m^2, m
     /// rad, rad^2.
     pub(super) fn covariance_at(&self, place: &Vector) -> Matrix6<f64> {
-        // shift = t + theta x (place - pivot)
-        let mut by = Matrix6::zeros();
-        by.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(&(place - self.pivot)));
-        by.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
-        by.fixed_view_mut::<3, 3>(3, 0).fill_with_identity();
+        let by = error_at(&(place - self.pivot));
         by * self.beginning.fixed_view::<6, 6>(0, 0) * by.transpose()
+    }
+
+    /// The same of the error against the gauge; against the map where there is none.
+    pub(super) fn covariance_against_gauge(&self, place: &Vector) -> Matrix6<f64> {
+        let own = self.covariance_at(place);
+        let found = self.gauge.and_then(|gauge| Some((gauge, self.place_of_gauge()?)));
+        let Some((gauge, at)) = found else { return own };
+        let (by, by_gauge) = (error_at(&(place - self.pivot)), error_at(&(place - gauge.pivot)));
+        let with_beginning = self.views[at].with_beginning.fixed_columns::<6>(0).into_owned();
+        let cross = by_gauge * with_beginning * by.transpose();
+        own + by_gauge * self.between(at, at) * by_gauge.transpose() - cross - cross.transpose()
+    }
+
+    /// Makes the beginning part of the gauge.
+    pub(super) fn gauge_by_beginning(&mut self) {
+        let place = self.beginning.fixed_view::<6, 6>(0, 0).into_owned();
+        let (Some(gauge), Some(at)) = (self.gauge, self.place_of_gauge()) else {
+            self.keep(GAUGE);
+            self.gauge = Some(Gauge { pivot: self.pivot, count: 1 });
+            return;
+        };
+        let share = 1.0 / (gauge.count + 1) as f64;
+        // The beginning's error, a turn about its own pivot, as one about the gauge's.
+        let mut moved = Matrix6::identity();
+        moved.fixed_view_mut::<3, 3>(3, 0).copy_from(&-skew(&(gauge.pivot - self.pivot)));
+        let with_old = self.views[at].with_beginning.fixed_columns::<6>(0) * moved.transpose();
+        let own = self.between(at, at) * (1.0 - share).powi(2)
+            + (with_old + with_old.transpose()) * (share * (1.0 - share))
+            + moved * place * moved.transpose() * share.powi(2);
+        for other in (0..self.views.len()).filter(|other| *other != at) {
+            let of_beginning = self.views[other].with_beginning.fixed_columns::<6>(0).transpose();
+            let mean = self.between(at, other) * (1.0 - share) + moved * of_beginning * share;
+            if other < at {
+                self.views[at].with_views[other] = mean;
+            } else {
+                self.views[other].with_views[at] = mean.transpose();
+            }
+        }
+        let of_beginning = moved * self.beginning.fixed_rows::<6>(0) * share;
+        self.views[at].with_beginning = self.views[at].with_beginning * (1.0 - share) + of_beginning;
+        self.views[at].with_views[at] = own;
+        self.gauge = Some(Gauge { count: gauge.count + 1, ..gauge });
+    }
+
+    fn place_of_gauge(&self) -> Option<usize> {
+        self.views.iter().position(|view| view.number == GAUGE)
     }
 
     /// `E[e_a e_b^T]` of two views.
     fn between(&self, a: usize, b: usize) -> Matrix6<f64> {
         if b <= a { self.views[a].with_views[b] } else { self.views[b].with_views[a].transpose() }
     }
+}
+
+/// How a turn and a shift of the map move a point `from_pivot` of their pivot: its position, then its attitude.
+fn error_at(from_pivot: &Vector) -> Matrix6<f64> {
+    // shift = t + theta x (place - pivot)
+    let mut by = Matrix6::zeros();
+    by.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(from_pivot));
+    by.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
+    by.fixed_view_mut::<3, 3>(3, 0).fill_with_identity();
+    by
 }
 
 /// `known`, and where the window begins to `place`.
@@ -205,6 +270,44 @@ mod tests {
             beginning: wave(seed),
             views: views.iter().map(|number| (*number, wave(seed + 9 + *number as usize))).collect(),
             noise: root * root.transpose() + OfBeginning::identity() * 0.1,
+        }
+    }
+
+    /// Against the definition: the mean of the beginnings' errors, each a row of coefficients of independent noises.
+    #[test]
+    fn an_error_against_the_gauge_is_that_against_the_mean_of_the_beginnings() {
+        let root = wave::<CARRIED>(31);
+        let mut consider = Consider::new(Vector::new(0.3, -0.2, 0.1), &(root * root.transpose()));
+        let sources = CARRIED * 7;
+        let mut beginning = DMatrix::<f64>::zeros(CARRIED, sources);
+        beginning.view_mut((0, 0), (CARRIED, CARRIED)).copy_from(&root);
+        let place = Vector::new(4.0, -3.0, 1.0);
+        let at = |beginning: &DMatrix<f64>, pivot: &Vector| {
+            let by = error_at(&(place - pivot));
+            DMatrix::from_fn(6, 6, |r, c| by[(r, c)]) * beginning.rows(0, 6)
+        };
+        let mut mean = DMatrix::<f64>::zeros(6, sources);
+        for step in 0..6 {
+            let pivot = Vector::new(step as f64, 0.5 * step as f64, 0.1);
+            let by = Sensitivity { pivot, ..sensitivity(step, &[]) };
+            consider.advance(&by);
+            beginning = DMatrix::from_fn(CARRIED, CARRIED, |r, c| by.beginning[(r, c)]) * &beginning;
+            let root = by.noise.cholesky().unwrap().l();
+            beginning.view_mut((0, CARRIED * (step + 1)), (CARRIED, CARRIED)).copy_from(&root);
+            if step < 4 {
+                consider.gauge_by_beginning();
+                mean += at(&beginning, &pivot) * 0.25;
+            }
+            if step == 1 {
+                consider.keep(7);
+            }
+        }
+        let pivot = consider.pivot();
+        let error = at(&beginning, &pivot) - mean;
+        let expected = &error * error.transpose();
+        let told = consider.covariance_against_gauge(&place);
+        for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
+            assert_relative_eq!(told[(r, c)], expected[(r, c)], epsilon = 1e-9, max_relative = 1e-9);
         }
     }
 

@@ -67,6 +67,33 @@ pub struct Warning {
     pub kind: WarningKind,
 }
 
+/// Measurements that are not used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LeftOut {
+    /// IMU samples that came late, or whose stamp runs backwards.
+    LateSamples,
+    /// Lidar scans that came late, or whose stamp runs backwards.
+    LateScans,
+    /// IMU samples that are far from their neighbours, or not finite.
+    Outliers,
+    /// IMU samples that repeat the reading before them.
+    RepeatedSamples,
+    /// Lidar scans that repeat the scan before them while the head turns, or have one range on all beams.
+    RepeatedScans,
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::LateSamples => "IMU samples that came late or ran backwards in time",
+            Self::LateScans => "lidar scans that came late or ran backwards in time",
+            Self::Outliers => "IMU samples that are outliers",
+            Self::RepeatedSamples => "IMU samples that repeat the reading before them",
+            Self::RepeatedScans => "lidar scans that repeat the scan before them, or have one range on all beams",
+        })
+    }
+}
+
 /// What can degrade an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum WarningKind {
@@ -104,10 +131,10 @@ pub enum WarningKind {
         /// Why it was not.
         why: String,
     },
-    /// Measurements that came too late, or with a stamp that runs backwards, and were left out.
+    /// Measurements that were left out.
     LeftOut {
-        /// `"IMU samples"` or `"lidar scans"`.
-        what: &'static str,
+        /// Which ones.
+        what: LeftOut,
         /// How many.
         count: usize,
     },
@@ -159,6 +186,29 @@ impl fmt::Display for Warning {
     }
 }
 
+impl WarningKind {
+    /// A key for scripts.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::StartedInMotion => "started_in_motion",
+            Self::NoisyImu { .. } => "noisy_imu",
+            Self::ImuGap { .. } => "imu_gap",
+            Self::LidarGap { .. } => "lidar_gap",
+            Self::BeganAgain { .. } => "restarted",
+            Self::FoundAgain { .. } => "relocalised",
+            Self::LostAgain { .. } => "not_relocalised",
+            Self::LeftOut { .. } => "left_out",
+            Self::FewMatches { .. } => "few_matches",
+            Self::WeakGeometry { .. } => "weak_geometry",
+            Self::Lost { .. } => "lost",
+            Self::Contradicted { .. } => "contradiction",
+            Self::NotSolved { .. } => "not_solved",
+            Self::LostInMap => "lost_in_map",
+            Self::Saturated { .. } => "clipped",
+        }
+    }
+}
+
 /// A direction in words.
 fn named(direction: &Vector) -> String {
     if direction.z.abs() > 0.9 {
@@ -203,9 +253,7 @@ impl fmt::Display for WarningKind {
                 "behind the silence the head was not found again in what was seen before ({why}); it goes on about where it \
                  had stopped, so what it did meanwhile is missing"
             ),
-            Self::LeftOut { what, count } => {
-                write!(f, "{count} {what} came late or ran backwards in time, and were left out")
-            }
+            Self::LeftOut { what, count } => write!(f, "left out: {count} {what}"),
             Self::FewMatches { matches } => {
                 write!(f, "only {matches} surfaces seen again; carried by the IMU alone")
             }

@@ -1,9 +1,12 @@
 //! What comes out of the estimator.
 
-use super::{Located, Survey, TimeSpent, Warning};
+use super::{Located, Survey, TimeSpent, Warning, WarningKind};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
+
+/// Over so many seconds at the start a trajectory is aligned when its error is stated, s.
+pub const GAUGED_S: f64 = 20.0;
 
 /// The head at an instant, and what the estimator thought of its sensors then.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +17,9 @@ pub struct EstimatedPose {
     pub map_from_head: Pose,
     /// How uncertain it is against the map, which is where the first pose puts it: m^2, m rad, rad^2.
     pub covariance: PoseCovariance,
+    /// How uncertain it is against a trajectory that is aligned with the truth over its first [`GAUGED_S`] seconds,
+    /// likewise; over these seconds themselves against their mean so far.
+    pub covariance_against_gauge: PoseCovariance,
     /// Velocity of the head's origin, m/s.
     pub velocity_in_map_m_per_s: Vector,
     /// Bias of the gyroscope, in the IMU's frame, rad/s.
@@ -51,6 +57,18 @@ pub struct WindowReport {
     pub imu_contradiction: f64,
     /// Clock offset after the window, s.
     pub clock_offset_s: f64,
+    /// Estimated rate of the clock offset, s/s.
+    pub clock_rate: f64,
+    /// Estimated correction of all ranges, m.
+    pub range_correction_m: f64,
+    /// Largest entry of the estimated scale errors and misalignments of gyroscope and accelerometer.
+    pub imu_matrix: f64,
+    /// Speed of the IMU at its end, m/s.
+    pub speed_m_per_s: f64,
+    /// Whether the head moves, so that surfaces should be observed again.
+    pub moving: bool,
+    /// What is wrong with the window's solution, if anything.
+    pub trouble: Option<WarningKind>,
     /// Time it took, s. With its parts the one figure that differs from run to run.
     pub elapsed_s: f64,
     /// The parts of that time; what they leave of it is the bookkeeping between them.

@@ -13,6 +13,15 @@ const RATE_WALK_PER_SQRT_S: f64 = 2e-7;
 const STRIKES: usize = 5;
 /// A sensor may have no period when its stamps scatter about a line by more than this multiple of it, and has none when
 /// the variance of `n` intervals is more than this fraction of `n` times that of one.
+/// Stamps are delayed where their skewness about a line is above the first (that of an exponential delay is 2); then a
+/// late stamp has the second times the variance of the jitter, an early one the third.
+const DELAYED: (f64, f64, f64) = (0.8, 30.0, 0.03);
+/// Of fewer stamps the skewness says nothing.
+const DELAYED_FROM: usize = 30;
+/// Iterations of the line below delayed stamps.
+const ENVELOPE_ITERATIONS: usize = 30;
+/// Stamps come in bursts where the median interval is less than this fraction of the mean.
+const BURST: f64 = 0.3;
 const APERIODIC: (f64, f64) = (0.2, 0.4);
 
 /// Follows the stamps of a regular sensor. Seconds on the sensor's own clock.
@@ -25,12 +34,15 @@ pub(super) struct StampFilter {
     strikes: usize,
     started: bool,
     off: bool,
+    /// Whether stamps are delayed, so that the earliest are the truest.
+    delayed: bool,
 }
 
 impl StampFilter {
     /// A filter for a sensor whose first stamps showed `regularity`, and that jitters by at least `jitter_s`; zero
     /// passes every stamp as it is, and so does a sensor without a period.
-    pub(super) fn new(Regularity { period_s, jitter_s: seen_s, periodic }: Regularity, jitter_s: f64) -> Self {
+    pub(super) fn new(regularity: Regularity, jitter_s: f64) -> Self {
+        let Regularity { period_s, jitter_s: seen_s, periodic, delayed } = regularity;
         let off = jitter_s <= 0.0 || !periodic;
         let jitter_s = jitter_s.max(seen_s);
         Self {
@@ -41,6 +53,7 @@ impl StampFilter {
             strikes: 0,
             started: false,
             off,
+            delayed,
         }
     }
 
@@ -91,7 +104,13 @@ impl StampFilter {
         // The jitter is measured as it comes; never believed below 10 us.
         self.jitter2 += 0.01 * (innovation * innovation - self.jitter2);
         let [xx, xp, pp] = self.covariance;
-        let total = xx + self.jitter2.max(1e-10);
+        // Delays only ever make a stamp late: an early one lies near the truth, a late one says little.
+        let share = match (self.delayed, innovation > 0.0) {
+            (false, _) => 1.0,
+            (true, true) => DELAYED.1,
+            (true, false) => DELAYED.2,
+        };
+        let total = xx + share * self.jitter2.max(1e-10);
         let (gain_x, gain_p) = (xx / total, xp / total);
         self.last_s += gain_x * innovation;
         self.period_s += gain_p * innovation;
@@ -106,6 +125,8 @@ pub(super) struct Regularity {
     pub(super) period_s: f64,
     /// Standard deviation of the stamps about a line through them, s.
     pub(super) jitter_s: f64,
+    /// Whether the stamps scatter to one side: they are delayed by a host or a bus.
+    pub(super) delayed: bool,
     /// Whether the samples follow a period at all; if not, `period_s` is the median interval.
     pub(super) periodic: bool,
 }
@@ -123,6 +144,10 @@ impl Regularity {
         }
         intervals.sort_by(f64::total_cmp);
         let median = intervals[intervals.len() / 2];
+        if median < BURST * intervals.iter().sum::<f64>() / intervals.len() as f64 {
+            // Stamps in bursts: the intervals within them say nothing of the period, the number of samples does.
+            return without_losses;
+        }
         let (mut count, mut before) = (-1.0, stamps_s[0]);
         let counted = stamps_s.iter().map(|stamp| {
             count += ((stamp - before) / median).round().max(1.0);
@@ -133,7 +158,7 @@ impl Regularity {
         let line =
             [by_intervals, without_losses].into_iter().flatten().min_by(|a, b| a.jitter_s.total_cmp(&b.jitter_s))?;
         if line.jitter_s > APERIODIC.0 * line.period_s && wanders(stamps_s) {
-            return Some(Self { period_s: median, jitter_s: 0.0, periodic: false });
+            return Some(Self { period_s: median, jitter_s: 0.0, periodic: false, delayed: false });
         }
         Some(line)
     }
@@ -147,8 +172,34 @@ impl Regularity {
         let sum = |of: &dyn Fn(f64, f64) -> f64| points.iter().map(|(x, y)| of(x - mx, y - my)).sum::<f64>();
         let period_s = sum(&|x, y| x * y) / sum(&|x, _| x * x);
         let jitter_s = (sum(&|x, y| (y - period_s * x).powi(2)) / n).sqrt();
+        let skewness = sum(&|x, y| (y - period_s * x).powi(3)) / n / jitter_s.powi(3);
+        let delayed = points.len() >= DELAYED_FROM && skewness > DELAYED.0 && jitter_s > 1e-4;
+        let period_s = if delayed { Self::lower_envelope(&points, period_s) } else { period_s };
         let is_line = points.len() > 2 && period_s > 0.0 && jitter_s.is_finite();
-        is_line.then_some(Self { period_s, jitter_s, periodic: true })
+        is_line.then_some(Self { period_s, jitter_s, periodic: true, delayed })
+    }
+
+    /// The slope of a line below points (count, stamp): least squares in which points above it count for little
+    /// (expectile regression, Newey and Powell, Econometrica 55, 1987), begun from `slope`.
+    fn lower_envelope(points: &[(f64, f64)], slope: f64) -> f64 {
+        let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / points.len() as f64;
+        let (mut slope, mut offset) = (slope, mean(|p| p.1) - slope * mean(|p| p.0));
+        for _ in 0..ENVELOPE_ITERATIONS {
+            let mut sums = [0.0; 5];
+            for (x, y) in points {
+                let weight = if *y > slope * x + offset { DELAYED.2 / DELAYED.1 } else { 1.0 };
+                let terms = [1.0, *x, *y, x * x, x * y];
+                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += weight * term);
+            }
+            let [w, x, y, xx, xy] = sums;
+            let determinant = w * xx - x * x;
+            if determinant <= 0.0 {
+                break;
+            }
+            slope = (w * xy - x * y) / determinant;
+            offset = (y - slope * x) / w;
+        }
+        slope
     }
 }
 
@@ -212,6 +263,54 @@ mod tests {
         // A line through 3000 stamps would know its end to 2 * 10 ms / sqrt(3000) = 0.37 ms.
         let error_s = error_after(&noisy, 3000);
         assert!(error_s < 7e-4, "{error_s}");
+    }
+
+    /// USB and operating systems delay stamps by an exponential time, and keep their order.
+    #[test]
+    fn delayed_stamps_are_followed_along_their_lower_envelope() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let mut last = 0.0_f64;
+        let delayed: Vec<(f64, f64)> = (0..6000)
+            .map(|k| {
+                let t = f64::from(k) * 0.01 * (1.0 + 20e-6);
+                last = (t - 5e-3 * (1.0 - random.random::<f64>()).ln()).max(last + 1e-6);
+                (t, last)
+            })
+            .collect();
+        let raw: Vec<f64> = delayed.iter().take(150).map(|(_, raw)| *raw).collect();
+        let regularity = Regularity::of(&raw).unwrap();
+        assert!(regularity.delayed);
+        let mut filter = StampFilter::new(regularity, 5e-4);
+        let errors: Vec<f64> = delayed.iter().map(|(t, raw)| filter.smooth(*raw) - t).collect();
+        // A constant delay is the clock offset's to find; what counts is how far it wanders.
+        let spread = |errors: &[f64]| {
+            let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+            (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / errors.len() as f64).sqrt()
+        };
+        assert!(spread(&errors[3000..]) < 1e-4, "{}", spread(&errors[3000..]));
+        assert!(spread(&errors[150..]) < 4e-4, "{}", spread(&errors[150..]));
+    }
+
+    #[test]
+    fn stamps_in_bursts_have_the_period_of_the_samples() {
+        let bursts: Vec<f64> = (0..160).map(|k| f64::from(k / 4) * 0.04 + f64::from(k % 4) * 1e-6).collect();
+        let regularity = Regularity::of(&bursts).unwrap();
+        assert!((regularity.period_s - 0.01).abs() < 2e-4 && regularity.periodic, "{regularity:?}");
+    }
+
+    #[test]
+    fn a_sensor_without_a_period_is_recognised() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(9);
+        let mut t = 0.0;
+        let irregular: Vec<f64> = (0..60)
+            .map(|_| {
+                t += 0.02 + 0.04 * random.random::<f64>();
+                t
+            })
+            .collect();
+        assert!(!Regularity::of(&irregular).unwrap().periodic);
+        let noisy: Vec<f64> = stamps(150, 8e-3).iter().map(|(_, raw)| *raw).collect();
+        assert!(Regularity::of(&noisy).unwrap().periodic);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
 use super::cloud_files::CloudWishes;
+use super::integrity::{bounds, write_integrity, write_windows};
 use super::map::{MapWishes, write_map_of};
 use super::open_loop::{How, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
@@ -141,6 +142,8 @@ pub(super) fn estimate_in(
         lidar: judge::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &wishes.estimator),
         ..metrics(origin, run, &registered, best.known)
     };
+    write_integrity(folder, &bounds(run, best.map_from_head))?;
+    write_windows(folder, &run.windows)?;
     let open_known = known.filter(|_| loops.closed.is_some());
     let open_errors = open_known.and_then(|known| Some(&known.errors.as_ref()?.drawn));
     let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);

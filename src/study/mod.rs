@@ -21,6 +21,7 @@ pub mod coverage;
 mod error;
 mod estimate;
 pub mod gains;
+mod integrity;
 mod journey;
 mod judge;
 pub mod latency;

@@ -3,7 +3,10 @@
 use super::cadence::Cadence;
 use super::read_ahead::{Coming, read_ahead};
 use super::{MapWishes, Stage, StudyError, Watch};
-use crate::estimation::{EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WarningKind};
+use crate::estimation::{
+    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WarningKind, WindowReport, blocks,
+    radius_99,
+};
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::recording::{Reader, RecordingError, Selection, TumWriter};
@@ -25,6 +28,8 @@ pub(super) struct OpenLoopRun {
     pub map_from_head: Trajectory,
     /// How uncertain the estimate is, ten times a second.
     pub covariances: Vec<(Stamp, PoseCovariance)>,
+    /// The radius of 99 % that follows from the covariance against the gauge at the same stamps, m.
+    pub radii_m: Vec<f64>,
     /// The estimated clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// What was learnt of the lidar beyond its calibration.
@@ -35,6 +40,12 @@ pub(super) struct OpenLoopRun {
     pub remarks: Vec<String>,
     /// What of the recording was lost or left out, a sentence each.
     pub losses: Vec<String>,
+    /// The windows' reports, in order.
+    pub windows: Vec<WindowReport>,
+    /// What the estimator reported, in order.
+    pub warnings: Vec<Warning>,
+    /// First and last stamp of the recording's measurements.
+    pub recorded: (Stamp, Stamp),
     /// Echoes in the recording.
     pub returns: usize,
     /// From the recording's first stamp to its last, s.
@@ -76,19 +87,20 @@ pub(super) fn run_open_loop(
         None => estimator,
     };
     let tum = tum.map(TumWriter::create).transpose()?;
-    let mut written = Written { tum, map_from_head: Trajectory::new(), covariances: Vec::new() };
+    let mut written = Written { tum, map_from_head: Trajectory::new(), covariances: Vec::new(), radii_m: Vec::new() };
     let mut heard = Heard::default();
     let (pushed, loss) = read_ahead(reader, selection, |measurements| {
         push_all(measurements, &mut estimator, (&mut heard, &mut written), expected_s, watch)
     });
     if let Err(StudyError::Stopped) = pushed {
-        written.finish()?;
+        written.close()?;
         return Err(StudyError::Stopped);
     }
     pushed?;
     let result = estimator.finish()?;
     written.take(&result.poses)?;
-    let (map_from_head, covariances) = written.finish()?;
+    written.close()?;
+    let Written { map_from_head, covariances, radii_m, .. } = written;
 
     let mut losses = loss.sentences();
     losses.extend(heard.imu.missing("IMU samples"));
@@ -103,12 +115,16 @@ pub(super) fn run_open_loop(
     Ok(OpenLoopRun {
         map_from_head,
         covariances,
+        radii_m,
         spent: result.windows.iter().map(|window| window.spent).sum(),
         clock_offsets: result.clock_offsets,
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,
         remarks,
         losses,
+        recorded: (start, start + Span::from_seconds(heard.seconds())),
+        windows: result.windows,
+        warnings: result.warnings,
         returns: heard.returns,
         acquisition_s: heard.seconds(),
         wall_s: started.elapsed().as_secs_f64() - result.survey.took_s(),
@@ -172,6 +188,7 @@ struct Written {
     tum: Option<TumWriter<BufWriter<File>>>,
     map_from_head: Trajectory,
     covariances: Vec<(Stamp, PoseCovariance)>,
+    radii_m: Vec<f64>,
 }
 
 impl Written {
@@ -185,16 +202,15 @@ impl Written {
             kept.map_err(|source| RecordingError::Trajectory { name, source })?;
             if self.covariances.last().is_none_or(|(last, _)| pose.stamp - *last >= COVARIANCE_PERIOD) {
                 self.covariances.push((pose.stamp, pose.covariance));
+                self.radii_m.push(radius_99(&blocks(&pose.covariance_against_gauge).0));
             }
         }
         Ok(())
     }
 
-    fn finish(self) -> Result<(Trajectory, Vec<(Stamp, PoseCovariance)>), RecordingError> {
-        if let Some(tum) = self.tum {
-            tum.finish()?;
-        }
-        Ok((self.map_from_head, self.covariances))
+    /// Closes the file.
+    fn close(&mut self) -> Result<(), RecordingError> {
+        self.tum.take().map_or(Ok(()), TumWriter::finish)
     }
 }
 

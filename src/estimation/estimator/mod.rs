@@ -15,7 +15,9 @@ use crate::estimation::survey::Survey;
 use crate::estimation::views::Views;
 use crate::estimation::whereabouts::{Before, Whereabouts};
 use crate::estimation::window::{Linearised, Window};
-use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
+use crate::estimation::{
+    EstimatedPose, EstimationError, EstimatorSpec, GAUGED_S, OpenLoop, Warning, WarningKind, WindowReport,
+};
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::surfel_map::SurfelMap;
@@ -67,6 +69,8 @@ pub struct Estimator {
     /// How the newest window's end hangs on its beginning.
     at_end: Option<Sensitivity>,
     next_pose: Option<Stamp>,
+    /// Until when beginnings are part of the gauge, IMU time, s.
+    gauged_until_s: Option<f64>,
     /// Stamp of the last pose that was handed out.
     newest_pose: Option<Stamp>,
     poses: Vec<EstimatedPose>,
@@ -101,6 +105,7 @@ impl Estimator {
             consider: Consider::new(Vector::zeros(), &OfBeginning::zeros()),
             at_end: None,
             next_pose: None,
+            gauged_until_s: None,
             newest_pose: None,
             poses: Vec::new(),
             clock_offsets: Vec::new(),
@@ -223,11 +228,12 @@ impl Estimator {
         spent.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return Ok(()) };
         let took = (elapsed_s + spent.views_s, spent);
-        self.windows.push(report(&solved, self.intake.stamp(stretch.end_s), window, took));
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving =
             window.speed_m_per_s() > MOVING.0 || stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
         let trouble = trouble(&solved, &self.spec, moving);
+        let at = (self.intake.stamp(stretch.end_s), moving);
+        self.windows.push(report(&solved, at, window, trouble.clone(), took));
         self.carried_s += if trouble.as_ref().is_some_and(leaves_to_the_imu) { self.spec.step_s } else { 0.0 };
         self.say(trouble, stretch.end_s);
         if let Some(until_s) = final_until_s {
@@ -323,6 +329,9 @@ impl Estimator {
         let until_s = window.next_start_s()?;
         if let Some(by) = linearised.and_then(|at| window.sensitivity_at(until_s, at, &self.views)) {
             self.consider.advance(&by);
+        }
+        if until_s < *self.gauged_until_s.get_or_insert(until_s + GAUGED_S) {
+            self.consider.gauge_by_beginning();
         }
         let patches = window.let_go(linearised)?;
         let taken = self.views.take(&patches, self.spec.step_s, (window.matcher(), self.consider.pivot()));

@@ -44,6 +44,7 @@ impl Estimator {
             stamp,
             map_from_head,
             covariance: self.consider.covariance_at(&map_from_head.translation.vector),
+            covariance_against_gauge: self.consider.covariance_against_gauge(&map_from_head.translation.vector),
             velocity_in_map_m_per_s: motion.velocity + motion.angular_velocity.cross(&arm),
             gyro_bias_rad_per_s: window.biases.gyro,
             accel_bias_m_per_s2: window.biases.accel,

@@ -4,9 +4,14 @@ use crate::estimation::window::{Solved, Window};
 use crate::estimation::{EstimatorSpec, TimeSpent, WarningKind, WindowReport};
 use crate::time::Stamp;
 
-/// What is told of a window's solution, and what it took.
-pub(super) fn report(solved: &Solved, stamp: Stamp, window: &Window, took: (f64, TimeSpent)) -> WindowReport {
-    let (elapsed_s, spent) = took;
+/// The report on a window's solution: whether the head moved in it, what was wrong with it, and the time it took.
+pub(super) fn report(
+    solved: &Solved,
+    (stamp, moving): (Stamp, bool),
+    window: &Window,
+    trouble: Option<WarningKind>,
+    (elapsed_s, spent): (f64, TimeSpent),
+) -> WindowReport {
     WindowReport {
         stamp,
         surfels: solved.surfels,
@@ -19,6 +24,12 @@ pub(super) fn report(solved: &Solved, stamp: Stamp, window: &Window, took: (f64,
         conditioning: solved.conditioning,
         imu_contradiction: window.imu_contradiction(),
         clock_offset_s: window.clock.offset_s,
+        clock_rate: window.clock.rate,
+        range_correction_m: window.lidar().range_m,
+        imu_matrix: window.imu_matrix(),
+        speed_m_per_s: window.speed_m_per_s(),
+        moving,
+        trouble,
         elapsed_s,
         spent,
     }

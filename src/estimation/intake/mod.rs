@@ -12,7 +12,7 @@ use super::spec::EstimatorSpec;
 use super::stamps::{Regularity, StampFilter};
 use super::strapdown::Interval;
 use super::surfel::Beam;
-use super::{EstimationError, Warning, WarningKind};
+use super::{EstimationError, LeftOut, Warning, WarningKind};
 use crate::measurement::{Calibration, Measurement};
 use crate::time::{Span, Stamp};
 
@@ -254,11 +254,11 @@ impl Intake {
         let stamp = self.stamp(self.next_start_s);
         let samples = self.samples.left_out;
         for (what, count) in [
-            ("IMU samples came late or ran backwards in time", samples.late),
-            ("lidar scans came late or ran backwards in time", self.scans.late),
-            ("IMU samples are outliers that no neighbour supports", samples.outliers),
-            ("IMU samples repeat the reading before them", samples.frozen),
-            ("lidar scans repeat the scan before them, or have one range on all beams", self.scans.frozen),
+            (LeftOut::LateSamples, samples.late),
+            (LeftOut::LateScans, self.scans.late),
+            (LeftOut::Outliers, samples.outliers),
+            (LeftOut::RepeatedSamples, samples.frozen),
+            (LeftOut::RepeatedScans, self.scans.frozen),
         ] {
             if count > 0 {
                 self.warnings.push(Warning { stamp, kind: WarningKind::LeftOut { what, count } });

@@ -279,6 +279,11 @@ impl Window {
         Some(placed)
     }
 
+    /// The largest of the estimated scale errors and misalignments of the IMU.
+    pub(super) fn imu_matrix(&self) -> f64 {
+        self.exaggerates.gyro.amax().max(self.exaggerates.accel.amax())
+    }
+
     /// What is known of the lidar beyond its calibration.
     pub(super) fn lidar(&self) -> LidarCorrection {
         self.maker.lidar

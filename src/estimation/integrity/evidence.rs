@@ -1,0 +1,212 @@
+//! What speaks for and against a result.
+
+use super::finding::{Cause, Finding, Status};
+use crate::estimation::{LeftOut, Warning, WarningKind, WindowReport};
+use crate::time::{Span, Stamp};
+
+/// Evidence is weighed over stretches of this length, s, or half of a shorter run.
+const STRETCH_S: f64 = 5.0;
+/// Contradiction between IMU and lidar, as a multiple of the IMU's noise, from which a result is degraded, and lost.
+/// 0.12 to 0.35 in 24 sound runs of all scenes, at most 0.61 in a window.
+const CONTRADICTION: (f64, f64) = (0.6, 3.0);
+/// Residual of matched surfaces, m, likewise. 2 to 4.5 mm in sound runs, 6 in a window.
+const RESIDUAL_M: (f64, f64) = (0.010, 0.018);
+/// Share of a stretch in which too few surfaces were matched, or windows were not solved.
+const NOT_TRACKED: (f64, f64) = (0.35, 0.6);
+/// Gaps longer than this degrade a result, s.
+const GAP_S: f64 = 0.2;
+const LIDAR_GAP_S: f64 = 1.0;
+/// Share of clipped samples, and of the recording without an estimate.
+const CLIPPED: f64 = 0.005;
+const NOT_COVERED: f64 = 0.05;
+/// More repeated readings than this are a frozen sensor.
+const FROZEN: (usize, usize) = (30, 10);
+/// Corrections of the calibration that are not plausible: of all ranges, m, and of the IMU's scale and misalignment.
+const RANGE_CORRECTION_M: (f64, f64) = (0.06, 0.1);
+const IMU_SCALE: (f64, f64) = (0.009, 0.04);
+/// Drift between the clocks that no crystals have, s/s.
+const CLOCK_RATE: f64 = 5e-4;
+/// A head that is faster than this was integrated without being observed, m/s.
+const SPEED_M_PER_S: f64 = 60.0;
+
+/// Contradiction, residual (m) and IMU scale up to which a covariance is taken at its word.
+const SOUND: (f64, f64, f64) = (0.4, 0.006, 0.004);
+/// Where no window constrains some direction, errors of normals pass for information: the covariance along it is too
+/// small by this factor.
+const WEAK_DOUBT: f64 = 4.0;
+const MOST_DOUBT: f64 = 1000.0;
+
+/// What an estimate leaves behind to judge it by.
+#[derive(Debug, Clone, Copy)]
+pub struct Evidence<'a> {
+    /// The windows' reports, in order.
+    pub windows: &'a [WindowReport],
+    /// What the estimator reported.
+    pub warnings: &'a [Warning],
+    /// How many IMU samples there were.
+    pub samples: usize,
+    /// First and last stamp of the recording, lidar time.
+    pub recorded: (Stamp, Stamp),
+    /// First and last stamp of the estimate.
+    pub estimated: (Stamp, Stamp),
+}
+
+/// What was found about a run, the worst first, those of one weight in the order of time.
+pub fn findings(evidence: &Evidence) -> Vec<Finding> {
+    let mut all = of_windows(evidence.windows);
+    all.extend(evidence.warnings.iter().filter_map(|warning| of_warning(warning, evidence)));
+    all.extend(of_calibration(evidence.windows));
+    all.extend(of_coverage(evidence));
+    all.sort_by_key(|finding| (std::cmp::Reverse(finding.status), finding.from));
+    all
+}
+
+/// A stretch of windows with the median of a measure, or a share.
+fn over_stretches(
+    windows: &[WindowReport],
+    measure: impl Fn(&[WindowReport]) -> f64,
+    (degraded, lost): (f64, f64),
+) -> Option<(Status, f64, Stamp, Stamp)> {
+    let step_s = windows.windows(2).map(|pair| pair[1].stamp.seconds_since(pair[0].stamp)).fold(0.0, f64::max);
+    let length = ((STRETCH_S / step_s.clamp(0.1, STRETCH_S)).round() as usize).min(windows.len() / 2).max(1);
+    let mut found: Option<(Status, f64, Stamp, Stamp)> = None;
+    for stretch in windows.windows(length) {
+        let value = measure(stretch);
+        if value <= degraded {
+            continue;
+        }
+        let status = if value > lost { Status::Lost } else { Status::Degraded };
+        let (from, to) = (stretch[0].stamp, stretch[length - 1].stamp);
+        found = Some(match found {
+            // A lost result is lost from the first stretch that is.
+            Some((worst, most, begins, ends)) if worst >= status => {
+                let ends = if worst > status { ends } else { to };
+                (worst, most.max(value), begins, ends)
+            }
+            Some((_, most, ..)) => (status, most.max(value), from, to),
+            None => (status, value, from, to),
+        });
+    }
+    found
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or_default()
+}
+
+/// Whether a window left the position to the IMU although surfaces should have been matched.
+fn is_untracked(window: &WindowReport) -> bool {
+    matches!(window.trouble, Some(WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }))
+}
+
+fn of_windows(windows: &[WindowReport]) -> Vec<Finding> {
+    let contradiction = |stretch: &[WindowReport]| median(stretch.iter().map(|w| w.imu_contradiction).collect());
+    let residual = |stretch: &[WindowReport]| median(stretch.iter().map(|w| w.residual_rms_m).collect());
+    let untracked =
+        |stretch: &[WindowReport]| stretch.iter().filter(|w| is_untracked(w)).count() as f64 / stretch.len() as f64;
+    let fastest = |stretch: &[WindowReport]| stretch.iter().map(|w| w.speed_m_per_s).fold(0.0, f64::max);
+    let mut all = Vec::new();
+    let mut add = |found: Option<(Status, f64, Stamp, Stamp)>, cause: &dyn Fn(f64, Stamp, Stamp) -> Cause| {
+        all.extend(found.map(|(status, value, from, to)| Finding { status, cause: cause(value, from, to), from, to }));
+    };
+    add(over_stretches(windows, contradiction, CONTRADICTION), &|times, _, _| Cause::Contradiction { times });
+    add(over_stretches(windows, residual, RESIDUAL_M), &|residual_m, _, _| Cause::PoorFit { residual_m });
+    add(over_stretches(windows, untracked, NOT_TRACKED), &|_, from, to| Cause::FewMatches {
+        seconds: to.seconds_since(from),
+    });
+    add(over_stretches(windows, fastest, (SPEED_M_PER_S, SPEED_M_PER_S)), &|speed_m_per_s, _, _| Cause::Speed {
+        speed_m_per_s,
+    });
+    all
+}
+
+fn of_warning(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
+    let end = evidence.recorded.1;
+    let from = warning.stamp;
+    let lasting = |seconds: f64| from + Span::from_seconds(seconds);
+    let (status, cause, to) = match &warning.kind {
+        WarningKind::BeganAgain { seconds } => {
+            (Status::Degraded, Cause::Gap { sensor: "IMU", seconds: *seconds }, lasting(*seconds))
+        }
+        WarningKind::ImuGap { seconds } if *seconds > GAP_S => {
+            (Status::Degraded, Cause::Gap { sensor: "IMU", seconds: *seconds }, lasting(*seconds))
+        }
+        WarningKind::LidarGap { seconds } if *seconds > LIDAR_GAP_S => {
+            (Status::Degraded, Cause::Gap { sensor: "lidar", seconds: *seconds }, from)
+        }
+        WarningKind::LostAgain { .. } | WarningKind::LostInMap => (Status::Lost, Cause::NotRelocalised, end),
+        WarningKind::Saturated { samples } if *samples as f64 > CLIPPED * evidence.samples as f64 => {
+            let share = *samples as f64 / evidence.samples.max(1) as f64;
+            (Status::Degraded, Cause::Clipped { share }, end)
+        }
+        WarningKind::LeftOut { what: LeftOut::RepeatedSamples, count } if *count > FROZEN.0 => {
+            (Status::Degraded, Cause::Frozen { sensor: "IMU", count: *count }, end)
+        }
+        WarningKind::LeftOut { what: LeftOut::RepeatedScans, count } if *count > FROZEN.1 => {
+            (Status::Degraded, Cause::Frozen { sensor: "lidar", count: *count }, end)
+        }
+        _ => return None,
+    };
+    Some(Finding { status, cause, from, to })
+}
+
+/// Corrections of the calibration that are too large to be true. They are taken at the run's end, when they are known
+/// best, and hold for all of it.
+fn of_calibration(windows: &[WindowReport]) -> Vec<Finding> {
+    let (Some(first), Some(last)) = (windows.first(), windows.last()) else { return Vec::new() };
+    let late = &windows[windows.len() / 2..];
+    let of = |value: f64, (degraded, lost): (f64, f64), cause: Cause| {
+        let status = if value > lost { Status::Lost } else { Status::Degraded };
+        (value > degraded).then_some(Finding { status, cause, from: first.stamp, to: last.stamp })
+    };
+    let correction_m = last.range_correction_m;
+    let entry = late.iter().map(|window| window.imu_matrix).fold(0.0, f64::max);
+    let rate = median(late.iter().map(|window| window.clock_rate.abs()).collect());
+    [
+        of(correction_m.abs(), RANGE_CORRECTION_M, Cause::RangeCorrection { correction_m }),
+        of(entry, IMU_SCALE, Cause::ImuScale { entry }),
+        of(rate, (CLOCK_RATE, f64::INFINITY), Cause::ClockRate { rate }),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+fn of_coverage(evidence: &Evidence) -> Option<Finding> {
+    let ((from, to), (begins, ends)) = (evidence.recorded, evidence.estimated);
+    let (before_s, after_s) = (begins.seconds_since(from).max(0.0), to.seconds_since(ends).max(0.0));
+    let seconds = before_s + after_s;
+    let (from, to) = if before_s > after_s { (from, begins) } else { (ends, to) };
+    let recorded_s = evidence.recorded.1.seconds_since(evidence.recorded.0);
+    let cause = Cause::NotCovered { seconds };
+    (seconds > NOT_COVERED * recorded_s && seconds > 0.5).then_some(Finding {
+        status: Status::Degraded,
+        cause,
+        from,
+        to,
+    })
+}
+
+/// By how much the bound that follows from the covariance is to be enlarged, at each window's end.
+///
+/// The covariance assumes that IMU, lidar and calibration are as specified. Where IMU and lidar contradict each other,
+/// surfaces fit badly, or the IMU's scale leaves its prior, something else is wrong too, and by about as much. An error
+/// that was made stays in the map, so the factor never falls.
+pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
+    let mut most = 1.0_f64;
+    let near = |k: usize| &windows[k.saturating_sub(2)..(k + 3).min(windows.len())];
+    let factor = |k: usize| {
+        let contradiction = median(near(k).iter().map(|w| w.imu_contradiction).collect());
+        let residual_m = median(near(k).iter().map(|w| w.residual_rms_m).collect());
+        let weak = near(k).iter().filter(|w| matches!(w.trouble, Some(WarningKind::WeakGeometry { .. }))).count();
+        let weak = if weak == near(k).len() { WEAK_DOUBT } else { 1.0 };
+        let scale = windows[k].imu_matrix / SOUND.2;
+        (contradiction / SOUND.0).max(residual_m / SOUND.1).max(scale).max(weak).clamp(1.0, MOST_DOUBT)
+    };
+    let enlarge = |k: usize| {
+        most = most.max(factor(k));
+        (windows[k].stamp, most)
+    };
+    (0..windows.len()).map(enlarge).collect()
+}

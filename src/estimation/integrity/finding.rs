@@ -1,0 +1,185 @@
+//! What was found about a run, and what it means for the result.
+
+use crate::time::Stamp;
+use std::fmt;
+
+/// The verdict on a result, best first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Status {
+    /// Within its bound, which is small.
+    #[default]
+    Good,
+    /// Usable within its bound, which is larger than usual, or incomplete.
+    Degraded,
+    /// Not usable from some time on.
+    Lost,
+}
+
+impl Status {
+    /// As in `metrics.json`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Degraded => "degraded",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A cause of degradation or loss, over a stretch of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// What it makes of the result.
+    pub status: Status,
+    /// What was found.
+    pub cause: Cause,
+    /// From when, lidar time.
+    pub from: Stamp,
+    /// Until when.
+    pub to: Stamp,
+}
+
+/// What degrades an estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cause {
+    /// IMU and lidar contradict each other by so many times the IMU's noise.
+    Contradiction {
+        /// Median over the stretch; 0.1 to 0.4 in a sound run.
+        times: f64,
+    },
+    /// Too few surfaces were observed again for so long, s.
+    FewMatches {
+        /// How long, s.
+        seconds: f64,
+    },
+    /// Matched surfaces do not fit, root mean square, m.
+    PoorFit {
+        /// Median over the stretch, m.
+        residual_m: f64,
+    },
+    /// After a gap the head was not found in the map built so far, so the trajectory has an unknown offset.
+    NotRelocalised,
+    /// The estimated velocity is not plausible.
+    Speed {
+        /// The largest, m/s.
+        speed_m_per_s: f64,
+    },
+    /// A gap in a sensor's data, longer than is bridged without doubt.
+    Gap {
+        /// `"IMU"` or `"lidar"`.
+        sensor: &'static str,
+        /// How long, s.
+        seconds: f64,
+    },
+    /// The estimate does not cover the whole recording.
+    NotCovered {
+        /// How much of it is missing, s.
+        seconds: f64,
+    },
+    /// The gyroscope or accelerometer was at the end of its range.
+    Clipped {
+        /// Share of the samples, 0..1.
+        share: f64,
+    },
+    /// A sensor repeats its reading.
+    Frozen {
+        /// `"IMU"` or `"lidar"`.
+        sensor: &'static str,
+        /// How many of its measurements were left out.
+        count: usize,
+    },
+    /// The estimated correction of all ranges is not plausible, m.
+    RangeCorrection {
+        /// The correction, m.
+        correction_m: f64,
+    },
+    /// The estimated scale or misalignment of the IMU is not plausible.
+    ImuScale {
+        /// Largest entry.
+        entry: f64,
+    },
+    /// The estimated rate of the clock offset is not plausible, s/s.
+    ClockRate {
+        /// The rate, s/s.
+        rate: f64,
+    },
+    /// The bound on the position error is large, m.
+    Uncertain {
+        /// Largest bound, m.
+        bound_m: f64,
+    },
+    /// Loop closure moved the trajectory by more than its uncertainty, m.
+    LoopClosure {
+        /// Largest shift, m.
+        moved_m: f64,
+    },
+}
+
+impl Cause {
+    /// A key for scripts.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Contradiction { .. } => "contradiction",
+            Self::FewMatches { .. } => "few_matches",
+            Self::PoorFit { .. } => "poor_fit",
+            Self::NotRelocalised => "not_relocalised",
+            Self::Speed { .. } => "speed",
+            Self::Gap { .. } => "gap",
+            Self::NotCovered { .. } => "not_covered",
+            Self::Clipped { .. } => "clipped",
+            Self::Frozen { .. } => "frozen",
+            Self::RangeCorrection { .. } => "range_correction",
+            Self::ImuScale { .. } => "imu_scale",
+            Self::ClockRate { .. } => "clock_rate",
+            Self::Uncertain { .. } => "uncertain",
+            Self::LoopClosure { .. } => "loop_closure",
+        }
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Contradiction { times } => write!(
+                f,
+                "IMU and lidar contradict each other by {times:.1} times the IMU noise (0.1 to 0.4 is usual); check the \
+                 extrinsics, the IMU's units, signs and range, and the clocks"
+            ),
+            Self::FewMatches { seconds } => {
+                write!(f, "too few surfaces observed again for {seconds:.1} s; position from the IMU only")
+            }
+            Self::PoorFit { residual_m } => {
+                write!(f, "matched surfaces fit to {:.0} mm only; map and trajectory are distorted", residual_m * 1e3)
+            }
+            Self::NotRelocalised => {
+                write!(f, "relocalisation failed after a gap; the trajectory after it has an unknown offset")
+            }
+            Self::Speed { speed_m_per_s } => write!(f, "implausible velocity of {speed_m_per_s:.0} m/s"),
+            Self::Gap { sensor, seconds } => write!(f, "gap of {seconds:.2} s in the {sensor} data"),
+            Self::NotCovered { seconds } => {
+                write!(f, "{seconds:.1} s of the recording have no estimate (a sensor is missing there)")
+            }
+            Self::Clipped { share } => {
+                write!(f, "{:.1} % of the IMU samples are clipped at the end of the sensor's range", share * 1e2)
+            }
+            Self::Frozen { sensor, count } => write!(f, "the {sensor} repeats its reading ({count} left out)"),
+            Self::RangeCorrection { correction_m } => {
+                write!(f, "implausible range correction of {:.0} mm", correction_m * 1e3)
+            }
+            Self::ImuScale { entry } => write!(f, "implausible IMU scale or misalignment of {:.1} %", entry * 1e2),
+            Self::ClockRate { rate } => write!(f, "implausible drift between the clocks of {:.0} ppm", rate * 1e6),
+            Self::Uncertain { bound_m } => {
+                write!(f, "the position error may reach {bound_m:.2} m (99 % bound)")
+            }
+            Self::LoopClosure { moved_m } => {
+                write!(f, "loop closure moved the trajectory by {moved_m:.2} m, more than its uncertainty")
+            }
+        }
+    }
+}
