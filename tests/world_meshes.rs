@@ -150,10 +150,15 @@ impl Scene {
     }
 
     fn build(&self, mesh: &str, bytes: &[u8]) -> Result<World, WorldError> {
+        self.build_with(mesh, bytes, "scale: 2")
+    }
+
+    /// A world of a mesh with these `keys`.
+    fn build_with(&self, mesh: &str, bytes: &[u8], keys: &str) -> Result<World, WorldError> {
         std::fs::write(self.path().join(mesh), bytes).unwrap();
         let text = format!(
             "(name: \"scene\",\n materials: {{\"a\": (reflectance: 0.5)}},\n items: [\n  \
-             Solid(shape: Mesh(file: \"{mesh}\", scale: 2), material: \"a\", at_m_deg: [(1, 2, 3, 90)]),\n])"
+             Solid(shape: Mesh(file: \"{mesh}\", {keys}), material: \"a\", at_m_deg: [(1, 2, 3, 90)]),\n])"
         );
         std::fs::write(self.path().join("scene.ron"), text).unwrap();
         World::load(self.path().join("scene.ron").to_str().unwrap())
@@ -209,9 +214,32 @@ fn a_box_is_the_same_box_from_every_format() {
 }
 
 #[test]
+fn the_unit_and_the_up_axis_of_a_mesh_can_be_specified() {
+    // The box is 2 x 1 x 3 of its units, about (0.5, 0, 0). With y up, its y points along z and its z along -y: 2 x 3 x 1.
+    // It stands turned by 90 degrees about z at (1, 2, 3).
+    let scene = Scene::new();
+    let size = |file: &str, bytes: &[u8], keys: &str| {
+        let (lower, upper) = scene.build_with(file, bytes, keys).unwrap_or_else(|error| panic!("{error}")).bounds();
+        upper - lower
+    };
+    for (keys, metres) in
+        [("unit: m", 1.0), ("unit: cm", 0.01), ("unit: mm", 1e-3), ("unit: inch", 0.0254), ("unit: foot", 0.3048)]
+    {
+        assert_relative_eq!(size("box.obj", &obj(), keys), Vector::new(1.0, 2.0, 3.0) * metres, epsilon = 1e-12);
+    }
+    assert_relative_eq!(size("box.obj", &obj(), "scale: 3, unit: cm"), Vector::new(0.03, 0.06, 0.09), epsilon = 1e-12);
+    assert_relative_eq!(size("box.stl", &stl_binary("x"), "up: y"), Vector::new(3.0, 2.0, 1.0), epsilon = 1e-12);
+    assert_relative_eq!(size("box.stl", &stl_binary("x"), "up: z"), Vector::new(1.0, 2.0, 3.0), epsilon = 1e-12);
+    assert_relative_eq!(size("box.glb", &glb(), "up: y"), Vector::new(1.0, 2.0, 3.0), epsilon = 1e-12);
+    assert_relative_eq!(size("box.glb", &glb(), "up: z"), Vector::new(1.0, 2.0, 3.0).xzy(), epsilon = 1e-12);
+    assert!(scene.build_with("box.obj", &obj(), "unit: furlong").is_err());
+}
+
+#[test]
 fn what_is_wrong_with_a_mesh_is_said_in_a_sentence() {
     let scene = Scene::new();
-    let faults: [(&str, Vec<u8>, &str); 17] = [
+    let faults: [(&str, Vec<u8>, &str); 18] = [
+        ("hall.dae", b"<COLLADA/>".to_vec(), "convert it to glTF"),
         ("empty.obj", b"".to_vec(), "has no triangles"),
         ("points.ply", ply_ascii()[..0].to_vec(), "end of file"),
         ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec(), "triangle 1 has a corner that is not finite"),
@@ -271,8 +299,20 @@ fn a_few_triangles_without_area_are_left_out_and_told() {
     }
     text += "v 0 0 0\nv 1 1 1\nv 2 2 2\nf -3 -2 -1\n";
     let world = scene.build("patched.obj", text.as_bytes()).unwrap();
-    assert_eq!(world.notes(), ["patched.obj: 1 triangles without area were left out"]);
+    assert_eq!(world.notes(), ["patched.obj: removed 1 of 413 triangles, which have no area"]);
     assert_eq!(world.triangle_count(), 412);
+}
+
+#[test]
+fn up_to_a_tenth_of_the_triangles_may_have_no_area() {
+    let scene = Scene::new();
+    let flat = |count: usize| "v 0 0 0\nv 1 1 1\nv 2 2 2\nf -3 -2 -1\n".repeat(count);
+    let sound: String = (0..90).map(|k| format!("v 0 0 {k}\nv 1 0 {k}\nv 0 1 {k}\nf -3 -2 -1\n")).collect();
+    let world = scene.build("hall.obj", (sound.clone() + &flat(10)).as_bytes()).unwrap();
+    assert_eq!(world.notes(), ["hall.obj: removed 10 of 100 triangles, which have no area"]);
+    assert_eq!(world.triangle_count(), 90);
+    let error = scene.error("hall.obj", (sound + &flat(11)).as_bytes());
+    assert!(error.contains("11 of its 101 triangles have no area") && error.contains("10 %"), "{error}");
 }
 
 #[test]

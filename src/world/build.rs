@@ -5,7 +5,9 @@ use super::import::{self, MeshTriangles};
 use super::mover::{Mover, Path};
 use super::scatter;
 use super::shape::Triangle;
-use super::{ItemSpec, Material, MaterialId, MaterialKind, MoverSpec, Placement, SceneSpec, ShapeSpec, WorldError};
+use super::{
+    ItemSpec, LengthUnit, Material, MaterialId, MaterialKind, MoverSpec, Placement, SceneSpec, ShapeSpec, WorldError,
+};
 use crate::geometry::{Pose, Route, Vector};
 use crate::spec::{Source, SpecError};
 use std::collections::BTreeMap;
@@ -221,11 +223,12 @@ impl Builder<'_> {
     }
 
     fn shape(&mut self, shape: &ShapeSpec) -> Result<Rc<MeshTriangles>, WorldError> {
-        let ShapeSpec::Mesh { file, scale } = shape else {
+        let ShapeSpec::Mesh { file, scale, unit, up } = shape else {
             let wrong = |(key, sentence): (&str, String)| SpecError::about(self.source, key, sentence);
             return Ok(Rc::new(MeshTriangles { triangles: shape.triangles().map_err(wrong)?, without_area: 0 }));
         };
-        let key = format!("{file} * {scale}");
+        let scale = scale * unit.map_or(1.0, LengthUnit::metres);
+        let key = format!("{file} * {scale}, up {up:?}");
         if let Some(known) = self.meshes.get(&key) {
             return Ok(Rc::clone(known));
         }
@@ -233,11 +236,14 @@ impl Builder<'_> {
         let Some(folder) = &self.source.folder else {
             return Err(wrong(format!("a scene without a folder of its own cannot name the mesh `{file}`")));
         };
-        let mesh =
-            import::read(&folder.join(file), *scale).map_err(|error| wrong(format!("the mesh `{file}` {error}")))?;
+        let mesh = import::read(&folder.join(file), scale, *up)
+            .map_err(|error| wrong(format!("the mesh `{file}` {error}")))?;
         if mesh.without_area > 0 {
             let count = mesh.without_area;
-            self.notes.push(format!("{file}: {count} triangles without area were left out"));
+            self.notes.push(format!(
+                "{file}: removed {count} of {} triangles, which have no area",
+                count + mesh.triangles.len()
+            ));
         }
         let mesh = Rc::new(mesh);
         self.meshes.insert(key, Rc::clone(&mesh));

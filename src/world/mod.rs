@@ -38,7 +38,7 @@ pub use material::{Material, MaterialId};
 pub use model::World;
 pub use placement::Placement;
 pub use ray::{Hit, Ray};
-pub use shape::{HeightsSpec, OpeningSpec, ShapeSpec};
+pub use shape::{HeightsSpec, LengthUnit, OpeningSpec, ShapeSpec, UpAxis};
 pub use spec::{
     ItemSpec, MaterialKind, MaterialSpec, MoverSpec, RouteSpec, ScatterSpec, SceneSpec, Turn, WaypointSpec,
 };

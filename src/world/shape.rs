@@ -93,7 +93,52 @@ pub enum ShapeSpec {
         /// Metres per unit of the file; 1 unless told.
         #[serde(default = "default_scale", deserialize_with = "checked::positive")]
         scale: f64,
+        /// The file's unit of length, by which `scale` is multiplied; metres unless told.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        unit: Option<LengthUnit>,
+        /// The file's axis that points up; unless told y in glTF, as its specification has it, and z in others.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        up: Option<UpAxis>,
     },
+}
+
+/// A unit of length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LengthUnit {
+    /// Metres.
+    M,
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
+    /// Inches of 25.4 mm.
+    Inch,
+    /// Feet of 304.8 mm.
+    Foot,
+}
+
+impl LengthUnit {
+    /// Metres in one of it.
+    pub(super) fn metres(self) -> f64 {
+        match self {
+            LengthUnit::M => 1.0,
+            LengthUnit::Cm => 0.01,
+            LengthUnit::Mm => 0.001,
+            LengthUnit::Inch => 0.0254,
+            LengthUnit::Foot => 0.3048,
+        }
+    }
+}
+
+/// The axis of a mesh that points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UpAxis {
+    /// y, as in glTF: x stays, z becomes -y.
+    Y,
+    /// z, as in scenes.
+    Z,
 }
 
 fn default_sides() -> usize {

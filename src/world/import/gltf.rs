@@ -1,7 +1,5 @@
 //! glTF 2.0, as `.gltf` with its buffers and as `.glb`: the triangles of the scene, each by the transforms of its
 //! nodes.
-//!
-//! In glTF y points up; here z does, so that a model stands as it was made to.
 
 mod accessor;
 mod document;
@@ -35,8 +33,7 @@ pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Triangle>
     for root in roots {
         walk.visit(root, &Transform::identity(), 0)?;
     }
-    let upright = |corner: Vector| Vector::new(corner.x, -corner.z, corner.y);
-    Ok(walk.triangles.into_iter().map(|triangle| triangle.map(upright)).collect())
+    Ok(walk.triangles)
 }
 
 fn malformed(problem: impl Into<String>) -> MeshError {

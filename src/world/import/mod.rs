@@ -6,14 +6,14 @@ mod obj;
 mod ply;
 mod stl;
 
-use super::shape::Triangle;
+use super::shape::{Triangle, UpAxis};
 use crate::geometry::Vector;
 use std::path::Path;
 
 /// Largest file of a mesh: twice the triangles that a scene may have, as binary STL.
 const MAX_BYTES: u64 = 1 << 30;
 /// Largest share of triangles without area that a mesh may have.
-const MAX_SHARE_WITHOUT_AREA: f64 = 0.01;
+const MAX_SHARE_WITHOUT_AREA: f64 = 0.1;
 /// A triangle is flat when its height is less than this part of its longest edge.
 const FLAT: f64 = 1e-6;
 
@@ -35,6 +35,10 @@ pub(super) enum MeshError {
     TooLarge(u64),
     #[error("ends in neither .obj, .stl, .ply, .gltf nor .glb")]
     UnknownFormat,
+    #[error(
+        "is a COLLADA file, which is not read: convert it to glTF with Blender (import the .dae, export as .glb) or with `assimp export model.dae model.glb`"
+    )]
+    Collada,
     #[error("is no {format} mesh: {problem}")]
     Malformed { format: &'static str, problem: String },
     #[error("says it has {said}, but holds {found}")]
@@ -46,13 +50,14 @@ pub(super) enum MeshError {
     #[error("triangle {0} has a corner that is not finite")]
     NotFinite(usize),
     #[error(
-        "{without} of its {all} triangles have no area (thinner than a millionth of their length); at most 1 % may: repair the mesh"
+        "{without} of its {all} triangles have no area (thinner than a millionth of their length); at most 10 % may: repair the mesh"
     )]
     WithoutArea { without: usize, all: usize },
 }
 
-/// Reads the mesh in a file; `scale` is metres per unit of it.
-pub(super) fn read(path: &Path, scale: f64) -> Result<MeshTriangles, MeshError> {
+/// Reads the mesh in a file; `scale` is metres per unit of it, `up` the axis that points up where that is not its
+/// format's own.
+pub(super) fn read(path: &Path, scale: f64, up: Option<UpAxis>) -> Result<MeshTriangles, MeshError> {
     let meta = std::fs::metadata(path)?;
     if !meta.is_file() {
         return Err(MeshError::Io(std::io::Error::other("it is not a file")));
@@ -60,25 +65,34 @@ pub(super) fn read(path: &Path, scale: f64) -> Result<MeshTriangles, MeshError> 
     if meta.len() > MAX_BYTES {
         return Err(MeshError::TooLarge(meta.len()));
     }
-    let parse = parser(path)?;
-    let triangles = parse(std::fs::read(path)?, path)?;
+    let Format { parse, up: own_up } = format_of(path)?;
+    let mut triangles = parse(std::fs::read(path)?, path)?;
+    if up.unwrap_or(own_up) == UpAxis::Y {
+        triangles.iter_mut().flatten().for_each(|corner| *corner = Vector::new(corner.x, -corner.z, corner.y));
+    }
     check(triangles, scale)
 }
 
-type Parser = fn(Vec<u8>, &Path) -> Result<Vec<Triangle>, MeshError>;
+/// How a file is read: the triangles as it has them, and the axis that points up unless the scene says otherwise.
+struct Format {
+    parse: fn(Vec<u8>, &Path) -> Result<Vec<Triangle>, MeshError>,
+    up: UpAxis,
+}
 
-fn parser(path: &Path) -> Result<Parser, MeshError> {
+fn format_of(path: &Path) -> Result<Format, MeshError> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     match ending.as_str() {
-        "obj" => Ok(|bytes, _| obj::parse(&bytes)),
-        "stl" => Ok(|bytes, _| stl::parse(bytes)),
-        "ply" => Ok(|bytes, _| ply::parse(&bytes)),
-        "gltf" | "glb" => Ok(|bytes, path| gltf::parse(&bytes, path.parent())),
+        "obj" => Ok(Format { parse: |bytes, _| obj::parse(&bytes), up: UpAxis::Z }),
+        "stl" => Ok(Format { parse: |bytes, _| stl::parse(bytes), up: UpAxis::Z }),
+        "ply" => Ok(Format { parse: |bytes, _| ply::parse(&bytes), up: UpAxis::Z }),
+        // The specification of glTF 2.0 has y up (section 3.4).
+        "gltf" | "glb" => Ok(Format { parse: |bytes, path| gltf::parse(&bytes, path.parent()), up: UpAxis::Y }),
+        "dae" => Err(MeshError::Collada),
         _ => Err(MeshError::UnknownFormat),
     }
 }
 
-/// Scales triangles, and leaves out the few that have no area.
+/// Scales triangles, and removes those that have no area, unless they are too many.
 fn check(triangles: Vec<Triangle>, scale: f64) -> Result<MeshTriangles, MeshError> {
     if triangles.is_empty() {
         return Err(MeshError::Empty);
