@@ -110,3 +110,24 @@ fn a_scene_with_meshes_is_included_from_its_own_folder_alone() {
     let told = fault(&apart, "guest.ron");
     assert!(told.contains("guest.ron:3:") && told.contains("keep it in the folder"), "{told}");
 }
+
+#[test]
+fn a_chain_of_includes_ends_in_an_error_before_the_stack_does() {
+    let scene = |name: &str, included: &[String]| {
+        format!(
+            "(name: \"{name}\", include: {included:?}, materials: {{}}, items: [Solid(shape: Box(size_m: (1, 1, 1)), \
+             material: \"stone\")])"
+        )
+    };
+    let last = HALL.replace("hall", "last");
+    let chain = |length: usize| {
+        let mut files: Vec<(String, String)> =
+            (0..length).map(|k| (format!("s{k}.ron"), scene(&format!("s{k}"), &[format!("s{}", k + 1)]))).collect();
+        files.push((format!("s{length}.ron"), last.clone()));
+        let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
+        built(&files, "s0.ron").map(|world| world.triangle_count())
+    };
+    assert_eq!(chain(16).unwrap(), 12 * 17);
+    let error = chain(5000).unwrap_err().to_string();
+    assert!(error.contains("17 levels deep; 16 at most"), "{error}");
+}

@@ -6,6 +6,9 @@ use crate::spec::{Kind, Source, SpecError, find, parse};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+/// Deepest chain of scenes that include each other.
+const MOST_DEEP: usize = 16;
+
 impl SceneSpec {
     /// This scene and those that it includes as one that includes none. `source` is the text it came from: a scene is
     /// looked for beside it, and then as everywhere.
@@ -32,6 +35,9 @@ fn whole(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError> {
         let other = beside(source, name).map_err(|error| wrong(format!("is missing: {}", error.message())))?;
         if chain.iter().any(|before| before.text == other.text) {
             return Err(wrong("includes itself, directly or through another".to_owned()).into());
+        }
+        if chain.len() > MOST_DEEP {
+            return Err(wrong(format!("is included {} levels deep; {MOST_DEEP} at most", chain.len())).into());
         }
         let other_chain: Vec<&Source> = chain.iter().copied().chain([&other]).collect();
         let included = whole(&parse(&other)?, &other_chain)?;
