@@ -111,7 +111,10 @@ pub fn parse_tum(name: &str, text: impl Read) -> Result<Trajectory, RecordingErr
         }
         let error = |problem: String| RecordingError::Line { name: name.to_owned(), line, problem };
         let whole = read < LONGEST_LINE as usize;
+        let is_first = line == 1;
         let line = std::str::from_utf8(&bytes).ok().filter(|_| whole).map(str::trim);
+        // Some editors put a byte order mark before the text.
+        let line = line.map(|line| if is_first { line.trim_start_matches('\u{feff}').trim() } else { line });
         let line = line.ok_or_else(|| error("this is no line of text of at most 4096 bytes".to_owned()))?;
         if line.is_empty() || line.starts_with('#') {
             continue;

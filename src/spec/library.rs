@@ -41,7 +41,12 @@ impl Source {
             return Err(SpecError::plain(&name, message));
         }
         let bytes = std::fs::read(path).map_err(io)?;
-        let text = String::from_utf8(bytes).map_err(|error| SpecError::plain(&name, format!("is no text: {error}")))?;
+        let mut text =
+            String::from_utf8(bytes).map_err(|error| SpecError::plain(&name, format!("is no text: {error}")))?;
+        // Some editors put a byte order mark before the text.
+        if text.starts_with('\u{feff}') {
+            text.drain(..'\u{feff}'.len_utf8());
+        }
         Ok(Self { name, folder: path.parent().map(Path::to_path_buf), text })
     }
 }

@@ -5,6 +5,7 @@
 //! nobody knows, a negative mass, is one [`SpecError`] with file, line and column. What concerns several fields is
 //! checked when the room that owns the spec builds its model from it.
 
+mod bounds;
 pub mod checked;
 mod error;
 mod library;
@@ -27,7 +28,13 @@ fn options() -> ron::Options {
 /// # Errors
 /// A [`SpecError`] with line and column, for bad syntax, unknown or missing keys, and numbers out of their range.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
-    options().from_str(&source.text).map_err(|error| SpecError::at(source, error.span.start, error.code.to_string()))
+    options().from_str(&source.text).map_err(|error| {
+        let bounds = match error.code {
+            ron::Error::IntegerOutOfBounds => bounds::message::<T>(source, &error),
+            _ => None,
+        };
+        SpecError::at(source, error.span.start, bounds.unwrap_or_else(|| error.code.to_string()))
+    })
 }
 
 /// Finds and parses the spec of `kind` called `name`: a path, or a name in the library.
