@@ -1,5 +1,8 @@
 use crate::spec::SpecError;
 
+/// Longest run, s: 7 days, whose recording takes 600 GB and more.
+pub const LONGEST_S: f64 = 604_800.0;
+
 /// Why a motion cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum MotionError {
@@ -47,7 +50,7 @@ pub enum MotionError {
         index: usize,
     },
     /// A length of time that is no length of time.
-    #[error("a motion lasts a finite time above 0 s, not {duration_s} s")]
+    #[error("a run of {duration_s} s: it lasts more than 0 s, and {LONGEST_S} s (7 days) at most")]
     Duration {
         /// What was asked for.
         duration_s: f64,

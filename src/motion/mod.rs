@@ -30,7 +30,7 @@ mod walk;
 
 pub use cruise::CruiseSpec;
 pub use drops::DropSpec;
-pub use error::MotionError;
+pub use error::{LONGEST_S, MotionError};
 pub use hand::{CarrySpec, GaitSpec, HandSpec, ShakeSpec};
 pub use legged::{LeggedSpec, StrideSpec};
 pub use marine::{HullSpec, MarineSpec, SeaSpec};

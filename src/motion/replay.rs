@@ -15,7 +15,7 @@ use crate::spec::{Source, SpecError};
 use crate::time::Stamp;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A trajectory of the base to play.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -93,10 +93,22 @@ fn onto((floor, heading): &(Vector, f64), first: &Pose) -> Pose {
     Pose::from_parts((floor - turn * below).into(), turn)
 }
 
+fn from_folder(source: &Source, file: &str) -> PathBuf {
+    source.folder.as_deref().unwrap_or(Path::new("")).join(file)
+}
+
 impl PosesSpec {
+    /// The file, or the folder of a recording; a relative path is from the folder of `source`.
+    pub(super) fn file(&self, source: &Source) -> Option<PathBuf> {
+        match self {
+            PosesSpec::Tum(file) | PosesSpec::Recording { file, .. } => Some(from_folder(source, file)),
+            PosesSpec::Here(_) => None,
+        }
+    }
+
     fn trajectory(&self, source: &Source) -> Result<Trajectory, SpecError> {
         let fault = |message: String| SpecError::about(source, "poses", message);
-        let beside = |file: &str| source.folder.as_deref().unwrap_or(Path::new("")).join(file);
+        let beside = |file: &str| from_folder(source, file);
         match self {
             PosesSpec::Tum(file) => read_tum(&beside(file)).map_err(|error| fault(error.to_string())),
             PosesSpec::Recording { file, topic } => {

@@ -7,11 +7,12 @@ use super::shaker::{Shaker, ShakerSpec};
 use super::stand::{Stand, StandSpec};
 use super::uav::{Uav, UavSpec};
 use super::vehicle::{Vehicle, VehicleSpec};
-use super::{BaseMotion, MotionError};
+use super::{BaseMotion, LONGEST_S, MotionError};
 use crate::geometry::Route;
 use crate::random::Seed;
 use crate::spec::{Kind, Source, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// How the base moves, as a file of `specs/motions/` says it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,12 +48,20 @@ pub fn load(name: &str) -> Result<(MotionSpec, Source), SpecError> {
 }
 
 impl MotionSpec {
+    /// The file, or the folder of a recording, that a recorded motion is read from; `source` is the spec's text.
+    pub fn recorded_file(&self, source: &Source) -> Option<PathBuf> {
+        match self {
+            MotionSpec::Replay(spec) => spec.poses.file(source),
+            _ => None,
+        }
+    }
+
     /// Builds the motion for a run of `duration_s` along `route` (m, on the floor), with all of its chance drawn from
     /// `seed`. `source` is the spec's text, which errors point into.
     ///
     /// # Errors
     /// When numbers of the spec contradict each other, the route is missing or cannot be followed, or the duration is
-    /// not a length of time.
+    /// not above 0 s and at most [`LONGEST_S`].
     pub fn build(
         &self,
         source: &Source,
@@ -60,7 +69,7 @@ impl MotionSpec {
         duration_s: f64,
         seed: Seed,
     ) -> Result<Box<dyn BaseMotion>, MotionError> {
-        if !(duration_s.is_finite() && duration_s > 0.0) {
+        if !(duration_s > 0.0 && duration_s <= LONGEST_S) {
             return Err(MotionError::Duration { duration_s });
         }
         Ok(match self {

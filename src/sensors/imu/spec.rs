@@ -3,6 +3,10 @@ use super::errors::{GaussMarkov, TriadModel};
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
 use crate::spec::{Source, SpecError, checked};
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
+
+/// Samples a second of any IMU that is simulated, Hz.
+const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
 
 /// An inertial measurement unit, as its data sheet has it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -94,6 +98,11 @@ pub struct GaussMarkovSpec {
 impl ImuSpec {
     /// Checks what concerns several fields.
     pub(super) fn check(&self, source: &Source) -> Result<(), SpecError> {
+        if !RATES_HZ.contains(&self.rate_hz) {
+            let message =
+                format!("{} samples a second; an IMU makes {} to {}", self.rate_hz, RATES_HZ.start(), RATES_HZ.end());
+            return Err(SpecError::about(source, "rate_hz", message));
+        }
         if self.stamp_delay_ms.abs() > 1e3 {
             let message = format!("a delay of {} ms; within 1000 ms", self.stamp_delay_ms);
             return Err(SpecError::about(source, "stamp_delay_ms", message));

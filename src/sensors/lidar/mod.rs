@@ -39,10 +39,11 @@ impl Lidar {
     /// The lidar that `spec`, from `source`, describes.
     ///
     /// # Errors
-    /// When its beams do not fit into its turn, or its limits contradict each other.
+    /// When its beams do not fit into its turn, its rates are those of no lidar, or its limits contradict each other.
     pub fn new(spec: &LidarSpec, source: &Source) -> Result<Self, SpecError> {
         spec.check(source)?;
         let Pattern { beams, plane, turns_per_scan } = spec.pattern.build(spec.rate_hz, source)?;
+        spec.check_beams(beams.len(), source)?;
         let (rays, weights) = spec.rays_of(&beams);
         Ok(Self { beams, plane, turns_per_scan, rays, weights, spec: spec.clone() })
     }
@@ -56,6 +57,11 @@ impl Lidar {
     /// where the pattern does not repeat.
     pub fn beams(&self) -> &[Beam] {
         &self.beams
+    }
+
+    /// Whether its scans have the polar form of a planar scan: one range and intensity for each step in azimuth.
+    pub fn is_planar(&self) -> bool {
+        self.plane.is_some()
     }
 
     /// How many rays stand for one beam.

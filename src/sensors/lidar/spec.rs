@@ -3,6 +3,12 @@ use crate::geometry::Vector;
 use crate::spec::{Source, SpecError, checked};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
+
+/// Scans a second of any lidar that is simulated, Hz.
+const RATES_HZ: RangeInclusive<f64> = 0.1..=1000.0;
+/// Most beams a second: a hundred times those of a spinning lidar with 16 channels.
+const MOST_BEAMS_PER_S: f64 = 3e7;
 
 /// A lidar, as its data sheet has it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -140,6 +146,11 @@ impl LidarSpec {
     /// Checks what concerns several fields.
     pub(super) fn check(&self, source: &Source) -> Result<(), SpecError> {
         let refuse = |key: &str, message: String| Err(SpecError::about(source, key, message));
+        if !RATES_HZ.contains(&self.rate_hz) {
+            let message =
+                format!("{} scans a second; a lidar makes {} to {}", self.rate_hz, RATES_HZ.start(), RATES_HZ.end());
+            return refuse("rate_hz", message);
+        }
         if self.range_min_m >= self.range_max_m {
             let message = format!("range_min_m {} is not below range_max_m {}", self.range_min_m, self.range_max_m);
             return refuse("range_min_m", message);
@@ -159,6 +170,19 @@ impl LidarSpec {
             return refuse("from_deg", "grazing incidence begins below 90 degrees".to_owned());
         }
         Ok(())
+    }
+
+    /// Checks how many beams a second there are, `beams` of them in a scan.
+    pub(super) fn check_beams(&self, beams: usize, source: &Source) -> Result<(), SpecError> {
+        let per_s = beams as f64 * self.rate_hz;
+        if per_s <= MOST_BEAMS_PER_S {
+            return Ok(());
+        }
+        let message = format!(
+            "{beams} beams a scan at {} Hz are {per_s:.3e} beams a second; {MOST_BEAMS_PER_S:.0e} at most",
+            self.rate_hz
+        );
+        Err(SpecError::about(source, "rate_hz", message))
     }
 
     /// The rays of each beam in turn, and the weight of each ray of a beam.

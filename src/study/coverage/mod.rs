@@ -20,6 +20,9 @@ use serde::Serialize;
 use sphere::Sphere;
 use track::SwingTrack;
 
+/// Latest time that is looked at, s: an hour, of which some 200 MB are held in memory.
+const LONGEST_S: f64 = 3600.0;
+
 /// What is run and looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoveragePlan {
@@ -112,7 +115,7 @@ pub struct GyroUse {
 /// Runs `head` on `motion` and tells what `lidar` sees; `watch` is shown every instant that is looked at.
 ///
 /// # Errors
-/// When the plan has no time to look, or the simulation fails.
+/// When the plan has no time to look or looks at more than an hour, or the simulation fails.
 pub fn coverage(
     head: &HeadModel,
     motion: &dyn BaseMotion,
@@ -122,6 +125,10 @@ pub fn coverage(
 ) -> Result<Coverage, StudyError> {
     if !(plan.duration_s >= 2.0 * lidar.period_s() && plan.from_s >= 0.0) {
         let message = format!("{} s from {} s on: less than two scans of the lidar", plan.duration_s, plan.from_s);
+        return Err(StudyError::Plan { what: "time to look", message });
+    }
+    if !(plan.from_s + plan.duration_s <= LONGEST_S) {
+        let message = format!("until {} s; {LONGEST_S} s at most", plan.from_s + plan.duration_s);
         return Err(StudyError::Plan { what: "time to look", message });
     }
     let track = SwingTrack::record(head, motion, plan, watch)?;

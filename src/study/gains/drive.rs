@@ -6,12 +6,20 @@ use crate::geometry::{Kinematics, Pose, Vector};
 use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, Phases, ShakerSpec, SignalSpec};
 use crate::spec::Source;
 use crate::study::StudyError;
+use std::ops::RangeInclusive;
 
 /// How long the shaker takes to reach its full strength, s.
 const ONSET_S: f64 = 1.0;
 
 /// What is left of the settling when recording begins.
 const LEFT_OF_SETTLING: f64 = 1e-5;
+
+/// Time steps that a simulation may have, s.
+const STEPS_S: RangeInclusive<f64> = 1e-5..=0.1;
+/// Most lines of a multisine: each pose of the base is a sum of so many sines.
+const MOST_LINES: f64 = 10_000.0;
+/// Most steps of a period, each of which is held in memory for each thread.
+const MOST_STEPS: f64 = 1e6;
 
 /// Times of a measurement, in steps of the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,8 +34,13 @@ impl Schedule {
     /// When to record `head` by `plan`.
     ///
     /// # Errors
-    /// When the period holds no line below the highest frequency, or too few steps.
+    /// When the period holds no line below the highest frequency, or too few steps; when it holds more of either than
+    /// memory and time allow, or the step is that of no simulation.
     pub fn of(head: &HeadModel, plan: &GainPlan) -> Result<Self, StudyError> {
+        if !STEPS_S.contains(&plan.step_s) {
+            let message = format!("{} s; from {} s to {} s", plan.step_s, STEPS_S.start(), STEPS_S.end());
+            return Err(StudyError::Plan { what: "step", message });
+        }
         let modes = head.linear_modes();
         let decay = modes.iter().map(|mode| mode.decay_per_s());
         let settling_s = decay.fold(0.0, |most, rate| f64::max(most, -LEFT_OF_SETTLING.ln() / rate));
@@ -42,6 +55,23 @@ impl Schedule {
                 plan.up_to_hz, plan.step_s
             );
             return Err(StudyError::Plan { what: "highest frequency", message });
+        }
+        if period_s * plan.up_to_hz > MOST_LINES {
+            let message = format!(
+                "{period_s} s and {} Hz make {:.3e} lines; {MOST_LINES} at most: take a shorter period or a lower \
+                 highest frequency",
+                plan.up_to_hz,
+                period_s * plan.up_to_hz
+            );
+            return Err(StudyError::Plan { what: "period", message });
+        }
+        if period_s / plan.step_s > MOST_STEPS {
+            let message = format!(
+                "{period_s} s in steps of {} s are {:.3e} steps; {MOST_STEPS} at most",
+                plan.step_s,
+                period_s / plan.step_s
+            );
+            return Err(StudyError::Plan { what: "period", message });
         }
         let steps = |span_s: f64| (span_s / plan.step_s).round() as usize;
         Ok(Self { settling: steps(settling_s) + 1, period: steps(period_s) })

@@ -9,6 +9,12 @@ use crate::signal::{Segments, TransferPoint, transfer_function};
 use crate::study::watch::Pieces;
 use crate::study::{Hear, StudyError};
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
+
+/// How many realisations there may be.
+const REALISATIONS: RangeInclusive<usize> = 2..=1000;
+/// Most steps of all periods that are kept for an axis: 160 MB, and six axes are kept at once.
+const MOST_KEPT: usize = 10_000_000;
 
 /// The gains of `head` along and about all six axes, in the order of [`AXES`].
 ///
@@ -49,11 +55,21 @@ fn checked(head: &HeadModel, plan: &GainPlan) -> Result<Schedule, StudyError> {
     if let Some(why) = head.unyielding() {
         return Err(StudyError::Plan { what: "head", message: why.to_owned() });
     }
-    if plan.realisations < 2 {
-        let message = format!("{} tell nothing of coherence: take 2 or more", plan.realisations);
+    if !REALISATIONS.contains(&plan.realisations) {
+        let (least, most) = (REALISATIONS.start(), REALISATIONS.end());
+        let message = format!("{}; from {least}, which coherence needs, to {most}", plan.realisations);
         return Err(StudyError::Plan { what: "realisations", message });
     }
-    Schedule::of(head, plan)
+    let schedule = Schedule::of(head, plan)?;
+    let kept = plan.realisations * schedule.period;
+    if kept > MOST_KEPT {
+        let message = format!(
+            "{} of {} steps each are {kept} steps; {MOST_KEPT} at most: take fewer, a shorter period or longer steps",
+            plan.realisations, schedule.period
+        );
+        return Err(StudyError::Plan { what: "realisations", message });
+    }
+    Ok(schedule)
 }
 
 /// One period of a settled head.
