@@ -28,13 +28,16 @@ pub struct Finding {
     pub notes: Vec<String>,
 }
 
+/// The first line of [`paper_table`], by which the file is recognised.
+pub const TABLE_HEADING: &str = "# The paper's experiments, reproduced";
+
 /// The table of all experiments, as Markdown; `findings` with the names that find them, `None` for one that is not
 /// finished. `options` belong to the command that makes them.
 pub fn paper_table(findings: &[(String, Option<Finding>)], extent: Extent, options: &str) -> String {
-    let mut text = "# The paper's experiments, reproduced\n\n\
+    let mut text = TABLE_HEADING.to_owned();
+    text += "\n\n\
         Bosse, Zlot and Flick, \"Zebedee: Design of a Spring-Mounted 3-D Range Sensor with Application to Mobile Mapping\", \
-        IEEE Transactions on Robotics 28(5), 2012. This file is written by `zsim reproduce`.\n\n"
-        .to_owned();
+        IEEE Transactions on Robotics 28(5), 2012. This file is written by `zsim reproduce`.\n\n";
     if extent == Extent::Quick {
         text +=
             "So little was simulated here that these figures are no results: they show that the experiments run.\n\n";

@@ -13,7 +13,7 @@ mod spec;
 mod timing;
 
 pub use damping::{Fit, FittedPeak, fit_damping};
-pub use finding::{Finding, Row, paper_table};
+pub use finding::{Finding, Row, TABLE_HEADING, paper_table};
 pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec};
 
 use super::latency::Latency;

@@ -89,10 +89,10 @@ fn check_names(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
     }
 }
 
-const UNFIT: &str = "cannot be a name in a table: leave out commas, quotes, bars and new lines";
+const UNFIT: &str = "cannot be a name in a table: leave out commas, quotes, bars and control characters";
 
 fn unfit(name: &str) -> bool {
-    name.is_empty() || name.contains([',', '"', '|', '\n', '\r'])
+    name.is_empty() || name.contains(|c: char| c.is_control() || [',', '"', '|'].contains(&c))
 }
 
 /// What a list has twice.

@@ -63,8 +63,12 @@ impl Plan {
     /// is replaced, of which all runs that are in both stay done.
     ///
     /// # Errors
-    /// When the folder holds another plan or cannot be written, or runs are wrong in their combination.
+    /// When the folder holds another plan or files that are not a sweep's, or cannot be written, or runs are wrong in
+    /// their combination.
     pub fn write(&self, folder: &Path, anew: bool) -> Result<Sweep, StudyError> {
+        if !anew && !plan_of(folder).exists() && is_foreign(folder)? {
+            return Err(StudyError::OtherWork { folder: folder.to_owned() });
+        }
         let temporary = temporary(folder);
         for each in [&temporary, &parts(folder)] {
             std::fs::create_dir_all(each).map_err(StudyError::file(each))?;
@@ -229,6 +233,22 @@ fn units(plan: &Plan, identities: &[Identity]) -> Vec<Unit> {
         count: block.len() as u64,
     };
     identities.chunks(size as usize).enumerate().map(unit).collect()
+}
+
+/// Whether a folder without a plan holds more than planning leaves behind when it is killed.
+fn is_foreign(folder: &Path) -> Result<bool, StudyError> {
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(false),
+        Err(error) => return Err(StudyError::file(folder)(error)),
+    };
+    let ours = [temporary(folder), parts(folder), points_of(folder)];
+    for entry in entries {
+        if !ours.contains(&entry.map_err(StudyError::file(folder))?.path()) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 fn plan_of(folder: &Path) -> PathBuf {

@@ -1,6 +1,7 @@
 //! Parts become one table: the same bytes, whoever did them, when, and in which order.
 
 use super::folder::{STRETCH, Unit};
+use super::part::Part;
 use super::table::{Column, Held, TableWriter, quoted};
 use super::{Measure, Share, Sweep};
 use crate::study::StudyError;
@@ -18,8 +19,10 @@ pub struct Status {
     pub done: u64,
     /// Those of them that failed.
     pub failed: u64,
-    /// Those that are not done.
+    /// Those that are not done, or whose parts are damaged: `zsim sweep run` does them.
     pub missing: u64,
+    /// Those of the missing runs whose parts are damaged, or belong to other runs.
+    pub damaged: u64,
     /// Time that one thread takes for what is missing, if it goes on as it did so far, s.
     pub thread_s_left: Option<f64>,
 }
@@ -28,12 +31,12 @@ impl Sweep {
     /// How far it is, or a share of it.
     ///
     /// # Errors
-    /// When a part cannot be read.
+    /// When a part cannot be opened.
     pub fn status(&self, share: Share) -> Result<Status, StudyError> {
         let mut tally = Tally::default();
         for unit in share.of(&self.tasks).flatten() {
             let unit = &self.units[*unit as usize];
-            tally.take(unit, self.kept(unit)?.as_deref());
+            tally.take(unit, &self.kept(unit)?);
         }
         Ok(tally.status())
     }
@@ -43,15 +46,15 @@ impl Sweep {
     /// Memory holds a stretch of rows.
     ///
     /// # Errors
-    /// When a part cannot be read, or the tables cannot be written.
+    /// When a part cannot be opened, or the tables cannot be written.
     pub fn merge(&self) -> Result<Status, StudyError> {
         let mut tables = Tables::create(self)?;
         let mut tally = Tally::default();
         let mut stretch = self.empty_stretch();
         for unit in &self.units {
             let kept = self.kept(unit)?;
-            tally.take(unit, kept.as_deref());
-            let Some(kept) = kept else { continue };
+            tally.take(unit, &kept);
+            let Part::Done(kept) = kept else { continue };
             stretch.take(self, unit, kept);
             if stretch.numbers.len() as u64 >= STRETCH {
                 tables.write(self, std::mem::replace(&mut stretch, self.empty_stretch()))?;
@@ -161,13 +164,15 @@ struct Tally {
     done: u64,
     failed: u64,
     missing: u64,
+    damaged: u64,
     wall_s: f64,
 }
 
 impl Tally {
-    fn take(&mut self, unit: &Unit, kept: Option<&[Column]>) {
-        let Some(kept) = kept else {
+    fn take(&mut self, unit: &Unit, part: &Part) {
+        let Part::Done(kept) = part else {
             self.missing += unit.count;
+            self.damaged += if *part == Part::Damaged { unit.count } else { 0 };
             return;
         };
         self.done += unit.count;
@@ -188,6 +193,7 @@ impl Tally {
             done: self.done,
             failed: self.failed,
             missing: self.missing,
+            damaged: self.damaged,
             thread_s_left: each_s.map(|each_s| each_s * self.missing as f64),
         }
     }

@@ -1,10 +1,27 @@
 //! What came of runs: rows, and the parts that they are kept in.
 
 use super::folder::Unit;
+use super::identity::Identity;
 use super::table::{Column, Held, Table, TableWriter};
 use super::{Measure, Sweep};
 use crate::study::StudyError;
+use parquet::errors::ParquetError;
 use std::error::Error;
+
+/// Keys of a part's metadata: the unit that it belongs to, and a hash of its cells.
+const UNIT: &str = "zsim.unit";
+const CHECKSUM: &str = "zsim.checksum";
+
+/// What is on disk of a unit.
+#[derive(Debug, PartialEq)]
+pub(super) enum Part {
+    /// Its columns: a measure each, errors, times.
+    Done(Vec<Column>),
+    /// A file that is cut short or changed, or that belongs to another unit.
+    Damaged,
+    /// Nothing.
+    Missing,
+}
 
 /// What came of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -56,22 +73,60 @@ impl Sweep {
         columns.push(Column::Words(rows.iter().map(|row| row.error.clone()).collect()));
         columns.push(Column::Numbers(rows.iter().map(|row| row.wall_s).collect()));
         table.write(&columns)?;
+        table.mark(UNIT, unit.identity.to_string());
+        table.mark(CHECKSUM, checksum(&columns, rows.len()).to_string());
         table.finish()
     }
 
-    /// The columns of a unit's part: a measure each, errors, times; `None` while it is not done.
-    pub(super) fn kept(&self, unit: &Unit) -> Result<Option<Vec<Column>>, StudyError> {
-        let Some(table) = Table::open(&self.part(unit))? else { return Ok(None) };
+    /// What is on disk of a unit.
+    ///
+    /// # Errors
+    /// When its file exists and cannot be opened. A damaged file is no error: the unit is to be done again.
+    pub(super) fn kept(&self, unit: &Unit) -> Result<Part, StudyError> {
+        match self.read(unit) {
+            Ok(Some(columns)) => Ok(Part::Done(columns)),
+            Ok(None) => Ok(Part::Missing),
+            Err(StudyError::Table { .. }) => Ok(Part::Damaged),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The columns of a unit's part, if there is one: measures, errors, times. One that is cut short or changed, or
+    /// that belongs to another unit, is an error of its table.
+    fn read(&self, unit: &Unit) -> Result<Option<Vec<Column>>, StudyError> {
+        let path = self.part(unit);
+        let Some(table) = Table::open(&path)? else { return Ok(None) };
+        let wrong = |what: &str| StudyError::table(&path)(ParquetError::General(what.to_owned()));
+        if table.mark(UNIT) != Some(&unit.identity.to_string()) {
+            return Err(wrong("belongs to another part of a sweep"));
+        }
+        if table.groups() != 1 || u64::try_from(table.rows()) != Ok(unit.count) {
+            return Err(wrong("has another number of rows"));
+        }
         let columns = self.part_columns();
         let columns: Vec<(&str, Held)> = columns.iter().map(|(name, held)| (name.as_str(), *held)).collect();
-        let mut kept = Vec::new();
-        for group in 0..table.groups() {
-            kept = table.read(group, &columns)?;
+        let kept = table.read(0, &columns)?;
+        let rows = unit.count as usize;
+        if kept.iter().any(|column| column.len() != rows) {
+            return Err(wrong("has columns of different lengths"));
+        }
+        if table.mark(CHECKSUM) != Some(&checksum(&kept, rows).to_string()) {
+            return Err(wrong("was changed"));
         }
         Ok(Some(kept))
     }
 
-    pub(super) fn is_done(&self, unit: &Unit) -> bool {
-        self.part(unit).is_file()
+    /// Whether a unit's part is on disk and undamaged.
+    ///
+    /// # Errors
+    /// As [`kept`](Self::kept).
+    pub(super) fn is_done(&self, unit: &Unit) -> Result<bool, StudyError> {
+        Ok(matches!(self.kept(unit)?, Part::Done(_)))
     }
+}
+
+/// A hash of all cells.
+fn checksum(columns: &[Column], rows: usize) -> Identity {
+    let cells: Vec<String> = columns.iter().flat_map(|column| (0..rows).map(move |row| column.cell(row))).collect();
+    Identity::of(cells.iter().map(String::as_bytes))
 }

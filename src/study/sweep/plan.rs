@@ -41,7 +41,7 @@ impl Plan {
     /// # Errors
     /// At the place in the spec that is wrong.
     pub fn new(name: &str, spec: &SweepSpec, source: &Source) -> Result<Self, StudyError> {
-        let mut shelf = Shelf { base: base(&spec.base, source)?, ..Shelf::default() };
+        let mut shelf = Shelf { base: base(&spec.base, name)?, ..Shelf::default() };
         let plan = Self::with(name, spec, &mut shelf, source)?;
         if let BaseSpec::Journey { .. } = spec.base {
             plan.simulation(&BTreeMap::new(), plan.spec.seeds[0])?;
@@ -52,6 +52,10 @@ impl Plan {
     /// The same with specs that were found before.
     pub(super) fn with(name: &str, spec: &SweepSpec, shelf: &mut Shelf, source: &Source) -> Result<Self, StudyError> {
         check(spec, source)?;
+        if name.chars().any(char::is_control) {
+            let message = format!("the sweep's name {name:?} has control characters: rename its file");
+            return Err(SpecError::plain(&source.name, message).into());
+        }
         let axes = spec.axes.iter().map(|axis| Axis::new(axis, spec.sampling, shelf, source));
         let axes: Vec<Axis> = axes.collect::<Result<_, _>>()?;
         let extents: Vec<Extent> = axes.iter().map(Axis::extent).collect();
@@ -235,8 +239,8 @@ impl Plan {
     }
 }
 
-/// The specs of a base.
-fn base(spec: &BaseSpec, source: &Source) -> Result<BTreeMap<Slot, Kept>, StudyError> {
+/// The specs of a base. The run itself is called by the plan's name, not by its file's path: `./a.ron` is `a.ron`.
+fn base(spec: &BaseSpec, name: &str) -> Result<BTreeMap<Slot, Kept>, StudyError> {
     let (run, named) = match spec {
         BaseSpec::Spring { head, shake } => (Component::Nod(Nod { shake: *shake }), vec![(Slot::Head, head)]),
         BaseSpec::Journey { scene, head, motion, lidar, imu, clock, faults, estimator, route, duration_s, .. } => {
@@ -254,7 +258,7 @@ fn base(spec: &BaseSpec, source: &Source) -> Result<BTreeMap<Slot, Kept>, StudyE
             (run, named)
         }
     };
-    let run = Kept { name: source.name.clone(), folder: None, component: run };
+    let run = Kept { name: name.to_owned(), folder: None, component: run };
     let named = named.into_iter().map(|(slot, name)| Ok((slot, Kept::load(slot, name)?)));
     std::iter::once(Ok((Slot::Run, run))).chain(named).collect()
 }

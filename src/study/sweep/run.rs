@@ -55,8 +55,12 @@ impl Sweep {
             let message = format!("{} of {}: shares are counted from 0", share.index, share.count);
             return Err(StudyError::Plan { what: "share", message });
         }
-        let is_missing = |task: &usize| self.tasks[*task].iter().any(|unit| !self.is_done(&self.units[*unit as usize]));
-        let tasks: Vec<usize> = (0..self.tasks.len()).filter(|task| share.has(*task)).filter(is_missing).collect();
+        let mut tasks = Vec::new();
+        for task in (0..self.tasks.len()).filter(|task| share.has(*task)) {
+            if !self.missing(task)?.is_empty() {
+                tasks.push(task);
+            }
+        }
         match self.plan.spec().base {
             BaseSpec::Spring { .. } => self.run_here(&tasks, runner),
             BaseSpec::Journey { .. } => self.run_in_workers(&tasks, runner),
@@ -78,8 +82,8 @@ impl Sweep {
     fn run_in_workers(&self, tasks: &[usize], runner: &Runner) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
         let at_once = threads.min(tasks.len()).max(1);
-        let missing = |task: &usize| self.missing(*task).len();
-        let pieces = Pieces::new(tasks.iter().map(missing).sum(), runner.hear);
+        let missing = tasks.iter().map(|task| self.missing(*task).map(|units| units.len()));
+        let pieces = Pieces::new(missing.sum::<Result<usize, StudyError>>()?, runner.hear);
         let next = AtomicUsize::new(0);
         let failed = AtomicBool::new(false);
         let work = || {
@@ -124,7 +128,7 @@ impl Sweep {
                 continue;
             }
             // Before any of them was begun, their simulation failed.
-            let failed = if begun.is_empty() { self.missing(worker.task) } else { begun };
+            let failed = if begun.is_empty() { self.missing(worker.task)? } else { begun };
             let row = Row::failed(self.plan.told().len(), &why);
             for unit in failed {
                 self.keep(&self.units[unit], std::slice::from_ref(&row))?;
@@ -135,8 +139,13 @@ impl Sweep {
     }
 
     /// The units of a task that are not done.
-    pub(super) fn missing(&self, task: usize) -> Vec<usize> {
-        let units = self.tasks[task].iter().map(|unit| *unit as usize);
-        units.filter(|unit| !self.is_done(&self.units[*unit])).collect()
+    pub(super) fn missing(&self, task: usize) -> Result<Vec<usize>, StudyError> {
+        let mut missing = Vec::new();
+        for unit in self.tasks[task].iter().map(|unit| *unit as usize) {
+            if !self.is_done(&self.units[unit])? {
+                missing.push(unit);
+            }
+        }
+        Ok(missing)
     }
 }

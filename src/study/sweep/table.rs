@@ -6,6 +6,7 @@ use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::get_typed_column_reader;
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
@@ -49,6 +50,15 @@ impl Column {
 
     pub fn counts(self) -> Vec<Option<i64>> {
         if let Self::Counts(cells) = self { cells } else { Vec::new() }
+    }
+
+    /// How many cells there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Counts(cells) => cells.len(),
+            Self::Numbers(cells) => cells.len(),
+            Self::Words(cells) => cells.len(),
+        }
     }
 
     /// The cell as CSV has it: numbers read back to the same bits.
@@ -122,6 +132,11 @@ impl TableWriter {
         group.close().map(drop)
     }
 
+    /// Writes a word under `key` into the file's metadata.
+    pub fn mark(&mut self, key: &str, word: String) {
+        self.writer.append_key_value_metadata(KeyValue::new(key.to_owned(), word));
+    }
+
     /// Closes the table and moves it to its place.
     pub fn finish(self) -> Result<(), StudyError> {
         let Self { writer, beside } = self;
@@ -168,6 +183,17 @@ impl Table {
     /// How many stretches of rows there are.
     pub fn groups(&self) -> usize {
         self.reader.num_row_groups()
+    }
+
+    /// The word that the file's metadata has under `key`.
+    pub fn mark(&self, key: &str) -> Option<&str> {
+        let marks = self.reader.metadata().file_metadata().key_value_metadata()?;
+        marks.iter().find(|mark| mark.key == key)?.value.as_deref()
+    }
+
+    /// How many rows there are.
+    pub fn rows(&self) -> i64 {
+        self.reader.metadata().file_metadata().num_rows()
     }
 
     /// These columns of a stretch of rows.

@@ -87,7 +87,7 @@ impl Sweep {
         };
         let mut shared: Vec<Shared> = Vec::new();
         let mut places: BTreeMap<Identity, usize> = BTreeMap::new();
-        for unit in units.iter().map(|unit| *unit as usize).filter(|unit| !self.is_done(&self.units[*unit])) {
+        for unit in self.missing(task)? {
             let point = self.plan.point(self.units[unit].first)?;
             let place = *places.entry(point.simulation).or_insert(shared.len());
             if place == shared.len() {
@@ -101,7 +101,7 @@ impl Sweep {
     /// A block of closed forms.
     pub(super) fn run_block(&self, unit: usize) -> Result<(), StudyError> {
         let unit = &self.units[unit];
-        if self.is_done(unit) {
+        if self.is_done(unit)? {
             return Ok(());
         }
         let told = self.plan.told();
@@ -148,7 +148,7 @@ impl Sweep {
         let next = AtomicUsize::new(0);
         let read = |reader: usize| {
             while let Some((tape, (unit, point))) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if self.is_done(&self.units[*unit]) {
+                if self.is_done(&self.units[*unit])? {
                     tell(Word::Done(*unit));
                     continue;
                 }
