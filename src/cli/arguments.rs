@@ -7,9 +7,10 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use zsim::estimation;
 use zsim::geometry::{Pose, Rotation, Route, Vector};
+use zsim::motion;
 use zsim::random::Seed;
 use zsim::simulation::Scenario;
-use zsim::spec::{Source, parse};
+use zsim::spec::{Kind, Source, find, parse};
 use zsim::study::{CalibrationSpec, CloudFormat, CloudWishes, Wishes};
 
 /// What every command understands.
@@ -22,8 +23,16 @@ pub(super) struct Global {
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Use this many threads (default: all of the machine's); results do not depend on it
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
+}
+
+/// Most threads that may be asked for.
+const MOST_THREADS: usize = 1024;
+
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let wrong = || format!("`{text}` is not a number of threads from 1 to {MOST_THREADS}");
+    text.parse().ok().filter(|threads: &NonZeroUsize| threads.get() <= MOST_THREADS).ok_or_else(wrong)
 }
 
 /// What to simulate beside the scene. A name is looked up as a path, then in scenes/ and specs/, then in the program.
@@ -78,6 +87,25 @@ impl ScenarioArguments {
             duration_s: self.duration.unwrap_or(default.duration_s),
             seed: self.seed.map_or(default.seed, Seed),
         }
+    }
+}
+
+impl ScenarioArguments {
+    /// The files that a simulation in `scene` reads, as far as they are known by name: specs, and a recorded motion.
+    pub(super) fn inputs(&self, scene: &str) -> Vec<PathBuf> {
+        let scenario = self.scenario(scene);
+        let names = [
+            (Kind::Scene, &scenario.scene),
+            (Kind::Head, &scenario.head),
+            (Kind::Motion, &scenario.motion),
+            (Kind::Lidar, &scenario.lidar),
+            (Kind::Imu, &scenario.imu),
+            (Kind::Clock, &scenario.clock),
+        ];
+        let sources = names.into_iter().filter_map(|(kind, name)| find(kind, name).ok());
+        let files = sources.filter(|source| source.folder.is_some()).map(|source| PathBuf::from(source.name));
+        let recorded = motion::load(&scenario.motion).ok().and_then(|(spec, source)| spec.recorded_file(&source));
+        files.chain(recorded).collect()
     }
 }
 

@@ -1,27 +1,14 @@
-//! Progress and talk on stderr, and the way to stop.
+//! Progress bars and notes on stderr.
 
 use super::arguments::Global;
+use super::output::printable;
+pub(super) use super::signals::stop_flag;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use zsim::study::{News, Stage};
 
-/// Set by Ctrl-C.
-static STOP: AtomicBool = AtomicBool::new(false);
-
 /// Steps of a whole bar.
 const STEPS: u64 = 1000;
-
-/// Makes Ctrl-C stop what runs; a second one ends the program at once.
-pub(super) fn stop_flag() -> &'static AtomicBool {
-    // Without the handler Ctrl-C ends the program at once, which files survive too.
-    let _ = ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(1);
-        }
-    });
-    &STOP
-}
 
 /// A progress bar for the stage that runs, on a terminal; remarks above it.
 pub(super) struct Bars {
@@ -60,8 +47,8 @@ impl Bars {
             return;
         }
         match &self.shown {
-            Some((_, bar)) => bar.suspend(|| eprintln!("note: {text}")),
-            None => eprintln!("note: {text}"),
+            Some((_, bar)) => bar.suspend(|| eprintln!("note: {}", printable(text))),
+            None => eprintln!("note: {}", printable(text)),
         }
     }
 

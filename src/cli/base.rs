@@ -49,6 +49,9 @@ pub(super) struct Arguments {
     out: OutArguments,
 }
 
+/// Poses of which a trajectory has one acceleration.
+const LEAST_POSES: usize = 3;
+
 /// One of the ways to tell the base.
 struct Way {
     key: &'static str,
@@ -56,10 +59,23 @@ struct Way {
     base: Trajectory,
 }
 
+impl Way {
+    /// The name of its trajectory's file.
+    fn file(&self) -> String {
+        format!("base_{}.tum", self.key)
+    }
+}
+
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
     let (head, source) = dynamics::load(&arguments.head)?;
     let head = HeadModel::new(&head, &source)?;
     let seen = read_tum(&arguments.trajectory)?;
+    anyhow::ensure!(
+        seen.len() >= LEAST_POSES,
+        "{}: a trajectory of {} poses; {LEAST_POSES} are needed, since the head's acceleration is a second difference",
+        arguments.trajectory.display(),
+        seen.len()
+    );
     let truth = arguments.truth.as_deref().map(true_base).transpose()?;
     let by_spring = match &arguments.base_imu {
         Some(_) => study::base_by_law(&head, &seen)?,
@@ -77,6 +93,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     ways.extend(estimate.as_ref().map(|imu| way("imu", "with the base's IMU", imu.trajectory.clone())));
     let wanted = arguments.out.out.clone().unwrap_or_else(|| PathBuf::from("results/base"));
     let folder = output::folder(&wanted, arguments.out.force)?;
+    let inputs: Vec<PathBuf> =
+        [Some(&arguments.trajectory), arguments.truth.as_ref()].into_iter().flatten().cloned().collect();
+    let written: Vec<PathBuf> = ways.iter().map(|way| folder.join(way.file())).collect();
+    output::spare_inputs(&inputs, &written)?;
     let (mut words, mut figures) = tell(&ways, truth.as_ref(), &folder)?;
     if let Some(imu) = &estimate {
         let (offset_ms, sigma_ms) = (imu.clock_offset_s * 1e3, imu.clock_offset_sigma_s * 1e3);
@@ -89,7 +109,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     }
     output::tell(global, &words, figures, Some(&folder))?;
     let Some(loss) = loss.filter(|loss| !loss.is_none()) else { return Ok(End::Done) };
-    loss.sentences().iter().for_each(|loss| eprintln!("loss: {loss}"));
+    loss.sentences().iter().for_each(|loss| eprintln!("loss: {}", output::printable(loss)));
     Ok(End::WithLoss)
 }
 
@@ -109,8 +129,8 @@ fn by_imu(
 /// Writes the trajectories to `folder`; their table, and their figures.
 fn tell(ways: &[Way], truth: Option<&Trajectory>, folder: &Path) -> anyhow::Result<(String, Value)> {
     let (mut rows, mut figures) = (Vec::new(), json!({}));
-    for Way { key, name, base } in ways {
-        write_tum(&folder.join(format!("base_{key}.tum")), base)?;
+    for way @ Way { key, name, base } in ways {
+        write_tum(&folder.join(way.file()), base)?;
         let errors = truth.filter(|_| !base.is_empty()).map(|truth| errors(base, truth)).transpose()?;
         let told = errors.as_ref().map(|e| (e.position_rmse_m(), e.rotation_rmse_rad().to_degrees()));
         figures[*key] = json!({

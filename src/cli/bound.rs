@@ -61,7 +61,7 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
     Ok(World::build(&specs.scene, &Source::in_memory("the recording's scene", ""))?)
 }
 
-fn leave(bounded: &Bounded, wanted: &Path, force: bool) -> anyhow::Result<PathBuf> {
+fn leave(bounded: &Bounded, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
     let path = folder.join("bound.csv");
     std::fs::write(&path, csv(bounded)).with_context(|| format!("{} cannot be written", path.display()))?;

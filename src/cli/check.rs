@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
                 let at = error.line_and_column();
                 figures.push(json!({ "file": file, "error": error.to_string(), "message": error.message(),
                     "line": at.map(|at| at.0), "column": at.map(|at| at.1) }));
-                eprintln!("error: {error}");
+                eprintln!("error: {}", output::printable(&error.to_string()));
             }
         }
     }

@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     Ok(End::Done)
 }
 
-fn leave(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<std::path::PathBuf> {
+fn leave(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
     for (name, text) in [("coverage.csv", over_time_csv(seen)), ("density.csv", density_csv(seen))] {
         let path = folder.join(name);

@@ -2,7 +2,7 @@
 
 use super::arguments::Global;
 use super::{End, output};
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         let estimate = read_tum(estimate)?;
         let pairs = Pairs::associate(&estimate, &read_tum(truth)?)?;
         let world_from_map = pairs.world_from_map()?;
-        judge_trajectory(&pairs, &world_from_map, &mut figures);
+        judge_trajectory(&pairs, &world_from_map, &mut figures)?;
         estimated = Some((estimate, world_from_map));
     }
     if let (Some(cloud), Some(scene)) = (&arguments.cloud, &arguments.scene) {
@@ -62,12 +62,16 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     Ok(End::Done)
 }
 
-fn judge_trajectory(pairs: &Pairs, world_from_map: &Pose, figures: &mut Map<String, Value>) {
+fn judge_trajectory(pairs: &Pairs, world_from_map: &Pose, figures: &mut Map<String, Value>) -> anyhow::Result<()> {
     let errors = Errors::after(pairs, world_from_map);
     let drifted = drift(pairs).ok();
     let relative = relative_error(pairs, Span::from_seconds(60.0)).ok();
     let mut tell = |key: &str, figure: Option<f64>| figures.insert(key.to_owned(), json!(figure));
     tell("duration_s", Some(pairs.duration_s()));
+    ensure!(
+        errors.position_rmse_m().is_finite() && errors.rotation_rmse_rad().is_finite(),
+        "the errors are too large for a number: a position of the estimate or of the truth is absurd"
+    );
     tell("position_rmse_m", Some(errors.position_rmse_m()));
     tell("rotation_rmse_deg", Some(errors.rotation_rmse_rad().to_degrees()));
     tell("drift_m_per_min", drifted.map(|drift| drift.position_m_per_min));
@@ -76,6 +80,7 @@ fn judge_trajectory(pairs: &Pairs, world_from_map: &Pose, figures: &mut Map<Stri
     tell("relative_error_per_minute_m", relative.map(|error| error.position_rmse_m));
     tell("relative_error_per_minute_deg", relative.map(|error| error.rotation_rmse_rad.to_degrees()));
     figures.insert("poses".to_owned(), json!(pairs.len()));
+    Ok(())
 }
 
 fn judge_cloud(

@@ -1,5 +1,7 @@
 //! What is said when a command fails, and with which code.
 
+use super::output::printable;
+use super::signals;
 use std::error::Error;
 use std::process::ExitCode;
 use zsim::simulation::SimulationError;
@@ -7,18 +9,26 @@ use zsim::spec::SpecError;
 use zsim::study::StudyError;
 use zsim::world::WorldError;
 
-/// Prints the error with its causes, and gives its exit code: 2 when what was asked for is wrong, else 1.
+/// Prints the error with its causes, and gives its exit code: that of the signal that stopped it, 2 when what was
+/// asked for is wrong, else 1.
 pub(super) fn tell(error: &anyhow::Error) -> ExitCode {
     let mut said = error.to_string();
-    eprintln!("error: {said}");
+    eprintln!("error: {}", printable(&said));
     for cause in error.chain().skip(1).map(ToString::to_string) {
         // A transparent error has its cause's words.
         if !said.contains(&cause) {
-            eprintln!("  because: {cause}");
+            eprintln!("  because: {}", printable(&cause));
         }
         said = cause;
     }
+    if error.chain().any(is_stopped) {
+        return ExitCode::from(signals::exit_code());
+    }
     if error.chain().any(is_wrong_input) { ExitCode::from(2) } else { ExitCode::FAILURE }
+}
+
+fn is_stopped(error: &(dyn Error + 'static)) -> bool {
+    error.downcast_ref::<StudyError>().is_some_and(|error| matches!(error, StudyError::Stopped))
 }
 
 fn is_wrong_input(error: &(dyn Error + 'static)) -> bool {

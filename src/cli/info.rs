@@ -1,6 +1,7 @@
 //! `zsim info`: what is in a recording.
 
 use super::arguments::Global;
+use super::output::printable_name;
 use super::{End, output, quantity};
 use clap::Args;
 use std::path::PathBuf;
@@ -27,7 +28,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     if info.loss.is_none() {
         return Ok(End::Done);
     }
-    info.loss.sentences().iter().for_each(|loss| eprintln!("loss: {loss}"));
+    info.loss.sentences().iter().for_each(|loss| eprintln!("loss: {}", output::printable(loss)));
     Ok(End::WithLoss)
 }
 
@@ -49,8 +50,8 @@ fn topic_row(topic: &TopicInfo) -> Vec<String> {
     let number = |figure: Option<f64>, decimals: usize| figure.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
     let short = topic.type_name.rsplit('/').next().unwrap_or_default();
     vec![
-        topic.topic.clone(),
-        short.to_owned(),
+        printable_name(&topic.topic),
+        printable_name(short),
         topic.messages.to_string(),
         number(topic.rate_hz, 1),
         number(topic.longest_gap_s, 3),
@@ -63,7 +64,7 @@ fn topic_row(topic: &TopicInfo) -> Vec<String> {
 fn clock_row(topic: &TopicInfo) -> Option<Vec<String>> {
     let clock = topic.clock?;
     Some(vec![
-        topic.topic.clone(),
+        printable_name(&topic.topic),
         format!("{:.3}", clock.offset_s * 1e3),
         format!("{:.2}", clock.drift_ppm),
         format!("{:.3}", clock.jitter_s * 1e3),

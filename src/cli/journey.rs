@@ -3,7 +3,7 @@
 use super::End;
 use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
 use super::bars::{Bars, stop_flag};
-use super::output;
+use super::{output, recording_size};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -29,9 +29,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let wishes = arguments.estimator.wishes()?;
     let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
-    let folder = output::folder(&wanted, arguments.out.force)?;
-
     let mut bars = Bars::new(global);
+    recording_size::check(&simulation, &wanted, |note| bars.remark(note))?;
+    let folder = output::folder(&wanted, arguments.out.force)?;
+    let written = ["recording.mcap", "truth.tum", "result.mcap", "open_loop.tum", "closed_loop.tum", "manifest.ron"];
+    output::spare_inputs(&arguments.scenario.inputs(scene), &written.map(|name| folder.join(name)))?;
+
     simulation.world().notes().iter().for_each(|note| bars.remark(note));
     let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
     let outcome = study::journey(&simulation, &wishes, &folder, &mut watch);
@@ -47,7 +50,7 @@ pub(super) fn default_folder(name: &str) -> PathBuf {
 
 /// Says where the part is that was complete before a failure.
 pub(super) fn left_behind(folder: &Path) {
-    eprintln!("what is complete is in {}", folder.display());
+    eprintln!("what is complete is in {}", output::printable(&folder.display().to_string()));
 }
 
 /// What each part of the estimator took, s, and the whole open loop with them.
@@ -75,6 +78,6 @@ pub(super) fn close(global: &Global, outcome: &Outcome, profile: bool, folder: &
     if outcome.losses.is_empty() {
         return Ok(End::Done);
     }
-    outcome.losses.iter().for_each(|loss| eprintln!("loss: {loss}"));
+    outcome.losses.iter().for_each(|loss| eprintln!("loss: {}", output::printable(loss)));
     Ok(End::WithLoss)
 }

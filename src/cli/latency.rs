@@ -45,16 +45,13 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let scenario = arguments.scenario.scenario(&arguments.scene);
     let spec = LatencySpec { scenario, estimator: arguments.estimator.clone(), ..*shipped };
     let latency = Latency::new(&spec, &source)?;
+    let folder = output::continued(&arguments.out)?;
     let bar = WorkBar::new(global, "estimating");
-    let ran = latency.run(&arguments.out, arguments.force, stop_flag(), &|share| bar.show(share));
+    let ran = latency.run(&folder, arguments.force, stop_flag(), &|share| bar.show(share));
     drop(bar);
-    let study = ran.inspect_err(|_| {
-        if arguments.out.exists() {
-            super::journey::left_behind(&arguments.out);
-        }
-    })?;
-    leave(&study, &arguments.out)?;
-    output::tell(global, &words(&study), serde_json::to_value(&study)?, Some(&arguments.out))?;
+    let study = ran.inspect_err(|_| super::journey::left_behind(&folder))?;
+    leave(&study, &folder)?;
+    output::tell(global, &words(&study), serde_json::to_value(&study)?, Some(&folder))?;
     Ok(End::Done)
 }
 

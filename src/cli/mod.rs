@@ -1,7 +1,7 @@
 //! The command `zsim`: one verb a file.
 //!
-//! Results go to stdout, talk and progress to stderr. Exit codes: 0 done, 1 failed, 2 wrong usage or spec, 3 done with
-//! loss.
+//! Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 failed, 2 wrong usage or spec, 3 done
+//! with loss, 130 and 143 stopped by SIGINT and SIGTERM.
 
 mod arguments;
 mod bars;
@@ -21,7 +21,10 @@ mod latency;
 mod map;
 mod output;
 mod quantity;
+mod recording_files;
+mod recording_size;
 mod reproduce;
+mod signals;
 mod simulate;
 mod slurm;
 mod spring;

@@ -1,52 +1,140 @@
 //! Where results go: folders that are not overwritten, and stdout.
 
 use super::arguments::Global;
-use anyhow::{Context, bail};
+use super::failure::Usage;
+use anyhow::{Context, anyhow, bail, ensure};
 use serde_json::Value;
+use std::borrow::Cow;
+use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Write};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 /// Most numbered siblings that are tried.
 const SIBLINGS: u32 = 10_000;
 
-/// A folder for results, made: `wanted`, or if that exists with something in it, `wanted-2`, `wanted-3`, ...
-pub(super) fn folder(wanted: &Path, force: bool) -> anyhow::Result<PathBuf> {
-    if let Some(parent) = wanted.parent() {
-        std::fs::create_dir_all(parent).with_context(|| format!("{} cannot be made", parent.display()))?;
+/// A folder for results that no other process writes to while this value lives.
+pub(super) struct Folder {
+    path: PathBuf,
+    /// The advisory lock on the folder; the system releases it when the process ends, however it ends.
+    _lock: Option<File>,
+}
+
+impl Deref for Folder {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.path
     }
+}
+
+impl AsRef<Path> for Folder {
+    fn as_ref(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// Creates and locks a folder for results: `wanted`, or if that is not empty or in use, `wanted-2`, `wanted-3`, ...
+///
+/// # Errors
+/// When it cannot be created, or with `force` when another process uses it.
+pub(super) fn folder(wanted: &Path, force: bool) -> anyhow::Result<Folder> {
+    create_parent(wanted)?;
     for candidate in candidates(wanted) {
         match std::fs::create_dir(&candidate) {
-            Ok(()) => return Ok(candidate),
             Err(error) if error.kind() != ErrorKind::AlreadyExists => {
-                return Err(error).with_context(|| format!("{} cannot be made", candidate.display()));
+                return Err(error).with_context(|| format!("{} cannot be created", candidate.display()));
             }
-            Err(_) => {}
+            _ => {}
         }
-        if candidate.is_dir() && (force || is_empty(&candidate)?) {
-            return Ok(candidate);
+        if !candidate.is_dir() {
+            ensure!(!force, "{} exists and is not a folder", candidate.display());
+            continue;
         }
-        if force {
-            bail!("{} is there and no folder", candidate.display());
+        match Folder::locked(&candidate)? {
+            Some(folder) if force || is_empty(&candidate)? => return Ok(folder),
+            None if force => bail!(in_use(&candidate)),
+            _ => {}
         }
     }
-    bail!("{} and thousands of numbered ones are there already", wanted.display());
+    bail!("{} and thousands of numbered folders exist already", wanted.display());
+}
+
+/// Creates and locks a folder in which earlier work is continued.
+///
+/// # Errors
+/// When it cannot be created, or another process uses it.
+pub(super) fn continued(wanted: &Path) -> anyhow::Result<Folder> {
+    std::fs::create_dir_all(wanted).with_context(|| format!("{} cannot be created", wanted.display()))?;
+    Folder::locked(wanted)?.ok_or_else(|| anyhow!(in_use(wanted)))
+}
+
+fn in_use(folder: &Path) -> String {
+    format!("{} is in use by another zsim: wait until it ends, or name another folder with --out", folder.display())
+}
+
+impl Folder {
+    /// Locks the folder at `path`; `None` when another process holds its lock.
+    ///
+    /// The lock is on the folder itself, so that no file is left behind. Where the system cannot lock a folder (some
+    /// network file systems, Windows) it is used without a lock.
+    fn locked(path: &Path) -> anyhow::Result<Option<Self>> {
+        let folder = |lock| Some(Self { path: path.to_owned(), _lock: lock });
+        if !cfg!(unix) {
+            return Ok(folder(None));
+        }
+        let handle = File::open(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        match handle.try_lock() {
+            Ok(()) => Ok(folder(Some(handle))),
+            Err(TryLockError::WouldBlock) => Ok(None),
+            Err(TryLockError::Error(_)) => Ok(folder(None)),
+        }
+    }
 }
 
 /// A file for results, not there yet: `wanted`, or `wanted` with a number before its ending.
 pub(super) fn file(wanted: &Path, force: bool) -> anyhow::Result<PathBuf> {
-    if let Some(parent) = wanted.parent() {
-        std::fs::create_dir_all(parent).with_context(|| format!("{} cannot be made", parent.display()))?;
-    }
+    create_parent(wanted)?;
     let mut candidates = candidates(wanted);
     match candidates.find(|candidate| force || !candidate.exists()) {
-        Some(path) if path.is_dir() => bail!("{} is a folder; the recording needs a file's name", path.display()),
+        Some(path) if path.is_dir() => bail!("{} is a folder; a file's name is needed", path.display()),
         Some(path) => Ok(path),
-        None => bail!("{} and thousands of numbered ones are there already", wanted.display()),
+        None => bail!("{} and thousands of numbered files exist already", wanted.display()),
+    }
+}
+
+/// Creates the folder that `wanted` will be in.
+pub(super) fn create_parent(wanted: &Path) -> anyhow::Result<()> {
+    if wanted.file_name().is_none() {
+        return Err(Usage(format!("--out \"{}\": this is not a name", wanted.display())).into());
+    }
+    match wanted.parent() {
+        Some(parent) => {
+            std::fs::create_dir_all(parent).with_context(|| format!("{} cannot be created", parent.display()))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses outputs that are among the files which the command reads.
+pub(super) fn spare_inputs(inputs: &[PathBuf], outputs: &[PathBuf]) -> anyhow::Result<()> {
+    let existing = |paths: &[PathBuf]| -> Vec<PathBuf> { paths.iter().flat_map(|path| path.canonicalize()).collect() };
+    let inputs = existing(inputs);
+    let is_read = |output: &&PathBuf| inputs.iter().any(|input| output.starts_with(input));
+    match existing(outputs).iter().find(is_read) {
+        None => Ok(()),
+        Some(output) => {
+            let message = format!(
+                "{} is read by this command and would be replaced by its result: name another file or folder with --out",
+                output.display()
+            );
+            Err(Usage(message).into())
+        }
     }
 }
 
 /// `a/b.c`, `a/b-2.c`, `a/b-3.c`, ...
-fn candidates(wanted: &Path) -> impl Iterator<Item = PathBuf> + '_ {
+pub(super) fn candidates(wanted: &Path) -> impl Iterator<Item = PathBuf> + '_ {
     let ending = wanted.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
     let stem = wanted.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let numbered = move |number: u32| wanted.with_file_name(format!("{stem}-{number}{ending}"));
@@ -71,12 +159,33 @@ pub(super) fn tell(global: &Global, words: &str, mut figures: Value, out: Option
     print(&(words + &out.map(|out| out + "\n").unwrap_or_default()))
 }
 
-/// Prints to stdout; a reader that went away is no error.
+/// Prints to stdout, with control characters escaped; a reader that went away is no error.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match std::io::stdout().lock().write_all(printable(text).as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("stdout cannot be written"),
         _ => Ok(()),
     }
+}
+
+/// Text with foreign names in it, fit for a terminal: control characters, which could move the cursor or set the
+/// window's title, and characters that reorder the text are escaped. Line ends stay.
+pub(super) fn printable(text: &str) -> Cow<'_, str> {
+    if text.chars().all(|c| c == '\n' || is_harmless(c)) {
+        return Cow::Borrowed(text);
+    }
+    let escape = |c: char| if c == '\n' || is_harmless(c) { c.to_string() } else { c.escape_default().to_string() };
+    Cow::Owned(text.chars().map(escape).collect())
+}
+
+/// A foreign name within a line or a table: as [`printable`], with line ends escaped too.
+pub(super) fn printable_name(name: &str) -> String {
+    printable(name).replace('\n', "\\n")
+}
+
+/// Whether a character is neither a control character nor one that changes the direction of what follows (Unicode
+/// Standard Annex 9).
+fn is_harmless(c: char) -> bool {
+    !c.is_control() && !matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]
@@ -87,11 +196,46 @@ mod tests {
     fn a_folder_with_something_in_it_is_left_alone() {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("deep/run");
-        assert_eq!(folder(&wanted, false).unwrap(), wanted);
-        assert_eq!(folder(&wanted, false).unwrap(), wanted, "an empty one is as good as none");
+        let made = |force| folder(&wanted, force).map(|folder| folder.path.clone()).map_err(|error| error.to_string());
+        assert_eq!(made(false).unwrap(), wanted);
+        assert_eq!(made(false).unwrap(), wanted, "an empty one is as good as none");
         std::fs::write(wanted.join("x"), "").unwrap();
-        assert_eq!(folder(&wanted, false).unwrap(), here.path().join("deep/run-2"));
-        assert_eq!(folder(&wanted, true).unwrap(), wanted);
+        assert_eq!(made(false).unwrap(), here.path().join("deep/run-2"));
+        assert_eq!(made(true).unwrap(), wanted);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_in_use_is_not_shared() {
+        let here = tempfile::tempdir().unwrap();
+        let wanted = here.path().join("run");
+        let first = folder(&wanted, false).unwrap();
+        let second = folder(&wanted, false).unwrap();
+        assert_eq!((&*first, &*second), (wanted.as_path(), here.path().join("run-2").as_path()));
+        for error in [folder(&wanted, true).err(), continued(&wanted).err()] {
+            assert!(error.unwrap().to_string().contains("in use by another zsim"));
+        }
+        drop(first);
+        assert_eq!(&*folder(&wanted, true).unwrap(), wanted.as_path());
+        assert_eq!(std::fs::read_dir(&wanted).unwrap().count(), 0, "a lock leaves no file");
+    }
+
+    #[test]
+    fn an_input_is_not_replaced_under_any_of_its_names() {
+        let here = tempfile::tempdir().unwrap();
+        let input = here.path().join("a.tum");
+        std::fs::write(&input, "").unwrap();
+        let other_name = here.path().join(".").join("a.tum");
+        assert!(spare_inputs(&[input.clone()], &[here.path().join("b.tum"), other_name]).is_err());
+        assert!(spare_inputs(&[input.clone()], &[here.path().join("b.tum")]).is_ok());
+        assert!(spare_inputs(&[here.path().to_owned()], &[input]).is_err(), "a recording that is a folder");
+    }
+
+    #[test]
+    fn control_characters_are_escaped_and_text_is_not() {
+        assert_eq!(printable("\u{1b}]0;x\u{7}\n\u{9b}2J\u{202e}"), "\\u{1b}]0;x\\u{7}\n\\u{9b}2J\\u{202e}");
+        assert_eq!(printable("0.5\u{b0} \u{4e16}"), "0.5\u{b0} \u{4e16}");
+        assert_eq!(printable_name("/a\nerror: b"), "/a\\nerror: b");
     }
 
     #[test]

@@ -2,13 +2,14 @@
 
 use super::arguments::Global;
 use super::bars::WorkBar;
+use super::failure::Usage;
 use super::{End, output};
 use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim::report;
-use zsim::study::reproduction::{Experiment, Extent, Finding, paper_table};
+use zsim::study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_table};
 
 /// Run the paper's experiments again: what it found, what we find
 ///
@@ -37,7 +38,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     // A wrong name shows before hours of work on another.
     let wanted = names.iter().map(|name| Ok(Experiment::load(name)?)).collect::<anyhow::Result<Vec<_>>>()?;
     let (extent, stem) = if arguments.quick { (Extent::Quick, "paper-quick") } else { (Extent::Whole, "paper") };
-    let folder = arguments.out.join(stem);
+    let folder = output::continued(&arguments.out.join(stem))?;
+    check_table(&folder.with_extension("md"), arguments.force)?;
     let mut found = Vec::new();
     table(arguments, extent, &folder, &found)?;
     for experiment in &wanted {
@@ -58,6 +60,19 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         found.iter().map(|(name, finding)| json!({ "name": name, "rows": finding.rows, "notes": finding.notes }));
     output::tell(global, &words, json!({ "experiments": figures.collect::<Vec<_>>() }), Some(&folder))?;
     Ok(End::Done)
+}
+
+/// Refuses to replace a file at the table's place that `zsim reproduce` did not write.
+fn check_table(path: &Path, force: bool) -> anyhow::Result<()> {
+    let is_foreign = |text: Vec<u8>| !text.starts_with(TABLE_HEADING.as_bytes());
+    if !force && std::fs::read(path).is_ok_and(is_foreign) {
+        let message = format!(
+            "{} was not written by zsim reproduce: name another folder with --out, or replace it with --force",
+            path.display()
+        );
+        return Err(Usage(message).into());
+    }
+    Ok(())
 }
 
 /// Writes the table of what was found now and by earlier runs.

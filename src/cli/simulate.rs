@@ -3,7 +3,8 @@
 use super::End;
 use super::arguments::{Global, ScenarioArguments};
 use super::bars::{Bars, stop_flag};
-use super::output;
+use super::recording_files::RecordingFiles;
+use super::{output, recording_size};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -11,7 +12,7 @@ use zsim::report;
 use zsim::simulation::{Simulation, SimulationSummary};
 use zsim::study::{self, Watch};
 
-/// Simulate and record: an MCAP file with the truth inside, and the true trajectory beside it as TUM
+/// Simulate and record: an MCAP file with the truth inside, and the true trajectory next to it as a TUM file
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim simulate --scene office --duration 2min --out office.mcap")]
 pub(super) struct Arguments {
@@ -20,10 +21,10 @@ pub(super) struct Arguments {
     scene: String,
     #[command(flatten)]
     scenario: ScenarioArguments,
-    /// The recording; if it exists, one with a number in its name [default: <scene>.mcap]
+    /// The recording; if it or the .tum file next to it exists, a number is added to both names [default: <scene>.mcap]
     #[arg(long, short, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
-    /// Write the recording even if it exists
+    /// Replace the recording and the .tum file, once the new ones are complete
     #[arg(long)]
     force: bool,
     /// Show the true head in /tf, for looking; an estimate of one's own would contradict it
@@ -34,15 +35,18 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
     let simulation = Simulation::prepare(&arguments.scenario.scenario(&arguments.scene))?;
     let default = || PathBuf::from(format!("{}.mcap", simulation.world().name()));
-    let recording = output::file(&arguments.out.clone().unwrap_or_else(default), arguments.force)?;
-    let truth = recording.with_extension("tum");
-
+    let inputs = arguments.scenario.inputs(&arguments.scene);
+    let wanted = arguments.out.clone().unwrap_or_else(default);
     let mut bars = Bars::new(global);
+    recording_size::check(&simulation, &wanted, |note| bars.remark(note))?;
+    let files = RecordingFiles::reserve(&wanted, arguments.force, &inputs)?;
+
     simulation.world().notes().iter().for_each(|note| bars.remark(note));
     let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
-    let recorded = study::record(&simulation, &recording, &truth, arguments.truth_tf, &mut watch);
+    let recorded = study::record(&simulation, files.recording(), files.truth(), arguments.truth_tf, &mut watch);
     bars.finish();
-    let summary = recorded.inspect_err(|_| super::journey::left_behind(&recording))?;
+    let summary = recorded.inspect_err(|_| super::journey::left_behind(files.recording()))?;
+    let (recording, truth) = files.finish()?;
 
     let mut figures = serde_json::to_value(summary)?;
     if let Some(object) = figures.as_object_mut() {

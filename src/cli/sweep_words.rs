@@ -16,6 +16,9 @@ pub(super) fn status_words(status: &Status) -> String {
         ("failed among them", status.failed.to_string()),
         ("missing", status.missing.to_string()),
     ];
+    if status.damaged > 0 {
+        rows.push(("damaged among them", status.damaged.to_string()));
+    }
     let left = status.thread_s_left.filter(|_| status.missing > 0);
     rows.extend(left.map(|seconds| ("left, on one thread", duration(seconds))));
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();

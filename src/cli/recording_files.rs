@@ -1,0 +1,151 @@
+//! The two files of a simulated recording, reserved before anything is computed.
+
+use super::failure::Usage;
+use super::output::{candidates, create_parent, spare_inputs};
+use anyhow::{Context, bail, ensure};
+use std::fs::{File, OpenOptions};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// A recording and the true trajectory next to it, as files that this process alone has created.
+///
+/// Files that exist are replaced only by [`finish`](Self::finish): until then the new ones have names of their own, so
+/// that a run that fails destroys nothing.
+pub(super) struct RecordingFiles {
+    recording: PathBuf,
+    truth: PathBuf,
+    /// Where the recording is moved when it is complete, if it is not there already.
+    replaces: Option<PathBuf>,
+    is_finished: bool,
+}
+
+impl RecordingFiles {
+    /// Reserves `wanted` and the file of the same name that ends in `.tum`. Where one of them exists a number is added
+    /// to both names, unless `force` says to replace them. None of `inputs` is replaced even so.
+    ///
+    /// # Errors
+    /// When the two files would be one, an input would be replaced, or they cannot be created.
+    pub fn reserve(wanted: &Path, force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
+        if wanted.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tum")) {
+            let message = format!(
+                "--out {}: the recording needs another ending, such as .mcap; the true trajectory is written next to it \
+                 as .tum",
+                wanted.display()
+            );
+            return Err(Usage(message).into());
+        }
+        create_parent(wanted)?;
+        let outputs = [wanted.to_owned(), truth_of(wanted)];
+        if !(force && outputs.iter().any(|path| path.exists())) {
+            return Self::first_free(wanted, None);
+        }
+        for path in &outputs {
+            ensure!(!path.is_dir(), "{} is a folder; a file's name is needed", path.display());
+        }
+        spare_inputs(inputs, &outputs)?;
+        let ending = wanted.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
+        Self::first_free(&wanted.with_extension(format!("partial{ending}")), Some(wanted))
+    }
+
+    fn first_free(wanted: &Path, replaces: Option<&Path>) -> anyhow::Result<Self> {
+        for recording in candidates(wanted) {
+            let truth = truth_of(&recording);
+            if !is_created(&recording)? {
+                continue;
+            }
+            if is_created(&truth)? {
+                return Ok(Self { recording, truth, replaces: replaces.map(Path::to_owned), is_finished: false });
+            }
+            std::fs::remove_file(&recording).with_context(|| format!("{} cannot be removed", recording.display()))?;
+        }
+        bail!("{} and thousands of numbered files exist already", wanted.display());
+    }
+
+    /// Where the recording is written.
+    pub fn recording(&self) -> &Path {
+        &self.recording
+    }
+
+    /// Where the true trajectory is written.
+    pub fn truth(&self) -> &Path {
+        &self.truth
+    }
+
+    /// Moves complete files to the names that were wanted; these names.
+    ///
+    /// # Errors
+    /// When they cannot be moved.
+    pub fn finish(mut self) -> anyhow::Result<(PathBuf, PathBuf)> {
+        self.is_finished = true;
+        let Some(wanted) = self.replaces.take() else { return Ok((self.recording.clone(), self.truth.clone())) };
+        let truth = truth_of(&wanted);
+        for (from, to) in [(&self.truth, &truth), (&self.recording, &wanted)] {
+            std::fs::rename(from, to)
+                .with_context(|| format!("{} cannot be moved to {}", from.display(), to.display()))?;
+        }
+        Ok((wanted, truth))
+    }
+}
+
+impl Drop for RecordingFiles {
+    /// Removes the files of a run that failed before it wrote anything.
+    fn drop(&mut self) {
+        for path in [&self.recording, &self.truth].into_iter().filter(|_| !self.is_finished) {
+            if std::fs::metadata(path).is_ok_and(|file| file.len() == 0) {
+                // What cannot be removed is an empty file, which harms nobody.
+                let _ = std::fs::remove_file(path);
+            }
+        }
+    }
+}
+
+/// Creates an empty file; `false` where something of this name exists, if only a link that leads nowhere.
+fn is_created(path: &Path) -> anyhow::Result<bool> {
+    match OpenOptions::new().write(true).create_new(true).open(path) {
+        Ok(File { .. }) => Ok(true),
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(false),
+        Err(error) => Err(error).with_context(|| format!("{} cannot be created", path.display())),
+    }
+}
+
+fn truth_of(recording: &Path) -> PathBuf {
+    recording.with_extension("tum")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neither_file_replaces_one_that_exists() {
+        let here = tempfile::tempdir().unwrap();
+        let wanted = here.path().join("run.mcap");
+        std::fs::write(here.path().join("run.tum"), "foreign").unwrap();
+        let first = RecordingFiles::reserve(&wanted, false, &[]).unwrap();
+        let second = RecordingFiles::reserve(&wanted, false, &[]).unwrap();
+        assert_eq!(first.recording(), here.path().join("run-2.mcap"));
+        assert_eq!(second.recording(), here.path().join("run-3.mcap"));
+        assert_eq!(second.truth(), here.path().join("run-3.tum"));
+        drop((first, second));
+        assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1, "empty files are removed");
+        assert!(RecordingFiles::reserve(&here.path().join("y.tum"), true, &[]).is_err());
+        assert!(RecordingFiles::reserve(Path::new(""), false, &[]).is_err());
+    }
+
+    #[test]
+    fn with_force_the_old_files_last_until_the_new_ones_are_complete() {
+        let here = tempfile::tempdir().unwrap();
+        let wanted = here.path().join("run.mcap");
+        let old = here.path().join("run.tum");
+        std::fs::write(&old, "old").unwrap();
+        let files = RecordingFiles::reserve(&wanted, true, &[]).unwrap();
+        std::fs::write(files.recording(), "new recording").unwrap();
+        std::fs::write(files.truth(), "new").unwrap();
+        assert_eq!(std::fs::read_to_string(&old).unwrap(), "old");
+        assert_eq!(files.finish().unwrap(), (wanted.clone(), old.clone()));
+        assert_eq!(std::fs::read_to_string(&old).unwrap(), "new");
+        assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 2);
+        let error = RecordingFiles::reserve(&wanted, true, &[old]).err().unwrap();
+        assert!(error.to_string().contains("would be replaced"), "{error}");
+    }
+}

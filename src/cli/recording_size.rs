@@ -1,0 +1,80 @@
+//! How large a recording will be, said and checked before it is begun.
+
+use anyhow::ensure;
+use std::path::Path;
+use zsim::sensors::{Imu, Lidar};
+use zsim::simulation::{STEP_S, Simulation};
+use zsim::study::free_bytes;
+
+/// Bytes of a beam in a `LaserScan` (range and intensity) and in a `PointCloud2`, compressed, as measured with the
+/// shipped lidars in the shipped office: 8 and 12 to 16.
+const BEAM_IN_SCAN_BYTES: f64 = 8.0;
+const BEAM_IN_CLOUD_BYTES: f64 = 16.0;
+/// Bytes of a sample of an IMU, compressed.
+const IMU_SAMPLE_BYTES: f64 = 150.0;
+/// Bytes of the truth at one step of the simulation: in the recording, and its line in the TUM file.
+const TRUTH_BYTES: f64 = 470.0 + 107.0;
+/// From this size on a note says it, bytes.
+const LARGE_BYTES: f64 = 1e9;
+
+/// Says with `note` how large a large recording at `wanted`, or in that folder, will be.
+///
+/// # Errors
+/// When the file system has not that much free space.
+pub(super) fn check(simulation: &Simulation, wanted: &Path, note: impl Fn(&str)) -> anyhow::Result<()> {
+    let bytes = expected_bytes(simulation);
+    if bytes < LARGE_BYTES {
+        return Ok(());
+    }
+    let duration_s = simulation.scenario().duration_s;
+    let size = format!("the recording of {duration_s} s will take about {:.1} GB", bytes / 1e9);
+    let folder = wanted.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
+    if let Some(free) = free_bytes(folder) {
+        ensure!(
+            free as f64 >= bytes,
+            "{size}, but the disk of {} has {:.1} GB free: shorten it with --duration, or record elsewhere with --out",
+            folder.display(),
+            free as f64 / 1e9
+        );
+    }
+    note(&size);
+    Ok(())
+}
+
+/// The size of the recording and of the true trajectory next to it, bytes, give or take a third.
+fn expected_bytes(simulation: &Simulation) -> f64 {
+    let of_imu = |imu: &Imu| IMU_SAMPLE_BYTES / imu.period_s();
+    let per_s = lidar_bytes_per_s(simulation.lidar())
+        + of_imu(simulation.imu())
+        + simulation.base_imu().map_or(0.0, of_imu)
+        + TRUTH_BYTES / STEP_S;
+    per_s * simulation.scenario().duration_s
+}
+
+fn lidar_bytes_per_s(lidar: &Lidar) -> f64 {
+    let of_beam = if lidar.is_planar() { BEAM_IN_SCAN_BYTES } else { BEAM_IN_CLOUD_BYTES };
+    of_beam * lidar.beams().len() as f64 / lidar.period_s()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+    use zsim::simulation::Scenario;
+    use zsim::study::{Watch, record};
+
+    #[test]
+    fn the_size_is_about_that_of_a_recording() {
+        let here = tempfile::tempdir().unwrap();
+        for lidar in ["utm30lx", "vlp16", "mid360"] {
+            let scenario = Scenario { lidar: lidar.to_owned(), duration_s: 2.0, ..Scenario::in_scene("office") };
+            let simulation = Simulation::prepare(&scenario).unwrap();
+            let files = [here.path().join("a.mcap"), here.path().join("a.tum")];
+            let mut watch = Watch { stop: &AtomicBool::new(false), tell: &mut |_| {} };
+            record(&simulation, &files[0], &files[1], false, &mut watch).unwrap();
+            let bytes: u64 = files.iter().map(|file| file.metadata().unwrap().len()).sum();
+            let ratio = expected_bytes(&simulation) / bytes as f64;
+            assert!((0.7..1.5).contains(&ratio), "{lidar}: {ratio}");
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Ctrl-C and termination: the first signal asks for a clean stop, a second one ends the program at once.
+
+use std::sync::Once;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+
+/// Set by the first signal.
+static STOP: AtomicBool = AtomicBool::new(false);
+/// The number of the first signal; 0 before it.
+static SIGNAL: AtomicI32 = AtomicI32::new(0);
+
+/// What a shell adds to a signal's number for the exit code of what it ended.
+const BY_SIGNAL: i32 = 128;
+/// SIGINT, the signal of Ctrl-C.
+const INTERRUPT: i32 = 2;
+
+/// The flag that SIGINT and SIGTERM set from now on.
+pub(super) fn stop_flag() -> &'static AtomicBool {
+    static HANDLER: Once = Once::new();
+    HANDLER.call_once(install);
+    &STOP
+}
+
+/// The exit code of a run that was stopped: 130 after SIGINT, 143 after SIGTERM.
+pub(super) fn exit_code() -> u8 {
+    // A run is stopped without a signal of its own when one of its workers received it.
+    let signal = Some(SIGNAL.load(Ordering::Relaxed)).filter(|signal| *signal != 0).unwrap_or(INTERRUPT);
+    u8::try_from(BY_SIGNAL + signal).unwrap_or(u8::MAX)
+}
+
+fn stop_by(signal: i32) {
+    if STOP.load(Ordering::Relaxed) {
+        std::process::exit(BY_SIGNAL + signal);
+    }
+    SIGNAL.store(signal, Ordering::Relaxed);
+    STOP.store(true, Ordering::Relaxed);
+}
+
+/// Without the handlers a signal ends the program at once, which files survive too.
+#[cfg(unix)]
+fn install() {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    if let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]) {
+        std::thread::spawn(move || signals.forever().for_each(stop_by));
+    }
+}
+
+/// Without the handler Ctrl-C ends the program at once, which files survive too.
+#[cfg(not(unix))]
+fn install() {
+    let _ = ctrlc::set_handler(|| stop_by(INTERRUPT));
+}
