@@ -151,6 +151,87 @@ fn a_plan_is_kept_gone_on_with_and_replaced_only_when_asked() {
     assert!(code == 2 && talk.contains("holds no sweep"), "{talk}");
 }
 
+#[test]
+fn a_path_to_the_same_spec_goes_on_and_foreign_files_are_spared() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("a.ron"), SPRINGS.replace("4096", "256")).unwrap();
+    well(here.path(), "study a.ron -o swept");
+    well(here.path(), "study ./a.ron -o swept");
+    let foreign = here.path().join("thesis");
+    std::fs::create_dir(&foreign).unwrap();
+    std::fs::write(foreign.join("table.csv"), "years of work").unwrap();
+    for command in ["study a.ron -o thesis", "sweep plan a.ron -o thesis"] {
+        let (code, _, talk) = run(here.path(), command);
+        assert!(code == 2 && talk.contains("somebody's files"), "{talk}");
+    }
+    assert_eq!(std::fs::read_to_string(foreign.join("table.csv")).unwrap(), "years of work");
+    assert_eq!(std::fs::read_dir(&foreign).unwrap().count(), 1, "nothing is left there");
+}
+
+#[test]
+fn damaged_and_swapped_parts_are_done_again() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("a.ron"), SPRINGS.replace("4096", "1000")).unwrap();
+    well(here.path(), "study a.ron -o swept");
+    let whole = tables(&here.path().join("swept"));
+    let parts: Vec<_> =
+        std::fs::read_dir(here.path().join("swept/parts")).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(parts.len(), 4, "parts have 250 runs each");
+    let damage: [(&dyn Fn(), u64); 4] = [
+        (&|| std::fs::write(&parts[0], &std::fs::read(&parts[0]).unwrap()[..1000]).unwrap(), 250),
+        (&|| std::fs::write(&parts[1], "").unwrap(), 250),
+        (
+            &|| {
+                let [a, b] = [&parts[0], &parts[1]].map(|path| std::fs::read(path).unwrap());
+                std::fs::write(&parts[0], b).unwrap();
+                std::fs::write(&parts[1], a).unwrap();
+            },
+            500,
+        ),
+        (
+            // A bit of a number in the middle of the file.
+            &|| {
+                let mut bytes = std::fs::read(&parts[2]).unwrap();
+                let middle = bytes.len() / 3;
+                bytes[middle] ^= 1;
+                std::fs::write(&parts[2], bytes).unwrap();
+            },
+            250,
+        ),
+    ];
+    for (harm, damaged) in damage {
+        harm();
+        let status = well(here.path(), "sweep status swept --json");
+        let status: Value = serde_json::from_str(&status).unwrap();
+        assert_eq!((status["missing"].as_u64(), status["damaged"].as_u64()), (Some(damaged), Some(damaged)));
+        let (code, _, talk) = run(here.path(), "sweep merge swept");
+        assert_eq!(code, 3, "a merge without the damaged parts is one with loss: {talk}");
+        well(here.path(), "sweep run swept");
+        well(here.path(), "sweep merge swept");
+        assert!(tables(&here.path().join("swept")) == whole);
+    }
+}
+
+#[test]
+fn a_plan_of_somebody_else_adds_nothing_to_a_slurm_script() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("a.ron"), SPRINGS.replace("4096", "256")).unwrap();
+    well(here.path(), "sweep plan a.ron -o swept");
+    let plan = here.path().join("swept/plan.ron");
+    let text = std::fs::read_to_string(&plan).unwrap();
+    let named = |name: &str| {
+        assert!(text.contains("name: \"a\""));
+        std::fs::write(&plan, text.replacen("name: \"a\"", &format!("name: \"{name}\""), 1)).unwrap();
+        run(here.path(), "sweep submit swept --slurm --dry-run")
+    };
+    let (code, _, talk) = named("a --uid=0; $(touch b)");
+    assert_eq!(code, 0, "{talk}");
+    let script = std::fs::read_to_string(here.path().join("swept/slurm/array.sh")).unwrap();
+    assert!(script.contains("#SBATCH --job-name=zsim-a_--uid_0____touch_b_\n"), "{script}");
+    let (code, _, talk) = named("a\\ntouch b\\u{1b}[2J");
+    assert!(code == 2 && talk.contains("control characters") && !talk.contains('\u{1b}'), "{talk}");
+}
+
 const WALKS: &str = r#"(
     base: journey(
         scene: "mocap_room", head: "handheld", motion: "hand", lidar: "utm30lx", imu: "3dm_gx2", clock: "drifting",

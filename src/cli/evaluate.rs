@@ -2,7 +2,7 @@
 
 use super::arguments::Global;
 use super::{End, output};
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -17,6 +17,9 @@ use zsim::world::World;
 const JUDGED: usize = 200_000;
 /// How far from a point a surface is looked for, m.
 const REACH_M: f64 = 1.0;
+
+/// Farthest that a position is from the origin, m: farther than the Sun.
+const FARTHEST_M: f64 = 1e12;
 
 /// Judge a trajectory by the true one, and a cloud by the true surfaces
 ///
@@ -47,9 +50,13 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
     let mut figures = Map::new();
     let mut estimated = None;
-    if let (Some(estimate), Some(truth)) = (&arguments.estimate, &arguments.truth) {
-        let estimate = read_tum(estimate)?;
-        let pairs = Pairs::associate(&estimate, &read_tum(truth)?)?;
+    if let (Some(estimated_path), Some(truth)) = (&arguments.estimate, &arguments.truth) {
+        let estimate = read_tum(estimated_path)?;
+        let known = read_tum(truth)?;
+        for (path, trajectory) in [(estimated_path, &estimate), (truth, &known)] {
+            check_positions(path, trajectory)?;
+        }
+        let pairs = Pairs::associate(&estimate, &known)?;
         let world_from_map = pairs.world_from_map()?;
         judge_trajectory(&pairs, &world_from_map, &mut figures)?;
         estimated = Some((estimate, world_from_map));
@@ -62,6 +69,18 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     Ok(End::Done)
 }
 
+/// Refuses positions whose squares no sum can hold.
+fn check_positions(path: &Path, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let far = trajectory.iter().find(|(_, pose)| !(pose.translation.vector.norm() <= FARTHEST_M));
+    let Some((stamp, pose)) = far else { return Ok(()) };
+    bail!(
+        "{}: the pose of t = {:.9} s is {:e} m from the origin; {FARTHEST_M:e} m at most: is the file of another format?",
+        path.display(),
+        stamp.nanos() as f64 * 1e-9,
+        pose.translation.vector.norm()
+    );
+}
+
 fn judge_trajectory(pairs: &Pairs, world_from_map: &Pose, figures: &mut Map<String, Value>) -> anyhow::Result<()> {
     let errors = Errors::after(pairs, world_from_map);
     let drifted = drift(pairs).ok();
@@ -70,7 +89,7 @@ fn judge_trajectory(pairs: &Pairs, world_from_map: &Pose, figures: &mut Map<Stri
     tell("duration_s", Some(pairs.duration_s()));
     ensure!(
         errors.position_rmse_m().is_finite() && errors.rotation_rmse_rad().is_finite(),
-        "the errors are too large for a number: a position of the estimate or of the truth is absurd"
+        "the errors of the estimate are too large for a number"
     );
     tell("position_rmse_m", Some(errors.position_rmse_m()));
     tell("rotation_rmse_deg", Some(errors.rotation_rmse_rad().to_degrees()));

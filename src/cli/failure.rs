@@ -4,6 +4,7 @@ use super::output::printable;
 use super::signals;
 use std::error::Error;
 use std::process::ExitCode;
+use zsim::motion::MotionError;
 use zsim::simulation::SimulationError;
 use zsim::spec::SpecError;
 use zsim::study::StudyError;
@@ -35,6 +36,7 @@ fn is_wrong_input(error: &(dyn Error + 'static)) -> bool {
     let simulation = |error: &SimulationError| !matches!(error, SimulationError::Sink(_));
     error.is::<SpecError>()
         || error.is::<WorldError>()
+        || error.is::<MotionError>()
         || error.is::<Usage>()
         || error.downcast_ref::<SimulationError>().is_some_and(simulation)
         || error.downcast_ref::<StudyError>().is_some_and(StudyError::is_wrong_input)

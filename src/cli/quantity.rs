@@ -1,5 +1,8 @@
 //! Numbers with units, as people type them.
 
+/// Longest time that can be typed, s: 30 years. What it is for has a lower bound.
+const MOST_S: f64 = 1e9;
+
 /// Seconds from `120s`, `2min`, `1.5h`, `250ms` or `90`.
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let text = text.trim();
@@ -17,7 +20,11 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
         _ => return Err(format!("`{unit}` is no unit of time; use ms, s, min or h, as in 120s or 2min")),
     };
     let seconds = number * factor;
-    if seconds.is_finite() && seconds > 0.0 { Ok(seconds) } else { Err("a length of time is above zero".to_owned()) }
+    if seconds > 0.0 && seconds <= MOST_S {
+        Ok(seconds)
+    } else {
+        Err(format!("a length of time is above zero, and {MOST_S:e} s at most"))
+    }
 }
 
 #[cfg(test)]
@@ -29,7 +36,7 @@ mod tests {
         for (text, expected) in [("120s", 120.0), ("2min", 120.0), ("90", 90.0), ("1.5 h", 5400.0), ("250ms", 0.25)] {
             assert_eq!(seconds(text), Ok(expected), "{text}");
         }
-        for text in ["", "s", "-3s", "0", "nan", "inf", "3 parsecs", "1e400s"] {
+        for text in ["", "s", "-3s", "0", "nan", "inf", "3 parsecs", "1e400s", "1e300s", "300000h"] {
             assert!(seconds(text).is_err(), "{text}");
         }
     }

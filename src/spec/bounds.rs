@@ -27,9 +27,11 @@ pub(super) fn message<T: DeserializeOwned>(source: &Source, error: &SpannedError
     let is_number = |c: &char| c.is_ascii_hexdigit() || ['x', 'o', '_', '+', '-'].contains(c);
     let start = end - text[..end].chars().rev().take_while(is_number).map(char::len_utf8).sum::<usize>();
     let accepts = |number: &i128| {
+        let number = number.to_string();
         let tried = format!("{}{number}{}", &text[..start], &text[end..]);
-        let refused = |other: &SpannedError| other.span.start == error.span.start;
-        !options().from_str::<T>(&tried).is_err_and(|other| refused(&other))
+        let end = start + number.len();
+        // An error further on is about something else.
+        options().from_str::<T>(&tried).map_or_else(|other| offset(&tried, other.span.start) > Some(end), |_| true)
     };
     let greatest = GREATEST.into_iter().find(accepts)?;
     let least = LEAST.into_iter().find(accepts)?;
@@ -63,7 +65,7 @@ mod tests {
         for (text, expected, column) in [
             ("(few: 256, many: 1, signed: 0)", "from 0 to 255, found 256", 7),
             ("(few: 1, many: 99_999_999_999_999_999_999, signed: 0)", "from 0 to 18446744073709551615, found 99_9", 16),
-            ("(few: 1, many: 1, signed: -3000000000)", "from -2147483648 to 2147483647, found -3000000000", 27),
+            ("(few: 1, many: 1, signed: -3000000000)", "from -2147483648 to 2147483647, found -3000000000", 28),
             ("(few: -1, many: 1, signed: 1)", "from 0 to 255, found -1", 7),
             // A second mistake further on changes nothing.
             ("(few: 0x100, many: -1, signed: 1)", "from 0 to 255, found 0x100", 7),

@@ -1,0 +1,150 @@
+//! The commands under attack: files that must not be replaced, numbers that must not be believed, names that must not
+//! reach a terminal, and signals.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod command;
+
+use command::run;
+use std::path::Path;
+
+const SHORT: &str = "simulate --scene mocap_room --duration 1s --quiet";
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap()
+}
+
+#[test]
+fn a_simulation_replaces_no_file_that_it_did_not_write() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("run.tum"), "foreign").unwrap();
+    let (code, out, _) = run(here.path(), &format!("{SHORT} --out run.mcap"));
+    assert_eq!((code, out.lines().last()), (0, Some("run-2.mcap")));
+    assert_eq!(read(here.path(), "run.tum"), b"foreign");
+    let (code, _, talk) = run(here.path(), &format!("{SHORT} --out y.tum"));
+    assert!(code == 2 && talk.contains("another ending"), "{talk}");
+    assert!(!here.path().join("y.tum").exists());
+}
+
+#[test]
+fn with_force_an_input_and_what_fails_are_spared() {
+    let here = tempfile::tempdir().unwrap();
+    let motion = r#"Replay((poses: Tum("in.tum"), from_route: false, still_s: 1.0, ease_s: 1.0))"#;
+    std::fs::write(here.path().join("replay.ron"), motion).unwrap();
+    let (code, _, talk) = run(here.path(), &format!("{SHORT} --out in.mcap"));
+    assert_eq!(code, 0, "{talk}");
+    let before = ["in.tum", "in.mcap"].map(|name| read(here.path(), name));
+    let (code, _, talk) = run(here.path(), &format!("{SHORT} --motion replay.ron --out in.mcap --force"));
+    assert!(code == 2 && talk.contains("would be replaced by its result"), "{talk}");
+    assert!(before == ["in.tum", "in.mcap"].map(|name| read(here.path(), name)));
+    let (code, out, talk) = run(here.path(), &format!("{SHORT} --seed 2 --out in.mcap --force"));
+    assert_eq!((code, out.lines().last()), (0, Some("in.mcap")), "{talk}");
+    assert!(before[1] != read(here.path(), "in.mcap"), "another seed, another recording");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "nothing is left of the replacing");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_closes_the_files_and_is_the_exit_code() {
+    use std::process::{Command, Stdio};
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let here = tempfile::tempdir().unwrap();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_zsim"))
+            .args("simulate --scene mocap_room --duration 20min --quiet --out long.mcap".split(' '))
+            .current_dir(here.path())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // Once a chunk is written the handlers are there.
+        while here.path().join("long.mcap").metadata().map_or(0, |file| file.len()) < 100_000 {
+            assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        assert!(Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(code));
+        let (code, _, talk) = run(here.path(), "info long.mcap");
+        assert_eq!(code, 0, "the recording is complete: {talk}");
+    }
+}
+
+#[test]
+fn numbers_that_no_machine_can_bear_are_refused_with_their_bound() {
+    let here = tempfile::tempdir().unwrap();
+    let write = |name: &str, kind: &str, from: &str, to: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs").join(kind);
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(text.contains(from), "{from}");
+        std::fs::write(here.path().join(name), text.replacen(from, to, 1)).unwrap();
+    };
+    write("lidar.ron", "lidars/utm30lx.ron", "rate_hz: 40", "rate_hz: 1e6");
+    write("many.ron", "lidars/utm30lx.ron", "beams: 1081", "beams: 99999999999");
+    write("imu.ron", "imus/3dm_gx2.ron", "rate_hz: 100", "rate_hz: 1e18");
+    for (arguments, words) in [
+        ("check lidar.ron", "0.1 to 1000"),
+        ("check many.ron", "from 0 to 4294967295, found 99999999999"),
+        ("check imu.ron", "1 to 10000"),
+        ("simulate --scene mocap_room --lidar lidar.ron", "0.1 to 1000"),
+        ("simulate --scene mocap_room --duration 1e8s", "604800 s (7 days) at most"),
+        ("coverage --duration 1e5s --motion stand", "3600 s at most"),
+        ("gains --step 1e-12", "from 0.00001 s to 0.1 s"),
+        ("gains --realisations 1000000000", "from 2, which coherence needs, to 1000"),
+        ("gains --realisations 1000 --period 100", "10000000 at most"),
+        ("gains --period 1e9", "10000 at most"),
+        ("check office --threads 1000000", "from 1 to 1024"),
+    ] {
+        let (code, _, talk) = run(here.path(), arguments);
+        assert!(code == 2 && talk.contains(words), "`{arguments}`: {code} {talk}");
+    }
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "nothing is left behind");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_that_no_disk_can_hold_is_not_begun() {
+    // 2^20 beams at 28 Hz are 3e7 a second, of 16 bytes each: 280 TB in 7 days.
+    let here = tempfile::tempdir().unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/lidars/mid360.ron");
+    let text = std::fs::read_to_string(path).unwrap();
+    let text = text.replace("rate_hz: 10,", "rate_hz: 28,").replace("beams: 20000,", "beams: 1048576,");
+    std::fs::write(here.path().join("dense.ron"), text).unwrap();
+    let dense = "simulate --scene mocap_room --motion stand --lidar dense.ron --duration 168h --out a.mcap";
+    let (code, _, talk) = run(here.path(), dense);
+    assert!(code == 1 && talk.contains("GB free"), "{talk}");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn trajectories_that_say_nothing_or_too_much_are_errors() {
+    let here = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(here.path().join(name), text).unwrap();
+    let poses = "1 0 0 0 0 0 0 1\n2 0 1 0 0 0 0 1\n3 1 0 0 0 0 0 1\n";
+    write("empty.tum", "");
+    write("poses.tum", poses);
+    write("marked.tum", &format!("\u{feff}{poses}"));
+    write("far.tum", &poses.replacen("2 0 1", "2 0 1e200", 1));
+    for (arguments, words) in [
+        ("base empty.tum", "empty.tum: a trajectory of 0 poses; 3 are needed"),
+        ("evaluate --estimate far.tum --truth poses.tum", "far.tum: the pose of t = 2.000000000 s is 1e200 m"),
+        ("evaluate --estimate poses.tum --truth far.tum", "far.tum: "),
+    ] {
+        let (code, _, talk) = run(here.path(), arguments);
+        assert!(code == 1 && talk.contains(words), "`{arguments}`: {code} {talk}");
+    }
+    let (code, out, talk) = run(here.path(), "evaluate --estimate marked.tum --truth poses.tum");
+    assert!(code == 0 && out.contains("position_rmse_m"), "a byte order mark: {talk}");
+}
+
+#[test]
+fn control_characters_do_not_reach_the_terminal() {
+    let here = tempfile::tempdir().unwrap();
+    let name = "\u{1b}]0;title\u{7}.ron";
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/imus/3dm_gx2.ron"), here.path().join(name))
+        .unwrap();
+    for (arguments, code) in [(format!("check {name}"), 0), (format!("check missing{name}"), 2)] {
+        let (ended, out, talk) = run(here.path(), &arguments);
+        assert_eq!(ended, code, "{talk}");
+        assert!(!(out + &talk).contains(['\u{1b}', '\u{7}']));
+    }
+    let (_, out, _) = run(here.path(), &format!("check {name}"));
+    assert!(out.starts_with("\\u{1b}]0;title\\u{7}.ron: "), "{out}");
+}
