@@ -124,7 +124,7 @@ fn trajectories_that_say_nothing_or_too_much_are_errors() {
     write("far.tum", &poses.replacen("2 0 1", "2 0 1e200", 1));
     for (arguments, words) in [
         ("base empty.tum", "empty.tum: a trajectory of 0 poses; 3 are needed"),
-        ("evaluate --estimate far.tum --truth poses.tum", "far.tum: the pose of t = 2.000000000 s is 1e200 m"),
+        ("evaluate --estimate far.tum --truth poses.tum", "far.tum: the pose of t = 2.000000000 s has a coordinate of 1e200 m"),
         ("evaluate --estimate poses.tum --truth far.tum", "far.tum: "),
     ] {
         let (code, _, talk) = run(here.path(), arguments);
