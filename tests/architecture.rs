@@ -45,7 +45,7 @@ const BELOW_CLI: &[&str] = &[
 const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
 
 /// Crates that one room keeps to itself (or a few, at the door), and what each is kept for.
-const KEPT: [(&str, &[&str]); 16] = [
+const KEPT: [(&str, &[&str]); 17] = [
     ("parry3d", &["world"]),
     ("rapier3d_f64", &["dynamics"]),
     ("mcap", &["recording"]),
@@ -61,6 +61,7 @@ const KEPT: [(&str, &[&str]); 16] = [
     ("parquet", &["study"]),
     ("rustix", &["study"]),
     ("sha2", &["study"]),
+    ("signal_hook", &["cli"]),
     ("sobol", &["study"]),
 ];
 

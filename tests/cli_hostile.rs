@@ -27,6 +27,15 @@ fn a_simulation_replaces_no_file_that_it_did_not_write() {
 }
 
 #[test]
+fn a_table_of_somebody_else_is_not_replaced() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("paper-quick.md"), "# My paper").unwrap();
+    let (code, _, talk) = run(here.path(), "reproduce fig3 --quick --out .");
+    assert!(code == 2 && talk.contains("not written by zsim reproduce"), "{talk}");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1);
+}
+
+#[test]
 fn with_force_an_input_and_what_fails_are_spared() {
     let here = tempfile::tempdir().unwrap();
     let motion = r#"Replay((poses: Tum("in.tum"), from_route: false, still_s: 1.0, ease_s: 1.0))"#;
@@ -124,7 +133,10 @@ fn trajectories_that_say_nothing_or_too_much_are_errors() {
     write("far.tum", &poses.replacen("2 0 1", "2 0 1e200", 1));
     for (arguments, words) in [
         ("base empty.tum", "empty.tum: a trajectory of 0 poses; 3 are needed"),
-        ("evaluate --estimate far.tum --truth poses.tum", "far.tum: the pose of t = 2.000000000 s has a coordinate of 1e200 m"),
+        (
+            "evaluate --estimate far.tum --truth poses.tum",
+            "far.tum: the pose of t = 2.000000000 s has a coordinate of 1e200 m",
+        ),
         ("evaluate --estimate poses.tum --truth far.tum", "far.tum: "),
     ] {
         let (code, _, talk) = run(here.path(), arguments);

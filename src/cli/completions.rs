@@ -16,6 +16,6 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<End> {
     let mut text = Vec::new();
     clap_complete::generate(arguments.shell, &mut Cli::command(), "zsim", &mut text);
-    output::print(&String::from_utf8_lossy(&text))?;
+    output::write_to_stdout(&String::from_utf8_lossy(&text))?;
     Ok(End::Done)
 }

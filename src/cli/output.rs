@@ -153,28 +153,41 @@ pub(super) fn tell(global: &Global, words: &str, mut figures: Value, out: Option
         if let (Some(out), Some(object)) = (out, figures.as_object_mut()) {
             object.insert("out".to_owned(), Value::String(out));
         }
-        return print(&(serde_json::to_string_pretty(&figures)? + "\n"));
+        return write_to_stdout(&escaped(&(serde_json::to_string_pretty(&figures)? + "\n"), in_json));
     }
     let words = if words.is_empty() { String::new() } else { format!("{}\n", words.trim_end()) };
     print(&(words + &out.map(|out| out + "\n").unwrap_or_default()))
 }
 
-/// Prints to stdout, with control characters escaped; a reader that went away is no error.
+/// Prints to stdout, with control characters escaped.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
-    match std::io::stdout().lock().write_all(printable(text).as_bytes()) {
+    write_to_stdout(&printable(text))
+}
+
+/// Writes to stdout as it is; a reader that went away is no error.
+pub(super) fn write_to_stdout(text: &str) -> anyhow::Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("stdout cannot be written"),
         _ => Ok(()),
     }
 }
 
 /// Text with foreign names in it, fit for a terminal: control characters, which could move the cursor or set the
-/// window's title, and characters that reorder the text are escaped. Line ends stay.
+/// window's title, and characters that reorder the text are escaped. Line ends and tabs stay.
 pub(super) fn printable(text: &str) -> Cow<'_, str> {
-    if text.chars().all(|c| c == '\n' || is_harmless(c)) {
+    escaped(text, |c| c.escape_default().to_string())
+}
+
+/// An escape as JSON has it (RFC 8259, section 7), of a character of the basic plane.
+fn in_json(c: char) -> String {
+    format!("\\u{:04x}", u32::from(c))
+}
+
+fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
+    if text.chars().all(is_harmless) {
         return Cow::Borrowed(text);
     }
-    let escape = |c: char| if c == '\n' || is_harmless(c) { c.to_string() } else { c.escape_default().to_string() };
-    Cow::Owned(text.chars().map(escape).collect())
+    Cow::Owned(text.chars().map(|c| if is_harmless(c) { c.to_string() } else { escape(c) }).collect())
 }
 
 /// A foreign name within a line or a table: as [`printable`], with line ends escaped too.
@@ -182,10 +195,11 @@ pub(super) fn printable_name(name: &str) -> String {
     printable(name).replace('\n', "\\n")
 }
 
-/// Whether a character is neither a control character nor one that changes the direction of what follows (Unicode
-/// Standard Annex 9).
+/// Whether a character is a line end, a tab, or neither a control character nor one that changes the direction of what
+/// follows (Unicode Standard Annex 9).
 fn is_harmless(c: char) -> bool {
-    !c.is_control() && !matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    ['\n', '\t'].contains(&c)
+        || !c.is_control() && !matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]
@@ -235,6 +249,8 @@ mod tests {
     fn control_characters_are_escaped_and_text_is_not() {
         assert_eq!(printable("\u{1b}]0;x\u{7}\n\u{9b}2J\u{202e}"), "\\u{1b}]0;x\\u{7}\n\\u{9b}2J\\u{202e}");
         assert_eq!(printable("0.5\u{b0} \u{4e16}"), "0.5\u{b0} \u{4e16}");
+        let json = escaped("\u{9b}\u{202e}", in_json);
+        assert_eq!(serde_json::from_str::<String>(&format!("\"{json}\"")).unwrap(), "\u{9b}\u{202e}");
         assert_eq!(printable_name("/a\nerror: b"), "/a\\nerror: b");
     }
 

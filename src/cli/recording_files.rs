@@ -3,7 +3,7 @@
 use super::failure::Usage;
 use super::output::{candidates, create_parent, spare_inputs};
 use anyhow::{Context, bail, ensure};
-use std::fs::{File, OpenOptions};
+use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -102,7 +102,7 @@ impl Drop for RecordingFiles {
 /// Creates an empty file; `false` where something of this name exists, if only a link that leads nowhere.
 fn is_created(path: &Path) -> anyhow::Result<bool> {
     match OpenOptions::new().write(true).create_new(true).open(path) {
-        Ok(File { .. }) => Ok(true),
+        Ok(_) => Ok(true),
         Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(false),
         Err(error) => Err(error).with_context(|| format!("{} cannot be created", path.display())),
     }

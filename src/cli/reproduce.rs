@@ -38,8 +38,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     // A wrong name shows before hours of work on another.
     let wanted = names.iter().map(|name| Ok(Experiment::load(name)?)).collect::<anyhow::Result<Vec<_>>>()?;
     let (extent, stem) = if arguments.quick { (Extent::Quick, "paper-quick") } else { (Extent::Whole, "paper") };
-    let folder = output::continued(&arguments.out.join(stem))?;
+    let folder = arguments.out.join(stem);
     check_table(&folder.with_extension("md"), arguments.force)?;
+    let folder = output::continued(&folder)?;
     let mut found = Vec::new();
     table(arguments, extent, &folder, &found)?;
     for experiment in &wanted {
