@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
 
 /// Refuses positions whose squares no sum can hold.
 fn check_positions(path: &Path, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let far = trajectory.iter().find(|(_, pose)| !(pose.translation.vector.amax() <= FARTHEST_M));
+    let far = trajectory.iter().find(|(_, pose)| pose.translation.vector.amax() > FARTHEST_M);
     let Some((stamp, pose)) = far else { return Ok(()) };
     bail!(
         "{}: the pose of t = {:.9} s has a coordinate of {:e} m; {FARTHEST_M:e} m at most: is the file of another format?",

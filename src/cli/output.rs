@@ -240,8 +240,8 @@ mod tests {
         let input = here.path().join("a.tum");
         std::fs::write(&input, "").unwrap();
         let other_name = here.path().join(".").join("a.tum");
-        assert!(spare_inputs(&[input.clone()], &[here.path().join("b.tum"), other_name]).is_err());
-        assert!(spare_inputs(&[input.clone()], &[here.path().join("b.tum")]).is_ok());
+        assert!(spare_inputs(std::slice::from_ref(&input), &[here.path().join("b.tum"), other_name]).is_err());
+        assert!(spare_inputs(std::slice::from_ref(&input), &[here.path().join("b.tum")]).is_ok());
         assert!(spare_inputs(&[here.path().to_owned()], &[input]).is_err(), "a recording that is a folder");
     }
 

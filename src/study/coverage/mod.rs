@@ -127,8 +127,9 @@ pub fn coverage(
         let message = format!("{} s from {} s on: less than two scans of the lidar", plan.duration_s, plan.from_s);
         return Err(StudyError::Plan { what: "time to look", message });
     }
-    if !(plan.from_s + plan.duration_s <= LONGEST_S) {
-        let message = format!("until {} s; {LONGEST_S} s at most", plan.from_s + plan.duration_s);
+    let until_s = plan.from_s + plan.duration_s;
+    if until_s > LONGEST_S {
+        let message = format!("until {until_s} s; {LONGEST_S} s at most");
         return Err(StudyError::Plan { what: "time to look", message });
     }
     let track = SwingTrack::record(head, motion, plan, watch)?;
