@@ -57,7 +57,7 @@ fn checked(head: &HeadModel, plan: &GainPlan) -> Result<Schedule, StudyError> {
     }
     if !REALISATIONS.contains(&plan.realisations) {
         let (least, most) = (REALISATIONS.start(), REALISATIONS.end());
-        let message = format!("{}; from {least}, which coherence needs, to {most}", plan.realisations);
+        let message = format!("{}; {least} or more, which coherence needs, and {most} at most", plan.realisations);
         return Err(StudyError::Plan { what: "realisations", message });
     }
     let schedule = Schedule::of(head, plan)?;
