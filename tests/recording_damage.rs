@@ -63,7 +63,7 @@ fn a_file_cut_anywhere_gives_all_of_its_whole_chunks() {
                 assert_eq!(read, in_order(written[..whole].to_vec()), "cut at {cut}");
                 assert!(loss.cut_short, "cut at {cut}: {loss}");
             }
-            Err(RecordingError::NotMcap { .. }) => assert!(cut < 8),
+            Err(RecordingError::NotRecording { .. }) => assert!(cut < 8),
             Err(RecordingError::NoSensor { .. }) => assert_eq!(whole, 0, "cut at {cut}"),
             Err(error) => panic!("cut at {cut}: {error}"),
         }
@@ -175,10 +175,20 @@ fn a_decompression_bomb_is_not_unpacked() {
 }
 
 #[test]
-fn what_is_not_mcap_is_said_to_be_none() {
-    for bytes in [&b""[..], b"\x89MCAP", b"#ROSBAG V2.0\n", &[0; 100]] {
-        let error = Reader::new("a.bag", Cursor::new(bytes.to_vec())).map(|_| ()).unwrap_err();
-        assert_eq!(error.to_string(), "a.bag: not an MCAP file (it does not begin with the MCAP magic bytes)");
+fn what_is_no_recording_is_refused_with_what_it_is() {
+    let cases: [(&[u8], &str); 8] = [
+        (b"", "an empty file"),
+        (b"\x89MCAP", "a file of an unknown format"),
+        (&[0; 100], "a file of an unknown format"),
+        (b"#ROSBAG V1.2\n", "`rosbag fix old.bag new.bag`"),
+        (&[0xD4, 0xC3, 0xB2, 0xA1, 2, 0, 4, 0], "a pcap capture"),
+        (&[0x0A, 0x0D, 0x0D, 0x0A, 0, 0, 0, 0], "a pcapng capture"),
+        (b"LASF\0\0\0\0", "a LAS point cloud"),
+        (b"SQLite format 3\0", "not a readable rosbag2 database"),
+    ];
+    for (bytes, found) in cases {
+        let error = Reader::new("a.bag", Cursor::new(bytes.to_vec())).map(|_| ()).unwrap_err().to_string();
+        assert!(error.starts_with("a.bag: ") && error.contains(found), "{error}");
     }
     let error = Reader::open(std::path::Path::new("/nowhere/run.mcap")).map(|_| ()).unwrap_err();
     assert!(error.to_string().starts_with("/nowhere/run.mcap: "), "{error}");

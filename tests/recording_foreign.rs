@@ -260,14 +260,24 @@ fn a_type_is_known_without_msg_in_its_name() {
 }
 
 #[test]
-fn a_folder_of_rosbag2_is_opened_when_one_recording_is_in_it() {
+fn a_folder_is_one_recording_or_says_why_not() {
     let folder = tempfile::tempdir().unwrap();
     let message = || Reader::open(folder.path()).map(|reader| reader.name().to_owned()).map_err(|e| e.to_string());
-    assert!(message().unwrap_err().ends_with("there is no .mcap file in this folder"));
-    std::fs::write(folder.path().join("metadata.yaml"), "").unwrap();
+    let put = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    assert!(message().unwrap_err().contains("has no recording in it (.mcap, .db3, .bag)"));
+    put("metadata.yaml", b"");
     let (bytes, _) = recordings::record(recordings::run(), 1);
-    std::fs::write(folder.path().join("run_0.mcap"), &bytes).unwrap();
+    put("run_0.mcap", &bytes);
     assert!(message().unwrap().ends_with("run_0.mcap"));
-    std::fs::write(folder.path().join("run_1.mcap"), &bytes).unwrap();
-    assert!(message().unwrap_err().ends_with("there are 2 .mcap files in this folder: name one"));
+    put("other.mcap", &bytes);
+    assert!(message().unwrap_err().contains("has 2 recordings in it, name one of them"));
+    put("metadata.yaml", b"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [run_0.mcap, run_1.mcap]\n");
+    assert!(message().unwrap_err().contains("has no file `run_1.mcap`, which its metadata.yaml names"));
+    put("run_1.mcap.zstd", &bytes);
+    put("metadata.yaml", b"rosbag2_bagfile_information:\n  relative_file_paths:\n    - run_1.mcap.zstd\n");
+    assert!(message().unwrap_err().contains("decompress it with `zstd -d --rm "));
+    put("run_1.mcap", &bytes);
+    assert!(message().unwrap().ends_with("run_1.mcap"));
+    put("metadata.yaml", b"a: [");
+    assert!(message().unwrap_err().contains("has a metadata.yaml that cannot be read"));
 }

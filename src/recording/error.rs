@@ -18,11 +18,31 @@ pub enum RecordingError {
     /// Writing went wrong midway.
     #[error("writing stopped: {0}; what was written before can be read")]
     Write(std::io::Error),
-    /// The file is not an MCAP file at all.
-    #[error("{name}: not an MCAP file (it does not begin with the MCAP magic bytes)")]
-    NotMcap {
+    /// The file is not a recording that is read here.
+    #[error("{name}: {found}, not an MCAP file, a ROS 1 bag or a rosbag2 database; {remedy}")]
+    NotRecording {
         /// Which file.
         name: String,
+        /// What it seems to be.
+        found: String,
+        /// How to make a recording of it.
+        remedy: String,
+    },
+    /// A folder that is not one recording.
+    #[error("{}: the folder {problem}", path.display())]
+    Folder {
+        /// Which folder.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// An SQLite database that rosbag2 did not write, or that is damaged.
+    #[error("{name}: not a readable rosbag2 database: {problem}; `sqlite3 {name} .recover` makes a new one of what is left")]
+    Database {
+        /// Which file.
+        name: String,
+        /// What is wrong.
+        problem: String,
     },
     /// A value that a message cannot hold.
     #[error("{what} is {value}, but {limit}")]

@@ -2,7 +2,7 @@
 
 use crate::geometry::Pose;
 use crate::measurement::Calibration;
-use crate::recording::container::Messages;
+use crate::recording::container::{ChannelId, Messages};
 use crate::recording::message::transforms::{self, Transform};
 use crate::recording::schema::MessageType;
 use crate::recording::topics::HEAD;
@@ -69,12 +69,12 @@ impl Reader {
         let is_static = |topic: &str| topic.trim_start_matches('/') == "tf_static";
         let channels =
             self.channels().iter().filter(|c| is_static(&c.topic) && MessageType::Transforms.is_named(&c.type_name));
-        let ids: Vec<u16> = channels.map(|channel| channel.id).collect();
+        let ids: Vec<ChannelId> = channels.map(|channel| channel.id).collect();
         let tree = self.frames_among(self.messages_near(&ids), &ids)?;
         if ids.is_empty() || !tree.is_empty() { Ok(tree) } else { self.frames_among(self.messages(), &ids) }
     }
 
-    fn frames_among(&self, mut messages: Messages<'_>, ids: &[u16]) -> Result<FrameTree, RecordingError> {
+    fn frames_among(&self, mut messages: Messages<'_>, ids: &[ChannelId]) -> Result<FrameTree, RecordingError> {
         let mut tree = FrameTree::default();
         while let Some(message) = messages.next()? {
             if !ids.contains(&message.channel) {

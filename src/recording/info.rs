@@ -3,8 +3,8 @@
 mod clock;
 mod intervals;
 
-use crate::recording::cdr::Decoder;
-use crate::recording::container::{Channel, RawMessage};
+use crate::recording::wire::Decoder;
+use crate::recording::container::{Channel, ChannelId, RawMessage};
 use crate::recording::schema::MessageType;
 use crate::recording::{Loss, Reader, RecordingError};
 use crate::time::{Span, Stamp};
@@ -106,14 +106,21 @@ impl Reader {
     /// # Errors
     /// When the file cannot be read.
     pub fn info(&self, gap: Span) -> Result<RecordingInfo, RecordingError> {
-        let mut gathered: BTreeMap<u16, Gathered> = self.channels().iter().map(|c| (c.id, Gathered::new())).collect();
+        // A topic is one channel in each file of a split recording.
+        let mut firsts = BTreeMap::new();
+        let mut known: BTreeMap<ChannelId, (ChannelId, &Channel)> = BTreeMap::new();
+        for channel in self.channels() {
+            let first = *firsts.entry((&channel.topic, &channel.type_name)).or_insert(channel.id);
+            known.insert(channel.id, (first, channel));
+        }
+        let mut gathered: BTreeMap<ChannelId, Gathered> = firsts.values().map(|id| (*id, Gathered::new())).collect();
         let mut loss = self.loss().clone();
         let mut messages = self.messages();
         while let Some(message) = messages.next()? {
-            let channel = self.channels().iter().find(|channel| channel.id == message.channel);
-            match (channel, gathered.get_mut(&message.channel)) {
-                (Some(channel), Some(topic)) => topic.add(&message, channel, gap),
-                _ => loss.unreadable_messages += 1,
+            let channel = known.get(&message.channel);
+            match channel.and_then(|(first, channel)| Some((channel, gathered.get_mut(first)?))) {
+                Some((channel, topic)) => topic.add(&message, channel, gap),
+                None => loss.unreadable_messages += 1,
             }
         }
         loss.add_pass(&messages, self.expected_messages());
@@ -154,9 +161,7 @@ fn topic_info(channel: &Channel, gathered: Gathered) -> TopicInfo {
 
 /// The stamp that a message begins with, where its type has one.
 fn stamp_of(message: &RawMessage<'_>, channel: &Channel) -> Option<Stamp> {
-    if channel.encoding != "cdr" {
-        return None;
-    }
+    channel.wire?;
     let mut input = Decoder::new(message.data).ok()?;
     if MessageType::Transforms.is_named(&channel.type_name) {
         // The stamp of the first transform, behind their number.

@@ -22,14 +22,14 @@ pub struct Loss {
 }
 
 impl Loss {
-    /// What the file as a whole lost.
-    pub(super) fn of_file(directory: &Directory) -> Self {
-        Self {
-            cut_short: directory.ending == Ending::CutShort,
-            damaged_summary: directory.ending == Ending::SummaryDamaged,
-            lost_bytes: directory.lost_bytes,
-            ..Self::default()
-        }
+    /// What the files as a whole lost.
+    pub(super) fn of_files<'d>(directories: impl Iterator<Item = &'d Directory>) -> Self {
+        directories.fold(Self::default(), |loss, directory| Self {
+            cut_short: loss.cut_short || directory.ending == Ending::CutShort,
+            damaged_summary: loss.damaged_summary || directory.ending == Ending::SummaryDamaged,
+            lost_bytes: loss.lost_bytes + directory.lost_bytes,
+            ..loss
+        })
     }
 
     /// Adds what a pass through all messages met, `expected` of them by the summary.

@@ -1,8 +1,8 @@
 //! A recording's measurements, one after the other, without its truth.
 
 use crate::measurement::{ImuSample, LidarScan, Measurement};
-use crate::recording::cdr::DecodeError;
-use crate::recording::container::{Messages, RawMessage};
+use crate::recording::wire::DecodeError;
+use crate::recording::container::{ChannelId, Messages, RawMessage};
 use crate::recording::message::scan::Projector;
 use crate::recording::message::{imu, points, scan};
 use crate::recording::order::InOrder;
@@ -16,10 +16,10 @@ use crate::recording::{Loss, Reader, RecordingError, Selection};
 /// [`loss`](Self::loss).
 pub struct Measurements<'r> {
     messages: Messages<'r>,
-    lidar: Vec<u16>,
+    lidar: Vec<ChannelId>,
     lidar_kind: LidarKind,
     point_times: Option<points::Unit>,
-    imu: Vec<u16>,
+    imu: Vec<ChannelId>,
     force_unit: imu::ForceUnit,
     projector: Projector,
     loss: Loss,

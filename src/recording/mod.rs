@@ -21,11 +21,11 @@
 //! [`write_surfel_map`] and [`read_surfel_map`] maps, and [`write_result`] an estimate as a recording for viewers.
 
 mod base_imu;
-mod cdr;
 mod cloud;
 mod container;
 mod error;
 mod extrinsics;
+mod folder;
 mod info;
 mod las;
 mod loss;
@@ -43,6 +43,7 @@ mod spool;
 mod topics;
 mod truth;
 mod tum;
+mod wire;
 mod writer;
 
 pub use base_imu::BaseImuRecord;

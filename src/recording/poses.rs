@@ -46,9 +46,10 @@ impl Reader {
     /// The topic of poses that is asked for, or else taken, and what its messages are.
     fn pose_topic(&self, asked: Option<&str>) -> Result<(&str, MessageType), RecordingError> {
         let kind_of = |channel: &Channel| TYPES.into_iter().find(|kind| kind.is_named(&channel.type_name));
-        let cdr = self.channels().iter().filter(|channel| channel.encoding == "cdr");
-        let mut topics: Vec<_> = cdr.filter_map(|channel| Some((channel.topic.as_str(), kind_of(channel)?))).collect();
+        let readable = self.channels().iter().filter(|channel| channel.wire.is_some());
+        let mut topics: Vec<_> = readable.filter_map(|channel| Some((channel.topic.as_str(), kind_of(channel)?))).collect();
         topics.sort_unstable();
+        topics.dedup();
         let named = |name: &str| topics.iter().find(|(topic, _)| *topic == name);
         let found = match asked {
             Some(name) => named(name),

@@ -1,45 +1,46 @@
 //! A recording, opened for reading: by zsim or by anybody.
 
-use crate::recording::container::{BlockKind, Channel, Directory, Ending, Loaded, Messages, Source, walk};
+use crate::recording::container::{Block, Channel, ChannelId, Messages, Part};
+use crate::recording::folder::files_of;
 use crate::recording::{Loss, RecordingError};
-use std::io::{Error, Read, Seek};
-use std::path::{Path, PathBuf};
+use std::io::{Read, Seek};
+use std::path::Path;
 
-/// An MCAP recording. Opening it finds what is where; messages are read as they are asked for, a chunk or two in memory
-/// at a time, from files that are cut short or damaged as from whole ones.
+/// A recording: an MCAP file, a ROS 1 bag, a rosbag2 database, or several files of these, split by their recorder.
+/// Opening it finds what is where; messages are read as they are asked for, a chunk or two in memory at a time, from
+/// files that are cut short or damaged as from whole ones.
 pub struct Reader {
     name: String,
-    source: Source,
-    directory: Directory,
+    parts: Vec<Part>,
     channels: Vec<Channel>,
     loss: Loss,
 }
 
 impl Reader {
-    /// Opens the file at `path`, or the one in the folder at `path`, as rosbag2 makes them.
+    /// Opens the file at `path`, or the one in the folder at `path`, as rosbag2 makes them: all of its files where the
+    /// recording is split.
     ///
     /// # Errors
-    /// When it cannot be opened or read, or is no MCAP file. A file that is cut short or damaged is opened.
+    /// When it cannot be opened or read, or is of no format that is read. A file that is cut short or damaged is opened.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let path = &file_of(path)?;
-        let file =
-            std::fs::File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
-        Self::new(&path.display().to_string(), file)
+        let files = files_of(path)?;
+        let parts = files.iter().zip(0..).map(|(file, place)| Part::open(place, file)).collect::<Result<_, _>>()?;
+        let name = if files.len() == 1 { &files[0] } else { path };
+        Ok(Self::of(&name.display().to_string(), parts))
     }
 
-    /// Opens `input`, which messages call `name`.
+    /// Opens `input`, one file, which messages call `name`.
     ///
     /// # Errors
-    /// When it cannot be read, or is no MCAP file.
+    /// When it cannot be read, or is of no format that is read.
     pub fn new(name: &str, input: impl Read + Seek + Send + 'static) -> Result<Self, RecordingError> {
-        let source = Source::new(input)?;
-        let mut directory = walk(&source, name)?;
-        if directory.ending != Ending::Complete || directory.channels.is_empty() {
-            find_definitions(&source, &mut directory)?;
-        }
-        let channels = directory.channels().collect();
-        let loss = Loss::of_file(&directory);
-        Ok(Self { name: name.to_owned(), source, directory, channels, loss })
+        Ok(Self::of(name, vec![Part::new_input(name, input)?]))
+    }
+
+    fn of(name: &str, parts: Vec<Part>) -> Self {
+        let channels = parts.iter().flat_map(Part::channels).collect();
+        let loss = Loss::of_files(parts.iter().map(|part| &part.directory));
+        Self { name: name.to_owned(), parts, channels, loss }
     }
 
     /// The file's name, for messages.
@@ -49,25 +50,25 @@ impl Reader {
 
     /// The manifest of the run that zsim recorded; `None` in a recording by others.
     pub fn manifest(&self) -> Option<&str> {
-        Some(self.directory.metadata.get("zsim")?.get("manifest")?.as_str())
+        self.parts.iter().find_map(|part| Some(part.directory.metadata.get("zsim")?.get("manifest")?.as_str()))
     }
 
-    /// What the file as a whole lost. Damaged chunks show only when they are read: each pass counts those it meets.
+    /// What the files as a whole lost. Damaged chunks show only when they are read: each pass counts those it meets.
     pub fn loss(&self) -> &Loss {
         &self.loss
     }
 
-    /// Bytes in the file.
+    /// Bytes in the files.
     pub(super) fn length_bytes(&self) -> u64 {
-        self.source.length()
+        self.parts.iter().map(|part| part.store.length()).sum()
     }
 
     pub(super) fn channels(&self) -> &[Channel] {
         &self.channels
     }
 
-    /// The numbers under which a topic's messages are in the file.
-    pub(super) fn ids_of(&self, topic: &str) -> Vec<u16> {
+    /// The numbers under which a topic's messages are in the recording.
+    pub(super) fn ids_of(&self, topic: &str) -> Vec<ChannelId> {
         self.channels.iter().filter(|channel| channel.topic == topic).map(|channel| channel.id).collect()
     }
 
@@ -79,48 +80,32 @@ impl Reader {
         if topics.is_empty() { "no topics at all".to_owned() } else { topics.join(", ") }
     }
 
+    fn blocks(&self) -> impl Iterator<Item = (&Part, &Block)> {
+        self.parts.iter().flat_map(|part| part.directory.blocks.iter().map(move |block| (part, block)))
+    }
+
     /// All messages in the order of their log time.
     pub(super) fn messages(&self) -> Messages<'_> {
-        Messages::new(&self.source, self.directory.blocks.iter())
+        Messages::new(self.blocks())
     }
 
     /// The messages of blocks that seem to hold some of `channels`, among others of those blocks.
-    pub(super) fn messages_near(&self, channels: &[u16]) -> Messages<'_> {
-        Messages::new(&self.source, self.directory.blocks.iter().filter(|block| block.seems_to_hold(channels)))
+    pub(super) fn messages_near(&self, channels: &[ChannelId]) -> Messages<'_> {
+        Messages::new(self.blocks_near(channels).into_iter())
     }
 
-    /// How many messages the summary counts.
+    fn blocks_near(&self, channels: &[ChannelId]) -> Vec<(&Part, &Block)> {
+        let near = |part: &Part| part.local(channels);
+        let blocks = self.parts.iter().map(|part| (part, near(part)));
+        let blocks = blocks.flat_map(|(part, ids)| {
+            let seem = part.directory.blocks.iter().filter(move |block| block.seems_to_hold(&ids));
+            seem.map(move |block| (part, block))
+        });
+        blocks.collect()
+    }
+
+    /// How many messages the summaries count.
     pub(super) fn expected_messages(&self) -> Option<u64> {
-        self.directory.expected_messages
+        self.parts.iter().map(|part| part.directory.expected_messages).sum()
     }
-}
-
-/// The recording in a folder; a path to anything else is that of a recording already.
-fn file_of(path: &Path) -> Result<PathBuf, RecordingError> {
-    if !path.is_dir() {
-        return Ok(path.to_owned());
-    }
-    let at = |source: Error| RecordingError::File { path: path.to_owned(), source };
-    let entries = std::fs::read_dir(path).map_err(at)?.collect::<Result<Vec<_>, _>>().map_err(at)?;
-    let mut files: Vec<_> = entries.into_iter().map(|entry| entry.path()).collect();
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "mcap"));
-    match (files.pop(), files.len()) {
-        (Some(file), 0) => Ok(file),
-        (None, _) => Err(at(Error::other("there is no .mcap file in this folder"))),
-        (_, more) => Err(at(Error::other(format!("there are {} .mcap files in this folder: name one", more + 1)))),
-    }
-}
-
-/// Reads the definitions that stand in chunks, where no summary repeats them.
-fn find_definitions(source: &Source, directory: &mut Directory) -> Result<(), RecordingError> {
-    let mut loaded = Loaded::default();
-    for k in 0..directory.blocks.len() {
-        let block = &directory.blocks[k];
-        if matches!(block.kind, BlockKind::Chunk(_)) && loaded.load(source, block)?.is_ok() {
-            for (opcode, fields) in &loaded.definitions {
-                directory.define(*opcode, &loaded.bytes[fields.clone()]);
-            }
-        }
-    }
-    Ok(())
 }

@@ -47,6 +47,22 @@ const DEFINITIONS: [(&str, &str); 21] = [
     ),
 ];
 
+/// Types that begin with a header, and that zsim does not write.
+const HEADED: [&str; 12] = [
+    "sensor_msgs/CompressedImage",
+    "sensor_msgs/CameraInfo",
+    "sensor_msgs/FluidPressure",
+    "sensor_msgs/Image",
+    "sensor_msgs/JointState",
+    "sensor_msgs/MagneticField",
+    "sensor_msgs/MultiEchoLaserScan",
+    "sensor_msgs/NavSatFix",
+    "sensor_msgs/Range",
+    "sensor_msgs/Temperature",
+    "livox_ros_driver/CustomMsg",
+    "livox_ros_driver2/CustomMsg",
+];
+
 /// A message type that recordings carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MessageType {
@@ -91,6 +107,12 @@ impl MessageType {
         let full = self.name();
         name == full
             || full.split_once("/msg/").is_some_and(|(package, kind)| name.split_once('/') == Some((package, kind)))
+    }
+
+    /// Whether messages of the type called `name` begin with a header.
+    pub fn known_with_header(name: &str) -> bool {
+        let short = name.replace("/msg/", "/");
+        fields_of(&short).starts_with("std_msgs/Header") || HEADED.contains(&short.as_str())
     }
 
     /// The definition with those it depends on, as `ros2msg` wants it: each after a line of `=` and its name.

@@ -1,11 +1,12 @@
 //! Which topics of a recording are the lidar and the IMU.
 
-use crate::recording::container::RawMessage;
+use crate::recording::container::{ChannelId, RawMessage};
 use crate::recording::measurements::is_finite;
 use crate::recording::message::{imu, points, scan};
 use crate::recording::schema::MessageType;
 use crate::recording::topics::TRUTH_PREFIX;
-use crate::recording::{Reader, RecordingError, cdr::Decoder};
+use crate::recording::wire::Decoder;
+use crate::recording::{Reader, RecordingError};
 use std::collections::BTreeMap;
 
 /// Topics that somebody asks for; those not named are found.
@@ -158,7 +159,7 @@ impl Reader {
         look: fn(&RawMessage<'_>, MessageType, &str) -> Option<Candidate>,
     ) -> Result<Vec<Candidate>, RecordingError> {
         let mut open = BTreeMap::new();
-        for channel in self.channels().iter().filter(|channel| channel.encoding == "cdr") {
+        for channel in self.channels().iter().filter(|channel| channel.wire.is_some()) {
             let kind = types.iter().find(|kind| kind.is_named(&channel.type_name));
             let wanted = asked.map_or(!channel.topic.starts_with(TRUTH_PREFIX), |asked| asked == channel.topic);
             if let Some(kind) = kind.filter(|_| wanted) {
@@ -170,7 +171,7 @@ impl Reader {
             let problem = format!("is not there as {}", names.join(" or "));
             return Err(self.topic_error(asked, problem));
         }
-        let ids: Vec<u16> = open.keys().copied().collect();
+        let ids: Vec<ChannelId> = open.keys().copied().collect();
         let mut found = Vec::new();
         for mut messages in [self.messages_near(&ids), self.messages()] {
             while !open.is_empty() {

@@ -5,7 +5,7 @@
 //! memory does not grow with the recording; their bytes do not depend on how threads are scheduled.
 
 use crate::recording::RecordingError;
-use crate::recording::cdr::Encoder;
+use crate::recording::wire::Encoder;
 use crate::recording::topics::Topic;
 use crate::time::Stamp;
 use mcap::records::{MessageHeader, Metadata};

@@ -1,7 +1,7 @@
 //! A recording's truth: only for those who judge an estimate, never for the estimator.
 
 use crate::geometry::{Pose, Trajectory};
-use crate::recording::container::{Messages, RawMessage};
+use crate::recording::container::{ChannelId, Messages, RawMessage};
 use crate::recording::message::{clock, pose};
 use crate::recording::topics::Topic;
 use crate::recording::{Loss, Reader, RecordingError};
@@ -22,9 +22,9 @@ pub enum Truth {
 /// Reads the truth in the order in which it was written.
 pub struct Truths<'r> {
     messages: Messages<'r>,
-    heads: Vec<u16>,
-    bases: Vec<u16>,
-    clocks: Vec<u16>,
+    heads: Vec<ChannelId>,
+    bases: Vec<ChannelId>,
+    clocks: Vec<ChannelId>,
     lidar: Option<clock::Reading<'static>>,
     loss: Loss,
     expected: Option<u64>,

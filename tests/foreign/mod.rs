@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub mod bag;
+
 use mcap::records::MessageHeader;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -141,6 +143,10 @@ impl Foreign {
     }
 
     pub fn message(&mut self, topic: &str, kind: &str, log_ns: i64, message: &impl Serialize) -> &mut Self {
+        self.serialised(topic, kind, log_ns, &cdr(message))
+    }
+
+    pub fn serialised(&mut self, topic: &str, kind: &str, log_ns: i64, message: &[u8]) -> &mut Self {
         let id = match self.channels.get(topic) {
             Some(id) => *id,
             None => {
@@ -152,7 +158,7 @@ impl Foreign {
         self.channels.insert(topic.to_owned(), id);
         let log_time = log_ns as u64;
         let header = MessageHeader { channel_id: id, sequence: 0, log_time, publish_time: log_time };
-        self.writer.write_to_known_channel(&header, &cdr(message)).unwrap();
+        self.writer.write_to_known_channel(&header, message).unwrap();
         self
     }
 

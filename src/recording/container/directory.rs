@@ -1,19 +1,25 @@
 //! What a file holds and where, without its messages.
 
+use super::bag::{self, BagChunk};
+use super::part::ChannelId;
 use super::record::{self, ChannelRecord, ChunkHeader, SchemaRecord, op};
+use crate::recording::topics::printable;
+use crate::recording::wire::Wire;
 use std::collections::BTreeMap;
 
 /// A topic and the type of its messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Channel {
-    /// Its number in the file.
-    pub id: u16,
-    /// Its name.
+    /// Its number in the recording.
+    pub id: ChannelId,
+    /// Its name, with control characters escaped.
     pub topic: String,
     /// The type of its messages, `package/msg/Type`; empty where the file does not say.
     pub type_name: String,
-    /// Encoding of its messages: `cdr` in the ROS 2 profile.
+    /// Encoding of its messages: `cdr` in ROS 2, `ros1` in ROS 1.
     pub encoding: String,
+    /// How its messages are serialised; `None` where they are not decoded.
+    pub wire: Option<Wire>,
     /// Whether its messages begin with a header, hence with a stamp.
     pub has_header: bool,
 }
@@ -36,10 +42,19 @@ pub struct Block {
 /// How a block is kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BlockKind {
-    /// As a chunk.
+    /// As a chunk of MCAP.
     Chunk(ChunkHeader),
-    /// As plain records, one after the other.
+    /// As plain records of MCAP, one after the other.
     Plain,
+    /// As a chunk of a ROS 1 bag.
+    BagChunk(BagChunk),
+    /// As rows of a database.
+    Rows {
+        /// Number of the first.
+        first: i64,
+        /// Number of the last.
+        last: i64,
+    },
 }
 
 impl Block {
@@ -107,13 +122,22 @@ impl Directory {
         .is_some()
     }
 
-    /// The topics, by number.
-    pub fn channels(&self) -> impl Iterator<Item = Channel> {
-        self.channels.values().map(|record| Channel {
-            id: record.id,
-            topic: record.topic.clone(),
-            type_name: self.schemas.get(&record.schema).map(|schema| schema.name.clone()).unwrap_or_default(),
-            encoding: record.encoding.clone(),
+    /// Takes up a connection of a bag; of two with one number, the first holds. `false` where it is broken.
+    pub fn define_connection(&mut self, bytes: &[u8]) -> bool {
+        let Some((channel, schema)) = bag::connection(bytes) else { return false };
+        self.schemas.entry(schema.id).or_insert(schema);
+        self.channels.entry(channel.id).or_insert(channel);
+        true
+    }
+
+    /// The topics, by number; `id_of` makes a number in the recording of one in the file.
+    pub fn channels(&self, id_of: impl Fn(u16) -> ChannelId) -> impl Iterator<Item = Channel> {
+        self.channels.values().map(move |record| Channel {
+            id: id_of(record.id),
+            topic: printable(&record.topic),
+            type_name: self.schemas.get(&record.schema).map(|schema| printable(&schema.name)).unwrap_or_default(),
+            encoding: printable(&record.encoding),
+            wire: Wire::of_encoding(&record.encoding),
             has_header: self.schemas.get(&record.schema).is_some_and(|schema| schema.has_header),
         })
     }

@@ -2,8 +2,9 @@
 
 use super::chunk::{Damage, Loaded};
 use super::directory::Block;
-use super::source::Source;
+use super::part::{ChannelId, Part};
 use crate::recording::RecordingError;
+use crate::recording::wire::Payload;
 use std::collections::VecDeque;
 
 /// Greatest size of blocks in memory at once, bytes. Blocks overlap in time where a program writes topic after topic:
@@ -14,11 +15,11 @@ const MOST_HELD: usize = 256 << 20;
 #[derive(Debug, Clone, Copy)]
 pub struct RawMessage<'a> {
     /// Number of its topic.
-    pub channel: u16,
+    pub channel: ChannelId,
     /// When it was written down, ns.
     pub log_time_ns: u64,
     /// Its bytes.
-    pub data: &'a [u8],
+    pub data: Payload<'a>,
 }
 
 /// A block that cannot be read.
@@ -35,22 +36,22 @@ pub struct DamagedBlock {
 /// A block is in memory from its first message's time to its last's, so as many are held as overlap in time: one, in a
 /// file written as time went on.
 pub struct Messages<'r> {
-    source: &'r Source,
-    /// Blocks to come, by the time of their first message, with their place in the file.
-    to_come: VecDeque<(usize, &'r Block)>,
-    held: Vec<Held>,
+    /// Blocks to come, by the time of their first message, with their place in the recording.
+    to_come: VecDeque<(usize, &'r Part, &'r Block)>,
+    held: Vec<Held<'r>>,
     spare: Vec<Loaded>,
     damaged: Vec<DamagedBlock>,
     count: u64,
 }
 
-struct Held {
+struct Held<'r> {
     place: usize,
+    part: &'r Part,
     loaded: Loaded,
     next: usize,
 }
 
-impl Held {
+impl Held<'_> {
     fn key(&self) -> Option<(u64, usize)> {
         Some((self.loaded.entries.get(self.next)?.log_time_ns, self.place))
     }
@@ -58,10 +59,10 @@ impl Held {
 
 impl<'r> Messages<'r> {
     /// The messages of `blocks`.
-    pub fn new(source: &'r Source, blocks: impl Iterator<Item = &'r Block>) -> Self {
-        let mut to_come: Vec<_> = blocks.enumerate().collect();
-        to_come.sort_by_key(|(_, block)| block.start_ns);
-        Self { source, to_come: to_come.into(), held: Vec::new(), spare: Vec::new(), damaged: Vec::new(), count: 0 }
+    pub fn new(blocks: impl Iterator<Item = (&'r Part, &'r Block)>) -> Self {
+        let mut to_come: Vec<_> = blocks.enumerate().map(|(place, (part, block))| (place, part, block)).collect();
+        to_come.sort_by_key(|(_, _, block)| block.start_ns);
+        Self { to_come: to_come.into(), held: Vec::new(), spare: Vec::new(), damaged: Vec::new(), count: 0 }
     }
 
     /// The next message, `None` after the last.
@@ -80,8 +81,9 @@ impl<'r> Messages<'r> {
         let held = &mut self.held[first];
         let Some(entry) = held.loaded.entries.get(held.next) else { return Ok(None) };
         held.next += 1;
-        let data = &held.loaded.bytes[entry.data.clone()];
-        Ok(Some(RawMessage { channel: entry.channel, log_time_ns: entry.log_time_ns, data }))
+        let data = Payload { bytes: &held.loaded.bytes[entry.data.clone()], wire: held.part.wire(entry.channel) };
+        let channel = held.part.channel_id(entry.channel);
+        Ok(Some(RawMessage { channel, log_time_ns: entry.log_time_ns, data }))
     }
 
     /// Blocks that could not be read so far.
@@ -104,7 +106,7 @@ impl<'r> Messages<'r> {
 
     /// Whether the next block may hold a message before those in memory.
     fn wants_another(&self) -> bool {
-        let Some((_, block)) = self.to_come.front() else { return false };
+        let Some((_, _, block)) = self.to_come.front() else { return false };
         match self.held.iter().filter_map(Held::key).min() {
             None => true,
             Some((time, _)) => block.start_ns <= time && self.bytes_held() < MOST_HELD,
@@ -116,12 +118,12 @@ impl<'r> Messages<'r> {
     }
 
     fn load_next(&mut self) -> Result<(), RecordingError> {
-        let Some((place, block)) = self.to_come.pop_front() else { return Ok(()) };
+        let Some((place, part, block)) = self.to_come.pop_front() else { return Ok(()) };
         let mut loaded = self.spare.pop().unwrap_or_default();
-        match loaded.load(self.source, block)? {
+        match loaded.load(&part.store, block)? {
             Ok(()) => {
                 self.count += loaded.entries.len() as u64;
-                self.held.push(Held { place, loaded, next: 0 });
+                self.held.push(Held { place, part, loaded, next: 0 });
             }
             Err(damage) => {
                 self.damaged.push(DamagedBlock { damage, bytes: block.length });

@@ -169,7 +169,7 @@ pub fn schema(bytes: &[u8]) -> Option<SchemaRecord> {
 }
 
 /// Whether the first field of a `ros2msg` definition is a header.
-fn begins_with_header(definition: &str) -> bool {
+pub fn begins_with_header(definition: &str) -> bool {
     let mut lines = definition.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     let kind = lines.next().and_then(|line| line.split_whitespace().next());
     matches!(kind, Some("std_msgs/Header" | "std_msgs/msg/Header" | "Header"))

@@ -19,8 +19,8 @@ const PLAIN_BLOCK: u64 = 1 << 20;
 /// Walks through all of `source`.
 ///
 /// # Errors
-/// When it cannot be read, or is no MCAP file (`name` is for the message).
-pub fn walk(source: &Source, name: &str) -> Result<Directory, RecordingError> {
+/// When it cannot be read.
+pub fn walk(source: &Source) -> Result<Directory, RecordingError> {
     let signposts = signposts::read(source)?;
     let mut input = source.lock();
     input.seek(SeekFrom::Start(0)).map_err(RecordingError::Read)?;
@@ -32,9 +32,7 @@ pub fn walk(source: &Source, name: &str) -> Result<Directory, RecordingError> {
         found: Directory::empty(),
         in_summary: false,
     };
-    if walk.take(MAGIC.len() as u64)? != MAGIC {
-        return Err(RecordingError::NotMcap { name: name.to_owned() });
-    }
+    walk.take(MAGIC.len() as u64)?;
     walk.found.expected_messages = walk.signposts.messages;
     while walk.step()? {}
     Ok(walk.found)

@@ -1,7 +1,7 @@
 //! `sensor_msgs/TimeReference`: what a sensor's clock said at a true time.
 
 use crate::recording::RecordingError;
-use crate::recording::cdr::{DecodeError, Decoder, Encoder};
+use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::Stamp;
 
 /// A sensor's clock beside true time.
@@ -29,7 +29,7 @@ pub fn encode(out: &mut Encoder<'_>, frame: &str, reading: &Reading<'_>) -> Resu
 ///
 /// # Errors
 /// When the bytes are not a `TimeReference` message.
-pub fn decode(message: &[u8]) -> Result<Reading<'_>, DecodeError> {
+pub fn decode(message: Payload<'_>) -> Result<Reading<'_>, DecodeError> {
     let mut input = Decoder::new(message)?;
     let (now, _) = input.header()?;
     let says = input.time()?;

@@ -2,7 +2,7 @@
 
 use crate::measurement::{ImuNoise, ImuSample};
 use crate::recording::RecordingError;
-use crate::recording::cdr::{DecodeError, Decoder, Encoder};
+use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 
 /// Variances that an IMU's messages state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +86,7 @@ pub fn encode(
 ///
 /// # Errors
 /// When the bytes are not an `Imu` message.
-pub fn decode(message: &[u8], unit: ForceUnit) -> Result<ImuSample, DecodeError> {
+pub fn decode(message: Payload<'_>, unit: ForceUnit) -> Result<ImuSample, DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
     input.f64s::<13>()?;
@@ -112,13 +112,13 @@ mod tests {
         let mut bytes = Vec::new();
         let variances = Variances { gyro: 2.5e-5, accel: 6.4e-5 };
         encode(&mut Encoder::new(&mut bytes), "imu_link", &sample, &variances).unwrap();
-        let mut input = Decoder::new(&bytes).unwrap();
+        let mut input = Decoder::new(Payload::cdr(&bytes)).unwrap();
         input.header().unwrap();
         assert_eq!(input.f64s().unwrap(), [0.0, 0.0, 0.0, 1.0]);
         assert_eq!(input.f64().unwrap(), -1.0);
         input.f64s::<11>().unwrap();
         assert_eq!(input.f64s().unwrap(), [2.5e-5, 0.0, 0.0, 0.0, 2.5e-5, 0.0, 0.0, 0.0, 2.5e-5]);
-        assert_eq!(decode(&bytes, ForceUnit::default()).unwrap(), sample);
+        assert_eq!(decode(Payload::cdr(&bytes), ForceUnit::default()).unwrap(), sample);
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod unit;
 
 use crate::measurement::{LidarReturn, LidarScan};
 use crate::recording::RecordingError;
-use crate::recording::cdr::{DecodeError, Decoder, Encoder};
+use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::recording::message::scan::from_earliest;
 use crate::time::Span;
 pub use fields::TimeField;
@@ -97,7 +97,7 @@ struct Cloud<'a> {
 }
 
 impl<'a> Cloud<'a> {
-    fn decode(message: &'a [u8]) -> Result<Self, DecodeError> {
+    fn decode(message: Payload<'a>) -> Result<Self, DecodeError> {
         let mut input = Decoder::new(message)?;
         let (stamp, _) = input.header()?;
         let (height, width) = (input.u32()? as usize, input.u32()? as usize);
@@ -146,7 +146,7 @@ impl<'a> Cloud<'a> {
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2` with x, y and z.
-pub fn decode(message: &[u8], unit: Option<Unit>) -> Result<LidarScan, DecodeError> {
+pub fn decode(message: Payload<'_>, unit: Option<Unit>) -> Result<LidarScan, DecodeError> {
     let cloud = Cloud::decode(message)?;
     let coordinate = |name| cloud.field(name).ok_or(DecodeError::Contradiction("a cloud has no x, y and z"));
     let (x, y, z) = (coordinate("x")?, coordinate("y")?, coordinate("z")?);
@@ -186,7 +186,7 @@ pub fn decode(message: &[u8], unit: Option<Unit>) -> Result<LidarScan, DecodeErr
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2`.
-pub fn by_other_clock(message: &[u8]) -> Result<Option<bool>, DecodeError> {
+pub fn by_other_clock(message: Payload<'_>) -> Result<Option<bool>, DecodeError> {
     let cloud = Cloud::decode(message)?;
     Ok(TimeField::find(&cloud.fields).map(|mut time| {
         time.learn(cloud.stamp, cloud.points(), cloud.big_endian);
@@ -195,7 +195,7 @@ pub fn by_other_clock(message: &[u8]) -> Result<Option<bool>, DecodeError> {
 }
 
 /// How long a cloud lasts by its points' times; `None` where they carry none, or tell instants.
-pub fn lasting(message: &[u8]) -> Option<Lasting> {
+pub fn lasting(message: Payload<'_>) -> Option<Lasting> {
     let cloud = Cloud::decode(message).ok()?;
     let mut time = TimeField::find(&cloud.fields)?;
     time.learn(cloud.stamp, cloud.points(), cloud.big_endian);

@@ -2,7 +2,7 @@
 
 use crate::geometry::{Kinematics, Pose, PoseCovariance};
 use crate::recording::RecordingError;
-use crate::recording::cdr::{DecodeError, Decoder, Encoder};
+use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::Stamp;
 
 /// Writes a `PoseStamped` in `frame`.
@@ -36,7 +36,7 @@ pub fn encode_uncertain(
 ///
 /// # Errors
 /// When the bytes are not such a message, or the pose is not a rigid one.
-pub fn decode(message: &[u8]) -> Result<(Stamp, Pose), DecodeError> {
+pub fn decode(message: Payload<'_>) -> Result<(Stamp, Pose), DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
     Ok((stamp, input.pose()?))
@@ -46,7 +46,7 @@ pub fn decode(message: &[u8]) -> Result<(Stamp, Pose), DecodeError> {
 ///
 /// # Errors
 /// When the bytes are not such a message, or the pose is not a rigid one.
-pub fn decode_odometry(message: &[u8]) -> Result<(Stamp, Pose), DecodeError> {
+pub fn decode_odometry(message: Payload<'_>) -> Result<(Stamp, Pose), DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
     input.string()?;
@@ -110,7 +110,7 @@ mod tests {
         };
         let mut bytes = Vec::new();
         encode_odometry(&mut Encoder::new(&mut bytes), ("map", "head"), Stamp::from_nanos(5), &body).unwrap();
-        let mut input = Decoder::new(&bytes).unwrap();
+        let mut input = Decoder::new(Payload::cdr(&bytes)).unwrap();
         assert_eq!(input.header().unwrap(), (Stamp::from_nanos(5), "map"));
         assert_eq!(input.string().unwrap(), "head");
         assert_eq!(input.pose().unwrap(), pose);

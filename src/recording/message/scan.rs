@@ -2,7 +2,7 @@
 
 use crate::measurement::{LidarReturn, LidarScan, PlanarScan};
 use crate::recording::RecordingError;
-use crate::recording::cdr::{DecodeError, Decoder, Encoder};
+use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::{Span, Stamp};
 
 /// Writes a sweep of the lidar in `frame` that began at `stamp`.
@@ -31,7 +31,7 @@ pub fn encode(out: &mut Encoder<'_>, frame: &str, stamp: Stamp, scan: &PlanarSca
 ///
 /// # Errors
 /// When the bytes are not a `LaserScan`, or its angles or times are not finite.
-pub fn decode(message: &[u8]) -> Result<(Stamp, PlanarScan), DecodeError> {
+pub fn decode(message: Payload<'_>) -> Result<(Stamp, PlanarScan), DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
     let [angle_min_rad, _, angle_increment_rad, time_increment_s, scan_time_s] = [

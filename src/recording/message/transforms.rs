@@ -2,7 +2,8 @@
 
 use crate::geometry::Pose;
 use crate::recording::RecordingError;
-use crate::recording::cdr::{DecodeError, Decoder, Encoder};
+use crate::recording::topics::printable;
+use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::Stamp;
 
 /// Least bytes that a transform takes on the wire: time, two strings, seven doubles.
@@ -37,10 +38,10 @@ pub fn encode(out: &mut Encoder<'_>, stamp: Stamp, transforms: &[Transform]) -> 
 ///
 /// # Errors
 /// When the bytes are not a `TFMessage`, or a transform is not a rigid one.
-pub fn decode(message: &[u8]) -> Result<Vec<Transform>, DecodeError> {
+pub fn decode(message: Payload<'_>) -> Result<Vec<Transform>, DecodeError> {
     let mut input = Decoder::new(message)?;
     let count = input.u32()? as usize;
-    if count > message.len() / LEAST_BYTES {
+    if count > message.bytes.len() / LEAST_BYTES {
         return Err(DecodeError::Short);
     }
     (0..count)
@@ -53,7 +54,7 @@ pub fn decode(message: &[u8]) -> Result<Vec<Transform>, DecodeError> {
         .collect()
 }
 
-/// A frame's name without the slash that tf (the first one) put before it.
+/// A frame's name as it is printed, without the slash that tf (the first one) put before it.
 pub fn plain(frame: &str) -> String {
-    frame.trim_start_matches('/').to_owned()
+    printable(frame.trim_start_matches('/'))
 }

@@ -1,5 +1,7 @@
-//! CDR, the wire form of ROS 2 messages: primitives aligned to their size, little-endian, strings and sequences led by
-//! their length (OMG DDSI-RTPS 2.5, section 10; OMG CORBA 3.4, part 2, section 9.3).
+//! Serialised messages: written as CDR (ROS 2), read as CDR and as ROS 1.
+//!
+//! CDR aligns numbers to their size; strings and sequences begin with their length (OMG DDSI-RTPS 2.5, section 10; OMG
+//! CORBA 3.4, part 2, section 9.3). ROS 1 has the same numbers without alignment, always little-endian.
 //!
 //! Written by hand because a scan is thousands of numbers: whole runs of them are copied at once, into a buffer that is
 //! used again for the next message.
@@ -7,7 +9,7 @@
 mod decoder;
 mod encoder;
 
-pub use decoder::{DecodeError, Decoder};
+pub use decoder::{DecodeError, Decoder, Payload, Wire};
 pub use encoder::Encoder;
 
 #[cfg(test)]
@@ -58,7 +60,7 @@ mod tests {
             assert_eq!(written(frame, numbers)[4..], other, "{frame}");
             let big = cdr_encoding::to_vec::<_, byteorder::BigEndian>(&mixed).unwrap();
             let big = [&[0, 0, 0, 0], big.as_slice()].concat();
-            let mut input = Decoder::new(&big).unwrap();
+            let mut input = Decoder::new(Payload::cdr(&big)).unwrap();
             assert_eq!(input.header().unwrap(), (Stamp::from_nanos(-1), frame));
             assert_eq!(input.u8().unwrap(), 9);
             assert_eq!(input.vector().unwrap(), Vector::new(1.0, -2.0, f64::MIN_POSITIVE));
@@ -70,7 +72,7 @@ mod tests {
     fn a_message_cut_anywhere_is_short_and_a_lying_length_takes_no_memory() {
         let whole = written("laser", &[1.0, 2.0]);
         let read = |bytes: &[u8]| -> Result<u8, DecodeError> {
-            let mut input = Decoder::new(bytes)?;
+            let mut input = Decoder::new(Payload::cdr(bytes))?;
             input.header()?;
             input.u8()?;
             input.vector()?;
@@ -81,7 +83,7 @@ mod tests {
         for cut in 0..whole.len() {
             assert_eq!(read(&whole[..cut]), Err(DecodeError::Short), "cut at {cut}");
         }
-        let mut input = Decoder::new(&[0, 1, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF]).unwrap();
+        let mut input = Decoder::new(Payload::cdr(&[0, 1, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF])).unwrap();
         assert_eq!(input.f32_sequence(), Err(DecodeError::Short));
         assert_eq!(read(&[0, 3, 0, 0]), Err(DecodeError::Encapsulation));
     }

@@ -1,6 +1,43 @@
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::time::{NANOS_PER_SECOND, Stamp};
 
+/// How a message is serialised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wire {
+    /// CDR of ROS 2: an encapsulation header, numbers aligned to their size.
+    Cdr,
+    /// ROS 1: little-endian, no alignment, headers with a sequence number.
+    Ros1,
+}
+
+impl Wire {
+    /// The serialisation that a container calls `encoding`; `None` for one that is not read.
+    pub fn of_encoding(encoding: &str) -> Option<Self> {
+        match encoding {
+            "cdr" => Some(Self::Cdr),
+            "ros1" => Some(Self::Ros1),
+            _ => None,
+        }
+    }
+}
+
+/// A serialised message.
+#[derive(Debug, Clone, Copy)]
+pub struct Payload<'a> {
+    /// Its bytes.
+    pub bytes: &'a [u8],
+    /// How they are serialised.
+    pub wire: Wire,
+}
+
+impl<'a> Payload<'a> {
+    /// A message in CDR.
+    #[cfg(test)]
+    pub fn cdr(bytes: &'a [u8]) -> Self {
+        Self { bytes, wire: Wire::Cdr }
+    }
+}
+
 /// Why a message's bytes are not what its type says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
@@ -23,6 +60,7 @@ pub enum DecodeError {
 pub struct Decoder<'a> {
     rest: &'a [u8],
     whole: usize,
+    wire: Wire,
     big_endian: bool,
 }
 
@@ -37,18 +75,22 @@ macro_rules! number {
 }
 
 impl<'a> Decoder<'a> {
-    /// Begins to read `message`, whose first four bytes are its encapsulation header.
+    /// Begins to read `message`; in CDR its first four bytes are the encapsulation header.
     ///
     /// # Errors
     /// When the header is not that of plain CDR.
-    pub fn new(message: &'a [u8]) -> Result<Self, DecodeError> {
-        let (header, rest) = message.split_at_checked(4).ok_or(DecodeError::Short)?;
+    pub fn new(message: Payload<'a>) -> Result<Self, DecodeError> {
+        let Payload { bytes, wire } = message;
+        if wire == Wire::Ros1 {
+            return Ok(Self { rest: bytes, whole: bytes.len(), wire, big_endian: false });
+        }
+        let (header, rest) = bytes.split_at_checked(4).ok_or(DecodeError::Short)?;
         let big_endian = match header[..2] {
             [0, 0] => true,
             [0, 1] => false,
             _ => return Err(DecodeError::Encapsulation),
         };
-        Ok(Self { rest, whole: rest.len(), big_endian })
+        Ok(Self { rest, whole: rest.len(), wire, big_endian })
     }
 
     fn take(&mut self, length: usize) -> Result<&'a [u8], DecodeError> {
@@ -58,6 +100,9 @@ impl<'a> Decoder<'a> {
     }
 
     fn align(&mut self, size: usize) -> Result<(), DecodeError> {
+        if self.wire == Wire::Ros1 {
+            return Ok(());
+        }
         let at = self.whole - self.rest.len();
         self.take(at.next_multiple_of(size) - at).map(|_| ())
     }
@@ -130,12 +175,16 @@ impl<'a> Decoder<'a> {
         Ok(words.iter().map(|word| from(*word)).collect())
     }
 
-    /// `builtin_interfaces/Time`.
+    /// `builtin_interfaces/Time`, or the `time` of ROS 1, whose seconds have no sign.
     ///
     /// # Errors
     /// When the message is cut short.
     pub fn time(&mut self) -> Result<Stamp, DecodeError> {
-        let seconds = i64::from(self.u32()?.cast_signed());
+        let seconds = self.u32()?;
+        let seconds = match self.wire {
+            Wire::Cdr => i64::from(seconds.cast_signed()),
+            Wire::Ros1 => i64::from(seconds),
+        };
         Ok(Stamp::from_nanos(seconds * NANOS_PER_SECOND + i64::from(self.u32()?)))
     }
 
@@ -144,6 +193,9 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// When the message is cut short, or the frame is not UTF-8.
     pub fn header(&mut self) -> Result<(Stamp, &'a str), DecodeError> {
+        if self.wire == Wire::Ros1 {
+            self.u32()?;
+        }
         let stamp = self.time()?;
         Ok((stamp, self.string()?))
     }
