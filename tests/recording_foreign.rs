@@ -19,7 +19,8 @@ fn compression_and_chunks_make_no_difference() {
         let mut foreign = Foreign::new(options);
         for k in 0..200_i64 {
             foreign.message("/sensors/imu/data", IMU, k * 10_000_000, &imu(k * 10_000_000, "imu"));
-            let times: Vec<_> = (0..100_u32).map(|k| (k * 1000).to_le_bytes().to_vec()).collect();
+            // No two clouds are equal, as of no sensor.
+            let times: Vec<_> = (0..100_u32).map(|p| (p * 1000 + k as u32).to_le_bytes().to_vec()).collect();
             foreign.message("/ouster/points", POINTS, k * 10_000_000, &cloud(k * 10_000_000, ("t", UINT32), &times));
         }
         let reader = foreign.reader();
@@ -271,7 +272,10 @@ fn a_folder_is_one_recording_or_says_why_not() {
     assert!(message().unwrap().ends_with("run_0.mcap"));
     put("other.mcap", &bytes);
     assert!(message().unwrap_err().contains("has 2 recordings in it, name one of them"));
-    put("metadata.yaml", b"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [run_0.mcap, run_1.mcap]\n");
+    put(
+        "metadata.yaml",
+        b"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [run_0.mcap, run_1.mcap]\n",
+    );
     assert!(message().unwrap_err().contains("has no file `run_1.mcap`, which its metadata.yaml names"));
     put("run_1.mcap.zstd", &bytes);
     put("metadata.yaml", b"rosbag2_bagfile_information:\n  relative_file_paths:\n    - run_1.mcap.zstd\n");

@@ -28,9 +28,9 @@ impl Reader {
     pub fn base_imu(&self, topic: Option<&str>) -> Result<BaseImuRecord, RecordingError> {
         let topic = topic.unwrap_or(Topic::BaseImu.name());
         let found = self.candidates(&[MessageType::Imu], Some(topic), imu_candidate)?;
-        let frame = found.first().map_or("", |candidate| candidate.frame.as_str());
+        let frame = found.found.first().map_or("", |candidate| candidate.frame.as_str());
         let base_from_imu = self.frames()?.target_from_source(BASE, frame);
-        let unit = self.force_unit(topic)?;
+        let unit = found.found.first().map(|candidate| self.force_unit(candidate)).transpose()?.unwrap_or_default();
         let (ids, mut loss) = (self.ids_of(topic), self.loss().clone());
         let (mut samples, mut messages) = (Vec::new(), self.messages());
         while let Some(message) = messages.next()? {

@@ -37,7 +37,9 @@ pub enum RecordingError {
         problem: String,
     },
     /// An SQLite database that rosbag2 did not write, or that is damaged.
-    #[error("{name}: not a readable rosbag2 database: {problem}; `sqlite3 {name} .recover` makes a new one of what is left")]
+    #[error(
+        "{name}: not a readable rosbag2 database: {problem}; `sqlite3 {name} .recover` makes a new one of what is left"
+    )]
     Database {
         /// Which file.
         name: String,
@@ -65,6 +67,26 @@ pub enum RecordingError {
         needs: &'static str,
         /// The topics that are there.
         has: String,
+    },
+    /// The recording has topics of a sensor, and none of them can be used.
+    #[error("{name}: no {sensor} topic can be used: {reasons}")]
+    Unusable {
+        /// Which file.
+        name: String,
+        /// Which sensor: "lidar" or "IMU".
+        sensor: &'static str,
+        /// The topics, each with the reason.
+        reasons: String,
+    },
+    /// The IMU's messages lack what an estimate needs.
+    #[error("{name}: IMU topic {topic} {problem}")]
+    Imu {
+        /// Which file.
+        name: String,
+        /// Which topic.
+        topic: String,
+        /// What is wrong.
+        problem: String,
     },
     /// A topic that was asked for is not there, or carries another type.
     #[error("{name}: topic {topic} {problem}; it has {has}")]

@@ -49,7 +49,9 @@ pub fn files_of(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     }
     if let Some(compressed) = files.iter().find(|file| file.extension() == Some(OsStr::new(COMPRESSED))) {
         let name = compressed.display();
-        return Err(folder(format!("has {name}, a file compressed as a whole; decompress it with `zstd -d --rm {name}`")));
+        return Err(folder(format!(
+            "has {name}, a file compressed as a whole; decompress it with `zstd -d --rm {name}`"
+        )));
     }
     Ok(files)
 }
@@ -65,7 +67,10 @@ fn named_by_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
         .map_err(|source| RecordingError::File { path: metadata.clone(), source })?;
     let broken = |problem: String| RecordingError::Folder {
         path: path.to_owned(),
-        problem: format!("has a {METADATA} that cannot be read ({problem}); write it anew with `ros2 bag reindex {}`", path.display()),
+        problem: format!(
+            "has a {METADATA} that cannot be read ({problem}); write it anew with `ros2 bag reindex {}`",
+            path.display()
+        ),
     };
     if length as u64 > LONGEST_METADATA {
         return Err(broken("it is longer than 16 MiB".to_owned()));
@@ -74,7 +79,8 @@ fn named_by_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
         return Ok(Vec::new());
     }
     let parsed: Metadata = serde_saphyr::from_str(&text).map_err(|error| broken(error.to_string()))?;
-    let names = parsed.rosbag2_bagfile_information.map(|information| information.relative_file_paths).unwrap_or_default();
+    let names =
+        parsed.rosbag2_bagfile_information.map(|information| information.relative_file_paths).unwrap_or_default();
     names.iter().map(|name| named_file(path, name)).collect()
 }
 
@@ -109,7 +115,8 @@ fn found_in(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
 }
 
 fn is_recording(file: &Path) -> bool {
-    let whole = if file.extension() == Some(OsStr::new(COMPRESSED)) { file.with_extension("") } else { file.to_owned() };
+    let whole =
+        if file.extension() == Some(OsStr::new(COMPRESSED)) { file.with_extension("") } else { file.to_owned() };
     whole.extension().and_then(OsStr::to_str).is_some_and(|ending| ENDINGS.contains(&ending)) && file.is_file()
 }
 

@@ -3,9 +3,9 @@
 mod clock;
 mod intervals;
 
-use crate::recording::wire::Decoder;
 use crate::recording::container::{Channel, ChannelId, RawMessage};
 use crate::recording::schema::MessageType;
+use crate::recording::wire::Decoder;
 use crate::recording::{Loss, Reader, RecordingError};
 use crate::time::{Span, Stamp};
 use clock::ClockFit;

@@ -19,6 +19,10 @@ pub struct Loss {
     pub unreadable_messages: u64,
     /// IMU samples with NaN or infinity in them.
     pub samples_not_finite: u64,
+    /// Scans that came twice and were used once; not a loss.
+    pub repeated_scans: u64,
+    /// IMU samples that came twice and were used once; not a loss.
+    pub repeated_samples: u64,
 }
 
 impl Loss {
@@ -41,7 +45,18 @@ impl Loss {
 
     /// Whether nothing was lost.
     pub fn is_none(&self) -> bool {
-        *self == Self::default()
+        *self
+            == Self { repeated_scans: self.repeated_scans, repeated_samples: self.repeated_samples, ..Self::default() }
+    }
+
+    /// What was left out without loss, a sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        let counted =
+            |count: u64, what: &str| (count > 0).then(|| format!("{count} {what} came twice and were used once"));
+        [counted(self.repeated_scans, "scans"), counted(self.repeated_samples, "IMU samples")]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 
     /// What was lost, a sentence each.

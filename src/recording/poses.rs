@@ -47,7 +47,8 @@ impl Reader {
     fn pose_topic(&self, asked: Option<&str>) -> Result<(&str, MessageType), RecordingError> {
         let kind_of = |channel: &Channel| TYPES.into_iter().find(|kind| kind.is_named(&channel.type_name));
         let readable = self.channels().iter().filter(|channel| channel.wire.is_some());
-        let mut topics: Vec<_> = readable.filter_map(|channel| Some((channel.topic.as_str(), kind_of(channel)?))).collect();
+        let mut topics: Vec<_> =
+            readable.filter_map(|channel| Some((channel.topic.as_str(), kind_of(channel)?))).collect();
         topics.sort_unstable();
         topics.dedup();
         let named = |name: &str| topics.iter().find(|(topic, _)| *topic == name);

@@ -1,6 +1,6 @@
 //! A recording, opened for reading: by zsim or by anybody.
 
-use crate::recording::container::{Block, Channel, ChannelId, Messages, Part};
+use crate::recording::container::{Block, Channel, ChannelId, Messages, Part, RawMessage};
 use crate::recording::folder::files_of;
 use crate::recording::{Loss, RecordingError};
 use std::io::{Read, Seek};
@@ -102,6 +102,32 @@ impl Reader {
             seem.map(move |block| (part, block))
         });
         blocks.collect()
+    }
+
+    /// Gives `take` messages of `channels` from all over the recording: of `blocks` blocks, evenly chosen, the first
+    /// `each`.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub(super) fn sample(
+        &self,
+        channels: &[ChannelId],
+        (blocks, each): (usize, usize),
+        mut take: impl FnMut(&RawMessage<'_>),
+    ) -> Result<(), RecordingError> {
+        let near = self.blocks_near(channels);
+        let step = near.len().div_ceil(blocks).max(1);
+        for block in near.iter().step_by(step) {
+            let (mut messages, mut left) = (Messages::new(std::iter::once(*block)), each);
+            while left > 0 {
+                let Some(message) = messages.next()? else { break };
+                if channels.contains(&message.channel) {
+                    take(&message);
+                    left -= 1;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// How many messages the summaries count.

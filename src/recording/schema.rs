@@ -70,6 +70,12 @@ pub enum MessageType {
     LaserScan,
     /// `sensor_msgs/msg/PointCloud2`.
     PointCloud2,
+    /// `sensor_msgs/msg/MultiEchoLaserScan`; read only.
+    MultiEchoLaserScan,
+    /// `livox_ros_driver/msg/CustomMsg`; read only.
+    Livox,
+    /// `livox_ros_driver2/msg/CustomMsg`; read only.
+    Livox2,
     /// `sensor_msgs/msg/Imu`.
     Imu,
     /// `sensor_msgs/msg/TimeReference`.
@@ -92,6 +98,9 @@ impl MessageType {
         match self {
             Self::LaserScan => "sensor_msgs/msg/LaserScan",
             Self::PointCloud2 => "sensor_msgs/msg/PointCloud2",
+            Self::MultiEchoLaserScan => "sensor_msgs/msg/MultiEchoLaserScan",
+            Self::Livox => "livox_ros_driver/msg/CustomMsg",
+            Self::Livox2 => "livox_ros_driver2/msg/CustomMsg",
             Self::Imu => "sensor_msgs/msg/Imu",
             Self::TimeReference => "sensor_msgs/msg/TimeReference",
             Self::Transforms => "tf2_msgs/msg/TFMessage",

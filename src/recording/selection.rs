@@ -1,13 +1,19 @@
-//! Which topics of a recording are the lidar and the IMU.
+//! Which topics of a recording are the lidar and the IMU, and how their messages are to be read.
 
-use crate::recording::container::{ChannelId, RawMessage};
-use crate::recording::measurements::is_finite;
-use crate::recording::message::{imu, points, scan};
+mod candidates;
+mod clocks;
+mod content;
+mod inertial;
+mod listen;
+
+use crate::recording::message::misses::Census;
+use crate::recording::message::{imu, multi_echo, points, scan};
 use crate::recording::schema::MessageType;
-use crate::recording::topics::TRUTH_PREFIX;
-use crate::recording::wire::Decoder;
 use crate::recording::{Reader, RecordingError};
-use std::collections::BTreeMap;
+use crate::time::Span;
+use candidates::BeamTimes;
+pub(super) use candidates::{Candidate, LidarKind, inertial as imu_candidate};
+pub(super) use inertial::Layout;
 
 /// Topics that somebody asks for; those not named are found.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -19,7 +25,7 @@ pub struct Preference {
 }
 
 /// The topics that measurements are read from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
     /// The lidar's topic.
     pub lidar_topic: String,
@@ -29,94 +35,105 @@ pub struct Selection {
     pub imu_topic: String,
     /// The frame in which it measures.
     pub imu_frame: String,
-    /// What was chosen among several, and what the choice lacks, a sentence each.
+    /// What was chosen among several, and how what is unusual is read, a sentence each.
     pub notes: Vec<String>,
-    pub(super) lidar_kind: LidarKind,
-    /// In what points' times are counted, where clouds show another unit than the usual one.
-    pub(super) point_times: Option<points::Unit>,
-    /// In what the IMU tells specific force.
-    pub(super) force_unit: imu::ForceUnit,
+    pub(super) lidar: LidarReading,
+    pub(super) imu: ImuReading,
 }
 
-/// How a lidar's messages tell its beams.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LidarKind {
-    /// As `LaserScan`.
-    Scan,
-    /// As `PointCloud2`.
-    Points,
+/// How a lidar's messages are read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LidarReading {
+    /// How they encode beams.
+    pub kind: LidarKind,
+    /// The unit of points' times, where clouds show another than the usual one.
+    pub point_times: Option<points::Unit>,
+    /// The constant range that encodes beams without a return, m, where there is one.
+    pub farthest_m: Option<f32>,
 }
 
-/// How well the times of beams are known, best first; equals are taken by kind, then by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum BeamTimes {
-    /// Each message tells them.
-    Told,
-    /// Each message tells them, by another clock than its stamp.
-    OfOtherClock,
-    /// They follow from the time that a turn takes.
-    Implied,
-    /// All beams seem to be fired at once.
-    Unknown,
+/// How an IMU's messages are read.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ImuReading {
+    /// The unit of specific force.
+    pub unit: imu::ForceUnit,
+    /// How messages make samples.
+    pub layout: Layout,
+    /// What is added to stamps to bring them to the lidar's clock.
+    pub shift: Span,
 }
 
-/// A topic that may be chosen: what its first message tells.
-pub(super) struct Candidate {
-    topic: String,
-    pub(super) frame: String,
-    kind: Option<LidarKind>,
-    times: BeamTimes,
-}
+const LIDAR_TYPES: [MessageType; 5] = [
+    MessageType::LaserScan,
+    MessageType::MultiEchoLaserScan,
+    MessageType::PointCloud2,
+    MessageType::Livox,
+    MessageType::Livox2,
+];
 
-const LIDAR_TYPES: [MessageType; 2] = [MessageType::LaserScan, MessageType::PointCloud2];
-
-/// Clouds by which the unit of their points' times is told.
+/// Clouds by which the unit of their points' times is recognised, and the length of a scan.
 const LOOKED_AT: usize = 20;
-/// Samples by which that of an IMU's specific force is.
-const FELT: usize = 200;
 
-/// Endings of IMU topics, preferred first: the raw one is without a filter's opinion.
-const IMU_ENDINGS: [&str; 3] = ["imu/data_raw", "imu/data", "imu"];
+/// Parts of the recording in which misses are counted, and messages in each.
+const SAMPLED: (usize, usize) = (24, 4);
 
 impl Reader {
-    /// Finds the lidar and the IMU: of lidars one that `/tf_static`, where there is one, puts beside the IMU. A
-    /// `LaserScan` whose beams' times are told is taken first, then a `PointCloud2` whose points have times; of several
-    /// the first by name. Truth, the recording's own, is never a candidate.
+    /// Finds the lidar and the IMU: of lidars one that `/tf_static`, where there is one, connects to the IMU. A scan
+    /// whose beams' times are stated is taken first, then a cloud whose points have times; of several the first by name.
+    /// Truth, the recording's own, is never a candidate.
     ///
     /// # Errors
-    /// When there is no lidar or no IMU, or not the one that is asked for.
+    /// When there is no lidar or no IMU that can be decoded, or not the one that is asked for, or the IMU lacks a part.
     pub fn select(&self, preference: &Preference) -> Result<Selection, RecordingError> {
-        let lidars = self.candidates(&LIDAR_TYPES, preference.lidar_topic.as_deref(), lidar_candidate)?;
-        let imus = self.candidates(&[MessageType::Imu], preference.imu_topic.as_deref(), imu_candidate)?;
-        let imu = imus.iter().min_by_key(|c| (imu_rank(&c.topic), &c.topic));
-        let stands_beside = |lidar: &Candidate| imu.is_none_or(|imu| self.connects(&imu.frame, &lidar.frame));
-        let lidar =
-            lidars.iter().min_by_key(|c| (!stands_beside(c), c.times, c.kind == Some(LidarKind::Points), &c.topic));
-        let (lidar, lidar_kind) = lidar
-            .and_then(|lidar| Some((lidar, lidar.kind?)))
-            .ok_or_else(|| self.no_sensor("lidar", "sensor_msgs/msg/LaserScan or sensor_msgs/msg/PointCloud2"))?;
-        let imu = imu.ok_or_else(|| self.no_sensor("IMU", "sensor_msgs/msg/Imu"))?;
-        let point_times = match lidar_kind {
-            LidarKind::Points => self.unit_of_point_times(&lidar.topic)?,
-            LidarKind::Scan => None,
+        let lidars = self.candidates(&LIDAR_TYPES, preference.lidar_topic.as_deref(), candidates::lidar)?;
+        let asked = preference.imu_topic.as_deref();
+        let imus = self.candidates(&[MessageType::Imu], asked, imu_candidate)?;
+        let others = match asked {
+            Some(_) => self.candidates(&[MessageType::Imu], None, imu_candidate)?.found,
+            None => Vec::new(),
         };
-        let force_unit = self.force_unit(&imu.topic)?;
+        let all_imus = if asked.is_some() { &others } else { &imus.found };
+        let imu = self.choose_imu(&imus.found, all_imus)?;
+        let is_connected =
+            |lidar: &Candidate| imu.as_ref().is_none_or(|imu| self.connects(&imu.candidate.frame, &lidar.frame));
+        let rank = |c: &&Candidate| (!is_connected(c), c.times, is_cloud(c), c.topic.clone());
+        let (lidar, kind) =
+            lidars.found.iter().min_by_key(rank).and_then(|lidar| Some((lidar, lidar.kind?))).ok_or_else(|| {
+                self.no_sensor(
+                    "lidar",
+                    "LaserScan, MultiEchoLaserScan, PointCloud2 or CustomMsg of Livox",
+                    &lidars.unusable,
+                )
+            })?;
+        let imu = imu.ok_or_else(|| self.no_sensor("IMU", "sensor_msgs/msg/Imu", &imus.unusable))?;
+        let census = self.count_misses(lidar, kind)?;
+        let point_times = match kind {
+            LidarKind::Points => self.unit_of_point_times(&lidar.topic)?,
+            _ => None,
+        };
+        let lidar_reading = LidarReading { kind, point_times, farthest_m: census.farthest_m() };
+        let scan_s = self.scan_s(lidar, lidar_reading)?;
+        let shift = clocks::shift(&imu.heard.logged, &self.logged(&lidar.topic)?, scan_s);
         let notes = [
-            notes_on_choice("lidar", lidar, &lidars),
-            notes_on_choice("IMU", imu, &imus),
+            note_on_choice("lidar", lidar, &lidars.found),
+            note_on_choice("IMU", &imu.candidate, &imus.found),
             note_on_times(lidar),
             point_times.map(|unit| note_on_unit(lidar, unit)),
-            (force_unit != imu::ForceUnit::default()).then(|| note_on_force(&imu.topic)),
+            (imu.unit != imu::ForceUnit::default()).then(|| note_on_force(&imu.candidate.topic)),
+            note_on_layout(&imu.candidate, &imu.layout),
+            census.note(&lidar.topic),
+            (kind == LidarKind::MultiEcho).then(|| note_on_echoes(lidar)),
+            shift.map(|shift| note_on_shift(&imu.candidate, lidar, shift)),
         ];
+        let unusable = lidars.unusable.iter().chain(&imus.unusable).map(|reason| format!("Not used: {reason}."));
         Ok(Selection {
             lidar_topic: lidar.topic.clone(),
             lidar_frame: lidar.frame.clone(),
-            imu_topic: imu.topic.clone(),
-            imu_frame: imu.frame.clone(),
-            notes: notes.into_iter().flatten().collect(),
-            lidar_kind,
-            point_times,
-            force_unit,
+            imu_topic: imu.candidate.topic.clone(),
+            imu_frame: imu.candidate.frame.clone(),
+            notes: notes.into_iter().flatten().chain(unusable).collect(),
+            lidar: lidar_reading,
+            imu: ImuReading { unit: imu.unit, layout: imu.layout, shift: shift.unwrap_or(Span::ZERO) },
         })
     }
 
@@ -134,106 +151,99 @@ impl Reader {
         Ok(points::Unit::shown_by(&lasting))
     }
 
-    /// In what an IMU's first samples tell specific force.
-    pub(super) fn force_unit(&self, topic: &str) -> Result<imu::ForceUnit, RecordingError> {
-        let ids = self.ids_of(topic);
-        let (mut messages, mut samples) = (self.messages_near(&ids), Vec::new());
-        while samples.len() < FELT {
-            let Some(message) = messages.next()? else { break };
-            if ids.contains(&message.channel) {
-                samples.extend(imu::decode(message.data, imu::ForceUnit::default()).ok().filter(is_finite));
-            }
-        }
-        Ok(imu::ForceUnit::shown_by(&samples))
-    }
-
-    fn no_sensor(&self, sensor: &'static str, needs: &'static str) -> RecordingError {
-        RecordingError::NoSensor { name: self.name().to_owned(), sensor, needs, has: self.what_it_has() }
-    }
-
-    /// Topics of `types` that have a message which `look` understands; of one topic alone, where it is asked for.
-    pub(super) fn candidates(
-        &self,
-        types: &[MessageType],
-        asked: Option<&str>,
-        look: fn(&RawMessage<'_>, MessageType, &str) -> Option<Candidate>,
-    ) -> Result<Vec<Candidate>, RecordingError> {
-        let mut open = BTreeMap::new();
-        for channel in self.channels().iter().filter(|channel| channel.wire.is_some()) {
-            let kind = types.iter().find(|kind| kind.is_named(&channel.type_name));
-            let wanted = asked.map_or(!channel.topic.starts_with(TRUTH_PREFIX), |asked| asked == channel.topic);
-            if let Some(kind) = kind.filter(|_| wanted) {
-                open.insert(channel.id, (*kind, channel.topic.as_str()));
-            }
-        }
-        if let Some(asked) = asked.filter(|_| open.is_empty()) {
-            let names: Vec<_> = types.iter().map(|kind| kind.name()).collect();
-            let problem = format!("is not there as {}", names.join(" or "));
-            return Err(self.topic_error(asked, problem));
-        }
-        let ids: Vec<ChannelId> = open.keys().copied().collect();
-        let mut found = Vec::new();
-        for mut messages in [self.messages_near(&ids), self.messages()] {
-            while !open.is_empty() {
-                let Some(message) = messages.next()? else { break };
-                let Some((kind, topic)) = open.get(&message.channel) else { continue };
-                if let Some(candidate) = look(&message, *kind, topic) {
-                    open.remove(&message.channel);
-                    found.push(candidate);
+    /// How the lidar encodes beams without a return, by messages from all over the recording.
+    fn count_misses(&self, lidar: &Candidate, kind: LidarKind) -> Result<Census, RecordingError> {
+        let mut census = Census::default();
+        self.sample(&self.ids_of(&lidar.topic), SAMPLED, |message| {
+            // A message that cannot be decoded is counted where measurements are read.
+            let planar = match kind {
+                LidarKind::Scan => scan::decode(message.data),
+                LidarKind::MultiEcho => multi_echo::decode(message.data),
+                LidarKind::Points => {
+                    let _ = points::count_misses(message.data, &mut census);
+                    return;
                 }
+                LidarKind::Livox => return,
+            };
+            let Ok((_, planar)) = planar else { return };
+            let limits = (planar.range_min_m, planar.range_max_m);
+            planar.ranges_m.iter().for_each(|range| census.add_range(*range, limits));
+        })?;
+        Ok(census)
+    }
+
+    /// How long a scan lasts after its stamp, s: the median of the first ones.
+    fn scan_s(&self, lidar: &Candidate, reading: LidarReading) -> Result<f64, RecordingError> {
+        let ids = self.ids_of(&lidar.topic);
+        let (mut messages, mut lasts) = (self.messages_near(&ids), Vec::new());
+        let mut projector = scan::Projector::default();
+        while lasts.len() < LOOKED_AT {
+            let Some(message) = messages.next()? else { break };
+            if !ids.contains(&message.channel) {
+                continue;
+            }
+            if let Ok(scan) = reading.decode(&message, &mut projector) {
+                let last = scan.returns.last().map_or(Span::ZERO, |last| last.offset);
+                lasts.push((last - scan.stamped_after).seconds());
             }
         }
-        Ok(found)
+        Ok(content::quantile(lasts, 0.5))
     }
 
-    fn topic_error(&self, topic: &str, problem: String) -> RecordingError {
-        let (name, has) = (self.name().to_owned(), self.what_it_has());
-        RecordingError::Topic { name, topic: topic.to_owned(), problem, has }
+    fn no_sensor(&self, sensor: &'static str, needs: &'static str, unusable: &[String]) -> RecordingError {
+        let name = self.name().to_owned();
+        if unusable.is_empty() {
+            return RecordingError::NoSensor { name, sensor, needs, has: self.what_it_has() };
+        }
+        RecordingError::Unusable { name, sensor, reasons: unusable.join("; ") }
     }
 }
 
-fn frame_of(message: &RawMessage<'_>) -> Option<String> {
-    let (_, frame) = Decoder::new(message.data).ok()?.header().ok()?;
-    Some(crate::recording::message::transforms::plain(frame))
-}
-
-fn lidar_candidate(message: &RawMessage<'_>, kind: MessageType, topic: &str) -> Option<Candidate> {
-    let frame = frame_of(message)?;
-    let (kind, times) = if kind == MessageType::LaserScan {
-        let (_, scan) = scan::decode(message.data).ok()?;
-        let times = match (scan.time_increment_s == 0.0, scan::time_increment_s(&scan) == 0.0) {
-            (false, _) => BeamTimes::Told,
-            (true, false) => BeamTimes::Implied,
-            (true, true) => BeamTimes::Unknown,
-        };
-        (LidarKind::Scan, times)
-    } else {
-        let times = match points::by_other_clock(message.data).ok()? {
-            Some(false) => BeamTimes::Told,
-            Some(true) => BeamTimes::OfOtherClock,
-            None => BeamTimes::Unknown,
-        };
-        (LidarKind::Points, times)
-    };
-    Some(Candidate { topic: topic.to_owned(), frame, kind: Some(kind), times })
-}
-
-pub(super) fn imu_candidate(message: &RawMessage<'_>, _: MessageType, topic: &str) -> Option<Candidate> {
-    let frame = frame_of(message)?;
-    Some(Candidate { topic: topic.to_owned(), frame, kind: None, times: BeamTimes::Told })
-}
-
-fn imu_rank(topic: &str) -> usize {
-    IMU_ENDINGS.iter().position(|ending| topic.ends_with(ending)).unwrap_or(IMU_ENDINGS.len())
+fn is_cloud(lidar: &Candidate) -> bool {
+    matches!(lidar.kind, Some(LidarKind::Points | LidarKind::Livox))
 }
 
 /// Says which of several sensors was taken; another message kind of the same sensor is no other sensor.
-fn notes_on_choice(sensor: &str, chosen: &Candidate, all: &[Candidate]) -> Option<String> {
+fn note_on_choice(sensor: &str, chosen: &Candidate, all: &[Candidate]) -> Option<String> {
     let mut others: Vec<_> =
         all.iter().filter(|c| c.topic != chosen.topic && c.frame != chosen.frame).map(|c| c.topic.as_str()).collect();
     others.sort_unstable();
     (!others.is_empty())
         .then(|| format!("Of several {sensor} topics, {} is read, not {}.", chosen.topic, others.join(", ")))
+}
+
+fn note_on_layout(imu: &Candidate, layout: &Layout) -> Option<String> {
+    let Layout::Separate { acceleration_topic, apart } = layout else { return None };
+    let apart_ms = 1e3 * apart.seconds();
+    Some(match acceleration_topic {
+        Some(forces) => format!(
+            "{} has angular velocities only: each is paired with the nearest acceleration of {forces}, at most {apart_ms:.1} ms \
+             apart.",
+            imu.topic
+        ),
+        None => format!(
+            "{} has angular velocities and accelerations in separate messages: they are paired by their stamps, at most \
+             {apart_ms:.1} ms apart.",
+            imu.topic
+        ),
+    })
+}
+
+fn note_on_echoes(lidar: &Candidate) -> String {
+    format!(
+        "{} has several echoes a beam: the strongest is used, or the first where there are no intensities.",
+        lidar.topic
+    )
+}
+
+fn note_on_shift(imu: &Candidate, lidar: &Candidate, shift: Span) -> String {
+    format!(
+        "The stamps of {} and {} are {:.3} s apart by their log times: {0} is shifted by {:+.3} s; the estimator finds the rest.",
+        imu.topic,
+        lidar.topic,
+        shift.seconds().abs(),
+        shift.seconds()
+    )
 }
 
 fn note_on_force(imu: &str) -> String {
@@ -249,7 +259,7 @@ fn note_on_unit(lidar: &Candidate, unit: points::Unit) -> String {
 
 fn note_on_times(lidar: &Candidate) -> Option<String> {
     match lidar.times {
-        BeamTimes::Told => None,
+        BeamTimes::Stated => None,
         BeamTimes::OfOtherClock => Some(format!(
             "{} tells its points' times by another clock than its clouds' stamps: they are counted from each cloud's first \
              point, which is taken to be fired at the stamp.",

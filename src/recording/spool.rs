@@ -5,8 +5,8 @@
 //! memory does not grow with the recording; their bytes do not depend on how threads are scheduled.
 
 use crate::recording::RecordingError;
-use crate::recording::wire::Encoder;
 use crate::recording::topics::Topic;
+use crate::recording::wire::Encoder;
 use crate::time::Stamp;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;

@@ -24,7 +24,9 @@ pub const TRUTH_PREFIX: &str = "/ground_truth/";
 
 /// A name as it is printed: control characters, and those that turn the direction of text, are escaped.
 pub fn printable(name: &str) -> String {
-    let is_hidden = |c: char| c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let is_hidden = |c: char| {
+        c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
     let mut printed = String::with_capacity(name.len());
     for c in name.chars() {
         if is_hidden(c) { printed.extend(c.escape_unicode()) } else { printed.push(c) }

@@ -108,7 +108,7 @@ pub(super) fn run_open_loop(
     let start = heard.start();
     losses.extend(result.warnings.iter().filter(|warning| is_loss(&warning.kind)).map(|w| since(start, w)));
     let remarks =
-        result.located.iter().map(found).chain(
+        loss.notes().into_iter().chain(result.located.iter().map(found)).chain(
             result.warnings.iter().filter(|warning| !is_loss(&warning.kind)).map(|warning| since(start, warning)),
         );
     let remarks = remarks.collect();

@@ -94,7 +94,8 @@ impl Loaded {
             }
             BlockKind::Chunk(header) => {
                 source.read_at(block.offset, length, &mut self.packed)?;
-                let packing = Packing { compression: &header.compression, size: header.uncompressed_size, crc: header.crc };
+                let packing =
+                    Packing { compression: &header.compression, size: header.uncompressed_size, crc: header.crc };
                 unpack(packing, &self.packed, &mut self.bytes).and_then(|()| self.index())
             }
             BlockKind::BagChunk(chunk) => {

@@ -42,12 +42,17 @@ const OTHERS: [(&[u8], &str, &str); 19] = [
     (b"# .PCD", "a PCD point cloud", CLOUD),
     (b"ASTM-E57", "an E57 point cloud", CLOUD),
     (b"RRF", "a rerun recording", "record the topics of lidar and IMU as MCAP with `ros2 bag record -s mcap`"),
-    (b"ULog", "a PX4 log", "convert its topics to a bag with `ulog2rosbag`, part of pyulog; a lidar's are rarely in it"),
+    (
+        b"ULog",
+        "a PX4 log",
+        "convert its topics to a bag with `ulog2rosbag`, part of pyulog; a lidar's are rarely in it",
+    ),
     (b"PAR1", "a Parquet table", "write its scans and samples as MCAP, see docs/recordings.md"),
 ];
 
 const PCAP: &str = "a pcap capture of network packets";
-const REPLAY: &str = "replay it through the lidar's ROS driver, and record the topics of lidar and IMU with `ros2 bag record -s mcap`";
+const REPLAY: &str =
+    "replay it through the lidar's ROS driver, and record the topics of lidar and IMU with `ros2 bag record -s mcap`";
 const CLOUD: &str = "an estimate needs the scans and IMU samples over time; record them with `ros2 bag record -s mcap`";
 const RECORD: &str = "record the topics of lidar and IMU with `ros2 bag record -s mcap`, or see docs/recordings.md";
 

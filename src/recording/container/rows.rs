@@ -20,10 +20,8 @@ const BLOCK_BYTES: u64 = 1 << 20;
 const BLOCK_MESSAGES: u64 = 4096;
 
 /// The tables of a database of rosbag2, with the columns that are read.
-const TABLES: [(&str, &[&str]); 2] = [
-    ("topics", &["id", "name", "type", "serialization_format"]),
-    ("messages", &["topic_id", "timestamp", "data"]),
-];
+const TABLES: [(&str, &[&str]); 2] =
+    [("topics", &["id", "name", "type", "serialization_format"]), ("messages", &["topic_id", "timestamp", "data"])];
 
 /// A database of rosbag2, read only.
 pub struct Rows {
@@ -117,7 +115,8 @@ fn time_ns(row: &Row<'_>, index: usize) -> rusqlite::Result<u64> {
 
 /// Whether `table` is an ordinary table with `columns` that are stored: a view or a computed column may take for ever.
 fn is_plain_table(database: &Connection, table: &str, columns: &[&str]) -> Result<(), String> {
-    let text = "SELECT count(*) FROM pragma_table_list WHERE schema = 'main' AND name = ?1 AND type = 'table' AND wr = 0";
+    let text =
+        "SELECT count(*) FROM pragma_table_list WHERE schema = 'main' AND name = ?1 AND type = 'table' AND wr = 0";
     let count: i64 = database.query_row(text, [table], |row| row.get(0)).map_err(|error| error.to_string())?;
     if count != 1 {
         return Err(format!("it has no table `{table}`"));

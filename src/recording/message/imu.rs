@@ -34,14 +34,6 @@ pub enum ForceUnit {
 }
 
 impl ForceUnit {
-    /// The unit that samples show: in any motion by hand or vehicle, gravity is most of what their median feels.
-    pub fn shown_by(samples: &[ImuSample]) -> Self {
-        let mut norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
-        norms.sort_unstable_by(f64::total_cmp);
-        let median = norms.get(norms.len() / 2).copied().unwrap_or_default();
-        if ONE_G.contains(&median) { Self::StandardGravity } else { Self::default() }
-    }
-
     /// One of it, m/s^2.
     fn in_m_per_s2(self) -> f64 {
         match self {
@@ -50,9 +42,6 @@ impl ForceUnit {
         }
     }
 }
-
-/// Medians of what is told in units of gravity.
-const ONE_G: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// By definition (3rd CGPM 1901).
 const STANDARD_GRAVITY_M_PER_S2: f64 = 9.806_65;

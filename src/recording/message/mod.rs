@@ -2,6 +2,9 @@
 
 pub mod clock;
 pub mod imu;
+pub mod livox;
+pub mod misses;
+pub mod multi_echo;
 pub mod points;
 pub mod pose;
 pub mod scan;

@@ -5,8 +5,9 @@ mod unit;
 
 use crate::measurement::{LidarReturn, LidarScan};
 use crate::recording::RecordingError;
-use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
+use crate::recording::message::misses::{Census, Limits};
 use crate::recording::message::scan::from_earliest;
+use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::Span;
 pub use fields::TimeField;
 use fields::{FLOAT32, Field, UINT32};
@@ -134,6 +135,15 @@ impl<'a> Cloud<'a> {
         self.fields.iter().find(|field| field.name == name)
     }
 
+    fn is_empty(&self) -> bool {
+        self.data.is_empty() || self.width == 0
+    }
+
+    fn coordinates(&self) -> Result<[&Field<'a>; 3], DecodeError> {
+        let coordinate = |name| self.field(name).ok_or(DecodeError::Contradiction("a cloud has no fields x, y and z"));
+        Ok([coordinate("x")?, coordinate("y")?, coordinate("z")?])
+    }
+
     fn points(&self) -> impl Iterator<Item = &'a [u8]> {
         let (row, step) = (self.width * self.point_step, self.point_step.max(1));
         self.data.chunks_exact(self.row_step.max(1)).flat_map(move |bytes| bytes[..row].chunks_exact(step))
@@ -141,15 +151,18 @@ impl<'a> Cloud<'a> {
 }
 
 /// Reads a cloud's returns in the order in which they were fired; points that are not finite or lie in the origin are
-/// beams that did not come back. Their times after the stamp are counted in `unit`, where another than the usual one is
-/// known.
+/// beams that did not come back, and so are those at `farthest_m` and beyond. Their times after the stamp are counted in
+/// `unit`, where another than the usual one is known.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2` with x, y and z.
-pub fn decode(message: Payload<'_>, unit: Option<Unit>) -> Result<LidarScan, DecodeError> {
+pub fn decode(message: Payload<'_>, unit: Option<Unit>, farthest_m: Option<f32>) -> Result<LidarScan, DecodeError> {
     let cloud = Cloud::decode(message)?;
-    let coordinate = |name| cloud.field(name).ok_or(DecodeError::Contradiction("a cloud has no x, y and z"));
-    let (x, y, z) = (coordinate("x")?, coordinate("y")?, coordinate("z")?);
+    if cloud.is_empty() {
+        // A cloud without points may come without fields.
+        return Ok(LidarScan { stamp: cloud.stamp, stamped_after: Span::ZERO, returns: Vec::new(), planar: None });
+    }
+    let [x, y, z] = cloud.coordinates()?;
     let intensity = ["intensity", "intensities", "reflectivity", "i"].iter().find_map(|name| cloud.field(name));
     let mut time = TimeField::find(&cloud.fields);
     if let Some(time) = &mut time {
@@ -158,11 +171,12 @@ pub fn decode(message: Payload<'_>, unit: Option<Unit>) -> Result<LidarScan, Dec
             None => time.learn(cloud.stamp, cloud.points(), cloud.big_endian),
         }
     }
+    let limits = Limits::new(0.0, 0.0, farthest_m);
     let mut returns = Vec::with_capacity((cloud.data.len() / cloud.point_step.max(1)).min(MOST_EXPECTED));
     for bytes in cloud.points() {
         let number = |field: &Field<'_>| field.number(bytes, cloud.big_endian) as f32;
         let point_in_laser = nalgebra::Vector3::new(number(x), number(y), number(z));
-        if !point_in_laser.iter().all(|c| c.is_finite()) || point_in_laser == nalgebra::Vector3::zeros() {
+        if !limits.is_return(point_in_laser.norm()) {
             continue;
         }
         let offset = match &time {
@@ -180,6 +194,33 @@ pub fn decode(message: Payload<'_>, unit: Option<Unit>) -> Result<LidarScan, Dec
     }
     let stamped_after = from_earliest(&mut returns);
     Ok(LidarScan { stamp: cloud.stamp - stamped_after, stamped_after, returns, planar: None })
+}
+
+/// Counts how the points of a cloud encode misses.
+///
+/// # Errors
+/// When the bytes are not a `PointCloud2` with x, y and z.
+pub fn count_misses(message: Payload<'_>, census: &mut Census) -> Result<(), DecodeError> {
+    let cloud = Cloud::decode(message)?;
+    if cloud.is_empty() {
+        return Ok(());
+    }
+    let coordinates = cloud.coordinates()?;
+    for bytes in cloud.points() {
+        let [x, y, z] = coordinates.map(|field| field.number(bytes, cloud.big_endian) as f32);
+        let distance_m = nalgebra::Vector3::new(x, y, z).norm();
+        if distance_m.is_nan() { census.add_no_point() } else { census.add_distance(distance_m) }
+    }
+    Ok(())
+}
+
+/// Whether a cloud has no points.
+///
+/// # Errors
+/// When the bytes are not a `PointCloud2`, or its points have no x, y and z.
+pub fn is_empty(message: Payload<'_>) -> Result<bool, DecodeError> {
+    let cloud = Cloud::decode(message)?;
+    if cloud.is_empty() { Ok(true) } else { cloud.coordinates().map(|_| false) }
 }
 
 /// Whether a cloud's points tell their times by another clock than its stamp, `None` where they tell none.

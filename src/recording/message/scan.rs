@@ -2,8 +2,12 @@
 
 use crate::measurement::{LidarReturn, LidarScan, PlanarScan};
 use crate::recording::RecordingError;
+use crate::recording::message::misses::Limits;
 use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::{Span, Stamp};
+
+/// Longest sweep that is credible, s.
+const LONGEST_S: f64 = 60.0;
 
 /// Writes a sweep of the lidar in `frame` that began at `stamp`.
 ///
@@ -27,30 +31,52 @@ pub fn encode(out: &mut Encoder<'_>, frame: &str, stamp: Stamp, scan: &PlanarSca
     out.f32_sequence(&scan.intensities)
 }
 
-/// Reads the polar form of a sweep: its stamp, and the sweep.
+/// What a sweep says before its ranges.
+pub struct Angles {
+    angle_min_rad: f64,
+    angle_increment_rad: f64,
+    time_increment_s: f64,
+    scan_time_s: f64,
+    range_min_m: f32,
+    range_max_m: f32,
+}
+
+impl Angles {
+    /// Reads the fields from `angle_min` to `range_max`.
+    ///
+    /// # Errors
+    /// When the message ends before, or an angle or a time is not finite.
+    pub fn decode(input: &mut Decoder<'_>) -> Result<Self, DecodeError> {
+        let mut finite = |field: &'static str| {
+            let value = f64::from(input.f32()?);
+            if value.is_finite() { Ok(value) } else { Err(DecodeError::NotFinite { field }) }
+        };
+        let angle_min_rad = finite("angle_min")?;
+        // Unused: some drivers leave it out of step with the number of ranges.
+        let _ = finite("angle_max");
+        let angle_increment_rad = finite("angle_increment")?;
+        let (time_increment_s, scan_time_s) = (finite("time_increment")?, finite("scan_time")?);
+        let (range_min_m, range_max_m) = (input.f32()?, input.f32()?);
+        Ok(Self { angle_min_rad, angle_increment_rad, time_increment_s, scan_time_s, range_min_m, range_max_m })
+    }
+}
+
+/// Puts a sweep together.
 ///
 /// # Errors
-/// When the bytes are not a `LaserScan`, or its angles or times are not finite.
-pub fn decode(message: Payload<'_>) -> Result<(Stamp, PlanarScan), DecodeError> {
-    let mut input = Decoder::new(message)?;
-    let (stamp, _) = input.header()?;
-    let [angle_min_rad, _, angle_increment_rad, time_increment_s, scan_time_s] = [
-        f64::from(input.f32()?),
-        f64::from(input.f32()?),
-        f64::from(input.f32()?),
-        f64::from(input.f32()?),
-        f64::from(input.f32()?),
-    ];
-    let (range_min_m, range_max_m) = (input.f32()?, input.f32()?);
-    let ranges_m = input.f32_sequence()?;
-    let intensities = input.f32_sequence()?;
-    if ![angle_min_rad, angle_increment_rad, time_increment_s, scan_time_s].iter().all(|x| x.is_finite()) {
-        return Err(DecodeError::Contradiction("a scan's angles or times are not finite"));
-    }
+/// When its parts contradict each other.
+pub fn planar(angles: Angles, ranges_m: Vec<f32>, intensities: Vec<f32>) -> Result<PlanarScan, DecodeError> {
+    let Angles { angle_min_rad, angle_increment_rad, time_increment_s, scan_time_s, range_min_m, range_max_m } = angles;
     if !intensities.is_empty() && intensities.len() != ranges_m.len() {
         return Err(DecodeError::Contradiction("a scan has another number of intensities than of ranges"));
     }
-    let planar = PlanarScan {
+    if angle_increment_rad == 0.0 && ranges_m.len() > 1 {
+        return Err(DecodeError::Contradiction("angle_increment is 0 with several ranges"));
+    }
+    if time_increment_s.abs() * ranges_m.len() as f64 > LONGEST_S || scan_time_s.abs() > LONGEST_S {
+        return Err(DecodeError::Contradiction("time_increment or scan_time make a scan of more than 60 s"));
+    }
+    Ok(PlanarScan {
         angle_min_rad,
         angle_increment_rad,
         time_increment_s,
@@ -59,8 +85,20 @@ pub fn decode(message: Payload<'_>) -> Result<(Stamp, PlanarScan), DecodeError> 
         range_max_m,
         ranges_m,
         intensities,
-    };
-    Ok((stamp, planar))
+    })
+}
+
+/// Reads the polar form of a sweep: its stamp, and the sweep.
+///
+/// # Errors
+/// When the bytes are not a `LaserScan`, or its angles or times cannot be used.
+pub fn decode(message: Payload<'_>) -> Result<(Stamp, PlanarScan), DecodeError> {
+    let mut input = Decoder::new(message)?;
+    let (stamp, _) = input.header()?;
+    let angles = Angles::decode(&mut input)?;
+    let ranges_m = input.f32_sequence()?;
+    let intensities = input.f32_sequence()?;
+    Ok((stamp, planar(angles, ranges_m, intensities)?))
 }
 
 /// Time between beams, s: as the sweep says, or, where it says nothing, what its angles and its period imply for a
@@ -83,13 +121,14 @@ pub struct Projector {
 impl Projector {
     /// The scan of a sweep that began at `stamp`: the beams that came back as points, in the order in which they were
     /// fired.
-    pub fn project(&mut self, stamp: Stamp, planar: PlanarScan) -> LidarScan {
+    /// `farthest_m` is a constant that encodes misses; its polar form is as the message states it.
+    pub fn project(&mut self, stamp: Stamp, planar: PlanarScan, farthest_m: Option<f32>) -> LidarScan {
         self.prepare(&planar);
         let step_s = time_increment_s(&planar);
+        let limits = Limits::new(planar.range_min_m, planar.range_max_m, farthest_m);
         let mut returns = Vec::with_capacity(planar.ranges_m.len());
         for (k, (range, (cos, sin))) in planar.ranges_m.iter().zip(&self.directions).enumerate() {
-            // REP-117: infinities and NaN are beams without a return.
-            if range.is_finite() && (planar.range_min_m..=planar.range_max_m).contains(range) {
+            if limits.is_return(*range) {
                 let r = f64::from(*range);
                 returns.push(LidarReturn {
                     offset: Span::from_seconds(k as f64 * step_s),

@@ -50,6 +50,12 @@ pub enum DecodeError {
     /// A string is not UTF-8.
     #[error("a string is not UTF-8")]
     Text,
+    /// A number that must be finite is not.
+    #[error("{field} is NaN or infinite")]
+    NotFinite {
+        /// Which number.
+        field: &'static str,
+    },
     /// Lengths or fields that contradict each other.
     #[error("{0}")]
     Contradiction(&'static str),
@@ -121,6 +127,10 @@ impl<'a> Decoder<'a> {
     number! {
         /// A 32-bit unsigned integer.
         u32
+    }
+    number! {
+        /// A 64-bit unsigned integer.
+        u64
     }
     number! {
         /// A 32-bit float.

@@ -1,0 +1,39 @@
+//! `sensor_msgs/MultiEchoLaserScan`: a sweep in a plane with several echoes a beam.
+
+use crate::measurement::PlanarScan;
+use crate::recording::message::scan::{Angles, planar};
+use crate::recording::wire::{DecodeError, Decoder, Payload};
+use crate::time::Stamp;
+
+/// Reads a sweep with one echo a beam: the strongest where there is an intensity for each, else the first.
+///
+/// # Errors
+/// When the bytes are not a `MultiEchoLaserScan`, or its angles or times cannot be used.
+pub fn decode(message: Payload<'_>) -> Result<(Stamp, PlanarScan), DecodeError> {
+    let mut input = Decoder::new(message)?;
+    let (stamp, _) = input.header()?;
+    let angles = Angles::decode(&mut input)?;
+    let ranges = echoes(&mut input, message)?;
+    let intensities = echoes(&mut input, message)?;
+    let has_intensities = !intensities.is_empty()
+        && intensities.len() == ranges.len()
+        && ranges.iter().zip(&intensities).all(|(ranges, intensities)| ranges.len() == intensities.len());
+    let strongest = |k: usize| {
+        let of_beam =
+            if has_intensities { intensities[k].iter().copied().enumerate() } else { [].iter().copied().enumerate() };
+        of_beam.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0))).map_or((0, 0.0), |echo| echo)
+    };
+    let chosen: Vec<_> = (0..ranges.len()).map(strongest).collect();
+    let ranges_m = ranges.iter().zip(&chosen).map(|(echoes, (k, _))| echoes.get(*k).copied().unwrap_or(f32::INFINITY));
+    let strengths = if has_intensities { chosen.iter().map(|(_, strength)| *strength).collect() } else { Vec::new() };
+    Ok((stamp, planar(angles, ranges_m.collect(), strengths)?))
+}
+
+/// The echoes of each beam.
+fn echoes(input: &mut Decoder<'_>, message: Payload<'_>) -> Result<Vec<Vec<f32>>, DecodeError> {
+    let count = input.u32()? as usize;
+    if count > message.bytes.len() / 4 {
+        return Err(DecodeError::Short);
+    }
+    (0..count).map(|_| input.f32_sequence()).collect()
+}
