@@ -178,7 +178,7 @@ pub(super) struct OutArguments {
 /// Reads a calibration that a user wrote.
 pub(super) fn calibration(path: Option<&Path>) -> anyhow::Result<CalibrationSpec> {
     match path {
-        Some(path) => Ok(parse(&Source::read(path)?)?),
+        Some(path) => Ok(CalibrationSpec::read(path)?),
         None => Ok(CalibrationSpec::default()),
     }
 }

@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     estimator: EstimatorArguments,
     /// A RON file that says where the sensors sit and how well they measure, for what the recording does not say:
     /// (head_from_laser: (position_m: (0, 0, 0)), head_from_imu: (position_m: (0, 0, -0.08), roll_pitch_yaw_deg: (0, 0,
-    /// 180))); docs/recordings.md has all keys, noise among them
+    /// 180))); docs/recordings.md has all keys, noise among them. Or a YAML file of Kalibr or allan_variance_ros
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// The frame whose pose is written [default: head where /tf_static has it, else the IMU's]

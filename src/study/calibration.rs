@@ -70,7 +70,8 @@ fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
     Ok((ordinary_imu()?, Lidar::new(&lidar_spec, &lidar)?.noise()))
 }
 
-fn ordinary_imu() -> Result<ImuNoise, SpecError> {
+/// The noise of an IMU of which nothing is known.
+pub(super) fn ordinary_imu() -> Result<ImuNoise, SpecError> {
     let imu = find(Kind::Imu, "unknown")?;
     let spec: ImuSpec = parse(&imu)?;
     Ok(Imu::new(&spec, &imu)?.noise())

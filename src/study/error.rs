@@ -37,6 +37,14 @@ pub enum StudyError {
     /// What was recorded cannot be analysed.
     #[error(transparent)]
     Signal(#[from] SignalError),
+    /// A calibration in YAML that cannot be used.
+    #[error("{name}: {problem}")]
+    Calibration {
+        /// Which file.
+        name: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// A plan whose numbers contradict each other.
     #[error("{what}: {message}")]
     Plan {

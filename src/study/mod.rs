@@ -25,6 +25,7 @@ pub mod gains;
 mod integrity;
 mod journey;
 mod judge;
+mod kalibr;
 pub mod latency;
 mod manifest;
 mod map;
