@@ -11,7 +11,7 @@ pub fn read_all(file: impl Read + Seek + Send + 'static) {
     let Ok(reader) = Reader::new("fuzz", file) else { return };
     let _ = reader.info(Span::from_seconds(0.1));
     reader.truth().for_each(drop);
-    let preferences = [None, Some("/points".to_owned())];
+    let preferences = [None, Some("/points"), Some("/echoes"), Some("/livox")].map(|topic| topic.map(str::to_owned));
     for lidar_topic in preferences {
         let Ok(selection) = reader.select(&Preference { lidar_topic, imu_topic: None }) else { continue };
         let _ = reader.calibration(&selection, &calibration(), None);

@@ -12,7 +12,7 @@ use zsim::study::{self, MapWishes, Watch, Wishes};
 
 /// Estimate trajectory and map from a recording, whoever made it
 ///
-/// Lidar and IMU are found among the topics (LaserScan or PointCloud2, and Imu), and where they sit in the head is read
+/// Lidar and IMU are found among the topics (LaserScan, MultiEchoLaserScan, PointCloud2 or Livox CustomMsg, and Imu), and where they sit in the head is read
 /// from /tf_static. Where the recording has the truth, the estimate is judged by it.
 #[derive(Args)]
 #[command(
@@ -20,8 +20,8 @@ use zsim::study::{self, MapWishes, Watch, Wishes};
                         tuesday.mcap --map results/monday/map.ply --start 4.2,0.5,0,90 --extend-map"
 )]
 pub(super) struct Arguments {
-    /// The recording
-    #[arg(value_name = "FILE.mcap")]
+    /// The recording: MCAP, a ROS 1 bag, a rosbag2 database, or a folder of rosbag2
+    #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     #[command(flatten)]
     estimator: EstimatorArguments,

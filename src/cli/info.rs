@@ -13,8 +13,8 @@ use zsim::time::Span;
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim info recording.mcap")]
 pub(super) struct Arguments {
-    /// The recording
-    #[arg(value_name = "FILE.mcap")]
+    /// The recording: MCAP, a ROS 1 bag, a rosbag2 database, or a folder of rosbag2
+    #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     /// What counts as a gap between messages of a topic
     #[arg(long, value_name = "TIME", default_value = "0.5s", value_parser = quantity::seconds)]

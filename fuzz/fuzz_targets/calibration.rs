@@ -1,0 +1,12 @@
+//! Any text as a calibration in the YAML of Kalibr.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use zsim::study::CalibrationSpec;
+
+fuzz_target!(|data: &[u8]| {
+    if let Ok(text) = std::str::from_utf8(data) {
+        let _ = CalibrationSpec::from_kalibr(text, "fuzz.yaml");
+    }
+});
