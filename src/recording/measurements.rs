@@ -117,7 +117,7 @@ impl Measurements<'_> {
 impl Decoding {
     /// Takes a message of the IMU (`is_imu`), or of the topic of its accelerations.
     fn imu_sample(&mut self, mut sample: ImuSample, is_imu: bool, order: &mut InOrder) {
-        sample.stamp = sample.stamp + self.imu.shift;
+        sample.stamp += self.imu.shift;
         let Layout::Separate { acceleration_topic, apart } = &self.imu.layout else {
             return order.put(Measurement::Imu(sample));
         };

@@ -41,6 +41,13 @@ pub struct Selection {
     pub(super) imu: ImuReading,
 }
 
+impl Selection {
+    /// What is added to the IMU's stamps to bring them to the lidar's epoch; zero but for clocks that are far apart.
+    pub fn imu_shift(&self) -> Span {
+        self.imu.shift
+    }
+}
+
 /// How a lidar's messages are read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LidarReading {

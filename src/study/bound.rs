@@ -42,7 +42,7 @@ pub struct Bounded {
 pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> Result<Bounded, StudyError> {
     let selection = reader.select(&Preference::default())?;
     let found = calibration(reader, &selection, &CalibrationSpec::default(), None)?;
-    let clock = TrueClock::read(reader)?;
+    let clock = TrueClock::read(reader, &selection)?;
     let mut span: Option<(Stamp, Stamp)> = None;
     let heads = reader.truth().filter_map(|told| match told {
         Ok(Truth::Head(stamp, pose)) => {

@@ -102,6 +102,8 @@ pub(super) fn run_open_loop(
     written.close()?;
     let Written { map_from_head, covariances, radii_m, .. } = written;
 
+    // Offsets are those of the stamps as they were recorded.
+    let shift_s = selection.imu_shift().seconds();
     let mut losses = loss.sentences();
     losses.extend(heard.imu.missing("IMU samples"));
     losses.extend(heard.lidar.missing("scans"));
@@ -117,7 +119,7 @@ pub(super) fn run_open_loop(
         covariances,
         radii_m,
         spent: result.windows.iter().map(|window| window.spent).sum(),
-        clock_offsets: result.clock_offsets,
+        clock_offsets: result.clock_offsets.into_iter().map(|(at, offset_s)| (at, offset_s - shift_s)).collect(),
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,
         remarks,

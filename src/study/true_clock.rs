@@ -1,4 +1,4 @@
-use crate::recording::{Reader, RecordingError, Truth};
+use crate::recording::{Reader, RecordingError, Selection, Truth};
 use crate::time::{Span, Stamp};
 use crate::truth::ClockTruth;
 
@@ -13,12 +13,14 @@ pub(super) fn true_offset(now: Stamp, clock: &ClockTruth) -> (Stamp, f64) {
 pub(super) struct TrueClock(Vec<(Stamp, f64)>);
 
 impl TrueClock {
-    /// What a recording tells.
-    pub(super) fn read(reader: &Reader) -> Result<Self, RecordingError> {
+    /// The offset of `selection`'s samples, whose stamps are shifted already where the clocks' epochs differ.
+    pub(super) fn read(reader: &Reader, selection: &Selection) -> Result<Self, RecordingError> {
+        let shift_s = selection.imu_shift().seconds();
         let mut offsets = Vec::new();
         for told in reader.truth() {
             if let Truth::Clock(now, clock) = told? {
-                offsets.push(true_offset(now, &clock));
+                let (at, offset_s) = true_offset(now, &clock);
+                offsets.push((at, offset_s + shift_s));
             }
         }
         Ok(Self(offsets))

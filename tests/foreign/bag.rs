@@ -97,76 +97,70 @@ fn connection(id: usize, (topic, kind): (&str, &str)) -> Vec<u8> {
     record(&[("op", &[7]), ("conn", &(id as u32).to_le_bytes()), ("topic", topic.as_bytes())], &inner)
 }
 
+/// The first record, padded with spaces to 4096 bytes, so that the recorder can write it again at the end.
+fn head(index: u64, connections: usize, chunks: usize) -> Vec<u8> {
+    let (connections, chunks) = ((connections as u32).to_le_bytes(), (chunks as u32).to_le_bytes());
+    let index = index.to_le_bytes();
+    let fields: [(&str, &[u8]); 4] =
+        [("index_pos", &index), ("conn_count", &connections), ("chunk_count", &chunks), ("op", &[3])];
+    let mut bytes = record(&fields, &[]);
+    let padding = 4096 - bytes.len();
+    let length = bytes.len() - 4;
+    bytes[length..].copy_from_slice(&(padding as u32).to_le_bytes());
+    bytes.extend(std::iter::repeat_n(b' ', padding));
+    [b"#ROSBAG V2.0\n", &bytes[..]].concat()
+}
+
+/// A chunk at `position` with the records that index it, and its record in the index at the end.
+fn chunk(topics: &[(&str, &str)], messages: &[Logged], compression: &str, position: u64) -> (Vec<u8>, Vec<u8>) {
+    let (mut inner, mut counts) = (Vec::new(), vec![0_u32; topics.len()]);
+    for (topic, logged, bytes) in messages {
+        if counts[*topic] == 0 {
+            inner.extend(connection(*topic, topics[*topic]));
+        }
+        counts[*topic] += 1;
+        let id = (*topic as u32).to_le_bytes();
+        inner.extend(record(&[("op", &[2]), ("conn", &id), ("time", &time(*logged))], bytes));
+    }
+    let (size, one) = ((inner.len() as u32).to_le_bytes(), 1_u32.to_le_bytes());
+    let fields: [(&str, &[u8]); 3] = [("op", &[5]), ("compression", compression.as_bytes()), ("size", &size)];
+    let (mut bytes, mut data) = (record(&fields, &packed(compression, &inner)), Vec::new());
+    for (id, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let (id, count_bytes) = ((id as u32).to_le_bytes(), count.to_le_bytes());
+        let fields: [(&str, &[u8]); 4] = [("op", &[4]), ("ver", &one), ("conn", &id), ("count", &count_bytes)];
+        bytes.extend(record(&fields, &vec![0; 12 * *count as usize]));
+        data.extend([id, count_bytes].concat());
+    }
+    let times = messages.iter().map(|(_, logged, _)| *logged);
+    let (start, end) = (time(times.clone().min().unwrap()), time(times.max().unwrap()));
+    let (position, count) = (position.to_le_bytes(), ((data.len() / 8) as u32).to_le_bytes());
+    let fields: [(&str, &[u8]); 6] = [
+        ("op", &[6]),
+        ("ver", &one),
+        ("chunk_pos", &position),
+        ("start_time", &start),
+        ("end_time", &end),
+        ("count", &count),
+    ];
+    (bytes, record(&fields, &data))
+}
+
 /// A bag of `topics` (name and type) with ten messages a chunk; `indexed` as `rosbag record` leaves it when it ends.
 pub fn bag(topics: &[(&str, &str)], messages: &[Logged], compression: &str, indexed: bool) -> Vec<u8> {
-    let header = |index: u64, chunks: u32| {
-        let connections = (topics.len() as u32).to_le_bytes();
-        let mut bytes = record(
-            &[
-                ("index_pos", &index.to_le_bytes()),
-                ("conn_count", &connections),
-                ("chunk_count", &chunks.to_le_bytes()),
-                ("op", &[3]),
-            ],
-            &[],
-        );
-        // Padded with spaces to 4096 bytes, so that the recorder can write it again at the end.
-        let padding = 4096 - bytes.len();
-        let length = bytes.len() - 4;
-        bytes[length..].copy_from_slice(&(padding as u32).to_le_bytes());
-        bytes.extend(std::iter::repeat_n(b' ', padding));
-        [b"#ROSBAG V2.0\n", &bytes[..]].concat()
-    };
-    let mut body = Vec::new();
-    let start = header(0, 0).len() as u64;
-    let mut infos = Vec::new();
-    for chunk in messages.chunks(10) {
-        let mut inner = Vec::new();
-        let mut counts = vec![0_u32; topics.len()];
-        for (topic, logged, bytes) in chunk {
-            if counts[*topic] == 0 {
-                inner.extend(connection(*topic, topics[*topic]));
-            }
-            counts[*topic] += 1;
-            let id = (*topic as u32).to_le_bytes();
-            inner.extend(record(&[("op", &[2]), ("conn", &id), ("time", &time(*logged))], bytes));
-        }
-        let position = start + body.len() as u64;
-        let size = (inner.len() as u32).to_le_bytes();
-        let chunk_header: [(&str, &[u8]); 3] = [("op", &[5]), ("compression", compression.as_bytes()), ("size", &size)];
-        body.extend(record(&chunk_header, &packed(compression, &inner)));
-        let mut data = Vec::new();
-        for (id, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
-            let ids = (id as u32).to_le_bytes();
-            let entries = vec![0; 12 * *count as usize];
-            let index: [(&str, &[u8]); 4] =
-                [("op", &[4]), ("ver", &1_u32.to_le_bytes()), ("conn", &ids), ("count", &count.to_le_bytes())];
-            body.extend(record(&index, &entries));
-            data.extend(ids);
-            data.extend(count.to_le_bytes());
-        }
-        let times = chunk.iter().map(|(_, logged, _)| *logged);
-        let count = (data.len() / 8) as u32;
-        infos.push(record(
-            &[
-                ("op", &[6]),
-                ("ver", &1_u32.to_le_bytes()),
-                ("chunk_pos", &position.to_le_bytes()),
-                ("start_time", &time(times.clone().min().unwrap())),
-                ("end_time", &time(times.max().unwrap())),
-                ("count", &count.to_le_bytes()),
-            ],
-            &data,
-        ));
+    let start = head(0, 0, 0).len();
+    let (mut body, mut infos) = (Vec::new(), Vec::new());
+    for messages in messages.chunks(10) {
+        let (bytes, info) = chunk(topics, messages, compression, (start + body.len()) as u64);
+        body.extend(bytes);
+        infos.push(info);
     }
     if !indexed {
-        return [header(0, 0), body].concat();
+        return [head(0, 0, 0), body].concat();
     }
-    let index = start + body.len() as u64;
+    let index = (start + body.len()) as u64;
     topics.iter().enumerate().for_each(|(id, topic)| body.extend(connection(id, *topic)));
-    let chunks = infos.len() as u32;
     infos.iter().for_each(|info| body.extend(info));
-    [header(index, chunks), body].concat()
+    [head(index, topics.len(), infos.len()), body].concat()
 }
 
 /// Writes a database of rosbag2 to `path`; its messages compressed each by itself where `compressed`.

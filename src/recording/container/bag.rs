@@ -5,6 +5,7 @@ use super::record::{ChannelRecord, Fields, SchemaRecord, begins_with_header};
 use super::source::Source;
 use crate::recording::RecordingError;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// First bytes of a bag.
 pub const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
@@ -15,8 +16,11 @@ const LONGEST_KEPT: u64 = 16 << 20;
 /// Greatest length of the index at the end of a bag, bytes.
 const LONGEST_INDEX: u64 = 256 << 20;
 
-/// Bytes of a record's header that the walk reads at once: enough for all but connections.
-const READ_AHEAD: u64 = 4096;
+/// Bytes that the walk reads at once.
+const READ_AHEAD: u64 = 1 << 16;
+
+/// Bytes of a record's header that are looked at first: enough for all but long connections.
+const USUAL_HEADER: u64 = 1 << 10;
 
 mod op {
     pub const MESSAGE: u8 = 0x02;
@@ -140,7 +144,13 @@ struct Index {
 /// # Errors
 /// When it cannot be read, or its chunks are encrypted (`name` is for the message).
 pub fn walk(source: &Source, name: &str) -> Result<Directory, RecordingError> {
-    let mut walk = Walk { source, at: MAGIC.len() as u64, index: Index::default(), found: Directory::empty() };
+    let mut walk = Walk {
+        source,
+        at: MAGIC.len() as u64,
+        index: Index::default(),
+        found: Directory::empty(),
+        ahead: (0, Vec::new()),
+    };
     let whole = match walk.header(MAGIC.len() as u64)? {
         Some((header, data)) if Header(&header).op() == Some(op::BAG_HEADER) => {
             let header = Header(&header);
@@ -162,14 +172,29 @@ pub fn walk(source: &Source, name: &str) -> Result<Directory, RecordingError> {
     Ok(walk.found)
 }
 
+/// A record in the file: its header, and where its data are.
+type Found = (Vec<u8>, Range<u64>);
+
 struct Walk<'a> {
     source: &'a Source,
     at: u64,
     index: Index,
     found: Directory,
+    /// Where the bytes that were read at last begin, and these.
+    ahead: (u64, Vec<u8>),
 }
 
 impl Walk<'_> {
+    /// The first bytes of a record at `at`.
+    fn head(&mut self, at: u64) -> Result<&[u8], RecordingError> {
+        let end = (at + USUAL_HEADER).min(self.source.length());
+        let (start, bytes) = &self.ahead;
+        if at < *start || end > *start + bytes.len() as u64 {
+            self.ahead = (at, self.bytes(at, READ_AHEAD)?);
+        }
+        Ok(&self.ahead.1[(at - self.ahead.0) as usize..])
+    }
+
     fn bytes(&self, offset: u64, length: u64) -> Result<Vec<u8>, RecordingError> {
         let mut bytes = Vec::new();
         let length = length.min(self.source.length().saturating_sub(offset));
@@ -178,21 +203,22 @@ impl Walk<'_> {
     }
 
     /// The header of the record at `at`, and where its data are; `None` where there is no whole record.
-    fn header(&self, at: u64) -> Result<Option<(Vec<u8>, std::ops::Range<u64>)>, RecordingError> {
-        let mut head = self.bytes(at, READ_AHEAD)?;
-        let Some(length) = Fields::new(&head).u32().map(u64::from).filter(|length| *length <= LONGEST_KEPT) else {
+    fn header(&mut self, at: u64) -> Result<Option<Found>, RecordingError> {
+        let file_end = self.source.length();
+        let head = self.head(at)?;
+        let Some(length) = Fields::new(head).u32().map(u64::from).filter(|length| *length <= LONGEST_KEPT) else {
             return Ok(None);
         };
-        if head.len() < length as usize + 8 {
-            head = self.bytes(at, length + 8)?;
-        }
-        let mut fields = Fields::new(&head);
+        let is_short = head.len() < length as usize + 8;
+        let longer = if is_short { self.bytes(at, length + 8)? } else { Vec::new() };
+        let head = if is_short { &longer[..] } else { self.head(at)? };
+        let mut fields = Fields::new(head);
         let (Some(_), Some(header), Some(size)) = (fields.u32(), fields.bytes(length as usize), fields.u32()) else {
             return Ok(None);
         };
         let start = at + length + 8;
         let end = start + u64::from(size);
-        Ok((end <= self.source.length()).then(|| (header.to_vec(), start..end)))
+        Ok((end <= file_end).then(|| (header.to_vec(), start..end)))
     }
 
     /// Reads the index at `position`; whether there is one.
@@ -249,7 +275,7 @@ impl Walk<'_> {
         Ok(())
     }
 
-    fn chunk(&mut self, start: u64, header: Header<'_>, data: std::ops::Range<u64>) {
+    fn chunk(&mut self, start: u64, header: Header<'_>, data: Range<u64>) {
         let (Some(compression), Some(size)) = (header.text("compression"), header.u32("size")) else {
             self.found.lost_bytes += data.end - start;
             return;

@@ -190,6 +190,7 @@ impl Loaded {
 }
 
 /// How a chunk is compressed, how many bytes it holds, and their CRC-32 (0 where there is none).
+#[derive(Clone, Copy)]
 struct Packing<'a> {
     compression: &'a str,
     size: u64,

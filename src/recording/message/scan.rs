@@ -32,6 +32,7 @@ pub fn encode(out: &mut Encoder<'_>, frame: &str, stamp: Stamp, scan: &PlanarSca
 }
 
 /// What a sweep says before its ranges.
+#[derive(Debug, Clone, Copy)]
 pub struct Angles {
     angle_min_rad: f64,
     angle_increment_rad: f64,

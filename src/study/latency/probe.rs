@@ -100,7 +100,7 @@ impl Probe {
         let shown: Vec<ProbeBeam> = kept.map(|(_, beam)| beam).collect();
         let rate = |beam: &ProbeBeam| cut.rate_deg_per_s(&truth, scan_stamps[beam.scan] + beam.offset);
         let shown_rates_deg_per_s = shown.iter().map(|beam| rate(beam).unwrap_or(f64::NAN)).collect();
-        let clock = TrueClock::read(reader)?;
+        let clock = TrueClock::read(reader, selection)?;
         Ok(Self { truth, clock, scan_stamps, judged, cut, range_m, shown, shown_rates_deg_per_s })
     }
 }
