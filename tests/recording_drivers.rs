@@ -297,124 +297,127 @@ fn xyz_i(after_ns: i64) -> Vec<u8> {
     [1.0, 2.0, 3.0 + after_ns as f32 * 1e-9, 40.0].map(f32::to_le_bytes).concat()
 }
 
+/// Name, fields, bytes of a point, when the cloud is stamped after its first point, the point.
+type Driver = (&'static str, Fields<'static>, u32, i64, Encode);
+
+const DRIVERS: [Driver; 6] = [
+    (
+        "ouster",
+        &[
+            ("x", 0, FLOAT32),
+            ("y", 4, FLOAT32),
+            ("z", 8, FLOAT32),
+            ("intensity", 16, FLOAT32),
+            ("t", 20, UINT32),
+            ("reflectivity", 24, 4),
+            ("ring", 26, 4),
+            ("ambient", 28, 4),
+            ("range", 32, UINT32),
+        ],
+        48,
+        0,
+        |_, after_ns| {
+            let mut bytes = xyz_i(after_ns);
+            bytes.splice(12..12, [0; 4]);
+            bytes.extend((after_ns as u32).to_le_bytes());
+            bytes.resize(48, 0);
+            bytes
+        },
+    ),
+    (
+        "velodyne, relative to the end of the scan",
+        &[
+            ("x", 0, FLOAT32),
+            ("y", 4, FLOAT32),
+            ("z", 8, FLOAT32),
+            ("intensity", 12, FLOAT32),
+            ("ring", 16, 4),
+            ("time", 18, FLOAT32),
+        ],
+        22,
+        100 * MS,
+        |_, after_ns| {
+            let time_s = (after_ns - 100 * MS) as f32 * 1e-9;
+            [xyz_i(after_ns), vec![5, 0], time_s.to_le_bytes().to_vec()].concat()
+        },
+    ),
+    (
+        "hesai",
+        &[
+            ("x", 0, FLOAT32),
+            ("y", 4, FLOAT32),
+            ("z", 8, FLOAT32),
+            ("intensity", 12, FLOAT32),
+            ("ring", 16, 4),
+            ("timestamp", 18, FLOAT64),
+        ],
+        26,
+        0,
+        |start_ns, after_ns| {
+            let time_s = (start_ns + after_ns) as f64 * 1e-9;
+            [xyz_i(after_ns), vec![5, 0], time_s.to_le_bytes().to_vec()].concat()
+        },
+    ),
+    (
+        "robosense, stamped at its end",
+        &[
+            ("x", 0, FLOAT32),
+            ("y", 4, FLOAT32),
+            ("z", 8, FLOAT32),
+            ("intensity", 16, FLOAT32),
+            ("ring", 20, 4),
+            ("timestamp", 24, FLOAT64),
+        ],
+        32,
+        100 * MS,
+        |start_ns, after_ns| {
+            let mut bytes = xyz_i(after_ns);
+            bytes.splice(12..12, [0; 4]);
+            bytes.extend([5, 0, 0, 0]);
+            bytes.extend(((start_ns + after_ns) as f64 * 1e-9).to_le_bytes());
+            bytes
+        },
+    ),
+    (
+        "livox_ros_driver2",
+        &[
+            ("x", 0, FLOAT32),
+            ("y", 4, FLOAT32),
+            ("z", 8, FLOAT32),
+            ("intensity", 12, FLOAT32),
+            ("tag", 16, 2),
+            ("line", 17, 2),
+            ("timestamp", 18, FLOAT64),
+        ],
+        26,
+        0,
+        |start_ns, after_ns| {
+            [xyz_i(after_ns), vec![0, 3], ((start_ns + after_ns) as f64).to_le_bytes().to_vec()].concat()
+        },
+    ),
+    (
+        "livox_ros_driver, by the clock of the sensor",
+        &[
+            ("x", 0, FLOAT32),
+            ("y", 4, FLOAT32),
+            ("z", 8, FLOAT32),
+            ("intensity", 12, FLOAT32),
+            ("tag", 16, 2),
+            ("line", 17, 2),
+            ("timestamp", 18, FLOAT64),
+        ],
+        26,
+        0,
+        |start_ns, after_ns| {
+            let since_on_ns = start_ns - START_NS + 123_000_000_000 + after_ns;
+            [xyz_i(after_ns), vec![0, 3], (since_on_ns as f64).to_le_bytes().to_vec()].concat()
+        },
+    ),
+];
+
 #[test]
 fn points_are_timed_as_their_drivers_write_them() {
-    // Name, fields, bytes of a point, when the cloud is stamped after its first point, the point.
-    let drivers: [(&str, Fields<'_>, u32, i64, Encode); 6] = [
-        (
-            "ouster",
-            &[
-                ("x", 0, FLOAT32),
-                ("y", 4, FLOAT32),
-                ("z", 8, FLOAT32),
-                ("intensity", 16, FLOAT32),
-                ("t", 20, UINT32),
-                ("reflectivity", 24, 4),
-                ("ring", 26, 4),
-                ("ambient", 28, 4),
-                ("range", 32, UINT32),
-            ],
-            48,
-            0,
-            |_, after_ns| {
-                let mut bytes = xyz_i(after_ns);
-                bytes.splice(12..12, [0; 4]);
-                bytes.extend((after_ns as u32).to_le_bytes());
-                bytes.resize(48, 0);
-                bytes
-            },
-        ),
-        (
-            "velodyne, relative to the end of the scan",
-            &[
-                ("x", 0, FLOAT32),
-                ("y", 4, FLOAT32),
-                ("z", 8, FLOAT32),
-                ("intensity", 12, FLOAT32),
-                ("ring", 16, 4),
-                ("time", 18, FLOAT32),
-            ],
-            22,
-            100 * MS,
-            |_, after_ns| {
-                let time_s = (after_ns - 100 * MS) as f32 * 1e-9;
-                [xyz_i(after_ns), vec![5, 0], time_s.to_le_bytes().to_vec()].concat()
-            },
-        ),
-        (
-            "hesai",
-            &[
-                ("x", 0, FLOAT32),
-                ("y", 4, FLOAT32),
-                ("z", 8, FLOAT32),
-                ("intensity", 12, FLOAT32),
-                ("ring", 16, 4),
-                ("timestamp", 18, FLOAT64),
-            ],
-            26,
-            0,
-            |start_ns, after_ns| {
-                let time_s = (start_ns + after_ns) as f64 * 1e-9;
-                [xyz_i(after_ns), vec![5, 0], time_s.to_le_bytes().to_vec()].concat()
-            },
-        ),
-        (
-            "robosense, stamped at its end",
-            &[
-                ("x", 0, FLOAT32),
-                ("y", 4, FLOAT32),
-                ("z", 8, FLOAT32),
-                ("intensity", 16, FLOAT32),
-                ("ring", 20, 4),
-                ("timestamp", 24, FLOAT64),
-            ],
-            32,
-            100 * MS,
-            |start_ns, after_ns| {
-                let mut bytes = xyz_i(after_ns);
-                bytes.splice(12..12, [0; 4]);
-                bytes.extend([5, 0, 0, 0]);
-                bytes.extend(((start_ns + after_ns) as f64 * 1e-9).to_le_bytes());
-                bytes
-            },
-        ),
-        (
-            "livox_ros_driver2",
-            &[
-                ("x", 0, FLOAT32),
-                ("y", 4, FLOAT32),
-                ("z", 8, FLOAT32),
-                ("intensity", 12, FLOAT32),
-                ("tag", 16, 2),
-                ("line", 17, 2),
-                ("timestamp", 18, FLOAT64),
-            ],
-            26,
-            0,
-            |start_ns, after_ns| {
-                [xyz_i(after_ns), vec![0, 3], ((start_ns + after_ns) as f64).to_le_bytes().to_vec()].concat()
-            },
-        ),
-        (
-            "livox_ros_driver, by the clock of the sensor",
-            &[
-                ("x", 0, FLOAT32),
-                ("y", 4, FLOAT32),
-                ("z", 8, FLOAT32),
-                ("intensity", 12, FLOAT32),
-                ("tag", 16, 2),
-                ("line", 17, 2),
-                ("timestamp", 18, FLOAT64),
-            ],
-            26,
-            0,
-            |start_ns, after_ns| {
-                let since_on_ns = start_ns - START_NS + 123_000_000_000 + after_ns;
-                [xyz_i(after_ns), vec![0, 3], (since_on_ns as f64).to_le_bytes().to_vec()].concat()
-            },
-        ),
-    ];
-    for (driver, fields, step, stamped_after_ns, encode) in drivers {
+    for (driver, fields, step, stamped_after_ns, encode) in DRIVERS {
         let mut foreign = Foreign::new(mcap::WriteOptions::new());
         for n in 0..8 {
             let start_ns = START_NS + n * 100 * MS;
