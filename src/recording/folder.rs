@@ -78,7 +78,8 @@ fn named_by_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     if text.trim().is_empty() {
         return Ok(Vec::new());
     }
-    let parsed: Metadata = serde_saphyr::from_str(&text).map_err(|error| broken(error.to_string()))?;
+    let parsed: Metadata =
+        serde_saphyr::from_str(&text).map_err(|error| broken(error.without_snippet().to_string()))?;
     let names =
         parsed.rosbag2_bagfile_information.map(|information| information.relative_file_paths).unwrap_or_default();
     names.iter().map(|name| named_file(path, name)).collect()

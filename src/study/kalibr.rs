@@ -96,7 +96,7 @@ impl CalibrationSpec {
     /// When it has an unknown key, a value that cannot be meant, or nothing that is used.
     pub fn from_kalibr(text: &str, name: &str) -> Result<Self, StudyError> {
         let wrong = |problem: String| StudyError::Calibration { name: name.to_owned(), problem };
-        let file: File = serde_saphyr::from_str(text).map_err(|error| wrong(error.to_string()))?;
+        let file: File = serde_saphyr::from_str(text).map_err(|error| wrong(error.without_snippet().to_string()))?;
         let transform = file.transform().map_err(wrong)?;
         let imu = file.noise(name)?;
         if transform.is_none() && imu.is_none() {
