@@ -10,7 +10,7 @@ use zsim::geometry::{Pose, Rotation, Route, Vector};
 use zsim::motion;
 use zsim::random::Seed;
 use zsim::simulation::Scenario;
-use zsim::spec::{Kind, Source, find, parse};
+use zsim::spec::{Kind, find};
 use zsim::study::{CalibrationSpec, CloudFormat, CloudWishes, Wishes};
 
 /// What every command understands.

@@ -7,7 +7,7 @@ use super::{output, recording_size};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim::report;
+use zsim::report::{self, Metrics};
 use zsim::simulation::Simulation;
 use zsim::study::{self, Outcome, Watch};
 
@@ -63,11 +63,8 @@ fn seconds_by_part(outcome: &Outcome) -> Value {
 /// Prints the figures of an estimate, with `profile` where its time went, and says what was lost.
 pub(super) fn close(global: &Global, outcome: &Outcome, profile: bool, folder: &Path) -> anyhow::Result<End> {
     let mut figures = serde_json::to_value(&outcome.metrics)?;
-    if let Value::Object(object) = &mut figures {
-        object.insert("losses".to_owned(), json!(outcome.losses));
-        if profile {
-            object.insert("profile".to_owned(), seconds_by_part(outcome));
-        }
+    if let (true, Value::Object(object)) = (profile, &mut figures) {
+        object.insert("profile".to_owned(), seconds_by_part(outcome));
     }
     let mut words = report::summary(&outcome.metrics);
     if let (true, Some(wall_s)) = (profile, outcome.metrics.open_loop.wall_s) {
@@ -75,9 +72,8 @@ pub(super) fn close(global: &Global, outcome: &Outcome, profile: bool, folder: &
         words += &report::time_spent(&outcome.spent, wall_s);
     }
     output::tell(global, &words, figures, Some(folder))?;
-    if outcome.losses.is_empty() {
-        return Ok(End::Done);
-    }
-    outcome.losses.iter().for_each(|loss| eprintln!("loss: {}", output::printable(loss)));
-    Ok(End::WithLoss)
+    let Metrics { losses, status, .. } = &outcome.metrics;
+    losses.iter().for_each(|loss| eprintln!("loss: {}", output::printable(&loss.line())));
+    let is_good = status.as_deref().is_none_or(|status| status == "good");
+    Ok(if losses.is_empty() && is_good { End::Done } else { End::WithLoss })
 }

@@ -82,6 +82,19 @@ pub enum LeftOut {
     RepeatedScans,
 }
 
+impl LeftOut {
+    /// A key for scripts.
+    fn name(self) -> &'static str {
+        match self {
+            Self::LateSamples => "late_samples",
+            Self::LateScans => "late_scans",
+            Self::Outliers => "outliers",
+            Self::RepeatedSamples => "repeated_samples",
+            Self::RepeatedScans => "repeated_scans",
+        }
+    }
+}
+
 impl fmt::Display for LeftOut {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -187,6 +200,20 @@ impl fmt::Display for Warning {
 }
 
 impl WarningKind {
+    /// How large it is, where that can be said: s, samples, or a ratio; the larger, the worse.
+    pub fn size(&self) -> Option<f64> {
+        match self {
+            Self::ImuGap { seconds } | Self::LidarGap { seconds } | Self::BeganAgain { seconds } => Some(*seconds),
+            Self::Lost { seconds, .. } => Some(*seconds),
+            Self::FoundAgain { away_m } => Some(*away_m),
+            Self::NoisyImu { gyro, accel } => Some(gyro.max(*accel)),
+            Self::LeftOut { count, .. } => Some(*count as f64),
+            Self::Saturated { samples } => Some(*samples as f64),
+            Self::Contradicted { times, .. } => Some(*times),
+            _ => None,
+        }
+    }
+
     /// A key for scripts.
     pub fn name(&self) -> &'static str {
         match self {
@@ -197,7 +224,7 @@ impl WarningKind {
             Self::BeganAgain { .. } => "restarted",
             Self::FoundAgain { .. } => "relocalised",
             Self::LostAgain { .. } => "not_relocalised",
-            Self::LeftOut { .. } => "left_out",
+            Self::LeftOut { what, .. } => what.name(),
             Self::FewMatches { .. } => "few_matches",
             Self::WeakGeometry { .. } => "weak_geometry",
             Self::Lost { .. } => "lost",

@@ -1,5 +1,6 @@
 //! The figures of a run: `metrics.json`.
 
+use super::{EventMetrics, IntegrityMetrics};
 use serde::{Deserialize, Serialize};
 
 /// All figures of a run, in SI units but for angles, in degrees. `None` (`null` in the file) is what is not known:
@@ -15,6 +16,8 @@ pub struct Metrics {
     pub seed: Option<u64>,
     /// Length of the recording, s.
     pub duration_s: f64,
+    /// The verdict on the estimate: `good`, `degraded`, `lost`.
+    pub status: Option<String>,
     /// The simulation.
     pub simulation: SimulationMetrics,
     /// The open loop.
@@ -27,6 +30,12 @@ pub struct Metrics {
     pub lidar: LidarMetrics,
     /// The cloud.
     pub cloud: CloudMetrics,
+    /// What the verdict rests on.
+    pub integrity: IntegrityMetrics,
+    /// What of the recording is missing or was not used, and stretches without an estimate.
+    pub losses: Vec<EventMetrics>,
+    /// What a user should know besides.
+    pub notes: Vec<EventMetrics>,
     /// Most memory that the process ever had, MiB.
     pub peak_rss_mib: Option<f64>,
 }
@@ -202,6 +211,7 @@ mod tests {
         "scene",
         "seed",
         "duration_s",
+        "status",
         "simulation",
         "wall_s",
         "beams",
@@ -257,6 +267,13 @@ mod tests {
         "kept_sigma_m",
         "standing_dropped_fraction",
         "movers_dropped_fraction",
+        "integrity",
+        "bound_m_99",
+        "largest_bound_m",
+        "since_s",
+        "causes",
+        "losses",
+        "notes",
         "peak_rss_mib",
     ];
 

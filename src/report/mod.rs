@@ -1,6 +1,7 @@
 //! Results for people: figures of a run ([`Metrics`]), tables, plots, a page. It knows results, not how they came.
 
 mod figures;
+mod integrity;
 mod metrics;
 mod page;
 pub mod plot;
@@ -12,6 +13,7 @@ mod table;
 pub use figures::{
     bound_over_time, clock_offset, errors_of_both_loops, errors_over_time, head_pitch, trajectory_from_above,
 };
+pub use integrity::{CauseMetrics, EventMetrics, IntegrityMetrics};
 pub use metrics::{
     ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, LoopMetrics, Metrics, OpenLoopMetrics,
     SimulationMetrics,

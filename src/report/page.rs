@@ -1,12 +1,14 @@
 //! The page: one HTML file that needs nothing else.
 
 use super::plot::{Figure, PlotError};
-use super::{Metrics, rows};
+use super::{EventMetrics, Metrics, integrity, rows};
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;color:#262626;max-width:760px;margin:2rem auto;padding:0 1rem}\
 h1{font-size:1.5rem;font-weight:600}h2{font-size:1.1rem;font-weight:600;margin:2rem 0 .5rem}\
 table{border-collapse:collapse;width:100%}td,th{padding:.15rem .5rem;text-align:left;vertical-align:top}\
 th{font-weight:600;padding-left:0}td:last-child{text-align:right;font-variant-numeric:tabular-nums}\
+.verdict{padding:.6rem .8rem;border-left:.4rem solid;font-weight:600}.good{border-color:#0072b2;background:#e8f3fa}\
+.degraded{border-color:#e69f00;background:#fdf4e3}.lost{border-color:#d55e00;background:#fbe9e0}\
 tbody tr:first-child>*{border-top:1px solid #d0d0d0}figure{margin:0}svg{width:100%;height:auto}\
 pre{background:#f5f5f5;padding:.8rem;overflow:auto;font-size:.8rem}footer{margin-top:2rem;color:#707070;font-size:.85rem}";
 
@@ -24,7 +26,7 @@ pub struct Section {
 /// When a plot cannot be drawn.
 pub fn page(metrics: &Metrics, sections: &[Section], manifest: &str) -> Result<String, PlotError> {
     let title = escaped(&rows::title(metrics));
-    let mut body = format!("<h1>{title}</h1>\n{}", figures_table(metrics));
+    let mut body = format!("<h1>{title}</h1>\n{}{}", verdict(metrics), figures_table(metrics));
     for section in sections {
         let svg = section.figure.svg()?;
         let svg = &svg[svg.find("<svg").unwrap_or_default()..];
@@ -37,6 +39,32 @@ pub fn page(metrics: &Metrics, sections: &[Section], manifest: &str) -> Result<S
          content=\"width=device-width\">\n<title>zsim: {title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{body}\
          <footer>zsim {version}</footer>\n</body>\n</html>\n"
     ))
+}
+
+/// The verdict with its causes, losses and notes.
+fn verdict(metrics: &Metrics) -> String {
+    let (Some(verdict), Some(status)) = (integrity::verdict(metrics), &metrics.status) else { return String::new() };
+    let cause = |cause: &super::CauseMetrics| {
+        format!("{:.1} to {:.1} s, {}: {}", cause.from_s, cause.to_s, cause.status, cause.sentence)
+    };
+    let causes: Vec<String> = metrics.integrity.causes.iter().map(cause).collect();
+    let events = |events: &[EventMetrics]| events.iter().map(EventMetrics::line).collect::<Vec<_>>();
+    format!(
+        "<p class=\"verdict {}\">{}</p>\n{}{}{}",
+        escaped(status),
+        escaped(&verdict),
+        list("Causes", &causes),
+        list("Losses", &events(&metrics.losses)),
+        list("Notes", &events(&metrics.notes))
+    )
+}
+
+fn list(title: &str, lines: &[String]) -> String {
+    if lines.is_empty() {
+        return String::new();
+    }
+    let items: String = lines.iter().map(|line| format!("<li>{}</li>\n", escaped(line))).collect();
+    format!("<details><summary>{title} ({})</summary>\n<ul>\n{items}</ul>\n</details>\n", lines.len())
 }
 
 fn figures_table(metrics: &Metrics) -> String {
@@ -60,6 +88,16 @@ fn escaped(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::report::plot::Chart;
+    use crate::report::{CauseMetrics, IntegrityMetrics};
+
+    #[test]
+    fn the_verdict_stands_first_with_its_causes() {
+        let cause = CauseMetrics { status: "lost".to_owned(), sentence: "a < b".to_owned(), ..CauseMetrics::default() };
+        let integrity = IntegrityMetrics { causes: vec![cause], ..IntegrityMetrics::default() };
+        let metrics = Metrics { status: Some("lost".to_owned()), integrity, ..Metrics::default() };
+        let html = page(&metrics, &[], "").unwrap();
+        assert!(html.find("class=\"verdict lost\">lost: a &lt; b").unwrap() < html.find("<table>").unwrap());
+    }
 
     #[test]
     fn the_page_needs_nothing_else_and_escapes_what_it_is_given() {

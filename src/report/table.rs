@@ -1,6 +1,6 @@
 //! Tables for the terminal, 80 columns wide at most.
 
-use super::{Metrics, rows};
+use super::{Metrics, integrity, rows};
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle};
 
 /// Widest table, columns.
@@ -57,5 +57,6 @@ pub fn summary(metrics: &Metrics) -> String {
             cells.push(vec![title.to_owned(), row.name.to_owned(), row.value]);
         }
     }
-    format!("{}\n{}", rows::title(metrics), table(&[], &cells, false))
+    let verdict = integrity::verdict(metrics).map_or_else(String::new, |verdict| format!("verdict: {verdict}\n"));
+    format!("{}\n{verdict}{}", rows::title(metrics), table(&[], &cells, false))
 }

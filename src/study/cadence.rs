@@ -24,6 +24,11 @@ impl Cadence {
         self.count += 1;
     }
 
+    /// How many messages there were.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
     /// First and last stamp.
     pub(super) fn span(&self) -> Option<(Stamp, Stamp)> {
         Some((self.first?, self.last?))

@@ -5,7 +5,7 @@ use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
 use super::cloud_files::CloudWishes;
-use super::integrity::{bounds, write_integrity, write_windows};
+use super::integrity::{Integrity, write_windows};
 use super::map::{MapWishes, write_map_of};
 use super::open_loop::{How, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
@@ -56,8 +56,6 @@ impl Wishes {
 pub struct Outcome {
     /// The figures, as in `metrics.json`.
     pub metrics: Metrics,
-    /// What of the recording was lost or left out, a sentence each; nothing, as a rule.
-    pub losses: Vec<String>,
     /// Of the open loop's time, what the parts of the estimator took.
     pub spent: TimeSpent,
 }
@@ -135,21 +133,26 @@ pub(super) fn estimate_in(
     };
     let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(wishes.estimator.fixed_views as u64);
+    let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
+    let judged = integrity.metrics(run, known.map(|_| judge::pairs_of(reader, best.map_from_head)).transpose()?);
     let metrics = Metrics {
+        status: Some(integrity.status().name().to_owned()),
+        integrity: judged,
+        losses: run.events.losses.clone(),
+        notes: run.events.notes.clone(),
         open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, known, drifting) },
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
         clock: judge::clock_metrics(run, known),
         lidar: judge::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &wishes.estimator),
         ..metrics(origin, run, &registered, best.known)
     };
-    write_integrity(folder, &bounds(run, best.map_from_head))?;
+    integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
     let open_known = known.filter(|_| loops.closed.is_some());
     let open_errors = open_known.and_then(|known| Some(&known.errors.as_ref()?.drawn));
     let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
-    let OpenLoopRun { losses, spent, .. } = loops.open;
-    Ok(Outcome { metrics, losses, spent })
+    Ok(Outcome { metrics, spent: loops.open.spent })
 }
 
 /// Both loops, and what the truth says of each.
@@ -189,7 +192,7 @@ impl Loops {
         let makes_map = within.map_or(wishes.closed_loop, |within| within.extend);
         let how = How { estimator, calibration, surveying: closes || makes_map, map: within };
         let open = run_open_loop(reader, selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
-        open.remarks.iter().for_each(|remark| watch.note(remark));
+        open.events.notes.iter().for_each(|note| watch.note(&note.line()));
         let closed = match closes {
             true => Some(close_loops(&open, folder, how, watch)?),
             false => None,

@@ -2,9 +2,12 @@
 
 use super::StudyError;
 use super::beside::Beside;
+use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{GAUGED_S, WindowReport, blocks, doubt};
-use crate::geometry::{PoseCovariance, Trajectory};
+use crate::estimation::{Cause, Evidence, Finding, GAUGED_S, Status, WindowReport, blocks, doubt, findings};
+use crate::evaluation::{ALIGNED_S, Errors, Pairs, align_poses};
+use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
+use crate::report::{CauseMetrics, IntegrityMetrics};
 use crate::time::Stamp;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -12,9 +15,15 @@ use std::path::Path;
 /// The bound of a position whose covariance says nothing is wrong is at least this, m: what a voxel's content adds.
 const LEAST_BOUND_M: f64 = 0.003;
 
+/// A result is not good where the bound exceeds both of these, m and as a share of the way.
+const LARGE_BOUND_M: f64 = 0.05;
+const LARGE_SHARE: f64 = 0.01;
+/// A turn counts in the alignment as much as a shift by this times the angle, m: as for the drift.
+const TURN_LEVER_M: f64 = 0.3;
+
 /// A pose's bound and standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PoseBound {
+struct PoseBound {
     pub stamp: Stamp,
     /// The position error is below this with a probability of 99 %, m.
     pub bound_m_99: f64,
@@ -23,7 +32,7 @@ pub(super) struct PoseBound {
 }
 
 /// The bounds of the poses of `trajectory`.
-pub(super) fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
+fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
     let doubts = doubt(&run.windows);
     let radii_m = radii(run);
     let mut covariances = run.covariances.iter().zip(&radii_m).peekable();
@@ -56,14 +65,148 @@ fn radii(run: &OpenLoopRun) -> Vec<f64> {
     radii_m
 }
 
-/// Writes `integrity.csv` to `folder`.
-pub(super) fn write_integrity(folder: &Path, bounds: &[PoseBound]) -> Result<(), StudyError> {
-    let header = "stamp_s,bound_m_99,sigma_x_m,sigma_y_m,sigma_z_m,sigma_roll_deg,sigma_pitch_deg,sigma_yaw_deg";
-    let rows = bounds.iter().map(|PoseBound { stamp, bound_m_99, sigmas }| {
-        let [x, y, z, roll, pitch, yaw] = sigmas;
-        format!("{},{bound_m_99:.6},{x:.6},{y:.6},{z:.6},{roll:.6},{pitch:.6},{yaw:.6}", seconds(*stamp))
-    });
-    write(folder, "integrity.csv", header, rows)
+/// What is known about how far a result can be trusted.
+pub(super) struct Integrity {
+    bounds: Vec<PoseBound>,
+    findings: Vec<Finding>,
+}
+
+impl Integrity {
+    /// Of the open loop's run and the trajectory that counts: the closed loop's, where loops were closed.
+    pub fn of(run: &OpenLoopRun, closed: Option<&ClosedLoopRun>, trajectory: &Trajectory) -> Self {
+        let mut bounds = bounds(run, trajectory);
+        let ends = |stamps: &[Stamp]| Some((*stamps.first()?, *stamps.last()?));
+        let estimated = ends(trajectory.stamps()).unwrap_or(run.recorded);
+        let evidence = Evidence {
+            windows: &run.windows,
+            warnings: &run.warnings,
+            samples: run.samples,
+            recorded: run.recorded,
+            estimated,
+        };
+        let mut findings = findings(&evidence);
+        findings.extend(closed.and_then(|closed| moved_by_closing(run, closed, &bounds)));
+        findings.extend(uncertain(&bounds, way_m(trajectory)));
+        findings.sort_by_key(|finding| (std::cmp::Reverse(finding.status), finding.from));
+        if let Some(lost) = findings.first().filter(|finding| finding.status == Status::Lost) {
+            // From there on nothing bounds the error.
+            let from = bounds.partition_point(|bound| bound.stamp < lost.from);
+            bounds[from..].iter_mut().for_each(|bound| bound.bound_m_99 = f64::INFINITY);
+        }
+        Self { bounds, findings }
+    }
+
+    /// The verdict.
+    pub fn status(&self) -> Status {
+        self.findings.iter().map(|finding| finding.status).max().unwrap_or_default()
+    }
+
+    /// As in `metrics.json`; `pairs` are the estimated and true poses, where the truth is known.
+    pub fn metrics(&self, run: &OpenLoopRun, pairs: Option<Pairs>) -> IntegrityMetrics {
+        let since = |stamp: Stamp| stamp.seconds_since(run.recorded.0);
+        let cause = |finding: &Finding| CauseMetrics {
+            status: finding.status.name().to_owned(),
+            kind: finding.cause.kind().to_owned(),
+            from_s: since(finding.from),
+            to_s: since(finding.to),
+            sentence: finding.cause.to_string(),
+        };
+        let finite = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
+        let all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
+        let largest = all.iter().copied().filter(|bound| bound.is_finite()).fold(0.0, f64::max);
+        let held = pairs.and_then(|pairs| self.held_against(&pairs));
+        IntegrityMetrics {
+            bound_m_99: median(all).and_then(finite),
+            largest_bound_m: Some(largest).filter(|bound| *bound > 0.0),
+            since_s: self.findings.iter().map(|finding| since(finding.from)).min_by(f64::total_cmp),
+            causes: self.findings.iter().map(cause).collect(),
+            within_bound: held.map(|held| held.0),
+            bound_over_error: held.and_then(|held| finite(held.1)),
+            largest_error_m: held.map(|held| held.2),
+        }
+    }
+
+    /// Share of the poses whose error, aligned over the first 20 s or half of a shorter run, is within the bound; median
+    /// of bound over error; largest error, m.
+    fn held_against(&self, pairs: &Pairs) -> Option<(f64, f64, f64)> {
+        let aligned = pairs.first_seconds(ALIGNED_S.min(0.5 * pairs.duration_s()));
+        let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
+        let errors = Errors::after(pairs, &world_from_map);
+        let mut bounds = self.bounds.iter();
+        let mut current = bounds.next()?;
+        let mut ratios = Vec::with_capacity(errors.stamps.len());
+        let (mut within, mut largest_m) = (0, 0.0_f64);
+        for (stamp, error) in errors.stamps.iter().zip(&errors.position_m) {
+            let error_m = error.norm();
+            while current.stamp < *stamp {
+                let Some(next) = bounds.next() else { break };
+                current = next;
+            }
+            within += usize::from(error_m <= current.bound_m_99);
+            largest_m = largest_m.max(error_m);
+            ratios.push(current.bound_m_99 / error_m.max(1e-9));
+        }
+        Some((within as f64 / ratios.len() as f64, median(ratios)?, largest_m))
+    }
+
+    /// Writes `integrity.csv` to `folder`.
+    pub fn write(&self, folder: &Path) -> Result<(), StudyError> {
+        let header = "stamp_s,bound_m_99,sigma_x_m,sigma_y_m,sigma_z_m,sigma_roll_deg,sigma_pitch_deg,sigma_yaw_deg";
+        let rows = self.bounds.iter().map(|PoseBound { stamp, bound_m_99, sigmas }| {
+            let [x, y, z, roll, pitch, yaw] = sigmas;
+            format!("{},{bound_m_99:.6},{x:.6},{y:.6},{z:.6},{roll:.6},{pitch:.6},{yaw:.6}", seconds(*stamp))
+        });
+        write(folder, "integrity.csv", header, rows)
+    }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// How far the head went: its path by positions a second apart, so that its swing does not count, m.
+fn way_m(trajectory: &Trajectory) -> f64 {
+    let mut last: Option<(Stamp, Vector)> = None;
+    let mut way_m = 0.0;
+    for (stamp, pose) in trajectory.iter() {
+        let place = pose.translation.vector;
+        match last {
+            Some((before, _)) if stamp.seconds_since(before) < 1.0 => {}
+            Some((_, from)) => {
+                way_m += (place - from).norm();
+                last = Some((stamp, place));
+            }
+            None => last = Some((stamp, place)),
+        }
+    }
+    way_m
+}
+
+/// Where the bound is larger than a good result allows.
+fn uncertain(bounds: &[PoseBound], way_m: f64) -> Option<Finding> {
+    let most_m = LARGE_BOUND_M.max(LARGE_SHARE * way_m);
+    let is_large = |bound: &&PoseBound| bound.bound_m_99 > most_m;
+    let from = bounds.iter().find(is_large)?.stamp;
+    let to = bounds.iter().rev().find(is_large)?.stamp;
+    let bound_m = bounds.iter().map(|bound| bound.bound_m_99).fold(0.0, f64::max);
+    Some(Finding { status: Status::Degraded, cause: Cause::Uncertain { bound_m }, from, to })
+}
+
+/// Where closing loops moved the trajectory by more than the bound on its error.
+fn moved_by_closing(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Finding> {
+    let open = closed.open_loop_told_anew.as_ref().unwrap_or(&run.map_from_head);
+    let shift = |((stamp, a), (_, b)): ((Stamp, &Pose), (Stamp, &Pose))| {
+        (stamp, (a.translation.vector - b.translation.vector).norm())
+    };
+    let shifts = open.iter().zip(closed.map_from_head.iter()).map(shift).zip(bounds);
+    let too_far: Vec<(Stamp, f64)> = shifts
+        .filter(|((_, moved_m), bound)| *moved_m > LARGE_BOUND_M.max(2.0 * bound.bound_m_99))
+        .map(|(moved, _)| moved)
+        .collect();
+    let (from, to) = (too_far.first()?.0, too_far.last()?.0);
+    let moved_m = too_far.iter().map(|(_, moved_m)| *moved_m).fold(0.0, f64::max);
+    Some(Finding { status: Status::Degraded, cause: Cause::LoopClosure { moved_m }, from, to })
 }
 
 /// Writes `windows.csv` to `folder`.

@@ -81,6 +81,16 @@ pub(super) fn truth_of(
     }))
 }
 
+/// The poses of `map_from_head` with the true ones at their stamps.
+pub(super) fn pairs_of(reader: &Reader, map_from_head: &Trajectory) -> Result<Pairs, StudyError> {
+    let heads = reader.truth().filter_map(|told| match told {
+        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
+        Ok(_) => None,
+        Err(error) => Some(Err::<(Stamp, Pose), RecordingError>(error)),
+    });
+    Ok(Pairs::gather(map_from_head, heads)?)
+}
+
 /// A measure, or a note on why there is none.
 fn known<T>(measure: Result<T, EvaluationError>, watch: &mut Watch) -> Option<T> {
     measure.inspect_err(|error| watch.note(&error.to_string())).ok()

@@ -21,6 +21,7 @@ pub mod coverage;
 mod disk;
 mod error;
 mod estimate;
+mod events;
 pub mod gains;
 mod integrity;
 mod journey;

@@ -1,11 +1,11 @@
 //! The open loop over a recording, as it would run while recording.
 
 use super::cadence::Cadence;
+use super::events::Events;
 use super::read_ahead::{Coming, read_ahead};
 use super::{MapWishes, Stage, StudyError, Watch};
 use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WarningKind, WindowReport, blocks,
-    radius_99,
+    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, blocks, radius_99,
 };
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
@@ -36,10 +36,10 @@ pub(super) struct OpenLoopRun {
     pub lidar: LidarCorrection,
     /// The same along the IMU's axes, as a calibration has it.
     pub calibrated_lidar: LidarCorrection,
-    /// What the estimator has to say of it beside the losses, a sentence each.
-    pub remarks: Vec<String>,
-    /// What of the recording was lost or left out, a sentence each.
-    pub losses: Vec<String>,
+    /// What was lost or left out, and what else a user should know.
+    pub events: Events,
+    /// How many IMU samples the recording has.
+    pub samples: usize,
     /// The windows' reports, in order.
     pub windows: Vec<WindowReport>,
     /// What the estimator reported, in order.
@@ -104,16 +104,14 @@ pub(super) fn run_open_loop(
 
     // Offsets are those of the stamps as they were recorded.
     let shift_s = selection.imu_shift().seconds();
-    let mut losses = loss.sentences();
-    losses.extend(heard.imu.missing("IMU samples"));
-    losses.extend(heard.lidar.missing("scans"));
+    let mut events = Events::default();
+    loss.sentences().into_iter().for_each(|sentence| events.lose("recording", sentence));
+    heard.imu.missing("IMU samples").into_iter().for_each(|sentence| events.lose("missing_samples", sentence));
+    heard.lidar.missing("scans").into_iter().for_each(|sentence| events.lose("missing_scans", sentence));
+    result.located.iter().for_each(|located| events.note("located", found(located)));
+    loss.notes().into_iter().for_each(|sentence| events.note("recording", sentence));
     let start = heard.start();
-    losses.extend(result.warnings.iter().filter(|warning| is_loss(&warning.kind)).map(|w| since(start, w)));
-    let remarks =
-        loss.notes().into_iter().chain(result.located.iter().map(found)).chain(
-            result.warnings.iter().filter(|warning| !is_loss(&warning.kind)).map(|warning| since(start, warning)),
-        );
-    let remarks = remarks.collect();
+    events.add_warnings(&result.warnings, start);
     Ok(OpenLoopRun {
         map_from_head,
         covariances,
@@ -122,8 +120,8 @@ pub(super) fn run_open_loop(
         clock_offsets: result.clock_offsets.into_iter().map(|(at, offset_s)| (at, offset_s - shift_s)).collect(),
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,
-        remarks,
-        losses,
+        events,
+        samples: heard.imu.count(),
         recorded: (start, start + Span::from_seconds(heard.seconds())),
         windows: result.windows,
         warnings: result.warnings,
@@ -157,20 +155,6 @@ fn push_all(
     Ok(())
 }
 
-/// Whether a warning says that measurements were not there, or not used, or that there was too little in them: an
-/// estimate with loss.
-fn is_loss(kind: &WarningKind) -> bool {
-    matches!(
-        kind,
-        WarningKind::ImuGap { .. }
-            | WarningKind::LidarGap { .. }
-            | WarningKind::BeganAgain { .. }
-            | WarningKind::LostAgain { .. }
-            | WarningKind::LeftOut { .. }
-            | WarningKind::Lost { .. }
-    )
-}
-
 /// Where in the map the head was found.
 fn found(located: &Located) -> String {
     format!(
@@ -178,11 +162,6 @@ fn found(located: &Located) -> String {
         100.0 * located.share,
         1e3 * located.residual_rms_m
     )
-}
-
-/// A warning with its time since the start.
-fn since(start: Stamp, warning: &Warning) -> String {
-    format!("{:.2} s after the start: {}", warning.stamp.seconds_since(start), warning.kind)
 }
 
 /// Poses in memory, and on disk where that is wanted.
