@@ -120,6 +120,11 @@ impl Noisier {
 }
 
 impl Rest {
+    /// A head that rests from `interval` on, if it does.
+    pub(super) fn from(interval: &Interval) -> Self {
+        Self { gyro: interval.gyro, force: interval.accel }
+    }
+
     /// Whether an interval says the same, within its noise.
     pub(super) fn goes_on(&self, interval: &Interval) -> bool {
         (interval.gyro - self.gyro).norm() < REST_SIGMAS * interval.gyro_sigma
@@ -132,13 +137,21 @@ impl Rest {
 /// hand's accelerations cancel), with little trust.
 ///
 /// The map's origin is the head's first position, and its x axis points where the head's does.
-pub(super) fn begin(intervals: &[Interval], head_from_imu: &Pose, noise: &ImuNoise, spec: &EstimatorSpec) -> Beginning {
+///
+/// `may_rest` is whether the lidar lets the head rest: one that moves evenly feels the same.
+pub(super) fn begin(
+    (intervals, may_rest): (&[Interval], bool),
+    head_from_imu: &Pose,
+    noise: &ImuNoise,
+    spec: &EstimatorSpec,
+) -> Beginning {
     let duration: f64 = intervals.iter().map(|i| i.h).sum();
     let mean = |of: fn(&Interval) -> Vector| intervals.iter().map(|i| of(i) * i.h).sum::<Vector>() / duration;
     let (gyro, force) = (mean(|i| i.gyro), mean(|i| i.accel));
     let rest = Rest { gyro, force };
     let seen = Noisier::seen_in(intervals);
-    let at_rest = intervals.iter().all(|interval| rest.goes_on(&seen.of(*interval)))
+    let at_rest = may_rest
+        && intervals.iter().all(|interval| rest.goes_on(&seen.of(*interval)))
         && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
     let upward = if at_rest { force } else { mean_force_at_start(intervals) };
     let up = Rotation::rotation_between(&upward, &Vector::z()).unwrap_or_else(Rotation::identity);
@@ -161,7 +174,12 @@ pub(super) fn begin(intervals: &[Interval], head_from_imu: &Pose, noise: &ImuNoi
         biases: Biases { gyro: gyro_bias, accel: accel_bias },
         rest: at_rest.then_some(rest),
         noisier,
-        velocity_sigma: if at_rest { 0.01 } else { 2.0 },
+        velocity_sigma: match (at_rest, may_rest) {
+            (true, _) => 0.01,
+            (false, true) => 2.0,
+            // A vehicle under way.
+            (false, false) => 10.0,
+        },
         information: information(gyro_sigma, at_rest, noise, spec),
     }
 }

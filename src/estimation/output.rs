@@ -67,6 +67,8 @@ pub struct WindowReport {
     pub speed_m_per_s: f64,
     /// Whether the head moves, so that surfaces should be observed again.
     pub moving: bool,
+    /// Whether it rests at the window's end.
+    pub resting: bool,
     /// What is wrong with the window's solution, if anything.
     pub trouble: Option<WarningKind>,
     /// Time it took, s. With its parts the one figure that differs from run to run.

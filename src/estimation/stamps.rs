@@ -16,6 +16,10 @@ const STRIKES: usize = 5;
 /// Stamps are delayed where their skewness about a line is above the first (that of an exponential delay is 2); then a
 /// late stamp has the second times the variance of the jitter, an early one the third.
 const DELAYED: (f64, f64, f64) = (0.8, 30.0, 0.03);
+/// A stamp that is later than this is behind a gap, not delayed, s.
+const LONGEST_DELAY_S: f64 = 0.12;
+/// So many late stamps in a row are behind a loss of samples.
+const LATE_IN_A_ROW: usize = 25;
 /// Of fewer stamps the skewness says nothing.
 const DELAYED_FROM: usize = 30;
 /// Iterations of the line below delayed stamps.
@@ -36,6 +40,8 @@ pub(super) struct StampFilter {
     off: bool,
     /// Whether stamps are delayed, so that the earliest are the truest.
     delayed: bool,
+    /// How many stamps in a row are late by half a period or more, and the least such delay, s.
+    late: (usize, f64),
 }
 
 impl StampFilter {
@@ -54,6 +60,7 @@ impl StampFilter {
             started: false,
             off,
             delayed,
+            late: (0, f64::INFINITY),
         }
     }
 
@@ -72,9 +79,14 @@ impl StampFilter {
         let since = raw_s - self.last_s;
         // One period unless the stamp is far off: a late stamp must not be taken for a lost sample.
         let tolerance = (0.5 * self.period_s).max(4.0 * self.jitter2.sqrt());
-        let periods =
-            if (since - self.period_s).abs() < tolerance { 1.0 } else { (since / self.period_s).round().max(0.0) };
+        let is_one = (since - self.period_s).abs() < tolerance || (self.delayed && since < LONGEST_DELAY_S);
+        let periods = if is_one { 1.0 } else { (since / self.period_s).round().max(0.0) };
         self.predict(periods);
+        if self.delayed {
+            self.catch_up(raw_s);
+            self.correct(raw_s - self.last_s);
+            return self.last_s;
+        }
         let innovation = raw_s - self.last_s;
         if innovation.abs() > tolerance {
             // One such stamp is a chance, many are a jitter that has grown.
@@ -91,6 +103,20 @@ impl StampFilter {
         self.strikes = 0;
         self.correct(innovation);
         self.last_s
+    }
+
+    /// Among delayed stamps samples that are lost show only after a while: when no stamp comes without delay any more.
+    fn catch_up(&mut self, raw_s: f64) {
+        let delay_s = raw_s - self.last_s;
+        if delay_s < 0.5 * self.period_s {
+            self.late = (0, f64::INFINITY);
+            return;
+        }
+        self.late = (self.late.0 + 1, self.late.1.min(delay_s));
+        if self.late.0 >= LATE_IN_A_ROW {
+            self.predict((self.late.1 / self.period_s).round().max(0.0));
+            self.late = (0, f64::INFINITY);
+        }
     }
 
     fn predict(&mut self, periods: f64) {

@@ -8,9 +8,10 @@ use crate::estimation::border::Border;
 use crate::estimation::consider::{Consider, OfBeginning, Sensitivity};
 use crate::estimation::initial::{self, Beginning, Carried, Noisier};
 use crate::estimation::intake::{Intake, Stretch};
+use crate::estimation::sight::shows_motion;
 use crate::estimation::spent::Stopwatch;
 use crate::estimation::strapdown::Interval;
-use crate::estimation::surfel::{Patch, SurfelMaker};
+use crate::estimation::surfel::{Beam, Patch, SurfelMaker};
 use crate::estimation::survey::Survey;
 use crate::estimation::views::Views;
 use crate::estimation::whereabouts::{Before, Whereabouts};
@@ -383,7 +384,8 @@ impl Estimator {
             survey.ranges_are_held = self.intake.sight().is_one_way();
         }
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let beginning = initial::begin(&intervals[..resting], head_from_imu, noise, &fitting);
+        let may_rest = !self.lidar_shows_motion();
+        let beginning = initial::begin((&intervals[..resting], may_rest), head_from_imu, noise, &fitting);
         let start_s = *start_s;
         self.make_noisier(beginning.noisier, start_s);
         let (beginning, goes_on) = match &self.carried {
@@ -401,6 +403,18 @@ impl Estimator {
         let (pivot, known) = (self.consider.pivot(), window.known_at_start().unwrap_or_default());
         self.consider = if goes_on { Consider::lost(pivot, &known) } else { Consider::new(pivot, &known) };
         self.window = Some(window);
+    }
+
+    /// Whether the lidar shows motion between the beginning and the end of the time in which the head should rest.
+    fn lidar_shows_motion(&self) -> bool {
+        let beams: Vec<Beam> = self.waiting.iter().flat_map(|stretch| &stretch.beams).copied().collect();
+        let (Some(first), Some(last)) = (beams.first(), beams.last()) else { return false };
+        let quarter_s = 0.25 * (last.tau_s.min(first.tau_s + self.spec.inertial.rest_s) - first.tau_s);
+        let until_s = first.tau_s + 4.0 * quarter_s;
+        let early = beams.partition_point(|beam| beam.tau_s < first.tau_s + quarter_s);
+        let late = beams.partition_point(|beam| beam.tau_s < until_s - quarter_s);
+        let end = beams.partition_point(|beam| beam.tau_s <= until_s);
+        shows_motion(&beams[..early], &beams[late..end])
     }
 
     /// Takes the IMU for so much noisier than it was told from now on, and what waits with it.

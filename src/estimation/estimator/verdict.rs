@@ -29,6 +29,7 @@ pub(super) fn report(
         imu_matrix: window.imu_matrix(),
         speed_m_per_s: window.speed_m_per_s(),
         moving,
+        resting: window.is_resting(),
         trouble,
         elapsed_s,
         spent,

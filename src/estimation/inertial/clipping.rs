@@ -98,14 +98,9 @@ impl RangeLimits {
     }
 
     /// On which axes `sample`, followed by `ahead`, is clipped.
-    pub(super) fn clipped<'a>(
-        &mut self,
-        sample: &ImuSample,
-        ahead: impl Iterator<Item = &'a ImuSample> + Clone,
-    ) -> Clipped {
-        let of = |reading: fn(&ImuSample) -> Vector| ahead.clone().map(reading).collect::<Vec<_>>();
-        let gyro_ahead = of(|next| next.angular_velocity_rad_per_s);
-        let accel_ahead = of(|next| next.specific_force_m_per_s2);
+    pub(super) fn clipped<'a>(&mut self, sample: &ImuSample, ahead: impl Iterator<Item = &'a ImuSample>) -> Clipped {
+        let readings = ahead.map(|next| (next.angular_velocity_rad_per_s, next.specific_force_m_per_s2));
+        let (gyro_ahead, accel_ahead): (Vec<Vector>, Vec<Vector>) = readings.unzip();
         let (gyro, accel) = (&sample.angular_velocity_rad_per_s, &sample.specific_force_m_per_s2);
         Clipped {
             gyro: clipped_axes(&mut self.gyro, gyro, &gyro_ahead, (self.data_sheet.0, LEAST_LIMIT.0)),

@@ -13,6 +13,8 @@ const CONTRADICTION: (f64, f64) = (0.6, 3.0);
 const RESIDUAL_M: (f64, f64) = (0.010, 0.018);
 /// Share of a stretch in which too few surfaces were matched, or windows were not solved.
 const NOT_TRACKED: (f64, f64) = (0.35, 0.6);
+/// Share of a run without any match, and not at rest, from which the result is lost.
+const UNOBSERVED: f64 = 0.5;
 /// Gaps longer than this degrade a result, s.
 const GAP_S: f64 = 0.2;
 const LIDAR_GAP_S: f64 = 1.0;
@@ -51,14 +53,27 @@ pub struct Evidence<'a> {
     pub estimated: (Stamp, Stamp),
 }
 
-/// What was found about a run, the worst first, those of one weight in the order of time.
+/// What was found about a run, each kind of cause once, the worst first, those of one weight in the order of time.
 pub fn findings(evidence: &Evidence) -> Vec<Finding> {
     let mut all = of_windows(evidence.windows);
     all.extend(evidence.warnings.iter().filter_map(|warning| of_warning(warning, evidence)));
     all.extend(of_calibration(evidence.windows));
     all.extend(of_coverage(evidence));
-    all.sort_by_key(|finding| (std::cmp::Reverse(finding.status), finding.from));
-    all
+    let mut merged: Vec<Finding> = Vec::new();
+    for finding in all {
+        let same = |other: &&mut Finding| other.status == finding.status && other.cause.kind() == finding.cause.kind();
+        match merged.iter_mut().find(same) {
+            Some(other) => {
+                (other.from, other.to) = (other.from.min(finding.from), other.to.max(finding.to));
+                if finding.cause.size() > other.cause.size() {
+                    other.cause = finding.cause;
+                }
+            }
+            None => merged.push(finding),
+        }
+    }
+    merged.sort_by_key(|finding| (std::cmp::Reverse(finding.status), finding.from));
+    merged
 }
 
 /// A stretch of windows with the median of a measure, or a share.
@@ -67,7 +82,7 @@ fn over_stretches(
     measure: impl Fn(&[WindowReport]) -> f64,
     (degraded, lost): (f64, f64),
 ) -> Option<(Status, f64, Stamp, Stamp)> {
-    let step_s = windows.windows(2).map(|pair| pair[1].stamp.seconds_since(pair[0].stamp)).fold(0.0, f64::max);
+    let step_s = median(windows.windows(2).map(|pair| pair[1].stamp.seconds_since(pair[0].stamp)).collect());
     let length = ((STRETCH_S / step_s.clamp(0.1, STRETCH_S)).round() as usize).min(windows.len() / 2).max(1);
     let mut found: Option<(Status, f64, Stamp, Stamp)> = None;
     for stretch in windows.windows(length) {
@@ -118,7 +133,19 @@ fn of_windows(windows: &[WindowReport]) -> Vec<Finding> {
     add(over_stretches(windows, fastest, (SPEED_M_PER_S, SPEED_M_PER_S)), &|speed_m_per_s, _, _| Cause::Speed {
         speed_m_per_s,
     });
+    all.extend(unobserved(windows));
     all
+}
+
+/// A head that neither rests nor observes any surface again for most of the run: its way is not known at all.
+fn unobserved(windows: &[WindowReport]) -> Option<Finding> {
+    let is_unobserved = |w: &&WindowReport| w.matches + w.view_matches == 0 && !w.resting;
+    let without = windows.iter().filter(is_unobserved).count();
+    let (first, last) = (windows.first()?, windows.last()?);
+    let seconds = last.stamp.seconds_since(first.stamp) * without as f64 / windows.len() as f64;
+    let cause = Cause::FewMatches { seconds };
+    let (from, to) = (first.stamp, last.stamp);
+    (without as f64 > UNOBSERVED * windows.len() as f64).then_some(Finding { status: Status::Lost, cause, from, to })
 }
 
 fn of_warning(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
@@ -135,6 +162,7 @@ fn of_warning(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
         WarningKind::LidarGap { seconds } if *seconds > LIDAR_GAP_S => {
             (Status::Degraded, Cause::Gap { sensor: "lidar", seconds: *seconds }, from)
         }
+        WarningKind::Lost { seconds, .. } => (Status::Lost, Cause::FewMatches { seconds: *seconds }, end),
         WarningKind::LostAgain { .. } | WarningKind::LostInMap => (Status::Lost, Cause::NotRelocalised, end),
         WarningKind::Saturated { samples } if *samples as f64 > CLIPPED * evidence.samples as f64 => {
             let share = *samples as f64 / evidence.samples.max(1) as f64;
@@ -202,11 +230,114 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
         let weak = near(k).iter().filter(|w| matches!(w.trouble, Some(WarningKind::WeakGeometry { .. }))).count();
         let weak = if weak == near(k).len() { WEAK_DOUBT } else { 1.0 };
         let scale = windows[k].imu_matrix / SOUND.2;
-        (contradiction / SOUND.0).max(residual_m / SOUND.1).max(scale).max(weak).clamp(1.0, MOST_DOUBT)
+        // A mismatch that no noise explains moves the estimate by more than in proportion.
+        (contradiction / SOUND.0).powi(2).max(residual_m / SOUND.1).max(scale).max(weak).clamp(1.0, MOST_DOUBT)
     };
     let enlarge = |k: usize| {
         most = most.max(factor(k));
         (windows[k].stamp, most)
     };
     (0..windows.len()).map(enlarge).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimation::TimeSpent;
+
+    /// Windows of a sound run, twice a second.
+    fn sound(count: usize) -> Vec<WindowReport> {
+        let report = |k: usize| WindowReport {
+            stamp: Stamp::from_nanos(k as i64 * 500_000_000),
+            surfels: 2500,
+            matches: 7000,
+            view_matches: 500,
+            views: 5,
+            residual_rms_m: 0.003,
+            iterations: 3,
+            last_correction_m: 1e-4,
+            conditioning: 0.1,
+            imu_contradiction: 0.2,
+            clock_offset_s: 0.003,
+            clock_rate: 2e-5,
+            range_correction_m: 0.002,
+            imu_matrix: 0.002,
+            speed_m_per_s: 1.0,
+            moving: true,
+            resting: false,
+            trouble: None,
+            elapsed_s: 0.0,
+            spent: TimeSpent::default(),
+        };
+        (0..count).map(report).collect()
+    }
+
+    fn judged(windows: &[WindowReport], warnings: &[Warning]) -> Vec<Finding> {
+        let recorded = (windows[0].stamp, windows[windows.len() - 1].stamp);
+        findings(&Evidence { windows, warnings, samples: 6000, recorded, estimated: recorded })
+    }
+
+    #[test]
+    fn a_sound_run_has_no_findings_and_no_doubt() {
+        assert_eq!(judged(&sound(80), &[]), vec![]);
+        assert!(doubt(&sound(80)).iter().all(|(_, factor)| *factor == 1.0));
+    }
+
+    #[test]
+    fn surfaces_that_do_not_fit_lose_a_run_however_short_it_is() {
+        for count in [6, 80] {
+            let mut windows = sound(count);
+            windows.iter_mut().for_each(|window| window.residual_rms_m = 0.03);
+            let found = judged(&windows, &[]);
+            assert_eq!((found[0].status, found[0].cause.kind()), (Status::Lost, "poor_fit"));
+        }
+    }
+
+    #[test]
+    fn a_contradiction_is_found_where_it_is_and_enlarges_the_bound_from_there_on() {
+        let mut windows = sound(80);
+        windows[40..60].iter_mut().for_each(|window| window.imu_contradiction = 1.2);
+        let found = judged(&windows, &[]);
+        assert_eq!((found[0].status, found[0].cause.kind()), (Status::Degraded, "contradiction"));
+        assert!(found[0].from >= windows[30].stamp && found[0].to <= windows[70].stamp);
+        let doubts = doubt(&windows);
+        assert_eq!(doubts[30].1, 1.0);
+        assert!((doubts[79].1 - 9.0).abs() < 1e-9, "{}", doubts[79].1);
+    }
+
+    #[test]
+    fn a_head_that_observes_nothing_is_lost_unless_it_rests() {
+        let mut windows = sound(20);
+        windows.iter_mut().for_each(|window| (window.matches, window.view_matches, window.moving) = (0, 0, false));
+        assert_eq!(judged(&windows, &[])[0].status, Status::Lost);
+        windows.iter_mut().for_each(|window| window.resting = true);
+        assert_eq!(judged(&windows, &[]), vec![]);
+    }
+
+    #[test]
+    fn gaps_of_one_sensor_are_one_finding_with_the_longest() {
+        let windows = sound(80);
+        let gap =
+            |k: usize, seconds: f64| Warning { stamp: windows[k].stamp, kind: WarningKind::BeganAgain { seconds } };
+        let found = judged(&windows, &[gap(10, 0.5), gap(30, 2.0), gap(50, 1.0)]);
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].cause, Cause::Gap { sensor: "IMU", seconds: 2.0 });
+        assert_eq!(found[0].from, windows[10].stamp);
+    }
+
+    #[test]
+    fn half_a_recording_without_an_estimate_is_stated() {
+        let windows = sound(80);
+        let recorded = (windows[0].stamp, windows[79].stamp);
+        let evidence = Evidence {
+            windows: &windows,
+            warnings: &[],
+            samples: 6000,
+            recorded,
+            estimated: (recorded.0, windows[40].stamp),
+        };
+        let found = findings(&evidence);
+        assert_eq!(found[0].cause, Cause::NotCovered { seconds: 19.5 });
+        assert_eq!(found[0].from, windows[40].stamp);
+    }
 }

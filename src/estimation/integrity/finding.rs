@@ -122,6 +122,24 @@ pub enum Cause {
 }
 
 impl Cause {
+    /// How large it is, in the unit of its kind.
+    pub(super) fn size(&self) -> f64 {
+        match self {
+            Self::Contradiction { times } => *times,
+            Self::FewMatches { seconds } | Self::Gap { seconds, .. } | Self::NotCovered { seconds } => *seconds,
+            Self::PoorFit { residual_m } => *residual_m,
+            Self::NotRelocalised => 0.0,
+            Self::Speed { speed_m_per_s } => *speed_m_per_s,
+            Self::Clipped { share } => *share,
+            Self::Frozen { count, .. } => *count as f64,
+            Self::RangeCorrection { correction_m } => correction_m.abs(),
+            Self::ImuScale { entry } => *entry,
+            Self::ClockRate { rate } => *rate,
+            Self::Uncertain { bound_m } => *bound_m,
+            Self::LoopClosure { moved_m } => *moved_m,
+        }
+    }
+
     /// A key for scripts.
     pub fn kind(&self) -> &'static str {
         match self {

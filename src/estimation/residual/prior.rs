@@ -109,12 +109,34 @@ pub(in crate::estimation) fn add_standstill(
     velocity: &Vector,
     sigma: f64,
 ) {
+    add_zero_rate(equations, (layout, 3), basis, velocity, sigma);
+}
+
+/// Adds that the head does not turn at a node, where it turns by `rate` (rad/s, in the map): `w + dr' = 0`, to `sigma`.
+pub(in crate::estimation) fn add_no_turn(
+    equations: &mut NormalEquations,
+    layout: &Layout,
+    basis: &Basis,
+    rate: &Vector,
+    sigma: f64,
+) {
+    add_zero_rate(equations, (layout, 0), basis, rate, sigma);
+}
+
+/// Adds that a rate plus the derivative of the correction is zero; `of` is the correction's first axis.
+fn add_zero_rate(
+    equations: &mut NormalEquations,
+    (layout, of): (&Layout, usize),
+    basis: &Basis,
+    rate: &Vector,
+    sigma: f64,
+) {
     let first = layout.knot(basis.first);
     let weight = sigma.powi(-2);
     for axis in 0..3 {
-        let column = |a: usize| first + 6 * a + 3 + axis;
+        let column = |a: usize| first + 6 * a + of + axis;
         for a in 0..4 {
-            equations.add_right(column(a), -weight * basis.rate[a] * velocity[axis]);
+            equations.add_right(column(a), -weight * basis.rate[a] * rate[axis]);
             for c in 0..=a {
                 equations.add_entry(column(a), column(c), weight * basis.rate[a] * basis.rate[c]);
             }

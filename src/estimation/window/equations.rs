@@ -20,6 +20,9 @@ use rayon::prelude::*;
 /// How still the head is at rest, m/s.
 const REST_VELOCITY_SIGMA: f64 = 0.003;
 
+/// How little it turns there, rad/s.
+const REST_RATE_SIGMA: f64 = 0.003;
+
 /// Memory that is used again from solve to solve.
 #[derive(Debug)]
 pub(super) struct Workspace {
@@ -130,6 +133,12 @@ impl Window {
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);
         for ((_, state), basis) in nodes.zip(&*bases).take_while(|((time, _), _)| **time < self.rested_until_s) {
             prior::add_standstill(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
+        }
+        for k in (first..self.nominal.intervals().len()).filter(|k| self.rests.at(self.nominal.times_s()[*k])) {
+            let (state, next, basis) = (&states[k], &states[k + 1], &bases[k - first]);
+            let turn = (next.rotation * state.rotation.inverse()).scaled_axis() / self.nominal.intervals()[k].h;
+            prior::add_standstill(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
+            prior::add_no_turn(equations, layout, basis, &turn, REST_RATE_SIGMA);
         }
         // The outermost knots hardly touch the window: a metre and a radian keep them where nothing else does.
         for unknown in 0..layout.border() {

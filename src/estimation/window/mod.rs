@@ -2,6 +2,7 @@
 
 mod correspondence;
 mod equations;
+mod rests;
 mod solve;
 mod uncertainty;
 
@@ -25,6 +26,7 @@ use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::Remembered;
 use equations::Workspace;
+use rests::Rests;
 use std::collections::VecDeque;
 
 /// Before the first motion that the IMU shows, the head has begun to move unseen: this long, s.
@@ -72,6 +74,8 @@ pub(super) struct Window {
     rest: Option<Rest>,
     /// Until when it rested, IMU time, s.
     rested_until_s: f64,
+    /// Rests on the way.
+    rests: Rests,
     workspace: Workspace,
 }
 
@@ -102,6 +106,7 @@ impl Window {
             leapt: false,
             rest: beginning.rest,
             rested_until_s: f64::NEG_INFINITY,
+            rests: Rests::default(),
             workspace: Workspace::default(),
         }
     }
@@ -168,6 +173,12 @@ impl Window {
         self.nominal.at(self.nominal.end_s(), &self.biases.gyro).velocity.norm()
     }
 
+    /// Whether the head rests at the window's end, as far as the IMU and the estimated speed show.
+    pub(super) fn is_resting(&self) -> bool {
+        let end_s = self.nominal.end_s() - REST_MARGIN_S;
+        self.rest.is_some() || self.rests.at(end_s)
+    }
+
     /// When it begins, IMU time, s.
     pub(super) fn begins_s(&self) -> f64 {
         self.start.u_s
@@ -188,6 +199,8 @@ impl Window {
         for (_, interval) in intervals.iter() {
             self.nominal.extend(interval.without(&self.exaggerates), &self.biases, &self.gravity);
             self.rest = self.rest.filter(|rest| rest.goes_on(interval));
+            let at_end = (self.nominal.end_s(), self.speed_m_per_s());
+            self.rests.take(interval, &self.biases, at_end);
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
             }
@@ -273,6 +286,7 @@ impl Window {
         let placed = oldest.surfels.iter().map(|surfel| surfel.place(&self.placing()).patch).collect();
         let by_lidar = linearised.and_then(|at| self.hangs_on_lidar(start_s, at));
         self.start = Start { by_lidar, ..Start::held(start_s) };
+        self.rests.forget_before(start_s);
         self.gropes = false;
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
