@@ -6,7 +6,7 @@
 mod estimation_fixture;
 
 use estimation_fixture::{Room, Run, Score, Walk, calibration};
-use zsim::estimation::{EstimationError, Estimator, EstimatorSpec, OpenLoop, WarningKind, estimate_all, load};
+use zsim::estimation::{EstimationError, Estimator, EstimatorSpec, LeftOut, OpenLoop, WarningKind, estimate_all, load};
 use zsim::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use zsim::measurement::Measurement;
 use zsim::time::{Span, Stamp};
@@ -197,7 +197,7 @@ fn a_head_that_is_not_found_again_goes_on_about_where_it_was_and_says_so() {
         _ => (6.0..12.0).contains(&seconds(m)),
     };
     let (result, score) = lossy(12, is_lost);
-    assert_eq!(warned(&result, |kind| matches!(kind, WarningKind::LostAgain { .. })), 1, "{:?}", result.warnings);
+    assert!(warned(&result, |kind| matches!(kind, WarningKind::LostAgain { .. })) >= 1, "{:?}", result.warnings);
     assert!(score.worst_m < 20.0, "{score:?}");
 }
 
@@ -329,7 +329,9 @@ fn a_lidar_that_falls_silent_leaves_the_imu_and_a_warning() {
     let kept = all.into_iter().filter(|m| matches!(m, Measurement::Imu(_)) || seconds(m) < 6.0).collect();
     let result = estimate(kept);
     assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::LidarGap { .. })), "{:?}", result.warnings);
-    assert!(result.trajectory.span().unwrap().1 > Stamp::from_nanos(9_000_000_000));
+    // Three seconds later the estimate stops.
+    let end_s = result.trajectory.span().unwrap().1.nanos() as f64 * 1e-9;
+    assert!((8.5..9.6).contains(&end_s), "{end_s}");
 }
 
 #[test]
@@ -345,13 +347,31 @@ fn a_recording_without_one_of_the_sensors_is_an_error() {
 }
 
 #[test]
-fn a_measurement_that_is_not_a_number_is_refused() {
+fn a_point_that_is_not_a_number_is_refused() {
     let mut estimator = Estimator::new(&spec(), &calibration()).unwrap();
-    let mut sample = hall(18, 1.0).measurements().into_iter().find(|m| matches!(m, Measurement::Imu(_))).unwrap();
-    if let Measurement::Imu(sample) = &mut sample {
-        sample.angular_velocity_rad_per_s.x = f64::NAN;
+    let mut scan = hall(18, 1.0).measurements().into_iter().find(|m| matches!(m, Measurement::Lidar(_))).unwrap();
+    if let Measurement::Lidar(scan) = &mut scan {
+        scan.returns[0].point_in_laser.x = f32::NAN;
     }
-    assert!(matches!(estimator.push(sample).unwrap_err(), EstimationError::NotFinite { sensor: "IMU", .. }));
+    assert!(matches!(estimator.push(scan).unwrap_err(), EstimationError::NotFinite { sensor: "lidar", .. }));
+}
+
+/// One wild sample, wherever it is and however wild, costs less than 2 cm, and is counted.
+#[test]
+fn a_wild_sample_is_left_out() {
+    for (rate, force) in [(10.0, 0.0), (0.0, 1e4), (1e30, 0.0), (f64::NAN, 0.0)] {
+        let run = hall(18, 10.0);
+        let mut measurements = run.measurements();
+        let samples = measurements.iter_mut().filter_map(|m| if let Measurement::Imu(s) = m { Some(s) } else { None });
+        let sample = samples.into_iter().nth(600).unwrap();
+        sample.angular_velocity_rad_per_s.x += rate;
+        sample.specific_force_m_per_s2.y += force;
+        let result = estimate(measurements);
+        let counted = |kind: &WarningKind| matches!(kind, WarningKind::LeftOut { what: LeftOut::Outliers, count: 1 });
+        assert_eq!(warned(&result, counted), 1, "{rate}, {force}: {:?}", result.warnings);
+        let score = Score::of(&result, &run);
+        assert!(score.worst_m < 0.02, "{rate}, {force}: {score:?}");
+    }
 }
 
 #[test]

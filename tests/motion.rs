@@ -151,7 +151,7 @@ fn a_motion_lasts_a_length_of_time() {
     let (spec, source) = load("stand").unwrap();
     for duration_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = spec.build(&source, None, duration_s, Seed(1)).err().unwrap().to_string();
-        assert!(error.contains("above 0 s"), "{error}");
+        assert!(error.contains("more than 0 s"), "{error}");
     }
 }
 

@@ -299,7 +299,9 @@ fn faults_are_an_axis_whose_runs_share_rays() {
         let alone = format!("--scene mocap_room --duration 7s --seed 3 --out alone --force --json{faults}");
         let (_, out, talk) = run(here.path(), &alone);
         let figures: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{talk}"));
-        assert_eq!(figures["open_loop"]["position_rmse_m"].as_f64(), Some(*error));
+        // Reading a decimal number may be off by its last digit.
+        let one = figures["open_loop"]["position_rmse_m"].as_f64().unwrap();
+        assert!((one - error).abs() < 1e-12, "{one} and {error}");
     }
 }
 

@@ -150,9 +150,9 @@ pub(super) fn begin(
     let (gyro, force) = (mean(|i| i.gyro), mean(|i| i.accel));
     let rest = Rest { gyro, force };
     let seen = Noisier::seen_in(intervals);
-    let at_rest = may_rest
-        && intervals.iter().all(|interval| rest.goes_on(&seen.of(*interval)))
+    let feels_rest = intervals.iter().all(|interval| rest.goes_on(&seen.of(*interval)))
         && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
+    let at_rest = may_rest && feels_rest;
     let upward = if at_rest { force } else { mean_force_at_start(intervals) };
     let up = Rotation::rotation_between(&upward, &Vector::z()).unwrap_or_else(Rotation::identity);
     let (_, _, yaw) = roll_pitch_yaw(&(up * head_from_imu.rotation.inverse()));
@@ -174,11 +174,11 @@ pub(super) fn begin(
         biases: Biases { gyro: gyro_bias, accel: accel_bias },
         rest: at_rest.then_some(rest),
         noisier,
-        velocity_sigma: match (at_rest, may_rest) {
+        velocity_sigma: match (at_rest, feels_rest) {
             (true, _) => 0.01,
-            (false, true) => 2.0,
+            (false, false) => 2.0,
             // A vehicle under way.
-            (false, false) => 10.0,
+            (false, true) => 10.0,
         },
         information: information(gyro_sigma, at_rest, noise, spec),
     }

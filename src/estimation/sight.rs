@@ -76,7 +76,7 @@ const CELL_RAD: f64 = 0.05;
 /// Ranges of one direction differ when they do by more than this, m, and this share.
 const DIFFER: (f64, f64) = (0.1, 0.03);
 /// A head moves when more than this share of the directions differ, of at least so many.
-const MOVED: (f64, usize) = (0.3, 20);
+const MOVED: (f64, usize) = (0.12, 20);
 
 /// Whether the lidar shows a head that moves: the ranges of `early` and `late` beams differ in many directions. A head
 /// that moves evenly feels like one at rest.

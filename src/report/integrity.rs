@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn the_verdict_names_its_first_cause_and_its_time() {
         assert_eq!(verdict(&Metrics::default()), None);
-        assert_eq!(verdict(&judged("good", vec![])).unwrap(), "good: 99 % of position errors below 6.2 mm");
+        assert_eq!(verdict(&judged("good", vec![])).unwrap(), "good: 99 % of position errors below 6.20 mm");
         let cause = |status: &str| CauseMetrics {
             status: status.to_owned(),
             kind: "gap".to_owned(),

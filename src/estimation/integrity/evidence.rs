@@ -33,8 +33,9 @@ const SPEED_M_PER_S: f64 = 60.0;
 
 /// Contradiction, residual (m) and IMU scale up to which a covariance is taken at its word.
 const SOUND: (f64, f64, f64) = (0.4, 0.006, 0.004);
-/// Where no window constrains some direction, errors of normals pass for information: the covariance along it is too
-/// small by this factor.
+/// Where so many windows in a row do not constrain some direction, errors of normals pass for information: the
+/// covariance along it is too small by this factor.
+const WEAK_WINDOWS: usize = 12;
 const WEAK_DOUBT: f64 = 4.0;
 const MOST_DOUBT: f64 = 1000.0;
 
@@ -227,8 +228,9 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
     let factor = |k: usize| {
         let contradiction = median(near(k).iter().map(|w| w.imu_contradiction).collect());
         let residual_m = median(near(k).iter().map(|w| w.residual_rms_m).collect());
-        let weak = near(k).iter().filter(|w| matches!(w.trouble, Some(WarningKind::WeakGeometry { .. }))).count();
-        let weak = if weak == near(k).len() { WEAK_DOUBT } else { 1.0 };
+        let is_weak = |w: &WindowReport| matches!(w.trouble, Some(WarningKind::WeakGeometry { .. }));
+        let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
+        let weak = if stays_weak { WEAK_DOUBT } else { 1.0 };
         let scale = windows[k].imu_matrix / SOUND.2;
         // A mismatch that no noise explains moves the estimate by more than in proportion.
         (contradiction / SOUND.0).powi(2).max(residual_m / SOUND.1).max(scale).max(weak).clamp(1.0, MOST_DOUBT)
