@@ -276,7 +276,9 @@ fn journeys_share_their_work_and_give_what_each_gives_alone() {
     for (row, imu) in [(0, "3dm_gx2"), (3, "tactical")] {
         let alone = format!("--scene mocap_room --duration 7s --seed 3 --imu {imu} --out {imu} --json");
         let told: Value = serde_json::from_str(&well(here.path(), &alone)).unwrap();
-        assert_eq!(told["open_loop"]["position_rmse_m"].as_f64(), Some(errors[row]));
+        // Reading a decimal number may be off by its last digit.
+        let one = told["open_loop"]["position_rmse_m"].as_f64().unwrap();
+        assert!((one - errors[row]).abs() < 1e-12, "{one} and {}", errors[row]);
     }
 }
 

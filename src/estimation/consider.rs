@@ -27,8 +27,8 @@ pub(super) const IMU: usize = 8;
 pub(super) const CARRIED: usize = 12 + IMU;
 /// Where in it the IMU's part begins.
 pub(super) const AT_IMU: usize = 12;
-/// The number under which the gauge is kept as a view.
-const GAUGE: u64 = u64::MAX;
+/// The number under which the gauge is kept as a view; the last one is the map's.
+const GAUGE: u64 = u64::MAX - 1;
 const _: () = assert!(GYRO_BIAS == 0, "the border begins with what is carried of it");
 
 /// Of what a window begins with, by itself.
