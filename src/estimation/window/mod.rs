@@ -36,6 +36,9 @@ const LONGEST: f64 = 3.0;
 /// A stretch counts as swept when it shows this fraction of the patches of the window's richest.
 const SWEPT: f64 = 0.25;
 
+/// A head whose speed is known no better than this is under way, m/s.
+const UNDER_WAY_M_PER_S: f64 = 5.0;
+
 /// How exactly a window is put into a map before it is matched with it, rad and m.
 const FOUND: [f64; 2] = [0.05, 0.2];
 
@@ -76,6 +79,8 @@ pub(super) struct Window {
     rested_until_s: f64,
     /// Rests on the way.
     rests: Rests,
+    /// Whether the speed is known: a head that began under way feels at rest until surfaces were matched.
+    knows_speed: bool,
     workspace: Workspace,
 }
 
@@ -107,6 +112,7 @@ impl Window {
             rest: beginning.rest,
             rested_until_s: f64::NEG_INFINITY,
             rests: Rests::default(),
+            knows_speed: beginning.velocity_sigma < UNDER_WAY_M_PER_S,
             workspace: Workspace::default(),
         }
     }
@@ -200,7 +206,9 @@ impl Window {
             self.nominal.extend(interval.without(&self.exaggerates), &self.biases, &self.gravity);
             self.rest = self.rest.filter(|rest| rest.goes_on(interval));
             let at_end = (self.nominal.end_s(), self.speed_m_per_s());
-            self.rests.take(interval, &self.biases, at_end);
+            if self.knows_speed {
+                self.rests.take(interval, &self.biases, at_end);
+            }
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
             }

@@ -88,6 +88,7 @@ impl Window {
                 break;
             }
             self.apply(&x, first, &layout, &mut total);
+            self.knows_speed |= !matches.all.is_empty();
             neighbours.moved(by.shift + ARM_M * by.turn);
             solved.spent.correction_s += watch.lap_s();
             solved.last_correction_m = by.most();
