@@ -55,6 +55,8 @@ pub struct IntegrityMetrics {
     pub within_bound: Option<f64>,
     /// Where the truth is known: median of bound over error.
     pub bound_over_error: Option<f64>,
+    /// Where the truth is known: position error after that alignment, root mean square, m.
+    pub aligned_rmse_m: Option<f64>,
     /// Where the truth is known: largest position error after that alignment, m.
     pub largest_error_m: Option<f64>,
 }

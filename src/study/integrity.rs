@@ -120,15 +120,15 @@ impl Integrity {
             largest_bound_m: Some(largest).filter(|bound| *bound > 0.0),
             since_s: self.findings.iter().map(|finding| since(finding.from)).min_by(f64::total_cmp),
             causes: self.findings.iter().map(cause).collect(),
-            within_bound: held.map(|held| held.0),
-            bound_over_error: held.and_then(|held| finite(held.1)),
-            largest_error_m: held.map(|held| held.2),
+            within_bound: held.map(|held| held.within),
+            bound_over_error: held.and_then(|held| finite(held.bound_over_error)),
+            aligned_rmse_m: held.map(|held| held.rmse_m),
+            largest_error_m: held.map(|held| held.largest_m),
         }
     }
 
-    /// Share of the poses whose error, aligned over the first 20 s or half of a shorter run, is within the bound; median
-    /// of bound over error; largest error, m.
-    fn held_against(&self, pairs: &Pairs) -> Option<(f64, f64, f64)> {
+    /// The bounds against the errors, aligned over the first 20 s or half of a shorter run.
+    fn held_against(&self, pairs: &Pairs) -> Option<Held> {
         let aligned = pairs.first_seconds(ALIGNED_S.min(0.5 * pairs.duration_s()));
         let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
         let errors = Errors::after(pairs, &world_from_map);
@@ -146,7 +146,12 @@ impl Integrity {
             largest_m = largest_m.max(error_m);
             ratios.push(current.bound_m_99 / error_m.max(1e-9));
         }
-        Some((within as f64 / ratios.len() as f64, median(ratios)?, largest_m))
+        Some(Held {
+            within: within as f64 / ratios.len() as f64,
+            bound_over_error: median(ratios)?,
+            rmse_m: errors.position_rmse_m(),
+            largest_m,
+        })
     }
 
     /// Writes `integrity.csv` to `folder`.
@@ -160,13 +165,26 @@ impl Integrity {
     }
 }
 
+/// Bounds held against the true errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Held {
+    /// Share of the poses whose error is within its bound.
+    within: f64,
+    /// Median.
+    bound_over_error: f64,
+    /// Position error, root mean square, m.
+    rmse_m: f64,
+    /// Position error, largest, m.
+    largest_m: f64,
+}
+
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
 
 /// How far the head went: its path by positions a second apart, so that its swing does not count, m.
-fn way_m(trajectory: &Trajectory) -> f64 {
+pub(super) fn way_m(trajectory: &Trajectory) -> f64 {
     let mut last: Option<(Stamp, Vector)> = None;
     let mut way_m = 0.0;
     for (stamp, pose) in trajectory.iter() {
@@ -183,9 +201,14 @@ fn way_m(trajectory: &Trajectory) -> f64 {
     way_m
 }
 
+/// A good result errs by less than this over a path of `way_m`, m.
+pub(super) fn large_error_m(way_m: f64) -> f64 {
+    LARGE_BOUND_M.max(LARGE_SHARE * way_m)
+}
+
 /// Where the bound is larger than a good result allows.
 fn uncertain(bounds: &[PoseBound], way_m: f64) -> Option<Finding> {
-    let most_m = LARGE_BOUND_M.max(LARGE_SHARE * way_m);
+    let most_m = large_error_m(way_m);
     let is_large = |bound: &&PoseBound| bound.bound_m_99 > most_m;
     let from = bounds.iter().find(is_large)?.stamp;
     let to = bounds.iter().rev().find(is_large)?.stamp;

@@ -5,12 +5,14 @@ use super::component::{Component, Slot};
 use super::measure::Told;
 use super::part::Row;
 use super::{LimitSpec, Plan, plan::Point};
-use crate::estimation::EstimatorSpec;
+use crate::estimation::{EstimatorSpec, Status};
 use crate::recording::{Preference, Reader, Writer};
+use crate::report::IntegrityMetrics;
 use crate::simulation::Simulation;
 use crate::study::calibration::calibration;
 use crate::study::closed_loop::run_closed_loop;
 use crate::study::coverage::{Coverage, CoveragePlan, coverage};
+use crate::study::integrity::{Integrity, way_m};
 use crate::study::open_loop::{How, run_open_loop};
 use crate::study::record::{description, record_together};
 use crate::study::{CalibrationSpec, StudyError, Watch, judge};
@@ -131,6 +133,9 @@ struct Estimated {
     open_loop: crate::report::OpenLoopMetrics,
     clock: crate::report::ClockMetrics,
     closed_position_rmse_m: Option<f64>,
+    status: Status,
+    integrity: IntegrityMetrics,
+    way_m: f64,
 }
 
 impl Estimated {
@@ -142,6 +147,13 @@ impl Estimated {
             Measure::YawDriftDegPerMin => self.open_loop.yaw_drift_deg_per_min,
             Measure::ClockRmseS => self.clock.offset_rmse_s,
             Measure::ClosedPositionRmseM => self.closed_position_rmse_m,
+            Measure::Status => Some(f64::from(self.status as u8)),
+            Measure::AlignedRmseM => self.integrity.aligned_rmse_m,
+            Measure::LargestErrorM => self.integrity.largest_error_m,
+            Measure::BoundM99 => self.integrity.bound_m_99,
+            Measure::WithinBound => self.integrity.within_bound,
+            Measure::BoundOverError => self.integrity.bound_over_error,
+            Measure::WayM => Some(self.way_m),
             _ => None,
         };
         figure.filter(|figure| figure.is_finite())
@@ -165,15 +177,22 @@ fn estimate(
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
         let known = judge::truth_of(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
         let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);
-        let closed = match closes_loops {
-            true => {
-                let closed = run_closed_loop(&run, &found.calibration, estimator);
-                judge::truth_of(&reader, (&closed.map_from_head, &[]), &mut watch)?
-            }
-            false => None,
+        let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator));
+        let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
+        let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
+        let pairs = judge::pairs_of(&reader, map_from_head)?;
+        let of_closed = match closed {
+            Some(_) => judge::truth_of(&reader, (map_from_head, &[]), &mut watch)?,
+            None => None,
         };
-        let closed_position_rmse_m = closed.and_then(|known| known.errors).map(|errors| errors.position_rmse_m);
-        Ok(Estimated { open_loop, clock: judge::clock_metrics(&run, known.as_ref()), closed_position_rmse_m })
+        Ok(Estimated {
+            open_loop,
+            clock: judge::clock_metrics(&run, known.as_ref()),
+            closed_position_rmse_m: of_closed.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
+            status: integrity.status(),
+            integrity: integrity.metrics(&run, Some(pairs)),
+            way_m: way_m(map_from_head),
+        })
     })
 }
 

@@ -20,6 +20,22 @@ pub enum Measure {
     /// Of the closed loop: position error after rigid alignment, root mean square, m; loops are closed only where it is
     /// asked for.
     ClosedPositionRmseM,
+    /// Verdict on the estimate: 0 good, 1 degraded, 2 lost.
+    Status,
+    /// Of the result that counts, the closed loop's where it is asked for: position error after rigid alignment over
+    /// the first 20 s (half of a shorter run), root mean square, m.
+    AlignedRmseM,
+    /// The same, the largest of the run, m.
+    LargestErrorM,
+    /// Median of the 99 % bound on that error, m.
+    #[serde(rename = "bound_m_99")]
+    BoundM99,
+    /// Share of the poses whose error is within its bound.
+    WithinBound,
+    /// Median over the poses of bound over error.
+    BoundOverError,
+    /// Length of the estimated path by positions a second apart, m.
+    WayM,
     /// Share of the sphere that the lidar saw at all.
     FractionSeen,
     /// Time until nine tenths of that had been seen, s.
@@ -66,13 +82,20 @@ pub(super) enum Told {
 
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 26] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
         Self::YawDriftDegPerMin,
         Self::ClockRmseS,
         Self::ClosedPositionRmseM,
+        Self::Status,
+        Self::AlignedRmseM,
+        Self::LargestErrorM,
+        Self::BoundM99,
+        Self::WithinBound,
+        Self::BoundOverError,
+        Self::WayM,
         Self::FractionSeen,
         Self::CoveredS,
         Self::DensityPerSrS,
@@ -102,6 +125,15 @@ impl Measure {
             Self::ClosedPositionRmseM => {
                 ("closed_position_rmse_m", "closed loop", "Position error, closed loop (mm rms)", "mm", 1e3)
             }
+            Self::Status => ("status", "status", "Verdict (0 good, 1 degraded, 2 lost)", "1", 1.0),
+            Self::AlignedRmseM => {
+                ("aligned_rmse_m", "aligned", "Position error, aligned over the first 20 s (mm rms)", "mm", 1e3)
+            }
+            Self::LargestErrorM => ("largest_error_m", "largest", "Largest position error (mm)", "mm", 1e3),
+            Self::BoundM99 => ("bound_m_99", "bound", "Bound on the position error, 99 % (mm)", "mm", 1e3),
+            Self::WithinBound => ("within_bound", "within", "Poses within their bound (%)", "%", 1e2),
+            Self::BoundOverError => ("bound_over_error", "bound/error", "Bound over error", "1", 1.0),
+            Self::WayM => ("way_m", "way", "Length of the path (m)", "m", 1.0),
             Self::FractionSeen => ("fraction_seen", "seen", "Share of the sphere seen (%)", "%", 1e2),
             Self::CoveredS => ("covered_s", "covered", "Time to nine tenths of it (s)", "s", 1.0),
             Self::DensityPerSrS => ("density_per_sr_s", "density", "Beams per sr and s", "1/sr/s", 1.0),
@@ -152,7 +184,14 @@ impl Measure {
             | Self::DriftMPerMin
             | Self::YawDriftDegPerMin
             | Self::ClockRmseS
-            | Self::ClosedPositionRmseM => Told::Estimate,
+            | Self::ClosedPositionRmseM
+            | Self::Status
+            | Self::AlignedRmseM
+            | Self::LargestErrorM
+            | Self::BoundM99
+            | Self::WithinBound
+            | Self::BoundOverError
+            | Self::WayM => Told::Estimate,
             Self::FractionSeen | Self::CoveredS | Self::DensityPerSrS | Self::RateP99DegPerS | Self::Saturated => {
                 Told::Swing
             }

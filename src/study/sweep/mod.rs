@@ -16,6 +16,7 @@ mod component;
 mod design;
 mod folder;
 mod identity;
+mod integrity;
 mod journey;
 mod measure;
 mod merge;

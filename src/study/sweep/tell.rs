@@ -1,5 +1,6 @@
 //! What a merged sweep leaves for people.
 
+use super::integrity::Coverage;
 use super::output::{csv, markdown, trends_csv, words};
 use super::{Status, Summary, Sweep};
 use crate::study::StudyError;
@@ -29,7 +30,10 @@ impl Sweep {
             return Err(StudyError::Plan { what: "the sweep", message });
         }
         let summary = self.summary()?;
-        let mut files = vec![("summary.csv", csv(&summary)), ("study.md", markdown(&summary, &self.plan, &status))];
+        let coverage = self.coverage()?;
+        let statement = coverage.as_ref().map_or_else(String::new, Coverage::markdown);
+        let told = markdown(&summary, &self.plan, &status) + &statement;
+        let mut files = vec![("summary.csv", csv(&summary)), ("study.md", told)];
         if !summary.trends.is_empty() {
             files.push(("trends.csv", trends_csv(&summary)));
         }
@@ -37,7 +41,7 @@ impl Sweep {
             write_text(&self.temporary(), &self.folder.join(name), &text)?;
         }
         self.draw(&summary)?;
-        let words = words(&summary, &self.plan);
+        let words = words(&summary, &self.plan) + &coverage.map_or_else(String::new, |coverage| coverage.words());
         Ok(Merged { status, summary, words })
     }
 }
