@@ -221,7 +221,8 @@ impl Intake {
         self.scans.start(first_scan, enough_s)?;
         // The IMU must cover the first beam whatever the clock offset.
         self.next_start_s = start_s + MARGIN_S;
-        self.samples.start(InertialStream::new(imu, self.calibration.imu, self.spec.inertial.clone()));
+        let stream = InertialStream::new(imu, self.calibration.imu, self.spec.inertial.clone());
+        self.samples.start(stream, start_s - MARGIN_S);
         Some(())
     }
 

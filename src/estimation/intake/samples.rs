@@ -96,8 +96,11 @@ impl SampleQueue {
         self.used_s
     }
 
-    /// Makes intervals by `stream` from now on.
-    pub(super) fn start(&mut self, stream: InertialStream) {
+    /// Makes intervals by `stream` from now on, of the samples from `from_s` on: what came before the lidar began would
+    /// only be dead reckoning.
+    pub(super) fn start(&mut self, stream: InertialStream, from_s: f64) {
+        let before = self.waiting.partition_point(|(seconds, _)| *seconds < from_s);
+        self.waiting.drain(..before);
         self.stream = Some(stream);
     }
 
