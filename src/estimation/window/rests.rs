@@ -6,6 +6,9 @@ use crate::estimation::strapdown::{Biases, Interval};
 /// A rest lasts at least this long, s, and is not believed for this long at either end.
 const LASTS_S: f64 = 0.7;
 const MARGIN_S: f64 = 0.15;
+/// A candidate survives missing samples over at most this, s: single ones that a driver loses, no gap in which a head
+/// could move and come to rest again.
+const MISSING_S: f64 = 0.1;
 /// A head at rest turns more slowly than this beyond the gyroscope's bias, rad/s.
 const RATE_RAD_PER_S: f64 = 0.01;
 /// And moves more slowly than this by the estimate, m/s: even motion feels the same.
@@ -16,6 +19,8 @@ const SPEED_M_PER_S: f64 = 0.15;
 pub(super) struct Rests {
     /// What the IMU reads since when, IMU time, s, if that has not changed since.
     candidate: Option<(Rest, f64)>,
+    /// For how long the samples have been missing, s.
+    missing_s: f64,
     /// From when until when the head rested, in order.
     found: Vec<(f64, f64)>,
 }
@@ -23,6 +28,10 @@ pub(super) struct Rests {
 impl Rests {
     /// Takes the interval that ends at `end_s`, at which the estimate has a speed of `speed_m_per_s`.
     pub(super) fn take(&mut self, interval: &Interval, biases: &Biases, (end_s, speed_m_per_s): (f64, f64)) {
+        self.missing_s = if interval.bridged { self.missing_s + interval.h } else { 0.0 };
+        if interval.bridged && self.missing_s < MISSING_S {
+            return;
+        }
         let goes_on = self.candidate.is_some_and(|(rest, _)| rest.goes_on(interval));
         let is_still = (interval.gyro - biases.gyro).norm() < RATE_RAD_PER_S + 6.0 * interval.gyro_sigma
             && !interval.bridged
@@ -90,6 +99,24 @@ mod tests {
         assert!(
             !rests.at(0.9) && !rests.at(1.1) && rests.at(1.3) && rests.at(2.8) && !rests.at(2.95) && !rests.at(3.5)
         );
+    }
+
+    /// A head that rests throughout; every fifth sample is lost, or those from 2 s to 2.3 s.
+    #[test]
+    fn lost_samples_do_not_end_a_rest_and_gaps_do() {
+        let biases = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
+        let found = |is_lost: &dyn Fn(usize) -> bool| {
+            let mut rests = Rests::default();
+            for k in 1..=400 {
+                let interval = Interval { bridged: is_lost(k), ..interval(0.002) };
+                rests.take(&interval, &biases, (k as f64 * 0.01, 0.01));
+            }
+            rests
+        };
+        let sparse = found(&|k| k % 5 == 0);
+        assert!((20..380).all(|k| sparse.at(f64::from(k) * 0.01)));
+        let gap = found(&|k| (200..230).contains(&k));
+        assert!(gap.at(1.7) && !gap.at(2.15) && !gap.at(2.35) && gap.at(3.5));
     }
 
     #[test]
