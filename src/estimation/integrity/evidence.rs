@@ -73,9 +73,23 @@ pub fn findings(evidence: &Evidence) -> Vec<Finding> {
             None => merged.push(finding),
         }
     }
-    merged.sort_by_key(|finding| (std::cmp::Reverse(finding.status), finding.from));
+    blame_clipping(&mut merged);
+    merged.sort_by_key(|finding| (std::cmp::Reverse(finding.status), !finding.is_of_sensor(), finding.from));
     merged
 }
+
+/// Where a result is lost while the IMU was clipped for a good part of it, that is why.
+fn blame_clipping(findings: &mut [Finding]) {
+    let is_lost = findings.iter().any(|finding| finding.status == Status::Lost);
+    let is_much = |cause: &Cause| matches!(cause, Cause::Clipped { share } if *share > MUCH_CLIPPED);
+    findings
+        .iter_mut()
+        .filter(|finding| is_lost && is_much(&finding.cause))
+        .for_each(|finding| finding.status = Status::Lost);
+}
+
+/// More than this share of clipped samples is enough to lose the head.
+const MUCH_CLIPPED: f64 = 0.02;
 
 /// A stretch of windows with the median of a measure, or a share.
 fn over_stretches(

@@ -121,6 +121,13 @@ pub enum Cause {
     },
 }
 
+impl Finding {
+    /// Whether it tells what a sensor did, rather than what came of it.
+    pub(super) fn is_of_sensor(&self) -> bool {
+        matches!(self.cause, Cause::Clipped { .. } | Cause::Frozen { .. })
+    }
+}
+
 impl Cause {
     /// How large it is, in the unit of its kind.
     pub(super) fn size(&self) -> f64 {
