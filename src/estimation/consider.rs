@@ -16,6 +16,7 @@
 use super::residual::GYRO_BIAS;
 use super::views::{MAP, Taken};
 use crate::geometry::{Vector, skew};
+use crate::time::Stamp;
 use nalgebra::{Matrix6, SMatrix};
 
 /// How little is known after a silence: turn, rad, and shift, m.
@@ -29,6 +30,11 @@ pub(super) const CARRIED: usize = 12 + IMU;
 pub(super) const AT_IMU: usize = 12;
 /// The number under which the gauge is kept as a view; the last one is the map's.
 const GAUGE: u64 = u64::MAX - 1;
+/// The number of the first beginning that is kept while the gauge is made; later ones count down from it.
+const FIRST_MARK: u64 = GAUGE - 1;
+/// A turn counts in an alignment as much as a shift by this times the angle, m: it holds one of a head that stays in one
+/// place, and is nothing beside any way.
+const TURN_LEVER_M: f64 = 0.3;
 const _: () = assert!(GYRO_BIAS == 0, "the border begins with what is carried of it");
 
 /// Of what a window begins with, by itself.
@@ -54,16 +60,26 @@ pub(super) struct Consider {
     beginning: OfBeginning,
     views: Vec<View>,
     gauge: Option<Gauge>,
+    marks: Vec<Mark>,
 }
 
-/// The mean error of the beginnings so far, kept as a view: against it a pose's error is that of a trajectory which is
-/// aligned with the truth over the first part of the recording.
+/// The rigid transform that aligns the beginnings so far with the truth, by least squares: against it a pose's error is
+/// that of a trajectory which is aligned over the first part of the recording. Its right-hand side, a sum over the
+/// beginnings' errors, is kept as a view.
 #[derive(Debug, Clone, Copy)]
 struct Gauge {
-    /// About what its error turns, m.
+    /// About what it turns, m.
     pivot: Vector,
-    /// Of how many beginnings it is the mean.
-    count: usize,
+    /// The normal matrix; of the beginnings' places alone.
+    normal: Matrix6<f64>,
+}
+
+/// A beginning that is kept as a view until the gauge is made.
+#[derive(Debug, Clone, Copy)]
+struct Mark {
+    number: u64,
+    pivot: Vector,
+    stamp: Stamp,
 }
 
 #[derive(Debug, Clone)]
@@ -79,7 +95,7 @@ impl Consider {
     /// Of a map that begins at `pivot`: there the error is none, by definition. `known` is the covariance of what a
     /// window begins with, but for where it is.
     pub(super) fn new(pivot: Vector, known: &OfBeginning) -> Self {
-        Self { pivot, beginning: *known, views: Vec::new(), gauge: None }
+        Self { pivot, beginning: *known, views: Vec::new(), gauge: None, marks: Vec::new() }
     }
 
     /// Of a map that goes on at `pivot` after a silence, in which the head went nobody knows where.
@@ -186,44 +202,74 @@ impl Consider {
 
     /// The same of the error against the gauge; against the map where there is none.
     pub(super) fn covariance_against_gauge(&self, place: &Vector) -> Matrix6<f64> {
-        let own = self.covariance_at(place);
-        let found = self.gauge.and_then(|gauge| Some((gauge, self.place_of_gauge()?)));
-        let Some((gauge, at)) = found else { return own };
-        let (by, by_gauge) = (error_at(&(place - self.pivot)), error_at(&(place - gauge.pivot)));
-        let with_beginning = self.views[at].with_beginning.fixed_columns::<6>(0).into_owned();
-        let cross = by_gauge * with_beginning * by.transpose();
+        let with_beginning = |at: usize| self.views[at].with_beginning.fixed_columns::<6>(0).into_owned();
+        let by = error_at(&(place - self.pivot));
+        self.against_gauge(place, (&by, self.beginning.fixed_view::<6, 6>(0, 0).into_owned()), with_beginning)
+    }
+
+    /// The same of an error of covariance `own` that moves `place` by `by`; `with` tells its covariance with the gauge,
+    /// which is the view at the place that it is given.
+    fn against_gauge(
+        &self,
+        place: &Vector,
+        (by, own): (&Matrix6<f64>, Matrix6<f64>),
+        with: impl Fn(usize) -> Matrix6<f64>,
+    ) -> Matrix6<f64> {
+        let own = by * own * by.transpose();
+        let solved = self.gauge.and_then(|gauge| Some((gauge.pivot, gauge.normal.cholesky()?.inverse())));
+        let (Some((pivot, solved)), Some(at)) = (solved, self.place_of_gauge()) else { return own };
+        let by_gauge = error_at(&(place - pivot)) * solved;
+        let cross = by_gauge * with(at) * by.transpose();
         own + by_gauge * self.between(at, at) * by_gauge.transpose() - cross - cross.transpose()
     }
 
     /// Makes the beginning part of the gauge.
     pub(super) fn gauge_by_beginning(&mut self) {
-        let place = self.beginning.fixed_view::<6, 6>(0, 0).into_owned();
-        let (Some(gauge), Some(at)) = (self.gauge, self.place_of_gauge()) else {
-            self.keep(GAUGE);
-            self.gauge = Some(Gauge { pivot: self.pivot, count: 1 });
-            return;
-        };
-        let share = 1.0 / (gauge.count + 1) as f64;
-        // The beginning's error, a turn about its own pivot, as one about the gauge's.
-        let mut moved = Matrix6::identity();
-        moved.fixed_view_mut::<3, 3>(3, 0).copy_from(&-skew(&(gauge.pivot - self.pivot)));
-        let with_old = self.views[at].with_beginning.fixed_columns::<6>(0) * moved.transpose();
-        let own = self.between(at, at) * (1.0 - share).powi(2)
-            + (with_old + with_old.transpose()) * (share * (1.0 - share))
-            + moved * place * moved.transpose() * share.powi(2);
+        let at = self.place_of_gauge().unwrap_or_else(|| {
+            let with_views = vec![Matrix6::zeros(); self.views.len() + 1];
+            self.views.push(View { number: GAUGE, with_beginning: SMatrix::zeros(), with_views });
+            self.views.len() - 1
+        });
+        let gauge = self.gauge.unwrap_or(Gauge { pivot: self.pivot, normal: Matrix6::zeros() });
+        // How the gauge moves the beginning, and how the beginning's error moves it.
+        let by = error_at(&(self.pivot - gauge.pivot));
+        let mut weight = Matrix6::identity();
+        weight.fixed_view_mut::<3, 3>(3, 3).scale_mut(TURN_LEVER_M * TURN_LEVER_M);
+        let from = by.transpose() * weight * error_at(&Vector::zeros());
+        let own = from * self.beginning.fixed_view::<6, 6>(0, 0) * from.transpose();
+        let with_old = from * self.views[at].with_beginning.fixed_columns::<6>(0).transpose();
         for other in (0..self.views.len()).filter(|other| *other != at) {
-            let of_beginning = self.views[other].with_beginning.fixed_columns::<6>(0).transpose();
-            let mean = self.between(at, other) * (1.0 - share) + moved * of_beginning * share;
+            let more = from * self.views[other].with_beginning.fixed_columns::<6>(0).transpose();
             if other < at {
-                self.views[at].with_views[other] = mean;
+                self.views[at].with_views[other] += more;
             } else {
-                self.views[other].with_views[at] = mean.transpose();
+                self.views[other].with_views[at] += more.transpose();
             }
         }
-        let of_beginning = moved * self.beginning.fixed_rows::<6>(0) * share;
-        self.views[at].with_beginning = self.views[at].with_beginning * (1.0 - share) + of_beginning;
-        self.views[at].with_views[at] = own;
-        self.gauge = Some(Gauge { count: gauge.count + 1, ..gauge });
+        self.views[at].with_beginning += from * self.beginning.fixed_rows::<6>(0);
+        self.views[at].with_views[at] += own + with_old + with_old.transpose();
+        self.gauge = Some(Gauge { normal: gauge.normal + by.transpose() * weight * by, ..gauge });
+    }
+
+    /// Keeps the beginning, of `stamp`, until the gauge is made.
+    pub(super) fn mark_beginning(&mut self, stamp: Stamp) {
+        let number = self.marks.last().map_or(FIRST_MARK, |last| last.number - 1);
+        self.keep(number);
+        self.marks.push(Mark { number, pivot: self.pivot, stamp });
+    }
+
+    /// The gauge is made: when the marked beginnings were, and the covariances of their errors against it.
+    pub(super) fn take_marks(&mut self) -> Vec<(Stamp, Matrix6<f64>)> {
+        let marks = std::mem::take(&mut self.marks);
+        let told = marks.iter().filter_map(|mark| {
+            let own = self.views.iter().position(|view| view.number == mark.number)?;
+            let with = |at: usize| self.between(at, own);
+            let by = error_at(&Vector::zeros());
+            Some((mark.stamp, self.against_gauge(&mark.pivot, (&by, self.between(own, own)), with)))
+        });
+        let told = told.collect();
+        marks.iter().for_each(|mark| self.forget(mark.number));
+        told
     }
 
     fn place_of_gauge(&self) -> Option<usize> {
@@ -273,9 +319,10 @@ mod tests {
         }
     }
 
-    /// Against the definition: the mean of the beginnings' errors, each a row of coefficients of independent noises.
+    /// Against the definition: the least-squares alignment of the beginnings' errors, each a row of coefficients of
+    /// independent noises, by a singular value decomposition of the stacked equations.
     #[test]
-    fn an_error_against_the_gauge_is_that_against_the_mean_of_the_beginnings() {
+    fn an_error_against_the_gauge_is_what_an_alignment_leaves() {
         let root = wave::<CARRIED>(31);
         let mut consider = Consider::new(Vector::new(0.3, -0.2, 0.1), &(root * root.transpose()));
         let sources = CARRIED * 7;
@@ -286,7 +333,10 @@ mod tests {
             let by = error_at(&(place - pivot));
             DMatrix::from_fn(6, 6, |r, c| by[(r, c)]) * beginning.rows(0, 6)
         };
-        let mut mean = DMatrix::<f64>::zeros(6, sources);
+        let mut weight = DMatrix::<f64>::identity(6, 6);
+        (3..6).for_each(|k| weight[(k, k)] = TURN_LEVER_M);
+        let (mut equations, mut errors) = (DMatrix::<f64>::zeros(24, 6), DMatrix::<f64>::zeros(24, sources));
+        let mut marked = None;
         for step in 0..6 {
             let pivot = Vector::new(step as f64, 0.5 * step as f64, 0.1);
             let by = Sensitivity { pivot, ..sensitivity(step, &[]) };
@@ -296,19 +346,37 @@ mod tests {
             beginning.view_mut((0, CARRIED * (step + 1)), (CARRIED, CARRIED)).copy_from(&root);
             if step < 4 {
                 consider.gauge_by_beginning();
-                mean += at(&beginning, &pivot) * 0.25;
+                let (by, own) = (error_at(&pivot), error_at(&Vector::zeros()));
+                let own = DMatrix::from_fn(6, 6, |r, c| own[(r, c)]) * beginning.rows(0, 6);
+                equations.rows_mut(6 * step, 6).copy_from(&(&weight * DMatrix::from_fn(6, 6, |r, c| by[(r, c)])));
+                errors.rows_mut(6 * step, 6).copy_from(&(&weight * &own));
+                if step == 2 {
+                    consider.mark_beginning(Stamp::from_nanos(9));
+                    marked = Some((pivot, own));
+                }
             }
             if step == 1 {
                 consider.keep(7);
             }
         }
         let pivot = consider.pivot();
-        let error = at(&beginning, &pivot) - mean;
-        let expected = &error * error.transpose();
+        let aligned = equations.svd(true, true).solve(&errors, 1e-12).unwrap();
+        let left = |error: &DMatrix<f64>, place: &Vector| {
+            let by = error_at(place);
+            let error = error - DMatrix::from_fn(6, 6, |r, c| by[(r, c)]) * &aligned;
+            &error * error.transpose()
+        };
         let told = consider.covariance_against_gauge(&place);
-        for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
-            assert_relative_eq!(told[(r, c)], expected[(r, c)], epsilon = 1e-9, max_relative = 1e-9);
+        let (mark, own) = marked.unwrap();
+        let marks = consider.take_marks();
+        assert_eq!(marks[0].0, Stamp::from_nanos(9));
+        let pairs = [(told, left(&at(&beginning, &pivot), &place)), (marks[0].1, left(&own, &mark))];
+        for (told, expected) in pairs {
+            for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
+                assert_relative_eq!(told[(r, c)], expected[(r, c)], epsilon = 1e-8, max_relative = 1e-8);
+            }
         }
+        assert!(consider.take_marks().is_empty());
     }
 
     /// The same by the definition: every error as a row of coefficients of independent noises.

@@ -18,7 +18,7 @@ pub struct EstimatedPose {
     /// How uncertain it is against the map, which is where the first pose puts it: m^2, m rad, rad^2.
     pub covariance: PoseCovariance,
     /// How uncertain it is against a trajectory that is aligned with the truth over its first [`GAUGED_S`] seconds,
-    /// likewise; over these seconds themselves against their mean so far.
+    /// likewise; over these seconds themselves against the alignment so far.
     pub covariance_against_gauge: PoseCovariance,
     /// Velocity of the head's origin, m/s.
     pub velocity_in_map_m_per_s: Vector,
@@ -84,6 +84,9 @@ pub struct OpenLoop {
     pub trajectory: Trajectory,
     /// The poses with velocity, biases and clock offset.
     pub poses: Vec<EstimatedPose>,
+    /// How uncertain poses of the first [`GAUGED_S`] seconds are against the alignment that these seconds give: m^2, m
+    /// rad, rad^2. Empty where the estimate began anew in this time.
+    pub gauged: Vec<(Stamp, PoseCovariance)>,
     /// The clock offset after each window: how much later the IMU stamps an instant than the lidar, s, by lidar time.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// What was learnt of the lidar beyond its calibration, at the end, as the poses go with it.

@@ -4,7 +4,7 @@ use super::StudyError;
 use super::beside::Beside;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{Cause, Evidence, Finding, GAUGED_S, Status, WindowReport, blocks, doubt, findings};
+use crate::estimation::{Cause, Evidence, Finding, GAUGED_S, Status, WindowReport, blocks, doubt, findings, radius_99};
 use crate::evaluation::{ALIGNED_S, Errors, Pairs, align_poses};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::report::{CauseMetrics, IntegrityMetrics};
@@ -54,14 +54,22 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
     trajectory.iter().map(|(stamp, _)| stamp).filter_map(bound).collect()
 }
 
-/// The radii that follow from the covariances; over the seconds of the alignment, whose mean is known only at their
-/// end, the largest of them.
+/// The radii that follow from the covariances; over the seconds of the alignment, which is known only at their end, the
+/// larger of those of the marked poses before and after.
 fn radii(run: &OpenLoopRun) -> Vec<f64> {
     let mut radii_m = run.radii_m.clone();
     let Some((first, _)) = run.covariances.first() else { return radii_m };
-    let aligned = run.covariances.partition_point(|(stamp, _)| stamp.seconds_since(*first) < GAUGED_S);
+    let marks_m: Vec<f64> = run.gauged.iter().map(|(_, covariance)| radius_99(&blocks(covariance).0)).collect();
+    let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| stamp.seconds_since(*first) < GAUGED_S;
+    let aligned = run.covariances.partition_point(is_aligned);
+    let end_m = aligned.checked_sub(1).map_or(0.0, |last| radii_m[last]);
     let largest_m = radii_m[..aligned].iter().copied().fold(0.0, f64::max);
-    radii_m[..aligned].fill(largest_m);
+    for (radius_m, (stamp, _)) in radii_m[..aligned].iter_mut().zip(&run.covariances) {
+        let after = run.gauged.partition_point(|(at, _)| at <= stamp);
+        let before_m = after.checked_sub(1).map(|before| marks_m[before]);
+        let near_m = marks_m.get(after).copied().unwrap_or(end_m).max(before_m.unwrap_or(0.0));
+        *radius_m = if marks_m.is_empty() { largest_m } else { near_m };
+    }
     radii_m
 }
 
@@ -87,10 +95,11 @@ impl Integrity {
         let mut findings = findings(&evidence);
         findings.extend(closed.and_then(|closed| moved_by_closing(run, closed, &bounds)));
         findings.extend(uncertain(&bounds, way_m(trajectory)));
-        findings.sort_by_key(|finding| (std::cmp::Reverse(finding.status), finding.from));
-        if let Some(lost) = findings.first().filter(|finding| finding.status == Status::Lost) {
+        findings.sort_by_key(|finding| std::cmp::Reverse(finding.status));
+        let lost = findings.iter().filter(|finding| finding.status == Status::Lost);
+        if let Some(lost_from) = lost.map(|finding| finding.from).min() {
             // From there on nothing bounds the error.
-            let from = bounds.partition_point(|bound| bound.stamp < lost.from);
+            let from = bounds.partition_point(|bound| bound.stamp < lost_from);
             bounds[from..].iter_mut().for_each(|bound| bound.bound_m_99 = f64::INFINITY);
         }
         Self { bounds, findings }

@@ -30,6 +30,8 @@ pub(super) struct OpenLoopRun {
     pub covariances: Vec<(Stamp, PoseCovariance)>,
     /// The radius of 99 % that follows from the covariance against the gauge at the same stamps, m.
     pub radii_m: Vec<f64>,
+    /// Covariances of poses of the first seconds against the alignment that these give.
+    pub gauged: Vec<(Stamp, PoseCovariance)>,
     /// The estimated clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// What was learnt of the lidar beyond its calibration.
@@ -116,6 +118,7 @@ pub(super) fn run_open_loop(
         map_from_head,
         covariances,
         radii_m,
+        gauged: result.gauged,
         spent: result.windows.iter().map(|window| window.spent).sum(),
         clock_offsets: result.clock_offsets.into_iter().map(|(at, offset_s)| (at, offset_s - shift_s)).collect(),
         lidar: result.lidar,

@@ -19,7 +19,7 @@ use crate::estimation::window::{Linearised, Window};
 use crate::estimation::{
     EstimatedPose, EstimationError, EstimatorSpec, GAUGED_S, OpenLoop, Warning, WarningKind, WindowReport,
 };
-use crate::geometry::{Pose, Trajectory, Vector};
+use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::surfel_map::SurfelMap;
 use crate::time::Stamp;
@@ -40,6 +40,9 @@ const MOVING: (f64, f64) = (0.3, 0.5);
 /// While the head is not found again behind a silence, the next one is bridged up to so many times as long as
 /// otherwise.
 const RELUCTANTLY: f64 = 3.0;
+
+/// While the alignment is made, a beginning is marked so often, s.
+const MARKED_EVERY_S: f64 = 2.5;
 
 /// An IMU that is noisier than it was told by more than this factor is told of.
 const TELLING: f64 = 1.5;
@@ -72,6 +75,10 @@ pub struct Estimator {
     next_pose: Option<Stamp>,
     /// Until when beginnings are part of the gauge, IMU time, s.
     gauged_until_s: Option<f64>,
+    /// The last beginning that was marked meanwhile, IMU time, s.
+    marked_s: Option<f64>,
+    /// How uncertain the marked beginnings are against the alignment.
+    gauged: Vec<(Stamp, PoseCovariance)>,
     /// Stamp of the last pose that was handed out.
     newest_pose: Option<Stamp>,
     poses: Vec<EstimatedPose>,
@@ -107,6 +114,8 @@ impl Estimator {
             at_end: None,
             next_pose: None,
             gauged_until_s: None,
+            marked_s: None,
+            gauged: Vec::new(),
             newest_pose: None,
             poses: Vec::new(),
             clock_offsets: Vec::new(),
@@ -171,10 +180,12 @@ impl Estimator {
         self.survey_window(Window::survey_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        let Self { poses, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
+        self.gauged.append(&mut self.consider.take_marks());
+        let Self { poses, gauged, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
         let survey = survey.unwrap_or_default();
         let located = whereabouts.and_then(|whereabouts| whereabouts.found().cloned());
-        Ok(OpenLoop { trajectory, poses, clock_offsets, lidar, calibrated_lidar, located, windows, warnings, survey })
+        let learnt = OpenLoop { lidar, calibrated_lidar, located, ..OpenLoop::default() };
+        Ok(OpenLoop { trajectory, poses, gauged, clock_offsets, windows, warnings, survey, ..learnt })
     }
 
     /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and
@@ -331,13 +342,27 @@ impl Estimator {
         if let Some(by) = linearised.and_then(|at| window.sensitivity_at(until_s, at, &self.views)) {
             self.consider.advance(&by);
         }
-        if until_s < *self.gauged_until_s.get_or_insert(until_s + GAUGED_S) {
-            self.consider.gauge_by_beginning();
-        }
+        let tau_s = until_s - window.clock.offset_at(until_s);
+        self.gauge(until_s, self.intake.stamp(tau_s));
+        let window = self.window.as_mut()?;
         let patches = window.let_go(linearised)?;
         let taken = self.views.take(&patches, self.spec.step_s, (window.matcher(), self.consider.pivot()));
         self.consider.take(taken);
         Some(until_s)
+    }
+
+    /// Over the first seconds, the beginning at `until_s` (IMU time), which is `stamp`, is part of the alignment.
+    fn gauge(&mut self, until_s: f64, stamp: Stamp) {
+        let end_s = *self.gauged_until_s.get_or_insert(until_s + GAUGED_S);
+        if until_s >= end_s {
+            self.gauged.append(&mut self.consider.take_marks());
+            return;
+        }
+        self.consider.gauge_by_beginning();
+        if self.marked_s.is_none_or(|last_s| until_s - last_s >= MARKED_EVERY_S) {
+            self.consider.mark_beginning(stamp);
+            self.marked_s = Some(until_s);
+        }
     }
 
     /// The IMU fell silent: what the window holds is final, and the estimate will begin again behind the silence.
