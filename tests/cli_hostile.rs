@@ -54,6 +54,53 @@ fn with_force_an_input_and_what_fails_are_spared() {
 
 #[cfg(unix)]
 #[test]
+fn a_replaced_folder_has_its_metrics_only_when_it_is_complete() {
+    use std::process::{Command, Stdio};
+    let here = tempfile::tempdir().unwrap();
+    let has = |name: &str| here.path().join("run").join(name).exists();
+    let journey = "--scene mocap_room --quiet --out run --force";
+    let (code, _, talk) = run(here.path(), &format!("{journey} --duration 8s"));
+    assert!(code == 0 && has("metrics.json") && has("plots/loops.svg") && has("map.ply"), "{talk}");
+    std::fs::write(here.path().join("run/notes.txt"), "mine").unwrap();
+    std::fs::write(here.path().join("run/.partial-x"), "half of a cloud").unwrap();
+
+    let mut child = Command::new(env!("CARGO_BIN_EXE_zsim"))
+        .args(journey.split(' ').chain(["--duration", "20min"]))
+        .current_dir(here.path())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    // Once the recording is longer than the old one the old one has been replaced.
+    while here.path().join("run/recording.mcap").metadata().map_or(0, |file| file.len()) < 10_000_000 {
+        assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let of_the_old_run = ["metrics.json", "report.html", "open_loop.tum", "cloud.ply", "plots/loops.svg", ".partial-x"];
+    assert_eq!(of_the_old_run.map(has), [false; 6], "the folder is not taken for a complete one");
+
+    // Without loop closures nothing of the first run's closed loop stays.
+    let (code, _, talk) = run(here.path(), &format!("{journey} --duration 8s --open-loop"));
+    assert!(code == 0 && has("metrics.json") && has("open_loop.tum"), "{talk}");
+    assert_eq!(["closed_loop.tum", "plots/loops.svg", "map.ply"].map(has), [false; 3]);
+    assert_eq!(read(here.path(), "run/notes.txt"), b"mine", "what zsim does not write stays");
+}
+
+#[test]
+fn with_force_the_map_that_localises_is_spared() {
+    let here = tempfile::tempdir().unwrap();
+    let (code, _, talk) = run(here.path(), "--scene mocap_room --duration 8s --quiet --out run");
+    assert_eq!(code, 0, "{talk}");
+    let map = read(here.path(), "run/map.ply");
+    let in_place = "estimate run/recording.mcap --map run/map.ply --extend-map --quiet --out run --force";
+    let (code, _, talk) = run(here.path(), in_place);
+    assert!(code == 2 && talk.contains("map.ply is read by this command and would be replaced"), "{talk}");
+    assert!(map == read(here.path(), "run/map.ply"));
+}
+
+#[cfg(unix)]
+#[test]
 fn a_signal_closes_the_files_and_is_the_exit_code() {
     use std::process::{Command, Stdio};
     for (signal, code) in [("INT", 130), ("TERM", 143)] {

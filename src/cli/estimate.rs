@@ -68,7 +68,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let stem = arguments.recording.file_stem().unwrap_or_default().to_string_lossy();
     let wanted = arguments.out.out.clone().unwrap_or_else(|| journey::default_folder(&stem));
     let folder = output::folder(&wanted, arguments.out.force)?;
-    output::spare_inputs(std::slice::from_ref(&arguments.recording), &[folder.join("result.mcap")])?;
+    let inputs = [Some(&arguments.recording), arguments.map.as_ref(), arguments.calibration.as_ref()];
+    let written: Vec<PathBuf> = study::estimate_files().iter().map(|name| folder.join(name)).collect();
+    output::spare_inputs(&inputs.into_iter().flatten().cloned().collect::<Vec<_>>(), &written)?;
 
     let mut bars = Bars::new(global);
     let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };

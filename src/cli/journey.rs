@@ -32,8 +32,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let mut bars = Bars::new(global);
     recording_size::check(&simulation, &wanted, |note| bars.remark(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
-    let written = ["recording.mcap", "truth.tum", "result.mcap", "open_loop.tum", "closed_loop.tum", "manifest.ron"];
-    output::spare_inputs(&arguments.scenario.inputs(scene), &written.map(|name| folder.join(name)))?;
+    let written: Vec<PathBuf> = study::journey_files().iter().map(|name| folder.join(name)).collect();
+    output::spare_inputs(&arguments.scenario.inputs(scene), &written)?;
 
     simulation.world().notes().iter().for_each(|note| bars.remark(note));
     let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };

@@ -1,8 +1,10 @@
 //! What a run leaves for people: plots and a page.
 
+use super::beside::write_text;
 use super::estimate::Best;
 use super::open_loop::OpenLoopRun;
 use super::register::Judged;
+use super::result_files::METRICS;
 use super::{Manifest, StudyError};
 use crate::evaluation::{Errors, InformationBound};
 use crate::geometry::{Pose, Trajectory, Vector};
@@ -83,15 +85,15 @@ fn outline(sample: &[Judged], world_from_map: &Pose, estimate: &Trajectory) -> V
     cells.into_iter().map(|(x, y)| Vector::new(x as f64 * CELL_M, y as f64 * CELL_M, height)).collect()
 }
 
-/// Writes `metrics.json`, the plots, and the page.
+/// Writes the plots, the page, and at last `metrics.json`: the folder is complete then.
 pub(super) fn write(folder: &Path, metrics: &Metrics, plots: Vec<Plot>, manifest: &Manifest) -> Result<(), StudyError> {
-    let write = |path: &Path, text: String| std::fs::write(path, text).map_err(StudyError::file(path));
-    write(&folder.join("metrics.json"), metrics.to_json()?)?;
     let pictures = folder.join("plots");
     std::fs::create_dir_all(&pictures).map_err(StudyError::file(&pictures))?;
     for plot in &plots {
         plot.section.figure.save(&pictures, plot.name)?;
     }
     let sections: Vec<Section> = plots.into_iter().map(|plot| plot.section).collect();
-    write(&folder.join("report.html"), report::page(metrics, &sections, &manifest.text()?)?)
+    let page = report::page(metrics, &sections, &manifest.text()?)?;
+    write_text(folder, &folder.join("report.html"), &page)?;
+    write_text(folder, &folder.join(METRICS), &metrics.to_json()?)
 }

@@ -9,6 +9,7 @@ use super::integrity::{Integrity, write_windows};
 use super::map::{MapWishes, write_map_of};
 use super::open_loop::{How, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
+use super::result_files::{estimate_files, remove};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
 use crate::estimation::{EstimatorSpec, TimeSpent};
 use crate::geometry::Trajectory;
@@ -65,6 +66,9 @@ pub struct Outcome {
 /// map, cloud and result are the closed loop's unless that is not wanted, or a map holds the trajectory already. Where
 /// the recording has the truth the estimate is judged by it, and where it has the scene the cloud is.
 ///
+/// Files of these names from an earlier run are removed first. `metrics.json` is written last: a folder without it is
+/// incomplete.
+///
 /// # Errors
 /// When the recording cannot be read, there is no estimate, a file cannot be written, or somebody stops it.
 pub fn estimate_recording(
@@ -74,6 +78,7 @@ pub fn estimate_recording(
     watch: &mut Watch,
 ) -> Result<Outcome, StudyError> {
     let reader = Reader::open(path)?;
+    remove(folder, &estimate_files())?;
     let manifest = Manifest::within(&reader).unwrap_or_else(Manifest::of_recording_by_others);
     let world = world_of(&manifest, watch);
     let carrier = manifest.specs.as_ref().map(|specs| carrier_of(&specs.head)).unwrap_or_default();

@@ -2,6 +2,7 @@
 
 use super::cloud::Surroundings;
 use super::estimate::{Origin, estimate_in};
+use super::result_files::{journey_files, remove};
 use super::{Manifest, Outcome, StudyError, Watch, Wishes, record};
 use crate::recording::Reader;
 use crate::simulation::Simulation;
@@ -10,7 +11,8 @@ use std::path::Path;
 /// From spring to trajectory error: simulates, records, estimates, judges, reports, all in `folder`, which exists.
 ///
 /// The estimator sees what the recording's file says, as of anybody's recording, and nothing else. Nothing is held in
-/// memory that grows with the run but the estimated trajectory.
+/// memory that grows with the run but the estimated trajectory. Files of an earlier run are removed first, and
+/// `metrics.json` is written last, as by [`estimate_recording`](super::estimate_recording).
 ///
 /// # Errors
 /// When a part fails, or somebody stops it; what came before is in the folder.
@@ -20,6 +22,7 @@ pub fn journey(
     folder: &Path,
     watch: &mut Watch,
 ) -> Result<Outcome, StudyError> {
+    remove(folder, &journey_files())?;
     let manifest = Manifest::of(simulation).with_estimator(&wishes.estimator);
     manifest.write(&folder.join("manifest.ron"))?;
 
