@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod simulation_kept;
+
+use simulation_kept::Kept;
 use std::f64::consts::PI;
 use zsim::dynamics::{DynamicsError, HeadState};
-use zsim::geometry::{Kinematics, Pose, Rotation, Trajectory, Vector, from_roll_pitch_yaw, gravity_in_world};
+use zsim::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw, gravity_in_world};
 use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::sensors::{ClockSpec, Clocks, ClocksSpec, Cylinder, Imu, Lidar, Scenery, SurfaceHit};
@@ -62,55 +65,6 @@ impl Iterator for Nodding {
         let t_s = self.step as f64 * STEP_S;
         self.step += 1;
         Some(Ok(HeadState { t_s, head: nodding(t_s), base: Kinematics::at_rest(Pose::identity()) }))
-    }
-}
-
-/// Keeps everything, with its arrival.
-#[derive(Default, PartialEq, Debug)]
-struct Kept {
-    samples: Vec<(Stamp, ImuSample)>,
-    scans: Vec<(Stamp, LidarScan)>,
-    truth: Vec<(Stamp, TruthSample)>,
-    clocks: Vec<(Stamp, ClockTruth)>,
-    last: Stamp,
-}
-
-impl Kept {
-    fn arrive(&mut self, now: Stamp) {
-        assert!(now >= self.last, "arrivals never decrease");
-        self.last = now;
-    }
-
-    fn trajectory(&self) -> Trajectory {
-        Trajectory::from_poses(self.truth.iter().map(|(_, t)| (t.lidar_stamp, t.head.world_from_body))).unwrap()
-    }
-}
-
-impl Sink for Kept {
-    fn imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
-        self.arrive(arrival);
-        self.samples.push((arrival, *sample));
-        Ok(())
-    }
-
-    fn lidar(&mut self, arrival: Stamp, scan: &LidarScan) -> Result<(), SinkError> {
-        self.arrive(arrival);
-        self.scans.push((arrival, scan.clone()));
-        Ok(())
-    }
-}
-
-impl TruthSink for Kept {
-    fn truth(&mut self, now: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
-        self.arrive(now);
-        self.truth.push((now, *sample));
-        Ok(())
-    }
-
-    fn clock(&mut self, now: Stamp, clock: &ClockTruth) -> Result<(), SinkError> {
-        self.arrive(now);
-        self.clocks.push((now, *clock));
-        Ok(())
     }
 }
 
