@@ -220,6 +220,8 @@ fn a_database_with_views_or_other_tables_is_refused() {
     let computed = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, \
                     data AS (zeroblob(1000000000)) VIRTUAL);";
     assert!(refused("computed.db3", &format!("{topics}{computed}")).contains("has no column `data`"));
+    let numbered = "CREATE TABLE messages(rowid TEXT, topic_id, timestamp, data);";
+    assert!(refused("numbered.db3", &format!("{topics}{numbered}")).contains("has a column `rowid`"));
 }
 
 #[test]
@@ -240,4 +242,60 @@ fn a_damaged_database_ends_in_an_error_or_in_what_is_left() {
             let _ = reader.info(Span::from_seconds(0.5)).unwrap();
         }
     }
+}
+
+/// Makes every page of the tree of messages below its root the child of all pages above it: an interior page of a table
+/// (type 5) has its cells' offsets from byte 12, each cell begins with its child's number, and the last child is at byte
+/// 8 (sqlite.org/fileformat2.html, section 1.6).
+fn tangle(bytes: &mut [u8], page_size: usize, root: usize) {
+    let two = |bytes: &[u8], at: usize| usize::from(u16::from_be_bytes([bytes[at], bytes[at + 1]]));
+    let is_interior = |bytes: &[u8], page: usize| bytes[(page - 1) * page_size] == 5;
+    let children = |bytes: &[u8], page: usize| -> Vec<usize> {
+        let start = (page - 1) * page_size;
+        let cells = (0..two(bytes, start + 3)).map(|k| start + two(bytes, start + 12 + 2 * k));
+        cells.chain([start + 8]).collect()
+    };
+    let child = |bytes: &[u8], at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let (mut path, mut page) = (Vec::new(), root);
+    while is_interior(bytes, page) {
+        path.push(page);
+        page = child(bytes, children(bytes, page)[0]);
+    }
+    // The leaves that follow the first one become interior pages too: copies of the last one of these.
+    let last = *path.last().unwrap();
+    let leaves: Vec<usize> = children(bytes, last).iter().map(|at| child(bytes, *at)).collect();
+    let copied = bytes[(last - 1) * page_size..last * page_size].to_vec();
+    for leaf in &leaves[1..9] {
+        bytes[(leaf - 1) * page_size..leaf * page_size].copy_from_slice(&copied);
+    }
+    path.extend(&leaves[1..9]);
+    for (k, above) in path.iter().enumerate() {
+        let below = path.get(k + 1).copied().unwrap_or(leaves[0]);
+        for at in children(bytes, *above) {
+            bytes[at..at + 4].copy_from_slice(&(below as u32).to_be_bytes());
+        }
+    }
+}
+
+#[test]
+fn rows_that_a_damaged_tree_repeats_are_read_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.db3");
+    let sql = "PRAGMA page_size = 512; CREATE TABLE topics(id INTEGER PRIMARY KEY, name, type, serialization_format);
+        CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data);
+        INSERT INTO topics VALUES (1, '/imu', 'sensor_msgs/msg/Imu', 'cdr');
+        WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n LIMIT 3000)
+        INSERT INTO messages SELECT k, 1, k, zeroblob(200) FROM n;";
+    let database = rusqlite::Connection::open(&file).unwrap();
+    database.execute_batch(sql).unwrap();
+    let text = "SELECT rootpage FROM sqlite_schema WHERE name = 'messages'";
+    let root: i64 = database.query_row(text, [], |row| row.get(0)).unwrap();
+    drop(database);
+    let mut bytes = std::fs::read(&file).unwrap();
+    tangle(&mut bytes, 512, root as usize);
+    let reader = Reader::new("tangled.db3", Cursor::new(bytes)).unwrap();
+    let info = reader.info(Span::from_seconds(0.5)).unwrap();
+    // A leaf of 512 bytes has two messages of 200 bytes; without a check there would be more than 30^10.
+    assert_eq!(info.messages, 2);
+    assert!(!info.loss.is_none());
 }

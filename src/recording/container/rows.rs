@@ -80,8 +80,8 @@ impl Rows {
         let mut found = Directory::empty();
         topics(&database, &mut found).map_err(|error| refused(error.to_string()))?;
         found.ending = match blocks(&database, &mut found) {
-            Ok(()) => Ending::Complete,
-            Err(_) => Ending::CutShort,
+            Ok(true) => Ending::Complete,
+            Ok(false) | Err(_) => Ending::CutShort,
         };
         Ok(found)
     }
@@ -92,11 +92,12 @@ impl Rows {
     /// When the database is damaged there.
     pub fn read(&self, rows: (i64, i64), bytes: &mut Vec<u8>, entries: &mut Vec<Entry>) -> Result<(), Damage> {
         let database = self.lock();
-        let text = "SELECT topic_id, timestamp, data FROM messages WHERE rowid BETWEEN ?1 AND ?2 ORDER BY rowid";
+        let text = "SELECT topic_id, timestamp, data, rowid FROM messages WHERE rowid BETWEEN ?1 AND ?2 ORDER BY rowid";
         let mut read = || -> rusqlite::Result<()> {
             let mut statement = database.prepare(text)?;
             let mut found = statement.query(rows)?;
-            while let Some(row) = found.next()? {
+            let mut order = Order::default();
+            while let Some(row) = found.next()?.filter(|row| row.get(3).is_ok_and(|id| order.goes_on(id))) {
                 let Ok(channel) = u16::try_from(row.get::<_, i64>(0)?) else { continue };
                 let start = bytes.len();
                 bytes.extend_from_slice(row.get_ref(2)?.as_bytes().unwrap_or_default());
@@ -105,6 +106,20 @@ impl Rows {
             Ok(())
         };
         read().map_err(|_| Damage::Records)
+    }
+}
+
+/// The order of row numbers, which increase in a table that is sound. Where pages of a damaged one are the children of
+/// several others, its rows come again and again, in numbers that grow exponentially with the depth of the tree.
+#[derive(Default)]
+struct Order(Option<i64>);
+
+impl Order {
+    /// Whether row `id` comes after all before it.
+    fn goes_on(&mut self, id: i64) -> bool {
+        let is_next = self.0.is_none_or(|last| id > last);
+        self.0 = Some(id);
+        is_next
     }
 }
 
@@ -121,6 +136,11 @@ fn is_plain_table(database: &Connection, table: &str, columns: &[&str]) -> Resul
     if count != 1 {
         return Err(format!("it has no table `{table}`"));
     }
+    let text = "SELECT count(*) FROM pragma_table_xinfo(?1) WHERE lower(name) = 'rowid'";
+    let count: i64 = database.query_row(text, [table], |row| row.get(0)).map_err(|error| error.to_string())?;
+    if count != 0 {
+        return Err(format!("its table `{table}` has a column `rowid` in the place of the number of a row"));
+    }
     for column in columns {
         let text = "SELECT count(*) FROM pragma_table_xinfo(?1) WHERE name = ?2 AND hidden = 0";
         let count: i64 =
@@ -134,7 +154,7 @@ fn is_plain_table(database: &Connection, table: &str, columns: &[&str]) -> Resul
 
 fn topics(database: &Connection, found: &mut Directory) -> rusqlite::Result<()> {
     let mut statement =
-        database.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id LIMIT 65536")?;
+        database.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY rowid LIMIT 65536")?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
         let Ok(id) = u16::try_from(row.get::<_, i64>(0)?) else { continue };
@@ -146,14 +166,17 @@ fn topics(database: &Connection, found: &mut Directory) -> rusqlite::Result<()> 
     Ok(())
 }
 
-/// Gathers messages to blocks, without reading them.
-fn blocks(database: &Connection, found: &mut Directory) -> rusqlite::Result<()> {
+/// Gathers messages to blocks, without reading them, as far as their row numbers increase; whether they do to the end.
+fn blocks(database: &Connection, found: &mut Directory) -> rusqlite::Result<bool> {
     let mut statement =
         database.prepare("SELECT rowid, topic_id, timestamp, length(data) FROM messages ORDER BY rowid")?;
     let mut rows = statement.query([])?;
-    let (mut messages, mut total) = (0, 0);
+    let (mut messages, mut total, mut order) = (0, 0, Order::default());
     while let Some(row) = rows.next()? {
         let (id, channel) = (row.get(0)?, u16::try_from(row.get::<_, i64>(1)?));
+        if !order.goes_on(id) {
+            return Ok(false);
+        }
         let (time, bytes) = (time_ns(row, 2)?, row.get::<_, Option<i64>>(3)?.unwrap_or(0).unsigned_abs());
         let Ok(channel) = channel else { continue };
         total += 1;
@@ -178,5 +201,5 @@ fn blocks(database: &Connection, found: &mut Directory) -> rusqlite::Result<()> 
         }
         found.expected_messages = Some(total);
     }
-    Ok(())
+    Ok(true)
 }
