@@ -60,12 +60,32 @@ impl Whereabouts {
         let rotation = Rotation::from_axis_angle(&Vector::z_axis(), turn);
         let shift = about.translation.vector - rotation * here_from_head.translation.vector;
         let start = Pose::from_parts(shift.into(), rotation);
-        let located = self.locator.find(&window.patches(), (&begins.translation.vector, &start), &IN_MAP);
+        let (seen, from) = (window.patches(), begins.translation.vector);
+        let mut located = self.locator.find(&seen, (&from, &start), &IN_MAP);
+        if let (None, Ok(found)) = (&self.found, &located)
+            && let Some(better) = self.locator.better_elsewhere(&seen, &from, found)
+        {
+            located = Err(not_here(found, &better, &(better.map_from_seen * here_from_head)));
+        }
         if let (None, Ok(located)) = (&self.found, &located) {
             self.found = Some(located.clone());
         }
         Some(located.map_err(EstimationError::NotInMap))
     }
+}
+
+/// Why the place found near a start is not believed, with the start at which there is a `better` one.
+fn not_here(found: &Located, better: &Located, map_from_head: &Pose) -> String {
+    let at = map_from_head.translation.vector;
+    format!(
+        "near the start {:.0} % of what was seen lies on the map, but {:.0} % at {:.1},{:.1},{:.1},{:.0}",
+        100.0 * found.share,
+        100.0 * better.share,
+        at.x,
+        at.y,
+        at.z,
+        roll_pitch_yaw(&map_from_head.rotation).2.to_degrees()
+    )
 }
 
 /// What had been seen when the IMU fell silent for too long, in which the head is looked for behind the silence.

@@ -118,21 +118,13 @@ impl Locator {
         (from, map_from_seen): (&Vector, &Pose),
         search: &Search,
     ) -> Result<Located, String> {
-        let by_level: Vec<Vec<Patch>> = (0..self.matcher.levels).map(|level| some_of(seen, level)).collect();
+        let by_level = self.by_level(seen);
         let finest = by_level.first().map_or(0, Vec::len);
         if finest < FEWEST {
             return Err(format!("it shows {finest} patches of surface, and {FEWEST} at least are needed"));
         }
-        let mut places = search.starts(map_from_seen, from);
-        for (level, seen) in by_level.iter().enumerate().rev().filter(|(_, seen)| !seen.is_empty()) {
-            let settled = places
-                .par_iter()
-                .filter_map(|(start, pose)| Some((*start, self.settle((level, seen), from, start, pose)?)));
-            places = settled.collect();
-            leave_one_of_each(&mut places, from);
-        }
-        let gate_m = search.gate_m.unwrap_or(self.matcher.finest_voxel_m * GATES.1);
-        let judged = places.iter().filter_map(|(_, pose)| self.judge(&by_level[0], from, pose, gate_m));
+        let places = self.settled(&by_level, search.starts(map_from_seen, from), from);
+        let judged = self.judged(&by_level[0], from, &places, search.gate_m);
         // Each with what it is worth.
         let worth = |found: &Located| found.share.powi(3) * search.likely(&found.map_from_seen, map_from_seen, from);
         let mut found: Vec<(f64, Located)> = judged.map(|found| (worth(&found), found)).collect();
@@ -140,8 +132,10 @@ impl Locator {
         let Some((worth, best)) = found.iter().find(|(worth, found)| *worth > 0.0 && search.believes(found)) else {
             let best = found.first().map_or((0.0, 0.0), |(_, best)| (100.0 * best.share, 100.0 * best.agreement));
             let (share, agreement) = best;
+            let residual_mm = found.first().map_or(0.0, |(_, best)| 1e3 * best.residual_rms_m);
             return Err(format!(
-                "at the best place {share:.0} % of what was seen lies on the map, {agreement:.0} % of what could"
+                "at the best place {share:.0} % of what was seen lies on the map, {agreement:.0} % of what could, to \
+                 {residual_mm:.0} mm"
             ));
         };
         let as_good = found.iter().filter(|(other, found)| *other > OTHER.2 * worth && search.believes(found));
@@ -154,6 +148,40 @@ impl Locator {
             }
             _ => Ok(best.in_doubt_with(&others, from)),
         }
+    }
+
+    /// What was seen, by resolution, as many of each as are laid upon the map.
+    pub(super) fn by_level(&self, seen: &[Patch]) -> Vec<Vec<Patch>> {
+        (0..self.matcher.levels).map(|level| some_of(seen, level)).collect()
+    }
+
+    /// Where what was seen settles from some starts, from the coarsest resolution to the finest.
+    pub(super) fn settled(
+        &self,
+        by_level: &[Vec<Patch>],
+        mut places: Vec<(Pose, Pose)>,
+        from: &Vector,
+    ) -> Vec<(Pose, Pose)> {
+        for (level, seen) in by_level.iter().enumerate().rev().filter(|(_, seen)| !seen.is_empty()) {
+            let settled = places
+                .par_iter()
+                .filter_map(|(start, pose)| Some((*start, self.settle((level, seen), from, start, pose)?)));
+            places = settled.collect();
+            leave_one_of_each(&mut places, from);
+        }
+        places
+    }
+
+    /// What places are worth by the finest patches; those where they determine nothing are left out.
+    pub(super) fn judged<'a>(
+        &'a self,
+        finest: &'a [Patch],
+        from: &'a Vector,
+        places: &'a [(Pose, Pose)],
+        gate_m: Option<f64>,
+    ) -> impl Iterator<Item = Located> + 'a {
+        let gate_m = gate_m.unwrap_or(self.matcher.finest_voxel_m * GATES.1);
+        places.iter().filter_map(move |(_, pose)| self.judge(finest, from, pose, gate_m))
     }
 
     /// Where the patches of a resolution that were seen settle from a pose, as level as they were at `start`; `None`
@@ -297,7 +325,8 @@ impl Located {
     }
 }
 
-fn is_elsewhere(a: &Located, b: &Located, from: &Vector) -> bool {
+/// Whether two places are not the same.
+pub(super) fn is_elsewhere(a: &Located, b: &Located, from: &Vector) -> bool {
     let (far_m, turned) = apart(&a.map_from_seen, &b.map_from_seen, from);
     far_m > OTHER.0 || turned > OTHER.1
 }
@@ -374,6 +403,24 @@ mod tests {
             assert!(apart.translation.vector.norm() < 2e-3 && apart.rotation.angle() < 1e-3, "{k}: {apart}");
             assert!(found.share > 0.9, "{}", found.share);
         }
+    }
+
+    #[test]
+    fn a_symmetric_room_from_the_wrong_end_is_better_elsewhere() {
+        let locator = locator(&all_levels(0.4, 0.5));
+        let seen = all_levels(0.37, 0.4);
+        let from = Vector::new(4.0, 2.5, 1.2);
+        // The room turned by half a circle about its middle: all but the pillar is the same.
+        let half = from_roll_pitch_yaw(0.0, 0.0, std::f64::consts::PI);
+        let wrong = Pose::from_parts(Vector::new(6.0, 4.0, 0.0).into(), half);
+        let found = locator.find(&seen, (&from, &wrong), &IN_MAP).unwrap();
+        assert!(apart(&found.map_from_seen, &wrong, &from).0 < 0.1 && found.share > 0.7, "{}", found.share);
+        let better = locator.better_elsewhere(&seen, &from, &found).unwrap();
+        let (far_m, turned) = apart(&better.map_from_seen, &Pose::identity(), &from);
+        assert!(far_m < 2e-3 && turned < 1e-3, "{far_m} m, {turned} rad");
+        // From the right end there is none.
+        let found = locator.find(&seen, (&from, &Pose::identity()), &IN_MAP).unwrap();
+        assert_eq!(locator.better_elsewhere(&seen, &from, &found), None);
     }
 
     /// Patches of a resolution of a corridor without ends along x, 2 m wide, between `from_m` and `to_m`.

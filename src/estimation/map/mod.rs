@@ -3,6 +3,7 @@
 mod fuse;
 mod locate;
 mod search;
+mod whole;
 
 pub use locate::Located;
 pub(super) use locate::Locator;

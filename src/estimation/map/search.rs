@@ -26,13 +26,18 @@ pub(in crate::estimation) struct Search {
     share: f64,
     /// Least share of those that have a patch of the map beside them.
     agreement: f64,
+    /// Largest residual of those that lie on the map, root mean square, m.
+    residual_m: f64,
     /// Whether of places that are as good the nearest counts; if not, none of them.
     pub(super) nearest: bool,
 }
 
+/// Largest residual in a map, m: at right places it is 3 to 7 mm, where surfaces match by chance 10 to 17 mm.
+const RESIDUAL_M: f64 = 0.01;
+
 /// In a map which shows all that is seen: with what the coarsest surfels reach, a metre and twenty degrees.
 pub(in crate::estimation) const IN_MAP: Search =
-    Search { reach: (APART.0, APART.1), gate_m: None, share: 0.4, agreement: 0.0, nearest: false };
+    Search { reach: APART, gate_m: None, share: 0.4, agreement: 0.0, residual_m: RESIDUAL_M, nearest: false };
 
 impl Search {
     /// In what was seen before a silence of `seconds`, matches being good to `sigma_m`. It may show little of what is
@@ -42,7 +47,7 @@ impl Search {
         let reach_deg = (TURNED_DEG.0 + TURNED_DEG.1 * seconds).min(TURNED_DEG.2);
         let reach = (reach_m, reach_deg.to_radians());
         let agreement = if seconds > LONG_S { 0.85 } else { 0.6 };
-        Self { reach, gate_m: Some(1.5 * sigma_m), share: 0.1, agreement, nearest: true }
+        Self { reach, gate_m: Some(1.5 * sigma_m), share: 0.1, agreement, residual_m: f64::INFINITY, nearest: true }
     }
 
     /// Each start, twice: as what it began, and as what it becomes.
@@ -64,7 +69,7 @@ impl Search {
 
     /// Whether enough of what was seen, and of what could, lies on the map where it was found.
     pub(super) fn believes(&self, found: &Located) -> bool {
-        found.share >= self.share && found.agreement >= self.agreement
+        found.share >= self.share && found.agreement >= self.agreement && found.residual_rms_m <= self.residual_m
     }
 
     /// How likely a head is where it was found, as far as where it was expected says, 0..1.
