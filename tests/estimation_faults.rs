@@ -198,7 +198,7 @@ fn sensors_that_fall_silent_or_freeze_are_stated() {
             &["lidar_gap", "repeated_scans"],
             Some((0.005, 0.15)),
         ),
-        ("clock jump", "(sensor: both, from_s: 6, fault: clock_jump(jump_s: 86400))", &["gap"], None),
+        ("clock jump", "(sensor: both, from_s: 6, fault: clock_jump(jump_s: 86400))", &["gap"], Some((0.003, 0.2))),
     ] {
         check(&Row { name, faults, code: 3, within, is_lost: within.is_none(), stated, ..ROW });
     }

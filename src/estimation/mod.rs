@@ -64,6 +64,7 @@ mod cloud;
 mod consider;
 mod error;
 mod estimator;
+mod gaps;
 mod inertial;
 mod initial;
 mod intake;

@@ -41,6 +41,7 @@ pub use places::{LoopReport, PlacesSpec};
 pub use spec::RegistrationSpec;
 
 use super::EstimatorSpec;
+use super::gaps::{Gaps, restored};
 use super::matching::Matcher;
 use super::survey::Survey;
 use super::window::Moved;
@@ -120,8 +121,21 @@ pub struct Travelled<'a> {
 
 /// Registers the whole of what an open loop saw with the sensors of `calibration`.
 ///
-/// The same for any number of threads.
+/// The same for any number of threads. Memory follows the data: long gaps in time are shortened first.
 pub fn register(travelled: Travelled, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
+    let stamps = travelled.map_from_head.stamps();
+    let Some(gaps) = Gaps::of(stamps) else { return register_without_gaps(travelled, calibration, spec) };
+    let map_from_head = &gaps.shorten(travelled.map_from_head);
+    let covariances = &gaps.shorten_covariances(travelled.covariances);
+    let survey = &gaps.shorten_survey(travelled.survey);
+    let shortened = Travelled { map_from_head, covariances, survey, lidar: travelled.lidar };
+    let closed = register_without_gaps(shortened, calibration, spec);
+    let trajectory = restored(&closed.trajectory, stamps);
+    let open_loop_told_anew = closed.open_loop_told_anew.map(|anew| restored(&anew, stamps));
+    ClosedLoop { trajectory, open_loop_told_anew, ..closed }
+}
+
+fn register_without_gaps(travelled: Travelled, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
     let of_all = &spec.registration;
     let matcher = Matcher::new(&of_all.matching(&spec.matching), &of_all.surfels(&spec.surfels));
     let Travelled { map_from_head, lidar, survey, .. } = travelled;

@@ -130,7 +130,7 @@ impl Window {
 
     /// Goes on with clock and sensors as they were known before the IMU fell silent.
     pub(super) fn take_over(&mut self, carried: &Carried) {
-        self.clock = carried.clock.told_from(self.start.u_s);
+        self.clock = carried.clock.after_gap((carried.until_s, self.start.u_s));
         self.exaggerates = carried.exaggerates;
         self.maker.lidar = carried.lidar;
     }
