@@ -81,6 +81,7 @@ mod spec;
 mod spent;
 mod spline;
 mod stamps;
+mod standstill;
 mod strapdown;
 mod surfel;
 mod survey;

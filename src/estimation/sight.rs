@@ -2,10 +2,8 @@
 
 use super::EstimatorSpec;
 use super::spec::SurfelSpec;
-use super::surfel::Beam;
 use crate::geometry::Vector;
 use crate::measurement::LidarScan;
-use std::collections::BTreeMap;
 
 /// Points a second from which on patches hold the number of points that the settings ask for; of fewer, fewer.
 const DENSE_PER_S: f64 = 28_000.0;
@@ -69,34 +67,6 @@ impl Sight {
         }
         fitting
     }
-}
-
-/// Directions are compared in cells of this size, rad.
-const CELL_RAD: f64 = 0.05;
-/// Ranges of one direction differ when they do by more than this, m, and this share.
-const DIFFER: (f64, f64) = (0.1, 0.03);
-/// A head moves when more than this share of the directions differ, of at least so many.
-const MOVED: (f64, usize) = (0.12, 20);
-
-/// Whether the lidar shows a head that moves: the ranges of `early` and `late` beams differ in many directions. A head
-/// that moves evenly feels like one at rest.
-pub(super) fn shows_motion(early: &[Beam], late: &[Beam]) -> bool {
-    let by_direction = |beams: &[Beam]| {
-        let mut cells: BTreeMap<(i32, i32), (f64, usize)> = BTreeMap::new();
-        for beam in beams {
-            let p = beam.point_in_imu;
-            let (azimuth, elevation) = (f64::from(p.y.atan2(p.x)), f64::from((p.z / p.norm()).asin()));
-            let key = ((azimuth / CELL_RAD).floor() as i32, (elevation / CELL_RAD).floor() as i32);
-            let cell = cells.entry(key).or_default();
-            *cell = (cell.0 + f64::from(beam.range_m), cell.1 + 1);
-        }
-        cells
-    };
-    let (early, late) = (by_direction(early), by_direction(late));
-    let mean = |(sum, count): &(f64, usize)| sum / *count as f64;
-    let both: Vec<(f64, f64)> = early.iter().filter_map(|(key, a)| Some((mean(a), mean(late.get(key)?)))).collect();
-    let differ = both.iter().filter(|(a, b)| (a - b).abs() > DIFFER.0 + DIFFER.1 * a.min(*b)).count();
-    both.len() >= MOVED.1 && differ as f64 > MOVED.0 * both.len() as f64
 }
 
 /// Whether a point may be of a planar lidar.
@@ -164,28 +134,6 @@ mod tests {
         assert!(at(0.1, 0.0).split_gap_s > 0.11 && at(0.2, 0.0).max_duration_s > 0.4);
         assert_eq!(at(0.025, 0.0), spec.surfels);
         assert_eq!(at(0.1, 0.2), spec.surfels, "a lidar of several beams sees a patch in one turn");
-    }
-
-    /// Beams of a sensor in a rectangular hall, which has gone `moved_m` along it, range noise by a fixed pattern.
-    fn beams(moved_m: f64) -> Vec<Beam> {
-        (0..720)
-            .map(|k| {
-                let azimuth = f64::from(k) * 0.008_726;
-                let (sin, cos) = azimuth.sin_cos();
-                let along = if cos > 0.0 { (12.0 - moved_m) / cos } else { (8.0 + moved_m) / -cos };
-                let range = along.min(3.0 / sin.abs()) + 0.01 * (f64::from(k) * 7.3).sin();
-                let point = nalgebra::Vector3::new(range * cos, range * sin, 0.0).cast();
-                Beam { tau_s: 0.0, point_in_imu: point, range_m: range as f32 }
-            })
-            .collect()
-    }
-
-    #[test]
-    fn a_head_that_moves_evenly_is_seen_to_move() {
-        assert!(!shows_motion(&beams(0.0), &beams(0.0)));
-        assert!(!shows_motion(&beams(0.0), &beams(0.02)));
-        assert!(shows_motion(&beams(0.0), &beams(4.0)));
-        assert!(!shows_motion(&beams(0.0), &[]));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::estimation::border::Border;
 use crate::estimation::consider::{Consider, OfBeginning, Sensitivity};
 use crate::estimation::initial::{self, Beginning, Carried, Noisier};
 use crate::estimation::intake::{Intake, Stretch};
-use crate::estimation::sight::shows_motion;
+use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::spent::Stopwatch;
 use crate::estimation::strapdown::Interval;
 use crate::estimation::surfel::{Beam, Patch, SurfelMaker};
@@ -367,7 +367,8 @@ impl Estimator {
             survey.ranges_are_held = self.intake.sight().is_one_way();
         }
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let may_rest = !self.lidar_shows_motion();
+        let seen = self.seen_standstill();
+        let may_rest = seen != Standstill::Moves;
         let beginning = initial::begin((&intervals[..resting], may_rest), head_from_imu, noise, &fitting);
         let start_s = *start_s;
         self.make_noisier(beginning.noisier, start_s);
@@ -380,6 +381,9 @@ impl Estimator {
             self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
         }
         let mut window = self.first_window(&fitting, &beginning, start_s);
+        if seen == Standstill::Unknown {
+            window = window.without_seeing_rest();
+        }
         if let Some(carried) = &self.carried {
             window.take_over(carried);
         }
@@ -388,16 +392,16 @@ impl Estimator {
         self.window = Some(window);
     }
 
-    /// Whether the lidar shows motion between the beginning and the end of the time in which the head should rest.
-    fn lidar_shows_motion(&self) -> bool {
+    /// What the lidar shows between the beginning and the end of the time in which the head should rest.
+    fn seen_standstill(&self) -> Standstill {
         let beams: Vec<Beam> = self.waiting.iter().flat_map(|stretch| &stretch.beams).copied().collect();
-        let (Some(first), Some(last)) = (beams.first(), beams.last()) else { return false };
+        let (Some(first), Some(last)) = (beams.first(), beams.last()) else { return Standstill::Unknown };
         let quarter_s = 0.25 * (last.tau_s.min(first.tau_s + self.spec.inertial.rest_s) - first.tau_s);
         let until_s = first.tau_s + 4.0 * quarter_s;
         let early = beams.partition_point(|beam| beam.tau_s < first.tau_s + quarter_s);
         let late = beams.partition_point(|beam| beam.tau_s < until_s - quarter_s);
         let end = beams.partition_point(|beam| beam.tau_s <= until_s);
-        shows_motion(&beams[..early], &beams[late..end])
+        standstill(&beams[..early], &beams[late..end])
     }
 
     /// Takes the IMU for so much noisier than it was told from now on, and what waits with it.

@@ -81,6 +81,8 @@ pub(super) struct Window {
     rests: Rests,
     /// Whether the speed is known: a head that began under way feels at rest until surfaces were matched.
     knows_speed: bool,
+    /// Whether the lidar shows that the head rests where it feels to, and not the IMU alone.
+    sees_rest: bool,
     workspace: Workspace,
 }
 
@@ -113,6 +115,7 @@ impl Window {
             rested_until_s: f64::NEG_INFINITY,
             rests: Rests::default(),
             knows_speed: beginning.velocity_sigma < UNDER_WAY_M_PER_S,
+            sees_rest: true,
             workspace: Workspace::default(),
         }
     }
@@ -179,10 +182,15 @@ impl Window {
         self.nominal.at(self.nominal.end_s(), &self.biases.gyro).velocity.norm()
     }
 
-    /// Whether the head rests at the window's end, as far as the IMU and the estimated speed show.
+    /// Whether the head rests at the window's end, as far as IMU, lidar and the estimated speed show.
     pub(super) fn is_resting(&self) -> bool {
         let end_s = self.nominal.end_s() - REST_MARGIN_S;
-        self.rest.is_some() || self.rests.at(end_s)
+        self.sees_rest && (self.rest.is_some() || self.rests.at(end_s))
+    }
+
+    /// The same window, which does not see whether the head rests until it matches surfaces.
+    pub(super) fn without_seeing_rest(self) -> Self {
+        Self { sees_rest: false, ..self }
     }
 
     /// When it begins, IMU time, s.

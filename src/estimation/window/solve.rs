@@ -89,6 +89,7 @@ impl Window {
             }
             self.apply(&x, first, &layout, &mut total);
             self.knows_speed |= !matches.all.is_empty();
+            self.sees_rest |= !matches.all.is_empty();
             neighbours.moved(by.shift + ARM_M * by.turn);
             solved.spent.correction_s += watch.lap_s();
             solved.last_correction_m = by.most();
