@@ -34,7 +34,7 @@ const GAUGE: u64 = u64::MAX - 1;
 const FIRST_MARK: u64 = GAUGE - 1;
 /// A turn counts in an alignment as much as a shift by this times the angle, m: it holds one of a head that stays in one
 /// place, and is nothing beside any way.
-const TURN_LEVER_M: f64 = 0.3;
+const TURN_LEVER_M: f64 = 0.05;
 const _: () = assert!(GYRO_BIAS == 0, "the border begins with what is carried of it");
 
 /// Of what a window begins with, by itself.
