@@ -67,8 +67,10 @@ pub struct WindowReport {
     pub speed_m_per_s: f64,
     /// Whether the head moves, so that surfaces should be observed again.
     pub moving: bool,
-    /// Whether it rests at the window's end.
+    /// Whether it rests at the window's end, as far as the IMU and the estimated speed show.
     pub resting: bool,
+    /// Whether the lidar would show it if it did not rest.
+    pub sees_rest: bool,
     /// What is wrong with the window's solution, if anything.
     pub trouble: Option<WarningKind>,
     /// Time it took, s. With its parts the one figure that differs from run to run.

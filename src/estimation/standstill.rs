@@ -17,9 +17,9 @@ const DIFFER: (f64, f64) = (0.1, 0.03);
 const MOVED: (f64, usize) = (0.12, 20);
 /// Or when it shifted by more than this, m.
 const SHIFTED_M: f64 = 0.03;
-/// Directions whose shift is off by more than this, m, hardly count: something moves there, or an edge.
-const OUTLIER_M: f64 = 0.03;
-const REWEIGHTED: usize = 5;
+/// Directions whose shift is off by more than this, m, hardly count: something moves there, or an edge. Narrower from
+/// one solution to the next.
+const OUTLIERS_M: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.03, 0.03];
 /// A cell is of one surface when its points leave a line by less than this share of their extent, and it is met at a
 /// cosine of more than this.
 const STRAIGHT: f64 = 0.1;
@@ -106,23 +106,24 @@ fn shift(facing: &[(Vector, f64)]) -> Standstill {
     if facing.len() < MOVED.1 {
         return Standstill::Unknown;
     }
+    let mean = facing.iter().map(|(normal, _)| normal * normal.transpose()).sum::<Matrix3<f64>>() / facing.len() as f64;
+    let parts = SymmetricEigen::new(mean);
+    let known: Vec<Vector> =
+        (0..3).filter(|k| parts.eigenvalues[*k] > FACED).map(|k| parts.eigenvectors.column(k).into()).collect();
+    // Along the other directions the shift stays zero.
+    let within = known.iter().map(|along| along * along.transpose()).sum::<Matrix3<f64>>();
     let mut shift = Vector::zeros();
-    let mut faced = 0;
-    for _ in 0..REWEIGHTED {
-        let (mut information, mut right, mut total) = (Matrix3::zeros(), Vector::zeros(), 0.0);
+    for outlier_m in OUTLIERS_M {
+        let (mut information, mut right) = (Matrix3::identity() - within, Vector::zeros());
         for (normal, came_m) in facing {
-            let weight = 1.0 / (1.0 + ((came_m - normal.dot(&shift)) / OUTLIER_M).powi(2));
+            let weight = 1.0 / (1.0 + ((came_m - normal.dot(&shift)) / outlier_m).powi(2));
+            let normal = within * normal;
             information += weight * normal * normal.transpose();
             right += weight * came_m * normal;
-            total += weight;
         }
-        let parts = SymmetricEigen::new(information / total);
-        let known = (0..3).filter(|k| parts.eigenvalues[*k] > FACED);
-        let along = |k: usize| -> Vector { parts.eigenvectors.column(k).into() };
-        shift = known.clone().map(|k| along(k) * along(k).dot(&right) / (total * parts.eigenvalues[k])).sum();
-        faced = known.count();
+        shift = information.try_inverse().unwrap_or_default() * right;
     }
-    match faced {
+    match known.len() {
         _ if shift.norm() > SHIFTED_M => Standstill::Moves,
         0 | 1 => Standstill::Unknown,
         _ => Standstill::Rests,

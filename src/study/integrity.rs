@@ -23,6 +23,8 @@ const ALIGNED_SHARE: f64 = 0.47;
 /// A result is not good where the bound exceeds both of these, m and as a share of the way.
 const LARGE_BOUND_M: f64 = 0.05;
 const LARGE_SHARE: f64 = 0.01;
+/// And of no use where it exceeds so many times as much: 1 m and a fifth of the way.
+const USELESS: f64 = 20.0;
 /// A turn counts in the alignment as much as a shift by this times the angle, m: as in the covariance against it.
 const TURN_LEVER_M: f64 = 0.05;
 
@@ -50,7 +52,8 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
         let (covariance, radius_m) = current?;
         let (position, attitude) = blocks(covariance);
         // What is aligned together is as doubtful as its end.
-        let after = doubts.partition_point(|(at, _)| *at < stamp.max(aligned_until)).min(doubts.len().saturating_sub(1));
+        let after =
+            doubts.partition_point(|(at, _)| *at < stamp.max(aligned_until)).min(doubts.len().saturating_sub(1));
         let factor = doubts.get(after).map_or(1.0, |(_, factor)| *factor);
         let sigma = |k: usize| {
             if k < 3 { position[(k, k)].sqrt() } else { attitude[(k - 3, k - 3)].sqrt().to_degrees() }
@@ -229,14 +232,18 @@ pub(super) fn large_error_m(way_m: f64) -> f64 {
     LARGE_BOUND_M.max(LARGE_SHARE * way_m)
 }
 
-/// Where the bound is larger than a good result allows.
+/// Where the bound is larger than a good result allows, or any.
 fn uncertain(bounds: &[PoseBound], way_m: f64) -> Option<Finding> {
-    let most_m = large_error_m(way_m);
+    let lost = beyond(bounds, USELESS * large_error_m(way_m), Status::Lost);
+    lost.or_else(|| beyond(bounds, large_error_m(way_m), Status::Degraded))
+}
+
+fn beyond(bounds: &[PoseBound], most_m: f64, status: Status) -> Option<Finding> {
     let is_large = |bound: &&PoseBound| bound.bound_m_99 > most_m;
     let from = bounds.iter().find(is_large)?.stamp;
     let to = bounds.iter().rev().find(is_large)?.stamp;
     let bound_m = bounds.iter().map(|bound| bound.bound_m_99).fold(0.0, f64::max);
-    Some(Finding { status: Status::Degraded, cause: Cause::Uncertain { bound_m }, from, to })
+    Some(Finding { status, cause: Cause::Uncertain { bound_m }, from, to })
 }
 
 /// Where closing loops moved the trajectory by more than the bound on its error.

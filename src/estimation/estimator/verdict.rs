@@ -39,6 +39,7 @@ pub(super) fn report(
         speed_m_per_s: window.speed_m_per_s(),
         moving,
         resting: window.is_resting(),
+        sees_rest: window.sees_rest(),
         trouble,
         elapsed_s,
         spent,

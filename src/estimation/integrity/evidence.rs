@@ -162,19 +162,29 @@ fn of_windows(windows: &[WindowReport]) -> Vec<Finding> {
     add(over_stretches(windows, fastest, (SPEED_M_PER_S, SPEED_M_PER_S)), &|speed_m_per_s, _, _| Cause::Speed {
         speed_m_per_s,
     });
-    all.extend(unobserved(windows));
+    // A head that neither rests nor observes any surface again for most of the run: its way is not known at all.
+    let (unobserved, assumed) = (for_most(windows, |w| !w.resting), for_most(windows, |w| w.resting && !w.sees_rest));
+    all.extend(unobserved.map(|(seconds, from, to)| Finding {
+        status: Status::Lost,
+        cause: Cause::FewMatches { seconds },
+        from,
+        to,
+    }));
+    all.extend(assumed.map(|(seconds, from, to)| Finding {
+        status: Status::Degraded,
+        cause: Cause::RestAssumed { seconds },
+        from,
+        to,
+    }));
     all
 }
 
-/// A head that neither rests nor observes any surface again for most of the run: its way is not known at all.
-fn unobserved(windows: &[WindowReport]) -> Option<Finding> {
-    let is_unobserved = |w: &&WindowReport| w.matches + w.view_matches == 0 && !w.resting;
-    let without = windows.iter().filter(is_unobserved).count();
-    let (first, last) = (windows.first()?, windows.last()?);
-    let seconds = last.stamp.seconds_since(first.stamp) * without as f64 / windows.len() as f64;
-    let cause = Cause::FewMatches { seconds };
-    let (from, to) = (first.stamp, last.stamp);
-    (without as f64 > UNOBSERVED * windows.len() as f64).then_some(Finding { status: Status::Lost, cause, from, to })
+/// For how many seconds, from and to when windows without any match are `such`, where that is most of the run.
+fn for_most(windows: &[WindowReport], such: impl Fn(&WindowReport) -> bool) -> Option<(f64, Stamp, Stamp)> {
+    let (from, to) = (windows.first()?.stamp, windows.last()?.stamp);
+    let without = windows.iter().filter(|w| w.matches + w.view_matches == 0 && such(w)).count();
+    let share = without as f64 / windows.len() as f64;
+    (share > UNOBSERVED).then_some((share * to.seconds_since(from), from, to))
 }
 
 fn of_warning(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
@@ -263,7 +273,13 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
         let late = &windows[(k + 1).saturating_sub(SETTLING_WINDOWS)..=k];
         let unsettled = unsettled(late).max(ill_conditioned(late));
         // A mismatch that no noise explains moves the estimate by more than in proportion.
-        (contradiction / SOUND.0).powi(2).max(residual_m / SOUND.1).max(scale).max(weak).max(unsettled).clamp(1.0, MOST_DOUBT)
+        (contradiction / SOUND.0)
+            .powi(2)
+            .max(residual_m / SOUND.1)
+            .max(scale)
+            .max(weak)
+            .max(unsettled)
+            .clamp(1.0, MOST_DOUBT)
     };
     let enlarge = |k: usize| {
         most = most.max(factor(k));
@@ -313,6 +329,7 @@ mod tests {
             speed_m_per_s: 1.0,
             moving: true,
             resting: false,
+            sees_rest: true,
             trouble: None,
             elapsed_s: 0.0,
             spent: TimeSpent::default(),
@@ -376,6 +393,9 @@ mod tests {
         assert_eq!(judged(&windows, &[])[0].status, Status::Lost);
         windows.iter_mut().for_each(|window| window.resting = true);
         assert_eq!(judged(&windows, &[]), vec![]);
+        windows.iter_mut().for_each(|window| window.sees_rest = false);
+        let found = judged(&windows, &[]);
+        assert_eq!((found[0].status, found[0].cause.kind()), (Status::Degraded, "rest_assumed"));
     }
 
     #[test]

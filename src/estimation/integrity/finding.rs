@@ -58,6 +58,11 @@ pub enum Cause {
         /// How long, s.
         seconds: f64,
     },
+    /// The head is taken for resting by its IMU alone: what it sees would not change if it moved evenly.
+    RestAssumed {
+        /// For how long, s.
+        seconds: f64,
+    },
     /// Matched surfaces do not fit, root mean square, m.
     PoorFit {
         /// Median over the stretch, m.
@@ -133,7 +138,10 @@ impl Cause {
     pub(super) fn size(&self) -> f64 {
         match self {
             Self::Contradiction { times } => *times,
-            Self::FewMatches { seconds } | Self::Gap { seconds, .. } | Self::NotCovered { seconds } => *seconds,
+            Self::FewMatches { seconds }
+            | Self::RestAssumed { seconds }
+            | Self::Gap { seconds, .. }
+            | Self::NotCovered { seconds } => *seconds,
             Self::PoorFit { residual_m } => *residual_m,
             Self::NotRelocalised => 0.0,
             Self::Speed { speed_m_per_s } => *speed_m_per_s,
@@ -152,6 +160,7 @@ impl Cause {
         match self {
             Self::Contradiction { .. } => "contradiction",
             Self::FewMatches { .. } => "few_matches",
+            Self::RestAssumed { .. } => "rest_assumed",
             Self::PoorFit { .. } => "poor_fit",
             Self::NotRelocalised => "not_relocalised",
             Self::Speed { .. } => "speed",
@@ -178,6 +187,12 @@ impl fmt::Display for Cause {
             ),
             Self::FewMatches { seconds } => {
                 write!(f, "too few surfaces observed again for {seconds:.1} s; position from the IMU only")
+            }
+            Self::RestAssumed { seconds } => {
+                write!(
+                    f,
+                    "taken for resting for {seconds:.1} s by the IMU alone; the surfaces in view would not show even motion"
+                )
             }
             Self::PoorFit { residual_m } => {
                 write!(f, "matched surfaces fit to {:.0} mm only; map and trajectory are distorted", residual_m * 1e3)

@@ -81,7 +81,7 @@ pub(super) struct Window {
     rests: Rests,
     /// Whether the speed is known: a head that began under way feels at rest until surfaces were matched.
     knows_speed: bool,
-    /// Whether the lidar shows that the head rests where it feels to, and not the IMU alone.
+    /// Whether the lidar would show it if the head did not rest.
     sees_rest: bool,
     workspace: Workspace,
 }
@@ -182,10 +182,15 @@ impl Window {
         self.nominal.at(self.nominal.end_s(), &self.biases.gyro).velocity.norm()
     }
 
-    /// Whether the head rests at the window's end, as far as IMU, lidar and the estimated speed show.
+    /// Whether the head rests at the window's end, as far as the IMU and the estimated speed show.
     pub(super) fn is_resting(&self) -> bool {
         let end_s = self.nominal.end_s() - REST_MARGIN_S;
-        self.sees_rest && (self.rest.is_some() || self.rests.at(end_s))
+        self.rest.is_some() || self.rests.at(end_s)
+    }
+
+    /// Whether the lidar would show it if the head did not rest.
+    pub(super) fn sees_rest(&self) -> bool {
+        self.sees_rest
     }
 
     /// The same window, which does not see whether the head rests until it matches surfaces.
