@@ -42,7 +42,8 @@ fn words(info: &RecordingInfo) -> String {
         true,
     );
     let clocks: Vec<_> = info.topics.iter().filter_map(clock_row).collect();
-    let clocks = report::table(&["stamps against log time", "offset ms", "drift ppm", "jitter ms"], &clocks, true);
+    let clocks =
+        report::table(&["stamps against log time", "offset ms", "drift ppm", "jitter ms", "pattern"], &clocks, true);
     format!("{head}\n\n{topics}\n{clocks}")
 }
 
@@ -68,5 +69,6 @@ fn clock_row(topic: &TopicInfo) -> Option<Vec<String>> {
         format!("{:.3}", clock.offset_s * 1e3),
         format!("{:.2}", clock.drift_ppm),
         format!("{:.3}", clock.jitter_s * 1e3),
+        topic.pattern.unwrap_or("-").to_owned(),
     ])
 }

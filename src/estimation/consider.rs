@@ -225,28 +225,54 @@ impl Consider {
 
     /// Makes the beginning part of the gauge.
     pub(super) fn gauge_by_beginning(&mut self) {
+        let own = self.beginning.fixed_view::<6, 6>(0, 0).into_owned();
+        let with_beginning = self.beginning.fixed_rows::<6>(0).into_owned();
+        let with_views: Vec<Matrix6<f64>> =
+            self.views.iter().map(|view| view.with_beginning.fixed_columns::<6>(0).transpose()).collect();
+        self.gauge_by(self.pivot, own, with_beginning, &with_views);
+    }
+
+    /// Makes the gauge anew of the beginnings that were marked up to `until`.
+    pub(super) fn gauge_by_marks(&mut self, until: Stamp) {
+        self.forget(GAUGE);
+        self.gauge = None;
+        for mark in self.marks.clone().iter().take_while(|mark| mark.stamp <= until) {
+            let Some(at) = self.views.iter().position(|view| view.number == mark.number) else { continue };
+            let with_views: Vec<Matrix6<f64>> = (0..self.views.len()).map(|other| self.between(at, other)).collect();
+            self.gauge_by(mark.pivot, with_views[at], self.views[at].with_beginning, &with_views);
+        }
+    }
+
+    /// Makes an error about `pivot` part of the gauge, of covariance `own`, and `with` the beginning and the views.
+    fn gauge_by(
+        &mut self,
+        pivot: Vector,
+        own: Matrix6<f64>,
+        with_beginning: SMatrix<f64, 6, CARRIED>,
+        with_views: &[Matrix6<f64>],
+    ) {
         let at = self.place_of_gauge().unwrap_or_else(|| {
             let with_views = vec![Matrix6::zeros(); self.views.len() + 1];
             self.views.push(View { number: GAUGE, with_beginning: SMatrix::zeros(), with_views });
             self.views.len() - 1
         });
-        let gauge = self.gauge.unwrap_or(Gauge { pivot: self.pivot, normal: Matrix6::zeros() });
-        // How the gauge moves the beginning, and how the beginning's error moves it.
-        let by = error_at(&(self.pivot - gauge.pivot));
+        let gauge = self.gauge.unwrap_or(Gauge { pivot, normal: Matrix6::zeros() });
+        // How the gauge moves the place, and how the error moves the gauge.
+        let by = error_at(&(pivot - gauge.pivot));
         let mut weight = Matrix6::identity();
         weight.fixed_view_mut::<3, 3>(3, 3).scale_mut(TURN_LEVER_M * TURN_LEVER_M);
         let from = by.transpose() * weight * error_at(&Vector::zeros());
-        let own = from * self.beginning.fixed_view::<6, 6>(0, 0) * from.transpose();
-        let with_old = from * self.views[at].with_beginning.fixed_columns::<6>(0).transpose();
+        let own = from * own * from.transpose();
+        let with_old = from * with_views.get(at).copied().unwrap_or_default();
         for other in (0..self.views.len()).filter(|other| *other != at) {
-            let more = from * self.views[other].with_beginning.fixed_columns::<6>(0).transpose();
+            let more = from * with_views[other];
             if other < at {
                 self.views[at].with_views[other] += more;
             } else {
                 self.views[other].with_views[at] += more.transpose();
             }
         }
-        self.views[at].with_beginning += from * self.beginning.fixed_rows::<6>(0);
+        self.views[at].with_beginning += from * with_beginning;
         self.views[at].with_views[at] += own + with_old + with_old.transpose();
         self.gauge = Some(Gauge { normal: gauge.normal + by.transpose() * weight * by, ..gauge });
     }
@@ -256,6 +282,11 @@ impl Consider {
         let number = self.marks.last().map_or(FIRST_MARK, |last| last.number - 1);
         self.keep(number);
         self.marks.push(Mark { number, pivot: self.pivot, stamp });
+    }
+
+    /// When the first beginning was that is still marked.
+    pub(super) fn first_mark(&self) -> Option<Stamp> {
+        self.marks.first().map(|mark| mark.stamp)
     }
 
     /// The gauge is made: when the marked beginnings were, and the covariances of their errors against it.
@@ -350,8 +381,8 @@ mod tests {
                 let own = DMatrix::from_fn(6, 6, |r, c| own[(r, c)]) * beginning.rows(0, 6);
                 equations.rows_mut(6 * step, 6).copy_from(&(&weight * DMatrix::from_fn(6, 6, |r, c| by[(r, c)])));
                 errors.rows_mut(6 * step, 6).copy_from(&(&weight * &own));
+                consider.mark_beginning(Stamp::from_nanos(step as i64));
                 if step == 2 {
-                    consider.mark_beginning(Stamp::from_nanos(9));
                     marked = Some((pivot, own));
                 }
             }
@@ -368,9 +399,17 @@ mod tests {
         };
         let told = consider.covariance_against_gauge(&place);
         let (mark, own) = marked.unwrap();
+        // Made anew of the same beginnings the gauge is the same; of half of them it is another.
+        let mut of_half = consider.clone();
+        of_half.gauge_by_marks(Stamp::from_nanos(1));
+        assert!((of_half.covariance_against_gauge(&place) - told).norm() > 0.01 * told.norm());
+        let mut of_all = consider.clone();
+        of_all.gauge_by_marks(Stamp::from_nanos(3));
+        let anew = of_all.covariance_against_gauge(&place);
         let marks = consider.take_marks();
-        assert_eq!(marks[0].0, Stamp::from_nanos(9));
-        let pairs = [(told, left(&at(&beginning, &pivot), &place)), (marks[0].1, left(&own, &mark))];
+        assert_eq!(marks[2].0, Stamp::from_nanos(2));
+        let expected = left(&at(&beginning, &pivot), &place);
+        let pairs = [(told, expected.clone()), (anew, expected), (marks[2].1, left(&own, &mark))];
         for (told, expected) in pairs {
             for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
                 assert_relative_eq!(told[(r, c)], expected[(r, c)], epsilon = 1e-8, max_relative = 1e-8);

@@ -86,7 +86,8 @@ pub struct OpenLoop {
     pub trajectory: Trajectory,
     /// The poses with velocity, biases and clock offset.
     pub poses: Vec<EstimatedPose>,
-    /// How uncertain poses of the first [`GAUGED_S`] seconds are against the alignment that these seconds give: m^2, m
+    /// How uncertain poses of the first twice [`GAUGED_S`] seconds are against the alignment that the first seconds
+    /// give, [`GAUGED_S`] or half of a shorter run: m^2, m
     /// rad, rad^2. Empty where the estimate began anew in this time.
     pub gauged: Vec<(Stamp, PoseCovariance)>,
     /// The clock offset after each window: how much later the IMU stamps an instant than the lidar, s, by lidar time.

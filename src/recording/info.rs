@@ -7,6 +7,7 @@ use crate::recording::container::{Channel, ChannelId, RawMessage};
 use crate::recording::schema::MessageType;
 use crate::recording::wire::Decoder;
 use crate::recording::{Loss, Reader, RecordingError};
+use crate::signal::StampPattern;
 use crate::time::{Span, Stamp};
 use clock::ClockFit;
 use intervals::Intervals;
@@ -47,8 +48,10 @@ pub struct TopicInfo {
     pub first_log_ns: Option<i64>,
     /// Log time of the last, ns.
     pub last_log_ns: Option<i64>,
-    /// How often they come, Hz: one over the median of the intervals at the start.
+    /// How often they come, Hz, at the start.
     pub rate_hz: Option<f64>,
+    /// How their stamps lie about that: `regular`, `delayed`, `bursts` or `irregular`.
+    pub pattern: Option<&'static str>,
     /// Longest time between one and the next, s.
     pub longest_gap_s: Option<f64>,
     /// Times between one and the next beyond the length that was asked for.
@@ -151,6 +154,7 @@ fn topic_info(channel: &Channel, gathered: Gathered) -> TopicInfo {
         first_log_ns: gathered.first.map(Stamp::nanos),
         last_log_ns: gathered.last.map(Stamp::nanos),
         rate_hz: intervals.period.map(|period| 1.0 / period.seconds()),
+        pattern: intervals.pattern.map(StampPattern::name),
         longest_gap_s: intervals.longest.map(Span::seconds),
         gaps: intervals.gaps,
         missing: intervals.missing,

@@ -1,13 +1,15 @@
-//! Spectra, transfer functions and Allan deviation of sampled signals; no physics.
+//! Spectra, transfer functions and Allan deviation of sampled signals, and the regularity of their stamps; no physics.
 
 mod allan;
 mod chi_squared;
+mod regularity;
 mod segments;
 mod spectrum;
 mod transfer;
 
 pub use allan::{AllanPoint, allan_deviation};
 pub use chi_squared::chi_squared_quantile;
+pub use regularity::{Regularity, StampPattern};
 pub use segments::{Segments, Window};
 pub use spectrum::{Spectrum, power_density};
 pub use transfer::{TransferPoint, transfer_function};

@@ -1,6 +1,7 @@
+use crate::signal::{Regularity, StampPattern};
 use crate::time::Stamp;
 
-/// Intervals from which the rhythm is learned.
+/// Stamps from which the rhythm is learned.
 const LEARNING: usize = 1000;
 /// The share of missing messages that is passed over: stamps are rounded, and a run may end within a turn.
 const PASSED_OVER: f64 = 0.005;
@@ -11,13 +12,13 @@ pub(super) struct Cadence {
     first: Option<Stamp>,
     last: Option<Stamp>,
     count: usize,
-    intervals_s: Vec<f64>,
+    learning_s: Vec<f64>,
 }
 
 impl Cadence {
     pub(super) fn take(&mut self, stamp: Stamp) {
-        if let Some(last) = self.last.filter(|last| stamp > *last && self.intervals_s.len() < LEARNING) {
-            self.intervals_s.push(stamp.seconds_since(last));
+        if self.learning_s.len() < LEARNING && self.last.is_none_or(|last| stamp >= last) {
+            self.learning_s.push(stamp.seconds_since(self.first.unwrap_or(stamp)));
         }
         self.first = Some(self.first.map_or(stamp, |first| first.min(stamp)));
         self.last = Some(self.last.map_or(stamp, |last| last.max(stamp)));
@@ -43,15 +44,10 @@ impl Cadence {
         told.then(|| format!("{missing:.0} of about {expected:.0} {what} are missing"))
     }
 
-    /// The mean of the intervals that are no gaps, as the median tells gaps, and how far jitter spreads the others.
+    /// The period; none of a sensor without one.
     fn period_s(&self) -> Option<f64> {
-        let mut sorted = self.intervals_s.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let quarter = |quarters: usize| sorted.get(sorted.len() * quarters / 4).copied();
-        let (median, spread) = (quarter(2)?, quarter(3)? - quarter(1)?);
-        let gap = median + (0.5 * median).max(4.0 * spread);
-        let whole: Vec<f64> = sorted.into_iter().filter(|s| *s < gap).collect();
-        Some(whole.iter().sum::<f64>() / whole.len() as f64).filter(|period| *period > 0.0)
+        let found = Regularity::of(&self.learning_s)?;
+        Some(found.period_s).filter(|_| found.pattern != StampPattern::Irregular)
     }
 }
 

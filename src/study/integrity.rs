@@ -71,14 +71,15 @@ fn aligned_until(trajectory: &Trajectory) -> Option<Stamp> {
 }
 
 /// The radii that follow from the covariances; over the seconds of the alignment, which is known only at their end, the
-/// larger of those of the marked poses before and after.
+/// larger of those of the marked poses before and after. A run that is aligned over its half has them throughout.
 fn radii(run: &OpenLoopRun) -> Vec<f64> {
     let mut radii_m = run.radii_m.clone();
-    let Some((first, _)) = run.covariances.first() else { return radii_m };
+    let Some(((first, _), (last, _))) = run.covariances.first().zip(run.covariances.last()) else { return radii_m };
+    let is_short = last.seconds_since(*first) < 2.0 * GAUGED_S;
     let marks_m: Vec<f64> = run.gauged.iter().map(|(_, covariance)| radius_99(&blocks(covariance).0)).collect();
-    let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| stamp.seconds_since(*first) < GAUGED_S;
+    let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| is_short || stamp.seconds_since(*first) < GAUGED_S;
     let aligned = run.covariances.partition_point(is_aligned);
-    let end_m = aligned.checked_sub(1).map_or(0.0, |last| radii_m[last]);
+    let end_m = aligned.checked_sub(1).filter(|_| !is_short).map_or(0.0, |last| radii_m[last]);
     let largest_m = radii_m[..aligned].iter().copied().fold(0.0, f64::max);
     for (radius_m, (stamp, _)) in radii_m[..aligned].iter_mut().zip(&run.covariances) {
         let after = run.gauged.partition_point(|(at, _)| at <= stamp);

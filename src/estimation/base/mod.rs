@@ -21,11 +21,12 @@ mod offset;
 mod smoother;
 
 use super::inertial::{InertialStream, Screen, Screened};
-use super::stamps::{Regularity, StampFilter};
+use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use super::{EstimationError, EstimatorSpec};
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::measurement::{ImuNoise, ImuSample};
+use crate::signal::Regularity;
 use crate::time::{Span, Stamp};
 use fixes::Fixes;
 

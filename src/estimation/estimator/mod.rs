@@ -22,7 +22,7 @@ use crate::estimation::{
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::surfel_map::SurfelMap;
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use std::time::Instant;
 
 /// A head that is faster than this, m/s, or turns faster than this, rad/s, should see surfaces again; one that does not
@@ -34,7 +34,7 @@ const MOVING: (f64, f64) = (0.3, 0.5);
 const RELUCTANTLY: f64 = 3.0;
 
 /// While the alignment is made, a beginning is marked so often, s.
-const MARKED_EVERY_S: f64 = 2.5;
+const MARKED_EVERY_S: f64 = 1.0;
 
 /// An IMU that is noisier than it was told by more than this factor is told of.
 const TELLING: f64 = 1.5;
@@ -172,7 +172,7 @@ impl Estimator {
         self.survey_window(Window::survey_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        self.gauged.append(&mut self.consider.take_marks());
+        self.gauge_by_half();
         let Self { poses, gauged, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
         let survey = survey.unwrap_or_default();
         let located = whereabouts.and_then(|whereabouts| whereabouts.found().cloned());
@@ -309,17 +309,29 @@ impl Estimator {
         Some(until_s)
     }
 
-    /// Over the first seconds, the beginning at `until_s` (IMU time), which is `stamp`, is part of the alignment.
+    /// Over the first seconds, the beginning at `until_s` (IMU time), which is `stamp`, is part of the alignment. For
+    /// twice as long beginnings are marked: a run that ends meanwhile is aligned over its first half.
     fn gauge(&mut self, until_s: f64, stamp: Stamp) {
         let end_s = *self.gauged_until_s.get_or_insert(until_s + GAUGED_S);
-        if until_s >= end_s {
+        if until_s >= end_s + GAUGED_S {
             self.gauged.append(&mut self.consider.take_marks());
             return;
         }
-        self.consider.gauge_by_beginning();
+        if until_s < end_s {
+            self.consider.gauge_by_beginning();
+        }
         if self.marked_s.is_none_or(|last_s| until_s - last_s >= MARKED_EVERY_S) {
             self.consider.mark_beginning(stamp);
             self.marked_s = Some(until_s);
+        }
+    }
+
+    /// The run ends: if beginnings are still marked, those of the first half are the alignment.
+    fn gauge_by_half(&mut self) {
+        if let (Some(first), Some(last)) = (self.consider.first_mark(), self.newest_pose) {
+            let half_s = (0.5 * last.seconds_since(first)).min(GAUGED_S);
+            self.consider.gauge_by_marks(first + Span::from_seconds(half_s));
+            self.gauged.append(&mut self.consider.take_marks());
         }
     }
 

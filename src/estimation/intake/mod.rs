@@ -9,11 +9,12 @@ use super::inertial::InertialStream;
 use super::initial::Noisier;
 use super::sight::Sight;
 use super::spec::EstimatorSpec;
-use super::stamps::{Regularity, StampFilter};
+use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use super::surfel::Beam;
 use super::{EstimationError, LeftOut, Warning, WarningKind};
 use crate::measurement::{Calibration, Measurement};
+use crate::signal::Regularity;
 use crate::time::{Span, Stamp};
 
 /// How much further than a stretch its intervals reach, s: room for the clock offset to change.

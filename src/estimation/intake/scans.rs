@@ -3,10 +3,11 @@
 use crate::estimation::EstimationError;
 use crate::estimation::sight::{Sight, is_in_plane};
 use crate::estimation::spec::EstimatorSpec;
-use crate::estimation::stamps::{Regularity, StampFilter};
+use crate::estimation::stamps::StampFilter;
 use crate::estimation::surfel::Beam;
 use crate::geometry::Pose;
 use crate::measurement::{Calibration, LidarScan};
+use crate::signal::Regularity;
 use std::collections::VecDeque;
 
 /// So many scans that equal the one before are frozen: the noise of a working lidar changes some range.

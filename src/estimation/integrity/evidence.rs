@@ -262,6 +262,7 @@ fn of_coverage(evidence: &Evidence) -> Option<Finding> {
 /// that was made stays in the map, so the factor never falls.
 pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
     let mut most = 1.0_f64;
+    let of = SETTLING_WINDOWS.min(windows.len());
     let near = |k: usize| &windows[k.saturating_sub(2)..(k + 3).min(windows.len())];
     let factor = |k: usize| {
         let contradiction = median(near(k).iter().map(|w| w.imu_contradiction).collect());
@@ -270,8 +271,8 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_DOUBT } else { 1.0 };
         let scale = windows[k].imu_matrix / SOUND.2;
-        let late = &windows[(k + 1).saturating_sub(SETTLING_WINDOWS)..=k];
-        let unsettled = unsettled(late).max(ill_conditioned(late));
+        let late = &windows[(k + 1).saturating_sub(of)..=k];
+        let unsettled = unsettled(late, of).max(ill_conditioned(late, of));
         // A mismatch that no noise explains moves the estimate by more than in proportion.
         (contradiction / SOUND.0)
             .powi(2)
@@ -288,19 +289,19 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
     (0..windows.len()).map(enlarge).collect()
 }
 
-/// By how much windows that do not settle err more than the covariance says; of few windows, little.
-fn unsettled(windows: &[WindowReport]) -> f64 {
+/// By how much windows that do not settle err more than the covariance says, those of `of` that there are.
+fn unsettled(windows: &[WindowReport], of: usize) -> f64 {
     let squares: f64 = windows.iter().map(|w| w.last_correction_m.powi(2)).sum();
     let unsettled = windows.iter().filter(|w| w.last_correction_m > UNSETTLED).count();
-    let share = unsettled as f64 / SETTLING_WINDOWS as f64;
-    let rms = (squares / SETTLING_WINDOWS as f64).sqrt();
+    let share = unsettled as f64 / of as f64;
+    let rms = (squares / of as f64).sqrt();
     (rms / SETTLED).max(1.0 + PER_SHARE * (share - UNSETTLED_SHARE))
 }
 
 /// By how much the covariance along the weakest direction is too small where windows that match constrain it badly.
-fn ill_conditioned(windows: &[WindowReport]) -> f64 {
+fn ill_conditioned(windows: &[WindowReport], of: usize) -> f64 {
     let matched: Vec<f64> = windows.iter().filter(|w| w.matches > 0 && !w.resting).map(|w| w.conditioning).collect();
-    let enough = 2 * matched.len() > SETTLING_WINDOWS;
+    let enough = 2 * matched.len() > of;
     if enough { (CONDITIONED.0 / median(matched).max(CONDITIONED.1)).sqrt() } else { 1.0 }
 }
 

@@ -1,9 +1,13 @@
 //! The times between messages, as they go by.
 
+use crate::signal::{Regularity, StampPattern};
 use crate::time::{Span, Stamp};
 
 /// Intervals from which the period is learned.
-const LEARNING: usize = 255;
+const LEARNING: usize = 1000;
+
+/// Of stamps that scatter so small a share of missing messages says nothing.
+const PASSED_OVER: f64 = 0.002;
 
 /// An interval of more periods than this has messages missing in it.
 const MISSING_BEYOND: f64 = 1.5;
@@ -11,8 +15,10 @@ const MISSING_BEYOND: f64 = 1.5;
 /// What the intervals of a topic are.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Summary {
-    /// Their median at the start.
+    /// The period at the start.
     pub period: Option<Span>,
+    /// How the stamps lie about it.
+    pub pattern: Option<StampPattern>,
     /// The longest.
     pub longest: Option<Span>,
     /// Those longer than a gap.
@@ -28,6 +34,9 @@ pub struct Summary {
 pub struct Intervals {
     latest: Option<Stamp>,
     learning: Vec<Span>,
+    /// Intervals so far, and what they take together.
+    count: u64,
+    taken: Span,
     summary: Summary,
 }
 
@@ -44,6 +53,8 @@ impl Intervals {
             return;
         }
         self.latest = Some(time);
+        self.count += 1;
+        self.taken = self.taken + interval;
         self.summary.longest = self.summary.longest.max(Some(interval));
         self.summary.gaps += u64::from(interval > gap);
         match self.summary.period {
@@ -55,13 +66,19 @@ impl Intervals {
         }
     }
 
-    /// Takes the median of the intervals so far for the period, and counts what is missing in them.
+    /// Learns the period from the intervals so far, and counts what is missing in them.
     fn learn(&mut self) {
-        let mut sorted = self.learning.clone();
-        sorted.sort_unstable();
-        let period = sorted.get(sorted.len() / 2).copied().filter(|period| *period > Span::ZERO);
-        let Some(period) = period else { return self.learning.clear() };
-        self.summary.period = Some(period);
+        let mut stamp_s = 0.0;
+        let after = self.learning.iter().map(|interval| {
+            stamp_s += interval.seconds();
+            stamp_s
+        });
+        let stamps_s: Vec<f64> = std::iter::once(0.0).chain(after).collect();
+        let Some(found) = Regularity::of(&stamps_s).or_else(|| only_interval(&stamps_s)) else {
+            return self.learning.clear();
+        };
+        let period = Span::from_seconds(found.period_s);
+        (self.summary.period, self.summary.pattern) = (Some(period), Some(found.pattern));
         self.summary.missing += self.learning.drain(..).map(|interval| missing_in(interval, period)).sum::<u64>();
     }
 
@@ -70,8 +87,26 @@ impl Intervals {
         if self.summary.period.is_none() {
             self.learn();
         }
+        self.summary.missing = match (self.summary.pattern, self.summary.period) {
+            (Some(StampPattern::Delayed | StampPattern::Bursts), Some(period)) => self.missing_in_all(period),
+            (Some(StampPattern::Irregular), _) => 0,
+            _ => self.summary.missing,
+        };
         self.summary
     }
+
+    /// What is missing in all: a message that comes late makes one interval long and the next one short.
+    fn missing_in_all(&self, period: Span) -> u64 {
+        let all_s = self.taken.seconds();
+        let missing = (all_s / period.seconds()).round() - self.count as f64;
+        if missing > PASSED_OVER * self.count as f64 { missing as u64 } else { 0 }
+    }
+}
+
+/// Of two messages the only interval is the period.
+fn only_interval(stamps_s: &[f64]) -> Option<Regularity> {
+    let &[from_s, to_s] = stamps_s else { return None };
+    (to_s > from_s).then_some(Regularity { period_s: to_s - from_s, jitter_s: 0.0, pattern: StampPattern::Regular })
 }
 
 fn missing_in(interval: Span, period: Span) -> u64 {
@@ -95,6 +130,19 @@ mod tests {
         assert_eq!((found.missing, found.gaps, found.out_of_order), (100, 0, 0));
         assert_eq!(found.period, Some(Span::from_nanos(25_000_000)));
         assert_eq!(found.longest, Some(Span::from_nanos(50_000_000)));
+    }
+
+    #[test]
+    fn messages_that_a_bus_delays_are_not_missing() {
+        // 10 ms apart, late by 0 to 29 ms and 5 ms on average, in order; or four at once.
+        let delays = (0..4000_i64).map(|k| k * 7919 % 97).map(|x| if x > 80 { x % 30 } else { x % 7 });
+        let late: Vec<i64> = delays.enumerate().map(|(k, delay)| k as i64 * 10 + delay).collect();
+        let mut in_order = late.clone();
+        in_order.sort_unstable();
+        let found = summary(in_order.into_iter());
+        assert_eq!((found.missing, found.pattern), (0, Some(StampPattern::Delayed)));
+        let found = summary((0..4000).map(|k| k / 4 * 40));
+        assert_eq!((found.missing, found.pattern), (0, Some(StampPattern::Bursts)));
     }
 
     #[test]
