@@ -270,7 +270,7 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
         let is_weak = |w: &WindowReport| matches!(w.trouble, Some(WarningKind::WeakGeometry { .. }));
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_DOUBT } else { 1.0 };
-        let scale = windows[k].imu_matrix / SOUND.2;
+        let scale = (windows[k].imu_matrix / SOUND.2).powi(2);
         let late = &windows[(k + 1).saturating_sub(of)..=k];
         let unsettled = unsettled(late, of).max(ill_conditioned(late, of));
         // A mismatch that no noise explains moves the estimate by more than in proportion.

@@ -78,7 +78,7 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -
             }
         });
         for axis in summary.axes.iter().filter(|axis| *axis != by) {
-            all.extend(told.iter().map(|level| level_table(summary, axis, Some((by, level)), true)));
+            all.extend(told.iter().map(|level| level_table(summary, axis, Some((by, level)), &summary.measures, true)));
         }
     }
     for (title, header, rows) in all {
@@ -88,6 +88,9 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -
     format!("{text}\n{}\n", legend(summary))
 }
 
+/// So many measures, each with its ratio, stand side by side in a terminal.
+const ACROSS: usize = 3;
+
 type TableOfWords = (String, Vec<String>, Vec<Vec<String>>);
 
 fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TableOfWords> {
@@ -96,7 +99,11 @@ fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TableOfWords> {
     }
     let is_shown = |axis: &&Axis| matches!(axis.extent(), Extent::Levels(1..=SHOWN) | Extent::Weighted(1..=SHOWN, _));
     let axes = plan.axes().iter().filter(is_shown);
-    axes.map(|axis| level_table(summary, &axis.name, None, bands)).collect()
+    let across = if bands { summary.measures.len().max(1) } else { ACROSS };
+    let of_axis = |axis: &Axis| {
+        summary.measures.chunks(across).map(|some| level_table(summary, &axis.name, None, some, bands)).collect()
+    };
+    axes.flat_map(|axis: &Axis| -> Vec<TableOfWords> { of_axis(axis) }).collect()
 }
 
 /// Axes by measures: rank correlations.
@@ -115,17 +122,23 @@ fn trend_table(summary: &Summary) -> TableOfWords {
     ("Rank correlation of each measure with each axis".to_owned(), header, summary.axes.iter().map(row).collect())
 }
 
-/// Levels by measures: median, with `bands` the quartiles too, and the ratio to the first level.
-fn level_table(summary: &Summary, axis: &str, within: Option<(&str, &str)>, bands: bool) -> TableOfWords {
+/// Levels by some of the measures: median, with `bands` the quartiles too, and the ratio to the first level.
+fn level_table(
+    summary: &Summary,
+    axis: &str,
+    within: Option<(&str, &str)>,
+    measures: &[Measure],
+    bands: bool,
+) -> TableOfWords {
     let mut header = vec![axis.to_owned()];
-    for measure in &summary.measures {
+    for measure in measures {
         header.extend([format!("{} {}", measure.short(), measure.unit().0), "ratio".to_owned()]);
     }
     let level_of = within.map(|(_, level)| level);
-    let Some(first) = summary.measures.first() else { return (String::new(), header, Vec::new()) };
+    let Some(first) = measures.first() else { return (String::new(), header, Vec::new()) };
     let row = |line: &Line| {
         let mut cells = vec![line.level.clone()];
-        for measure in &summary.measures {
+        for measure in measures {
             match summary.line(axis, &line.level, level_of, *measure) {
                 Some(line) => cells.extend([figures(line, bands), ratio(line)]),
                 None => cells.extend([String::new(), String::new()]),
