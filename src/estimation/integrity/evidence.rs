@@ -39,6 +39,8 @@ const SETTLING_WINDOWS: usize = 40;
 /// 0.5 mm where errors are a few millimetres; 1 to 4 mm where they are centimetres, because another choice of matches
 /// would give another solution.
 const SETTLED: f64 = 0.0005;
+/// No single window counts for more than this: behind a gap or a shock the first one jumps.
+const LARGEST_STEP: f64 = 0.01;
 /// A window whose last correction is larger has not settled. 3 to 15 % of the windows in most places, 40 to 60 % on
 /// stairs; each share more enlarges the bound by [`PER_SHARE`].
 const UNSETTLED: f64 = 0.0002;
@@ -291,7 +293,7 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
 
 /// By how much windows that do not settle err more than the covariance says, those of `of` that there are.
 fn unsettled(windows: &[WindowReport], of: usize) -> f64 {
-    let squares: f64 = windows.iter().map(|w| w.last_correction_m.powi(2)).sum();
+    let squares: f64 = windows.iter().map(|w| w.last_correction_m.min(LARGEST_STEP).powi(2)).sum();
     let unsettled = windows.iter().filter(|w| w.last_correction_m > UNSETTLED).count();
     let share = unsettled as f64 / of as f64;
     let rms = (squares / of as f64).sqrt();

@@ -38,6 +38,8 @@ const SWEPT: f64 = 0.25;
 
 /// A head whose speed is known no better than this is under way, m/s.
 const UNDER_WAY_M_PER_S: f64 = 5.0;
+/// Where the velocity may have changed unseen by more than this, surfaces match from farther off for a second, m/s.
+const SHOCK_M_PER_S: f64 = 0.1;
 
 /// How exactly a window is put into a map before it is matched with it, rad and m.
 const FOUND: [f64; 2] = [0.05, 0.2];
@@ -71,8 +73,10 @@ pub(super) struct Window {
     start: Start,
     /// Whether it is the first one, begun in motion: level and biases are guesses, and surfaces match from farther off.
     gropes: bool,
-    /// Whether the IMU was silent for a while in its newest stretch, so that it leapt.
+    /// Whether the IMU was silent for a while in its newest stretch, so that it leapt, or clipped there or before.
     leapt: bool,
+    /// By how much the velocity may have changed unseen over the newest stretch, standard deviation, m/s.
+    shock_m_per_s: f64,
     /// While the head has not moved yet: what the IMU says at rest.
     rest: Option<Rest>,
     /// Until when it rested, IMU time, s.
@@ -111,6 +115,7 @@ impl Window {
             start: Start::first(start_u_s, beginning.velocity_sigma),
             gropes: beginning.rest.is_none(),
             leapt: false,
+            shock_m_per_s: 0.0,
             rest: beginning.rest,
             rested_until_s: f64::NEG_INFINITY,
             rests: Rests::default(),
@@ -227,7 +232,11 @@ impl Window {
             }
         }
         let bridged = intervals.iter().filter(|(_, interval)| interval.bridged);
-        self.leapt = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S;
+        let shocked =
+            intervals.iter().map(|(_, interval)| (interval.accel_sigma * interval.h).powi(2)).sum::<f64>().sqrt();
+        let shocks = [std::mem::replace(&mut self.shock_m_per_s, shocked), shocked];
+        self.leapt = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
+            || shocks.iter().any(|shock| *shock > SHOCK_M_PER_S);
         let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         let remembered = vec![Remembered::default(); surfels.len()];
