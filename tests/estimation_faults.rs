@@ -185,6 +185,10 @@ fn saturated_sensors_are_stated() {
     let drop = "grip_s: 0.5,\n    drops: [(at_s: 6.0, height_m: 0.25, landing_s: 0.035)],";
     let row = gyro("drop of 0.25 m at 2 g", "(sensor: imu, fault: clip(accel_m_per_s2: 19.6133))");
     check(&Row { code: 3, motion: hand(&[("grip_s: 0.5,", drop)]), stated: &["clipped"], ..row });
+    // With the range of 5 g of the IMU itself.
+    let motion = Some(std::fs::read_to_string(specs("motions/hand_drop.ron")).unwrap());
+    let row = Row { scene: "office", duration_s: 25, motion, code: 3, ..ROW };
+    check(&Row { name: "drop of 0.25 m at 5 g", within: Some((0.015, 1.0)), stated: &["clipped"], ..row });
 }
 
 #[test]
@@ -194,6 +198,7 @@ fn sensors_that_fall_silent_or_freeze_are_stated() {
         ("irregular IMU", micro_controller, &["gap", "poor_fit"][..], None),
         ("IMU ends", "(sensor: imu, fault: cut(end_s: 6))", &["not_covered"], Some((0.004, 0.4))),
         ("IMU begins late", "(sensor: imu, fault: cut(start_s: 6))", &["not_covered"], Some((0.004, 0.4))),
+        ("lidar begins late", "(sensor: lidar, fault: cut(start_s: 5))", &["not_covered"], Some((0.01, 1.0))),
         ("IMU frozen", "(sensor: imu, from_s: 6, fault: freeze)", &["frozen", "not_covered"], Some((0.004, 0.4))),
         ("lidar frozen", "(sensor: lidar, from_s: 6, to_s: 8, fault: freeze)", &["lidar_gap"], Some((0.005, 0.15))),
         (

@@ -54,6 +54,8 @@ const CONDITIONED: (f64, f64) = (0.002, 0.0001);
 const WEAK_WINDOWS: usize = 12;
 const WEAK_DOUBT: f64 = 4.0;
 const MOST_DOUBT: f64 = 1000.0;
+/// An IMU scale that a shock left behind says no more than this of the trajectory.
+const MOST_BY_SCALE: f64 = 10.0;
 
 /// What an estimate leaves behind to judge it by.
 #[derive(Debug, Clone, Copy)]
@@ -272,7 +274,7 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
         let is_weak = |w: &WindowReport| matches!(w.trouble, Some(WarningKind::WeakGeometry { .. }));
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_DOUBT } else { 1.0 };
-        let scale = (windows[k].imu_matrix / SOUND.2).powi(2);
+        let scale = (windows[k].imu_matrix / SOUND.2).powi(2).min(MOST_BY_SCALE);
         let late = &windows[(k + 1).saturating_sub(of)..=k];
         let unsettled = unsettled(late, of).max(ill_conditioned(late, of));
         // A mismatch that no noise explains moves the estimate by more than in proportion.

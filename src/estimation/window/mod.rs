@@ -38,8 +38,9 @@ const SWEPT: f64 = 0.25;
 
 /// A head whose speed is known no better than this is under way, m/s.
 const UNDER_WAY_M_PER_S: f64 = 5.0;
-/// Where the velocity may have changed unseen by more than this, surfaces match from farther off for a second, m/s.
+/// Where the velocity may have changed unseen by more than this, m/s, surfaces match from farther off for so long, s.
 const SHOCK_M_PER_S: f64 = 0.1;
+const SHAKEN_S: f64 = 2.0;
 
 /// How exactly a window is put into a map before it is matched with it, rad and m.
 const FOUND: [f64; 2] = [0.05, 0.2];
@@ -75,8 +76,8 @@ pub(super) struct Window {
     gropes: bool,
     /// Whether the IMU was silent for a while in its newest stretch, so that it leapt, or clipped there or before.
     leapt: bool,
-    /// By how much the velocity may have changed unseen over the newest stretch, standard deviation, m/s.
-    shock_m_per_s: f64,
+    /// Until when surfaces match from farther off behind a shock, IMU time, s.
+    shaken_until_s: f64,
     /// While the head has not moved yet: what the IMU says at rest.
     rest: Option<Rest>,
     /// Until when it rested, IMU time, s.
@@ -115,7 +116,7 @@ impl Window {
             start: Start::first(start_u_s, beginning.velocity_sigma),
             gropes: beginning.rest.is_none(),
             leapt: false,
-            shock_m_per_s: 0.0,
+            shaken_until_s: f64::NEG_INFINITY,
             rest: beginning.rest,
             rested_until_s: f64::NEG_INFINITY,
             rests: Rests::default(),
@@ -232,11 +233,13 @@ impl Window {
             }
         }
         let bridged = intervals.iter().filter(|(_, interval)| interval.bridged);
-        let shocked =
+        let unseen =
             intervals.iter().map(|(_, interval)| (interval.accel_sigma * interval.h).powi(2)).sum::<f64>().sqrt();
-        let shocks = [std::mem::replace(&mut self.shock_m_per_s, shocked), shocked];
+        if unseen > SHOCK_M_PER_S {
+            self.shaken_until_s = self.nominal.end_s() + SHAKEN_S;
+        }
         self.leapt = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
-            || shocks.iter().any(|shock| *shock > SHOCK_M_PER_S);
+            || self.nominal.end_s() < self.shaken_until_s;
         let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         let remembered = vec![Remembered::default(); surfels.len()];
