@@ -40,7 +40,7 @@ const SETTLING_WINDOWS: usize = 40;
 /// would give another solution.
 const SETTLED: f64 = 0.0005;
 /// No single window counts for more than this: behind a gap or a shock the first one jumps.
-const LARGEST_STEP: f64 = 0.01;
+const LARGEST_STEP: f64 = 0.02;
 /// A window whose last correction is larger has not settled. 3 to 15 % of the windows in most places, 40 to 60 % on
 /// stairs; each share more enlarges the bound by [`PER_SHARE`].
 const UNSETTLED: f64 = 0.0002;
