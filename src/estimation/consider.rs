@@ -13,6 +13,7 @@
 //! left out, a head that for seconds sees neither floor nor ceiling drifts along the vertical four times as far as its
 //! windows, each for itself, would say.
 
+use super::output::TURN_LEVER_M;
 use super::residual::GYRO_BIAS;
 use super::views::{MAP, Taken};
 use crate::geometry::{Vector, skew};
@@ -32,9 +33,6 @@ pub(super) const AT_IMU: usize = 12;
 const GAUGE: u64 = u64::MAX - 1;
 /// The number of the first beginning that is kept while the gauge is made; later ones count down from it.
 const FIRST_MARK: u64 = GAUGE - 1;
-/// A turn counts in an alignment as much as a shift by this times the angle, m: it holds one of a head that stays in one
-/// place, and is nothing beside any way.
-const TURN_LEVER_M: f64 = 0.05;
 const _: () = assert!(GYRO_BIAS == 0, "the border begins with what is carried of it");
 
 /// Of what a window begins with, by itself.

@@ -8,6 +8,10 @@ use crate::time::Stamp;
 /// Over so many seconds at the start a trajectory is aligned when its error is stated, s.
 pub const GAUGED_S: f64 = 20.0;
 
+/// A turn counts in an alignment as much as a shift by this times the angle, m: it holds one of a head that stays in one
+/// place, and counts for nothing on a walk.
+pub const TURN_LEVER_M: f64 = 0.05;
+
 /// The head at an instant, and what the estimator thought of its sensors then.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatedPose {

@@ -4,7 +4,9 @@ use super::StudyError;
 use super::beside::Beside;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{Cause, Evidence, Finding, GAUGED_S, Status, WindowReport, blocks, doubt, findings, radius_99};
+use crate::estimation::{
+    Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, blocks, doubt, findings, radius_99,
+};
 use crate::evaluation::{ALIGNED_S, Errors, Pairs, align_poses};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::report::{CauseMetrics, IntegrityMetrics};
@@ -26,8 +28,6 @@ const LARGE_BOUND_M: f64 = 0.05;
 const LARGE_SHARE: f64 = 0.01;
 /// And of no use where it exceeds so many times as much: 1 m and a fifth of the way.
 const USELESS: f64 = 20.0;
-/// A turn counts in the alignment as much as a shift by this times the angle, m: as in the covariance against it.
-const TURN_LEVER_M: f64 = 0.05;
 
 /// A pose's bound and standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
