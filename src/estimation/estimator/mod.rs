@@ -1,8 +1,10 @@
 //! The estimator: measurements in, poses out.
 
+mod gauging;
 mod poses;
 mod verdict;
 
+use self::gauging::Gauging;
 use self::verdict::{leaves_to_the_imu, report, trouble};
 use crate::estimation::border::Border;
 use crate::estimation::consider::{Consider, OfBeginning, Sensitivity};
@@ -16,13 +18,11 @@ use crate::estimation::survey::Survey;
 use crate::estimation::views::Views;
 use crate::estimation::whereabouts::{Before, Whereabouts};
 use crate::estimation::window::{Linearised, Window};
-use crate::estimation::{
-    EstimatedPose, EstimationError, EstimatorSpec, GAUGED_S, OpenLoop, Warning, WarningKind, WindowReport,
-};
-use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
+use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
+use crate::geometry::{Pose, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::surfel_map::SurfelMap;
-use crate::time::{Span, Stamp};
+use crate::time::Stamp;
 use std::time::Instant;
 
 /// A head that is faster than this, m/s, or turns faster than this, rad/s, should see surfaces again; one that does not
@@ -32,9 +32,6 @@ const MOVING: (f64, f64) = (0.3, 0.5);
 /// While the head is not found again behind a silence, the next one is bridged up to so many times as long as
 /// otherwise.
 const RELUCTANTLY: f64 = 3.0;
-
-/// While the alignment is made, a beginning is marked so often, s.
-const MARKED_EVERY_S: f64 = 1.0;
 
 /// An IMU that is noisier than it was told by more than this factor is told of.
 const TELLING: f64 = 1.5;
@@ -62,15 +59,10 @@ pub struct Estimator {
     /// What was seen, where that is asked for.
     survey: Option<Survey>,
     consider: Consider,
+    gauging: Gauging,
     /// How the newest window's end hangs on its beginning.
     at_end: Option<Sensitivity>,
     next_pose: Option<Stamp>,
-    /// Until when beginnings are part of the gauge, IMU time, s.
-    gauged_until_s: Option<f64>,
-    /// The last beginning that was marked meanwhile, IMU time, s.
-    marked_s: Option<f64>,
-    /// How uncertain the marked beginnings are against the alignment.
-    gauged: Vec<(Stamp, PoseCovariance)>,
     /// Stamp of the last pose that was handed out.
     newest_pose: Option<Stamp>,
     poses: Vec<EstimatedPose>,
@@ -103,11 +95,9 @@ impl Estimator {
             before: None,
             survey: None,
             consider: Consider::new(Vector::zeros(), &OfBeginning::zeros()),
+            gauging: Gauging::default(),
             at_end: None,
             next_pose: None,
-            gauged_until_s: None,
-            marked_s: None,
-            gauged: Vec::new(),
             newest_pose: None,
             poses: Vec::new(),
             clock_offsets: Vec::new(),
@@ -172,8 +162,8 @@ impl Estimator {
         self.survey_window(Window::survey_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        self.gauge_by_half();
-        let Self { poses, gauged, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
+        let gauged = self.gauging.finish(&mut self.consider, self.newest_pose);
+        let Self { poses, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
         let survey = survey.unwrap_or_default();
         let located = whereabouts.and_then(|whereabouts| whereabouts.found().cloned());
         let learnt = OpenLoop { lidar, calibrated_lidar, located, ..OpenLoop::default() };
@@ -301,38 +291,12 @@ impl Estimator {
             self.consider.advance(&by);
         }
         let tau_s = until_s - window.clock.offset_at(until_s);
-        self.gauge(until_s, self.intake.stamp(tau_s));
+        self.gauging.advance(&mut self.consider, until_s, self.intake.stamp(tau_s));
         let window = self.window.as_mut()?;
         let patches = window.let_go(linearised)?;
         let taken = self.views.take(&patches, self.spec.step_s, (window.matcher(), self.consider.pivot()));
         self.consider.take(taken);
         Some(until_s)
-    }
-
-    /// Over the first seconds, the beginning at `until_s` (IMU time), which is `stamp`, is part of the alignment. For
-    /// twice as long beginnings are marked: a run that ends meanwhile is aligned over its first half.
-    fn gauge(&mut self, until_s: f64, stamp: Stamp) {
-        let end_s = *self.gauged_until_s.get_or_insert(until_s + GAUGED_S);
-        if until_s >= end_s + GAUGED_S {
-            self.gauged.append(&mut self.consider.take_marks());
-            return;
-        }
-        if until_s < end_s {
-            self.consider.gauge_by_beginning();
-        }
-        if self.marked_s.is_none_or(|last_s| until_s - last_s >= MARKED_EVERY_S) {
-            self.consider.mark_beginning(stamp);
-            self.marked_s = Some(until_s);
-        }
-    }
-
-    /// The run ends: if beginnings are still marked, those of the first half are the alignment.
-    fn gauge_by_half(&mut self) {
-        if let (Some(first), Some(last)) = (self.consider.first_mark(), self.newest_pose) {
-            let half_s = (0.5 * last.seconds_since(first)).min(GAUGED_S);
-            self.consider.gauge_by_marks(first + Span::from_seconds(half_s));
-            self.gauged.append(&mut self.consider.take_marks());
-        }
     }
 
     /// The IMU fell silent: what the window holds is final, and the estimate will begin again behind the silence.

@@ -4,6 +4,9 @@ use super::finding::{Cause, Finding, Status};
 use crate::estimation::{LeftOut, Warning, WarningKind, WindowReport};
 use crate::time::{Span, Stamp};
 
+/// More than this share of clipped samples is enough to lose the head.
+const MUCH_CLIPPED: f64 = 0.02;
+
 /// Evidence is weighed over stretches of this length, s, or half of a shorter run.
 const STRETCH_S: f64 = 5.0;
 /// Contradiction between IMU and lidar, as a multiple of the IMU's noise, from which a result is degraded, and lost.
@@ -105,9 +108,6 @@ fn blame_clipping(findings: &mut [Finding]) {
         .filter(|finding| is_lost && is_much(&finding.cause))
         .for_each(|finding| finding.status = Status::Lost);
 }
-
-/// More than this share of clipped samples is enough to lose the head.
-const MUCH_CLIPPED: f64 = 0.02;
 
 /// A stretch of windows with the median of a measure, or a share.
 fn over_stretches(

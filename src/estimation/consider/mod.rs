@@ -13,11 +13,12 @@
 //! left out, a head that for seconds sees neither floor nor ceiling drifts along the vertical four times as far as its
 //! windows, each for itself, would say.
 
-use super::output::TURN_LEVER_M;
+mod gauge;
+
+use self::gauge::{Gauge, Mark};
 use super::residual::GYRO_BIAS;
 use super::views::{MAP, Taken};
 use crate::geometry::{Vector, skew};
-use crate::time::Stamp;
 use nalgebra::{Matrix6, SMatrix};
 
 /// How little is known after a silence: turn, rad, and shift, m.
@@ -29,10 +30,6 @@ pub(super) const IMU: usize = 8;
 pub(super) const CARRIED: usize = 12 + IMU;
 /// Where in it the IMU's part begins.
 pub(super) const AT_IMU: usize = 12;
-/// The number under which the gauge is kept as a view; the last one is the map's.
-const GAUGE: u64 = u64::MAX - 1;
-/// The number of the first beginning that is kept while the gauge is made; later ones count down from it.
-const FIRST_MARK: u64 = GAUGE - 1;
 const _: () = assert!(GYRO_BIAS == 0, "the border begins with what is carried of it");
 
 /// Of what a window begins with, by itself.
@@ -59,25 +56,6 @@ pub(super) struct Consider {
     views: Vec<View>,
     gauge: Option<Gauge>,
     marks: Vec<Mark>,
-}
-
-/// The rigid transform that aligns the beginnings so far with the truth, by least squares: against it a pose's error is
-/// that of a trajectory which is aligned over the first part of the recording. Its right-hand side, a sum over the
-/// beginnings' errors, is kept as a view.
-#[derive(Debug, Clone, Copy)]
-struct Gauge {
-    /// About what it turns, m.
-    pivot: Vector,
-    /// The normal matrix; of the beginnings' places alone.
-    normal: Matrix6<f64>,
-}
-
-/// A beginning that is kept as a view until the gauge is made.
-#[derive(Debug, Clone, Copy)]
-struct Mark {
-    number: u64,
-    pivot: Vector,
-    stamp: Stamp,
 }
 
 #[derive(Debug, Clone)]
@@ -198,113 +176,6 @@ impl Consider {
         by * self.beginning.fixed_view::<6, 6>(0, 0) * by.transpose()
     }
 
-    /// The same of the error against the gauge; against the map where there is none.
-    pub(super) fn covariance_against_gauge(&self, place: &Vector) -> Matrix6<f64> {
-        let with_beginning = |at: usize| self.views[at].with_beginning.fixed_columns::<6>(0).into_owned();
-        let by = error_at(&(place - self.pivot));
-        self.against_gauge(place, (&by, self.beginning.fixed_view::<6, 6>(0, 0).into_owned()), with_beginning)
-    }
-
-    /// The same of an error of covariance `own` that moves `place` by `by`; `with` tells its covariance with the gauge,
-    /// which is the view at the place that it is given.
-    fn against_gauge(
-        &self,
-        place: &Vector,
-        (by, own): (&Matrix6<f64>, Matrix6<f64>),
-        with: impl Fn(usize) -> Matrix6<f64>,
-    ) -> Matrix6<f64> {
-        let own = by * own * by.transpose();
-        let solved = self.gauge.and_then(|gauge| Some((gauge.pivot, gauge.normal.cholesky()?.inverse())));
-        let (Some((pivot, solved)), Some(at)) = (solved, self.place_of_gauge()) else { return own };
-        let by_gauge = error_at(&(place - pivot)) * solved;
-        let cross = by_gauge * with(at) * by.transpose();
-        own + by_gauge * self.between(at, at) * by_gauge.transpose() - cross - cross.transpose()
-    }
-
-    /// Makes the beginning part of the gauge.
-    pub(super) fn gauge_by_beginning(&mut self) {
-        let own = self.beginning.fixed_view::<6, 6>(0, 0).into_owned();
-        let with_beginning = self.beginning.fixed_rows::<6>(0).into_owned();
-        let with_views: Vec<Matrix6<f64>> =
-            self.views.iter().map(|view| view.with_beginning.fixed_columns::<6>(0).transpose()).collect();
-        self.gauge_by(self.pivot, own, with_beginning, &with_views);
-    }
-
-    /// Makes the gauge anew of the beginnings that were marked up to `until`.
-    pub(super) fn gauge_by_marks(&mut self, until: Stamp) {
-        self.forget(GAUGE);
-        self.gauge = None;
-        for mark in self.marks.clone().iter().take_while(|mark| mark.stamp <= until) {
-            let Some(at) = self.views.iter().position(|view| view.number == mark.number) else { continue };
-            let with_views: Vec<Matrix6<f64>> = (0..self.views.len()).map(|other| self.between(at, other)).collect();
-            self.gauge_by(mark.pivot, with_views[at], self.views[at].with_beginning, &with_views);
-        }
-    }
-
-    /// Makes an error about `pivot` part of the gauge, of covariance `own`, and `with` the beginning and the views.
-    fn gauge_by(
-        &mut self,
-        pivot: Vector,
-        own: Matrix6<f64>,
-        with_beginning: SMatrix<f64, 6, CARRIED>,
-        with_views: &[Matrix6<f64>],
-    ) {
-        let at = self.place_of_gauge().unwrap_or_else(|| {
-            let with_views = vec![Matrix6::zeros(); self.views.len() + 1];
-            self.views.push(View { number: GAUGE, with_beginning: SMatrix::zeros(), with_views });
-            self.views.len() - 1
-        });
-        let gauge = self.gauge.unwrap_or(Gauge { pivot, normal: Matrix6::zeros() });
-        // How the gauge moves the place, and how the error moves the gauge.
-        let by = error_at(&(pivot - gauge.pivot));
-        let mut weight = Matrix6::identity();
-        weight.fixed_view_mut::<3, 3>(3, 3).scale_mut(TURN_LEVER_M * TURN_LEVER_M);
-        let from = by.transpose() * weight * error_at(&Vector::zeros());
-        let own = from * own * from.transpose();
-        let with_old = from * with_views.get(at).copied().unwrap_or_default();
-        for other in (0..self.views.len()).filter(|other| *other != at) {
-            let more = from * with_views[other];
-            if other < at {
-                self.views[at].with_views[other] += more;
-            } else {
-                self.views[other].with_views[at] += more.transpose();
-            }
-        }
-        self.views[at].with_beginning += from * with_beginning;
-        self.views[at].with_views[at] += own + with_old + with_old.transpose();
-        self.gauge = Some(Gauge { normal: gauge.normal + by.transpose() * weight * by, ..gauge });
-    }
-
-    /// Keeps the beginning, of `stamp`, until the gauge is made.
-    pub(super) fn mark_beginning(&mut self, stamp: Stamp) {
-        let number = self.marks.last().map_or(FIRST_MARK, |last| last.number - 1);
-        self.keep(number);
-        self.marks.push(Mark { number, pivot: self.pivot, stamp });
-    }
-
-    /// When the first beginning was that is still marked.
-    pub(super) fn first_mark(&self) -> Option<Stamp> {
-        self.marks.first().map(|mark| mark.stamp)
-    }
-
-    /// The gauge is made: when the marked beginnings were, and the covariances of their errors against it.
-    pub(super) fn take_marks(&mut self) -> Vec<(Stamp, Matrix6<f64>)> {
-        let marks = std::mem::take(&mut self.marks);
-        let told = marks.iter().filter_map(|mark| {
-            let own = self.views.iter().position(|view| view.number == mark.number)?;
-            let with = |at: usize| self.between(at, own);
-            let by = error_at(&Vector::zeros());
-            Some((mark.stamp, self.against_gauge(&mark.pivot, (&by, self.between(own, own)), with)))
-        });
-        let told = told.collect();
-        marks.iter().for_each(|mark| self.forget(mark.number));
-        told
-    }
-
-    fn place_of_gauge(&self) -> Option<usize> {
-        self.views.iter().position(|view| view.number == GAUGE)
-    }
-
     /// `E[e_a e_b^T]` of two views.
     fn between(&self, a: usize, b: usize) -> Matrix6<f64> {
         if b <= a { self.views[a].with_views[b] } else { self.views[b].with_views[a].transpose() }
@@ -334,11 +205,11 @@ mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    fn wave<const C: usize>(seed: usize) -> SMatrix<f64, CARRIED, C> {
+    pub(super) fn wave<const C: usize>(seed: usize) -> SMatrix<f64, CARRIED, C> {
         SMatrix::from_fn(|r, c| 0.2 * ((seed * 7 + r * 5 + c * 3 + r * c) as f64 * 0.61).sin())
     }
 
-    fn sensitivity(seed: usize, views: &[u64]) -> Sensitivity {
+    pub(super) fn sensitivity(seed: usize, views: &[u64]) -> Sensitivity {
         let root = wave::<CARRIED>(seed + 50);
         Sensitivity {
             pivot: Vector::zeros(),
@@ -348,77 +219,7 @@ mod tests {
         }
     }
 
-    /// Against the gauge made anew of the beginnings that were marked until then.
-    fn anew(consider: &Consider, until_ns: i64, place: &Vector) -> Matrix6<f64> {
-        let mut of_marks = consider.clone();
-        of_marks.gauge_by_marks(Stamp::from_nanos(until_ns));
-        of_marks.covariance_against_gauge(place)
-    }
-
-    /// Against the definition: the least-squares alignment of the beginnings' errors, each a row of coefficients of
-    /// independent noises, by a singular value decomposition of the stacked equations.
-    #[test]
-    fn an_error_against_the_gauge_is_what_an_alignment_leaves() {
-        let root = wave::<CARRIED>(31);
-        let mut consider = Consider::new(Vector::new(0.3, -0.2, 0.1), &(root * root.transpose()));
-        let sources = CARRIED * 7;
-        let mut beginning = DMatrix::<f64>::zeros(CARRIED, sources);
-        beginning.view_mut((0, 0), (CARRIED, CARRIED)).copy_from(&root);
-        let place = Vector::new(4.0, -3.0, 1.0);
-        let at = |beginning: &DMatrix<f64>, pivot: &Vector| {
-            let by = error_at(&(place - pivot));
-            DMatrix::from_fn(6, 6, |r, c| by[(r, c)]) * beginning.rows(0, 6)
-        };
-        let mut weight = DMatrix::<f64>::identity(6, 6);
-        (3..6).for_each(|k| weight[(k, k)] = TURN_LEVER_M);
-        let (mut equations, mut errors) = (DMatrix::<f64>::zeros(24, 6), DMatrix::<f64>::zeros(24, sources));
-        let mut marked = None;
-        for step in 0..6 {
-            let pivot = Vector::new(step as f64, 0.5 * step as f64, 0.1);
-            let by = Sensitivity { pivot, ..sensitivity(step, &[]) };
-            consider.advance(&by);
-            beginning = DMatrix::from_fn(CARRIED, CARRIED, |r, c| by.beginning[(r, c)]) * &beginning;
-            let root = by.noise.cholesky().unwrap().l();
-            beginning.view_mut((0, CARRIED * (step + 1)), (CARRIED, CARRIED)).copy_from(&root);
-            if step < 4 {
-                consider.gauge_by_beginning();
-                let (by, own) = (error_at(&pivot), error_at(&Vector::zeros()));
-                let own = DMatrix::from_fn(6, 6, |r, c| own[(r, c)]) * beginning.rows(0, 6);
-                equations.rows_mut(6 * step, 6).copy_from(&(&weight * DMatrix::from_fn(6, 6, |r, c| by[(r, c)])));
-                errors.rows_mut(6 * step, 6).copy_from(&(&weight * &own));
-                consider.mark_beginning(Stamp::from_nanos(step as i64));
-                if step == 2 {
-                    marked = Some((pivot, own));
-                }
-            }
-            if step == 1 {
-                consider.keep(7);
-            }
-        }
-        let pivot = consider.pivot();
-        let aligned = equations.svd(true, true).solve(&errors, 1e-12).unwrap();
-        let left = |error: &DMatrix<f64>, place: &Vector| {
-            let by = error_at(place);
-            let error = error - DMatrix::from_fn(6, 6, |r, c| by[(r, c)]) * &aligned;
-            &error * error.transpose()
-        };
-        let told = consider.covariance_against_gauge(&place);
-        let (mark, own) = marked.unwrap();
-        // Made anew of the same beginnings the gauge is the same; of half of them it is another.
-        assert!((anew(&consider, 1, &place) - told).norm() > 0.01 * told.norm());
-        let anew = anew(&consider, 3, &place);
-        let marks = consider.take_marks();
-        assert_eq!(marks[2].0, Stamp::from_nanos(2));
-        let expected = left(&at(&beginning, &pivot), &place);
-        let pairs = [(told, expected.clone()), (anew, expected), (marks[2].1, left(&own, &mark))];
-        for (told, expected) in pairs {
-            for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
-                assert_relative_eq!(told[(r, c)], expected[(r, c)], epsilon = 1e-8, max_relative = 1e-8);
-            }
-        }
-    }
-
-    /// The same by the definition: every error as a row of coefficients of independent noises.
+    /// By the definition: every error as a row of coefficients of independent noises.
     #[test]
     fn the_joint_covariance_is_that_of_the_errors_written_out() {
         // What is known at first, and what eight windows add.
