@@ -1,7 +1,6 @@
 use super::{Errors, EvaluationError, Pairs};
+use crate::estimation::GAUGED_S;
 
-/// Length of the alignment at the start, s.
-pub const ALIGNED_S: f64 = 20.0;
 /// Length of the stretch at the end over which the error is averaged, s.
 pub const TAIL_S: f64 = 5.0;
 
@@ -22,7 +21,7 @@ pub struct Drift {
     pub end_error_m: f64,
 }
 
-/// Drift of an estimate that is aligned over its first [`ALIGNED_S`] seconds alone.
+/// Drift of an estimate that is aligned over its first [`GAUGED_S`] seconds alone.
 ///
 /// The estimate is aligned with the truth over the first 20 s, all six degrees of freedom: by positions, and by
 /// attitudes as far as positions do not tell (twenty seconds of a straight way leave the turn about it to chance). What
@@ -33,11 +32,11 @@ pub struct Drift {
 /// # Errors
 /// When the two stretches overlap, or the first has too little motion to align.
 pub fn drift(pairs: &Pairs) -> Result<Drift, EvaluationError> {
-    let (needed_s, found_s) = (ALIGNED_S + TAIL_S, pairs.duration_s());
+    let (needed_s, found_s) = (GAUGED_S + TAIL_S, pairs.duration_s());
     if found_s < needed_s {
         return Err(EvaluationError::TooShort { what: "drift", needed_s, found_s });
     }
-    let (start, tail) = (pairs.first_seconds(ALIGNED_S), pairs.last_seconds(TAIL_S));
+    let (start, tail) = (pairs.first_seconds(GAUGED_S), pairs.last_seconds(TAIL_S));
     let world_from_map = super::align_poses(start.truth(), start.estimate(), TURN_LEVER_M)?;
     let (at_start, at_end) = (Errors::after(&start, &world_from_map), Errors::after(&tail, &world_from_map));
     let origin = pairs.stamps()[0];

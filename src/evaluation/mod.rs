@@ -28,7 +28,7 @@ pub use clock::{ClockError, clock_error};
 pub use cloud::{CloudErrors, CloudSummary, Thinning};
 pub use consistency::{Consistency, consistency};
 pub use dead_reckoning::{DeadReckoning, Rest};
-pub use drift::{ALIGNED_S, Drift, TAIL_S, drift};
+pub use drift::{Drift, TAIL_S, drift};
 pub use error::EvaluationError;
 pub use pairs::Pairs;
 pub use relative::{RelativeError, relative_error};

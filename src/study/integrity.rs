@@ -7,7 +7,7 @@ use super::open_loop::OpenLoopRun;
 use crate::estimation::{
     Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, blocks, doubt, findings, radius_99,
 };
-use crate::evaluation::{ALIGNED_S, Errors, Pairs, align_poses};
+use crate::evaluation::{Errors, Pairs, align_poses};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::report::{CauseMetrics, IntegrityMetrics};
 use crate::time::{Span, Stamp};
@@ -21,7 +21,7 @@ const LEAST_BOUND_M: f64 = 0.001;
 /// alignment takes away. With 0.47, 99 % of the poses were within their bound in each of 56 runs of 14 kinds; with 0.36
 /// in 86 % of them. A run shorter than 40 s is aligned over less and keeps more, up to all of it: as the root of the
 /// inverse length.
-const ALIGNED_SHARE: f64 = 0.47;
+const GAUGED_SHARE: f64 = 0.47;
 
 /// A result is not good where the bound exceeds both of these, m and as a share of the way.
 const LARGE_BOUND_M: f64 = 0.05;
@@ -69,14 +69,14 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
 /// The share of the covariance that the alignment leaves of a trajectory.
 fn aligned_share(trajectory: &Trajectory) -> f64 {
     let aligned_s = trajectory.stamps().first().zip(aligned_until(trajectory)).map(|(from, until)| until - *from);
-    let shorter = ALIGNED_S / aligned_s.map_or(ALIGNED_S, Span::seconds).max(0.1);
-    (ALIGNED_SHARE * shorter.sqrt()).min(1.0)
+    let shorter = GAUGED_S / aligned_s.map_or(GAUGED_S, Span::seconds).max(0.1);
+    (GAUGED_SHARE * shorter.sqrt()).min(1.0)
 }
 
 /// Until when a trajectory is aligned with the truth: over 20 s, or half of a shorter one.
 fn aligned_until(trajectory: &Trajectory) -> Option<Stamp> {
     let (first, last) = (trajectory.stamps().first()?, trajectory.stamps().last()?);
-    Some(*first + Span::from_seconds(ALIGNED_S.min(0.5 * last.seconds_since(*first))))
+    Some(*first + Span::from_seconds(GAUGED_S.min(0.5 * last.seconds_since(*first))))
 }
 
 /// The radii that follow from the covariances; over the seconds of the alignment, which is known only at their end, the
@@ -165,7 +165,7 @@ impl Integrity {
 
     /// The bounds against the errors, aligned over the first 20 s or half of a shorter run.
     fn held_against(&self, pairs: &Pairs) -> Option<Held> {
-        let aligned = pairs.first_seconds(ALIGNED_S.min(0.5 * pairs.duration_s()));
+        let aligned = pairs.first_seconds(GAUGED_S.min(0.5 * pairs.duration_s()));
         let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
         let errors = Errors::after(pairs, &world_from_map);
         let mut bounds = self.bounds.iter();

@@ -141,8 +141,8 @@ impl Consider {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{sensitivity, wave};
     use super::super::Sensitivity;
+    use super::super::tests::{sensitivity, wave};
     use super::*;
     use approx::assert_relative_eq;
     use nalgebra::DMatrix;
