@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub type Stream = ChaCha8Rng;
 
 /// The seed of a run, from which all of its randomness follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(transparent)]
 pub struct Seed(pub u64);
 

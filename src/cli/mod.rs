@@ -27,6 +27,7 @@ mod reproduce;
 mod signals;
 mod simulate;
 mod slurm;
+mod spec;
 mod spring;
 mod spring_words;
 mod study;
@@ -75,6 +76,7 @@ enum Verb {
     Study(study::Arguments),
     Sweep(sweep::Arguments),
     Check(check::Arguments),
+    Spec(spec::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
 }
@@ -123,6 +125,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<End> {
         Verb::Study(arguments) => study::run(arguments, global),
         Verb::Sweep(arguments) => sweep::run(arguments, global),
         Verb::Check(arguments) => check::run(arguments, global),
+        Verb::Spec(arguments) => spec::run(arguments, global),
         Verb::Info(arguments) => info::run(arguments, global),
         Verb::Completions(arguments) => completions::run(arguments),
     }

@@ -2,49 +2,49 @@
 
 use super::spec::PlacementSpec;
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
-use crate::spec::checked::{finite_array, non_negative, positive};
+use crate::spec::checked::{FiniteArray, NonNegative, Positive};
 use crate::spec::{Source, SpecError};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// A motor between base and head.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct MotorSpec {
     /// Direction of the axis that it turns the head about, in the head; of any length but 0.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub axis_in_head: [f64; 3],
     /// A point on that axis, in the head, m.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub pivot_in_head_m: [f64; 3],
     /// How it turns.
     pub turn: TurnSpec,
     /// How long it stands still first, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// How long it then takes to come to its full turn, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub start_s: f64,
 }
 
 /// How a motor turns a head.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum TurnSpec {
     /// Round and round, at a steady rate.
     Spin {
         /// Turns a second, Hz.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         rate_hz: f64,
     },
     /// To and fro, as a sine.
     Nod {
         /// Greatest angle to either side, degrees.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         amplitude_deg: f64,
         /// How often, Hz.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         frequency_hz: f64,
     },
 }

@@ -2,27 +2,27 @@
 
 use super::spec::HeadSpec;
 use crate::geometry::Vector;
-use crate::spec::checked::{finite_array, fraction, positive};
+use crate::spec::checked::{FiniteArray, Fraction, Positive};
 use crate::spec::{Source, SpecError};
 use serde::{Deserialize, Serialize};
 
 /// A part of what carries the head: an upright cylinder, closed at both ends, fixed to the base.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct CarrierSpec {
     /// What it is.
     pub name: String,
     /// Where its axis, along the base's z, ends below, in the base, m.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub foot_in_base_m: [f64; 3],
     /// Its radius, m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub radius_m: f64,
     /// Its height, m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub height_m: f64,
     /// Share of the light that comes back diffusely at normal incidence, 0 to 1.
-    #[serde(deserialize_with = "fraction")]
+    #[serde(with = "Fraction")]
     pub reflectance: f64,
 }
 

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// The frame `head` is where the spec puts it: a sane choice has its origin at the laser's optical centre, x forward, y
 /// left, z up along the spring.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeadSpec {
     /// What the head is made of, and what is fastened to it.
@@ -39,7 +39,7 @@ pub fn load(name: &str) -> Result<(HeadSpec, Source), SpecError> {
 }
 
 /// A part of the head: a rigid body.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum PartSpec {
     /// A homogeneous block, its edges along the head's axes.
@@ -47,13 +47,13 @@ pub enum PartSpec {
         /// What it is.
         name: String,
         /// Mass, kg.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         mass_kg: f64,
         /// Edges along x, y, z, m.
-        #[serde(deserialize_with = "checked::positive_array")]
+        #[serde(with = "checked::PositiveArray::<3>")]
         size_m: [f64; 3],
         /// Its centre in the head, m.
-        #[serde(deserialize_with = "checked::finite_array")]
+        #[serde(with = "checked::FiniteArray::<3>")]
         centre_m: [f64; 3],
     },
     /// A body whose mass properties are known.
@@ -61,10 +61,10 @@ pub enum PartSpec {
         /// What it is.
         name: String,
         /// Mass, kg.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         mass_kg: f64,
         /// Its centre of mass in the head, m.
-        #[serde(deserialize_with = "checked::finite_array")]
+        #[serde(with = "checked::FiniteArray::<3>")]
         centre_of_mass_m: [f64; 3],
         /// Its inertia about its centre of mass, in the head's axes.
         inertia_kg_m2: InertiaSpec,
@@ -72,38 +72,38 @@ pub enum PartSpec {
 }
 
 /// A tensor of inertia; products are entries of the tensor, so `xy` is minus the integral of x y.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct InertiaSpec {
     /// About x, kg m^2.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub xx: f64,
     /// About y, kg m^2.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub yy: f64,
     /// About z, kg m^2.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub zz: f64,
     /// Product, kg m^2.
-    #[serde(default, deserialize_with = "checked::finite")]
+    #[serde(default, with = "checked::Finite")]
     pub xy: f64,
     /// Product, kg m^2.
-    #[serde(default, deserialize_with = "checked::finite")]
+    #[serde(default, with = "checked::Finite")]
     pub xz: f64,
     /// Product, kg m^2.
-    #[serde(default, deserialize_with = "checked::finite")]
+    #[serde(default, with = "checked::Finite")]
     pub yz: f64,
 }
 
 /// Where a frame sits in another.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlacementSpec {
     /// Its origin, m.
-    #[serde(deserialize_with = "checked::finite_array")]
+    #[serde(with = "checked::FiniteArray::<3>")]
     pub position_m: [f64; 3],
     /// Its roll, pitch and yaw (about fixed x, then y, then z), degrees.
-    #[serde(default, deserialize_with = "checked::finite_array")]
+    #[serde(default, with = "checked::FiniteArray::<3>")]
     pub roll_pitch_yaw_deg: [f64; 3],
 }
 
@@ -116,7 +116,7 @@ impl PlacementSpec {
 }
 
 /// What holds the head on the base.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 #[expect(clippy::large_enum_variant, reason = "there is one a head")]
 pub enum LinkageSpec {
@@ -187,48 +187,48 @@ impl LinkageSpec {
 }
 
 /// Damping ratios of the six modes about rest.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DampingSpec {
     /// Of the two slowest bending modes, in which the head nods and rolls.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub rocking: f64,
     /// Of the other two bending modes, in which it shifts sideways against its turn.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub sway: f64,
     /// Of the mode along the spring.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub bounce: f64,
     /// Of the mode about the spring.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub yaw: f64,
 }
 
 /// A stop against which the head comes when its axis leans too far: the axis of a spring's top from its foot's, or, on
 /// several elements, the head's from where it rests.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct EndStopSpec {
     /// Lean at which it begins to press, degrees.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub angle_deg: f64,
     /// Torque for each radian beyond, N m/rad.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub stiffness_nm_per_rad: f64,
     /// Torque for each rad/s of lean while it presses, N m s/rad.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub damping_nm_s_per_rad: f64,
 }
 
 /// A hand that holds the head: a spring and a damper towards the head's rest, as firm as the motion says at each
 /// instant.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct HoldSpec {
     /// Frequency that the head would have in a firm hand alone, without spring and gravity, Hz.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub frequency_hz: f64,
     /// Damping ratio that it would have in it.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub damping_ratio: f64,
 }

@@ -5,7 +5,7 @@ use crate::spec::{Kind, SpecError, checked};
 use serde::{Deserialize, Serialize};
 
 /// A spring, as a spec has it: `specs/springs/NAME.ron`, or within a head.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 #[expect(clippy::large_enum_variant, reason = "there is one a head")]
 pub enum SpringSpec {
@@ -14,16 +14,16 @@ pub enum SpringSpec {
     /// A helical spring of round wire.
     Coil {
         /// Mean diameter of the coil, mm.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         coil_diameter_mm: f64,
         /// Diameter of the wire, mm.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         wire_diameter_mm: f64,
         /// Coils that are free to move.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         active_coils: f64,
         /// Length without load, mm.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         free_length_mm: f64,
         /// What the wire is made of.
         material: Material,
@@ -32,7 +32,7 @@ pub enum SpringSpec {
     /// the spring in it, its moment about the base not.
     Stiffness {
         /// Length under the head's weight, mm.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         length_mm: f64,
         /// Force and torque of the top by its displacement: order x, y, z, rx, ry, rz; N, m, rad.
         rows: [StiffnessRow; 6],
@@ -40,12 +40,12 @@ pub enum SpringSpec {
 }
 
 /// One row of a stiffness: force in N, or torque in N m, for each of x, y, z in m and rx, ry, rz in rad.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(transparent)]
-pub struct StiffnessRow(#[serde(deserialize_with = "checked::finite_array")] pub [f64; 6]);
+pub struct StiffnessRow(#[serde(with = "checked::FiniteArray::<6>")] pub [f64; 6]);
 
 /// What a wire is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Material {
     /// Patented or music wire: E = 206 GPa, G = 79.3 GPa.
@@ -55,10 +55,10 @@ pub enum Material {
     /// Any other.
     Moduli {
         /// Young's modulus, GPa.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         youngs_gpa: f64,
         /// Shear modulus, GPa.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         shear_gpa: f64,
         /// Density, kg/m^3; needed for the spring's own mass alone.
         #[serde(default)]
@@ -67,9 +67,9 @@ pub enum Material {
 }
 
 /// A density above zero, kg/m^3.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(transparent)]
-pub struct Density(#[serde(deserialize_with = "checked::positive")] pub f64);
+pub struct Density(#[serde(with = "checked::Positive")] pub f64);
 
 impl Material {
     /// Its moduli.

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 
 /// A base at constant velocity from the start of the run on, from where the route begins, along its heading there. It
 /// goes straight on where the route bends: the scene has to be long enough.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CruiseSpec {
     /// Height of the base above the floor, m.
-    #[serde(deserialize_with = "crate::spec::checked::finite")]
+    #[serde(with = "crate::spec::checked::Finite")]
     pub height_m: f64,
     /// Speed, m/s.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub speed_m_per_s: f64,
 }
 

@@ -2,22 +2,22 @@
 
 use super::jet::Jet;
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
-use crate::spec::checked::{non_negative, positive};
+use crate::spec::checked::{NonNegative, Positive};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A step down: a free fall that ends in a landing shock. The base stays lower by its height.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DropSpec {
     /// When the fall begins, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub at_s: f64,
     /// Height of the fall, m; the fall lasts `sqrt(2 height / g)`.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub height_m: f64,
     /// Duration of the landing, s; the fall begins as smoothly.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub landing_s: f64,
 }
 

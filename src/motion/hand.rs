@@ -18,19 +18,19 @@ use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Pose, Route, Vector};
 use crate::random::Seed;
 use crate::spec::Source;
-use crate::spec::checked::{finite, fraction, non_negative, positive};
+use crate::spec::checked::{Finite, Fraction, NonNegative, Positive};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// How a hand carries and shakes the base.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HandSpec {
     /// How long everything is at rest first, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// Height of the base above the floor, m.
-    #[serde(deserialize_with = "finite")]
+    #[serde(with = "Finite")]
     pub height_m: f64,
     /// Where the hand goes.
     pub carry: CarrySpec,
@@ -41,7 +41,7 @@ pub struct HandSpec {
     /// When the hand holds the head still.
     pub stops: StopsSpec,
     /// How long it takes to grasp the head, and to let it go, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub grip_s: f64,
     /// When the walker stands still in the middle of the way: start and duration of each rest, s. The wrist does not
     /// shake then; the head swings on its spring unless a stop holds it.
@@ -53,7 +53,7 @@ pub struct HandSpec {
 }
 
 /// Where a hand goes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum CarrySpec {
     /// Along the scene's route.
@@ -62,70 +62,70 @@ pub enum CarrySpec {
     /// begins (the paper's pseudostationary experiment, section IV-A).
     Box {
         /// Size forward and to the left, m.
-        #[serde(deserialize_with = "crate::spec::checked::positive_array")]
+        #[serde(with = "crate::spec::checked::PositiveArray::<2>")]
         size_m: [f64; 2],
         /// How many times round.
         rounds: u32,
         /// Speed along the sides, m/s.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         speed_m_per_s: f64,
         /// Half-width of the bump that rounds the corners, s.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         smoothing_s: f64,
     },
 }
 
 /// How the body moves with the steps; all of it grows with the walking speed, to the amplitudes given at full speed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GaitSpec {
     /// Steps a second, Hz.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub step_hz: f64,
     /// Amplitude up and down, once a step, m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub bob_m: f64,
     /// Amplitude to the sides, once in two steps, m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub sway_m: f64,
     /// Amplitude forward and back, once a step, m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub surge_m: f64,
     /// How far the steps wander off their beat, rad rms of two steps' phase.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub irregularity_rad: f64,
 }
 
 /// How the wrist shakes the base.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShakeSpec {
     /// The rhythm's frequency, Hz: near the head's rocking frequency.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub frequency_hz: f64,
     /// Mean amplitude of pitch, degrees.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub pitch_deg: f64,
     /// Mean amplitude of roll, degrees.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub roll_deg: f64,
     /// Whether roll follows pitch a quarter of a beat later, so that the head circles like a lasso; else roll has a
     /// rhythm of its own.
     pub lasso: bool,
     /// Standard deviation of the amplitudes, as a share of their mean.
-    #[serde(deserialize_with = "fraction")]
+    #[serde(with = "Fraction")]
     pub amplitude_spread: f64,
     /// How far the rhythm wanders off its beat, rad rms.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub phase_spread_rad: f64,
     /// The highest frequency in the wandering of amplitude and phase, Hz.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub wander_hz: f64,
     /// How far below the base the wrist is, about which it turns, m.
-    #[serde(deserialize_with = "finite")]
+    #[serde(with = "Finite")]
     pub wrist_below_m: f64,
     /// How long the shaking takes to reach its full strength, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub onset_s: f64,
 }
 

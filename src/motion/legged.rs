@@ -8,27 +8,27 @@ use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Route};
 use crate::random::Seed;
 use crate::spec::Source;
-use crate::spec::checked::{finite, finite_array, non_negative, positive};
+use crate::spec::checked::{Finite, FiniteArray, NonNegative, Positive};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
 /// A legged machine that carries the base.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeggedSpec {
     /// How long everything is at rest first, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// Height of the base above the floor, m.
-    #[serde(deserialize_with = "finite")]
+    #[serde(with = "Finite")]
     pub height_m: f64,
     /// How it walks along the route.
     pub follow: WalkSpec,
     /// Strides a second, Hz: a stride is a whole cycle of all legs.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub stride_hz: f64,
     /// How far the strides wander off their beat, turns rms, at up to a tenth of their frequency.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub irregularity_turns: f64,
     /// What a stride does to the body, as its harmonics; all grow with the speed, to the amplitudes given at full
     /// speed.
@@ -36,23 +36,23 @@ pub struct LeggedSpec {
 }
 
 /// A harmonic of a stride: the body moves by `amplitude cos(2 pi order strides + phase)`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StrideSpec {
     /// Cycles a stride: a trot bounces twice, a walk on four legs four times.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub order: f64,
     /// Amplitudes forward, to the left and up, m.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub position_m: [f64; 3],
     /// Their phases, degrees.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub position_phase_deg: [f64; 3],
     /// Amplitudes of roll, pitch and yaw, degrees.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub rotation_deg: [f64; 3],
     /// Their phases, degrees.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub rotation_phase_deg: [f64; 3],
 }
 

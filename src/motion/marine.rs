@@ -12,7 +12,7 @@ use super::stand::standpoint;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Pose, Route, STANDARD_GRAVITY_M_PER_S2};
 use crate::random::{Seed, Stream};
-use crate::spec::checked::{finite, finite_array, non_negative, positive};
+use crate::spec::checked::{Finite, FiniteArray, NonNegative, Positive};
 use crate::spec::{Source, SpecError};
 use nalgebra::Complex;
 use rand::RngExt;
@@ -20,17 +20,17 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A vessel that lies in waves and carries the base.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MarineSpec {
     /// How long everything is at rest first, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// How long the waves take to reach their full height, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub onset_s: f64,
     /// Where the base is, from the middle of the waterplane: forward, to the left, up, m.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub base_m: [f64; 3],
     /// The waves.
     pub sea: SeaSpec,
@@ -39,44 +39,44 @@ pub struct MarineSpec {
 }
 
 /// A random sea.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SeaSpec {
     /// Significant wave height, m: four times the standard deviation of the surface.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub significant_height_m: f64,
     /// Period of the spectrum's peak, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub peak_period_s: f64,
     /// JONSWAP's peak enhancement: 3.3 in a growing wind sea, 1 for Pierson and Moskowitz's fully developed one.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub peakedness: f64,
     /// Where the waves go to, against the bow, degrees to the left: 0 from astern, 180 on the bow.
-    #[serde(deserialize_with = "finite")]
+    #[serde(with = "Finite")]
     pub going_deg: f64,
     /// The exponent s of the spreading `cos^2s` of single waves about that direction.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub spreading: f64,
 }
 
 /// A vessel's shape, and its roll.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HullSpec {
     /// Length of the waterplane, m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub length_m: f64,
     /// Its breadth, m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub beam_m: f64,
     /// How deep it lies, m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub draught_m: f64,
     /// Natural period of roll, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub roll_period_s: f64,
     /// Damping ratio of roll.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub roll_damping: f64,
 }
 

@@ -10,7 +10,7 @@ use super::stand::standpoint;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Pose, Rotation, Route, Trajectory, Vector, from_roll_pitch_yaw};
 use crate::recording::{Reader, read_tum};
-use crate::spec::checked::{non_negative, positive};
+use crate::spec::checked::{NonNegative, Positive};
 use crate::spec::{Source, SpecError};
 use crate::time::Stamp;
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// A trajectory of the base to play.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReplaySpec {
     /// The poses `world_from_base`.
@@ -27,15 +27,15 @@ pub struct ReplaySpec {
     /// begins; else it is played where it was recorded.
     pub from_route: bool,
     /// How long the base is at rest first, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// Half of the time that play takes to come to its speed, and to end, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub ease_s: f64,
 }
 
 /// Where recorded poses are.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum PosesSpec {
     /// In a file in the TUM format; a relative path is from the spec's folder.

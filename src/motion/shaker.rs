@@ -7,7 +7,7 @@ use super::stand::standpoint;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Route, Vector};
 use crate::random::{Seed, Stream};
-use crate::spec::checked::{finite, non_negative, positive};
+use crate::spec::checked::{Finite, NonNegative, Positive};
 use crate::spec::{Source, SpecError};
 use nalgebra::Complex;
 use rand::RngExt;
@@ -15,24 +15,24 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// A base that is driven along or about its axes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShakerSpec {
     /// Height of the base above the floor, m.
-    #[serde(deserialize_with = "finite")]
+    #[serde(with = "Finite")]
     pub height_m: f64,
     /// How long everything is at rest first, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// How long the signals take to reach their full strength, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub onset_s: f64,
     /// The signals; those of one axis add up.
     pub drives: Vec<DriveSpec>,
 }
 
 /// A signal on an axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DriveSpec {
     /// The axis.
@@ -42,7 +42,7 @@ pub struct DriveSpec {
 }
 
 /// An axis of the base at rest: along x (forward), y (left), z (up), or about them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Axis {
     /// Forward.
     X,
@@ -69,16 +69,16 @@ impl Axis {
 }
 
 /// A test signal.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum SignalSpec {
     /// A sine whose frequency goes exponentially from one end to the other until the end of the run.
     SweptSine {
         /// Frequency at the start, Hz.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         from_hz: f64,
         /// Frequency at the end, Hz.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         to_hz: f64,
         /// Amplitude, held over the sweep.
         amplitude: Level,
@@ -87,13 +87,13 @@ pub enum SignalSpec {
     /// does not leak.
     Multisine {
         /// The period, s.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         period_s: f64,
         /// Lowest frequency, Hz.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         low_hz: f64,
         /// Highest frequency, Hz.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         high_hz: f64,
         /// Root mean square of the whole.
         rms: Level,
@@ -104,10 +104,10 @@ pub enum SignalSpec {
     /// Random noise with a flat spectrum within a band: 256 sinusoids.
     BandNoise {
         /// Lowest frequency, Hz.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         low_hz: f64,
         /// Highest frequency, Hz.
-        #[serde(deserialize_with = "positive")]
+        #[serde(with = "Positive")]
         high_hz: f64,
         /// Root mean square of the whole.
         rms: Level,
@@ -115,7 +115,7 @@ pub enum SignalSpec {
 }
 
 /// The phases of a multisine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Phases {
     /// Schroeder's: a low crest.
     #[default]
@@ -125,7 +125,7 @@ pub enum Phases {
 }
 
 /// How strong a signal is, and in which derivative it is so at every frequency alike.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Level {
     /// Displacement, m.
     Metres(f64),

@@ -6,11 +6,11 @@ use crate::geometry::{Kinematics, Route, Vector};
 use serde::{Deserialize, Serialize};
 
 /// A base that stands still where the route begins, facing along it; without a route at the world's origin, facing x.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StandSpec {
     /// Height of the base above the floor, m.
-    #[serde(deserialize_with = "crate::spec::checked::finite")]
+    #[serde(with = "crate::spec::checked::Finite")]
     pub height_m: f64,
 }
 

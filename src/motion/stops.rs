@@ -7,7 +7,7 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 /// When the hand holds the head still, while whatever else it does goes on.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum StopsSpec {
     /// At these times: when each begins, and how long it lasts with grasping and letting go, s. None of them: never.
@@ -15,13 +15,13 @@ pub enum StopsSpec {
     /// At random times.
     Random {
         /// Mean time from the end of one to the begin of the next, s; each is between half and one and a half of it.
-        #[serde(deserialize_with = "crate::spec::checked::positive")]
+        #[serde(with = "crate::spec::checked::Positive")]
         every_s: f64,
         /// The shortest, s.
-        #[serde(deserialize_with = "crate::spec::checked::positive")]
+        #[serde(with = "crate::spec::checked::Positive")]
         shortest_s: f64,
         /// The longest, s.
-        #[serde(deserialize_with = "crate::spec::checked::positive")]
+        #[serde(with = "crate::spec::checked::Positive")]
         longest_s: f64,
     },
 }

@@ -12,29 +12,29 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// The walk is the route at piecewise constant speed, convolved with a bump in time ([`super`]): corners are cut by at
 /// most `0.137 smoothing_s |change of velocity|`, and the speed never exceeds `speed_m_per_s`. At the end of an open
 /// route the walker turns round and goes back; a closed one is walked round and round.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WalkSpec {
     /// Speed on the straight, m/s.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub speed_m_per_s: f64,
     /// Speed about a corner of 90 degrees or more, m/s; about a smaller one in proportion nearer to the full speed.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub corner_speed_m_per_s: f64,
     /// How far before and after a corner the walker is slow, m.
-    #[serde(deserialize_with = "crate::spec::checked::non_negative")]
+    #[serde(with = "crate::spec::checked::NonNegative")]
     pub corner_reach_m: f64,
     /// Half-width of the bump that rounds the walk, s.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub smoothing_s: f64,
     /// Least half-width of a turn of the body, s.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub turn_s: f64,
     /// Greatest rate of a turn, degrees/s: greater turns take longer.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub turn_rate_deg_per_s: f64,
     /// How much later than the walk the body turns, s.
-    #[serde(deserialize_with = "crate::spec::checked::finite")]
+    #[serde(with = "crate::spec::checked::Finite")]
     pub turn_lag_s: f64,
 }
 

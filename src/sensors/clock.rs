@@ -3,7 +3,7 @@ use crate::time::{Span, Stamp};
 use serde::{Deserialize, Serialize};
 
 /// The clocks of the sensors, one each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClocksSpec {
     /// The lidar's. Its time is the one in which trajectories are written.
@@ -13,20 +13,20 @@ pub struct ClocksSpec {
 }
 
 /// A sensor's clock against true time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClockSpec {
     /// How far it is ahead at the start, ms.
-    #[serde(deserialize_with = "checked::finite")]
+    #[serde(with = "checked::Finite")]
     pub offset_ms: f64,
     /// How much faster it runs, parts per million (1 ms a minute is 16.67 ppm).
-    #[serde(deserialize_with = "checked::finite")]
+    #[serde(with = "checked::Finite")]
     pub rate_ppm: f64,
     /// Standard deviation of the white noise on a stamp, ms.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub jitter_ms: f64,
     /// What stamps are rounded down to a multiple of, ms; 0 for none.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub resolution_ms: f64,
 }
 

@@ -8,7 +8,7 @@ use crate::world::SceneSpec;
 use serde::{Deserialize, Serialize};
 
 /// What to simulate, by name: each a path, or a name in the library.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// The world.
@@ -32,7 +32,7 @@ pub struct Scenario {
     /// The scene's way to walk; `None` for its default one.
     pub route: Option<String>,
     /// How long, s.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub duration_s: f64,
     /// The seed from which all chance follows.
     pub seed: Seed,
@@ -59,7 +59,7 @@ impl Scenario {
 }
 
 /// The specs of a run as they were used, whole: with them and the scenario a run can be repeated anywhere.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Specs {
     /// The world, with the scenes that it includes.

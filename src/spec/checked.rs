@@ -1,91 +1,142 @@
-//! Numbers that are checked where they are read, so that the error points at them.
+//! Numbers that are checked while a spec is read, so that the error has the line of the number.
 //!
-//! Use with `#[serde(deserialize_with = "crate::spec::checked::positive")]`.
+//! Use with `#[serde(with = "crate::spec::checked::Positive")]`. The JSON schema of a spec takes the range from the same
+//! attribute.
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserialize, Deserializer, Error};
+use serde::ser::{Serialize, Serializer};
+use std::borrow::Cow;
 
-/// A number that is neither NaN nor infinite.
-///
-/// # Errors
-/// When it is not.
-pub fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    require(f64::deserialize(deserializer)?, |x| x.is_finite(), "a finite number")
-}
+/// Defines a checked number and the array of such numbers.
+macro_rules! checked {
+    ($(#[$doc:meta])* $number:ident, $array:ident, $accepts:expr, $expected:literal, $several:literal, $schema:tt) => {
+        $(#[$doc])*
+        pub struct $number;
 
-/// A finite number above zero.
-///
-/// # Errors
-/// When it is not.
-pub fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    require(f64::deserialize(deserializer)?, |x| x.is_finite() && x > 0.0, "a finite number above 0")
-}
+        impl $number {
+            /// Reads the number.
+            ///
+            /// # Errors
+            /// When it is out of range.
+            pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+                let number = f64::deserialize(deserializer)?;
+                let accepts: fn(f64) -> bool = $accepts;
+                if accepts(number) {
+                    Ok(number)
+                } else {
+                    Err(D::Error::custom(format!("expected {}, found {number}", $expected)))
+                }
+            }
 
-/// A finite number of at least zero.
-///
-/// # Errors
-/// When it is not.
-pub fn non_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    require(f64::deserialize(deserializer)?, |x| x.is_finite() && x >= 0.0, "a finite number of at least 0")
-}
-
-/// A number from 0 to 1.
-///
-/// # Errors
-/// When it is not.
-pub fn fraction<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    require(f64::deserialize(deserializer)?, |x| (0.0..=1.0).contains(&x), "a number from 0 to 1")
-}
-
-/// `N` finite numbers.
-///
-/// # Errors
-/// When there are not `N`, or one of them is not finite.
-pub fn finite_array<'de, D, const N: usize>(deserializer: D) -> Result<[f64; N], D::Error>
-where
-    D: Deserializer<'de>,
-    [f64; N]: Deserialize<'de>,
-{
-    let numbers = <[f64; N]>::deserialize(deserializer)?;
-    match numbers.iter().find(|x| !x.is_finite()) {
-        Some(bad) => Err(D::Error::custom(format!("expected {N} finite numbers, found {bad} among them"))),
-        None => Ok(numbers),
-    }
-}
-
-/// `N` finite numbers of at least zero.
-///
-/// # Errors
-/// When there are not `N`, or one of them is not.
-pub fn non_negative_array<'de, D, const N: usize>(deserializer: D) -> Result<[f64; N], D::Error>
-where
-    D: Deserializer<'de>,
-    [f64; N]: Deserialize<'de>,
-{
-    let numbers = <[f64; N]>::deserialize(deserializer)?;
-    match numbers.iter().find(|x| !(x.is_finite() && **x >= 0.0)) {
-        Some(bad) => {
-            Err(D::Error::custom(format!("expected {N} finite numbers of at least 0, found {bad} among them")))
+            /// Writes the number.
+            ///
+            /// # Errors
+            /// When the format cannot represent it.
+            pub fn serialize<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+                number.serialize(serializer)
+            }
         }
-        None => Ok(numbers),
-    }
+
+        impl JsonSchema for $number {
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($number).into()
+            }
+
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!($schema)
+            }
+        }
+
+        #[doc = concat!("`N` numbers, each as [`", stringify!($number), "`].")]
+        pub struct $array<const N: usize>;
+
+        impl<const N: usize> $array<N> {
+            /// Reads the numbers.
+            ///
+            /// # Errors
+            /// When the count is not `N`, or one of them is out of range.
+            pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; N], D::Error>
+            where
+                [f64; N]: Deserialize<'de>,
+            {
+                let numbers = <[f64; N]>::deserialize(deserializer)?;
+                let accepts: fn(f64) -> bool = $accepts;
+                match numbers.iter().find(|number| !accepts(**number)) {
+                    Some(bad) => Err(D::Error::custom(format!("expected {N} {}, found {bad} among them", $several))),
+                    None => Ok(numbers),
+                }
+            }
+
+            /// Writes the numbers.
+            ///
+            /// # Errors
+            /// When the format cannot represent them.
+            pub fn serialize<S: Serializer>(numbers: &[f64; N], serializer: S) -> Result<S::Ok, S::Error>
+            where
+                [f64; N]: Serialize,
+            {
+                numbers.serialize(serializer)
+            }
+        }
+
+        impl<const N: usize> JsonSchema for $array<N> {
+            fn schema_name() -> Cow<'static, str> {
+                format!("{}{N}", stringify!($array)).into()
+            }
+
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+                let number = $number::json_schema(generator);
+                json_schema!({ "type": "array", "items": number, "minItems": N, "maxItems": N })
+            }
+        }
+    };
 }
 
-/// `N` finite numbers above zero.
-///
-/// # Errors
-/// When there are not `N`, or one of them is not.
-pub fn positive_array<'de, D, const N: usize>(deserializer: D) -> Result<[f64; N], D::Error>
-where
-    D: Deserializer<'de>,
-    [f64; N]: Deserialize<'de>,
-{
-    let numbers = <[f64; N]>::deserialize(deserializer)?;
-    match numbers.iter().find(|x| !(x.is_finite() && **x > 0.0)) {
-        Some(bad) => Err(D::Error::custom(format!("expected {N} finite numbers above 0, found {bad} among them"))),
-        None => Ok(numbers),
-    }
-}
+checked!(
+    /// A number that is neither NaN nor infinite.
+    Finite,
+    FiniteArray,
+    |x| x.is_finite(),
+    "a finite number",
+    "finite numbers",
+    { "type": "number" }
+);
 
-fn require<E: Error>(x: f64, is_right: impl Fn(f64) -> bool, what: &str) -> Result<f64, E> {
-    if is_right(x) { Ok(x) } else { Err(E::custom(format!("expected {what}, found {x}"))) }
-}
+checked!(
+    /// A finite number above zero.
+    Positive,
+    PositiveArray,
+    |x| x.is_finite() && x > 0.0,
+    "a finite number above 0",
+    "finite numbers above 0",
+    { "type": "number", "exclusiveMinimum": 0.0 }
+);
+
+checked!(
+    /// A finite number of at least zero.
+    NonNegative,
+    NonNegativeArray,
+    |x| x.is_finite() && x >= 0.0,
+    "a finite number of at least 0",
+    "finite numbers of at least 0",
+    { "type": "number", "minimum": 0.0 }
+);
+
+checked!(
+    /// A number from 0 to 1.
+    Fraction,
+    FractionArray,
+    |x| (0.0..=1.0).contains(&x),
+    "a number from 0 to 1",
+    "numbers from 0 to 1",
+    { "type": "number", "minimum": 0.0, "maximum": 1.0 }
+);

@@ -57,6 +57,19 @@ impl<'de> Visitor<'de> for PlacementVisitor {
     }
 }
 
+impl schemars::JsonSchema for Placement {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Placement".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "description": "A pose: x, y, z (m), yaw, pitch, roll (degrees); omitted trailing numbers are 0.",
+            "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 6
+        })
+    }
+}
+
 impl Serialize for Placement {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let used = self.numbers.iter().rposition(|x| *x != 0.0).map_or(0, |last| last + 1).max(2);

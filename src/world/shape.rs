@@ -18,31 +18,31 @@ pub(super) type Triangle = [Vector; 3];
 const MAX_DIVISIONS: usize = 4096;
 
 /// A shape, in a frame of its own with z up. It stands on the plane z = 0.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum ShapeSpec {
     /// A box, centred on the origin in x and y.
     Box {
         /// Extents along x, y, z, m.
-        #[serde(deserialize_with = "checked::positive_array")]
+        #[serde(with = "checked::PositiveArray::<3>")]
         size_m: [f64; 3],
     },
     /// A rectangle in the plane z = 0, centred on the origin, seen from both sides.
     Rectangle {
         /// Extents along x and y, m.
-        #[serde(deserialize_with = "checked::positive_array")]
+        #[serde(with = "checked::PositiveArray::<2>")]
         size_m: [f64; 2],
     },
     /// A wall from the origin along x, its middle plane at y = 0.
     Wall {
         /// Extent along x, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         length_m: f64,
         /// Extent along z, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         height_m: f64,
         /// Extent along y, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         thickness_m: f64,
         /// Doorways and windows, in order along x; none unless told.
         #[serde(default)]
@@ -51,10 +51,10 @@ pub enum ShapeSpec {
     /// An upright cylinder about z: a prism whose corners lie on the circle.
     Cylinder {
         /// Radius, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         radius_m: f64,
         /// Extent along z, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         height_m: f64,
         /// Number of sides, 24 unless told.
         #[serde(default = "default_sides")]
@@ -65,23 +65,23 @@ pub enum ShapeSpec {
         /// Number of steps.
         steps: usize,
         /// Extent along y, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         width_m: f64,
         /// Height of a step, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         rise_m: f64,
         /// Depth of a step, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         tread_m: f64,
         /// Thickness below the inner edges of the steps, m, with a soffit along the slope; solid down to z = 0 unless
         /// told.
-        #[serde(default, deserialize_with = "checked::non_negative")]
+        #[serde(default, with = "checked::NonNegative")]
         slab_m: f64,
     },
     /// Ground with a height at each node of a grid, centred on the origin in x and y.
     HeightField {
         /// Extents along x and y, m.
-        #[serde(deserialize_with = "checked::positive_array")]
+        #[serde(with = "checked::PositiveArray::<2>")]
         size_m: [f64; 2],
         /// The heights.
         heights: HeightsSpec,
@@ -91,7 +91,7 @@ pub enum ShapeSpec {
         /// The file, from the scene's folder.
         file: String,
         /// Metres per unit of the file; 1 unless told.
-        #[serde(default = "default_scale", deserialize_with = "checked::positive")]
+        #[serde(default = "default_scale", with = "checked::Positive")]
         scale: f64,
         /// The file's unit of length, by which `scale` is multiplied; metres unless told.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -103,7 +103,7 @@ pub enum ShapeSpec {
 }
 
 /// A unit of length.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LengthUnit {
     /// Metres.
@@ -132,7 +132,7 @@ impl LengthUnit {
 }
 
 /// The axis of a mesh that points up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
     /// y, as in glTF: x stays, z becomes -y.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A scene: what there is, what it is made of, what moves in it, and where one can walk. Lengths in metres, z up.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// What to call it.
@@ -33,11 +33,11 @@ pub struct SceneSpec {
 }
 
 /// What a surface does with a laser's light.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
     /// Fraction scattered back, 0 to 1.
-    #[serde(deserialize_with = "checked::fraction")]
+    #[serde(with = "checked::Fraction")]
     pub reflectance: f64,
     /// Whether light goes through.
     #[serde(default)]
@@ -45,7 +45,7 @@ pub struct MaterialSpec {
 }
 
 /// Whether light goes through a surface.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum MaterialKind {
     /// Nothing goes through.
@@ -54,13 +54,13 @@ pub enum MaterialKind {
     /// A part goes straight through.
     Glass {
         /// That part, 0 to 1.
-        #[serde(deserialize_with = "checked::fraction")]
+        #[serde(with = "checked::Fraction")]
         transmission: f64,
     },
 }
 
 /// Something in a scene, once or at several places.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum ItemSpec {
     /// A shape of one material.
@@ -86,7 +86,7 @@ pub enum ItemSpec {
 }
 
 /// Many copies of a template, thrown into a region.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScatterSpec {
     /// The template's name.
@@ -98,17 +98,17 @@ pub struct ScatterSpec {
     /// Two opposite corners of the region, m: the templates' origins lie between them.
     pub region_m: ([f64; 3], [f64; 3]),
     /// Smallest distance between two origins, m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub min_spacing_m: f64,
     /// Smallest horizontal distance from an origin to any route, m.
-    #[serde(default, deserialize_with = "checked::non_negative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub keep_from_routes_m: f64,
     /// How the copies are turned.
     pub turn: Turn,
 }
 
 /// How scattered copies are turned.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Turn {
     /// As the template stands.
     Fixed,
@@ -119,7 +119,7 @@ pub enum Turn {
 }
 
 /// A template that moves along timed waypoints: a walking person, a swinging door.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MoverSpec {
     /// The template's name.
@@ -131,18 +131,18 @@ pub struct MoverSpec {
 }
 
 /// Where a mover is at one time.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WaypointSpec {
     /// Time since the run's start, s.
-    #[serde(deserialize_with = "checked::finite")]
+    #[serde(with = "checked::Finite")]
     pub time_s: f64,
     /// Its pose then.
     pub at_m_deg: Placement,
 }
 
 /// A way to walk.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RouteSpec {
     /// Whether it goes round, from the last point to the first.

@@ -4,24 +4,24 @@ use crate::estimation::spec::{MatchingSpec, SurfelSpec};
 use serde::{Deserialize, Serialize};
 
 /// How the whole is registered.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegistrationSpec {
     /// Spacing of the knots of the correction's spline, s.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub knot_spacing_s: f64,
     /// Edge of the finest voxels, m.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub finest_voxel_m: f64,
     /// How many resolutions, each double the last.
     pub levels: usize,
     /// Fewest points of a surfel.
     pub min_points: usize,
     /// Points of a cell are split when they span more than this, s.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub max_duration_s: f64,
     /// Length of the chapters whose surfels are matched with each other's, s.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub chapter_s: f64,
     /// A chapter becomes a reference, with which others are matched, where fewer references than this have seen the
     /// same.
@@ -32,44 +32,44 @@ pub struct RegistrationSpec {
     pub neighbours: usize,
     /// Greatest distance along the normal of finest surfels, m; of coarser ones, in proportion to their edges, until
     /// those are settled.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub max_plane_distance_m: f64,
     /// Cauchy threshold, in standard deviations.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub cauchy: f64,
     /// Standard deviation of a match beside what its points' number says, m.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub match_sigma_m: f64,
     /// Weight of a surfel's matches together against one that stood alone.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub match_weight: f64,
     /// Time in which the open loop's error, of the size that its covariance tells, becomes another, s.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub correlation_s: f64,
     /// Drift of the open loop's position beside what its covariance tells, a random walk, m/sqrt(s).
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub drift_m_per_sqrt_s: f64,
     /// Likewise of its attitude, degrees/sqrt(s).
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub turn_deg_per_sqrt_s: f64,
     /// Standard deviation of the open loop's roll and pitch against gravity, degrees.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub level_sigma_deg: f64,
     /// Most iterations of match and solve a resolution.
     pub max_iterations: usize,
     /// Iterations end when no knot moves by more than this, m.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub settled_m: f64,
     /// Least over greatest information that the matches hold about the position along any direction, 0..1: with less
     /// that direction is weak.
-    #[serde(deserialize_with = "crate::spec::checked::fraction")]
+    #[serde(with = "crate::spec::checked::Fraction")]
     pub weak_conditioning: f64,
     /// What was seen so long apart was seen again, s: what was seen within it the open loop's windows have weighed.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub again_after_s: f64,
     /// Fraction of what holds a weak direction that must have been seen again, 0..1: with less the open loop stays,
     /// whose windows and IMU know that direction better.
-    #[serde(deserialize_with = "crate::spec::checked::fraction")]
+    #[serde(with = "crate::spec::checked::Fraction")]
     pub min_seen_again: f64,
     /// How places are recognised.
     pub places: PlacesSpec,

@@ -4,20 +4,20 @@ use super::UavSpec;
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
 use crate::motion::sines::{Line, Part, Sines, geometric_parts};
 use crate::random::Stream;
-use crate::spec::checked::{non_negative, positive};
+use crate::spec::checked::{NonNegative, Positive};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// Wind with Dryden's gusts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GustSpec {
     /// Mean wind at 6 m (20 feet) above the ground, m/s: gusts grow with it. Light turbulence: 7.7, moderate: 15.4.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub wind_m_per_s: f64,
     /// Speed at which the craft meets the air, m/s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub airspeed_m_per_s: f64,
 }
 

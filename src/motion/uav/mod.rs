@@ -18,36 +18,36 @@ use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Route, STANDARD_GRAVITY_M_PER_S2};
 use crate::random::Seed;
 use crate::spec::Source;
-use crate::spec::checked::{non_negative, positive};
+use crate::spec::checked::{NonNegative, Positive};
 use gust::{horizontal, vertical};
 use rotors::Rotors;
 use serde::{Deserialize, Serialize};
 
 /// A small multirotor that carries the base.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UavSpec {
     /// How long everything is at rest first, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// How long gusts and vibration take to reach their full strength, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub onset_s: f64,
     /// Height of the base above the route's floor, m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub height_m: f64,
     /// How it flies along the route.
     pub follow: WalkSpec,
     /// The wind.
     pub gust: GustSpec,
     /// Natural frequency with which it holds its place, Hz.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub hold_hz: f64,
     /// Damping ratio of that.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub hold_damping: f64,
     /// How the air drags it: acceleration for each m/s of wind, 1/s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub drag_per_s: f64,
     /// The rotors.
     pub rotors: RotorSpec,

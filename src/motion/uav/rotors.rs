@@ -3,31 +3,31 @@
 use crate::motion::jet::Jet;
 use crate::motion::sines::{Line, Sines};
 use crate::random::Stream;
-use crate::spec::checked::{non_negative, positive};
+use crate::spec::checked::{NonNegative, Positive};
 use nalgebra::Complex;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Rotors of a craft.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotorSpec {
     /// How many, up to 255.
     pub count: u8,
     /// Their mean speed, turns/s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub speed_hz: f64,
     /// By how much their speeds differ, as a share of the mean, either way.
-    #[serde(deserialize_with = "crate::spec::checked::fraction")]
+    #[serde(with = "crate::spec::checked::Fraction")]
     pub speed_spread: f64,
     /// Blades of a rotor.
     pub blades: u8,
     /// What the imbalance of one shakes the craft with: a circle in the level, m/s^2.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub imbalance_m_per_s2: f64,
     /// What the blades of one beat the craft with, up and down, m/s^2.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub beat_m_per_s2: f64,
 }
 

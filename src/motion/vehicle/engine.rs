@@ -4,35 +4,35 @@ use crate::motion::jet::Jet;
 use crate::motion::rhythm::Wander;
 use crate::motion::sines::{Line, Sines};
 use crate::random::Stream;
-use crate::spec::checked::{finite_array, non_negative, positive};
+use crate::spec::checked::{FiniteArray, NonNegative, Positive};
 use nalgebra::Complex;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// An engine that runs at one speed, more or less.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EngineSpec {
     /// Its speed, revolutions a minute.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub speed_rpm: f64,
     /// How far its phase wanders, turns rms, at up to 0.5 Hz.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub irregularity_turns: f64,
     /// Its harmonics.
     pub orders: Vec<OrderSpec>,
 }
 
 /// A harmonic of an engine's speed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OrderSpec {
     /// Cycles a revolution: 1 is imbalance; a four-stroke engine of n cylinders fires n / 2 times.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub order: f64,
     /// Amplitude of acceleration forward, to the left and up, m/s^2.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub acceleration_m_per_s2: [f64; 3],
 }
 

@@ -19,21 +19,21 @@ use super::walk::{Walk, WalkSpec};
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Pose, Route};
 use crate::random::Seed;
-use crate::spec::checked::{finite_array, non_negative};
+use crate::spec::checked::{FiniteArray, NonNegative};
 use crate::spec::{Source, SpecError};
 use engine::Engine;
 use serde::{Deserialize, Serialize};
 
 /// A wheeled vehicle that carries the base. It turns on the spot where a route is bent sharply, as a skid-steered one
 /// does.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleSpec {
     /// How long everything is at rest first, s.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// Where the base is, from the body's centre of mass: forward, to the left, up, m.
-    #[serde(deserialize_with = "finite_array")]
+    #[serde(with = "FiniteArray::<3>")]
     pub base_m: [f64; 3],
     /// How it drives along the route.
     pub follow: WalkSpec,

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// How rough a road is.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum RoadSpec {
     /// A class of ISO 8608.
@@ -24,13 +24,13 @@ pub enum RoadSpec {
     /// Any other road, or floor.
     Roughness {
         /// The displacement density at 0.1 cycles/m, 1e-6 m^3.
-        #[serde(deserialize_with = "crate::spec::checked::non_negative")]
+        #[serde(with = "crate::spec::checked::NonNegative")]
         at_n0_1e6_m3: f64,
     },
 }
 
 /// The classes of ISO 8608, from very good to very poor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum RoadClass {
     /// A motorway in good repair.
     A,

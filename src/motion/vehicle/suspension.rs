@@ -5,47 +5,47 @@
 
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
 use crate::motion::sines::Line;
-use crate::spec::checked::{non_negative, positive};
+use crate::spec::checked::{NonNegative, Positive};
 use nalgebra::{Complex, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// A body on four sprung wheels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SuspensionSpec {
     /// Mass of the body, kg.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub body_mass_kg: f64,
     /// Moment of inertia of the body about its forward axis, kg m^2.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub roll_inertia_kg_m2: f64,
     /// Moment of inertia of the body about its axis to the left, kg m^2.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub pitch_inertia_kg_m2: f64,
     /// Height of the body's centre of mass above the ground, m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub centre_height_m: f64,
     /// From the centre of mass forward to the front axle, m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub front_m: f64,
     /// From the centre of mass back to the rear axle, m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub rear_m: f64,
     /// Between the left and the right wheels, m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub track_m: f64,
     /// Mass of a wheel and what moves with it, kg.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub wheel_mass_kg: f64,
     /// Stiffness of a wheel's spring, N/m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub spring_n_per_m: f64,
     /// Damping of a wheel's spring, N s/m.
-    #[serde(deserialize_with = "non_negative")]
+    #[serde(with = "NonNegative")]
     pub damper_n_s_per_m: f64,
     /// Stiffness of a tyre, N/m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(with = "Positive")]
     pub tyre_n_per_m: f64,
 }
 

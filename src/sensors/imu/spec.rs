@@ -9,15 +9,15 @@ use std::ops::RangeInclusive;
 const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
 
 /// An inertial measurement unit, as its data sheet has it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImuSpec {
     /// Samples a second. Each is the average over the time since the one before.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub rate_hz: f64,
     /// How much later than the middle of that time a sample is stamped, ms: half a period for a stamp at its end, less
     /// for a driver that corrects it, more for a filter or a buffer. The clock's own offset comes on top.
-    #[serde(deserialize_with = "checked::finite")]
+    #[serde(with = "checked::Finite")]
     pub stamp_delay_ms: f64,
     /// The gyroscope.
     pub gyro: GyroSpec,
@@ -26,72 +26,72 @@ pub struct ImuSpec {
 }
 
 /// The errors of a gyroscope, alike and independent on its three axes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GyroSpec {
     /// White noise, deg/s/sqrt(Hz).
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub density_deg_per_s_per_sqrt_hz: f64,
     /// Standard deviation of the bias when switched on, deg/s.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub turn_on_bias_deg_per_s: f64,
     /// Random walk of the bias, rad/s/sqrt(s).
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub bias_walk_rad_per_s_per_sqrt_s: f64,
     /// A bias that wanders but returns, deg/h.
     pub wander_deg_per_h: Option<GaussMarkovSpec>,
     /// Standard deviation of the scale's error, per cent.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub scale_percent: f64,
     /// Standard deviation of the angle of each axis towards each of the others, degrees.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub misalignment_deg: f64,
     /// Greatest rate on an axis, deg/s.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub limit_deg_per_s: f64,
     /// What rates are rounded to a multiple of, deg/s; 0 for none.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub resolution_deg_per_s: f64,
 }
 
 /// The errors of an accelerometer, alike and independent on its three axes. One g is 9.80665 m/s^2.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AccelSpec {
     /// White noise, ug/sqrt(Hz).
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub density_ug_per_sqrt_hz: f64,
     /// Standard deviation of the bias when switched on, mg.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub turn_on_bias_mg: f64,
     /// Random walk of the bias, m/s^2/sqrt(s).
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub bias_walk_m_per_s2_per_sqrt_s: f64,
     /// A bias that wanders but returns, mg.
     pub wander_mg: Option<GaussMarkovSpec>,
     /// Standard deviation of the scale's error, per cent.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub scale_percent: f64,
     /// Standard deviation of the angle of each axis towards each of the others, degrees.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub misalignment_deg: f64,
     /// Greatest specific force on an axis, g.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub limit_g: f64,
     /// What specific forces are rounded to a multiple of, mg; 0 for none.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub resolution_mg: f64,
 }
 
 /// A first-order Gauss-Markov process.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GaussMarkovSpec {
     /// Standard deviation in the long run, in the unit of the key it stands under.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub sigma: f64,
     /// Time over which it forgets itself by 1/e, s.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub time_s: f64,
 }
 

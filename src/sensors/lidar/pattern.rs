@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 pub(super) const MAX_BEAMS: usize = 1 << 20;
 
 /// Where and when the beams of a scan are fired.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PatternSpec {
     /// A mirror that sweeps the plane z = 0 counter-clockwise, one turn a scan.
@@ -18,10 +18,10 @@ pub enum PatternSpec {
         /// How many beams.
         beams: u32,
         /// Azimuth of the first, degrees from x.
-        #[serde(deserialize_with = "checked::finite")]
+        #[serde(with = "checked::Finite")]
         first_deg: f64,
         /// Azimuth from one to the next, degrees.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         step_deg: f64,
         /// How many beams would fit into a whole turn, the blind part included: tells the time from beam to beam.
         slots_per_turn: u32,
@@ -31,10 +31,10 @@ pub enum PatternSpec {
         /// Elevation of each channel, degrees above the plane, in the order in which they fire.
         elevations_deg: Vec<f64>,
         /// Time from one channel's shot to the next one's, us.
-        #[serde(deserialize_with = "checked::non_negative")]
+        #[serde(with = "checked::NonNegative")]
         channel_period_us: f64,
         /// Time from one round of all channels to the next, us.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         round_period_us: f64,
     },
     /// A mirror that sweeps the plane z = 0 counter-clockwise and takes several turns for a scan, each a step further
@@ -43,11 +43,11 @@ pub enum PatternSpec {
         /// How many beams of the whole scan.
         beams: u32,
         /// Azimuth of the first, degrees from x.
-        #[serde(deserialize_with = "checked::finite")]
+        #[serde(with = "checked::Finite")]
         first_deg: f64,
         /// Azimuth between neighbours in the whole scan, degrees: beams of one mirror turn are `mirror_turns` steps
         /// apart.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         step_deg: f64,
         /// How many beams of one mirror turn would fit into a whole turn, the blind part included.
         slots_per_turn: u32,
@@ -60,13 +60,13 @@ pub enum PatternSpec {
         /// How many beams of a scan, evenly spaced in time over its whole period.
         beams: u32,
         /// Elevation at which the curve turns up, degrees above the plane z = 0.
-        #[serde(deserialize_with = "checked::finite")]
+        #[serde(with = "checked::Finite")]
         lowest_deg: f64,
         /// Elevation at which it turns down, degrees.
-        #[serde(deserialize_with = "checked::finite")]
+        #[serde(with = "checked::Finite")]
         highest_deg: f64,
         /// Turns about z a scan; what it has beyond a whole number turns each scan against the one before.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         turns_per_scan: f64,
         /// Swings up and down a scan.
         waves_per_scan: u32,

@@ -11,32 +11,32 @@ const RATES_HZ: RangeInclusive<f64> = 0.1..=1000.0;
 const MOST_BEAMS_PER_S: f64 = 3e7;
 
 /// A lidar, as its data sheet has it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LidarSpec {
     /// Where and when the beams of a scan are fired.
     pub pattern: PatternSpec,
     /// Scans a second.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub rate_hz: f64,
     /// Least range that is reported, m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub range_min_m: f64,
     /// Greatest range that is reported, m.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub range_max_m: f64,
     /// How many rays stand for a beam.
     pub beam: Rays,
     /// Angle from a beam's axis to where its light has fallen to 1/e^2, mrad.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub divergence_half_angle_mrad: f64,
     /// Surfaces within one beam that are nearer to each other than this, along it, give one mixed echo, m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub pulse_length_m: f64,
     /// How many echoes of a beam are reported at most, the strongest first choice; 1..=7.
     pub echoes: u8,
     /// Intensity of the echo of a white surface, met squarely at 1 m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub intensity_at_1_m: f64,
     /// Whether the errors below act.
     pub noise: Switch,
@@ -45,7 +45,7 @@ pub struct LidarSpec {
 }
 
 /// How many rays stand for a beam.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rays {
     /// One: no mixed pixels.
@@ -55,7 +55,7 @@ pub enum Rays {
 }
 
 /// On or off.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Switch {
     /// On.
@@ -65,7 +65,7 @@ pub enum Switch {
 }
 
 /// The errors of a lidar's ranges.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LidarErrorsSpec {
     /// Noise, bias and resolution of any range.
@@ -79,66 +79,66 @@ pub struct LidarErrorsSpec {
 }
 
 /// Noise, bias and resolution of a range.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RangeNoiseSpec {
     /// Standard deviation up to `near_m`, m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub near_sigma_m: f64,
     /// Up to where it holds, m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub near_m: f64,
     /// Standard deviation at `far_m`, to which it rises linearly, m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub far_sigma_m: f64,
     /// Where that holds, m.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub far_m: f64,
     /// Standard deviation, over runs, of the bias that all ranges of a run share, m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub bias_sigma_m: f64,
     /// What ranges are rounded to a multiple of, m; 0 for none.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub resolution_m: f64,
 }
 
 /// Which echoes are detected. The power of an echo is `reflectance cos(incidence) / range^2`, as of a surface that
 /// scatters evenly and is wider than the beam; whether it passes the detector's threshold is logistic in its logarithm.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DetectionSpec {
     /// Range at which half of the echoes of a white sheet (reflectance 0.9), met squarely, are detected, m.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub white_reach_m: f64,
     /// Change of the logarithm of the power over which the odds of detection change by e.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub softness: f64,
     /// How much too long the range of an echo at the threshold is, m; inversely proportional to power.
-    #[serde(deserialize_with = "checked::finite")]
+    #[serde(with = "checked::Finite")]
     pub weak_bias_m: f64,
 }
 
 /// What grazing incidence does to a range.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GrazingSpec {
     /// Incidence from which on ranges are biased, degrees from the normal.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub from_deg: f64,
     /// Bias at 90 degrees, m, to which it grows linearly in the cosine; negative for too short.
-    #[serde(deserialize_with = "checked::finite")]
+    #[serde(with = "checked::Finite")]
     pub bias_m: f64,
 }
 
 /// What a surface of glass does, beside weakening light by its material's transmission, there and back.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlassSpec {
     /// Share of beams, met squarely, that come back from the glass itself; in proportion to the cosine of incidence.
-    #[serde(deserialize_with = "checked::fraction")]
+    #[serde(with = "checked::Fraction")]
     pub echo: f64,
     /// How much farther what stands behind it seems, m: thickness times (refractive index - 1).
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub delay_m: f64,
 }
 

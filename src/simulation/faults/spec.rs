@@ -4,7 +4,7 @@ use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
 /// Faults of the sensors and of their delivery, applied in the order listed.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultsSpec {
     /// The faults; each acts on what the ones before it left.
@@ -15,7 +15,7 @@ pub struct FaultsSpec {
 ///
 /// Times are true seconds since the start of the run. A measurement belongs to the time at which it is complete: the
 /// end of an IMU sample's interval, the end of a lidar's sweep.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultSpec {
     /// The sensor whose measurements are affected.
@@ -37,7 +37,7 @@ pub struct FaultSpec {
 }
 
 /// The sensor that a fault affects.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultySensor {
     /// The inertial measurement unit of the head.
@@ -49,13 +49,13 @@ pub enum FaultySensor {
 }
 
 /// What happens to measurements.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum FaultKind {
     /// Messages are lost at random.
     Drop {
         /// Probability that a message is lost, 0 to 1.
-        #[serde(deserialize_with = "checked::fraction")]
+        #[serde(with = "checked::Fraction")]
         share: f64,
     },
     /// All messages of the interval are lost.
@@ -85,7 +85,7 @@ pub enum FaultKind {
     /// waits for the one before it.
     Delay {
         /// Mean of the distribution, s; at most 2.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         mean_s: f64,
     },
     /// Messages arrive in groups, stamped at the arrival of the group's last.
@@ -93,7 +93,7 @@ pub enum FaultKind {
         /// Messages in a group, 2 to 1000.
         size: usize,
         /// Time between the stamps within a group, us; 0 for equal stamps.
-        #[serde(deserialize_with = "checked::non_negative")]
+        #[serde(with = "checked::NonNegative")]
         spacing_us: f64,
     },
     /// The IMU saturates below the limits of its data sheet. The noise model that is published with the recording
@@ -114,7 +114,7 @@ pub enum FaultKind {
     /// Every beam of the lidar returns the same range.
     ConstantRange {
         /// That range, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         range_m: f64,
     },
     /// Single samples of the IMU are replaced.
@@ -155,25 +155,25 @@ pub enum FaultKind {
     /// The sensor's clock jumps at `from_s`: all later stamps are off by the jump.
     ClockJump {
         /// The jump, s; positive is forward.
-        #[serde(deserialize_with = "checked::finite")]
+        #[serde(with = "checked::Finite")]
         jump_s: f64,
     },
     /// The sensor's clock is off by a constant from the start.
     ClockOffset {
         /// The offset, s; positive is ahead.
-        #[serde(deserialize_with = "checked::finite")]
+        #[serde(with = "checked::Finite")]
         offset_s: f64,
     },
     /// Messages are delivered twice.
     Duplicate {
         /// Probability that a message is repeated, 0 to 1.
-        #[serde(deserialize_with = "checked::fraction")]
+        #[serde(with = "checked::Fraction")]
         share: f64,
     },
     /// Neighbouring messages are delivered in the wrong order; their stamps stay.
     Reorder {
         /// Probability that a message is exchanged with the next one, 0 to 1.
-        #[serde(deserialize_with = "checked::fraction")]
+        #[serde(with = "checked::Fraction")]
         share: f64,
     },
     /// The IMU's driver uses other conventions than REP-145.
@@ -206,7 +206,7 @@ pub enum FaultKind {
 }
 
 /// How a driver writes a beam that did not come back. The simulated lidar writes `inf` (REP-117).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MissEncoding {
     /// The maximum range.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 const MOST_MS: f64 = 20.0;
 
 /// A study of latency and timing noise, as it is written.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LatencySpec {
     /// The paper's figure.
@@ -27,10 +27,10 @@ pub struct LatencySpec {
     /// Noises whose maps are shown, ms.
     pub shown_noises_ms: Vec<f64>,
     /// The map is shown as it was seen for so long, about the middle of the run, s.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub shown_s: f64,
     /// Length of the stretches of the run that are drawn again and again for the confidence bands, s.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub block_s: f64,
 }
 

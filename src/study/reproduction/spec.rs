@@ -8,7 +8,7 @@ use crate::study::latency::LatencySpec;
 use serde::{Deserialize, Serialize};
 
 /// An experiment of the paper.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum ExperimentSpec {
     /// Gain curves of several heads, their damping fitted to the paper's peaks.
@@ -18,16 +18,16 @@ pub enum ExperimentSpec {
 }
 
 /// Gain curves of several heads.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainCurvesSpec {
     /// The paper's figure.
     pub figure: String,
     /// Highest frequency that the figure shows, Hz.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub shown_to_hz: f64,
     /// Highest frequency at which gains are measured and peaks are looked for, Hz.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub up_to_hz: f64,
     /// Least and greatest damping ratio that the fit may choose.
     pub ratios: (f64, f64),
@@ -36,7 +36,7 @@ pub struct GainCurvesSpec {
 }
 
 /// A head of a figure.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DesignedSpec {
     /// Its letter in the paper's figure.
@@ -50,7 +50,7 @@ pub struct DesignedSpec {
 }
 
 /// The highest gain along or about each axis; left out where the paper shows none.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PeaksSpec {
     /// Rate about x.

@@ -15,11 +15,11 @@ pub use wire::{Mounting, Section, Wire};
 use serde::{Deserialize, Serialize};
 
 /// A hand that nods the base by a sine about the spring's foot.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shake {
     /// Amplitude of the base's pitch, degrees.
-    #[serde(deserialize_with = "crate::spec::checked::positive")]
+    #[serde(with = "crate::spec::checked::Positive")]
     pub pitch_deg: f64,
     /// Frequency, Hz; left out, the hand finds the head's slowest mode.
     #[serde(default)]

@@ -81,7 +81,7 @@ impl Slot {
 #[serde(deny_unknown_fields)]
 pub(super) struct Walk {
     pub route: Option<String>,
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub duration_s: f64,
 }
 

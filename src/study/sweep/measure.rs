@@ -4,7 +4,7 @@ use super::BaseSpec;
 use serde::{Deserialize, Serialize};
 
 /// A figure of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Of the estimate: position error after rigid alignment, root mean square, m.

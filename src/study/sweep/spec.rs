@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What is varied about a run, and what is told of each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepSpec {
     /// The run that is varied.
@@ -30,7 +30,7 @@ pub struct SweepSpec {
 }
 
 /// A run, by names: each a path, or a name in the library.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum BaseSpec {
     /// A head on its spring in a hand that nods, by closed form: no simulation, a fraction of a millisecond.
@@ -64,7 +64,7 @@ pub enum BaseSpec {
         #[serde(default)]
         route: Option<String>,
         /// How long a run lasts, s.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         duration_s: f64,
         /// What a run may take.
         limit: LimitSpec,
@@ -72,11 +72,11 @@ pub enum BaseSpec {
 }
 
 /// What a run may take before it counts as failed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LimitSpec {
     /// Time for a simulation, and for each estimate from it, s.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub time_s: f64,
     /// Memory of the process that does it, MiB; enforced on Linux.
     pub memory_mib: u64,
@@ -87,7 +87,7 @@ pub struct LimitSpec {
 /// A path leads through a spec's keys as they are nested there: `head.linkage.spring.spring.coil.wire_diameter_mm`.
 /// Keys that are not needed to tell it may be left out: `head.wire_diameter_mm`. The name of a spec itself, `imu`,
 /// takes names of specs. A number in it counts from 0 in a list: `head.parts.0.mass_kg`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum AxisSpec {
     /// These values of one setting.
@@ -109,10 +109,10 @@ pub enum AxisSpec {
         /// The setting.
         path: String,
         /// The first value.
-        #[serde(deserialize_with = "checked::finite")]
+        #[serde(with = "checked::Finite")]
         from: f64,
         /// The last value.
-        #[serde(deserialize_with = "checked::finite")]
+        #[serde(with = "checked::Finite")]
         to: f64,
         /// How many, in a grid.
         #[serde(default)]
@@ -126,10 +126,10 @@ pub enum AxisSpec {
         /// The setting.
         path: String,
         /// The first value, above 0.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         from: f64,
         /// The last value, above 0.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         to: f64,
         /// How many, in a grid.
         #[serde(default)]
@@ -148,7 +148,7 @@ pub enum AxisSpec {
 }
 
 /// Settings with a name.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LevelSpec {
     /// What it is called in tables.
@@ -159,7 +159,7 @@ pub struct LevelSpec {
 }
 
 /// A setting's value.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum Setting {
     /// On or off.
@@ -173,7 +173,7 @@ pub enum Setting {
 }
 
 /// Which combinations of the axes are run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Sampling {
     /// All of them; the last axis changes fastest.
@@ -193,7 +193,7 @@ pub enum Sampling {
 }
 
 /// What is wanted of a measure.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GoalSpec {
     /// The measure.
@@ -203,7 +203,7 @@ pub struct GoalSpec {
 }
 
 /// How much of a measure is wanted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Aim {
     /// As little as can be.

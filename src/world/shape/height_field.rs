@@ -6,7 +6,7 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 /// The heights of a height field.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum HeightsSpec {
     /// Given, m: rows along x, from the lowest y to the highest; at least 2 x 2.
@@ -19,10 +19,10 @@ pub enum HeightsSpec {
         /// Number of cells along x and y.
         cells: [usize; 2],
         /// Greatest height of the first octave above and below zero, m.
-        #[serde(deserialize_with = "checked::non_negative")]
+        #[serde(with = "checked::NonNegative")]
         amplitude_m: f64,
         /// Length of the first octave, m.
-        #[serde(deserialize_with = "checked::positive")]
+        #[serde(with = "checked::Positive")]
         wavelength_m: f64,
     },
 }

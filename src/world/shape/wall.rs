@@ -4,20 +4,20 @@ use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
 /// A doorway or a window in a wall: a rectangle that is cut out.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OpeningSpec {
     /// Where it begins along the wall, m.
-    #[serde(deserialize_with = "checked::non_negative")]
+    #[serde(with = "checked::NonNegative")]
     pub from_m: f64,
     /// Where it ends along the wall, m.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub to_m: f64,
     /// Height of its lower edge, m: 0, and unless told, for a doorway.
-    #[serde(default, deserialize_with = "checked::non_negative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub sill_m: f64,
     /// Height of its upper edge, m.
-    #[serde(deserialize_with = "checked::positive")]
+    #[serde(with = "checked::Positive")]
     pub head_m: f64,
 }
 

@@ -6,7 +6,7 @@ use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
 /// What is wanted of a spring, and where to look for it.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DesignSpec {
     /// The head that it carries: a name or a file. The spring there is replaced; its mounting, damping and stops stay.
@@ -31,22 +31,22 @@ pub struct DesignSpec {
 }
 
 /// Where to look for a spring.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum SpaceSpec {
     /// Any coil between bounds.
     Coil {
         /// Mean diameter of the coil, from and to, mm.
-        #[serde(deserialize_with = "checked::positive_array")]
+        #[serde(with = "checked::PositiveArray::<2>")]
         coil_diameter_mm: [f64; 2],
         /// Diameter of the wire, from and to, mm.
-        #[serde(deserialize_with = "checked::positive_array")]
+        #[serde(with = "checked::PositiveArray::<2>")]
         wire_diameter_mm: [f64; 2],
         /// Coils that are free to move, from and to.
-        #[serde(deserialize_with = "checked::positive_array")]
+        #[serde(with = "checked::PositiveArray::<2>")]
         active_coils: [f64; 2],
         /// Length without load, from and to, mm.
-        #[serde(deserialize_with = "checked::positive_array")]
+        #[serde(with = "checked::PositiveArray::<2>")]
         free_length_mm: [f64; 2],
         /// What the wire is made of.
         material: Material,
@@ -56,7 +56,7 @@ pub enum SpaceSpec {
 }
 
 /// A figure of a design.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FigureName {
     /// Frequency of the slowest mode, Hz.
@@ -104,11 +104,11 @@ impl FigureName {
 }
 
 /// What is wanted of a figure.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Aim {
     /// This value.
-    Target(#[serde(deserialize_with = "checked::positive")] f64),
+    Target(#[serde(with = "checked::Positive")] f64),
     /// As little as can be.
     Least,
     /// As much as can be.
@@ -116,7 +116,7 @@ pub enum Aim {
 }
 
 /// A goal.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct GoalSpec {
     /// Of what.
@@ -137,7 +137,7 @@ impl GoalSpec {
 }
 
 /// A limit.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct LimitSpec {
     /// Of what.
@@ -160,7 +160,7 @@ impl LimitSpec {
 }
 
 /// A coil to try.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 pub struct CoilDesign {
     /// Its name in the catalogue; empty for one that is in none.
     pub name: String,

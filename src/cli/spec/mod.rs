@@ -1,0 +1,149 @@
+//! `zsim spec`: lists, shows and documents the specs.
+
+mod reference;
+
+use super::arguments::Global;
+use super::{End, output};
+use clap::{Args, Subcommand, ValueEnum};
+use schemars::{Schema, SchemaGenerator, json_schema, schema_for};
+use serde_json::json;
+use zsim::dynamics::HeadSpec;
+use zsim::elasticity::SpringSpec;
+use zsim::estimation::EstimatorSpec;
+use zsim::motion::MotionSpec;
+use zsim::sensors::{ClocksSpec, ImuSpec, LidarSpec};
+use zsim::simulation::FaultsSpec;
+use zsim::spec::{Kind, find, names};
+use zsim::study::reproduction::ExperimentSpec;
+use zsim::study::spring::design::DesignSpec;
+use zsim::study::sweep::SweepSpec;
+use zsim::world::SceneSpec;
+
+/// List and show the specs that ship, and the keys of each kind of spec
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  zsim spec list head\n  zsim spec show head handheld > my_head.ron\n  zsim spec schema head > head.schema.json"
+)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// List the specs that are built into zsim
+    List {
+        /// List only this kind
+        #[arg(value_enum)]
+        kind: Option<KindArgument>,
+    },
+    /// Print the text of a spec
+    Show {
+        /// The kind
+        #[arg(value_enum)]
+        kind: KindArgument,
+        /// A name that `zsim spec list` prints, or a file
+        name: String,
+    },
+    /// Print the JSON schema of a kind of spec
+    ///
+    /// RON and JSON have the same structure here: RON's (a: 1) is JSON's {"a": 1}, Variant(x) is {"Variant": x}.
+    Schema {
+        /// The kind
+        #[arg(value_enum)]
+        kind: KindArgument,
+    },
+    /// Print every key of a kind of spec with type, unit, default and range, as Markdown
+    Reference {
+        /// The kind
+        #[arg(value_enum)]
+        kind: KindArgument,
+    },
+}
+
+/// A kind of spec on the command line.
+#[derive(Clone, Copy, ValueEnum)]
+enum KindArgument {
+    Scene,
+    Head,
+    Spring,
+    Lidar,
+    Imu,
+    Clock,
+    Faults,
+    Motion,
+    Estimator,
+    Study,
+    Experiment,
+}
+
+impl From<KindArgument> for Kind {
+    fn from(kind: KindArgument) -> Self {
+        match kind {
+            KindArgument::Scene => Kind::Scene,
+            KindArgument::Head => Kind::Head,
+            KindArgument::Spring => Kind::Spring,
+            KindArgument::Lidar => Kind::Lidar,
+            KindArgument::Imu => Kind::Imu,
+            KindArgument::Clock => Kind::Clock,
+            KindArgument::Faults => Kind::Faults,
+            KindArgument::Motion => Kind::Motion,
+            KindArgument::Estimator => Kind::Estimator,
+            KindArgument::Study => Kind::Study,
+            KindArgument::Experiment => Kind::Experiment,
+        }
+    }
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+    match &arguments.verb {
+        Verb::List { kind } => list(kind.map(Kind::from), global)?,
+        Verb::Show { kind, name } => output::write_to_stdout(&find((*kind).into(), name)?.text)?,
+        Verb::Schema { kind } => {
+            let text = serde_json::to_string_pretty(&schema((*kind).into()))? + "\n";
+            output::write_to_stdout(&text)?;
+        }
+        Verb::Reference { kind } => {
+            let kind = (*kind).into();
+            output::write_to_stdout(&reference::markdown(kind, &schema(kind)))?;
+        }
+    }
+    Ok(End::Done)
+}
+
+fn list(wanted: Option<Kind>, global: &Global) -> anyhow::Result<()> {
+    let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| wanted.is_none_or(|wanted| wanted == *kind)).collect();
+    let width = kinds.iter().map(|kind| kind.folder().len()).max().unwrap_or_default();
+    let lines = kinds.iter().map(|kind| format!("{:width$}  {}\n", kind.folder(), names(*kind).join(", ")));
+    let figures = kinds.iter().map(|kind| (kind.folder().to_owned(), json!(names(*kind)))).collect();
+    output::tell(global, &lines.collect::<String>(), serde_json::Value::Object(figures), None)
+}
+
+/// The JSON schema of a kind of spec.
+fn schema(kind: Kind) -> Schema {
+    match kind {
+        Kind::Scene => schema_for!(SceneSpec),
+        Kind::Head => schema_for!(HeadSpec),
+        Kind::Spring => schema_for!(SpringSpec),
+        Kind::Lidar => schema_for!(LidarSpec),
+        Kind::Imu => schema_for!(ImuSpec),
+        Kind::Clock => schema_for!(ClocksSpec),
+        Kind::Faults => schema_for!(FaultsSpec),
+        Kind::Motion => schema_for!(MotionSpec),
+        Kind::Estimator => schema_for!(EstimatorSpec),
+        Kind::Study => study_schema(),
+        Kind::Experiment => schema_for!(ExperimentSpec),
+    }
+}
+
+/// The schema of a study: a sweep or the design of a spring.
+fn study_schema() -> Schema {
+    let mut generator = SchemaGenerator::default();
+    let alternatives = [generator.subschema_for::<SweepSpec>(), generator.subschema_for::<DesignSpec>()];
+    let definitions = generator.take_definitions(true);
+    json_schema!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "anyOf": alternatives,
+        "$defs": definitions
+    })
+}
