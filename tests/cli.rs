@@ -89,7 +89,7 @@ fn a_recording_is_told_estimated_and_cut_short_with_loss() {
     let here = tempfile::tempdir().unwrap();
     let (code, out, _) = run(here.path(), "simulate --scene mocap_room --duration 6s --out a.mcap");
     assert_eq!((code, out.lines().last()), (0, Some("a.mcap")));
-    assert!(here.path().join("a.tum").metadata().unwrap().len() > 100_000, "the truth stands beside it");
+    assert!(here.path().join("a.tum").metadata().unwrap().len() > 100_000, "the truth is next to it");
 
     let (code, out, _) = run(here.path(), "info a.mcap");
     assert_eq!(code, 0);
@@ -195,7 +195,7 @@ fn a_spec_anywhere_is_known_by_its_text() {
     let here = tempfile::tempdir().unwrap();
     std::fs::copy(root().join("specs/imus/3dm_gx2.ron"), here.path().join("mine.ron")).unwrap();
     let (code, out, _) = run(here.path(), "check mine.ron");
-    assert_eq!((code, out.trim()), (0, "mine.ron: IMU, right"));
+    assert_eq!((code, out.trim()), (0, "mine.ron: IMU, OK"));
 }
 
 #[test]

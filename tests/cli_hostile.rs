@@ -44,7 +44,7 @@ fn with_force_an_input_and_what_fails_are_spared() {
     assert_eq!(code, 0, "{talk}");
     let before = ["in.tum", "in.mcap"].map(|name| read(here.path(), name));
     let (code, _, talk) = run(here.path(), &format!("{SHORT} --motion replay.ron --out in.mcap --force"));
-    assert!(code == 2 && talk.contains("would be replaced by its result"), "{talk}");
+    assert!(code == 2 && talk.contains("would be replaced by the result"), "{talk}");
     assert!(before == ["in.tum", "in.mcap"].map(|name| read(here.path(), name)));
     let (code, out, talk) = run(here.path(), &format!("{SHORT} --seed 2 --out in.mcap --force"));
     assert_eq!((code, out.lines().last()), (0, Some("in.mcap")), "{talk}");

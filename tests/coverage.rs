@@ -50,7 +50,8 @@ fn a_level_scanner_that_stands_sees_its_arc_and_nothing_else() {
         assert!(cell.elevation_deg.0.abs() < 1e-9 || cell.elevation_deg.1.abs() < 1e-9, "{cell:?}");
         assert!(cell.azimuth_deg.0 <= 135.0 + 1e-9 && cell.azimuth_deg.1 >= -135.0 - 1e-9, "{cell:?}");
     }
-    let ahead = |cell: &&zsim::study::coverage::SeenCell| cell.azimuth_deg.0 >= -135.0 && cell.azimuth_deg.1 <= 135.0;
+    let ahead =
+        |cell: &&zsim::study::coverage::CoverageCell| cell.azimuth_deg.0 >= -135.0 && cell.azimuth_deg.1 <= 135.0;
     let rows = 32.0 * seen.cells.iter().filter(ahead).map(|cell| cell.beams_per_sr_s).sum::<f64>()
         / seen.cells.iter().filter(ahead).count() as f64;
     // Each of 1081 beams, 40 times a second, less the two at the ends; a row is 4 pi / 32 sr, of it 3/4 ahead.

@@ -74,7 +74,7 @@ fn coverage_tells_of_a_motion_without_a_scene() {
     assert_eq!((lines("coverage.csv"), lines("density.csv")), (1 + 120, 1 + 2048));
     assert!(out.join("coverage.png").is_file());
     let still = ["coverage", "--head", "rigid", "--motion", "stand", "--duration", "1s"];
-    zsim(&still).assert().success().stdout(predicate::str::contains("share of the sphere seen"));
+    zsim(&still).assert().success().stdout(predicate::str::contains("observed fraction of the sphere"));
 }
 
 #[test]

@@ -88,7 +88,7 @@ fn another_study_is_left_alone() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("made_from.ron"), "()").unwrap();
     let error = run(here.path(), 1, 2.0).unwrap_err();
-    assert!(error.is_wrong_input() && error.to_string().contains("other work"), "{error}");
+    assert!(error.is_invalid_input() && error.to_string().contains("other work"), "{error}");
 }
 
 #[test]

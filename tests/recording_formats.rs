@@ -245,8 +245,8 @@ fn a_damaged_database_ends_in_an_error_or_in_what_is_left() {
 }
 
 /// Makes every page of the tree of messages below its root the child of all pages above it: an interior page of a table
-/// (type 5) has its cells' offsets from byte 12, each cell begins with its child's number, and the last child is at byte
-/// 8 (sqlite.org/fileformat2.html, section 1.6).
+/// (type 5) has its cells' offsets from byte 12, each cell begins with its child's number, and the last child is at
+/// byte 8 (sqlite.org/fileformat2.html, section 1.6).
 fn tangle(bytes: &mut [u8], page_size: usize, root: usize) {
     let two = |bytes: &[u8], at: usize| usize::from(u16::from_be_bytes([bytes[at], bytes[at + 1]]));
     let is_interior = |bytes: &[u8], page: usize| bytes[(page - 1) * page_size] == 5;

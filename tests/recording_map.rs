@@ -52,7 +52,8 @@ fn with(from: &str, to: &str) -> Vec<u8> {
     [header.replace(from, to).as_bytes(), &FILE[end..]].concat()
 }
 
-/// The file with the checksum that docs/maps.md tells: of the words `1 0.5 4 <count>` and all bytes behind the header.
+/// The file with the checksum that docs/guide/maps.md tells: of the words `1 0.5 4 <count>` and all bytes behind the
+/// header.
 fn sealed(mut file: Vec<u8>, count: usize) -> Vec<u8> {
     let end = header_end(&file);
     let mut sum = crc32fast::Hasher::new();

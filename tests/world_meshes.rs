@@ -215,8 +215,8 @@ fn a_box_is_the_same_box_from_every_format() {
 
 #[test]
 fn the_unit_and_the_up_axis_of_a_mesh_can_be_specified() {
-    // The box is 2 x 1 x 3 of its units, about (0.5, 0, 0). With y up, its y points along z and its z along -y: 2 x 3 x 1.
-    // It stands turned by 90 degrees about z at (1, 2, 3).
+    // The box is 2 x 1 x 3 of its units, about (0.5, 0, 0). With y up, its y points along z and its z along -y: 2 x 3 x
+    // 1. It stands turned by 90 degrees about z at (1, 2, 3).
     let scene = Scene::new();
     let size = |file: &str, bytes: &[u8], keys: &str| {
         let (lower, upper) = scene.build_with(file, bytes, keys).unwrap_or_else(|error| panic!("{error}")).bounds();

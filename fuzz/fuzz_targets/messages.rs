@@ -1,5 +1,5 @@
-//! Any bytes as messages of each kind, of ROS 2 or of ROS 1, in a file that is sound: an IMU sample and a scan, then the
-//! message in question.
+//! Any bytes as messages of each kind, of ROS 2 or of ROS 1, in a file that is sound: an IMU sample and a scan, then
+//! the message in question.
 
 #![no_main]
 

@@ -11,15 +11,15 @@ use zsim::motion;
 use zsim::random::Seed;
 use zsim::simulation::Scenario;
 use zsim::spec::{Kind, find};
-use zsim::study::{CalibrationSpec, CloudFormat, CloudWishes, Wishes};
+use zsim::study::{CalibrationSpec, CloudFormat, CloudOptions, EstimateOptions};
 
-/// What every command understands.
+/// Arguments that every command accepts.
 #[derive(Args)]
 pub(super) struct Global {
     /// Print results as JSON
     #[arg(long, global = true)]
     pub json: bool,
-    /// Print results and errors alone
+    /// Suppress progress and notes; print results and errors only
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Use this many threads (default: all of the machine's); results do not depend on it
@@ -27,7 +27,7 @@ pub(super) struct Global {
     pub threads: Option<NonZeroUsize>,
 }
 
-/// Most threads that may be asked for.
+/// Maximum number of threads.
 const MOST_THREADS: usize = 1024;
 
 fn threads(text: &str) -> Result<NonZeroUsize, String> {
@@ -35,7 +35,8 @@ fn threads(text: &str) -> Result<NonZeroUsize, String> {
     text.parse().ok().filter(|threads: &NonZeroUsize| threads.get() <= MOST_THREADS).ok_or_else(wrong)
 }
 
-/// What to simulate beside the scene. A name is looked up as a path, then in scenes/ and specs/, then in the program.
+/// Parts of the simulation other than the scene. A name is resolved as a path, then in scenes/ and specs/, then in the
+/// program.
 #[derive(Args)]
 pub(super) struct ScenarioArguments {
     /// The head and its spring, a name under specs/heads/ or a file [default: handheld]
@@ -91,7 +92,7 @@ impl ScenarioArguments {
 }
 
 impl ScenarioArguments {
-    /// The files that a simulation in `scene` reads, as far as they are known by name: specs, and a recorded motion.
+    /// The input files of a simulation in `scene` that are known by name: specs, and a recorded motion.
     pub(super) fn inputs(&self, scene: &str) -> Vec<PathBuf> {
         let scenario = self.scenario(scene);
         let names = [
@@ -121,16 +122,16 @@ pub(super) struct EstimatorArguments {
     /// Stop before the global registration
     #[arg(long)]
     open_loop: bool,
-    /// Estimate also how the lidar sits beside the IMU, from where the calibration puts it
+    /// Estimate the lidar extrinsics too, starting from the calibration
     #[arg(long)]
     refine_extrinsics: bool,
     /// The cloud's files: cloud.ply, cloud.las, or both
     #[arg(long, value_name = "FORMAT", value_enum, default_value = "ply")]
     cloud_format: CloudFormatArgument,
-    /// Leave in the cloud what is no surface that stands: echoes of two surfaces, isolated ones, what moved
+    /// Keep mixed pixels, isolated points and moving points in the cloud
     #[arg(long)]
     keep_outliers: bool,
-    /// Tell where the open loop's time went
+    /// Report the time that each part of the open loop took
     #[arg(long)]
     pub profile: bool,
 }
@@ -154,20 +155,20 @@ impl From<CloudFormatArgument> for CloudFormat {
 }
 
 impl EstimatorArguments {
-    pub(super) fn wishes(&self) -> anyhow::Result<Wishes> {
+    pub(super) fn options(&self) -> anyhow::Result<EstimateOptions> {
         let mut estimator = estimation::load(&self.estimator)?;
         estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
         estimator.extrinsics.estimated |= self.refine_extrinsics;
         estimator.check().map_err(|error| Usage(error.to_string()))?;
-        let cloud = CloudWishes { format: self.cloud_format.into(), keep_outliers: self.keep_outliers };
-        Ok(Wishes { closed_loop: !self.open_loop, cloud, ..Wishes::with(estimator) })
+        let cloud = CloudOptions { format: self.cloud_format.into(), keep_outliers: self.keep_outliers };
+        Ok(EstimateOptions { closed_loop: !self.open_loop, cloud, ..EstimateOptions::with(estimator) })
     }
 }
 
 /// Where results go.
 #[derive(Args)]
 pub(super) struct OutArguments {
-    /// The folder for results; if it exists and is not empty, one with a number after its name
+    /// Folder for results; if it exists and is not empty, a number is appended to the name
     #[arg(long, short, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Write into the folder even if it exists
@@ -183,7 +184,7 @@ pub(super) fn calibration(path: Option<&Path>) -> anyhow::Result<CalibrationSpec
     }
 }
 
-/// A place on a map, `x,y,z,yaw`: metres, and degrees about the vertical.
+/// A pose on a map, `x,y,z,yaw`: metres, and degrees about the vertical.
 pub(super) fn start(text: &str) -> Result<Pose, String> {
     let numbers: Vec<f64> = text
         .split(',')

@@ -5,9 +5,9 @@ use super::output::printable;
 pub(super) use super::signals::stop_flag;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::time::Duration;
-use zsim::study::{News, Stage};
+use zsim::study::{Stage, StudyEvent};
 
-/// Steps of a whole bar.
+/// Steps of a full bar.
 const STEPS: u64 = 1000;
 
 /// A progress bar for the stage that runs, on a terminal; remarks above it.
@@ -21,14 +21,14 @@ impl Bars {
         Self { quiet: global.quiet, shown: None }
     }
 
-    /// Shows what an experiment tells.
-    pub(super) fn tell(&mut self, news: News) {
+    /// Shows the messages of an experiment.
+    pub(super) fn tell(&mut self, news: StudyEvent) {
         if self.quiet {
             return;
         }
         match news {
-            News::Note(text) => self.remark(text),
-            News::Progress { stage, fraction, done_s } => {
+            StudyEvent::Note(text) => self.remark(text),
+            StudyEvent::Progress { stage, fraction, done_s } => {
                 let bar = self.bar_of(stage, fraction.is_some());
                 match fraction {
                     Some(fraction) => bar.set_position((fraction * STEPS as f64) as u64),
@@ -70,7 +70,7 @@ impl Bars {
     }
 }
 
-/// A progress bar on a terminal for work that threads do in pieces; gone when it is dropped.
+/// A progress bar on a terminal for work that threads do in pieces; removed when it is dropped.
 pub(super) struct WorkBar(ProgressBar);
 
 impl WorkBar {
@@ -84,12 +84,12 @@ impl WorkBar {
         Self(bar)
     }
 
-    /// What the work is at.
+    /// Shows the current task.
     pub(super) fn say(&self, what: String) {
         self.0.set_message(what);
     }
 
-    /// Shows which share of the work is done.
+    /// Shows the fraction of the work that is done.
     pub(super) fn show(&self, share: f64) {
         self.0.set_position((share * STEPS as f64) as u64);
     }
@@ -101,7 +101,7 @@ impl Drop for WorkBar {
     }
 }
 
-/// A bar on stderr, which draws on terminals alone.
+/// A bar on stderr, drawn only on terminals.
 fn bar(has_end: bool) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
     bar.set_style(style(has_end));

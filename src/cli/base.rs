@@ -14,12 +14,12 @@ use zsim::recording::{Loss, Reader, Truth, read_tum, write_tum};
 use zsim::report;
 use zsim::study;
 
-/// Tell where the base (the handle, the vehicle) was, from the trajectory of the head on its spring
+/// Compute the trajectory of the base (handle, vehicle) from that of the head on its spring
 ///
 /// Twice: as if the head were screwed to the base as it rests (base_rigid_link.tum), and by the spring's own law: the
-/// base that pushes the head as it is seen to accelerate (base_spring.tum). The trajectory, a TUM file, has z up and is
-/// of the head's frame, at an IMU's rate or more, as estimates and the truth of zsim are. With a recording of an IMU on
-/// the base a third time: that IMU and the spring's law, smoothed together (base_imu.tum).
+/// base that moves the head with the observed acceleration (base_spring.tum). The trajectory, a TUM file, has z up and
+/// is of the head's frame, at an IMU's rate or more, as estimates and the truth of zsim are. With a recording of an IMU
+/// on the base a third time: that IMU and the spring's law, smoothed together (base_imu.tum).
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim base results/office/closed_loop.tum --head handheld --truth \
                         results/office/recording.mcap\n  zsim base results/office/closed_loop.tum --head handheld \
@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     /// The topic of that IMU [default: /base/imu]
     #[arg(long, value_name = "TOPIC", requires = "base_imu")]
     base_imu_topic: Option<String>,
-    /// How much later that IMU stamps an instant than the trajectory does, to a millisecond or two [default: found by
+    /// Time offset, IMU stamps minus trajectory stamps, accurate to a millisecond or two [default: found by
     /// how both turn, and followed as it drifts]
     #[arg(long, value_name = "MS", requires = "base_imu", allow_hyphen_values = true)]
     clock_offset_ms: Option<f64>,
@@ -52,7 +52,7 @@ pub(super) struct Arguments {
 /// Poses of which a trajectory has one acceleration.
 const LEAST_POSES: usize = 3;
 
-/// One of the ways to tell the base.
+/// A method that computes the base trajectory.
 struct Way {
     key: &'static str,
     name: &'static str,
@@ -60,7 +60,7 @@ struct Way {
 }
 
 impl Way {
-    /// The name of its trajectory's file.
+    /// The file name of the trajectory.
     fn file(&self) -> String {
         format!("base_{}.tum", self.key)
     }

@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 use zsim::recording::Reader;
 use zsim::report;
 use zsim::spec::Source;
-use zsim::study::{Bounded, Manifest, Watch, information_bound};
+use zsim::study::{Manifest, RecordingBound, Watch, information_bound};
 use zsim::world::World;
 
-/// Tell how accurate any estimate of a recording could be: the Cramer-Rao bound of its beams and its IMU
+/// Compute the Cramer-Rao bound of a recording: the accuracy that no estimator can exceed
 ///
-/// Every beam that met a surface of the scene counts with its noise and incidence, and the IMU with its noise, biases,
-/// scale errors and clock; surfaces are taken to be known. Needs a recording with its truth. With --out, writes
+/// Every beam that hits a surface of the scene counts with its noise and incidence, and the IMU with its noise, biases,
+/// scale errors and clock; the surfaces count as known. Needs a recording with its truth. With --out, writes
 /// bound.csv (by time) and a plot.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim bound run.mcap --scene office.ron --out results/bound")]
@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     /// The world, a name under scenes/ or a file [default: that in the recording's manifest]
     #[arg(long, value_name = "NAME|FILE")]
     scene: Option<String>,
-    /// The folder for results; if it exists and is not empty, one with a number after its name [default: none is
+    /// Folder for results; if it exists and is not empty, a number is appended to the name [default: none is
     /// written]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -41,7 +41,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let reader = Reader::open(&arguments.recording)?;
     let world = world(arguments, &reader)?;
     let mut bars = Bars::new(global);
-    let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
+    let mut watch = Watch { stop: stop_flag(), report: &mut |news| bars.tell(news) };
     let bounded = information_bound(&reader, &world, &mut watch);
     bars.finish();
     let bounded = bounded?;
@@ -55,13 +55,13 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
         return Ok(World::load(scene)?);
     }
     let Some(specs) = Manifest::within(reader).and_then(|manifest| manifest.specs) else {
-        let message = format!("{} does not say in which scene it was made: name it with --scene", reader.name());
+        let message = format!("{} does not name its scene: pass it with --scene", reader.name());
         return Err(Usage(message).into());
     };
     Ok(World::build(&specs.scene, &Source::in_memory("the recording's scene", ""))?)
 }
 
-fn leave(bounded: &Bounded, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
+fn leave(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
     let path = folder.join("bound.csv");
     std::fs::write(&path, csv(bounded)).with_context(|| format!("{} cannot be written", path.display()))?;
@@ -70,7 +70,7 @@ fn leave(bounded: &Bounded, wanted: &Path, force: bool) -> anyhow::Result<output
 }
 
 /// Standard deviations by time: along and about each axis of the world.
-fn csv(bounded: &Bounded) -> String {
+fn csv(bounded: &RecordingBound) -> String {
     let bound = &bounded.bound;
     let mut text = "stamp_ns,x_m,y_m,z_m,about_x_rad,about_y_rad,about_z_rad\n".to_owned();
     for ((stamp, position), attitude) in bound.stamps.iter().zip(&bound.position_sigma_m).zip(&bound.attitude_sigma_rad)
@@ -81,7 +81,7 @@ fn csv(bounded: &Bounded) -> String {
     text
 }
 
-fn words(bounded: &Bounded) -> String {
+fn words(bounded: &RecordingBound) -> String {
     let bound = &bounded.bound;
     let mm = |m: f64| format!("{:.3} mm", m * 1e3);
     let axes = bound.axis_rmse_m;
@@ -92,13 +92,13 @@ fn words(bounded: &Bounded) -> String {
         ("attitude RMSE", format!("{:.4} deg", bound.attitude_rmse_rad.to_degrees())),
         ("clock offset at the end", format!("{:.3} us", bound.clock_offset_s * 1e6)),
         ("offset of the ranges", mm(bound.range_offset_m)),
-        ("beams", format!("{} ({} left out)", bounded.beams, bounded.left_out)),
+        ("beams", format!("{} ({} skipped)", bounded.beams, bounded.rejected)),
     ];
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
     format!("No unbiased estimate can be better than:\n{}", report::table(&[], &rows, false))
 }
 
-fn figures(bounded: &Bounded, scene: &str) -> Value {
+fn figures(bounded: &RecordingBound, scene: &str) -> Value {
     let bound = &bounded.bound;
     json!({
         "scene": scene,
@@ -109,6 +109,6 @@ fn figures(bounded: &Bounded, scene: &str) -> Value {
         "clock_offset_s": bound.clock_offset_s,
         "range_offset_m": bound.range_offset_m,
         "beams": bounded.beams,
-        "left_out": bounded.left_out,
+        "left_out": bounded.rejected,
     })
 }

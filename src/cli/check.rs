@@ -34,9 +34,9 @@ const KINDS: [Kind; 11] = [
     Kind::Experiment,
 ];
 
-/// Check scenes and specs: line and column of what is wrong
+/// Check scenes and specs; report line and column of each error
 ///
-/// What a file describes is told by its folder (scenes/, specs/heads/, ...), or else by trying.
+/// The kind of a file follows from its folder (scenes/, specs/heads/, ...), or else from trying each parser.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim check scenes/office.ron specs/heads/handheld.ron")]
 pub(super) struct Arguments {
@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     for (file, result) in &checked {
         match result {
             Ok(kind) => {
-                words += &format!("{file}: {}, right\n", kind.noun());
+                words += &format!("{file}: {}, OK\n", kind.noun());
                 figures.push(json!({ "file": file, "kind": kind.noun(), "error": null }));
             }
             Err(error) => {
@@ -64,14 +64,14 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         }
     }
     output::tell(global, &words, json!({ "files": figures }), None)?;
-    let wrong = checked.iter().filter(|(_, result)| result.is_err()).count();
-    if wrong > 0 {
-        return Err(failure::Usage(format!("{wrong} of {} files are wrong", checked.len())).into());
+    let invalid = checked.iter().filter(|(_, result)| result.is_err()).count();
+    if invalid > 0 {
+        return Err(failure::Usage(format!("{invalid} of {} files invalid", checked.len())).into());
     }
     Ok(End::Done)
 }
 
-/// The kind of a spec that is right.
+/// The kind of a valid spec.
 fn check(file: &str) -> Result<Kind, SpecError> {
     if let Some(kind) = kind_by_folder(file) {
         return build(kind, &find(kind, file)?).map(|()| kind);
@@ -90,7 +90,7 @@ fn check(file: &str) -> Result<Kind, SpecError> {
     kind_by_trying(&source)
 }
 
-/// The kind whose parser reads the text, checked; if none does, the error of the one that came farthest.
+/// The kind whose parser accepts the text, checked; if none does, the error with the largest line number.
 fn kind_by_trying(source: &Source) -> Result<Kind, SpecError> {
     let mut farthest: Option<SpecError> = None;
     for kind in KINDS {
@@ -132,7 +132,7 @@ enum Study {
     Sweep(SweepSpec),
 }
 
-/// The study in a text; if it is none, the error of the kind that came farther in reading it.
+/// Parses a study of either type; if neither fits, returns the error with the larger line number.
 fn study(source: &Source) -> Result<Study, SpecError> {
     match (parse(source), parse(source)) {
         (Ok(design), _) => Ok(Study::Design(design)),
@@ -153,7 +153,7 @@ impl Study {
     }
 }
 
-/// Builds what the spec describes, as a run would.
+/// Builds the model that the spec describes, as a run does.
 fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
     let spec_error = |error: &dyn std::error::Error| SpecError::plain(source.name.clone(), error.to_string());
     match kind {

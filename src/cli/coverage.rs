@@ -1,4 +1,4 @@
-//! `zsim coverage`: what a lidar on a moving head sees of the sphere about it.
+//! `zsim coverage`: the part of the sphere that a lidar on a moving head observes.
 
 use super::arguments::{Global, OutArguments, any_route};
 use super::bars::WorkBar;
@@ -14,9 +14,10 @@ use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, find, parse};
 use zsim::study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
 
-/// Tell what a lidar on a moving head sees of the sphere: how much, how densely, how soon; and the gyroscope's range
+/// Compute how much of the sphere a lidar on a moving head observes, how densely, how soon, and the gyroscope range it
+/// needs
 ///
-/// Needs no scene: directions alone count, as seen from the base's heading. A motion that walks goes round a hall of 20
+/// Needs no scene: directions count, relative to the base's heading. A motion that walks goes round a hall of 20
 /// m by 10 m. With --out, writes coverage.csv (by time), density.csv (by direction), and a plot.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim coverage --head handheld --motion hand --duration 30s --out results/coverage")]
@@ -30,13 +31,13 @@ pub(super) struct Arguments {
     /// The lidar, under specs/lidars/
     #[arg(long, value_name = "NAME|FILE", default_value = "utm30lx")]
     lidar: String,
-    /// The IMU whose range the gyroscope's rate is held against, under specs/imus/
+    /// The IMU whose gyroscope range is compared with the angular velocity, under specs/imus/
     #[arg(long, value_name = "NAME|FILE", default_value = "3dm_gx2")]
     imu: String,
-    /// How long is looked: 30s, 2min, 90
+    /// Duration of the observation: 30s, 2min, 90
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = quantity::seconds)]
     duration: f64,
-    /// When looking begins: after the motion's first seconds at rest
+    /// Start of the observation [default: after the motion's first seconds at rest]
     #[arg(long, value_name = "TIME", default_value = "5s", value_parser = quantity::seconds)]
     from: f64,
     /// The seed from which the motion's chance follows
@@ -90,8 +91,8 @@ fn words(seen: &Coverage) -> String {
             format!("{:.0}, {:.0}", seen.density_per_sr_s.mean, seen.density_per_sr_s.p10)
         }),
         ("elevation of the forward beam, deg", format!("{:.1} (95 % of the time)", seen.field_of_view_deg)),
-        ("greatest tilt of the scan's plane, deg", format!("{:.1}", seen.most_tilt_deg)),
-        ("greatest rate on an axis, deg/s", format!("{:.0} of {:.0}", gyro.most_deg_per_s, gyro.limit_deg_per_s)),
+        ("maximum tilt of the scan plane, deg", format!("{:.1}", seen.most_tilt_deg)),
+        ("maximum rate on an axis, deg/s", format!("{:.0} of {:.0}", gyro.most_deg_per_s, gyro.limit_deg_per_s)),
         ("rate not exceeded in 99 % of the time", format!("{:.0}", gyro.p99_deg_per_s)),
     ]);
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();

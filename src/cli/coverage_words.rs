@@ -1,17 +1,17 @@
-//! What is said of a lidar's coverage.
+//! The table of a lidar's coverage.
 
 use zsim::study::coverage::Coverage;
 
-/// Its figures, each with its name.
+/// Rows of the table: name and value.
 pub(super) fn rows(seen: &Coverage) -> Vec<(&'static str, String)> {
     let or_dash = |x: Option<f64>, decimals: usize| x.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
     vec![
-        ("share of the sphere seen", format!("{:.3}", seen.fraction_seen)),
+        ("observed fraction of the sphere", format!("{:.3}", seen.fraction_seen)),
         ("in a sweep", or_dash(seen.fraction_in_a_sweep, 3)),
         ("time of a sweep, s", or_dash(seen.sweep_s, 3)),
         ("beams per sr in a sweep", or_dash(seen.density_in_a_sweep_per_sr, 0)),
         ("beams per sr and s", format!("{:.0}", seen.density_per_sr_s.median)),
         ("time to nine tenths of it, s", format!("{:.2}", seen.covered_s)),
-        ("share of time beyond the gyro's range", format!("{:.4}", seen.gyro.saturated)),
+        ("fraction of time above the gyro range", format!("{:.4}", seen.gyro.saturated)),
     ]
 }

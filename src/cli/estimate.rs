@@ -8,12 +8,13 @@ use clap::Args;
 use std::path::PathBuf;
 use zsim::geometry::Pose;
 use zsim::recording::{Preference, Reader};
-use zsim::study::{self, MapWishes, Watch, Wishes};
+use zsim::study::{self, EstimateOptions, MapOptions, Watch};
 
-/// Estimate trajectory and map from a recording, whoever made it
+/// Estimate trajectory and map from a recording of any program
 ///
-/// Lidar and IMU are found among the topics (LaserScan, MultiEchoLaserScan, PointCloud2 or Livox CustomMsg, and Imu), and where they sit in the head is read
-/// from /tf_static. Where the recording has the truth, the estimate is judged by it.
+/// Lidar and IMU are found among the topics (LaserScan, MultiEchoLaserScan, PointCloud2 or Livox CustomMsg, and Imu),
+/// and where they sit in the head is read from /tf_static. Where the recording has the truth, the estimate is judged by
+/// it.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  zsim estimate recording.mcap --out results/recording --fixed-views 2\n  zsim estimate \
@@ -25,9 +26,9 @@ pub(super) struct Arguments {
     recording: PathBuf,
     #[command(flatten)]
     estimator: EstimatorArguments,
-    /// A RON file that says where the sensors sit and how well they measure, for what the recording does not say:
+    /// RON file with extrinsics and noise of the sensors, for values that the recording does not contain:
     /// (head_from_laser: (position_m: (0, 0, 0)), head_from_imu: (position_m: (0, 0, -0.08), roll_pitch_yaw_deg: (0, 0,
-    /// 180))); docs/recordings.md has all keys, noise among them. Or a YAML file of Kalibr or allan_variance_ros
+    /// 180))); docs/guide/recordings.md has all keys, noise among them. Or a YAML file of Kalibr or allan_variance_ros
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// The frame whose pose is written [default: head where /tf_static has it, else the IMU's]
@@ -39,15 +40,16 @@ pub(super) struct Arguments {
     /// The IMU's topic [default: found]
     #[arg(long, value_name = "TOPIC")]
     imu_topic: Option<String>,
-    /// A map of an earlier run (its map.ply), in which the head is to be localised: the trajectory is in the map's
+    /// Map of an earlier run (its map.ply) in which to localise the head: the trajectory is in the map's
     /// frame then
     #[arg(long, value_name = "MAP.ply")]
     map: Option<PathBuf>,
-    /// Where in the map the head begins, to a metre and twenty degrees: metres, and degrees about the vertical
+    /// Initial position and yaw in the map, accurate to a metre and twenty degrees: metres, and degrees about the
+    /// vertical
     #[arg(long, value_name = "X,Y,Z,YAW", value_parser = start, default_value = "0,0,0,0", requires = "map",
         allow_hyphen_values = true)]
     start: Pose,
-    /// Go on from the map: write it with what the recording shows, as map.ply
+    /// Extend the map with this recording and write it as map.ply
     #[arg(long, requires = "map")]
     extend_map: bool,
     #[command(flatten)]
@@ -55,16 +57,16 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
-    let within = |path: &PathBuf| MapWishes::read(path, arguments.start, arguments.extend_map);
-    let wishes = Wishes {
+    let within = |path: &PathBuf| MapOptions::read(path, arguments.start, arguments.extend_map);
+    let options = EstimateOptions {
         map: arguments.map.as_ref().map(within).transpose()?,
         calibration: calibration(arguments.calibration.as_deref())?,
         body_frame: arguments.body_frame.clone(),
         topics: Preference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
-        ..arguments.estimator.wishes()?
+        ..arguments.estimator.options()?
     };
-    // A recording that is not there, or without a sensor that is needed, leaves no folder behind.
-    Reader::open(&arguments.recording)?.select(&wishes.topics)?;
+    // Open the recording first: a recording that is missing, or lacks a sensor, must not create a folder.
+    Reader::open(&arguments.recording)?.select(&options.topics)?;
     let stem = arguments.recording.file_stem().unwrap_or_default().to_string_lossy();
     let wanted = arguments.out.out.clone().unwrap_or_else(|| journey::default_folder(&stem));
     let folder = output::folder(&wanted, arguments.out.force)?;
@@ -73,8 +75,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     output::spare_inputs(&inputs.into_iter().flatten().cloned().collect::<Vec<_>>(), &written)?;
 
     let mut bars = Bars::new(global);
-    let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
-    let outcome = study::estimate_recording(&arguments.recording, &folder, &wishes, &mut watch);
+    let mut watch = Watch { stop: stop_flag(), report: &mut |news| bars.tell(news) };
+    let outcome = study::estimate_recording(&arguments.recording, &folder, &options, &mut watch);
     bars.finish();
     let outcome = outcome.inspect_err(|_| journey::left_behind(&folder))?;
     journey::close(global, &outcome, arguments.estimator.profile, &folder)

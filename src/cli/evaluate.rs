@@ -15,7 +15,7 @@ use zsim::world::World;
 
 /// Most points of a cloud that are judged.
 const JUDGED: usize = 200_000;
-/// How far from a point a surface is looked for, m.
+/// Search radius around a point for the true surface, m.
 const REACH_M: f64 = 1.0;
 
 /// Farthest that a position is from the origin, m: farther than the Sun.
@@ -25,7 +25,7 @@ const FARTHEST_M: f64 = 1e12;
 ///
 /// Trajectories are TUM files (`t x y z qx qy qz qw`) stamped by one clock. The estimate is aligned with the truth
 /// first (rigid, by positions, as evo_ape -a). With both, a cloud in the estimate's map is aligned the same way;
-/// without them it is taken to be in the world's frame.
+/// without them it is in the world frame.
 #[derive(Args)]
 #[command(
     group = clap::ArgGroup::new("what").required(true).multiple(true).args(["estimate", "cloud"]),

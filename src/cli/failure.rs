@@ -1,4 +1,4 @@
-//! What is said when a command fails, and with which code.
+//! Error output and exit codes.
 
 use super::output::printable;
 use super::signals;
@@ -10,13 +10,13 @@ use zsim::spec::SpecError;
 use zsim::study::StudyError;
 use zsim::world::WorldError;
 
-/// Prints the error with its causes, and gives its exit code: that of the signal that stopped it, 2 when what was
-/// asked for is wrong, else 1.
+/// Prints the error with its causes and returns the exit code: that of the signal that stopped the run, 2 for invalid
+/// usage or input, else 1.
 pub(super) fn tell(error: &anyhow::Error) -> ExitCode {
     let mut said = error.to_string();
     eprintln!("error: {}", printable(&said));
     for cause in error.chain().skip(1).map(ToString::to_string) {
-        // A transparent error has its cause's words.
+        // A transparent error repeats the text of the cause.
         if !said.contains(&cause) {
             eprintln!("  because: {}", printable(&cause));
         }
@@ -25,21 +25,21 @@ pub(super) fn tell(error: &anyhow::Error) -> ExitCode {
     if error.chain().any(is_stopped) {
         return ExitCode::from(signals::exit_code());
     }
-    if error.chain().any(is_wrong_input) { ExitCode::from(2) } else { ExitCode::FAILURE }
+    if error.chain().any(is_invalid_input) { ExitCode::from(2) } else { ExitCode::FAILURE }
 }
 
 fn is_stopped(error: &(dyn Error + 'static)) -> bool {
     error.downcast_ref::<StudyError>().is_some_and(|error| matches!(error, StudyError::Stopped))
 }
 
-fn is_wrong_input(error: &(dyn Error + 'static)) -> bool {
+fn is_invalid_input(error: &(dyn Error + 'static)) -> bool {
     let simulation = |error: &SimulationError| !matches!(error, SimulationError::Sink(_));
     error.is::<SpecError>()
         || error.is::<WorldError>()
         || error.is::<MotionError>()
         || error.is::<Usage>()
         || error.downcast_ref::<SimulationError>().is_some_and(simulation)
-        || error.downcast_ref::<StudyError>().is_some_and(StudyError::is_wrong_input)
+        || error.downcast_ref::<StudyError>().is_some_and(StudyError::is_invalid_input)
 }
 
 /// A wish that makes no sense.

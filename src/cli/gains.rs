@@ -17,10 +17,10 @@ use zsim::study::gains::{
     swing_figure, swing_study, with_damping,
 };
 
-/// Measure a head's gain curves: the head's motion over its base's by frequency, from simulation and in closed form
+/// Measure a head's gain curves: head motion over base motion by frequency, from simulation and in closed form
 ///
-/// The base is shaken on one axis at a time about the spring's foot by a periodic multisine; the head is watched at its
-/// IMU. Writes gains.csv, swing.csv with --swing, and plots.
+/// The base is shaken on one axis at a time about the spring's foot by a periodic multisine; the head is observed at
+/// its IMU. Writes gains.csv, swing.csv with --swing, and plots.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim gains --head handheld --out results/gains")]
 pub(super) struct Arguments {
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
     /// peak]
     #[arg(long, value_name = "S")]
     period: Option<f64>,
-    /// What is compared along x, y and z
+    /// Quantity compared along x, y and z
     #[arg(long, value_enum, default_value_t = Along::Acceleration)]
     along: Along,
     /// Damp all modes by this ratio instead of the head's own
@@ -57,12 +57,12 @@ pub(super) struct Arguments {
     swing: Option<Vec<f64>>,
 }
 
-/// What is compared along x, y and z.
+/// The quantity compared along x, y and z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Along {
     /// Acceleration as such.
     Acceleration,
-    /// What accelerometers read.
+    /// The accelerometer readings.
     SpecificForce,
 }
 
@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let folder = output::folder(&wanted, arguments.out.force)?;
     write(&folder.join("gains.csv"), &csv(&curves))?;
     let plots = folder.join("plots");
-    std::fs::create_dir_all(&plots).with_context(|| format!("{} cannot be made", plots.display()))?;
+    std::fs::create_dir_all(&plots).with_context(|| format!("cannot create {}", plots.display()))?;
     gain_figure(&curves).save(&plots, "gains")?;
     coherence_figure(&curves).save(&plots, "coherence")?;
     if let Some(swings) = &swings {
@@ -129,11 +129,11 @@ fn plan(arguments: &Arguments) -> anyhow::Result<GainPlan> {
 }
 
 fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> anyhow::Result<Vec<SwingStudy>> {
-    if let Some(wrong) = degrees.iter().find(|x| !(x.is_finite() && **x > 0.0)) {
-        return Err(Usage(format!("--swing {wrong}: expected degrees above 0")).into());
+    if let Some(invalid) = degrees.iter().find(|x| !(x.is_finite() && **x > 0.0)) {
+        return Err(Usage(format!("--swing {invalid}: expected degrees above 0")).into());
     }
     let axes = [Axis::Roll, Axis::Pitch, Axis::X, Axis::Y];
-    // The resonance of interest is the slowest; above it a hard shake has little to say.
+    // The slowest resonance is the interesting one; above it a hard shake adds little.
     let slowest_hz = head.linear_modes().first().map_or(plan.up_to_hz, |mode| mode.frequency_hz);
     let plan = GainPlan { up_to_hz: plan.up_to_hz.min(3.0 * slowest_hz), ..plan.clone() };
     let study = |(before, axis): (usize, &Axis)| {

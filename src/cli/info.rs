@@ -1,4 +1,4 @@
-//! `zsim info`: what is in a recording.
+//! `zsim info`: the contents of a recording.
 
 use super::arguments::Global;
 use super::output::printable_name;
@@ -9,14 +9,14 @@ use zsim::recording::{Reader, RecordingInfo, TopicInfo};
 use zsim::report;
 use zsim::time::Span;
 
-/// Tell what a recording holds: topics, rates, gaps, clocks, and what is lost
+/// Summarise a recording: topics, rates, gaps, clocks, and losses
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim info recording.mcap")]
 pub(super) struct Arguments {
     /// The recording: MCAP, a ROS 1 bag, a rosbag2 database, or a folder of rosbag2
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
-    /// What counts as a gap between messages of a topic
+    /// Minimum gap between messages of a topic that is reported
     #[arg(long, value_name = "TIME", default_value = "0.5s", value_parser = quantity::seconds)]
     gap: f64,
 }
@@ -34,8 +34,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
 
 fn words(info: &RecordingInfo) -> String {
     let mebibytes = info.length_bytes as f64 / (1 << 20) as f64;
-    let made = if info.has_manifest { ", made by zsim" } else { "" };
-    let head = format!("{}: {:.3} s, {} messages, {mebibytes:.1} MiB{made}", info.name, info.duration_s, info.messages);
+    let maker = if info.has_manifest { ", made by zsim" } else { "" };
+    let head =
+        format!("{}: {:.3} s, {} messages, {mebibytes:.1} MiB{maker}", info.name, info.duration_s, info.messages);
     let topics = report::table(
         &["topic", "type", "count", "Hz", "max s", "gaps", "lost", "late"],
         &info.topics.iter().map(topic_row).collect::<Vec<_>>(),

@@ -1,4 +1,4 @@
-//! `zsim --scene`: the whole journey.
+//! `zsim --scene`: the full run, from simulation to report.
 
 use super::End;
 use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
@@ -26,7 +26,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
     let scene = arguments.scene.as_deref().unwrap_or_default();
-    let wishes = arguments.estimator.wishes()?;
+    let options = arguments.estimator.options()?;
     let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
     let mut bars = Bars::new(global);
@@ -36,31 +36,31 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     output::spare_inputs(&arguments.scenario.inputs(scene), &written)?;
 
     simulation.world().notes().iter().for_each(|note| bars.remark(note));
-    let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
-    let outcome = study::journey(&simulation, &wishes, &folder, &mut watch);
+    let mut watch = Watch { stop: stop_flag(), report: &mut |news| bars.tell(news) };
+    let outcome = study::journey(&simulation, &options, &folder, &mut watch);
     bars.finish();
     let outcome = outcome.inspect_err(|_| left_behind(&folder))?;
     close(global, &outcome, arguments.estimator.profile, &folder)
 }
 
-/// Where results go unless somebody says otherwise.
+/// Default folder for results.
 pub(super) fn default_folder(name: &str) -> PathBuf {
     Path::new("results").join(name)
 }
 
-/// Says where the part is that was complete before a failure.
+/// Prints the folder that has the parts completed before a failure.
 pub(super) fn left_behind(folder: &Path) {
-    eprintln!("what is complete is in {}", output::printable(&folder.display().to_string()));
+    eprintln!("completed parts are in {}", output::printable(&folder.display().to_string()));
 }
 
-/// What each part of the estimator took, s, and the whole open loop with them.
+/// Time of each part of the estimator, s, and of the open loop in total.
 fn seconds_by_part(outcome: &Outcome) -> Value {
     let parts = outcome.spent.parts().into_iter().map(|(name, seconds)| (format!("{name}_s"), json!(seconds)));
     let whole = ("open_loop_s".to_owned(), json!(outcome.metrics.open_loop.wall_s));
     Value::Object(parts.chain([whole]).collect())
 }
 
-/// Prints the figures of an estimate, with `profile` where its time went, and says what was lost.
+/// Prints the results of an estimate, its times with `profile`, and its losses.
 pub(super) fn close(global: &Global, outcome: &Outcome, profile: bool, folder: &Path) -> anyhow::Result<End> {
     let mut figures = serde_json::to_value(&outcome.metrics)?;
     if let (true, Value::Object(object)) = (profile, &mut figures) {

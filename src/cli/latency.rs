@@ -1,4 +1,4 @@
-//! `zsim latency`: what errors of timing do to a map.
+//! `zsim latency`: the effect of timing errors on a map.
 
 use super::arguments::{Global, ScenarioArguments};
 use super::bars::{WorkBar, stop_flag};
@@ -10,14 +10,14 @@ use zsim::spec::{Kind, SpecError, find, parse};
 use zsim::study::latency::{ClockState, Latency, LatencySpec, Study, csv, curve_figure, map_figure, words};
 use zsim::study::reproduction::ExperimentSpec;
 
-/// The experiment whose latencies and noises are taken.
+/// The experiment with the default latencies and noises.
 const FIGURE_4: &str = "fig4";
 
 /// Put latency and timing noise on one recording: maps as in the paper's figure 4, and curves of error with their bands
 ///
-/// Each latency and noise is estimated with the clock state off (what the paper shows) and on (what it recovers).
-/// Writes latency.csv, metrics.json and plots. What is in the folder already is not done again: a study that was
-/// stopped goes on.
+/// Each latency and noise is estimated with the clock state off (as in the paper) and on (as zsim estimates).
+/// Writes latency.csv, metrics.json and plots. A second start in the same folder skips finished runs and
+/// continues.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim latency --scene office.ron --out results/latency")]
 pub(super) struct Arguments {
@@ -29,10 +29,10 @@ pub(super) struct Arguments {
     /// The estimator's settings, a name under specs/estimators/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     estimator: String,
-    /// The folder for results, in which a study that was stopped goes on [default: results/latency]
+    /// Folder for results; an interrupted study in it is continued [default: results/latency]
     #[arg(long, short, value_name = "DIR", default_value = "results/latency")]
     out: PathBuf,
-    /// Begin anew even if the folder holds another study of this kind
+    /// Start anew even if the folder has another study of this kind
     #[arg(long)]
     force: bool,
 }
@@ -61,7 +61,7 @@ fn leave(study: &Study, folder: &Path) -> anyhow::Result<()> {
         std::fs::write(&path, text).with_context(|| format!("{} cannot be written", path.display()))?;
     }
     let plots = folder.join("plots");
-    std::fs::create_dir_all(&plots).with_context(|| format!("{} cannot be made", plots.display()))?;
+    std::fs::create_dir_all(&plots).with_context(|| format!("cannot create {}", plots.display()))?;
     map_figure(study, ClockState::Off).save(&plots, "maps")?;
     map_figure(study, ClockState::On).save(&plots, "maps_clock_on")?;
     curve_figure(study).save(&plots, "curves")?;

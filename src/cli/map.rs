@@ -13,7 +13,7 @@ use zsim::study;
 /// Put maps together
 ///
 /// `zsim estimate` leaves a map, map.ply: surfels with their uncertainty. Another recording is localised in it with
-/// `zsim estimate --map`, and goes on from it with --extend-map.
+/// `zsim estimate --map`, and extended with --extend-map.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --start 4.2,0.5,0,90 --out both.ply")]
 pub(super) struct Arguments {
@@ -26,13 +26,13 @@ enum Verb {
     Merge(MergeArguments),
 }
 
-/// Put two maps together by what both show
+/// Merge two maps by their common surfaces
 ///
-/// The second is looked for in the first within a metre and twenty degrees of where its origin is said to be.
+/// The second map is searched for in the first within a metre and twenty degrees of the given origin.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --start 4.2,0.5,0,90 --out both.ply")]
 struct MergeArguments {
-    /// The map whose frame is kept
+    /// The map that defines the frame
     #[arg(value_name = "A.ply")]
     first: PathBuf,
     /// The map that is put into it
@@ -44,7 +44,7 @@ struct MergeArguments {
     /// The estimator's settings, a name under specs/estimators/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     estimator: String,
-    /// The file for both; if it exists, one with a number in its name
+    /// File for the merged map; if it exists, a number is added to the name
     #[arg(long, short, value_name = "C.ply")]
     out: PathBuf,
     /// Write the file even if it exists

@@ -40,9 +40,9 @@ use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Design and simulate moving range sensors: a lidar and an IMU on a spring, and the continuous-time SLAM that makes a
-/// map of what they see.
+/// map from their measurements.
 ///
-/// With a scene and no command, the whole journey: simulate, record, estimate, evaluate, report.
+/// With a scene and no command, zsim does a full run: simulate, record, estimate, evaluate, report.
 #[derive(Parser)]
 #[command(
     name = "zsim",
@@ -88,7 +88,7 @@ enum End {
     WithLoss,
 }
 
-/// Parses, runs, and turns what happened into an exit code.
+/// Parses the arguments, runs the command, and returns the exit code.
 pub fn run() -> ExitCode {
     // clap itself prints help (code 0) and complaints about usage (code 2).
     let cli = Cli::parse();

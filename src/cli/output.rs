@@ -74,9 +74,9 @@ fn in_use(folder: &Path) -> String {
 }
 
 impl Folder {
-    /// Locks the folder at `path`; `None` when another process holds its lock.
+    /// Locks the folder at `path`; `None` when another process has locked it.
     ///
-    /// The lock is on the folder itself, so that no file is left behind. Where the system cannot lock a folder (some
+    /// The lock is on the folder itself, so that no lock file remains. Where the system cannot lock a folder (some
     /// network file systems, Windows) it is used without a lock.
     fn locked(path: &Path) -> anyhow::Result<Option<Self>> {
         let folder = |lock| Some(Self { path: path.to_owned(), _lock: lock });
@@ -92,7 +92,7 @@ impl Folder {
     }
 }
 
-/// A file for results, not there yet: `wanted`, or `wanted` with a number before its ending.
+/// A new file for results: `wanted`, or `wanted` with a number before its ending.
 pub(super) fn file(wanted: &Path, force: bool) -> anyhow::Result<PathBuf> {
     create_parent(wanted)?;
     let mut candidates = candidates(wanted);
@@ -125,7 +125,7 @@ pub(super) fn spare_inputs(inputs: &[PathBuf], outputs: &[PathBuf]) -> anyhow::R
         None => Ok(()),
         Some(output) => {
             let message = format!(
-                "{} is read by this command and would be replaced by its result: name another file or folder with --out",
+                "{} is an input of this command and would be replaced by the result: pass another path with --out",
                 output.display()
             );
             Err(Usage(message).into())
@@ -195,7 +195,7 @@ pub(super) fn printable_name(name: &str) -> String {
     printable(name).replace('\n', "\\n")
 }
 
-/// Whether a character is a line end, a tab, or neither a control character nor one that changes the direction of what
+/// Whether a character is a line end, a tab, or neither a control character nor one that changes the direction of
 /// follows (Unicode Standard Annex 9).
 fn is_harmless(c: char) -> bool {
     ['\n', '\t'].contains(&c)

@@ -1,6 +1,6 @@
 //! Numbers with units, as people type them.
 
-/// Longest time that can be typed, s: 30 years. What it is for has a lower bound.
+/// Longest duration that the command line accepts, s: 30 years. Commands have lower limits.
 const MOST_S: f64 = 1e9;
 
 /// Seconds from `120s`, `2min`, `1.5h`, `250ms` or `90`.

@@ -7,10 +7,10 @@ use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A recording and the true trajectory next to it, as files that this process alone has created.
+/// A recording and the true trajectory next to it, as files that only this process has created.
 ///
 /// Files that exist are replaced only by [`finish`](Self::finish): until then the new ones have names of their own, so
-/// that a run that fails destroys nothing.
+/// so that a run that fails destroys no file.
 pub(super) struct RecordingFiles {
     recording: PathBuf,
     truth: PathBuf,
@@ -21,7 +21,7 @@ pub(super) struct RecordingFiles {
 
 impl RecordingFiles {
     /// Reserves `wanted` and the file of the same name that ends in `.tum`. Where one of them exists a number is added
-    /// to both names, unless `force` says to replace them. None of `inputs` is replaced even so.
+    /// to both names, unless `force` permits to replace them. No file of `inputs` is ever replaced.
     ///
     /// # Errors
     /// When the two files would be one, an input would be replaced, or they cannot be created.
@@ -92,7 +92,7 @@ impl Drop for RecordingFiles {
     fn drop(&mut self) {
         for path in [&self.recording, &self.truth].into_iter().filter(|_| !self.is_finished) {
             if std::fs::metadata(path).is_ok_and(|file| file.len() == 0) {
-                // What cannot be removed is an empty file, which harms nobody.
+                // A file that cannot be removed is empty and harmless.
                 let _ = std::fs::remove_file(path);
             }
         }

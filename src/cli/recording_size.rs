@@ -1,4 +1,4 @@
-//! How large a recording will be, said and checked before it is begun.
+//! Size of a recording, reported and checked before the run starts.
 
 use anyhow::ensure;
 use std::path::Path;
@@ -12,15 +12,15 @@ const BEAM_IN_SCAN_BYTES: f64 = 8.0;
 const BEAM_IN_CLOUD_BYTES: f64 = 16.0;
 /// Bytes of a sample of an IMU, compressed.
 const IMU_SAMPLE_BYTES: f64 = 150.0;
-/// Bytes of the truth at one step of the simulation: in the recording, and its line in the TUM file.
+/// Bytes of the truth at one step of the simulation: in the recording, and the line in the TUM file.
 const TRUTH_BYTES: f64 = 470.0 + 107.0;
-/// From this size on a note says it, bytes.
+/// Size above which a note reports it, bytes.
 const LARGE_BYTES: f64 = 1e9;
 
-/// Says with `note` how large a large recording at `wanted`, or in that folder, will be.
+/// Reports with `note` the size of a large recording at `wanted`, or in that folder.
 ///
 /// # Errors
-/// When the file system has not that much free space.
+/// When the file system has less free space.
 pub(super) fn check(simulation: &Simulation, wanted: &Path, note: impl Fn(&str)) -> anyhow::Result<()> {
     let bytes = expected_bytes(simulation);
     if bytes < LARGE_BYTES {
@@ -70,7 +70,7 @@ mod tests {
             let scenario = Scenario { lidar: lidar.to_owned(), duration_s: 2.0, ..Scenario::in_scene("office") };
             let simulation = Simulation::prepare(&scenario).unwrap();
             let files = [here.path().join("a.mcap"), here.path().join("a.tum")];
-            let mut watch = Watch { stop: &AtomicBool::new(false), tell: &mut |_| {} };
+            let mut watch = Watch { stop: &AtomicBool::new(false), report: &mut |_| {} };
             record(&simulation, &files[0], &files[1], false, &mut watch).unwrap();
             let bytes: u64 = files.iter().map(|file| file.metadata().unwrap().len()).sum();
             let ratio = expected_bytes(&simulation) / bytes as f64;

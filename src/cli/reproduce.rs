@@ -11,23 +11,23 @@ use std::path::{Path, PathBuf};
 use zsim::report;
 use zsim::study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_table};
 
-/// Run the paper's experiments again: what it found, what we find
+/// Repeat the paper's experiments: compare the published results with zsim's
 ///
-/// Each leaves its figures in DIR/paper/NAME/, and DIR/paper.md is the table of all that are finished. What was stopped
-/// goes on where it was.
+/// Each writes its figures to DIR/paper/NAME/; DIR/paper.md is the table of all finished ones. An interrupted
+/// experiment continues from its last finished run.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim reproduce\n  zsim reproduce fig3 --out results")]
 pub(super) struct Arguments {
     /// Experiments, names under specs/experiments/ or files [default: all]
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// The folder in which all of it goes
+    /// Folder for all results
     #[arg(long, short, value_name = "DIR", default_value = "results")]
     out: PathBuf,
-    /// Do so little of each that it takes seconds, in DIR/paper-quick/: to see that it runs; its figures are no results
+    /// Run a small variant of each in seconds, in DIR/paper-quick/, as a smoke test; its figures are no results
     #[arg(long)]
     quick: bool,
-    /// Begin anew even if a folder holds work by another spec or version
+    /// Start anew even if a folder has work by another spec or version
     #[arg(long)]
     force: bool,
 }
@@ -35,7 +35,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
     let all = Experiment::all();
     let names = if arguments.names.is_empty() { &all } else { &arguments.names };
-    // A wrong name shows before hours of work on another.
+    // Check all names before the first experiment runs for hours.
     let wanted = names.iter().map(|name| Ok(Experiment::load(name)?)).collect::<anyhow::Result<Vec<_>>>()?;
     let (extent, stem) = if arguments.quick { (Extent::Quick, "paper-quick") } else { (Extent::Whole, "paper") };
     let folder = arguments.out.join(stem);
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     Ok(End::Done)
 }
 
-/// Refuses to replace a file at the table's place that `zsim reproduce` did not write.
+/// Refuses to replace a table that `zsim reproduce` did not write.
 fn check_table(path: &Path, force: bool) -> anyhow::Result<()> {
     let is_foreign = |text: Vec<u8>| !text.starts_with(TABLE_HEADING.as_bytes());
     if !force && std::fs::read(path).is_ok_and(is_foreign) {
@@ -76,7 +76,7 @@ fn check_table(path: &Path, force: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the table of what was found now and by earlier runs.
+/// Writes the table of the findings of this and earlier runs.
 fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[(String, Finding)]) -> anyhow::Result<()> {
     let mut findings: Vec<(String, Option<Finding>)> = Vec::new();
     for name in Experiment::all() {
@@ -95,7 +95,7 @@ fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[(String,
         options += &format!(" --out {}", arguments.out.display());
     }
     let path = folder.with_extension("md");
-    std::fs::create_dir_all(&arguments.out).with_context(|| format!("{} cannot be made", arguments.out.display()))?;
+    std::fs::create_dir_all(&arguments.out).with_context(|| format!("cannot create {}", arguments.out.display()))?;
     std::fs::write(&path, paper_table(&findings, extent, &options))
         .with_context(|| format!("{} cannot be written", path.display()))
 }

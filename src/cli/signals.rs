@@ -8,7 +8,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// The number of the first signal; 0 before it.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
 
-/// What a shell adds to a signal's number for the exit code of what it ended.
+/// A shell adds this to a signal's number for the exit code of the process that the signal ended.
 const BY_SIGNAL: i32 = 128;
 /// SIGINT, the signal of Ctrl-C.
 const INTERRUPT: i32 = 2;
@@ -22,7 +22,7 @@ pub(super) fn stop_flag() -> &'static AtomicBool {
 
 /// The exit code of a run that was stopped: 130 after SIGINT, 143 after SIGTERM.
 pub(super) fn exit_code() -> u8 {
-    // A run is stopped without a signal of its own when one of its workers received it.
+    // When a worker received the signal, the run stops without a signal of its own.
     let signal = Some(SIGNAL.load(Ordering::Relaxed)).filter(|signal| *signal != 0).unwrap_or(INTERRUPT);
     u8::try_from(BY_SIGNAL + signal).unwrap_or(u8::MAX)
 }

@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let files = RecordingFiles::reserve(&wanted, arguments.force, &inputs)?;
 
     simulation.world().notes().iter().for_each(|note| bars.remark(note));
-    let mut watch = Watch { stop: stop_flag(), tell: &mut |news| bars.tell(news) };
+    let mut watch = Watch { stop: stop_flag(), report: &mut |news| bars.tell(news) };
     let recorded = study::record(&simulation, files.recording(), files.truth(), arguments.truth_tf, &mut watch);
     bars.finish();
     let summary = recorded.inspect_err(|_| super::journey::left_behind(files.recording()))?;

@@ -17,12 +17,12 @@ const RUNS_IN_AN_ELEMENT: u64 = 20;
 const MOST_ELEMENTS: u64 = 1000;
 /// Longest name of a job, characters.
 const LONGEST_NAME: usize = 64;
-/// Memory beside what a run's limit allows, MiB: the process that watches over the runs.
+/// Memory above the limit of a run, MiB: for the process that supervises the runs.
 const MEMORY_BESIDE_MIB: u64 = 256;
 
-/// Hand a sweep to a scheduler: a job array whose elements do a share each
+/// Submit a sweep to a scheduler as a job array; each element does a part of the runs
 ///
-/// The folder must be one that all nodes see. Merge when the array is done; submit again to do what is missing then.
+/// All nodes must see the folder. Merge when the array is done; submit a second time for missing runs.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim sweep submit results/springs --slurm --elements 16")]
 pub(super) struct Arguments {
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     }
     let elements = wanted.min(sweep.tasks() as u64).max(1);
     let logs = folder.join("slurm");
-    std::fs::create_dir_all(&logs).with_context(|| format!("{} cannot be made", logs.display()))?;
+    std::fs::create_dir_all(&logs).with_context(|| format!("cannot create {}", logs.display()))?;
     let script = logs.join("array.sh");
     let threads = global.threads.map_or(1, std::num::NonZeroUsize::get);
     std::fs::write(&script, text((&sweep, &log), &folder, elements, threads)?)
@@ -108,8 +108,8 @@ fn job_name(name: &str) -> String {
 /// The option that names the elements' logs, `folder/slurm/<job>_<element>.log`.
 ///
 /// # Errors
-/// When the folder's path has a character that a line of sbatch's options cannot hold as it is: sbatch has quoting rules
-/// of its own, and reads `%` and `\` in this option.
+/// When the folder's path has a character that a line of sbatch's options cannot hold as it is: sbatch has quoting
+/// rules of its own, and interprets `%` and `\` in this option.
 fn log_option(folder: &Path) -> anyhow::Result<String> {
     let is_plain = |c: char| c.is_alphanumeric() || " ./_-+=:,@~".contains(c);
     let path = folder.to_str().filter(|path| path.chars().all(is_plain)).ok_or_else(|| {
@@ -128,7 +128,7 @@ fn quoted(path: &Path) -> anyhow::Result<String> {
     Ok(format!("'{}'", text.replace('\'', "'\\''")))
 }
 
-/// Hands the script to sbatch; the job's number.
+/// Hands the script to sbatch; returns the job number.
 fn submitted(script: &Path, options: &str) -> anyhow::Result<u64> {
     let mut sbatch = Command::new("sbatch");
     sbatch.arg("--parsable").args(options.split_whitespace()).arg(script);
@@ -137,9 +137,9 @@ fn submitted(script: &Path, options: &str) -> anyhow::Result<u64> {
         bail!("sbatch refused: {}", String::from_utf8_lossy(&output.stderr).trim());
     }
     // `number` or `number;cluster`.
-    let said = String::from_utf8_lossy(&output.stdout);
-    let number = said.trim().split(';').next().and_then(|number| number.parse().ok());
-    number.with_context(|| format!("sbatch said \"{}\", which is no job's number", said.trim()))
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let number = printed.trim().split(';').next().and_then(|number| number.parse().ok());
+    number.with_context(|| format!("sbatch printed \"{}\", expected a job number", printed.trim()))
 }
 
 #[cfg(test)]

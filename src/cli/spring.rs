@@ -14,7 +14,7 @@ use zsim::study::coverage::{CoveragePlan, coverage_figure};
 use zsim::study::spring::design::{DesignSpec, Search, csv, pareto_figure};
 use zsim::study::spring::{Shake, mode_figure, spring_report};
 
-/// Tell all about a spring, or any other linkage, under its head: stiffness, rest, modes, field of view, limits; or
+/// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
 /// search for one
 ///
 /// FILE is a head, or a spring, which is then put under the head given by --head. That the head falls is an answer.
@@ -29,13 +29,13 @@ pub(super) struct Arguments {
     /// A head or a spring: a name under specs/heads/ or specs/springs/, or a file
     #[arg(value_name = "FILE", required = true)]
     file: Option<String>,
-    /// The head that a bare spring carries
+    /// The head on a spring that is given without one
     #[arg(long, value_name = "NAME|FILE", default_value = "handheld")]
     head: String,
-    /// The lidar whose view is told
+    /// The lidar whose field of view is reported
     #[arg(long, value_name = "NAME|FILE", default_value = "utm30lx")]
     lidar: String,
-    /// The IMU whose range is told
+    /// The IMU whose range is reported
     #[arg(long, value_name = "NAME|FILE", default_value = "3dm_gx2")]
     imu: String,
     /// Amplitude of the hand's nod, degrees
@@ -44,7 +44,7 @@ pub(super) struct Arguments {
     /// Frequency of the hand's nod, Hz [default: the head's slowest mode]
     #[arg(long, value_name = "HZ")]
     frequency: Option<f64>,
-    /// A folder for plots of the modes and of what the lidar sees
+    /// Folder for plots of the modes and of the lidar coverage
     #[command(flatten)]
     out: OutArguments,
 }
@@ -58,7 +58,7 @@ enum Verb {
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim spring design spring_design --out results/springs")]
 struct Design {
-    /// What is wanted, a name under specs/studies/ or a file
+    /// The design goals, a name under specs/studies/ or a file
     #[arg(value_name = "FILE")]
     file: String,
     #[command(flatten)]
@@ -124,7 +124,7 @@ fn head_of(file: &str, head: &str) -> anyhow::Result<(HeadSpec, Source)> {
             Ok((spec, source))
         }
         (Err(as_head), Err(as_spring)) => {
-            // Whichever came farther in reading is what the file means to be.
+            // The parser that accepted more lines determines the intended kind.
             let is_spring = as_spring.line_and_column() > as_head.line_and_column();
             Err(if is_spring { as_spring } else { as_head }.into())
         }

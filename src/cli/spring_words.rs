@@ -1,10 +1,10 @@
-//! What `zsim spring` says.
+//! The output of `zsim spring`.
 
 use super::coverage_words;
 use zsim::dynamics::{Bearing, BearingKind, ModeKind};
 use zsim::report::table;
 use zsim::study::spring::design::DesignStudy;
-use zsim::study::spring::{CoilReport, Figures, SpringReport, UnderShake};
+use zsim::study::spring::{CoilReport, DesignFigures, ShakeResponse, SpringReport};
 
 /// All about a spring.
 pub(super) fn report(report: &SpringReport) -> String {
@@ -102,12 +102,13 @@ fn modes(report: &SpringReport) -> String {
     table(&["mode", "Hz", "ratio", "x", "y", "z", "rx", "ry", "rz"], &rows, true)
 }
 
-fn under_shake(shaken: &UnderShake) -> String {
+fn under_shake(shaken: &ShakeResponse) -> String {
     let header = ["nodded by a hand", "closed form", "simulated"];
     let simulated = shaken.simulated.as_ref();
-    let line = |name: &str, of: fn(&Figures) -> Option<f64>, decimals: usize| {
-        let number =
-            |figures: Option<&Figures>| figures.and_then(of).map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
+    let line = |name: &str, of: fn(&DesignFigures) -> Option<f64>, decimals: usize| {
+        let number = |figures: Option<&DesignFigures>| {
+            figures.and_then(of).map_or("-".to_owned(), |x| format!("{x:.decimals$}"))
+        };
         vec![name.to_owned(), number(Some(&shaken.closed_form)), number(simulated)]
     };
     let mut rows = vec![
@@ -124,7 +125,7 @@ fn under_shake(shaken: &UnderShake) -> String {
     format!("\n{}{failed}", table(&header, &rows, true))
 }
 
-/// What a search found.
+/// The result of a search.
 pub(super) fn design(study: &DesignStudy) -> String {
     let header =
         ["D mm", "d mm", "coils", "L mm", "Hz", "view deg", "simulated", "rate", "sag mm", "g", "stress", "holds"];

@@ -6,17 +6,17 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use zsim::study::sweep::Share;
 
-/// Vary a run and tell what matters: `zsim sweep` plan, run and merge in one
+/// Vary the parameters of a run and report their effects: `zsim sweep` plan, run and merge in one
 ///
-/// Writes table.parquet and table.csv, a row a run; summary.csv and study.md, what each axis does and whether that is
-/// significant; and plots. What is in the folder already is not done again: a study that was stopped goes on.
+/// Writes table.parquet and table.csv, a row per run; summary.csv and study.md, the effect of each axis and its
+/// significance; and plots. A second start in the same folder skips finished runs and continues.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim study estimator_ablation --out results/estimator_ablation")]
 pub(super) struct Arguments {
-    /// What is varied, a name under specs/studies/ or a file
+    /// The study, a name under specs/studies/ or a file
     #[arg(value_name = "FILE")]
     file: String,
-    /// The folder for results, in which a study that was stopped goes on [default: results/<name>]
+    /// Folder for results; an interrupted study in it is continued [default: results/<name>]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace another plan in the folder; runs that are in both stay done

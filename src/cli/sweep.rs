@@ -13,11 +13,11 @@ use std::path::{Path, PathBuf};
 use zsim::spec::{Kind, find, parse};
 use zsim::study::sweep::{Plan, Runner, Share, Status, Sweep, confine};
 
-/// Run a design again and again with other parameters: plan, run in any number of pieces anywhere, merge
+/// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///
-/// A sweep is a spec under specs/studies/: a run, what is varied, what is told. `plan` leaves it in a folder; `run`
-/// does what is missing there, on this machine's threads or as one of many processes on many machines; `merge` makes
-/// one table, the same bytes however it came about, with plots. Whatever stops it, what is done stays done.
+/// A sweep is a spec under specs/studies/: a run, its varied parameters, its measures. `plan` writes it to a folder;
+/// `run` does missing runs, on this machine's threads or as one of many processes on many machines; `merge` creates one
+/// table, the same bytes for any division of the work, with plots. Finished runs survive any interruption.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  zsim sweep plan spring_sweep -o results/springs\n  zsim sweep run results/springs\n  zsim sweep merge results/springs"
@@ -45,7 +45,7 @@ struct PlanArguments {
     /// The sweep, a name under specs/studies/ or a file
     #[arg(value_name = "SPEC")]
     spec: String,
-    /// The folder, in which a sweep that was begun goes on [default: results/<name>]
+    /// The folder; a sweep in it is continued [default: results/<name>]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace another plan in the folder; runs that are in both stay done
@@ -53,9 +53,9 @@ struct PlanArguments {
     force: bool,
 }
 
-/// Do what is missing, or a share of it
+/// Do the missing runs, or a part of them
 ///
-/// In a Slurm array or a Kubernetes Indexed Job the index is taken from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX.
+/// In a Slurm array or a Kubernetes Indexed Job the index is SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  zsim sweep run results/springs --threads 8\n  zsim sweep run results/springs --index 3 --count 16"
@@ -72,7 +72,7 @@ struct RunArguments {
     count: Option<usize>,
 }
 
-/// A folder that holds a sweep
+/// The folder of a sweep
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim sweep status results/springs --json\n  zsim sweep merge results/springs")]
 struct FolderArguments {
@@ -124,16 +124,16 @@ fn run_share(arguments: &RunArguments, global: &Global) -> anyhow::Result<End> {
     tell(global, &sweep.status(share)?, &arguments.folder)
 }
 
-/// Does what is missing of a share, with a progress bar.
+/// Does the missing runs of a part, with a progress bar.
 pub(super) fn run_sweep(sweep: &Sweep, share: Share, global: &Global) -> anyhow::Result<()> {
     let program = std::env::current_exe().context("this program's own path is not known")?;
     let bar = WorkBar::new(global, "sweeping");
     let hear = |share: f64| bar.show(share);
-    sweep.run(share, &Runner { program: &program, stop: stop_flag(), hear: &hear })?;
+    sweep.run(share, &Runner { program: &program, stop: stop_flag(), on_progress: &hear })?;
     Ok(())
 }
 
-/// The share that is asked for, or that the scheduler gave.
+/// The part given on the command line or by the scheduler.
 fn share(arguments: &RunArguments) -> anyhow::Result<Share> {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<usize>().ok());
     let slurm = number("SLURM_ARRAY_TASK_ID");
@@ -145,11 +145,11 @@ fn share(arguments: &RunArguments) -> anyhow::Result<Share> {
             let (first, step) = (number("SLURM_ARRAY_TASK_MIN"), number("SLURM_ARRAY_TASK_STEP"));
             let index = index.saturating_sub(first.unwrap_or(0)) / step.unwrap_or(1).max(1);
             let count = number("SLURM_ARRAY_TASK_COUNT");
-            let count = count.ok_or_else(|| Usage("SLURM_ARRAY_TASK_COUNT is not set: say --count".to_owned()))?;
+            let count = count.ok_or_else(|| Usage("SLURM_ARRAY_TASK_COUNT is not set: pass --count".to_owned()))?;
             Ok(Share { index, count })
         }
-        (Some(index), None) => Err(Usage(format!("share {index} of how many? say --count")).into()),
-        (None, Some(count)) => Err(Usage(format!("which of the {count} shares? say --index")).into()),
+        (Some(index), None) => Err(Usage(format!("--index {index} needs --count")).into()),
+        (None, Some(count)) => Err(Usage(format!("--count {count} needs --index")).into()),
     }
 }
 
@@ -157,7 +157,7 @@ fn run_task(arguments: &TaskArguments) -> anyhow::Result<End> {
     let sweep = Sweep::open(&arguments.folder)?;
     confine(sweep.limit())?;
     sweep.run_task(arguments.task, &|word| {
-        // Nobody who listens, nobody who works: the process that began this one ends it too.
+        // The supervisor has ended: end this process too.
         if writeln!(std::io::stdout().lock(), "{word}").is_err() {
             std::process::exit(1);
         }
@@ -165,7 +165,7 @@ fn run_task(arguments: &TaskArguments) -> anyhow::Result<End> {
     Ok(End::Done)
 }
 
-/// Merges what is done, and tells what it says.
+/// Merges the finished runs and prints a summary.
 pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<End> {
     let merged = sweep.tell()?;
     let words = format!("{}\n{}", merged.words, status_words(&merged.status));

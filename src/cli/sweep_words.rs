@@ -3,12 +3,12 @@
 use zsim::report;
 use zsim::study::sweep::{Status, Sweep};
 
-/// What was planned.
+/// Summary of a plan.
 pub(super) fn plan_words(sweep: &Sweep) -> String {
     format!("{} runs in {} tasks", sweep.plan().points(), sweep.tasks())
 }
 
-/// How far a sweep is.
+/// Progress of a sweep.
 pub(super) fn status_words(status: &Status) -> String {
     let mut rows = vec![
         ("runs", status.points.to_string()),
@@ -20,12 +20,12 @@ pub(super) fn status_words(status: &Status) -> String {
         rows.push(("damaged among them", status.damaged.to_string()));
     }
     let left = status.thread_s_left.filter(|_| status.missing > 0);
-    rows.extend(left.map(|seconds| ("left, on one thread", duration(seconds))));
+    rows.extend(left.map(|seconds| ("remaining, on one thread", duration(seconds))));
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
     report::table(&[], &rows, true)
 }
 
-/// A time as people say it.
+/// A duration in readable units.
 fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 90.0 => format!("{s:.0} s"),

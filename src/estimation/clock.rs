@@ -1,5 +1,5 @@
-/// The drift between the clocks is extrapolated for at most so long, s: a longer gap is a clock that was set, or a pause
-/// in which it may have been, and a rate known to 20 ppm would be off by 1.7 s after a day.
+/// The drift between the clocks is extrapolated for at most so long, s: a longer gap is a clock that was set, or a
+/// pause in which it may have been, and a rate known to 20 ppm would be off by 1.7 s after a day.
 const EXTRAPOLATED_S: f64 = 60.0;
 
 /// How the IMU's clock stands against the lidar's: `u = tau + l(tau)`.

@@ -8,8 +8,8 @@ use crate::time::Stamp;
 /// Over so many seconds at the start a trajectory is aligned when its error is stated, s.
 pub const GAUGED_S: f64 = 20.0;
 
-/// A turn counts in an alignment as much as a shift by this times the angle, m: it holds one of a head that stays in one
-/// place, and counts for nothing on a walk.
+/// A turn counts in an alignment as much as a shift by this times the angle, m: it holds one of a head that stays in
+/// one place, and counts for nothing on a walk.
 pub const TURN_LEVER_M: f64 = 0.05;
 
 /// The head at an instant, and what the estimator thought of its sensors then.
@@ -56,8 +56,8 @@ pub struct WindowReport {
     /// Least over greatest eigenvalue of the information that the matches hold about the position, 0..1; 0 without
     /// matches.
     pub conditioning: f64,
-    /// How many times as far as their noise has it the IMU's samples are from the trajectory, which follows them: 0.1 to
-    /// 0.4 where all is well.
+    /// How many times as far as their noise has it the IMU's samples are from the trajectory, which follows them: 0.1
+    /// to 0.4 where all is well.
     pub imu_contradiction: f64,
     /// Clock offset after the window, s.
     pub clock_offset_s: f64,

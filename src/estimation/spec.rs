@@ -74,8 +74,8 @@ pub struct SurfelSpec {
     /// slice that a planar scan cuts out of a corner or a pipe.
     #[serde(with = "crate::spec::checked::Positive")]
     pub max_incidence_deg: f64,
-    /// Nearest range used, m. Nearer returns are of the carrier (who holds the head, or what it is mounted on): it moves
-    /// along, and matched as a static surface it constrains the head not to move. 0.7 m is an arm's reach.
+    /// Nearest range used, m. Nearer returns are of the carrier (who holds the head, or what it is mounted on): it
+    /// moves along, and matched as a static surface it constrains the head not to move. 0.7 m is an arm's reach.
     #[serde(with = "crate::spec::checked::NonNegative")]
     pub min_range_m: f64,
     /// Standard deviation of an offset common to all ranges, which is estimated, m; 0 for none.

@@ -99,8 +99,8 @@ impl StampFilter {
         self.last_s
     }
 
-    /// Delays only ever make a stamp late: an early one lies near the truth, a late one says nothing, but the least late
-    /// of many in a row is on time. Where that is late by periods, samples were lost.
+    /// Delays only ever make a stamp late: an early one lies near the truth, a late one says nothing, but the least
+    /// late of many in a row is on time. Where that is late by periods, samples were lost.
     fn follow_envelope(&mut self, raw_s: f64) {
         let delay_s = raw_s - self.last_s;
         let (count, least_s) = (self.late.0 + 1, self.late.1.min(delay_s));

@@ -1,8 +1,8 @@
 //! Whether the lidar shows a head at rest: a head that moves evenly feels like one at rest to its IMU.
 //!
 //! The ranges of one direction, early and late, differ by what the head moved: along a ray `u` that meets a surface of
-//! normal `n`, a shift `d` changes the range `r` by `-n.d / n.u`. Of many directions least squares gives the shift, where
-//! the surfaces constrain it: between two parallel walls it is unknown along them.
+//! normal `n`, a shift `d` changes the range `r` by `-n.d / n.u`. Of many directions least squares gives the shift,
+//! where the surfaces constrain it: between two parallel walls it is unknown along them.
 
 use super::surfel::Beam;
 use crate::geometry::Vector;

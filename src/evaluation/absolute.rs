@@ -26,7 +26,7 @@ impl Errors {
         errors
     }
 
-    /// Those of every `stride`-th instant.
+    /// The errors of every `stride`-th pair.
     #[must_use]
     pub fn every(&self, stride: usize) -> Self {
         let thin = |vectors: &[Vector]| vectors.iter().step_by(stride).copied().collect();
@@ -94,8 +94,8 @@ mod tests {
 
     #[test]
     fn an_alternating_error_is_its_own_root_mean_square() {
-        // +-3 cm along x, alternating from pose to pose, cannot be aligned away: RMSE is 3 cm. A constant turn of the
-        // head in its own frame by 2 degrees leaves the positions alone: rotation RMSE is 2 degrees.
+        // +-3 cm along x, alternating from pose to pose, cannot be aligned: RMSE is 3 cm. A constant rotation of the
+        // head in the head frame by 2 degrees does not move the positions: rotation RMSE is 2 degrees.
         let turn = Pose::from_parts(Vector::zeros().into(), from_roll_pitch_yaw(0.0, 0.0, 2_f64.to_radians()));
         let walked = walk();
         let shaken = walked.iter().enumerate().map(|(k, (stamp, pose))| {

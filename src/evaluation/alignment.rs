@@ -7,7 +7,7 @@ const LINE: f64 = 1e-12;
 
 /// The rigid transform `to_from_from` that brings the points `from` nearest to `to`, pair by pair, in least squares.
 ///
-/// Umeyama (1991), eq. 40-42, with its scale held at 1: the rotation is `U S V^T` of the singular value decomposition
+/// Umeyama (1991), eq. 40-42, with the scale fixed at 1: the rotation is `U S V^T` of the singular value decomposition
 /// of the cross covariance, with the sign in `S` that makes it proper.
 ///
 /// # Errors
@@ -23,7 +23,7 @@ pub fn align(to: &[Vector], from: &[Vector]) -> Result<Pose, EvaluationError> {
 /// covariance as `lever_m^2 / 2 R_to R_from^T`.
 ///
 /// # Errors
-/// When there are fewer than three pairs, or nothing that tells a direction.
+/// When there are fewer than three pairs, or no direction is determined.
 pub fn align_poses(to: &[Pose], from: &[Pose], lever_m: f64) -> Result<Pose, EvaluationError> {
     let turn = |(a, b): (&Pose, &Pose)| (a.rotation * b.rotation.inverse()).to_rotation_matrix().into_inner();
     let turns: Matrix = to.iter().zip(from).map(turn).sum();
@@ -32,7 +32,7 @@ pub fn align_poses(to: &[Pose], from: &[Pose], lever_m: f64) -> Result<Pose, Eva
     nearest(&positions(to), &positions(from), &(turns * each))
 }
 
-/// As [`align`], with what attitudes add to the mean cross covariance.
+/// As [`align`], with the contribution of the attitudes to the mean cross covariance.
 fn nearest(to: &[Vector], from: &[Vector], turns: &Matrix) -> Result<Pose, EvaluationError> {
     let pairs = to.len().min(from.len());
     if pairs < 3 {

@@ -9,8 +9,8 @@ pub struct ClockError {
     pub offset_end_error_s: f64,
 }
 
-/// Judges estimated offsets of the IMU's clock after the lidar's against the true ones, both over lidar time; the truth
-/// is interpolated linearly. `None` where the two have no instant in common.
+/// Computes the error of estimated offsets between the IMU and lidar clocks, both over lidar time; the truth
+/// is interpolated linearly. `None` where the two do not overlap in time.
 pub fn clock_error(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Option<ClockError> {
     let errors: Vec<f64> =
         estimate.iter().filter_map(|(stamp, offset_s)| Some(offset_s - offset_at(truth, *stamp)?)).collect();
@@ -37,7 +37,7 @@ mod tests {
 
     #[test]
     fn an_estimate_that_starts_from_zero_and_settles_is_told_by_both_numbers() {
-        // Truth 3 ms + 1 ms/min, told at 0 and 60 s. Estimates: 0 at the start (3 ms off), 3.6 at 30 s (+0.1), 3.9 at
+        // Truth 3 ms + 1 ms/min, given at 0 and 60 s. Estimates: 0 at the start (3 ms off), 3.6 at 30 s (+0.1), 3.9 at
         // 60 s.
         let at = |s: i64| Stamp::from_nanos(s * 1_000_000_000);
         let truth = [(at(0), 3e-3), (at(60), 4e-3)];

@@ -3,8 +3,8 @@ use rayon::prelude::*;
 
 /// Which points of a cloud are judged: a bounded number, spread evenly over it, always the same ones.
 ///
-/// Point `k` is kept when the Weyl sequence `k / phi mod 1` falls below the wanted share: evenly spread, and out of
-/// step with any period of the scanner.
+/// Point `k` is selected when the Weyl sequence `k / phi mod 1` is below the wanted fraction: evenly distributed, and
+/// out of step with any period of the scanner.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thinning {
     share: f64,
@@ -26,7 +26,7 @@ impl Thinning {
 /// Signed distances of points to the true surfaces.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CloudErrors {
-    /// Distance to the nearest surface, m: positive on the side from which the point was seen (a range too short).
+    /// Distance to the nearest surface, m: positive on the side of the sensor (a range too short).
     pub signed_m: Vec<f64>,
     /// How many points had no surface within reach.
     pub beyond_reach: usize,
@@ -37,17 +37,17 @@ pub struct CloudErrors {
 pub struct CloudSummary {
     /// Mean signed distance, m.
     pub bias_m: f64,
-    /// Standard deviation of the signed distance about its mean, m.
+    /// Standard deviation of the signed distance about the mean, m.
     pub sigma_m: f64,
     /// 95 % of the points are no farther from a surface than this, m.
     pub p95_m: f64,
-    /// Share of the points without a surface within reach; they are in none of the other numbers.
+    /// Fraction of the points without a surface within reach; the other numbers exclude them.
     pub beyond_reach: f64,
 }
 
 impl CloudErrors {
-    /// Distances of points, each with the place from which it was seen (or `None`: the sign is then the surface's own).
-    /// Surfaces farther than `reach_m` are not looked for.
+    /// Distances of points, each with the position of the sensor (or `None`: the sign is then that of the surface).
+    /// Surfaces at more than `reach_m` are ignored.
     pub fn to_surface(surface: &dyn Surface, seen: &[(Vector, Option<Vector>)], reach_m: f64) -> Self {
         let distance = |(point, from): &(Vector, Option<Vector>)| {
             let nearest = surface.nearest(point, reach_m)?;
@@ -85,7 +85,7 @@ mod tests {
     use crate::geometry::SurfacePoint;
     use approx::assert_relative_eq;
 
-    /// The floor z = 0, its normal pointing down, away from those who stand on it.
+    /// The floor z = 0, with the normal pointing down.
     struct Floor;
 
     impl Surface for Floor {
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn planted_heights_over_a_floor_are_found() {
-        // Heights 0.00, 0.01, ..., 0.99 m seen from above: mean 0.495, variance (100^2 - 1)/12 cm^2, p95 at 0.94.
+        // Heights 0.00, 0.01, ..., 0.99 m observed from above: mean 0.495, variance (100^2 - 1)/12 cm^2, p95 at 0.94.
         let from = Some(Vector::new(0.0, 0.0, 2.0));
         let points: Vec<_> = (0..100).map(|k| (Vector::new(k as f64, 0.0, 0.01 * k as f64), from)).collect();
         let summary = CloudErrors::to_surface(&Floor, &points, 1.0).summary().unwrap();
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn thinning_keeps_about_the_limit_and_every_phase_of_a_scan() {
-        // 1081 beams a scan, 2000 scans: of 100 000 kept, each beam's index is kept about 92 times.
+        // 1081 beams a scan, 2000 scans: of 100 000 selected points, each beam's index occurs about 92 times.
         let total = 1081 * 2000;
         let thinning = Thinning::to(100_000, total);
         let mut per_beam = vec![0_usize; 1081];

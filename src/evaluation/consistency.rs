@@ -5,11 +5,11 @@ use crate::time::{Span, Stamp};
 /// Time between the samples; errors change slowly, and more samples would only repeat each other.
 const EVERY: Span = Span::from_nanos(1_000_000_000);
 
-/// Whether the errors are as large as the estimator says.
+/// Whether the errors agree with the covariances of the estimator.
 ///
 /// The normalised estimation error squared `e^T P^-1 e` (Bar-Shalom, Li and Kirubarajan, Estimation with Applications
 /// to Tracking and Navigation, 2001, section 5.4) is chi-squared with three degrees of freedom, 3 on average, where the
-/// covariance P is right; above that the estimator believes too much. Errors are told in the map, against the first
+/// covariance P is correct; a larger value means that the estimator is overconfident. Errors are relative to the first
 /// pose of both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Consistency {
@@ -21,8 +21,8 @@ pub struct Consistency {
     pub end: [f64; 2],
 }
 
-/// Holds the errors of `pairs` against the covariances that the estimator gave at some of their stamps, in order of
-/// time. `None` where no covariance says anything.
+/// Compares the errors of `pairs` with the covariances that the estimator reported at some of the stamps, in order of
+/// time. `None` where no covariance is usable.
 pub fn consistency(pairs: &Pairs, covariances: &[(Stamp, PoseCovariance)]) -> Option<Consistency> {
     let map_from_world = pairs.estimate().first()? * pairs.truth().first()?.inverse();
     let mut next = *pairs.stamps().first()?;
@@ -40,7 +40,7 @@ pub fn consistency(pairs: &Pairs, covariances: &[(Stamp, PoseCovariance)]) -> Op
     Some(Consistency { end: *told.last()?, position_nees: mean(0), attitude_nees: mean(1) })
 }
 
-/// Of position and attitude; `None` where a covariance is not positive definite: nothing is claimed.
+/// Of position and attitude; `None` where a covariance is not positive definite.
 fn nees(estimate: &Pose, truth: &Pose, covariance: &PoseCovariance) -> Option<[f64; 2]> {
     let shift = estimate.translation.vector - truth.translation.vector;
     let turn = (estimate.rotation * truth.rotation.inverse()).scaled_axis();

@@ -4,19 +4,19 @@ use crate::measurement::ImuSample;
 use crate::time::{Span, Stamp};
 use std::collections::VecDeque;
 
-/// Time between poses that are kept.
+/// Time between output poses.
 const KEPT_EVERY: Span = Span::from_nanos(100_000_000);
 
-/// What counts as rest at the start.
+/// Limits that define rest at the start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rest {
-    /// Greatest change of the angular velocity against its mean so far, rad/s.
+    /// Maximum deviation of the angular velocity from the running mean, rad/s.
     pub gyro_rad_per_s: f64,
-    /// Greatest change of the specific force against its mean so far, m/s^2.
+    /// Maximum deviation of the specific force from the running mean, m/s^2.
     pub accel_m_per_s2: f64,
     /// Least length of the rest, s.
     pub least_s: f64,
-    /// How long before it shows a motion may have begun, s: so much of the rest's end is not averaged.
+    /// Delay with which a motion is detected, s: the last part of the rest of this length is not averaged.
     pub onset_s: f64,
 }
 
@@ -27,19 +27,19 @@ impl Default for Rest {
     }
 }
 
-/// What the IMU alone says: its raw samples integrated from a start at rest, the simplest strapdown.
+/// Dead reckoning by the IMU only: raw samples integrated from a start at rest, the simplest strapdown.
 ///
-/// The rest gives the gyroscope's bias (its mean) and down (the mean specific force, whose magnitude is taken for
-/// gravity's). From there attitude, velocity and position are integrated by the trapezoidal rule. Samples that run
-/// backwards in time or are not finite are left out. The map's origin is the IMU's place at rest, its heading
-/// arbitrary.
+/// The rest determines the gyroscope bias (the mean) and down (the mean specific force, with the magnitude of
+/// gravity). Then attitude, velocity and position are integrated by the trapezoidal rule. Samples that run
+/// backwards in time or are not finite are skipped. The map's origin is the position of the IMU at rest, the heading
+/// is arbitrary.
 #[derive(Debug, Clone)]
 pub struct DeadReckoning {
     rest: Rest,
     imu_from_head: Pose,
     start: RestMean,
     still: bool,
-    /// The end of the rest so far, which may belong to a motion that does not show yet.
+    /// The last part of the rest, which may include the onset of a motion.
     held: VecDeque<ImuSample>,
     latest: Option<Stamp>,
     previous: Option<ImuSample>,
@@ -74,7 +74,7 @@ impl RestMean {
 }
 
 impl DeadReckoning {
-    /// Dead reckoning of a head with its IMU at `head_from_imu`.
+    /// Dead reckoning of a head whose IMU is at `head_from_imu`.
     pub fn new(head_from_imu: &Pose, rest: Rest) -> Self {
         Self {
             rest,
@@ -110,7 +110,7 @@ impl DeadReckoning {
         }
     }
 
-    /// Holds a sample of the rest back until it is old enough to belong to the rest for certain.
+    /// Delays a sample until it certainly belongs to the rest.
     fn hold(&mut self, sample: &ImuSample) {
         self.held.push_back(*sample);
         while self.held.front().is_some_and(|held| sample.stamp.seconds_since(held.stamp) >= self.rest.onset_s) {
@@ -152,7 +152,7 @@ impl DeadReckoning {
         if self.trajectory.span().is_some_and(|(_, last)| sample.stamp - last < KEPT_EVERY) {
             return;
         }
-        // Only a run that left all bounds is not finite; its trajectory ends there.
+        // Only a run that diverged is not finite; the trajectory ends there.
         let _ = self.trajectory.push(sample.stamp, map_from_imu * self.imu_from_head);
     }
 

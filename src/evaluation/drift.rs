@@ -4,7 +4,7 @@ use crate::estimation::GAUGED_S;
 /// Length of the stretch at the end over which the error is averaged, s.
 pub const TAIL_S: f64 = 5.0;
 
-/// A turn counts in the alignment as much as a shift by this times the angle, m: little beside a way that is not
+/// Weight of a rotation in the alignment: equivalent shift per angle, m; small compared with a path that is not
 /// straight.
 const TURN_LEVER_M: f64 = 0.3;
 
@@ -15,26 +15,26 @@ const SECONDS_PER_MINUTE: f64 = 60.0;
 pub struct Drift {
     /// Growth of the distance to the true position, m/min.
     pub position_m_per_min: f64,
-    /// Growth of the error about the vertical, without its sign, rad/min.
+    /// Growth of the error about the vertical, absolute, rad/min.
     pub yaw_rad_per_min: f64,
     /// Distance to the true position at the end, with the start aligned, m.
     pub end_error_m: f64,
 }
 
-/// Drift of an estimate that is aligned over its first [`GAUGED_S`] seconds alone.
+/// Drift of an estimate that is aligned over the first [`GAUGED_S`] seconds only.
 ///
 /// The estimate is aligned with the truth over the first 20 s, all six degrees of freedom: by positions, and by
-/// attitudes as far as positions do not tell (twenty seconds of a straight way leave the turn about it to chance). What
-/// counts is then the mean distance over the last [`TAIL_S`] seconds, by the minutes from the middle of the first
-/// stretch (where an even drift was aligned to nothing) to the middle of the last; for the yaw, the mean error over the
-/// last stretch less that over the first. So a planted, even drift is returned as it was planted.
+/// attitudes where positions do not determine the rotation (twenty seconds of a straight path). The drift is the mean
+/// distance over the last [`TAIL_S`] seconds, divided by the minutes from the middle of the first
+/// interval (where a constant drift is aligned to zero) to the middle of the last; for the yaw, the mean error over the
+/// last interval minus that over the first. So a constant drift that a test adds is returned unchanged.
 ///
 /// # Errors
 /// When the two stretches overlap, or the first has too little motion to align.
 pub fn drift(pairs: &Pairs) -> Result<Drift, EvaluationError> {
     let (needed_s, found_s) = (GAUGED_S + TAIL_S, pairs.duration_s());
     if found_s < needed_s {
-        return Err(EvaluationError::TooShort { what: "drift", needed_s, found_s });
+        return Err(EvaluationError::TooShort { measure: "drift", needed_s, found_s });
     }
     let (start, tail) = (pairs.first_seconds(GAUGED_S), pairs.last_seconds(TAIL_S));
     let world_from_map = super::align_poses(start.truth(), start.estimate(), TURN_LEVER_M)?;
@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn an_even_drift_is_returned_as_planted() {
         // 6 cm/min upwards. The alignment tilts a little to follow the drift within its 20 s (2 cm over a room of 6 m,
-        // of which what correlates with the path), so to a few per cent.
+        // of which the part that correlates with the path), so to a few per cent.
         let found = drift_of(|minutes| Pose::translation(0.0, 0.0, 0.06 * minutes));
         assert_relative_eq!(found.position_m_per_min, 0.06, max_relative = 0.05);
         assert!(found.yaw_rad_per_min < 1e-4);
@@ -91,7 +91,7 @@ mod tests {
         let found = drift(&pairs).unwrap();
         assert_relative_eq!(found.yaw_rad_per_min, 0.01, max_relative = 1e-6);
         // The head's turn over the first 20 s, 1/600 rad from its mean at most, turns the alignment by a hundredth of
-        // itself.
+        // that.
         assert!(found.position_m_per_min < 1e-4, "{found:?}");
     }
 
@@ -99,6 +99,6 @@ mod tests {
     fn a_run_of_twenty_seconds_has_no_drift_to_speak_of() {
         let short = Trajectory::from_poses(walk(|_| Pose::identity()).iter().take(1000).map(|(s, p)| (s, *p))).unwrap();
         let error = drift(&Pairs::associate(&short, &short).unwrap()).unwrap_err();
-        assert_eq!(error, EvaluationError::TooShort { what: "drift", needed_s: 25.0, found_s: 19.98 });
+        assert_eq!(error, EvaluationError::TooShort { measure: "drift", needed_s: 25.0, found_s: 19.98 });
     }
 }

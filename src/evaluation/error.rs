@@ -1,10 +1,8 @@
 /// Why an estimate cannot be judged.
 #[derive(Debug, Clone, thiserror::Error, PartialEq)]
 pub enum EvaluationError {
-    /// No pose of the estimate lies within the truth's time.
-    #[error(
-        "the estimate ({estimate}) and the truth ({truth}) have no instant in common; both must be stamped by the same clock"
-    )]
+    /// No pose of the estimate is within the time of the truth.
+    #[error("the estimate ({estimate}) and the truth ({truth}) do not overlap in time; use one clock for both")]
     NothingInCommon {
         /// The estimate's span, for people.
         estimate: String,
@@ -12,7 +10,7 @@ pub enum EvaluationError {
         truth: String,
     },
     /// Too few pairs of poses to align.
-    #[error("{pairs} poses have a true one beside them; a rigid alignment needs at least 3")]
+    #[error("{pairs} poses have a matching true pose; a rigid alignment needs at least 3")]
     TooFew {
         /// How many there are.
         pairs: usize,
@@ -21,21 +19,21 @@ pub enum EvaluationError {
     #[error("the positions lie on a line or in a point, so that no rigid alignment by positions is determined")]
     OnALine,
     /// The trajectory is too short for the measure.
-    #[error("{what} needs {needed_s} s of trajectory, and there are {found_s:.3} s")]
+    #[error("{measure} needs {needed_s} s of trajectory, and there are {found_s:.3} s")]
     TooShort {
         /// The measure.
-        what: &'static str,
-        /// What it needs, s.
+        measure: &'static str,
+        /// Required length, s.
         needed_s: f64,
-        /// What there is, s.
+        /// Actual length, s.
         found_s: f64,
     },
     /// The IMU never rested long enough to find down and the gyroscope's bias.
     #[error("the IMU rests for {found_s:.3} s at the start; dead reckoning needs {needed_s} s of rest")]
     NoRest {
-        /// What it needs, s.
+        /// Required length, s.
         needed_s: f64,
-        /// What there is, s.
+        /// Actual length, s.
         found_s: f64,
     },
 }

@@ -1,10 +1,10 @@
-//! How far an estimate is from the truth.
+//! Errors of an estimate against the truth.
 //!
-//! A trajectory is judged by pairs of poses of one instant ([`Pairs`]), after a rigid alignment by their positions
-//! ([`align`], Umeyama without scale, as `evo_ape -a`): the absolute errors over time ([`Errors`]), the drift out of an
-//! alignment over the first seconds alone ([`drift()`]), the error of the motion within a minute ([`relative_error`]).
-//! A clock offset is judged by [`clock_error`], a cloud by its distances to the true surfaces ([`CloudErrors`]). Beside
-//! the estimate stands what the raw IMU alone would have said ([`DeadReckoning`]), and the least error that the
+//! A trajectory is compared by pairs of poses of equal time ([`Pairs`]), after a rigid alignment by their positions
+//! ([`align`], Umeyama without scale, as `evo_ape -a`): the absolute errors over time ([`Errors`]), the drift after an
+//! alignment over the first seconds only ([`drift()`]), the error of the motion within a minute ([`relative_error`]).
+//! [`clock_error`] compares clock offsets, [`CloudErrors`] the distances of a cloud to the true surfaces. For
+//! comparison there are the dead reckoning of the raw IMU ([`DeadReckoning`]) and the smallest error that the
 //! measurements allow ([`Information`]).
 //!
 //! Everything here is pure: numbers in, numbers out.

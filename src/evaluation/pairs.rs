@@ -3,7 +3,7 @@ use crate::geometry::{Pose, Trajectory, Vector};
 use crate::time::{Span, Stamp};
 use std::convert::Infallible;
 
-/// Estimated poses, each with the true one of the same instant.
+/// Estimated poses, each with the true pose of the same time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pairs {
     stamps: Vec<Stamp>,
@@ -25,11 +25,11 @@ impl Pairs {
         Ok(pairs)
     }
 
-    /// The same, of a truth that is told pose by pose in order of time, and never held as a whole. There may be no
-    /// pairs.
+    /// The same, for a truth that is read pose by pose in order of time and never stored in full. The result may be
+    /// empty.
     ///
     /// # Errors
-    /// When the truth cannot be told on.
+    /// When reading the truth fails.
     pub fn gather<E>(
         estimate: &Trajectory,
         truth: impl IntoIterator<Item = Result<(Stamp, Pose), E>>,
@@ -41,7 +41,7 @@ impl Pairs {
         let mut before: Option<(Stamp, Pose)> = None;
         for told in truth {
             let now = told?;
-            // What lies before the first true pose has no partner.
+            // Poses before the first true pose have no partner.
             while let Some((stamp, pose)) = waiting.next_if(|(stamp, _)| *stamp <= now.0) {
                 let around = before.into_iter().filter(|before| before.0 < now.0).chain([now]);
                 let between = Trajectory::from_poses(around).unwrap_or_default();
@@ -66,7 +66,7 @@ impl Pairs {
         self.stamps.is_empty()
     }
 
-    /// The instants, increasing.
+    /// The times, increasing.
     pub fn stamps(&self) -> &[Stamp] {
         &self.stamps
     }
@@ -122,7 +122,7 @@ impl Pairs {
         super::align(&positions(&self.truth), &positions(&self.estimate))
     }
 
-    /// The instant in the middle of the pairs, seconds after `origin`: the mean of their stamps.
+    /// The mean time of the pairs, seconds after `origin`.
     pub(super) fn mean_time_s(&self, origin: Stamp) -> f64 {
         self.stamps.iter().map(|stamp| stamp.seconds_since(origin)).sum::<f64>() / self.len() as f64
     }

@@ -54,8 +54,8 @@ impl Eased {
 impl DropSpec {
     /// How far the base is below its way at an instant, m, negative.
     ///
-    /// With the eased step `s` and the end of the fall `T = sqrt(2 h / g)`, `z'' = -g (s(t) - s(t - T)) + g T s'(t - T)`:
-    /// the pulse of the landing takes the speed `g T` of the fall, and `z` ends at `-g T^2 / 2 = -h`.
+    /// With the eased step `s` and the end of the fall `T = sqrt(2 h / g)`, `z'' = -g (s(t) - s(t - T)) + g T s'(t -
+    /// T)`: the pulse of the landing takes the speed `g T` of the fall, and `z` ends at `-g T^2 / 2 = -h`.
     pub(super) fn at(&self, t_s: f64) -> Jet {
         let g = STANDARD_GRAVITY_M_PER_S2;
         let fall_s = (2.0 * self.height_m / g).sqrt();
@@ -83,7 +83,8 @@ mod tests {
         assert!((end.x + 0.25).abs() < 1e-12 && end.d.abs() < 1e-12 && end.dd.abs() < 1e-9, "{end:?}");
         let later = drop.at(1000.0);
         assert!((later.x + 0.25).abs() < 1e-8 && later.d.abs() < 1e-9, "{later:?}");
-        // The pulse is half a sine of area g T, so its peak is pi / 2 g T / 35 ms; half of gravity is compensated by then.
+        // The pulse is half a sine of area g T, so its peak is pi / 2 g T / 35 ms; half of gravity is compensated by
+        // then.
         let peak = drop.at(2.0 + fall_s + 0.0175).dd;
         let expected = STANDARD_GRAVITY_M_PER_S2 * (fall_s * PI / 2.0 / 0.035 - 0.5);
         assert!((peak - expected).abs() < 1e-9, "{peak}, {expected}");

@@ -1,5 +1,5 @@
 //! Maps as PLY: surfels with their uncertainty, which CloudCompare and Open3D show as points with normals. The format
-//! is told in `docs/maps.md`.
+//! is told in `docs/guide/maps.md`.
 
 use super::ply::header::{self, Form, Header, Problem, Property, Scalar};
 use crate::geometry::{Matrix, Vector};

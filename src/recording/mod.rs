@@ -1,10 +1,10 @@
 //! The door: recordings, trajectories and clouds, written and read.
 //!
 //! [`Writer`] takes what a simulated run says, measurements and truth, and makes an MCAP file in the ROS 2 profile,
-//! which ROS, Foxglove and rerun read. [`Reader`] reads such a file, or one by another program: MCAP, ROS 1 bags and the
-//! databases of rosbag2, split or whole. Measurements
-//! ([`Reader::measurements`]) and truth ([`Reader::truth`]) come by different ways, so that an estimator can be given
-//! the one without the other; [`Reader::poses`] gives those of any one topic.
+//! which ROS, Foxglove and rerun read. [`Reader`] reads such a file, or one by another program: MCAP, ROS 1 bags and
+//! the databases of rosbag2, split or whole. Measurements ([`Reader::measurements`]) and truth ([`Reader::truth`]) come
+//! by different ways, so that an estimator can be given the one without the other; [`Reader::poses`] gives those of any
+//! one topic.
 //!
 //! | topic | type | frame | what |
 //! |---|---|---|---|

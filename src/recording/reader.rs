@@ -21,7 +21,8 @@ impl Reader {
     /// recording is split.
     ///
     /// # Errors
-    /// When it cannot be opened or read, or is of no format that is read. A file that is cut short or damaged is opened.
+    /// When it cannot be opened or read, or is of no format that is read. A file that is cut short or damaged is
+    /// opened.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let files = files_of(path)?;
         let parts = files.iter().zip(0..).map(|(file, place)| Part::open(place, file)).collect::<Result<_, _>>()?;

@@ -86,8 +86,8 @@ const SAMPLED: (usize, usize) = (24, 4);
 
 impl Reader {
     /// Finds the lidar and the IMU: of lidars one that `/tf_static`, where there is one, connects to the IMU. A scan
-    /// whose beams' times are stated is taken first, then a cloud whose points have times; of several the first by name.
-    /// Truth, the recording's own, is never a candidate.
+    /// whose beams' times are stated is taken first, then a cloud whose points have times; of several the first by
+    /// name. Truth, the recording's own, is never a candidate.
     ///
     /// # Errors
     /// When there is no lidar or no IMU that can be decoded, or not the one that is asked for, or the IMU lacks a part.

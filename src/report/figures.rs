@@ -12,7 +12,7 @@ const CLOSE_UP_S: f64 = 10.0;
 /// The way of the head from above: true and estimated, over an outline of the world (points of its walls).
 ///
 /// `truth` may be empty, where there is none; the estimate is then in its own map.
-pub fn trajectory_from_above(truth: &Trajectory, estimate: &Trajectory, outline_in_world: &[Vector]) -> Figure {
+pub fn trajectory_top_view(truth: &Trajectory, estimate: &Trajectory, outline_in_world: &[Vector]) -> Figure {
     let outline = outline_in_world.iter().map(|point| (point.x, point.y)).collect();
     let chart = Chart::new("The head from above", "x (m)", "y (m)")
         .as_map()
@@ -48,7 +48,7 @@ pub fn errors_over_time(errors: &Errors) -> Figure {
 }
 
 /// Size of the position's error over time, of the open loop and of the closed one, each after an alignment of its own.
-pub fn errors_of_both_loops(open: &Errors, closed: &Errors) -> Figure {
+pub fn open_and_closed_loop_errors(open: &Errors, closed: &Errors) -> Figure {
     let greatest = open.position_m.iter().chain(&closed.position_m).map(Vector::norm).fold(0.0, f64::max);
     let (unit, per_m) = length_unit(greatest);
     let curve = |errors: &Errors| -> Vec<(f64, f64)> {

@@ -11,7 +11,7 @@ mod rows;
 mod table;
 
 pub use figures::{
-    bound_over_time, clock_offset, errors_of_both_loops, errors_over_time, head_pitch, trajectory_from_above,
+    bound_over_time, clock_offset, errors_over_time, head_pitch, open_and_closed_loop_errors, trajectory_top_view,
 };
 pub use integrity::{CauseMetrics, EventMetrics, IntegrityMetrics};
 pub use metrics::{

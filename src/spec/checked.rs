@@ -1,7 +1,7 @@
 //! Numbers that are checked while a spec is read, so that the error has the line of the number.
 //!
-//! Use with `#[serde(with = "crate::spec::checked::Positive")]`. The JSON schema of a spec takes the range from the same
-//! attribute.
+//! Use with `#[serde(with = "crate::spec::checked::Positive")]`. The JSON schema of a spec takes the range from the
+//! same attribute.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserialize, Deserializer, Error};

@@ -1,9 +1,9 @@
-//! What a run leaves for people: plots and a page.
+//! The plots and the HTML page of a run.
 
-use super::beside::write_text;
-use super::estimate::Best;
+use super::atomic_file::write_text;
+use super::estimate::BestEstimate;
 use super::open_loop::OpenLoopRun;
-use super::register::Judged;
+use super::register::SampledBeam;
 use super::result_files::METRICS;
 use super::{Manifest, StudyError};
 use crate::evaluation::{Errors, InformationBound};
@@ -14,78 +14,79 @@ use crate::time::Stamp;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Side of the cells in which the outline has one dot, m.
+/// Cell size of the outline in the top view, m; each occupied cell is one dot.
 const CELL_M: f64 = 0.05;
-/// Most instants that a curve is drawn of: some dozen to a pixel.
-const DRAWN: usize = 50_000;
-/// The outline is cut from the cloud at the head's height, give or take this, m.
-const CUT_M: f64 = 0.4;
+/// Maximum number of points of a curve: about a dozen for each pixel of the plot's width.
+const MAX_PLOT_POINTS: usize = 50_000;
+/// Half the height of the slice of the cloud, about the head's mean height, that gives the outline, m.
+const SLICE_HALF_HEIGHT_M: f64 = 0.4;
 
-/// A plot with its file's name and its heading.
+/// A plot with a file name and a heading.
 pub(super) struct Plot {
     name: &'static str,
     section: Section,
 }
 
-/// The plots of an estimate; `open_errors` are those that the open loop had, where loops were closed.
+/// The plots of an estimate; `open_errors` are the errors of the open loop if a closed loop was computed.
 pub(super) fn plots(
     run: &OpenLoopRun,
-    best: &Best,
+    best: &BestEstimate,
     (open_errors, bound): (Option<&Errors>, Option<&InformationBound>),
-    sample: &[Judged],
+    sample: &[SampledBeam],
 ) -> Vec<Plot> {
-    let known = best.known;
-    let world_from_map = known.and_then(|known| known.world_from_map).unwrap_or_else(Pose::identity);
-    let estimate = drawn(best.map_from_head.iter().map(|(stamp, pose)| (stamp, world_from_map * pose)));
-    let nothing = Trajectory::new();
-    let truth = known.map_or(&nothing, |known| &known.truth);
+    let comparison = best.comparison;
+    let world_from_map = comparison.and_then(|found| found.world_from_map).unwrap_or_else(Pose::identity);
+    let estimate = decimated(best.map_from_head.iter().map(|(stamp, pose)| (stamp, world_from_map * pose)));
+    let no_truth = Trajectory::new();
+    let truth = comparison.map_or(&no_truth, |found| &found.truth);
     let outline = outline(sample, &world_from_map, &estimate);
     let plot = |name, title: &str, figure: Figure| Plot { name, section: Section { title: title.to_owned(), figure } };
 
-    let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_from_above(truth, &estimate, &outline))];
-    if let Some(errors) = known.and_then(|known| known.errors.as_ref()).map(|errors| &errors.drawn) {
+    let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_top_view(truth, &estimate, &outline))];
+    if let Some(errors) = comparison.and_then(|found| found.errors.as_ref()).map(|errors| &errors.decimated) {
         plots.push(plot("errors", "Errors over time", report::errors_over_time(errors)));
         if let Some(open) = open_errors {
-            plots.push(plot("loops", "What closing loops is good for", report::errors_of_both_loops(open, errors)));
+            let figure = report::open_and_closed_loop_errors(open, errors);
+            plots.push(plot("loops", "Position error: open loop and closed loop", figure));
         }
     }
     plots.extend(bound.map(|bound| plot("bound", "Information bound", report::bound_over_time(bound))));
     plots.push(plot("pitch", "Pitch of the head", report::head_pitch(truth, &estimate)));
-    let true_offsets = known.map_or(&[][..], |known| &known.clock_offsets);
-    plots.push(plot("clock", "Clock offset", report::clock_offset(true_offsets, &run.clock_offsets)));
+    let true_offsets = comparison.map_or(&[][..], |found| &found.clock_offsets);
+    plots.push(plot("clock", "IMU clock offset", report::clock_offset(true_offsets, &run.clock_offsets)));
     plots
 }
 
-/// What is drawn of the poses of a long run.
-pub(super) fn drawn(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -> Trajectory {
+/// Decimates poses to the maximum number of plot points.
+pub(super) fn decimated(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -> Trajectory {
     let stride = stride(stamped.len());
     Trajectory::from_poses(stamped.step_by(stride)).unwrap_or_default()
 }
 
-/// What is drawn of the errors of a long run.
-pub(super) fn drawn_errors(errors: &Errors) -> Errors {
+/// Decimates errors to the maximum number of plot points.
+pub(super) fn decimated_errors(errors: &Errors) -> Errors {
     errors.every(stride(errors.stamps.len()))
 }
 
-/// One instant in so many is drawn of `count`.
+/// The decimation factor for `count` points.
 fn stride(count: usize) -> usize {
-    count.div_ceil(DRAWN).max(1)
+    count.div_ceil(MAX_PLOT_POINTS).max(1)
 }
 
-/// What of the cloud lies at the head's height: the walls, from above, one point a cell.
-fn outline(sample: &[Judged], world_from_map: &Pose, estimate: &Trajectory) -> Vec<Vector> {
+/// Outline of the walls in the top view: cloud points near the head's mean height, one for each cell.
+fn outline(sample: &[SampledBeam], world_from_map: &Pose, estimate: &Trajectory) -> Vec<Vector> {
     let heights = estimate.poses().iter().map(|pose| pose.translation.z);
     let height = heights.sum::<f64>() / estimate.len().max(1) as f64;
     let at_height = sample
         .iter()
-        .map(|judged| world_from_map.rotation * judged.in_map.point + world_from_map.translation.vector)
-        .filter(|point| (point.z - height).abs() < CUT_M);
+        .map(|beam| world_from_map.rotation * beam.in_map.point + world_from_map.translation.vector)
+        .filter(|point| (point.z - height).abs() < SLICE_HALF_HEIGHT_M);
     let cells: BTreeSet<(i64, i64)> =
         at_height.map(|point| ((point.x / CELL_M).round() as i64, (point.y / CELL_M).round() as i64)).collect();
     cells.into_iter().map(|(x, y)| Vector::new(x as f64 * CELL_M, y as f64 * CELL_M, height)).collect()
 }
 
-/// Writes the plots, the page, and at last `metrics.json`: the folder is complete then.
+/// Writes the plots and the page, then `metrics.json`, which marks the folder as complete.
 pub(super) fn write(folder: &Path, metrics: &Metrics, plots: Vec<Plot>, manifest: &Manifest) -> Result<(), StudyError> {
     let pictures = folder.join("plots");
     std::fs::create_dir_all(&pictures).map_err(StudyError::file(&pictures))?;

@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all.
+//! Files that appear under the final name only when they are complete.
 
 use super::StudyError;
 use std::fs::File;
@@ -6,46 +6,46 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// How the names begin of files that are not whole yet: what a kill leaves of them is nobody's work.
-pub(super) const PARTIAL: &str = ".partial-";
+/// Name prefix of incomplete files; a killed process can leave them in the folder, and the next run removes them.
+pub(super) const PARTIAL_PREFIX: &str = ".partial-";
 
-/// A file that is written beside its place, and moved there when it is whole.
-pub(super) struct Beside {
+/// A temporary file that replaces the target file when it is complete.
+pub(super) struct AtomicFile {
     file: NamedTempFile,
-    place: PathBuf,
+    target: PathBuf,
 }
 
-impl Beside {
-    /// A file for `place`, until it is whole in `folder` of the same file system.
-    pub fn new(folder: &Path, place: &Path) -> Result<Self, StudyError> {
+impl AtomicFile {
+    /// Creates a temporary file for `target` in `folder`, which must be on the same file system.
+    pub fn new(folder: &Path, target: &Path) -> Result<Self, StudyError> {
         let mut builder = tempfile::Builder::new();
-        builder.prefix(PARTIAL);
+        builder.prefix(PARTIAL_PREFIX);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(std::fs::Permissions::from_mode(0o644));
         }
         let file = builder.tempfile_in(folder).map_err(StudyError::file(folder))?;
-        Ok(Self { file, place: place.to_owned() })
+        Ok(Self { file, target: target.to_owned() })
     }
 
     pub fn file(&mut self) -> &mut File {
         self.file.as_file_mut()
     }
 
-    /// Its place.
-    pub fn place(&self) -> &Path {
-        &self.place
+    /// Path of the complete file.
+    pub fn target(&self) -> &Path {
+        &self.target
     }
 
-    /// Moves the file to its place, where it replaces what is there.
+    /// Flushes the file to disk and renames it to the target; an existing target is replaced.
     pub fn finish(self) -> Result<(), StudyError> {
-        self.file.as_file().sync_all().map_err(StudyError::file(&self.place))?;
-        self.file.persist(&self.place).map(drop).map_err(|error| StudyError::file(&self.place)(error.error))
+        self.file.as_file().sync_all().map_err(StudyError::file(&self.target))?;
+        self.file.persist(&self.target).map(drop).map_err(|error| StudyError::file(&self.target)(error.error))
     }
 }
 
-impl Write for Beside {
+impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         self.file.write(bytes)
     }
@@ -55,9 +55,9 @@ impl Write for Beside {
     }
 }
 
-/// Writes a text whole or not at all.
-pub(super) fn write_text(folder: &Path, place: &Path, text: &str) -> Result<(), StudyError> {
-    let mut beside = Beside::new(folder, place)?;
-    beside.write_all(text.as_bytes()).map_err(StudyError::file(place))?;
-    beside.finish()
+/// Writes a text file atomically.
+pub(super) fn write_text(folder: &Path, target: &Path, text: &str) -> Result<(), StudyError> {
+    let mut partial = AtomicFile::new(folder, target)?;
+    partial.write_all(text.as_bytes()).map_err(StudyError::file(target))?;
+    partial.finish()
 }

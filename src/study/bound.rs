@@ -2,7 +2,7 @@
 
 use super::calibration::calibration;
 use super::true_clock::TrueClock;
-use super::truth_near::{TrueInstant, TruthNear};
+use super::truth_cursor::{TrueState, TruthCursor};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch};
 use crate::evaluation::{BoundModel, Information, InformationBound, Sight};
 use crate::geometry::{Pose, Rotation, Vector};
@@ -13,38 +13,39 @@ use crate::time::{Span, Stamp};
 use crate::world::{Hit, Ray, World};
 use rayon::prelude::*;
 
-/// What an estimator may believe of the clocks beforehand, one standard deviation: next to nothing, s and s/s.
-const CLOCK: (f64, f64) = (0.1, 1e-3);
-/// A beam whose range is farther from the truth than this did not end where the ray does: on the carrier, say, m.
+/// Prior standard deviations of the clock offset, s, and the clock rate, s/s: wide, so that they carry no information.
+const CLOCK_PRIOR: (f64, f64) = (0.1, 1e-3);
+/// Maximum difference between measured and true range for a beam and a ray to hit the same surface, m. A larger one
+/// means that the beam hit an object that the ray does not meet, such as the carrier.
 const SAME_SURFACE_M: f64 = 0.15;
-/// What is nearer to a mover than this is of it, m.
-const OF_A_MOVER_M: f64 = 0.05;
-/// Most panes of glass that a beam passes.
-const MOST_GLASS: usize = 8;
-/// Time between the true poses of a scan: that between those recorded.
+/// A point within this distance of a moving object belongs to that object, m.
+const MOVER_DISTANCE_M: f64 = 0.05;
+/// Maximum number of glass panes on the path of a beam.
+const MAX_PANES: usize = 8;
+/// Time between the true poses of a scan: the period of the recorded truth.
 const STEP: Span = Span::from_nanos(1_000_000);
 
-/// The bound, and what it rests on.
+/// The information bound of a recording, with the number of beams that it uses.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bounded {
+pub struct RecordingBound {
     /// The bound.
     pub bound: InformationBound,
-    /// Beams that told of a surface that stands.
+    /// Beams on static surfaces, which the bound uses.
     pub beams: u64,
-    /// Echoes that were left out: of what carries the lidar, of what moves, or where the truth does not reach.
-    pub left_out: u64,
+    /// Rejected returns: on the carrier of the lidar, on moving objects, or at times without truth.
+    pub rejected: u64,
 }
 
-/// The information bound of the recording that `reader` reads, in `world`.
+/// Computes the information bound of the recording of `reader` in `world`.
 ///
 /// # Errors
-/// When the recording cannot be read, has no sensors or no truth, or somebody stops it.
-pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> Result<Bounded, StudyError> {
+/// When the recording cannot be read, has no sensors or no truth, or the computation is stopped.
+pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> Result<RecordingBound, StudyError> {
     let selection = reader.select(&Preference::default())?;
     let found = calibration(reader, &selection, &CalibrationSpec::default(), None)?;
     let clock = TrueClock::read(reader, &selection)?;
     let mut span: Option<(Stamp, Stamp)> = None;
-    let heads = reader.truth().filter_map(|told| match told {
+    let heads = reader.truth().filter_map(|record| match record {
         Ok(Truth::Head(stamp, pose)) => {
             span = Some((span.map_or(stamp, |(first, _)| first), stamp));
             Some(Ok((stamp, pose)))
@@ -54,30 +55,30 @@ pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> R
     });
     let information = Information::new(model(reader, &found.calibration), heads)?;
     let Some((first, last)) = span else {
-        let message = "the recording has no truth, without which no bound can be told".to_owned();
-        return Err(StudyError::Plan { what: "bound", message });
+        let message = "the recording has no true trajectory, which the bound requires".to_owned();
+        return Err(StudyError::Plan { what: "information bound", message });
     };
-    let near = TruthNear::new(reader.truth());
+    let truth = TruthCursor::new(reader.truth());
     let calibration = &found.calibration;
-    let mut gathering = Gathering { world, calibration, near, information, beams: 0, left_out: 0 };
+    let mut accumulator = BoundAccumulator { world, calibration, truth, information, beams: 0, rejected: 0 };
     for measurement in reader.measurements(&selection) {
         match measurement? {
-            Measurement::Imu(sample) => gathering.information.hear(clock.on_lidar_clock(sample.stamp), &sample),
+            Measurement::Imu(sample) => accumulator.information.hear(clock.on_lidar_clock(sample.stamp), &sample),
             Measurement::Lidar(scan) => {
                 if watch.is_stopped() {
                     return Err(StudyError::Stopped);
                 }
-                let (done_s, whole_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
-                watch.progress(Stage::Bounding, done_s, Some(whole_s));
-                gathering.take(&scan)?;
+                let (done_s, total_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
+                watch.progress(Stage::Bounding, done_s, Some(total_s));
+                accumulator.take(&scan)?;
             }
         }
     }
-    let Gathering { information, beams, left_out, .. } = gathering;
-    Ok(Bounded { bound: information.bound()?, beams, left_out })
+    let BoundAccumulator { information, beams, rejected, .. } = accumulator;
+    Ok(RecordingBound { bound: information.bound()?, beams, rejected })
 }
 
-/// What is known of the sensors: of our own recordings what they were made with, of others their noise alone.
+/// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
 fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
     let specs = Manifest::within(reader).and_then(|manifest| manifest.specs);
     let matrix = |of: fn(&ImuSpec) -> (f64, f64)| {
@@ -90,47 +91,48 @@ fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
         gyro_matrix: matrix(|imu| (imu.gyro.scale_percent, imu.gyro.misalignment_deg)),
         accel_matrix: matrix(|imu| (imu.accel.scale_percent, imu.accel.misalignment_deg)),
         range_offset_m: specs.as_ref().map_or(0.0, |specs| specs.lidar.errors.range.bias_sigma_m),
-        clock_offset_s: CLOCK.0,
-        clock_rate: CLOCK.1,
+        clock_offset_s: CLOCK_PRIOR.0,
+        clock_rate: CLOCK_PRIOR.1,
     }
 }
 
-/// Gathers what beams tell, scan by scan.
-struct Gathering<'a> {
+/// Accumulates the information of the beams, scan by scan.
+struct BoundAccumulator<'a> {
     world: &'a World,
     calibration: &'a Calibration,
-    near: TruthNear<'a>,
+    truth: TruthCursor<'a>,
     information: Information,
     beams: u64,
-    left_out: u64,
+    rejected: u64,
 }
 
-impl Gathering<'_> {
+impl BoundAccumulator<'_> {
     fn take(&mut self, scan: &LidarScan) -> Result<(), StudyError> {
-        let mut moved = Moved { first: scan.stamp - STEP, instants: Vec::new() };
+        let mut scan_motion = ScanMotion { first: scan.stamp - STEP, states: Vec::new() };
         let sweep = scan.returns.iter().map(|hit| hit.offset).max().unwrap_or(Span::ZERO);
         let steps = (sweep.nanos() / STEP.nanos()).max(0) + 3;
         for step in 0..=steps {
-            let stamp = moved.first + Span::from_nanos(step * STEP.nanos());
-            moved.instants.push(self.near.at(stamp)?);
+            let stamp = scan_motion.first + Span::from_nanos(step * STEP.nanos());
+            scan_motion.states.push(self.truth.at(stamp)?);
         }
-        let sights: Vec<Option<Sight>> = scan.returns.par_iter().map(|hit| self.sight(scan, hit, &moved)).collect();
+        let sights: Vec<Option<Sight>> =
+            scan.returns.par_iter().map(|hit| self.sight(scan, hit, &scan_motion)).collect();
         for sight in sights {
             match sight {
                 Some(sight) => {
                     self.information.see(&sight);
                     self.beams += 1;
                 }
-                None => self.left_out += 1,
+                None => self.rejected += 1,
             }
         }
         Ok(())
     }
 
-    /// What a beam truly met, if that stands.
-    fn sight(&self, scan: &LidarScan, hit: &LidarReturn, moved: &Moved) -> Option<Sight> {
+    /// The observation of a beam, if it hit a static surface.
+    fn sight(&self, scan: &LidarScan, hit: &LidarReturn, scan_motion: &ScanMotion) -> Option<Sight> {
         let stamp = scan.stamp + hit.offset;
-        let motion = moved.at(stamp)?;
+        let motion = scan_motion.at(stamp)?;
         let world_from_laser = motion.world_from_head * self.calibration.head_from_laser;
         let point_in_laser: Vector = hit.point_in_laser.cast();
         let range_m = point_in_laser.norm();
@@ -138,9 +140,9 @@ impl Gathering<'_> {
             origin_in_world: world_from_laser.translation.vector,
             direction_in_world: world_from_laser.rotation * (point_in_laser / range_m),
         };
-        let met = self.met(&ray, range_m, motion.t_s)?;
-        let hit_in_world = ray.at(met.distance_m);
-        let moves = self.world.distance_to_movers_m(&hit_in_world, OF_A_MOVER_M, motion.t_s).is_some();
+        let surface = self.surface_at_range(&ray, range_m, motion.t_s)?;
+        let hit_in_world = ray.at(surface.distance_m);
+        let moves = self.world.distance_to_movers_m(&hit_in_world, MOVER_DISTANCE_M, motion.t_s).is_some();
         (!moves).then(|| Sight {
             stamp,
             world_from_head: motion.world_from_head,
@@ -148,16 +150,16 @@ impl Gathering<'_> {
             angular_velocity_in_world: motion.angular_velocity_in_world,
             hit_in_world,
             direction_in_world: ray.direction_in_world,
-            normal_in_world: met.normal_in_world,
-            range_sigma_m: self.calibration.lidar.sigma_m(met.distance_m),
+            normal_in_world: surface.normal_in_world,
+            range_sigma_m: self.calibration.lidar.sigma_m(surface.distance_m),
         })
     }
 
-    /// The surface about as far away as the beam says, behind glass if need be.
-    fn met(&self, ray: &Ray, range_m: f64, t_s: f64) -> Option<Hit> {
+    /// The surface at the measured range along a ray, through glass panes if necessary.
+    fn surface_at_range(&self, ray: &Ray, range_m: f64, t_s: f64) -> Option<Hit> {
         let reach_m = range_m + SAME_SURFACE_M;
         let mut hit = self.world.cast(ray, reach_m, t_s)?;
-        for _ in 0..MOST_GLASS {
+        for _ in 0..MAX_PANES {
             if (hit.distance_m - range_m).abs() <= SAME_SURFACE_M {
                 return Some(hit);
             }
@@ -170,32 +172,32 @@ impl Gathering<'_> {
     }
 }
 
-/// How the head moved during a scan.
-struct Moved {
+/// True poses of the head during a scan.
+struct ScanMotion {
     first: Stamp,
-    /// One a [`STEP`].
-    instants: Vec<Option<TrueInstant>>,
+    /// One state for each [`STEP`].
+    states: Vec<Option<TrueState>>,
 }
 
-/// How the head moved at an instant.
-struct Motion {
+/// True pose and velocity of the head at one time.
+struct HeadMotion {
     world_from_head: Pose,
     velocity_in_world: Vector,
     angular_velocity_in_world: Vector,
     t_s: f64,
 }
 
-impl Moved {
-    fn at(&self, stamp: Stamp) -> Option<Motion> {
+impl ScanMotion {
+    fn at(&self, stamp: Stamp) -> Option<HeadMotion> {
         let since = (stamp - self.first).nanos();
         let index = usize::try_from(since / STEP.nanos()).ok()?;
-        let (before, after) = ((*self.instants.get(index)?)?, (*self.instants.get(index + 1)?)?);
+        let (before, after) = ((*self.states.get(index)?)?, (*self.states.get(index + 1)?)?);
         let u = (since % STEP.nanos()) as f64 / STEP.nanos() as f64;
         let (a, b) = (before.world_from_head, after.world_from_head);
         let shift = b.translation.vector - a.translation.vector;
         let turn = (b.rotation * a.rotation.inverse()).scaled_axis();
         let rotation = Rotation::from_scaled_axis(turn * u) * a.rotation;
-        Some(Motion {
+        Some(HeadMotion {
             world_from_head: Pose::from_parts((a.translation.vector + shift * u).into(), rotation),
             velocity_in_world: shift / STEP.seconds(),
             angular_velocity_in_world: turn / STEP.seconds(),

@@ -1,4 +1,4 @@
-//! How the sensors sit in a recording's head, and how well they measure.
+//! Extrinsics and noise of the sensors of a recording.
 
 use super::{Manifest, StudyError};
 use crate::dynamics::PlacementSpec;
@@ -9,14 +9,16 @@ use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use crate::spec::{Kind, Source, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
 
-/// A calibration as a user writes it; what is left out is taken from the recording, or else is that of the UTM-30LX
-/// and of an ordinary IMU (`specs/imus/unknown.ron`).
+/// Sensor calibration given by the user.
+///
+/// A missing entry is read from the recording; if the recording has none, it is that of the UTM-30LX or of a typical
+/// IMU (`specs/imus/unknown.ron`).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CalibrationSpec {
-    /// Where the lidar is in the head.
+    /// Pose of the lidar in the head.
     pub head_from_laser: Option<PlacementSpec>,
-    /// Where the IMU is in the head.
+    /// Pose of the IMU in the head.
     pub head_from_imu: Option<PlacementSpec>,
     /// The IMU's noise.
     pub imu: Option<ImuNoise>,
@@ -24,15 +26,15 @@ pub struct CalibrationSpec {
     pub lidar: Option<LidarNoise>,
 }
 
-/// The calibration for an estimate: the user's word first, then the recording's, then what is usual.
+/// The calibration for an estimate: from the user, else from the recording, else the defaults.
 pub(super) fn calibration(
     reader: &Reader,
     selection: &Selection,
     given: &CalibrationSpec,
     body_frame: Option<&str>,
 ) -> Result<FoundCalibration, StudyError> {
-    let placed = |placement: Option<PlacementSpec>| placement.map(|placement| placement.pose());
-    let (head_from_laser, head_from_imu) = (placed(given.head_from_laser), placed(given.head_from_imu));
+    let pose_of = |placement: Option<PlacementSpec>| placement.map(|placement| placement.pose());
+    let (head_from_laser, head_from_imu) = (pose_of(given.head_from_laser), pose_of(given.head_from_imu));
     let (imu, lidar) = noise(reader)?;
     let defaults = Calibration {
         head_from_laser: head_from_laser.unwrap_or_else(Pose::identity),
@@ -51,15 +53,14 @@ pub(super) fn calibration(
     Ok(found)
 }
 
-/// The noise of the base's IMU that a recording of ours was made with; of others, that of an ordinary one.
+/// Noise of the base IMU: from the manifest of a simulated recording, else that of a typical IMU.
 pub(super) fn base_imu_noise(reader: &Reader) -> Result<ImuNoise, SpecError> {
     let specs = Manifest::within(reader).and_then(|manifest| manifest.specs);
-    let Some(spec) = specs.and_then(|specs| specs.base_imu) else { return ordinary_imu() };
+    let Some(spec) = specs.and_then(|specs| specs.base_imu) else { return typical_imu_noise() };
     Ok(Imu::new(&spec, &Source::in_memory("the recording's manifest", ""))?.noise())
 }
 
-/// The noise of the sensors that a recording of ours was made with; of others, that of an ordinary IMU and of the
-/// paper's lidar.
+/// Sensor noise: from the manifest of a simulated recording, else that of a typical IMU and of the paper's lidar.
 fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
     if let Some(specs) = Manifest::within(reader).and_then(|manifest| manifest.specs) {
         let source = Source::in_memory("the recording's manifest", "");
@@ -67,11 +68,11 @@ fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
     }
     let lidar = find(Kind::Lidar, "utm30lx")?;
     let lidar_spec: LidarSpec = parse(&lidar)?;
-    Ok((ordinary_imu()?, Lidar::new(&lidar_spec, &lidar)?.noise()))
+    Ok((typical_imu_noise()?, Lidar::new(&lidar_spec, &lidar)?.noise()))
 }
 
-/// The noise of an IMU of which nothing is known.
-pub(super) fn ordinary_imu() -> Result<ImuNoise, SpecError> {
+/// Noise of an IMU without a known specification.
+pub(super) fn typical_imu_noise() -> Result<ImuNoise, SpecError> {
     let imu = find(Kind::Imu, "unknown")?;
     let spec: ImuSpec = parse(&imu)?;
     Ok(Imu::new(&spec, &imu)?.noise())

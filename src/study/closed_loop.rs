@@ -1,4 +1,4 @@
-//! The closed loop over what the open loop saw.
+//! The closed loop: global registration of the open-loop estimate.
 
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{EstimatorSpec, LoopReport, Travelled, register};
@@ -6,25 +6,25 @@ use crate::geometry::Trajectory;
 use crate::measurement::{Calibration, LidarCorrection};
 use std::time::Instant;
 
-/// What the global registration made of an open loop.
+/// Result of the global registration.
 pub(super) struct ClosedLoopRun {
     /// The estimate, at the open loop's stamps.
     pub map_from_head: Trajectory,
-    /// What was learnt of the lidar beyond its calibration.
+    /// Estimated correction of the lidar calibration.
     pub lidar: LidarCorrection,
-    /// The open loop's trajectory told anew by how the lidar was found to sit, where that was estimated.
-    pub open_loop_told_anew: Option<Trajectory>,
-    /// Places recognised.
+    /// The open-loop trajectory with the estimated lidar extrinsics, if these were estimated.
+    pub open_loop_recalibrated: Option<Trajectory>,
+    /// Recognised places.
     pub loops: LoopReport,
-    /// Why the open loop stayed, where it did.
-    pub left: Option<&'static str>,
-    /// What it has to say, a sentence each.
-    pub remarks: Vec<String>,
-    /// Time it took, that of the survey included, s.
+    /// The reason why the loop closure was not applied; `None` if it was.
+    pub rejected_because: Option<&'static str>,
+    /// Messages to the user.
+    pub notes: Vec<String>,
+    /// Wall-clock time, including that of the survey, s.
     pub wall_s: f64,
 }
 
-/// Registers the whole of what `run` saw.
+/// Runs the global registration over the survey of `run`.
 pub(super) fn run_closed_loop(
     run: &OpenLoopRun,
     calibration: &Calibration,
@@ -33,17 +33,19 @@ pub(super) fn run_closed_loop(
     let started = Instant::now();
     let OpenLoopRun { map_from_head, covariances, lidar, survey, .. } = run;
     let closed = register(Travelled { map_from_head, covariances, lidar, survey }, calibration, estimator);
-    let (loops, left) = (closed.report.loops, closed.report.left);
-    let stayed = left.map(|why| format!("the global registration left the open loop as it was: {why}"));
-    let bent = (loops.closed > 0)
-        .then(|| format!("the open loop had drifted out of reach; it was bent to {} recognised places", loops.closed));
+    let (loops, rejected_because) = (closed.report.loops, closed.report.left);
+    let rejected =
+        rejected_because.map(|why| format!("loop closure not applied ({why}); the result is the open-loop trajectory"));
+    let closed_loops = (loops.closed > 0).then(|| {
+        format!("the open loop drifted beyond the matching distance; {} loop closures corrected it", loops.closed)
+    });
     ClosedLoopRun {
         map_from_head: closed.trajectory,
         lidar: closed.lidar,
-        open_loop_told_anew: closed.open_loop_told_anew,
+        open_loop_recalibrated: closed.open_loop_told_anew,
         loops,
-        left,
-        remarks: bent.into_iter().chain(stayed).collect(),
+        rejected_because,
+        notes: closed_loops.into_iter().chain(rejected).collect(),
         wall_s: started.elapsed().as_secs_f64() + run.survey.took_s(),
     }
 }

@@ -1,7 +1,7 @@
-//! The registered cloud against what the beams truly met.
+//! Metrics of the registered cloud against the true surfaces.
 
-use super::register::{Beam, Fates, Judged, Registered};
-use super::truth_near::TrueInstant;
+use super::register::{FateCounts, ProjectedBeam, Registered, SampledBeam};
+use super::truth_cursor::TrueState;
 use crate::estimation::Fate;
 use crate::evaluation::{CloudErrors, CloudSummary};
 use crate::geometry::{Pose, Surface, Vector};
@@ -10,58 +10,60 @@ use crate::sensors::Cylinder;
 use crate::world::World;
 use rayon::prelude::*;
 
-/// How far from a point a surface is looked for, m.
-const REACH_M: f64 = 1.0;
+/// Maximum distance from a point to the nearest surface, m.
+const MAX_DISTANCE_M: f64 = 1.0;
 
-/// What the figures of distance are of.
-const JUDGED: &str = "every echo of what stands, filtered or not";
+/// The returns that the distance metrics include.
+const JUDGED_RETURNS: &str = "all returns from static surfaces, before filtering";
 
-/// What stands around a lidar, what moves there, and what carries it.
+/// The surroundings of a lidar: scene and carrier.
 #[derive(Clone, Copy)]
 pub(super) struct Surroundings<'a> {
-    /// What stands, and what moves.
+    /// The scene with static surfaces and moving objects.
     pub world: &'a World,
-    /// What of its carrier the lidar may see, fixed to the base.
+    /// Parts of the carrier that the lidar can see, fixed to the base.
     pub carrier: &'a [Cylinder],
 }
 
-/// What a beam ended on.
+/// The kind of object that a beam hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Target {
-    /// What stands: a map of it can be right or wrong.
-    Still,
-    /// What carries the lidar.
+    /// A static surface: the map of it has a true position.
+    Static,
+    /// The carrier of the lidar.
     Carrier,
-    /// What moves through the scene.
+    /// A moving object of the scene.
     Mover,
 }
 
 impl Surroundings<'_> {
-    /// Whether a beam ended on what stands, whose end, projected by the true pose, is at `end_in_world`.
-    pub(super) fn ends_on_what_stands(&self, end_in_world: &Vector, instant: &TrueInstant) -> bool {
-        self.target(end_in_world, instant) == Target::Still
+    /// Whether a beam hit a static surface; `end_in_world` is the end of the beam, projected by the true pose.
+    pub(super) fn hits_static_surface(&self, end_in_world: &Vector, instant: &TrueState) -> bool {
+        self.target(end_in_world, instant) == Target::Static
     }
 
-    /// What a beam ended on whose end, projected by the true pose, is at `end_in_world`: whatever is nearest to that.
+    /// The object nearest to `end_in_world`, the end of a beam projected by the true pose.
     ///
-    /// Noise takes the end off what the beam met by centimetres, so one is taken for another only where both are within
-    /// centimetres of it, and the map is none the worse for it.
-    fn target(&self, end_in_world: &Vector, instant: &TrueInstant) -> Target {
+    /// Range noise moves the end by centimetres. A beam is therefore assigned to another object only if both objects
+    /// are within centimetres of the end, which has no effect on the metrics of the map.
+    fn target(&self, end_in_world: &Vector, instant: &TrueState) -> Target {
         let on_carrier_m = instant.world_from_base.and_then(|world_from_base| {
             let in_base = world_from_base.inverse_transform_point(&(*end_in_world).into()).coords;
             self.carrier.iter().map(|part| part.distance_m(&in_base)).min_by(f64::total_cmp)
         });
-        let on_movers_m = self.world.distance_to_movers_m(end_in_world, REACH_M, instant.t_s);
+        let on_movers_m = self.world.distance_to_movers_m(end_in_world, MAX_DISTANCE_M, instant.t_s);
         let carrier = (on_carrier_m.unwrap_or(f64::INFINITY), Target::Carrier);
         let mover = (on_movers_m.unwrap_or(f64::INFINITY), Target::Mover);
         let (distance_m, moving) = if carrier.0 <= mover.0 { carrier } else { mover };
-        let is_still = distance_m > REACH_M || self.world.nearest(end_in_world, distance_m).is_some();
-        if is_still { Target::Still } else { moving }
+        let is_static = distance_m > MAX_DISTANCE_M || self.world.nearest(end_in_world, distance_m).is_some();
+        if is_static { Target::Static } else { moving }
     }
 }
 
-/// The cloud's figures: of its sample the beams that ended on what stands, whatever the filter made of them, against
-/// the true surfaces, where both they and the alignment are known; and how many beams ended on something else.
+/// Computes the metrics of the cloud.
+///
+/// The distances to the true surfaces include all sampled beams on static surfaces, before filtering. They need the
+/// scene and the alignment. The other beams of the sample, on the carrier and on moving objects, are counted.
 pub(super) fn cloud_metrics(
     registered: &Registered,
     world_from_map: Option<&Pose>,
@@ -75,25 +77,26 @@ pub(super) fn cloud_metrics(
     let (Some(world_from_map), Some(surroundings)) = (world_from_map, surroundings) else {
         return counted;
     };
-    let target = |beam: &Judged| beam.by_truth.map_or(Target::Still, |(by, at)| surroundings.target(&by.point, &at));
+    let target =
+        |beam: &SampledBeam| beam.by_truth.map_or(Target::Static, |(by, at)| surroundings.target(&by.point, &at));
     let targets: Vec<Target> = registered.sample.par_iter().map(target).collect();
     let share = |of: Target| {
         let count = targets.iter().filter(|target| **target == of).count();
         (!targets.is_empty()).then(|| count as f64 / targets.len() as f64)
     };
-    let still = || registered.sample.iter().zip(&targets).filter(|(_, target)| **target == Target::Still);
-    let errors = |seen: Vec<_>| CloudErrors::to_surface(surroundings.world, &seen, REACH_M).summary();
-    let estimated = errors(still().map(|(beam, _)| seen(&beam.in_map, world_from_map)).collect());
-    let by_truth = still().filter_map(|(beam, _)| beam.by_truth.map(|(by, _)| seen(&by, &Pose::identity())));
+    let static_beams = || registered.sample.iter().zip(&targets).filter(|(_, target)| **target == Target::Static);
+    let errors = |in_world: Vec<_>| CloudErrors::to_surface(surroundings.world, &in_world, MAX_DISTANCE_M).summary();
+    let estimated = errors(static_beams().map(|(beam, _)| in_world(&beam.in_map, world_from_map)).collect());
+    let by_truth = static_beams().filter_map(|(beam, _)| beam.by_truth.map(|(by, _)| in_world(&by, &Pose::identity())));
     let by_truth = errors(by_truth.collect());
     let filter = match registered.filtered {
-        true => {
-            judged_filter(registered, &targets, |kept| errors(kept.map(|k| seen(&k.in_map, world_from_map)).collect()))
-        }
+        true => judged_filter(registered, &targets, |kept| {
+            errors(kept.map(|k| in_world(&k.in_map, world_from_map)).collect())
+        }),
         false => FilterMetrics::default(),
     };
     CloudMetrics {
-        judged: estimated.map(|_| JUDGED.to_owned()),
+        judged: estimated.map(|_| JUDGED_RETURNS.to_owned()),
         bias_m: estimated.map(|cloud| cloud.bias_m),
         sigma_m: estimated.map(|cloud| cloud.sigma_m),
         p95_m: estimated.map(|cloud| cloud.p95_m),
@@ -106,31 +109,31 @@ pub(super) fn cloud_metrics(
     }
 }
 
-/// What the filter did to echoes of what stands, and of what moves.
+/// Metrics of the filter for returns from static surfaces and from moving objects.
 fn judged_filter<'a>(
     registered: &'a Registered,
     targets: &'a [Target],
-    errors: impl Fn(&mut dyn Iterator<Item = &'a Judged>) -> Option<CloudSummary>,
+    errors: impl Fn(&mut dyn Iterator<Item = &'a SampledBeam>) -> Option<CloudSummary>,
 ) -> FilterMetrics {
     let of = |target: Target| {
         let all = registered.sample.iter().zip(targets);
         all.filter(move |(_, on)| **on == target).map(|(beam, _)| beam)
     };
-    let kept = |beam: &&Judged| beam.fate == Fate::Kept;
+    let kept = |beam: &&SampledBeam| beam.fate == Fate::Kept;
     let dropped = |target: Target| {
-        let (all, left) = (of(target).count(), of(target).filter(kept).count());
-        (all > 0).then(|| (all - left) as f64 / all as f64)
+        let (all, remaining) = (of(target).count(), of(target).filter(kept).count());
+        (all > 0).then(|| (all - remaining) as f64 / all as f64)
     };
     FilterMetrics {
-        kept_sigma_m: errors(&mut of(Target::Still).filter(kept)).map(|cloud| cloud.sigma_m),
-        standing_dropped_fraction: dropped(Target::Still),
+        kept_sigma_m: errors(&mut of(Target::Static).filter(kept)).map(|cloud| cloud.sigma_m),
+        standing_dropped_fraction: dropped(Target::Static),
         movers_dropped_fraction: dropped(Target::Mover),
         ..filter_metrics(&registered.fates)
     }
 }
 
-/// How many echoes the filter kept, and how many it dropped and why.
-fn filter_metrics(fates: &Fates) -> FilterMetrics {
+/// Counts of the filter: returns in the cloud, and removed returns by reason.
+fn filter_metrics(fates: &FateCounts) -> FilterMetrics {
     FilterMetrics {
         kept: Some(fates.kept),
         dropped_mixed: Some(fates.mixed),
@@ -140,8 +143,8 @@ fn filter_metrics(fates: &Fates) -> FilterMetrics {
     }
 }
 
-/// A beam's end in the world, and where it was seen from.
-fn seen(beam: &Beam, world_from: &Pose) -> (Vector, Option<Vector>) {
+/// End and origin of a beam in the world.
+fn in_world(beam: &ProjectedBeam, world_from: &Pose) -> (Vector, Option<Vector>) {
     let moved = |at: &Vector| world_from.rotation * at + world_from.translation.vector;
     (moved(&beam.point), Some(moved(&beam.origin)))
 }
@@ -153,7 +156,7 @@ mod tests {
     use crate::spec::{Source, parse};
     use approx::assert_relative_eq;
 
-    /// A floor of 20 m, and a box of 0.4 m and 2 m high that goes over it along y = 3, at x = t.
+    /// A floor of 20 m, and a box of 0.4 m by 0.4 m by 2 m that moves along y = 3 with x = t.
     fn world() -> World {
         let text = r#"(
             name: "floor and box",
@@ -171,46 +174,46 @@ mod tests {
         Cylinder { foot_in_base: Vector::new(-0.5, 0.0, -1.2), radius_m: 0.2, height_m: 1.7, reflectance: 0.3 };
 
     /// The base 1.2 m above the floor, walking along x at 1 m/s.
-    fn at(t_s: f64) -> TrueInstant {
+    fn at(t_s: f64) -> TrueState {
         let pose = Pose::translation(t_s, 0.0, 1.2);
-        TrueInstant { world_from_head: pose, world_from_base: Some(pose), t_s }
+        TrueState { world_from_head: pose, world_from_base: Some(pose), t_s }
     }
 
     #[test]
-    fn a_beam_ended_on_what_is_nearest_to_its_end_at_its_time() {
+    fn the_target_is_the_object_nearest_to_the_end_of_the_beam_at_that_time() {
         let world = world();
         let surroundings = Surroundings { world: &world, carrier: &[OPERATOR] };
         let target = |x: f64, y: f64, z: f64, t_s: f64| surroundings.target(&Vector::new(x, y, z), &at(t_s));
-        // The side of the operator at 4 s is at x = 3.7, that of the box at y = 2.8.
+        // At 4 s the side of the operator is at x = 3.7 and the side of the box at y = 2.8.
         assert_eq!(target(3.72, 0.0, 1.0, 4.0), Target::Carrier);
-        assert_eq!(target(3.72, 0.0, 1.0, 8.0), Target::Still, "the operator has gone on");
+        assert_eq!(target(3.72, 0.0, 1.0, 8.0), Target::Static, "the operator has moved on");
         assert_eq!(target(4.0, 2.79, 1.0, 4.0), Target::Mover);
-        assert_eq!(target(4.0, 2.79, 1.0, 2.0), Target::Still, "the box is not there yet");
-        // On the floor under either: the nearest counts.
-        assert_eq!(target(3.72, 0.0, 0.01, 4.0), Target::Still);
+        assert_eq!(target(4.0, 2.79, 1.0, 2.0), Target::Static, "the box has not arrived");
+        // On the floor below operator or box: the nearest object counts.
+        assert_eq!(target(3.72, 0.0, 0.01, 4.0), Target::Static);
         assert_eq!(target(3.71, 0.0, 0.02, 4.0), Target::Carrier);
-        assert_eq!(target(4.0, 2.79, 0.005, 4.0), Target::Still);
-        let untold = TrueInstant { world_from_base: None, ..at(4.0) };
-        assert_eq!(surroundings.target(&Vector::new(3.72, 0.0, 1.0), &untold), Target::Still);
+        assert_eq!(target(4.0, 2.79, 0.005, 4.0), Target::Static);
+        let without_base = TrueState { world_from_base: None, ..at(4.0) };
+        assert_eq!(surroundings.target(&Vector::new(3.72, 0.0, 1.0), &without_base), Target::Static);
     }
 
     #[test]
-    fn what_did_not_stand_is_counted_and_not_judged() {
+    fn beams_on_carrier_and_moving_objects_are_counted_but_not_in_the_distances() {
         let world = world();
         let surroundings = Surroundings { world: &world, carrier: &[OPERATOR] };
-        // At 4 s: 16 beams to 3 cm above the floor, then under it, by turns; 3 to the operator, 1 to the box. The map
-        // is 1 cm too high.
+        // At 4 s: 16 beams that end alternately 3 cm above and below the floor; 3 on the operator, 1 on the box. The
+        // map is 1 cm too high.
         let mut ends: Vec<_> = (0..16).map(|k| Vector::new(6.0, k as f64 * 0.1, [0.03, -0.03][k % 2])).collect();
         ends.extend([0.5, 0.7, 0.9].map(|z| Vector::new(3.7, 0.0, z)));
         ends.push(Vector::new(4.0, 2.8, 1.0));
-        let beam = |point: Vector| Beam { point, origin: Vector::new(4.0, 0.0, 1.4) };
-        let judged = |end: &Vector| Judged {
+        let beam = |point: Vector| ProjectedBeam { point, origin: Vector::new(4.0, 0.0, 1.4) };
+        let judged = |end: &Vector| SampledBeam {
             in_map: beam(end + Vector::z() * 0.01),
             by_truth: Some((beam(*end), at(4.0))),
             fate: if end.x == 6.0 { Fate::Kept } else { Fate::Moving },
         };
         let registered = Registered {
-            fates: Fates { kept: 16, moving: 4, ..Fates::default() },
+            fates: FateCounts { kept: 16, moving: 4, ..FateCounts::default() },
             filtered: true,
             sample: ends.iter().map(judged).collect(),
             dead_reckoning: Err(EvaluationError::OnALine),
@@ -221,11 +224,11 @@ mod tests {
         assert_relative_eq!(metrics.bias_m.unwrap(), 0.01, epsilon = 1e-6);
         assert_relative_eq!(metrics.sigma_m.unwrap(), 0.03, epsilon = 1e-6);
         assert_relative_eq!(metrics.sigma_by_truth_m.unwrap(), 0.03, epsilon = 1e-6);
-        // Were they judged, as beams that are said to have met nothing but what stands are, they would outdo all else.
+        // Without a carrier all beams count as static; the beams on the operator then dominate the standard deviation.
         let empty = Surroundings { carrier: &[], ..surroundings };
         let judged_all = cloud_metrics(&registered, Some(&Pose::identity()), Some(empty));
         assert!(judged_all.sigma_m.unwrap() > 0.2, "{judged_all:?}");
-        // What the filter dropped is counted, and judged all the same.
+        // Filtered returns are counted, and are in the distance metrics.
         assert_eq!((metrics.filter.kept, metrics.filter.dropped_moving), (Some(16), Some(4)));
         assert_eq!(metrics.filter.standing_dropped_fraction, Some(0.0));
         assert_eq!(metrics.filter.movers_dropped_fraction, Some(1.0));

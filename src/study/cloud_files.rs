@@ -1,54 +1,54 @@
-//! The cloud's files.
+//! Output files of the registered cloud.
 
 use super::StudyError;
-use super::beside::Beside;
+use super::atomic_file::AtomicFile;
 use crate::recording::{CloudPoint, LasWriter, PlyWriter, RecordingError};
 use std::fs::File;
 use std::path::Path;
 
-/// In which formats the cloud is written.
+/// File formats of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CloudFormat {
-    /// As `cloud.ply`.
+    /// `cloud.ply`.
     #[default]
     Ply,
-    /// As `cloud.las`.
+    /// `cloud.las`.
     Las,
-    /// As both.
+    /// Both files.
     Both,
 }
 
-/// What is asked of the cloud.
+/// Options of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct CloudWishes {
-    /// Its files.
+pub struct CloudOptions {
+    /// File formats.
     pub format: CloudFormat,
-    /// Whether echoes stay in it that are no surface that stands.
+    /// Whether the cloud includes mixed pixels, isolated points and moving objects.
     pub keep_outliers: bool,
 }
 
-/// The files while they are written: they are in their place when they are whole.
+/// Writers of the cloud files; the files get their final names when they are complete.
 pub(super) struct CloudFiles {
-    ply: Option<(PlyWriter<File>, Beside)>,
-    las: Option<(LasWriter<File>, Beside)>,
+    ply: Option<(PlyWriter<File>, AtomicFile)>,
+    las: Option<(LasWriter<File>, AtomicFile)>,
 }
 
 impl CloudFiles {
-    /// Begins `cloud.ply` and `cloud.las` in `folder`, as far as they are wanted.
+    /// Creates the files of `format` in `folder`.
     pub(super) fn create(folder: &Path, format: CloudFormat) -> Result<Self, StudyError> {
-        let begin = |name: &str| -> Result<(File, Beside), StudyError> {
-            let mut beside = Beside::new(folder, &folder.join(name))?;
-            let file = beside.file().try_clone().map_err(StudyError::file(beside.place()))?;
-            Ok((file, beside))
+        let create = |name: &str| -> Result<(File, AtomicFile), StudyError> {
+            let mut partial = AtomicFile::new(folder, &folder.join(name))?;
+            let file = partial.file().try_clone().map_err(StudyError::file(partial.target()))?;
+            Ok((file, partial))
         };
         let mut files = Self { ply: None, las: None };
         if format != CloudFormat::Las {
-            let (file, beside) = begin("cloud.ply")?;
-            files.ply = Some((PlyWriter::new(file)?, beside));
+            let (file, partial) = create("cloud.ply")?;
+            files.ply = Some((PlyWriter::new(file)?, partial));
         }
         if format != CloudFormat::Ply {
-            let (file, beside) = begin("cloud.las")?;
-            files.las = Some((LasWriter::new(file)?, beside));
+            let (file, partial) = create("cloud.las")?;
+            files.las = Some((LasWriter::new(file)?, partial));
         }
         Ok(files)
     }
@@ -64,13 +64,13 @@ impl CloudFiles {
     }
 
     pub(super) fn finish(self) -> Result<(), StudyError> {
-        if let Some((ply, beside)) = self.ply {
+        if let Some((ply, partial)) = self.ply {
             ply.finish()?;
-            beside.finish()?;
+            partial.finish()?;
         }
-        if let Some((las, beside)) = self.las {
+        if let Some((las, partial)) = self.las {
             las.finish()?;
-            beside.finish()?;
+            partial.finish()?;
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-/// Free space of the file system that `folder` is on, for this user, bytes; `None` where the system does not report it.
+/// Free space for this user on the file system of `folder`, bytes; `None` if the system does not report it.
 pub fn free_bytes(folder: &Path) -> Option<u64> {
     #[cfg(target_os = "linux")]
     {

@@ -10,22 +10,22 @@ use crate::spec::SpecError;
 use parquet::errors::ParquetError;
 use std::path::{Path, PathBuf};
 
-/// Why an experiment did not come to its end.
+/// Error of an experiment.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// The simulation could not begin, or go on.
+    /// The simulation failed at the start or during the run.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     /// A file could not be written or read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// An estimate, or a run, cannot be judged.
+    /// An estimate or a run cannot be evaluated.
     #[error(transparent)]
     Evaluation(#[from] EvaluationError),
-    /// There is no estimate.
+    /// The estimation failed.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
-    /// A spec is missing or wrong.
+    /// A spec is missing or invalid.
     #[error(transparent)]
     Spec(#[from] SpecError),
     /// The head cannot be modelled, or its simulation failed.
@@ -34,74 +34,74 @@ pub enum StudyError {
     /// The motion cannot be built.
     #[error(transparent)]
     Motion(#[from] MotionError),
-    /// What was recorded cannot be analysed.
+    /// A recorded signal cannot be analysed.
     #[error(transparent)]
     Signal(#[from] SignalError),
-    /// A calibration in YAML that cannot be used.
+    /// A YAML calibration is invalid.
     #[error("{name}: {problem}")]
     Calibration {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// A plan whose numbers contradict each other.
+    /// The settings of an experiment are inconsistent or cannot be met.
     #[error("{what}: {message}")]
     Plan {
-        /// Which number.
+        /// Name of the setting.
         what: &'static str,
-        /// What is wrong with it, and what to do.
+        /// The problem, and what to do.
         message: String,
     },
     /// A plot could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// The figures could not be written as JSON.
-    #[error("the figures cannot be written: {0}")]
+    /// The metrics could not be written as JSON.
+    #[error("the metrics cannot be written as JSON: {0}")]
     Figures(#[from] serde_json::Error),
-    /// A file or folder could not be made.
+    /// A file or folder could not be read, created or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// Which one.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A table could not be written or read.
     #[error("{}: {source}", path.display())]
     Table {
-        /// Which one.
+        /// Path of the table.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Error of the Parquet library.
         source: Box<ParquetError>,
     },
-    /// A run of a sweep took longer than it may.
+    /// A run of a sweep exceeded the time limit.
     #[error("took longer than {time_s} s")]
     TooLong {
-        /// What it may take, s.
+        /// Time limit, s.
         time_s: f64,
     },
-    /// A process that was to do a part of the work could not.
-    #[error("a worker could not work: {message}")]
+    /// A worker process failed.
+    #[error("a worker process failed: {message}")]
     Worker {
-        /// What it said.
+        /// Error message of the process.
         message: String,
     },
-    /// There is no thread to work on.
-    #[error("a thread could not be begun: {0}")]
+    /// The thread pool could not be created.
+    #[error("cannot start the worker threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
-    /// A folder holds something else than the beginning of the work that was to go on in it.
+    /// The output folder has files that do not belong to this experiment, so that it cannot be resumed there.
     #[error(
-        "{} holds other work than this (another spec, extent or version, or somebody's files): give another folder with \
-         --out, or begin anew in one of ours with --force",
+        "{} contains files of another experiment (different spec, extent or version, or unrelated files): pass another \
+         folder with --out, or restart with --force if the folder was written by zsim",
         folder.display()
     )]
-    OtherWork {
-        /// Which folder.
+    FolderMismatch {
+        /// The output folder.
         folder: PathBuf,
     },
-    /// Somebody stopped it.
-    #[error("stopped; what is complete can be read")]
+    /// The experiment was stopped.
+    #[error("stopped; completed files can be read")]
     Stopped,
 }
 
@@ -122,10 +122,10 @@ impl StudyError {
         move |source| Self::Table { path, source: Box::new(source) }
     }
 
-    /// Whether what was asked for is wrong (a spec, a setting), rather than something on the way.
-    pub fn is_wrong_input(&self) -> bool {
+    /// Whether the input is invalid (a spec, a setting), as opposed to a failure during the run.
+    pub fn is_invalid_input(&self) -> bool {
         match self {
-            Self::Spec(_) | Self::Motion(_) | Self::Plan { .. } | Self::OtherWork { .. } => true,
+            Self::Spec(_) | Self::Motion(_) | Self::Plan { .. } | Self::FolderMismatch { .. } => true,
             Self::Dynamics(error) => !matches!(**error, DynamicsError::Diverged { .. }),
             Self::Estimation(error) => {
                 matches!(error, EstimationError::Setting { .. } | EstimationError::Calibration(_))

@@ -4,9 +4,9 @@ use super::bound::information_bound;
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
-use super::cloud_files::CloudWishes;
+use super::cloud_files::CloudOptions;
 use super::integrity::{Integrity, write_windows};
-use super::map::{MapWishes, write_map_of};
+use super::map::{MapOptions, write_map_of};
 use super::open_loop::{How, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::result_files::{estimate_files, remove};
@@ -26,10 +26,10 @@ const TRUE_FRAME: &str = "head";
 
 /// What is asked of an estimate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wishes {
+pub struct EstimateOptions {
     /// The estimator's settings.
     pub estimator: EstimatorSpec,
-    /// What is known of the sensors beside what the recording says.
+    /// What is comparison of the sensors beside what the recording says.
     pub calibration: CalibrationSpec,
     /// The frame whose pose is told; `None` for `head` where the recording has it, else the IMU's.
     pub body_frame: Option<String>,
@@ -38,16 +38,16 @@ pub struct Wishes {
     /// Whether to register the whole behind the open loop.
     pub closed_loop: bool,
     /// What is asked of the cloud.
-    pub cloud: CloudWishes,
+    pub cloud: CloudOptions,
     /// The map in which the recording is to be localised, where there is one.
-    pub map: Option<MapWishes>,
+    pub map: Option<MapOptions>,
 }
 
-impl Wishes {
+impl EstimateOptions {
     /// An estimate with these settings, loops closed, and no further wish.
     pub fn with(estimator: EstimatorSpec) -> Self {
         let (calibration, topics) = (CalibrationSpec::default(), Preference::default());
-        let cloud = CloudWishes::default();
+        let cloud = CloudOptions::default();
         Self { estimator, calibration, body_frame: None, topics, closed_loop: true, cloud, map: None }
     }
 }
@@ -74,7 +74,7 @@ pub struct Outcome {
 pub fn estimate_recording(
     path: &Path,
     folder: &Path,
-    wishes: &Wishes,
+    wishes: &EstimateOptions,
     watch: &mut Watch,
 ) -> Result<Outcome, StudyError> {
     let reader = Reader::open(path)?;
@@ -87,7 +87,7 @@ pub fn estimate_recording(
     estimate_in(&reader, folder, wishes, &origin, watch)
 }
 
-/// What is known of how a recording was made, for the figures alone.
+/// What is comparison of how a recording was made, for the figures alone.
 pub(super) struct Origin<'a> {
     /// Its manifest, with the estimator's settings.
     pub manifest: &'a Manifest,
@@ -97,11 +97,11 @@ pub(super) struct Origin<'a> {
     pub simulation: Option<&'a SimulationSummary>,
 }
 
-/// The same with the recording open, and what is known of its origin.
+/// The same with the recording open, and what is comparison of its origin.
 pub(super) fn estimate_in(
     reader: &Reader,
     folder: &Path,
-    wishes: &Wishes,
+    wishes: &EstimateOptions,
     origin: &Origin,
     watch: &mut Watch,
 ) -> Result<Outcome, StudyError> {
@@ -112,7 +112,7 @@ pub(super) fn estimate_in(
 
     let expected_s = origin.simulation.map(|summary| summary.duration_s);
     let loops = Loops::run((reader, &selection, &found), folder, wishes, expected_s, watch)?;
-    let (run, known, best) = (&loops.open, loops.known.as_ref(), loops.best());
+    let (run, comparison, best) = (&loops.open, loops.comparison.as_ref(), loops.best());
     let registration = Registration {
         reader,
         selection: &selection,
@@ -122,39 +122,39 @@ pub(super) fn estimate_in(
         covariances: &run.covariances,
         lidar: best.lidar,
         returns: run.returns,
-        with_truth: known.is_some(),
+        with_truth: comparison.is_some(),
         wishes: wishes.cloud,
     };
     let registered = registration.run(folder, watch)?;
 
     watch.progress(Stage::Reporting, 0.0, None);
-    let drifting = match known {
+    let drifting = match comparison {
         Some(_) => judge::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
         None => None,
     };
-    let bound = match (known, origin.surroundings) {
+    let bound = match (comparison, origin.surroundings) {
         (Some(_), Some(Surroundings { world, .. })) => Some(information_bound(reader, world, watch)?.bound),
         _ => None,
     };
     let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(wishes.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
-    let judged = integrity.metrics(run, known.map(|_| judge::pairs_of(reader, best.map_from_head)).transpose()?);
+    let judged = integrity.metrics(run, comparison.map(|_| judge::pairs_of(reader, best.map_from_head)).transpose()?);
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
         integrity: judged,
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),
-        open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, known, drifting) },
+        open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, comparison, drifting) },
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
-        clock: judge::clock_metrics(run, known),
+        clock: judge::clock_metrics(run, comparison),
         lidar: judge::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &wishes.estimator),
-        ..metrics(origin, run, &registered, best.known)
+        ..metrics(origin, run, &registered, best.comparison)
     };
     integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
-    let open_known = known.filter(|_| loops.closed.is_some());
-    let open_errors = open_known.and_then(|known| Some(&known.errors.as_ref()?.drawn));
+    let open_known = comparison.filter(|_| loops.closed.is_some());
+    let open_errors = open_known.and_then(|comparison| Some(&comparison.errors.as_ref()?.decimated));
     let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
     Ok(Outcome { metrics, spent: loops.open.spent })
@@ -163,20 +163,20 @@ pub(super) fn estimate_in(
 /// Both loops, and what the truth says of each.
 struct Loops {
     open: OpenLoopRun,
-    known: Option<judge::Known>,
+    comparison: Option<judge::Comparison>,
     closed: Option<ClosedLoopRun>,
-    closed_known: Option<judge::Known>,
+    closed_comparison: Option<judge::Comparison>,
 }
 
 /// The estimate that goes into cloud, result and plots: the closed loop's where loops were closed.
-pub(super) struct Best<'a> {
+pub(super) struct BestEstimate<'a> {
     pub map_from_head: &'a Trajectory,
     /// From where what was seen was seen, by the open loop.
     pub seen_from: &'a Trajectory,
     /// What was learnt of the lidar beyond its calibration.
     pub lidar: &'a LidarCorrection,
     /// What the truth says of it.
-    pub known: Option<&'a judge::Known>,
+    pub comparison: Option<&'a judge::Comparison>,
 }
 
 impl Loops {
@@ -184,7 +184,7 @@ impl Loops {
     fn run(
         (reader, selection, found): (&Reader, &Selection, &FoundCalibration),
         folder: &Path,
-        wishes: &Wishes,
+        wishes: &EstimateOptions,
         expected_s: Option<f64>,
         watch: &mut Watch,
     ) -> Result<Self, StudyError> {
@@ -202,35 +202,41 @@ impl Loops {
             true => Some(close_loops(&open, folder, how, watch)?),
             false => None,
         };
-        let mut truth_of = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
-            true => judge::truth_of(reader, (map_from_head, covariances), watch),
+        let mut compare = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
+            true => judge::compare_with_truth(reader, (map_from_head, covariances), watch),
             false => Ok(None),
         };
-        let known = truth_of(&open.map_from_head, &open.covariances[..])?;
-        let closed_known = closed.as_ref().map(|closed| truth_of(&closed.map_from_head, &[])).transpose()?.flatten();
-        let loops = Self { open, known, closed, closed_known };
+        let comparison = compare(&open.map_from_head, &open.covariances[..])?;
+        let closed_comparison =
+            closed.as_ref().map(|closed| compare(&closed.map_from_head, &[])).transpose()?.flatten();
+        let loops = Self { open, comparison, closed, closed_comparison };
         if makes_map && !loops.open.survey.is_empty() {
             write_map_of(&loops.open, &loops.best(), (estimator, within), folder)?;
         }
         Ok(loops)
     }
 
-    fn best(&self) -> Best<'_> {
+    fn best(&self) -> BestEstimate<'_> {
         let open = &self.open.map_from_head;
         match &self.closed {
-            Some(ClosedLoopRun { map_from_head, lidar, open_loop_told_anew, .. }) => Best {
+            Some(ClosedLoopRun { map_from_head, lidar, open_loop_recalibrated, .. }) => BestEstimate {
                 map_from_head,
-                seen_from: open_loop_told_anew.as_ref().unwrap_or(open),
+                seen_from: open_loop_recalibrated.as_ref().unwrap_or(open),
                 lidar,
-                known: self.closed_known.as_ref(),
+                comparison: self.closed_comparison.as_ref(),
             },
-            None => Best { map_from_head: open, seen_from: open, lidar: &self.open.lidar, known: self.known.as_ref() },
+            None => BestEstimate {
+                map_from_head: open,
+                seen_from: open,
+                lidar: &self.open.lidar,
+                comparison: self.comparison.as_ref(),
+            },
         }
     }
 
     fn closed_metrics(&self) -> ClosedLoopMetrics {
-        let (known, acquisition_s) = (self.closed_known.as_ref(), self.open.acquisition_s);
-        let told = self.closed.as_ref().map(|closed| judge::closed_loop_metrics(closed, known, acquisition_s));
+        let (comparison, acquisition_s) = (self.closed_comparison.as_ref(), self.open.acquisition_s);
+        let told = self.closed.as_ref().map(|closed| judge::closed_loop_metrics(closed, comparison, acquisition_s));
         told.unwrap_or_default()
     }
 }
@@ -239,15 +245,20 @@ impl Loops {
 fn close_loops(run: &OpenLoopRun, folder: &Path, how: How, watch: &mut Watch) -> Result<ClosedLoopRun, StudyError> {
     watch.progress(Stage::ClosingLoops, 0.0, None);
     let closed = run_closed_loop(run, how.calibration, how.estimator);
-    closed.remarks.iter().for_each(|remark| watch.note(remark));
+    closed.notes.iter().for_each(|note| watch.note(note));
     write_tum(&folder.join("closed_loop.tum"), &closed.map_from_head)?;
     if watch.is_stopped() { Err(StudyError::Stopped) } else { Ok(closed) }
 }
 
 /// All figures but those of the two loops and the clock.
-fn metrics(origin: &Origin, run: &OpenLoopRun, registered: &Registered, known: Option<&judge::Known>) -> Metrics {
+fn metrics(
+    origin: &Origin,
+    run: &OpenLoopRun,
+    registered: &Registered,
+    comparison: Option<&judge::Comparison>,
+) -> Metrics {
     let Manifest { scenario, specs, .. } = origin.manifest;
-    let world_from_map = known.and_then(|known| known.world_from_map);
+    let world_from_map = comparison.and_then(|comparison| comparison.world_from_map);
     Metrics {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scene: specs.as_ref().map(|specs| specs.scene.name.clone()),
@@ -267,7 +278,12 @@ fn world_of(manifest: &Manifest, watch: &mut Watch) -> Option<World> {
     built.inspect_err(|error| watch.note(&format!("the cloud is not judged: {error}"))).ok()
 }
 
-fn notes_on(selection: &Selection, found: &FoundCalibration, (wishes, origin): (&Wishes, &Origin), watch: &mut Watch) {
+fn notes_on(
+    selection: &Selection,
+    found: &FoundCalibration,
+    (wishes, origin): (&EstimateOptions, &Origin),
+    watch: &mut Watch,
+) {
     selection.notes.iter().for_each(|note| watch.note(note));
     let given = wishes.calibration.head_from_laser.is_some() && wishes.calibration.head_from_imu.is_some();
     if !found.from_recording && !given {

@@ -1,4 +1,4 @@
-//! What the estimator and the recording report, each kind once with its count, its first and its worst.
+//! Losses and notes of a run: one entry for each kind, with count, first and last time, and the worst case.
 
 use crate::estimation::{LeftOut, Warning, WarningKind};
 use crate::report::EventMetrics;
@@ -7,24 +7,24 @@ use crate::time::Stamp;
 /// Losses and notes of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Events {
-    /// Measurements that are missing or were not used, and stretches without an estimate.
+    /// Missing or unused measurements, and intervals without an estimate.
     pub losses: Vec<EventMetrics>,
-    /// What a user should know besides.
+    /// Other information for the user.
     pub notes: Vec<EventMetrics>,
 }
 
 impl Events {
-    /// A loss that has no time: a sentence of its own.
-    pub fn lose(&mut self, kind: &str, sentence: String) {
+    /// Adds a loss without a time.
+    pub fn add_loss(&mut self, kind: &str, sentence: String) {
         self.losses.push(EventMetrics { kind: kind.to_owned(), count: 1, sentence, ..EventMetrics::default() });
     }
 
-    /// A note that has no time.
-    pub fn note(&mut self, kind: &str, sentence: String) {
+    /// Adds a note without a time.
+    pub fn add_note(&mut self, kind: &str, sentence: String) {
         self.notes.push(EventMetrics { kind: kind.to_owned(), count: 1, sentence, ..EventMetrics::default() });
     }
 
-    /// Adds what the estimator reported, times counting from `start`.
+    /// Adds the warnings of the estimator, with times relative to `start`.
     pub fn add_warnings(&mut self, warnings: &[Warning], start: Stamp) {
         for Warning { stamp, kind } in warnings {
             let events = if is_loss(kind) { &mut self.losses } else { &mut self.notes };
@@ -33,7 +33,7 @@ impl Events {
     }
 }
 
-/// Adds one event to those of its kind.
+/// Adds one event to the entry of the same kind.
 fn add(events: &mut Vec<EventMetrics>, at_s: f64, kind: &WarningKind) {
     let (name, size) = (kind.name(), kind.size());
     let Some(event) = events.iter_mut().find(|event| event.kind == name) else {
@@ -50,7 +50,7 @@ fn add(events: &mut Vec<EventMetrics>, at_s: f64, kind: &WarningKind) {
     }
 }
 
-/// Whether a warning says that measurements are missing or were not used, or that the estimate is: a result with loss.
+/// Whether a warning is a loss: measurements are missing or unused, or there is no estimate for some time.
 fn is_loss(kind: &WarningKind) -> bool {
     match kind {
         WarningKind::ImuGap { .. }
@@ -70,7 +70,7 @@ mod tests {
     use crate::time::Span;
 
     #[test]
-    fn each_kind_is_stated_once_with_its_count_its_first_and_its_worst() {
+    fn each_kind_is_one_entry_with_count_first_time_and_worst_case() {
         let start = Stamp::from_nanos(5_000_000_000);
         let gap = |at_s: f64, seconds: f64| Warning {
             stamp: start + Span::from_seconds(at_s),

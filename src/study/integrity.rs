@@ -1,7 +1,7 @@
 //! The statement of integrity: `integrity.csv`, `windows.csv`, and what the truth says of them.
 
 use super::StudyError;
-use super::beside::Beside;
+use super::atomic_file::AtomicFile;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{
@@ -120,7 +120,7 @@ impl Integrity {
         };
         let mut findings = findings(&evidence);
         findings.extend(closed.and_then(|closed| moved_by_closing(run, closed, &bounds)));
-        findings.extend(uncertain(&bounds, way_m(trajectory)));
+        findings.extend(uncertain(&bounds, path_length_m(trajectory)));
         findings.sort_by_key(|finding| std::cmp::Reverse(finding.status));
         let lost = findings.iter().filter(|finding| finding.status == Status::Lost);
         if let Some(lost_from) = lost.map(|finding| finding.from).min() {
@@ -220,32 +220,32 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 /// How far the head went: its path by positions a second apart, so that its swing does not count, m.
-pub(super) fn way_m(trajectory: &Trajectory) -> f64 {
+pub(super) fn path_length_m(trajectory: &Trajectory) -> f64 {
     let mut last: Option<(Stamp, Vector)> = None;
-    let mut way_m = 0.0;
+    let mut path_m = 0.0;
     for (stamp, pose) in trajectory.iter() {
         let place = pose.translation.vector;
         match last {
             Some((before, _)) if stamp.seconds_since(before) < 1.0 => {}
             Some((_, from)) => {
-                way_m += (place - from).norm();
+                path_m += (place - from).norm();
                 last = Some((stamp, place));
             }
             None => last = Some((stamp, place)),
         }
     }
-    way_m
+    path_m
 }
 
-/// A good result errs by less than this over a path of `way_m`, m.
-pub(super) fn large_error_m(way_m: f64) -> f64 {
-    LARGE_BOUND_M.max(LARGE_SHARE * way_m)
+/// A good result errs by less than this over a path of `path_m`, m.
+pub(super) fn large_error_m(path_m: f64) -> f64 {
+    LARGE_BOUND_M.max(LARGE_SHARE * path_m)
 }
 
 /// Where the bound is larger than a good result allows, or any.
-fn uncertain(bounds: &[PoseBound], way_m: f64) -> Option<Finding> {
-    let lost = beyond(bounds, USELESS * large_error_m(way_m), Status::Lost);
-    lost.or_else(|| beyond(bounds, large_error_m(way_m), Status::Degraded))
+fn uncertain(bounds: &[PoseBound], path_m: f64) -> Option<Finding> {
+    let lost = beyond(bounds, USELESS * large_error_m(path_m), Status::Lost);
+    lost.or_else(|| beyond(bounds, large_error_m(path_m), Status::Degraded))
 }
 
 fn beyond(bounds: &[PoseBound], most_m: f64, status: Status) -> Option<Finding> {
@@ -258,7 +258,7 @@ fn beyond(bounds: &[PoseBound], most_m: f64, status: Status) -> Option<Finding> 
 
 /// Where closing loops moved the trajectory by more than the bound on its error.
 fn moved_by_closing(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Finding> {
-    let open = closed.open_loop_told_anew.as_ref().unwrap_or(&run.map_from_head);
+    let open = closed.open_loop_recalibrated.as_ref().unwrap_or(&run.map_from_head);
     let shift = |((stamp, a), (_, b)): ((Stamp, &Pose), (Stamp, &Pose))| {
         (stamp, (a.translation.vector - b.translation.vector).norm())
     };
@@ -309,7 +309,7 @@ fn seconds(stamp: Stamp) -> String {
 
 fn write(folder: &Path, name: &str, header: &str, mut rows: impl Iterator<Item = String>) -> Result<(), StudyError> {
     let path = folder.join(name);
-    let mut file = BufWriter::new(Beside::new(folder, &path)?);
+    let mut file = BufWriter::new(AtomicFile::new(folder, &path)?);
     let written = writeln!(file, "{header}").and_then(|()| rows.try_for_each(|row| writeln!(file, "{row}")));
     written.map_err(StudyError::file(&path))?;
     let file = file.into_inner().map_err(|error| StudyError::file(&path)(error.into_error()))?;

@@ -3,7 +3,7 @@
 use super::cloud::Surroundings;
 use super::estimate::{Origin, estimate_in};
 use super::result_files::{journey_files, remove};
-use super::{Manifest, Outcome, StudyError, Watch, Wishes, record};
+use super::{EstimateOptions, Manifest, Outcome, StudyError, Watch, record};
 use crate::recording::Reader;
 use crate::simulation::Simulation;
 use std::path::Path;
@@ -18,7 +18,7 @@ use std::path::Path;
 /// When a part fails, or somebody stops it; what came before is in the folder.
 pub fn journey(
     simulation: &Simulation,
-    wishes: &Wishes,
+    wishes: &EstimateOptions,
     folder: &Path,
     watch: &mut Watch,
 ) -> Result<Outcome, StudyError> {

@@ -1,6 +1,6 @@
 //! An estimate against the truth, where the recording has it.
 
-use super::artefacts::{drawn, drawn_errors};
+use super::artefacts::{decimated, decimated_errors};
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use super::true_clock::true_offset;
@@ -17,43 +17,43 @@ use crate::simulation::SimulationSummary;
 use crate::time::{Span, Stamp};
 
 /// The truth as far as an estimate asks for it.
-pub(super) struct Known {
-    /// The true trajectory, `world_from_head`, as far as it is drawn.
+pub(super) struct Comparison {
+    /// The true trajectory, `world_from_head`, as far as it is decimated.
     pub truth: Trajectory,
     /// The true clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// The alignment of the whole estimate, where its positions determine one.
     pub world_from_map: Option<Pose>,
     /// What remains after it.
-    pub errors: Option<Remaining>,
+    pub errors: Option<AlignedErrors>,
     drift: Option<Drift>,
     consistency: Option<Consistency>,
     per_minute: Option<RelativeError>,
 }
 
 /// The errors that remain after alignment.
-pub(super) struct Remaining {
+pub(super) struct AlignedErrors {
     pub position_rmse_m: f64,
     rotation_rmse_rad: f64,
-    /// Over time, as far as they are drawn.
-    pub drawn: Errors,
+    /// Over time, as far as they are decimated.
+    pub decimated: Errors,
 }
 
-impl Remaining {
+impl AlignedErrors {
     fn after(pairs: &Pairs, world_from_map: &Pose) -> Self {
         let errors = Errors::after(pairs, world_from_map);
         let (position_rmse_m, rotation_rmse_rad) = (errors.position_rmse_m(), errors.rotation_rmse_rad());
-        Self { position_rmse_m, rotation_rmse_rad, drawn: drawn_errors(&errors) }
+        Self { position_rmse_m, rotation_rmse_rad, decimated: decimated_errors(&errors) }
     }
 }
 
 /// An estimate, with the covariances that are known of it, against the truth at its instants; `None` where the
 /// recording has none. What is not asked for afterwards is not kept: poses of an hour are many.
-pub(super) fn truth_of(
+pub(super) fn compare_with_truth(
     reader: &Reader,
     (map_from_head, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),
     watch: &mut Watch,
-) -> Result<Option<Known>, StudyError> {
+) -> Result<Option<Comparison>, StudyError> {
     let mut clock_offsets = Vec::new();
     let heads = reader.truth().filter_map(|told| match told {
         Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
@@ -69,9 +69,9 @@ pub(super) fn truth_of(
         return Ok(None);
     }
     let world_from_map = known(pairs.world_from_map(), watch);
-    let errors = world_from_map.map(|world_from_map| Remaining::after(&pairs, &world_from_map));
-    Ok(Some(Known {
-        truth: drawn(pairs.stamps().iter().copied().zip(pairs.truth().iter().copied())),
+    let errors = world_from_map.map(|world_from_map| AlignedErrors::after(&pairs, &world_from_map));
+    Ok(Some(Comparison {
+        truth: decimated(pairs.stamps().iter().copied().zip(pairs.truth().iter().copied())),
         clock_offsets,
         world_from_map,
         errors,
@@ -111,8 +111,8 @@ pub(super) fn simulation_metrics(summary: &SimulationSummary) -> SimulationMetri
 /// The open loop's figures.
 pub(super) fn open_loop_metrics(
     run: &OpenLoopRun,
-    known: Option<&Known>,
-    dead_reckoning: Option<Drifting>,
+    known: Option<&Comparison>,
+    dead_reckoning: Option<ImuOnlyDrift>,
 ) -> OpenLoopMetrics {
     let drifted = known.and_then(|known| known.drift);
     let errors = known.and_then(|known| known.errors.as_ref());
@@ -128,14 +128,18 @@ pub(super) fn open_loop_metrics(
         yaw_drift_deg_per_min: drifted.map(|drift| drift.yaw_rad_per_min.to_degrees()),
         end_error_m: drifted.map(|drift| drift.end_error_m),
         relative_error_per_minute_m: relative.map(|error| error.position_rmse_m),
-        imu_only_drift_m_per_min: dead_reckoning.map(|drifting| drifting.0),
+        imu_only_drift_m_per_min: dead_reckoning.map(|drift| drift.0),
         position_nees: consistent.map(|found| found.position_nees),
         attitude_nees: consistent.map(|found| found.attitude_nees),
     }
 }
 
 /// The closed loop's figures.
-pub(super) fn closed_loop_metrics(run: &ClosedLoopRun, known: Option<&Known>, acquisition_s: f64) -> ClosedLoopMetrics {
+pub(super) fn closed_loop_metrics(
+    run: &ClosedLoopRun,
+    known: Option<&Comparison>,
+    acquisition_s: f64,
+) -> ClosedLoopMetrics {
     let errors = known.and_then(|known| known.errors.as_ref());
     ClosedLoopMetrics {
         wall_s: Some(run.wall_s),
@@ -148,13 +152,13 @@ pub(super) fn closed_loop_metrics(run: &ClosedLoopRun, known: Option<&Known>, ac
             verified: Some(run.loops.verified as u64),
             closed: Some(run.loops.closed as u64),
         },
-        left: run.left.map(str::to_owned),
+        left: run.rejected_because.map(str::to_owned),
     }
 }
 
 /// Drift of the IMU alone, m/min.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Drifting(f64);
+pub(super) struct ImuOnlyDrift(f64);
 
 /// How the IMU alone would have drifted; `None` without truth, and where it cannot be told.
 ///
@@ -163,7 +167,7 @@ pub(super) fn imu_only(
     reader: &Reader,
     dead_reckoning: Result<&Trajectory, &EvaluationError>,
     watch: &mut Watch,
-) -> Result<Option<Drifting>, StudyError> {
+) -> Result<Option<ImuOnlyDrift>, StudyError> {
     let told = dead_reckoning.map_err(Clone::clone);
     let Some(map_from_head) = known(told, watch) else { return Ok(None) };
     let heads = reader.truth().filter_map(|told| match told {
@@ -172,11 +176,11 @@ pub(super) fn imu_only(
         Err(error) => Some(Err(error)),
     });
     let pairs = Pairs::gather(map_from_head, heads)?;
-    Ok(drift(&pairs).ok().map(|drift| Drifting(drift.position_m_per_min)))
+    Ok(drift(&pairs).ok().map(|drift| ImuOnlyDrift(drift.position_m_per_min)))
 }
 
 /// The clock's figures.
-pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Known>) -> ClockMetrics {
+pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Comparison>) -> ClockMetrics {
     let error = known.and_then(|known| clock_error(&run.clock_offsets, &known.clock_offsets));
     ClockMetrics {
         offset_end_s: run.clock_offsets.last().map(|(_, offset_s)| *offset_s),

@@ -1,7 +1,7 @@
 //! Calibrations in the YAML of Kalibr and of allan_variance_ros: an IMU's noise, and where the lidar is from the IMU.
 
 use super::StudyError;
-use super::calibration::{CalibrationSpec, ordinary_imu};
+use super::calibration::{CalibrationSpec, typical_imu_noise};
 use crate::dynamics::PlacementSpec;
 use crate::geometry::{Pose, Rotation};
 use crate::measurement::ImuNoise;
@@ -186,7 +186,7 @@ impl File {
                 accel_density_m_per_s2_per_sqrt_hz: accel,
                 gyro_bias_walk_rad_per_s_per_sqrt_s: gyro_walk,
                 accel_bias_walk_m_per_s2_per_sqrt_s: accel_walk,
-                ..ordinary_imu()?
+                ..typical_imu_noise()?
             })),
             _ => {
                 let missing = given.iter().zip(values).filter(|(_, value)| value.is_none()).map(|((key, ..), _)| *key);

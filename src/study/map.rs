@@ -1,8 +1,8 @@
 //! Maps that last: written behind an estimate, given to the next, put together.
 
 use super::StudyError;
-use super::beside::Beside;
-use super::estimate::Best;
+use super::atomic_file::AtomicFile;
+use super::estimate::BestEstimate;
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{EstimatorSpec, Located, locate_map, map_of, merge_maps};
 use crate::geometry::Pose;
@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// A map in which a recording's head is to be found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MapWishes {
+pub struct MapOptions {
     /// The map.
     pub map: SurfelMap,
     /// Where the head begins in it, to a metre on the level and twenty degrees about the vertical.
@@ -21,7 +21,7 @@ pub struct MapWishes {
     pub extend: bool,
 }
 
-impl MapWishes {
+impl MapOptions {
     /// The map at `path`.
     ///
     /// # Errors
@@ -61,8 +61,8 @@ pub fn merge_map_files(
 /// Writes the map that an estimate makes, or adds to, to `map.ply` in `folder`; whether there is one.
 pub(super) fn write_map_of(
     run: &OpenLoopRun,
-    best: &Best,
-    (estimator, within): (&EstimatorSpec, Option<&MapWishes>),
+    best: &BestEstimate,
+    (estimator, within): (&EstimatorSpec, Option<&MapOptions>),
     folder: &Path,
 ) -> Result<(), StudyError> {
     let trajectories = (best.seen_from, best.map_from_head);
@@ -76,7 +76,7 @@ pub(super) fn write_map_of(
 
 fn write(map: &SurfelMap, place: &Path) -> Result<(), StudyError> {
     let folder = place.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut beside = Beside::new(folder, place)?;
+    let mut beside = AtomicFile::new(folder, place)?;
     write_surfel_map(&mut beside, map)?;
     beside.finish()
 }

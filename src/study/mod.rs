@@ -9,8 +9,8 @@
 //! [`coverage`] of its lidar. A [`sweep`] varies any of it, and tells what matters.
 
 mod artefacts;
+mod atomic_file;
 mod base;
-mod beside;
 mod bound;
 mod cadence;
 mod calibration;
@@ -40,19 +40,19 @@ mod result_files;
 pub mod spring;
 pub mod sweep;
 mod true_clock;
-mod truth_near;
+mod truth_cursor;
 mod watch;
 
 pub use base::{base_by_imu, base_by_law};
-pub use bound::{Bounded, information_bound};
+pub use bound::{RecordingBound, information_bound};
 pub use calibration::CalibrationSpec;
-pub use cloud_files::{CloudFormat, CloudWishes};
+pub use cloud_files::{CloudFormat, CloudOptions};
 pub use disk::free_bytes;
 pub use error::StudyError;
-pub use estimate::{Outcome, Wishes, estimate_recording};
+pub use estimate::{EstimateOptions, Outcome, estimate_recording};
 pub use journey::journey;
 pub use manifest::Manifest;
-pub use map::{MapWishes, Merged, merge_map_files};
+pub use map::{MapOptions, Merged, merge_map_files};
 pub use record::record;
 pub use result_files::{estimate_files, journey_files};
-pub use watch::{Hear, News, Stage, Watch};
+pub use watch::{OnProgress, Stage, StudyEvent, Watch};

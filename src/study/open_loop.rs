@@ -3,7 +3,7 @@
 use super::cadence::Cadence;
 use super::events::Events;
 use super::read_ahead::{Coming, read_ahead};
-use super::{MapWishes, Stage, StudyError, Watch};
+use super::{MapOptions, Stage, StudyError, Watch};
 use crate::estimation::{
     EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, blocks, radius_99,
 };
@@ -68,7 +68,7 @@ pub(super) struct How<'a> {
     /// Whether what is seen is kept, for the closed loop and the map.
     pub surveying: bool,
     /// The map in which the head is, where there is one.
-    pub map: Option<&'a MapWishes>,
+    pub map: Option<&'a MapOptions>,
 }
 
 /// Estimates from what `reader` reads; poses go to the TUM file `tum`, if one is wanted, as they become final.
@@ -107,11 +107,11 @@ pub(super) fn run_open_loop(
     // Offsets are those of the stamps as they were recorded.
     let shift_s = selection.imu_shift().seconds();
     let mut events = Events::default();
-    loss.sentences().into_iter().for_each(|sentence| events.lose("recording", sentence));
-    heard.imu.missing("IMU samples").into_iter().for_each(|sentence| events.lose("missing_samples", sentence));
-    heard.lidar.missing("scans").into_iter().for_each(|sentence| events.lose("missing_scans", sentence));
-    result.located.iter().for_each(|located| events.note("located", found(located)));
-    loss.notes().into_iter().for_each(|sentence| events.note("recording", sentence));
+    loss.sentences().into_iter().for_each(|sentence| events.add_loss("recording", sentence));
+    heard.imu.missing("IMU samples").into_iter().for_each(|sentence| events.add_loss("missing_samples", sentence));
+    heard.lidar.missing("scans").into_iter().for_each(|sentence| events.add_loss("missing_scans", sentence));
+    result.located.iter().for_each(|located| events.add_note("located", found(located)));
+    loss.notes().into_iter().for_each(|sentence| events.add_note("recording", sentence));
     let start = heard.start();
     events.add_warnings(&result.warnings, start);
     Ok(OpenLoopRun {

@@ -1,7 +1,7 @@
-//! Beams become a cloud: in files, for viewers, and a sample of it to be judged.
+//! BeamProjection become a cloud: in files, for viewers, and a sample of it to be judged.
 
-use super::cloud_files::{CloudFiles, CloudWishes};
-use super::truth_near::{TrueInstant, TruthNear};
+use super::cloud_files::{CloudFiles, CloudOptions};
+use super::truth_cursor::{TrueState, TruthCursor};
 use super::{Stage, StudyError, Watch};
 use crate::estimation::{CloudFilter, Fate, Hit, point_sigma_m};
 use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
@@ -18,32 +18,32 @@ const SHOWN: usize = 1_000_000;
 
 /// A beam of the sample: where it ended and began.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Beam {
+pub(super) struct ProjectedBeam {
     pub point: Vector,
     pub origin: Vector,
 }
 
 /// A beam of the sample, to be judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Judged {
+pub(super) struct SampledBeam {
     /// By the estimate, in the map.
-    pub in_map: Beam,
+    pub in_map: ProjectedBeam,
     /// By the true pose, in the world, and what else is true at its instant; `None` where there is no truth.
-    pub by_truth: Option<(Beam, TrueInstant)>,
+    pub by_truth: Option<(ProjectedBeam, TrueState)>,
     /// What became of it.
     pub fate: Fate,
 }
 
 /// How many echoes there were, and what became of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Fates {
+pub(super) struct FateCounts {
     pub kept: u64,
     pub mixed: u64,
     pub isolated: u64,
     pub moving: u64,
 }
 
-impl Fates {
+impl FateCounts {
     /// All echoes.
     pub(super) fn all(&self) -> u64 {
         self.kept + self.mixed + self.isolated + self.moving
@@ -62,11 +62,11 @@ impl Fates {
 /// The cloud, and what else a second reading of the recording gave.
 pub(super) struct Registered {
     /// What became of the echoes.
-    pub fates: Fates,
+    pub fates: FateCounts,
     /// Whether the cloud was filtered.
     pub filtered: bool,
     /// A sample of the beams, whatever became of them.
-    pub sample: Vec<Judged>,
+    pub sample: Vec<SampledBeam>,
     /// What the IMU alone says.
     pub dead_reckoning: Result<Trajectory, EvaluationError>,
 }
@@ -86,17 +86,17 @@ pub(super) struct Registration<'a> {
     /// Whether to project a sample by the truth too.
     pub with_truth: bool,
     /// What is asked of the cloud.
-    pub wishes: CloudWishes,
+    pub wishes: CloudOptions,
 }
 
 impl Registration<'_> {
     /// Projects every beam by the estimate, into the cloud's files and `result.mcap` in `folder`.
     pub(super) fn run(&self, folder: &Path, watch: &mut Watch) -> Result<Registered, StudyError> {
         let noise = self.calibration.lidar;
-        let mut beams = Beams {
+        let mut beams = BeamProjection {
             measurements: self.reader.measurements(self.selection),
             cursor: SmoothCursor::new(self.map_from_head),
-            truth: self.with_truth.then(|| TruthNear::new(self.reader.truth())),
+            truth: self.with_truth.then(|| TruthCursor::new(self.reader.truth())),
             calibrated: Lidar { head_from_laser: self.calibration.head_from_laser, range_m: 0.0 },
             corrected: Lidar {
                 head_from_laser: self.calibration.head_from_corrected_laser(self.lidar),
@@ -112,7 +112,7 @@ impl Registration<'_> {
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
             echoes: 0,
-            fates: Fates::default(),
+            fates: FateCounts::default(),
             sample: Vec::new(),
             failure: None,
             watch,
@@ -130,7 +130,7 @@ impl Registration<'_> {
 }
 
 /// Where a beam begins and ends by the estimate, and by the truth.
-type Ends = (Beam, Option<(Beam, TrueInstant)>);
+type Ends = (ProjectedBeam, Option<(ProjectedBeam, TrueState)>);
 
 /// An echo whose fate is not known yet.
 struct Pending {
@@ -142,10 +142,10 @@ struct Pending {
 }
 
 /// Reads scan by scan, writes the points that are kept, and gives those for viewers as an iterator.
-struct Beams<'a, 'w, 's> {
+struct BeamProjection<'a, 'w, 's> {
     measurements: Measurements<'a>,
     cursor: SmoothCursor<'a>,
-    truth: Option<TruthNear<'a>>,
+    truth: Option<TruthCursor<'a>>,
     calibrated: Lidar,
     corrected: Lidar,
     noise: LidarNoise,
@@ -160,13 +160,13 @@ struct Beams<'a, 'w, 's> {
     span: Option<(Stamp, Stamp)>,
     /// Echoes so far.
     echoes: usize,
-    fates: Fates,
-    sample: Vec<Judged>,
+    fates: FateCounts,
+    sample: Vec<SampledBeam>,
     failure: Option<StudyError>,
     watch: &'w mut Watch<'s>,
 }
 
-impl Iterator for Beams<'_, '_, '_> {
+impl Iterator for BeamProjection<'_, '_, '_> {
     type Item = CloudPoint;
 
     fn next(&mut self) -> Option<CloudPoint> {
@@ -186,7 +186,7 @@ impl Iterator for Beams<'_, '_, '_> {
     }
 }
 
-impl Beams<'_, '_, '_> {
+impl BeamProjection<'_, '_, '_> {
     /// The points for viewers of the next scan.
     fn next_scan(&mut self) -> Result<Option<Vec<CloudPoint>>, StudyError> {
         loop {
@@ -266,7 +266,7 @@ impl Beams<'_, '_, '_> {
         let mut shown = Vec::new();
         for (pending, fate) in told {
             self.fates.count(fate);
-            self.sample.extend(pending.judged.map(|ends| Judged { in_map: ends.0, by_truth: ends.1, fate }));
+            self.sample.extend(pending.judged.map(|ends| SampledBeam { in_map: ends.0, by_truth: ends.1, fate }));
             if fate == Fate::Kept {
                 self.files.point(&pending.point)?;
                 shown.extend(pending.shown.then_some(pending.point));
@@ -284,10 +284,10 @@ struct Lidar {
 
 impl Lidar {
     /// A beam that measured `point_in_laser`, where the head is at `frame_from_head`.
-    fn beam(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> Beam {
+    fn beam(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> ProjectedBeam {
         let frame_from_laser = frame_from_head * self.head_from_laser;
         let origin = frame_from_laser.translation.vector;
         let longer = 1.0 + self.range_m / point_in_laser.norm();
-        Beam { point: frame_from_laser.rotation * point_in_laser * longer + origin, origin }
+        ProjectedBeam { point: frame_from_laser.rotation * point_in_laser * longer + origin, origin }
     }
 }

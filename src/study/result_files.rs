@@ -1,7 +1,7 @@
 //! The files of a result folder.
 
 use super::StudyError;
-use super::beside::PARTIAL;
+use super::atomic_file::PARTIAL_PREFIX;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -46,7 +46,7 @@ pub(super) fn remove(folder: &Path, names: &[String]) -> Result<(), StudyError> 
         }
     }
     for entry in std::fs::read_dir(folder).map_err(StudyError::file(folder))?.flatten() {
-        let is_partial = entry.file_name().to_string_lossy().starts_with(PARTIAL);
+        let is_partial = entry.file_name().to_string_lossy().starts_with(PARTIAL_PREFIX);
         if is_partial && entry.file_type().is_ok_and(|kind| kind.is_file()) {
             std::fs::remove_file(entry.path()).map_err(StudyError::file(&entry.path()))?;
         }

@@ -9,7 +9,7 @@ const KEPT: Span = Span::from_nanos(1_000_000_000);
 
 /// What is true at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TrueInstant {
+pub(super) struct TrueState {
     /// Where the head is.
     pub world_from_head: Pose,
     /// Where the base is that carries it; `None` in a recording that does not tell.
@@ -19,7 +19,7 @@ pub(super) struct TrueInstant {
 }
 
 /// The truth at instants that go forward, but for a second: read as it is asked for, never held as a whole.
-pub(super) struct TruthNear<'r> {
+pub(super) struct TruthCursor<'r> {
     truths: Truths<'r>,
     heads: Near,
     bases: Near,
@@ -31,13 +31,13 @@ pub(super) struct TruthNear<'r> {
 #[derive(Default)]
 struct Near(VecDeque<(Stamp, Pose)>);
 
-impl<'r> TruthNear<'r> {
+impl<'r> TruthCursor<'r> {
     pub(super) fn new(truths: Truths<'r>) -> Self {
         Self { truths, heads: Near::default(), bases: Near::default(), lidar_ahead: Span::ZERO }
     }
 
     /// What is true at `stamp`, on the lidar's clock; `None` where there is no truth, or no more.
-    pub(super) fn at(&mut self, stamp: Stamp) -> Result<Option<TrueInstant>, RecordingError> {
+    pub(super) fn at(&mut self, stamp: Stamp) -> Result<Option<TrueState>, RecordingError> {
         // The base of an instant is told after the head.
         while self.heads.last().is_none_or(|last| last < stamp) || self.bases.last().is_some_and(|last| last < stamp) {
             match self.truths.next().transpose()? {
@@ -50,7 +50,7 @@ impl<'r> TruthNear<'r> {
         self.heads.forget_before(stamp - KEPT);
         self.bases.forget_before(stamp - KEPT);
         let t_s = (stamp - self.lidar_ahead).seconds_since(EPOCH);
-        let instant = |world_from_head| TrueInstant { world_from_head, world_from_base: self.bases.at(stamp), t_s };
+        let instant = |world_from_head| TrueState { world_from_head, world_from_base: self.bases.at(stamp), t_s };
         Ok(self.heads.at(stamp).map(instant))
     }
 }

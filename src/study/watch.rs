@@ -19,7 +19,7 @@ pub enum Stage {
 
 /// What an experiment tells while it runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum News<'a> {
+pub enum StudyEvent<'a> {
     /// How far a stage is: from 0 to 1 where its end is known, and by seconds of data.
     Progress {
         /// The stage.
@@ -38,7 +38,7 @@ pub struct Watch<'a> {
     /// Set from outside to stop as soon as what is begun can be closed.
     pub stop: &'a AtomicBool,
     /// Hears how it goes.
-    pub tell: &'a mut dyn FnMut(News),
+    pub report: &'a mut dyn FnMut(StudyEvent),
 }
 
 impl Watch<'_> {
@@ -48,32 +48,32 @@ impl Watch<'_> {
 
     pub(super) fn progress(&mut self, stage: Stage, done_s: f64, whole_s: Option<f64>) {
         let fraction = whole_s.filter(|whole_s| *whole_s > 0.0).map(|whole_s| (done_s / whole_s).clamp(0.0, 1.0));
-        (self.tell)(News::Progress { stage, fraction, done_s });
+        (self.report)(StudyEvent::Progress { stage, fraction, done_s });
     }
 
     pub(super) fn note(&mut self, text: &str) {
-        (self.tell)(News::Note(text));
+        (self.report)(StudyEvent::Note(text));
     }
 }
 
 /// Hears which share of some work is done, from 0 to 1, on whatever thread did it.
-pub type Hear<'a> = &'a (dyn Fn(f64) + Sync);
+pub type OnProgress<'a> = &'a (dyn Fn(f64) + Sync);
 
 /// Work in equal pieces that threads finish in any order.
-pub(super) struct Pieces<'a> {
+pub(super) struct PieceProgress<'a> {
     whole: usize,
     done: AtomicUsize,
-    hear: Hear<'a>,
+    on_progress: OnProgress<'a>,
 }
 
-impl<'a> Pieces<'a> {
-    pub(super) fn new(whole: usize, hear: Hear<'a>) -> Self {
-        Self { whole, done: AtomicUsize::new(0), hear }
+impl<'a> PieceProgress<'a> {
+    pub(super) fn new(whole: usize, on_progress: OnProgress<'a>) -> Self {
+        Self { whole, done: AtomicUsize::new(0), on_progress }
     }
 
     /// Counts a piece that is done.
     pub(super) fn finish_one(&self) {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        (self.hear)(done as f64 / self.whole.max(1) as f64);
+        (self.on_progress)(done as f64 / self.whole.max(1) as f64);
     }
 }

@@ -181,6 +181,9 @@ fn mounts_that_give_nowhere_say_so_when_asked_for_gains_or_a_spring() {
         assert!(head.linear_modes().is_empty() && head.linear().is_none());
         let error = gain_curves(&head, &GainPlan::default(), &|_| ()).unwrap_err();
         let told = error.to_string();
-        assert!(error.is_wrong_input() && told.contains(because) && told.contains("nothing to characterise"), "{told}");
+        assert!(
+            error.is_invalid_input() && told.contains(because) && told.contains("nothing to characterise"),
+            "{told}"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! The covariance of a pose's error that is left when the trajectory is aligned with the truth over its first seconds.
+//! Covariance of the pose error after the trajectory is aligned with the truth over the first seconds.
 
 use super::{CARRIED, Consider, View, error_at};
 use crate::estimation::output::TURN_LEVER_M;
@@ -6,23 +6,23 @@ use crate::geometry::Vector;
 use crate::time::Stamp;
 use nalgebra::{Matrix6, SMatrix};
 
-/// The number under which the gauge is kept as a view; the last one is the map's.
+/// The view number of the gauge; the last number is that of the map.
 const GAUGE: u64 = u64::MAX - 1;
-/// The number of the first beginning that is kept while the gauge is made; later ones count down from it.
+/// The number of the first beginning marked while the gauge is built; later ones count down from it.
 const FIRST_MARK: u64 = GAUGE - 1;
 
-/// The rigid transform that aligns the beginnings so far with the truth, by least squares: against it a pose's error is
-/// that of a trajectory which is aligned over the first part of the recording. Its right-hand side, a sum over the
-/// beginnings' errors, is kept as a view.
+/// The rigid transform that aligns the beginnings so far with the truth, by least squares: relative to it a pose error
+/// is that of a trajectory aligned over the first part of the recording. The right-hand side, a sum over the
+/// beginnings' errors, is stored as a view.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gauge {
-    /// About what it turns, m.
+    /// Pivot of the rotation, m.
     pivot: Vector,
-    /// The normal matrix; of the beginnings' places alone.
+    /// The normal matrix; from the positions of the beginnings only.
     normal: Matrix6<f64>,
 }
 
-/// A beginning that is kept as a view until the gauge is made.
+/// A beginning stored as a view until the gauge is complete.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mark {
     number: u64,
@@ -38,8 +38,8 @@ impl Consider {
         self.against_gauge(place, (&by, self.beginning.fixed_view::<6, 6>(0, 0).into_owned()), with_beginning)
     }
 
-    /// The same of an error of covariance `own` that moves `place` by `by`; `with` tells its covariance with the gauge,
-    /// which is the view at the place that it is given.
+    /// The same for an error of covariance `own` that moves `place` by `by`; `with` returns its covariance with the
+    /// view at the given index, the gauge.
     fn against_gauge(
         &self,
         place: &Vector,
@@ -88,7 +88,7 @@ impl Consider {
             self.views.len() - 1
         });
         let gauge = self.gauge.unwrap_or(Gauge { pivot, normal: Matrix6::zeros() });
-        // How the gauge moves the place, and how the error moves the gauge.
+        // The effect of the gauge on the position, and of the error on the gauge.
         let by = error_at(&(pivot - gauge.pivot));
         let mut weight = Matrix6::identity();
         weight.fixed_view_mut::<3, 3>(3, 3).scale_mut(TURN_LEVER_M * TURN_LEVER_M);
@@ -108,7 +108,7 @@ impl Consider {
         self.gauge = Some(Gauge { normal: gauge.normal + by.transpose() * weight * by, ..gauge });
     }
 
-    /// Keeps the beginning, of `stamp`, until the gauge is made.
+    /// Stores the beginning at `stamp` until the gauge is complete.
     pub(in crate::estimation) fn mark_beginning(&mut self, stamp: Stamp) {
         let number = self.marks.last().map_or(FIRST_MARK, |last| last.number - 1);
         self.keep(number);
@@ -120,7 +120,8 @@ impl Consider {
         self.marks.first().map(|mark| mark.stamp)
     }
 
-    /// The gauge is made: when the marked beginnings were, and the covariances of their errors against it.
+    /// Completes the gauge: returns the stamps of the marked beginnings and the covariances of their errors relative to
+    /// it.
     pub(in crate::estimation) fn take_marks(&mut self) -> Vec<(Stamp, Matrix6<f64>)> {
         let marks = std::mem::take(&mut self.marks);
         let told = marks.iter().filter_map(|mark| {
@@ -147,7 +148,7 @@ mod tests {
     use approx::assert_relative_eq;
     use nalgebra::DMatrix;
 
-    /// Against the gauge made anew of the beginnings that were marked until then.
+    /// Relative to a gauge built from the beginnings marked until then.
     fn anew(consider: &Consider, until_ns: i64, place: &Vector) -> Matrix6<f64> {
         let mut of_marks = consider.clone();
         of_marks.gauge_by_marks(Stamp::from_nanos(until_ns));
@@ -203,7 +204,7 @@ mod tests {
         };
         let told = consider.covariance_against_gauge(&place);
         let (mark, own) = marked.unwrap();
-        // Made anew of the same beginnings the gauge is the same; of half of them it is another.
+        // Rebuilt from the same beginnings the gauge is the same; from half of them it differs.
         assert!((anew(&consider, 1, &place) - told).norm() > 0.01 * told.norm());
         let anew = anew(&consider, 3, &place);
         let marks = consider.take_marks();

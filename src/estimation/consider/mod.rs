@@ -1,17 +1,17 @@
 //! How uncertain the trajectory is, with all that a window takes for exact.
 //!
-//! A window is solved with its beginning and its fixed views held where they stand. Their errors are its errors too:
+//! A window is solved with the beginning and the fixed views held constant. Their errors enter the solution:
 //! with the window's answer linear in them, `e' = A e + sum V_k e_k + q`, the joint covariance of the beginning and of
-//! all views that are kept goes on from window to window (Schmidt's consider covariance, 1966; as in the stochastic
-//! cloning of Roumeliotis and Burdick, 2002, a view that is kept is a copy of the beginning's error at that time).
-//! Without views `A` is the identity and the errors walk away; where an old view is seen again, `A` vanishes and the
+//! all stored views propagates from window to window (Schmidt's consider covariance, 1966; as in the stochastic
+//! cloning of Roumeliotis and Burdick, 2002, a stored view is a copy of the beginning's error at that time).
+//! Without views `A` is the identity and the errors random-walk; where an old view is re-observed, `A` vanishes and the
 //! error is the view's.
 //!
-//! An error of a view is six numbers: a small turn (rad) of all that hangs on it about its pivot, then a shift (m), in
-//! the map. That of a beginning is the same about where the IMU is, their derivatives by time, and what the window
-//! takes over of the IMU: biases and gravity's tilt. A velocity that is wrong, or a bias, stays so over many windows:
-//! left out, a head that for seconds sees neither floor nor ceiling drifts along the vertical four times as far as its
-//! windows, each for itself, would say.
+//! An error of a view is six numbers: a small rotation (rad) of the view about the pivot, then a shift (m), in
+//! the map. The error of a beginning is the same about the IMU's position, with the time derivatives, and the IMU state
+//! that the window inherits: biases and gravity's tilt. An error of velocity or bias persists over many windows:
+//! without these terms, the vertical drift of a head that observes neither floor nor ceiling for seconds is four times
+//! what the covariances of the separate windows predict.
 
 mod gauge;
 
@@ -24,31 +24,31 @@ use nalgebra::{Matrix6, SMatrix};
 /// How little is known after a silence: turn, rad, and shift, m.
 const LOST: (f64, f64) = (1.0, 1.0);
 
-/// What a window takes over of the IMU: the first of the border's unknowns, its biases and gravity's tilt.
+/// The inherited IMU state: the first of the border's unknowns, biases and gravity's tilt.
 pub(super) const IMU: usize = 8;
-/// What a window begins with: turn and shift, their derivatives, and [`IMU`].
+/// The state at a window's beginning: rotation and shift, their derivatives, and [`IMU`].
 pub(super) const CARRIED: usize = 12 + IMU;
-/// Where in it the IMU's part begins.
+/// Index of the IMU part in it.
 pub(super) const AT_IMU: usize = 12;
-const _: () = assert!(GYRO_BIAS == 0, "the border begins with what is carried of it");
+const _: () = assert!(GYRO_BIAS == 0, "the border starts with the inherited unknowns");
 
-/// Of what a window begins with, by itself.
+/// A matrix over the state at a window's beginning.
 pub(super) type OfBeginning = SMatrix<f64, CARRIED, CARRIED>;
 
-/// What a window's solution owes to what it held fixed.
+/// Sensitivity of a window's solution to the errors of its fixed quantities.
 #[derive(Debug, Clone)]
 pub(super) struct Sensitivity {
-    /// Where the error is told, IMU's place, m.
+    /// Reference point of the error: the IMU's position, m.
     pub(super) pivot: Vector,
     /// `A`: by the error of the window's beginning.
     pub(super) beginning: OfBeginning,
-    /// `V_k`: by the error of each view in use, by its number.
+    /// `V_k`: sensitivity to the error of each view in use, by view number.
     pub(super) views: Vec<(u64, SMatrix<f64, CARRIED, 6>)>,
-    /// Covariance of what the window's own measurements add.
+    /// Covariance added by the window's measurements.
     pub(super) noise: OfBeginning,
 }
 
-/// The joint covariance of the window's beginning and of the views that are kept.
+/// The joint covariance of the window's beginning and of the stored views.
 #[derive(Debug, Clone)]
 pub(super) struct Consider {
     pivot: Vector,
@@ -68,13 +68,13 @@ struct View {
 }
 
 impl Consider {
-    /// Of a map that begins at `pivot`: there the error is none, by definition. `known` is the covariance of what a
-    /// window begins with, but for where it is.
+    /// For a map with the origin at `pivot`: the pose error there is zero by definition. `known` is the covariance of
+    /// the rest of the beginning's state.
     pub(super) fn new(pivot: Vector, known: &OfBeginning) -> Self {
         Self { pivot, beginning: *known, views: Vec::new(), gauge: None, marks: Vec::new() }
     }
 
-    /// Of a map that goes on at `pivot` after a silence, in which the head went nobody knows where.
+    /// For a map that continues at `pivot` after a gap with unknown motion.
     pub(super) fn lost(pivot: Vector, known: &OfBeginning) -> Self {
         let mut sigmas = [LOST.0; 6];
         sigmas[3..].fill(LOST.1);
@@ -91,18 +91,18 @@ impl Consider {
         Self { views: vec![map], ..Self::new(pivot, &somewhere(known, &(found + of_map))) }
     }
 
-    /// The window's end is as uncertain as its beginning, which carries it along, and what measurements add by there.
+    /// Sets the window's end: the uncertainty of the beginning, propagated, plus that of the measurements.
     pub(super) fn carry(&mut self, end: &Sensitivity) {
         self.go_rigidly(end.pivot, end.noise);
     }
 
-    /// Behind a silence the head was found again at `pivot`, to a covariance `found`, by what was seen before, which is
-    /// as uncertain as the head was then; `known` as for [`Consider::new`].
+    /// Relocalised at `pivot` after a gap, with covariance `found`, by surfaces from before the gap, which have the
+    /// uncertainty of that time; `known` as for [`Consider::new`].
     pub(super) fn find_again(&mut self, pivot: Vector, known: &OfBeginning, found: &Matrix6<f64>) {
         self.go_rigidly(pivot, somewhere(known, found));
     }
 
-    /// A turn of the beginning carries `pivot` along; of the rest of it is known what `noise` tells.
+    /// A rotation of the beginning moves `pivot` too; `noise` is the covariance of the remaining state.
     fn go_rigidly(&mut self, pivot: Vector, noise: OfBeginning) {
         let mut place = Matrix6::identity();
         place.fixed_view_mut::<3, 3>(3, 0).copy_from(&-skew(&(pivot - self.pivot)));
@@ -110,7 +110,7 @@ impl Consider {
         self.advance(&Sensitivity { pivot, beginning, views: Vec::new(), noise });
     }
 
-    /// The window moves on: its new beginning is what `by` says of the old one and the views.
+    /// Advances the window: the new beginning depends on the old one and the views as `by` states.
     pub(super) fn advance(&mut self, by: &Sensitivity) {
         let used: Vec<(usize, SMatrix<f64, CARRIED, 6>)> = by
             .views
@@ -136,12 +136,12 @@ impl Consider {
         }
     }
 
-    /// About what the beginning's error turns: where the IMU was then, m.
+    /// Pivot of the beginning's rotation error: the IMU's position at that time, m.
     pub(super) fn pivot(&self) -> Vector {
         self.pivot
     }
 
-    /// Views were kept and forgotten.
+    /// Updates the stored views: adds and removes.
     pub(super) fn take(&mut self, taken: Taken) {
         if let Some(number) = taken.forgotten {
             self.forget(number);
@@ -151,7 +151,7 @@ impl Consider {
         }
     }
 
-    /// A view is kept that shares the beginning's error; told about where its pivot is now.
+    /// Stores a view with the beginning's error, relative to the current pivot.
     fn keep(&mut self, number: u64) {
         let with_beginning = self.beginning.fixed_rows::<6>(0).into_owned();
         let place = |of: &SMatrix<f64, 6, CARRIED>| of.fixed_columns::<6>(0).into_owned();
@@ -169,8 +169,8 @@ impl Consider {
         }
     }
 
-    /// Covariance of position and then attitude, in the map's axes, of what hangs on the beginning at `place`: m^2, m
-    /// rad, rad^2.
+    /// Covariance of position and then attitude, in the map's axes, of a point at `place` rigidly connected to the
+    /// beginning: m^2, m rad, rad^2.
     pub(super) fn covariance_at(&self, place: &Vector) -> Matrix6<f64> {
         let by = error_at(&(place - self.pivot));
         by * self.beginning.fixed_view::<6, 6>(0, 0) * by.transpose()
@@ -182,7 +182,7 @@ impl Consider {
     }
 }
 
-/// How a turn and a shift of the map move a point `from_pivot` of their pivot: its position, then its attitude.
+/// Effect of a rotation and a shift of the map on a point at `from_pivot` from the pivot: on position, then attitude.
 fn error_at(from_pivot: &Vector) -> Matrix6<f64> {
     // shift = t + theta x (place - pivot)
     let mut by = Matrix6::zeros();
@@ -192,7 +192,7 @@ fn error_at(from_pivot: &Vector) -> Matrix6<f64> {
     by
 }
 
-/// `known`, and where the window begins to `place`.
+/// `known`, with `place` as the covariance of the window's pose.
 fn somewhere(known: &OfBeginning, place: &Matrix6<f64>) -> OfBeginning {
     let mut all = *known;
     all.fixed_view_mut::<6, 6>(0, 0).copy_from(place);
@@ -222,7 +222,7 @@ mod tests {
     /// By the definition: every error as a row of coefficients of independent noises.
     #[test]
     fn the_joint_covariance_is_that_of_the_errors_written_out() {
-        // What is known at first, and what eight windows add.
+        // The initial covariance, and the contribution of eight windows.
         let root = wave::<CARRIED>(31);
         let mut consider = Consider::new(Vector::zeros(), &(root * root.transpose()));
         let sources = CARRIED * 9;
@@ -289,12 +289,12 @@ mod tests {
         let there = Vector::new(1.0, -2.0, 0.5);
         let (known, found) = (OfBeginning::identity() * 0.7, Matrix6::identity() * 0.2);
         consider.find_again(there, &known, &found);
-        // What hung on the old beginning at that place, and the finding's own error.
+        // The error of the old beginning at that position, and the relocalisation error.
         let old = Consider::new(Vector::zeros(), &before);
         let own = Consider::new(there, &somewhere(&known, &found));
         let expected = old.covariance_at(&there) + own.covariance_at(&there);
         assert_relative_eq!(consider.covariance_at(&there), expected, epsilon = 1e-12);
-        // Velocity and biases are as at any beginning, and hang on nothing.
+        // Velocity and biases are independent, as at any beginning.
         assert_relative_eq!(consider.beginning[(7, 7)], 0.7, epsilon = 1e-12);
         assert_relative_eq!(consider.beginning[(2, 13)], 0.0, epsilon = 1e-12);
         // The view's error is in it.
@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn what_is_away_from_the_pivot_moves_with_its_turn() {
-        // A turn of variance s^2 about z alone, seen 3 m along x: 9 s^2 along y, correlated with the turn.
+        // A rotation of variance s^2 about z only, observed 3 m along x: 9 s^2 along y, correlated with the rotation.
         let mut noise = OfBeginning::zeros();
         noise[(2, 2)] = 1e-6;
         let mut consider = Consider::new(Vector::zeros(), &OfBeginning::zeros());

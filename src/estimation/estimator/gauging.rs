@@ -1,14 +1,14 @@
-//! When the gauge is made: which windows' beginnings the trajectory is aligned by when its error is stated.
+//! Construction of the gauge: the window beginnings over which the trajectory is aligned when errors are reported.
 
 use crate::estimation::GAUGED_S;
 use crate::estimation::consider::Consider;
 use crate::geometry::PoseCovariance;
 use crate::time::{Span, Stamp};
 
-/// While the alignment is made, a beginning is marked so often, s.
+/// Interval between marked beginnings while the alignment is built, s.
 const MARKED_EVERY_S: f64 = 1.0;
 
-/// The alignment of the first seconds, while it is made.
+/// The alignment of the first seconds, under construction.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gauging {
     /// Until when beginnings are part of the gauge, IMU time, s.
@@ -20,8 +20,8 @@ pub(super) struct Gauging {
 }
 
 impl Gauging {
-    /// Over the first seconds, the beginning at `until_s` (IMU time), which is `stamp`, is part of the alignment. For
-    /// twice as long beginnings are marked: a run that ends meanwhile is aligned over its first half.
+    /// Adds the beginning at `until_s` (IMU time), lidar time `stamp`, to the alignment of the first seconds. For
+    /// twice as long beginnings are marked: a run that ends meanwhile is aligned over the first half.
     pub(super) fn advance(&mut self, consider: &mut Consider, until_s: f64, stamp: Stamp) {
         let end_s = *self.until_s.get_or_insert(until_s + GAUGED_S);
         if until_s >= end_s + GAUGED_S {
@@ -37,8 +37,8 @@ impl Gauging {
         }
     }
 
-    /// The run ends with a pose at `last`: if beginnings are still marked, those of the first half are the alignment.
-    /// How uncertain the marked beginnings are against it.
+    /// The run ends with a pose at `last`: if beginnings are still marked, those of the first half form the alignment.
+    /// Returns the covariances of the marked beginnings relative to it.
     pub(super) fn finish(&mut self, consider: &mut Consider, last: Option<Stamp>) -> Vec<(Stamp, PoseCovariance)> {
         if let (Some(first), Some(last)) = (consider.first_mark(), last) {
             let half_s = (0.5 * last.seconds_since(first)).min(GAUGED_S);

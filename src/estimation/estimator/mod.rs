@@ -25,22 +25,22 @@ use crate::surfel_map::SurfelMap;
 use crate::time::Stamp;
 use std::time::Instant;
 
-/// A head that is faster than this, m/s, or turns faster than this, rad/s, should see surfaces again; one that does not
-/// is kept by the IMU.
+/// A head faster than this, m/s, or turning faster than this, rad/s, should match surfaces. Below both the IMU is
+/// sufficient.
 const MOVING: (f64, f64) = (0.3, 0.5);
 
-/// While the head is not found again behind a silence, the next one is bridged up to so many times as long as
-/// otherwise.
+/// Until the head is relocalised after a gap, the next gap is bridged up to this many times longer than
+/// usual.
 const RELUCTANTLY: f64 = 3.0;
 
-/// An IMU that is noisier than it was told by more than this factor is told of.
+/// An estimated noise above the specification by more than this factor is reported.
 const TELLING: f64 = 1.5;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
-/// Latency: a pose is final, and handed out by [`Estimator::take_poses`], when the window has passed it: `window_s`
-/// plus `step_s` after its instant, plus 0.1 s in which late measurements may still come. While the head is held still
-/// the window grows until `window_s` of it were swept, to three times `window_s` at most: a pose then waits as long.
+/// Latency: [`Estimator::take_poses`] returns a pose when it is final, `window_s` plus `step_s` after the time of the
+/// pose, plus 0.1 s for late measurements. While the head is at rest
+/// the window grows until the lidar has swept for `window_s`, to three times `window_s` at most; the latency grows too.
 #[derive(Debug)]
 pub struct Estimator {
     spec: EstimatorSpec,
@@ -49,18 +49,18 @@ pub struct Estimator {
     /// Stretches that wait until there are enough to begin.
     waiting: Vec<Stretch>,
     window: Option<Window>,
-    /// What was known when the IMU last fell silent, until the window behind it is level with it.
+    /// The state at the start of the last IMU gap, until the first window after the gap is level.
     carried: Option<Carried>,
     views: Views,
     /// A map in which the head is, where one is given.
     whereabouts: Option<Whereabouts>,
-    /// What was seen before the IMU fell silent, until the head is looked for in it.
+    /// Surfaces from before the IMU gap, until relocalisation in them is done.
     before: Option<Before>,
-    /// What was seen, where that is asked for.
+    /// Observed surfaces, where the caller requests them.
     survey: Option<Survey>,
     consider: Consider,
     gauging: Gauging,
-    /// How the newest window's end hangs on its beginning.
+    /// Sensitivity of the newest window's end to the errors of its beginning.
     at_end: Option<Sensitivity>,
     next_pose: Option<Stamp>,
     /// Stamp of the last pose that was handed out.
@@ -69,14 +69,14 @@ pub struct Estimator {
     clock_offsets: Vec<(Stamp, f64)>,
     windows: Vec<WindowReport>,
     warnings: Vec<Warning>,
-    /// For how long the IMU alone carried the head through motion, s.
+    /// Time for which only the IMU constrained the motion, s.
     carried_s: f64,
-    /// What was wrong with the newest window, and whether that was said.
+    /// The problem of the newest window, and whether it was reported.
     trouble: Option<(WarningKind, bool)>,
 }
 
 impl Estimator {
-    /// An estimator that has seen nothing yet.
+    /// An estimator without measurements.
     ///
     /// # Errors
     /// When a setting or the calibration makes no sense.
@@ -108,15 +108,15 @@ impl Estimator {
         })
     }
 
-    /// The same estimator, which also keeps what it sees for [`super::register`]: its memory then grows with the
+    /// The same estimator, which also stores its observations for [`super::register`]: memory then grows with the
     /// recording.
     pub fn surveying(self) -> Self {
         Self { survey: Some(Survey::default()), ..self }
     }
 
-    /// The same estimator, whose trajectory is in the frame of `map`, in which the head begins about at
-    /// `map_from_head`: within a metre on the level and twenty degrees about the vertical. Every window is then matched
-    /// with the map as well. No pose is handed out before the head is found, which is when the first window is full.
+    /// The same estimator, with the trajectory in the frame of `map`. The head starts near
+    /// `map_from_head`: within a metre on the level and twenty degrees about the vertical. Every window is
+    /// matched with the map too. The first pose follows after the first full window, when the head is localised.
     pub fn in_map(self, map: &SurfelMap, map_from_head: &Pose) -> Self {
         Self { whereabouts: Some(Whereabouts::about(map, *map_from_head, &self.spec)), ..self }
     }
@@ -138,7 +138,7 @@ impl Estimator {
         std::mem::take(&mut self.poses)
     }
 
-    /// Solves what is left; the result holds the poses not taken yet, and the reports of all windows.
+    /// Solves the remaining windows; the result has the poses not yet returned, and the reports of all windows.
     ///
     /// # Errors
     /// When there was no IMU, no lidar, or too little of both to start, or the head is not found in the map that was
@@ -170,8 +170,8 @@ impl Estimator {
         Ok(OpenLoop { trajectory, poses, gauged, clock_offsets, windows, warnings, survey, ..learnt })
     }
 
-    /// A stretch's way: it joins the window, the window is solved, the oldest stretch leaves, its poses are final, and
-    /// its surfels may become a fixed view.
+    /// Processes one segment: it joins the window, the window is solved, the oldest segment leaves, its poses are
+    /// final, and its surfels may become a fixed view.
     fn advance(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
         // While the head is still to be found, beginning once more would be to lose it.
         self.intake.bridge(if self.before.is_some() { RELUCTANTLY } else { 1.0 });
@@ -206,7 +206,7 @@ impl Estimator {
             window.level_as(&carried);
         }
         if window.is_full() && (self.find_in_map()? || self.find_again()) {
-            // Once more, with what is seen there.
+            // Solve a second time, with the surfaces in view there.
             let Some(window) = &mut self.window else { return Ok(()) };
             (solved, linearised) = window.solve(&self.views);
             spent += solved.spent;
@@ -217,7 +217,7 @@ impl Estimator {
         if window.is_full() {
             self.survey_window(Window::survey_oldest, Window::oldest_end_s);
         }
-        watch.lap_s(); // told by the survey itself
+        watch.lap_s(); // the survey reports this time itself
         let final_until_s = self.let_go(linearised.as_ref());
         spent.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return Ok(()) };
@@ -260,7 +260,7 @@ impl Estimator {
         Ok(true)
     }
 
-    /// Puts the window where it is in what was seen before a silence, if it is looked for there; whether it was found.
+    /// Relocalises the window in the surfaces from before a gap, if a search is pending; returns whether it succeeded.
     fn find_again(&mut self) -> bool {
         let (Some(window), Some(before)) = (&mut self.window, self.before.take()) else { return false };
         let stamp = self.intake.stamp(window.nominal.end_s());
@@ -299,7 +299,7 @@ impl Estimator {
         Some(until_s)
     }
 
-    /// The IMU fell silent: what the window holds is final, and the estimate will begin again behind the silence.
+    /// Handles an IMU gap: the window's content is final, and the estimate restarts after the gap.
     fn pause(&mut self) {
         self.waiting.clear();
         let Some(window) = &self.window else { return };
@@ -322,7 +322,7 @@ impl Estimator {
         }
     }
 
-    /// Begins, when enough of the start is there to tell rest from motion; with `last`, with whatever there is.
+    /// Starts when the data suffice to distinguish rest from motion; with `last`, with the data available.
     fn begin(&mut self, last: bool) {
         if self.window.is_some() {
             return;
@@ -368,7 +368,7 @@ impl Estimator {
         self.window = Some(window);
     }
 
-    /// What the lidar shows between the beginning and the end of the time in which the head should rest.
+    /// The evidence of the lidar on whether the head moved in the assumed rest.
     fn seen_standstill(&self) -> Standstill {
         let beams: Vec<Beam> = self.waiting.iter().flat_map(|stretch| &stretch.beams).copied().collect();
         let (Some(first), Some(last)) = (beams.first(), beams.last()) else { return Standstill::Unknown };
@@ -380,7 +380,7 @@ impl Estimator {
         standstill(&beams[..early], &beams[late..end])
     }
 
-    /// Takes the IMU for so much noisier than it was told from now on, and what waits with it.
+    /// Raises the assumed IMU noise from now on, for the queued samples too.
     fn make_noisier(&mut self, noisier: Noisier, start_s: f64) {
         if noisier == Noisier::NOT {
             return;
@@ -412,7 +412,7 @@ impl Estimator {
         if self.survey.is_some() { window.surveyed_by(surveyor) } else { window }
     }
 
-    /// Adds what the window saw, as far as `seen` tells it and until `until`, to the survey, where one is asked for.
+    /// Adds the window's observations returned by `seen`, up to `until`, to the survey, if there is one.
     fn survey_window(&mut self, seen: fn(&Window) -> Vec<(f64, Patch)>, until: fn(&Window) -> f64) {
         if let (Some(window), Some(survey)) = (&self.window, &mut self.survey) {
             let mut watch = Stopwatch::start();
@@ -421,7 +421,7 @@ impl Estimator {
         }
     }
 
-    /// What the window still holds is final: it is as uncertain as its end.
+    /// The window's content is final: the uncertainty is that of the window's end.
     fn consider_the_end(&mut self) {
         if let Some(end) = self.at_end.take() {
             self.consider.carry(&end);

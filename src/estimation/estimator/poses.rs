@@ -7,7 +7,7 @@ use crate::geometry::{Pose, Rotation};
 use crate::time::{Span, Stamp};
 
 impl Estimator {
-    /// Hands out the poses up to `until_u_s` (IMU time) at whole multiples of the IMU's period.
+    /// Outputs the poses up to `until_u_s` (IMU time) at whole multiples of the IMU's period.
     pub(super) fn hand_out(&mut self, until_u_s: f64) {
         let Some(window) = &self.window else { return };
         let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
@@ -16,7 +16,7 @@ impl Estimator {
             let start_ns = self.intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
             Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
         });
-        // Behind a silence the window may begin before the last pose: poses increase strictly all the same.
+        // After a gap the window may begin before the last pose: poses increase strictly all the same.
         if let Some(last) = self.newest_pose.filter(|last| stamp <= *last) {
             stamp = Stamp::from_nanos((last.nanos().div_euclid(period_ns) + 1) * period_ns);
         }

@@ -6,14 +6,16 @@ use crate::estimation::{EstimatorSpec, TimeSpent, Warning, WarningKind, WindowRe
 use crate::time::Stamp;
 use std::mem::discriminant;
 
-/// The head is lost when the IMU alone carried it for longer than this, s, and for more than this share of the time.
+/// The head is lost when it depends on the IMU only for longer than this, s, and for more than this fraction of the
+/// time.
 const LOST: (f64, f64) = (5.0, 0.2);
 
-/// Noise leaves the IMU and the trajectory less apart than this, as a multiple of itself: the trajectory follows it, and
-/// is solved with a noise half as much again. Where they are farther apart for as long as that, one of them is wrong.
+/// Noise produces a contradiction between IMU and trajectory below this multiple of the noise: the trajectory follows
+/// the IMU, and the noise is assumed half as large again. A larger contradiction over a window means that one of them
+/// is in error.
 const CONTRADICTED: f64 = 0.6;
 
-/// The report on a window's solution: whether the head moved in it, what was wrong with it, and the time it took.
+/// The report on a window's solution: whether the head moved, the problem found, and the time used.
 pub(super) fn report(
     solved: &Solved,
     (stamp, moving): (Stamp, bool),
@@ -46,7 +48,7 @@ pub(super) fn report(
     }
 }
 
-/// What is to be said about a window, if anything; `expected` tells whether it should have found surfaces.
+/// The problem of a window, if any; `expected`: whether surfaces should have been matched.
 pub(super) fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
     let matches = solved.matches + solved.view_matches;
     if let Some(reason) = solved.trouble {
@@ -60,7 +62,7 @@ pub(super) fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> 
     }
 }
 
-/// Whether a trouble means that the IMU alone told how the head went on.
+/// Whether a problem means that only the IMU determined the motion.
 pub(super) fn leaves_to_the_imu(trouble: &WarningKind) -> bool {
     match trouble {
         WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
@@ -70,7 +72,7 @@ pub(super) fn leaves_to_the_imu(trouble: &WarningKind) -> bool {
 }
 
 impl Estimator {
-    /// Warns where the IMU alone carried the head for too long: what it then tells is no estimate.
+    /// Warns where the IMU was the only constraint for too long: the trajectory is then no estimate.
     pub(super) fn warn_of_loss(&mut self) {
         let (seconds, of_seconds) = (self.carried_s, self.windows.len() as f64 * self.spec.step_s);
         if let Some(first) = self.windows.first().filter(|_| seconds > LOST.0 && seconds > LOST.1 * of_seconds) {
@@ -78,7 +80,7 @@ impl Estimator {
         }
     }
 
-    /// Warns where the IMU contradicted what the lidar saw by more than noise leaves.
+    /// Warns where IMU and lidar contradict each other by more than noise explains.
     pub(super) fn warn_of_contradiction(&mut self) {
         let all = self.windows.iter().map(|window| window.imu_contradiction);
         let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTED).collect();
@@ -90,8 +92,8 @@ impl Estimator {
         }
     }
 
-    /// Warns of a trouble when it lasts for two windows, or at once of a solution that was not believed; and once only,
-    /// until a window is well again or something else is wrong.
+    /// Warns of a problem when it lasts for two windows, or at once of a rejected solution; and only once,
+    /// until a window has no problem or another one.
     pub(super) fn say(&mut self, trouble: Option<WarningKind>, end_s: f64) {
         let before =
             self.trouble.take().filter(|(kind, _)| Some(discriminant(kind)) == trouble.as_ref().map(discriminant));

@@ -12,10 +12,11 @@ pub(super) const EDGE: usize = 5;
 /// Hz has 280 rad/s^3.
 const BRIDGED_PER_S2: (f64, f64) = (120.0, 300.0);
 const BRIDGED_AT_MOST: (f64, f64) = (2.0, 5.0);
-/// Gaps shorter than this are bridged by straight lines: the slopes at their ends are known less well than the chord, s.
+/// Gaps shorter than this are bridged by straight lines: the slopes at their ends are known less well than the chord,
+/// s.
 const SHORT_S: f64 = 0.045;
-/// A clipped angular velocity is known to this fraction of what the reconstruction is beyond the limit, and at least, to
-/// this fraction of the limit.
+/// A clipped angular velocity is known to this fraction of what the reconstruction is beyond the limit, and at least,
+/// to this fraction of the limit.
 const CLIPPED_GYRO: (f64, f64) = (0.5, 0.02);
 /// A clipped force is known to this fraction of the limit: a shock can be of any size.
 const CLIPPED_ACCEL: f64 = 1.0;

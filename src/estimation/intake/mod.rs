@@ -1,4 +1,4 @@
-//! Takes measurements as they come, and hands out stretches of time in which both sensors have spoken.
+//! Queues measurements as they arrive, and outputs time segments that both sensors cover.
 
 mod samples;
 mod scans;
@@ -17,28 +17,28 @@ use crate::measurement::{Calibration, Measurement};
 use crate::signal::Regularity;
 use crate::time::{Span, Stamp};
 
-/// How much further than a stretch its intervals reach, s: room for the clock offset to change.
+/// Margin of the intervals on both sides of a segment, s: room for the clock offset to change.
 pub(super) const MARGIN_S: f64 = 0.05;
 /// Disorder of arrivals that is put right, s.
 const DISORDER_S: f64 = 0.1;
-/// Clipped samples are reported again when they are so many times more than at the last report.
+/// Clipped samples are reported a second time when the count has grown by this factor.
 const CLIPPED_MORE: usize = 10;
 /// A silence of the lidar longer than this is a gap, s.
 const LIDAR_GAP_S: f64 = 0.5;
-/// Without the lidar for longer than this, the estimate stops and begins again with it, s.
+/// Without lidar data for longer than this, the estimate stops and restarts with the next scan, s.
 const LIDAR_AWAY_S: f64 = 3.0;
 /// A head that turns faster than this on average does not see the same twice, rad/s.
 const TURNS_RAD_PER_S: f64 = 0.1;
 /// Scans wait for the IMU no longer than this, s.
 const WAITS_FOR_IMU_S: f64 = 30.0;
 
-/// A stretch of time: what both sensors said in it.
+/// A time segment with the measurements of both sensors.
 #[derive(Debug, Default)]
 pub(super) struct Stretch {
-    /// Where it begins and ends, lidar time, s.
+    /// Start and end, lidar time, s.
     pub(super) start_s: f64,
     pub(super) end_s: f64,
-    /// Intervals of the IMU that follow those of the stretch before, each with its start, IMU time.
+    /// Intervals of the IMU that follow those of the previous segment, each with the start time, IMU time.
     pub(super) intervals: Vec<(f64, Interval)>,
     /// Beams of the stretch in the order of time.
     pub(super) beams: Vec<Beam>,
@@ -107,27 +107,27 @@ impl Intake {
         std::mem::take(&mut self.warnings)
     }
 
-    /// The IMU is so many times noisier than its specification.
+    /// Raises the assumed IMU noise by a factor.
     pub(super) fn make_noisier(&mut self, noisier: Noisier) {
         self.samples.make_noisier(noisier);
     }
 
-    /// Whether the lidar scans in one plane, as far as its scans have shown.
+    /// Whether the lidar scans in one plane, according to the scans so far.
     pub(super) fn is_planar(&self) -> bool {
         self.scans.is_planar()
     }
 
-    /// How the lidar looks about, as far as its first scans have shown.
+    /// The scanning geometry of the lidar, according to the first scans.
     pub(super) fn sight(&self) -> Sight {
         self.scans.sight()
     }
 
-    /// How many IMU samples and lidar scans came.
+    /// Numbers of IMU samples and lidar scans received.
     pub(super) fn counts(&self) -> (usize, usize) {
         (self.samples.count, self.scans.count)
     }
 
-    /// Takes a measurement in the order of its sensor's stamps.
+    /// Queues a measurement in the order of the sensor's stamps.
     pub(super) fn take(&mut self, measurement: Measurement) -> Result<(), EstimationError> {
         match measurement {
             Measurement::Imu(sample) => {
@@ -142,8 +142,8 @@ impl Intake {
         }
     }
 
-    /// The next stretch, when both sensors have passed its end, or one is silent for too long to wait; with `last`, of
-    /// whatever is left.
+    /// The next segment, when both sensors have passed its end, or one is silent for too long; with `last`, of
+    /// the remaining data.
     pub(super) fn next_stretch(&mut self, last: bool) -> Option<Stretch> {
         if self.samples.period_s().is_none() {
             self.start(last)?;
@@ -162,7 +162,7 @@ impl Intake {
         }
     }
 
-    /// Cuts the next stretch from what waits.
+    /// Cuts the next segment from the queues.
     fn cut(&mut self, last: bool) -> Option<Stretch> {
         let start_s = self.next_start_s;
         let imu_end_s = self.samples.newest_s() - MARGIN_S;
@@ -216,7 +216,7 @@ impl Intake {
         if both_s < enough_s + DISORDER_S && !(last && both_s > start_s + 2.0 * self.spec.step_s) {
             return None;
         }
-        // What came by now beyond the needed does not count, so that the order of arrivals does not.
+        // Ignore data beyond the required, so that the order of arrival has no effect.
         let stamps: Vec<f64> = self.samples.stamps().filter(|s| *s <= enough_s).collect();
         let imu = StampFilter::new(Regularity::of(&stamps)?, self.spec.clock.jitter_s);
         self.scans.start(first_scan, enough_s)?;
@@ -227,7 +227,7 @@ impl Intake {
         Some(())
     }
 
-    /// Reports what is notable about a stretch.
+    /// Reports the notable events of a segment.
     fn report(&mut self, stretch: &Stretch) {
         for (from_s, seconds) in self.samples.take_gaps() {
             self.warnings.push(Warning { stamp: self.stamp(from_s), kind: WarningKind::ImuGap { seconds } });
@@ -248,7 +248,7 @@ impl Intake {
         self.warnings.push(Warning { stamp: self.stamp(at_s), kind: WarningKind::Saturated { samples } });
     }
 
-    /// Reports what is left to report when nothing more comes.
+    /// Reports the remaining events at the end of the data.
     pub(super) fn close(&mut self) {
         if self.samples.clipped > self.clipped_reported {
             self.report_clipping(self.next_start_s);

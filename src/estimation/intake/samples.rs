@@ -7,14 +7,14 @@ use crate::estimation::strapdown::Interval;
 use crate::measurement::{ImuNoise, ImuSample};
 use std::collections::VecDeque;
 
-/// A sample is used when the newest one is later by this, s: by then those that came out of order are in place, and
-/// those that its screening looks ahead to are there.
+/// A sample is used when the newest one is later by this, s: then samples out of order have arrived, and
+/// those that the screening needs ahead.
 const COMPLETE_AFTER_S: f64 = 0.2;
 
-/// How far the samples reached.
+/// Coverage of the samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Reached {
-    /// Intervals cover what was asked for.
+    /// The intervals cover the requested time.
     All,
     /// More samples are needed.
     Waits,
@@ -22,7 +22,7 @@ pub(super) enum Reached {
     Silence(f64, f64),
 }
 
-/// What was left out of an IMU's samples, in numbers.
+/// Counts of the skipped IMU samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct LeftOut {
     pub late: usize,
@@ -34,15 +34,15 @@ pub(super) struct LeftOut {
 #[derive(Debug)]
 pub(super) struct SampleQueue {
     waiting: VecDeque<(f64, ImuSample)>,
-    /// Stamp of the last sample that was taken out, whatever became of it; earlier ones are late.
+    /// Stamp of the last sample removed from the queue; earlier ones are late.
     taken_s: f64,
     /// Stamp of the last sample that was used.
     used_s: f64,
     pub(super) count: usize,
     pub(super) left_out: LeftOut,
-    /// Clipped samples so far.
+    /// Number of clipped samples.
     pub(super) clipped: usize,
-    /// Silences that were bridged since they were last asked for: when they began and how long they were, s.
+    /// Gaps bridged since the last query: start and length, s.
     gaps: Vec<(f64, f64)>,
     screen: Screen,
     stream: Option<InertialStream>,
@@ -65,7 +65,7 @@ impl SampleQueue {
         }
     }
 
-    /// Puts a sample in its place among those that wait.
+    /// Inserts a sample into the queue.
     pub(super) fn take(&mut self, seconds: f64, sample: ImuSample) {
         self.count += 1;
         if seconds <= self.taken_s {
@@ -81,7 +81,7 @@ impl SampleQueue {
         self.waiting.iter().map(|(seconds, _)| *seconds)
     }
 
-    /// First and last stamp of those that wait, s.
+    /// First and last stamp in the queue, s.
     pub(super) fn span(&self) -> Option<(f64, f64)> {
         Some((self.waiting.front()?.0, self.waiting.back()?.0))
     }
@@ -96,8 +96,8 @@ impl SampleQueue {
         self.used_s
     }
 
-    /// Makes intervals by `stream` from now on, of the samples from `from_s` on: what came before the lidar began would
-    /// only be dead reckoning.
+    /// Starts the integration by `stream` with the samples from `from_s` on: data from before the first lidar scan
+    /// would be dead reckoning.
     pub(super) fn start(&mut self, stream: InertialStream, from_s: f64) {
         let before = self.waiting.partition_point(|(seconds, _)| *seconds < from_s);
         self.waiting.drain(..before);
@@ -109,15 +109,15 @@ impl SampleQueue {
         self.stream.as_ref().map(InertialStream::period_s)
     }
 
-    /// The IMU is so many times noisier than its specification.
+    /// Raises the assumed IMU noise by a factor.
     pub(super) fn make_noisier(&mut self, noisier: Noisier) {
         if let Some(stream) = &mut self.stream {
             stream.make_noisier(noisier);
         }
     }
 
-    /// Uses samples until intervals reach a little beyond `end_s`; silences of up to `bridged_s` are bridged. `last`:
-    /// nothing more comes.
+    /// Uses samples until the intervals reach slightly past `end_s`; gaps of up to `bridged_s` are bridged. `last`:
+    /// no more data will arrive.
     pub(super) fn advance(&mut self, end_s: f64, bridged_s: f64, last: bool) -> Reached {
         let complete_s = if last { f64::INFINITY } else { self.newest_s() - COMPLETE_AFTER_S };
         let Some(stream) = &mut self.stream else { return Reached::Waits };
@@ -161,7 +161,7 @@ impl SampleQueue {
         if self.used_s > end_s + MARGIN_S { Reached::All } else { Reached::Waits }
     }
 
-    /// The intervals that are complete, in order, each with its start.
+    /// The complete intervals, in order, each with the start time.
     pub(super) fn take_intervals(&mut self) -> Vec<(f64, Interval)> {
         if let Some(stream) = &mut self.stream {
             self.clipped += stream.take_saturated();
@@ -179,7 +179,7 @@ impl SampleQueue {
         self.stream.as_ref().map_or(f64::NEG_INFINITY, InertialStream::end_s)
     }
 
-    /// Begins again behind a silence with the sample stamped `until_s`, which is the next.
+    /// Restarts after a gap with the next sample, stamped `until_s`.
     pub(super) fn begin_again_at(&mut self, until_s: f64) {
         (self.taken_s, self.used_s) = (until_s - 1e-9, f64::NEG_INFINITY);
         if let Some(stream) = &mut self.stream {

@@ -15,7 +15,7 @@ const FROZEN: usize = 2;
 /// Scans of at least this many returns whose ranges are all equal to this, m, show no world.
 const CONSTANT: (usize, f32) = (20, 1e-4);
 
-/// What a scan's content is worth.
+/// Usability of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Content {
     New,
@@ -29,16 +29,16 @@ pub(super) struct ScanQueue {
     spec: EstimatorSpec,
     imu_from_laser: Pose,
     waiting: VecDeque<(f64, LidarScan, Content)>,
-    /// Raw stamp of the last scan that was used; what comes before it is late.
+    /// Raw stamp of the last scan used; earlier ones are late.
     used_s: f64,
     pub(super) count: usize,
     pub(super) late: usize,
-    /// Scans that were left out since they show nothing new.
+    /// Number of scans skipped as repeats.
     pub(super) frozen: usize,
     /// How many scans before the newest equal it, and their fingerprint.
     repeated: (usize, u64),
     sight: Sight,
-    /// Whether all points so far lay in the lidar's x-y plane.
+    /// Whether all points so far were in the lidar's x-y plane.
     planar: bool,
     filter: Option<StampFilter>,
     /// Beams already placed in time that belong to the next stretches.
@@ -63,7 +63,7 @@ impl ScanQueue {
         }
     }
 
-    /// Puts a scan in its place among those that wait; one that shows nothing new is left out.
+    /// Inserts a scan into the queue; skips a repeated one.
     pub(super) fn take(&mut self, seconds: f64, scan: LidarScan) -> Result<(), EstimationError> {
         let finite = |p: &nalgebra::Vector3<f32>| p.iter().copied().all(f32::is_finite);
         if !scan.returns.iter().all(|hit| finite(&hit.point_in_laser)) {
@@ -91,7 +91,7 @@ impl ScanQueue {
         if times >= FROZEN { Content::Repeated } else { Content::New }
     }
 
-    /// First and last stamp of those that wait, s.
+    /// First and last stamp in the queue, s.
     pub(super) fn span(&self) -> Option<(f64, f64)> {
         Some((self.waiting.front()?.0, self.waiting.back()?.0))
     }
@@ -106,12 +106,12 @@ impl ScanQueue {
         self.used_s
     }
 
-    /// Whether the lidar scans in one plane, as far as its scans have shown.
+    /// Whether the lidar scans in one plane, according to the scans so far.
     pub(super) fn is_planar(&self) -> bool {
         self.planar
     }
 
-    /// How the lidar looks about, as far as its first scans have shown.
+    /// The scanning geometry of the lidar, according to the first scans.
     pub(super) fn sight(&self) -> Sight {
         self.sight
     }
@@ -126,7 +126,8 @@ impl ScanQueue {
         Some(())
     }
 
-    /// The beams before `end_s`, lidar time, that were not taken yet; without those of repeated scans if the head moves.
+    /// The beams before `end_s`, lidar time, not yet used; without those of repeated scans if the head
+    /// moves.
     pub(super) fn take_until(&mut self, end_s: f64, moves: bool) -> Vec<Beam> {
         self.use_until(end_s, moves);
         let before = self.beams.iter().take_while(|beam| beam.tau_s < end_s).count();

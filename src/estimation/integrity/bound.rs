@@ -3,13 +3,13 @@
 use crate::geometry::{Matrix, PoseCovariance};
 use crate::signal::chi_squared_quantile;
 
-/// How probable it is that a position lies within its bound.
+/// Probability that a position is within the bound.
 const PROBABILITY: f64 = 0.99;
 
-/// The radius within which a Gaussian error of covariance `covariance` lies with a probability of 99 %, in the unit of
-/// its square root; infinite where the covariance is no covariance.
+/// The radius that contains a Gaussian error of covariance `covariance` with a probability of 99 %, in the unit of
+/// the covariance's square root; infinite where the matrix is no covariance.
 ///
-/// The squared error is a weighted sum of chi-squared variables. It is taken for one scaled chi-squared variable of the
+/// The squared error is a weighted sum of chi-squared variables, approximated by one scaled chi-squared variable of the
 /// same mean `tr P` and variance `2 tr P^2` (Satterthwaite, Biometrics Bulletin 2, 1946), which is exact for equal
 /// eigenvalues and for a single one.
 pub fn radius_99(covariance: &Matrix) -> f64 {

@@ -1,10 +1,10 @@
-//! What speaks for and against a result.
+//! Evidence for and against a result.
 
 use super::finding::{Cause, Finding, Status};
 use crate::estimation::{LeftOut, Warning, WarningKind, WindowReport};
 use crate::time::{Span, Stamp};
 
-/// More than this share of clipped samples is enough to lose the head.
+/// Above this fraction of clipped samples the head may be lost.
 const MUCH_CLIPPED: f64 = 0.02;
 
 /// Evidence is weighed over stretches of this length, s, or half of a shorter run.
@@ -12,16 +12,16 @@ const STRETCH_S: f64 = 5.0;
 /// Contradiction between IMU and lidar, as a multiple of the IMU's noise, from which a result is degraded, and lost.
 /// 0.12 to 0.35 in 24 sound runs of all scenes, at most 0.61 in a window.
 const CONTRADICTION: (f64, f64) = (0.6, 3.0);
-/// Residual of matched surfaces, m, likewise. 2 to 4.5 mm in sound runs, 6 in a window.
+/// Residual of matched surfaces, m. 2 to 4.5 mm in sound runs, 6 in a window.
 const RESIDUAL_M: (f64, f64) = (0.010, 0.018);
-/// Share of a stretch in which too few surfaces were matched, or windows were not solved.
+/// Fraction of an interval with too few matched surfaces, or with unsolved windows.
 const NOT_TRACKED: (f64, f64) = (0.35, 0.6);
-/// Share of a run without any match, and not at rest, from which the result is lost.
+/// Fraction of a run without any match, and not at rest, above which the result is lost.
 const UNOBSERVED: f64 = 0.5;
 /// Gaps longer than this degrade a result, s.
 const GAP_S: f64 = 0.2;
 const LIDAR_GAP_S: f64 = 1.0;
-/// Share of clipped samples, and of the recording without an estimate.
+/// Fraction of clipped samples, and of the recording without an estimate.
 const CLIPPED: f64 = 0.005;
 const NOT_COVERED: f64 = 0.05;
 /// More repeated readings than this are a frozen sensor.
@@ -34,18 +34,18 @@ const CLOCK_RATE: f64 = 5e-4;
 /// A head that is faster than this was integrated without being observed, m/s.
 const SPEED_M_PER_S: f64 = 60.0;
 
-/// Contradiction, residual (m) and IMU scale up to which a covariance is taken at its word.
+/// Contradiction, residual (m) and IMU scale up to which the covariance is used without enlargement.
 const SOUND: (f64, f64, f64) = (0.4, 0.006, 0.004);
-/// How a solution settles is looked at over so many windows, 20 s of the usual step.
+/// The settling of solutions is evaluated over this many windows, 20 s at the usual step.
 const SETTLING_WINDOWS: usize = 40;
 /// Last correction of a window's iterations, m and rad, up to which its matches are settled: root mean square. 0.1 to
 /// 0.5 mm where errors are a few millimetres; 1 to 4 mm where they are centimetres, because another choice of matches
 /// would give another solution.
 const SETTLED: f64 = 0.0005;
-/// No single window counts for more than this: behind a gap or a shock the first one jumps.
+/// Limit on the contribution of a window: after a gap or a shock the first one jumps.
 const LARGEST_STEP: f64 = 0.02;
 /// A window whose last correction is larger has not settled. 3 to 15 % of the windows in most places, 40 to 60 % on
-/// stairs; each share more enlarges the bound by [`PER_SHARE`].
+/// stairs; the bound grows with this fraction by [`PER_SHARE`].
 const UNSETTLED: f64 = 0.0002;
 const UNSETTLED_SHARE: f64 = 0.15;
 const PER_SHARE: f64 = 4.0;
@@ -57,15 +57,15 @@ const CONDITIONED: (f64, f64) = (0.002, 0.0001);
 const WEAK_WINDOWS: usize = 12;
 const WEAK_DOUBT: f64 = 4.0;
 const MOST_DOUBT: f64 = 1000.0;
-/// An IMU scale that a shock left behind says no more than this of the trajectory.
+/// Limit on the factor from the IMU scale: after a shock the scale says little about the trajectory.
 const MOST_BY_SCALE: f64 = 10.0;
 
-/// What an estimate leaves behind to judge it by.
+/// The data that an estimate is judged by.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence<'a> {
     /// The windows' reports, in order.
     pub windows: &'a [WindowReport],
-    /// What the estimator reported.
+    /// Warnings of the estimator.
     pub warnings: &'a [Warning],
     /// How many IMU samples there were.
     pub samples: usize,
@@ -75,7 +75,7 @@ pub struct Evidence<'a> {
     pub estimated: (Stamp, Stamp),
 }
 
-/// What was found about a run, each kind of cause once, the worst first, those of one weight in the order of time.
+/// The findings of a run, each kind of cause once, the worst first, equal ones in order of time.
 pub fn findings(evidence: &Evidence) -> Vec<Finding> {
     let mut all = of_windows(evidence.windows);
     all.extend(evidence.warnings.iter().filter_map(|warning| of_warning(warning, evidence)));
@@ -109,7 +109,7 @@ fn blame_clipping(findings: &mut [Finding]) {
         .for_each(|finding| finding.status = Status::Lost);
 }
 
-/// A stretch of windows with the median of a measure, or a share.
+/// A sequence of windows with the median of a measure, or a fraction.
 fn over_stretches(
     windows: &[WindowReport],
     measure: impl Fn(&[WindowReport]) -> f64,
@@ -143,7 +143,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or_default()
 }
 
-/// Whether a window left the position to the IMU although surfaces should have been matched.
+/// Whether only the IMU determined a window's position although surfaces should have been matched.
 fn is_untracked(window: &WindowReport) -> bool {
     matches!(window.trouble, Some(WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }))
 }
@@ -166,7 +166,7 @@ fn of_windows(windows: &[WindowReport]) -> Vec<Finding> {
     add(over_stretches(windows, fastest, (SPEED_M_PER_S, SPEED_M_PER_S)), &|speed_m_per_s, _, _| Cause::Speed {
         speed_m_per_s,
     });
-    // A head that neither rests nor observes any surface again for most of the run: its way is not known at all.
+    // A head that neither rests nor matches any surface for most of the run: the path is unknown.
     let (unobserved, assumed) = (for_most(windows, |w| !w.resting), for_most(windows, |w| w.resting && !w.sees_rest));
     all.extend(unobserved.map(|(seconds, from, to)| Finding {
         status: Status::Lost,
@@ -222,8 +222,8 @@ fn of_warning(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
     Some(Finding { status, cause, from, to })
 }
 
-/// Corrections of the calibration that are too large to be true. They are taken at the run's end, when they are known
-/// best, and hold for all of it.
+/// Implausibly large corrections of the calibration. They are evaluated at the run's end, where the estimate is
+/// best, and apply to the full run.
 fn of_calibration(windows: &[WindowReport]) -> Vec<Finding> {
     let (Some(first), Some(last)) = (windows.first(), windows.last()) else { return Vec::new() };
     let late = &windows[windows.len() / 2..];
@@ -259,11 +259,11 @@ fn of_coverage(evidence: &Evidence) -> Option<Finding> {
     })
 }
 
-/// By how much the bound that follows from the covariance is to be enlarged, at each window's end.
+/// Factor on the bound that follows from the covariance, at each window's end.
 ///
 /// The covariance assumes that IMU, lidar and calibration are as specified. Where IMU and lidar contradict each other,
-/// surfaces fit badly, or the IMU's scale leaves its prior, something else is wrong too, and by about as much. An error
-/// that was made stays in the map, so the factor never falls.
+/// surfaces fit badly, or the IMU's scale leaves the prior, another assumption is violated too, by about as much. An
+/// error persists in the map, so the factor never decreases.
 pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
     let mut most = 1.0_f64;
     let of = SETTLING_WINDOWS.min(windows.len());
@@ -293,7 +293,7 @@ pub fn doubt(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
     (0..windows.len()).map(enlarge).collect()
 }
 
-/// By how much windows that do not settle err more than the covariance says, those of `of` that there are.
+/// Factor by which the errors of windows that do not settle exceed the covariance, over the last `of` windows.
 fn unsettled(windows: &[WindowReport], of: usize) -> f64 {
     let squares: f64 = windows.iter().map(|w| w.last_correction_m.min(LARGEST_STEP).powi(2)).sum();
     let unsettled = windows.iter().filter(|w| w.last_correction_m > UNSETTLED).count();
@@ -302,7 +302,7 @@ fn unsettled(windows: &[WindowReport], of: usize) -> f64 {
     (rms / SETTLED).max(1.0 + PER_SHARE * (share - UNSETTLED_SHARE))
 }
 
-/// By how much the covariance along the weakest direction is too small where windows that match constrain it badly.
+/// Factor by which the covariance is too small in the weakest direction of badly conditioned windows.
 fn ill_conditioned(windows: &[WindowReport], of: usize) -> f64 {
     let matched: Vec<f64> = windows.iter().filter(|w| w.matches > 0 && !w.resting).map(|w| w.conditioning).collect();
     let enough = 2 * matched.len() > of;

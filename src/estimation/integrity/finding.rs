@@ -1,4 +1,4 @@
-//! What was found about a run, and what it means for the result.
+//! Findings about a run, and their effect on the result.
 
 use crate::time::Stamp;
 use std::fmt;
@@ -6,10 +6,10 @@ use std::fmt;
 /// The verdict on a result, best first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Status {
-    /// Within its bound, which is small.
+    /// Within the bound, which is small.
     #[default]
     Good,
-    /// Usable within its bound, which is larger than usual, or incomplete.
+    /// Usable within the bound, which is larger than usual, or incomplete.
     Degraded,
     /// Not usable from some time on.
     Lost,
@@ -35,9 +35,9 @@ impl fmt::Display for Status {
 /// A cause of degradation or loss, over a stretch of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// What it makes of the result.
+    /// Effect on the result.
     pub status: Status,
-    /// What was found.
+    /// The cause.
     pub cause: Cause,
     /// From when, lidar time.
     pub from: Stamp,
@@ -45,7 +45,7 @@ pub struct Finding {
     pub to: Stamp,
 }
 
-/// What degrades an estimate.
+/// A cause that degrades an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cause {
     /// IMU and lidar contradict each other by so many times the IMU's noise.
@@ -53,12 +53,12 @@ pub enum Cause {
         /// Median over the stretch; 0.1 to 0.4 in a sound run.
         times: f64,
     },
-    /// Too few surfaces were observed again for so long, s.
+    /// Too few surfaces were matched for this long, s.
     FewMatches {
         /// How long, s.
         seconds: f64,
     },
-    /// The head is taken for resting by its IMU alone: what it sees would not change if it moved evenly.
+    /// Rest is assumed from the IMU only: uniform motion would not change the lidar's view.
     RestAssumed {
         /// For how long, s.
         seconds: f64,
@@ -68,7 +68,7 @@ pub enum Cause {
         /// Median over the stretch, m.
         residual_m: f64,
     },
-    /// After a gap the head was not found in the map built so far, so the trajectory has an unknown offset.
+    /// Relocalisation in the map failed after a gap, so the trajectory has an unknown offset.
     NotRelocalised,
     /// The estimated velocity is not plausible.
     Speed {
@@ -82,21 +82,21 @@ pub enum Cause {
         /// How long, s.
         seconds: f64,
     },
-    /// The estimate does not cover the whole recording.
+    /// The estimate does not cover the full recording.
     NotCovered {
-        /// How much of it is missing, s.
+        /// Length of the missing part, s.
         seconds: f64,
     },
     /// The gyroscope or accelerometer was at the end of its range.
     Clipped {
-        /// Share of the samples, 0..1.
+        /// Fraction of the samples, 0..1.
         share: f64,
     },
-    /// A sensor repeats its reading.
+    /// A sensor repeats the same reading.
     Frozen {
         /// `"IMU"` or `"lidar"`.
         sensor: &'static str,
-        /// How many of its measurements were left out.
+        /// Number of skipped measurements.
         count: usize,
     },
     /// The estimated correction of all ranges is not plausible, m.
@@ -119,7 +119,7 @@ pub enum Cause {
         /// Largest bound, m.
         bound_m: f64,
     },
-    /// Loop closure moved the trajectory by more than its uncertainty, m.
+    /// Loop closure moved the trajectory by more than the uncertainty, m.
     LoopClosure {
         /// Largest shift, m.
         moved_m: f64,
@@ -127,14 +127,14 @@ pub enum Cause {
 }
 
 impl Finding {
-    /// Whether it tells what a sensor did, rather than what came of it.
+    /// Whether the cause is the behaviour of a sensor, not a consequence.
     pub(super) fn is_of_sensor(&self) -> bool {
         matches!(self.cause, Cause::Clipped { .. } | Cause::Frozen { .. })
     }
 }
 
 impl Cause {
-    /// How large it is, in the unit of its kind.
+    /// Magnitude, in the unit of the kind.
     pub(super) fn size(&self) -> f64 {
         match self {
             Self::Contradiction { times } => *times,
@@ -186,12 +186,12 @@ impl fmt::Display for Cause {
                  extrinsics, the IMU's units, signs and range, and the clocks"
             ),
             Self::FewMatches { seconds } => {
-                write!(f, "too few surfaces observed again for {seconds:.1} s; position from the IMU only")
+                write!(f, "tracking lost for {seconds:.1} s (too few matched surfaces); position from the IMU only")
             }
             Self::RestAssumed { seconds } => {
                 write!(
                     f,
-                    "taken for resting for {seconds:.1} s by the IMU alone; the surfaces in view would not show even motion"
+                    "at rest for {seconds:.1} s according to the IMU only; the visible surfaces cannot confirm it"
                 )
             }
             Self::PoorFit { residual_m } => {
@@ -208,7 +208,7 @@ impl fmt::Display for Cause {
             Self::Clipped { share } => {
                 write!(f, "{:.1} % of the IMU samples are clipped at the end of the sensor's range", share * 1e2)
             }
-            Self::Frozen { sensor, count } => write!(f, "the {sensor} repeats its reading ({count} left out)"),
+            Self::Frozen { sensor, count } => write!(f, "the {sensor} repeats the same reading ({count} skipped)"),
             Self::RangeCorrection { correction_m } => {
                 write!(f, "implausible range correction of {:.0} mm", correction_m * 1e3)
             }
@@ -218,7 +218,7 @@ impl fmt::Display for Cause {
                 write!(f, "the position error may reach {bound_m:.2} m (99 % bound)")
             }
             Self::LoopClosure { moved_m } => {
-                write!(f, "loop closure moved the trajectory by {moved_m:.2} m, more than its uncertainty")
+                write!(f, "loop closure moved the trajectory by {moved_m:.2} m, more than the uncertainty")
             }
         }
     }

@@ -1,10 +1,11 @@
 //! Integrity of an estimate: a bound on each pose's error, and a verdict on the run with its causes.
 //!
-//! The covariance of a pose says how large its error is if all that the estimator assumes is right. [`Evidence`] is what
-//! speaks for or against that: how well IMU and lidar agree, how many surfaces were observed again and how well they fit,
-//! which directions they constrain, gaps, clipping, frozen sensors, implausible calibration states, and how far the loop
-//! closure moved the odometry. [`findings`] turns it into causes, each with its time and its weight, and [`doubt`] into a
-//! factor on the covariance-based bound. `docs/integrity.md` has the theory and how it compares with truth.
+//! The covariance of a pose is valid if the estimator's assumptions are. [`Evidence`] tests
+//! these: agreement of IMU and lidar, number of matched surfaces and their residuals,
+//! constrained directions, gaps, clipping, frozen sensors, implausible calibration states, and the
+//! shift by the loop closure. [`findings`] turns it into causes, each with time and severity, and
+//! [`doubt`] into a factor on the covariance-based bound. `docs/theory/integrity.md` has the theory and the comparison
+//! with truth.
 
 mod bound;
 mod evidence;

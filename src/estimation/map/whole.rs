@@ -2,9 +2,9 @@
 //!
 //! Rooms are symmetric and storeys alike: from a wrong start a wrong place is found in which most of what was seen lies
 //! on the map (up to 82 % in the mocap room turned by 180 degrees, where the right place has 99 %). No property of the
-//! wrong place alone separates it from the right one in a map that shows little of what is seen; the comparison with all
-//! other places of the map does. These are proposed by correlation (Olson, ICRA 2009), in three dimensions and by all
-//! surfaces, with their normals.
+//! wrong place alone separates it from the right one in a map that shows little of what is seen; the comparison with
+//! all other places of the map does. These are proposed by correlation (Olson, ICRA 2009), in three dimensions and by
+//! all surfaces, with their normals.
 
 use super::locate::{Located, Locator, is_elsewhere, tried};
 use super::search::IN_MAP;
@@ -52,7 +52,8 @@ impl Shift {
     }
 }
 
-/// Surfaces of the map about a place: of each cell the directions of the normals in it and in its neighbours, a bit each.
+/// Surfaces of the map about a place: of each cell the directions of the normals in it and in its neighbours, a bit
+/// each.
 struct Volume {
     first: [i32; 3],
     size: [i32; 3],

@@ -1,21 +1,21 @@
-//! By how much an IMU contradicts a trajectory.
+//! Contradiction between an IMU and a trajectory.
 
 use super::inertial::Inertial;
 use crate::estimation::strapdown::{Biases, Interval, State};
 use crate::geometry::Vector;
 
-/// Turns and speeds are summed for so long, s: what single samples are off by does not count.
-const SPELL_S: f64 = 0.2;
+/// Rotations and velocities are summed over this interval, s, which averages the noise of single samples.
+const SUMMED_S: f64 = 0.2;
 
-/// What turn and speed are off by over a spell, rad and m/s, and the variance of each on an axis.
+/// Residuals of rotation (rad) and velocity (m/s) summed over a time span, and the variance of each on an axis.
 #[derive(Default)]
-struct Spell {
+struct SummedResidual {
     lasts_s: f64,
     off: [Vector; 2],
     variances: [f64; 2],
 }
 
-impl Spell {
+impl SummedResidual {
     fn add(&mut self, terms: &Inertial, interval: &Interval) {
         let h = interval.h;
         self.lasts_s += h;
@@ -25,25 +25,27 @@ impl Spell {
         self.variances[1] += (interval.accel_sigma * h).powi(2);
     }
 
-    /// Both as multiples of their standard deviations.
+    /// Both residuals as multiples of the standard deviations.
     fn times(&self) -> [f64; 2] {
         [0, 1].map(|k| self.off[k].norm() / (3.0 * self.variances[k]).sqrt())
     }
 }
 
-/// How many times farther than their noise has it an IMU's samples are from the turns and the speeds between `states`:
-/// the median over spells, of turns or of speeds, whichever is more; about one where samples and states agree.
+/// The disagreement between IMU samples and `states`, as a multiple of the IMU noise.
+///
+/// The median over spans of the rotation or of the velocity residual, the larger of the two; about 1 for consistent
+/// data.
 pub(in crate::estimation) fn contradiction(
     states: &[State],
     intervals: &[Interval],
     (biases, gravity): (&Biases, &Vector),
 ) -> f64 {
-    let (mut spell, mut times) = (Spell::default(), [Vec::new(), Vec::new()]);
+    let (mut sum, mut times) = (SummedResidual::default(), [Vec::new(), Vec::new()]);
     for (ends, interval) in states.windows(2).zip(intervals) {
-        spell.add(&Inertial::between((&ends[0], &ends[1]), interval, biases, gravity), interval);
-        if spell.lasts_s >= SPELL_S {
-            let told = std::mem::take(&mut spell).times();
-            times.iter_mut().zip(told).for_each(|(all, one)| all.push(one));
+        sum.add(&Inertial::between((&ends[0], &ends[1]), interval, biases, gravity), interval);
+        if sum.lasts_s >= SUMMED_S {
+            let multiples = std::mem::take(&mut sum).times();
+            times.iter_mut().zip(multiples).for_each(|(all, one)| all.push(one));
         }
     }
     let median = |mut all: Vec<f64>| {
@@ -61,7 +63,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Forty seconds of an IMU that turns and is shaken, and the states that it tells.
+    /// Forty seconds of an IMU under rotation and vibration, and the states integrated from it.
     fn run(biases: &Biases, gravity: &Vector) -> (Vec<State>, Vec<Interval>) {
         let mut states =
             vec![State { rotation: Default::default(), position: Vector::zeros(), velocity: Vector::zeros() }];
@@ -85,22 +87,22 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_contradicts_by_the_median_of_its_own_norm_and_a_wrong_sign_by_far_more() {
+    fn white_noise_gives_the_median_of_its_norm_and_a_flipped_sign_a_large_value() {
         let (biases, gravity) = (Biases { gyro: Vector::zeros(), accel: Vector::zeros() }, gravity_in_world());
         let (states, mut intervals) = run(&biases, &gravity);
-        let told = |intervals: &[Interval]| contradiction(&states, intervals, (&biases, &gravity));
-        assert!(told(&intervals) < 1e-6);
+        let multiples = |intervals: &[Interval]| contradiction(&states, intervals, (&biases, &gravity));
+        assert!(multiples(&intervals) < 1e-6);
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut noise = |sigma: f64| Vector::from_fn(|_, _| sigma * random.sample::<f64, _>(StandardNormal));
         for interval in &mut intervals {
             interval.gyro += noise(interval.gyro_sigma);
             interval.accel += noise(interval.accel_sigma);
         }
-        // The median of chi-squared with three degrees of freedom is 2.366; 200 spells know it to 6 %, the more of two
-        // is above it.
+        // The median of chi-squared with three degrees of freedom is 2.366. With 200 spans the sample median has an
+        // error of 6 %; the larger of two medians is above it.
         let expected = (2.366_f64 / 3.0).sqrt();
-        assert!((told(&intervals) / expected - 1.0).abs() < 0.15, "{}", told(&intervals));
+        assert!((multiples(&intervals) / expected - 1.0).abs() < 0.15, "{}", multiples(&intervals));
         intervals.iter_mut().for_each(|interval| interval.accel.x *= -1.0);
-        assert!(told(&intervals) > 20.0);
+        assert!(multiples(&intervals) > 20.0);
     }
 }

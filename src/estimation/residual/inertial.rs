@@ -1,50 +1,51 @@
-//! How the trajectory deviates from what the IMU measured over an interval between two nodes.
+//! Residuals between the trajectory and the IMU measurements over an interval between two nodes.
 //!
 //! ```text
 //! e_w = log(exp(phi(b_w))^-1 R_k^-1 R_(k+1)) / h
 //! e_a = R_mid^T ((v_(k+1) - v_k) / h - g) - (f_mid - b_a)
 //! ```
 //!
-//! Both compare means over the interval, so the rate belongs to its middle and no second difference of positions is
-//! taken: `v` is the integrated velocity, corrected by the spline's exact derivative. With `R' = exp(dr) R`, `t' = t +
-//! dt`, in the map's axes:
+//! Both compare means over the interval, so the rate belongs to the middle and no second difference of positions is
+//! needed: `v` is the integrated velocity, corrected by the exact derivative of the spline. With `R' = exp(dr) R`, `t'
+//! = t + dt`, in the map's axes:
 //!
 //! ```text
 //! d R_(k+1) e_w / d(dr_(k+1) - dr_k) = 1 / h      d R_(k+1) e_w / db_w = R_(k+1)
 //! d R_mid e_a / d(dv_(k+1) - dv_k) = 1 / h        d R_mid e_a / d dr_mid = [x]x,  x = (v_(k+1) - v_k) / h - g
-//! d R_(k+1) e_w / dM = R_(k+1) w^T, row by row, M the gyroscope's exaggeration
-//! d R_mid e_a / dM = R_mid f^T, likewise, M the accelerometer's
+//! d R_(k+1) e_w / dM = R_(k+1) w^T, row by row, M the gyroscope's scale errors and misalignments
+//! d R_mid e_a / dM = R_mid f^T, row by row, M the accelerometer's
 //! d R_mid e_a / db_a = R_mid                      d R_mid e_a / dgamma = [g]x (e_x, e_y),  g' = exp(gamma) g
 //! ```
 //!
-//! The equations take them summed over a knot's spacing ([`add_inertial`]): so far the correction can follow what a
-//! bias does.
+//! The equations use residuals summed over a knot spacing ([`add_inertial`]), which is the resolution at which the
+//! correction can follow the effect of a bias.
 
-use super::rows::{KNOTS, Row, Rows};
+use super::rows::{KNOTS, ResidualRow, ResidualSums};
 use super::{ACCEL_BIAS, ACCEL_MATRIX, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::estimation::strapdown::{Biases, Interval, State};
 use crate::geometry::{Matrix, Rotation, Vector, skew};
 
-/// Sigmas that differ by this factor are not summed.
+/// Intervals whose sigmas differ by more than this factor are not summed.
 const UNLIKE: f64 = 3.0;
-/// By how much a single sample of the accelerometer may be off, beyond its noise, since the correction cannot follow it
-/// within a knot's span. None at all, and a correction could swing between the sums' ends.
+/// Factor on the noise of a single accelerometer sample, since the correction cannot follow it within a knot's span.
+/// Without the single samples the correction could oscillate between the ends of the sums.
 const WITHIN_SPAN: f64 = 3.0;
 
-/// Gaps of the IMU no longer than this leave no step that would matter, and the head's place more certain than matches
-/// reach, s.
+/// IMU gaps up to this length, s, cause no significant velocity step, and the predicted pose stays within the match
+/// gate.
 pub(in crate::estimation) const SHORT_GAP_S: f64 = 0.05;
-/// An interval whose readings are less certain than this, rad/s and m/s^2, is weakly measured.
+/// An interval with larger sigmas than these, rad/s and m/s^2, is weakly measured.
 const WEAK: (f64, f64) = (0.3, 1.0);
-/// Behind a run of weakly measured intervals the correction may have to step by this, rad and m/s.
+/// Uncertainty after a run of weakly measured intervals above which the correction may have a step, rad and m/s.
 const STEP: (f64, f64) = (0.03, 0.08);
-/// How far to both sides of a gap the correction takes the step, s, and by how much it then differs, rad/s and m/s^2.
-const BESIDE_S: f64 = 0.3;
-const BESIDE: (f64, f64) = (0.5, 3.0);
+/// Time on both sides of a gap over which the correction absorbs the step, s.
+const STEP_MARGIN_S: f64 = 0.3;
+/// Sigmas added to the samples within this time, rad/s and m/s^2.
+const STEP_MARGIN_SIGMA: (f64, f64) = (0.5, 3.0);
 
-/// The residuals of an interval and what their derivatives are made of.
+/// The residuals of an interval, and the factors of their derivatives.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Inertial {
     /// `e_w`, rad/s.
@@ -75,14 +76,14 @@ impl Inertial {
     }
 }
 
-/// Adds to the equations what `intervals` between `states` say, with the splines' bases at the states.
+/// Adds the residuals of `intervals` between `states` to the equations, with the spline bases at the states.
 ///
-/// A head that rocks turns a change of its accelerometer's bias into a changing acceleration. The correction, whose
-/// second derivative is straight between knots, follows it in the mean over a knot's spacing, and not from sample to
-/// sample: taken sample by sample, the difference would pass for knowledge and hold the bias wherever it is. So speeds
-/// count in full when summed from one middle of a knot's span to the next, and sample by sample for less
-/// ([`WITHIN_SPAN`]). Where sigmas change, as where a sensor is silent, another sum begins, so that the better part
-/// keeps its worth.
+/// If the head rocks, a change of the accelerometer bias becomes a changing acceleration in the map. The second
+/// derivative of the correction is linear between knots, so it follows this acceleration on average over a knot spacing
+/// but not from sample to sample. With full weight on single samples, the difference would count as information and
+/// freeze the bias at any value. Therefore velocities have full weight when summed from the middle of one knot span to
+/// the next, and single samples have less ([`WITHIN_SPAN`]). Where sigmas change, for example at a dropout, a new sum
+/// starts, so that the accurate samples retain their weight.
 pub(in crate::estimation) fn add_inertial(
     equations: &mut NormalEquations,
     layout: &Layout,
@@ -90,7 +91,7 @@ pub(in crate::estimation) fn add_inertial(
     intervals: &[Interval],
     (biases, gravity): (&Biases, &Vector),
 ) {
-    let (mut each, mut whole) = (Rows::none(), Rows::none());
+    let (mut each, mut whole) = (ResidualSums::none(), ResidualSums::none());
     let mut sum: Option<Speed> = None;
     let near_steps = near_steps(intervals);
     for (k, interval) in intervals.iter().enumerate() {
@@ -113,10 +114,11 @@ pub(in crate::estimation) fn add_inertial(
     whole.move_to(equations, layout);
 }
 
-/// Which intervals are near a run of weakly measured ones (a bridged gap, clipped readings) behind which velocity or
-/// attitude are uncertain by more than [`STEP`]: there the correction has to make a step. It is smooth over some knots'
-/// spacings and takes the step on both sides of the run, where it contradicts good samples; taken at their word they
-/// would move the biases instead.
+/// Marks intervals close to a run of weakly measured ones (a bridged gap, clipped readings).
+///
+/// After such a run velocity or attitude are uncertain by more than [`STEP`], so the correction needs a step. The
+/// correction is smooth over some knot spacings and spreads the step to both sides of the run, where it contradicts
+/// valid samples. With their nominal sigmas these samples would move the biases instead.
 fn near_steps(intervals: &[Interval]) -> Vec<bool> {
     let mut near = vec![false; intervals.len()];
     let (mut step2, mut since_s) = ((0.0, 0.0), f64::INFINITY);
@@ -126,12 +128,12 @@ fn near_steps(intervals: &[Interval]) -> Vec<bool> {
         step2 = (add(step2.0, interval.gyro_sigma), add(step2.1, interval.accel_sigma));
         let is_step = step2.0.sqrt() > STEP.0 || step2.1.sqrt() > STEP.1;
         since_s = if is_step { 0.0 } else { since_s + interval.h };
-        near[k] = since_s < BESIDE_S;
+        near[k] = since_s < STEP_MARGIN_S;
         if is_step {
             let mut before_s = 0.0;
             for (earlier, near) in intervals[..k].iter().zip(&mut near).rev() {
                 before_s += earlier.h;
-                if *near || before_s > BESIDE_S {
+                if *near || before_s > STEP_MARGIN_S {
                     break;
                 }
                 *near = true;
@@ -141,18 +143,19 @@ fn near_steps(intervals: &[Interval]) -> Vec<bool> {
     near
 }
 
-/// The same interval, of which the correction may differ by [`BESIDE`].
+/// The same interval with [`STEP_MARGIN_SIGMA`] added to the sigmas.
 fn loosened(interval: &Interval) -> Interval {
-    let (gyro_sigma, accel_sigma) = (interval.gyro_sigma.hypot(BESIDE.0), interval.accel_sigma.hypot(BESIDE.1));
+    let (gyro_sigma, accel_sigma) =
+        (interval.gyro_sigma.hypot(STEP_MARGIN_SIGMA.0), interval.accel_sigma.hypot(STEP_MARGIN_SIGMA.1));
     Interval { gyro_sigma, accel_sigma, ..*interval }
 }
 
-/// Speeds are summed from one middle of a knot's span to the next.
+/// The number of the sum that an interval belongs to: from the middle of one knot span to the next.
 fn span_of(basis: &Basis) -> i64 {
     basis.first + i64::from(basis.value[3] > basis.value[0])
 }
 
-/// A deviation on three axes, rad or m/s, with its variance, and the knots that it hangs on.
+/// A residual on three axes, rad or m/s, with the variance and the knots that it depends on.
 #[derive(Debug, Clone, Copy)]
 struct Sum {
     /// Index of the first knot.
@@ -164,24 +167,24 @@ struct Sum {
 }
 
 impl Sum {
-    /// Of a mean deviation over an interval, between bases at its ends.
+    /// The sum of a mean residual over an interval, between the bases at both ends.
     fn over(deviation: &Vector, sigma: f64, h: f64, ends: (&Basis, &Basis)) -> Self {
         let used = 4 + place(ends.1.first, ends.0.first);
         Self { first: ends.0.first, used, deviation: deviation * h, variance: (sigma * h).powi(2) }
     }
 }
 
-/// The place of a knot among those from `first` on.
+/// The offset of a knot from `first`.
 fn place(knot: i64, first: i64) -> usize {
     ((knot - first).max(0) as usize).min(KNOTS - 4)
 }
 
-/// What the gyroscope says over an interval, and how that hangs on the unknowns.
+/// The gyroscope residual over an interval, with the derivatives by the unknowns.
 #[derive(Debug, Clone, Copy)]
 struct Turn {
     sum: Sum,
     by_turn: [f64; KNOTS],
-    /// By the bias, and by the columns of the exaggeration.
+    /// By the bias, and by the columns of the scale and misalignment matrix.
     by_gyro: [Matrix; 4],
 }
 
@@ -200,10 +203,10 @@ impl Turn {
         Self { sum, by_turn, by_gyro }
     }
 
-    fn add_to(&self, rows: &mut Rows, equations: &mut NormalEquations, layout: &Layout) {
+    fn add_to(&self, rows: &mut ResidualSums, equations: &mut NormalEquations, layout: &Layout) {
         let Sum { first, used, deviation, variance } = self.sum;
         for axis in 0..3 {
-            let mut row = Row::from(first);
+            let mut row = ResidualRow::from(first);
             for (knot, by) in self.by_turn[..used].iter().enumerate() {
                 *row.knot(knot, axis) = *by;
             }
@@ -218,7 +221,7 @@ impl Turn {
     }
 }
 
-/// What the accelerometer says over some intervals, and how that hangs on the unknowns.
+/// The accelerometer residual over one or more intervals, with the derivatives by the unknowns.
 #[derive(Debug, Clone, Copy)]
 struct Speed {
     span: i64,
@@ -226,7 +229,7 @@ struct Speed {
     sum: Sum,
     by_shift: [f64; KNOTS],
     by_turn: [Matrix; KNOTS],
-    /// By the bias, and by the columns of the exaggeration.
+    /// By the bias, and by the columns of the scale and misalignment matrix.
     by_accel: [Matrix; 4],
     by_tilt: Matrix,
 }
@@ -254,12 +257,12 @@ impl Speed {
         }
     }
 
-    /// Whether another belongs to the same span, and is about as good.
+    /// Whether another interval belongs to the same span and has a similar sigma.
     fn goes_on_with(&self, next: &Self) -> bool {
         next.span == self.span && next.sigma < UNLIKE * self.sigma && self.sigma < UNLIKE * next.sigma
     }
 
-    /// Adds what the interval after it says.
+    /// Adds the residual of the next interval.
     fn join(&mut self, next: &Self) {
         let place = place(next.sum.first, self.sum.first);
         let used = next.sum.used.min(KNOTS - place);
@@ -274,12 +277,12 @@ impl Speed {
         self.sum.variance += next.sum.variance;
     }
 
-    /// Adds what it says, with its sigma taken `looser` times.
-    fn add_to(&self, looser: f64, rows: &mut Rows, equations: &mut NormalEquations, layout: &Layout) {
+    /// Adds the residual to the equations, with the sigma multiplied by `looser`.
+    fn add_to(&self, looser: f64, rows: &mut ResidualSums, equations: &mut NormalEquations, layout: &Layout) {
         let Sum { first, used, deviation, variance } = self.sum;
         let weight = (variance * looser * looser).recip();
         for axis in 0..3 {
-            let mut row = Row::from(first);
+            let mut row = ResidualRow::from(first);
             for knot in 0..used {
                 for i in 0..3 {
                     *row.knot(knot, i) = self.by_turn[knot][(axis, i)];
@@ -337,8 +340,7 @@ mod tests {
             equations
         }
 
-        /// The deviations, whitened: of the turn and of the speed, sample by sample, and of the speed over all
-        /// intervals.
+        /// The whitened residuals: rotation and velocity sample by sample, and velocity over all intervals.
         fn whitened(&self) -> Vec<f64> {
             let (mut whole, mut variance) = (Vector::zeros(), 0.0);
             let mut each = Vec::new();
@@ -382,7 +384,7 @@ mod tests {
         Case { states, intervals, biases, gravity, start_s }
     }
 
-    /// 200 ms from one middle of a span across a knot to the next, which are summed, with states that do not quite fit.
+    /// 200 ms from the middle of one span to the next, which form one sum, with states that do not fit exactly.
     fn misfit() -> Case {
         let mut case = rocking(0.505, 20);
         for (k, state) in case.states.iter_mut().enumerate() {
@@ -437,7 +439,8 @@ mod tests {
             jacobian.set_column(k, &((forward - whitened(&case, &x)) / (2.0 * step)));
         }
         let equations = case.equations(&layout);
-        // Left out on purpose: what the biases do through terms of order h (a turn of 0.05 rad within the interval).
+        // Neglected on purpose: the effect of the biases through terms of order h (a rotation of 0.05 rad in the
+        // interval).
         let (dense, numeric) = (equations.dense(), jacobian.transpose() * &jacobian);
         let scale = numeric.amax();
         assert_relative_eq!(dense, numeric, epsilon = 1e-2 * scale, max_relative = 2e-2);
@@ -450,15 +453,16 @@ mod tests {
 
     #[test]
     fn integration_leaves_no_residual() {
-        // Rounding, and the coning term, h^3 small: the middle is found from the turn here and from the rate there.
+        // Rounding and the coning term of order h^3: the residual takes the middle from the rotation, integration from
+        // the rate.
         let largest = rocking(0.0, 100).whitened().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         assert!(largest < 0.1, "{largest}");
     }
 
     #[test]
-    fn an_imu_alone_says_next_to_nothing_of_its_bias() {
-        // Any bias of the accelerometer goes with some trajectory that begins as this one does. So four seconds of
-        // rocking, which would know a constant to 10 mm/s^2 / sqrt(400), leave it unknown to 25 times that.
+    fn an_imu_without_other_sensors_does_not_observe_its_bias() {
+        // Any accelerometer bias is consistent with some trajectory with the same initial state. Four seconds of
+        // rocking would determine a constant to 10 mm/s^2 / sqrt(400); the bias sigma stays above 25 times that.
         let case = rocking(0.013, 400);
         let layout = Layout { first_knot: 0, knots: 24 };
         let mut equations = case.equations(&layout);

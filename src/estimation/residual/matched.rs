@@ -1,19 +1,19 @@
-//! How far two matched surfels are apart along the normal of the surface that both belong to.
+//! Distance between two matched surfels along the normal of their common surface.
 //!
 //! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by `zeta^2 = 1 / (sigma_r^2 +
-//! lambda + d_i + d_j)`, with `d` what a patch that is not flat is in doubt by. A live surfel's centre moves by `dt +
-//! dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the way from the lidar, `u` along it, and the lidar turned by
-//! `e` and shifted by `s` along the IMU's axes; one of a fixed view does not.
+//! lambda + d_i + d_j)`, with `d` the extra variance of a patch that is not flat. The centre of a live surfel moves by
+//! `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the vector from the lidar, `u` its direction, and the
+//! lidar rotated by `e` and translated by `s` along the IMU axes. A surfel of a fixed view does not move.
 //!
-//! What all surfels share stands in the border: `B` unknowns of it are carried, [`SHARED`] or, where the lidar's place
-//! on the IMU is not estimated, only the [`ALWAYS`] first.
+//! The unknowns common to all surfels are in the border. `B` of them are used: [`COMMON`], or only the first [`ALWAYS`]
+//! if the lidar extrinsics are not estimated.
 
 use super::sums::{OF_SPAN, add_scaled, over_knots};
 use super::{CLOCK, Layout};
 use crate::estimation::surfel::{Patch, Placed};
 use crate::geometry::{Matrix, Vector};
 
-/// Two surfels of one surface.
+/// The common plane of two matched surfels.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Plane {
     /// Unit normal of the surface.
@@ -27,12 +27,12 @@ pub(in crate::estimation) struct Plane {
 }
 
 impl Plane {
-    /// The plane common to two patches, `sigma_m` being what a match may be off beside their thickness and doubt.
+    /// The common plane of two patches; `sigma_m` is the match error in addition to thickness and doubt.
     pub(in crate::estimation) fn of(a: &Patch, b: &Patch, sigma_m: f64) -> Self {
         let both = a.covariance + b.covariance;
         let start = a.normal + b.normal;
-        // One step of inverse iteration from the mean normal: the adjugate is the inverse but for a factor, and exists
-        // for a perfectly thin patch as well.
+        // One step of inverse iteration from the mean normal. The adjugate is proportional to the inverse, and also
+        // exists for a patch of zero thickness.
         let normal = adjugate(&both) * start;
         let normal = normal.try_normalize(0.0).or_else(|| start.try_normalize(0.0)).unwrap_or(b.normal);
         let lambda = normal.dot(&(both * normal));
@@ -41,7 +41,7 @@ impl Plane {
         Self { normal, apart, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) + a.doubt + b.doubt }
     }
 
-    /// Says nothing any more along `direction`, a unit vector.
+    /// Removes the component of the normal along `direction`, a unit vector.
     pub(in crate::estimation) fn forget(&mut self, direction: &Vector) {
         let left = self.normal - direction * self.normal.dot(direction);
         self.normal = left.try_normalize(1e-3).unwrap_or(self.normal);
@@ -54,46 +54,46 @@ fn adjugate(m: &Matrix) -> Matrix {
     Matrix::from_rows(&[b.cross(&c).transpose(), c.cross(&a).transpose(), a.cross(&b).transpose()])
 }
 
-/// The clock's offset and rate, and the lidar's range.
+/// Common unknowns without extrinsics: clock offset, clock rate and range bias.
 pub(in crate::estimation) const ALWAYS: usize = 3;
-/// Those, and the lidar's turn and shift.
-pub(in crate::estimation) const SHARED: usize = 9;
+/// Common unknowns with extrinsics: also rotation and translation of the lidar.
+pub(in crate::estimation) const COMMON: usize = 9;
 
-/// The derivative of `e` by what moves a live surfel.
+/// The derivatives of `e` by the unknowns of one matched surfel.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Side<const B: usize> {
-    /// By its turn and its shift.
+    /// By rotation and translation of the surfel.
     pub(super) own: [f64; 6],
-    /// By what it shares with all others, which follow each other in the border.
-    pub(super) beside: [f64; B],
+    /// By the common unknowns, which are contiguous in the border.
+    pub(super) common: [f64; B],
 }
 
 impl<const B: usize> Side<B> {
-    /// Of a surfel that `normal` leads to.
+    /// The derivatives for `surfel`, with `normal` pointing towards it.
     #[inline(always)]
     pub(in crate::estimation) fn of(surfel: &Placed, normal: &Vector, clock_at_s: f64) -> Self {
         let turn = surfel.arm.cross(normal);
         let later = normal.dot(&surfel.velocity);
-        let mut beside = [0.0; B];
-        beside[..ALWAYS].copy_from_slice(&[later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam)]);
-        if B == SHARED {
+        let mut common = [0.0; B];
+        common[..ALWAYS].copy_from_slice(&[later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam)]);
+        if B == COMMON {
             let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.reach().cross(normal));
             let lidar_shift = surfel.map_from_imu.tr_mul(normal);
-            beside[ALWAYS..ALWAYS + 3].copy_from_slice(lidar_turn.as_slice());
-            beside[ALWAYS + 3..].copy_from_slice(lidar_shift.as_slice());
+            common[ALWAYS..ALWAYS + 3].copy_from_slice(lidar_turn.as_slice());
+            common[ALWAYS + 3..].copy_from_slice(lidar_shift.as_slice());
         }
-        Self { own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], beside }
+        Self { own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], common }
     }
 
-    /// With what the surfel on the other side adds in the border.
+    /// Adds the other surfel's derivatives by the common unknowns.
     #[inline(always)]
     pub(in crate::estimation) fn together_with(mut self, other: &Self) -> Self {
-        self.beside.iter_mut().zip(other.beside).for_each(|(sum, term)| *sum += term);
+        self.common.iter_mut().zip(other.common).for_each(|(sum, term)| *sum += term);
         self
     }
 }
 
-/// Adds the row of the Jacobian of a match of `surfel`, `scales[k]` times to column `k` of six.
+/// Adds the Jacobian row of a match of `surfel`, scaled by `scales[k]`, to column `k` of six.
 pub(in crate::estimation) fn add_scaled_row(
     columns: &mut [Vec<f64>; 6],
     layout: &Layout,
@@ -101,12 +101,12 @@ pub(in crate::estimation) fn add_scaled_row(
     scales: &[f64; 6],
     clock_at_s: f64,
 ) {
-    let side = Side::<SHARED>::of(surfel, normal, clock_at_s);
-    let (first, beside, knots) =
+    let side = Side::<COMMON>::of(surfel, normal, clock_at_s);
+    let (first, common, knots) =
         (layout.knot(surfel.basis.first), layout.border() + CLOCK, over_knots(&side.own, &surfel.basis));
     for (column, scale) in columns.iter_mut().zip(scales) {
         add_scaled(&mut column[first..first + OF_SPAN], &knots, *scale);
-        add_scaled(&mut column[beside..beside + SHARED], &side.beside, *scale);
+        add_scaled(&mut column[common..common + COMMON], &side.common, *scale);
     }
 }
 
@@ -124,7 +124,7 @@ mod tests {
 
     const AT_S: f64 = 0.5;
 
-    /// Two thin patches of about one plane, seen at different times.
+    /// A thin patch close to a common plane, measured at `tau_s`.
     fn surfel(tau_s: f64, seed: f64) -> Placed {
         let turn = from_roll_pitch_yaw(0.02 * seed, 0.3, 0.4).to_rotation_matrix().into_inner();
         let covariance = turn * Matrix::from_diagonal(&Vector::new(0.02, 0.05, 1e-4)) * turn.transpose();
@@ -176,7 +176,7 @@ mod tests {
             (distance(&step(1e-6)) - distance(&step(-1e-6))) / 2e-6
         });
         let mut equations = NormalEquations::new(layout.size());
-        let one = Side::<SHARED>::of(a, &plane.normal, AT_S);
+        let one = Side::<COMMON>::of(a, &plane.normal, AT_S);
         let other = b.map(|b| (b, Side::of(b, &-plane.normal, AT_S)));
         let both = other.as_ref().map_or(one, |(_, other)| one.together_with(other));
         for (surfel, side) in [(a, both)].into_iter().chain(other.map(|(b, side)| (b, side.together_with(&one)))) {
@@ -184,7 +184,7 @@ mod tests {
             own.add(&side, plane.distance_m, 3.0);
             of_span.add(&own, &surfel.basis);
             if std::ptr::eq(surfel, a) {
-                of_span.beside.add(&side, plane.distance_m, 3.0);
+                of_span.common.add(&side, plane.distance_m, 3.0);
             }
             of_span.add_to(&mut equations, &layout, surfel.basis.first);
         }

@@ -1,4 +1,4 @@
-//! The terms of the window's cost, each with its derivatives: inertial, matched surfaces, priors.
+//! The terms of the window's cost, each with derivatives: inertial, matched surfaces, priors.
 
 pub(super) mod contradiction;
 pub(super) mod inertial;
@@ -7,11 +7,12 @@ pub(super) mod prior;
 mod rows;
 pub(super) mod sums;
 
-/// Unknowns of the border, behind the knots: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and
-/// rate, correction of the ranges, of the lidar's attitude and of its place, and by how much gyroscope and
-/// accelerometer exaggerate, each three by three.
+/// Number of border unknowns, which follow the knots.
+///
+/// Gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate, range bias, rotation and translation of
+/// the lidar, and scale and misalignment of gyroscope and accelerometer, each three by three.
 pub(super) const BORDER: usize = 35;
-/// Where each begins.
+/// Offsets of the unknowns in the border.
 pub(super) const GYRO_BIAS: usize = 0;
 pub(super) const ACCEL_BIAS: usize = 3;
 pub(super) const GRAVITY: usize = 6;
@@ -23,7 +24,7 @@ pub(super) const LIDAR_SHIFT: usize = 14;
 pub(super) const GYRO_MATRIX: usize = 17;
 pub(super) const ACCEL_MATRIX: usize = 26;
 
-/// Where the unknowns of a window stand.
+/// The order of a window's unknowns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
     /// Index of the first knot, counted from the start of time.

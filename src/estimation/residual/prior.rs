@@ -1,4 +1,4 @@
-//! What is known before the window's own measurements: where it begins, and the border.
+//! Priors of the window: the start state and the border.
 
 use super::{BORDER, LIDAR_TURN, Layout};
 use crate::estimation::normal_equations::NormalEquations;
@@ -6,39 +6,41 @@ use crate::estimation::spline::Basis;
 use crate::geometry::Vector;
 use nalgebra::{Matrix6, SMatrix, SVector};
 
-/// How firmly the correction is held where the window begins, so that it goes on from the one before.
+/// Prior on the correction at the start of the window, which makes it continuous with the previous window.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Start {
-    /// Where the window begins, IMU time, s.
+    /// Start of the window, IMU time, s.
     pub(in crate::estimation) u_s: f64,
     /// Standard deviations of rotation and translation (rad, m), of their first (1/s) and second derivative (1/s^2).
     pub(in crate::estimation) sigmas: [[f64; 2]; 3],
-    /// On what it hangs how the lidar sits, where that is estimated.
+    /// Dependence on the lidar extrinsics, if they are estimated.
     pub(in crate::estimation) by_lidar: Option<ByLidar>,
 }
 
-/// By how much the correction (rows: turn, shift), its first and its second derivative where a window begins would be
-/// others, had the window before taken the lidar to be turned and shifted on the IMU (columns).
+/// Derivative of the start state by the lidar extrinsics.
 ///
-/// What was seen tells the way of the lidar, and the IMU's only through where the lidar sits. So the IMU where a window
-/// begins is as uncertain as that. Held regardless, it would hold the lidar where it was thought to be: each window
-/// would know that anew, and from nothing.
+/// Change of the correction (rows: rotation, translation), and of the first and second derivative of it, if the
+/// previous window had assumed the lidar rotated and translated on the IMU (columns).
+///
+/// The lidar measures the motion of the lidar, and constrains the IMU pose only through the extrinsics. So the start
+/// pose of the IMU is as uncertain as the extrinsics. A prior without this dependence would freeze the extrinsics at
+/// the initial value: each window would add the same information a second time.
 pub(in crate::estimation) type ByLidar = [Matrix6<f64>; 3];
 
 impl Start {
-    /// A beginning from which the window goes on smoothly: pose and velocity are those of the window before, and nearly
-    /// the acceleration, which a bias that has become better known changes at once.
+    /// The continuation of the previous window.
+    /// Pose and velocity are continuous. The acceleration is continuous only approximately, because an update of a bias
+    /// estimate changes it immediately.
     pub(in crate::estimation) fn held(u_s: f64) -> Self {
         Self { u_s, sigmas: [[1e-5, 1e-5], [1e-4, 1e-4], [1e-2, 0.3]], by_lidar: None }
     }
 
-    /// The very beginning: the pose is the map's origin by definition, the velocity known to `velocity_sigma` (m/s).
+    /// The first window: the pose is the map origin by definition, the velocity has the sigma `velocity_sigma`, m/s.
     pub(in crate::estimation) fn first(u_s: f64, velocity_sigma: f64) -> Self {
         Self { u_s, sigmas: [[1e-5, 1e-5], [0.1, velocity_sigma], [10.0, 10.0]], by_lidar: None }
     }
 
-    /// Adds the conditions, `total` being the coefficients of the corrections made in this window so far, and `moved`
-    /// how far the border has moved in it.
+    /// Adds the prior; `total` has the sum of this window's corrections so far, and `moved` that of the border.
     pub(in crate::estimation) fn add_to(
         &self,
         equations: &mut NormalEquations,
@@ -75,8 +77,7 @@ impl Start {
 }
 
 impl Start {
-    /// The right-hand side that asks for these corrections, turn then shift, and their first derivatives where the
-    /// window begins.
+    /// The right-hand side for these corrections, rotation then translation, and their rates at the start.
     pub(in crate::estimation) fn right_hand_side(
         &self,
         layout: &Layout,
@@ -101,7 +102,7 @@ impl Start {
     }
 }
 
-/// Adds that the velocity is zero at a node: `v + dt' = 0`, to `sigma` (m/s).
+/// Adds a zero-velocity measurement at a node: `v + dt' = 0`, to `sigma` (m/s).
 pub(in crate::estimation) fn add_standstill(
     equations: &mut NormalEquations,
     layout: &Layout,
@@ -112,7 +113,7 @@ pub(in crate::estimation) fn add_standstill(
     add_zero_rate(equations, (layout, 3), basis, velocity, sigma);
 }
 
-/// Adds that the head does not turn at a node, where it turns by `rate` (rad/s, in the map): `w + dr' = 0`, to `sigma`.
+/// Adds a zero-rate measurement at a node with rate `rate` (rad/s, in the map): `w + dr' = 0`, to `sigma`.
 pub(in crate::estimation) fn add_no_turn(
     equations: &mut NormalEquations,
     layout: &Layout,
@@ -123,7 +124,7 @@ pub(in crate::estimation) fn add_no_turn(
     add_zero_rate(equations, (layout, 0), basis, rate, sigma);
 }
 
-/// Adds that a rate plus the derivative of the correction is zero; `of` is the correction's first axis.
+/// Adds that a rate plus the derivative of the correction is zero; `of` is the first axis of the correction.
 fn add_zero_rate(
     equations: &mut NormalEquations,
     (layout, of): (&Layout, usize),
@@ -144,7 +145,7 @@ fn add_zero_rate(
     }
 }
 
-/// Adds what is known of the border: `information`, about the values from which it is `from_mean` away.
+/// Adds the prior of the border: `information`, with the current values `from_mean` away from the mean.
 pub(in crate::estimation) fn add_border(
     equations: &mut NormalEquations,
     layout: &Layout,
@@ -166,10 +167,10 @@ mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    /// Against the definition: the residuals of the correction, less what the lidar's change asks for, differentiated
-    /// by steps.
+    /// Against the definition: residuals of the correction minus the effect of the extrinsics, differentiated
+    /// numerically.
     #[test]
-    fn a_beginning_that_hangs_on_the_lidar_is_held_to_where_the_lidar_would_have_put_it() {
+    fn a_start_prior_that_depends_on_the_lidar_follows_the_extrinsics() {
         const SPACING_S: f64 = 0.2;
         let layout = Layout { first_knot: 2, knots: 6 };
         let by_lidar: ByLidar =
@@ -198,7 +199,7 @@ mod tests {
         let mut jacobian = DMatrix::zeros(residual.len(), layout.size());
         for unknown in 0..layout.size() {
             let mut step = zero.clone();
-            step[unknown] = 1.0; // it is linear
+            step[unknown] = 1.0; // the residual is linear
             jacobian.set_column(unknown, &(whitened(&step) - &residual));
         }
         let mut equations = NormalEquations::new(layout.size());
@@ -207,7 +208,7 @@ mod tests {
         assert_relative_eq!(equations.dense(), square, epsilon = 1e-9 * square.amax());
         let right = jacobian.transpose() * -residual;
         assert_relative_eq!(equations.right(), right, epsilon = 1e-9 * right.amax());
-        // Asked for elsewhere, it is held there.
+        // The right-hand side for a shifted start.
         let (value, rate) = ([0.1, -0.2, 0.3, 0.5, -0.4, 0.2], [0.3, 0.1, -0.2, 0.6, 0.2, -0.1]);
         let whitened = |k: usize, axis: usize| match k {
             0 => value[axis] / sigmas[0][axis / 3],

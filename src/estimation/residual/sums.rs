@@ -1,7 +1,7 @@
-//! What matches say, summed by the spans between knots in which their surfels were seen.
+//! Normal equations of matches, summed by the knot spans of their surfels.
 //!
-//! All surfels of a span hang on the same four knots. What they say is summed in small dense blocks, which stay in the
-//! processor's nearest memory, and goes into the equations a block at a time.
+//! All surfels of a span depend on the same four knots. Their terms are summed in small dense blocks, which fit into
+//! the L1 cache, and enter the equations a block at a time.
 
 use super::matched::Side;
 use super::{CLOCK, Layout};
@@ -12,41 +12,43 @@ use crate::estimation::surfel::Placed;
 /// Unknowns of the four knots about a span.
 pub(super) const OF_SPAN: usize = 24;
 
-/// What all matches of a surfel say about its own motion: `sum w g v^T`, with `g` the derivative of `e` by turn and
-/// shift, and `v` in turn `g`, that by the border, and `e`.
+/// The terms of all matches of a surfel by the motion of that surfel.
 ///
-/// A surfel has several matches, and its motion hangs on many unknowns: summed here first, each match costs little.
+/// `sum w g v^T`, with `g` the derivative of `e` by rotation and translation, and `v` in turn `g`, the derivative by
+/// the border, and `e`.
+///
+/// A surfel has several matches, and its motion depends on many unknowns: this intermediate sum keeps a match cheap.
 #[derive(Debug)]
 pub(in crate::estimation) struct Own<const B: usize> {
     square: [[f64; 6]; 6],
-    beside: [[f64; 6]; B],
+    common: [[f64; 6]; B],
     right: [f64; 6],
 }
 
 impl<const B: usize> Own<B> {
     /// No match yet.
-    pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; 6]; 6], beside: [[0.0; 6]; B], right: [0.0; 6] };
+    pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; 6]; 6], common: [[0.0; 6]; B], right: [0.0; 6] };
 
-    /// Adds a match whose distance grows by `side`.
+    /// Adds a match with derivatives `side`.
     #[inline(always)]
     pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
         for (square, by) in self.square.iter_mut().zip(side.own) {
             add_scaled(square, &side.own, weight * by);
         }
-        for (sums, by) in self.beside.iter_mut().zip(side.beside) {
+        for (sums, by) in self.common.iter_mut().zip(side.common) {
             add_scaled(sums, &side.own, weight * by);
         }
         add_scaled(&mut self.right, &side.own, weight * distance_m);
     }
 }
 
-/// What the matches of all surfels of a span say about their own motion, and about what all surfels share.
+/// The terms of all matches of the surfels of a span, by their motion and by the common unknowns.
 #[derive(Debug)]
 pub(in crate::estimation) struct OfSpan<const B: usize> {
     square: [[f64; OF_SPAN]; OF_SPAN],
     by_border: [[f64; OF_SPAN]; B],
     right: [f64; OF_SPAN],
-    pub(in crate::estimation) beside: Beside<B>,
+    pub(in crate::estimation) common: CommonSums<B>,
 }
 
 impl<const B: usize> OfSpan<B> {
@@ -55,10 +57,10 @@ impl<const B: usize> OfSpan<B> {
         square: [[0.0; OF_SPAN]; OF_SPAN],
         by_border: [[0.0; OF_SPAN]; B],
         right: [0.0; OF_SPAN],
-        beside: Beside::NONE,
+        common: CommonSums::NONE,
     };
 
-    /// Adds what a surfel's matches say of it, `basis` being that of its time.
+    /// Adds the terms of a surfel; `basis` is the spline basis at the time of the surfel.
     #[inline(always)]
     pub(in crate::estimation) fn add(&mut self, own: &Own<B>, basis: &Basis) {
         let square = own.square.map(|row| over_knots(&row, basis));
@@ -67,47 +69,47 @@ impl<const B: usize> OfSpan<B> {
                 add_scaled(sums, row, value);
             }
         }
-        for (sums, row) in self.by_border.iter_mut().zip(&own.beside) {
+        for (sums, row) in self.by_border.iter_mut().zip(&own.common) {
             add_scaled(sums, &over_knots(row, basis), 1.0);
         }
         add_scaled(&mut self.right, &over_knots(&own.right, basis), -1.0);
     }
 
-    /// Adds it to the equations of the window's unknowns; `span` is the first of its knots.
+    /// Adds the sum to the window's equations; `span` is the index of the first knot.
     pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, span: i64) {
-        let (first, beside) = (layout.knot(span), layout.border() + CLOCK);
+        let (first, common) = (layout.knot(span), layout.border() + CLOCK);
         for (row, sums) in self.square.iter().enumerate() {
             equations.add_row(first + row, first, &sums[..=row]);
             equations.add_right(first + row, self.right[row]);
         }
         for (unknown, sums) in self.by_border.iter().enumerate() {
-            equations.add_row(beside + unknown, first, sums);
+            equations.add_row(common + unknown, first, sums);
         }
-        self.beside.add_to(equations, beside);
+        self.common.add_to(equations, common);
     }
 }
 
-/// What all matches say about what surfels share: `sum w b v^T`, with `b` the derivative of `e` by them, and `v` in
+/// The terms of all matches by the common unknowns: `sum w b v^T`, with `b` the derivative of `e` by them, and `v` in
 /// turn `b` and `e`.
 #[derive(Debug)]
-pub(in crate::estimation) struct Beside<const B: usize> {
+pub(in crate::estimation) struct CommonSums<const B: usize> {
     square: [[f64; B]; B],
     right: [f64; B],
 }
 
-impl<const B: usize> Beside<B> {
+impl<const B: usize> CommonSums<B> {
     const NONE: Self = Self { square: [[0.0; B]; B], right: [0.0; B] };
 
-    /// Adds a match whose distance grows by `side`, both surfels' part of it.
+    /// Adds a match; `side` has the derivatives of both surfels.
     #[inline(always)]
     pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
-        for (square, by) in self.square.iter_mut().zip(side.beside) {
-            add_scaled(square, &side.beside, weight * by);
+        for (square, by) in self.square.iter_mut().zip(side.common) {
+            add_scaled(square, &side.common, weight * by);
         }
-        add_scaled(&mut self.right, &side.beside, -weight * distance_m);
+        add_scaled(&mut self.right, &side.common, -weight * distance_m);
     }
 
-    /// Adds it to the equations, in which what surfels share begins at `first`.
+    /// Adds the sum to the equations, in which the common unknowns start at `first`.
     fn add_to(&self, equations: &mut NormalEquations, first: usize) {
         for (row, sums) in self.square.iter().enumerate() {
             equations.add_row(first + row, first, &sums[..=row]);
@@ -116,8 +118,7 @@ impl<const B: usize> Beside<B> {
     }
 }
 
-/// How the knots about the surfels of two spans hang together by matches between them: rows by the later span's
-/// unknowns.
+/// The off-diagonal block of the matches between two spans: rows by the unknowns of the later span.
 #[derive(Debug)]
 pub(in crate::estimation) struct Coupling([[f64; OF_SPAN]; OF_SPAN]);
 
@@ -139,7 +140,7 @@ impl Coupling {
         }
     }
 
-    /// Adds it to the equations of the window's unknowns; `early` and `late` are the first knots of the spans.
+    /// Adds the block to the window's equations; `early` and `late` are the first knots of the spans.
     pub(in crate::estimation) fn add_to(
         &self,
         equations: &mut NormalEquations,
@@ -148,7 +149,7 @@ impl Coupling {
     ) {
         let (first_column, first_row) = (layout.knot(early), layout.knot(late));
         for (row, sums) in self.0.iter().enumerate().map(|(k, sums)| (first_row + k, sums)) {
-            // Where the spans have knots in common, columns reach the diagonal, and beyond it are those of the mirrored
+            // If the spans have common knots, the columns reach the diagonal; those after it belong to the mirrored
             // block.
             let below = row.saturating_sub(first_column).min(OF_SPAN);
             equations.add_row(row, first_column, &sums[..below]);
@@ -159,7 +160,7 @@ impl Coupling {
     }
 }
 
-/// Six derivatives by a surfel's motion as those by the four knots about it.
+/// Converts six derivatives by a surfel's motion to derivatives by the four knots of the span.
 #[inline(always)]
 pub(super) fn over_knots(by_motion: &[f64; 6], basis: &Basis) -> [f64; OF_SPAN] {
     let mut knots = [0.0; OF_SPAN];

@@ -1,4 +1,4 @@
-//! Which of the window's surfels show what others show, or what a fixed view shows.
+//! Surfel matching: pairs within the window, and window surfels with patches of the fixed views.
 
 use super::{Stretch, Window};
 use crate::estimation::matching::Matcher;
@@ -8,33 +8,34 @@ use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use rayon::prelude::*;
 
-/// Neighbours are looked for again when a surfel may have moved by this since, m: by less, they hardly change.
+/// The neighbour search is repeated when a surfel may have moved by this, m; smaller motion hardly changes the result.
 const MOVED_M: f64 = 0.02;
-/// Surfaces match from so many times farther off in a first window that was begun in motion, and behind a leap.
-const GROPING: f64 = 3.0;
-/// A normal leans when it does so by more than this multiple of its error.
+/// Widening of the match gate in a first window that starts in motion, and after a bridged gap.
+const WIDE_GATE: f64 = 3.0;
+/// A tilt of a normal is significant above this multiple of the standard deviation.
 const SIGNIFICANT: f64 = 4.0;
 
-/// Which surfels may belong together, before anything is said of how far apart they are.
+/// Candidate pairs of surfels, before the distance gate.
 #[derive(Default)]
 pub(super) struct Neighbours {
-    /// Of the window: indices into the scene.
+    /// Within the window: indices into the scene.
     pairs: Vec<(u32, u32)>,
     /// With views: a surfel of the scene, a view, a patch of the view.
     fixed: Vec<(u32, u32, u32)>,
-    /// How many surfels there were.
+    /// Number of surfels in the scene at the time of the search.
     of: usize,
-    /// How far surfels may have moved since, m.
+    /// Upper bound on the motion of any surfel since the search, m.
     moved_m: f64,
 }
 
-/// Where a surfel was when it was last looked for in fixed views, and what was near it there. Views stand still, and a
-/// surfel hardly moves once its stretch has been solved: so most are looked for once.
+/// Cached fixed-view neighbours of a surfel, and the position at which they were searched.
+///
+/// Views do not move, and a surfel hardly moves once the stretch has been solved: most surfels are searched once.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Remembered {
+pub(super) struct CachedNeighbours {
     centre: Vector,
-    /// By the views' numbers: indices of patches.
-    near: Vec<(u64, Vec<u32>)>,
+    /// By view number: indices of the neighbouring patches.
+    found: Vec<(u64, Vec<u32>)>,
 }
 
 /// Two surfels of one surface.
@@ -42,16 +43,16 @@ pub(super) struct Remembered {
 pub(super) struct Match {
     /// Index into the scene.
     pub a: u32,
-    /// What it is matched with.
+    /// The other side of the match.
     pub with: With,
     /// The surface, its normal from the other surfel to `a`.
     pub plane: Plane,
 }
 
-/// What a live surfel is matched with.
+/// The other side of a match of a live surfel.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum With {
-    /// Another of the window: an index into the scene.
+    /// Another surfel of the window: an index into the scene.
     Live(u32),
     /// A patch of a fixed view.
     Fixed { view: u32, patch: u32 },
@@ -61,14 +62,14 @@ pub(super) enum With {
 #[derive(Debug, Default)]
 pub(super) struct Matches {
     pub all: Vec<Match>,
-    /// The matches of each surfel of the scene that has any, by the span between knots in which it was seen.
+    /// The matched surfels of the scene, by the span between knots in which they were measured.
     pub spans: Runs<i64>,
-    /// Those of two live surfels, by the earlier and the later one's span.
+    /// The matches of two live surfels, by the spans of the earlier and the later one.
     pub couplings: Runs<(i64, i64)>,
     /// Indices of the matches of each surfel of the scene, one surfel after the other.
     of_surfels: Vec<u32>,
-    /// Where each surfel's begin in it, and where the last one's end.
-    begins: Vec<usize>,
+    /// Offset of each surfel's first match in `of_surfels`, then the offset of the end.
+    offsets: Vec<usize>,
 }
 
 /// Indices in runs of one key each, in the order of keys.
@@ -79,7 +80,7 @@ pub(super) struct Runs<K> {
 }
 
 impl Match {
-    /// The other surfel, where it is live too: an index into the scene.
+    /// The other surfel if it is live: an index into the scene.
     pub fn other(&self) -> Option<usize> {
         if let With::Live(b) = self.with { Some(b as usize) } else { None }
     }
@@ -103,7 +104,7 @@ impl<K> Default for Runs<K> {
 }
 
 impl<K: Copy + Send + Sync> Runs<K> {
-    /// Each run's key and indices.
+    /// The key and the indices of each run.
     pub fn par_iter(&self) -> impl IndexedParallelIterator<Item = (K, impl Iterator<Item = usize>)> {
         (0..self.ends.len()).into_par_iter().map(|k| {
             let from = k.checked_sub(1).map_or(0, |before| self.ends[before]);
@@ -115,16 +116,16 @@ impl<K: Copy + Send + Sync> Runs<K> {
 
 impl Matches {
     fn of(all: Vec<Match>, scene: &[Placed]) -> Self {
-        let mut begins = vec![0; scene.len() + 1];
+        let mut offsets = vec![0; scene.len() + 1];
         let sides = |one: &Match| [Some(one.a as usize), one.other()];
         for surfel in all.iter().flat_map(sides).flatten() {
-            begins[surfel + 1] += 1;
+            offsets[surfel + 1] += 1;
         }
         for surfel in 0..scene.len() {
-            begins[surfel + 1] += begins[surfel];
+            offsets[surfel + 1] += offsets[surfel];
         }
-        let mut next = begins.clone();
-        let mut of_surfels = vec![0; begins[scene.len()]];
+        let mut next = offsets.clone();
+        let mut of_surfels = vec![0; offsets[scene.len()]];
         for (index, one) in all.iter().enumerate() {
             for surfel in sides(one).into_iter().flatten() {
                 of_surfels[next[surfel]] = index as u32;
@@ -132,18 +133,18 @@ impl Matches {
             }
         }
         let span = |surfel: usize| scene[surfel].basis.first;
-        let matched = (0..scene.len()).filter(|surfel| begins[*surfel] < begins[surfel + 1]);
+        let matched = (0..scene.len()).filter(|surfel| offsets[*surfel] < offsets[surfel + 1]);
         let spans = Runs::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
         let coupled = all.iter().enumerate().filter_map(|(index, one)| {
             let (a, b) = (span(one.a as usize), span(one.other()?));
             Some(((a.min(b), a.max(b)), index as u32))
         });
-        Self { spans, couplings: Runs::of(coupled.collect()), all, of_surfels, begins }
+        Self { spans, couplings: Runs::of(coupled.collect()), all, of_surfels, offsets }
     }
 
-    /// The matches of a surfel of the scene: indices into all.
+    /// The matches of a surfel of the scene: indices into `all`.
     pub fn of_surfel(&self, surfel: usize) -> &[u32] {
-        &self.of_surfels[self.begins[surfel]..self.begins[surfel + 1]]
+        &self.of_surfels[self.offsets[surfel]..self.offsets[surfel + 1]]
     }
 
     pub fn planes(&self) -> impl Iterator<Item = &Plane> {
@@ -152,19 +153,19 @@ impl Matches {
 }
 
 impl Neighbours {
-    /// The surfels have moved by at most `by_m`.
+    /// Records that the surfels have moved by at most `by_m`.
     pub fn moved(&mut self, by_m: f64) {
         self.moved_m += by_m;
     }
 
-    /// Whether they need not be looked for again.
-    pub fn are_good_for(&self, scene: &[Placed]) -> bool {
+    /// Whether the neighbours are still valid for `scene`.
+    pub fn are_valid_for(&self, scene: &[Placed]) -> bool {
         self.of == scene.len() && self.moved_m < MOVED_M
     }
 }
 
 impl Window {
-    /// The window's surfels in the map; those that a change of clock has moved out of the window's knots stay out.
+    /// The window's surfels in the map frame, except surfels that a clock correction moved out of the window's knots.
     pub(super) fn scene(&self) -> Vec<Placed> {
         let placing = self.placing();
         let homes = self.homes();
@@ -175,7 +176,7 @@ impl Window {
             .collect()
     }
 
-    /// Where the surfels of the scene are at home: a stretch, and an index into its surfels.
+    /// For each surfel of the scene: the stretch, and the index into the surfels of that stretch.
     fn homes(&self) -> Vec<(usize, usize)> {
         let (from, to) = (self.start.u_s, self.nominal.end_s());
         let is_within = |surfel: &Surfel| (from..=to).contains(&self.clock.imu_s(surfel.tau_s));
@@ -186,7 +187,7 @@ impl Window {
         self.stretches.iter().enumerate().flat_map(of_stretch).collect()
     }
 
-    /// Those `neighbours` in `scene` that match.
+    /// The `neighbours` in `scene` that pass the match gates.
     pub(super) fn match_up(
         &self,
         scene: &[Placed],
@@ -194,7 +195,7 @@ impl Window {
         neighbours: &Neighbours,
         iteration: usize,
     ) -> Matches {
-        let wider = if self.gropes || self.leapt { GROPING } else { 1.0 };
+        let wider = if self.wide_matching || self.bridged_gap { WIDE_GATE } else { 1.0 };
         let gate_m = wider * self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, other: &Patch| {
@@ -214,9 +215,16 @@ impl Window {
         Matches::of(all.into_iter().flatten().collect(), scene)
     }
 
-    /// Normals that lean to `direction` by no more than they may err lean no more: together, such errors would pass for
-    /// knowledge, and hold the head back.
-    pub(super) fn straighten(&self, matches: &mut Matches, scene: &[Placed], views: &Views, direction: &Vector) {
+    /// Removes the component along `direction` from normals whose tilt towards it is within the normal error.
+    ///
+    /// The sum of many such errors would otherwise count as information about the motion along `direction`.
+    pub(super) fn remove_insignificant_tilt(
+        &self,
+        matches: &mut Matches,
+        scene: &[Placed],
+        views: &Views,
+        direction: &Vector,
+    ) {
         for Match { a, with, plane } in &mut matches.all {
             let other = match *with {
                 With::Live(b) => &scene[b as usize].patch,
@@ -229,48 +237,48 @@ impl Window {
         }
     }
 
-    /// The neighbours in `scene` and in the `chosen` views.
-    pub(super) fn look_around(&mut self, scene: &[Placed], (views, chosen): (&Views, &[usize])) -> Neighbours {
+    /// Searches the neighbours in `scene` and in the `chosen` views.
+    pub(super) fn search_neighbours(&mut self, scene: &[Placed], (views, chosen): (&Views, &[usize])) -> Neighbours {
         let patches: Vec<Patch> = scene.iter().map(|surfel| surfel.patch).collect();
         let pairs = self.matcher.among(scene, &self.matcher.plant(&patches));
         let homes = self.homes();
-        let mut remembered: Vec<Remembered> =
-            homes.iter().map(|(k, index)| std::mem::take(&mut self.stretches[*k].remembered[*index])).collect();
-        let look = |(a, (patch, remembered)): (usize, (&Patch, &mut Remembered))| {
-            remembered.look(patch, (views, chosen), &self.matcher, self.spec.views.neighbours);
-            let near = |index: &usize| {
-                let found = remembered.near_in(views.view(*index).number);
-                found.iter().map(|patch| (a as u32, *index as u32, *patch)).collect::<Vec<_>>()
+        let mut cached: Vec<CachedNeighbours> =
+            homes.iter().map(|(k, index)| std::mem::take(&mut self.stretches[*k].cached[*index])).collect();
+        let search = |(a, (patch, cached)): (usize, (&Patch, &mut CachedNeighbours))| {
+            cached.update(patch, (views, chosen), &self.matcher, self.spec.views.neighbours);
+            let in_view = |index: &usize| {
+                let patches = cached.found_in(views.view(*index).number);
+                patches.iter().map(|patch| (a as u32, *index as u32, *patch)).collect::<Vec<_>>()
             };
-            chosen.iter().flat_map(near).collect::<Vec<_>>()
+            chosen.iter().flat_map(in_view).collect::<Vec<_>>()
         };
-        let both = patches.par_iter().zip(remembered.par_iter_mut()).enumerate();
-        let fixed: Vec<_> = both.with_min_len(256).map(look).collect();
-        for ((k, index), remembered) in homes.into_iter().zip(remembered) {
-            self.stretches[k].remembered[index] = remembered;
+        let both = patches.par_iter().zip(cached.par_iter_mut()).enumerate();
+        let fixed: Vec<_> = both.with_min_len(256).map(search).collect();
+        for ((k, index), cached) in homes.into_iter().zip(cached) {
+            self.stretches[k].cached[index] = cached;
         }
         Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), of: scene.len(), moved_m: 0.0 }
     }
 }
 
-impl Remembered {
-    /// Looks for `patch` in the `chosen` views, where that has not been done from about here.
-    fn look(&mut self, patch: &Patch, (views, chosen): (&Views, &[usize]), matcher: &Matcher, count: usize) {
+impl CachedNeighbours {
+    /// Updates the neighbours of `patch` in the `chosen` views; views searched from about this position stay cached.
+    fn update(&mut self, patch: &Patch, (views, chosen): (&Views, &[usize]), matcher: &Matcher, count: usize) {
         let is_chosen = |number: u64| chosen.iter().any(|index| views.view(*index).number == number);
         let moved = (patch.centre - self.centre).norm() > MOVED_M;
-        self.near.retain(|(number, _)| !moved && is_chosen(*number));
-        if self.near.is_empty() {
+        self.found.retain(|(number, _)| !moved && is_chosen(*number));
+        if self.found.is_empty() {
             self.centre = patch.centre;
         }
         for view in chosen.iter().map(|index| views.view(*index)) {
-            if self.near.iter().all(|(number, _)| *number != view.number) {
-                self.near.push((view.number, matcher.neighbours(&view.forest, patch, count)));
+            if self.found.iter().all(|(number, _)| *number != view.number) {
+                self.found.push((view.number, matcher.neighbours(&view.forest, patch, count)));
             }
         }
     }
 
-    /// What was near in the view of a number.
-    fn near_in(&self, view: u64) -> &[u32] {
-        self.near.iter().find(|(number, _)| *number == view).map_or(&[], |(_, near)| near)
+    /// The cached neighbours in the view with number `view`.
+    fn found_in(&self, view: u64) -> &[u32] {
+        self.found.iter().find(|(number, _)| *number == view).map_or(&[], |(_, patches)| patches)
     }
 }

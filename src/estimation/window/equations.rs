@@ -1,4 +1,4 @@
-//! The window's normal equations: the IMU's part and what is known before, then the matches with their robust weights.
+//! The window's normal equations: IMU residuals and priors, then the matches with robust weights.
 
 use super::Window;
 use super::correspondence::{Match, Matches};
@@ -6,7 +6,7 @@ use crate::estimation::nominal::Correction;
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
 use crate::estimation::residual::inertial::add_inertial;
-use crate::estimation::residual::matched::{ALWAYS, Plane, SHARED, Side};
+use crate::estimation::residual::matched::{ALWAYS, COMMON, Plane, Side};
 use crate::estimation::residual::prior;
 use crate::estimation::residual::sums::{Coupling, OfSpan, Own};
 use crate::estimation::spec::SolveSpec;
@@ -17,13 +17,13 @@ use crate::geometry::Vector;
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// How still the head is at rest, m/s.
+/// Standard deviation of the zero-velocity measurement at rest, m/s.
 const REST_VELOCITY_SIGMA: f64 = 0.003;
 
-/// How little it turns there, rad/s.
+/// Standard deviation of the zero-rate measurement at rest, rad/s.
 const REST_RATE_SIGMA: f64 = 0.003;
 
-/// Memory that is used again from solve to solve.
+/// Buffers that all solves of a window share.
 #[derive(Debug)]
 pub(super) struct Workspace {
     equations: NormalEquations,
@@ -37,7 +37,7 @@ impl Default for Workspace {
     }
 }
 
-/// Cauchy's weights.
+/// Cauchy robust kernel.
 #[derive(Debug)]
 pub(super) struct Robust {
     weight: f64,
@@ -45,33 +45,33 @@ pub(super) struct Robust {
 }
 
 impl Robust {
-    /// Those of an iteration: the threshold shrinks from `cauchy_start` to `cauchy_end`.
+    /// The kernel of an iteration: the threshold shrinks from `cauchy_start` to `cauchy_end`.
     pub fn of(spec: &SolveSpec, iteration: usize) -> Self {
         let late = iteration as f64 / (spec.max_iterations as f64 - 1.0).max(1.0);
         let threshold = spec.cauchy_start + (spec.cauchy_end - spec.cauchy_start) * late;
         Self { weight: spec.match_weight, threshold }
     }
 
-    /// The weight of a match that a solution leaves `residual_m` apart.
+    /// The weight of a match with residual `residual_m`.
     pub fn weight(&self, plane: &Plane, residual_m: f64) -> f64 {
         let normalised2 = residual_m * residual_m / plane.variance;
         self.weight / (plane.variance * (1.0 + normalised2 / (self.threshold * self.threshold)))
     }
 }
 
-/// The most that a correction moves the trajectory anywhere.
+/// The largest displacement of the trajectory by a correction.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Moved {
-    /// m.
+    /// Translation, m.
     pub shift: f64,
-    /// rad.
+    /// Rotation, rad.
     pub turn: f64,
 }
 
 impl Moved {
-    /// Of some corrections, turn and shift.
+    /// The maximum over corrections, each rotation and translation.
     pub fn greatest(corrections: impl Iterator<Item = (Vector, Vector)>) -> Self {
-        // NaN must not pass for small.
+        // A NaN must not count as small.
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
         corrections.fold(Self { shift: 0.0, turn: 0.0 }, |most, (turn, shift)| Self {
             shift: larger(most.shift, shift.norm()),
@@ -79,14 +79,14 @@ impl Moved {
         })
     }
 
-    /// The larger of both, m or rad.
+    /// The larger of rotation (rad) and translation (m).
     pub fn most(self) -> f64 {
         self.shift.max(self.turn)
     }
 }
 
 impl Window {
-    /// Where the window's unknowns stand, those from the node `first` on.
+    /// The order of the window's unknowns; also computes the spline bases at the nodes from `first` on.
     pub(super) fn layout(&mut self, first: usize) -> Layout {
         let spacing = self.spec.knot_spacing_s;
         self.workspace.bases.clear();
@@ -96,7 +96,7 @@ impl Window {
         Layout { first_knot, knots: (last_knot - first_knot + 1) as usize }
     }
 
-    /// Solves the linearised window: the solution, and by how much it moves the head; adds the time to `spent`.
+    /// Solves the linearised window and returns the solution with the displacement; adds the run time to `spent`.
     pub(super) fn solve_linearised(
         &mut self,
         (first, total): (usize, &[f64]),
@@ -107,8 +107,8 @@ impl Window {
     ) -> Option<(Vec<f64>, Moved)> {
         let mut watch = Stopwatch::start();
         self.assemble_inertial(first, layout, total);
-        let seen = Seen { scene, matches, robust, clock_at_s: self.clock.at_s };
-        seen.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
+        let weighted = WeightedMatches { scene, matches, robust, clock_at_s: self.clock.at_s };
+        weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
         spent.equations_s += watch.lap_s();
         let Workspace { equations, factor, bases } = &mut self.workspace;
         equations.factor(factor).ok()?;
@@ -121,7 +121,7 @@ impl Window {
         Some((x, moved))
     }
 
-    /// Empties the equations, and begins them with what does not hang on matches: IMU and priors.
+    /// Resets the equations and adds the terms that do not depend on matches: IMU and priors.
     fn assemble_inertial(&mut self, first: usize, layout: &Layout, total: &[f64]) {
         let Workspace { equations, bases, .. } = &mut self.workspace;
         equations.reset(layout.size());
@@ -140,35 +140,35 @@ impl Window {
             prior::add_standstill(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
             prior::add_no_turn(equations, layout, basis, &turn, REST_RATE_SIGMA);
         }
-        // The outermost knots hardly touch the window: a metre and a radian keep them where nothing else does.
+        // The outermost knots are hardly observed: a weak prior of 1 m and 1 rad keeps the system regular.
         for unknown in 0..layout.border() {
             equations.add_entry(unknown, unknown, 1.0);
         }
     }
 }
 
-/// What was seen, on its way into the normal equations.
-struct Seen<'a> {
+/// The matches, with all that their normal equations need.
+struct WeightedMatches<'a> {
     scene: &'a [Placed],
     matches: &'a Matches,
     robust: &'a Robust,
     clock_at_s: f64,
 }
 
-impl Seen<'_> {
-    /// Adds all matches; with `extrinsics`, with what they say of how the lidar sits.
+impl WeightedMatches<'_> {
+    /// Adds all matches; with `extrinsics`, including their derivatives by the lidar extrinsics.
     fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, extrinsics: bool) {
         let weigh = |one: &Match| self.robust.weight(&one.plane, one.plane.distance_m);
         let weights: Vec<f64> = self.matches.all.iter().map(weigh).collect();
         if extrinsics {
-            self.add_weighted::<SHARED>(&weights, equations, layout);
+            self.add_weighted::<COMMON>(&weights, equations, layout);
         } else {
             self.add_weighted::<ALWAYS>(&weights, equations, layout);
         }
     }
 
-    /// Sums are taken run by run and added in order: so they are the same bits on any number of threads, and, since
-    /// vector units of any width take them in the same order, on all machines.
+    /// Sums run by run and adds the sums in order. The result has the same bits for any number of threads, and on all
+    /// machines, because vector units of any width add in the same order.
     fn add_weighted<const B: usize>(&self, weights: &[f64], equations: &mut NormalEquations, layout: &Layout) {
         let spans = self.matches.spans.par_iter();
         let spans = spans.map(|(span, surfels)| (span, Arch::new().dispatch(|| self.of_span::<B>(surfels, weights))));
@@ -179,7 +179,7 @@ impl Seen<'_> {
         pairs.iter().for_each(|(pair, sum)| sum.add_to(equations, layout, *pair));
     }
 
-    /// What the matches of the surfels of a span say of each surfel's own motion.
+    /// The normal equations of all matches of the surfels of a span, by the motion of each surfel.
     #[inline(always)]
     fn of_span<const B: usize>(&self, surfels: impl Iterator<Item = usize>, weights: &[f64]) -> OfSpan<B> {
         let mut sum = OfSpan::NONE;
@@ -192,9 +192,9 @@ impl Seen<'_> {
                 let side = self.side(one, is_first);
                 let side = if one.other().is_some() { side.together_with(&self.side(one, !is_first)) } else { side };
                 own.add(&side, one.plane.distance_m, weight);
-                // Each match of two is met from both sides.
+                // A match of two live surfels is visited from both sides.
                 if is_first {
-                    sum.beside.add(&side, one.plane.distance_m, weight);
+                    sum.common.add(&side, one.plane.distance_m, weight);
                 }
             }
             sum.add(&own, &surfel.basis);
@@ -202,7 +202,7 @@ impl Seen<'_> {
         sum
     }
 
-    /// How the surfels of two spans hang together by some matches.
+    /// The off-diagonal block of some matches between two spans.
     #[inline(always)]
     fn coupling<const B: usize>(&self, matches: impl Iterator<Item = usize>, weights: &[f64]) -> Coupling {
         let mut sum = Coupling::NONE;
@@ -217,7 +217,7 @@ impl Seen<'_> {
         sum
     }
 
-    /// How a match's distance grows by what moves its first surfel, or the other.
+    /// The derivative of the match distance by the motion of the first surfel, or of the other one.
     #[inline(always)]
     fn side<const B: usize>(&self, one: &Match, first: bool) -> Side<B> {
         let normal = if first { one.plane.normal } else { -one.plane.normal };

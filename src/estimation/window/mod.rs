@@ -1,4 +1,4 @@
-//! The sliding window: what is being solved, and how.
+//! The sliding window: states, solution and marginalisation.
 
 mod correspondence;
 mod equations;
@@ -24,35 +24,36 @@ use super::strapdown::{Biases, Exaggerates, Interval};
 use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
-use correspondence::Remembered;
+use correspondence::CachedNeighbours;
 use equations::Workspace;
 use rests::Rests;
 use std::collections::VecDeque;
 
-/// Before the first motion that the IMU shows, the head has begun to move unseen: this long, s.
+/// The head may move this long before the IMU shows the first motion, s.
 const REST_MARGIN_S: f64 = 0.3;
-/// The window grows to at most this multiple of its length while too few surfaces are swept.
-const LONGEST: f64 = 3.0;
-/// A stretch counts as swept when it shows this fraction of the patches of the window's richest.
+/// The window grows to at most this multiple of the nominal length while the stretches contain few surfaces.
+const MAX_LENGTH: f64 = 3.0;
+/// A stretch counts as swept if it has this fraction of the patches of the richest stretch.
 const SWEPT: f64 = 0.25;
 
-/// A head whose speed is known no better than this is under way, m/s.
+/// A head whose initial velocity has at least this standard deviation counts as moving, m/s.
 const UNDER_WAY_M_PER_S: f64 = 5.0;
-/// Where the velocity may have changed unseen by more than this, m/s, surfaces match from farther off for so long, s.
+/// A velocity uncertainty above this in one stretch, m/s, widens the match gate for [`SHAKEN_S`].
 const SHOCK_M_PER_S: f64 = 0.1;
+/// Duration of the wide match gate after a shock, s.
 const SHAKEN_S: f64 = 2.0;
 
-/// How exactly a window is put into a map before it is matched with it, rad and m.
-const FOUND: [f64; 2] = [0.05, 0.2];
+/// Standard deviations of the pose after relocalisation in a map, before the window is matched with it, rad and m.
+const RELOCALISED_SIGMA: [f64; 2] = [0.05, 0.2];
 
-/// A stretch of time in the window.
+/// A time step of the window.
 #[derive(Debug)]
 struct Stretch {
     end_tau_s: f64,
     beams: Vec<Beam>,
     surfels: Vec<Surfel>,
-    /// What each surfel found in fixed views.
-    remembered: Vec<Remembered>,
+    /// Cached fixed-view neighbours of each surfel.
+    cached: Vec<CachedNeighbours>,
 }
 
 /// The state of the estimator: trajectory, biases, gravity, clock, and the surfels of the last few seconds.
@@ -60,39 +61,39 @@ struct Stretch {
 pub(super) struct Window {
     spec: EstimatorSpec,
     maker: SurfelMaker,
-    /// Makes the surfels of the survey, where one is asked for.
+    /// Builds the surfels of the survey, if one is requested.
     surveyor: Option<SurfelMaker>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
     pub(super) clock: Clock,
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
-    /// By how much the IMU exaggerates, as far as it is known.
+    /// Estimated scale errors and misalignments of the IMU.
     exaggerates: Exaggerates,
     border: Border,
     stretches: VecDeque<Stretch>,
     start: Start,
-    /// Whether it is the first one, begun in motion: level and biases are guesses, and surfaces match from farther off.
-    gropes: bool,
-    /// Whether the IMU was silent for a while in its newest stretch, so that it leapt, or clipped there or before.
-    leapt: bool,
-    /// Until when surfaces match from farther off behind a shock, IMU time, s.
+    /// Whether this is the first window and starts in motion: level and biases are guesses, and the match gate is wide.
+    wide_matching: bool,
+    /// Whether the newest stretch bridges an IMU gap, or a shock or clipping makes the velocity uncertain.
+    bridged_gap: bool,
+    /// End of the wide match gate after a shock, IMU time, s.
     shaken_until_s: f64,
-    /// While the head has not moved yet: what the IMU says at rest.
+    /// The IMU readings at rest, until the head first moves.
     rest: Option<Rest>,
-    /// Until when it rested, IMU time, s.
+    /// End of the initial rest, IMU time, s.
     rested_until_s: f64,
-    /// Rests on the way.
+    /// Later rests.
     rests: Rests,
-    /// Whether the speed is known: a head that began under way feels at rest until surfaces were matched.
+    /// Whether the speed is known. Constant motion looks like rest to the IMU until surfaces are matched.
     knows_speed: bool,
-    /// Whether the lidar would show it if the head did not rest.
+    /// Whether the lidar would show a motion of a head that the IMU reports at rest.
     sees_rest: bool,
     workspace: Workspace,
 }
 
 impl Window {
-    /// A window that begins with the IMU's first interval, at `start_u_s`.
+    /// A window that starts with the first IMU interval, at `start_u_s`.
     pub(super) fn new(
         spec: &EstimatorSpec,
         maker: SurfelMaker,
@@ -114,8 +115,8 @@ impl Window {
             border,
             stretches: VecDeque::new(),
             start: Start::first(start_u_s, beginning.velocity_sigma),
-            gropes: beginning.rest.is_none(),
-            leapt: false,
+            wide_matching: beginning.rest.is_none(),
+            bridged_gap: false,
             shaken_until_s: f64::NEG_INFINITY,
             rest: beginning.rest,
             rested_until_s: f64::NEG_INFINITY,
@@ -126,7 +127,7 @@ impl Window {
         }
     }
 
-    /// What goes on when the IMU falls silent.
+    /// The states that continue across an IMU gap.
     pub(super) fn carried(&self) -> Option<Carried> {
         let state = *self.nominal.states().last()?;
         let (exaggerates, lidar) = (self.exaggerates, self.maker.lidar);
@@ -137,45 +138,45 @@ impl Window {
         Some(Carried { until_s, state, mean_velocity, biases, gravity, clock, exaggerates, lidar })
     }
 
-    /// Goes on with clock and sensors as they were known before the IMU fell silent.
+    /// Initialises clock and sensor corrections with the values from before the IMU gap.
     pub(super) fn take_over(&mut self, carried: &Carried) {
         self.clock = carried.clock.after_gap((carried.until_s, self.start.u_s));
         self.exaggerates = carried.exaggerates;
         self.maker.lidar = carried.lidar;
     }
 
-    /// Turns the window about its beginning, the shortest way that makes gravity what it is in `carried`'s map.
+    /// Rotates the window about the start, by the smallest angle that aligns gravity with the map of `carried`.
     pub(super) fn level_as(&mut self, carried: &Carried) {
         let turn = Rotation::rotation_between(&self.gravity, &carried.gravity).unwrap_or_else(Rotation::identity);
         self.nominal.turn(&turn, &carried.state.position);
         self.gravity = carried.gravity;
     }
 
-    /// All patches of the window as they stand.
+    /// All patches of the window, in the map frame.
     pub(super) fn patches(&self) -> Vec<Patch> {
         self.scene().into_iter().map(|placed| placed.patch).collect()
     }
 
-    /// Puts the window where it was found in a map, to which the map holds it from now on.
+    /// Moves the window to the pose from relocalisation; from then on the map constrains it.
     pub(super) fn found_at(&mut self, map_from_here: &Pose) {
         self.nominal.move_by(map_from_here);
         self.gravity = map_from_here.rotation * self.gravity;
-        self.start.sigmas[0] = FOUND;
+        self.start.sigmas[0] = RELOCALISED_SIGMA;
     }
 
-    /// Whether it was put where it was found in a map, and has not gone on from there.
+    /// Whether the window was relocalised and has not advanced since.
     fn is_just_found(&self) -> bool {
-        self.start.sigmas[0] == FOUND
+        self.start.sigmas[0] == RELOCALISED_SIGMA
     }
 
-    /// Where the IMU is at the window's beginning.
+    /// The IMU pose at the start of the window.
     pub(super) fn begins(&self) -> Pose {
         let motion = self.nominal.at(self.start.u_s, &self.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
         Pose::from_parts(motion.position.into(), rotation)
     }
 
-    /// By how much the IMU contradicts the window's trajectory, as a multiple of its noise.
+    /// The contradiction between the IMU and the trajectory, as a multiple of the IMU noise.
     pub(super) fn imu_contradiction(&self) -> f64 {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let states = self.nominal.states().get(first..).unwrap_or_default();
@@ -183,33 +184,33 @@ impl Window {
         contradiction(states, intervals, (&self.biases, &self.gravity))
     }
 
-    /// How fast the IMU is at the window's end, m/s.
+    /// The speed of the IMU at the end of the window, m/s.
     pub(super) fn speed_m_per_s(&self) -> f64 {
         self.nominal.at(self.nominal.end_s(), &self.biases.gyro).velocity.norm()
     }
 
-    /// Whether the head rests at the window's end, as far as the IMU and the estimated speed show.
+    /// Whether the head rests at the end of the window, by the IMU and the estimated speed.
     pub(super) fn is_resting(&self) -> bool {
         let end_s = self.nominal.end_s() - REST_MARGIN_S;
         self.rest.is_some() || self.rests.at(end_s)
     }
 
-    /// Whether the lidar would show it if the head did not rest.
+    /// Whether the lidar would show a motion of a head that the IMU reports at rest.
     pub(super) fn sees_rest(&self) -> bool {
         self.sees_rest
     }
 
-    /// The same window, which does not see whether the head rests until it matches surfaces.
+    /// The same window, in which rest is unobserved by the lidar until surfaces are matched.
     pub(super) fn without_seeing_rest(self) -> Self {
         Self { sees_rest: false, ..self }
     }
 
-    /// When it begins, IMU time, s.
+    /// Start of the window, IMU time, s.
     pub(super) fn begins_s(&self) -> f64 {
         self.start.u_s
     }
 
-    /// The same window, which also tells what it saw by the surfels of `surveyor`.
+    /// The same window, which also builds survey surfels with `surveyor`.
     pub(super) fn surveyed_by(self, surveyor: SurfelMaker) -> Self {
         Self { surveyor: Some(surveyor), ..self }
     }
@@ -218,7 +219,7 @@ impl Window {
         &self.matcher
     }
 
-    /// Appends a stretch: integrates its intervals, and makes surfels of its beams. The time it took.
+    /// Appends a stretch: integrates the intervals and builds surfels of the beams. Returns the run time.
     pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) -> TimeSpent {
         let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
@@ -238,14 +239,14 @@ impl Window {
         if unseen > SHOCK_M_PER_S {
             self.shaken_until_s = self.nominal.end_s() + SHAKEN_S;
         }
-        self.leapt = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
+        self.bridged_gap = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
             || self.nominal.end_s() < self.shaken_until_s;
         let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
-        let remembered = vec![Remembered::default(); surfels.len()];
-        self.stretches.push_back(Stretch { end_tau_s, beams, surfels, remembered });
+        let cached = vec![CachedNeighbours::default(); surfels.len()];
+        self.stretches.push_back(Stretch { end_tau_s, beams, surfels, cached });
         let surfels_s = watch.lap_s();
-        // The clock is told from the middle of the window, where offset and rate are least correlated.
+        // Reference time of the clock: the middle of the window, where offset and rate are least correlated.
         let length_s = self.spec.step_s * self.stretches.len() as f64;
         let middle_s = end_tau_s - 0.5 * length_s;
         self.border.clock_told_from(middle_s - self.clock.at_s);
@@ -253,20 +254,21 @@ impl Window {
         TimeSpent { integration_s, surfels_s, ..TimeSpent::default() }
     }
 
-    /// Makes the newest stretch's surfels again, with the trajectory as it has become.
+    /// Rebuilds the surfels of the newest stretch with the current trajectory.
     pub(super) fn remake_newest(&mut self) {
         if let Some(newest) = self.stretches.back_mut() {
             newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
-            newest.remembered = vec![Remembered::default(); newest.surfels.len()];
+            newest.cached = vec![CachedNeighbours::default(); newest.surfels.len()];
             if self.surveyor.is_none() {
                 newest.beams = Vec::new();
             }
         }
     }
 
-    /// Whether the oldest stretch is to leave: without it the window still holds `window_s` of stretches that swept
-    /// over surfaces, or it has none to give. While the head is held still it sees lines alone, which need the patches
-    /// seen before.
+    /// Whether the oldest stretch can be removed.
+    ///
+    /// The rest of the window must contain `window_s` of swept stretches, or the oldest stretch must have few surfaces.
+    /// A head at rest measures only lines and needs the older patches.
     pub(super) fn is_full(&self) -> bool {
         let richest = self.stretches.iter().map(|stretch| stretch.surfels.len()).max().unwrap_or(0);
         let enough = (richest as f64 * SWEPT) as usize;
@@ -274,32 +276,32 @@ impl Window {
         let swept = self.stretches.iter().filter(|stretch| is_swept(stretch)).count();
         let windows = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
         let all = windows(self.stretches.len());
-        windows(swept) > 1.0 || all > LONGEST || (all > 1.0 && !self.stretches.front().is_some_and(is_swept))
+        windows(swept) > 1.0 || all > MAX_LENGTH || (all > 1.0 && !self.stretches.front().is_some_and(is_swept))
     }
 
-    /// Where the window will begin when its oldest stretch has gone, IMU time, s.
+    /// Start of the window after the removal of the oldest stretch, IMU time, s.
     pub(super) fn next_start_s(&self) -> Option<f64> {
-        // Behind a gap the IMU's intervals may end before the stretch does.
+        // After a gap the IMU intervals may end before the stretch does.
         let end_s = self.nominal.end_s();
         Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
-    /// What the oldest stretch saw, by the surfels of the survey, as they stand in the map, each with its time, s.
+    /// The survey patches of the oldest stretch in the map frame, each with the measurement time, s.
     pub(super) fn survey_oldest(&self) -> Vec<(f64, Patch)> {
         self.stretches.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
     }
 
-    /// What all stretches of the window saw, likewise.
+    /// The survey patches of all stretches of the window, as [`Self::survey_oldest`].
     pub(super) fn survey_all(&self) -> Vec<(f64, Patch)> {
         self.stretches.iter().flat_map(|stretch| self.survey(stretch)).collect()
     }
 
-    /// When the oldest stretch ends, lidar time, s.
+    /// End of the oldest stretch, lidar time, s.
     pub(super) fn oldest_end_s(&self) -> f64 {
         self.stretches.front().map_or(f64::NEG_INFINITY, |oldest| oldest.end_tau_s)
     }
 
-    /// When the newest stretch ends, likewise.
+    /// End of the newest stretch, lidar time, s.
     pub(super) fn end_s(&self) -> f64 {
         self.stretches.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
     }
@@ -312,7 +314,7 @@ impl Window {
         seen.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
     }
 
-    /// Lets the oldest stretch go: what is before its end is final. Its patches as they stand in the map.
+    /// Removes the oldest stretch, whose states become final. Returns the patches of it in the map frame.
     pub(super) fn let_go(&mut self, linearised: Option<&Linearised>) -> Option<Vec<Patch>> {
         let start_s = self.next_start_s()?;
         let oldest = self.stretches.pop_front()?;
@@ -320,25 +322,26 @@ impl Window {
         let by_lidar = linearised.and_then(|at| self.hangs_on_lidar(start_s, at));
         self.start = Start { by_lidar, ..Start::held(start_s) };
         self.rests.forget_before(start_s);
-        self.gropes = false;
+        self.wide_matching = false;
         let share = 1.0 / (self.stretches.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
         Some(placed)
     }
 
-    /// The largest of the estimated scale errors and misalignments of the IMU.
+    /// The largest estimated scale error or misalignment of the IMU.
     pub(super) fn imu_matrix(&self) -> f64 {
         self.exaggerates.gyro.amax().max(self.exaggerates.accel.amax())
     }
 
-    /// What is known of the lidar beyond its calibration.
+    /// The estimated corrections of the lidar calibration.
     pub(super) fn lidar(&self) -> LidarCorrection {
         self.maker.lidar
     }
 
-    /// The same along the axes by which the IMU is calibrated, where how the lidar sits is estimated: midway between
-    /// those of the gyroscope, by which the head's attitude is told then, and those of the accelerometer, either being
-    /// as good.
+    /// The lidar correction in the axes of the IMU calibration.
+    ///
+    /// If the extrinsics are estimated, the axes are midway between the gyroscope axes, which the estimated attitude
+    /// refers to, and the accelerometer axes; both are equally accurate.
     pub(super) fn calibrated_lidar(&self) -> LidarCorrection {
         let lidar = self.maker.lidar;
         if !self.spec.extrinsics.estimated {
@@ -350,7 +353,7 @@ impl Window {
         LidarCorrection { turn: imu_from_gyro * lidar.turn, shift, ..lidar }
     }
 
-    /// By what surfels are placed, as it is known now.
+    /// The current states with which surfels are placed in the map.
     fn placing(&self) -> Placing<'_> {
         Placing {
             nominal: &self.nominal,

@@ -1,32 +1,33 @@
-//! Rests of the head on the way: zero velocity and zero rate are measurements too.
+//! Rests after the start: zero-velocity and zero-rate measurements.
 
 use crate::estimation::initial::Rest;
 use crate::estimation::strapdown::{Biases, Interval};
 
-/// A rest lasts at least this long, s, and is not believed for this long at either end.
+/// A rest lasts at least this long, s.
 const LASTS_S: f64 = 0.7;
+/// No rest is assumed for this long at either end, s.
 const MARGIN_S: f64 = 0.15;
-/// A candidate survives missing samples over at most this, s: single ones that a driver loses, no gap in which a head
-/// could move and come to rest again.
+/// Missing samples end a candidate after this long, s: a driver drops single samples, but in a longer gap the head
+/// could move and stop.
 const MISSING_S: f64 = 0.1;
-/// A head at rest turns more slowly than this beyond the gyroscope's bias, rad/s.
+/// Maximum turn rate at rest after subtraction of the gyroscope bias, rad/s; the sample noise is added to it.
 const RATE_RAD_PER_S: f64 = 0.01;
-/// And moves more slowly than this by the estimate, m/s: even motion feels the same.
+/// Maximum estimated speed at rest, m/s: the IMU cannot distinguish constant motion from rest.
 const SPEED_M_PER_S: f64 = 0.15;
 
-/// Finds rests in the intervals as they come.
+/// Detects rests in the stream of intervals.
 #[derive(Debug, Default)]
 pub(super) struct Rests {
-    /// What the IMU reads since when, IMU time, s, if that has not changed since.
+    /// The IMU readings of a possible rest, and the start of it, IMU time, s.
     candidate: Option<(Rest, f64)>,
-    /// For how long the samples have been missing, s.
+    /// Duration of the missing samples so far, s.
     missing_s: f64,
-    /// From when until when the head rested, in order.
+    /// Start and end of each rest, in order, IMU time, s.
     found: Vec<(f64, f64)>,
 }
 
 impl Rests {
-    /// Takes the interval that ends at `end_s`, at which the estimate has a speed of `speed_m_per_s`.
+    /// Adds the interval that ends at `end_s`, where the estimated speed is `speed_m_per_s`.
     pub(super) fn take(&mut self, interval: &Interval, biases: &Biases, (end_s, speed_m_per_s): (f64, f64)) {
         self.missing_s = if interval.bridged { self.missing_s + interval.h } else { 0.0 };
         if interval.bridged && self.missing_s < MISSING_S {
@@ -57,7 +58,7 @@ impl Rests {
         after.checked_sub(1).is_some_and(|k| u_s <= self.found[k].1)
     }
 
-    /// Forgets rests that were over before `u_s`.
+    /// Removes rests that ended before `u_s`.
     pub(super) fn forget_before(&mut self, u_s: f64) {
         self.found.retain(|(_, until_s)| *until_s >= u_s);
     }
@@ -81,7 +82,7 @@ mod tests {
         }
     }
 
-    /// Rests found when the head turns before 1 s and after 3 s, at a speed of `speed`.
+    /// Rests of a head that turns before 1 s and after 3 s and has a speed of `speed`.
     fn rests(speed: f64) -> Rests {
         let biases = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
         let mut rests = Rests::default();
@@ -101,7 +102,7 @@ mod tests {
         );
     }
 
-    /// A head that rests throughout; every fifth sample is lost, or those from 2 s to 2.3 s.
+    /// A head that rests throughout; every fifth sample is lost, or the samples from 2 s to 2.3 s.
     #[test]
     fn lost_samples_do_not_end_a_rest_and_gaps_do() {
         let biases = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
@@ -120,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn even_motion_is_no_rest() {
+    fn constant_motion_is_no_rest() {
         let rests = rests(8.0);
         assert!((0..400).all(|k| !rests.at(f64::from(k) * 0.01)));
     }

@@ -1,4 +1,4 @@
-//! The window's iterations: place the surfels, match, solve; again until nothing moves.
+//! The window's iterations: place the surfels, match, solve, until the correction converges.
 
 use super::Window;
 use super::correspondence::{Matches, Neighbours, With};
@@ -16,17 +16,17 @@ use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
 
-/// A correction beyond this (m, rad) in one solve is not believed.
-const BELIEVABLE: (f64, f64) = (2.0, 0.8);
-/// A turn moves a surfel by so much, m a rad: what is farther away is in larger cells.
+/// A correction above this (m, rad) in one iteration is rejected.
+const MAX_CORRECTION: (f64, f64) = (2.0, 0.8);
+/// Lever arm that converts a rotation of the head into surfel motion, m; more distant surfaces are in larger cells.
 const ARM_M: f64 = 5.0;
-/// A normal that leans to a direction by less than this sine may do so by its error alone.
+/// A normal that tilts towards a direction by less than this sine may do so only by measurement error.
 pub(in crate::estimation) const LEANING: f64 = 0.3;
-/// Conditioning below which a window that was just found in a map is not moved along the weakest direction: nothing but
-/// a few matches, of which some are false, would hold it there.
-const UNTOLD: f64 = 0.01;
+/// Conditioning below which a just relocalised window is not corrected along the weakest direction. Only a few matches
+/// constrain it, and some of them are false.
+const UNCONSTRAINED: f64 = 0.01;
 
-/// How a window's solution came out.
+/// Statistics of a window's solution.
 #[derive(Debug, Clone, Default)]
 pub(in crate::estimation) struct Solved {
     pub surfels: usize,
@@ -37,17 +37,17 @@ pub(in crate::estimation) struct Solved {
     pub iterations: usize,
     pub last_correction_m: f64,
     pub conditioning: f64,
-    /// The direction about which the matches say least, in the map.
+    /// The least constrained direction, in the map frame.
     pub weakest: Vector,
     pub trouble: Option<&'static str>,
     pub spent: TimeSpent,
 }
 
 impl Window {
-    /// Solves the window; what it was linearised at, where its solution is believed.
+    /// Solves the window; returns the last linearisation if the solution is accepted.
     pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
         if self.nominal.end_s() <= self.start.u_s {
-            let trouble = Some("the IMU's samples do not reach it");
+            let trouble = Some("the IMU samples do not reach the window");
             return (Solved { trouble, ..Solved::default() }, None);
         }
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
@@ -66,25 +66,25 @@ impl Window {
             solved.spent.placing_s += watch.lap_s();
             let chosen = chosen.get_or_insert_with(|| views.choose(&scene));
             solved.spent.views_s += watch.lap_s();
-            if !neighbours.are_good_for(&scene) {
-                neighbours = self.look_around(&scene, (views, chosen));
+            if !neighbours.are_valid_for(&scene) {
+                neighbours = self.search_neighbours(&scene, (views, chosen));
             }
             solved.spent.neighbours_s += watch.lap_s();
             let matches = self.match_up(&scene, views, &neighbours, iteration);
             let robust = Robust::of(&self.spec.solve, iteration);
-            solved.describe(&matches, &robust);
+            solved.record(&matches, &robust);
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
-            let matches = self.believed(matches, &solved, &scene, views);
+            let matches = self.significant(matches, &solved, &scene, views);
             solved.spent.matches_s += watch.lap_s();
             let seen = (&matches, &robust);
             let spent = &mut solved.spent;
             let Some((x, by)) = self.solve_linearised((first, &total), &scene, seen, &layout, spent) else {
-                solved.trouble = Some("its equations are singular");
+                solved.trouble = Some("the normal equations are singular");
                 break;
             };
-            watch.lap_s(); // told by the solver itself
-            if !(by.shift < BELIEVABLE.0 && by.turn < BELIEVABLE.1) {
-                solved.trouble = Some("its correction is too large");
+            watch.lap_s(); // the solver records this time
+            if !(by.shift < MAX_CORRECTION.0 && by.turn < MAX_CORRECTION.1) {
+                solved.trouble = Some("the correction is too large");
                 break;
             }
             self.apply(&x, first, &layout, &mut total);
@@ -107,20 +107,20 @@ impl Window {
         (solved, linearised)
     }
 
-    /// The matches as far as they tell more than their errors; none of so few that they may all be wrong.
-    fn believed(&self, mut matches: Matches, solved: &Solved, scene: &[Placed], views: &Views) -> Matches {
+    /// Removes matches and match components that are not significant; too few matches are removed entirely.
+    fn significant(&self, mut matches: Matches, solved: &Solved, scene: &[Placed], views: &Views) -> Matches {
         if matches.all.len() < self.spec.solve.min_matches {
             return Matches::default();
         }
-        if self.is_just_found() && solved.conditioning < UNTOLD {
+        if self.is_just_found() && solved.conditioning < UNCONSTRAINED {
             matches.all.iter_mut().for_each(|found| found.plane.forget(&solved.weakest));
         } else if solved.conditioning < self.spec.solve.weak_conditioning {
-            self.straighten(&mut matches, scene, views, &solved.weakest);
+            self.remove_insignificant_tilt(&mut matches, scene, views, &solved.weakest);
         }
         matches
     }
 
-    /// Moves the window's unknowns by a solution.
+    /// Applies a solution to the window's unknowns.
     fn apply(&mut self, x: &[f64], first: usize, layout: &Layout, total: &mut [f64]) {
         let bases = &self.workspace.bases;
         self.nominal.correct(first, |node| Correction::of_spline(&bases[node - first], layout.first_knot, x));
@@ -147,8 +147,8 @@ impl Window {
 }
 
 impl Solved {
-    /// Number, residual and conditioning of a set of matches.
-    fn describe(&mut self, matches: &Matches, robust: &Robust) {
+    /// Records number, residual and conditioning of a set of matches.
+    fn record(&mut self, matches: &Matches, robust: &Robust) {
         self.matches = matches.all.iter().filter(|one| matches!(one.with, With::Live(_))).count();
         self.view_matches = matches.all.len() - self.matches;
         let (mut weights, mut squares, mut information) = (0.0, 0.0, Matrix::zeros());
@@ -163,10 +163,12 @@ impl Solved {
         if weights > 0.0 {
             let eigen = information.symmetric_eigen();
             let weakest: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-            // In a smooth tunnel no normal leans along it, but for errors: together they would pass for information.
+            // In a smooth tunnel normals tilt along the axis only by error; the sum of the errors would count as
+            // information.
             let along = |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|lean| lean.abs() > LEANING);
-            let held = |plane: &Plane| along(plane).map(|lean| robust.weight(plane, plane.distance_m) * lean * lean);
-            let least = matches.planes().filter_map(held).fold(0.0, |sum, term| sum + term);
+            let information_of =
+                |plane: &Plane| along(plane).map(|lean| robust.weight(plane, plane.distance_m) * lean * lean);
+            let least = matches.planes().filter_map(information_of).fold(0.0, |sum, term| sum + term);
             (self.conditioning, self.weakest) = (least / eigen.eigenvalues.max(), weakest);
         }
     }

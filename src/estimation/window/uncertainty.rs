@@ -1,4 +1,4 @@
-//! How a window's solution hangs on what it was given: its beginning, its views, and its own measurements.
+//! Sensitivity of a window's solution to the start, to the views, and to the measurements.
 
 use super::Window;
 use super::correspondence::{Match, Matches, With};
@@ -12,7 +12,7 @@ use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use nalgebra::{Matrix6, SMatrix};
 
-/// The last linearisation of a window that was solved, whose factor the workspace still holds.
+/// The last linearisation of a solved window; the workspace still has the factor of it.
 #[derive(Debug)]
 pub(in crate::estimation) struct Linearised {
     pub(super) layout: Layout,
@@ -22,7 +22,7 @@ pub(in crate::estimation) struct Linearised {
 }
 
 impl Window {
-    /// How what a window takes over at `u_s`, IMU time, hangs on what this one held fixed.
+    /// Sensitivity of the states at `u_s`, IMU time, to the quantities that this window assumes fixed.
     pub(in crate::estimation) fn sensitivity_at(
         &self,
         u_s: f64,
@@ -31,7 +31,7 @@ impl Window {
     ) -> Option<Sensitivity> {
         let size = at.layout.size();
         let taken_over = self.columns_at(u_s, &at.layout);
-        // H^-1 is symmetric: solving for its rows serves all that is held.
+        // H^-1 is symmetric: the solutions for these rows serve all fixed quantities.
         let solved: Vec<Vec<f64>> = taken_over.iter().map(|column| self.workspace.factor.solve(column)).collect();
         let by = |r: usize, column: &[f64]| (0..size).map(|k| solved[r][k] * column[k]).sum::<f64>();
         let by_start = self.columns_of_start(&at.layout);
@@ -41,7 +41,7 @@ impl Window {
         let mut beginning = OfBeginning::zeros();
         beginning.fixed_columns_mut::<12>(0).copy_from(&of_start);
         beginning.fixed_columns_mut::<IMU>(AT_IMU).copy_from(&of_imu);
-        // What is left of the covariance when that of the beginning is taken from it, of which the next windows know.
+        // The remainder of the covariance after subtraction of the start's part, which `Consider` propagates.
         let all = OfBeginning::from_fn(|r, c| by(r, &taken_over[c]));
         let own = all - beginning * self.known_at_start()? * beginning.transpose();
         let by_views = self.columns_of_views(at, views);
@@ -53,7 +53,7 @@ impl Window {
         })
     }
 
-    /// Covariance of what the window begins with, as its equations have it.
+    /// Covariance of the start states, as the window's equations assume it.
     pub(in crate::estimation) fn known_at_start(&self) -> Option<OfBeginning> {
         let sigma = |k: usize| self.start.sigmas[k / 6][k % 6 / 3];
         let mut known = OfBeginning::zeros();
@@ -63,8 +63,9 @@ impl Window {
         Some(known)
     }
 
-    /// How the corrections at `u_s`, IMU time, and their derivatives hang on how the lidar sits on the IMU, all else
-    /// being solved for: `P_xl P_ll^-1` of the covariances `P`. Nothing where that is not estimated.
+    /// Regression of the corrections at `u_s` (IMU time) and of their derivatives on the lidar extrinsics.
+    ///
+    /// With all other unknowns solved: `P_xl P_ll^-1` of the covariances `P`. None if the extrinsics are not estimated.
     pub(super) fn hangs_on_lidar(&self, u_s: f64, at: &Linearised) -> Option<ByLidar> {
         if !self.spec.extrinsics.estimated {
             return None;
@@ -75,7 +76,7 @@ impl Window {
             column[lidar + k] = 1.0;
             self.workspace.factor.solve(&column)
         });
-        // In standard deviations: radians and metres are of different size.
+        // In standard deviations, because radians and metres have different magnitudes.
         let sigma = |k: usize| covariances[k][lidar + k].sqrt();
         let of_lidar = Matrix6::from_fn(|r, c| covariances[c][lidar + r] / (sigma(r) * sigma(c)));
         let information = of_lidar.try_inverse()?;
@@ -91,8 +92,8 @@ impl Window {
         Some([basis.value, basis.rate, basis.acceleration].map(by_lidar))
     }
 
-    /// What the next window takes over at `u_s`, as rows over the window's unknowns: the six corrections, turn then
-    /// shift, their derivatives, and the IMU's part of the border.
+    /// The states that the next window inherits at `u_s`, as rows over the window's unknowns: the six corrections,
+    /// rotation then translation, the derivatives, and the IMU part of the border.
     fn columns_at(&self, u_s: f64, layout: &Layout) -> [Vec<f64>; CARRIED] {
         let basis = Basis::at(u_s, self.spec.knot_spacing_s);
         let first = layout.knot(basis.first);
@@ -108,7 +109,7 @@ impl Window {
         })
     }
 
-    /// What the right-hand side gains when the window's beginning is turned and shifted, and those are under way.
+    /// Change of the right-hand side per unit rotation, translation, and rate of each, of the window's start.
     fn columns_of_start(&self, layout: &Layout) -> [Vec<f64>; 12] {
         std::array::from_fn(|of| {
             let mut asked = [[0.0; 6]; 2];
@@ -117,7 +118,7 @@ impl Window {
         })
     }
 
-    /// What the right-hand side gains when a view is turned about its pivot and shifted, for each view in use.
+    /// Change of the right-hand side per unit rotation about the pivot and translation of each view in use.
     fn columns_of_views(&self, at: &Linearised, views: &Views) -> Vec<(u64, [Vec<f64>; 6])> {
         let mut columns: Vec<(u32, [Vec<f64>; 6])> = Vec::new();
         for Match { a, with, plane } in &at.matches.all {

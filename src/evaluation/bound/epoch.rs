@@ -1,11 +1,11 @@
-//! What was heard and seen about an instant.
+//! The measurements of one epoch.
 
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::ImuSample;
 use crate::time::Stamp;
 use nalgebra::{SMatrix, SVector};
 
-/// A beam that met a surface that stands, as it truly was.
+/// A beam that hit a static surface, without noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sight {
     /// When it was fired, lidar time.
@@ -22,34 +22,34 @@ pub struct Sight {
     pub direction_in_world: Vector,
     /// The surface's unit normal, of either sign.
     pub normal_in_world: Vector,
-    /// Standard deviation of its range, m.
+    /// Standard deviation of the range, m.
     pub range_sigma_m: f64,
 }
 
-/// Beams along a surface to within this cosine say nothing that could be believed to first order.
+/// Beams along a surface to within this cosine are skipped: the first-order model does not apply to them.
 const GRAZING: f64 = 0.02;
 
-/// Errors that a beam tells of: attitude, position, clock offset now, offset of the ranges.
+/// Errors that a beam measures: attitude, position, current clock offset, range offset.
 pub(super) type Seen = SMatrix<f64, 8, 8>;
-/// Entries of its lower triangle.
+/// Entries of the lower triangle.
 const TOLD: usize = 36;
 
-/// An instant: how the IMU moved, what it said on average, and what the beams about it say together.
+/// An epoch: the motion of the IMU, the mean of the IMU samples, and the information of the beams.
 #[derive(Debug, Clone)]
 pub(super) struct Epoch {
     pub world_from_imu: Rotation,
     pub position_in_world: Vector,
     pub velocity_in_world: Vector,
-    /// Sums of what the samples say, and how many there are.
+    /// Sums and count of the samples.
     rate_sum: Vector,
     force_sum: Vector,
     samples: f64,
-    /// Fisher information of the beams: its lower triangle, row by row.
+    /// Fisher information of the beams: the lower triangle, row by row.
     told: [f64; TOLD],
 }
 
 impl Epoch {
-    /// Nothing heard yet where the IMU was at `world_from_imu`, `dt_s` after `before`.
+    /// An epoch without measurements, with the IMU at `world_from_imu`, `dt_s` after `before`.
     pub(super) fn new(world_from_imu: &Pose, before: &Pose, dt_s: f64) -> Self {
         let position_in_world = world_from_imu.translation.vector;
         Self {

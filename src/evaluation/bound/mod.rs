@@ -1,14 +1,14 @@
-//! How well a trajectory can be told at all: the Cramer-Rao bound of a recording in its scene.
+//! The Cramer-Rao bound of a recording in a known scene: the accuracy that no estimator can exceed.
 //!
-//! Whatever an unbiased estimator does, the covariance of its errors is no less than the inverse of the Fisher
-//! information that its measurements hold. Here these are all beams, of known noise, on surfaces that are known
-//! exactly, and an inertial measurement unit of known noise whose biases walk. An estimator that does not know the map
-//! knows less, so the bound holds for it too; how much less is not told.
+//! The covariance of the errors of any unbiased estimator is at least the inverse of the Fisher information of the
+//! measurements. Here these are all beams, of known noise, on surfaces that are known exactly, and an inertial
+//! measurement unit of known noise whose biases walk. An estimator without the map has less information, so the bound
+//! applies to it too, but is optimistic.
 //!
 //! # The model
 //!
 //! Errors of the estimate, all to first order about the truth: attitude `dtheta` (`R' = exp(dtheta) R`), velocity and
-//! position of the IMU in the world, the biases of gyroscope and accelerometer, and what is constant over the run:
+//! position of the IMU in the world, the biases of gyroscope and accelerometer, and the constants of the run:
 //! clock offset `l` and its rate, an offset of all ranges, and the scale and misalignment of both triads. They move as
 //!
 //! ```text
@@ -16,14 +16,14 @@
 //! ```
 //!
 //! A beam from the head that meets a plane of normal `n` at `rho` from the IMU, along `u`, has the range `dr = -n (dp +
-//! dtheta x rho) / (n u)`, and its time is looked up on the IMU's clock: an error of `l` moves the pose by its own
-//! velocity. The trajectory is told in lidar time, so that `l` is in its error likewise.
+//! dtheta x rho) / (n u)`. Its time is converted to the IMU's clock: an error of `l` moves the pose by its velocity.
+//! The trajectory is in lidar time, so its error includes `l` too.
 //!
-//! # What is left out, to the side of a lower bound
+//! # Omitted effects, all of which would raise the bound
 //!
 //! Rounding of ranges, jitter and rounding of stamps, missed echoes and their biases at grazing incidence, beams that
-//! met anything but what stands, and samples at their limit: as if known. The IMU is taken to be heard continuously, of
-//! which its samples are averages. Gravity is known.
+//! hit moving objects, and samples at their limit: assumed known. The IMU samples are averages over adjacent intervals.
+//! Gravity is known.
 
 mod epoch;
 mod motion;
@@ -38,10 +38,10 @@ use crate::geometry::{Pose, Vector};
 use crate::measurement::{ImuNoise, ImuSample};
 use crate::time::{Span, Stamp};
 
-/// Time between the instants at which errors are told.
+/// Time between the epochs at which errors are reported.
 const EPOCH: Span = Span::from_nanos(20_000_000);
 
-/// What is known of the sensors before they are heard; standard deviations.
+/// Prior standard deviations of the sensors' errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoundModel {
     /// Where the IMU is in the head.
@@ -52,17 +52,17 @@ pub struct BoundModel {
     pub gyro_matrix: (f64, f64),
     /// The same of the accelerometer.
     pub accel_matrix: (f64, f64),
-    /// The offset that all ranges of the run share, m.
+    /// The offset common to all ranges of the run, m.
     pub range_offset_m: f64,
     /// The offset between the clocks, s.
     pub clock_offset_s: f64,
-    /// Its rate, s/s.
+    /// Rate of the clock offset, s/s.
     pub clock_rate: f64,
 }
 
-/// The information that a recording holds, gathered as it is read.
+/// The information in a recording, accumulated while it is read.
 ///
-/// It keeps a record of some hundred bytes for each 20 ms: what its beams say together, and how the head moved.
+/// Stores some hundred bytes for each 20 ms: the information of the beams and the motion of the head.
 #[derive(Debug, Clone)]
 pub struct Information {
     model: BoundModel,
@@ -83,8 +83,8 @@ pub struct InformationBound {
     pub position_rmse_m: f64,
     /// The same along each axis of the world, m.
     pub axis_rmse_m: Vector,
-    /// Of the position after the rigid alignment by which estimates are judged, m: what an error of that measure is
-    /// held against.
+    /// RMSE of the position after the rigid alignment that the evaluation uses, m: comparable with the RMSE of an
+    /// estimate.
     pub aligned_position_rmse_m: f64,
     /// Of the attitude over the run, in the world, rad.
     pub attitude_rmse_rad: f64,
@@ -95,7 +95,7 @@ pub struct InformationBound {
 }
 
 impl Information {
-    /// Nothing heard yet of a run in which the head was truly at `heads`: `world_from_head` in lidar time, in order, at
+    /// No measurements yet; the true trajectory is `heads`: `world_from_head` in lidar time, in order, at
     /// least 50 a second.
     pub fn new<E>(model: BoundModel, heads: impl Iterator<Item = Result<(Stamp, Pose), E>>) -> Result<Self, E> {
         let mut epochs: Vec<Epoch> = Vec::new();
@@ -114,7 +114,7 @@ impl Information {
         Ok(Self { model, start: start.unwrap_or_default(), epochs })
     }
 
-    /// Hears a sample of the IMU, taken at `stamp` of the lidar's clock.
+    /// Adds a sample of the IMU with the stamp `stamp` of the lidar's clock.
     pub fn hear(&mut self, stamp: Stamp, sample: &ImuSample) {
         if let Some(epoch) = self.epoch_at(stamp) {
             epoch.hear(sample);
@@ -129,7 +129,7 @@ impl Information {
         }
     }
 
-    /// The epoch about an instant.
+    /// The epoch at a time.
     fn epoch_at(&mut self, stamp: Stamp) -> Option<&mut Epoch> {
         let index = (stamp.seconds_since(self.start) / EPOCH.seconds()).round();
         (index >= 0.0).then(|| self.epochs.get_mut(index as usize)).flatten()
@@ -142,7 +142,7 @@ impl Information {
     pub fn bound(self) -> Result<InformationBound, EvaluationError> {
         let found_s = self.epochs.len() as f64 * EPOCH.seconds();
         if found_s < 0.1 {
-            return Err(EvaluationError::TooShort { what: "the information bound", needed_s: 0.1, found_s });
+            return Err(EvaluationError::TooShort { measure: "the information bound", needed_s: 0.1, found_s });
         }
         Ok(smoother::bound(&self.model, self.start, &self.epochs))
     }

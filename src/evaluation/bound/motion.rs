@@ -8,17 +8,17 @@ use super::{BoundModel, EPOCH};
 use crate::geometry::{Matrix, Vector, skew};
 use nalgebra::SMatrix;
 
-/// What of the state is an error of the head, as it is told: attitude and position, in lidar time.
+/// The part of the state that is reported: attitude and position of the head, in lidar time.
 pub(super) type Told = SMatrix<f64, 3, N>;
 
-/// Noise of an IMU that says nothing, against one that speaks.
+/// Noise of a missing IMU relative to a working one.
 const SILENT: f64 = 1e4;
 
 /// From one epoch to the next.
 pub(super) struct Step {
-    /// What becomes of an error.
+    /// Propagation of the errors.
     pub transition: State,
-    /// The covariance of what comes in.
+    /// The covariance of the process noise.
     pub noise: State,
 }
 
@@ -108,7 +108,7 @@ fn with_clock(mut told: Told, velocity: &Vector, since_start_s: f64) -> Told {
     told
 }
 
-/// The covariance of the noise that comes in during a step: white noise `r` before its end has moved attitude by
+/// The covariance of the process noise of a step: white noise `r` before the end has moved attitude by
 /// itself, velocity by `-[Rf]x r` and position by `-[Rf]x r^2 / 2` of it (gyroscope), or velocity by itself and
 /// position by `r` (accelerometer). Integrated over `r` by Gauss' rule of three points, exact to the fifth order.
 fn noise(model: &BoundModel, pull: &Matrix, worse: f64) -> State {

@@ -8,8 +8,8 @@
 //! L~ = W + (I - W P) L^ (I - P W)      P_smoothed = P - P L~ P      L^_before = F^T L~ F
 //! ```
 //!
-//! Nothing is inverted that may be singular. Of the forward pass one covariance in [`STRETCH`] is kept, and the rest of
-//! a stretch computed again on the way back.
+//! No matrix that may be singular is inverted. The forward pass stores one covariance in [`STRETCH`]; the backward pass
+//! recomputes the others.
 
 use super::epoch::{Epoch, Seen};
 use super::motion::{Step, Told, attitude_told, head_in_world, position_told};
@@ -19,9 +19,9 @@ use crate::geometry::{Matrix, Vector, skew};
 use crate::time::{Span, Stamp};
 use nalgebra::{Matrix6, SMatrix};
 
-/// Epochs between two covariances that are kept.
+/// Epochs between two stored covariances.
 const STRETCH: usize = 64;
-/// Errors that measurements tell of, by their place in the state.
+/// Errors that measurements constrain, by index in the state.
 const TOLD_OF: [usize; 9] =
     [ATTITUDE, ATTITUDE + 1, ATTITUDE + 2, POSITION, POSITION + 1, POSITION + 2, CLOCK, CLOCK_RATE, RANGE];
 
@@ -45,7 +45,7 @@ impl Run<'_> {
         Step::between(self.model, ends, &self.middle_in_world, self.since_start_s(index))
     }
 
-    /// `W` of an epoch's measurements, on the errors that they tell of: `(I + M P)^-1 M` with their information `M`.
+    /// `W` of an epoch's measurements, on the errors that they constrain: `(I + M P)^-1 M` with the information `M`.
     fn weight(&self, index: usize, predicted: &State) -> Measured {
         let information = with_rate(&self.epochs[index].seen(), self.since_start_s(index));
         let known = Measured::from_fn(|i, j| predicted[(TOLD_OF[i], TOLD_OF[j])]);
@@ -64,7 +64,7 @@ impl Run<'_> {
     }
 }
 
-/// Information on the clock offset now as information on the offset at the start and its rate.
+/// Information on the current clock offset as information on the initial offset and the rate.
 fn with_rate(seen: &Seen, since_start_s: f64) -> Measured {
     let mut spread = SMatrix::<f64, 8, 9>::zeros();
     (0..7).for_each(|k| spread[(k, k)] = 1.0);
@@ -158,7 +158,7 @@ fn back(run: &Run<'_>, kept: &[State], found: &mut Variances) {
     }
 }
 
-/// `L~` of an epoch, from what comes behind it.
+/// `L~` of an epoch, from the later epochs.
 fn updated(weight: &Measured, predicted: &State, behind: &State) -> State {
     let mut whole = State::zeros();
     for (i, row) in TOLD_OF.iter().enumerate() {
@@ -170,10 +170,10 @@ fn updated(weight: &Measured, predicted: &State, behind: &State) -> State {
     symmetric(&(whole + left * behind * left.transpose()))
 }
 
-/// Tells what is known of the epoch at `index`, of which `adjoint` comes from behind.
+/// Computes the smoothed variances of the epoch at `index`; `adjoint` is from the later epochs.
 fn smooth(run: &Run<'_>, (index, predicted, adjoint): (usize, &State, &State), found: &mut Variances) {
     let (epoch, since_start_s) = (&run.epochs[index], run.since_start_s(index));
-    // C (P - P L~ P) C^T, for what is told alone.
+    // C (P - P L~ P) C^T, for the reported errors only.
     let variances = |told: &Told| -> Vector {
         let across = told * predicted;
         let covariance: Matrix = across * told.transpose() - across * adjoint * across.transpose();
@@ -189,9 +189,9 @@ fn smooth(run: &Run<'_>, (index, predicted, adjoint): (usize, &State, &State), f
     }
 }
 
-/// What a rigid alignment over all epochs takes from the sum of the squared position errors: with `A` the motion of all
+/// The reduction of the sum of squared position errors by a rigid alignment over all epochs: with `A` the motion of all
 /// positions by a small rigid one, `tr((A^T A)^-1 A^T S A)`, where `A^T S A` is the covariance of the sums that the
-/// state carries.
+/// state includes.
 fn taken_by_alignment(run: &Run<'_>, last: &State) -> f64 {
     let at_end = run.epochs.len() - 1;
     let across = columns(last);

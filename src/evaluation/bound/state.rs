@@ -1,4 +1,4 @@
-//! Where each error stands in the state.
+//! Layout of the error state.
 
 use super::BoundModel;
 use nalgebra::{SMatrix, SVector};
@@ -9,13 +9,13 @@ pub(super) const N: usize = 42;
 pub(super) const ATTITUDE: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const POSITION: usize = 6;
-/// Sums over the run of the position's error, and of the moment of it about the trajectory's middle: what an alignment
-/// takes.
+/// Sums over the run of the position error, and of the moment of it about the trajectory's centre: the terms of the
+/// alignment.
 pub(super) const SUMS: usize = 9;
 /// Biases.
 pub(super) const GYRO_BIAS: usize = 15;
 pub(super) const ACCEL_BIAS: usize = 18;
-/// Clock offset at the start, its rate, and the offset of all ranges.
+/// Clock offset at the start, clock rate, and the offset of all ranges.
 pub(super) const CLOCK: usize = 21;
 pub(super) const CLOCK_RATE: usize = 22;
 pub(super) const RANGE: usize = 23;
@@ -25,7 +25,7 @@ pub(super) const ACCEL_MATRIX: usize = 33;
 
 pub(super) type State = SMatrix<f64, N, N>;
 
-/// What is known of attitude, rad, velocity, m/s, and position, m, before anything is heard: next to nothing.
+/// Prior standard deviations of attitude, rad, velocity, m/s, and position, m: nearly uninformative.
 const UNKNOWN: [f64; 3] = [1.0, 10.0, 10.0];
 
 /// The covariance before anything is heard.

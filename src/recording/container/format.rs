@@ -47,14 +47,15 @@ const OTHERS: [(&[u8], &str, &str); 19] = [
         "a PX4 log",
         "convert its topics to a bag with `ulog2rosbag`, part of pyulog; a lidar's are rarely in it",
     ),
-    (b"PAR1", "a Parquet table", "write its scans and samples as MCAP, see docs/recordings.md"),
+    (b"PAR1", "a Parquet table", "write its scans and samples as MCAP, see docs/guide/recordings.md"),
 ];
 
 const PCAP: &str = "a pcap capture of network packets";
 const REPLAY: &str =
     "replay it through the lidar's ROS driver, and record the topics of lidar and IMU with `ros2 bag record -s mcap`";
 const CLOUD: &str = "an estimate needs the scans and IMU samples over time; record them with `ros2 bag record -s mcap`";
-const RECORD: &str = "record the topics of lidar and IMU with `ros2 bag record -s mcap`, or see docs/recordings.md";
+const RECORD: &str =
+    "record the topics of lidar and IMU with `ros2 bag record -s mcap`, or see docs/guide/recordings.md";
 
 impl Format {
     /// The format that begins with `magic`.

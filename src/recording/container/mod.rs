@@ -1,5 +1,5 @@
-//! The containers of recordings, read: MCAP, ROS 1 bags and the databases of rosbag2; each as a directory of blocks, and
-//! messages in the order of their log time.
+//! The containers of recordings, read: MCAP, ROS 1 bags and the databases of rosbag2; each as a directory of blocks,
+//! and messages in the order of their log time.
 //!
 //! Written for files that may be cut short, damaged, or made by anybody: nothing is allocated on the word of a length
 //! field alone, every record is bounded by what is there, and what cannot be read is counted, not feared.

@@ -151,8 +151,8 @@ impl<'a> Cloud<'a> {
 }
 
 /// Reads a cloud's returns in the order in which they were fired; points that are not finite or lie in the origin are
-/// beams that did not come back, and so are those at `farthest_m` and beyond. Their times after the stamp are counted in
-/// `unit`, where another than the usual one is known.
+/// beams that did not come back, and so are those at `farthest_m` and beyond. Their times after the stamp are counted
+/// in `unit`, where another than the usual one is known.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2` with x, y and z.

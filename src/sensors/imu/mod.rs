@@ -25,7 +25,8 @@ impl Imu {
     /// The IMU that `spec`, from `source`, describes.
     ///
     /// # Errors
-    /// When its rate is that of no IMU, its stamps are late or early by more than a second, or a resolution exceeds its limit.
+    /// When its rate is that of no IMU, its stamps are late or early by more than a second, or a resolution exceeds its
+    /// limit.
     pub fn new(spec: &ImuSpec, source: &Source) -> Result<Self, SpecError> {
         spec.check(source)?;
         Ok(Self { gyro: spec.gyro.model(), accel: spec.accel.model(), spec: spec.clone() })

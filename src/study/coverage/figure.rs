@@ -1,4 +1,4 @@
-use super::{Coverage, SeenCell};
+use super::{Coverage, CoverageCell};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Series};
 
 /// Share of the cells that are darker than the darkest colour: few directions at the ends of a swing would else make
@@ -17,11 +17,11 @@ pub fn coverage_figure(coverage: &Coverage) -> Figure {
 }
 
 /// The sphere unrolled as from within, left at the left; what was never seen is white.
-fn density_map(cells: &[SeenCell]) -> Chart {
+fn density_map(cells: &[CoverageCell]) -> Chart {
     let mut amounts: Vec<f64> = cells.iter().map(|cell| cell.beams_per_sr_s).filter(|amount| *amount > 0.0).collect();
     amounts.sort_by(f64::total_cmp);
     let most = amounts.get(((1.0 - BEYOND) * amounts.len() as f64) as usize).or(amounts.last()).copied();
-    let cell = |cell: &SeenCell| Cell {
+    let cell = |cell: &CoverageCell| Cell {
         x: (-cell.azimuth_deg.1, -cell.azimuth_deg.0),
         y: (cell.elevation_deg.0, cell.elevation_deg.1),
         value: if cell.beams_per_sr_s > 0.0 { cell.beams_per_sr_s } else { f64::NAN },

@@ -67,19 +67,19 @@ pub struct Coverage {
     /// Greatest angle of the lidar's plane from level, degrees.
     pub most_tilt_deg: f64,
     /// What the gyroscope saw.
-    pub gyro: GyroUse,
+    pub gyro: GyroUsage,
     /// Beams per steradian and second by elevation (degrees), the whole circle of azimuths averaged.
     pub by_elevation: Vec<(f64, f64)>,
     /// Share of the sphere seen by time (s).
     pub over_time: Vec<(f64, f64)>,
     /// How densely beams lie in each cell of the sphere, from below.
     #[serde(skip)]
-    pub cells: Vec<SeenCell>,
+    pub cells: Vec<CoverageCell>,
 }
 
 /// A cell of the sphere of directions; all are equally large.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SeenCell {
+pub struct CoverageCell {
     /// Left and right end, degrees from where the base heads; positive to the left.
     pub azimuth_deg: (f64, f64),
     /// Lower and upper end, degrees above the horizon.
@@ -101,7 +101,7 @@ pub struct Density {
 
 /// A gyroscope's rates against its limit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct GyroUse {
+pub struct GyroUsage {
     /// Greatest rate on an axis that it reads, degrees/s.
     pub limit_deg_per_s: f64,
     /// Greatest rate on an axis that there was, degrees/s.
@@ -166,7 +166,7 @@ pub fn coverage(
         covered_s: reach(0.9),
         field_of_view_deg: track.field_of_view_rad().to_degrees(),
         most_tilt_deg: track.most_tilt_rad.to_degrees(),
-        gyro: track.gyro_use(plan.rate_limit_deg_per_s),
+        gyro: track.gyro_usage(plan.rate_limit_deg_per_s),
         by_elevation: sphere.by_elevation(looked_s),
         cells: sphere.cells(looked_s),
         over_time,

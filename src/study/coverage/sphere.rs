@@ -1,6 +1,6 @@
 //! The sphere of directions in cells of equal size.
 
-use super::{Density, SeenCell};
+use super::{CoverageCell, Density};
 use crate::geometry::Vector;
 use std::f64::consts::{PI, TAU};
 
@@ -62,12 +62,12 @@ impl Sphere {
     }
 
     /// Every cell with its beams per steradian and second, from below.
-    pub fn cells(&self, looked_s: f64) -> Vec<SeenCell> {
+    pub fn cells(&self, looked_s: f64) -> Vec<CoverageCell> {
         let cell = |(index, beams): (usize, &u32)| {
             let edge = |band: usize| (2.0 * band as f64 / BANDS as f64 - 1.0).asin().to_degrees();
             let side = |cell: usize| (cell as f64 / CELLS as f64 - 0.5) * 360.0;
             let (band, place) = (index / CELLS, index % CELLS);
-            SeenCell {
+            CoverageCell {
                 azimuth_deg: (side(place), side(place + 1)),
                 elevation_deg: (edge(band), edge(band + 1)),
                 beams_per_sr_s: f64::from(*beams) / (CELL_SR * looked_s),

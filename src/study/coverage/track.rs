@@ -1,6 +1,6 @@
 //! How the lidar and the gyroscope turned, instant by instant.
 
-use super::{CoveragePlan, GyroUse};
+use super::{CoveragePlan, GyroUsage};
 use crate::dynamics::{HeadModel, HeadSimulation, HeadState};
 use crate::geometry::{Rotation, Vector, roll_pitch_yaw};
 use crate::motion::BaseMotion;
@@ -88,10 +88,10 @@ impl SwingTrack {
         turning
     }
 
-    pub fn gyro_use(&self, limit_deg_per_s: f64) -> GyroUse {
+    pub fn gyro_usage(&self, limit_deg_per_s: f64) -> GyroUsage {
         let limit = limit_deg_per_s.to_radians();
         let beyond = self.rates.iter().filter(|rate| **rate > limit).count();
-        GyroUse {
+        GyroUsage {
             limit_deg_per_s,
             most_deg_per_s: self.rates.iter().copied().fold(0.0, f64::max).to_degrees(),
             p99_deg_per_s: quantile(&self.rates, 0.99).to_degrees(),
@@ -130,6 +130,6 @@ mod tests {
         assert!(turning.windows(2).all(|w| (w[1] - w[0] - 0.5).abs() < 0.05), "{turning:?}");
         // Of a sine, 2.5 % of the time are beyond 0.997 of its amplitude.
         assert!((track.field_of_view_rad() - 1.0).abs() < 0.03);
-        assert_eq!(track.gyro_use(600.0).saturated, 0.5);
+        assert_eq!(track.gyro_usage(600.0).saturated, 0.5);
     }
 }

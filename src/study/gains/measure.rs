@@ -6,8 +6,8 @@ use crate::dynamics::{HeadModel, HeadSimulation, HeadState, Peak, Points, Quanti
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::motion::Axis;
 use crate::signal::{Segments, TransferPoint, transfer_function};
-use crate::study::watch::Pieces;
-use crate::study::{Hear, StudyError};
+use crate::study::watch::PieceProgress;
+use crate::study::{OnProgress, StudyError};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
@@ -18,14 +18,19 @@ const MOST_KEPT: usize = 10_000_000;
 
 /// The gains of `head` along and about all six axes, in the order of [`AXES`].
 ///
-/// Realisations run in parallel; the result is the same for any number of threads. `hear` is told after each of them.
+/// Realisations run in parallel; the result is the same for any number of threads. `on_progress` is told after each of
+/// them.
 ///
 /// # Errors
 /// When the plan cannot be carried out, or the head's simulation fails.
-pub fn gain_curves(head: &HeadModel, plan: &GainPlan, hear: Hear<'_>) -> Result<Vec<GainCurve>, StudyError> {
+pub fn gain_curves(
+    head: &HeadModel,
+    plan: &GainPlan,
+    on_progress: OnProgress<'_>,
+) -> Result<Vec<GainCurve>, StudyError> {
     let schedule = checked(head, plan)?;
     let tasks: Vec<_> = AXES.iter().flat_map(|axis| (0..plan.realisations).map(|k| (*axis, k))).collect();
-    let pieces = Pieces::new(tasks.len(), hear);
+    let pieces = PieceProgress::new(tasks.len(), on_progress);
     let records = tasks.par_iter().map(|(axis, k)| {
         let record = record(head, *axis, *k, plan, schedule);
         pieces.finish_one();
@@ -36,13 +41,18 @@ pub fn gain_curves(head: &HeadModel, plan: &GainPlan, hear: Hear<'_>) -> Result<
     of_axes.map(|(axis, records)| curve(head, *axis, records, plan, schedule)).collect()
 }
 
-/// The gain of `head` along or about `axis`; `hear` is told after each realisation.
+/// The gain of `head` along or about `axis`; `on_progress` is told after each realisation.
 ///
 /// # Errors
 /// When the plan cannot be carried out, or the head's simulation fails.
-pub fn gain_curve(head: &HeadModel, axis: Axis, plan: &GainPlan, hear: Hear<'_>) -> Result<GainCurve, StudyError> {
+pub fn gain_curve(
+    head: &HeadModel,
+    axis: Axis,
+    plan: &GainPlan,
+    on_progress: OnProgress<'_>,
+) -> Result<GainCurve, StudyError> {
     let schedule = checked(head, plan)?;
-    let pieces = Pieces::new(plan.realisations, hear);
+    let pieces = PieceProgress::new(plan.realisations, on_progress);
     let records = (0..plan.realisations).into_par_iter().map(|k| {
         let record = record(head, axis, k, plan, schedule);
         pieces.finish_one();

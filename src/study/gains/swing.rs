@@ -3,7 +3,7 @@
 use super::{GainPlan, gain_curve};
 use crate::dynamics::{HeadModel, Peak};
 use crate::motion::Axis;
-use crate::study::{Hear, StudyError};
+use crate::study::{OnProgress, StudyError};
 
 /// The resonance at one strength of the shaking.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -39,7 +39,8 @@ fn by_name<S: serde::Serializer>(axis: &Axis, serializer: S) -> Result<S::Ok, S:
 }
 
 /// Measures the gain about or along `axis` at strengths that would swing the linear head by each of `swings_deg` (root
-/// mean square). Ends early, and says why, where the simulation leaves its bounds. `hear` is told as realisations end.
+/// mean square). Ends early, and says why, where the simulation leaves its bounds. `on_progress` is told as
+/// realisations end.
 ///
 /// # Errors
 /// When the plan cannot be carried out at the smallest swing.
@@ -48,10 +49,10 @@ pub fn swing_study(
     axis: Axis,
     swings_deg: &[f64],
     plan: &GainPlan,
-    hear: Hear<'_>,
+    on_progress: OnProgress<'_>,
 ) -> Result<SwingStudy, StudyError> {
     let curves = (swings_deg.len() + 1) as f64;
-    let small = gain_curve(head, axis, plan, &|share| hear(share / curves))?;
+    let small = gain_curve(head, axis, plan, &|share| on_progress(share / curves))?;
     let mut study = SwingStudy { axis, peak_model: small.peak_model, points: Vec::new(), ended: None };
     for (before, swing_deg) in swings_deg.iter().enumerate() {
         let share = swing_deg / small.swing_rms_deg;
@@ -60,7 +61,7 @@ pub fn swing_study(
             acceleration_m_per_s2: plan.acceleration_m_per_s2 * share,
             ..plan.clone()
         };
-        match gain_curve(head, axis, &plan, &|share| hear((before as f64 + 1.0 + share) / curves)) {
+        match gain_curve(head, axis, &plan, &|share| on_progress((before as f64 + 1.0 + share) / curves)) {
             Ok(curve) => {
                 let next_to = |peak: Peak| {
                     let away = |f: f64| (f - peak.freq_hz).abs();

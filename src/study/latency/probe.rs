@@ -8,7 +8,7 @@ use crate::recording::{Reader, Selection};
 use crate::study::StudyError;
 use crate::study::cloud::Surroundings;
 use crate::study::true_clock::TrueClock;
-use crate::study::truth_near::TruthNear;
+use crate::study::truth_cursor::TruthCursor;
 use crate::time::{Span, Stamp};
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -70,7 +70,7 @@ impl Probe {
             return Err(StudyError::Plan { what: "latency", message });
         };
         let mut sampling = Sampling {
-            near: TruthNear::new(reader.truth()),
+            near: TruthCursor::new(reader.truth()),
             surroundings,
             head_from_laser: calibration.head_from_laser,
             cut,
@@ -107,7 +107,7 @@ impl Probe {
 
 /// Gathers beams scan by scan.
 struct Sampling<'a> {
-    near: TruthNear<'a>,
+    near: TruthCursor<'a>,
     surroundings: Surroundings<'a>,
     head_from_laser: Pose,
     cut: Cut,
@@ -132,7 +132,7 @@ impl Sampling<'_> {
             let world_from_laser = instant.world_from_head * self.head_from_laser;
             let end = world_from_laser.transform_point(&beam.point_in_laser.into()).coords;
             let (judged, shown) = (self.thinning.keeps(index), self.cut.has(&end, stamp));
-            if !(judged || shown) || !self.surroundings.ends_on_what_stands(&end, &instant) {
+            if !(judged || shown) || !self.surroundings.hits_static_surface(&end, &instant) {
                 continue;
             }
             if judged {

@@ -11,8 +11,8 @@ use crate::simulation::{Simulation, Specs};
 use crate::spec::Source;
 use crate::study::cloud::Surroundings;
 use crate::study::reproduction::kept::Kept;
-use crate::study::watch::Pieces;
-use crate::study::{Hear, StudyError, Watch, record};
+use crate::study::watch::PieceProgress;
+use crate::study::{OnProgress, StudyError, Watch, record};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -142,24 +142,35 @@ impl Latency {
         (env!("CARGO_PKG_VERSION"), self.spec.clone(), self.specs.clone(), self.estimator.clone())
     }
 
-    /// Does in `folder` what is not done yet; `hear` is told how far it is.
+    /// Does in `folder` what is not done yet; `on_progress` is told how far it is.
     ///
     /// What it finds does not depend on the number of threads, nor on where an earlier run was stopped.
     ///
     /// # Errors
     /// When the folder holds other work and `anew` does not allow to throw it away, a part fails, or somebody stops it.
-    pub fn run(&self, folder: &Path, anew: bool, stop: &AtomicBool, hear: Hear<'_>) -> Result<Study, StudyError> {
+    pub fn run(
+        &self,
+        folder: &Path,
+        anew: bool,
+        stop: &AtomicBool,
+        on_progress: OnProgress<'_>,
+    ) -> Result<Study, StudyError> {
         let kept = Kept::open(folder, &self.made_from(), anew)?;
-        self.run_in(&kept, stop, hear)
+        self.run_in(&kept, stop, on_progress)
     }
 
     /// The same in a folder that is open.
-    pub(in crate::study) fn run_in(&self, kept: &Kept, stop: &AtomicBool, hear: Hear<'_>) -> Result<Study, StudyError> {
+    pub(in crate::study) fn run_in(
+        &self,
+        kept: &Kept,
+        stop: &AtomicBool,
+        on_progress: OnProgress<'_>,
+    ) -> Result<Study, StudyError> {
         let simulation = Simulation::prepare(&self.spec.scenario)?;
         let path = kept.folder().join(RECORDING);
         if !path.is_file() {
             let part = kept.folder().join("recording.part");
-            let mut watch = Watch { stop, tell: &mut |_| {} };
+            let mut watch = Watch { stop, report: &mut |_| {} };
             record(&simulation, &part, &kept.folder().join("truth.tum"), false, &mut watch)?;
             std::fs::rename(&part, &path).map_err(StudyError::file(&path))?;
         }
@@ -177,7 +188,7 @@ impl Latency {
             block_s: self.spec.block_s,
             seed: self.spec.scenario.seed,
         };
-        let judged = self.estimate_all(&bench, kept, stop, hear)?;
+        let judged = self.estimate_all(&bench, kept, stop, on_progress)?;
         Ok(self.sum_up(simulation.world().name(), &judged, probe))
     }
 
@@ -201,10 +212,10 @@ impl Latency {
         bench: &Bench<'_>,
         kept: &Kept,
         stop: &AtomicBool,
-        hear: Hear<'_>,
+        on_progress: OnProgress<'_>,
     ) -> Result<Vec<Judged>, StudyError> {
         let runs = self.spec.runs();
-        let (next, pieces) = (AtomicUsize::new(0), Pieces::new(runs.len(), hear));
+        let (next, pieces) = (AtomicUsize::new(0), PieceProgress::new(runs.len(), on_progress));
         let work = || -> Result<(), StudyError> {
             let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
             while let Some((disturbance, clock)) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {

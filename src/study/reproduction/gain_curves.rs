@@ -6,8 +6,8 @@ use crate::dynamics::{DampingSpec, HeadModel, HeadSpec, Peak};
 use crate::motion::Axis;
 use crate::spec::{self, Source};
 use crate::study::gains::{AXES, GainCurve, GainPlan, axis_name, csv, gain_curve, with_damping};
-use crate::study::watch::Pieces;
-use crate::study::{Hear, StudyError};
+use crate::study::watch::PieceProgress;
+use crate::study::{OnProgress, StudyError};
 use rayon::prelude::*;
 
 /// A head with fitted damping, and how it answers.
@@ -23,7 +23,7 @@ pub(super) fn run(
     heads: &[HeadSpec],
     extent: Extent,
     kept: &Kept,
-    hear: Hear<'_>,
+    on_progress: OnProgress<'_>,
 ) -> Result<Finding, StudyError> {
     let plan = plan(spec, extent);
     let designs: Vec<(&DesignedSpec, &HeadSpec)> = spec.designs.iter().zip(heads).collect();
@@ -35,7 +35,7 @@ pub(super) fn run(
     });
     let fitted: Vec<Fit> = fitted.collect::<Result<_, StudyError>>()?;
     let tasks: Vec<(usize, Axis)> = (0..designs.len()).flat_map(|k| AXES.map(|axis| (k, axis))).collect();
-    let pieces = Pieces::new(tasks.len() * plan.realisations, hear);
+    let pieces = PieceProgress::new(tasks.len() * plan.realisations, on_progress);
     let curves = tasks.par_iter().map(|(k, axis)| {
         let (design, head) = designs[*k];
         let name = format!("{}-{}", design.letter, axis_name(*axis));

@@ -2,7 +2,7 @@
 
 use crate::spec::{self, Source};
 use crate::study::StudyError;
-use crate::study::beside::{PARTIAL, write_text};
+use crate::study::atomic_file::{PARTIAL_PREFIX, write_text};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io::ErrorKind;
@@ -34,8 +34,8 @@ impl Kept {
                 return Ok(kept);
             }
             Some(_) if anew => std::fs::remove_dir_all(folder).map_err(StudyError::file(folder))?,
-            Some(_) => return Err(StudyError::OtherWork { folder: folder.to_owned() }),
-            None if is_occupied(folder) => return Err(StudyError::OtherWork { folder: folder.to_owned() }),
+            Some(_) => return Err(StudyError::FolderMismatch { folder: folder.to_owned() }),
+            None if is_occupied(folder) => return Err(StudyError::FolderMismatch { folder: folder.to_owned() }),
             None => {}
         }
         kept.write(MADE_FROM, &text)?;
@@ -132,7 +132,7 @@ fn is_occupied(folder: &Path) -> bool {
 
 /// Whether a file was not whole when its writer ended.
 fn is_unfinished(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(PARTIAL))
+    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(PARTIAL_PREFIX))
 }
 
 #[cfg(test)]
@@ -146,10 +146,10 @@ mod tests {
         let kept = Kept::open(&folder, &"one", false).unwrap();
         assert_eq!(kept.part("a", || Ok(0.1 + 0.2)).unwrap(), 0.1 + 0.2);
         // A run that was killed leaves a file that is not whole; it is no part, and no other work.
-        std::fs::write(folder.join(format!("parts/{PARTIAL}b")), "half of").unwrap();
+        std::fs::write(folder.join(format!("parts/{PARTIAL_PREFIX}b")), "half of").unwrap();
         let begun = here.path().join("begun");
         std::fs::create_dir(&begun).unwrap();
-        std::fs::write(begun.join(format!("{PARTIAL}c")), "half of").unwrap();
+        std::fs::write(begun.join(format!("{PARTIAL_PREFIX}c")), "half of").unwrap();
         Kept::open(&begun, &"one", false).unwrap();
         let again = Kept::open(&folder, &"one", false).unwrap();
         assert_eq!(again.part("a", || Ok(7.0)).unwrap(), 0.1 + 0.2);

@@ -17,7 +17,7 @@ pub use finding::{Finding, Row, TABLE_HEADING, paper_table};
 pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec};
 
 use super::latency::Latency;
-use super::{Hear, StudyError};
+use super::{OnProgress, StudyError};
 use crate::dynamics::HeadSpec;
 use crate::spec::{Kind, Source, find, names, parse};
 use kept::Kept;
@@ -66,22 +66,28 @@ impl Experiment {
         names(Kind::Experiment)
     }
 
-    /// Does what is not yet done of it in `folder`; `hear` is told how far it is.
+    /// Does what is not yet done of it in `folder`; `on_progress` is told how far it is.
     ///
     /// What it leaves does not depend on the number of threads, nor on where an earlier run was stopped.
     ///
     /// # Errors
     /// When the folder holds another experiment's work (or this one's by another spec or version) and `anew` does not
     /// allow to throw it away, something cannot be simulated, or a file not be written.
-    pub fn run(&self, folder: &Path, extent: Extent, anew: bool, hear: Hear<'_>) -> Result<Finding, StudyError> {
+    pub fn run(
+        &self,
+        folder: &Path,
+        extent: Extent,
+        anew: bool,
+        on_progress: OnProgress<'_>,
+    ) -> Result<Finding, StudyError> {
         match self.work(extent)? {
             Work::GainCurves(spec, heads) => {
                 let kept = Kept::open(folder, &made_from(extent, spec, &heads), anew)?;
-                kept.part(FINDING, || gain_curves::run(spec, &heads, extent, &kept, hear))
+                kept.part(FINDING, || gain_curves::run(spec, &heads, extent, &kept, on_progress))
             }
             Work::Latency(latency) => {
                 let kept = Kept::open(folder, &latency.made_from(), anew)?;
-                kept.part(FINDING, || timing::run(&latency, &kept, hear))
+                kept.part(FINDING, || timing::run(&latency, &kept, on_progress))
             }
         }
     }

@@ -3,12 +3,12 @@
 use super::kept::Kept;
 use super::{Finding, Row};
 use crate::study::latency::{ClockState, Disturbance, Latency, Study, csv, curve_figure, map_figure, sentences};
-use crate::study::{Hear, StudyError};
+use crate::study::{OnProgress, StudyError};
 use std::sync::atomic::AtomicBool;
 
 /// Estimates, draws, and tells.
-pub(super) fn run(latency: &Latency, kept: &Kept, hear: Hear<'_>) -> Result<Finding, StudyError> {
-    let study = latency.run_in(kept, &AtomicBool::new(false), hear)?;
+pub(super) fn run(latency: &Latency, kept: &Kept, on_progress: OnProgress<'_>) -> Result<Finding, StudyError> {
+    let study = latency.run_in(kept, &AtomicBool::new(false), on_progress)?;
     kept.write("latency.csv", &csv(&study))?;
     kept.write("latency.json", &(serde_json::to_string_pretty(&study)? + "\n"))?;
     for (name, figure) in [

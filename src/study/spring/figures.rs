@@ -1,6 +1,6 @@
 //! A design in figures: at once from the linearised head, or from a simulation.
 
-use super::{Mounting, Shake, Wire};
+use super::{Shake, SpringMounting, Wire};
 use crate::dynamics::{FrequencyResponse, HeadModel, HeadSpec, HeadState, LinkageSpec, Points, Quantity};
 use crate::elasticity::{SpringDesign, split};
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 
 /// What a head on its spring comes to, under a hand's [`Shake`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Figures {
+pub struct DesignFigures {
     /// Frequency of the slowest mode, Hz.
     pub rocking_hz: f64,
     /// Greatest gain of the pitch rate.
@@ -42,7 +42,7 @@ const PEAKS_UP_TO_HZ: f64 = 20.0;
 ///
 /// # Errors
 /// When the spec is wrong or the head does not stand; the error does not say how nearly.
-pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<Figures, StudyError> {
+pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignFigures, StudyError> {
     let head = HeadModel::attempt(spec, source)?;
     let design = Design::of(spec, &head)?;
     let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
@@ -73,7 +73,7 @@ pub fn simulated(
     shake: &Shake,
     lidar: &Lidar,
     plan: &CoveragePlan,
-) -> Result<(Figures, Coverage), StudyError> {
+) -> Result<(DesignFigures, Coverage), StudyError> {
     let head = HeadModel::new(spec, source)?;
     let design = Design::of(spec, &head)?;
     let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
@@ -119,7 +119,7 @@ struct Swung {
 /// What a design is before it swings.
 pub(super) struct Design {
     pub wire: Option<Wire>,
-    pub mounting: Option<Mounting>,
+    pub mounting: Option<SpringMounting>,
     /// Whether the spring bears the head alone, without a cable: then its stress follows from the head's motion.
     pub is_alone: bool,
     pub free_length_m: Option<f64>,
@@ -128,7 +128,7 @@ pub(super) struct Design {
 
 impl Design {
     pub fn of(spec: &HeadSpec, head: &HeadModel) -> Result<Self, StudyError> {
-        let mounting = Mounting::of(spec, head.body());
+        let mounting = SpringMounting::of(spec, head.body());
         let LinkageSpec::Spring { spring, cable, .. } = &spec.linkage else {
             return Ok(Self { mounting, ..Self::unmounted() });
         };
@@ -156,11 +156,11 @@ impl Design {
         Some(mounting.stress_pa(&wire, state))
     }
 
-    fn figures(&self, head: &HeadModel, swung: &Swung) -> Figures {
+    fn figures(&self, head: &HeadModel, swung: &Swung) -> DesignFigures {
         let response = head.frequency_response(&head.usual_points());
         let peak = response.peak(Axis::Pitch, PEAKS_UP_TO_HZ, Quantity::Kinematic);
         let yields = self.wire.and_then(|wire| wire.yield_pa());
-        Figures {
+        DesignFigures {
             rocking_hz: head.linear_modes().first().map_or(f64::INFINITY, |mode| mode.frequency_hz),
             peak_gain: peak.map_or(1.0, |peak| peak.gain),
             sag_mm: self.sag_m(head) * 1e3,

@@ -8,9 +8,9 @@ mod report;
 mod wire;
 
 pub use figure::mode_figure;
-pub use figures::{Figures, closed_form, simulated};
-pub use report::{CoilReport, ModeReport, RestReport, SpringReport, UnderShake, spring_report};
-pub use wire::{Mounting, Section, Wire};
+pub use figures::{DesignFigures, closed_form, simulated};
+pub use report::{CoilReport, ModeReport, RestReport, ShakeResponse, SpringReport, spring_report};
+pub use wire::{SpringMounting, Wire, WireLoad};
 
 use serde::{Deserialize, Serialize};
 

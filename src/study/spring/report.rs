@@ -1,7 +1,7 @@
 //! All about one spring under one head.
 
 use super::figures::Design;
-use super::{Figures, Shake, closed_form, simulated};
+use super::{DesignFigures, Shake, closed_form, simulated};
 use crate::dynamics::{
     Bearing, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg,
 };
@@ -38,7 +38,7 @@ pub struct SpringReport {
     /// The highest peak of each gain curve up to 20 Hz.
     pub gain_peaks: Vec<(&'static str, Option<Peak>)>,
     /// Under a hand's shake.
-    pub shaken: Option<UnderShake>,
+    pub shaken: Option<ShakeResponse>,
 }
 
 /// A coil spring, and how far it is from its limits.
@@ -97,13 +97,13 @@ pub struct ModeReport {
 
 /// What a hand's shake does to it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct UnderShake {
+pub struct ShakeResponse {
     /// The shake.
     pub shake: Shake,
-    /// Figures of the linearised head.
-    pub closed_form: Figures,
-    /// Figures of the simulated head.
-    pub simulated: Option<Figures>,
+    /// DesignFigures of the linearised head.
+    pub closed_form: DesignFigures,
+    /// DesignFigures of the simulated head.
+    pub simulated: Option<DesignFigures>,
     /// What the lidar saw in that simulation.
     pub coverage: Option<Coverage>,
     /// Why there is no simulation, if there is none.
@@ -156,7 +156,7 @@ pub fn spring_report(
         stiffness: head.linear().map(|linear| rows(&linear.stiffness)),
         modes: head.linear_modes().iter().map(mode_report).collect(),
         gain_peaks: AXES.map(peak).to_vec(),
-        shaken: head.linear().map(|_| under_shake(spec, source, shake, lidar, plan)).transpose()?,
+        shaken: head.linear().map(|_| shake_response(spec, source, shake, lidar, plan)).transpose()?,
     })
 }
 
@@ -191,20 +191,20 @@ fn fallen(spec: &HeadSpec, heaviest_head_kg: Option<f64>, because: String) -> Re
     })
 }
 
-fn under_shake(
+fn shake_response(
     spec: &HeadSpec,
     source: &Source,
     shake: &Shake,
     lidar: &Lidar,
     plan: &CoveragePlan,
-) -> Result<UnderShake, StudyError> {
+) -> Result<ShakeResponse, StudyError> {
     let closed_form = closed_form(spec, source, shake)?;
     let (simulated, coverage, failed) = match simulated(spec, source, shake, lidar, plan) {
         Ok((figures, coverage)) => (Some(figures), Some(coverage), None),
         Err(error @ StudyError::Dynamics(_)) => (None, None, Some(error.to_string())),
         Err(error) => return Err(error),
     };
-    Ok(UnderShake { shake: *shake, closed_form, simulated, coverage, failed })
+    Ok(ShakeResponse { shake: *shake, closed_form, simulated, coverage, failed })
 }
 
 fn coil_of(spec: &HeadSpec) -> Result<Option<Coil>, StudyError> {

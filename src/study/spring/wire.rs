@@ -18,7 +18,7 @@ pub struct Wire {
 
 /// What one side of a cut across the spring does to the other, about the spring's axis there; z along the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Section {
+pub struct WireLoad {
     /// N.
     pub force: Vector,
     /// N m.
@@ -54,7 +54,7 @@ impl Wire {
     /// axial force together Wahl's factor (Wahl, Mechanical Springs, chapter 2). Bending about the coil's axis has that
     /// of a curved bar, `(4C^2 - C - 1) / (4C (C - 1))`; bending about n has none. The pitch angle counts as small, and
     /// the greatest torsion and bending as if they met in one point.
-    pub fn equivalent_stress_pa(&self, section: &Section) -> f64 {
+    pub fn equivalent_stress_pa(&self, section: &WireLoad) -> f64 {
         let c = self.index();
         let (curved_torsion, curved_bending) =
             ((4.0 * c - 1.0) / (4.0 * c - 4.0), (4.0 * c * c - c - 1.0) / (4.0 * c * (c - 1.0)));
@@ -92,13 +92,13 @@ impl Wire {
 
 /// Where a spring is fastened, and to what.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mounting {
+pub struct SpringMounting {
     base_from_foot: Pose,
     head_from_top: Pose,
     body: Body,
 }
 
-impl Mounting {
+impl SpringMounting {
     /// That of a head on one spring; `None` for any other.
     pub fn of(spec: &HeadSpec, body: &Body) -> Option<Self> {
         let LinkageSpec::Spring { base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
@@ -113,7 +113,7 @@ impl Mounting {
 
     /// What the spring carries at its foot and at its top: the head's weight less its inertia (d'Alembert), about each
     /// end.
-    pub fn ends(&self, state: &HeadState) -> [Section; 2] {
+    pub fn ends(&self, state: &HeadState) -> [WireLoad; 2] {
         let centre =
             state.head.of_frame(&Pose::from_parts(self.body.centre_of_mass_in_head.into(), Default::default()));
         let force = (gravity_in_world() - centre.acceleration_in_world) * self.body.mass_kg;
@@ -127,7 +127,7 @@ impl Mounting {
             let arm = centre.world_from_body.translation.vector - world_from_end.translation.vector;
             let moment = arm.cross(&force) - rotation * spin;
             let in_end = world_from_end.rotation.inverse();
-            Section { force: in_end * force, moment: in_end * moment }
+            WireLoad { force: in_end * force, moment: in_end * moment }
         })
     }
 
@@ -150,7 +150,7 @@ mod tests {
         let c = 25.0 / 3.0;
         let wahl = (4.0 * c - 1.0) / (4.0 * c - 4.0) + 0.615 / c;
         let tau = 8.0 * 20.0 * 0.025 / (PI * 0.003_f64.powi(3)) * wahl;
-        let section = Section { force: -Vector::z() * 20.0, moment: Vector::zeros() };
+        let section = WireLoad { force: -Vector::z() * 20.0, moment: Vector::zeros() };
         assert_relative_eq!(WIRE.equivalent_stress_pa(&section), 3_f64.sqrt() * tau, max_relative = 1e-3);
     }
 
@@ -159,7 +159,7 @@ mod tests {
         // sigma = K_i 32 T / (pi d^3), K_i = (4C^2 - C - 1) / (4C (C - 1)).
         let c: f64 = 25.0 / 3.0;
         let factor = (4.0 * c * c - c - 1.0) / (4.0 * c * (c - 1.0));
-        let section = Section { force: Vector::zeros(), moment: Vector::z() * 0.5 };
+        let section = WireLoad { force: Vector::zeros(), moment: Vector::z() * 0.5 };
         let sigma = factor * 32.0 * 0.5 / (PI * 0.003_f64.powi(3));
         assert_relative_eq!(WIRE.equivalent_stress_pa(&section), sigma, max_relative = 1e-12);
     }
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn bending_the_spring_bends_and_twists_its_wire_in_turn() {
         // Where the moment is along the radius, the wire is bent: 32 M / (pi d^3); where along the tangent, twisted.
-        let section = Section { force: Vector::zeros(), moment: Vector::x() * 0.5 };
+        let section = WireLoad { force: Vector::zeros(), moment: Vector::x() * 0.5 };
         let bent = 32.0 * 0.5 / (PI * 0.003_f64.powi(3));
         let stress = WIRE.equivalent_stress_pa(&section);
         assert!(stress >= bent * (1.0 - 1e-12) && stress < 1.1 * bent, "{stress} {bent}");

@@ -14,7 +14,7 @@ use super::table::{Column, Held, Table, TableWriter};
 use super::{BaseSpec, Plan, SweepSpec};
 use crate::spec::{self, Source, SpecError, to_text};
 use crate::study::StudyError;
-use crate::study::beside::write_text;
+use crate::study::atomic_file::write_text;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -67,7 +67,7 @@ impl Plan {
     /// their combination.
     pub fn write(&self, folder: &Path, anew: bool) -> Result<Sweep, StudyError> {
         if !anew && !plan_of(folder).exists() && is_foreign(folder)? {
-            return Err(StudyError::OtherWork { folder: folder.to_owned() });
+            return Err(StudyError::FolderMismatch { folder: folder.to_owned() });
         }
         let temporary = temporary(folder);
         for each in [&temporary, &parts(folder)] {
@@ -90,7 +90,7 @@ impl Plan {
             return Sweep::open(folder);
         }
         if plan.exists() && !anew {
-            return Err(StudyError::OtherWork { folder: folder.to_owned() });
+            return Err(StudyError::FolderMismatch { folder: folder.to_owned() });
         }
         // In this order: a plan is there when its points are.
         if plan.exists() {

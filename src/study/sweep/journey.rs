@@ -12,7 +12,7 @@ use crate::simulation::Simulation;
 use crate::study::calibration::calibration;
 use crate::study::closed_loop::run_closed_loop;
 use crate::study::coverage::{Coverage, CoveragePlan, coverage};
-use crate::study::integrity::{Integrity, way_m};
+use crate::study::integrity::{Integrity, path_length_m};
 use crate::study::open_loop::{How, run_open_loop};
 use crate::study::record::{description, record_together};
 use crate::study::{CalibrationSpec, StudyError, Watch, judge};
@@ -51,7 +51,7 @@ pub(super) fn tapes(
         writers.push(Writer::new(open()?, description(simulation, false)?)?);
         // The name goes here; the handles keep what is behind it.
     }
-    within(limit, |stop| record_together(&simulations, writers, &Watch { stop, tell: &mut |_| {} }))?;
+    within(limit, |stop| record_together(&simulations, writers, &Watch { stop, report: &mut |_| {} }))?;
     Ok(simulations.into_iter().zip(handles).map(|(simulation, handles)| Tape { simulation, handles }).collect())
 }
 
@@ -169,20 +169,20 @@ fn estimate(
 ) -> Result<Estimated, StudyError> {
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     alone.install(|| {
-        let mut watch = Watch { stop, tell: &mut |_| {} };
+        let mut watch = Watch { stop, report: &mut |_| {} };
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&Preference::default())?;
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
         let how = How { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
-        let known = judge::truth_of(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
+        let known = judge::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
         let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);
         let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator));
         let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
         let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
         let pairs = judge::pairs_of(&reader, map_from_head)?;
         let of_closed = match closed {
-            Some(_) => judge::truth_of(&reader, (map_from_head, &[]), &mut watch)?,
+            Some(_) => judge::compare_with_truth(&reader, (map_from_head, &[]), &mut watch)?,
             None => None,
         };
         Ok(Estimated {
@@ -191,7 +191,7 @@ fn estimate(
             closed_position_rmse_m: of_closed.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
             status: integrity.status(),
             integrity: integrity.metrics(&run, Some(pairs)),
-            way_m: way_m(map_from_head),
+            way_m: path_length_m(map_from_head),
         })
     })
 }

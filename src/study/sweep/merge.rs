@@ -5,7 +5,7 @@ use super::part::Part;
 use super::table::{Column, Held, TableWriter, quoted};
 use super::{Measure, Share, Sweep};
 use crate::study::StudyError;
-use crate::study::beside::Beside;
+use crate::study::atomic_file::AtomicFile;
 use serde::Serialize;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
@@ -116,7 +116,7 @@ impl Stretch {
 /// The files that are being written.
 struct Tables {
     parquet: TableWriter,
-    csv: BufWriter<Beside>,
+    csv: BufWriter<AtomicFile>,
     times: TableWriter,
 }
 
@@ -124,9 +124,9 @@ impl Tables {
     fn create(sweep: &Sweep) -> Result<Self, StudyError> {
         let (temporary, columns) = (sweep.temporary(), sweep.table_columns());
         let parquet = TableWriter::create(&temporary, &sweep.table(), &columns)?;
-        let mut csv = BufWriter::new(Beside::new(&temporary, &sweep.folder.join("table.csv"))?);
+        let mut csv = BufWriter::new(AtomicFile::new(&temporary, &sweep.folder.join("table.csv"))?);
         let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
-        writeln!(csv, "{}", names.join(",")).map_err(StudyError::file(csv.get_ref().place()))?;
+        writeln!(csv, "{}", names.join(",")).map_err(StudyError::file(csv.get_ref().target()))?;
         let of_times = [("point".to_owned(), Held::Counts), (Measure::WallS.key().to_owned(), Held::Numbers)];
         let times = TableWriter::create(&temporary, &sweep.times(), &of_times)?;
         Ok(Self { parquet, csv, times })
@@ -144,7 +144,7 @@ impl Tables {
         for row in 0..stretch.numbers.len() {
             let cells: Vec<String> = columns.iter().map(|column| column.cell(row)).collect();
             let line = writeln!(self.csv, "{}", cells.join(","));
-            line.map_err(StudyError::file(self.csv.get_ref().place()))?;
+            line.map_err(StudyError::file(self.csv.get_ref().target()))?;
         }
         Ok(())
     }
@@ -152,7 +152,7 @@ impl Tables {
     fn finish(self) -> Result<(), StudyError> {
         self.parquet.finish()?;
         self.times.finish()?;
-        let place = self.csv.get_ref().place().to_owned();
+        let place = self.csv.get_ref().target().to_owned();
         let flushed = self.csv.into_inner().map_err(std::io::IntoInnerError::into_error);
         flushed.map_err(StudyError::file(&place))?.finish()
     }

@@ -5,7 +5,7 @@ use super::summary::{Line, Summary, quantile};
 use super::{Aim, Measure, Plan, Sweep};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Mark, Series};
 use crate::study::StudyError;
-use crate::study::beside::write_text;
+use crate::study::atomic_file::write_text;
 use crate::study::spring::design::pareto_set;
 use std::path::Path;
 

@@ -4,7 +4,7 @@ use super::part::Row;
 use super::worker::{Ended, Worker};
 use super::{BaseSpec, Sweep};
 use crate::study::StudyError;
-use crate::study::watch::{Hear, Pieces};
+use crate::study::watch::{OnProgress, PieceProgress};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -40,7 +40,7 @@ pub struct Runner<'a> {
     /// Set from outside to stop.
     pub stop: &'a AtomicBool,
     /// Hears which share of what was missing is done.
-    pub hear: Hear<'a>,
+    pub on_progress: OnProgress<'a>,
 }
 
 impl Sweep {
@@ -68,7 +68,7 @@ impl Sweep {
     }
 
     fn run_here(&self, tasks: &[usize], runner: &Runner) -> Result<(), StudyError> {
-        let pieces = Pieces::new(tasks.len(), runner.hear);
+        let pieces = PieceProgress::new(tasks.len(), runner.on_progress);
         tasks.par_iter().try_for_each(|task| {
             if runner.stop.load(Ordering::Relaxed) {
                 return Err(StudyError::Stopped);
@@ -83,7 +83,7 @@ impl Sweep {
         let threads = rayon::current_num_threads();
         let at_once = threads.min(tasks.len()).max(1);
         let missing = tasks.iter().map(|task| self.missing(*task).map(|units| units.len()));
-        let pieces = Pieces::new(missing.sum::<Result<usize, StudyError>>()?, runner.hear);
+        let pieces = PieceProgress::new(missing.sum::<Result<usize, StudyError>>()?, runner.on_progress);
         let next = AtomicUsize::new(0);
         let failed = AtomicBool::new(false);
         let work = || {

@@ -1,7 +1,7 @@
 //! Tables on disk: Parquet, there whole or not at all.
 
 use crate::study::StudyError;
-use crate::study::beside::Beside;
+use crate::study::atomic_file::AtomicFile;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::get_typed_column_reader;
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
@@ -79,13 +79,13 @@ pub(super) fn quoted(word: &str) -> String {
 /// A table that is being written.
 pub(super) struct TableWriter {
     writer: SerializedFileWriter<File>,
-    beside: Beside,
+    partial: AtomicFile,
 }
 
 impl TableWriter {
     /// Begins a table for `place`, kept in `folder` until it is whole.
     pub fn create(folder: &Path, place: &Path, columns: &[(String, Held)]) -> Result<Self, StudyError> {
-        let mut beside = Beside::new(folder, place)?;
+        let mut partial = AtomicFile::new(folder, place)?;
         let wrong = |error| StudyError::table(place)(error);
         let fields: Vec<Arc<Type>> = columns
             .iter()
@@ -97,14 +97,14 @@ impl TableWriter {
             .set_compression(Compression::SNAPPY)
             .set_created_by(concat!("zsim ", env!("CARGO_PKG_VERSION")).to_owned())
             .build();
-        let file = beside.file().try_clone().map_err(StudyError::file(place))?;
+        let file = partial.file().try_clone().map_err(StudyError::file(place))?;
         let writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(wrong)?;
-        Ok(Self { writer, beside })
+        Ok(Self { writer, partial })
     }
 
     /// Adds rows: a stretch of each column, equally long.
     pub fn write(&mut self, columns: &[Column]) -> Result<(), StudyError> {
-        let place = self.beside.place().to_owned();
+        let place = self.partial.target().to_owned();
         self.group(columns).map_err(StudyError::table(&place))
     }
 
@@ -139,9 +139,9 @@ impl TableWriter {
 
     /// Closes the table and moves it to its place.
     pub fn finish(self) -> Result<(), StudyError> {
-        let Self { writer, beside } = self;
-        writer.close().map_err(StudyError::table(beside.place()))?;
-        beside.finish()
+        let Self { writer, partial } = self;
+        writer.close().map_err(StudyError::table(partial.target()))?;
+        partial.finish()
     }
 }
 

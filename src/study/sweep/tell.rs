@@ -4,7 +4,7 @@ use super::integrity::Coverage;
 use super::output::{csv, markdown, trends_csv, words};
 use super::{Status, Summary, Sweep};
 use crate::study::StudyError;
-use crate::study::beside::write_text;
+use crate::study::atomic_file::write_text;
 
 /// A merged sweep.
 #[derive(Debug, Clone)]

@@ -4,7 +4,7 @@ use super::Sweep;
 use super::run::Runner;
 use super::task::Word;
 use crate::study::StudyError;
-use crate::study::watch::Pieces;
+use crate::study::watch::PieceProgress;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -31,7 +31,7 @@ pub(super) struct Worker<'a> {
     pub runner: &'a Runner<'a>,
     /// Set when another task could not be done.
     pub failed: &'a AtomicBool,
-    pub pieces: &'a Pieces<'a>,
+    pub pieces: &'a PieceProgress<'a>,
 }
 
 /// How a process ended.

@@ -3,7 +3,7 @@
 use super::{DesignStudy, FigureName, Verified};
 use crate::elasticity::Material;
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
-use crate::study::spring::Figures;
+use crate::study::spring::DesignFigures;
 use std::fmt::Write;
 
 const FIGURES: [(&str, FigureName); 7] = [
@@ -46,7 +46,7 @@ fn line(text: &mut String, verified: &Verified) {
         coil.name, coil.coil_diameter_mm, coil.wire_diameter_mm, coil.active_coils, coil.free_length_mm
     );
     let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:.5}"));
-    let of = |figures: Option<&Figures>, name: FigureName| number(figures.map(|figures| name.of(figures)));
+    let of = |figures: Option<&DesignFigures>, name: FigureName| number(figures.map(|figures| name.of(figures)));
     for figures in [Some(&verified.candidate.figures), verified.simulated.as_ref()] {
         for (_, name) in FIGURES {
             let _ = write!(text, ",{}", of(figures, name));
@@ -59,7 +59,7 @@ fn line(text: &mut String, verified: &Verified) {
 pub fn pareto_figure(study: &DesignStudy) -> Figure {
     let figure = |k: usize| study.spec.goals.get(k).or(study.spec.goals.first()).map(|goal| goal.figure);
     let (Some(x), Some(y)) = (figure(0), figure(1)) else { return Figure::of(Vec::new()) };
-    let at = |figures: &Figures| (x.of(figures), y.of(figures));
+    let at = |figures: &DesignFigures| (x.of(figures), y.of(figures));
     let closed = study.candidates.iter().map(|v| at(&v.candidate.figures)).collect();
     let simulated = study.candidates.iter().filter_map(|v| v.simulated.as_ref().map(at)).collect();
     let chart = Chart::new("Springs within limits", x.label(), y.label())

@@ -7,9 +7,9 @@ use crate::random::{Seed, Stream};
 use crate::sensors::Lidar;
 use crate::spec::{Kind, Source, SpecError, find, parse};
 use crate::study::coverage::CoveragePlan;
-use crate::study::spring::{Figures, closed_form, simulated};
-use crate::study::watch::Pieces;
-use crate::study::{Hear, StudyError};
+use crate::study::spring::{DesignFigures, closed_form, simulated};
+use crate::study::watch::PieceProgress;
+use crate::study::{OnProgress, StudyError};
 use cmaes::{CMAESOptions, DVector};
 use rand::RngExt;
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ pub struct Candidate {
     /// The coil.
     pub coil: CoilDesign,
     /// Its figures by the closed form.
-    pub figures: Figures,
+    pub figures: DesignFigures,
     /// How far it is from each goal.
     pub costs: Vec<f64>,
 }
@@ -33,7 +33,7 @@ pub struct Verified {
     #[serde(flatten)]
     pub candidate: Candidate,
     /// Its figures by simulation.
-    pub simulated: Option<Figures>,
+    pub simulated: Option<DesignFigures>,
     /// Whether they are within all limits.
     pub holds: bool,
     /// Share of the sphere that the lidar saw.
@@ -125,13 +125,14 @@ impl Search {
         Ok(Self { spec: spec.clone(), head, source: head_source, lidar, space })
     }
 
-    /// Tries the space, and returns every design within all limits, and how many were tried; `hear` is told after each.
-    pub fn explore(&self, hear: Hear<'_>) -> (Vec<Candidate>, usize) {
+    /// Tries the space, and returns every design within all limits, and how many were tried; `on_progress` is told
+    /// after each.
+    pub fn explore(&self, on_progress: OnProgress<'_>) -> (Vec<Candidate>, usize) {
         let whole = match &self.space {
             Space::Catalogue(springs) => springs.len(),
             Space::Coil { .. } => self.spec.evaluations,
         };
-        let pieces = Pieces::new(whole, hear);
+        let pieces = PieceProgress::new(whole, on_progress);
         let judge = |coil: &CoilDesign| {
             let outcome = self.judge(coil);
             pieces.finish_one();
@@ -176,7 +177,7 @@ impl Search {
     }
 
     /// By how much in all limits are exceeded.
-    fn excess(&self, figures: &Figures) -> f64 {
+    fn excess(&self, figures: &DesignFigures) -> f64 {
         self.spec.limits.iter().map(|limit| limit.excess(limit.figure.of(figures))).sum()
     }
 
@@ -189,19 +190,19 @@ impl Search {
         head
     }
 
-    /// Explores, takes the Pareto set, and verifies as much of it as the spec says. `hear` is told as designs are tried
-    /// (the first half) and verified.
+    /// Explores, takes the Pareto set, and verifies as much of it as the spec says. `on_progress` is told as designs
+    /// are tried (the first half) and verified.
     ///
     /// # Errors
     /// When the verification cannot be set up. A design whose simulation fails is a result.
-    pub fn run(&self, hear: Hear<'_>) -> Result<DesignStudy, StudyError> {
-        let (feasible, evaluated) = self.explore(&|share| hear(0.5 * share));
+    pub fn run(&self, on_progress: OnProgress<'_>) -> Result<DesignStudy, StudyError> {
+        let (feasible, evaluated) = self.explore(&|share| on_progress(0.5 * share));
         let costs: Vec<Vec<f64>> = feasible.iter().map(|candidate| candidate.costs.clone()).collect();
         let front = pareto_set(&costs);
         let of_front: Vec<Vec<f64>> = front.iter().map(|k| costs[*k].clone()).collect();
         let chosen = spread(&of_front, self.spec.candidates);
-        let second_half = |share: f64| hear(0.5 + 0.5 * share);
-        let pieces = Pieces::new(chosen.len(), &second_half);
+        let second_half = |share: f64| on_progress(0.5 + 0.5 * share);
+        let pieces = PieceProgress::new(chosen.len(), &second_half);
         let verified = chosen.par_iter().map(|k| {
             let verified = self.verify(&feasible[front[*k]]);
             pieces.finish_one();

@@ -1,6 +1,6 @@
 //! What is wanted of a spring, as it is written: `specs/studies/NAME.ron`.
 
-use super::super::{Figures, Shake};
+use super::super::{DesignFigures, Shake};
 use crate::elasticity::{Material, SpringSpec};
 use crate::spec::checked;
 use serde::{Deserialize, Serialize};
@@ -77,7 +77,7 @@ pub enum FigureName {
 
 impl FigureName {
     /// The figure's value; infinite where the design has none.
-    pub fn of(self, figures: &Figures) -> f64 {
+    pub fn of(self, figures: &DesignFigures) -> f64 {
         match self {
             FigureName::RockingHz => figures.rocking_hz,
             FigureName::PeakGain => figures.peak_gain,
