@@ -168,7 +168,7 @@ mod tests {
         let map_from_laser = map_from_head() * mount.head_from_laser;
         let centre = map_from_laser.translation.vector + map_from_laser.rotation * direction * range_m;
         let covariance = Matrix::from_diagonal(&Vector::new(0.02, 0.05, 1e-4));
-        Patch { centre, normal: Vector::z(), points: 50.0, covariance, doubt: 0.0, level: 0 }
+        Patch { centre, normal: Vector::z(), points: 50.0, covariance, roughness_variance: 0.0, level: 0 }
     }
 
     #[test]

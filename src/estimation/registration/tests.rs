@@ -128,7 +128,7 @@ fn walked(
             normal: turn * normal,
             points: 100.0,
             covariance,
-            doubt: 0.0,
+            roughness_variance: 0.0,
             level,
         };
         Sighting { tau_s, patch, lidar: 0 }

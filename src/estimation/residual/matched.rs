@@ -27,7 +27,7 @@ pub(in crate::estimation) struct Plane {
 }
 
 impl Plane {
-    /// The common plane of two patches; `sigma_m` is the match error in addition to thickness and doubt.
+    /// The common plane of two patches; `sigma_m` is the match error in addition to thickness and roughness.
     pub(in crate::estimation) fn of(a: &Patch, b: &Patch, sigma_m: f64) -> Self {
         let both = a.covariance + b.covariance;
         let start = a.normal + b.normal;
@@ -38,7 +38,12 @@ impl Plane {
         let lambda = normal.dot(&(both * normal));
         let apart = a.centre - b.centre;
         let distance_m = normal.dot(&apart);
-        Self { normal, apart, distance_m, variance: sigma_m * sigma_m + lambda.max(0.0) + a.doubt + b.doubt }
+        Self {
+            normal,
+            apart,
+            distance_m,
+            variance: sigma_m * sigma_m + lambda.max(0.0) + a.roughness_variance + b.roughness_variance,
+        }
     }
 
     /// Removes the component of the normal along `direction`, a unit vector.
@@ -77,7 +82,7 @@ impl<const B: usize> Side<B> {
         let mut common = [0.0; B];
         common[..ALWAYS].copy_from_slice(&[later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam)]);
         if B == COMMON {
-            let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.reach().cross(normal));
+            let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.ray().cross(normal));
             let lidar_shift = surfel.map_from_imu.tr_mul(normal);
             common[ALWAYS..ALWAYS + 3].copy_from_slice(lidar_turn.as_slice());
             common[ALWAYS + 3..].copy_from_slice(lidar_shift.as_slice());
@@ -133,7 +138,7 @@ mod tests {
             normal: turn * Vector::z(),
             points: 50.0,
             covariance,
-            doubt: 0.0,
+            roughness_variance: 0.0,
             level: 0,
         };
         Placed {

@@ -1,6 +1,6 @@
-//! From beams to surfels: voxels at several resolutions and on two grids, filled from fine to coarse.
+//! Builds surfels from lidar returns: voxels at several resolutions on two grids, merged from fine to coarse.
 
-use super::flat::{self, Shaped};
+use super::flatness::{self, SurfelThickness};
 use super::moments::Moments;
 use super::{Beam, Surfel};
 use crate::estimation::Clock;
@@ -11,25 +11,27 @@ use crate::geometry::{Matrix, Vector};
 use crate::measurement::{LidarCorrection, LidarNoise};
 use rayon::prelude::*;
 
-/// Poses are computed at this spacing and taken linearly in between, s: at 400 degrees/s the chord is 1.5 um/m from the
-/// arc.
+/// Spacing of the poses that project returns, s; linear interpolation in between. At 400 degrees/s the error is 1.5 um per
+/// metre of range.
 const POSE_SPACING_S: f64 = 0.0005;
-/// A surface is upright, a wall rather than ground, when its normal leans less than this to the vertical: its cosine.
-const UPRIGHT: f64 = 0.7;
+/// A surface counts as a wall, not ground or ceiling, if the vertical component of the unit normal is below this (within
+/// 45 degrees of horizontal).
+const MAX_WALL_NORMAL_Z: f64 = 0.7;
 
-/// What it takes to turn beams into surfels.
+/// Builds surfels from lidar returns.
 #[derive(Debug, Clone)]
 pub(in super::super) struct SurfelMaker {
     pub(in super::super) spec: SurfelSpec,
     pub(in super::super) noise: LidarNoise,
-    /// Normal of the scan plane, if the lidar has one plane, and the lidar's place, in the IMU's frame.
+    /// Unit normal of the scan plane in the IMU frame; `None` for a lidar without a single scan plane.
     pub(in super::super) scan_normal: Option<Vector>,
+    /// Calibrated position of the lidar in the IMU frame, m.
     pub(in super::super) laser_in_imu: Vector,
-    /// What is known of the lidar beyond its calibration.
+    /// Estimated correction of the lidar's calibration.
     pub(in super::super) lidar: LidarCorrection,
 }
 
-/// Consecutive beams that fell in one finest cell.
+/// Moments of consecutive returns in the same finest cell.
 #[derive(Debug, Clone, Copy)]
 struct Fragment {
     cell: [i32; 3],
@@ -39,7 +41,7 @@ struct Fragment {
 }
 
 impl SurfelMaker {
-    /// The surfels of a stretch of beams, each in order of resolution, grid, cell and time.
+    /// Builds the surfels of one time segment, in order of resolution, grid, cell and time.
     pub(in super::super) fn build(
         &self,
         beams: &[Beam],
@@ -60,26 +62,26 @@ impl SurfelMaker {
                 offset.add(&point, beam.tau_s, noise2);
             }
         });
-        let (regular, offset) = (regular.done(), offset.done());
+        let (regular, offset) = (regular.finish(), offset.finish());
         let mut grids = Vec::new();
         for level in 0..self.spec.levels {
             grids.push((regular, level, 0));
             match (self.spec.offset_grids, level) {
                 (false, _) => {}
                 (true, 0) => grids.push((offset, 0, 0)),
-                // A coarse cell of the offset grid is made of regular cells of the resolution below.
+                // Half a coarse cell is an integer number of regular finest cells, so the offset grid needs no fragments of its own.
                 (true, _) => grids.push((regular, level, 1 << (level - 1))),
             }
         }
-        let surfels_of = |(fragments, level, shift): &(&[Fragment], usize, i32)| -> Vec<Shaped> {
-            let cells = group(fragments, *level, *shift, &self.spec);
-            cells.iter().filter_map(|cell| self.shape(cell, *level, &origin, (nominal, clock, biases))).collect()
+        let surfels_of = |(fragments, level, shift): &(&[Fragment], usize, i32)| -> Vec<SurfelThickness> {
+            let cells = merge_by_cell(fragments, *level, *shift, &self.spec);
+            cells.iter().filter_map(|cell| self.fit_surfel(cell, *level, &origin, (nominal, clock, biases))).collect()
         };
-        let shaped: Vec<Vec<Shaped>> = grids.par_iter().map(surfels_of).collect();
-        flat::doubted(shaped.concat(), &self.spec)
+        let shaped: Vec<Vec<SurfelThickness>> = grids.par_iter().map(surfels_of).collect();
+        flatness::add_roughness_variance(shaped.concat(), &self.spec)
     }
 
-    /// Calls `with` for each beam and its point in the map.
+    /// Calls `with` for each return and the point in the map, m.
     fn project(
         &self,
         beams: &[Beam],
@@ -105,20 +107,22 @@ impl SurfelMaker {
             let x = (beam.tau_s - start_s) / POSE_SPACING_S;
             let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
             let position = a.position.lerp(&b.position, x);
-            let reach = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
-            let reach = turn * (reach * (1.0 + self.lidar.range_m / f64::from(beam.range_m)));
-            with(beam, rotation * (laser_in_imu + reach) + position);
+            let ray = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
+            let ray = turn * (ray * (1.0 + self.lidar.range_m / f64::from(beam.range_m)));
+            with(beam, rotation * (laser_in_imu + ray) + position);
         }
     }
 
-    /// The patch of surface that a cell's points are, if they are one.
-    fn shape(
+    /// Fits a surfel to a cell's points; `None` if they are not planar, too thick, or badly observed.
+    ///
+    /// The scan plane must sweep across the surface fast enough, and the angle of incidence must be small enough.
+    fn fit_surfel(
         &self,
         moments: &Moments,
         level: usize,
         origin: &Vector,
         state: (&Nominal, &Clock, &Biases),
-    ) -> Option<Shaped> {
+    ) -> Option<SurfelThickness> {
         let (nominal, clock, biases) = state;
         let covariance = moments.covariance();
         let eigen = covariance.symmetric_eigen();
@@ -151,23 +155,23 @@ impl SurfelMaker {
         }
         let surfel = Surfel {
             tau_s,
-            reach_in_imu: beam * (range_m - self.lidar.range_m),
+            ray_in_imu: beam * (range_m - self.lidar.range_m),
             normal_in_imu: if normal.dot(&beam) > 0.0 { -normal } else { normal },
             covariance_in_imu: calibrated_from_map * covariance * calibrated_from_map.transpose(),
             points: moments.count(),
-            doubt: 0.0,
+            roughness_variance: 0.0,
             level,
         };
-        Some(Shaped {
+        Some(SurfelThickness {
             surfel,
-            is_upright: eigen.eigenvectors.column(order[0]).z.abs() < UPRIGHT,
+            is_upright: eigen.eigenvectors.column(order[0]).z.abs() < MAX_WALL_NORMAL_Z,
             variance: l1,
-            by_noise: flat::noise_across(moments.mean_noise2(), normal.dot(&beam)),
+            noise_variance: flatness::noise_across(moments.mean_noise2(), normal.dot(&beam)),
         })
     }
 }
 
-/// Fragments of one grid, in the order of time.
+/// Collects the fragments of one grid in time order.
 struct Fragments {
     origin: Vector,
     per_edge: f64,
@@ -193,21 +197,24 @@ impl Fragments {
         self.done.extend(self.current.replace(fragment));
     }
 
-    fn done(&mut self) -> &[Fragment] {
+    /// Closes the current fragment and returns all of them.
+    fn finish(&mut self) -> &[Fragment] {
         self.done.extend(self.current.take());
         &self.done
     }
 }
 
-/// A cell of resolution `level` as one number that sorts.
-fn key(cell: &[i32; 3], level: usize, shift: i32) -> u64 {
+/// Sortable key of the cell of resolution `level` that contains a finest cell.
+fn cell_key(cell: &[i32; 3], level: usize, shift: i32) -> u64 {
     let part = |x: i32| ((x.wrapping_add(shift) >> level).wrapping_add(1 << 20)) as u64 & 0x1f_ffff;
     part(cell[0]) << 42 | part(cell[1]) << 21 | part(cell[2])
 }
 
-/// Merges the fragments of each cell, split where their times leave a gap or last too long; those with enough points.
-fn group(fragments: &[Fragment], level: usize, shift: i32, spec: &SurfelSpec) -> Vec<Moments> {
-    let keyed = fragments.iter().enumerate().map(|(k, f)| (key(&f.cell, level, shift), k as u32));
+/// Merges the fragments of each cell, split at time gaps and at the maximum duration.
+///
+/// Returns only groups with at least `min_points` points.
+fn merge_by_cell(fragments: &[Fragment], level: usize, shift: i32, spec: &SurfelSpec) -> Vec<Moments> {
+    let keyed = fragments.iter().enumerate().map(|(k, f)| (cell_key(&f.cell, level, shift), k as u32));
     let mut keyed: Vec<(u64, u32)> = keyed.collect();
     keyed.sort_unstable();
     let mut groups: Vec<Moments> = Vec::new();
@@ -242,8 +249,7 @@ mod tests {
     use crate::estimation::strapdown::{Interval, State};
     use crate::geometry::Rotation;
 
-    /// Planar scans of a vertical corner, 2.1 m off on both sides, by a lidar that nods at `rate`, rad/s, across the
-    /// way to it.
+    /// Planar scans of a vertical corner with walls 2.1 m away, by a lidar that nods towards it at `rate`, rad/s.
     fn scans_of_a_corner(rate: f64, scans: usize) -> (Nominal, Vec<Beam>) {
         let nodding = Vector::new(-1.0, 1.0, 0.0).normalize() * rate;
         let none = Vector::zeros();
@@ -271,8 +277,8 @@ mod tests {
         (nominal, (0..scans * 181).map(beam).collect())
     }
 
-    /// How steep the normals of the patches are: their vertical parts.
-    fn steepness((nominal, beams): (Nominal, Vec<Beam>), max_incidence_deg: f64) -> Vec<f64> {
+    /// Absolute vertical components of the surfels' normals.
+    fn normal_heights((nominal, beams): (Nominal, Vec<Beam>), max_incidence_deg: f64) -> Vec<f64> {
         let shipped = spec::load("default").unwrap().surfels;
         let maker = SurfelMaker {
             spec: SurfelSpec { max_incidence_deg, ..shipped },
@@ -287,12 +293,15 @@ mod tests {
     }
 
     #[test]
-    fn the_slice_of_a_corner_is_no_surface_and_its_walls_are() {
+    fn slice_of_a_corner_is_rejected_and_its_walls_are_accepted() {
         let shipped_deg = spec::load("default").unwrap().surfels.max_incidence_deg;
-        let slices = steepness(scans_of_a_corner(0.3, 4), 90.0);
-        assert!(slices.iter().any(|z| *z > 0.9), "no slice passes for a surface: this tests nothing");
-        assert_eq!(steepness(scans_of_a_corner(0.3, 4), shipped_deg), [0.0; 0]);
-        let walls = steepness(scans_of_a_corner(0.8, 8), shipped_deg);
+        let slices = normal_heights(scans_of_a_corner(0.3, 4), 90.0);
+        assert!(
+            slices.iter().any(|z| *z > 0.9),
+            "without the incidence gate a slice must be accepted, or this test is void"
+        );
+        assert_eq!(normal_heights(scans_of_a_corner(0.3, 4), shipped_deg), [0.0; 0]);
+        let walls = normal_heights(scans_of_a_corner(0.8, 8), shipped_deg);
         assert!(walls.len() > 10 && walls.iter().all(|z| *z < 0.3), "{walls:?}");
     }
 }

@@ -1,11 +1,11 @@
-//! Surfels: small patches of surface, each seen in one passing of the beams.
+//! Surfels: small planar patches of surface, each observed in one pass of the lidar beams.
 //!
-//! A surfel is made once, from points that the trajectory projected when they were new; from then on it moves as one
-//! rigid piece with the trajectory at its mean time: all its points were measured within a fraction of a second, over
-//! which the shape of the trajectory is left to the IMU.
+//! A surfel is built once, when the points are first projected by the trajectory. From then on it moves as a rigid body with
+//! the trajectory at the mean time of the points: these span a fraction of a second, over which only the IMU
+//! determines the shape of the trajectory.
 
 mod build;
-mod flat;
+mod flatness;
 mod moments;
 
 pub(super) use build::SurfelMaker;
@@ -17,79 +17,81 @@ use super::strapdown::Biases;
 use crate::geometry::{Matrix, Vector};
 use crate::measurement::LidarCorrection;
 
-/// A beam that came back.
+/// A lidar return in the IMU frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Beam {
-    /// When it was fired, lidar time, s.
+    /// Time of emission, lidar time, s.
     pub(super) tau_s: f64,
-    /// Where it hit, in the IMU's frame, m.
+    /// Measured point in the IMU frame, m.
     pub(super) point_in_imu: nalgebra::Vector3<f32>,
-    /// Its length, m.
+    /// Measured range, m.
     pub(super) range_m: f32,
 }
 
-/// A patch of surface as the lidar saw it at the patch's mean time, along the axes of the IMU; what is known of the
-/// lidar beyond its calibration is applied where it is placed.
+/// A planar patch as measured by the calibrated lidar at the patch's mean time, in IMU axes.
+///
+/// The estimated correction of the lidar's calibration is applied when the surfel is placed in the map.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Surfel {
-    /// Mean time of its points, lidar time, s.
+    /// Mean time of the points, lidar time, s.
     pub(super) tau_s: f64,
-    /// From the lidar to the mean of its points, as calibrated, m.
-    pub(super) reach_in_imu: Vector,
-    /// Unit normal, turned to the lidar, as calibrated.
+    /// Vector from the lidar to the mean of the points, by the calibration, m.
+    pub(super) ray_in_imu: Vector,
+    /// Unit normal towards the lidar, by the calibration.
     pub(super) normal_in_imu: Vector,
-    /// Second central moment of its points, as calibrated, m^2.
+    /// Second central moment of the points, by the calibration, m^2.
     pub(super) covariance_in_imu: Matrix,
-    /// What its place along the normal is in doubt by because it is not flat: a variance, m^2.
-    pub(super) doubt: f64,
-    /// Number of its points.
+    /// Additional variance of the position along the normal because the surface is not flat, m^2.
+    pub(super) roughness_variance: f64,
+    /// Number of points.
     pub(super) points: f64,
     /// Resolution, 0 the finest.
     pub(super) level: usize,
 }
 
-/// A patch of surface in the map.
+/// A planar patch of surface in the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Patch {
     /// Centre, m.
     pub(super) centre: Vector,
     /// Unit normal, towards the lidar.
     pub(super) normal: Vector,
-    /// Number of its points.
+    /// Number of points.
     pub(super) points: f64,
     /// Second central moment, m^2.
     pub(super) covariance: Matrix,
-    /// What its place along the normal is in doubt by because it is not flat: a variance, m^2.
-    pub(super) doubt: f64,
+    /// Additional variance of the position along the normal because the surface is not flat, m^2.
+    pub(super) roughness_variance: f64,
     /// Resolution, 0 the finest.
     pub(super) level: usize,
 }
 
-/// A surfel where the trajectory puts it in the map, and how it moves with the window's unknowns.
+/// A surfel placed in the map by the trajectory, with derivatives by the window's unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct Placed {
     /// The surfel in the map.
     pub(super) patch: Patch,
-    /// Its mean time, lidar time, s.
+    /// Mean time of the points, lidar time, s.
     pub(super) tau_s: f64,
-    /// From the IMU to the centre, m.
+    /// Vector from the IMU to the centre, in map axes, m.
     pub(super) arm: Vector,
-    /// Unit vector along its beams, away from the lidar.
+    /// Unit vector from the lidar to the centre, in map axes.
     pub(super) beam: Vector,
-    /// Length of its beams, m.
+    /// Distance from the lidar to the centre, m.
     pub(super) range_m: f64,
-    /// Attitude of the IMU at its time.
+    /// Attitude of the IMU at that time.
     pub(super) map_from_imu: Matrix,
-    /// How the centre would move if the clock offset grew, m/s.
+    /// Derivative of the centre by the clock offset, m/s.
     pub(super) velocity: Vector,
-    /// The correction spline's basis at its time.
+    /// The correction spline's basis at that time.
     pub(super) basis: Basis,
 }
 
 impl Patch {
-    /// Variance of how far the patch's normal leans to a direction: of a plane fitted to `N` points of thickness
-    /// `lambda` and spread `s^2` along it, `lambda / (N s^2)`.
-    pub(super) fn variance_of_lean(&self, direction: &Vector) -> f64 {
+    /// Variance of the normal's tilt towards `direction`, rad^2.
+    ///
+    /// A plane fitted to `N` points of variance `lambda` along the normal and `s^2` along the direction has `lambda / (N s^2)`.
+    pub(super) fn normal_tilt_variance(&self, direction: &Vector) -> f64 {
         let along = direction - self.normal * self.normal.dot(direction);
         let spread = along.dot(&(self.covariance * along)) / along.norm_squared();
         let thin = self.normal.dot(&(self.covariance * self.normal)).max(0.0);
@@ -98,46 +100,47 @@ impl Patch {
 }
 
 impl Placed {
-    /// From the lidar to the centre, m.
-    pub(super) fn reach(&self) -> Vector {
+    /// Vector from the lidar to the centre, in map axes, m.
+    pub(super) fn ray(&self) -> Vector {
         self.beam * self.range_m
     }
 }
 
-/// By what surfels are placed in the map.
+/// Trajectory, clock and calibration that place surfels in the map.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Placing<'a> {
+pub(super) struct PlacementState<'a> {
     pub(super) nominal: &'a Nominal,
     pub(super) clock: &'a Clock,
     pub(super) biases: &'a Biases,
-    /// Where the lidar is calibrated to be, m.
+    /// Calibrated position of the lidar in the IMU frame, m.
     pub(super) laser_in_imu: &'a Vector,
+    /// Estimated correction of the lidar's calibration.
     pub(super) lidar: &'a LidarCorrection,
     pub(super) knot_spacing_s: f64,
 }
 
 impl Surfel {
-    /// The surfel in the map.
-    pub(super) fn place(&self, by: &Placing<'_>) -> Placed {
+    /// Places the surfel in the map.
+    pub(super) fn place(&self, by: &PlacementState<'_>) -> Placed {
         let u_s = by.clock.imu_s(self.tau_s);
         let motion = by.nominal.at(u_s, &by.biases.gyro);
-        let reach_in_imu = by.lidar.reach(&self.reach_in_imu);
-        let arm = motion.rotation * (by.laser_in_imu + by.lidar.shift + reach_in_imu);
+        let ray_in_imu = by.lidar.reach(&self.ray_in_imu);
+        let arm = motion.rotation * (by.laser_in_imu + by.lidar.shift + ray_in_imu);
         let map_from_calibrated = motion.rotation * by.lidar.turn.to_rotation_matrix().matrix();
         let patch = Patch {
             centre: motion.position + arm,
             normal: map_from_calibrated * self.normal_in_imu,
             covariance: map_from_calibrated * self.covariance_in_imu * map_from_calibrated.transpose(),
-            doubt: self.doubt,
+            roughness_variance: self.roughness_variance,
             level: self.level,
             points: self.points,
         };
-        let range_m = reach_in_imu.norm();
+        let range_m = ray_in_imu.norm();
         Placed {
             patch,
             tau_s: self.tau_s,
             arm,
-            beam: motion.rotation * reach_in_imu / range_m,
+            beam: motion.rotation * ray_in_imu / range_m,
             range_m,
             map_from_imu: motion.rotation,
             velocity: motion.velocity + motion.angular_velocity.cross(&arm),

@@ -1,6 +1,6 @@
 use crate::geometry::{Matrix, Vector};
 
-/// Sums over points: enough for their number, mean time, mean and second central moment, and additive.
+/// Additive sums over points: their number, mean time, mean and second central moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(in super::super) struct Moments {
     count: f64,
@@ -26,7 +26,7 @@ impl Moments {
         }
     }
 
-    /// Adds the points that another has summed.
+    /// Adds the points of `other`.
     pub(in super::super) fn merge(&mut self, other: &Self) {
         self.count += other.count;
         self.time_s += other.time_s;
@@ -39,27 +39,27 @@ impl Moments {
         }
     }
 
-    /// How many points.
+    /// Number of points.
     pub(in super::super) fn count(&self) -> f64 {
         self.count
     }
 
-    /// The points' mean time, s.
+    /// Mean time of the points, s.
     pub(in super::super) fn mean_time_s(&self) -> f64 {
         self.time_s / self.count
     }
 
-    /// The mean variance of the points along their beams, m^2.
+    /// Mean range variance of the points along their beams, m^2.
     pub(in super::super) fn mean_noise2(&self) -> f64 {
         self.noise2 / self.count
     }
 
-    /// The points' mean, m.
+    /// Mean of the points, m.
     pub(in super::super) fn mean(&self) -> Vector {
         Vector::from(self.sum) / self.count
     }
 
-    /// The points' second central moment, m^2.
+    /// Second central moment of the points, m^2.
     pub(in super::super) fn covariance(&self) -> Matrix {
         let mean = self.mean();
         let [xx, xy, xz, yy, yz, zz] = self.outer.map(|sum| sum / self.count);
@@ -73,8 +73,8 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn merged_moments_are_those_of_all_points() {
-        // Against the definition: mean and mean of (p - mean)(p - mean)^T over all points.
+    fn merged_moments_equal_the_moments_of_all_points() {
+        // The definition: the mean, and the mean of (p - mean)(p - mean)^T over all points.
         let points: Vec<Vector> =
             (0..40).map(f64::from).map(|k| Vector::new((k * 0.7).sin(), (k * 1.3).cos(), 0.1 * k)).collect();
         let (mut first, mut second) = (Moments::default(), Moments::default());
@@ -83,10 +83,10 @@ mod tests {
         }
         first.merge(&second);
         let mean = points.iter().sum::<Vector>() / 40.0;
-        let brute = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum::<Matrix>() / 40.0;
+        let expected = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum::<Matrix>() / 40.0;
         assert_eq!(first.count(), 40.0);
         assert_relative_eq!(first.mean(), mean, epsilon = 1e-13);
         assert_relative_eq!(first.mean_time_s(), 19.5, epsilon = 1e-13);
-        assert_relative_eq!(first.covariance(), brute, epsilon = 1e-12);
+        assert_relative_eq!(first.covariance(), expected, epsilon = 1e-12);
     }
 }

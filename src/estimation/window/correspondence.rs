@@ -230,7 +230,8 @@ impl Window {
                 With::Live(b) => &scene[b as usize].patch,
                 With::Fixed { view, patch } => &views.view(view as usize).patches[patch as usize],
             };
-            let variance = scene[*a as usize].patch.variance_of_lean(direction) + other.variance_of_lean(direction);
+            let variance =
+                scene[*a as usize].patch.normal_tilt_variance(direction) + other.normal_tilt_variance(direction);
             if plane.normal.dot(direction).abs() < SIGNIFICANT * variance.sqrt() {
                 plane.forget(direction);
             }

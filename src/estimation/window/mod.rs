@@ -21,7 +21,7 @@ use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, Exaggerates, Interval};
-use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
+use super::surfel::{Beam, Patch, PlacementState, Surfel, SurfelMaker};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
@@ -354,8 +354,8 @@ impl Window {
     }
 
     /// The current states with which surfels are placed in the map.
-    fn placing(&self) -> Placing<'_> {
-        Placing {
+    fn placing(&self) -> PlacementState<'_> {
+        PlacementState {
             nominal: &self.nominal,
             clock: &self.clock,
             biases: &self.biases,

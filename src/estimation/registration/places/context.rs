@@ -140,7 +140,7 @@ mod tests {
             let centre = centre + Vector::z() * (1.0 + (3.0 * wave).cos());
             let covariance = Matrix::identity() * 1e-4;
             let (centre, normal) = (rotation * centre, rotation * normal);
-            Patch { centre, normal, points: 50.0, covariance, doubt: 0.0, level: 0 }
+            Patch { centre, normal, points: 50.0, covariance, roughness_variance: 0.0, level: 0 }
         };
         (0..90).map(post).collect()
     }
