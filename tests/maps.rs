@@ -212,8 +212,8 @@ fn a_map_that_goes_on_and_one_that_is_put_together_are_as_exact_as_their_parts()
     let truly = first.place_of(second);
     let found =
         locate_map(&first.map, &second.map, &aside(&truly, Vector::new(-0.5, 0.5, 0.0), -12.0), &spec()).unwrap();
-    let apart = truly.inverse() * found.map_from_seen;
-    let merged = merge_maps(&first.map, &second.map, &found.map_from_seen).unwrap();
+    let apart = truly.inverse() * found.map_from_query;
+    let merged = merge_maps(&first.map, &second.map, &found.map_from_query).unwrap();
     let both = of(&merged, &first.world_from_map);
     println!("parts {parts:?} m, together {both} m, found {:.4} m off", apart.translation.vector.norm());
     assert!(apart.translation.vector.norm() < 0.02 && apart.rotation.angle() < 0.003, "{apart}");

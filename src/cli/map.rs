@@ -58,9 +58,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let out = output::file(&merge.out, merge.force)?;
     let merged = study::merge_map_files((&merge.first, &merge.second), &merge.start, &estimator, &out)?;
     let [first, second, both] = merged.surfels;
-    let at = merged.located.map_from_seen;
+    let at = merged.located.map_from_query;
     let (place, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());
-    let (share, residual_m) = (merged.located.share, merged.located.residual_rms_m);
+    let (share, residual_m) = (merged.located.inlier_ratio, merged.located.residual_rms_m);
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let rows = [
         row("surfels of the first", first.to_string()),

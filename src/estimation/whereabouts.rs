@@ -1,7 +1,7 @@
 //! Where the head is: in a map that was given, or behind a silence in what was seen before it.
 
 use super::consider::Consider;
-use super::map::{IN_MAP, Located, Locator, Search, covariance_of};
+use super::map::{Located, MAP_LIMITS, RelocalisationLimits, Relocaliser, map_covariance};
 use super::surfel::Patch;
 use super::views::Views;
 use super::window::Window;
@@ -13,7 +13,7 @@ use nalgebra::Matrix6;
 /// Where the head is looked for.
 #[derive(Debug)]
 pub(super) struct Whereabouts {
-    locator: Locator,
+    relocaliser: Relocaliser,
     covariance: Matrix6<f64>,
     /// Where it is about, until it is looked for.
     about: Option<Pose>,
@@ -25,13 +25,13 @@ impl Whereabouts {
     /// In `map`, where the head begins about at `map_from_head`.
     pub(super) fn about(map: &SurfelMap, map_from_head: Pose, spec: &EstimatorSpec) -> Self {
         let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
-        let locator = Locator::new(map, (&spec.matching, &spec.surfels), certainty);
-        Self { locator, covariance: covariance_of(map), about: Some(map_from_head), found: None }
+        let relocaliser = Relocaliser::new(map, (&spec.matching, &spec.surfels), certainty);
+        Self { relocaliser, covariance: map_covariance(map), about: Some(map_from_head), found: None }
     }
 
     /// The map's patches.
     pub(super) fn patches(&self) -> &[Patch] {
-        self.locator.patches()
+        self.relocaliser.patches()
     }
 
     /// The map's own error.
@@ -61,11 +61,11 @@ impl Whereabouts {
         let shift = about.translation.vector - rotation * here_from_head.translation.vector;
         let start = Pose::from_parts(shift.into(), rotation);
         let (seen, from) = (window.patches(), begins.translation.vector);
-        let mut located = self.locator.find(&seen, (&from, &start), &IN_MAP);
+        let mut located = self.relocaliser.find(&seen, (&from, &start), &MAP_LIMITS);
         if let (None, Ok(found)) = (&self.found, &located)
-            && let Some(better) = self.locator.better_elsewhere(&seen, &from, found)
+            && let Some(better) = self.relocaliser.find_better_elsewhere(&seen, &from, found)
         {
-            located = Err(not_here(found, &better, &(better.map_from_seen * here_from_head)));
+            located = Err(not_here(found, &better, &(better.map_from_query * here_from_head)));
         }
         if let (None, Ok(located)) = (&self.found, &located) {
             self.found = Some(located.clone());
@@ -79,8 +79,8 @@ fn not_here(found: &Located, better: &Located, map_from_head: &Pose) -> String {
     let at = map_from_head.translation.vector;
     format!(
         "near the start {:.0} % of what was seen lies on the map, but {:.0} % at {:.1},{:.1},{:.1},{:.0}",
-        100.0 * found.share,
-        100.0 * better.share,
+        100.0 * found.inlier_ratio,
+        100.0 * better.inlier_ratio,
         at.x,
         at.y,
         at.z,
@@ -109,12 +109,12 @@ impl Before {
     pub(super) fn find(mut self, window: &Window, spec: &EstimatorSpec) -> Result<(Pose, Views, Consider), String> {
         self.last.extend(self.views.patches());
         let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
-        let locator = Locator::among(self.last, (&spec.matching, &spec.surfels), certainty);
+        let relocaliser = Relocaliser::in_patches(self.last, (&spec.matching, &spec.surfels), certainty);
         let begins = window.begins().translation.vector;
-        let search = Search::behind_silence(window.begins_s() - self.until_s, spec.solve.match_sigma_m);
-        let found = locator.find(&window.patches(), (&begins, &Pose::identity()), &search)?;
-        let there = found.map_from_seen.transform_point(&begins.into()).coords;
+        let search = RelocalisationLimits::after_gap(window.begins_s() - self.until_s, spec.solve.match_sigma_m);
+        let found = relocaliser.find(&window.patches(), (&begins, &Pose::identity()), &search)?;
+        let there = found.map_from_query.transform_point(&begins.into()).coords;
         self.consider.find_again(there, &window.known_at_start().unwrap_or_default(), &found.covariance);
-        Ok((found.map_from_seen, self.views, self.consider))
+        Ok((found.map_from_query, self.views, self.consider))
     }
 }

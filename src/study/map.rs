@@ -53,7 +53,7 @@ pub fn merge_map_files(
 ) -> Result<Merged, StudyError> {
     let (first, second) = (read_surfel_map(first)?, read_surfel_map(second)?);
     let located = locate_map(&first, &second, start, estimator)?;
-    let both = merge_maps(&first, &second, &located.map_from_seen)?;
+    let both = merge_maps(&first, &second, &located.map_from_query)?;
     write(&both, out)?;
     Ok(Merged { surfels: [&first, &second, &both].map(|map| map.surfels().len()), located })
 }

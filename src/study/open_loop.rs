@@ -162,7 +162,7 @@ fn push_all(
 fn found(located: &Located) -> String {
     format!(
         "found in the map: {:.0} % of what the first window shows lies on it, to {:.1} mm",
-        100.0 * located.share,
+        100.0 * located.inlier_ratio,
         1e3 * located.residual_rms_m
     )
 }

@@ -251,7 +251,7 @@ impl Estimator {
             Some(Err(error)) => return Err(error),
             None => return Ok(false),
         };
-        window.found_at(&found.map_from_seen);
+        window.found_at(&found.map_from_query);
         let place = window.begins().translation.vector;
         let views = Views::new(&self.spec.views, self.spec.fixed_views);
         self.views = views.in_map(whereabouts.patches(), window.matcher(), place);

@@ -1,36 +1,36 @@
-//! Surfels of one surface become one: those of a cell whose normals agree and that lie in one plane.
+//! Fuses surfels of the same surface: same cell, similar normals, coplanar.
 
 use crate::geometry::{Matrix, Vector};
 use crate::surfel_map::MapSurfel;
 
-/// Normals of one surface are no farther from each other than this, degrees.
-const ANGLE_DEG: f64 = 15.0;
-/// Planes of one surface are no farther from each other than this at the finest resolution, m, and beside it by so many
-/// standard deviations of both surfels' places.
-const APART: (f64, f64) = (0.03, 3.0);
+/// Maximum angle between the normals of one surface, degrees.
+const MAX_NORMAL_ANGLE_DEG: f64 = 15.0;
+/// Maximum distance between the planes of one surface: this at the finest resolution, m (it doubles with each level), plus
+/// this many standard deviations of both surfels' positions.
+const MAX_PLANE_DISTANCE: (f64, f64) = (0.03, 3.0);
 
-/// Surfels of one surface, put together.
+/// The accumulated surfels of one surface.
 #[derive(Debug, Clone)]
 struct Cluster {
     points: f64,
     mean: Vector,
     covariance: Matrix,
     normal: Vector,
-    /// Mean variance of their places, by their points.
+    /// Mean variance of the positions along the normal, weighted by points, m^2.
     variance: f64,
     level: usize,
 }
 
-/// The surfels put together, in order of resolution and cell; of those of a cell the one that came first begins.
+/// Fuses surfels, in order of resolution and cell; within a cell the clusters grow in input order.
 pub(super) fn fuse(finest_voxel_m: f64, surfels: Vec<MapSurfel>) -> Vec<MapSurfel> {
     let mut keyed: Vec<_> = surfels.into_iter().map(|surfel| (cell(&surfel, finest_voxel_m), surfel)).collect();
-    // Stable: those of a cell stay in the order of time.
+    // A stable sort keeps the surfels of a cell in time order.
     keyed.sort_by_key(|(cell, _)| *cell);
     let cells = keyed.chunk_by(|(a, _), (b, _)| a == b);
     cells.flat_map(|cell| clusters(cell.iter().map(|(_, surfel)| surfel))).map(Cluster::into_surfel).collect()
 }
 
-/// Resolution and place of a surfel's cell.
+/// Resolution and coordinates of a surfel's cell.
 fn cell(surfel: &MapSurfel, finest_voxel_m: f64) -> (usize, [i64; 3]) {
     let edge_m = finest_voxel_m * f64::from(1_u32 << surfel.level);
     (surfel.level, [0, 1, 2].map(|axis| (surfel.centre_in_map[axis] / edge_m).floor() as i64))
@@ -39,16 +39,16 @@ fn cell(surfel: &MapSurfel, finest_voxel_m: f64) -> (usize, [i64; 3]) {
 fn clusters<'a>(surfels: impl Iterator<Item = &'a MapSurfel>) -> Vec<Cluster> {
     let mut clusters: Vec<Cluster> = Vec::new();
     for surfel in surfels {
-        match clusters.iter_mut().find(|cluster| cluster.is_of(surfel)) {
-            Some(cluster) => cluster.take(surfel),
-            None => clusters.push(Cluster::of(surfel)),
+        match clusters.iter_mut().find(|cluster| cluster.matches(surfel)) {
+            Some(cluster) => cluster.add(surfel),
+            None => clusters.push(Cluster::from_surfel(surfel)),
         }
     }
     clusters
 }
 
 impl Cluster {
-    fn of(surfel: &MapSurfel) -> Self {
+    fn from_surfel(surfel: &MapSurfel) -> Self {
         Self {
             points: surfel.points,
             mean: surfel.centre_in_map,
@@ -59,28 +59,30 @@ impl Cluster {
         }
     }
 
-    fn is_of(&self, surfel: &MapSurfel) -> bool {
-        let apart = surfel.centre_in_map - self.mean;
-        let most_m = APART.0 * f64::from(1_u32 << self.level)
-            + APART.1 * (self.variance + surfel.sigma_m * surfel.sigma_m).sqrt();
-        self.normal.dot(&surfel.normal_in_map) > ANGLE_DEG.to_radians().cos()
-            && apart.dot(&self.normal).abs().max(apart.dot(&surfel.normal_in_map).abs()) < most_m
+    fn matches(&self, surfel: &MapSurfel) -> bool {
+        let difference = surfel.centre_in_map - self.mean;
+        let max_distance_m = MAX_PLANE_DISTANCE.0 * f64::from(1_u32 << self.level)
+            + MAX_PLANE_DISTANCE.1 * (self.variance + surfel.sigma_m * surfel.sigma_m).sqrt();
+        self.normal.dot(&surfel.normal_in_map) > MAX_NORMAL_ANGLE_DEG.to_radians().cos()
+            && difference.dot(&self.normal).abs().max(difference.dot(&surfel.normal_in_map).abs()) < max_distance_m
     }
 
-    /// Adds a surfel's points. The errors of one trajectory go together: what is put together is as uncertain as its
-    /// parts are in the mean.
-    fn take(&mut self, surfel: &MapSurfel) {
+    /// Adds a surfel's points.
+    ///
+    /// Errors of one trajectory are correlated, so the variance of the position is averaged and does not decrease.
+    fn add(&mut self, surfel: &MapSurfel) {
         let points = self.points + surfel.points;
         let (ours, theirs) = (self.points / points, surfel.points / points);
-        let apart = surfel.centre_in_map - self.mean;
-        self.mean += apart * theirs;
-        self.covariance =
-            self.covariance * ours + surfel.covariance_in_map * theirs + apart * apart.transpose() * (ours * theirs);
+        let difference = surfel.centre_in_map - self.mean;
+        self.mean += difference * theirs;
+        self.covariance = self.covariance * ours
+            + surfel.covariance_in_map * theirs
+            + difference * difference.transpose() * (ours * theirs);
         self.variance = self.variance * ours + surfel.sigma_m * surfel.sigma_m * theirs;
         self.points = points;
         let eigen = self.covariance.symmetric_eigen();
-        let least: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        self.normal = if least.dot(&self.normal) < 0.0 { -least } else { least };
+        let smallest: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        self.normal = if smallest.dot(&self.normal) < 0.0 { -smallest } else { smallest };
     }
 
     fn into_surfel(self) -> MapSurfel {
@@ -100,7 +102,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// The surfel that points are, by the definitions.
+    /// Surfel of `points`, computed from the definitions of the moments.
     fn surfel(points: &[Vector], normal: Vector) -> MapSurfel {
         let count = points.len() as f64;
         let mean = points.iter().sum::<Vector>() / count;
@@ -117,19 +119,19 @@ mod tests {
     }
 
     #[test]
-    fn two_sights_of_a_floor_become_the_surfel_of_all_their_points() {
+    fn two_observations_of_a_floor_fuse_into_the_surfel_of_all_points() {
         let all = floor(0, 90);
         let fused = fuse(0.5, vec![surfel(&all[..40], Vector::z()), surfel(&all[40..], Vector::z())]);
         let [one] = fused[..] else { panic!("{fused:?}") };
-        let brute = surfel(&all, Vector::z());
+        let expected = surfel(&all, Vector::z());
         assert_eq!(one.points, 90.0);
-        assert_relative_eq!(one.centre_in_map, brute.centre_in_map, epsilon = 1e-12);
-        assert_relative_eq!(one.covariance_in_map, brute.covariance_in_map, epsilon = 1e-12);
+        assert_relative_eq!(one.centre_in_map, expected.centre_in_map, epsilon = 1e-12);
+        assert_relative_eq!(one.covariance_in_map, expected.covariance_in_map, epsilon = 1e-12);
         assert!(one.normal_in_map.z > 0.99 && (one.sigma_m - 0.002).abs() < 1e-12);
     }
 
     #[test]
-    fn both_sides_of_a_board_and_steps_stay_apart() {
+    fn opposite_sides_of_a_board_and_steps_are_not_fused() {
         let moved = |by: f64| -> Vec<Vector> { floor(0, 40).iter().map(|p| p + Vector::z() * by).collect() };
         let (below, above) = (surfel(&moved(0.0), -Vector::z()), surfel(&moved(0.02), Vector::z()));
         let step = surfel(&moved(0.2), Vector::z());

@@ -1,71 +1,71 @@
-//! Whether what was seen fits another place of the map better than the one that was found near a start.
+//! Global check of a relocalisation: searches the map for a pose that matches better than the accepted one.
 //!
-//! Rooms are symmetric and storeys alike: from a wrong start a wrong place is found in which most of what was seen lies
-//! on the map (up to 82 % in the mocap room turned by 180 degrees, where the right place has 99 %). No property of the
-//! wrong place alone separates it from the right one in a map that shows little of what is seen; the comparison with
-//! all other places of the map does. These are proposed by correlation (Olson, ICRA 2009), in three dimensions and by
-//! all surfaces, with their normals.
+//! Rooms are symmetric and storeys look alike, so a wrong start can lead to a false pose at which most surfels match the
+//! map: up to 82 % in the mocap room rotated by 180 degrees, against 99 % at the correct pose. If the map covers little of
+//! the query, no property of the false pose separates it from the correct one; the comparison with all other poses does.
+//! Candidate poses come from correlative matching (Olson, ICRA 2009), here in 3-D and with the normals of all surfaces.
 
-use super::locate::{Located, Locator, is_elsewhere, tried};
-use super::search::IN_MAP;
+use super::limits::MAP_LIMITS;
+use super::relocaliser::{Located, Relocaliser, is_different_pose, offset_pose};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Pose, Vector};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
-/// Edge of the grid's cells, m.
+/// Edge of the grid cells, m: the correlation tolerates about one cell of error.
 const CELL_M: f64 = 0.5;
-/// Patches of the map farther than this from the place found are left out, m: on the level, and in height.
-const WITHIN_M: (f64, f64) = (50.0, 12.0);
-/// Places farther than this from it are not looked at, m, nor those that differ in height by more.
-const REACH_M: (f64, f64) = (25.0, 8.0);
-/// Steps between places: cells on the level and in height, and turns a full circle.
+/// Map patches within this horizontal and vertical distance of the accepted pose enter the grid, m: the search radius plus the
+/// range of the lidar indoors.
+const GRID_REACH_M: (f64, f64) = (50.0, 12.0);
+/// Horizontal and vertical search radius around the accepted pose, m: bounds the computing time.
+const SEARCH_REACH_M: (f64, f64) = (25.0, 8.0);
+/// Step of the search in cells, horizontally and vertically.
 const STEPS: (i32, i32) = (1, 2);
-const TURNS: usize = 80;
-/// Patches of what was seen that are counted.
-const COUNTED: usize = 100;
-/// Places that are refined, overall and of one turn.
-const REFINED: usize = 32;
-const OF_A_TURN: usize = 8;
-/// Two proposals are others when they differ by more, cells and turns.
-const OTHER: (i32, i32) = (2, 2);
-/// A surface is level when its normal leaves the vertical by less than this cosine.
-const LEVEL: f64 = 0.8;
-/// A place found near a start is the right one unless another has more than so many times its share of surfels on the
-/// map. Of 144 starts in office, mocap room, courtyard and stairwell the best wrong place has at most 0.88 times the
-/// share of the right one.
-const BETTER: f64 = 1.05;
+/// Heading steps per full circle (4.5 degrees each).
+const HEADINGS: usize = 80;
+/// Maximum number of query patches in the correlation.
+const MAX_CORRELATED: usize = 100;
+/// Number of candidates that are refined.
+const MAX_CANDIDATES: usize = 32;
+/// Maximum number of candidates per heading.
+const MAX_PER_HEADING: usize = 8;
+/// Candidates within this many cells and heading steps of a stronger one are suppressed.
+const SUPPRESSION: (i32, i32) = (2, 2);
+/// A surface is horizontal if the vertical component of the unit normal exceeds this (37 degrees).
+const HORIZONTAL_NORMAL_Z: f64 = 0.8;
+/// An accepted pose is rejected if another has more than this multiple of its inlier ratio. In 144 starts in office, mocap
+/// room, courtyard and stairwell the best false pose has at most 0.88 times the inlier ratio of the correct one.
+const BETTER_RATIO: f64 = 1.05;
 
-/// A turn by so many steps and a shift by so many cells.
+/// Candidate pose on the search grid: heading steps and cells relative to the accepted pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Shift {
-    turn: i32,
+struct GridPose {
+    heading_step: i32,
     cells: [i32; 3],
 }
 
-impl Shift {
+impl GridPose {
     fn is_near(&self, other: &Self) -> bool {
-        let turns = (self.turn - other.turn).rem_euclid(TURNS as i32);
-        let apart = (0..3).map(|axis| (self.cells[axis] - other.cells[axis]).abs()).fold(0, i32::max);
-        turns.min(TURNS as i32 - turns) <= OTHER.1 && apart <= OTHER.0
+        let turns = (self.heading_step - other.heading_step).rem_euclid(HEADINGS as i32);
+        let cells_apart = (0..3).map(|axis| (self.cells[axis] - other.cells[axis]).abs()).fold(0, i32::max);
+        turns.min(HEADINGS as i32 - turns) <= SUPPRESSION.1 && cells_apart <= SUPPRESSION.0
     }
 }
 
-/// Surfaces of the map about a place: of each cell the directions of the normals in it and in its neighbours, a bit
-/// each.
-struct Volume {
+/// Occupancy grid of normal directions around a pose: for each cell a bit per direction present in the cell or its neighbours.
+struct NormalGrid {
     first: [i32; 3],
     size: [i32; 3],
     cells: Vec<u16>,
 }
 
-impl Volume {
-    /// Of the finest of `patches` around `centre`; `None` where there are none.
-    fn about(centre: &Vector, patches: &[Patch]) -> Option<Self> {
+impl NormalGrid {
+    /// Grid of the finest `patches` around `centre`; `None` if there are none.
+    fn around(centre: &Vector, patches: &[Patch]) -> Option<Self> {
         let is_near = |patch: &&Patch| {
-            let apart = patch.centre - centre;
-            patch.level == 0 && apart.xy().norm() < WITHIN_M.0 && apart.z.abs() < WITHIN_M.1
+            let offset = patch.centre - centre;
+            patch.level == 0 && offset.xy().norm() < GRID_REACH_M.0 && offset.z.abs() < GRID_REACH_M.1
         };
         let near: Vec<([i32; 3], u16)> = patches
             .iter()
@@ -81,16 +81,16 @@ impl Volume {
             first[axis] = end(axis, i32::min)? - 1;
             size[axis] = end(axis, i32::max)? + 2 - first[axis];
         }
-        let mut volume = Self { first, size, cells: vec![0; size.iter().map(|n| *n as usize).product()] };
+        let mut grid = Self { first, size, cells: vec![0; size.iter().map(|n| *n as usize).product()] };
         for (at, bits) in near {
             for k in 0..27 {
-                let beside = [at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1];
-                if let Some(index) = volume.index(beside) {
-                    volume.cells[index] |= bits;
+                let neighbour = [at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1];
+                if let Some(index) = grid.index(neighbour) {
+                    grid.cells[index] |= bits;
                 }
             }
         }
-        Some(volume)
+        Some(grid)
     }
 
     fn index(&self, at: [i32; 3]) -> Option<usize> {
@@ -103,12 +103,12 @@ impl Volume {
         self.index(at).is_some()
     }
 
-    /// How many of some cells with directions fall onto surfaces when they are shifted.
-    fn hits(&self, seen: &[([i32; 3], u16)], by: [i32; 3]) -> usize {
+    /// Number of cells with directions that hit a surface of the same direction when translated.
+    fn hits(&self, query: &[([i32; 3], u16)], by: [i32; 3]) -> usize {
         let is_hit = |(at, bit): &&([i32; 3], u16)| {
             self.index([at[0] + by[0], at[1] + by[1], at[2] + by[2]]).is_some_and(|index| self.cells[index] & bit != 0)
         };
-        seen.iter().filter(is_hit).count()
+        query.iter().filter(is_hit).count()
     }
 }
 
@@ -116,9 +116,9 @@ fn cell(point: &Vector) -> [i32; 3] {
     [point.x, point.y, point.z].map(|x| (x / CELL_M).floor() as i32)
 }
 
-/// Bits of the direction that a normal is nearest to and of the one next to it: eight on the level, up and down.
+/// Bits of the nearest and the second nearest direction of a normal: eight horizontal ones, up, down.
 fn directions(normal: &Vector) -> (u16, u16) {
-    if normal.z.abs() > LEVEL {
+    if normal.z.abs() > HORIZONTAL_NORMAL_Z {
         let bit = if normal.z > 0.0 { 1 << 8 } else { 1 << 9 };
         return (bit, bit);
     }
@@ -129,62 +129,63 @@ fn directions(normal: &Vector) -> (u16, u16) {
     (bit(nearest), bit(next))
 }
 
-impl Locator {
-    /// A place of the map that `seen`, looked at from `from`, fits clearly better than the place `found`.
-    pub(in crate::estimation) fn better_elsewhere(
+impl Relocaliser {
+    /// Returns a pose of `query`, observed from the point `from`, that matches clearly better than `found`.
+    pub(in crate::estimation) fn find_better_elsewhere(
         &self,
-        seen: &[Patch],
+        query: &[Patch],
         from: &Vector,
         found: &Located,
     ) -> Option<Located> {
-        let here = found.map_from_seen;
-        let by_level = self.by_level(seen);
-        let proposed = proposals(self.patches(), &by_level[0], from, &here);
-        let starts = proposed.iter().map(|by| {
+        let here = found.map_from_query;
+        let patches_by_level = self.patches_by_level(query);
+        let candidates_here = candidates(self.patches(), &patches_by_level[0], from, &here);
+        let starts = candidates_here.iter().map(|by| {
             let shift = Vector::from(by.cells.map(|cells| f64::from(cells) * CELL_M));
-            let start = tried(&here, from, f64::from(by.turn) * TAU / TURNS as f64, shift);
+            let start = offset_pose(&here, from, f64::from(by.heading_step) * TAU / HEADINGS as f64, shift);
             (start, start)
         });
-        let places = self.settled(&by_level, starts.collect(), from);
-        let believed = self.judged(&by_level[0], from, &places, None).filter(|place| IN_MAP.believes(place));
-        let best = believed.max_by(|a, b| a.share.total_cmp(&b.share))?;
-        (best.share > BETTER * found.share && is_elsewhere(&best, found, from)).then_some(best)
+        let poses = self.refine_all(&patches_by_level, starts.collect(), from);
+        let accepted =
+            self.evaluate_all(&patches_by_level[0], from, &poses, None).filter(|located| MAP_LIMITS.accepts(located));
+        let best = accepted.max_by(|a, b| a.inlier_ratio.total_cmp(&b.inlier_ratio))?;
+        (best.inlier_ratio > BETTER_RATIO * found.inlier_ratio && is_different_pose(&best, found, from)).then_some(best)
     }
 }
 
-/// The most promising places of what was `seen` from `from`, as turns and shifts of the pose `here`.
-fn proposals(map: &[Patch], seen: &[Patch], from: &Vector, here: &Pose) -> Vec<Shift> {
+/// Candidate poses of the query by correlation with the map, relative to the pose `here`.
+fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose) -> Vec<GridPose> {
     let centre = here.transform_point(&(*from).into()).coords;
-    let Some(volume) = Volume::about(&centre, map) else { return Vec::new() };
-    let counted: Vec<&Patch> = seen.iter().step_by(seen.len().div_ceil(COUNTED).max(1)).collect();
-    let (aside, up) = ((REACH_M.0 / CELL_M) as i32, (REACH_M.1 / CELL_M) as i32);
+    let Some(grid) = NormalGrid::around(&centre, map) else { return Vec::new() };
+    let correlated: Vec<&Patch> = query.iter().step_by(query.len().div_ceil(MAX_CORRELATED).max(1)).collect();
+    let (horizontal, up) = ((SEARCH_REACH_M.0 / CELL_M) as i32, (SEARCH_REACH_M.1 / CELL_M) as i32);
     let steps = |most: i32, step: i32| (-most / step..=most / step).map(move |k| k * step);
-    let level = || steps(aside, STEPS.0).flat_map(move |x| steps(aside, STEPS.0).map(move |y| (x, y)));
+    let level = || steps(horizontal, STEPS.0).flat_map(move |x| steps(horizontal, STEPS.0).map(move |y| (x, y)));
     let at = cell(&centre);
     let cells: Vec<[i32; 3]> = steps(up, STEPS.1)
         .flat_map(|z| level().map(move |(x, y)| [x, y, z]))
-        .filter(|by| volume.contains([at[0] + by[0], at[1] + by[1], at[2] + by[2]]))
+        .filter(|by| grid.contains([at[0] + by[0], at[1] + by[1], at[2] + by[2]]))
         .collect();
-    let of_turn = |turn: i32| {
-        let pose = tried(here, from, f64::from(turn) * TAU / TURNS as f64, Vector::zeros());
-        let turned = counted.iter().map(|patch| {
+    let at_heading = |heading_step: i32| {
+        let pose = offset_pose(here, from, f64::from(heading_step) * TAU / HEADINGS as f64, Vector::zeros());
+        let rotated = correlated.iter().map(|patch| {
             let centre = pose.transform_point(&patch.centre.into()).coords;
             (cell(&centre), directions(&(pose.rotation * patch.normal)).0)
         });
-        let turned: Vec<([i32; 3], u16)> = turned.collect();
-        let hits = cells.iter().map(|by| (volume.hits(&turned, *by), Shift { turn, cells: *by }));
-        strongest(hits.collect(), OF_A_TURN)
+        let rotated: Vec<([i32; 3], u16)> = rotated.collect();
+        let hits = cells.iter().map(|by| (grid.hits(&rotated, *by), GridPose { heading_step, cells: *by }));
+        suppress_non_maxima(hits.collect(), MAX_PER_HEADING)
     };
-    let all: Vec<(usize, Shift)> = (0..TURNS as i32).into_par_iter().flat_map_iter(of_turn).collect();
-    strongest(all, REFINED).into_iter().map(|(_, shift)| shift).collect()
+    let all: Vec<(usize, GridPose)> = (0..HEADINGS as i32).into_par_iter().flat_map_iter(at_heading).collect();
+    suppress_non_maxima(all, MAX_CANDIDATES).into_iter().map(|(_, shift)| shift).collect()
 }
 
-/// The `count` with the most hits of which none is near to another.
-fn strongest(mut all: Vec<(usize, Shift)>, count: usize) -> Vec<(usize, Shift)> {
+/// The `count` candidates with the most hits, after non-maximum suppression.
+fn suppress_non_maxima(mut all: Vec<(usize, GridPose)>, count: usize) -> Vec<(usize, GridPose)> {
     let most = all.iter().map(|(hits, _)| *hits).max().unwrap_or(0);
     all.retain(|(hits, _)| 2 * hits > most);
     all.sort_unstable_by_key(|(hits, shift)| (Reverse(*hits), *shift));
-    let mut chosen: Vec<(usize, Shift)> = Vec::new();
+    let mut chosen: Vec<(usize, GridPose)> = Vec::new();
     for one in all {
         if chosen.len() == count {
             break;

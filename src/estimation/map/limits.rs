@@ -1,84 +1,99 @@
-//! Where something is looked for in a map, from where, and what is believed of what is found.
+//! Search region and acceptance thresholds of the relocalisation.
 
-use super::locate::{Located, apart, tried};
+use super::relocaliser::{Located, offset_pose, pose_distance};
 use crate::geometry::{Pose, Vector};
 
-/// How far apart starts are, m, and by what angle, rad: what the coarsest surfels reach.
-const APART: (f64, f64) = (0.7, 14.0 / 180.0 * std::f64::consts::PI);
-/// Behind a silence the head is at most so far from where it was expected, m: at once, a second, and at most.
-const AWAY: (f64, f64, f64) = (0.3, 1.0, 2.5);
-/// Starts go no farther, m: what is seen from there reaches the rest.
-const FARTHEST_M: f64 = 1.4;
-/// Behind a longer silence a place must agree better: it is looked for far about, s.
-const LONG_S: f64 = 1.5;
-/// It is turned by at most so much, degrees: at once, a second, and at most.
-const TURNED_DEG: (f64, f64, f64) = (15.0, 60.0, 90.0);
+/// Spacing of the start poses, m and rad: within half of it the coarsest surfels converge.
+const START_SPACING: (f64, f64) = (0.7, 14.0 / 180.0 * std::f64::consts::PI);
+/// Search radius after a gap, m: initial value, growth per second of the gap, upper limit.
+const GAP_RADIUS: (f64, f64, f64) = (0.3, 1.0, 2.5);
+/// Start poses go no farther than this, m: from there the matching converges over the rest of the search radius.
+const MAX_START_OFFSET_M: f64 = 1.4;
+/// After a gap longer than this, s, the search region is large, and a pose must agree better with the map.
+const LONG_GAP_S: f64 = 1.5;
+/// Search range of the heading after a gap, degrees: initial value, growth per second of the gap, upper limit.
+const GAP_HEADING_DEG: (f64, f64, f64) = (15.0, 60.0, 90.0);
 
-/// How far from about where it may be something is looked for, and what is believed.
+/// Search region around an expected pose, and thresholds for accepting a pose.
 #[derive(Debug)]
-pub(in crate::estimation) struct Search {
-    /// On the level, m, and turned, rad.
+pub(in crate::estimation) struct RelocalisationLimits {
+    /// Horizontal distance, m, and heading, rad, from the expected pose.
     reach: (f64, f64),
-    /// Patches this far apart along their normals lie on each other, m; the share of a voxel's edge where nothing is
-    /// said.
+    /// Maximum distance of matched patches along their normals, m; `None` for a fixed fraction of the voxel edge.
     pub(super) gate_m: Option<f64>,
-    /// Least share of the finest patches that lies on the map.
-    share: f64,
-    /// Least share of those that have a patch of the map beside them.
-    agreement: f64,
-    /// Largest residual of those that lie on the map, root mean square, m.
-    residual_m: f64,
-    /// Whether of places that are as good the nearest counts; if not, none of them.
+    /// Minimum fraction of the finest patches that match the map.
+    min_inlier_ratio: f64,
+    /// Minimum fraction of matches among the patches that have a neighbour in the map.
+    min_agreement: f64,
+    /// Maximum root mean square residual of the matches, m.
+    max_residual_m: f64,
+    /// Whether the pose nearest to the expected one wins among equally good poses; if not, they are ambiguous.
     pub(super) nearest: bool,
 }
 
-/// Largest residual in a map, m: at right places it is 3 to 7 mm, where surfaces match by chance 10 to 17 mm.
-const RESIDUAL_M: f64 = 0.01;
+/// Maximum residual in a map, m: correct poses have 3 to 7 mm, chance matches of surfaces 10 to 17 mm.
+const MAX_RESIDUAL_M: f64 = 0.01;
 
-/// In a map which shows all that is seen: with what the coarsest surfels reach, a metre and twenty degrees.
-pub(in crate::estimation) const IN_MAP: Search =
-    Search { reach: APART, gate_m: None, share: 0.4, agreement: 0.0, residual_m: RESIDUAL_M, nearest: false };
+/// Limits in a complete map: the starts cover the convergence range of the coarsest surfels, 1 m and 20 degrees.
+pub(in crate::estimation) const MAP_LIMITS: RelocalisationLimits = RelocalisationLimits {
+    reach: START_SPACING,
+    gate_m: None,
+    min_inlier_ratio: 0.4,
+    min_agreement: 0.0,
+    max_residual_m: MAX_RESIDUAL_M,
+    nearest: false,
+};
 
-impl Search {
-    /// In what was seen before a silence of `seconds`, matches being good to `sigma_m`. It may show little of what is
-    /// seen behind it, but where both show a place, it must be the same; and the head cannot have gone far.
-    pub(in crate::estimation) fn behind_silence(seconds: f64, sigma_m: f64) -> Self {
-        let reach_m = (AWAY.0 + AWAY.1 * seconds).min(AWAY.2);
-        let reach_deg = (TURNED_DEG.0 + TURNED_DEG.1 * seconds).min(TURNED_DEG.2);
-        let reach = (reach_m, reach_deg.to_radians());
-        let agreement = if seconds > LONG_S { 0.85 } else { 0.6 };
-        Self { reach, gate_m: Some(1.5 * sigma_m), share: 0.1, agreement, residual_m: f64::INFINITY, nearest: true }
+impl RelocalisationLimits {
+    /// Limits for the surfels observed before a gap of `seconds`; `sigma_m` is the standard deviation of a match.
+    ///
+    /// The two sets of surfels may overlap little, but where they overlap they must agree. The head cannot have gone far.
+    pub(in crate::estimation) fn after_gap(seconds: f64, sigma_m: f64) -> Self {
+        let reach_m = (GAP_RADIUS.0 + GAP_RADIUS.1 * seconds).min(GAP_RADIUS.2);
+        let reach_deg = (GAP_HEADING_DEG.0 + GAP_HEADING_DEG.1 * seconds).min(GAP_HEADING_DEG.2);
+        Self {
+            reach: (reach_m, reach_deg.to_radians()),
+            gate_m: Some(1.5 * sigma_m),
+            min_inlier_ratio: 0.1,
+            min_agreement: if seconds > LONG_GAP_S { 0.85 } else { 0.6 },
+            max_residual_m: f64::INFINITY,
+            nearest: true,
+        }
     }
 
-    /// Each start, twice: as what it began, and as what it becomes.
-    pub(super) fn starts(&self, map_from_seen: &Pose, from: &Vector) -> Vec<(Pose, Pose)> {
-        let steps = |reach: f64, apart: f64| {
-            let most = (reach / apart).floor() as i32;
-            (-most..=most).map(move |k| f64::from(k) * apart)
+    /// Start poses on a grid around the expected pose, each as a pair (start, current pose).
+    pub(super) fn starts(&self, map_from_query: &Pose, viewpoint: &Vector) -> Vec<(Pose, Pose)> {
+        let steps = |reach: f64, spacing: f64| {
+            let most = (reach / spacing).floor() as i32;
+            (-most..=most).map(move |k| f64::from(k) * spacing)
         };
-        let far_m = self.reach.0.min(FARTHEST_M);
+        let reach_m = self.reach.0.min(MAX_START_OFFSET_M);
         let mut starts = Vec::new();
-        for yaw in steps(self.reach.1, APART.1) {
-            for (x, y) in steps(far_m, APART.0).flat_map(|x| steps(far_m, APART.0).map(move |y| (x, y))) {
-                let start = tried(map_from_seen, from, yaw, Vector::new(x, y, 0.0));
+        for yaw in steps(self.reach.1, START_SPACING.1) {
+            for (x, y) in
+                steps(reach_m, START_SPACING.0).flat_map(|x| steps(reach_m, START_SPACING.0).map(move |y| (x, y)))
+            {
+                let start = offset_pose(map_from_query, viewpoint, yaw, Vector::new(x, y, 0.0));
                 starts.push((start, start));
             }
         }
         starts
     }
 
-    /// Whether enough of what was seen, and of what could, lies on the map where it was found.
-    pub(super) fn believes(&self, found: &Located) -> bool {
-        found.share >= self.share && found.agreement >= self.agreement && found.residual_rms_m <= self.residual_m
+    /// Whether a pose meets the acceptance thresholds.
+    pub(super) fn accepts(&self, found: &Located) -> bool {
+        found.inlier_ratio >= self.min_inlier_ratio
+            && found.agreement >= self.min_agreement
+            && found.residual_rms_m <= self.max_residual_m
     }
 
-    /// How likely a head is where it was found, as far as where it was expected says, 0..1.
-    pub(super) fn likely(&self, found: &Pose, expected: &Pose, from: &Vector) -> f64 {
+    /// Prior likelihood of the pose `found` by the distance from the expected one, 0..1.
+    pub(super) fn prior(&self, found: &Pose, expected: &Pose, viewpoint: &Vector) -> f64 {
         if !self.nearest {
             return 1.0;
         }
-        let (far_m, turned) = apart(found, expected, from);
-        let sigmas = 2.0 * (far_m / self.reach.0).max(turned / self.reach.1);
+        let (distance_m, angle) = pose_distance(found, expected, viewpoint);
+        let sigmas = 2.0 * (distance_m / self.reach.0).max(angle / self.reach.1);
         if sigmas > 3.0 { 0.0 } else { (-0.5 * sigmas * sigmas).exp() }
     }
 }

@@ -1,13 +1,13 @@
-//! Maps that last: what a survey saw becomes surfels that are kept, found again, and put together.
+//! Persistent surfel maps: building, relocalisation and merging.
 
 mod fuse;
-mod locate;
-mod search;
-mod whole;
+mod global_check;
+mod limits;
+mod relocaliser;
 
-pub use locate::Located;
-pub(super) use locate::Locator;
-pub(super) use search::{IN_MAP, Search};
+pub(super) use limits::{MAP_LIMITS, RelocalisationLimits};
+pub use relocaliser::Located;
+pub(super) use relocaliser::Relocaliser;
 
 use super::surfel::Patch;
 use super::survey::{Sighting, Survey};
@@ -17,20 +17,21 @@ use crate::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
 use crate::time::{Span, Stamp};
 use nalgebra::Matrix6;
 
-/// The map that an open loop's `survey` makes: its patches are carried from where the open loop put them to where the
-/// final trajectory, at the same stamps, has them (`open_loop` and `best`), and those of one surface are put together.
-/// `covariances` are those of some of the poses.
+/// Builds a map from the `survey` of an odometry run.
+///
+/// Each patch is moved from the odometry pose (`open_loop`) to the final pose (`best`) at the same time, both `map_from_head`;
+/// patches of the same surface are then fused. `covariances` are pose covariances at some of the stamps.
 ///
 /// # Errors
-/// When there is nothing in it.
+/// When the survey yields no surfels.
 pub fn map_of(
     survey: &Survey,
     (open_loop, best): (&Trajectory, &Trajectory),
     covariances: &[(Stamp, PoseCovariance)],
     spec: &RegistrationSpec,
 ) -> Result<SurfelMap, EstimationError> {
-    let mut seen: Vec<_> = survey.sightings.iter().collect();
-    seen.sort_by(|a, b| a.tau_s.total_cmp(&b.tau_s));
+    let mut sightings: Vec<_> = survey.sightings.iter().collect();
+    sightings.sort_by(|a, b| a.tau_s.total_cmp(&b.tau_s));
     let moved = |sighting: &&Sighting| {
         let stamp = survey.origin + Span::from_seconds(sighting.tau_s);
         let (before, after) = (open_loop.at(stamp)?, best.at(stamp)?);
@@ -39,17 +40,18 @@ pub fn map_of(
         let index = covariances.partition_point(|(at, _)| *at <= stamp).saturating_sub(1);
         let of_pose = covariances.get(index).map_or(0.0, |(_, c)| variance_along(&patch.normal, c, &arm));
         let thin = patch.normal.dot(&(patch.covariance * patch.normal)).max(0.0);
-        Some(patch.to_map((of_pose + thin / patch.points).sqrt()))
+        Some(patch.to_map_surfel((of_pose + thin / patch.points).sqrt()))
     };
-    let surfels: Vec<MapSurfel> = seen.iter().filter_map(moved).collect();
+    let surfels: Vec<MapSurfel> = sightings.iter().filter_map(moved).collect();
     map_from(spec.finest_voxel_m, spec.levels, surfels)
 }
 
-/// Where in `map` another map is, whose origin is about at `start` in it: within a metre on the level and twenty
-/// degrees about the vertical, both maps being level.
+/// Registers the map `other` to `map`, starting at the pose `start` of its origin in `map`.
+///
+/// Both maps must be level. `start` must be within 1 m horizontally and 20 degrees of heading.
 ///
 /// # Errors
-/// When it is not found there, or at several places.
+/// When no pose matches, or several poses match equally well.
 pub fn locate_map(
     map: &SurfelMap,
     other: &SurfelMap,
@@ -58,28 +60,29 @@ pub fn locate_map(
 ) -> Result<Located, EstimationError> {
     let surfels = spec.registration.surfels(&spec.surfels);
     let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
-    let locator = Locator::new(map, (&spec.matching, &surfels), certainty);
-    let seen: Vec<Patch> = other.surfels().iter().map(Patch::of_map).collect();
-    locator.find(&seen, (&Vector::zeros(), start), &IN_MAP).map_err(EstimationError::NotInMap)
+    let relocaliser = Relocaliser::new(map, (&spec.matching, &surfels), certainty);
+    let query: Vec<Patch> = other.surfels().iter().map(Patch::from_map_surfel).collect();
+    relocaliser.find(&query, (&Vector::zeros(), start), &MAP_LIMITS).map_err(EstimationError::NotInMap)
 }
 
-/// One map of two, in the frame of the first: `map_from_other` puts the second there. What both saw of a surface is put
-/// together.
+/// Merges two maps in the frame of the first; `map_from_other` is the pose of the second in it.
+///
+/// Surfels of the same surface are fused.
 ///
 /// # Errors
-/// When they have not the same resolutions.
+/// When the maps have different resolutions.
 pub fn merge_maps(map: &SurfelMap, other: &SurfelMap, map_from_other: &Pose) -> Result<SurfelMap, EstimationError> {
     let resolutions = |map: &SurfelMap| (map.finest_voxel_m(), map.levels());
     if resolutions(map) != resolutions(other) {
         let ((a, m), (b, n)) = (resolutions(map), resolutions(other));
         let message = format!(
-            "one has {m} resolutions from {a} m on, the other {n} from {b} m on; maps of one kind can be put together"
+            "cannot merge: one map has {m} resolutions from {a} m, the other {n} from {b} m; build both with the same settings"
         );
         return Err(EstimationError::Map(message));
     }
     let moved = other.surfels().iter().map(|surfel| {
-        let patch = Patch::of_map(surfel).moved_by(map_from_other);
-        patch.to_map(surfel.sigma_m)
+        let patch = Patch::from_map_surfel(surfel).moved_by(map_from_other);
+        patch.to_map_surfel(surfel.sigma_m)
     });
     map_from(map.finest_voxel_m(), map.levels(), map.surfels().iter().copied().chain(moved).collect())
 }
@@ -87,13 +90,13 @@ pub fn merge_maps(map: &SurfelMap, other: &SurfelMap, map_from_other: &Pose) -> 
 fn map_from(finest_voxel_m: f64, levels: usize, surfels: Vec<MapSurfel>) -> Result<SurfelMap, EstimationError> {
     let fused = fuse::fuse(finest_voxel_m, surfels);
     if fused.is_empty() {
-        return Err(EstimationError::Map("nothing was seen that makes a map".to_owned()));
+        return Err(EstimationError::Map("no surfels to build a map from".to_owned()));
     }
     SurfelMap::new(finest_voxel_m, levels, fused)
         .map_err(|error: SurfelMapError| EstimationError::Map(error.to_string()))
 }
 
-/// Variance along `normal` of a point `arm` away from a head of this covariance, m^2.
+/// Variance along `normal` of a point at `arm` (m) from the head, by the head's pose covariance, m^2.
 fn variance_along(normal: &Vector, covariance: &PoseCovariance, arm: &Vector) -> f64 {
     let mut by = nalgebra::Matrix3x6::<f64>::zeros();
     by.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
@@ -103,7 +106,7 @@ fn variance_along(normal: &Vector, covariance: &PoseCovariance, arm: &Vector) ->
 }
 
 impl Patch {
-    /// The patch where `a_from_b` puts it.
+    /// Transforms the patch by `a_from_b`.
     pub(super) fn moved_by(&self, a_from_b: &Pose) -> Self {
         let turn = a_from_b.rotation.to_rotation_matrix().into_inner();
         let covariance: Matrix = turn * self.covariance * turn.transpose();
@@ -115,22 +118,22 @@ impl Patch {
         }
     }
 
-    pub(super) fn of_map(surfel: &MapSurfel) -> Self {
+    pub(super) fn from_map_surfel(surfel: &MapSurfel) -> Self {
         Self {
             centre: surfel.centre_in_map,
             normal: surfel.normal_in_map,
             points: surfel.points,
             covariance: surfel.covariance_in_map,
-            doubt: 0.0,
+            roughness_variance: 0.0,
             level: surfel.level,
         }
     }
 
-    pub(super) fn to_map(self, sigma_m: f64) -> MapSurfel {
+    pub(super) fn to_map_surfel(self, sigma_m: f64) -> MapSurfel {
         MapSurfel {
             centre_in_map: self.centre,
             normal_in_map: self.normal.normalize(),
-            covariance_in_map: self.covariance + self.normal * self.normal.transpose() * self.doubt,
+            covariance_in_map: self.covariance + self.normal * self.normal.transpose() * self.roughness_variance,
             points: self.points,
             sigma_m,
             level: self.level,
@@ -138,9 +141,11 @@ impl Patch {
     }
 }
 
-/// A map's own error as one of the whole: a shift as large as its surfels are uncertain in the middle (median), and a
-/// turn that makes as much of it at `ARM_M`.
-pub(super) fn covariance_of(map: &SurfelMap) -> Matrix6<f64> {
+/// Covariance of a common error of the whole map: rotation (rad), then translation (m).
+///
+/// The translation has the median standard deviation of the surfels; the rotation causes the same displacement at `ARM_M`.
+pub(super) fn map_covariance(map: &SurfelMap) -> Matrix6<f64> {
+    /// Typical distance of surfaces from the head, m.
     const ARM_M: f64 = 5.0;
     let mut sigmas: Vec<f64> = map.surfels().iter().map(|surfel| surfel.sigma_m).collect();
     sigmas.sort_by(f64::total_cmp);

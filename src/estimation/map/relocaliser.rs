@@ -1,11 +1,11 @@
-//! Where in a map something was seen: from about where it may be, coarse to fine.
+//! Relocalisation: finds the pose of observed surfels (the query) in a map, from an approximate pose.
 //!
-//! What was seen is put into the map from several starts, and laid upon it: neighbours in six dimensions, matched as in
-//! a window; a rigid motion that brings matched planes together (Chen and Medioni 1992), robustly; again, from the
-//! coarsest resolution to the finest. Of the places found so the one counts in which most of what was seen lies on the
-//! map, where no other is nearly as good.
+//! From several start poses the query is registered to the map: nearest neighbours in six dimensions as in a window, then
+//! the rigid motion that minimises point-to-plane distances (Chen and Medioni 1992) with robust weights, iterated from the
+//! coarsest resolution to the finest. The result is the pose with the highest fraction of matched surfels, provided that no
+//! different pose is nearly as good.
 
-use super::search::Search;
+use super::limits::RelocalisationLimits;
 use crate::estimation::matching::{Forest, Matcher};
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
@@ -16,49 +16,49 @@ use crate::surfel_map::SurfelMap;
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 
-/// A direction along which normals lean by less than this share, in the mean of their squares, is not told by them.
-const WEAK: f64 = 0.01;
-/// Most patches of a resolution that are laid upon the map.
-const MOST: usize = 2000;
-/// Iterations a resolution.
+/// A direction is unobservable if the weighted mean square of the normals' components along it is below this.
+const MIN_NORMAL_SQUARE: f64 = 0.01;
+/// Maximum number of query patches per resolution.
+const MAX_PATCHES: usize = 2000;
+/// Iterations per resolution.
 const ITERATIONS: usize = 8;
-/// In the first of them planes may be this share of a voxel's edge apart, in the last that one.
+/// Match gate along the normal in the first and the last iteration, as a fraction of the voxel edge.
 const GATES: (f64, f64) = (0.5, 0.1);
-/// Normals may differ by this much at first, degrees.
-const ANGLE_DEG: f64 = 30.0;
-/// Both frames are level to this, degrees.
-const LEVEL_DEG: f64 = 1.0;
-/// Of how many directions of a shift nothing may be told: along a corridor of one; over bare ground of two, and of the
-/// heading.
-const MOST_UNTOLD: f64 = 1.5;
-/// Information that holds a pose where it is along what is not told, 1/m^2: more than all matches together.
-const UNMOVED: f64 = 1e12;
-/// Fewest finest patches of which a place can be told.
-const FEWEST: usize = 50;
-/// Starts that settled so near to each other, m and rad, are one.
-const SAME: f64 = 0.01;
-/// Another place is another from this distance on, m, or this angle, rad; and as good as the best at this share of what
-/// that has.
-const OTHER: (f64, f64, f64) = (0.3, 0.1, 0.85);
+/// Minimum gate on the angle between normals, degrees: start poses are up to half a heading step off.
+const NORMAL_GATE_DEG: f64 = 30.0;
+/// Standard deviation of roll and pitch between the two level frames, degrees.
+const LEVEL_SIGMA_DEG: f64 = 1.0;
+/// Maximum number of unobservable directions of translation: a corridor has one; bare ground has two (and no heading), and is
+/// rejected.
+const MAX_UNOBSERVABLE: f64 = 1.5;
+/// Information that fixes the pose along unobservable directions, 1/m^2: larger than that of all matches.
+const FIXED_INFORMATION: f64 = 1e12;
+/// Minimum number of finest query patches for a relocalisation.
+const MIN_PATCHES: usize = 50;
+/// Poses that converged to within this distance, m and rad, are duplicates.
+const DUPLICATE: f64 = 0.01;
+/// Two poses are different above this distance, m, or angle, rad; a different pose competes with the best one if it has
+/// at least this fraction of the score of the best.
+const DIFFERENT: (f64, f64, f64) = (0.3, 0.1, 0.85);
 
-/// Where something was found in a map.
+/// Pose of a query found in a map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Located {
-    /// Where it is.
-    pub map_from_seen: Pose,
-    /// Share of its finest surfels that lie on the map.
-    pub share: f64,
-    /// Share of those that have a patch of the map beside them.
+    /// Pose of the query frame in the map.
+    pub map_from_query: Pose,
+    /// Fraction of the finest query surfels that match the map.
+    pub inlier_ratio: f64,
+    /// Fraction of matches among the surfels with a neighbour in the map.
     pub(in crate::estimation) agreement: f64,
-    /// Root mean square of their distances along normals, m.
+    /// Root mean square distance of the matches along the normals, m.
     pub residual_rms_m: f64,
-    /// Covariance of a turn (rad) about where it was seen from, and a shift (m), in the map.
+    /// Covariance of a rotation about the viewpoint (rad) and a translation (m), in map axes.
     pub(in crate::estimation) covariance: Matrix6<f64>,
 }
 
-/// A map in which places are looked for.
+/// Finds poses in a map of patches.
 #[derive(Debug)]
-pub(in crate::estimation) struct Locator {
+pub(in crate::estimation) struct Relocaliser {
     matcher: Matcher,
     patches: Vec<Patch>,
     forest: Forest,
@@ -66,43 +66,49 @@ pub(in crate::estimation) struct Locator {
     sigma_m: f64,
 }
 
-/// What the matches of an iteration say.
+/// Sums over the matches of one iteration.
 #[derive(Default)]
-struct Tally {
+struct MatchSums {
+    /// Normal matrix and right-hand side, for a rotation about the viewpoint and a translation.
     information: Matrix6<f64>,
     right: Vector6<f64>,
     matched: usize,
-    /// Their normals, each with its weight.
+    /// Normals of the matches and their weights.
     normals: Vec<(Vector, f64)>,
-    /// How many had a patch beside them, matched or not.
-    beside: usize,
+    /// Number of query patches with a neighbour in the map, matched or not.
+    with_neighbour: usize,
+    /// Sum of squared distances, m^2.
     squares: f64,
 }
 
-/// How to match in an iteration.
+/// Match settings of one iteration.
 struct Gate {
     level: usize,
+    /// Maximum distance along the normals, m.
     gate_m: f64,
-    /// Standard deviation of a match, m, beside its surfels' thickness.
+    /// Standard deviation of a match in addition to surfel thickness, m.
     sigma_m: f64,
 }
 
-impl Locator {
-    /// Of things that are seen by surfels of `surfels`; a match is off by `sigma_m` beside its surfels' thickness, and
-    /// the covariance is `inflation` times what matches say.
+impl Relocaliser {
+    /// Relocaliser in `map`, for queries with the surfel settings `surfels`.
+    ///
+    /// `certainty`: standard deviation of a match in addition to surfel thickness, m; factor on the covariance.
     pub(in crate::estimation) fn new(map: &SurfelMap, by: (&MatchingSpec, &SurfelSpec), certainty: (f64, f64)) -> Self {
-        Self::among(map.surfels().iter().map(Patch::of_map).collect(), by, certainty)
+        Self::in_patches(map.surfels().iter().map(Patch::from_map_surfel).collect(), by, certainty)
     }
 
-    /// The same among `patches`.
-    pub(in crate::estimation) fn among(
+    /// Relocaliser in `patches`, which are in one frame.
+    pub(in crate::estimation) fn in_patches(
         patches: Vec<Patch>,
         (matching, surfels): (&MatchingSpec, &SurfelSpec),
         (sigma_m, inflation): (f64, f64),
     ) -> Self {
         let forest = Matcher::new(matching, surfels).plant(&patches);
-        let wide =
-            MatchingSpec { max_normal_angle_deg: ANGLE_DEG.max(matching.max_normal_angle_deg), ..matching.clone() };
+        let wide = MatchingSpec {
+            max_normal_angle_deg: NORMAL_GATE_DEG.max(matching.max_normal_angle_deg),
+            ..matching.clone()
+        };
         Self { matcher: Matcher::new(&wide, surfels), patches, forest, inflation, sigma_m }
     }
 
@@ -111,82 +117,87 @@ impl Locator {
         &self.patches
     }
 
-    /// Where `seen`, looked at from `from`, is, which is about at `map_from_seen`; or why that is not found.
+    /// Finds the pose of `query`, observed from the point `from`, near `map_from_query`.
+    ///
+    /// # Errors
+    /// The reason why no pose is accepted.
     pub(in crate::estimation) fn find(
         &self,
-        seen: &[Patch],
-        (from, map_from_seen): (&Vector, &Pose),
-        search: &Search,
+        query: &[Patch],
+        (from, map_from_query): (&Vector, &Pose),
+        limits: &RelocalisationLimits,
     ) -> Result<Located, String> {
-        let by_level = self.by_level(seen);
-        let finest = by_level.first().map_or(0, Vec::len);
-        if finest < FEWEST {
-            return Err(format!("it shows {finest} patches of surface, and {FEWEST} at least are needed"));
+        let patches_by_level = self.patches_by_level(query);
+        let finest = patches_by_level.first().map_or(0, Vec::len);
+        if finest < MIN_PATCHES {
+            return Err(format!("the query has {finest} finest surfels, at least {MIN_PATCHES} are needed"));
         }
-        let places = self.settled(&by_level, search.starts(map_from_seen, from), from);
-        let judged = self.judged(&by_level[0], from, &places, search.gate_m);
-        // Each with what it is worth.
-        let worth = |found: &Located| found.share.powi(3) * search.likely(&found.map_from_seen, map_from_seen, from);
-        let mut found: Vec<(f64, Located)> = judged.map(|found| (worth(&found), found)).collect();
+        let poses = self.refine_all(&patches_by_level, limits.starts(map_from_query, from), from);
+        let evaluated = self.evaluate_all(&patches_by_level[0], from, &poses, limits.gate_m);
+        let score =
+            |found: &Located| found.inlier_ratio.powi(3) * limits.prior(&found.map_from_query, map_from_query, from);
+        let mut found: Vec<(f64, Located)> = evaluated.map(|found| (score(&found), found)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let Some((worth, best)) = found.iter().find(|(worth, found)| *worth > 0.0 && search.believes(found)) else {
-            let best = found.first().map_or((0.0, 0.0), |(_, best)| (100.0 * best.share, 100.0 * best.agreement));
-            let (share, agreement) = best;
+        let Some((score, best)) = found.iter().find(|(score, found)| *score > 0.0 && limits.accepts(found)) else {
+            let best =
+                found.first().map_or((0.0, 0.0), |(_, best)| (100.0 * best.inlier_ratio, 100.0 * best.agreement));
+            let (inliers, agreement) = best;
             let residual_mm = found.first().map_or(0.0, |(_, best)| 1e3 * best.residual_rms_m);
             return Err(format!(
-                "at the best place {share:.0} % of what was seen lies on the map, {agreement:.0} % of what could, to \
-                 {residual_mm:.0} mm"
+                "at the best pose {inliers:.0} % of the surfels match the map, {agreement:.0} % of those with a neighbour \
+                 (residual {residual_mm:.0} mm)"
             ));
         };
-        let as_good = found.iter().filter(|(other, found)| *other > OTHER.2 * worth && search.believes(found));
+        let as_good = found.iter().filter(|(other, found)| *other > DIFFERENT.2 * score && limits.accepts(found));
         let others: Vec<&Located> =
-            as_good.map(|(_, other)| other).filter(|other| is_elsewhere(best, other, from)).collect();
+            as_good.map(|(_, other)| other).filter(|other| is_different_pose(best, other, from)).collect();
         match others.first() {
-            Some(other) if !search.nearest => {
-                let (far_m, _) = apart(&best.map_from_seen, &other.map_from_seen, from);
-                Err(format!("it may be there as well as {far_m:.1} m from there"))
+            Some(other) if !limits.nearest => {
+                let (distance_m, _) = pose_distance(&best.map_from_query, &other.map_from_query, from);
+                Err(format!("ambiguous: another pose at a distance of {distance_m:.1} m matches as well"))
             }
-            _ => Ok(best.in_doubt_with(&others, from)),
+            _ => Ok(best.with_alternatives(&others, from)),
         }
     }
 
-    /// What was seen, by resolution, as many of each as are laid upon the map.
-    pub(super) fn by_level(&self, seen: &[Patch]) -> Vec<Vec<Patch>> {
-        (0..self.matcher.levels).map(|level| some_of(seen, level)).collect()
+    /// Query patches by resolution, at most `MAX_PATCHES` each.
+    pub(super) fn patches_by_level(&self, query: &[Patch]) -> Vec<Vec<Patch>> {
+        (0..self.matcher.levels).map(|level| subsample(query, level)).collect()
     }
 
-    /// Where what was seen settles from some starts, from the coarsest resolution to the finest.
-    pub(super) fn settled(
+    /// Refines start poses from the coarsest resolution to the finest; drops failures and duplicates.
+    pub(super) fn refine_all(
         &self,
-        by_level: &[Vec<Patch>],
-        mut places: Vec<(Pose, Pose)>,
+        patches_by_level: &[Vec<Patch>],
+        mut poses: Vec<(Pose, Pose)>,
         from: &Vector,
     ) -> Vec<(Pose, Pose)> {
-        for (level, seen) in by_level.iter().enumerate().rev().filter(|(_, seen)| !seen.is_empty()) {
-            let settled = places
+        for (level, query) in patches_by_level.iter().enumerate().rev().filter(|(_, query)| !query.is_empty()) {
+            let refined = poses
                 .par_iter()
-                .filter_map(|(start, pose)| Some((*start, self.settle((level, seen), from, start, pose)?)));
-            places = settled.collect();
-            leave_one_of_each(&mut places, from);
+                .filter_map(|(start, pose)| Some((*start, self.refine((level, query), from, start, pose)?)));
+            poses = refined.collect();
+            remove_duplicates(&mut poses, from);
         }
-        places
+        poses
     }
 
-    /// What places are worth by the finest patches; those where they determine nothing are left out.
-    pub(super) fn judged<'a>(
+    /// Evaluates poses with the finest patches; skips poses that the matches do not determine.
+    pub(super) fn evaluate_all<'a>(
         &'a self,
         finest: &'a [Patch],
         from: &'a Vector,
-        places: &'a [(Pose, Pose)],
+        poses: &'a [(Pose, Pose)],
         gate_m: Option<f64>,
     ) -> impl Iterator<Item = Located> + 'a {
         let gate_m = gate_m.unwrap_or(self.matcher.finest_voxel_m * GATES.1);
-        places.iter().filter_map(move |(_, pose)| self.judge(finest, from, pose, gate_m))
+        poses.iter().filter_map(move |(_, pose)| self.evaluate(finest, from, pose, gate_m))
     }
 
-    /// Where the patches of a resolution that were seen settle from a pose, as level as they were at `start`; `None`
-    /// where the matches determine nothing.
-    fn settle(&self, (level, seen): (usize, &[Patch]), from: &Vector, start: &Pose, pose: &Pose) -> Option<Pose> {
+    /// Refines a pose with the patches of one resolution; roll and pitch are constrained to the values at `start`.
+    ///
+    /// `None` if the matches do not determine the pose.
+    fn refine(&self, (level, query): (usize, &[Patch]), from: &Vector, start: &Pose, pose: &Pose) -> Option<Pose> {
         let mut pose = *pose;
         let edge_m = self.matcher.finest_voxel_m * f64::from(1_u32 << level);
         for iteration in 0..ITERATIONS {
@@ -194,17 +205,17 @@ impl Locator {
             let gate_m = edge_m * GATES.0 * (GATES.1 / GATES.0).powf(late);
             let gate = Gate { level, gate_m, sigma_m: gate_m / 3.0 };
             let pivot = pose.transform_point(&(*from).into()).coords;
-            let mut tally = self.tally(seen, &pose, &pivot, &gate);
+            let mut sums = self.sum_matches(query, &pose, &pivot, &gate);
             let tilt = (pose.rotation * start.rotation.inverse()).scaled_axis();
-            // What a resolution does not tell stays as it is.
-            tally.information += Matrix6::identity() + tally.untold() * UNMOVED;
-            let level_weight = LEVEL_DEG.to_radians().powi(-2);
+            // Unobservable directions keep their value.
+            sums.information += Matrix6::identity() + sums.unobservable() * FIXED_INFORMATION;
+            let level_weight = LEVEL_SIGMA_DEG.to_radians().powi(-2);
             for axis in 0..2 {
-                tally.information[(axis, axis)] += level_weight;
-                tally.right[axis] -= level_weight * tilt[axis];
+                sums.information[(axis, axis)] += level_weight;
+                sums.right[axis] -= level_weight * tilt[axis];
             }
-            let step = (tally.matched >= 6).then(|| tally.information.cholesky())??.solve(&tally.right);
-            pose = corrected(&pose, &pivot, &step);
+            let step = (sums.matched >= 6).then(|| sums.information.cholesky())??.solve(&sums.right);
+            pose = apply_step(&pose, &pivot, &step);
             if step.amax() < 1e-5 {
                 break;
             }
@@ -212,33 +223,33 @@ impl Locator {
         Some(pose)
     }
 
-    /// What a pose is worth by the finest patches that were seen; `None` where they determine nothing.
-    fn judge(&self, seen: &[Patch], from: &Vector, pose: &Pose, gate_m: f64) -> Option<Located> {
+    /// Evaluates a pose with the finest patches; `None` if they leave too many directions unobservable.
+    fn evaluate(&self, query: &[Patch], from: &Vector, pose: &Pose, gate_m: f64) -> Option<Located> {
         let pivot = pose.transform_point(&(*from).into()).coords;
-        let tally = self.tally(seen, pose, &pivot, &Gate { level: 0, gate_m, sigma_m: self.sigma_m });
-        let untold = tally.untold();
-        if untold.trace() > MOST_UNTOLD {
+        let sums = self.sum_matches(query, pose, &pivot, &Gate { level: 0, gate_m, sigma_m: self.sigma_m });
+        let unobservable = sums.unobservable();
+        if unobservable.trace() > MAX_UNOBSERVABLE {
             return None;
         }
-        // What is not told is known to a metre and a radian.
-        let told = Matrix6::identity() - untold;
-        let information = told * tally.information * told + Matrix6::identity();
+        // Along unobservable directions the standard deviation is 1 m and 1 rad.
+        let observable = Matrix6::identity() - unobservable;
+        let information = observable * sums.information * observable + Matrix6::identity();
         let covariance = information.try_inverse()? * self.inflation;
-        let residual_rms_m = (tally.squares / tally.matched.max(1) as f64).sqrt();
-        let share = tally.matched as f64 / seen.len() as f64;
-        let agreement = tally.matched as f64 / tally.beside.max(1) as f64;
-        Some(Located { map_from_seen: *pose, share, agreement, residual_rms_m, covariance })
+        let residual_rms_m = (sums.squares / sums.matched.max(1) as f64).sqrt();
+        let inlier_ratio = sums.matched as f64 / query.len() as f64;
+        let agreement = sums.matched as f64 / sums.with_neighbour.max(1) as f64;
+        Some(Located { map_from_query: *pose, inlier_ratio, agreement, residual_rms_m, covariance })
     }
 
-    /// Matches of what was seen at `pose` with the map, for a turn about `pivot` and a shift.
-    fn tally(&self, seen: &[Patch], pose: &Pose, pivot: &Vector, gate: &Gate) -> Tally {
-        let mut tally = Tally::default();
-        for patch in seen {
+    /// Matches the query at `pose` with the map; unknowns are a rotation about `pivot` and a translation.
+    fn sum_matches(&self, query: &[Patch], pose: &Pose, pivot: &Vector, gate: &Gate) -> MatchSums {
+        let mut sums = MatchSums::default();
+        for patch in query {
             let patch = patch.moved_by(pose);
             let near = self.matcher.neighbours(&self.forest, &patch, 1);
             let Some(other) = near.first().map(|k| &self.patches[*k as usize]) else { continue };
             debug_assert_eq!(other.level, gate.level);
-            tally.beside += 1;
+            sums.with_neighbour += 1;
             if !self.matcher.agree(&patch, other, gate.gate_m) {
                 continue;
             }
@@ -246,77 +257,78 @@ impl Locator {
             let (turn, distance_m) = ((patch.centre - pivot).cross(&plane.normal), plane.distance_m);
             let row = Vector6::new(turn.x, turn.y, turn.z, plane.normal.x, plane.normal.y, plane.normal.z);
             let weight = 1.0 / (plane.variance + distance_m * distance_m);
-            tally.information += row * row.transpose() * weight;
-            tally.right -= row * (weight * distance_m);
-            tally.normals.push((plane.normal, weight));
-            tally.matched += 1;
-            tally.squares += distance_m * distance_m;
+            sums.information += row * row.transpose() * weight;
+            sums.right -= row * (weight * distance_m);
+            sums.normals.push((plane.normal, weight));
+            sums.matched += 1;
+            sums.squares += distance_m * distance_m;
         }
-        tally
+        sums
     }
 }
 
-/// Patches of a resolution, evenly chosen where there are too many.
-fn some_of(seen: &[Patch], level: usize) -> Vec<Patch> {
-    let all: Vec<&Patch> = seen.iter().filter(|patch| patch.level == level).collect();
-    all.iter().step_by(all.len().div_ceil(MOST).max(1)).map(|patch| **patch).collect()
+/// Patches of a resolution, evenly subsampled to at most `MAX_PATCHES`.
+fn subsample(query: &[Patch], level: usize) -> Vec<Patch> {
+    let all: Vec<&Patch> = query.iter().filter(|patch| patch.level == level).collect();
+    all.iter().step_by(all.len().div_ceil(MAX_PATCHES).max(1)).map(|patch| **patch).collect()
 }
 
-/// Of places that are the same, the first.
-fn leave_one_of_each(places: &mut Vec<(Pose, Pose)>, from: &Vector) {
-    let mut left: Vec<(Pose, Pose)> = Vec::new();
-    for (start, pose) in places.drain(..) {
+/// Keeps the first of duplicate poses.
+fn remove_duplicates(poses: &mut Vec<(Pose, Pose)>, from: &Vector) {
+    let mut distinct: Vec<(Pose, Pose)> = Vec::new();
+    for (start, pose) in poses.drain(..) {
         let is_other = |(_, other): &(Pose, Pose)| {
-            let (far_m, turned) = apart(&pose, other, from);
-            far_m > SAME || turned > SAME
+            let (distance_m, angle) = pose_distance(&pose, other, from);
+            distance_m > DUPLICATE || angle > DUPLICATE
         };
-        if left.iter().all(is_other) {
-            left.push((start, pose));
+        if distinct.iter().all(is_other) {
+            distinct.push((start, pose));
         }
     }
-    *places = left;
+    *poses = distinct;
 }
 
-/// A start turned about the vertical through `from`, and shifted.
-pub(super) fn tried(map_from_seen: &Pose, from: &Vector, yaw: f64, by: Vector) -> Pose {
-    let pivot = map_from_seen.transform_point(&(*from).into()).coords;
-    corrected(map_from_seen, &pivot, &Vector6::new(0.0, 0.0, yaw, by.x, by.y, by.z))
+/// Pose rotated about the vertical through the viewpoint and translated.
+pub(super) fn offset_pose(map_from_query: &Pose, from: &Vector, yaw: f64, by: Vector) -> Pose {
+    let pivot = map_from_query.transform_point(&(*from).into()).coords;
+    apply_step(map_from_query, &pivot, &Vector6::new(0.0, 0.0, yaw, by.x, by.y, by.z))
 }
 
-/// A pose turned about `pivot` and shifted.
-fn corrected(pose: &Pose, pivot: &Vector, step: &Vector6<f64>) -> Pose {
+/// Pose rotated about `pivot` and translated.
+fn apply_step(pose: &Pose, pivot: &Vector, step: &Vector6<f64>) -> Pose {
     let turn = Rotation::from_scaled_axis(step.fixed_rows::<3>(0).into_owned());
     let shift: Vector = step.fixed_rows::<3>(3).into_owned();
     let translation = pivot + shift + turn * (pose.translation.vector - pivot);
     Pose::from_parts(translation.into(), turn * pose.rotation)
 }
 
-impl Tally {
-    /// Of the directions of a shift those that no normals tell but by their errors: `sum e e^T` in the block of the
-    /// shift.
-    fn untold(&self) -> Matrix6<f64> {
+impl MatchSums {
+    /// Projector on the unobservable directions of translation, `sum e e^T`, in the translation block.
+    ///
+    /// Small components of normals along a direction are errors of the normals and do not count.
+    fn unobservable(&self) -> Matrix6<f64> {
         let sum: f64 = self.normals.iter().map(|(_, weight)| weight).sum();
         let scatter: Matrix = self.normals.iter().map(|(normal, weight)| normal * normal.transpose() * *weight).sum();
-        let mut untold = Matrix6::zeros();
+        let mut unobservable = Matrix6::zeros();
         for direction in scatter.symmetric_eigen().eigenvectors.column_iter() {
-            let lean = |(normal, weight): &(Vector, f64)| (normal.dot(&direction), *weight);
-            let held = self.normals.iter().map(lean).filter(|(lean, _)| lean.abs() > LEANING);
-            if held.map(|(lean, weight)| lean * lean * weight).sum::<f64>() < WEAK * sum {
-                let mut block = untold.fixed_view_mut::<3, 3>(3, 3);
+            let component = |(normal, weight): &(Vector, f64)| (normal.dot(&direction), *weight);
+            let large = self.normals.iter().map(component).filter(|(component, _)| component.abs() > LEANING);
+            if large.map(|(component, weight)| component * component * weight).sum::<f64>() < MIN_NORMAL_SQUARE * sum {
+                let mut block = unobservable.fixed_view_mut::<3, 3>(3, 3);
                 block += direction * direction.transpose();
             }
         }
-        untold
+        unobservable
     }
 }
 
 impl Located {
-    /// The same place, with the doubt that `others` are as good.
-    fn in_doubt_with(&self, others: &[&Located], from: &Vector) -> Self {
+    /// Adds to the covariance the spread of equally good poses.
+    fn with_alternatives(&self, others: &[&Located], from: &Vector) -> Self {
         let mut covariance = self.covariance;
         for other in others {
-            let turn = (other.map_from_seen.rotation * self.map_from_seen.rotation.inverse()).scaled_axis();
-            let place = |located: &Located| located.map_from_seen.transform_point(&(*from).into()).coords;
+            let turn = (other.map_from_query.rotation * self.map_from_query.rotation.inverse()).scaled_axis();
+            let place = |located: &Located| located.map_from_query.transform_point(&(*from).into()).coords;
             let shift = place(other) - place(self);
             let by = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
             covariance += by * by.transpose() / (others.len() + 1) as f64;
@@ -325,39 +337,39 @@ impl Located {
     }
 }
 
-/// Whether two places are not the same.
-pub(super) fn is_elsewhere(a: &Located, b: &Located, from: &Vector) -> bool {
-    let (far_m, turned) = apart(&a.map_from_seen, &b.map_from_seen, from);
-    far_m > OTHER.0 || turned > OTHER.1
+/// Whether two poses differ by more than `DIFFERENT`.
+pub(super) fn is_different_pose(a: &Located, b: &Located, from: &Vector) -> bool {
+    let (distance_m, angle) = pose_distance(&a.map_from_query, &b.map_from_query, from);
+    distance_m > DIFFERENT.0 || angle > DIFFERENT.1
 }
 
-/// How far apart two poses put `from`, m, and by what angle they differ, rad.
-pub(super) fn apart(a: &Pose, b: &Pose, from: &Vector) -> (f64, f64) {
+/// Distance of the viewpoint between two poses, m, and their angle, rad.
+pub(super) fn pose_distance(a: &Pose, b: &Pose, from: &Vector) -> (f64, f64) {
     let place = |pose: &Pose| pose.transform_point(&(*from).into()).coords;
     ((place(a) - place(b)).norm(), a.rotation.angle_to(&b.rotation))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::search::IN_MAP;
+    use super::super::limits::MAP_LIMITS;
     use super::*;
     use crate::estimation;
     use crate::geometry::from_roll_pitch_yaw;
 
-    /// Patches of a resolution of a room of 6 m by 4 m by 2.5 m with a pillar, seen from within; `at` tells where in
-    /// its cell each has its centre.
+    /// Patches of one resolution of a room of 6 m by 4 m by 2.5 m with a pillar; `at` is the position of the centres within
+    /// their cells, 0..1.
     fn room(edge_m: f64, level: usize, at: f64) -> Vec<Patch> {
         let mut patches = Vec::new();
         let mut wall = |corner: Vector, along: Vector, up: Vector, normal: Vector| {
             let (wide, high) = (along.norm(), up.norm());
             let (columns, rows) = ((wide / edge_m).ceil() as usize, (high / edge_m).ceil() as usize);
             for (i, j) in (0..columns).flat_map(|i| (0..rows).map(move |j| (i, j))) {
-                let share = |k: usize, of: usize| (k as f64 + at) / of as f64;
-                let centre = corner + along * share(i, columns) + up * share(j, rows);
+                let inlier_ratio = |k: usize, of: usize| (k as f64 + at) / of as f64;
+                let centre = corner + along * inlier_ratio(i, columns) + up * inlier_ratio(j, rows);
                 let (u, v) = (along / wide, up / high);
                 let flat = (u * u.transpose() + v * v.transpose()) * (edge_m * edge_m / 12.0);
                 let covariance: Matrix = flat + normal * normal.transpose() * 1e-4;
-                patches.push(Patch { centre, normal, points: 100.0, covariance, doubt: 0.0, level });
+                patches.push(Patch { centre, normal, points: 100.0, covariance, roughness_variance: 0.0, level });
             }
         };
         let (x, y, z) = (Vector::x(), Vector::y(), Vector::z());
@@ -377,53 +389,60 @@ mod tests {
         (0..3).flat_map(|level| room(edge_m * f64::from(1 << level), level, at)).collect()
     }
 
-    fn locator(patches: &[Patch]) -> Locator {
+    fn relocaliser(patches: &[Patch]) -> Relocaliser {
         let spec = estimation::load("default").unwrap();
-        let map = SurfelMap::new(0.4, 3, patches.iter().map(|patch| patch.to_map(0.002)).collect()).unwrap();
-        Locator::new(&map, (&spec.matching, &spec.surfels), (0.01, 7.0))
+        let map = SurfelMap::new(0.4, 3, patches.iter().map(|patch| patch.to_map_surfel(0.002)).collect()).unwrap();
+        Relocaliser::new(&map, (&spec.matching, &spec.surfels), (0.01, 7.0))
     }
 
     #[test]
-    fn a_room_is_found_again_from_a_metre_and_twenty_degrees_away() {
-        let locator = locator(&all_levels(0.4, 0.5));
+    fn room_is_found_from_a_start_1_m_and_20_degrees_off() {
+        let relocaliser = relocaliser(&all_levels(0.4, 0.5));
         for k in 0..12 {
             let wave = |m: f64| (k as f64 * m + 0.3).sin();
-            // Where it truly is, and from where it was seen.
-            let map_from_seen = Pose::from_parts(
+            // The true pose.
+            let map_from_query = Pose::from_parts(
                 Vector::new(3.0 * wave(0.9), 2.0, -1.0).into(),
                 from_roll_pitch_yaw(0.005, -0.004, 3.0 * wave(1.7)),
             );
-            let from = map_from_seen.inverse_transform_point(&Vector::new(4.0, 2.5, 1.2).into()).coords;
-            let seen: Vec<Patch> =
-                all_levels(0.37, 0.4).iter().map(|patch| patch.moved_by(&map_from_seen.inverse())).collect();
+            let from = map_from_query.inverse_transform_point(&Vector::new(4.0, 2.5, 1.2).into()).coords;
+            let query: Vec<Patch> =
+                all_levels(0.37, 0.4).iter().map(|patch| patch.moved_by(&map_from_query.inverse())).collect();
             let direction = Vector::new(wave(2.3), wave(3.1), 0.3 * wave(4.7)).normalize();
-            let start = tried(&map_from_seen, &from, 20_f64.to_radians() * wave(5.3).signum(), direction);
-            let found = locator.find(&seen, (&from, &start), &IN_MAP).unwrap();
-            let apart = found.map_from_seen.inverse() * map_from_seen;
-            assert!(apart.translation.vector.norm() < 2e-3 && apart.rotation.angle() < 1e-3, "{k}: {apart}");
-            assert!(found.share > 0.9, "{}", found.share);
+            let start = offset_pose(&map_from_query, &from, 20_f64.to_radians() * wave(5.3).signum(), direction);
+            let found = relocaliser.find(&query, (&from, &start), &MAP_LIMITS).unwrap();
+            let pose_distance = found.map_from_query.inverse() * map_from_query;
+            assert!(
+                pose_distance.translation.vector.norm() < 2e-3 && pose_distance.rotation.angle() < 1e-3,
+                "{k}: {pose_distance}"
+            );
+            assert!(found.inlier_ratio > 0.9, "{}", found.inlier_ratio);
         }
     }
 
     #[test]
-    fn a_symmetric_room_from_the_wrong_end_is_better_elsewhere() {
-        let locator = locator(&all_levels(0.4, 0.5));
-        let seen = all_levels(0.37, 0.4);
+    fn symmetric_room_started_at_the_wrong_end_matches_better_elsewhere() {
+        let relocaliser = relocaliser(&all_levels(0.4, 0.5));
+        let query = all_levels(0.37, 0.4);
         let from = Vector::new(4.0, 2.5, 1.2);
-        // The room turned by half a circle about its middle: all but the pillar is the same.
+        // The room rotated by 180 degrees about the middle: only the pillar differs.
         let half = from_roll_pitch_yaw(0.0, 0.0, std::f64::consts::PI);
         let wrong = Pose::from_parts(Vector::new(6.0, 4.0, 0.0).into(), half);
-        let found = locator.find(&seen, (&from, &wrong), &IN_MAP).unwrap();
-        assert!(apart(&found.map_from_seen, &wrong, &from).0 < 0.1 && found.share > 0.7, "{}", found.share);
-        let better = locator.better_elsewhere(&seen, &from, &found).unwrap();
-        let (far_m, turned) = apart(&better.map_from_seen, &Pose::identity(), &from);
-        assert!(far_m < 2e-3 && turned < 1e-3, "{far_m} m, {turned} rad");
-        // From the right end there is none.
-        let found = locator.find(&seen, (&from, &Pose::identity()), &IN_MAP).unwrap();
-        assert_eq!(locator.better_elsewhere(&seen, &from, &found), None);
+        let found = relocaliser.find(&query, (&from, &wrong), &MAP_LIMITS).unwrap();
+        assert!(
+            pose_distance(&found.map_from_query, &wrong, &from).0 < 0.1 && found.inlier_ratio > 0.7,
+            "{}",
+            found.inlier_ratio
+        );
+        let better = relocaliser.find_better_elsewhere(&query, &from, &found).unwrap();
+        let (distance_m, angle) = pose_distance(&better.map_from_query, &Pose::identity(), &from);
+        assert!(distance_m < 2e-3 && angle < 1e-3, "{distance_m} m, {angle} rad");
+        // From the correct end no pose is better.
+        let found = relocaliser.find(&query, (&from, &Pose::identity()), &MAP_LIMITS).unwrap();
+        assert_eq!(relocaliser.find_better_elsewhere(&query, &from, &found), None);
     }
 
-    /// Patches of a resolution of a corridor without ends along x, 2 m wide, between `from_m` and `to_m`.
+    /// Patches of one resolution of a corridor along x, 2 m wide, without end walls, between `from_m` and `to_m`.
     fn corridor(level: usize, (from_m, to_m): (f64, f64)) -> Vec<Patch> {
         let edge_m = 0.4 * f64::from(1 << level);
         let mut patches = Vec::new();
@@ -433,7 +452,7 @@ mod tests {
                 let across = Matrix::identity() - normal * normal.transpose();
                 let covariance = across * (edge_m * edge_m / 12.0) + normal * normal.transpose() * 1e-4;
                 let centre = x + place;
-                patches.push(Patch { centre, normal, points: 100.0, covariance, doubt: 0.0, level });
+                patches.push(Patch { centre, normal, points: 100.0, covariance, roughness_variance: 0.0, level });
             };
             for k in 0..((2.0 / edge_m) as usize).max(1) {
                 let along = (k as f64 + 0.5) * edge_m;
@@ -446,47 +465,50 @@ mod tests {
     }
 
     #[test]
-    fn along_a_corridor_a_head_stays_where_it_is_expected_and_is_in_doubt() {
+    fn corridor_keeps_the_expected_pose_along_it_with_a_large_covariance() {
         let all = |reach: (f64, f64)| (0..3).flat_map(|level| corridor(level, reach)).collect::<Vec<_>>();
-        let locator = locator(&all((0.0, 24.0)));
+        let relocaliser = relocaliser(&all((0.0, 24.0)));
         let from = Vector::new(14.0, 1.0, 1.2);
-        let seen = all((8.0, 20.0));
-        // Expected 0.2 m to the side, and turned by a tenth.
-        let start = tried(&Pose::identity(), &from, 0.1, Vector::new(0.0, 0.2, 0.0));
-        let found = locator.find(&seen, (&from, &start), &Search::behind_silence(1.0, 0.01)).unwrap();
-        let apart = found.map_from_seen.transform_point(&from.into()).coords - from;
-        assert!(apart.y.abs() < 2e-3 && apart.z.abs() < 2e-3 && apart.x.abs() < 0.05, "{apart}");
-        assert!(found.map_from_seen.rotation.angle() < 1e-3, "{}", found.map_from_seen);
+        let query = all((8.0, 20.0));
+        // The expected pose is 0.2 m to the side, with a heading error of 0.1 rad.
+        let start = offset_pose(&Pose::identity(), &from, 0.1, Vector::new(0.0, 0.2, 0.0));
+        let found = relocaliser.find(&query, (&from, &start), &RelocalisationLimits::after_gap(1.0, 0.01)).unwrap();
+        let pose_distance = found.map_from_query.transform_point(&from.into()).coords - from;
+        assert!(
+            pose_distance.y.abs() < 2e-3 && pose_distance.z.abs() < 2e-3 && pose_distance.x.abs() < 0.05,
+            "{pose_distance}"
+        );
+        assert!(found.map_from_query.rotation.angle() < 1e-3, "{}", found.map_from_query);
         let sigma = |k: usize| found.covariance[(k, k)].sqrt();
         assert!(sigma(3) > 0.2 && sigma(4) < 0.01, "{} m along, {} m across", sigma(3), sigma(4));
-        // In a map that should tell where it is, that is no place.
-        assert!(locator.find(&seen, (&from, &start), &IN_MAP).unwrap_err().contains("as well as"));
+        // In a complete map an ambiguous pose is rejected.
+        assert!(relocaliser.find(&query, (&from, &start), &MAP_LIMITS).unwrap_err().contains("matches as well"));
     }
 
     #[test]
-    fn bare_ground_tells_no_place() {
+    fn bare_ground_is_rejected() {
         let ground = |reach: (f64, f64)| {
             let all = (0..3).flat_map(|level| corridor(level, reach));
             all.filter(|patch| patch.normal == Vector::z()).collect::<Vec<_>>()
         };
         let (from, start) = (Vector::new(14.0, 1.0, 1.2), Pose::identity());
-        let found = locator(&ground((0.0, 24.0))).find(
+        let found = relocaliser(&ground((0.0, 24.0))).find(
             &ground((8.0, 20.0)),
             (&from, &start),
-            &Search::behind_silence(0.5, 0.01),
+            &RelocalisationLimits::after_gap(0.5, 0.01),
         );
         assert!(found.is_err(), "{found:?}");
     }
 
     #[test]
-    fn another_room_is_not_taken_for_it_and_too_little_tells_nothing() {
-        let locator = locator(&all_levels(0.4, 0.5));
+    fn distant_pose_and_too_few_surfels_are_rejected() {
+        let relocaliser = relocaliser(&all_levels(0.4, 0.5));
         let far = Pose::translation(30.0, 0.0, 0.0);
-        let seen = all_levels(0.4, 0.5);
+        let query = all_levels(0.4, 0.5);
         let from = Vector::new(4.0, 2.5, 1.2);
-        assert!(locator.find(&seen, (&from, &far), &IN_MAP).unwrap_err().contains("lies on the map"));
-        let few: Vec<Patch> = seen.iter().take(20).copied().collect();
-        let said = locator.find(&few, (&from, &Pose::identity()), &IN_MAP).unwrap_err();
-        assert!(said.contains("20 patches"), "{said}");
+        assert!(relocaliser.find(&query, (&from, &far), &MAP_LIMITS).unwrap_err().contains("match the map"));
+        let few: Vec<Patch> = query.iter().take(20).copied().collect();
+        let message = relocaliser.find(&few, (&from, &Pose::identity()), &MAP_LIMITS).unwrap_err();
+        assert!(message.contains("20 finest surfels"), "{message}");
     }
 }
