@@ -1,15 +1,15 @@
-//! The error-state Kalman filter.
+//! Error-state Kalman filter of the base's IMU.
 //!
-//! The error of the attitude is a small turn in the world's axes, `R = exp(theta) R^`; all other errors are
-//! differences. Strapdown integration over an interval `h` with mean rate `w` and force `f` (biases `b`, `c`; `R` in
-//! its middle) gives
+//! The attitude error is a small rotation in world axes, `R = exp(theta) R^`; all other errors are additive. Strapdown
+//! integration over an interval `h` with mean angular rate `w` and specific force `f` (biases `b`, `c`; `R` at mid-interval)
+//! propagates the errors as
 //!
 //! ```text
 //! theta' = theta - R h b        v' = v - [R f h]x theta - R h c - h [g]x tilt        p' = p + h v'(mean)
 //! l'     = l + h l_rate
 //! ```
 //!
-//! and a fix, looked up at `u - l` for the IMU's time `u`, shows `theta + omega l` and `p + v l`.
+//! A fix, interpolated at `u - l` for the IMU time `u`, measures `theta + omega l` and `p + v l`.
 
 use super::FixSigmas;
 use crate::estimation::EstimatorSpec;
@@ -18,47 +18,48 @@ use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, skew};
 use crate::measurement::ImuNoise;
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-/// Numbers of the error: attitude, position, velocity, the two biases, offset of the clock and its rate, tilt of
-/// gravity.
+/// Dimension of the error state: attitude, position, velocity, two biases (3 each), clock offset, clock rate, gravity tilt (2).
 const STATES: usize = 19;
 const ATTITUDE: usize = 0;
 const POSITION: usize = 3;
 const VELOCITY: usize = 6;
 const GYRO_BIAS: usize = 9;
 const ACCEL_BIAS: usize = 12;
-const OFFSET: usize = 15;
-const RATE: usize = 16;
+const CLOCK_OFFSET: usize = 15;
+const CLOCK_RATE: usize = 16;
 const TILT: usize = 17;
 
-/// Standard deviations of the start: velocity, m/s, the clock's offset, s, and gravity's direction in the world, rad.
+/// Initial standard deviation of the velocity, m/s: error of the difference quotient of two fixes.
 const START_VELOCITY: f64 = 0.5;
+/// Initial standard deviation of the clock offset, s: the accuracy of the search.
 const START_OFFSET_S: f64 = 5e-3;
+/// Initial standard deviation of the direction of gravity in the world, rad: levelling error of the map.
 const START_TILT: f64 = 5e-3;
-/// Wander of the clock's rate per square root of a second: 0.2 ppm, a quartz in a room.
-const RATE_WALK: f64 = 2e-7;
-/// Beyond so many standard deviations, over six numbers at once, a correction is believed less.
-const BELIEVED: f64 = 5.0;
+/// Random walk of the clock rate, 1/sqrt(s): 0.2 ppm, a quartz at room temperature.
+const CLOCK_RATE_WALK: f64 = 2e-7;
+/// Huber threshold on the Mahalanobis norm of the six-dimensional innovation.
+const HUBER_THRESHOLD: f64 = 5.0;
 
-pub(super) type Errors = SVector<f64, STATES>;
-pub(super) type Square = SMatrix<f64, STATES, STATES>;
-type Shown = SMatrix<f64, 6, STATES>;
+pub(super) type ErrorState = SVector<f64, STATES>;
+pub(super) type ErrorMatrix = SMatrix<f64, STATES, STATES>;
+type MeasurementMatrix = SMatrix<f64, 6, STATES>;
 
-/// All that is estimated at an instant.
+/// Estimated state at one time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Estimate {
     pub(super) state: State,
     pub(super) biases: Biases,
-    /// How much later the IMU stamps an instant than the fixes do, s.
+    /// Clock offset: IMU stamp minus fix stamp of the same event, s.
     pub(super) offset_s: f64,
-    /// How fast that grows, s/s.
+    /// Rate of the clock offset, s/s.
     pub(super) rate: f64,
-    /// The turn of gravity from -z, about x and y of the world, rad; the third number is zero.
+    /// Rotation of gravity from -z about the x and y axes of the world, rad; the z component is zero.
     pub(super) tilt: Vector,
 }
 
 impl Estimate {
-    /// The estimate that is off by `errors` from this one.
-    pub(super) fn plus(&self, errors: &Errors) -> Self {
+    /// Adds an error state.
+    pub(super) fn plus(&self, errors: &ErrorState) -> Self {
         let part = |at: usize| Vector::from(errors.fixed_rows::<3>(at));
         let mut rotation = Rotation::from_scaled_axis(part(ATTITUDE)) * self.state.rotation;
         rotation.renormalize_fast();
@@ -69,22 +70,22 @@ impl Estimate {
                 velocity: self.state.velocity + part(VELOCITY),
             },
             biases: Biases { gyro: self.biases.gyro + part(GYRO_BIAS), accel: self.biases.accel + part(ACCEL_BIAS) },
-            offset_s: self.offset_s + errors[OFFSET],
-            rate: self.rate + errors[RATE],
+            offset_s: self.offset_s + errors[CLOCK_OFFSET],
+            rate: self.rate + errors[CLOCK_RATE],
             tilt: self.tilt + Vector::new(errors[TILT], errors[TILT + 1], 0.0),
         }
     }
 
-    /// By what this one is off from `other`.
-    pub(super) fn minus(&self, other: &Self) -> Errors {
-        let mut errors = Errors::zeros();
-        let turn = (self.state.rotation * other.state.rotation.inverse()).scaled_axis();
-        errors.fixed_rows_mut::<3>(ATTITUDE).copy_from(&turn);
+    /// Error state of `self` relative to `other`.
+    pub(super) fn minus(&self, other: &Self) -> ErrorState {
+        let mut errors = ErrorState::zeros();
+        let rotation = (self.state.rotation * other.state.rotation.inverse()).scaled_axis();
+        errors.fixed_rows_mut::<3>(ATTITUDE).copy_from(&rotation);
         errors.fixed_rows_mut::<3>(POSITION).copy_from(&(self.state.position - other.state.position));
         errors.fixed_rows_mut::<3>(VELOCITY).copy_from(&(self.state.velocity - other.state.velocity));
         errors.fixed_rows_mut::<3>(GYRO_BIAS).copy_from(&(self.biases.gyro - other.biases.gyro));
         errors.fixed_rows_mut::<3>(ACCEL_BIAS).copy_from(&(self.biases.accel - other.biases.accel));
-        (errors[OFFSET], errors[RATE]) = (self.offset_s - other.offset_s, self.rate - other.rate);
+        (errors[CLOCK_OFFSET], errors[CLOCK_RATE]) = (self.offset_s - other.offset_s, self.rate - other.rate);
         (errors[TILT], errors[TILT + 1]) = (self.tilt.x - other.tilt.x, self.tilt.y - other.tilt.y);
         errors
     }
@@ -94,38 +95,37 @@ impl Estimate {
         Rotation::from_scaled_axis(self.tilt) * gravity_in_world()
     }
 
-    /// The IMU's state, one interval later.
-    pub(super) fn after(&self, interval: &Interval) -> Self {
+    /// Propagates the state by one interval.
+    pub(super) fn propagated(&self, interval: &Interval) -> Self {
         let state = self.state.after(interval, &self.biases, &self.gravity());
         Self { state, offset_s: self.offset_s + self.rate * interval.h, ..*self }
     }
 }
 
-/// What fixes say of an epoch, against what the filter expects: the mean of the differences, turn (rad) and shift (m)
-/// in the world's axes.
+/// Mean innovation of the fixes of one epoch: rotation (rad) and translation (m) in world axes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Difference {
-    pub(super) turn: Vector,
-    pub(super) shift: Vector,
+pub(super) struct Innovation {
+    pub(super) rotation: Vector,
+    pub(super) translation: Vector,
     /// Angular velocity in the world, rad/s.
-    pub(super) turning: Vector,
-    /// How long before the epoch's end the mean's instant is, s.
+    pub(super) angular_velocity: Vector,
+    /// Time from the mean fix to the end of the epoch, s.
     pub(super) ago_s: f64,
     pub(super) sigmas: FixSigmas,
 }
 
-/// The filter at an instant.
+/// Filter state at one time.
 #[derive(Debug, Clone)]
 pub(super) struct Filter {
     pub(super) estimate: Estimate,
-    pub(super) covariance: Square,
+    pub(super) covariance: ErrorMatrix,
     gyro_walk: f64,
     accel_walk: f64,
 }
 
 impl Filter {
-    /// Starts at a fix, moving with `velocity`, and with `offset_s` between the clocks.
-    pub(super) fn beginning(
+    /// Initialises the filter at a fix, with the given velocity (m/s) and clock offset.
+    pub(super) fn starting_at(
         (pose, sigmas): (Pose, FixSigmas),
         velocity: Vector,
         offset_s: f64,
@@ -134,7 +134,7 @@ impl Filter {
     ) -> Self {
         let state = State { rotation: pose.rotation, position: pose.translation.vector, velocity };
         let biases = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
-        let mut deviations = Errors::zeros();
+        let mut deviations = ErrorState::zeros();
         let parts = [
             (ATTITUDE, 3.0 * sigmas.rotation_rad),
             (POSITION, 3.0 * sigmas.position_m),
@@ -144,80 +144,80 @@ impl Filter {
         ];
         parts.iter().for_each(|(at, sigma)| deviations.fixed_rows_mut::<3>(*at).fill(*sigma));
         deviations.fixed_rows_mut::<2>(TILT).fill(START_TILT);
-        (deviations[OFFSET], deviations[RATE]) = (START_OFFSET_S, (spec.clock.drift_ppm * 1e-6).max(1e-9));
+        (deviations[CLOCK_OFFSET], deviations[CLOCK_RATE]) = (START_OFFSET_S, (spec.clock.drift_ppm * 1e-6).max(1e-9));
         Self {
             estimate: Estimate { state, biases, offset_s, rate: 0.0, tilt: Vector::zeros() },
-            covariance: Square::from_diagonal(&deviations.map(|sigma| sigma * sigma)),
+            covariance: ErrorMatrix::from_diagonal(&deviations.map(|sigma| sigma * sigma)),
             gyro_walk: noise.gyro_bias_walk_rad_per_s_per_sqrt_s.max(1e-9),
             accel_walk: noise.accel_bias_walk_m_per_s2_per_sqrt_s.max(1e-9),
         }
     }
 
-    /// Goes one interval further, and tells how the errors went along.
-    pub(super) fn predict(&mut self, interval: &Interval) -> Square {
+    /// Propagates the filter by one interval; returns the transition matrix of the errors.
+    pub(super) fn predict(&mut self, interval: &Interval) -> ErrorMatrix {
         let (h, biases) = (interval.h, self.estimate.biases);
         let middle = self.estimate.state.rotation * Rotation::from_scaled_axis(interval.turn_to_middle(&biases));
         let axes = middle.to_rotation_matrix().into_inner();
-        let mut along = Square::identity();
-        along.fixed_view_mut::<3, 3>(ATTITUDE, GYRO_BIAS).copy_from(&(axes * -h));
-        along.fixed_view_mut::<3, 3>(POSITION, VELOCITY).copy_from(&(Matrix3::identity() * h));
+        let mut transition = ErrorMatrix::identity();
+        transition.fixed_view_mut::<3, 3>(ATTITUDE, GYRO_BIAS).copy_from(&(axes * -h));
+        transition.fixed_view_mut::<3, 3>(POSITION, VELOCITY).copy_from(&(Matrix3::identity() * h));
         if !interval.bridged {
-            let push = skew(&(middle * interval.force_in_middle(&biases))) * -h;
-            along.fixed_view_mut::<3, 3>(VELOCITY, ATTITUDE).copy_from(&push);
-            along.fixed_view_mut::<3, 3>(VELOCITY, ACCEL_BIAS).copy_from(&(axes * -h));
-            let falls = skew(&self.estimate.gravity()).fixed_columns::<2>(0) * -h;
-            along.fixed_view_mut::<3, 2>(VELOCITY, TILT).copy_from(&falls);
-            along.fixed_view_mut::<3, 2>(POSITION, TILT).copy_from(&(falls * (0.5 * h)));
-            along.fixed_view_mut::<3, 3>(POSITION, ATTITUDE).copy_from(&(push * (0.5 * h)));
-            along.fixed_view_mut::<3, 3>(POSITION, ACCEL_BIAS).copy_from(&(axes * (-0.5 * h * h)));
+            let by_force = skew(&(middle * interval.force_in_middle(&biases))) * -h;
+            transition.fixed_view_mut::<3, 3>(VELOCITY, ATTITUDE).copy_from(&by_force);
+            transition.fixed_view_mut::<3, 3>(VELOCITY, ACCEL_BIAS).copy_from(&(axes * -h));
+            let by_gravity = skew(&self.estimate.gravity()).fixed_columns::<2>(0) * -h;
+            transition.fixed_view_mut::<3, 2>(VELOCITY, TILT).copy_from(&by_gravity);
+            transition.fixed_view_mut::<3, 2>(POSITION, TILT).copy_from(&(by_gravity * (0.5 * h)));
+            transition.fixed_view_mut::<3, 3>(POSITION, ATTITUDE).copy_from(&(by_force * (0.5 * h)));
+            transition.fixed_view_mut::<3, 3>(POSITION, ACCEL_BIAS).copy_from(&(axes * (-0.5 * h * h)));
         }
-        along[(OFFSET, RATE)] = h;
-        self.covariance = along * self.covariance * along.transpose();
-        let comes = [
+        transition[(CLOCK_OFFSET, CLOCK_RATE)] = h;
+        self.covariance = transition * self.covariance * transition.transpose();
+        let process_noise = [
             (ATTITUDE, (interval.gyro_sigma * h).powi(2)),
             (POSITION, (0.5 * interval.accel_sigma * h * h).powi(2)),
             (VELOCITY, (interval.accel_sigma * h).powi(2)),
             (GYRO_BIAS, self.gyro_walk.powi(2) * h),
             (ACCEL_BIAS, self.accel_walk.powi(2) * h),
         ];
-        for (at, variance) in comes {
+        for (at, variance) in process_noise {
             (at..at + 3).for_each(|k| self.covariance[(k, k)] += variance);
         }
-        self.covariance[(RATE, RATE)] += RATE_WALK * RATE_WALK * h;
-        self.estimate = self.estimate.after(interval);
-        along
+        self.covariance[(CLOCK_RATE, CLOCK_RATE)] += CLOCK_RATE_WALK * CLOCK_RATE_WALK * h;
+        self.estimate = self.estimate.propagated(interval);
+        transition
     }
 
-    /// Is corrected by what the fixes say. One far beyond what is expected counts as less certain, by Huber's weight.
-    pub(super) fn correct(&mut self, difference: &Difference) {
-        let mut shown = Shown::zeros();
-        shown.fixed_view_mut::<3, 3>(0, ATTITUDE).copy_from(&Matrix3::identity());
-        shown.fixed_view_mut::<3, 3>(3, POSITION).copy_from(&Matrix3::identity());
-        shown.fixed_view_mut::<3, 3>(3, VELOCITY).copy_from(&(Matrix3::identity() * -difference.ago_s));
-        shown.fixed_view_mut::<3, 1>(0, OFFSET).copy_from(&difference.turning);
-        shown.fixed_view_mut::<3, 1>(3, OFFSET).copy_from(&self.estimate.state.velocity);
-        let mut seen = SVector::<f64, 6>::zeros();
-        seen.fixed_rows_mut::<3>(0).copy_from(&difference.turn);
-        seen.fixed_rows_mut::<3>(3).copy_from(&difference.shift);
-        let FixSigmas { position_m, rotation_rad } = difference.sigmas;
+    /// Updates the filter with an innovation; outliers get a larger variance (Huber weight).
+    pub(super) fn correct(&mut self, innovation: &Innovation) {
+        let mut jacobian = MeasurementMatrix::zeros();
+        jacobian.fixed_view_mut::<3, 3>(0, ATTITUDE).copy_from(&Matrix3::identity());
+        jacobian.fixed_view_mut::<3, 3>(3, POSITION).copy_from(&Matrix3::identity());
+        jacobian.fixed_view_mut::<3, 3>(3, VELOCITY).copy_from(&(Matrix3::identity() * -innovation.ago_s));
+        jacobian.fixed_view_mut::<3, 1>(0, CLOCK_OFFSET).copy_from(&innovation.angular_velocity);
+        jacobian.fixed_view_mut::<3, 1>(3, CLOCK_OFFSET).copy_from(&self.estimate.state.velocity);
+        let mut residual = SVector::<f64, 6>::zeros();
+        residual.fixed_rows_mut::<3>(0).copy_from(&innovation.rotation);
+        residual.fixed_rows_mut::<3>(3).copy_from(&innovation.translation);
+        let FixSigmas { position_m, rotation_rad } = innovation.sigmas;
         let mut noise = SMatrix::<f64, 6, 6>::zeros();
         for k in 0..3 {
             (noise[(k, k)], noise[(k + 3, k + 3)]) = (rotation_rad * rotation_rad, position_m * position_m);
         }
-        let expected = shown * self.covariance * shown.transpose();
-        let Some(whole) = (expected + noise).cholesky() else { return };
-        let far = (seen.dot(&whole.solve(&seen))).sqrt() / BELIEVED;
-        let noise = noise * far.max(1.0);
-        let Some(whole) = (expected + noise).cholesky() else { return };
-        let gain = whole.solve(&(shown * self.covariance)).transpose();
-        self.estimate = self.estimate.plus(&(gain * seen));
-        // Joseph's form stays positive.
-        let kept = Square::identity() - gain * shown;
-        self.covariance = kept * self.covariance * kept.transpose() + gain * noise * gain.transpose();
+        let expected = jacobian * self.covariance * jacobian.transpose();
+        let Some(cholesky) = (expected + noise).cholesky() else { return };
+        let mahalanobis_ratio = (residual.dot(&cholesky.solve(&residual))).sqrt() / HUBER_THRESHOLD;
+        let noise = noise * mahalanobis_ratio.max(1.0);
+        let Some(cholesky) = (expected + noise).cholesky() else { return };
+        let gain = cholesky.solve(&(jacobian * self.covariance)).transpose();
+        self.estimate = self.estimate.plus(&(gain * residual));
+        // The Joseph form keeps the covariance positive definite.
+        let remaining = ErrorMatrix::identity() - gain * jacobian;
+        self.covariance = remaining * self.covariance * remaining.transpose() + gain * noise * gain.transpose();
     }
 
-    /// Standard deviation of the clock's offset, s.
+    /// Standard deviation of the clock offset, s.
     pub(super) fn offset_sigma_s(&self) -> f64 {
-        self.covariance[(OFFSET, OFFSET)].sqrt()
+        self.covariance[(CLOCK_OFFSET, CLOCK_OFFSET)].sqrt()
     }
 }
