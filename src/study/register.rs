@@ -3,7 +3,7 @@
 use super::cloud_files::{CloudFiles, CloudOptions};
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{Stage, StudyError, Watch};
-use crate::estimation::{CloudFilter, Fate, Hit, point_sigma_m};
+use crate::estimation::{CloudFilter, Fate, ProjectedReturn, point_sigma_m};
 use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
@@ -231,7 +231,7 @@ impl BeamProjection<'_, '_, '_> {
         map_from_head: &Pose,
         beam: &LidarReturn,
         stamp: Stamp,
-    ) -> Result<(Hit, Pending), RecordingError> {
+    ) -> Result<(ProjectedReturn, Pending), RecordingError> {
         let index = self.echoes;
         self.echoes += 1;
         let point_in_laser: Vector = beam.point_in_laser.cast();
@@ -247,7 +247,7 @@ impl BeamProjection<'_, '_, '_> {
                 instant.map(|instant| (self.calibrated.beam(&instant.world_from_head, &point_in_laser), instant));
             judged = Some(Box::new((in_map, by_truth)));
         }
-        let hit = Hit { stamp, point_in_map: in_map.point, origin_in_map: in_map.origin };
+        let hit = ProjectedReturn { stamp, point_in_map: in_map.point, origin_in_map: in_map.origin };
         Ok((hit, Pending { point, shown: self.shown.keeps(index), judged }))
     }
 

@@ -1,83 +1,83 @@
-//! How many points are about a point.
+//! Number of points in the neighbourhood of a point.
 
-use super::Hit;
-use super::cell::{EDGE_M, coordinates, number};
+use super::ProjectedReturn;
+use super::cell::{EDGE_M, coordinates, morton_code};
 use crate::geometry::Vector;
 
-/// Up to this range the finest cells count, m; up to twice it the next, and so on: beams part as they go.
-const FINEST_TO_M: f64 = 5.0;
-/// Coarsest cells.
-const COARSEST: u32 = 3;
-/// Fewest points of a cell, the point itself among them.
-const FEWEST: u32 = 4;
+/// Range up to which the finest cells are used, m; each doubling uses the next level, as beams diverge with range.
+const FINEST_RANGE_M: f64 = 5.0;
+/// Level of the coarsest cells (edge 0.8 m).
+const COARSEST_LEVEL: u32 = 3;
+/// Minimum number of points in the neighbourhood, including the point itself.
+const MIN_POINTS: u32 = 4;
 
-/// Points of a block by finest cells.
+/// Number of points of a block in each finest cell.
 #[derive(Debug)]
-pub(super) struct Crowd {
-    /// Cells and their points, in order.
+pub(super) struct BlockCounts {
+    /// Morton codes and counts, sorted.
     cells: Vec<(u64, u32)>,
 }
 
-impl Crowd {
-    pub(super) fn of(hits: &[Hit]) -> Self {
-        let mut numbers: Vec<u64> = hits.iter().map(|hit| number(coordinates(&hit.point_in_map, 0), 0)).collect();
-        numbers.sort_unstable();
-        numbers.chunk_by(|a, b| a == b).map(|cell| (cell[0], cell.len() as u32)).collect()
+impl BlockCounts {
+    pub(super) fn from_returns(hits: &[ProjectedReturn]) -> Self {
+        let mut codes: Vec<u64> = hits.iter().map(|hit| morton_code(coordinates(&hit.point_in_map, 0), 0)).collect();
+        codes.sort_unstable();
+        codes.chunk_by(|a, b| a == b).map(|cell| (cell[0], cell.len() as u32)).collect()
     }
 
-    /// Cells by their numbers, in order, and how many points each has.
+    /// Morton code and number of points of each cell, sorted.
     pub(super) fn cells(&self) -> impl Iterator<Item = (u64, u32)> {
         self.cells.iter().copied()
     }
 }
 
-impl FromIterator<(u64, u32)> for Crowd {
-    /// Of cells in order.
+impl FromIterator<(u64, u32)> for BlockCounts {
+    /// Takes sorted cells.
     fn from_iter<I: IntoIterator<Item = (u64, u32)>>(cells: I) -> Self {
         Self { cells: cells.into_iter().collect() }
     }
 }
 
-/// Points of several blocks.
+/// Number of points of several blocks, for range queries on Morton codes.
 #[derive(Debug)]
-pub(super) struct Support {
-    numbers: Vec<u64>,
-    /// Points before each cell, and of all.
-    before: Vec<u32>,
+pub(super) struct Density {
+    codes: Vec<u64>,
+    /// Cumulative number of points before each cell, then the total.
+    cumulative: Vec<u32>,
 }
 
-impl Support {
-    pub(super) fn of<'a>(crowds: impl Iterator<Item = &'a Crowd>) -> Self {
-        let mut cells: Vec<(u64, u32)> = crowds.flat_map(|crowd| &crowd.cells).copied().collect();
+impl Density {
+    pub(super) fn from_blocks<'a>(blocks: impl Iterator<Item = &'a BlockCounts>) -> Self {
+        let mut cells: Vec<(u64, u32)> = blocks.flat_map(|block| &block.cells).copied().collect();
         cells.sort_unstable();
-        let mut before = Vec::with_capacity(cells.len() + 1);
+        let mut cumulative = Vec::with_capacity(cells.len() + 1);
         let mut sum = 0;
         for (_, count) in &cells {
-            before.push(sum);
+            cumulative.push(sum);
             sum += count;
         }
-        before.push(sum);
-        Self { numbers: cells.into_iter().map(|(number, _)| number).collect(), before }
+        cumulative.push(sum);
+        Self { codes: cells.into_iter().map(|(code, _)| code).collect(), cumulative }
     }
 
-    /// Whether a point has others about it, in the eight cells of its range's level that are nearest to it.
-    pub(super) fn holds(&self, hit: &Hit) -> bool {
-        let level = (hit.range_m() / FINEST_TO_M).log2().ceil().clamp(0.0, f64::from(COARSEST)) as u32;
-        // Most have enough in their own cell.
-        self.count(&hit.point_in_map, level) >= FEWEST || self.count_about(&hit.point_in_map, level) >= FEWEST
+    /// Whether a point has enough neighbours in the eight nearest cells of the level that fits its range.
+    pub(super) fn is_sufficient_at(&self, hit: &ProjectedReturn) -> bool {
+        let level = (hit.range_m() / FINEST_RANGE_M).log2().ceil().clamp(0.0, f64::from(COARSEST_LEVEL)) as u32;
+        // The own cell suffices for most points.
+        self.count(&hit.point_in_map, level) >= MIN_POINTS || self.count_around(&hit.point_in_map, level) >= MIN_POINTS
     }
 
-    /// Points in the cell of `level` that a point is in.
+    /// Number of points in the cell of `level` that contains `point`.
     fn count(&self, point: &Vector, level: u32) -> u32 {
-        let number = number(coordinates(point, level), level);
-        let (first, last) = (number << (3 * level), (number + 1) << (3 * level));
-        let from = self.numbers.partition_point(|n| *n < first);
-        let until = from + self.numbers[from..].partition_point(|n| *n < last);
-        self.before[until] - self.before[from]
+        let code = morton_code(coordinates(point, level), level);
+        let (first, last) = (code << (3 * level), (code + 1) << (3 * level));
+        let from = self.codes.partition_point(|n| *n < first);
+        let until = from + self.codes[from..].partition_point(|n| *n < last);
+        self.cumulative[until] - self.cumulative[from]
     }
 
-    /// Points in the eight cells of `level` nearest to a point.
-    pub(super) fn count_about(&self, point: &Vector, level: u32) -> u32 {
+    /// Number of points in the eight cells of `level` nearest to `point`.
+    pub(super) fn count_around(&self, point: &Vector, level: u32) -> u32 {
         let half_m = 0.5 * EDGE_M * f64::from(1_u32 << level);
         let corners = (0..8_u32).map(|corner| {
             let side = |bit: u32| if corner >> bit & 1 == 0 { -half_m } else { half_m };
@@ -92,30 +92,35 @@ mod tests {
     use super::*;
     use crate::time::Stamp;
 
-    fn hit(point_in_map: Vector, range_m: f64) -> Hit {
-        Hit { stamp: Stamp::default(), point_in_map, origin_in_map: point_in_map - Vector::x() * range_m }
+    fn hit(point_in_map: Vector, range_m: f64) -> ProjectedReturn {
+        ProjectedReturn { stamp: Stamp::default(), point_in_map, origin_in_map: point_in_map - Vector::x() * range_m }
     }
 
     #[test]
-    fn a_point_alone_has_no_support_and_one_of_four_has_wherever_cells_begin() {
+    fn isolated_points_are_found_independently_of_the_cell_boundaries() {
         for k in 0..100 {
             let at = Vector::new((k as f64 * 0.7).sin() * 20.0, (k as f64 * 0.9).cos() * 20.0, k as f64 * 0.1);
             let aside = |by_m: f64| hit(at + Vector::new(0.0, 0.6, 0.8) * by_m, 3.0);
-            let holds = |hits: &[Hit]| Support::of([Crowd::of(hits)].iter()).holds(&hits[0]);
-            assert!(!holds(&[aside(0.0)]));
-            assert!(!holds(&[aside(0.0), aside(0.01), aside(0.02)]));
-            assert!(holds(&[aside(0.0), aside(0.015), aside(0.03), aside(-0.03)]), "{at}");
-            assert!(!holds(&[aside(0.0), aside(0.3), aside(-0.3), aside(0.35)]), "{at}");
+            let sufficient = |hits: &[ProjectedReturn]| {
+                Density::from_blocks([BlockCounts::from_returns(hits)].iter()).is_sufficient_at(&hits[0])
+            };
+            assert!(!sufficient(&[aside(0.0)]));
+            assert!(!sufficient(&[aside(0.0), aside(0.01), aside(0.02)]));
+            assert!(sufficient(&[aside(0.0), aside(0.015), aside(0.03), aside(-0.03)]), "{at}");
+            assert!(!sufficient(&[aside(0.0), aside(0.3), aside(-0.3), aside(0.35)]), "{at}");
         }
     }
 
     #[test]
-    fn far_points_may_be_farther_from_each_other_and_blocks_add_up() {
+    fn neighbourhood_grows_with_range_and_blocks_add_up() {
         let at = Vector::new(7.0, 8.0, 9.0);
         let far = |by_m: f64| hit(at + Vector::z() * by_m, 18.0);
-        let crowds = [0.0, 0.12, -0.12, 0.15].map(|by_m| Crowd::of(&[far(by_m)]));
-        assert!(Support::of(crowds.iter()).holds(&far(0.0)));
-        assert!(!Support::of(crowds[..3].iter()).holds(&far(0.0)));
-        assert!(!Support::of(crowds.iter()).holds(&hit(at, 2.0)), "seen from near they would be closer");
+        let blocks = [0.0, 0.12, -0.12, 0.15].map(|by_m| BlockCounts::from_returns(&[far(by_m)]));
+        assert!(Density::from_blocks(blocks.iter()).is_sufficient_at(&far(0.0)));
+        assert!(!Density::from_blocks(blocks[..3].iter()).is_sufficient_at(&far(0.0)));
+        assert!(
+            !Density::from_blocks(blocks.iter()).is_sufficient_at(&hit(at, 2.0)),
+            "at short range the neighbourhood is smaller"
+        );
     }
 }

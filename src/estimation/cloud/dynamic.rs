@@ -1,91 +1,93 @@
-//! What moved: cells that were hit at one time, and through which beams went at others, are of no surface that stands.
+//! Detection of dynamic objects: cells that are occupied at one time and free at others.
 //!
-//! The idea is that of occupancy grids (Moravec and Elfes 1985), kept a second a grid and a few seconds long. A cell is
-//! small, so that few beams look at it; what it tells is therefore put together with what those around it tell.
+//! Uses occupancy grids (Moravec and Elfes 1985), one per block of 1 s. Cells are small and few beams cross each of them, so
+//! a point is classified by the cells around it together.
 
-use super::Hit;
+use super::ProjectedReturn;
 use super::cell::{EDGE_M, coordinates, coordinates_of};
-use super::cells::{Cells, Cube, cube_of};
-use super::support::{Crowd, Support};
+use super::cell_set::{CellSet, Cube, cube_of};
+use super::density::{BlockCounts, Density};
 use crate::geometry::Vector;
 use rayon::prelude::*;
 
-/// Every so many-th beam carves.
+/// Only every fourth beam is traced, to save time; neighbouring beams cross the same cells.
 const STRIDE: usize = 4;
-/// Beams carve up to this share of their length, and to so far before their end, m: what they graze then is what they
-/// hit.
-const UNTIL: (f64, f64) = (0.9, 0.3);
-/// But no farther than this, m.
-const FARTHEST_M: f64 = 20.0;
-/// A cell of what moves was free in at least so many blocks, and in no fewer than those in which it, or one beside it,
-/// was hit; one of what stands was hit in so many, and in more than were free.
-const BLOCKS: usize = 2;
-/// A point is judged by the cells in the eight of this level that are nearest to it.
+/// A beam is traced up to this fraction of its range, and up to this distance before the hit, m: the cells behind
+/// that limit belong to the surface that it hits.
+const TRACE_LIMIT: (f64, f64) = (0.9, 0.3);
+/// Maximum length of a traced beam, m: limits the computing time.
+const MAX_TRACE_M: f64 = 20.0;
+/// A cell is dynamic if it was free in at least this many blocks, and in at least as many as in which it or an adjacent
+/// cell was hit. It is static if it was hit in at least this many blocks, and in more than in which it was free.
+const MIN_BLOCKS: usize = 2;
+/// A point is classified by the finest cells within the eight nearest cells of this level.
 const LEVEL: u32 = 1;
-/// It moved where about it so many times more points are in cells of what moved than in such of what stands.
-const MORE: u32 = 2;
+/// A point is dynamic if more than this many times as many points around it are in dynamic cells as in static ones.
+const DYNAMIC_RATIO: u32 = 2;
 
-/// Cells that a block's beams hit, with those beside them, and those that were free in it: gone through, and none of
-/// the former.
+/// Occupied and free cells of a block.
 #[derive(Debug)]
-pub(super) struct Carved {
-    beside: Cells,
-    free: Cells,
+pub(super) struct FreeSpace {
+    /// Cells that were hit, and their neighbours.
+    occupied: CellSet,
+    /// Cells that a beam crossed and that are not in `occupied`.
+    free: CellSet,
 }
 
-impl Carved {
-    pub(super) fn by(hits: &[Hit], crowd: &Crowd) -> Self {
+impl FreeSpace {
+    pub(super) fn from_returns(hits: &[ProjectedReturn], counts: &BlockCounts) -> Self {
         let around = |(cell, _)| with_neighbours(coordinates_of(cell, 0));
-        let beside = || cells(crowd.cells().flat_map(around));
-        let through = || cells(hits.iter().step_by(STRIDE).filter_map(Way::of).flatten());
-        let (beside, through) = rayon::join(beside, through);
-        Self { free: through.without(&beside), beside }
+        let occupied = || collect(counts.cells().flat_map(around));
+        let crossed = || collect(hits.iter().step_by(STRIDE).filter_map(Traversal::of).flatten());
+        let (occupied, crossed) = rayon::join(occupied, crossed);
+        Self { free: crossed.difference(&occupied), occupied }
     }
 }
 
-fn cells(of: impl Iterator<Item = [i64; 3]>) -> Cells {
-    let mut cells = Cells::default();
-    cells.extend(of);
+fn collect(cells_of: impl Iterator<Item = [i64; 3]>) -> CellSet {
+    let mut cells = CellSet::default();
+    cells.extend(cells_of);
     cells
 }
 
-/// What moved, and what stands, of what was hit in a block.
+/// Points of a block in dynamic and in static cells.
 #[derive(Debug)]
-pub(super) struct Moving {
-    moved: Support,
-    stood: Support,
+pub(super) struct DynamicCells {
+    dynamic: Density,
+    fixed: Density,
 }
 
-impl Moving {
-    /// Of what is in `block`, as what is `around` it, the block itself included, tells.
-    pub(super) fn of(block: &Crowd, around: &[&Carved]) -> Self {
+impl DynamicCells {
+    /// Classifies the cells of `block` by the blocks `around` it, including itself.
+    pub(super) fn find(block: &BlockCounts, around: &[&FreeSpace]) -> Self {
         let cells: Vec<(u64, u32)> = block.cells().collect();
         let cubes: Vec<&[(u64, u32)]> = cells.chunk_by(|a, b| cube_of(a.0) == cube_of(b.0)).collect();
-        let judged: Vec<(u64, u32, bool)> =
-            cubes.into_par_iter().with_min_len(32).flat_map_iter(|cells| judged(cells, around)).collect();
-        let those = |that: bool| {
-            let cells = judged.iter().filter(|(.., moved)| *moved == that);
-            Support::of([Crowd::from_iter(cells.map(|(cell, points, _)| (*cell, *points)))].iter())
+        let classified: Vec<(u64, u32, bool)> =
+            cubes.into_par_iter().with_min_len(32).flat_map_iter(|cells| classify(cells, around)).collect();
+        let density_of = |is_dynamic: bool| {
+            let cells = classified.iter().filter(|(.., moved)| *moved == is_dynamic);
+            Density::from_blocks([BlockCounts::from_iter(cells.map(|(cell, points, _)| (*cell, *points)))].iter())
         };
-        Self { moved: those(true), stood: those(false) }
+        Self { dynamic: density_of(true), fixed: density_of(false) }
     }
 
-    /// Whether what is about a point moved.
-    pub(super) fn has(&self, point: &Vector) -> bool {
-        let moved = self.moved.count_about(point, LEVEL);
-        moved > 0 && moved > MORE * self.stood.count_about(point, LEVEL)
+    /// Whether a point is on a dynamic object.
+    pub(super) fn contains(&self, point: &Vector) -> bool {
+        let dynamic = self.dynamic.count_around(point, LEVEL);
+        dynamic > 0 && dynamic > DYNAMIC_RATIO * self.fixed.count_around(point, LEVEL)
     }
 }
 
-/// Of cells of one cube those that moved or stood, each with its points and whether it moved.
-fn judged<'a>(cells: &'a [(u64, u32)], around: &[&Carved]) -> impl Iterator<Item = (u64, u32, bool)> + use<'a> {
+/// Classifies the cells of one cube: code, number of points, whether it is dynamic; undecided cells are skipped.
+fn classify<'a>(cells: &'a [(u64, u32)], around: &[&FreeSpace]) -> impl Iterator<Item = (u64, u32, bool)> + use<'a> {
     let cube = cube_of(cells[0].0);
-    let seen: Vec<[Cube; 2]> = around.iter().map(|carved| [carved.free.cube(cube), carved.beside.cube(cube)]).collect();
+    let cubes: Vec<[Cube; 2]> =
+        around.iter().map(|free_space| [free_space.free.cube(cube), free_space.occupied.cube(cube)]).collect();
     cells.iter().filter_map(move |(cell, points)| {
         let at = coordinates_of(*cell, 0);
-        let [free, beside] = [0, 1].map(|which| seen.iter().filter(|cubes| cubes[which].has(at)).count());
-        let moved = free >= BLOCKS && free >= beside;
-        (moved || beside >= BLOCKS).then_some((*cell, *points, moved))
+        let [free, occupied] = [0, 1].map(|which| cubes.iter().filter(|pair| pair[which].contains(at)).count());
+        let moved = free >= MIN_BLOCKS && free >= occupied;
+        (moved || occupied >= MIN_BLOCKS).then_some((*cell, *points, moved))
     })
 }
 
@@ -93,35 +95,35 @@ fn with_neighbours([x, y, z]: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
     (0..27).map(move |k| [x + k / 9 - 1, y + k / 3 % 3 - 1, z + k % 3 - 1])
 }
 
-/// The cells that a beam goes through, one after the other (Amanatides and Woo 1987).
-struct Way {
+/// Iterator over the cells that a beam crosses (Amanatides and Woo 1987).
+struct Traversal {
     cell: Option<[i64; 3]>,
-    /// Along each axis: whereto, the length at which the beam enters the next cell, m, and what each further one takes.
+    /// For each axis: direction of the step, range at which the beam enters the next cell, m, and range per cell, m.
     side: [i64; 3],
     next_m: [f64; 3],
     step_m: [f64; 3],
-    until_m: f64,
+    limit_m: f64,
 }
 
-impl Way {
-    /// `None` of beams that are too short.
-    fn of(hit: &Hit) -> Option<Self> {
-        let way = hit.point_in_map - hit.origin_in_map;
-        let range_m = way.norm();
-        let until_m = (range_m * UNTIL.0).min(range_m - UNTIL.1).min(FARTHEST_M);
-        let step_m = [0, 1, 2].map(|axis| EDGE_M * range_m / way[axis].abs());
+impl Traversal {
+    /// Starts at the lidar; `None` if the beam is too short to be traced.
+    fn of(hit: &ProjectedReturn) -> Option<Self> {
+        let ray = hit.point_in_map - hit.origin_in_map;
+        let range_m = ray.norm();
+        let limit_m = (range_m * TRACE_LIMIT.0).min(range_m - TRACE_LIMIT.1).min(MAX_TRACE_M);
+        let step_m = [0, 1, 2].map(|axis| EDGE_M * range_m / ray[axis].abs());
         let next_m = [0, 1, 2].map(|axis| {
             let at = hit.origin_in_map[axis] / EDGE_M;
-            let ahead = if way[axis] > 0.0 { 1.0 - (at - at.floor()) } else { at - at.floor() };
-            if way[axis] == 0.0 { f64::INFINITY } else { ahead * step_m[axis] }
+            let ahead = if ray[axis] > 0.0 { 1.0 - (at - at.floor()) } else { at - at.floor() };
+            if ray[axis] == 0.0 { f64::INFINITY } else { ahead * step_m[axis] }
         });
-        let side = [0, 1, 2].map(|axis| if way[axis] > 0.0 { 1 } else { -1 });
+        let side = [0, 1, 2].map(|axis| if ray[axis] > 0.0 { 1 } else { -1 });
         let cell = Some(coordinates(&hit.origin_in_map, 0));
-        (until_m > 0.0).then_some(Self { cell, side, next_m, step_m, until_m })
+        (limit_m > 0.0).then_some(Self { cell, side, next_m, step_m, limit_m })
     }
 }
 
-impl Iterator for Way {
+impl Iterator for Traversal {
     type Item = [i64; 3];
 
     fn next(&mut self) -> Option<[i64; 3]> {
@@ -134,7 +136,7 @@ impl Iterator for Way {
         } else {
             2
         };
-        self.cell = (self.next_m[axis] <= self.until_m).then(|| {
+        self.cell = (self.next_m[axis] <= self.limit_m).then(|| {
             let mut next = cell;
             next[axis] += self.side[axis];
             next
@@ -149,58 +151,58 @@ mod tests {
     use super::*;
     use crate::time::Stamp;
 
-    fn beam(from: [f64; 3], to: [f64; 3]) -> Hit {
-        Hit { stamp: Stamp::default(), point_in_map: to.into(), origin_in_map: from.into() }
+    fn beam(from: [f64; 3], to: [f64; 3]) -> ProjectedReturn {
+        ProjectedReturn { stamp: Stamp::default(), point_in_map: to.into(), origin_in_map: from.into() }
     }
 
     #[test]
-    fn a_beam_goes_through_the_cells_that_small_steps_along_it_find() {
+    fn traversal_agrees_with_small_steps_along_the_beam() {
         for k in 0..200 {
             let wave = |m: f64| (k as f64 * m).sin() * 7.0;
             let (from, to) = ([wave(0.7), wave(1.1), wave(1.9)], [wave(2.3), wave(2.9), wave(3.1)]);
             let hit = beam(from, to);
-            let cells: Vec<[i64; 3]> = Way::of(&hit).into_iter().flatten().collect();
+            let cells: Vec<[i64; 3]> = Traversal::of(&hit).into_iter().flatten().collect();
             let range_m = hit.range_m();
-            let until_m = (0.9 * range_m).min(range_m - 0.3);
-            let way = (hit.point_in_map - hit.origin_in_map) / range_m;
-            let steps = (until_m / 1e-3).max(0.0) as usize;
-            let at = |k: usize| coordinates(&(hit.origin_in_map + way * (k as f64 * 1e-3)), 0);
+            let limit_m = (0.9 * range_m).min(range_m - 0.3);
+            let ray = (hit.point_in_map - hit.origin_in_map) / range_m;
+            let steps = (limit_m / 1e-3).max(0.0) as usize;
+            let at = |k: usize| coordinates(&(hit.origin_in_map + ray * (k as f64 * 1e-3)), 0);
             let mut stepped: Vec<[i64; 3]> = (0..steps).map(at).collect();
             stepped.dedup();
-            // Small steps miss the tips of cells, and no more.
+            // Small steps only miss the corners of cells.
             assert!(stepped.iter().all(|cell| cells.contains(cell)), "{from:?} {to:?}");
             assert!(cells.len() <= stepped.len() + 2 + stepped.len() / 20, "{} and {}", cells.len(), stepped.len());
         }
     }
 
-    /// A wall at x = 6, seen from the origin in a fan, and in front of it, where `mover_y` says, a post.
-    fn block(mover_y: Option<f64>) -> (Crowd, Carved) {
+    /// Returns of a wall at x = 6, seen from the origin, with a post in front of it at `mover_y`, if any.
+    fn block(mover_y: Option<f64>) -> (BlockCounts, FreeSpace) {
         let at = |k: usize| (-4.0 + 0.02 * (k % 400) as f64, 0.4 + 0.1 * (k / 400) as f64);
         let end = |(y, z): (f64, f64)| match mover_y {
             Some(mover_y) if (y / 2.0 - mover_y).abs() < 0.15 => [3.0, y / 2.0, z / 2.0],
             _ => [6.0, y, z],
         };
-        let hits: Vec<Hit> = (0..4000).map(|k| beam([0.0; 3], end(at(k)))).collect();
-        let crowd = Crowd::of(&hits);
-        let carved = Carved::by(&hits, &crowd);
-        (crowd, carved)
+        let hits: Vec<ProjectedReturn> = (0..4000).map(|k| beam([0.0; 3], end(at(k)))).collect();
+        let counts = BlockCounts::from_returns(&hits);
+        let free_space = FreeSpace::from_returns(&hits, &counts);
+        (counts, free_space)
     }
 
-    /// What moved in the fifth of blocks.
-    fn moved_in(blocks: &[(Crowd, Carved)]) -> Moving {
-        let around: Vec<&Carved> = blocks.iter().map(|(_, carved)| carved).collect();
-        Moving::of(&blocks[4].0, &around)
+    /// Dynamic cells of the fifth block.
+    fn dynamic_cells_in(blocks: &[(BlockCounts, FreeSpace)]) -> DynamicCells {
+        let around: Vec<&FreeSpace> = blocks.iter().map(|(_, free_space)| free_space).collect();
+        DynamicCells::find(&blocks[4].0, &around)
     }
 
     #[test]
-    fn what_stood_there_for_two_seconds_of_eleven_moved_and_what_stands_did_not() {
+    fn object_present_for_2_of_11_seconds_is_dynamic_and_the_wall_is_not() {
         let blocks: Vec<_> = (0..11).map(|k| block((4..6).contains(&k).then_some(0.9))).collect();
-        let moving = moved_in(&blocks);
-        assert!(moving.has(&Vector::new(3.0, 0.9, 0.4)));
-        assert!(!moving.has(&Vector::new(6.0, 1.8, 0.8)), "the wall that it hid stands");
-        assert!(!moving.has(&Vector::new(6.0, -2.0, 0.8)));
-        // A post that stands all the time does not move.
+        let dynamic = dynamic_cells_in(&blocks);
+        assert!(dynamic.contains(&Vector::new(3.0, 0.9, 0.4)));
+        assert!(!dynamic.contains(&Vector::new(6.0, 1.8, 0.8)), "the occluded wall is static");
+        assert!(!dynamic.contains(&Vector::new(6.0, -2.0, 0.8)));
+        // A post that is present all the time is static.
         let blocks: Vec<_> = (0..11).map(|_| block(Some(0.9))).collect();
-        assert!(!moved_in(&blocks).has(&Vector::new(3.0, 0.9, 0.4)));
+        assert!(!dynamic_cells_in(&blocks).contains(&Vector::new(3.0, 0.9, 0.4)));
     }
 }

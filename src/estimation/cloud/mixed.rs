@@ -1,75 +1,75 @@
-//! Echoes of two surfaces at once: a beam that is split by an edge may answer from in between (Tuley, Vandapel and
+//! Detection of mixed pixels: a beam split by an edge can return a range between the two surfaces (Tuley, Vandapel and
 //! Hebert, ICRA 2005).
 //!
-//! Such an echo lies between its neighbours in range, far from both. So does one on a surface that is seen at a grazing
-//! angle; but along a line, `1 / r` is linear in the angle as long as that is small, and two neighbours on one side
-//! foretell it.
+//! The range of a mixed pixel is between those of the two neighbours and differs from both by many standard deviations. The
+//! same holds on a surface at grazing incidence; but there `1 / r` is linear in the (small) angle between beams, so two
+//! neighbours on one side predict the range.
 
-use super::Hit;
+use super::ProjectedReturn;
 use crate::geometry::Vector;
 use crate::measurement::LidarNoise;
 
-/// Beams farther from each other than this are no neighbours, rad.
-const NEIGHBOURS_RAD: f64 = 0.02;
-/// A mixed echo is farther than this from both its neighbours, in standard deviations of a difference of two ranges.
+/// Maximum angle between neighbouring beams, rad.
+const MAX_NEIGHBOUR_RAD: f64 = 0.02;
+/// Minimum range difference of a mixed pixel to both neighbours, in standard deviations of the difference.
 const GAP_SIGMAS: f64 = 5.0;
-/// An echo is on its neighbours' line within so many standard deviations.
+/// Maximum deviation from the line through two neighbours, in standard deviations of the prediction.
 const LINE_SIGMAS: f64 = 3.0;
 
-/// A beam of a scan.
-struct Beam {
-    /// Sum of the angles between beams up to it, rad.
+/// A return by angle and range.
+struct PolarReturn {
+    /// Cumulative angle between successive beams, rad.
     angle: f64,
     range_m: f64,
     sigma_m: f64,
 }
 
-/// Which echoes of a scan, in the order in which they were fired, are mixed.
-pub(super) fn in_scan(hits: &[Hit], noise: &LidarNoise) -> Vec<bool> {
-    let mut beams: Vec<Beam> = Vec::with_capacity(hits.len());
+/// Flags the mixed pixels of a scan; `hits` are in order of emission.
+pub(super) fn find_mixed(hits: &[ProjectedReturn], noise: &LidarNoise) -> Vec<bool> {
+    let mut beams: Vec<PolarReturn> = Vec::with_capacity(hits.len());
     let mut before: Option<Vector> = None;
     for hit in hits {
-        let way = hit.point_in_map - hit.origin_in_map;
-        let range_m = way.norm();
-        let direction = way.try_normalize(0.0).unwrap_or_default();
-        // Of small angles the chord is the arc.
+        let ray = hit.point_in_map - hit.origin_in_map;
+        let range_m = ray.norm();
+        let direction = ray.try_normalize(0.0).unwrap_or_default();
+        // For small angles the chord equals the arc.
         let step = before.map_or(0.0, |before| (direction - before).norm());
         let angle = beams.last().map_or(0.0, |last| last.angle) + step;
-        beams.push(Beam { angle, range_m, sigma_m: noise.sigma_m(range_m) });
+        beams.push(PolarReturn { angle, range_m, sigma_m: noise.sigma_m(range_m) });
         before = Some(direction);
     }
     (0..beams.len()).map(|k| is_mixed(&beams, k)).collect()
 }
 
-fn is_mixed(beams: &[Beam], k: usize) -> bool {
+fn is_mixed(beams: &[PolarReturn], k: usize) -> bool {
     let beam = &beams[k];
     let near = |other: Option<usize>| {
         let other = beams.get(other?)?;
-        ((other.angle - beam.angle).abs() < NEIGHBOURS_RAD).then_some(other)
+        ((other.angle - beam.angle).abs() < MAX_NEIGHBOUR_RAD).then_some(other)
     };
     let (Some(before), Some(after)) = (near(k.checked_sub(1)), near(k.checked_add(1))) else { return false };
-    let apart = |other: &Beam| {
+    let normalised_difference = |other: &PolarReturn| {
         let sigma_m = beam.sigma_m.hypot(other.sigma_m);
         (beam.range_m - other.range_m) / sigma_m
     };
-    let (from_before, from_after) = (apart(before), apart(after));
+    let (from_before, from_after) = (normalised_difference(before), normalised_difference(after));
     let is_between = from_before * from_after < 0.0 && from_before.abs().min(from_after.abs()) > GAP_SIGMAS;
-    let foretold = |one: &Beam, two: Option<&Beam>| two.is_some_and(|two| is_on_line(beam, one, two));
-    is_between && !foretold(before, near(k.checked_sub(2))) && !foretold(after, near(k.checked_add(2)))
+    let predicted = |one: &PolarReturn, two: Option<&PolarReturn>| two.is_some_and(|two| is_on_line(beam, one, two));
+    is_between && !predicted(before, near(k.checked_sub(2))) && !predicted(after, near(k.checked_add(2)))
 }
 
-/// Whether a beam ends on the line through the ends of two others, the nearer neighbour first.
-fn is_on_line(beam: &Beam, one: &Beam, two: &Beam) -> bool {
+/// Whether a return is on the line through two others, the nearer neighbour first.
+fn is_on_line(beam: &PolarReturn, one: &PolarReturn, two: &PolarReturn) -> bool {
     let step = one.angle - two.angle;
     if step == 0.0 {
         return false;
     }
     let ahead = (beam.angle - one.angle) / step;
-    let inverse = |beam: &Beam| (1.0 / beam.range_m, beam.sigma_m / (beam.range_m * beam.range_m));
+    let inverse = |beam: &PolarReturn| (1.0 / beam.range_m, beam.sigma_m / (beam.range_m * beam.range_m));
     let ((d0, s0), (d1, s1), (d2, s2)) = (inverse(beam), inverse(one), inverse(two));
-    let foretold = d1 + (d1 - d2) * ahead;
+    let predicted = d1 + (d1 - d2) * ahead;
     let variance = s0 * s0 + (s1 * (1.0 + ahead)).powi(2) + (s2 * ahead).powi(2);
-    (d0 - foretold).abs() <= LINE_SIGMAS * variance.sqrt()
+    (d0 - predicted).abs() <= LINE_SIGMAS * variance.sqrt()
 }
 
 #[cfg(test)]
@@ -79,48 +79,48 @@ mod tests {
 
     const NOISE: LidarNoise = LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 };
 
-    /// A scan of ranges, a quarter of a degree from each other.
+    /// Indices of the mixed pixels in a scan with beams 0.25 degrees apart.
     fn mixed(ranges_m: &[f64]) -> Vec<usize> {
         let hit = |(k, range_m): (usize, &f64)| {
             let angle = 0.25_f64.to_radians() * k as f64;
             let point_in_map = Vector::new(angle.cos(), angle.sin(), 0.0) * *range_m;
-            Hit { stamp: Stamp::default(), point_in_map, origin_in_map: Vector::zeros() }
+            ProjectedReturn { stamp: Stamp::default(), point_in_map, origin_in_map: Vector::zeros() }
         };
-        let hits: Vec<Hit> = ranges_m.iter().enumerate().map(hit).collect();
-        let told = in_scan(&hits, &NOISE);
-        told.iter().enumerate().filter(|(_, mixed)| **mixed).map(|(k, _)| k).collect()
+        let hits: Vec<ProjectedReturn> = ranges_m.iter().enumerate().map(hit).collect();
+        let flags = find_mixed(&hits, &NOISE);
+        flags.iter().enumerate().filter(|(_, mixed)| **mixed).map(|(k, _)| k).collect()
     }
 
     #[test]
-    fn an_echo_in_the_gap_behind_an_edge_is_mixed() {
+    fn return_between_two_surfaces_at_an_edge_is_mixed() {
         assert_eq!(mixed(&[2.0, 2.0, 2.0, 2.6, 4.0, 4.0, 4.0]), [3]);
         assert_eq!(mixed(&[4.0, 4.0, 3.1, 2.0, 2.0]), [2]);
-        assert_eq!(mixed(&[2.0, 2.0, 2.0, 4.0, 4.0, 4.0]), [0; 0], "an edge alone is none");
-        assert_eq!(mixed(&[2.0, 2.0, 2.03, 2.05, 2.05]), [0; 0], "nor is noise");
+        assert_eq!(mixed(&[2.0, 2.0, 2.0, 4.0, 4.0, 4.0]), [0; 0], "a clean edge has no mixed pixel");
+        assert_eq!(mixed(&[2.0, 2.0, 2.03, 2.05, 2.05]), [0; 0], "noise is not a mixed pixel");
     }
 
     #[test]
-    fn a_grazed_floor_is_no_edge_however_far_its_echoes_are_apart() {
-        // A floor 1.2 m below, in a scan that goes up from 9 degrees below the level by a quarter of a degree: at the
-        // end its echoes are 2 m apart.
+    fn floor_at_grazing_incidence_has_no_mixed_pixels() {
+        // A floor 1.2 m below, scanned from 9 degrees below the horizon upwards in steps of 0.25 degrees: successive
+        // ranges differ by up to 2 m.
         let at = |k: usize| 1.2 / (9.0 - 0.25 * k as f64).to_radians().sin();
         let ranges: Vec<f64> = (0..24).map(at).collect();
         assert!(ranges[23] - ranges[22] > 1.5);
         assert_eq!(mixed(&ranges), [0; 0]);
-        // The same up to a wall, and from a box that stands before it.
+        // The same floor up to a wall.
         let with_wall: Vec<f64> = ranges.iter().map(|r| r.min(14.0)).collect();
         assert_eq!(mixed(&with_wall), [0; 0]);
     }
 
     #[test]
-    fn beams_far_from_each_other_are_no_neighbours() {
-        let hit = |point: [f64; 3]| Hit {
+    fn beams_at_large_angles_are_not_neighbours() {
+        let hit = |point: [f64; 3]| ProjectedReturn {
             stamp: Stamp::default(),
             point_in_map: point.into(),
             origin_in_map: Vector::zeros(),
         };
-        let apart = [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [-4.0, 0.0, 0.0]].map(hit);
-        assert_eq!(in_scan(&apart, &NOISE), [false; 3]);
-        assert!(in_scan(&[], &NOISE).is_empty());
+        let distant = [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [-4.0, 0.0, 0.0]].map(hit);
+        assert_eq!(find_mixed(&distant, &NOISE), [false; 3]);
+        assert!(find_mixed(&[], &NOISE).is_empty());
     }
 }

@@ -1,161 +1,165 @@
-//! What of a cloud is kept: echoes that are no surface are found while they pass by.
+//! Streaming filter of the point cloud: removes points that are not on a static surface.
 //!
-//! | fate | what it is | how it is told |
+//! | class | meaning | criterion |
 //! |---|---|---|
-//! | [`Fate::Mixed`] | an echo of two surfaces at once, in the gap between them | within its scan, see `mixed` |
-//! | [`Fate::Moving`] | of what moved through the scene | beams went where it was, see `carve` |
-//! | [`Fate::Isolated`] | with next to nothing beside it | by the number of points around it, see `support` |
+//! | [`Fate::Mixed`] | mixed pixel: one return of two surfaces, measured in between | neighbours in the scan, see `mixed` |
+//! | [`Fate::Moving`] | point of a dynamic object | other beams passed through the cell, see `dynamic` |
+//! | [`Fate::Isolated`] | isolated point | few points around it, see `density` |
 //!
-//! Time is cut into blocks of a second, and a point is judged by the blocks up to five seconds before and after its
-//! own: a head that swings about once a second has looked there several times by then. So memory is that of eleven
-//! blocks, however long the recording.
+//! Time is divided into blocks of 1 s. A point is classified with the blocks up to 5 s before and after: the head swings
+//! about once a second and observes the same spot several times within that period. Memory is bounded by eleven blocks.
 
-mod carve;
 mod cell;
-mod cells;
+mod cell_set;
+mod density;
+mod dynamic;
 mod mixed;
 mod sigma;
-mod support;
 
 pub use sigma::point_sigma_m;
 
 use crate::geometry::Vector;
 use crate::measurement::LidarNoise;
 use crate::time::{Span, Stamp};
-use carve::{Carved, Moving};
+use density::{BlockCounts, Density};
+use dynamic::{DynamicCells, FreeSpace};
 use rayon::prelude::*;
 use std::collections::VecDeque;
-use support::{Crowd, Support};
 
-/// Length of a block.
+/// Length of a block, 1 s: about one swing of the head.
 const BLOCK: Span = Span::from_nanos(1_000_000_000);
-/// A point is judged by so many blocks before its own, and as many after.
-const AROUND: usize = 5;
+/// Number of blocks before, and after, that are used to classify a block.
+const CONTEXT_BLOCKS: usize = 5;
 
-/// An echo where the estimate puts it.
+/// A lidar return, projected into the map by the estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hit {
-    /// When its beam was fired.
+pub struct ProjectedReturn {
+    /// Time of emission.
     pub stamp: Stamp,
-    /// Where it is, m, in the map.
+    /// Measured point in the map, m.
     pub point_in_map: Vector,
-    /// Where the lidar was, m, in the map.
+    /// Position of the lidar in the map, m.
     pub origin_in_map: Vector,
 }
 
-impl Hit {
-    /// Its distance from the lidar, m.
+impl ProjectedReturn {
+    /// Distance from the lidar, m.
     fn range_m(&self) -> f64 {
         (self.point_in_map - self.origin_in_map).norm()
     }
 }
 
-/// What becomes of an echo.
+/// Class of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
-    /// It is of the map.
+    /// On a static surface; stays in the cloud.
     Kept,
-    /// It is an echo of two surfaces, and on neither.
+    /// Mixed pixel: a return of two surfaces, on neither of them.
     Mixed,
-    /// Nothing else was seen about there.
+    /// Too few other points around it.
     Isolated,
-    /// It is of something that moved.
+    /// On a dynamic object.
     Moving,
 }
 
-/// Tells echoes that are no surface of the map from those that are, as they come; each carries a `T` along.
+/// Classifies returns in a stream; each return has a payload `T`.
 #[derive(Debug)]
 pub struct CloudFilter<T> {
     noise: LidarNoise,
-    /// The block that is filled.
-    filling: Option<(Stamp, Vec<Seen<T>>)>,
-    /// Blocks that are whole: first those that were judged, then those that wait.
-    whole: VecDeque<Block<T>>,
-    /// Blocks of `whole` that were judged.
-    judged: usize,
+    /// The block being filled: start time and returns.
+    filling: Option<(Stamp, Vec<PendingReturn<T>>)>,
+    /// Complete blocks: the classified ones, then the pending ones.
+    complete: VecDeque<Block<T>>,
+    /// Number of classified blocks in `complete`.
+    classified: usize,
 }
 
-/// An echo, whether it is mixed, and what it carries.
+/// A return with its payload.
 #[derive(Debug)]
-struct Seen<T> {
-    hit: Hit,
+struct PendingReturn<T> {
+    hit: ProjectedReturn,
     mixed: bool,
-    carried: T,
+    payload: T,
 }
 
-/// What was seen in a second.
+/// The returns of one block of time.
 #[derive(Debug)]
 struct Block<T> {
-    seen: Vec<Seen<T>>,
-    crowd: Crowd,
-    carved: Carved,
+    returns: Vec<PendingReturn<T>>,
+    counts: BlockCounts,
+    free_space: FreeSpace,
 }
 
 impl<T: Send + Sync> CloudFilter<T> {
-    /// A filter of the echoes of a lidar of this noise.
+    /// Filter for a lidar of the given noise.
     pub fn new(noise: LidarNoise) -> Self {
-        Self { noise, filling: None, whole: VecDeque::new(), judged: 0 }
+        Self { noise, filling: None, complete: VecDeque::new(), classified: 0 }
     }
 
-    /// Takes the echoes of a scan, in the order in which their beams were fired. Those whose fate is known by now, in
-    /// the order in which they came: of a second, six seconds later.
-    pub fn push(&mut self, scan: Vec<(Hit, T)>) -> Vec<(T, Fate)> {
+    /// Adds the returns of a scan, in order of emission; returns the newly classified ones in input order.
+    ///
+    /// A block is classified about 6 s after its last return.
+    pub fn push(&mut self, scan: Vec<(ProjectedReturn, T)>) -> Vec<(T, Fate)> {
         let Some((first, _)) = scan.first() else { return Vec::new() };
         let stamp = first.stamp;
-        let mut told = Vec::new();
-        if self.filling.as_ref().is_some_and(|(begun, _)| stamp - *begun >= BLOCK) {
+        let mut classified = Vec::new();
+        if self.filling.as_ref().is_some_and(|(start, _)| stamp - *start >= BLOCK) {
             self.close_block();
-            if self.whole.len() > self.judged + AROUND {
-                told = self.judge_next();
+            if self.complete.len() > self.classified + CONTEXT_BLOCKS {
+                classified = self.classify_next();
             }
         }
-        let hits: Vec<Hit> = scan.iter().map(|(hit, _)| *hit).collect();
-        let mixed = mixed::in_scan(&hits, &self.noise);
-        let (_, seen) = self.filling.get_or_insert_with(|| (stamp, Vec::new()));
-        seen.extend(scan.into_iter().zip(mixed).map(|((hit, carried), mixed)| Seen { hit, mixed, carried }));
-        told
+        let hits: Vec<ProjectedReturn> = scan.iter().map(|(hit, _)| *hit).collect();
+        let mixed = mixed::find_mixed(&hits, &self.noise);
+        let (_, returns) = self.filling.get_or_insert_with(|| (stamp, Vec::new()));
+        returns.extend(scan.into_iter().zip(mixed).map(|((hit, payload), mixed)| PendingReturn {
+            hit,
+            mixed,
+            payload,
+        }));
+        classified
     }
 
-    /// The echoes whose fate was not known yet.
+    /// Classifies the remaining returns.
     pub fn finish(mut self) -> Vec<(T, Fate)> {
         self.close_block();
-        let mut told = Vec::new();
-        while self.judged < self.whole.len() {
-            told.extend(self.judge_next());
+        let mut classified = Vec::new();
+        while self.classified < self.complete.len() {
+            classified.extend(self.classify_next());
         }
-        told
+        classified
     }
 
     fn close_block(&mut self) {
-        let Some((_, seen)) = self.filling.take() else { return };
-        let hits: Vec<Hit> = seen.iter().map(|seen| seen.hit).collect();
-        let crowd = Crowd::of(&hits);
-        let carved = Carved::by(&hits, &crowd);
-        self.whole.push_back(Block { seen, crowd, carved });
+        let Some((_, returns)) = self.filling.take() else { return };
+        let hits: Vec<ProjectedReturn> = returns.iter().map(|one| one.hit).collect();
+        let counts = BlockCounts::from_returns(&hits);
+        let free_space = FreeSpace::from_returns(&hits, &counts);
+        self.complete.push_back(Block { returns, counts, free_space });
     }
 
-    /// Judges the oldest block that waits, and forgets the one that no further needs.
-    fn judge_next(&mut self) -> Vec<(T, Fate)> {
-        let until = (self.judged + AROUND + 1).min(self.whole.len());
-        let around = || self.whole.range(..until);
-        let support = Support::of(around().map(|block| &block.crowd));
-        let carved: Vec<&Carved> = around().map(|block| &block.carved).collect();
-        let block = &self.whole[self.judged];
-        let moving = Moving::of(&block.crowd, &carved);
-        let fate = |seen: &Seen<T>| match seen {
-            Seen { mixed: true, .. } => Fate::Mixed,
-            Seen { hit, .. } if !support.holds(hit) => Fate::Isolated,
-            Seen { hit, .. } if moving.has(&hit.point_in_map) => Fate::Moving,
+    /// Classifies the oldest pending block; drops the block that is no longer needed.
+    fn classify_next(&mut self) -> Vec<(T, Fate)> {
+        let until = (self.classified + CONTEXT_BLOCKS + 1).min(self.complete.len());
+        let around = || self.complete.range(..until);
+        let density = Density::from_blocks(around().map(|block| &block.counts));
+        let free_spaces: Vec<&FreeSpace> = around().map(|block| &block.free_space).collect();
+        let block = &self.complete[self.classified];
+        let dynamic = DynamicCells::find(&block.counts, &free_spaces);
+        let fate = |one: &PendingReturn<T>| match one {
+            PendingReturn { mixed: true, .. } => Fate::Mixed,
+            PendingReturn { hit, .. } if !density.is_sufficient_at(hit) => Fate::Isolated,
+            PendingReturn { hit, .. } if dynamic.contains(&hit.point_in_map) => Fate::Moving,
             _ => Fate::Kept,
         };
-        let fates: Vec<Fate> = block.seen.par_iter().with_min_len(512).map(fate).collect();
-        let seen = std::mem::take(&mut self.whole[self.judged].seen);
-        self.judged += 1;
-        if self.judged > AROUND {
-            self.whole.pop_front();
-            self.judged -= 1;
+        let fates: Vec<Fate> = block.returns.par_iter().with_min_len(512).map(fate).collect();
+        let returns = std::mem::take(&mut self.complete[self.classified].returns);
+        self.classified += 1;
+        if self.classified > CONTEXT_BLOCKS {
+            self.complete.pop_front();
+            self.classified -= 1;
         }
-        seen.into_iter().map(|seen| seen.carried).zip(fates).collect()
+        returns.into_iter().map(|one| one.payload).zip(fates).collect()
     }
 }
 
@@ -165,43 +169,42 @@ mod tests {
 
     const NOISE: LidarNoise = LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 };
 
-    /// A scan at `ms` of a wall at x = 4, a hundred beams over 25 degrees, in a plane that nods; `other` is put where
-    /// beam 50 ends.
-    fn scan(ms: i64, other: Option<Vector>) -> Vec<(Hit, (i64, usize))> {
+    /// A scan at `ms` of a wall at x = 4, 100 beams over 25 degrees, in a nodding plane; beam 50 ends at `other`.
+    fn scan(ms: i64, other: Option<Vector>) -> Vec<(ProjectedReturn, (i64, usize))> {
         let height = (ms as f64 * 0.01).sin();
         let hit = |k: usize| {
             let wall = Vector::new(4.0, (k as f64 - 50.0) * 0.02, height);
             let point_in_map = other.filter(|_| k == 50).unwrap_or(wall);
             let stamp = Stamp::from_nanos(ms * 1_000_000 + k as i64 * 20_000);
-            (Hit { stamp, point_in_map, origin_in_map: Vector::zeros() }, (ms, k))
+            (ProjectedReturn { stamp, point_in_map, origin_in_map: Vector::zeros() }, (ms, k))
         };
         (0..100).map(hit).collect()
     }
 
     #[test]
-    fn all_come_out_once_in_order_and_a_point_in_the_air_is_isolated() {
+    fn returns_keep_their_order_and_a_floating_point_is_isolated() {
         let mut filter = CloudFilter::new(NOISE);
-        let (mut told, mut latest_behind) = (Vec::new(), 0);
+        let (mut classified, mut max_latency_ms) = (Vec::new(), 0);
         for k in 0..800_i64 {
-            // Once, twenty metres above everything.
+            // One point 20 m above all others.
             let other = (k == 300).then(|| Vector::new(4.0, 0.0, 20.0));
-            told.extend(filter.push(scan(k * 25, other)));
-            latest_behind = latest_behind.max(k * 25 - told.last().map_or(0, |((ms, _), _)| *ms));
+            classified.extend(filter.push(scan(k * 25, other)));
+            max_latency_ms = max_latency_ms.max(k * 25 - classified.last().map_or(0, |((ms, _), _)| *ms));
         }
-        assert!(latest_behind <= 7025, "{latest_behind} ms behind");
-        told.extend(filter.finish());
-        let order: Vec<(i64, usize)> = told.iter().map(|(carried, _)| *carried).collect();
+        assert!(max_latency_ms <= 7025, "latency {max_latency_ms} ms");
+        classified.extend(filter.finish());
+        let order: Vec<(i64, usize)> = classified.iter().map(|(payload, _)| *payload).collect();
         assert!(order.is_sorted() && order.len() == 80_000);
-        let dropped: Vec<_> = told.iter().filter(|(_, fate)| *fate != Fate::Kept).collect();
+        let dropped: Vec<_> = classified.iter().filter(|(_, fate)| *fate != Fate::Kept).collect();
         assert_eq!(dropped, [&((7500, 50), Fate::Isolated)]);
     }
 
     #[test]
-    fn an_echo_between_two_surfaces_is_mixed_and_nothing_is_no_scan() {
+    fn return_between_two_surfaces_is_mixed_and_an_empty_scan_is_ignored() {
         let mut filter = CloudFilter::new(NOISE);
         assert!(filter.push(Vec::new()).is_empty());
-        let edge: Vec<(Hit, usize)> = scan(0, None).into_iter().map(|(hit, (_, k))| (hit, k)).collect();
-        let nearer = |(mut hit, k): (Hit, usize)| {
+        let edge: Vec<(ProjectedReturn, usize)> = scan(0, None).into_iter().map(|(hit, (_, k))| (hit, k)).collect();
+        let nearer = |(mut hit, k): (ProjectedReturn, usize)| {
             hit.point_in_map *= match k {
                 0..50 => 1.0,
                 50 => 0.8,
@@ -210,7 +213,10 @@ mod tests {
             (hit, k)
         };
         let _ = filter.push(edge.into_iter().map(nearer).collect());
-        let told = filter.finish();
-        assert_eq!(told.iter().filter(|(_, fate)| *fate == Fate::Mixed).map(|(k, _)| *k).collect::<Vec<_>>(), [50]);
+        let classified = filter.finish();
+        assert_eq!(
+            classified.iter().filter(|(_, fate)| *fate == Fate::Mixed).map(|(k, _)| *k).collect::<Vec<_>>(),
+            [50]
+        );
     }
 }

@@ -1,25 +1,26 @@
-//! How far a point of the cloud may be from where it truly is.
+//! Position uncertainty of a point of the cloud.
 
 use crate::geometry::{PoseCovariance, Vector, skew};
 
-/// Standard deviation of a point's place in the map, m: the root of the mean square of its distance from its true
-/// place.
+/// Root mean square position error of a point in the map, m.
 ///
-/// Its range errs by `range_sigma_m` along its beam. The head, from which the point is `arm` away (m, in the map), errs
-/// by `covariance`, position first: `p = t + arm` moves by `dt + theta x arm`, so that
+/// `range_sigma_m` is the standard deviation along the beam; `covariance` is that of the head's pose, position first; `arm`
+/// is the vector from the head to the point in map axes, m. The point `p = t + arm` moves by `dt + theta x arm`, so
 ///
 /// ```text
 /// sigma^2 = sigma_r^2 + tr(J C J^T),   J = [I, -[arm]_x]
 /// ```
 ///
-/// The incidence is not known of a single point, and does not matter to its distance from its true place: it tells how
-/// much of that lies along the surface's normal, a share of `cos` at most.
+/// The angle of incidence is unknown for a single point and does not affect this error; it only determines the component
+/// along the surface normal.
 pub fn point_sigma_m(range_sigma_m: f64, covariance: &PoseCovariance, arm: &Vector) -> f64 {
-    let by_turn = -skew(arm);
+    let by_rotation = -skew(arm);
     let turn = covariance.fixed_view::<3, 3>(3, 3);
     let cross = covariance.fixed_view::<3, 3>(0, 3);
     let shift = covariance.fixed_view::<3, 3>(0, 0).trace();
-    let moved = shift + 2.0 * (cross * by_turn.transpose()).trace() + (by_turn * turn * by_turn.transpose()).trace();
+    let moved = shift
+        + 2.0 * (cross * by_rotation.transpose()).trace()
+        + (by_rotation * turn * by_rotation.transpose()).trace();
     (range_sigma_m * range_sigma_m + moved.max(0.0)).sqrt()
 }
 
@@ -31,7 +32,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     #[test]
-    fn it_is_the_root_mean_square_of_the_distances_drawn_from_the_same_errors() {
+    fn sigma_equals_the_rms_distance_of_sampled_errors() {
         let root = Matrix6::from_fn(|r, c| 0.01 * ((r * 5 + c * 3) as f64 * 0.61).sin());
         let covariance = root * root.transpose();
         let (arm, range_sigma_m) = (Vector::new(3.0, -2.0, 0.5), 0.012);
@@ -45,8 +46,8 @@ mod tests {
             let (shift, turn) = (e.fixed_rows::<3>(0).into_owned(), e.fixed_rows::<3>(3).into_owned());
             sum += (shift + turn.cross(&arm) + along * (range_sigma_m * draw())).norm_squared();
         }
-        let drawn = (sum / f64::from(count)).sqrt();
-        let told = point_sigma_m(range_sigma_m, &covariance, &arm);
-        assert!((told / drawn - 1.0).abs() < 0.01, "{told} told, {drawn} drawn");
+        let sampled = (sum / f64::from(count)).sqrt();
+        let predicted = point_sigma_m(range_sigma_m, &covariance, &arm);
+        assert!((predicted / sampled - 1.0).abs() < 0.01, "predicted {predicted}, sampled {sampled}");
     }
 }

@@ -69,7 +69,7 @@ impl SurfelMaker {
             match (self.spec.offset_grids, level) {
                 (false, _) => {}
                 (true, 0) => grids.push((offset, 0, 0)),
-                // Half a coarse cell is an integer number of regular finest cells, so the offset grid needs no fragments of its own.
+                // Half a coarse cell is an integer number of finest cells: the regular fragments serve both grids.
                 (true, _) => grids.push((regular, level, 1 << (level - 1))),
             }
         }
