@@ -4,7 +4,9 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 use std::sync::LazyLock;
-use zsim::estimation::{EstimatedPose, EstimationError, Estimator, EstimatorSpec, OpenLoop, Travelled, WarningKind};
+use zsim::estimation::{
+    EstimatedPose, EstimationError, Estimator, EstimatorSpec, OpenLoop, RegistrationInput, WarningKind,
+};
 use zsim::estimation::{load, locate_map, map_of, merge_maps, register};
 use zsim::evaluation::{Errors, Pairs};
 use zsim::geometry::{Pose, PoseCovariance, Rotation, Surface, Trajectory, Vector};
@@ -102,7 +104,7 @@ impl Mapped {
         let run = session.estimate(None).unwrap();
         let covariances = covariances(&run.poses);
         let OpenLoop { trajectory, lidar, survey, .. } = &run;
-        let travelled = Travelled { map_from_head: trajectory, covariances: &covariances, lidar, survey };
+        let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, survey };
         let closed = register(travelled, &session.calibration, &spec());
         let both = (&run.trajectory, &closed.trajectory);
         let map = map_of(&run.survey, both, &covariances, &spec().registration).unwrap();

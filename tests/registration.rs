@@ -5,7 +5,7 @@
 mod estimation_fixture;
 
 use estimation_fixture::{Room, Run, Score, Walk, calibration};
-use zsim::estimation::{ClosedLoop, Estimator, OpenLoop, Travelled, load, register};
+use zsim::estimation::{ClosedLoop, Estimator, OpenLoop, RegistrationInput, load, register};
 use zsim::evaluation::{Errors, Pairs};
 use zsim::geometry::{Pose, Rotation, Trajectory, Vector};
 use zsim::measurement::Calibration;
@@ -32,13 +32,13 @@ fn surveyed(run: &Run) -> OpenLoop {
 fn registered(open: &OpenLoop, calibration: &Calibration) -> ClosedLoop {
     let covariances: Vec<_> = open.poses.iter().map(|pose| (pose.stamp, pose.covariance)).collect();
     let OpenLoop { trajectory, lidar, survey, .. } = open;
-    let travelled = Travelled { map_from_head: trajectory, covariances: &covariances, lidar, survey };
+    let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, survey };
     register(travelled, calibration, &load("default").unwrap())
 }
 
 fn closed(open: &OpenLoop) -> OpenLoop {
     let closed = registered(open, &calibration());
-    assert_eq!(closed.report.left, None, "{:?}", closed.report);
+    assert_eq!(closed.report.rejected_because, None, "{:?}", closed.report);
     OpenLoop { trajectory: closed.trajectory, ..open.clone() }
 }
 

@@ -97,7 +97,9 @@ pub use estimator::{Estimator, estimate_all};
 pub use integrity::{Cause, Evidence, Finding, Status, blocks, doubt, findings, radius_99};
 pub use map::{Located, locate_map, map_of, merge_maps};
 pub use output::{EstimatedPose, GAUGED_S, OpenLoop, TURN_LEVER_M, WindowReport};
-pub use registration::{ClosedLoop, LoopReport, PlacesSpec, RegistrationReport, RegistrationSpec, Travelled, register};
+pub use registration::{
+    ClosedLoop, LoopReport, PlacesSpec, RegistrationInput, RegistrationReport, RegistrationSpec, register,
+};
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
 pub use spent::TimeSpent;
 pub use stamps::smoothed_stamps;

@@ -1,7 +1,7 @@
 //! The closed loop: global registration of the open-loop estimate.
 
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{EstimatorSpec, LoopReport, Travelled, register};
+use crate::estimation::{EstimatorSpec, LoopReport, RegistrationInput, register};
 use crate::geometry::Trajectory;
 use crate::measurement::{Calibration, LidarCorrection};
 use std::time::Instant;
@@ -32,8 +32,8 @@ pub(super) fn run_closed_loop(
 ) -> ClosedLoopRun {
     let started = Instant::now();
     let OpenLoopRun { map_from_head, covariances, lidar, survey, .. } = run;
-    let closed = register(Travelled { map_from_head, covariances, lidar, survey }, calibration, estimator);
-    let (loops, rejected_because) = (closed.report.loops, closed.report.left);
+    let closed = register(RegistrationInput { map_from_head, covariances, lidar, survey }, calibration, estimator);
+    let (loops, rejected_because) = (closed.report.loops, closed.report.rejected_because);
     let rejected =
         rejected_because.map(|why| format!("loop closure not applied ({why}); the result is the open-loop trajectory"));
     let closed_loops = (loops.closed > 0).then(|| {
@@ -42,7 +42,7 @@ pub(super) fn run_closed_loop(
     ClosedLoopRun {
         map_from_head: closed.trajectory,
         lidar: closed.lidar,
-        open_loop_recalibrated: closed.open_loop_told_anew,
+        open_loop_recalibrated: closed.open_loop_recalibrated,
         loops,
         rejected_because,
         notes: closed_loops.into_iter().chain(rejected).collect(),

@@ -1,14 +1,13 @@
-//! What matched surfels say of the corrections.
+//! Residuals of matched surfels and their contribution to the normal equations.
 //!
-//! `e = n^T (mu_i - mu_j)`, `n` the normal of the plane that both have in common. A surfel's centre moves by `dt + dr x
-//! arm` with the correction at its time, and with what the lidar is found to be: `lidar`. There are many more matches
-//! than unknowns: they are summed first by the slots (halves of knot intervals) in which their two surfels were seen,
-//! as if in their middle, then spread to the knots. Residuals are exact; their derivatives are those of an instant at
-//! most a quarter of an interval away.
+//! `e = n^T (mu_i - mu_j)` with the normal `n` of the common plane. The centre of a surfel moves by `dt + dr x arm` with the
+//! correction at that time, and with the range bias (`lidar_model`). There are many more matches than unknowns: they are first
+//! summed by the time bins (half knot intervals) of both surfels, with derivatives at the middle of the bins, then distributed
+//! to the knots. Residuals are exact; derivatives are evaluated at most a quarter of a knot interval off.
 
 use super::RegistrationSpec;
-use super::equations::{Beside, Equations, Link, Own};
-use super::neighbours::InUse;
+use super::equations::{Equations, PairTerm, SharedTerm, UnaryTerm};
+use super::neighbours::ActiveNeighbours;
 use super::scene::Scene;
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
@@ -17,34 +16,34 @@ use crate::geometry::{Matrix, Vector};
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
-/// So many sums are made before they are spread to the knots: the bound of their memory.
-const AT_ONCE: usize = 4096;
+/// Number of pairs of bins that are summed before they are distributed to the knots: bounds the memory.
+const PAIRS_AT_ONCE: usize = 4096;
 
-/// What was matched, in figures.
+/// Statistics of the matches.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Tally {
+pub(super) struct MatchStatistics {
     pub(super) matches: usize,
-    /// Sums of weights, and of weighted squares of distances, m^2.
+    /// Sum of weights, and weighted sum of squared distances, m^2.
     pub(super) weights: f64,
     pub(super) squares: f64,
-    /// What the matches know of the position: `sum w n n^T`.
+    /// Information about the position: `sum w n n^T`.
     pub(super) information: Matrix,
-    /// What they know of it along the weakest direction so far, by normals that lean to it.
-    pub(super) held: f64,
-    /// So much of that by matches of what was seen again.
-    pub(super) held_again: f64,
+    /// Information along the weakest direction, only from normals with a large component along it.
+    pub(super) weak_information: f64,
+    /// The part of it from matches of revisited surfaces.
+    pub(super) revisited_information: f64,
 }
 
-impl Tally {
-    fn count(&mut self, plane: &Plane, weight: f64, (weakest, again): (&Vector, bool)) {
+impl MatchStatistics {
+    fn count(&mut self, plane: &Plane, weight: f64, (weakest, is_revisit): (&Vector, bool)) {
         self.matches += 1;
         self.weights += weight;
         self.squares += weight * plane.distance_m * plane.distance_m;
         self.information += plane.normal * plane.normal.transpose() * weight;
-        let lean = plane.normal.dot(weakest);
-        if lean.abs() > LEANING {
-            self.held += weight * lean * lean;
-            self.held_again += if again { weight * lean * lean } else { 0.0 };
+        let component = plane.normal.dot(weakest);
+        if component.abs() > LEANING {
+            self.weak_information += weight * component * component;
+            self.revisited_information += if is_revisit { weight * component * component } else { 0.0 };
         }
     }
 
@@ -53,65 +52,66 @@ impl Tally {
         self.weights += other.weights;
         self.squares += other.squares;
         self.information += other.information;
-        self.held += other.held;
-        self.held_again += other.held_again;
+        self.weak_information += other.weak_information;
+        self.revisited_information += other.revisited_information;
     }
 
-    /// Weighted root mean square of the matches' distances, m.
+    /// Weighted root mean square distance of the matches, m.
     pub(super) fn rms_m(&self) -> f64 {
         if self.weights > 0.0 { (self.squares / self.weights).sqrt() } else { 0.0 }
     }
 }
 
-/// What some matches say, summed.
+/// Sums over the matches between two time bins.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Sum {
-    pub(super) link: Link,
-    pub(super) beside: Beside,
-    pub(super) tally: Tally,
+pub(super) struct BinPairSums {
+    pub(super) pair_term: PairTerm,
+    pub(super) shared_term: SharedTerm,
+    pub(super) statistics: MatchStatistics,
 }
 
-/// The matches of an iteration: which neighbours agree, and how much each counts.
+/// The matches of an iteration, from neighbours that agree.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Matches<'a> {
     pub(super) scene: &'a Scene,
-    pub(super) neighbours: &'a InUse,
+    pub(super) neighbours: &'a ActiveNeighbours,
     pub(super) matcher: &'a Matcher,
     pub(super) spec: &'a RegistrationSpec,
-    /// Greatest distance along the normal, m.
+    /// Maximum distance along the normal, m.
     pub(super) gate_m: f64,
-    /// The direction of which the matches before said least.
+    /// Direction with the least information in the previous iteration.
     pub(super) weakest: Vector,
 }
 
 impl Matches<'_> {
-    /// Adds what all matches say to the equations.
-    pub(super) fn add_to(&self, equations: &mut Equations) -> Tally {
-        let mut tally = Tally::default();
-        let mut own = vec![Own::default(); self.scene.middles.len()];
-        for runs in self.neighbours.runs.chunks(AT_ONCE) {
-            let sums: Vec<Sum> = runs.par_iter().map(|run| self.sum(&self.neighbours.pairs[run.clone()])).collect();
-            for (run, Sum { link, beside, tally: of_run }) in
-                runs.iter().zip(&sums).filter(|(_, sum)| sum.tally.matches > 0)
+    /// Adds all matches to the equations.
+    pub(super) fn add_to(&self, equations: &mut Equations) -> MatchStatistics {
+        let mut statistics = MatchStatistics::default();
+        let mut unary = vec![UnaryTerm::default(); self.scene.bin_bases.len()];
+        for runs in self.neighbours.runs.chunks(PAIRS_AT_ONCE) {
+            let sums: Vec<BinPairSums> =
+                runs.par_iter().map(|run| self.sum(&self.neighbours.pairs[run.clone()])).collect();
+            for (run, BinPairSums { pair_term, shared_term, statistics: of_run }) in
+                runs.iter().zip(&sums).filter(|(_, sum)| sum.statistics.matches > 0)
             {
                 let (i, j) = self.neighbours.pairs[run.start];
-                let slots = (self.scene.slots[i as usize] as usize, self.scene.slots[j as usize] as usize);
-                own[slots.0].merge(&link.first);
-                own[slots.1].merge(&link.second);
-                equations.add_cross(&self.scene.middles[slots.0], &self.scene.middles[slots.1], &link.cross);
-                equations.beside.merge(beside);
-                tally.merge(of_run);
+                let bins = (self.scene.bins[i as usize] as usize, self.scene.bins[j as usize] as usize);
+                unary[bins.0].merge(&pair_term.first);
+                unary[bins.1].merge(&pair_term.second);
+                equations.add_cross(&self.scene.bin_bases[bins.0], &self.scene.bin_bases[bins.1], &pair_term.cross);
+                equations.shared_term.merge(shared_term);
+                statistics.merge(of_run);
             }
         }
-        for (own, middle) in own.iter().zip(&self.scene.middles) {
-            equations.add_own(middle, own);
+        for (unary, basis) in unary.iter().zip(&self.scene.bin_bases) {
+            equations.add_unary(basis, unary);
         }
-        tally
+        statistics
     }
 
-    /// What the matches among `pairs`, of the same two slots, say.
-    pub(super) fn sum(&self, pairs: &[(u32, u32)]) -> Sum {
-        let mut sum = Sum::default();
+    /// Sums the matches among `pairs`, which are of the same two time bins.
+    pub(super) fn sum(&self, pairs: &[(u32, u32)]) -> BinPairSums {
+        let mut sum = BinPairSums::default();
         for (i, j) in pairs.iter().map(|(i, j)| (*i as usize, *j as usize)) {
             let (a, b) = (&self.scene.patches[i], &self.scene.patches[j]);
             if !self.matcher.agree(a, b, self.gate_m) {
@@ -124,22 +124,24 @@ impl Matches<'_> {
                 Vector6::new(turn.x, turn.y, turn.z, normal.x, normal.y, normal.z)
             };
             let (by_a, by_b) = (by(&self.scene.arms[i], &plane.normal), -by(&self.scene.arms[j], &plane.normal));
-            let by_shared = self.scene.sights[i].by(&plane.normal) - self.scene.sights[j].by(&plane.normal);
-            sum.link.add((&by_a, &by_b), plane.distance_m, weight);
-            sum.link.first.add_shared(&by_a, &by_shared, weight);
-            sum.link.second.add_shared(&by_b, &by_shared, weight);
-            sum.beside.add(&by_shared, plane.distance_m, weight);
-            let again = self.scene.apart_s((i, j)) > self.spec.again_after_s;
-            sum.tally.count(&plane, weight, (&self.weakest, again));
+            let by_shared = self.scene.rays[i].derivative(&plane.normal) - self.scene.rays[j].derivative(&plane.normal);
+            sum.pair_term.add((&by_a, &by_b), plane.distance_m, weight);
+            sum.pair_term.first.add_shared(&by_a, &by_shared, weight);
+            sum.pair_term.second.add_shared(&by_b, &by_shared, weight);
+            sum.shared_term.add(&by_shared, plane.distance_m, weight);
+            let is_revisit = self.scene.time_difference_s((i, j)) > self.spec.again_after_s;
+            sum.statistics.count(&plane, weight, (&self.weakest, is_revisit));
         }
         sum
     }
 
-    /// Cauchy's weight of a match. A surfel's error is in all its matches: together they count as one.
+    /// Weight of a match with a Cauchy kernel.
+    ///
+    /// The error of a surfel is common to all matches of the surfel; together they have the weight of one match.
     fn weight(&self, plane: &Plane, (i, j): (usize, usize)) -> f64 {
-        let share = |k: usize| 1.0 / f64::from(self.neighbours.counts[k].max(1));
+        let weight_share = |k: usize| 1.0 / f64::from(self.neighbours.counts[k].max(1));
         let normalised2 = plane.distance_m * plane.distance_m / plane.variance;
         let robust = 1.0 / (1.0 + normalised2 / (self.spec.cauchy * self.spec.cauchy));
-        self.spec.match_weight * (share(i) + share(j)) * robust / plane.variance
+        self.spec.match_weight * (weight_share(i) + weight_share(j)) * robust / plane.variance
     }
 }

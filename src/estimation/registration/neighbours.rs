@@ -1,4 +1,4 @@
-//! Which surfels of two chapters may show the same, resolution by resolution.
+//! Candidate matches: reciprocal nearest neighbours between two submaps, for each resolution.
 
 use super::scene::Scene;
 use crate::estimation::matching::{Forest, Matcher};
@@ -6,82 +6,84 @@ use crate::estimation::surfel::Patch;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Neighbours are looked for again when surfels may have moved by this fraction of their edges since.
-const MOVED_EDGES: f64 = 0.05;
+/// Neighbours are searched again when surfels may have moved by this fraction of the voxel edge.
+const MAX_MOTION_EDGES: f64 = 0.05;
 
-/// Neighbours among the surfels of each resolution.
+/// Cached neighbours of all resolutions.
 #[derive(Debug)]
 pub(super) struct Neighbours {
-    /// Of each resolution, once they were looked for.
-    levels: Vec<Option<Found>>,
+    /// Neighbours of each resolution, after the first search.
+    levels: Vec<Option<LevelNeighbours>>,
     finest: usize,
-    pub(super) in_use: InUse,
+    pub(super) active: ActiveNeighbours,
 }
 
-/// The neighbours of one resolution.
+/// Neighbours of one resolution.
 #[derive(Debug)]
-struct Found {
+struct LevelNeighbours {
     pairs: Vec<(u32, u32)>,
-    /// How far the surfels may have moved since, m.
+    /// Upper limit of the motion of the surfels since the search, m.
     moved_m: f64,
 }
 
-/// The neighbours of the resolutions in use.
+/// Neighbours of the active resolutions.
 #[derive(Debug, Default)]
-pub(super) struct InUse {
-    /// Pairs of surfels `(i, j)`, `i < j`, by the slots in which the two were seen.
+pub(super) struct ActiveNeighbours {
+    /// Pairs of surfels `(i, j)`, `i < j`, sorted by the time bins of both.
     pub(super) pairs: Vec<(u32, u32)>,
-    /// Where they are of the same two slots.
+    /// Ranges of pairs of the same two time bins.
     pub(super) runs: Vec<Range<usize>>,
-    /// How many neighbours each surfel has.
+    /// Number of neighbours of each surfel.
     pub(super) counts: Vec<u32>,
 }
 
-/// A chapter's surfels of one resolution.
-struct Shelf {
+/// Search index of the surfels of a submap at one resolution.
+struct SubmapIndex {
     members: Vec<u32>,
     patches: Vec<Patch>,
     forest: Forest,
 }
 
 impl Neighbours {
-    /// Nobody has looked for any yet, at any of `levels` resolutions.
-    pub(super) fn unknown(levels: usize) -> Self {
-        Self { levels: (0..levels).map(|_| None).collect(), finest: levels, in_use: InUse::default() }
+    /// An empty cache for `levels` resolutions.
+    pub(super) fn new(levels: usize) -> Self {
+        Self { levels: (0..levels).map(|_| None).collect(), finest: levels, active: ActiveNeighbours::default() }
     }
 
-    /// Uses those of the resolutions from `finest` on, and looks for them where need be; whether they have changed.
-    pub(super) fn use_from(&mut self, finest: usize, scene: &Scene, matcher: &Matcher, count: usize) -> bool {
+    /// Activates the resolutions from `finest` to the coarsest and searches outdated ones.
+    ///
+    /// Returns whether the neighbours changed.
+    pub(super) fn update(&mut self, finest: usize, scene: &Scene, matcher: &Matcher, count: usize) -> bool {
         let mut changed = self.finest != finest;
         for (level, found) in self.levels.iter_mut().enumerate().skip(finest) {
             let edge_m = matcher.finest_voxel_m * f64::from(1_u32 << level);
-            if found.as_ref().is_none_or(|found| found.moved_m > MOVED_EDGES * edge_m) {
-                *found = Some(Found { pairs: look_around(level, scene, matcher, count), moved_m: 0.0 });
+            if found.as_ref().is_none_or(|found| found.moved_m > MAX_MOTION_EDGES * edge_m) {
+                *found = Some(LevelNeighbours { pairs: search_level(level, scene, matcher, count), moved_m: 0.0 });
                 changed = true;
             }
         }
         if changed {
             self.finest = finest;
             let pairs = self.levels[finest..].iter().flatten().flat_map(|found| &found.pairs).copied().collect();
-            self.in_use = InUse::of(pairs, scene);
+            self.active = ActiveNeighbours::of(pairs, scene);
         }
         changed
     }
 
-    /// Surfels have moved by at most `by_m`.
-    pub(super) fn moved(&mut self, by_m: f64) {
+    /// Records that surfels moved by at most `by_m`.
+    pub(super) fn add_motion(&mut self, by_m: f64) {
         self.levels.iter_mut().flatten().for_each(|found| found.moved_m += by_m);
     }
 }
 
-impl InUse {
+impl ActiveNeighbours {
     fn of(mut pairs: Vec<(u32, u32)>, scene: &Scene) -> Self {
-        let slots = |(i, j): &(u32, u32)| (scene.slots[*i as usize], scene.slots[*j as usize]);
-        pairs.par_sort_unstable_by_key(|pair| (slots(pair), *pair));
+        let bins = |(i, j): &(u32, u32)| (scene.bins[*i as usize], scene.bins[*j as usize]);
+        pairs.par_sort_unstable_by_key(|pair| (bins(pair), *pair));
         let mut runs = Vec::new();
         let mut from = 0;
         for k in 1..=pairs.len() {
-            if k == pairs.len() || slots(&pairs[k]) != slots(&pairs[from]) {
+            if k == pairs.len() || bins(&pairs[k]) != bins(&pairs[from]) {
                 runs.push(from..k);
                 from = k;
             }
@@ -95,25 +97,24 @@ impl InUse {
     }
 }
 
-/// Neighbours of one resolution, found from both sides, in every pair of chapters.
-fn look_around(level: usize, scene: &Scene, matcher: &Matcher, count: usize) -> Vec<(u32, u32)> {
-    let shelf = |chapter: &Range<usize>| {
-        let members: Vec<u32> =
-            chapter.clone().filter(|k| scene.patches[*k].level == level).map(|k| k as u32).collect();
+/// Searches the reciprocal neighbours of one resolution in every pair of submaps.
+fn search_level(level: usize, scene: &Scene, matcher: &Matcher, count: usize) -> Vec<(u32, u32)> {
+    let index = |submap: &Range<usize>| {
+        let members: Vec<u32> = submap.clone().filter(|k| scene.patches[*k].level == level).map(|k| k as u32).collect();
         let patches: Vec<Patch> = members.iter().map(|k| scene.patches[*k as usize]).collect();
         let forest = matcher.plant(&patches);
-        Shelf { members, patches, forest }
+        SubmapIndex { members, patches, forest }
     };
-    let shelves: Vec<Shelf> = scene.chapters.par_iter().map(shelf).collect();
+    let indices: Vec<SubmapIndex> = scene.submaps.par_iter().map(index).collect();
     let between = |(a, b): &(usize, usize)| {
-        let (a, b) = (&shelves[*a], &shelves[*b]);
+        let (a, b) = (&indices[*a], &indices[*b]);
         let back: Vec<Vec<u32>> = b.patches.iter().map(|patch| matcher.neighbours(&a.forest, patch, count)).collect();
         let mut found = Vec::new();
         for (i, patch) in a.patches.iter().enumerate() {
             for j in matcher.neighbours(&b.forest, patch, count) {
                 let pair = (a.members[i], b.members[j as usize]);
-                let apart_s = scene.apart_s((pair.0 as usize, pair.1 as usize));
-                if back[j as usize].contains(&(i as u32)) && apart_s >= matcher.spec.min_time_difference_s {
+                let time_difference_s = scene.time_difference_s((pair.0 as usize, pair.1 as usize));
+                if back[j as usize].contains(&(i as u32)) && time_difference_s >= matcher.spec.min_time_difference_s {
                     found.push(pair);
                 }
             }

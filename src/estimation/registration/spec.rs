@@ -3,80 +3,81 @@ use crate::estimation::EstimationError;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
 use serde::{Deserialize, Serialize};
 
-/// How the whole is registered.
+/// Global registration (loop-closed trajectory) settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegistrationSpec {
-    /// Spacing of the knots of the correction's spline, s.
+    /// Spacing of the knots of the correction spline, s.
     #[serde(with = "crate::spec::checked::Positive")]
     pub knot_spacing_s: f64,
     /// Edge of the finest voxels, m.
     #[serde(with = "crate::spec::checked::Positive")]
     pub finest_voxel_m: f64,
-    /// How many resolutions, each double the last.
+    /// Number of resolutions; each has double the voxel edge of the previous one.
     pub levels: usize,
-    /// Fewest points of a surfel.
+    /// Minimum number of points of a surfel.
     pub min_points: usize,
-    /// Points of a cell are split when they span more than this, s.
+    /// Maximum duration of a surfel, s; points of a cell that span more are split.
     #[serde(with = "crate::spec::checked::Positive")]
     pub max_duration_s: f64,
-    /// Length of the chapters whose surfels are matched with each other's, s.
+    /// Duration of a submap, s; surfels are matched between pairs of submaps.
     #[serde(with = "crate::spec::checked::Positive")]
     pub chapter_s: f64,
-    /// A chapter becomes a reference, with which others are matched, where fewer references than this have seen the
-    /// same.
+    /// Number of reference submaps that must observe each cell; all submaps are matched with references. More references
+    /// give more matches and longer computing times.
     pub references: usize,
-    /// Most references that a chapter is matched with.
+    /// Maximum number of references that a submap is matched with.
     pub partners: usize,
-    /// Neighbours of a surfel looked up in each of them.
+    /// Number of nearest neighbours of a surfel in each of them.
     pub neighbours: usize,
-    /// Greatest distance along the normal of finest surfels, m; of coarser ones, in proportion to their edges, until
-    /// those are settled.
+    /// Maximum distance along the normal of a match at the finest resolution, m; while coarser resolutions are registered
+    /// it is larger in proportion to the voxel edge.
     #[serde(with = "crate::spec::checked::Positive")]
     pub max_plane_distance_m: f64,
-    /// Cauchy threshold, in standard deviations.
+    /// Threshold of the Cauchy kernel, in standard deviations.
     #[serde(with = "crate::spec::checked::Positive")]
     pub cauchy: f64,
-    /// Standard deviation of a match beside what its points' number says, m.
+    /// Standard deviation of a match in addition to surfel thickness, m.
     #[serde(with = "crate::spec::checked::Positive")]
     pub match_sigma_m: f64,
-    /// Weight of a surfel's matches together against one that stood alone.
+    /// Weight of all matches of a surfel together, relative to one independent match: errors of matches are correlated.
     #[serde(with = "crate::spec::checked::Positive")]
     pub match_weight: f64,
-    /// Time in which the open loop's error, of the size that its covariance tells, becomes another, s.
+    /// Correlation time of the open-loop error, s; the size of the error is that of the open-loop covariance.
     #[serde(with = "crate::spec::checked::Positive")]
     pub correlation_s: f64,
-    /// Drift of the open loop's position beside what its covariance tells, a random walk, m/sqrt(s).
+    /// Random walk of the open-loop position in addition to the covariance, m/sqrt(s).
     #[serde(with = "crate::spec::checked::Positive")]
     pub drift_m_per_sqrt_s: f64,
-    /// Likewise of its attitude, degrees/sqrt(s).
+    /// Random walk of the open-loop attitude in addition to the covariance, degrees/sqrt(s).
     #[serde(with = "crate::spec::checked::Positive")]
     pub turn_deg_per_sqrt_s: f64,
-    /// Standard deviation of the open loop's roll and pitch against gravity, degrees.
+    /// Standard deviation of the open-loop roll and pitch relative to gravity, degrees.
     #[serde(with = "crate::spec::checked::Positive")]
     pub level_sigma_deg: f64,
-    /// Most iterations of match and solve a resolution.
+    /// Maximum number of iterations of match and solve per resolution.
     pub max_iterations: usize,
-    /// Iterations end when no knot moves by more than this, m.
+    /// Convergence threshold: iterations end when no knot moves by more than this, m.
     #[serde(with = "crate::spec::checked::Positive")]
     pub settled_m: f64,
-    /// Least over greatest information that the matches hold about the position along any direction, 0..1: with less
-    /// that direction is weak.
+    /// The geometry is weak if the smallest over the largest eigenvalue of the position information of the matches is below
+    /// this, 0..1.
     #[serde(with = "crate::spec::checked::Fraction")]
     pub weak_conditioning: f64,
-    /// What was seen so long apart was seen again, s: what was seen within it the open loop's windows have weighed.
+    /// Minimum time between the two surfels of a match that counts as a revisit, s; shorter ones are already used by the
+    /// windows of the open loop.
     #[serde(with = "crate::spec::checked::Positive")]
     pub again_after_s: f64,
-    /// Fraction of what holds a weak direction that must have been seen again, 0..1: with less the open loop stays,
-    /// whose windows and IMU know that direction better.
+    /// Minimum fraction of the information along a weak direction due to revisits, 0..1; with less, the
+    /// registration is rejected, because the IMU constrains that direction better in the open loop.
     #[serde(with = "crate::spec::checked::Fraction")]
     pub min_seen_again: f64,
-    /// How places are recognised.
+    /// Loop closure by place recognition.
     pub places: PlacesSpec,
 }
 
 impl RegistrationSpec {
-    /// The settings of the surfels that are registered, in other things those of the open loop's.
+    /// Surfel settings of the registration; the others equal `open_loop`.
     pub(in crate::estimation) fn surfels(&self, open_loop: &SurfelSpec) -> SurfelSpec {
         SurfelSpec {
             finest_voxel_m: self.finest_voxel_m,
@@ -87,23 +88,27 @@ impl RegistrationSpec {
         }
     }
 
-    /// The settings of their matches, likewise.
+    /// Matching settings of the registration; the others equal `open_loop`.
     pub(super) fn matching(&self, open_loop: &MatchingSpec) -> MatchingSpec {
         MatchingSpec { max_plane_distance_m: self.max_plane_distance_m, ..open_loop.clone() }
     }
 
-    /// Checks the range of the counts.
+    /// Checks the ranges of the counts.
     pub(in crate::estimation) fn check(&self) -> Result<(), EstimationError> {
         let require = |is_right: bool, key: &'static str, message: &str| {
             let message = message.to_owned();
             if is_right { Ok(()) } else { Err(EstimationError::Setting { key, message }) }
         };
         require((1..=6).contains(&self.levels), "registration.levels", "must be 1 to 6")?;
-        require(self.min_points >= 4, "registration.min_points", "must be at least 4: fewer are no plane")?;
+        require(
+            self.min_points >= 4,
+            "registration.min_points",
+            "must be at least 4: fewer points do not determine a plane",
+        )?;
         require(
             self.chapter_s >= self.knot_spacing_s,
             "registration.chapter_s",
-            "must be at least its knot_spacing_s",
+            "must be at least registration.knot_spacing_s",
         )?;
         for (key, count) in [
             ("registration.references", self.references),

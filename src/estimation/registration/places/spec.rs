@@ -1,42 +1,42 @@
 use serde::{Deserialize, Serialize};
 
-/// How places are recognised where the open loop has drifted out of the matches' reach.
+/// Loop closure by place recognition, for drift beyond the matching distance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlacesSpec {
-    /// Whether they are.
+    /// Enables loop closure.
     pub recognised: bool,
-    /// Length of the trajectory in a place, s.
+    /// Duration of a place (submap for recognition), s.
     #[serde(with = "crate::spec::checked::Positive")]
     pub length_s: f64,
-    /// Places are compared that are at least so far apart in time, s.
+    /// Minimum time between two places of a loop closure, s.
     #[serde(with = "crate::spec::checked::Positive")]
     pub min_apart_s: f64,
-    /// So many of a place's nearest by key are compared with it by their whole context.
+    /// Number of nearest neighbours by ring key that are compared by their full Scan Context descriptor, per place.
     pub candidates: usize,
-    /// Of those, so many of the most alike are laid upon it.
+    /// Number of most similar candidates that are registered, per place.
     pub tries: usize,
-    /// Greatest distance of two contexts, 0..1.
+    /// Maximum Scan Context distance of a candidate, 0 (equal) to 1.
     #[serde(with = "crate::spec::checked::Fraction")]
     pub max_distance: f64,
-    /// What the open loop may have drifted at any time, m, and further in every minute, m/min.
+    /// Maximum drift of the open-loop position independent of time, m; larger loop closures are rejected.
     #[serde(with = "crate::spec::checked::NonNegative")]
     pub max_drift_m: f64,
-    /// m/min.
+    /// Additional maximum drift of the position per minute, m/min.
     #[serde(with = "crate::spec::checked::NonNegative")]
     pub max_drift_m_per_min: f64,
-    /// Likewise of its heading, degrees.
+    /// Maximum drift of the open-loop heading independent of time, degrees.
     #[serde(with = "crate::spec::checked::NonNegative")]
     pub max_turn_deg: f64,
-    /// Degrees/min.
+    /// Additional maximum drift of the heading per minute, degrees/min.
     #[serde(with = "crate::spec::checked::NonNegative")]
     pub max_turn_deg_per_min: f64,
-    /// Least share of a place's surfaces that lie on the other's, of those that face any one direction, 0..1.
+    /// Minimum fraction of the surfaces facing each direction that agree with the other place, 0..1.
     #[serde(with = "crate::spec::checked::Fraction")]
     pub min_agreement: f64,
-    /// Within this along their normals, m.
+    /// Maximum distance along the normal of surfaces that agree, m.
     #[serde(with = "crate::spec::checked::Positive")]
     pub max_plane_distance_m: f64,
-    /// Fewest loops that are believed, together.
+    /// Minimum number of consistent loop closures; with fewer, none is applied.
     pub min_loops: usize,
 }

@@ -1,52 +1,52 @@
-//! Conjugate gradients for equations too linked to be factored.
+//! Preconditioned conjugate gradients for normal equations with many loop closures.
 //!
-//! Where one place is seen again and again, each stretch of time hangs together with stretches all over the recording,
-//! and a sparse factor fills up: its work grows with the cube of the length. For the same reason such equations are
-//! well conditioned once what hangs together in time is solved for. Conjugate gradients, preconditioned by the factor
-//! of that (Hestenes and Stiefel 1952; Golub and Van Loan 2013, 11.5.2), need some dozens of products with the matrix.
+//! If an area is revisited often, matches link times all over the recording, and the sparse Cholesky factor fills in: its cost
+//! grows with the cube of the length. The same matches make the equations well conditioned after preconditioning with the
+//! terms between neighbouring times. Conjugate gradients (Hestenes and Stiefel 1952; Golub and Van Loan 2013, 11.5.2) with the
+//! factor of these terms need some dozens of matrix products.
 
-/// A symmetric positive definite matrix, and one near it that is easily solved.
-pub(super) trait System {
+/// A symmetric positive definite matrix and a preconditioner.
+pub(super) trait PreconditionedSystem {
     /// Adds the product with `x` to `sum`.
     fn add_product(&self, x: &[f64], sum: &mut [f64]);
-    /// Makes of the right side in `z` the solution of the near one.
-    fn solve_near(&self, z: &mut [f64]);
+    /// Applies the inverse of the preconditioner to `z`.
+    fn precondition(&self, z: &mut [f64]);
 }
 
-/// Solved, when the residual as the near matrix weighs it is such a part of what it was; and solved well enough, when
-/// rounding permits no more.
-const SOLVED: f64 = 1e-8;
-const PASSABLE: f64 = 1e-4;
-/// So many products with the matrix at most.
-const MOST_PRODUCTS: usize = 1000;
+/// Convergence: the preconditioned norm of the residual has decreased by this factor.
+const TOLERANCE: f64 = 1e-8;
+/// A larger residual, up to this factor, is accepted if rounding errors prevent convergence.
+const ACCEPTABLE: f64 = 1e-4;
+/// Maximum number of iterations, one matrix product each; some dozens are usual.
+const MAX_ITERATIONS: usize = 1000;
 
-/// The solution of `system` for the right side `b`, or nothing where it is not found.
-pub(super) fn solve(system: &impl System, b: &[f64]) -> Option<Vec<f64>> {
+/// Solves `system` for the right-hand side `b`; `None` if the iteration does not converge.
+pub(super) fn solve(system: &impl PreconditionedSystem, b: &[f64]) -> Option<Vec<f64>> {
     let (mut x, mut r, mut product) = (vec![0.0; b.len()], b.to_vec(), vec![0.0; b.len()]);
     let mut z = b.to_vec();
-    system.solve_near(&mut z);
+    system.precondition(&mut z);
     let mut direction = z.clone();
     let first = dot(&r, &z);
-    let mut left = first;
-    for _ in 0..MOST_PRODUCTS {
-        if left <= SOLVED * SOLVED * first {
+    let mut residual = first;
+    for _ in 0..MAX_ITERATIONS {
+        if residual <= TOLERANCE * TOLERANCE * first {
             return Some(x);
         }
         product.fill(0.0);
         system.add_product(&direction, &mut product);
-        let step = left / dot(&direction, &product);
+        let step = residual / dot(&direction, &product);
         if !(step.is_finite() && step > 0.0) {
             break;
         }
         add_scaled(&mut x, &direction, step);
         add_scaled(&mut r, &product, -step);
         z.copy_from_slice(&r);
-        system.solve_near(&mut z);
-        let before = std::mem::replace(&mut left, dot(&r, &z));
-        let kept = left / before;
-        direction.iter_mut().zip(&z).for_each(|(along, z)| *along = z + kept * *along);
+        system.precondition(&mut z);
+        let before = std::mem::replace(&mut residual, dot(&r, &z));
+        let ratio = residual / before;
+        direction.iter_mut().zip(&z).for_each(|(along, z)| *along = z + ratio * *along);
     }
-    (left <= PASSABLE * PASSABLE * first).then_some(x)
+    (residual <= ACCEPTABLE * ACCEPTABLE * first).then_some(x)
 }
 
 fn add_scaled(into: &mut [f64], from: &[f64], scale: f64) {
@@ -62,15 +62,15 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    /// A dense matrix with its diagonal for the near one.
+    /// A dense matrix, preconditioned with the diagonal.
     struct Dense(DMatrix<f64>);
 
-    impl System for Dense {
+    impl PreconditionedSystem for Dense {
         fn add_product(&self, x: &[f64], sum: &mut [f64]) {
             add_scaled(sum, (&self.0 * DVector::from_column_slice(x)).as_slice(), 1.0);
         }
 
-        fn solve_near(&self, z: &mut [f64]) {
+        fn precondition(&self, z: &mut [f64]) {
             z.iter_mut().zip(self.0.diagonal().iter()).for_each(|(z, d)| *z /= d);
         }
     }
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn the_solution_is_that_of_a_direct_solver() {
+    fn solution_matches_a_direct_solver() {
         let (system, b) = (dense(0.01), DVector::from_fn(40, |k, _| (k as f64).cos()));
         let expected = system.0.clone().lu().solve(&b).unwrap();
         let x = DVector::from_vec(solve(&system, b.as_slice()).unwrap());
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_positive_definite_or_finite_has_no_solution() {
+    fn indefinite_and_non_finite_systems_have_no_solution() {
         let b: Vec<f64> = (0..40).map(|k| f64::from(k).cos()).collect();
         assert_eq!(solve(&dense(-5.0), &b), None);
         assert_eq!(solve(&dense(f64::NAN), &b), None);

@@ -1,20 +1,20 @@
-//! Symmetric matrices of blocks, six by six, of which most are zero.
+//! Sparse symmetric matrix of 6 x 6 blocks.
 
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use nalgebra::{Matrix6, Vector6};
 
-/// On and below the diagonal, row by row.
+/// Sparse symmetric matrix of 6 x 6 blocks; stores the lower triangle by rows.
 #[derive(Debug, Clone)]
-pub(super) struct Blocks {
-    /// Of each row the columns that are not zero, in order.
+pub(super) struct BlockMatrix {
+    /// Sorted columns of the non-zero blocks of each row.
     columns: Vec<Vec<u32>>,
-    /// One block each.
+    /// The blocks at these columns.
     blocks: Vec<Vec<Matrix6<f64>>>,
 }
 
-impl Blocks {
-    /// Zeros at `columns`, which are those of each row up to itself, in any order and more than once.
+impl BlockMatrix {
+    /// Zero matrix with the given pattern: the columns of each row up to the diagonal; unsorted, duplicates allowed.
     pub(super) fn new(mut columns: Vec<Vec<u32>>) -> Self {
         for row in &mut columns {
             row.sort_unstable();
@@ -24,13 +24,14 @@ impl Blocks {
         Self { columns, blocks }
     }
 
-    /// Sets all numbers to zero.
+    /// Sets all blocks to zero.
     pub(super) fn clear(&mut self) {
         self.blocks.iter_mut().flatten().for_each(|block| block.fill(0.0));
     }
 
-    /// Adds `block` at (`row`, `column`), which is not always zero, and its transpose at (`column`, `row`); both, where
-    /// the two are one.
+    /// Adds `block` at (`row`, `column`) and its transpose at (`column`, `row`); on the diagonal it adds both.
+    ///
+    /// A block outside of the pattern is ignored.
     pub(super) fn add(&mut self, row: usize, column: usize, block: &Matrix6<f64>) {
         let (late, early) = (row.max(column), row.min(column));
         if let Ok(at) = self.columns[late].binary_search(&(early as u32)) {
@@ -68,7 +69,7 @@ impl Blocks {
         }
     }
 
-    /// The Cholesky factor, or nothing where the matrix is not positive definite.
+    /// Cholesky factor; `None` if the matrix is not positive definite.
     pub(super) fn factor(&self) -> Option<Llt<usize, f64>> {
         let (starts, rows, values) = self.upper_by_columns();
         let size = 6 * self.columns.len();
@@ -77,8 +78,9 @@ impl Blocks {
         Llt::try_new_with_symbolic(symbolic, SparseColMatRef::new(pattern, &values), faer::Side::Upper).ok()
     }
 
-    /// On and above the diagonal, column by column: where each column begins, rows, values. A row of blocks below the
-    /// diagonal is a column above it.
+    /// Upper triangle in compressed columns: column starts, rows, values.
+    ///
+    /// A row of blocks below the diagonal is a column above it.
     fn upper_by_columns(&self) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
         let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
         for (row, (columns, blocks)) in self.columns.iter().zip(&self.blocks).enumerate() {

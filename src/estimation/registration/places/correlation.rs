@@ -1,34 +1,37 @@
-//! How two places may lie beside each other: a search over turns and shifts in the plane.
+//! Start alignments of two places by correlation over heading and horizontal translation.
 //!
-//! After E. Olson, Real-time correlative scan matching (ICRA 2009): the walls of one place are drawn into a grid, and
-//! the other's are counted that fall into it, at every shift within reach and every turn near the one proposed. A wall
-//! is drawn with the octants that its normal is nearest to, and counts where these agree.
+//! After E. Olson, Real-time correlative scan matching (ICRA 2009): the vertical surfaces of one place are entered into a grid
+//! with the octants of their normals. For every translation in range and every heading around the given one, the surfaces of
+//! the other place that fall into cells with the same octant are counted.
 
-use super::context::is_upright;
-use super::fit::Alignment;
+use super::alignment::Alignment;
+use super::scan_context::is_wall;
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Rotation, Vector};
 
-/// Edge of the grid's cells, m, and their number from the middle to the border.
+/// Edge of the grid cells, m.
 const CELL_M: f64 = 0.5;
+/// Number of cells from the centre to the border: 20 m, as the Scan Context descriptor.
 const HALF: i32 = 40;
-/// Reach of the search: cells to every side, and turns to each with their step, rad.
+/// Search range of the translation in cells to each side: 3 m, the maximum distance of two views of one place.
 const REACH: i32 = 6;
-const TURNS: i32 = 3;
-const TURN_STEP: f64 = 3.0 * std::f64::consts::PI / 180.0;
-/// Most walls that are counted.
-const WALLS: usize = 300;
-/// Two starts are others when they differ by more, cells and turns.
-const OTHER: (i32, i32) = (2, 3);
+/// Number of heading steps to each side: 9 degrees, more than one sector of the descriptor.
+const HEADING_STEPS: i32 = 3;
+/// Heading step, rad.
+const HEADING_STEP: f64 = 3.0 * std::f64::consts::PI / 180.0;
+/// Maximum number of walls in the correlation.
+const MAX_WALLS: usize = 300;
+/// Alignments within this many cells and heading steps of a stronger one are suppressed.
+const SUPPRESSION: (i32, i32) = (2, 3);
 
-/// The `count` most promising alignments of `from` with `to`, turned by about `yaw` and lifted by `up_m`.
-pub(super) fn starts(from: &[Patch], to: &[Patch], (yaw, up_m): (f64, f64), count: usize) -> Vec<Alignment> {
+/// The `count` best alignments of `from` with `to`, at headings around `yaw` and with a vertical shift of `up_m`.
+pub(super) fn start_alignments(from: &[Patch], to: &[Patch], (yaw, up_m): (f64, f64), count: usize) -> Vec<Alignment> {
     let grid = Grid::of(to);
-    let walls: Vec<&Patch> = from.iter().filter(|patch| is_upright(patch)).collect();
-    let walls: Vec<&Patch> = walls.iter().step_by(walls.len().div_ceil(WALLS).max(1)).copied().collect();
+    let walls: Vec<&Patch> = from.iter().filter(|patch| is_wall(patch)).collect();
+    let walls: Vec<&Patch> = walls.iter().step_by(walls.len().div_ceil(MAX_WALLS).max(1)).copied().collect();
     let mut found: Vec<(u32, [i32; 3])> = Vec::new();
-    for turn in -TURNS..=TURNS {
-        let rotation = Rotation::from_scaled_axis(Vector::z() * (yaw + f64::from(turn) * TURN_STEP));
+    for step in -HEADING_STEPS..=HEADING_STEPS {
+        let rotation = Rotation::from_scaled_axis(Vector::z() * (yaw + f64::from(step) * HEADING_STEP));
         let cells: Vec<(i32, i32, u8)> = walls
             .iter()
             .map(|wall| {
@@ -38,33 +41,33 @@ pub(super) fn starts(from: &[Patch], to: &[Patch], (yaw, up_m): (f64, f64), coun
             .collect();
         for (x, y) in (-REACH..=REACH).flat_map(|x| (-REACH..=REACH).map(move |y| (x, y))) {
             let hits = cells.iter().filter(|(u, v, octant)| grid.at(u + x, v + y) & octant != 0).count();
-            found.push((hits as u32, [turn, x, y]));
+            found.push((hits as u32, [step, x, y]));
         }
     }
     found.sort_by_key(|(hits, at)| (std::cmp::Reverse(*hits), *at));
     let mut chosen: Vec<[i32; 3]> = Vec::new();
     for (_, at) in found {
         let is_other = |one: &[i32; 3]| {
-            (one[0] - at[0]).abs() > OTHER.1 || (one[1] - at[1]).abs().max((one[2] - at[2]).abs()) > OTHER.0
+            (one[0] - at[0]).abs() > SUPPRESSION.1 || (one[1] - at[1]).abs().max((one[2] - at[2]).abs()) > SUPPRESSION.0
         };
         if chosen.len() < count && chosen.iter().all(is_other) {
             chosen.push(at);
         }
     }
-    let start = |[turn, x, y]: [i32; 3]| Alignment {
-        yaw: yaw + f64::from(turn) * TURN_STEP,
+    let start = |[step, x, y]: [i32; 3]| Alignment {
+        yaw: yaw + f64::from(step) * HEADING_STEP,
         shift: Vector::new(f64::from(x) * CELL_M, f64::from(y) * CELL_M, up_m),
     };
     chosen.into_iter().map(start).collect()
 }
 
-/// Walls from above: of each cell the octants of the normals in it and in its neighbours, a bit each.
+/// Horizontal grid: for each cell a bit per octant of the normals in the cell and its neighbours.
 struct Grid(Vec<u8>);
 
 impl Grid {
     fn of(patches: &[Patch]) -> Self {
         let mut grid = Self(vec![0; (4 * HALF * HALF) as usize]);
-        for patch in patches.iter().filter(|patch| is_upright(patch)) {
+        for patch in patches.iter().filter(|patch| is_wall(patch)) {
             let (x, y) = cell(&patch.centre);
             let (nearest, next) = octants(&patch.normal);
             for (u, v) in (x - 1..=x + 1).flat_map(|u| (y - 1..=y + 1).map(move |v| (u, v))) {
@@ -90,7 +93,7 @@ fn cell(point: &Vector) -> (i32, i32) {
     ((point.x / CELL_M).floor() as i32, (point.y / CELL_M).floor() as i32)
 }
 
-/// The octant whose middle a direction is nearest to, and the one next to it, 0..8.
+/// The nearest and the second nearest octant of a direction, 0..8.
 fn octants(direction: &Vector) -> (u8, u8) {
     let eighths = direction.y.atan2(direction.x) / std::f64::consts::FRAC_PI_4;
     let nearest = eighths.round();

@@ -1,13 +1,12 @@
-//! The lidar among the unknowns: how its ranges differ from what the open loop took them for.
+//! Lidar model of the registration: a range bias common to all surfels.
 //!
-//! Common to all that was seen, it stands beside the knots' corrections: a range longer by `o` moves a surfel's centre
-//! by `u o`, with `u` the unit vector to it from the lidar.
+//! A range bias of `o` moves the centre of a surfel by `u o`, with `u` the unit vector from the lidar to it.
 //!
-//! How the lidar sits on the IMU is not among the unknowns: the open loop has told it by the IMU, and what was seen
-//! says nothing more of it. As the open loop went on it learnt better, so what it then took the head's poses for is
-//! told anew: [`remounted`].
+//! The extrinsics are not estimated here: the open loop determined them with the IMU, and the matches of the registration add
+//! no information. As their estimate changed during the open loop, [`recalibrated`] recomputes the head's poses with the final
+//! extrinsics.
 
-use super::equations::Beside;
+use super::equations::SharedTerm;
 use crate::estimation::EstimatorSpec;
 use crate::estimation::surfel::Patch;
 use crate::estimation::survey::Survey;
@@ -15,30 +14,30 @@ use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
 use nalgebra::SVector;
 
-/// Unknowns of the lidar: the offset of its ranges, m.
-pub(super) const SHARED: usize = 1;
-/// Those of one residual, or of a step.
-pub(super) type Shared = SVector<f64, SHARED>;
+/// Number of unknowns shared by all times: the range bias, m.
+pub(super) const SHARED_DIMENSION: usize = 1;
+/// Vector over the shared unknowns: a derivative or a step.
+pub(super) type Shared = SVector<f64, SHARED_DIMENSION>;
 
-/// How the lidar measures: as calibrated, and as it is known now.
+/// Pose and estimated correction of the lidar.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Mount {
-    /// Where the lidar is in the head, as the open loop left it.
+pub(super) struct LidarModel {
+    /// Pose of the lidar in the head frame, by the open loop.
     head_from_laser: Pose,
     pub(super) lidar: LidarCorrection,
-    /// Standard deviation of the ranges' offset, m.
+    /// Prior standard deviation of the range bias, m.
     range_sigma_m: f64,
 }
 
-/// From where a surfel was seen.
+/// The vector from the lidar to a surfel.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sight {
-    /// From the lidar to the surfel's centre, m.
-    reach: Vector,
+pub(super) struct LidarRay {
+    /// Vector to the centre of the surfel, in map axes, m.
+    vector: Vector,
 }
 
-impl Mount {
-    /// As the open loop left it, with the ranges held where nothing tells their offset.
+impl LidarModel {
+    /// Starts with the estimate of the open loop; the range bias is fixed if it is unobservable.
     pub(super) fn new(
         calibration: &Calibration,
         (lidar, ranges_are_held): (&LidarCorrection, bool),
@@ -48,74 +47,76 @@ impl Mount {
         Self {
             head_from_laser: calibration.head_from_corrected_laser(lidar),
             lidar: *lidar,
-            // What is left at zero is held there.
+            // A tiny standard deviation fixes the bias.
             range_sigma_m: range_sigma_m.max(1e-9),
         }
     }
 
-    /// From where `patch`, made by the correction `made_by`, was seen by a head at `map_from_head`; the patch becomes
-    /// what the lidar as it is known now makes of it.
-    pub(super) fn sight(&self, map_from_head: &Pose, patch: &mut Patch, made_by: &LidarCorrection) -> Sight {
+    /// Vector from the lidar to `patch`, observed by a head at `map_from_head`.
+    ///
+    /// The patch was built with the correction `made_by`; it is moved to match the current range bias.
+    pub(super) fn ray_to(&self, map_from_head: &Pose, patch: &mut Patch, made_by: &LidarCorrection) -> LidarRay {
         let lidar_at = (map_from_head * self.head_from_laser).translation.vector;
-        let seen = patch.centre - lidar_at;
-        let reach = seen * (1.0 + (self.lidar.range_m - made_by.range_m) / seen.norm());
-        patch.centre = lidar_at + reach;
-        Sight { reach }
+        let old_vector = patch.centre - lidar_at;
+        let vector = old_vector * (1.0 + (self.lidar.range_m - made_by.range_m) / old_vector.norm());
+        patch.centre = lidar_at + vector;
+        LidarRay { vector }
     }
 
-    /// Adds what the calibration says of the correction so far.
-    pub(super) fn add_to(&self, beside: &mut Beside) {
-        beside.add(&Shared::new(1.0), self.lidar.range_m, self.range_sigma_m.powi(-2));
+    /// Adds the prior of the range bias.
+    pub(super) fn add_to(&self, shared_term: &mut SharedTerm) {
+        shared_term.add(&Shared::new(1.0), self.lidar.range_m, self.range_sigma_m.powi(-2));
     }
 
-    /// Takes a step.
+    /// Applies a step.
     pub(super) fn correct(&mut self, step: &Shared) {
         self.lidar.range_m += step[0];
     }
 }
 
-impl Sight {
-    /// By how much the distance along `normal` grows with the ranges.
-    pub(super) fn by(&self, normal: &Vector) -> Shared {
-        Shared::new(normal.dot(&self.reach.normalize()))
+impl LidarRay {
+    /// Derivative of the distance along `normal` by the range bias.
+    pub(super) fn derivative(&self, normal: &Vector) -> Shared {
+        Shared::new(normal.dot(&self.vector.normalize()))
     }
 
-    /// The trajectory turns at its time.
-    pub(super) fn turn(&mut self, turn: &Rotation) {
-        self.reach = turn * self.reach;
+    /// Rotates the vector with the trajectory.
+    pub(super) fn rotate(&mut self, turn: &Rotation) {
+        self.vector = turn * self.vector;
     }
 
-    /// Moves a patch, seen from here, by a step of the lidar; by how much its centre moves, m.
+    /// Moves the patch by a step of the lidar; returns the displacement of the centre, m.
     pub(super) fn correct(&mut self, step: &Shared, patch: &mut Patch) -> Vector {
-        let moved = self.reach * (step[0] / self.reach.norm());
+        let moved = self.vector * (step[0] / self.vector.norm());
         patch.centre += moved;
-        self.reach += moved;
+        self.vector += moved;
         moved
     }
 }
 
-/// Turns a patch about its centre.
-pub(super) fn turn_patch(patch: &mut Patch, turn: &Rotation) {
+/// Rotates a patch about the centre.
+pub(super) fn rotate_patch(patch: &mut Patch, turn: &Rotation) {
     let turn = turn.to_rotation_matrix().into_inner();
     patch.normal = turn * patch.normal;
     patch.covariance = turn * patch.covariance * turn.transpose();
 }
 
-/// The trajectory of a head whose lidar had been known all along as `lidar`, while what was seen stays where it is: the
-/// lidar was where the survey has it, and the head is told from there.
-pub(super) fn remounted(
+/// Recomputes the trajectory of the head with the final extrinsics `lidar`.
+///
+/// The surfels, and therefore the poses of the lidar, stay unchanged; the poses of the head follow from these.
+pub(super) fn recalibrated(
     map_from_head: &Trajectory,
     survey: &Survey,
     (calibration, lidar): (&Calibration, &LidarCorrection),
 ) -> Trajectory {
     let laser_from_head = calibration.head_from_corrected_laser(lidar).inverse();
-    let told_anew = |(stamp, pose): (_, &Pose)| {
+    let recalibrate = |(stamp, pose): (_, &Pose)| {
         let then = survey.lidar_at(stamp);
         let head_from_head =
             then.map_or_else(Pose::identity, |then| calibration.head_from_corrected_laser(then) * laser_from_head);
         (stamp, pose * head_from_head)
     };
-    Trajectory::from_poses(map_from_head.iter().map(told_anew)).unwrap_or_default()
+    Trajectory::from_poses(map_from_head.iter().map(recalibrate)).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -145,10 +146,10 @@ mod tests {
         }
     }
 
-    fn mount(lidar: LidarCorrection) -> Mount {
+    fn model(lidar: LidarCorrection) -> LidarModel {
         let mut spec = load("default").unwrap();
         spec.extrinsics.estimated = true;
-        Mount::new(&calibration(), (&lidar, false), &spec)
+        LidarModel::new(&calibration(), (&lidar, false), &spec)
     }
 
     fn map_from_head() -> Pose {
@@ -163,43 +164,43 @@ mod tests {
         }
     }
 
-    /// A patch `range_m` along `direction` from the lidar of `mount`.
-    fn seen(mount: &Mount, direction: &Vector, range_m: f64) -> Patch {
-        let map_from_laser = map_from_head() * mount.head_from_laser;
+    /// A patch at `range_m` along `direction` from the lidar of `model`.
+    fn patch_at(model: &LidarModel, direction: &Vector, range_m: f64) -> Patch {
+        let map_from_laser = map_from_head() * model.head_from_laser;
         let centre = map_from_laser.translation.vector + map_from_laser.rotation * direction * range_m;
         let covariance = Matrix::from_diagonal(&Vector::new(0.02, 0.05, 1e-4));
         Patch { centre, normal: Vector::z(), points: 50.0, covariance, roughness_variance: 0.0, level: 0 }
     }
 
     #[test]
-    fn a_patch_made_by_older_ranges_becomes_that_of_the_newer() {
-        let (direction, now) = (Vector::new(2.0, 3.0, -1.0).normalize(), mount(correction(1.0)));
+    fn patch_with_an_old_range_bias_is_moved_to_the_new_one() {
+        let (direction, now) = (Vector::new(2.0, 3.0, -1.0).normalize(), model(correction(1.0)));
         let then = LidarCorrection { range_m: -0.007, ..now.lidar };
-        let mut patch = seen(&now, &direction, 3.0 + then.range_m);
-        now.sight(&map_from_head(), &mut patch, &then);
-        assert_relative_eq!(patch.centre, seen(&now, &direction, 3.0 + now.lidar.range_m).centre, epsilon = 1e-12);
+        let mut patch = patch_at(&now, &direction, 3.0 + then.range_m);
+        now.ray_to(&map_from_head(), &mut patch, &then);
+        assert_relative_eq!(patch.centre, patch_at(&now, &direction, 3.0 + now.lidar.range_m).centre, epsilon = 1e-12);
     }
 
     #[test]
-    fn derivatives_are_those_of_differences_and_steps_move_the_patch_by_them() {
-        let (start, normal) = (mount(correction(1.0)), Vector::new(0.3, -0.8, 0.5).normalize());
-        let patch = seen(&start, &Vector::new(2.0, 3.0, -4.0).normalize(), 4.0);
-        let sight = start.sight(&map_from_head(), &mut { patch }, &start.lidar);
-        for k in 0..SHARED {
+    fn derivatives_match_finite_differences_and_steps() {
+        let (start, normal) = (model(correction(1.0)), Vector::new(0.3, -0.8, 0.5).normalize());
+        let patch = patch_at(&start, &Vector::new(2.0, 3.0, -4.0).normalize(), 4.0);
+        let ray = start.ray_to(&map_from_head(), &mut { patch }, &start.lidar);
+        for k in 0..SHARED_DIMENSION {
             let step = Shared::from_fn(|row, _| if row == k { 1e-6 } else { 0.0 });
             let mut there = start;
             there.correct(&step);
             let mut moved = patch;
-            there.sight(&map_from_head(), &mut moved, &start.lidar);
+            there.ray_to(&map_from_head(), &mut moved, &start.lidar);
             let moved = moved.centre - patch.centre;
-            assert_relative_eq!(sight.by(&normal)[k], normal.dot(&moved) * 1e6, epsilon = 1e-5);
-            let by_step = { sight }.correct(&step, &mut { patch });
+            assert_relative_eq!(ray.derivative(&normal)[k], normal.dot(&moved) * 1e6, epsilon = 1e-5);
+            let by_step = { ray }.correct(&step, &mut { patch });
             assert_relative_eq!(by_step, moved, epsilon = 1e-11);
         }
     }
 
     #[test]
-    fn told_anew_the_lidar_stays_where_it_was() {
+    fn recalibration_keeps_the_poses_of_the_lidar() {
         let stamp = |k: i64| Stamp::from_nanos(k * 500_000_000);
         let mut survey = Survey::default();
         let (early, late) = (correction(-0.5), correction(1.0));
@@ -211,7 +212,7 @@ mod tests {
         });
         let open = Trajectory::from_poses(poses).unwrap();
         let calibration = calibration();
-        let anew = remounted(&open, &survey, (&calibration, &late));
+        let anew = recalibrated(&open, &survey, (&calibration, &late));
         for ((at, before), after) in open.iter().zip(anew.poses()) {
             let known_then = if at <= stamp(0) + Span::from_seconds(0.75) { early } else { late };
             let was = before * calibration.head_from_corrected_laser(&known_then);

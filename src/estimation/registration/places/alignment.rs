@@ -1,34 +1,37 @@
-//! Two places laid upon each other, plane on plane, and whether they are one.
+//! Point-to-plane registration of two places, and the agreement of their surfaces.
 
 use crate::estimation::matching::{Forest, Matcher};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Matrix, Rotation, Vector};
 use nalgebra::{Matrix4, Vector4};
 
-/// Resolutions that places are aligned by; those are compared that say whether they agree.
+/// Number of resolutions used for the registration.
 pub(super) const ALIGNED_LEVELS: usize = 3;
+/// Resolution at which the agreement is evaluated.
 const COMPARED_LEVEL: usize = 1;
-/// Most surfels of a resolution that look for their counterparts.
-const ASKING: usize = 400;
-/// Steps of the alignment a resolution; it is settled when one is smaller, m and rad.
-const STEPS: usize = 5;
-const SETTLED: f64 = 1e-3;
-/// Counterparts are no farther apart along their normals, in edges of their resolution.
+/// Maximum number of query surfels per resolution.
+const MAX_QUERIES: usize = 400;
+/// Maximum number of iterations per resolution.
+const MAX_ITERATIONS: usize = 5;
+/// The iterations end when a step is smaller than this, m and rad.
+const CONVERGED: f64 = 1e-3;
+/// Maximum distance of matches along the normal, in voxel edges of the resolution.
 const GATE_EDGES: f64 = 0.25;
-/// A surface faces a direction when its normal leans to it by more than this cosine.
-const FACING: f64 = 0.7;
-/// Fewest surfaces that must face a direction for it to be judged.
-const FEWEST_FACING: usize = 8;
-/// What a match of two places may err, m: the open loop may have smeared either.
+/// A surface faces a direction if the cosine between normal and direction exceeds this (45 degrees).
+const FACING_COSINE: f64 = 0.7;
+/// Minimum number of surfaces facing a direction for the evaluation.
+const MIN_FACING: usize = 8;
+/// Standard deviation of a match, m: drift within a place distorts the surfaces.
 const MATCH_SIGMA_M: f64 = 0.1;
 
-/// How one place lies beside another. What the first sees at `x` about its head, the second sees at `Rz(yaw) x + shift`
-/// about its own; both along the map's axes.
+/// Relative pose of two levelled places: a point `x` of the first is at `Rz(yaw) x + shift` in the second.
+///
+/// Both are relative to their head positions, in map axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::estimation::registration) struct Alignment {
-    /// rad.
+    /// Heading difference, rad.
     pub(in crate::estimation::registration) yaw: f64,
-    /// m.
+    /// Translation, m.
     pub(in crate::estimation::registration) shift: Vector,
 }
 
@@ -41,64 +44,64 @@ impl Alignment {
         Patch { centre: turn * patch.centre + self.shift, normal: turn * patch.normal, ..*patch }
     }
 
-    /// How far apart two alignments are, m and rad.
-    pub(super) fn apart(&self, other: &Self) -> (f64, f64) {
+    /// Difference of two alignments, m and rad.
+    pub(super) fn difference(&self, other: &Self) -> (f64, f64) {
         let turns = (self.yaw - other.yaw) / std::f64::consts::TAU;
         ((self.shift - other.shift).norm(), ((turns - turns.round()) * std::f64::consts::TAU).abs())
     }
 }
 
-/// A place ready to be laid upon others.
-pub(super) struct Seen {
-    /// All surfels of the resolutions that are aligned, and a tree of them.
+/// Surfels of a place with a search index.
+pub(super) struct PlaceSurfels {
+    /// All surfels of the used resolutions.
     patches: Vec<Patch>,
     forest: Forest,
-    /// Some of each resolution.
-    asking: Vec<Vec<Patch>>,
+    /// Subsampled query surfels of each resolution.
+    queries: Vec<Vec<Patch>>,
 }
 
-/// An alignment with what speaks for it.
+/// Result of a registration.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fit {
     pub(super) alignment: Alignment,
-    /// What the matches know of `[yaw, shift]`.
+    /// Information of the matches about `[yaw, shift]`, 1/rad^2 and 1/m^2.
     pub(super) information: Matrix4<f64>,
-    /// Matches of the last step.
+    /// Number of matches in the last iteration.
     pub(super) matches: usize,
 }
 
-impl Seen {
-    /// Of a place's patches, resolution by resolution.
+impl PlaceSurfels {
+    /// Builds the index from patches by resolution.
     pub(super) fn new(levels: Vec<Vec<Patch>>, matcher: &Matcher) -> Self {
-        let thinned = |patches: &Vec<Patch>| {
-            patches.iter().step_by(patches.len().div_ceil(ASKING).max(1)).copied().collect::<Vec<_>>()
+        let subsample = |patches: &Vec<Patch>| {
+            patches.iter().step_by(patches.len().div_ceil(MAX_QUERIES).max(1)).copied().collect::<Vec<_>>()
         };
-        let asking = levels.iter().map(thinned).collect();
+        let queries = levels.iter().map(subsample).collect();
         let patches: Vec<Patch> = levels.into_iter().flatten().collect();
         let forest = matcher.plant(&patches);
-        Self { patches, forest, asking }
+        Self { patches, forest, queries }
     }
 
-    /// Its finest patches.
+    /// Query surfels of the finest resolution.
     pub(super) fn finest(&self) -> &[Patch] {
-        self.asking.first().map_or(&[], Vec::as_slice)
+        self.queries.first().map_or(&[], Vec::as_slice)
     }
 
-    /// The nearest patch to `patch`, where the two can be one surface.
+    /// The patch nearest to `patch`, if the two pass the match gates.
     fn counterpart(&self, patch: &Patch, matcher: &Matcher, gate_m: f64) -> Option<&Patch> {
         let nearest = *matcher.neighbours(&self.forest, patch, 1).first()?;
         Some(&self.patches[nearest as usize]).filter(|other| matcher.agree(patch, other, gate_m))
     }
 }
 
-/// Lays `from` upon `to`, from the coarsest resolution to the finest; `None` where too little matches.
-pub(super) fn lay(from: &Seen, to: &Seen, start: &Alignment, matcher: &Matcher) -> Option<Fit> {
+/// Registers `from` to `to` from the coarsest resolution to the finest; `None` without matches.
+pub(super) fn align(from: &PlaceSurfels, to: &PlaceSurfels, start: &Alignment, matcher: &Matcher) -> Option<Fit> {
     let mut fit = Fit { alignment: *start, information: Matrix4::zeros(), matches: 0 };
-    for level in (0..from.asking.len()).rev() {
+    for level in (0..from.queries.len()).rev() {
         let gate_m = GATE_EDGES * matcher.finest_voxel_m * f64::from(1_u32 << level);
-        for _ in 0..STEPS {
+        for _ in 0..MAX_ITERATIONS {
             let step = step(&mut fit, (from, to), level, gate_m, matcher)?;
-            if step.norm() < SETTLED {
+            if step.norm() < CONVERGED {
                 break;
             }
         }
@@ -106,17 +109,17 @@ pub(super) fn lay(from: &Seen, to: &Seen, start: &Alignment, matcher: &Matcher) 
     Some(fit)
 }
 
-/// One step towards the planes of the counterparts: `e = n^T (Rz x + shift - mu)`, by yaw and shift.
+/// One Gauss-Newton step of `e = n^T (Rz x + shift - mu)` over yaw and shift.
 fn step(
     fit: &mut Fit,
-    (from, to): (&Seen, &Seen),
+    (from, to): (&PlaceSurfels, &PlaceSurfels),
     level: usize,
     gate_m: f64,
     matcher: &Matcher,
 ) -> Option<Vector4<f64>> {
     let turn = fit.alignment.turn();
     let (mut square, mut right, mut matches) = (Matrix4::zeros(), Vector4::zeros(), 0);
-    for patch in &from.asking[level] {
+    for patch in &from.queries[level] {
         let moved = fit.alignment.moved(patch, &turn);
         let Some(other) = to.counterpart(&moved, matcher, gate_m) else { continue };
         let (n, arm) = (other.normal, moved.centre - fit.alignment.shift);
@@ -127,7 +130,7 @@ fn step(
         right -= by * (e * robust / MATCH_SIGMA_M.powi(2));
         matches += 1;
     }
-    // Where nothing holds a direction it stays, as if known to a metre and a radian.
+    // A prior of 1 m and 1 rad keeps unobservable directions.
     let step = (square + Matrix4::identity()).cholesky()?.solve(&right);
     fit.alignment.yaw += step[0];
     fit.alignment.shift += Vector::new(step[1], step[2], step[3]);
@@ -135,29 +138,30 @@ fn step(
     (matches > 0).then_some(step)
 }
 
-/// The share of `from`'s surfaces that lie on some of `to`'s, within `gate_m`: the least of those that face the
-/// vertical, and each of two horizontal directions at right angles, which are those that most and least of them face.
-/// In a corridor floor and walls agree wherever along it one is. `None` where too few face a direction to say.
+/// Fraction of the surfaces of `from` that match `to` within `gate_m`: the minimum over three directions.
+///
+/// The directions are the vertical and the horizontal principal axes of the normals. The minimum is used because in a corridor
+/// floor and walls match at any position along it. `None` if too few surfaces face one of the directions.
 pub(super) fn agreement(
-    from: &Seen,
-    to: &Seen,
+    from: &PlaceSurfels,
+    to: &PlaceSurfels,
     alignment: &Alignment,
     (matcher, gate_m): (&Matcher, f64),
 ) -> Option<f64> {
-    let asking = from.asking.get(COMPARED_LEVEL.min(from.asking.len().saturating_sub(1)))?;
+    let queries = from.queries.get(COMPARED_LEVEL.min(from.queries.len().saturating_sub(1)))?;
     let turn = alignment.turn();
-    let directions = directions(asking);
+    let directions = directions(queries);
     let mut facing = [(0_usize, 0_usize); 3];
-    for patch in asking {
-        let Some(k) = directions.iter().position(|d| patch.normal.dot(d).abs() > FACING) else { continue };
+    for patch in queries {
+        let Some(k) = directions.iter().position(|d| patch.normal.dot(d).abs() > FACING_COSINE) else { continue };
         let agrees = to.counterpart(&alignment.moved(patch, &turn), matcher, gate_m).is_some();
         facing[k] = (facing[k].0 + usize::from(agrees), facing[k].1 + 1);
     }
-    let share = |(agreeing, all): &(usize, usize)| (*all >= FEWEST_FACING).then(|| *agreeing as f64 / *all as f64);
-    facing.iter().map(share).try_fold(f64::INFINITY, |least, share| Some(least.min(share?)))
+    let fraction = |(agreeing, all): &(usize, usize)| (*all >= MIN_FACING).then(|| *agreeing as f64 / *all as f64);
+    facing.iter().map(fraction).try_fold(f64::INFINITY, |smallest, fraction| Some(smallest.min(fraction?)))
 }
 
-/// The vertical, and two horizontal directions.
+/// The vertical and the two horizontal principal axes of the normals.
 fn directions(patches: &[Patch]) -> [Vector; 3] {
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for n in patches.iter().map(|patch| patch.normal) {

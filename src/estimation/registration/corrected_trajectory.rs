@@ -1,0 +1,302 @@
+//! The trajectory under correction, and the residuals against the motion of the open loop.
+//!
+//! ```text
+//! e_r = log(C_b C_a^-1)                             relative rotation between two nodes
+//! e_t = (t'_b - t'_a) - C (t_b - t_a)               relative translation, in open-loop axes
+//! e_l = (-(C z)_y, (C z)_x)                         roll and pitch, which gravity determined
+//! ```
+//!
+//! `C = R' R^T` is the accumulated correction, by default at the middle of the interval; in `e_l` it includes a previous pose graph
+//! optimisation. With the next corrections `dr`, `dt` and `v = C (t_b - t_a)`,
+//!
+//! ```text
+//! de_r = dr_b - dr_a       de_t = dt_b - dt_a + v x (dr_a + dr_b) / 2       de_l = [dr]_(x, y)
+//! ```
+
+use super::RegistrationSpec;
+use super::equations::{Equations, PairTerm, UnaryTerm};
+use crate::estimation::nominal::Correction;
+use crate::estimation::spline::Basis;
+use crate::geometry::{Pose, PoseCovariance, Rotation, Trajectory, Vector, skew};
+use crate::time::{Span, Stamp};
+use nalgebra::{Matrix6, Vector6};
+
+/// Standard deviation of position, m, and heading, rad, of the first pose: it defines the map frame.
+const START_SIGMA: (f64, f64) = (1e-4, 1e-5);
+
+/// A trajectory under iterative correction.
+#[derive(Debug, Clone)]
+pub(super) struct CorrectedTrajectory {
+    spacing_s: f64,
+    times_s: Vec<f64>,
+    poses: Vec<Pose>,
+    nodes: Vec<Node>,
+}
+
+/// A time at which the corrected trajectory is compared with the open loop.
+#[derive(Debug, Clone)]
+struct Node {
+    stamp: Stamp,
+    basis: Basis,
+    /// Open-loop position, m.
+    open_position: Vector,
+    /// Corrected position, m.
+    position: Vector,
+    /// Rotation `C` of the correction.
+    correction: Rotation,
+    /// Rotation of a previous pose graph optimisation.
+    previous_correction: Rotation,
+    /// Variances per axis of the open-loop translation and rotation since the previous node, m^2 and rad^2.
+    variances: (f64, f64),
+}
+
+impl CorrectedTrajectory {
+    /// Starts with the open-loop trajectory; `None` if it has fewer than two poses.
+    ///
+    /// The spacing of the nodes is half the knot spacing.
+    pub(super) fn new(
+        map_from_head: &Trajectory,
+        covariances: &[(Stamp, PoseCovariance)],
+        origin: Stamp,
+        spec: &RegistrationSpec,
+    ) -> Option<Self> {
+        let (first, last) = map_from_head.span().filter(|(first, last)| first < last)?;
+        let seconds = |stamp: Stamp| stamp.seconds_since(origin);
+        let (start_s, end_s) = (seconds(first), seconds(last));
+        let intervals = ((end_s - start_s) / (0.5 * spec.knot_spacing_s)).ceil().max(1.0) as usize;
+        let step_s = (end_s - start_s) / intervals as f64;
+        let (translation_walk, rotation_walk) =
+            (spec.drift_m_per_sqrt_s.powi(2), spec.turn_deg_per_sqrt_s.to_radians().powi(2));
+        let node = |k: usize| {
+            let tau_s = (start_s + step_s * k as f64).min(end_s);
+            let stamp = (origin + Span::from_seconds(tau_s)).clamp(first, last);
+            let open_position = map_from_head.at(stamp)?.translation.vector;
+            let (translation, rotation) =
+                drift(covariances, stamp - Span::from_seconds(step_s), stamp, spec.correlation_s);
+            let variances = (translation_walk * step_s + translation, rotation_walk * step_s + rotation);
+            let basis = Basis::at(tau_s, spec.knot_spacing_s);
+            let (correction, previous_correction) = (Rotation::identity(), Rotation::identity());
+            Some(Node {
+                stamp,
+                basis,
+                open_position,
+                position: open_position,
+                correction,
+                previous_correction,
+                variances,
+            })
+        };
+        let nodes = (0..=intervals).map(node).collect::<Option<_>>()?;
+        let times_s = map_from_head.stamps().iter().map(|stamp| seconds(*stamp)).collect();
+        Some(Self { spacing_s: spec.knot_spacing_s, times_s, poses: map_from_head.poses().to_vec(), nodes })
+    }
+
+    /// First and last time, s.
+    pub(super) fn span_s(&self) -> (f64, f64) {
+        (self.times_s[0], self.times_s[self.times_s.len() - 1])
+    }
+
+    /// Index of the first knot, and number of knots.
+    pub(super) fn knots(&self) -> (i64, usize) {
+        let (start_s, end_s) = self.span_s();
+        let first = Basis::at(start_s, self.spacing_s).first;
+        (first, (Basis::at(end_s, self.spacing_s).first + 4 - first) as usize)
+    }
+
+    /// The correction spline's basis at `tau_s`.
+    pub(super) fn basis_at(&self, tau_s: f64) -> Basis {
+        Basis::at(tau_s, self.spacing_s)
+    }
+
+    /// Takes roll and pitch from `open_loop`; the trajectory was created from `optimised`, the pose graph solution.
+    pub(super) fn with_gravity_from(mut self, open_loop: &Trajectory, optimised: &Trajectory) -> Self {
+        for node in &mut self.nodes {
+            if let (Some(before), Some(now)) = (open_loop.at(node.stamp), optimised.at(node.stamp)) {
+                node.previous_correction = now.rotation * before.rotation.inverse();
+            }
+        }
+        self
+    }
+
+    /// `map_from_head` at `tau_s`, interpolated linearly.
+    pub(super) fn pose_at(&self, tau_s: f64) -> Pose {
+        let after = self.times_s.partition_point(|t| *t <= tau_s).clamp(1, self.times_s.len() - 1);
+        let (t0, t1) = (self.times_s[after - 1], self.times_s[after]);
+        let (a, b, x) = (&self.poses[after - 1], &self.poses[after], ((tau_s - t0) / (t1 - t0)).clamp(0.0, 1.0));
+        let turn = (a.rotation.inverse() * b.rotation).scaled_axis() * x;
+        let position = a.translation.vector.lerp(&b.translation.vector, x);
+        Pose::from_parts(position.into(), a.rotation * Rotation::from_scaled_axis(turn))
+    }
+
+    /// Adds the residuals against the open loop.
+    pub(super) fn add_to(&self, equations: &mut Equations, level_sigma_rad: f64) {
+        for pair in self.nodes.windows(2) {
+            let pair_term = deviation(&pair[0], &pair[1]).pair_term();
+            equations.add_unary(&pair[0].basis, &pair_term.first);
+            equations.add_unary(&pair[1].basis, &pair_term.second);
+            equations.add_cross(&pair[0].basis, &pair[1].basis, &pair_term.cross);
+        }
+        for node in &self.nodes {
+            let up = node.correction * node.previous_correction * Vector::z();
+            let mut unary = UnaryTerm::default();
+            for (axis, tilt) in [-up.y, up.x].into_iter().enumerate() {
+                unary.add(&unit(axis), tilt, level_sigma_rad.powi(-2));
+            }
+            equations.add_unary(&node.basis, &unary);
+        }
+        self.fix_start(equations);
+    }
+
+    /// Fixes position and heading of the first pose.
+    fn fix_start(&self, equations: &mut Equations) {
+        let Some(first) = self.nodes.first() else { return };
+        let mut unary = UnaryTerm::default();
+        unary.add(&unit(2), first.correction.scaled_axis().z, START_SIGMA.1.powi(-2));
+        let moved = first.position - first.open_position;
+        for axis in 0..3 {
+            unary.add(&unit(3 + axis), moved[axis], START_SIGMA.0.powi(-2));
+        }
+        equations.add_unary(&first.basis, &unary);
+    }
+
+    /// Applies a solution of the equations.
+    pub(super) fn correct(&mut self, x: &[f64]) {
+        let (first_knot, _) = self.knots();
+        for (tau_s, pose) in self.times_s.iter().zip(&mut self.poses) {
+            let by = Correction::of_spline(&Basis::at(*tau_s, self.spacing_s), first_knot, x);
+            pose.rotation = Rotation::from_scaled_axis(by.rotation) * pose.rotation;
+            pose.rotation.renormalize_fast();
+            pose.translation.vector += by.translation;
+        }
+        for node in &mut self.nodes {
+            let by = Correction::of_spline(&node.basis, first_knot, x);
+            node.correction = Rotation::from_scaled_axis(by.rotation) * node.correction;
+            node.position += by.translation;
+        }
+    }
+
+    /// The corrected trajectory at the stamps of the open loop.
+    pub(super) fn into_trajectory(self, stamps: &[Stamp]) -> Trajectory {
+        Trajectory::from_poses(stamps.iter().copied().zip(self.poses)).unwrap_or_default()
+    }
+}
+
+/// Residuals `e_r` and `e_t` between two nodes, and derivatives by the next corrections of both.
+struct Deviation {
+    e: Vector6<f64>,
+    by_first: Matrix6<f64>,
+    by_second: Matrix6<f64>,
+    variances: (f64, f64),
+}
+
+fn deviation(a: &Node, b: &Node) -> Deviation {
+    let rotation_error = (b.correction * a.correction.inverse()).scaled_axis();
+    let middle = Rotation::from_scaled_axis(rotation_error * 0.5) * a.correction;
+    let shift = middle * (b.open_position - a.open_position);
+    let e_t = (b.position - a.position) - shift;
+    let mut by_first = -Matrix6::identity();
+    let mut by_second = Matrix6::identity();
+    let half = skew(&shift) * 0.5;
+    by_first.fixed_view_mut::<3, 3>(3, 0).copy_from(&half);
+    by_second.fixed_view_mut::<3, 3>(3, 0).copy_from(&half);
+    let e = Vector6::new(rotation_error.x, rotation_error.y, rotation_error.z, e_t.x, e_t.y, e_t.z);
+    Deviation { e, by_first, by_second, variances: b.variances }
+}
+
+impl Deviation {
+    fn pair_term(&self) -> PairTerm {
+        let mut pair_term = PairTerm::default();
+        let (shift, turn) = self.variances;
+        for row in 0..6 {
+            let weight = if row < 3 { 1.0 / turn } else { 1.0 / shift };
+            let by = (&self.by_first.row(row).transpose(), &self.by_second.row(row).transpose());
+            pair_term.add(by, self.e[row], weight);
+        }
+        pair_term
+    }
+}
+
+/// Variances per axis of the open loop's drift of position and attitude between two times, m^2 and rad^2.
+///
+/// Sum of the growth of the variance, and of the change of a stationary error: a Gauss-Markov process of variance `s^2` and
+/// correlation time `tau` changes over `h` with variance `2 s^2 h / tau`. The open loop behaves so when it moves from one
+/// fixed view to the next.
+fn drift(covariances: &[(Stamp, PoseCovariance)], from: Stamp, to: Stamp, tau_s: f64) -> (f64, f64) {
+    let at = |stamp: Stamp| {
+        let index = covariances.partition_point(|(s, _)| *s <= stamp).saturating_sub(1);
+        let mean = |c: &PoseCovariance, k: usize| (c[(k, k)] + c[(k + 1, k + 1)] + c[(k + 2, k + 2)]) / 3.0;
+        covariances.get(index).map_or((0.0, 0.0), |(_, c)| (mean(c, 0), mean(c, 3)))
+    };
+    let (before, after) = (at(from), at(to));
+    let changed_fraction = 2.0 * to.seconds_since(from) / tau_s;
+    let drift = |before: f64, after: f64| (after - before).max(0.0) + before.min(after) * changed_fraction;
+    (drift(before.0, after.0), drift(before.1, after.1))
+}
+
+fn unit(axis: usize) -> Vector6<f64> {
+    let mut unit = Vector6::zeros();
+    unit[axis] = 1.0;
+    unit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::from_roll_pitch_yaw;
+    use approx::assert_relative_eq;
+
+    fn node(seed: f64) -> Node {
+        let wave = |k: f64| (seed * 1.7 + k).sin();
+        Node {
+            stamp: Stamp::from_nanos(0),
+            previous_correction: Rotation::identity(),
+            basis: Basis::at(0.3, 1.0),
+            open_position: Vector::new(wave(0.0), wave(1.0), wave(2.0)) * 3.0,
+            position: Vector::new(wave(3.0), wave(4.0), wave(5.0)) * 3.0,
+            correction: from_roll_pitch_yaw(0.001 * wave(6.0), 0.001 * wave(7.0), 0.2 + 0.001 * wave(8.0)),
+            variances: (1e-6, 1e-8),
+        }
+    }
+
+    fn moved(node: &Node, by: &Vector6<f64>) -> Node {
+        let correction = Rotation::from_scaled_axis(Vector::new(by[0], by[1], by[2])) * node.correction;
+        Node { correction, position: node.position + Vector::new(by[3], by[4], by[5]), ..node.clone() }
+    }
+
+    #[test]
+    fn derivatives_match_finite_differences() {
+        let (a, b) = (node(1.0), node(2.0));
+        let at = deviation(&a, &b);
+        let step = 1e-6;
+        for axis in 0..6 {
+            let by = unit(axis) * step;
+            let difference = |there: Deviation, back: Deviation| (there.e - back.e) / (2.0 * step);
+            let first = difference(deviation(&moved(&a, &by), &b), deviation(&moved(&a, &-by), &b));
+            let second = difference(deviation(&a, &moved(&b, &by)), deviation(&a, &moved(&b, &-by)));
+            // The derivatives neglect products of the twist (0.002 rad) with a correction, at a lever arm of up to 10 m.
+            assert_relative_eq!(first, at.by_first.column(axis).into_owned(), epsilon = 0.02);
+            assert_relative_eq!(second, at.by_second.column(axis).into_owned(), epsilon = 0.02);
+        }
+    }
+
+    #[test]
+    fn rigidly_transformed_trajectory_has_no_residual() {
+        let correction = from_roll_pitch_yaw(0.1, -0.2, 1.3);
+        let rigidly =
+            |node: &Node| Node { position: correction * node.open_position + Vector::x(), correction, ..node.clone() };
+        let at = deviation(&rigidly(&node(1.0)), &rigidly(&node(2.0)));
+        assert!(at.e.norm() < 1e-12, "{}", at.e);
+    }
+
+    #[test]
+    fn drift_is_variance_growth_plus_stationary_change() {
+        let covariance =
+            |k: i64, variance: f64| (Stamp::from_nanos(k * 1_000_000_000), PoseCovariance::identity() * variance);
+        let covariances = [covariance(0, 0.0), covariance(1, 2e-6), covariance(2, 1e-6)];
+        let at = |k: i64| Stamp::from_nanos(k * 1_000_000_000);
+        assert_relative_eq!(drift(&covariances, at(0), at(1), 20.0).0, 2e-6);
+        // The variance shrank: only the stationary change remains.
+        assert_relative_eq!(drift(&covariances, at(1), at(2), 20.0).0, 1e-7, max_relative = 1e-12);
+        assert_eq!(drift(&[], at(0), at(1), 20.0), (0.0, 0.0));
+    }
+}

@@ -1,0 +1,70 @@
+//! Divides the recording into places, submaps for place recognition.
+
+use super::PlacesSpec;
+use crate::estimation::registration::corrected_trajectory::CorrectedTrajectory;
+use crate::estimation::registration::submaps::divide;
+use crate::estimation::surfel::Patch;
+use crate::estimation::survey::Survey;
+use crate::geometry::Vector;
+use std::ops::Range;
+
+/// Quantile of the surfel heights that defines the height of the ground: a few surfels are lower, on floors below
+/// stairwells or from outliers.
+const GROUND_QUANTILE: f64 = 0.02;
+
+/// A submap of a few seconds.
+#[derive(Debug, Clone)]
+pub(super) struct Place {
+    /// Middle time, s.
+    pub(super) tau_s: f64,
+    /// Position of the head at that time in the map, m.
+    pub(super) head: Vector,
+    /// Height of the ground relative to the head, m (negative).
+    pub(super) ground_m: f64,
+    /// Range of the surfels in time order.
+    members: Range<usize>,
+}
+
+/// All places and their surfels.
+#[derive(Debug)]
+pub(super) struct PlaceDatabase<'a> {
+    survey: &'a Survey,
+    /// Indices of the sightings of the survey in time order.
+    order: Vec<u32>,
+    pub(super) places: Vec<Place>,
+}
+
+impl<'a> PlaceDatabase<'a> {
+    /// Divides the part of `survey` within the time of `corrected`.
+    pub(super) fn new(survey: &'a Survey, corrected: &CorrectedTrajectory, spec: &PlacesSpec) -> Self {
+        let (start_s, end_s) = corrected.span_s();
+        let tau_s = |k: &u32| survey.sightings[*k as usize].tau_s;
+        let mut order: Vec<u32> = (0..survey.len() as u32).filter(|k| (start_s..=end_s).contains(&tau_s(k))).collect();
+        order.sort_by(|a, b| tau_s(a).total_cmp(&tau_s(b)));
+        let times_s: Vec<f64> = order.iter().map(tau_s).collect();
+        let place = |members: Range<usize>| {
+            let tau_s = 0.5 * (times_s[members.start] + times_s[members.end - 1]);
+            let head = corrected.pose_at(tau_s).translation.vector;
+            let mut heights: Vec<f64> = order[members.clone()]
+                .iter()
+                .map(|k| &survey.sightings[*k as usize].patch)
+                .filter(|patch| patch.level == 0)
+                .map(|patch| patch.centre.z - head.z)
+                .collect();
+            heights.sort_by(f64::total_cmp);
+            let ground_m = heights.get((heights.len() as f64 * GROUND_QUANTILE) as usize).copied().unwrap_or(0.0);
+            Place { tau_s, head, ground_m, members }
+        };
+        let places = divide(&times_s, spec.length_s).into_iter().map(place).collect();
+        Self { survey, order, places }
+    }
+
+    /// Surfels of `level` of a place, relative to the head, in map axes.
+    pub(super) fn patches(&self, place: usize, level: usize) -> impl Iterator<Item = Patch> + '_ {
+        let Place { head, members, .. } = self.places[place].clone();
+        let patches = self.order[members].iter().map(|k| self.survey.sightings[*k as usize].patch);
+        patches
+            .filter(move |patch| patch.level == level)
+            .map(move |patch| Patch { centre: patch.centre - head, ..patch })
+    }
+}

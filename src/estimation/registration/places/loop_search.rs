@@ -1,0 +1,185 @@
+//! Search for loop closures between places.
+
+use super::alignment::{ALIGNED_LEVELS, Alignment, Fit, PlaceSurfels, agreement, align};
+use super::database::PlaceDatabase;
+use super::scan_context::{self, Context};
+use super::{LoopReport, MATCHING_REACH, PlacesSpec, RelativePose, correlation};
+use crate::estimation::matching::Matcher;
+use rayon::prelude::*;
+
+/// Maximum distance of two views of one place, m: up to it the descriptors stay similar.
+const MAX_VIEW_DISTANCE_M: f64 = 3.0;
+/// Number of start alignments per pair.
+const STARTS: usize = 3;
+/// Alignments that differ by less than this, m and rad, are equal.
+const SAME_ALIGNMENT: (f64, f64) = (0.5, 0.1);
+/// The best alignment is ambiguous if a different one has more than this fraction of the agreement.
+const MAX_SECOND_RATIO: f64 = 0.8;
+/// Minimum number of matches for a link between successive places.
+const MIN_LINK_MATCHES: usize = 30;
+
+/// Selects the loops to search for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LoopFilter {
+    /// All loops, including those that the trajectory already satisfies.
+    All,
+    /// Only loops of places without any candidate that agrees at the current pose.
+    OutOfReach,
+}
+
+/// A pair of similar places.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    /// Indices of the later and the earlier place.
+    places: (usize, usize),
+    yaw: f64,
+    distance: f64,
+}
+
+/// Result of the candidates of one place.
+#[derive(Debug, Clone, Copy, Default)]
+struct Outcome {
+    /// Number of candidates that were registered.
+    registered: usize,
+    found: Option<RelativePose>,
+}
+
+/// Searches the place database for loop closures.
+pub(super) struct LoopSearch<'a> {
+    pub(super) database: PlaceDatabase<'a>,
+    pub(super) matcher: &'a Matcher,
+    pub(super) spec: &'a PlacesSpec,
+}
+
+impl LoopSearch<'_> {
+    /// Verified loops in time order, with statistics.
+    pub(super) fn loops(&self, filter: LoopFilter) -> (Vec<RelativePose>, LoopReport) {
+        let outcomes: Vec<Outcome> =
+            self.candidates().into_par_iter().map(|of_place| self.test_candidates(&of_place, filter)).collect();
+        let loops: Vec<RelativePose> = outcomes.iter().filter_map(|outcome| outcome.found).collect();
+        let proposed = outcomes.iter().map(|outcome| outcome.registered).sum();
+        let report = LoopReport { proposed, verified: loops.len(), closed: 0 };
+        (loops, report)
+    }
+
+    /// For each place the most similar earlier places, most similar first.
+    fn candidates(&self) -> Vec<Vec<Candidate>> {
+        let places = &self.database.places;
+        let context = |place: usize| Context::from_patches(self.database.patches(place, 0), places[place].ground_m);
+        let contexts: Vec<Context> = (0..places.len()).into_par_iter().map(context).collect();
+        // Neighbours in time are similar, too, and excluded below: request as many more.
+        let in_time = 2 * (self.spec.min_apart_s / self.spec.length_s).ceil() as usize;
+        let near = scan_context::nearest_by_key(&contexts, self.spec.candidates + in_time);
+        let of_place = |late: usize| {
+            let to_candidate = |early: &usize| {
+                let similarity = contexts[late].compare(&contexts[*early])?;
+                let candidate =
+                    Candidate { places: (late, *early), yaw: similarity.yaw, distance: similarity.distance };
+                Some(candidate).filter(|candidate| self.is_possible(candidate))
+            };
+            let earlier = near[late].iter().filter(|early| **early < late);
+            let mut candidates: Vec<Candidate> = earlier.filter_map(to_candidate).collect();
+            candidates.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+            candidates.truncate(self.spec.tries);
+            candidates
+        };
+        (0..places.len()).into_par_iter().map(of_place).collect()
+    }
+
+    /// Whether similarity, time difference and drift of a candidate are within the limits.
+    fn is_possible(&self, candidate: &Candidate) -> bool {
+        let (late, early) = (&self.database.places[candidate.places.0], &self.database.places[candidate.places.1]);
+        let (max_drift_m, max_heading_error) = self.max_drift(candidate.places);
+        late.tau_s - early.tau_s >= self.spec.min_apart_s
+            && candidate.distance < self.spec.max_distance
+            && (late.head - early.head).norm() < MAX_VIEW_DISTANCE_M + max_drift_m
+            && candidate.yaw.abs() < max_heading_error
+    }
+
+    /// Maximum drift of the open loop between two times, m and rad.
+    fn max_drift(&self, (late, early): (usize, usize)) -> (f64, f64) {
+        let minutes = (self.database.places[late].tau_s - self.database.places[early].tau_s) / 60.0;
+        let spec = self.spec;
+        let turn_deg = spec.max_turn_deg + spec.max_turn_deg_per_min * minutes;
+        (spec.max_drift_m + spec.max_drift_m_per_min * minutes, turn_deg.to_radians())
+    }
+
+    /// Registers the candidates of one place; returns the first verified loop.
+    ///
+    /// With `OutOfReach` it returns no loop if any candidate already agrees at the current pose.
+    fn test_candidates(&self, candidates: &[Candidate], filter: LoopFilter) -> Outcome {
+        let mut outcome = Outcome::default();
+        let Some(first) = candidates.first() else { return outcome };
+        let late = self.surfels(first.places.0);
+        for Candidate { places, yaw, .. } in candidates {
+            let early = self.surfels(places.1);
+            let now = self.current_alignment(*places);
+            let agrees = self.agreement(&late, &early, &now).is_some_and(|ratio| ratio >= self.spec.min_agreement);
+            if agrees && filter == LoopFilter::OutOfReach {
+                return Outcome { found: None, ..outcome };
+            }
+            outcome.registered += 1;
+            let Some(fit) = self.verify((&late, &early), *places, *yaw) else { continue };
+            let (shift_m, turn) = fit.alignment.difference(&now);
+            if shift_m < MATCHING_REACH.0 && turn < MATCHING_REACH.1 && filter == LoopFilter::OutOfReach {
+                return Outcome { found: None, ..outcome };
+            }
+            let (max_drift_m, max_heading_error) = self.max_drift(*places);
+            if shift_m < max_drift_m && turn < max_heading_error {
+                outcome.found = outcome.found.or(Some(self.relative_pose(*places, &fit)));
+            }
+        }
+        outcome
+    }
+
+    /// Registers two places; `None` if the agreement is insufficient or ambiguous.
+    fn verify(&self, (late, early): (&PlaceSurfels, &PlaceSurfels), places: (usize, usize), yaw: f64) -> Option<Fit> {
+        let ground_m = |place: usize| self.database.places[place].ground_m;
+        let up_m = ground_m(places.1) - ground_m(places.0);
+        let mut starts = correlation::start_alignments(late.finest(), early.finest(), (yaw, up_m), STARTS);
+        starts.push(self.current_alignment(places));
+        let register = |start: &Alignment| {
+            let fit = align(late, early, start, self.matcher)?;
+            Some((self.agreement(late, early, &fit.alignment)?, fit))
+        };
+        let fits: Vec<(f64, Fit)> = starts.iter().filter_map(register).collect();
+        let (best, fit) = *fits.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let is_other = |other: &Fit| {
+            let (shift_m, turn) = other.alignment.difference(&fit.alignment);
+            shift_m > SAME_ALIGNMENT.0 || turn > SAME_ALIGNMENT.1
+        };
+        let next = fits.iter().filter(|(_, other)| is_other(other)).map(|(ratio, _)| *ratio).fold(0.0, f64::max);
+        (best >= self.spec.min_agreement && next < MAX_SECOND_RATIO * best).then_some(fit)
+    }
+
+    /// Relative poses of successive places with enough common surfaces.
+    pub(super) fn links(&self) -> Vec<RelativePose> {
+        let link = |early: usize| {
+            let places = (early + 1, early);
+            let fit =
+                align(&self.surfels(places.0), &self.surfels(places.1), &self.current_alignment(places), self.matcher)?;
+            (fit.matches >= MIN_LINK_MATCHES).then(|| self.relative_pose(places, &fit))
+        };
+        (0..self.database.places.len().saturating_sub(1)).into_par_iter().filter_map(link).collect()
+    }
+
+    fn relative_pose(&self, (late, early): (usize, usize), fit: &Fit) -> RelativePose {
+        let time_s = |place: usize| self.database.places[place].tau_s;
+        let times_s = (time_s(late), time_s(early));
+        RelativePose { times_s, alignment: fit.alignment, information: fit.information }
+    }
+
+    fn surfels(&self, place: usize) -> PlaceSurfels {
+        let levels = 0..ALIGNED_LEVELS.min(self.matcher.levels);
+        PlaceSurfels::new(levels.map(|level| self.database.patches(place, level).collect()).collect(), self.matcher)
+    }
+
+    fn current_alignment(&self, (late, early): (usize, usize)) -> Alignment {
+        let head = |place: usize| self.database.places[place].head;
+        Alignment { yaw: 0.0, shift: head(late) - head(early) }
+    }
+
+    fn agreement(&self, late: &PlaceSurfels, early: &PlaceSurfels, alignment: &Alignment) -> Option<f64> {
+        agreement(late, early, alignment, (self.matcher, self.spec.max_plane_distance_m))
+    }
+}
