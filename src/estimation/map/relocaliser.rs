@@ -364,8 +364,8 @@ mod tests {
             let (wide, high) = (along.norm(), up.norm());
             let (columns, rows) = ((wide / edge_m).ceil() as usize, (high / edge_m).ceil() as usize);
             for (i, j) in (0..columns).flat_map(|i| (0..rows).map(move |j| (i, j))) {
-                let inlier_ratio = |k: usize, of: usize| (k as f64 + at) / of as f64;
-                let centre = corner + along * inlier_ratio(i, columns) + up * inlier_ratio(j, rows);
+                let position = |k: usize, of: usize| (k as f64 + at) / of as f64;
+                let centre = corner + along * position(i, columns) + up * position(j, rows);
                 let (u, v) = (along / wide, up / high);
                 let flat = (u * u.transpose() + v * v.transpose()) * (edge_m * edge_m / 12.0);
                 let covariance: Matrix = flat + normal * normal.transpose() * 1e-4;
@@ -411,11 +411,8 @@ mod tests {
             let direction = Vector::new(wave(2.3), wave(3.1), 0.3 * wave(4.7)).normalize();
             let start = offset_pose(&map_from_query, &from, 20_f64.to_radians() * wave(5.3).signum(), direction);
             let found = relocaliser.find(&query, (&from, &start), &MAP_LIMITS).unwrap();
-            let pose_distance = found.map_from_query.inverse() * map_from_query;
-            assert!(
-                pose_distance.translation.vector.norm() < 2e-3 && pose_distance.rotation.angle() < 1e-3,
-                "{k}: {pose_distance}"
-            );
+            let error = found.map_from_query.inverse() * map_from_query;
+            assert!(error.translation.vector.norm() < 2e-3 && error.rotation.angle() < 1e-3, "{k}: {error}");
             assert!(found.inlier_ratio > 0.9, "{}", found.inlier_ratio);
         }
     }
@@ -473,11 +470,8 @@ mod tests {
         // The expected pose is 0.2 m to the side, with a heading error of 0.1 rad.
         let start = offset_pose(&Pose::identity(), &from, 0.1, Vector::new(0.0, 0.2, 0.0));
         let found = relocaliser.find(&query, (&from, &start), &RelocalisationLimits::after_gap(1.0, 0.01)).unwrap();
-        let pose_distance = found.map_from_query.transform_point(&from.into()).coords - from;
-        assert!(
-            pose_distance.y.abs() < 2e-3 && pose_distance.z.abs() < 2e-3 && pose_distance.x.abs() < 0.05,
-            "{pose_distance}"
-        );
+        let error = found.map_from_query.transform_point(&from.into()).coords - from;
+        assert!(error.y.abs() < 2e-3 && error.z.abs() < 2e-3 && error.x.abs() < 0.05, "{error}");
         assert!(found.map_from_query.rotation.angle() < 1e-3, "{}", found.map_from_query);
         let sigma = |k: usize| found.covariance[(k, k)].sqrt();
         assert!(sigma(3) > 0.2 && sigma(4) < 0.01, "{} m along, {} m across", sigma(3), sigma(4));

@@ -222,8 +222,8 @@ impl Problem<'_> {
 /// Largest difference of two trajectories at the same stamps, m and rad.
 fn moved(from: &Trajectory, to: &Trajectory) -> (f64, f64) {
     from.poses().iter().zip(to.poses()).fold((0.0, 0.0), |(shift, turn): (f64, f64), (from, to)| {
-        let apart = to.translation.vector - from.translation.vector;
-        (shift.max(apart.norm()), turn.max(from.rotation.angle_to(&to.rotation)))
+        let difference = to.translation.vector - from.translation.vector;
+        (shift.max(difference.norm()), turn.max(from.rotation.angle_to(&to.rotation)))
     })
 }
 

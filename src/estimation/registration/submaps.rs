@@ -106,7 +106,7 @@ mod tests {
     fn repeatedly_observed_cells_get_no_more_references_than_required() {
         let cells: Vec<Vec<u64>> = (0..500).map(|_| (0..40).collect()).collect();
         let by_cell = select_references(&cells, 6);
-        assert!(by_cell.values().all(|seen| seen.len() == 6));
+        assert!(by_cell.values().all(|references| references.len() == 6));
         // Spread over the 500 submaps.
         assert_eq!(by_cell[&7], [0, 256, 128, 384, 64, 320]);
     }

@@ -148,11 +148,11 @@ fn simulated(
 ///
 /// The first pose defines the map; an error of that pose is common to all others.
 fn rms_distance_m(a: &Trajectory, b: &Trajectory) -> (f64, f64) {
-    let apart: Vec<Vector> =
+    let difference: Vec<Vector> =
         a.poses().iter().zip(b.poses()).map(|(a, b)| a.translation.vector - b.translation.vector).collect();
-    let n = apart.len() as f64;
-    let mean = apart.iter().sum::<Vector>() / n;
-    let rms = |from: &Vector| (apart.iter().map(|v| (v - from).norm_squared()).sum::<f64>() / n).sqrt();
+    let n = difference.len() as f64;
+    let mean = difference.iter().sum::<Vector>() / n;
+    let rms = |from: &Vector| (difference.iter().map(|v| (v - from).norm_squared()).sum::<f64>() / n).sqrt();
     (rms(&Vector::zeros()), rms(&mean))
 }
 
@@ -172,7 +172,7 @@ fn distorted_trajectory_is_corrected() {
 /// Registers the same trajectory with floor and ceiling observed only `when` requested.
 fn registered_with_floor(when: impl Fn(f64) -> bool) -> ClosedLoop {
     let mut setup = distorted(distortion);
-    setup.survey.sightings.retain(|seen| seen.patch.normal.z.abs() < 0.5 || when(seen.tau_s));
+    setup.survey.sightings.retain(|sighting| sighting.patch.normal.z.abs() < 0.5 || when(sighting.tau_s));
     setup.registered()
 }
 

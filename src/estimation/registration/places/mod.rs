@@ -142,8 +142,8 @@ fn is_out_of_reach(
         Some(at(early_s)?.inverse() * at(late_s)?)
     };
     between(open_loop).zip(between(optimised)).is_some_and(|(before, now)| {
-        let apart = now.translation.vector - before.translation.vector;
-        apart.norm() > MATCHING_REACH.0 || before.rotation.angle_to(&now.rotation) > MATCHING_REACH.1
+        let difference = now.translation.vector - before.translation.vector;
+        difference.norm() > MATCHING_REACH.0 || before.rotation.angle_to(&now.rotation) > MATCHING_REACH.1
     })
 }
 
