@@ -148,7 +148,7 @@ fn a_plan_is_kept_gone_on_with_and_replaced_only_when_asked() {
     let out = well(here.path(), "sweep status swept --json");
     assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 256);
     let (code, _, talk) = run(here.path(), "sweep run nowhere");
-    assert!(code == 2 && talk.contains("holds no sweep"), "{talk}");
+    assert!(code == 2 && talk.contains("contains no sweep"), "{talk}");
 }
 
 #[test]
@@ -349,14 +349,14 @@ fn what_makes_no_sense_is_told_with_its_line() {
         assert!(!here.path().join("bad").exists());
     };
     wrong(SPRINGS, "head.coil_diameter_mm", "head.coil_diameter", &["bad.ron:4:", "coil_diameter_mm", "axis"]);
-    wrong(SPRINGS, "head.coil_diameter_mm", "head.mass_kg", &["may be any of", "parts.0.block.mass_kg"]);
+    wrong(SPRINGS, "head.coil_diameter_mm", "head.mass_kg", &["is ambiguous", "parts.0.block.mass_kg"]);
     wrong(SPRINGS, "head.coil_diameter_mm", "lidar.rate_hz", &["bad.ron:4:", "no setting"]);
     wrong(SPRINGS, "from: 18.0", "from: -1.0", &["bad.ron:4:", "above 0"]);
     wrong(SPRINGS, "from: 1.6", "from: 0.0", &["bad.ron:5:"]);
     wrong(SPRINGS, "\"stainless\"", "\"wood\"", &["bad.ron:6:", "wood"]);
     wrong(SPRINGS, "sobol(count: 4096)", "grid", &["steps"]);
     wrong(SPRINGS, "count: 4096", "count: 0", &["count"]);
-    wrong(SPRINGS, "[rocking_hz", "[position_rmse_m", &["does not tell position_rmse_m"]);
+    wrong(SPRINGS, "[rocking_hz", "[position_rmse_m", &["does not measure position_rmse_m"]);
     wrong(SPRINGS, "[rocking_hz", "[rocking_hz, rocking_hz", &["more than once"]);
     wrong(WALKS, "seeds: [3]", "seeds: []", &["at least one"]);
     wrong(WALKS, "seeds: [3]", "seeds: [3, 3]", &["more than once"]);

@@ -11,7 +11,7 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use zsim::spec::{Kind, find, parse};
-use zsim::study::sweep::{Plan, Runner, Share, Status, Sweep, confine};
+use zsim::study::sweep::{Plan, Runner, Share, Sweep, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///
@@ -155,7 +155,7 @@ fn share(arguments: &RunArguments) -> anyhow::Result<Share> {
 
 fn run_task(arguments: &TaskArguments) -> anyhow::Result<End> {
     let sweep = Sweep::open(&arguments.folder)?;
-    confine(sweep.limit())?;
+    limit_process(sweep.limit())?;
     sweep.run_task(arguments.task, &|word| {
         // The supervisor has ended: end this process too.
         if writeln!(std::io::stdout().lock(), "{word}").is_err() {
@@ -167,14 +167,14 @@ fn run_task(arguments: &TaskArguments) -> anyhow::Result<End> {
 
 /// Merges the finished runs and prints a summary.
 pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<End> {
-    let merged = sweep.tell()?;
-    let words = format!("{}\n{}", merged.words, status_words(&merged.status));
+    let merged = sweep.merge_and_report()?;
+    let words = format!("{}\n{}", merged.text, status_words(&merged.status));
     let figures = json!({ "status": merged.status, "summary": merged.summary });
     output::tell(global, &words, figures, Some(folder))?;
     Ok(if merged.status.missing == 0 { End::Done } else { End::WithLoss })
 }
 
-fn tell(global: &Global, status: &Status, folder: &Path) -> anyhow::Result<End> {
+fn tell(global: &Global, status: &SweepStatus, folder: &Path) -> anyhow::Result<End> {
     output::tell(global, &status_words(status), serde_json::to_value(status)?, Some(folder))?;
     Ok(End::Done)
 }

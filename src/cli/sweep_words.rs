@@ -1,7 +1,7 @@
 //! A sweep in words.
 
 use zsim::report;
-use zsim::study::sweep::{Status, Sweep};
+use zsim::study::sweep::{Sweep, SweepStatus};
 
 /// Summary of a plan.
 pub(super) fn plan_words(sweep: &Sweep) -> String {
@@ -9,7 +9,7 @@ pub(super) fn plan_words(sweep: &Sweep) -> String {
 }
 
 /// Progress of a sweep.
-pub(super) fn status_words(status: &Status) -> String {
+pub(super) fn status_words(status: &SweepStatus) -> String {
     let mut rows = vec![
         ("runs", status.points.to_string()),
         ("done", status.done.to_string()),

@@ -1,7 +1,7 @@
-//! A sweep in pictures: curves of each axis, maps of two, the front of what nothing beats.
+//! Plots of a sweep: effect of each axis, maps over two axes, ratios, Pareto front.
 
-use super::runs::{Runs, level_of, levels_of};
-use super::summary::{Line, Summary, quantile};
+use super::runs::{Runs, level_count, level_label};
+use super::summary::{LevelSummary, Summary, quantile};
 use super::{Aim, Measure, Plan, Sweep};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Mark, Series};
 use crate::study::StudyError;
@@ -9,24 +9,24 @@ use crate::study::atomic_file::write_text;
 use crate::study::spring::design::pareto_set;
 use std::path::Path;
 
-/// Height of a level's row in a plot of ratios, points.
+/// Height of a level's row in a ratio plot, points: fits a line of text.
 const ROW_HEIGHT: f64 = 17.0;
-/// Ratios at which the axis of such a plot has marks.
-const MARKS: [f64; 15] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1.0, 1.4, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
-/// Most pairs of axes that have maps.
-const MOST_MAPS: usize = 6;
-/// Most dots in a plot: of more every so many-th is drawn.
-const MOST_DOTS: usize = 5_000;
+/// Ticks of the logarithmic ratio axis.
+const RATIO_TICKS: [f64; 15] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1.0, 1.4, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
+/// Maximum number of pairs of axes with a map, to keep the figure readable.
+const MAX_MAPS: usize = 6;
+/// Maximum number of dots in a plot; more are subsampled evenly to limit the size of the SVG.
+const MAX_DOTS: usize = 5_000;
 
 impl Sweep {
-    /// Draws all into `plots/`; what was chosen for the front goes to `front.csv`.
+    /// Draws all plots to `plots/`, and writes the Pareto front to `front.csv`.
     ///
     /// # Errors
-    /// When the table is not merged, or a picture cannot be written.
+    /// If the table is not merged, or if a file cannot be written.
     pub(super) fn draw(&self, summary: &Summary) -> Result<(), StudyError> {
         let folder = self.folder.join("plots");
         std::fs::create_dir_all(&folder).map_err(StudyError::file(&folder))?;
-        let runs = Runs::of(self)?;
+        let runs = Runs::read(self)?;
         for measure in &summary.measures {
             effects(&self.plan, summary, *measure).save(&folder, &format!("effects_{}", measure.key()))?;
             let maps = self.maps(&runs, *measure)?;
@@ -43,12 +43,12 @@ impl Sweep {
         self.draw_front(&runs, &folder)
     }
 
-    /// A map of a measure's median for each pair of axes.
+    /// Maps of a measure's median, one for each pair of axes.
     fn maps(&self, runs: &Runs, measure: Measure) -> Result<Vec<Chart>, StudyError> {
         let axes = self.plan.axes().len();
-        let is_shown = |axis: &usize| (2..=60).contains(&levels_of(&self.plan, *axis));
+        let is_shown = |axis: &usize| (2..=60).contains(&level_count(&self.plan, *axis));
         let pairs = (0..axes).flat_map(|x| (x + 1..axes).map(move |y| (x, y)));
-        let pairs: Vec<(usize, usize)> = pairs.filter(|(x, y)| is_shown(x) && is_shown(y)).take(MOST_MAPS).collect();
+        let pairs: Vec<(usize, usize)> = pairs.filter(|(x, y)| is_shown(x) && is_shown(y)).take(MAX_MAPS).collect();
         if pairs.is_empty() {
             return Ok(Vec::new());
         }
@@ -56,13 +56,13 @@ impl Sweep {
         Ok(pairs.into_iter().map(|(x, y)| map(&self.plan, runs, &figures, (x, y, measure))).collect())
     }
 
-    /// The runs that no other beats in the goals of the spec.
+    /// Draws and writes the Pareto front of the spec's goals.
     fn draw_front(&self, runs: &Runs, folder: &Path) -> Result<(), StudyError> {
         let goals = &self.plan.spec().front;
         let [first, second, ..] = goals.as_slice() else { return Ok(()) };
         let columns: Vec<Vec<f64>> = goals.iter().map(|goal| self.figures(goal.measure)).collect::<Result<_, _>>()?;
-        let is_told = |row: &usize| columns.iter().all(|column| column[*row].is_finite());
-        let rows: Vec<usize> = (0..runs.numbers.len()).filter(is_told).collect();
+        let is_complete = |row: &usize| columns.iter().all(|column| column[*row].is_finite());
+        let rows: Vec<usize> = (0..runs.numbers.len()).filter(is_complete).collect();
         let sign = |aim: Aim| if aim == Aim::Least { 1.0 } else { -1.0 };
         let costs =
             |row: &usize| goals.iter().zip(&columns).map(|(goal, column)| sign(goal.aim) * column[*row]).collect();
@@ -72,8 +72,8 @@ impl Sweep {
             let shown = |measure: Measure, k: usize| columns[k][*row] * measure.unit().1;
             (shown(first.measure, 0), shown(second.measure, 1))
         };
-        let every = rows.len().div_ceil(MOST_DOTS).max(1);
-        let chart = Chart::new("What no other run beats", first.measure.label(), second.measure.label())
+        let every = rows.len().div_ceil(MAX_DOTS).max(1);
+        let chart = Chart::new("Pareto front", first.measure.label(), second.measure.label())
             .with(
                 Series::dots("runs", Colour::Backdrop, rows.iter().step_by(every).map(at).collect())
                     .marked(Mark::Dots(2.0)),
@@ -103,14 +103,14 @@ impl Sweep {
     }
 }
 
-/// A curve of each axis, over all else: the median, and a band between the quartiles.
+/// Effect of each axis over all other settings: median and interquartile band.
 fn effects(plan: &Plan, summary: &Summary, measure: Measure) -> Figure {
     let (_, per_unit) = measure.unit();
     let charts = plan.axes().iter().map(|axis| {
-        let lines: Vec<&Line> = summary.of_axis(&axis.name, None, measure).collect();
+        let lines: Vec<&LevelSummary> = summary.of_axis(&axis.name, None, measure).collect();
         if axis.is_number() {
-            let at = |line: &&Line| (line.value.unwrap_or(f64::NAN), line.median * per_unit);
-            let ends = |line: &&Line| {
+            let at = |line: &&LevelSummary| (line.value.unwrap_or(f64::NAN), line.median * per_unit);
+            let ends = |line: &&LevelSummary| {
                 let [low, high] = [line.quarter, line.three_quarters].map(|x| x * per_unit);
                 (line.value.unwrap_or(f64::NAN), low, high)
             };
@@ -118,7 +118,7 @@ fn effects(plan: &Plan, summary: &Summary, measure: Measure) -> Figure {
             let curve = Series::line("", Colour::Estimate, lines.iter().map(at).collect()).with_band(band);
             return Chart::new(&format!("By {}", axis.name), &axis.name, measure.label()).with(curve);
         }
-        by_words(&axis.name, measure, &lines)
+        text_level_chart(&axis.name, measure, &lines)
     });
     let charts: Vec<Chart> = charts.collect();
     let most = charts.iter().map(|chart| chart.y_marks.len()).max().unwrap_or_default();
@@ -128,8 +128,8 @@ fn effects(plan: &Plan, summary: &Summary, measure: Measure) -> Figure {
     figure
 }
 
-/// Median and quartiles of levels that are words, which have no order that a line might follow: below each other.
-fn by_words(axis: &str, measure: Measure, lines: &[&Line]) -> Chart {
+/// Median and quartiles of text levels in rows: such levels have no order for a curve.
+fn text_level_chart(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Chart {
     let (_, per_unit) = measure.unit();
     let height = |index: usize| lines.len() as f64 - 1.0 - index as f64;
     let bars = lines.iter().enumerate().flat_map(|(k, line)| {
@@ -138,7 +138,7 @@ fn by_words(axis: &str, measure: Measure, lines: &[&Line]) -> Chart {
     });
     let dots = lines.iter().enumerate().map(|(k, line)| (line.median * per_unit, height(k)));
     let marks = lines.iter().enumerate().map(|(k, line)| (height(k), line.level.clone()));
-    // Half a row is left free above and below.
+    // An invisible line reserves half a row above and below.
     let finite = lines.iter().flat_map(|line| [line.quarter, line.three_quarters]).filter(|x| x.is_finite());
     let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
     let middle = if low <= high { 0.5 * (low + high) * per_unit } else { 0.0 };
@@ -150,19 +150,19 @@ fn by_words(axis: &str, measure: Measure, lines: &[&Line]) -> Chart {
         .with_y_marks(marks.collect())
 }
 
-/// A measure's median over two axes, and all else.
+/// Map of a measure's median over two axes.
 fn map(plan: &Plan, runs: &Runs, figures: &[f64], (x, y, measure): (usize, usize, Measure)) -> Chart {
     let (unit, per_unit) = measure.unit();
-    let (wide, high) = (levels_of(plan, x), levels_of(plan, y));
-    let mut gathered: Vec<Vec<f64>> = vec![Vec::new(); wide * high];
+    let (wide, high) = (level_count(plan, x), level_count(plan, y));
+    let mut figures_of_cell: Vec<Vec<f64>> = vec![Vec::new(); wide * high];
     for (row, figure) in figures.iter().enumerate().filter(|(_, figure)| !figure.is_nan()) {
-        gathered[runs.levels[x][row] as usize * high + runs.levels[y][row] as usize].push(*figure);
+        figures_of_cell[runs.levels[x][row] as usize * high + runs.levels[y][row] as usize].push(*figure);
     }
     let median = |mut figures: Vec<f64>| {
         figures.sort_by(f64::total_cmp);
         quantile(&figures, 0.5) * per_unit
     };
-    let medians: Vec<f64> = gathered.into_iter().map(median).collect();
+    let medians: Vec<f64> = figures_of_cell.into_iter().map(median).collect();
     let finite = medians.iter().copied().filter(|median| median.is_finite());
     let (low, most) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
     let (across, up) = (edges(plan, x), edges(plan, y));
@@ -177,14 +177,14 @@ fn map(plan: &Plan, runs: &Runs, figures: &[f64], (x, y, measure): (usize, usize
         cells: medians.iter().enumerate().map(cell).collect(),
     };
     let chart = Chart::new("", &plan.axes()[x].name, &plan.axes()[y].name).with_cells(cells);
-    let chart = if plan.axes()[x].is_number() { chart } else { chart.with_x_marks(words(plan, x)) };
-    if plan.axes()[y].is_number() { chart } else { chart.with_y_marks(words(plan, y)) }
+    let chart = if plan.axes()[x].is_number() { chart } else { chart.with_x_marks(level_ticks(plan, x)) };
+    if plan.axes()[y].is_number() { chart } else { chart.with_y_marks(level_ticks(plan, y)) }
 }
 
-/// From where to where each level of an axis is drawn: half way to its neighbours.
+/// Extent of each level in a map: half way to its neighbours.
 fn edges(plan: &Plan, axis: usize) -> Vec<(f64, f64)> {
-    let count = levels_of(plan, axis);
-    let number = |k: usize| level_of(plan, axis, k).1.filter(|_| plan.axes()[axis].is_number()).unwrap_or(k as f64);
+    let count = level_count(plan, axis);
+    let number = |k: usize| level_label(plan, axis, k).1.filter(|_| plan.axes()[axis].is_number()).unwrap_or(k as f64);
     let at: Vec<f64> = (0..count).map(number).collect();
     let middle = |a: usize, b: usize| 0.5 * (at[a] + at[b]);
     let step = if count > 1 { at[1] - at[0] } else { 1.0 };
@@ -198,37 +198,38 @@ fn edges(plan: &Plan, axis: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-fn words(plan: &Plan, axis: usize) -> Vec<(f64, String)> {
-    (0..levels_of(plan, axis)).map(|k| (k as f64, level_of(plan, axis, k).0)).collect()
+/// Ticks with the labels of an axis's levels.
+fn level_ticks(plan: &Plan, axis: usize) -> Vec<(f64, String)> {
+    (0..level_count(plan, axis)).map(|k| (k as f64, level_label(plan, axis, k).0)).collect()
 }
 
-/// A measure's ratio to the first level of an axis for each other one, from the least to the greatest; logarithmic.
+/// Ratio of a measure to an axis's first level, for each other level: median and range, logarithmic.
 fn ratios(summary: &Summary, axis: &str, measure: Measure) -> Option<Figure> {
-    let lines: Vec<&Line> =
+    let lines: Vec<&LevelSummary> =
         summary.of_axis(axis, None, measure).skip(1).filter(|line| line.against_first.is_some()).collect();
     let count = lines.len() as f64;
     let height = |index: usize| count - 1.0 - index as f64;
-    let (mut ranges, mut alike, mut differ) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut ranges, mut similar, mut different) = (Vec::new(), Vec::new(), Vec::new());
     for (index, line) in lines.iter().enumerate() {
         let (y, against) = (height(index), line.against_first?);
         ranges.extend([(against.least.log10(), y), (against.greatest.log10(), y), (f64::NAN, f64::NAN)]);
-        if against.is_significant() { &mut differ } else { &mut alike }.push((against.ratio.log10(), y));
+        if against.is_significant() { &mut different } else { &mut similar }.push((against.ratio.log10(), y));
     }
     if lines.is_empty() {
         return None;
     }
-    let named = |(index, line): (usize, &&Line)| {
+    let named = |(index, line): (usize, &&LevelSummary)| {
         let lost = if line.lost > 0 { format!(" ({} lost)", line.lost) } else { String::new() };
         (height(index), format!("{}{lost}", line.level))
     };
     let title = format!("{}, ratio to the first of {axis}", measure.short());
-    let chart = Chart::new(&title, "Ratio (median, least and greatest of all runs)", "")
+    let chart = Chart::new(&title, "Ratio (median, minimum and maximum of all runs)", "")
         .with_y_marks(lines.iter().enumerate().map(named).collect())
-        .with_x_marks(MARKS.map(|ratio| (ratio.log10(), ratio.to_string())).to_vec())
+        .with_x_marks(RATIO_TICKS.map(|ratio| (ratio.log10(), ratio.to_string())).to_vec())
         .with(Series::line("", Colour::Truth, vec![(0.0, -0.5), (0.0, count - 0.5)]).marked(Mark::Dashes(1.0)))
         .with(Series::line("range", Colour::Backdrop, ranges).marked(Mark::Line(4.0)))
-        .with(Series::dots("alike", Colour::Estimate, alike).marked(Mark::Dots(6.0)))
-        .with(Series::dots("different", Colour::Second, differ).marked(Mark::Dots(6.0)));
+        .with(Series::dots("not significant", Colour::Estimate, similar).marked(Mark::Dots(6.0)))
+        .with(Series::dots("significant", Colour::Second, different).marked(Mark::Dots(6.0)));
     let mut figure = Figure::of(vec![chart]);
     figure.chart_height = 76.0 + ROW_HEIGHT * count;
     Some(figure)
