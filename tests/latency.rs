@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use zsim::spec::{Kind, Source, find, parse};
 use zsim::study::StudyError;
 use zsim::study::latency::{
-    ClockState, Disturbance, Latency, LatencySpec, Study, csv, curve_figure, map_figure, words,
+    ClockState, Disturbance, LatencyResult, LatencySpec, LatencyStudy, csv, curve_figure, map_figure, text_table,
 };
 use zsim::study::reproduction::ExperimentSpec;
 
@@ -34,11 +34,11 @@ fn small() -> LatencySpec {
 }
 
 /// Runs it with so many threads, and stops it when this share is done.
-fn run(folder: &Path, threads: usize, stop_at: f64) -> Result<Study, StudyError> {
+fn run(folder: &Path, threads: usize, stop_at: f64) -> Result<LatencyResult, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let stop = AtomicBool::new(false);
     let hear = |share: f64| stop.store(share >= stop_at, Ordering::Relaxed);
-    let latency = Latency::new(&small(), &shipped().1).unwrap();
+    let latency = LatencyStudy::new(&small(), &shipped().1).unwrap();
     pool.install(|| latency.run(folder, false, &stop, &hear))
 }
 
@@ -78,7 +78,7 @@ fn a_latency_blurs_the_cloud_both_ways_the_clock_state_recovers_it_and_a_stop_ch
     }
 
     assert_eq!(csv(&study).lines().count(), 9);
-    assert!(words(&study).contains("noise 5 ms"));
+    assert!(text_table(&study).contains("noise 5 ms"));
     assert!(map_figure(&study, ClockState::Off).svg().unwrap().contains("ms latency"));
     assert!(curve_figure(&study).svg().unwrap().contains("clock state on"));
 }
@@ -99,15 +99,15 @@ fn a_study_that_makes_no_sense_says_where() {
         ("latencies_ms: [-5.0, -2.0, -1.0, -0.5, 0.0,", "latencies_ms: [0.0,", "on each side of 0"),
         ("latencies_ms: [-5.0, -2.0,", "latencies_ms: [-5.0, -5.0,", "more than once"),
         ("noises_ms: [0.0, 1.0,", "noises_ms: [0.0, -1.0,", "expected 0 to 20"),
-        ("shown_noises_ms: [0.0,", "shown_noises_ms: [0.0, 3.0,", "not among those"),
-        ("shown_noises_ms: [0.0, 1.0,", "shown_noises_ms: [0.0,", "show as many"),
+        ("shown_noises_ms: [0.0,", "shown_noises_ms: [0.0, 3.0,", "but not studied"),
+        ("shown_noises_ms: [0.0, 1.0,", "shown_noises_ms: [0.0,", "expected equal numbers"),
         ("block_s: 5.0", "block_s: 70.0", "do not fit"),
         ("scene: \"office\"", "scene: \"nowhere\"", "no such scene"),
     ] {
         assert!(source.text.contains(old), "{old}");
         let source = Source { text: source.text.replacen(old, new, 1), ..source.clone() };
         let ExperimentSpec::Latency(spec) = parse(&source).unwrap() else { panic!("figure 4 is of latency") };
-        let error = Latency::new(&spec, &source).map(|_| ()).unwrap_err().to_string();
+        let error = LatencyStudy::new(&spec, &source).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(sentence), "{error}");
     }
 }

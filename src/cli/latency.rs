@@ -7,7 +7,9 @@ use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use zsim::spec::{Kind, SpecError, find, parse};
-use zsim::study::latency::{ClockState, Latency, LatencySpec, Study, csv, curve_figure, map_figure, words};
+use zsim::study::latency::{
+    ClockState, LatencyResult, LatencySpec, LatencyStudy, csv, curve_figure, map_figure, text_table,
+};
 use zsim::study::reproduction::ExperimentSpec;
 
 /// The experiment with the default latencies and noises.
@@ -44,18 +46,18 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     };
     let scenario = arguments.scenario.scenario(&arguments.scene);
     let spec = LatencySpec { scenario, estimator: arguments.estimator.clone(), ..*shipped };
-    let latency = Latency::new(&spec, &source)?;
+    let latency = LatencyStudy::new(&spec, &source)?;
     let folder = output::continued(&arguments.out)?;
     let bar = WorkBar::new(global, "estimating");
     let ran = latency.run(&folder, arguments.force, stop_flag(), &|share| bar.show(share));
     drop(bar);
     let study = ran.inspect_err(|_| super::journey::left_behind(&folder))?;
     leave(&study, &folder)?;
-    output::tell(global, &words(&study), serde_json::to_value(&study)?, Some(&folder))?;
+    output::tell(global, &text_table(&study), serde_json::to_value(&study)?, Some(&folder))?;
     Ok(End::Done)
 }
 
-fn leave(study: &Study, folder: &Path) -> anyhow::Result<()> {
+fn leave(study: &LatencyResult, folder: &Path) -> anyhow::Result<()> {
     for (name, text) in [("latency.csv", csv(study)), ("metrics.json", serde_json::to_string_pretty(study)? + "\n")] {
         let path = folder.join(name);
         std::fs::write(&path, text).with_context(|| format!("{} cannot be written", path.display()))?;

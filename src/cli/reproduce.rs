@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim::report;
-use zsim::study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_table};
+use zsim::study::reproduction::{Experiment, ExperimentResult, Extent, TABLE_HEADING, paper_table};
 
 /// Repeat the paper's experiments: compare the published results with zsim's
 ///
@@ -77,8 +77,13 @@ fn check_table(path: &Path, force: bool) -> anyhow::Result<()> {
 }
 
 /// Writes the table of the findings of this and earlier runs.
-fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[(String, Finding)]) -> anyhow::Result<()> {
-    let mut findings: Vec<(String, Option<Finding>)> = Vec::new();
+fn table(
+    arguments: &Arguments,
+    extent: Extent,
+    folder: &Path,
+    found: &[(String, ExperimentResult)],
+) -> anyhow::Result<()> {
+    let mut findings: Vec<(String, Option<ExperimentResult>)> = Vec::new();
     for name in Experiment::all() {
         let earlier = || Experiment::load(&name)?.finished(&folder.join(&name), extent);
         let finding = match found.iter().find(|(other, _)| *other == name) {
