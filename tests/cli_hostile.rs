@@ -95,7 +95,10 @@ fn with_force_the_map_that_localises_is_spared() {
     let map = read(here.path(), "run/map.ply");
     let in_place = "estimate run/recording.mcap --map run/map.ply --extend-map --quiet --out run --force";
     let (code, _, talk) = run(here.path(), in_place);
-    assert!(code == 2 && talk.contains("map.ply is read by this command and would be replaced"), "{talk}");
+    assert!(
+        code == 2 && talk.contains("map.ply is an input of this command and would be replaced by the result"),
+        "{talk}"
+    );
     assert!(map == read(here.path(), "run/map.ply"));
 }
 
