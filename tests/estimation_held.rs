@@ -1,4 +1,4 @@
-//! The estimator while the head does not turn: through stops of the swing, and with a lidar that needs none.
+//! The estimator while the head does not swing: stops, and a multi-plane lidar that needs no swing.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -8,23 +8,23 @@ use estimation_fixture::{Room, Run, Scanner, Score, Walk, calibration, growth_m}
 use zsim::estimation::{EstimatorSpec, estimate_all, load};
 use zsim::geometry::{Rotation, Vector};
 
-/// From when to when the head is held, s; it takes a second to come to rest, and another to swing again.
-const HELD_S: (f64, f64) = (7.0, 13.0);
+/// Start and end of the stop, s. The head takes a second to come to rest, and another to swing again.
+const STOP_S: (f64, f64) = (7.0, 13.0);
 
-/// A walk round a hall whose swing is held for six seconds while the walk goes on.
+/// A walk round a hall in which the swing stops for six seconds while the walk continues.
 fn walk_with_a_stop(seed: u64) -> Run {
-    let stop = Some((HELD_S.0 - 1.0, HELD_S.1));
+    let stop = Some((STOP_S.0 - 1.0, STOP_S.1));
     Run::new(Room::furnished(), Walk { start_s: 1.5, stop, ..Walk::new((1.8, 1.2), 25.0) }, seed, 16.0)
 }
 
-/// By how much the error grows over the stop, until the head swings again, m.
+/// Growth of the position error over the stop, until the head swings again, m.
 fn growth_in_the_stop_m(run: &Run, spec: &EstimatorSpec) -> f64 {
     let result = estimate_all(spec, &calibration(), run.measurements().into_iter()).unwrap();
-    growth_m(&result, run, (HELD_S.0 - 1.0, HELD_S.1 + 1.0))
+    growth_m(&result, run, (STOP_S.0 - 1.0, STOP_S.1 + 1.0))
 }
 
 #[test]
-fn over_a_stop_of_six_seconds_the_error_grows_by_less_than_five_centimetres() {
+fn the_error_grows_by_less_than_5_cm_over_a_6_s_stop() {
     let default = load("default").unwrap();
     for seed in [21, 22] {
         let run = walk_with_a_stop(seed);
@@ -37,8 +37,8 @@ fn over_a_stop_of_six_seconds_the_error_grows_by_less_than_five_centimetres() {
 }
 
 #[test]
-fn a_lidar_of_many_planes_is_tracked_without_any_swing() {
-    // The head is carried round the hall and never nods: a plane of beams would sweep nothing, 16 rings show patches.
+fn a_multi_plane_lidar_is_tracked_without_swing() {
+    // The head moves round the hall without nodding: a single scan plane would not observe patches, 16 rings do.
     let walk = Walk { start_s: 1.5, stop: Some((-10.0, 1000.0)), ..Walk::new((1.8, 1.2), 25.0) };
     let run = Run { scanner: Scanner::Rings, ..Run::new(Room::furnished(), walk, 23, 10.0) };
     let result = estimate_all(&load("default").unwrap(), &calibration(), run.measurements().into_iter()).unwrap();
@@ -53,7 +53,7 @@ fn a_lidar_of_many_planes_is_tracked_without_any_swing() {
 }
 
 #[test]
-fn a_clock_that_is_not_estimated_stays_where_it_was_put() {
+fn a_clock_that_is_not_estimated_keeps_its_initial_offset() {
     let mut spec = load("default").unwrap();
     (spec.clock.estimated, spec.clock.start_s) = (false, 0.002);
     let run = walk_with_a_stop(24);
@@ -67,7 +67,7 @@ fn a_clock_that_is_not_estimated_stays_where_it_was_put() {
 }
 
 #[test]
-fn how_the_lidar_sits_beside_the_imu_is_found_from_a_wrong_calibration() {
+fn lidar_extrinsics_are_estimated_from_an_incorrect_calibration() {
     let run = Run::new(Room::furnished(), Walk { start_s: 1.5, ..Walk::new((1.8, 1.2), 25.0) }, 25, 30.0);
     let (shift, turn) = (Vector::new(0.010, -0.008, 0.006), Vector::new(0.5, -0.4, 0.6).map(f64::to_radians));
     let mut wrong = calibration();
@@ -85,7 +85,7 @@ fn how_the_lidar_sits_beside_the_imu_is_found_from_a_wrong_calibration() {
     let turned_back = found.turn * Rotation::from_scaled_axis(turn);
     assert!(turned_back.angle().to_degrees() < 0.1, "{turned_back}");
     assert!((found.shift + shift).norm() < 0.003, "{found:?}");
-    // Taken as calibrated, it stays where it is.
+    // Without refinement the calibrated extrinsics do not change.
     let held = estimate(false).lidar;
     assert!(held.turn.angle() < 1e-6 && held.shift.norm() < 1e-6, "{held:?}");
 }
