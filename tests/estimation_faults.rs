@@ -56,8 +56,8 @@ fn hand(changes: &[(&str, &str)]) -> Option<String> {
     }))
 }
 
-/// Exit code, stdout, stderr and trajectory of the journey of a case.
-fn journey(case: &Case) -> (i32, String, String, Option<String>) {
+/// Exit code, stdout, stderr and trajectory of the full run of a case.
+fn full_run(case: &Case) -> (i32, String, String, Option<String>) {
     let here = tempfile::tempdir().unwrap();
     let faults = case.faults.replace("FAULTS", &specs("faults").display().to_string());
     std::fs::write(here.path().join("faults.ron"), format!("(faults: [{faults}])")).unwrap();
@@ -92,7 +92,7 @@ fn errors(metrics: &Value) -> (f64, f64) {
 
 fn check(case: &Case) {
     let name = case.name;
-    let (code, figures, talk, poses) = journey(case);
+    let (code, figures, talk, poses) = full_run(case);
     assert_eq!(code, case.code, "{name}: {talk}");
     if code == 1 {
         assert!(case.stated.iter().all(|words| talk.contains(words)), "{name}: {talk}");

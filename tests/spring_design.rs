@@ -1,4 +1,4 @@
-//! The search for a spring.
+//! Spring design by search.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -17,11 +17,11 @@ fn small(name: &str) -> DesignStudy {
 }
 
 #[test]
-fn a_search_over_geometry_meets_its_targets_and_simulation_agrees() {
+fn a_search_over_geometry_meets_its_targets_as_simulation_confirms() {
     let study = small("spring_design");
     assert!(study.feasible > 50 && study.pareto > 3, "{} {}", study.feasible, study.pareto);
     assert_eq!(study.candidates.len(), 3);
-    // The rocking frequency is a goal of its own: the best there is at the target.
+    // The rocking frequency is a goal itself: the optimum is at the target.
     let best = study.candidates.iter().map(|v| (v.candidate.figures.rocking_hz / 1.3 - 1.0).abs()).fold(1.0, f64::min);
     assert!(best < 0.01, "{best}");
     for verified in &study.candidates {
@@ -34,7 +34,7 @@ fn a_search_over_geometry_meets_its_targets_and_simulation_agrees() {
 }
 
 #[test]
-fn a_search_is_the_same_for_any_number_of_threads() {
+fn a_search_does_not_depend_on_the_number_of_threads() {
     let (spec, source) = load("spring_design");
     let spec = DesignSpec { evaluations: 500, ..spec };
     let explore = |threads: usize| {
@@ -47,8 +47,8 @@ fn a_search_is_the_same_for_any_number_of_threads() {
 }
 
 #[test]
-fn descents_beat_even_samples() {
-    // With as many evaluations in all, those of the search leave a front that even samples alone hardly touch.
+fn optimisation_gives_a_better_front_than_sampling() {
+    // With the same number of evaluations, samples reach hardly any point of the search's front.
     let (spec, source) = load("spring_design");
     let front = |evaluations: usize| {
         let spec = DesignSpec { evaluations, ..spec.clone() };
@@ -57,14 +57,14 @@ fn descents_beat_even_samples() {
         let set = pareto_set(&costs);
         set.into_iter().map(|k| costs[k].clone()).collect::<Vec<_>>()
     };
-    // 150 evaluations leave fewer than a population to each descent: samples alone.
+    // With 150 evaluations less than one population remains for each descent, so that only samples are used.
     let (sampled, searched) = (front(150), front(1000));
     let beaten = |c: &&Vec<f64>| searched.iter().any(|s| s.iter().zip(*c).all(|(s, c)| s <= c));
     assert!(sampled.iter().filter(beaten).count() * 10 >= sampled.len() * 7);
 }
 
 #[test]
-fn a_catalogue_is_tried_through() {
+fn a_catalogue_is_searched_completely() {
     let (spec, source) = load("spring_stock");
     let spec = DesignSpec { candidates: 2, ..spec };
     let study = Search::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
@@ -74,7 +74,7 @@ fn a_catalogue_is_tried_through() {
 }
 
 #[test]
-fn a_search_that_makes_no_sense_says_why() {
+fn an_invalid_search_is_an_error_with_the_reason() {
     let (spec, source) = load("spring_design");
     let wrong = |change: fn(&mut DesignSpec)| {
         let mut spec = spec.clone();

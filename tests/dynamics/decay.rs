@@ -23,9 +23,9 @@ fn fitted(q: &[f64], step_s: f64) -> (f64, f64) {
     (omega / TAU, decay / omega)
 }
 
-/// The free decay of one mode after a small twitch of the base along `axis`.
+/// Frequency and damping of the free decay of one mode after a small pulse of the base.
 fn decay_of(model: &HeadModel, mode: &Mode) -> (f64, f64) {
-    // Sideways for what bends about x and y, upwards, and round.
+    // Pulse along or about the axis that excites the mode: sideways for rocking and sway, up for bounce, about z for yaw.
     let axis = match mode.kind {
         ModeKind::Bounce => 2,
         ModeKind::Yaw => 5,
@@ -35,7 +35,7 @@ fn decay_of(model: &HeadModel, mode: &Mode) -> (f64, f64) {
     let period_s = 1.0 / mode.frequency_hz;
     let path = states(model, &twitch, 1e-3, 8.0 * period_s);
     let mass = model.linear().unwrap().mass;
-    // The mode's own coordinate, in which other modes do not show; a twelfth of a period apart.
+    // The modal coordinate, which excludes other modes, sampled twelve times per period.
     let stride = (period_s / 12.0 / 1e-3).round() as usize;
     let after = (twitch.period_s / 1e-3).ceil() as usize + 1;
     let own: Vec<f64> = path[after..].iter().map(|s| (mass * mode.shape).dot(&displacement(model, s))).collect();
@@ -47,7 +47,7 @@ fn decay_of(model: &HeadModel, mode: &Mode) -> (f64, f64) {
 fn each_mode_decays_with_the_frequency_and_damping_of_the_linear_model() {
     let table = Table { damping: [0.02, 0.03, 0.04, 0.05], ..Table::default() };
     for model in [table.model(), shipped("handheld")] {
-        // Sideways for what bends about x and y, upwards, and round.
+        // Pulse along or about the axis that excites the mode: sideways for rocking and sway, up for bounce, about z for yaw.
         for mode in model.linear_modes() {
             let (frequency_hz, damping_ratio) = decay_of(&model, mode);
             assert_relative_eq!(frequency_hz, mode.frequency_hz, max_relative = 0.01);
@@ -57,7 +57,7 @@ fn each_mode_decays_with_the_frequency_and_damping_of_the_linear_model() {
 }
 
 #[test]
-fn modes_of_other_linkages_decay_as_the_linear_model_says_too() {
+fn modes_of_other_linkages_decay_as_in_the_linear_model() {
     let damped = |text: String| {
         let ratios = "rocking: 0.02, sway: 0.03, bounce: 0.04, yaw: 0.05";
         built(&text.replace("rocking: 0.0, sway: 0.0, bounce: 0.0, yaw: 0.0", ratios)).unwrap()
@@ -83,7 +83,7 @@ fn modes_of_other_linkages_decay_as_the_linear_model_says_too() {
 }
 
 #[test]
-fn segments_change_nothing_of_a_small_decay() {
+fn a_small_decay_does_not_depend_on_the_number_of_segments() {
     let damping = [0.02, 0.03, 0.04, 0.05];
     let decay = |segments: usize| {
         let model = Table { damping, segments, ..Table::default() }.model();

@@ -3,7 +3,7 @@ use approx::assert_relative_eq;
 use zsim::dynamics::{HeadModel, HeadSimulation};
 use zsim::geometry::Vector;
 
-/// Energy above rest over time of an undamped head that the base has thrown once, J, and the greatest lean, degrees.
+/// Energy above rest over time of a head after a pulse of the base, J, and the largest inclination, degrees.
 fn energies(model: &HeadModel, twitch: &Twitch, step_s: f64, seconds: f64) -> (Vec<f64>, f64) {
     let mut at_rest = None;
     let (mut energies, mut lean) = (Vec::new(), 0.0_f64);
@@ -24,8 +24,8 @@ fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len() as f64
 }
 
-/// Trend of the energy from the first tenth to the last, and its greatest excursion, both in parts of its mean.
-fn trend_and_excursion(energy: &[f64]) -> (f64, f64) {
+/// Trend of the energy from the first tenth to the last, and its largest deviation, both relative to its mean.
+fn trend_and_deviation(energy: &[f64]) -> (f64, f64) {
     let tenth = energy.len() / 10;
     let (first, last) = (mean(&energy[..tenth]), mean(&energy[energy.len() - tenth..]));
     let most = energy.iter().fold(0.0_f64, |most, e| most.max((e - first).abs()));
@@ -35,11 +35,11 @@ fn trend_and_excursion(energy: &[f64]) -> (f64, f64) {
 #[test]
 fn without_damping_energy_has_no_trend_in_small_and_large_swings() {
     let model = Table::default().model();
-    // A nod of a degree for two minutes, and a 60-degree swing for ten.
+    // A swing of 1 degree for two minutes, and one of 60 degrees for ten.
     for (amount, degrees, seconds) in [(0.002, 0.5..2.0, 120.0), (0.115, 55.0..70.0, 600.0)] {
         let (energy, lean) = energies(&model, &Twitch { axis: 0, amount, period_s: 0.6 }, 1e-3, seconds);
         assert!(degrees.contains(&lean), "leans by {lean} degrees");
-        let (trend, excursion) = trend_and_excursion(&energy);
+        let (trend, excursion) = trend_and_deviation(&energy);
         assert!(trend.abs() < 1e-5 && excursion < 1e-3, "a trend of {trend:.1e}, excursions of {excursion:.1e}");
     }
 }
@@ -49,7 +49,7 @@ fn energy_has_no_trend_in_a_segmented_spring_either() {
     let model = Table { segments: 4, ..Table::default() }.model();
     let (energy, lean) = energies(&model, &Twitch { axis: 0, amount: 0.115, period_s: 0.6 }, 1e-3, 20.0);
     assert!((55.0..70.0).contains(&lean), "leans by {lean} degrees");
-    let (trend, excursion) = trend_and_excursion(&energy);
+    let (trend, excursion) = trend_and_deviation(&energy);
     assert!(trend.abs() < 1e-5 && excursion < 1e-3, "a trend of {trend:.1e}, excursions of {excursion:.1e}");
 }
 
@@ -71,7 +71,7 @@ fn energy_has_no_trend_in_any_other_linkage() {
     ];
     for (name, model, amount, period_s) in heads {
         let (energy, lean) = energies(&model, &Twitch { axis: 0, amount, period_s }, 1e-3, 60.0);
-        let (trend, excursion) = trend_and_excursion(&energy);
+        let (trend, excursion) = trend_and_deviation(&energy);
         assert!(lean > 0.5, "{name} leans by {lean} degrees");
         assert!(
             trend.abs() < 2e-4 && excursion < 1e-2,
@@ -81,10 +81,10 @@ fn energy_has_no_trend_in_any_other_linkage() {
 }
 
 #[test]
-fn damping_only_ever_takes_energy() {
+fn damping_never_adds_energy() {
     let model = Table { damping: [0.03; 4], ..Table::default() }.model();
     let (energy, _) = energies(&model, &Twitch { axis: 0, amount: 0.115, period_s: 0.6 }, 1e-3, 10.0);
-    // The energy is of poses and velocities that agree to second order in the step: ripples of 1e-3 at most.
+    // Poses and velocities agree to second order in the step, so that the energy has ripples of at most 1e-3.
     let start = energy[0];
     let mut least = f64::INFINITY;
     for e in energy {
@@ -105,7 +105,7 @@ fn halving_the_step_quarters_the_error() {
     let fine = end(1.25e-4);
     let error = |step_s: f64| (end(step_s).translation.vector - fine.translation.vector).norm();
     let (coarse, middle) = (error(2e-3), error(1e-3));
-    // Against a step of h/8 the error of h shows as (1 - 1/64), that of 2h as (1 - 1/256).
+    // Relative to a step of h/8, the difference is (1 - 1/64) of the error for h, and (1 - 1/256) for 2h.
     assert_relative_eq!(coarse / middle, 4.0, max_relative = 0.1);
     assert!(middle < 1e-3, "{middle} m at 1 ms");
 }

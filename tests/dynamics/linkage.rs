@@ -11,12 +11,12 @@ fn a_rigid_head_moves_with_its_base() {
     for state in states(&model, &base, 1e-3, 1.0) {
         assert_eq!(state.head, base.at(state.t_s).of_frame(model.rest_pose_base_from_head()));
     }
-    // Where the sprung head rests, to the millimetre.
+    // The rest position of the sprung head, to 1 mm.
     let apart = shipped("handheld").rest_pose_base_from_head().inv_mul(model.rest_pose_base_from_head());
     assert!(apart.translation.vector.norm() < 1e-3 && apart.rotation.angle() < 1e-3);
 }
 
-/// A twitch after which a hand takes hold.
+/// A pulse of the base, after which a hand holds the head.
 struct Held {
     twitch: Twitch,
     from_s: f64,
@@ -41,12 +41,12 @@ fn a_hand_brings_a_swinging_head_to_rest() {
     let swing =
         |path: &[zsim::dynamics::HeadState]| path.iter().map(|s| displacement(&model, s).norm()).fold(0.0, f64::max);
     assert!(swing(&free[2_000..]) > 0.2, "swings freely by {}", swing(&free[2_000..]));
-    // Critical damping at 6 Hz leaves exp(-0.8 * 2 pi 6 * 0.7) = 1e-9 of it after 0.7 s in a firm hand.
+    // A damping ratio of 0.8 at 6 Hz leaves exp(-0.8 * 2 pi 6 * 0.7) = 1e-9 of the swing after 0.7 s.
     assert!(swing(&held[2_500..]) < 1e-6, "still swings by {}", swing(&held[2_500..]));
 }
 
 #[test]
-fn a_stop_ends_the_swing() {
+fn an_end_stop_limits_the_swing() {
     let stop = "end_stop: (angle_deg: 30.0, stiffness_nm_per_rad: 100.0, damping_nm_s_per_rad: 0.02),";
     let model = Table { more: stop, ..Table::default() }.model();
     let lean = |path: &[zsim::dynamics::HeadState]| {
@@ -59,7 +59,7 @@ fn a_stop_ends_the_swing() {
 }
 
 #[test]
-fn a_head_thrown_too_far_is_an_error_with_its_time_and_never_a_nan() {
+fn divergence_is_an_error_with_its_time_and_never_nan() {
     let model = Table::default().model();
     let twitch = Twitch { axis: 0, amount: 0.6, period_s: 0.3 };
     let mut last = None;
@@ -68,7 +68,7 @@ fn a_head_thrown_too_far_is_an_error_with_its_time_and_never_a_nan() {
             Ok(state) => {
                 let Kinematics { world_from_body: Pose { rotation, translation }, .. } = state.head;
                 assert!(rotation.coords.iter().chain(translation.vector.iter()).all(|x| x.is_finite()));
-                assert!(last.is_none(), "goes on after an error");
+                assert!(last.is_none(), "continues after an error");
             }
             Err(_) => last = Some(state),
         }
@@ -78,7 +78,7 @@ fn a_head_thrown_too_far_is_an_error_with_its_time_and_never_a_nan() {
 }
 
 #[test]
-fn a_base_that_is_nowhere_is_an_error() {
+fn a_base_pose_with_nan_is_an_error() {
     struct Lost;
     impl BaseMotion for Lost {
         fn at(&self, t_s: f64) -> Kinematics {

@@ -1,15 +1,15 @@
-//! What a simulation gave, in memory.
+//! Sink that stores the measurements and ground truth of a simulation in memory.
 
-#![allow(dead_code, clippy::unwrap_used, reason = "each test uses a part of it, and fails by panicking")]
+#![allow(dead_code, clippy::unwrap_used, reason = "each test uses only a part of it, and fails by panicking")]
 
 use zsim::geometry::Trajectory;
 use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::time::Stamp;
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
-/// Keeps everything, with its arrival.
+/// Stores everything with its arrival time.
 #[derive(Default, PartialEq, Debug)]
-pub struct Kept {
+pub struct MemorySink {
     pub samples: Vec<(Stamp, ImuSample)>,
     pub scans: Vec<(Stamp, LidarScan)>,
     pub truth: Vec<(Stamp, TruthSample)>,
@@ -17,7 +17,7 @@ pub struct Kept {
     last: Stamp,
 }
 
-impl Kept {
+impl MemorySink {
     fn arrive(&mut self, now: Stamp) {
         assert!(now >= self.last, "arrivals never decrease");
         self.last = now;
@@ -28,7 +28,7 @@ impl Kept {
     }
 }
 
-impl Sink for Kept {
+impl Sink for MemorySink {
     fn imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
         self.arrive(arrival);
         self.samples.push((arrival, *sample));
@@ -42,7 +42,7 @@ impl Sink for Kept {
     }
 }
 
-impl TruthSink for Kept {
+impl TruthSink for MemorySink {
     fn truth(&mut self, now: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
         self.arrive(now);
         self.truth.push((now, *sample));

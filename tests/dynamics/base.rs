@@ -1,4 +1,4 @@
-//! The base found from the head's motion, against the base that moved it.
+//! Base trajectory from the head's motion, compared with the true base motion.
 
 use zsim::dynamics::{DynamicsError, HeadModel, HeadSimulation, load};
 use zsim::geometry::{Pose, Route, Trajectory, Vector};
@@ -11,7 +11,7 @@ fn model(head: &str) -> HeadModel {
     HeadModel::new(&spec, &source).unwrap()
 }
 
-/// Head and base on a walk of ten seconds, `rate_hz` poses a second.
+/// Head model and true trajectories of head and base on a 10 s walk, with `rate_hz` poses/s.
 fn walk(head: &str, rate_hz: i64) -> (HeadModel, Trajectory, Trajectory) {
     let model = model(head);
     let route = Route { points_in_world: vec![Vector::zeros(), Vector::new(20.0, 0.0, 0.0)], closed: false };
@@ -30,8 +30,8 @@ fn walk(head: &str, rate_hz: i64) -> (HeadModel, Trajectory, Trajectory) {
     (model, heads, bases)
 }
 
-/// Greatest distance and angle between two trajectories where both have poses, m and degrees.
-fn apart(a: &[(Stamp, Pose)], b: &Trajectory) -> (f64, f64) {
+/// Largest distance and angle between two trajectories at common stamps, m and degrees.
+fn largest_difference(a: &[(Stamp, Pose)], b: &Trajectory) -> (f64, f64) {
     let pairs = a.iter().map(|(stamp, pose)| (pose, b.at(*stamp).unwrap()));
     pairs.fold((0.0, 0.0), |(shift, turn), (a, b)| {
         let angle = a.rotation.angle_to(&b.rotation).to_degrees();
@@ -40,25 +40,25 @@ fn apart(a: &[(Stamp, Pose)], b: &Trajectory) -> (f64, f64) {
 }
 
 #[test]
-fn the_springs_law_finds_the_base_that_a_rigid_link_misses() {
+fn the_spring_model_determines_the_base_and_a_rigid_link_does_not() {
     let (model, heads, bases) = walk("handheld", 1000);
-    let by_spring = apart(&model.base_under(&heads).unwrap(), &bases);
-    let by_link = apart(&model.base_on_rigid_link(&heads), &bases);
+    let by_spring = largest_difference(&model.base_under(&heads).unwrap(), &bases);
+    let by_link = largest_difference(&model.base_on_rigid_link(&heads), &bases);
     println!("spring {by_spring:?}, rigid link {by_link:?}");
     assert!(by_spring.0 < 0.001 && by_spring.1 < 0.2, "{by_spring:?}");
     assert!(by_link.0 > 0.03 && by_link.1 > 30.0, "{by_link:?}");
 }
 
 #[test]
-fn differences_at_an_imus_rate_lose_little() {
+fn differences_at_the_imu_rate_lose_little_accuracy() {
     let (model, heads, bases) = walk("handheld", 100);
-    let by_spring = apart(&model.base_under(&heads).unwrap(), &bases);
+    let by_spring = largest_difference(&model.base_under(&heads).unwrap(), &bases);
     println!("{by_spring:?}");
     assert!(by_spring.0 < 0.02 && by_spring.1 < 3.0, "{by_spring:?}");
 }
 
 #[test]
-fn a_pose_that_no_base_explains_costs_its_neighbours_alone() {
+fn a_pose_without_a_base_solution_affects_only_its_neighbours() {
     let (model, heads, _) = walk("handheld", 100);
     let whole = model.base_under(&heads).unwrap();
     let thrown = heads.iter().enumerate().map(|(k, (stamp, pose))| {
@@ -70,12 +70,12 @@ fn a_pose_that_no_base_explains_costs_its_neighbours_alone() {
     let far = |stamp: Stamp| stamp.seconds_since(Stamp::default()) > 5.1 || stamp.seconds_since(Stamp::default()) < 4.9;
     let whole = Trajectory::from_poses(whole).unwrap();
     let told: Vec<_> = told.into_iter().filter(|(stamp, _)| far(*stamp)).collect();
-    let (shift, turn) = apart(&told, &whole);
+    let (shift, turn) = largest_difference(&told, &whole);
     assert!(shift < 1e-3 && turn < 0.1, "{shift} m, {turn} degrees");
 }
 
 #[test]
-fn a_motor_does_not_tell_its_base() {
+fn the_base_of_an_actuated_head_cannot_be_computed() {
     let error = model("spinning").base_under(&Trajectory::new()).unwrap_err();
     assert!(matches!(error, DynamicsError::BaseUnknown { .. }), "{error}");
 }

@@ -1,6 +1,6 @@
 use crate::heads::{Table, built, cord, floating, jointed, moored, suspended};
 
-/// The error of the table's head with one piece of its text replaced.
+/// The error of the reference head with one replacement in its text.
 fn error_with(from: &str, to: &str) -> String {
     let text = Table::default().text();
     assert!(text.contains(from), "the text has no {from}");
@@ -8,7 +8,7 @@ fn error_with(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn what_is_wrong_with_a_number_is_said_where_it_stands() {
+fn an_invalid_number_is_an_error_with_its_line() {
     let negative = error_with("mass_kg: 0.40", "mass_kg: -0.40");
     assert!(negative.starts_with("head.ron:4:") && negative.contains("above 0, found -0.4"), "{negative}");
     let nan = error_with("mass_kg: 0.40", "mass_kg: NaN");
@@ -22,8 +22,8 @@ fn what_is_wrong_with_a_number_is_said_where_it_stands() {
 }
 
 #[test]
-fn an_inertia_of_no_rigid_body_is_refused() {
-    // zz > xx + yy is the inertia of nothing.
+fn an_inertia_that_no_rigid_body_can_have_is_refused() {
+    // zz > xx + yy violates the triangle inequality of principal moments.
     let error = error_with("zz: 4e-4", "zz: 4e-3");
     assert!(error.starts_with("head.ron:6:") && error.contains("at most the sum of the other two"), "{error}");
     let error = error_with("zz: 4e-4", "zz: 4e-4, xy: 2e-3");
@@ -31,24 +31,24 @@ fn an_inertia_of_no_rigid_body_is_refused() {
 }
 
 #[test]
-fn a_head_that_falls_over_is_told_by_how_much() {
-    // The table's 25/2.0/10/100 falls over under 0.40 kg.
+fn the_error_of_an_unstable_head_has_its_largest_stable_mass() {
+    // A spring of 25/2.0/10/100 mm is unstable under 0.40 kg.
     let text = Table { coil: [25.0, 2.0, 10.0, 100.0], ..Table::default() }.text();
     let error = built(&text).unwrap_err().to_string();
     assert!(error.contains("cannot stand") && error.contains("the head has 0.400 kg"), "{error}");
-    let carries: f64 = error.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
-    // A little lighter than what it carries it stands, a little heavier it does not.
+    let largest_kg: f64 = error.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    // A head slightly lighter than the stated mass is stable, a slightly heavier one is not.
     let with_mass = |mass_kg: f64| {
-        // The same load distribution: a lighter head of the same centre of mass; inertia does not matter to statics.
+        // The same load distribution: the centre of mass is unchanged, and inertia does not affect statics.
         built(&text.replacen("mass_kg: 0.40", &format!("mass_kg: {mass_kg}"), 1))
     };
-    assert!(carries > 0.05 && carries < 0.4, "{carries}");
-    assert!(with_mass(carries * 0.99).is_ok());
-    assert!(with_mass(carries * 1.01).is_err());
+    assert!(largest_kg > 0.05 && largest_kg < 0.4, "{largest_kg}");
+    assert!(with_mass(largest_kg * 0.99).is_ok());
+    assert!(with_mass(largest_kg * 1.01).is_err());
 }
 
 #[test]
-fn a_spring_that_is_none_is_refused() {
+fn invalid_springs_are_refused() {
     let coil = |coil: [f64; 4]| built(&Table { coil, ..Table::default() }.text()).unwrap_err().to_string();
     assert!(coil([25.0, 14.0, 2.0, 120.0]).contains("spring index"), "{}", coil([25.0, 14.0, 2.0, 120.0]));
     assert!(coil([25.0, 3.0, 41.0, 120.0]).contains("coils"), "{}", coil([25.0, 3.0, 41.0, 120.0]));
@@ -83,7 +83,7 @@ fn a_spring_that_is_none_is_refused() {
 }
 
 #[test]
-fn a_stop_that_the_head_leans_on_already_is_refused() {
+fn an_end_stop_in_contact_at_rest_is_refused() {
     let stop = "end_stop: (angle_deg: 175.0, stiffness_nm_per_rad: 20.0, damping_nm_s_per_rad: 0.02),";
     let error = built(&Table { more: stop, ..Table::default() }.text()).unwrap_err().to_string();
     assert!(error.starts_with("head.ron:19:") && error.contains("below 170"), "{error}");
@@ -95,31 +95,31 @@ fn refused(place: [f64; 3], elements: &str) -> String {
 }
 
 #[test]
-fn a_suspension_that_holds_nothing_says_so_in_a_sentence() {
+fn invalid_suspensions_are_errors_with_the_reason() {
     let none = refused([0.0; 3], "");
     assert!(none.starts_with("head.ron:") && none.contains("at least one element"), "{none}");
     let rope = |x: f64| cord([x, 0.0, 0.0], [x, 0.0, 0.05], 0.4, 800.0);
     let zero = refused([0.0; 3], &rope(0.0).replace("length_m: 0.4", "length_m: 0.0"));
     assert!(zero.starts_with("head.ron:") && zero.contains("above 0, found 0"), "{zero}");
-    // On a single rope the head turns about it as it likes.
+    // A single rope does not constrain the rotation about itself.
     let loose = refused([0.0, 0.0, -0.45], &rope(0.0));
     assert!(loose.contains("nothing holds it against a turn about z"), "{loose}");
-    // Ropes that would have to push: the head goes through and hangs below.
+    // Ropes cannot push: the head falls to a pose below them.
     let above = refused([0.0, 0.0, 0.45], &(rope(0.03) + &rope(-0.03)));
     assert!(above.contains("from where base_from_head puts it"), "{above}");
     let joints = refused([0.0, 0.0, 0.07], &jointed(0.7).repeat(2));
     assert!(joints.contains("at most one universal_joint"), "{joints}");
-    // 0.40 kg 70 mm above a joint need 0.27 N m/rad.
+    // 0.40 kg at 70 mm above a joint need 0.27 N m/rad.
     let falls = refused([0.0, 0.0, 0.07], &jointed(0.2));
     assert!(falls.contains("cannot stand on its elements") && falls.contains("they carry at most"), "{falls}");
-    // A cylinder of 1.2 litres does not carry it in a fluid of a third of water's density.
+    // The buoyancy of a cylinder of 1.2 litres is too small in a fluid of a third of water's density.
     let sinks = floating([0.0; 4]).replace("density_kg_per_m3: 1000.0", "density_kg_per_m3: 300.0");
     let sinks = refused([0.0, 0.0, 0.05], &(sinks + &moored()));
     assert!(sinks.contains("cannot stand") && sinks.contains("they carry at most 0."), "{sinks}");
 }
 
 #[test]
-fn a_wire_or_a_cable_that_is_none_is_refused() {
+fn invalid_wires_and_cables_are_refused() {
     let cable = "cable: (length_m: 0.1, tension_n: 50.0, stiffness_n_per_m: 400.0, damping_n_s_per_m: 0.0),";
     let error = built(&Table { more: cable, ..Table::default() }.text()).unwrap_err().to_string();
     assert!(error.starts_with("head.ron:") && error.contains("-0.025 m long without its tension"), "{error}");
@@ -132,13 +132,13 @@ fn a_wire_or_a_cable_that_is_none_is_refused() {
 }
 
 #[test]
-fn what_is_wrong_with_a_carrier_is_said_where_it_stands() {
+fn an_invalid_carrier_is_an_error_with_its_line() {
     let with = |carrier: &str| {
         let text = Table::default().text();
         let (body, _) = text.rsplit_once(')').unwrap();
         built(&format!("{body}    carrier: [\n        ({carrier}),\n    ],\n)"))
     };
-    // The head stands on a spring of 120 mm, its laser 100 mm above that.
+    // The head is on a spring of 120 mm, with its laser 100 mm higher.
     let around = "name: \"post\", foot_in_base_m: (0.0, 0.0, 0.2), radius_m: 0.05, height_m: 0.1, reflectance: 0.5";
     let told = |from: &str, to: &str| {
         assert!(around.contains(from), "{from}");
