@@ -29,9 +29,9 @@ fn the_error_grows_by_less_than_5_cm_over_a_6_s_stop() {
     for seed in [21, 22] {
         let run = walk_with_a_stop(seed);
         for fixed_views in [0, 2] {
-            let held = growth_in_the_stop_m(&run, &EstimatorSpec { fixed_views, ..default.clone() });
-            println!("seed {seed}, {fixed_views} views: {held:.4} m");
-            assert!(held < 0.05, "seed {seed}, {fixed_views} views: {held}");
+            let grown_m = growth_in_the_stop_m(&run, &EstimatorSpec { fixed_views, ..default.clone() });
+            println!("seed {seed}, {fixed_views} views: {grown_m:.4} m");
+            assert!(grown_m < 0.05, "seed {seed}, {fixed_views} views: {grown_m}");
         }
     }
 }
@@ -86,6 +86,6 @@ fn lidar_extrinsics_are_estimated_from_an_incorrect_calibration() {
     assert!(turned_back.angle().to_degrees() < 0.1, "{turned_back}");
     assert!((found.shift + shift).norm() < 0.003, "{found:?}");
     // Without refinement the calibrated extrinsics do not change.
-    let held = estimate(false).lidar;
-    assert!(held.turn.angle() < 1e-6 && held.shift.norm() < 1e-6, "{held:?}");
+    let unrefined = estimate(false).lidar;
+    assert!(unrefined.turn.angle() < 1e-6 && unrefined.shift.norm() < 1e-6, "{unrefined:?}");
 }

@@ -85,7 +85,7 @@ fn gain_curves_do_not_depend_on_the_number_of_threads() {
 }
 
 /// The handheld head on a flexible joint of 1 mm length, stiff in all other directions; upright or hanging.
-fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
+fn on_a_joint(stiffness_nm_per_rad: f64, is_hanging: bool) -> HeadModel {
     let (mut spec, source) = load("handheld").unwrap();
     let joint = format!(
         "stiffness(length_mm: 1, rows: ((1e5,0,0,0,0,0),(0,1e5,0,0,0,0),(0,0,1e5,0,0,0),(0,0,0,{k},0,0),(0,0,0,0,{k},0),\
@@ -97,10 +97,10 @@ fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
     {
         *spring = parse(&Source::in_memory("a joint", joint)).unwrap();
         *damping_ratio = DampingSpec { rocking: 0.08, sway: 0.08, bounce: 0.08, yaw: 0.08 };
-        base_from_spring.roll_pitch_yaw_deg = [if hangs { 180.0 } else { 0.0 }, 0.0, 0.0];
+        base_from_spring.roll_pitch_yaw_deg = [if is_hanging { 180.0 } else { 0.0 }, 0.0, 0.0];
         (*segments, *end_stop, *hold) = (1, None, None);
     }
-    // Upside down the carrier would overlap the head.
+    // Upside down the head would hang inside its carrier.
     spec.carrier.clear();
     HeadModel::new(&spec, &source).unwrap()
 }
@@ -119,9 +119,9 @@ fn a_large_swing_raises_the_resonance_of_an_upright_head_and_lowers_that_of_a_ha
         };
     let weight_nm = 0.35 * 9.80665 * lever_m;
     let plan = GainPlan { up_to_hz: 4.0, realisations: 6, ..plan() };
-    for (hangs, sign) in [(false, 1.0), (true, -1.0)] {
-        let stiffness = if hangs { 0.6 * weight_nm } else { 1.6 * weight_nm };
-        let study = swing_study(&on_a_joint(stiffness, hangs), Axis::X, &[0.2, 12.0], &plan, &|_| ()).unwrap();
+    for (is_hanging, sign) in [(false, 1.0), (true, -1.0)] {
+        let stiffness = if is_hanging { 0.6 * weight_nm } else { 1.6 * weight_nm };
+        let study = swing_study(&on_a_joint(stiffness, is_hanging), Axis::X, &[0.2, 12.0], &plan, &|_| ()).unwrap();
         let [small, large] = study.points[..] else { panic!("{study:?}") };
         let sigma = large.swing_rms_deg.to_radians();
         let shift = sign * weight_nm / (4.0 * (stiffness - sign * weight_nm)) * sigma * sigma;

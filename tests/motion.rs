@@ -36,9 +36,9 @@ fn slope(f: impl Fn(f64) -> Vector, t: f64, h: f64) -> Vector {
     ((f(t + h) - f(t - h)) * 8.0 - (f(t + 2.0 * h) - f(t - 2.0 * h))) / (12.0 * h)
 }
 
-fn assert_close(measured: &Vector, told: &Vector, what: &str) {
-    let error = (measured - told).norm();
-    assert!(error < 1e-5 * (1.0 + told.norm()), "{what}: differs by {error} from {told:?}");
+fn assert_close(measured: &Vector, expected: &Vector, name: &str) {
+    let error = (measured - expected).norm();
+    assert!(error < 1e-5 * (1.0 + expected.norm()), "{name}: differs by {error} from {expected:?}");
 }
 
 #[test]

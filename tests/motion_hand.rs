@@ -97,12 +97,12 @@ fn at_the_end_of_an_open_route_the_walker_turns_round() {
     let x = |now: &zsim::geometry::Kinematics| now.world_from_body.translation.vector.x;
     assert!(samples.iter().all(|now| (-1e-9..10.0 + 1e-9).contains(&x(now))));
     let backwards = samples.iter().filter(|now| now.velocity_in_world.x < -0.999);
-    let mut seen = 0;
+    let mut returning = 0;
     for now in backwards {
         assert!((now.world_from_body.rotation * Vector::x()).x < -0.9, "walks backwards at {}", x(now));
-        seen += 1;
+        returning += 1;
     }
-    assert!(seen > 1000, "came back for {seen} samples");
+    assert!(returning > 1000, "walks back for {returning} samples");
     let quickest = samples.iter().map(|now| now.angular_velocity_in_world.norm()).fold(0.0, f64::max);
     assert!(quickest.to_degrees() < 110.01, "turns at {} degrees/s", quickest.to_degrees());
 }

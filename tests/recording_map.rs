@@ -136,7 +136,7 @@ proptest! {
         let mut file = FILE.clone();
         file[at] ^= by;
         if let Ok(read) = read(&file) {
-            // A changed byte within a comment of the header.
+            // The byte is in the header comment that describes the columns.
             prop_assert!(read == map(40));
         }
     }

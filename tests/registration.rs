@@ -13,7 +13,7 @@ use zsim::recording::{Preference, Reader, RunDescription, Writer};
 use zsim::simulation::{Scenario, Simulation};
 use zsim::spec::{Kind, names};
 
-/// Recordings with little and with much revisited geometry.
+/// One recording with few loops, and two with several laps or a closed corridor.
 fn runs() -> [Run; 3] {
     let walk = |semi_axes_m, lap_s| Walk { start_s: 1.5, ..Walk::new(semi_axes_m, lap_s) };
     [

@@ -119,7 +119,7 @@ fn beams_projected_by_truth_lie_within_a_millimetre_of_the_offices_surfaces() {
     // The operator's trunk covers directions from -1.6 to 47.2 degrees from straight back; the beams end at 45 degrees.
     // A few of the 1081 beams see it, and more when the head yaws on its spring.
     let on_carrier = on_carrier.len();
-    assert!((1_000..20_000).contains(&on_carrier), "the operator is seen at the edge of the scans: {on_carrier}");
+    assert!((1_000..20_000).contains(&on_carrier), "returns of the operator at the edge of the scans: {on_carrier}");
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn the_carrier_does_not_affect_a_head_waved_outdoors() {
 
 #[test]
 fn beams_of_spinning_nodding_and_trawling_lasers_lie_on_the_surfaces_too() {
-    // 8 s include rest, start and steady motion. The exact lidar is on the head's own mount.
+    // 8 s include rest, start and steady motion. The error-free lidar spins or nods with the head.
     for head in ["spinning", "nodding", "trawling"] {
         let scenario = Scenario { head: head.to_owned(), motion: "cart".to_owned(), ..exact_office(8.0) };
         let (on_world, _) = beams_on_surfaces(&Simulation::prepare(&scenario).unwrap());

@@ -148,7 +148,7 @@ fn moving_objects_are_hit_at_their_position_at_the_time_of_the_ray() {
     // times sqrt(2).
     let expected = 2.5 - 0.02 * 2_f64.sqrt();
     assert_relative_eq!(world.cast(&towards_x(0.5), 30.0, 1.0).unwrap().distance_m, expected, epsilon = 1e-9);
-    // With several objects on a ray the closest one is hit.
+    // No hit with a range limit in front of the leaf.
     assert!(world.cast(&towards_x(0.5), 1.9, 2.0).is_none());
 }
 

@@ -1,4 +1,4 @@
-use crate::heads::{Nodding, Still, built, shipped, states};
+use crate::heads::{FixedBase, Nodding, built, shipped, states};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use zsim::dynamics::{HeadModel, HeadState};
 use zsim::geometry::{Kinematics, Pose, Rotation, Vector};
@@ -72,7 +72,7 @@ fn an_actuated_heads_velocities_are_the_derivatives_of_its_poses() {
 fn an_actuated_head_starts_at_rest_with_continuous_acceleration() {
     for turn in ["spin(rate_hz: 1.3)", "nod(amplitude_deg: 50.0, frequency_hz: 0.9)"] {
         let model = built(&text(turn)).unwrap();
-        let path = states(&model, &Still(Pose::identity()), 1e-3, 3.0);
+        let path = states(&model, &FixedBase(Pose::identity()), 1e-3, 3.0);
         for state in &path[..=500] {
             assert_eq!(state.head, Kinematics::at_rest(*model.rest_pose_base_from_head()), "{turn}");
         }
@@ -89,7 +89,7 @@ fn an_actuated_head_starts_at_rest_with_continuous_acceleration() {
 #[test]
 fn the_rotation_is_as_specified_and_points_on_the_axis_do_not_move() {
     let model = built(&text("spin(rate_hz: 1.3)")).unwrap();
-    let path = states(&model, &Still(Pose::identity()), 1e-3, 3.0);
+    let path = states(&model, &FixedBase(Pose::identity()), 1e-3, 3.0);
     let pivot = |state: &HeadState| state.head.world_from_body * nalgebra::Point3::new(-0.2, 0.1, 0.05);
     assert!(path.iter().all(|state| (pivot(state) - pivot(&path[0])).norm() < 1e-12));
     // At full rate from 1.3 s on, after half of the rotation at full rate since 0.5 s.
@@ -101,7 +101,7 @@ fn the_rotation_is_as_specified_and_points_on_the_axis_do_not_move() {
     }
     // A nod of 50 degrees at 0.9 Hz, at its amplitude at three quarters of its second period.
     let model = built(&text("nod(amplitude_deg: 50.0, frequency_hz: 0.9)")).unwrap();
-    let path = states(&model, &Still(Pose::identity()), 1e-3, 3.0);
+    let path = states(&model, &FixedBase(Pose::identity()), 1e-3, 3.0);
     let angle = |state: &HeadState| {
         model.rest_pose_base_from_head().rotation.angle_to(&state.head.world_from_body.rotation).to_degrees()
     };
@@ -115,7 +115,7 @@ fn half_a_revolution_of_the_spinning_lms291_covers_the_front_hemisphere() {
     let source = find(Kind::Lidar, "lms291").unwrap();
     let lidar = Lidar::new(&parse(&source).unwrap(), &source).unwrap();
     let stand = Pose::translation(0.0, 0.0, 0.9);
-    let path = states(&head, &Still(stand), 1e-3, 6.0);
+    let path = states(&head, &FixedBase(stand), 1e-3, 6.0);
     // The middle ray does not move, 0.75 m above the ground.
     let mut seen = Vec::new();
     for scan in 0..38 {

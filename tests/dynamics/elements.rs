@@ -83,7 +83,7 @@ fn parallel_springs_add_up_and_have_rotational_stiffness_from_their_levers() {
 
 #[test]
 fn a_suspension_of_one_spring_equals_the_single_spring() {
-    let table = crate::heads::Table { coil: [20.0, 2.5, 8.0, 80.0], ..Default::default() };
+    let table = crate::heads::ReferenceHead { coil: [20.0, 2.5, 8.0, 80.0], ..Default::default() };
     // The reference head has its centre 70 mm above the spring, and the same inertias.
     let alone = table.model();
     let one = model([0.0, 0.0, 0.15], &upright_spring([0.0; 3], [0.0, 0.0, -0.07]));

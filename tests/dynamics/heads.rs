@@ -7,7 +7,7 @@ use zsim::motion::BaseMotion;
 use zsim::spec::{Source, parse};
 
 /// The reference head: 0.40 kg, centre of mass 70 mm above the spring, 9e-4 kg m^2. Its frame is the spring's top.
-pub struct Table {
+pub struct ReferenceHead {
     /// Mean coil diameter, wire diameter, active coils, free length, mm.
     pub coil: [f64; 4],
     pub segments: usize,
@@ -18,13 +18,13 @@ pub struct Table {
     pub more: &'static str,
 }
 
-impl Default for Table {
+impl Default for ReferenceHead {
     fn default() -> Self {
         Self { coil: [25.0, 3.0, 12.0, 120.0], segments: 1, damping: [0.0; 4], hanging: false, more: "" }
     }
 }
 
-impl Table {
+impl ReferenceHead {
     pub fn text(&self) -> String {
         let ([coil, wire, coils, length], [rocking, sway, bounce, yaw]) = (self.coil, self.damping);
         let (segments, more) = (self.segments, self.more);
@@ -142,22 +142,22 @@ pub fn shipped(name: &str) -> HeadModel {
 }
 
 /// A base that does not move.
-pub struct Still(pub Pose);
+pub struct FixedBase(pub Pose);
 
-impl BaseMotion for Still {
+impl BaseMotion for FixedBase {
     fn at(&self, _t_s: f64) -> Kinematics {
         Kinematics::at_rest(self.0)
     }
 }
 
 /// A base that makes one pulse `amount (1 - cos(2 pi t / T)) / 2` along x, y, z or in roll, pitch, yaw.
-pub struct Twitch {
+pub struct BasePulse {
     pub axis: usize,
     pub amount: f64,
     pub period_s: f64,
 }
 
-impl BaseMotion for Twitch {
+impl BaseMotion for BasePulse {
     fn at(&self, t_s: f64) -> Kinematics {
         let rate = std::f64::consts::TAU / self.period_s;
         let phase = rate * t_s.clamp(0.0, self.period_s);

@@ -1,8 +1,8 @@
-use crate::heads::{Table, built, cord, floating, jointed, moored, suspended};
+use crate::heads::{ReferenceHead, built, cord, floating, jointed, moored, suspended};
 
 /// The error of the reference head with one replacement in its text.
 fn error_with(from: &str, to: &str) -> String {
-    let text = Table::default().text();
+    let text = ReferenceHead::default().text();
     assert!(text.contains(from), "the text has no {from}");
     built(&text.replacen(from, to, 1)).unwrap_err().to_string()
 }
@@ -33,7 +33,7 @@ fn an_inertia_that_no_rigid_body_can_have_is_refused() {
 #[test]
 fn the_error_of_an_unstable_head_has_its_largest_stable_mass() {
     // A spring of 25/2.0/10/100 mm is unstable under 0.40 kg.
-    let text = Table { coil: [25.0, 2.0, 10.0, 100.0], ..Table::default() }.text();
+    let text = ReferenceHead { coil: [25.0, 2.0, 10.0, 100.0], ..ReferenceHead::default() }.text();
     let error = built(&text).unwrap_err().to_string();
     assert!(error.contains("cannot stand") && error.contains("the head has 0.400 kg"), "{error}");
     let largest_kg: f64 = error.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
@@ -49,12 +49,13 @@ fn the_error_of_an_unstable_head_has_its_largest_stable_mass() {
 
 #[test]
 fn invalid_springs_are_refused() {
-    let coil = |coil: [f64; 4]| built(&Table { coil, ..Table::default() }.text()).unwrap_err().to_string();
+    let coil =
+        |coil: [f64; 4]| built(&ReferenceHead { coil, ..ReferenceHead::default() }.text()).unwrap_err().to_string();
     assert!(coil([25.0, 14.0, 2.0, 120.0]).contains("spring index"), "{}", coil([25.0, 14.0, 2.0, 120.0]));
     assert!(coil([25.0, 3.0, 41.0, 120.0]).contains("coils"), "{}", coil([25.0, 3.0, 41.0, 120.0]));
     let pieces = error_with("segments: 1", "segments: 0");
     assert!(pieces.starts_with("head.ron:") && pieces.contains("1 to 64 segments, not 0"), "{pieces}");
-    let text = Table::default().text();
+    let text = ReferenceHead::default().text();
     let from = text.find("coil(").unwrap();
     let to = text.find("segments").unwrap();
     let named = built(&format!("{}named(\"no_such\"), {}", &text[..from], &text[to..])).unwrap_err().to_string();
@@ -85,7 +86,7 @@ fn invalid_springs_are_refused() {
 #[test]
 fn an_end_stop_in_contact_at_rest_is_refused() {
     let stop = "end_stop: (angle_deg: 175.0, stiffness_nm_per_rad: 20.0, damping_nm_s_per_rad: 0.02),";
-    let error = built(&Table { more: stop, ..Table::default() }.text()).unwrap_err().to_string();
+    let error = built(&ReferenceHead { more: stop, ..ReferenceHead::default() }.text()).unwrap_err().to_string();
     assert!(error.starts_with("head.ron:19:") && error.contains("below 170"), "{error}");
 }
 
@@ -121,9 +122,9 @@ fn invalid_suspensions_are_errors_with_the_reason() {
 #[test]
 fn invalid_wires_and_cables_are_refused() {
     let cable = "cable: (length_m: 0.1, tension_n: 50.0, stiffness_n_per_m: 400.0, damping_n_s_per_m: 0.0),";
-    let error = built(&Table { more: cable, ..Table::default() }.text()).unwrap_err().to_string();
+    let error = built(&ReferenceHead { more: cable, ..ReferenceHead::default() }.text()).unwrap_err().to_string();
     assert!(error.starts_with("head.ron:") && error.contains("-0.025 m long without its tension"), "{error}");
-    let text = Table { more: "spring_mass: included,", ..Table::default() }.text();
+    let text = ReferenceHead { more: "spring_mass: included,", ..ReferenceHead::default() }.text();
     let unknown = text.replace("spring_steel", "moduli(youngs_gpa: 206.0, shear_gpa: 79.3)");
     let error = built(&unknown).unwrap_err().to_string();
     assert!(error.contains("density_kg_per_m3"), "{error}");
@@ -134,7 +135,7 @@ fn invalid_wires_and_cables_are_refused() {
 #[test]
 fn an_invalid_carrier_is_an_error_with_its_line() {
     let with = |carrier: &str| {
-        let text = Table::default().text();
+        let text = ReferenceHead::default().text();
         let (body, _) = text.rsplit_once(')').unwrap();
         built(&format!("{body}    carrier: [\n        ({carrier}),\n    ],\n)"))
     };

@@ -1,4 +1,4 @@
-use crate::heads::{Nodding, Table, Twitch, displacement, shipped, states};
+use crate::heads::{BasePulse, Nodding, ReferenceHead, displacement, shipped, states};
 use zsim::dynamics::{DynamicsError, HeadSimulation};
 use zsim::geometry::{Kinematics, Pose, Vector};
 use zsim::motion::BaseMotion;
@@ -18,13 +18,13 @@ fn a_rigid_head_moves_with_its_base() {
 
 /// A pulse of the base, after which a hand holds the head.
 struct Held {
-    twitch: Twitch,
+    pulse: BasePulse,
     from_s: f64,
 }
 
 impl BaseMotion for Held {
     fn at(&self, t_s: f64) -> Kinematics {
-        self.twitch.at(t_s)
+        self.pulse.at(t_s)
     }
 
     fn hold(&self, t_s: f64) -> f64 {
@@ -34,10 +34,11 @@ impl BaseMotion for Held {
 
 #[test]
 fn a_hand_brings_a_swinging_head_to_rest() {
-    let model = Table { more: "hold: (frequency_hz: 6.0, damping_ratio: 0.8),", ..Table::default() }.model();
-    let twitch = || Twitch { axis: 0, amount: 0.14, period_s: 0.4 };
-    let free = states(&model, &twitch(), 1e-3, 3.0);
-    let held = states(&model, &Held { twitch: twitch(), from_s: 1.0 }, 1e-3, 3.0);
+    let model =
+        ReferenceHead { more: "hold: (frequency_hz: 6.0, damping_ratio: 0.8),", ..ReferenceHead::default() }.model();
+    let pulse = || BasePulse { axis: 0, amount: 0.14, period_s: 0.4 };
+    let free = states(&model, &pulse(), 1e-3, 3.0);
+    let held = states(&model, &Held { pulse: pulse(), from_s: 1.0 }, 1e-3, 3.0);
     let swing =
         |path: &[zsim::dynamics::HeadState]| path.iter().map(|s| displacement(&model, s).norm()).fold(0.0, f64::max);
     assert!(swing(&free[2_000..]) > 0.2, "swings freely by {}", swing(&free[2_000..]));
@@ -48,22 +49,27 @@ fn a_hand_brings_a_swinging_head_to_rest() {
 #[test]
 fn an_end_stop_limits_the_swing() {
     let stop = "end_stop: (angle_deg: 30.0, stiffness_nm_per_rad: 100.0, damping_nm_s_per_rad: 0.02),";
-    let model = Table { more: stop, ..Table::default() }.model();
+    let model = ReferenceHead { more: stop, ..ReferenceHead::default() }.model();
     let lean = |path: &[zsim::dynamics::HeadState]| {
         let axis = |s: &zsim::dynamics::HeadState| (s.head.world_from_body.rotation * Vector::z()).angle(&Vector::z());
         path.iter().map(axis).fold(0.0, f64::max).to_degrees()
     };
-    let free = lean(&states(&Table::default().model(), &Twitch { axis: 0, amount: 0.14, period_s: 0.4 }, 1e-3, 2.0));
-    let stopped = lean(&states(&model, &Twitch { axis: 0, amount: 0.14, period_s: 0.4 }, 1e-3, 2.0));
+    let free = lean(&states(
+        &ReferenceHead::default().model(),
+        &BasePulse { axis: 0, amount: 0.14, period_s: 0.4 },
+        1e-3,
+        2.0,
+    ));
+    let stopped = lean(&states(&model, &BasePulse { axis: 0, amount: 0.14, period_s: 0.4 }, 1e-3, 2.0));
     assert!(free > 44.0 && (30.0..38.0).contains(&stopped), "{free} free, {stopped} with a stop");
 }
 
 #[test]
 fn divergence_is_an_error_with_its_time_and_never_nan() {
-    let model = Table::default().model();
-    let twitch = Twitch { axis: 0, amount: 0.6, period_s: 0.3 };
+    let model = ReferenceHead::default().model();
+    let pulse = BasePulse { axis: 0, amount: 0.6, period_s: 0.3 };
     let mut last = None;
-    for state in HeadSimulation::new(&model, &twitch, 1e-3).unwrap().take(5_000) {
+    for state in HeadSimulation::new(&model, &pulse, 1e-3).unwrap().take(5_000) {
         match &state {
             Ok(state) => {
                 let Kinematics { world_from_body: Pose { rotation, translation }, .. } = state.head;
@@ -86,7 +92,7 @@ fn a_base_pose_with_nan_is_an_error() {
             Kinematics::at_rest(Pose::translation(x, 0.0, 0.0))
         }
     }
-    let model = Table::default().model();
+    let model = ReferenceHead::default().model();
     let mut simulation = HeadSimulation::new(&model, &Lost, 1e-3).unwrap().skip_while(Result::is_ok);
     let error = simulation.next().unwrap().unwrap_err();
     assert!(error.to_string().contains("0.010 s after the start"), "{error}");
@@ -95,7 +101,7 @@ fn a_base_pose_with_nan_is_an_error() {
 
 #[test]
 fn a_step_too_long_for_the_fastest_mode_is_refused() {
-    let model = Table::default().model();
+    let model = ReferenceHead::default().model();
     for step_s in [0.1, 0.0, -1.0, f64::NAN] {
         let error = HeadSimulation::new(&model, &Nodding { amount_rad: 0.0 }, step_s).err().unwrap();
         assert!(error.to_string().contains("fastest oscillation"), "{error}");

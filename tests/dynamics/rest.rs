@@ -1,4 +1,4 @@
-use crate::heads::{Still, Table, built, shipped, states};
+use crate::heads::{FixedBase, ReferenceHead, built, shipped, states};
 use approx::assert_relative_eq;
 use nalgebra::{Matrix2, Vector2};
 use zsim::dynamics::{HeadSpec, LinkageSpec, ModeKind};
@@ -20,7 +20,7 @@ fn rocking_frequencies_agree_with_reference_values_for_any_number_of_segments() 
     ];
     for (coil, hanging, expected_hz) in table {
         for segments in [1, 2, 4, 8] {
-            let model = Table { coil, hanging, segments, ..Table::default() }.model();
+            let model = ReferenceHead { coil, hanging, segments, ..ReferenceHead::default() }.model();
             let rocking = &model.linear_modes()[0];
             assert_eq!(rocking.kind, ModeKind::Rocking);
             assert_relative_eq!(rocking.frequency_hz, expected_hz, max_relative = 0.02);
@@ -31,20 +31,20 @@ fn rocking_frequencies_agree_with_reference_values_for_any_number_of_segments() 
 #[test]
 fn the_static_deflection_is_weight_over_axial_stiffness() {
     // G d^4 / (8 D^3 n) = 79.3e9 0.003^4 / (8 0.025^3 12) = 4282.2 N/m under 0.40 kg: 0.916 mm.
-    let model = Table::default().model();
+    let model = ReferenceHead::default().model();
     let sag = 0.40 * G / 4282.2;
     let rest = model.rest_pose_base_from_head();
     assert_relative_eq!(rest.translation.vector, Vector::new(0.0, 0.0, 0.12 - sag), epsilon = 1e-8);
-    let hanging = Table { hanging: true, ..Table::default() }.model();
+    let hanging = ReferenceHead { hanging: true, ..ReferenceHead::default() }.model();
     assert_relative_eq!(hanging.rest_pose_base_from_head().translation.z, -(0.12 + sag), epsilon = 1e-8);
 }
 
 #[test]
 fn a_head_on_a_tilted_base_rests_at_the_inclination_of_the_loaded_column() {
-    let model = Table::default().model();
+    let model = ReferenceHead::default().model();
     let tilt = 0.002;
     let base = Pose::from_parts(Vector::new(3.0, -2.0, 1.0).into(), from_roll_pitch_yaw(0.0, tilt, 0.4));
-    let path = states(&model, &Still(base), 1e-3, 1.0);
+    let path = states(&model, &FixedBase(base), 1e-3, 1.0);
     // In base axes gravity acts with m g tilt along x at 70 mm above the top. The top's (x, theta) solve
     // [K_xx, K_xt; K_xt, K_tt - m g h] (x, theta) = m g tilt (1, h), with the stiffness K of the loaded column.
     let moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
@@ -105,7 +105,7 @@ fn the_handheld_head_is_light_and_rocks_between_1_and_1_5_hz() {
 fn gravity_amplifies_a_slow_tilt_of_the_base() {
     // Rotation of an upright head relative to that of its base at zero frequency: 1.58 and 2.64; 1 about z.
     for (coil, gain) in [([25.0, 3.0, 8.0, 80.0], 1.58), ([25.0, 3.0, 12.0, 120.0], 2.64)] {
-        let model = Table { coil, ..Table::default() }.model();
+        let model = ReferenceHead { coil, ..ReferenceHead::default() }.model();
         let linear = model.linear().unwrap();
         let followed = linear.stiffness.try_inverse().unwrap() * linear.base_stiffness;
         assert_relative_eq!(followed[(3, 3)], gain, max_relative = 0.02);
@@ -127,7 +127,7 @@ fn every_shipped_head_is_valid_and_stays_at_rest() {
             LinkageSpec::Actuated { motor, .. } => motor.still_s,
             _ => 10.0,
         };
-        let path = states(&model, &Still(Pose::identity()), 1e-3, rests_s);
+        let path = states(&model, &FixedBase(Pose::identity()), 1e-3, rests_s);
         let moved = path[path.len() - 1].head.world_from_body.inv_mul(model.rest_pose_base_from_head());
         assert!(moved.translation.vector.norm() < 1e-9, "{name} moves by {moved}");
     }
@@ -138,8 +138,8 @@ fn every_shipped_head_is_valid_and_stays_at_rest() {
 
 #[test]
 fn a_head_can_refer_to_a_spring_spec_by_name() {
-    let text = Table::default().text();
+    let text = ReferenceHead::default().text();
     let (from, to) = (text.find("coil(").unwrap(), text.find("segments").unwrap());
     let named = built(&format!("{}named(\"25x3x12x120\"), {}", &text[..from], &text[to..])).unwrap();
-    assert_eq!(named.linear_modes(), Table::default().model().linear_modes());
+    assert_eq!(named.linear_modes(), ReferenceHead::default().model().linear_modes());
 }

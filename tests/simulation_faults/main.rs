@@ -76,7 +76,7 @@ fn random_faults_depend_only_on_the_seed() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert!(pool.install(|| with(list)) == once);
     }
-    // The seeds lose different samples: that independent losses agree this well has a probability of 1e-100.
+    // The seeds lose different scans: equal arrivals by chance have a probability of 1e-100.
     let other = run(&scenario("mocap_room", "3dm_gx2", 2), Some(list));
     let arrivals = |recorded: &MemorySink| recorded.scans.iter().map(|(arrival, _)| *arrival).collect::<Vec<_>>();
     assert_ne!(arrivals(&once), arrivals(&other));
