@@ -6,7 +6,7 @@ use super::{Rig, SimulationSummary};
 use crate::geometry::{Pose, Vector};
 use crate::measurement::{ImuNoise, ImuSample, LidarScan};
 use crate::random::Seed;
-use crate::sensors::{Carried, Clock, Firing, Imu, ImuErrors, LidarErrors, Scenery, Track, mean_motion};
+use crate::sensors::{Clock, Imu, ImuErrors, LidarErrors, ScanTiming, Scenery, SceneryWithCarrier, Track, mean_motion};
 use crate::time::{Span, Stamp};
 use crate::truth::{ClockTruth, TruthSample};
 use rayon::prelude::*;
@@ -152,29 +152,29 @@ fn scans(
     until_s: f64,
     summaries: &mut [SimulationSummary],
 ) -> Vec<Vec<(Stamp, LidarScan)>> {
-    let firings: Vec<Vec<Firing>> = sensors.iter_mut().map(|one| one.schedule.scans(until_s)).collect();
-    let (Some(first), Some(firings)) = (sensors.first(), firings.first()) else { return Vec::new() };
+    let timings: Vec<Vec<ScanTiming>> = sensors.iter_mut().map(|one| one.schedule.scans(until_s)).collect();
+    let (Some(first), Some(timings)) = (sensors.first(), timings.first()) else { return Vec::new() };
     let Rig { lidar, scenery, carrier, head_from_laser, .. } = *first.rig;
     let laser = head.of_frame(&head_from_laser);
-    let carried = Carried { scenery, carrier, base };
+    let carried = SceneryWithCarrier { scenery, carrier, base };
     let scenery: &dyn Scenery = if carrier.is_empty() { scenery } else { &carried };
     let started = Instant::now();
     let sensors = &*sensors;
-    let scan = |firing: &Firing| {
-        let sweep = lidar.sweep(scenery, &laser, firing);
-        let over = first.rig.true_stamp(firing.start_s + lidar.sweep_span().seconds() / firing.pace);
+    let scan = |timing: &ScanTiming| {
+        let sweep = lidar.sweep(scenery, &laser, timing);
+        let over = first.rig.true_stamp(timing.start_s + lidar.sweep_span().seconds() / timing.pace);
         let said = |one: &Sensors| (over, one.rig.lidar.measure(&sweep, &one.lidar_errors));
         sensors.iter().map(said).collect::<Vec<_>>()
     };
-    let by_firing: Vec<Vec<(Stamp, LidarScan)>> = firings.par_iter().map(scan).collect();
+    let by_scan: Vec<Vec<(Stamp, LidarScan)>> = timings.par_iter().map(scan).collect();
     let wall_s = started.elapsed().as_secs_f64();
     for summary in summaries {
         summary.rays_wall_s += wall_s;
-        summary.beams += (firings.len() * lidar.beams().len()) as u64;
-        summary.rays += (firings.len() * lidar.beams().len() * lidar.rays_per_beam()) as u64;
+        summary.beams += (timings.len() * lidar.beams().len()) as u64;
+        summary.rays += (timings.len() * lidar.beams().len() * lidar.rays_per_beam()) as u64;
     }
-    let mut by_sensors: Vec<Vec<_>> = sensors.iter().map(|_| Vec::with_capacity(by_firing.len())).collect();
-    for scans in by_firing {
+    let mut by_sensors: Vec<Vec<_>> = sensors.iter().map(|_| Vec::with_capacity(by_scan.len())).collect();
+    for scans in by_scan {
         by_sensors.iter_mut().zip(scans).for_each(|(all, scan)| all.push(scan));
     }
     by_sensors

@@ -2,7 +2,7 @@
 
 use super::Rig;
 use crate::random::Seed;
-use crate::sensors::{Clock, Firing, Imu, Stamper};
+use crate::sensors::{Clock, Imu, ScanTiming, Stamper};
 use crate::time::{Span, Stamp};
 
 /// Truth is written at whole milliseconds of the lidar's time, so that poses estimated at such stamps find theirs.
@@ -116,14 +116,14 @@ impl Schedule {
     }
 
     /// The scans that are over at `until_s`, and were not handed out before; each within the time that truth covers.
-    pub fn scans(&mut self, until_s: f64) -> Vec<Firing> {
+    pub fn scans(&mut self, until_s: f64) -> Vec<ScanTiming> {
         let until_s = until_s.min(self.end_s);
-        let mut firings = Vec::new();
+        let mut timings = Vec::new();
         while let Some(index) = self.scans.take_until(self.sweep_s, until_s) {
             let (start_s, pace) = (self.scans.true_s(index), self.scans.clock.pace());
-            firings.extend(self.scan_stamps.next().map(|stamp| Firing { index, start_s, pace, stamp }));
+            timings.extend(self.scan_stamps.next().map(|stamp| ScanTiming { index, start_s, pace, stamp }));
         }
-        firings
+        timings
     }
 
     /// When `imu` takes its samples on `clock`, within the time that truth covers; `seed` makes the stamps' jitter.

@@ -64,7 +64,7 @@ impl Faults {
     /// When missing returns of a lidar that scans no plane are to be encoded: they are not in its messages.
     pub(super) fn check_with(&self, lidar: &Lidar, source: &Source) -> Result<(), SpecError> {
         let is_misses = |fault: &FaultSpec| matches!(fault.fault, FaultKind::Misses { .. });
-        match self.spec.faults.iter().position(is_misses).filter(|_| !lidar.scans_plane()) {
+        match self.spec.faults.iter().position(is_misses).filter(|_| !lidar.is_planar()) {
             Some(index) => {
                 let message = format!("fault {index} (misses): this lidar scans no plane, and has no LaserScan");
                 Err(check::about(source, index, "misses", message).with_help("use a lidar that scans a plane: utm30lx"))
