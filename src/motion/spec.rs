@@ -42,7 +42,6 @@ pub enum MotionSpec {
 /// Returns the source too, for the errors of [`MotionSpec::build`].
 ///
 /// # Errors
-///
 /// If there is no such motion, or its spec is invalid.
 pub fn load(name: &str) -> Result<(MotionSpec, Source), SpecError> {
     let source = find(Kind::Motion, name)?;
@@ -64,7 +63,6 @@ impl MotionSpec {
     /// of the spec.
     ///
     /// # Errors
-    ///
     /// If values of the spec contradict each other, if the route is missing or cannot be followed, or if the duration
     /// is not above 0 s and at most [`MAX_DURATION_S`].
     pub fn build(

@@ -58,7 +58,6 @@ impl Clocks {
     /// The clocks that `spec`, from `source`, describes, in a run that starts at `epoch`.
     ///
     /// # Errors
-    ///
     /// If the rate of a clock is off by more than 10 %, its offset exceeds a day, or its jitter or resolution exceeds 1
     /// s.
     pub fn new(spec: &ClocksSpec, source: &Source, epoch: Stamp) -> Result<Self, SpecError> {
@@ -70,7 +69,6 @@ impl Clock {
     /// The clock that `spec`, from `source`, describes, in a run that starts at `epoch`.
     ///
     /// # Errors
-    ///
     /// If its rate is off by more than 10 %, its offset exceeds a day, or its jitter or resolution exceeds 1 s.
     pub fn new(spec: &ClockSpec, source: &Source, epoch: Stamp) -> Result<Self, SpecError> {
         let limits = [

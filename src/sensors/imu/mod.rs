@@ -25,7 +25,6 @@ impl Imu {
     /// The IMU that `spec`, from `source`, describes.
     ///
     /// # Errors
-    ///
     /// If the rate is out of range, stamps are late or early by more than 1 s, or a resolution exceeds its limit.
     pub fn new(spec: &ImuSpec, source: &Source) -> Result<Self, SpecError> {
         spec.check(source)?;

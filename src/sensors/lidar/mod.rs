@@ -39,7 +39,6 @@ impl Lidar {
     /// The lidar that `spec`, from `source`, describes.
     ///
     /// # Errors
-    ///
     /// If the beams do not fit into a turn, a rate is out of range, or limits contradict each other.
     pub fn new(spec: &LidarSpec, source: &Source) -> Result<Self, SpecError> {
         spec.check(source)?;
