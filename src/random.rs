@@ -1,7 +1,7 @@
-//! Random seed of a run, and its named streams.
+//! Random seed of a run, and named streams.
 //!
-//! Each source of noise has its own stream, named after the quantity it disturbs (`"imu/gyro/white"`). A stream depends
-//! on the seed and on its name only: a new source, or more draws from one stream, does not change the others.
+//! Each source of noise has a separate stream, named after the quantity it disturbs (`"imu/gyro/white"`). A stream depends
+//! on seed and name only: a new source, or more draws from one stream, does not change the others.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

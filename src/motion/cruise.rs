@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// A base at constant velocity from the start of the run.
 ///
-/// It starts at the first point of the route and keeps its heading there, straight on past corners: the scene must be
+/// It starts at the first point of the route and keeps the heading there, straight on past corners: the scene must be
 /// long enough.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]

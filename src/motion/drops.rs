@@ -21,7 +21,7 @@ pub struct DropSpec {
     pub landing_s: f64,
 }
 
-/// A unit step that starts at 0 and takes `lasts_s`, half a cosine, with its derivative and its first two integrals.
+/// A unit step that starts at 0 and takes `lasts_s`, half a cosine, with derivative and first two integrals.
 struct SmoothStep {
     rate: f64,
     level: f64,

@@ -37,7 +37,7 @@ pub struct HandSpec {
     pub gait: Option<GaitSpec>,
     /// Rotation of the wrist.
     pub shake: ShakeSpec,
-    /// When the hand holds the head still.
+    /// When the hand grips the head.
     pub stops: StopsSpec,
     /// Time to grasp the head, and to release it, s.
     #[serde(with = "Positive")]
@@ -123,7 +123,7 @@ pub struct ShakeSpec {
     /// Distance of the wrist, the centre of rotation, below the base, m.
     #[serde(with = "Finite")]
     pub wrist_below_m: f64,
-    /// Time in which the shaking rises to its full amplitude, s.
+    /// Time in which the shaking rises to full amplitude, s.
     #[serde(with = "Positive")]
     pub onset_s: f64,
 }

@@ -1,9 +1,9 @@
-//! Forward-mode differentiation: a function of time with its first and second derivative.
+//! Forward-mode differentiation: a function of time with first and second derivative.
 
 use crate::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// Value of a function of time with its first and second derivative.
+/// Value of a function of time with first and second derivative.
 ///
 /// Sums and products of jets follow the rules of Leibniz, so that a motion computed with jets has exact derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -94,7 +94,7 @@ impl Mul<f64> for Jet {
     }
 }
 
-/// Position and attitude of a frame, each component with its derivatives.
+/// Position and attitude of a frame, each component with derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct PoseJet {
     /// Position in the world, m.

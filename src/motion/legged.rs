@@ -1,4 +1,4 @@
-//! A legged robot that follows a route; each stride moves its body periodically.
+//! A legged robot that follows a route; each stride moves the body periodically.
 
 use super::jet::{Jet, PoseJet};
 use super::oscillator::BandLimitedNoise;

@@ -1,9 +1,9 @@
 //! A small vessel in waves.
 //!
 //! The sea is a sum of plane waves in deep water (`w^2 = g k`) with a JONSWAP spectrum; a peakedness of 1 gives the
-//! Pierson-Moskowitz spectrum. The vessel follows waves that are long compared with its hull. Heave, pitch and roll are
+//! Pierson-Moskowitz spectrum. The vessel follows waves that are long compared with the hull. Heave, pitch and roll are
 //! the height and the slopes of the surface, averaged over the waterplane and attenuated with draught; roll also has
-//! its own resonance. Surge and sway are the displacement of the water.
+//! a resonance. Surge and sway are the displacement of the water.
 
 use super::jet::{Jet, PoseJet};
 use super::sines::{FrequencyBin, SineSum, SpectralLine, log_bins};
@@ -138,7 +138,7 @@ impl HullSpec {
     ///
     /// For the height `Re(a exp(i w t - i k (x cos d + y sin d)))` the slopes forward and to the left are
     /// `-i k cos d a` and `-i k sin d a`, and the displacement of the water is `-i a` along the wave. A slope that
-    /// rises forward lifts the bow: pitch is its negative. A slope that rises to the left lifts the left side: roll
+    /// rises forward lifts the bow: pitch is the negative. A slope that rises to the left lifts the left side: roll
     /// equals it.
     fn wave_response(&self, (freq_hz, height, direction): (f64, Complex<f64>, f64)) -> SpectralLine<5> {
         let rate = TAU * freq_hz;

@@ -1,11 +1,11 @@
-//! Motion of the base, the body to which the spring is clamped: its pose as a smooth function of time.
+//! Motion of the base, the body to which the spring is clamped, as a smooth function of time.
 //!
 //! [`MotionSpec`] is the data (the files of `specs/motions/`). [`MotionSpec::build`] turns it into a [`BaseMotion`],
-//! which evaluates the pose and its exact first and second derivatives at any time. A motion has no state and no time
+//! which evaluates the pose and the exact first and second derivatives at any time. A motion has no state and no time
 //! step: it is a closed form of time (smoothed polylines, sums of sinusoids with seeded phases, splines). The result
 //! therefore does not depend on the order of evaluation or on the thread.
 //!
-//! The base frame has its origin at the clamped end of the spring: x forward, y left, z up (REP-103).
+//! The base frame is at the clamped end of the spring: x forward, y left, z up (REP-103).
 
 mod cruise;
 mod drops;
@@ -47,7 +47,7 @@ use crate::geometry::Kinematics;
 
 /// The prescribed motion of the base.
 pub trait BaseMotion: Send + Sync {
-    /// The motion at `t_s` seconds after the start: `world_from_base` with its exact derivatives. Accelerations are
+    /// The motion at `t_s` seconds after the start: `world_from_base` with exact derivatives. Accelerations are
     /// continuous. The base is at rest at the start, except in a cruise.
     fn at(&self, t_s: f64) -> Kinematics;
 

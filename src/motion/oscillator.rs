@@ -43,7 +43,7 @@ pub(super) struct Oscillator {
 impl Oscillator {
     /// An oscillator at `frequency_hz`.
     ///
-    /// Its relative amplitude has the mean 1 and the standard deviation `strength_spread`; its phase deviates by
+    /// The relative amplitude has the mean 1 and the standard deviation `strength_spread`; the phase deviates by
     /// `phase_spread` rad rms. Both vary with power up to `bandwidth_hz`.
     pub fn new(frequency_hz: f64, spreads: (f64, f64), bandwidth_hz: f64, stream: &mut Stream) -> Self {
         let (strength_spread, phase_spread) = spreads;

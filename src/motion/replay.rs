@@ -29,7 +29,7 @@ pub struct ReplaySpec {
     /// Time at rest at the start, s.
     #[serde(with = "NonNegative")]
     pub still_s: f64,
-    /// Half of the time in which the replay reaches its full speed, and stops, s.
+    /// Half of the time in which the replay reaches full speed, and stops, s.
     #[serde(with = "Positive")]
     pub ease_s: f64,
 }
@@ -86,7 +86,7 @@ impl Replay {
     }
 }
 
-/// Translation and turn about the vertical that move `first` to the start of the route; its height is kept.
+/// Translation and turn about the vertical that move `first` to the start of the route; the height does not change.
 fn align_start((floor, heading): &(Vector, f64), first: &Pose) -> Pose {
     let (_, _, yaw) = first.rotation.euler_angles();
     let turn = from_roll_pitch_yaw(0.0, 0.0, heading - yaw);

@@ -77,7 +77,7 @@ mod tests {
         let source = Source::in_memory("test", "");
         let moving_time = MovingTime::new(&[(20.0, 40.0)], &source, 100.0).unwrap().unwrap();
         assert!((moving_time.at(10.0).x - 10.0).abs() < 1e-12 && (moving_time.at(10.0).d - 1.0).abs() < 1e-12);
-        // The speed changes linearly on average, so each stop and each start loses half of its 1.5 s.
+        // The speed changes linearly on average, so each stop and each start loses half of 1.5 s.
         for t_s in [20.0, 33.0, 60.0] {
             let at = moving_time.at(t_s);
             assert!((at.x - (20.0 - HALF_S)).abs() < 1e-12 && at.d.abs() < 1e-12 && at.dd.abs() < 1e-9, "{at:?}");

@@ -1,13 +1,13 @@
 //! Piecewise constant or linear motion, smoothed by convolution with a kernel.
 //!
 //! The kernel is the triweight `k(u) = 35/32 (1 - u^2)^3` on -1..1, scaled to a half-width in time. The smoothed value
-//! is a moving average: it stays within the range (a position: the convex hull) of its input and depends on a bounded
+//! is a moving average: it stays within the range (a position: the convex hull) of the input and depends on a bounded
 //! interval. A path of straight segments, and a level that changes in steps, get three continuous derivatives.
 
 use super::jet::Jet;
 use crate::geometry::Vector;
 
-/// Maximum of the kernel, at its centre. The peak rate of a smoothed unit step is this divided by the half-width.
+/// Maximum of the kernel, at the centre. The peak rate of a smoothed unit step is this divided by the half-width.
 pub(super) const PEAK: f64 = 35.0 / 32.0;
 
 /// Deviation of a smoothed corner with a unit change of slope, in half-widths: the value of the ramp at the corner.

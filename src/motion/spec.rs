@@ -42,7 +42,7 @@ pub enum MotionSpec {
 /// Returns the source too, for the errors of [`MotionSpec::build`].
 ///
 /// # Errors
-/// If there is no such motion, or its spec is invalid.
+/// If there is no such motion, or the spec is invalid.
 pub fn load(name: &str) -> Result<(MotionSpec, Source), SpecError> {
     let source = find(Kind::Motion, name)?;
     Ok((parse(&source)?, source))

@@ -1,4 +1,4 @@
-//! Stops: intervals in which the hand holds the head still while the walk continues.
+//! Stops: intervals in which the hand grips the head while the walk continues.
 
 use super::smooth::SmoothSteps;
 use crate::random::Stream;
@@ -6,7 +6,7 @@ use crate::spec::{Source, SpecError};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-/// When the hand holds the head still. The rest of the motion continues.
+/// When the hand grips the head. The rest of the motion continues.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum StopsSpec {

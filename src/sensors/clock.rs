@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClocksSpec {
-    /// Clock of the lidar. Trajectories are written in its time.
+    /// Clock of the lidar. Trajectories are written in lidar time.
     pub lidar: ClockSpec,
     /// Clock of the IMU.
     pub imu: ClockSpec,
@@ -39,7 +39,7 @@ pub struct Clocks {
     pub imu: Clock,
 }
 
-/// A sensor clock without its jitter.
+/// A sensor clock without jitter.
 ///
 /// True time `t` is in seconds from the start of the run, `epoch`. The crystal reads `epoch + offset + (1 + rate) t`
 /// and triggers the samples of the sensor. Stamps are the reading rounded down to the resolution, so they lag by half

@@ -10,7 +10,7 @@
 //! - IMU: [`mean_motion`] is the ideal sample over an interval; [`ImuErrors::measure`] adds the errors;
 //! - clock: [`Clock`] determines the sample times and the mean stamps; [`Stamper`] adds the jitter.
 //!
-//! Each source of noise has its own random stream, named after the quantity it disturbs. The streams of a lidar have
+//! Each source of noise has a separate random stream, named after the quantity it disturbs. The streams of a lidar have
 //! one part per scan, so that scans can be computed in any order and on any thread.
 
 mod carrier;

@@ -8,7 +8,7 @@ use std::collections::BinaryHeap;
 /// Jitter is limited to this many standard deviations: it affects 6 stamps in 10 million.
 const MAX_JITTER_SIGMAS: f64 = 5.0;
 
-/// Stamps for samples that are taken at the constant period of a clock's crystal: with jitter, rounded down, in order.
+/// Stamps for samples at the constant period of a clock's crystal: with jitter, rounded down, in order.
 ///
 /// Jitter changes stamps, not the order of samples: a driver delivers samples in the order in which they were taken,
 /// with strictly increasing stamps. Sample `k` therefore gets the `k`-th smallest of the noisy stamps. To delay each

@@ -36,7 +36,7 @@ fn time_of<T>(events: &[(Stamp, T)], index: usize) -> Option<Stamp> {
     events.get(index).map(|(stamp, _)| *stamp)
 }
 
-/// The kind with the earliest next event (the first of equal ones), and its time.
+/// The kind with the earliest next event (the first of equal ones), and the time.
 fn earliest(next: &[Option<Stamp>]) -> Option<(usize, Stamp)> {
     next.iter().enumerate().filter_map(|(kind, at)| at.map(|at| (kind, at))).min_by_key(|(kind, at)| (*at, *kind))
 }

@@ -16,7 +16,7 @@ pub enum SimulationError {
     /// The world cannot be built.
     #[error(transparent)]
     World(#[from] WorldError),
-    /// The head cannot be modelled, or its simulation failed.
+    /// The head cannot be modelled, or the simulation failed.
     #[error(transparent)]
     Dynamics(Box<DynamicsError>),
     /// The motion is shorter than the run.
@@ -39,7 +39,7 @@ pub enum SimulationError {
     #[error("simulations run together differ in more than the IMUs, the lidar's errors and the faults")]
     DifferentRays,
     /// The sink failed, for example because the disk is full.
-    #[error("the simulation stopped: its output could not be written")]
+    #[error("the simulation stopped: the output could not be written")]
     Sink(#[source] SinkError),
 }
 

@@ -32,7 +32,7 @@ pub(super) struct Sensors<'a> {
     base_imu: Option<SimulatedImu>,
 }
 
-/// An IMU on a body, with its state from sample to sample.
+/// An IMU on a body, with the state from sample to sample.
 struct SimulatedImu {
     samples: ImuSchedule,
     errors: ImuErrors,
@@ -46,7 +46,7 @@ impl SimulatedImu {
         Self { samples, errors: ImuErrors::new(imu, seed), noise: imu.noise(), body_from_imu }
     }
 
-    /// The samples that are complete by `until_s`, each with its completion time, s.
+    /// The samples that are complete by `until_s`, each with the completion time, s.
     fn take(&mut self, body: &Track, until_s: f64) -> Vec<(f64, ImuSample)> {
         self.samples.until(until_s).iter().map(|interval| (interval.to_s, self.sample(body, interval))).collect()
     }

@@ -10,7 +10,7 @@ use crate::spec::{Source, SpecError};
 use crate::truth::TruthSink;
 use crate::world::World;
 
-/// A scenario with all its models built, ready to run.
+/// A scenario with all models built, ready to run.
 pub struct Simulation {
     scenario: Scenario,
     specs: Specs,

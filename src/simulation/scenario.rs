@@ -63,7 +63,7 @@ impl Scenario {
 pub struct Specs {
     /// The scene, with included scenes merged.
     pub scene: SceneSpec,
-    /// The head and its linkage.
+    /// The head and the linkage.
     pub head: HeadSpec,
     /// The motion of the base.
     pub motion: MotionSpec,

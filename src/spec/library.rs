@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 static SCENES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenes");
 static SPECS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/specs");
 
-/// The text of a spec, and its name for errors.
+/// The text of a spec, and the name for errors.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
     /// Name for errors: the path as the user would type it.
@@ -55,7 +55,7 @@ impl Source {
 pub enum Kind {
     /// A world: `scenes/`.
     Scene,
-    /// A head and its linkage: `specs/heads/`.
+    /// A head and linkage: `specs/heads/`.
     Head,
     /// A spring: `specs/springs/`.
     Spring,
@@ -131,7 +131,7 @@ impl Kind {
 /// Finds a spec: `name` as a path, then in the folder of the kind below the working directory, then in the binary.
 ///
 /// # Errors
-/// If there is no such spec (the error lists the known names), or its file cannot be read.
+/// If there is no such spec (the error lists the known names), or the file cannot be read.
 pub fn find(kind: Kind, name: &str) -> Result<Source, SpecError> {
     let file = if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") };
     let local = Path::new(kind.folder()).join(&file);

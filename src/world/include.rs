@@ -24,7 +24,7 @@ impl SceneSpec {
     }
 }
 
-/// `spec` merged with its included scenes. `chain` holds the sources from the outermost scene to `spec`, each included
+/// `spec` merged with the included scenes. `chain` holds the sources from the outermost scene to `spec`, each included
 /// by the one before.
 fn flatten(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError> {
     let Some(source) = chain.last() else { return Ok(spec.clone()) };
@@ -71,7 +71,7 @@ fn has_meshes(spec: &SceneSpec) -> bool {
     spec.items.iter().chain(spec.templates.values().flatten()).any(is_mesh)
 }
 
-/// Merges two scenes: the parts of `first` come first, and its name is kept.
+/// Merges two scenes: the parts of `first` come first; the name is that of `first`.
 fn merge(mut first: SceneSpec, second: SceneSpec, source: &Source) -> Result<SceneSpec, SpecError> {
     merge_named(&mut first.materials, second.materials, "material", source)?;
     merge_named(&mut first.templates, second.templates, "template", source)?;
@@ -90,7 +90,9 @@ fn merge_named<T>(
 ) -> Result<(), SpecError> {
     for (name, value) in second {
         if first.contains_key(&name) {
-            let message = format!("two of the included scenes define the {what} `{name}`: rename one");
+            let message = format!(
+                "this scene and the scenes that it includes define the {what} `{name}` more than once: rename one"
+            );
             return Err(SpecError::about(source, &name, message));
         }
         first.insert(name, value);

@@ -85,7 +85,7 @@ pub enum ShapeSpec {
         /// The heights.
         heights: HeightsSpec,
     },
-    /// A mesh from an OBJ, STL, PLY or glTF file, recognised by its extension.
+    /// A mesh from an OBJ, STL, PLY or glTF file, recognised by the extension.
     Mesh {
         /// The file, relative to the folder of the scene.
         file: String,
@@ -95,7 +95,7 @@ pub enum ShapeSpec {
         /// Unit of length of the file, multiplied by `scale`. Default: metres.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         unit: Option<LengthUnit>,
-        /// Axis of the file that points up. Default: y for glTF (by its specification), z for other formats.
+        /// Axis of the file that points up. Default: y for glTF (by specification), z for other formats.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         up: Option<UpAxis>,
     },
@@ -149,7 +149,7 @@ fn default_scale() -> f64 {
 }
 
 impl ShapeSpec {
-    /// The triangles of the shape; empty for a mesh, whose triangles are in its file.
+    /// The triangles of the shape; empty for a mesh, whose triangles are in the file.
     ///
     /// # Errors
     /// The key and a message, if the values are inconsistent.
@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn a_flight_of_stairs_holds_the_volume_of_its_steps() {
         // Step k of n (from 1) is k rises high: the sum is n (n + 1) / 2 blocks of tread x width x rise.
-        // With a slab, each step is a trapezoid: slab + rise high at its front, slab at its back.
+        // With a slab, each step is a trapezoid: slab + rise high at the front, slab at the back.
         for (slab_m, expected) in [(0.0, 10.0 * 1.2 * 0.18 * 0.27), (0.2, 4.0 * 1.2 * 0.27 * (0.2 + 0.09))] {
             let faces = triangles(&ShapeSpec::Stairs { steps: 4, width_m: 1.2, rise_m: 0.18, tread_m: 0.27, slab_m });
             assert_relative_eq!(volume(&faces), expected, epsilon = 1e-12);

@@ -1,4 +1,4 @@
-//! Rotor vibration: each rotor has its own speed, an imbalance, and a blade-pass oscillation.
+//! Rotor vibration: each rotor has a different speed, an imbalance, and a blade-pass oscillation.
 
 use crate::motion::jet::Jet;
 use crate::motion::sines::{SineSum, SpectralLine};
@@ -31,7 +31,7 @@ pub struct RotorSpec {
     pub beat_m_per_s2: f64,
 }
 
-/// Vibration of the craft by its rotors.
+/// Vibration of the craft by the rotors.
 pub(super) struct Rotors(SineSum<3>);
 
 impl Rotors {

@@ -36,7 +36,7 @@ pub struct OrderSpec {
     pub acceleration_m_per_s2: [f64; 3],
 }
 
-/// Vibration of a body by its engine.
+/// Vibration of a body by the engine.
 pub(super) struct Engine {
     turns_per_s: f64,
     irregularity_turns: f64,

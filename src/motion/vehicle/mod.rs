@@ -40,7 +40,7 @@ pub struct VehicleSpec {
     pub follow: WalkSpec,
     /// Road roughness.
     pub road: RoadSpec,
-    /// The body and its suspension.
+    /// The body and the suspension.
     pub suspension: SuspensionSpec,
     /// The engine, started at the end of the rest; `None` for no engine.
     pub engine: Option<EngineSpec>,
@@ -99,7 +99,7 @@ impl Vehicle {
     }
 }
 
-/// Time in which the engine reaches its speed, s.
+/// Time in which the engine reaches full speed, s.
 const STARTING_S: f64 = 1.0;
 
 impl BaseMotion for Vehicle {

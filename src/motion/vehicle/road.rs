@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 pub enum RoadSpec {
     /// A road class of ISO 8608.
     Class(RoadClass),
-    /// Another road or floor, by its roughness.
+    /// Another road or floor, by roughness.
     Roughness {
         /// Displacement density at 0.1 cycles/m, 1e-6 m^3. A larger value is rougher.
         #[serde(with = "crate::spec::checked::NonNegative")]

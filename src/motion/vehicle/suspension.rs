@@ -17,10 +17,10 @@ pub struct SuspensionSpec {
     /// Mass of the body, kg.
     #[serde(with = "Positive")]
     pub body_mass_kg: f64,
-    /// Moment of inertia of the body about its forward axis, kg m^2.
+    /// Moment of inertia of the body about the forward axis, kg m^2.
     #[serde(with = "Positive")]
     pub roll_inertia_kg_m2: f64,
-    /// Moment of inertia of the body about its lateral axis, kg m^2.
+    /// Moment of inertia of the body about the lateral axis, kg m^2.
     #[serde(with = "Positive")]
     pub pitch_inertia_kg_m2: f64,
     /// Height of the body's centre of mass above the ground, m.
@@ -50,7 +50,7 @@ pub struct SuspensionSpec {
 }
 
 impl SuspensionSpec {
-    /// Forward and left position of each wheel, m, and the index of its track: 0 left, 1 right.
+    /// Forward and left position of each wheel, m, and the index of the track: 0 left, 1 right.
     fn wheels(&self) -> [(f64, f64, usize); 4] {
         let half = self.track_m / 2.0;
         [(self.front_m, half, 0), (self.front_m, -half, 1), (-self.rear_m, half, 0), (-self.rear_m, -half, 1)]
@@ -105,7 +105,7 @@ impl SuspensionSpec {
         (moment / (stiffness(|wheel| wheel.1) - falling), -moment / (stiffness(|wheel| wheel.0) - falling))
     }
 
-    /// Whether the springs support the body against its weight.
+    /// Whether the springs support the body against the weight.
     pub(super) fn is_stable(&self) -> bool {
         let (roll, pitch) = self.lean();
         roll > 0.0 && pitch < 0.0

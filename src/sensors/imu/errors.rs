@@ -73,7 +73,7 @@ struct Triad {
     /// Standard deviation per sample; so is `walk_sigma`.
     white_sigma: f64,
     walk_sigma: f64,
-    /// Decay factor of the Gauss-Markov bias per sample, and standard deviation of its increment.
+    /// Decay factor of the Gauss-Markov bias per sample, and standard deviation of the increment.
     gauss_markov: Option<(f64, f64)>,
     limit: f64,
     resolution: f64,

@@ -11,7 +11,7 @@ pub struct MeanMotion {
 
 /// The sample of an ideal IMU over the interval from `start` to `end`, of length `dt_s`.
 ///
-/// It is the change of attitude and velocity over the interval, divided by its length, as a strapdown unit reports it
+/// It is the change of attitude and velocity over the interval, divided by the length, as a strapdown unit reports it
 /// that integrates at a high rate inside (coning and sculling included).
 ///
 /// The angular velocity is `log(R_start^T R_end) / dt`. The specific force is `R_mid^T ((v_end - v_start) / dt - g)`,

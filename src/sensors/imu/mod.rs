@@ -1,4 +1,4 @@
-//! Inertial measurement units: the ideal sample, and its errors.
+//! Inertial measurement units: the ideal sample, and the errors.
 
 mod errors;
 mod mean;
@@ -25,7 +25,7 @@ impl Imu {
     /// The IMU that `spec`, from `source`, describes.
     ///
     /// # Errors
-    /// If the rate is out of range, stamps are late or early by more than 1 s, or a resolution exceeds its limit.
+    /// If the rate is out of range, stamps are late or early by more than 1 s, or a resolution exceeds the limit.
     pub fn new(spec: &ImuSpec, source: &Source) -> Result<Self, SpecError> {
         spec.check(source)?;
         Ok(Self { gyro: spec.gyro.model(), accel: spec.accel.model(), spec: spec.clone() })

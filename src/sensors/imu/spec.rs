@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 /// Accepted sample rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
 
-/// An inertial measurement unit, by its data sheet.
+/// An inertial measurement unit, by the data sheet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImuSpec {

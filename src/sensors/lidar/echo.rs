@@ -1,4 +1,4 @@
-//! Echoes of a beam, from the surfaces that its rays hit.
+//! Echoes of a beam, from the surfaces that the rays hit.
 
 use super::{GlassSpec, Lidar, Sweep};
 

@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// Reflectance of the white target (Kent sheet) with which data sheets specify range.
 const WHITE_REFLECTANCE: f64 = 0.9;
-/// Detection odds above which an echo counts as certain: less than one miss in a million.
+/// Detection odds above which an echo counts as certain: fewer than one miss in a million.
 const CERTAIN_ODDS: f64 = 1e6;
 /// Detection odds for which the power threshold is precomputed: most draws are below, so most beams need no `powf`.
 const FAST_PATH_ODDS: f64 = 100.0;

@@ -9,7 +9,7 @@ use crate::time::Span;
 impl Lidar {
     /// The scan that the sensor reports for the ray intersections of `sweep`.
     ///
-    /// With errors switched off, a beam passes all glass, and each echo has its exact range without rounding.
+    /// With errors switched off, a beam passes all glass, and each echo has the exact range without rounding.
     pub fn measure(&self, sweep: &Sweep, errors: &LidarErrors) -> LidarScan {
         let mut draws = errors.scan_draws(sweep.timing.index);
         let mut returns = Vec::with_capacity(self.beams.len());
@@ -24,7 +24,7 @@ impl Lidar {
         LidarScan { stamp: sweep.timing.stamp, stamped_after: Span::ZERO, returns, planar }
     }
 
-    /// Appends the returns of a beam, and returns range and intensity of its strongest echo, encoded by REP-117.
+    /// Appends the returns of a beam, and returns range and intensity of the strongest echo, encoded by REP-117.
     fn measure_beam(
         &self,
         sweep: &Sweep,

@@ -30,7 +30,7 @@ pub struct Lidar {
     turns_per_scan: f64,
     /// The rays, grouped by beam: unit vectors in the lidar frame.
     rays: Vec<Vector>,
-    /// Fraction of the light of a beam in each of its rays.
+    /// Fraction of the light of a beam in each ray.
     weights: &'static [f64],
     spec: LidarSpec,
 }

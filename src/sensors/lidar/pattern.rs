@@ -54,7 +54,7 @@ pub enum PatternSpec {
         /// Mirror turns per scan.
         mirror_turns: u32,
     },
-    /// A curve that rotates counter-clockwise about z while its elevation oscillates, different in each scan: an
+    /// A curve that rotates counter-clockwise about z while the elevation oscillates, different in each scan: an
     /// approximation of lidars with a non-repetitive pattern.
     Rosette {
         /// Number of beams per scan, evenly spaced in time over the scan period.

@@ -2,7 +2,7 @@ use super::pattern::{Beam, MAX_BEAMS};
 use crate::spec::{Source, SpecError};
 use std::f64::consts::TAU;
 
-/// A non-repetitive pattern: beams evenly spaced in time on a curve that rotates about z while its elevation
+/// A non-repetitive pattern: beams evenly spaced in time on a curve that rotates about z while the elevation
 /// oscillates.
 ///
 /// This is an approximation: manufacturers publish the field of view and the rate, not the curve. Azimuth increases at

@@ -10,7 +10,7 @@ const RATES_HZ: RangeInclusive<f64> = 0.1..=1000.0;
 /// Maximum beams per second: a hundred times those of a spinning lidar with 16 channels.
 const MAX_BEAMS_PER_S: f64 = 3e7;
 
-/// A lidar, by its data sheet.
+/// A lidar, by the data sheet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LidarSpec {
@@ -131,7 +131,7 @@ pub struct GrazingSpec {
     pub bias_m: f64,
 }
 
-/// Effects of glass, in addition to the attenuation by its transmission in both directions.
+/// Effects of glass, in addition to the attenuation by transmission in both directions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlassSpec {

@@ -77,7 +77,7 @@ impl Lidar {
         sweep
     }
 
-    /// Traces a ray through glass to its last surface. `previous_m` is the range of the previous ray on entry, and of
+    /// Traces a ray through glass to the last surface. `previous_m` is the range of the previous ray on entry, and of
     /// this ray on return.
     fn trace(
         &self,

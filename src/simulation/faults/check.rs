@@ -36,7 +36,7 @@ pub(super) fn check(spec: &FaultsSpec, source: &Source) -> Result<(), SpecError>
     Ok(())
 }
 
-/// An error at `key` of fault `index`, or at its sensor if the key is not found after it.
+/// An error at `key` of fault `index`, or at the sensor if the key is not found after it.
 pub(super) fn about(source: &Source, index: usize, key: &str, message: String) -> SpecError {
     let mut sensors = 0;
     let mut place = None;
@@ -102,7 +102,7 @@ fn check_times(fault: &FaultSpec) -> Result<(), Problem> {
     }
 }
 
-/// Checks that the fault applies to its sensor.
+/// Checks that the fault applies to the sensor.
 fn check_sensor(fault: &FaultSpec) -> Result<(), Problem> {
     let only = match fault.fault {
         FaultKind::Clip { .. } | FaultKind::Spike { .. } | FaultKind::BiasStep { .. } | FaultKind::Axes { .. } => {

@@ -7,7 +7,7 @@ use crate::spec::{Kind, Source, SpecError, text_file};
 const MAX_ARRIVALS: usize = 1_000_000;
 
 impl FaultsSpec {
-    /// Reads the files that the spec refers to, and replaces each file of `thin` with its arrival times.
+    /// Reads the files that the spec refers to, and replaces each file of `thin` with the arrival times.
     ///
     /// # Errors
     /// If a file cannot be read, or a line is not a number.

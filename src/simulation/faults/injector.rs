@@ -131,7 +131,7 @@ impl<S: Sink + TruthSink + ?Sized> TruthSink for Injector<'_, S> {
     }
 }
 
-/// Attitude of the IMU during the interval of its last sample.
+/// Attitude of the IMU during the interval of the last sample.
 struct Attitude {
     head_from_imu: Rotation,
     period: Span,
@@ -151,7 +151,7 @@ impl Attitude {
         self.recent.push_back((now, world_from_head.rotation * self.head_from_imu));
     }
 
-    /// Mean specific force of an IMU with this attitude and no acceleration, in its frame, m/s^2.
+    /// Mean specific force of an IMU with this attitude and no acceleration, in the IMU frame, m/s^2.
     fn force_at_rest(&self) -> Vector {
         let at_rest = |(_, world_from_imu): &(Stamp, Rotation)| world_from_imu.inverse() * -gravity_in_world();
         self.recent.iter().map(at_rest).sum::<Vector>() / self.recent.len().max(1) as f64

@@ -2,8 +2,8 @@
 //!
 //! [`FaultsSpec`] is the list of faults in a file of `specs/faults/`; [`Faults`] is the checked list. An [`Injector`]
 //! takes the data of a simulation, applies the faults in the order of the list, and passes the result to the sink. Each
-//! sensor has a pipeline with one stage per fault. Each fault has its own random stream, and all stages run on the
-//! delivering thread in order of delivery, so the result does not depend on the number of threads. Memory holds delayed
+//! sensor has a pipeline with one stage per fault. Each fault has a separate random stream, and all stages run on the
+//! delivering thread in order of delivery, so the result does not depend on the number of threads. Memory contains delayed
 //! messages only.
 
 mod check;
@@ -35,7 +35,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Checks `spec` from `source`; its files must have been read ([`FaultsSpec::with_files`]).
+    /// Checks `spec` from `source`; the files must have been read ([`FaultsSpec::with_files`]).
     ///
     /// # Errors
     /// If times, values or units of a fault are inconsistent.
@@ -61,7 +61,7 @@ impl Faults {
     /// Checks that the faults are possible with `lidar`.
     ///
     /// # Errors
-    /// If misses are to be encoded for a lidar that is not planar: its messages do not contain misses.
+    /// If misses are to be encoded for a lidar that is not planar: the messages do not contain misses.
     pub(super) fn check_with(&self, lidar: &Lidar, source: &Source) -> Result<(), SpecError> {
         let is_misses = |fault: &FaultSpec| matches!(fault.fault, FaultKind::Misses { .. });
         match self.spec.faults.iter().position(is_misses).filter(|_| !lidar.is_planar()) {

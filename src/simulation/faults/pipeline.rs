@@ -61,7 +61,7 @@ pub(super) trait Stage {
     }
 }
 
-/// Time without messages after which a stage emits its held messages: the message that they wait for may never come.
+/// Time without messages after which a stage emits held messages: the message that they wait for may never come.
 const SILENCE: Span = Span::from_nanos(5_000_000_000);
 
 /// All fault stages of a sensor.
@@ -69,7 +69,7 @@ pub(super) struct Pipeline {
     stages: Vec<TimedStage>,
 }
 
-/// A stage with its interval.
+/// A stage and the interval of the fault.
 struct TimedStage {
     interval: Interval,
     stage: Box<dyn Stage>,
@@ -154,7 +154,7 @@ mod tests {
         Pipeline::new(&faults, true, 100.0, Seed(1))
     }
 
-    /// An IMU message taken at `ms` after the start.
+    /// An IMU message at `ms` after the start.
     fn message(ms: i64) -> Message {
         let taken = EPOCH + Span::from_nanos(ms * 1_000_000);
         let still = Vector::zeros();

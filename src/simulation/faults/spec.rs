@@ -96,7 +96,7 @@ pub enum FaultKind {
         #[serde(with = "checked::NonNegative")]
         spacing_us: f64,
     },
-    /// The IMU saturates below the limits of its data sheet. The noise model that is published with the recording
+    /// The IMU saturates below the limits of the data sheet. The noise model that is published with the recording
     /// keeps those of the data sheet.
     Clip {
         /// Maximum rate on an axis, rad/s.
@@ -199,7 +199,7 @@ pub enum FaultKind {
         /// Error of the sensor's position in the head, m.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         position_m: Option<[f64; 3]>,
-        /// Error of its attitude about its own axes, degrees.
+        /// Error of the attitude about the sensor axes, degrees.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         roll_pitch_yaw_deg: Option<[f64; 3]>,
     },
@@ -224,7 +224,7 @@ pub enum MissEncoding {
 }
 
 impl FaultKind {
-    /// Its name in a spec.
+    /// Name in a spec.
     pub(super) fn name(&self) -> &'static str {
         match self {
             Self::Drop { .. } => "drop",

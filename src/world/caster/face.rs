@@ -65,7 +65,7 @@ fn nearest_on_edge(point: &Vector, start: Vector, edge: Vector) -> Vector {
     if length2 == 0.0 { start } else { start + edge * (edge.dot(&(point - start)) / length2).clamp(0.0, 1.0) }
 }
 
-/// The faces of triangles relative to `middle`, each with the index of its first triangle.
+/// The faces of triangles relative to `middle`, each with the index of the first triangle.
 pub(super) fn faces(triangles: &[Triangle], materials: &[MaterialId], middle: &Vector) -> Vec<(usize, Face)> {
     let local = |at: usize| triangles.get(at).map(|triangle| triangle.map(|corner| corner - middle));
     let (mut faces, mut at) = (Vec::with_capacity(triangles.len()), 0);

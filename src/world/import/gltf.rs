@@ -1,4 +1,4 @@
-//! glTF 2.0 (`.gltf` with buffers, or `.glb`): the triangles of the scene with the transforms of its nodes.
+//! glTF 2.0 (`.gltf` with buffers, or `.glb`): the triangles of the scene with the transforms of the nodes.
 
 mod accessor;
 mod document;
@@ -21,7 +21,7 @@ const TRIANGLES: u32 = 4;
 const TRIANGLE_STRIP: u32 = 5;
 const TRIANGLE_FAN: u32 = 6;
 
-/// The triangles of a glTF file; `folder` contains its buffers.
+/// The triangles of a glTF file; `folder` contains the buffers.
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Triangle>, MeshError> {
     let (json, blob) = split(bytes)?;
     let document = Document::parse(json).map_err(malformed)?;

@@ -14,7 +14,7 @@ use std::path::Path;
 const MAX_BYTES: u64 = 1 << 30;
 /// Maximum fraction of triangles without area: a mesh with more is damaged.
 const MAX_FRACTION_WITHOUT_AREA: f64 = 0.1;
-/// A triangle counts as flat if its height is below this fraction of its longest edge.
+/// A triangle counts as flat if its height is below this fraction of the longest edge.
 const FLAT_RATIO: f64 = 1e-6;
 
 /// The triangles of a mesh.
@@ -72,7 +72,7 @@ pub(super) fn read(path: &Path, scale: f64, up: Option<UpAxis>) -> Result<MeshTr
     check(triangles, scale)
 }
 
-/// A file format: its parser, and its default up axis.
+/// A file format: parser and default up axis.
 struct Format {
     parse: fn(Vec<u8>, &Path) -> Result<Vec<Triangle>, MeshError>,
     up: UpAxis,
@@ -111,7 +111,7 @@ fn check(triangles: Vec<Triangle>, scale: f64) -> Result<MeshTriangles, MeshErro
     Ok(MeshTriangles { triangles: with_area, without_area: without })
 }
 
-/// Whether a triangle is thinner than a millionth of its longest edge.
+/// Whether a triangle is thinner than a millionth of the longest edge.
 fn is_flat([a, b, c]: &Triangle) -> bool {
     let edges = [b - a, c - b, a - c];
     let longest = edges.iter().map(Vector::norm).fold(0.0, f64::max);

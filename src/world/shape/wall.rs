@@ -21,7 +21,7 @@ pub struct OpeningSpec {
     pub head_m: f64,
 }
 
-/// The outer faces of a wall of `size` (length, thickness, height), and the reveals of its openings.
+/// The outer faces of a wall of `size` (length, thickness, height), and the reveals of the openings.
 pub(super) fn triangles(size: Vector, openings: &[OpeningSpec]) -> Result<Vec<Triangle>, String> {
     check(size, openings)?;
     let mut faces = Faces { thickness: size.y, triangles: Vec::new() };

@@ -10,7 +10,7 @@ const U16: u32 = 5123;
 const U32: u32 = 5125;
 const F32: u32 = 5126;
 
-/// A document with the bytes of its buffers.
+/// A document with the bytes of the buffers.
 pub(super) struct Data {
     pub document: Document,
     pub buffers: Vec<Vec<u8>>,

@@ -108,7 +108,7 @@ impl Document {
 }
 
 impl Node {
-    /// Transform from the frame of the node to the frame of its parent.
+    /// Transform from the frame of the node to the frame of the parent.
     pub fn transform(&self) -> Transform {
         if let Some(columns) = &self.matrix {
             return Transform::from_column_slice(columns);
