@@ -10,7 +10,7 @@ use zsim::geometry::{STANDARD_GRAVITY_M_PER_S2, Vector};
 use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::recording::{RunDescription, Writer};
-use zsim::sensors::{Firing, ImuErrors, LidarErrors, MeanMotion, Track};
+use zsim::sensors::{ImuErrors, LidarErrors, MeanMotion, ScanTiming, Track};
 use zsim::simulation::{EPOCH, STEP_S, Scenario, Simulation};
 use zsim::time::Stamp;
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
@@ -27,7 +27,7 @@ fn scan(criterion: &mut Criterion) {
     let states = HeadSimulation::new(office.head(), office.motion(), STEP_S).unwrap().skip(6000).take(30);
     let head = Track::new(6000, STEP_S, states.map(|state| state.unwrap().head).collect()).unwrap();
     let laser = head.of_frame(office.head().head_from_laser());
-    let firing = Firing { index: 7, start_s: 6.005, pace: 1.0, stamp: EPOCH };
+    let firing = ScanTiming { index: 7, start_s: 6.005, pace: 1.0, stamp: EPOCH };
     let (lidar, errors) = (office.lidar(), LidarErrors::new(office.lidar(), Seed(1)));
     let sweep = lidar.sweep(office.world(), &laser, &firing);
 

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use zsim::geometry::{Kinematics, Pose, Trajectory, Vector, from_roll_pitch_yaw};
 use zsim::measurement::LidarScan;
 use zsim::random::Seed;
-use zsim::sensors::{Firing, Lidar, LidarErrors, LidarSpec, Rays, Scenery, SurfaceHit, Switch, Track};
+use zsim::sensors::{BeamModel, Lidar, LidarErrors, LidarSpec, ScanTiming, Scenery, SurfaceHit, Switch, Track};
 use zsim::spec::{self, Kind, Source};
 use zsim::time::Stamp;
 use zsim::world::World;
@@ -71,8 +71,8 @@ fn resting() -> Track {
     Track::new(0, 1e-3, vec![Kinematics::at_rest(Pose::identity()); 101]).unwrap()
 }
 
-fn firing(index: u64) -> Firing {
-    Firing { index, start_s: 0.0, pace: 1.0, stamp: Stamp::from_nanos(1_000_000_000) }
+fn firing(index: u64) -> ScanTiming {
+    ScanTiming { index, start_s: 0.0, pace: 1.0, stamp: Stamp::from_nanos(1_000_000_000) }
 }
 
 /// Scan `index` of a lidar at rest at the origin.
@@ -118,10 +118,10 @@ fn beams_projected_by_poses_at_1_khz_lie_on_the_surface() {
     let stamped = (0..200).map(|k| (Stamp::from_nanos(k * 1_000_000), nodding(k as f64 * 1e-3).world_from_body));
     let truth = Trajectory::from_poses(stamped).unwrap();
     let globe = Globe { radius_m: 10.0, reflectance: 0.5 };
-    let firing = Firing { index: 3, start_s: 0.0751, pace: 1.0, stamp: Stamp::from_nanos(75_100_000) };
+    let firing = ScanTiming { index: 3, start_s: 0.0751, pace: 1.0, stamp: Stamp::from_nanos(75_100_000) };
     for (name, beams) in [("utm30lx_exact", 1081), ("lms291_0_25deg", 721), ("vlp16", 28_928), ("mid360", 20_000)] {
         let mut spec = spec_of(name);
-        (spec.noise, spec.beam) = (Switch::Off, Rays::Single);
+        (spec.noise, spec.beam) = (Switch::Off, BeamModel::Single);
         let lidar = lidar(&spec);
         let scan = lidar.measure(&lidar.sweep(&globe, &track, &firing), &LidarErrors::new(&lidar, Seed(1)));
         assert_eq!(scan.returns.len(), beams);
@@ -272,9 +272,9 @@ fn a_divergent_beam_mixes_close_surfaces_and_resolves_distant_ones() {
     let mut spec = spec_of("utm30lx_exact");
     let middle = |spec: &LidarSpec, depth_m: f64| scan(spec, &edge(depth_m), 1, 0).planar.unwrap().ranges_m[540];
     assert!((middle(&spec, 0.3) - 5.3).abs() < 1e-6, "one ray sees one wall");
-    spec.beam = Rays::Divergent;
-    // Of seven rays, three with a twelfth of the power each hit the closer wall (at 120, 180 and 240 degrees from the
-    // left). The power decreases as 1 / r^2: (3 / 25, 9 / 5.3^2) / 12.
+    spec.beam = BeamModel::Divergent;
+    // Of seven rays, three of a twelfth fall on the near wall (at 120, 180 and 240 degrees from the left); the powers
+    // go as 1 / r^2: (3 / 25, 9 / 5.3^2) / 12.
     let (near, far) = (3.0 / 25.0, 9.0 / (5.3 * 5.3));
     let mixed = (5.0 * near + 5.3 * far) / (near + far);
     assert!((f64::from(middle(&spec, 0.3)) - mixed).abs() < 1e-4, "{} {mixed}", middle(&spec, 0.3));

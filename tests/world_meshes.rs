@@ -250,11 +250,11 @@ fn an_invalid_mesh_is_an_error_with_the_reason() {
         ("overflow.obj", b"v 0 0 0\nf 99999999999999999999 1 1\n".to_vec(), "line 2"),
         ("two.obj", b"v 0 0 0\nv 1 1 1\nf 1 2\n".to_vec(), "at least three corners"),
         ("flat.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n".to_vec(), "1 of its 1 triangles have no area"),
-        ("short.stl", stl_binary("x")[..400].to_vec(), "says it has 12 triangles (684 bytes), but holds 400 bytes"),
+        ("short.stl", stl_binary("x")[..400].to_vec(), "declares 12 triangles (684 bytes), but contains 400 bytes"),
         ("tiny.stl", b"abc".to_vec(), "3 bytes"),
         ("twice.stl", [stl_ascii(), stl_ascii()].concat(), "12 of its 24 facets"),
         ("cut.ply", ply_binary(true)[..250].to_vec(), "PLY"),
-        ("cut.glb", glb()[..500].to_vec(), "says it has"),
+        ("cut.glb", glb()[..500].to_vec(), "declares"),
         ("up.gltf", gltf_json(r#","uri":"../secret.bin""#).into_bytes(), "not a file in the mesh's folder"),
         ("box.fbx", b"x".to_vec(), "ends in neither"),
     ];
@@ -274,7 +274,7 @@ fn a_header_that_declares_too_much_is_refused_at_once() {
     assert!(scene.error("bare.ply", bare.as_bytes()).contains("4000000000 of `vertex` with 0 properties"));
     let mut stl = stl_binary("x");
     stl[80..84].fill(0xff);
-    assert!(scene.error("many.stl", &stl).contains("says it has 4294967295 triangles"));
+    assert!(scene.error("many.stl", &stl).contains("declares 4294967295 triangles"));
     let gltf = gltf_json(r#","uri":"data:x;base64,AAAA""#).replace("132", "4000000000");
     assert!(scene.error("many.gltf", gltf.as_bytes()).contains("4000000000 bytes in a buffer"));
     let count = gltf_json("").replace("\"count\":36", "\"count\":18446744073709551615");
@@ -286,7 +286,7 @@ fn cyclic_nodes_are_an_error() {
     let scene = Scene::new();
     std::fs::write(scene.path().join("box.bin"), gltf_buffer()).unwrap();
     let round = gltf_json(r#","uri":"box.bin""#).replace("\"mesh\":0,", "\"mesh\":0,\"children\":[0],");
-    assert!(scene.error("round.gltf", round.as_bytes()).contains("go round"));
+    assert!(scene.error("round.gltf", round.as_bytes()).contains("form a cycle"));
 }
 
 #[test]

@@ -68,7 +68,7 @@ fn each_error_has_its_line() {
         ("[Place(template: \"pillar\")]", "[Place(template: \"outer\")]", 9, "nest deeper than 8"),
         ("to_m: 2,", "to_m: 20,", 13, "beyond the wall of 10 m"),
         ("[0.1, 0]]", "[0.1]]", 14, "row 2 of the grid has 1 heights"),
-        ("count: 4,", "count: 4000,", 16, "of 4000 copies of `pillar` found a place"),
+        ("count: 4,", "count: 4000,", 16, "of 4000 copies of `pillar`"),
         ("count: 4,", "count: 0,", 16, "`count` is 0"),
         ("(time_s: 4,", "(time_s: 0,", 18, "times do not increase"),
         ("(3, 0, 0, 90)", "(3, 0, 0, 190)", 18, "turns by 180 degrees"),

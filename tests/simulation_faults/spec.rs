@@ -63,7 +63,7 @@ fn an_invalid_fault_is_refused_with_its_line_and_a_remedy() {
     let Err(error) = simulation(&round, Some("(sensor: lidar, fault: misses(encoding: zero))")) else {
         panic!("no LaserScan")
     };
-    assert!(error.contains("scans no plane"), "{error}");
+    assert!(error.contains("is not planar"), "{error}");
 }
 
 #[test]

@@ -144,7 +144,7 @@ pub fn coverage(
         while next.next_if(|t| *t <= start_s).is_some() {
             sweeps.end(&mut sphere);
         }
-        let turned = lidar.turned(scan as u64).unwrap_or_else(Rotation::identity);
+        let turned = lidar.scan_rotation(scan as u64).unwrap_or_else(Rotation::identity);
         for beam in lidar.beams() {
             let heading_from_laser = track.heading_from_laser(start_s + beam.offset_s);
             sphere.see(&(heading_from_laser * (turned * beam.direction_in_laser)));
