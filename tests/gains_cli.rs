@@ -105,6 +105,6 @@ fn a_mount_without_a_spring_has_nothing_to_characterise_and_that_is_said() {
         let told = predicate::str::contains("there is no spring, hence nothing to characterise");
         zsim(&arguments).assert().code(2).stderr(told);
     }
-    zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns it"));
+    zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns the head"));
     zsim(&["check", "spinning", "nodding", "trawling"]).assert().success();
 }

@@ -75,7 +75,7 @@ fn springs_side_by_side_are_parallel_and_turn_by_their_levers() {
     }
     assert_relative_eq!(stiffness(&[[0.0; 2]; 3])[(2, 2)], 3.0 * along, max_relative = 1e-6);
     // Each carries its part of the weight.
-    for bearing in at(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]).bearings() {
+    for bearing in at(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]).element_loads() {
         assert_relative_eq!(bearing.load_n.unwrap(), M * G / 3.0, max_relative = 1e-6);
     }
 }
@@ -178,7 +178,7 @@ fn a_float_goes_where_its_vessel_goes() {
     // Fluid that speeds up pushes what it carries as hard as what it has replaced: up and down the head follows at
     // once.
     let model = model([0.0, 0.0, 0.05], &(floating([0.0; 4]) + &moored()));
-    let response = model.frequency_response(&model.usual_points());
+    let response = model.frequency_response(&model.default_points());
     for freq_hz in [0.5, 2.0, 5.0, 9.0] {
         let gain = response.gain(zsim::motion::Axis::Z, freq_hz, zsim::dynamics::Quantity::Kinematic);
         assert_relative_eq!(gain, 1.0, max_relative = 1e-4);
@@ -206,7 +206,7 @@ fn a_joint_leaves_two_turns_that_rock_by_spring_less_weight() {
     }
     // Tilted slowly, the base lifts the head by k / (k - m g h); shifted and turned about the vertical, it takes it
     // along.
-    let response = model.frequency_response(&model.usual_points());
+    let response = model.frequency_response(&model.default_points());
     let gain = |axis| response.gain(axis, 1e-6, zsim::dynamics::Quantity::Kinematic);
     assert_relative_eq!(gain(zsim::motion::Axis::Pitch), k / (k - M * G * h), max_relative = 1e-6);
     for axis in [zsim::motion::Axis::Z, zsim::motion::Axis::Yaw] {

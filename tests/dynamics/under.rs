@@ -42,8 +42,8 @@ fn apart(a: &[(Stamp, Pose)], b: &Trajectory) -> (f64, f64) {
 #[test]
 fn the_springs_law_finds_the_base_that_a_rigid_link_misses() {
     let (model, heads, bases) = walk("handheld", 1000);
-    let by_spring = apart(&model.base_under(&heads).unwrap(), &bases);
-    let by_link = apart(&model.base_on_rigid_link(&heads), &bases);
+    let by_spring = apart(&model.base_from_force_law(&heads).unwrap(), &bases);
+    let by_link = apart(&model.base_from_rigid_link(&heads), &bases);
     println!("spring {by_spring:?}, rigid link {by_link:?}");
     assert!(by_spring.0 < 0.001 && by_spring.1 < 0.2, "{by_spring:?}");
     assert!(by_link.0 > 0.03 && by_link.1 > 30.0, "{by_link:?}");
@@ -52,7 +52,7 @@ fn the_springs_law_finds_the_base_that_a_rigid_link_misses() {
 #[test]
 fn differences_at_an_imus_rate_lose_little() {
     let (model, heads, bases) = walk("handheld", 100);
-    let by_spring = apart(&model.base_under(&heads).unwrap(), &bases);
+    let by_spring = apart(&model.base_from_force_law(&heads).unwrap(), &bases);
     println!("{by_spring:?}");
     assert!(by_spring.0 < 0.02 && by_spring.1 < 3.0, "{by_spring:?}");
 }
@@ -60,12 +60,12 @@ fn differences_at_an_imus_rate_lose_little() {
 #[test]
 fn a_pose_that_no_base_explains_costs_its_neighbours_alone() {
     let (model, heads, _) = walk("handheld", 100);
-    let whole = model.base_under(&heads).unwrap();
+    let whole = model.base_from_force_law(&heads).unwrap();
     let thrown = heads.iter().enumerate().map(|(k, (stamp, pose))| {
         let shift = if k == 500 { Vector::x() * 2.0 } else { Vector::zeros() };
         (stamp, Pose::from_parts((pose.translation.vector + shift).into(), pose.rotation))
     });
-    let told = model.base_under(&Trajectory::from_poses(thrown).unwrap()).unwrap();
+    let told = model.base_from_force_law(&Trajectory::from_poses(thrown).unwrap()).unwrap();
     assert!((whole.len() - 10..whole.len()).contains(&told.len()), "{} of {}", told.len(), whole.len());
     let far = |stamp: Stamp| stamp.seconds_since(Stamp::default()) > 5.1 || stamp.seconds_since(Stamp::default()) < 4.9;
     let whole = Trajectory::from_poses(whole).unwrap();
@@ -76,6 +76,6 @@ fn a_pose_that_no_base_explains_costs_its_neighbours_alone() {
 
 #[test]
 fn a_motor_does_not_tell_its_base() {
-    let error = model("spinning").base_under(&Trajectory::new()).unwrap_err();
+    let error = model("spinning").base_from_force_law(&Trajectory::new()).unwrap_err();
     assert!(matches!(error, DynamicsError::BaseUnknown { .. }), "{error}");
 }
