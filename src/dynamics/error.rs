@@ -15,7 +15,7 @@ pub enum DynamicsError {
         "the head has no equilibrium on the base at the start of the simulation ({reason}): start with the base upright and \
          at rest"
     )]
-    NoRestAtStart {
+    NoEquilibriumAtStart {
         /// Cause, as text.
         reason: String,
     },

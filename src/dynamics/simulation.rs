@@ -130,7 +130,7 @@ impl<'a> CompliantMotion<'a> {
         let scale_m = compliant.law.springs.first().map_or(0.1, |mounted| mounted.spring.length_m());
         let (rest, _) = Statics { law: &compliant.law, body, gravity_in_base, weight: 1.0, scale_m }
             .find_equilibrium(&compliant.rest)
-            .map_err(|failure| DynamicsError::NoRestAtStart { reason: failure.to_string() })?;
+            .map_err(|failure| DynamicsError::NoEquilibriumAtStart { reason: failure.to_string() })?;
         let head = base.of_frame(&rest);
         let centre = head.of_frame(&Pose::from_parts(body.centre_of_mass_in_head.into(), Rotation::identity()));
         let engine = Engine::new(body, &head.world_from_body, &velocity_before(&centre, 0.5 * step_s), step_s);

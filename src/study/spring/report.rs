@@ -318,6 +318,6 @@ mod tests {
         let report = spring_report(&spec, &source, &Shake::default(), &utm30lx(), &plan).unwrap();
         assert!(!report.stands && report.modes.is_empty());
         assert!(report.heaviest_head_kg.unwrap() < 2.14, "{report:?}");
-        assert!(report.falls_because.unwrap().contains("carries at most"));
+        assert!(report.falls_because.unwrap().contains("supports at most"));
     }
 }
