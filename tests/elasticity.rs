@@ -53,7 +53,7 @@ fn the_tangent_stiffness_under_load_is_haringxs_for_any_number_of_segments() {
     // Up to 60 % of the buckling load, and in tension.
     let coil = Coil::new(0.040, 0.0025, 15.0, 0.120, STEEL).unwrap();
     for load_n in [0.0, 12.1, -12.1] {
-        let column = coil.under(load_n).unwrap();
+        let column = coil.under_load(load_n).unwrap();
         let expected = loaded_stiffness(&column).unwrap();
         for segments in [1, 2, 4, 8] {
             let spring = Spring::of_column(&column, segments).unwrap();
@@ -72,9 +72,9 @@ fn the_tangent_stiffness_under_load_is_haringxs_for_any_number_of_segments() {
 fn a_spring_loaded_above_its_design_load_softens_as_in_haringxs_theory() {
     // Designed for 4 N and loaded with 12.1 N: the force law must follow the actual load, not the design load.
     let coil = Coil::new(0.040, 0.0025, 15.0, 0.120, STEEL).unwrap();
-    let expected = loaded_stiffness(&coil.under(12.1).unwrap()).unwrap();
+    let expected = loaded_stiffness(&coil.under_load(12.1).unwrap()).unwrap();
     for (segments, within) in [(2, 0.03), (4, 0.03), (8, 0.01)] {
-        let spring = Spring::of_column(&coil.under(4.0).unwrap(), segments).unwrap();
+        let spring = Spring::of_column(&coil.under_load(4.0).unwrap(), segments).unwrap();
         let top = rest_under(&spring, Vector::new(0.0, 0.0, -12.1));
         let found = tangent(&spring, &mut spring.state(), &top);
         assert_relative_eq!(found[(0, 0)], expected[(0, 0)], max_relative = within);
@@ -108,7 +108,7 @@ fn a_slender_cantilever_follows_the_elastica() {
 fn the_wrench_of_a_segmented_spring_is_the_gradient_of_its_energy() {
     // The gradient of the energy with the inner nodes in equilibrium, at a large rotation about no coordinate axis.
     let spring =
-        Spring::of_column(&Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap().under(3.9).unwrap(), 4).unwrap();
+        Spring::of_column(&Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap().under_load(3.9).unwrap(), 4).unwrap();
     let turn = Rotation::from_scaled_axis(Vector::new(0.5, 1.1, 0.4));
     let top = Pose::from_parts(Vector::new(0.06, -0.03, 0.09).into(), turn);
     let mut state = spring.state();
@@ -124,7 +124,7 @@ fn the_wrench_of_a_segmented_spring_is_the_gradient_of_its_energy() {
 #[test]
 fn the_equilibrium_of_inner_nodes_does_not_depend_on_their_start() {
     let spring =
-        Spring::of_column(&Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap().under(3.9).unwrap(), 8).unwrap();
+        Spring::of_column(&Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap().under_load(3.9).unwrap(), 8).unwrap();
     let at = |angle: f64| {
         let place = skew(&Vector::y()) * Vector::z() * (0.06 * angle) + Vector::z() * 0.11;
         Pose::from_parts(place.into(), Rotation::from_scaled_axis(Vector::y() * angle))

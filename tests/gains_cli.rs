@@ -105,6 +105,6 @@ fn gains_and_spring_refuse_a_mount_without_a_spring() {
         let told = predicate::str::contains("there is no spring, hence nothing to characterise");
         zsim(&arguments).assert().code(2).stderr(told);
     }
-    zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns it"));
+    zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns the head"));
     zsim(&["check", "spinning", "nodding", "trawling"]).assert().success();
 }

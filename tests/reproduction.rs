@@ -16,7 +16,7 @@ const RATIOS: (f64, f64) = (0.0005, 0.3);
 fn peaks(damping: DampingSpec, up_to_hz: f64) -> PeaksSpec {
     let (spec, source) = load("handheld").unwrap();
     let head = HeadModel::new(&with_damping(&spec, damping), &source).unwrap();
-    let response = head.frequency_response(&head.usual_points());
+    let response = head.frequency_response(&head.default_points());
     let peak = |axis| response.peak(axis, up_to_hz, Quantity::Kinematic).map(|peak| peak.gain);
     PeaksSpec {
         x_rot: peak(Axis::Roll),

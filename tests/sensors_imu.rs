@@ -218,7 +218,7 @@ fn assert_allan_deviation_of_spec(name: &str, hours: f64) {
                 assert!(point.deviation < 1e-9, "{name}: {point:?}, expected none");
                 continue;
             }
-            let (low, high) = point.band(0.999);
+            let (low, high) = point.confidence_interval(0.999);
             let near = (point.deviation / deviation - 1.0).abs() < 0.10;
             let right = if point.tau_s <= 1e-3 * duration_s { near } else { low < deviation && deviation < high };
             assert!(right, "{name}: {point:?}, expected {deviation}");

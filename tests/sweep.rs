@@ -320,7 +320,7 @@ fn a_failed_run_is_a_row_and_the_others_continue() {
     run_ok(here.path(), "study falls.ron -o falls --threads 2");
     let errors = column(&here.path().join("falls"), "error");
     assert!(errors[0].is_empty() && errors[1].is_empty(), "{errors:?}");
-    assert!(errors[2].contains("cannot stand on its spring") && errors[3] == errors[2], "{errors:?}");
+    assert!(errors[2].contains("cannot stand on the spring") && errors[3] == errors[2], "{errors:?}");
 
     std::fs::write(here.path().join("late.ron"), spec.replace("time_s: 300.0", "time_s: 0.01")).unwrap();
     run_ok(here.path(), "study late.ron -o late");

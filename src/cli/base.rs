@@ -79,14 +79,14 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let truth = arguments.truth.as_deref().map(true_base).transpose()?;
     let by_spring = match &arguments.base_imu {
         Some(_) => study::base_by_law(&head, &seen)?,
-        None => head.base_under(&seen)?,
+        None => head.base_from_force_law(&seen)?,
     };
     let by_imu = arguments.base_imu.as_deref().map(|recording| by_imu(recording, arguments, &head, &seen));
     let by_imu = by_imu.transpose()?;
 
     let way = |key, name, base| Way { key, name, base };
     let mut ways = vec![
-        way("rigid_link", "rigid link", Trajectory::from_poses(head.base_on_rigid_link(&seen))?),
+        way("rigid_link", "rigid link", Trajectory::from_poses(head.base_from_rigid_link(&seen))?),
         way("spring", "spring's law", Trajectory::from_poses(by_spring)?),
     ];
     let (estimate, loss) = by_imu.unzip();

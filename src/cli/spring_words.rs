@@ -1,7 +1,7 @@
 //! The output of `zsim spring`.
 
 use super::coverage_words;
-use zsim::dynamics::{Bearing, BearingKind, ModeKind};
+use zsim::dynamics::{ElementKind, ElementLoad, ModeKind};
 use zsim::report::table;
 use zsim::study::spring::design::DesignStudy;
 use zsim::study::spring::{CoilReport, DesignFigures, ShakeResponse, SpringReport};
@@ -45,12 +45,12 @@ fn row(name: &str, value: String) -> Vec<String> {
     vec![name.to_owned(), value]
 }
 
-fn bearing(bearing: &Bearing) -> Vec<String> {
+fn bearing(bearing: &ElementLoad) -> Vec<String> {
     let name = match bearing.kind {
-        BearingKind::Spring => "a spring is pressed by",
-        BearingKind::Cord => "a cord is pulled by",
-        BearingKind::Float => "a float is lifted by",
-        BearingKind::UniversalJoint => "a universal joint bears",
+        ElementKind::Spring => "a spring is pressed by",
+        ElementKind::Cord => "a cord is pulled by",
+        ElementKind::Float => "a float is lifted by",
+        ElementKind::UniversalJoint => "a universal joint bears",
     };
     row(name, bearing.load_n.map_or("the rest".to_owned(), |n| format!("{n:.2} N")))
 }

@@ -157,11 +157,11 @@ fn invalid_motors_are_refused_with_their_line() {
     for (from, to, line, part) in [
         ("rate_hz: 1.0", "rate_hz: 0.0", 10, "above 0, found 0"),
         ("rate_hz: 1.0", "rate_hz: NaN", 10, "found NaN"),
-        ("rate_hz: 1.0", "rate_hz: 40.0", 10, "40.0 turns a second; 15 are most"),
+        ("rate_hz: 1.0", "rate_hz: 40.0", 10, "40.0 revolutions per second; the maximum is 15"),
         ("rate_hz: 1.0", "rate: 1.0", 10, "rate"),
-        ("spin(rate_hz: 1.0)", "nod(amplitude_deg: 200.0, frequency_hz: 0.1)", 10, "overlaps itself"),
-        ("spin(rate_hz: 1.0)", "nod(amplitude_deg: 170.0, frequency_hz: 6.0)", 10, "17.8 turns a second"),
-        ("(1.0, 2.0, -0.5)", "(0.0, 0.0, 0.0)", 8, "points nowhere"),
+        ("spin(rate_hz: 1.0)", "nod(amplitude_deg: 200.0, frequency_hz: 0.1)", 10, "the maximum is 180"),
+        ("spin(rate_hz: 1.0)", "nod(amplitude_deg: 170.0, frequency_hz: 6.0)", 10, "17.8 revolutions per second"),
+        ("(1.0, 2.0, -0.5)", "(0.0, 0.0, 0.0)", 8, "length zero"),
         ("(1.0, 2.0, -0.5)", "(0.0, inf, 0.0)", 8, "finite"),
         ("still_s: 0.5", "still_s: -0.5", 11, "at least 0, found -0.5"),
         ("start_s: 0.8", "start_s: 0.0", 12, "above 0, found 0"),
@@ -174,7 +174,8 @@ fn invalid_motors_are_refused_with_their_line() {
 #[test]
 fn rigid_mounts_have_no_gains_and_no_spring() {
     use zsim::study::gains::{GainPlan, gain_curves};
-    for (name, because) in [("spinning", "a motor turns it"), ("nodding", "a motor turns it"), ("trawling", "screwed")]
+    for (name, because) in
+        [("spinning", "a motor turns the head"), ("nodding", "a motor turns the head"), ("trawling", "screwed")]
     {
         let head: HeadModel = shipped(name);
         assert!(head.linear_modes().is_empty() && head.linear().is_none());

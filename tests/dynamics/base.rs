@@ -42,8 +42,8 @@ fn largest_difference(a: &[(Stamp, Pose)], b: &Trajectory) -> (f64, f64) {
 #[test]
 fn the_spring_model_determines_the_base_and_a_rigid_link_does_not() {
     let (model, heads, bases) = walk("handheld", 1000);
-    let by_spring = largest_difference(&model.base_under(&heads).unwrap(), &bases);
-    let by_link = largest_difference(&model.base_on_rigid_link(&heads), &bases);
+    let by_spring = apart(&model.base_from_force_law(&heads).unwrap(), &bases);
+    let by_link = apart(&model.base_from_rigid_link(&heads), &bases);
     println!("spring {by_spring:?}, rigid link {by_link:?}");
     assert!(by_spring.0 < 0.001 && by_spring.1 < 0.2, "{by_spring:?}");
     assert!(by_link.0 > 0.03 && by_link.1 > 30.0, "{by_link:?}");
@@ -52,7 +52,7 @@ fn the_spring_model_determines_the_base_and_a_rigid_link_does_not() {
 #[test]
 fn differences_at_the_imu_rate_lose_little_accuracy() {
     let (model, heads, bases) = walk("handheld", 100);
-    let by_spring = largest_difference(&model.base_under(&heads).unwrap(), &bases);
+    let by_spring = apart(&model.base_from_force_law(&heads).unwrap(), &bases);
     println!("{by_spring:?}");
     assert!(by_spring.0 < 0.02 && by_spring.1 < 3.0, "{by_spring:?}");
 }
@@ -60,12 +60,12 @@ fn differences_at_the_imu_rate_lose_little_accuracy() {
 #[test]
 fn a_pose_without_a_base_solution_affects_only_its_neighbours() {
     let (model, heads, _) = walk("handheld", 100);
-    let whole = model.base_under(&heads).unwrap();
+    let whole = model.base_from_force_law(&heads).unwrap();
     let thrown = heads.iter().enumerate().map(|(k, (stamp, pose))| {
         let shift = if k == 500 { Vector::x() * 2.0 } else { Vector::zeros() };
         (stamp, Pose::from_parts((pose.translation.vector + shift).into(), pose.rotation))
     });
-    let told = model.base_under(&Trajectory::from_poses(thrown).unwrap()).unwrap();
+    let told = model.base_from_force_law(&Trajectory::from_poses(thrown).unwrap()).unwrap();
     assert!((whole.len() - 10..whole.len()).contains(&told.len()), "{} of {}", told.len(), whole.len());
     let far = |stamp: Stamp| stamp.seconds_since(Stamp::default()) > 5.1 || stamp.seconds_since(Stamp::default()) < 4.9;
     let whole = Trajectory::from_poses(whole).unwrap();
@@ -75,7 +75,7 @@ fn a_pose_without_a_base_solution_affects_only_its_neighbours() {
 }
 
 #[test]
-fn the_base_of_an_actuated_head_cannot_be_computed() {
-    let error = model("spinning").base_under(&Trajectory::new()).unwrap_err();
+fn a_motor_does_not_tell_its_base() {
+    let error = model("spinning").base_from_force_law(&Trajectory::new()).unwrap_err();
     assert!(matches!(error, DynamicsError::BaseUnknown { .. }), "{error}");
 }

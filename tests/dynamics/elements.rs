@@ -75,8 +75,8 @@ fn parallel_springs_add_up_and_have_rotational_stiffness_from_their_levers() {
         assert_relative_eq!(apart[(4, 4)] - together[(4, 4)], along * sum_of_squares, max_relative = 1e-4);
     }
     assert_relative_eq!(stiffness(&[[0.0; 2]; 3])[(2, 2)], 3.0 * along, max_relative = 1e-6);
-    // Each spring carries its part of the weight.
-    for bearing in at(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]).bearings() {
+    // Each carries its part of the weight.
+    for bearing in at(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]).element_loads() {
         assert_relative_eq!(bearing.load_n.unwrap(), M * G / 3.0, max_relative = 1e-6);
     }
 }
@@ -179,7 +179,7 @@ fn a_float_follows_its_vessel() {
     // Accelerating fluid exerts on the float the force that it would exert on the displaced fluid, so that the head
     // follows vertical motion at once.
     let model = model([0.0, 0.0, 0.05], &(floating([0.0; 4]) + &moored()));
-    let response = model.frequency_response(&model.usual_points());
+    let response = model.frequency_response(&model.default_points());
     for freq_hz in [0.5, 2.0, 5.0, 9.0] {
         let gain = response.gain(zsim::motion::Axis::Z, freq_hz, zsim::dynamics::Quantity::Kinematic);
         assert_relative_eq!(gain, 1.0, max_relative = 1e-4);
@@ -205,8 +205,9 @@ fn a_universal_joint_has_two_rocking_modes_with_the_stiffness_of_spring_less_gra
         assert_eq!(mode.kind, ModeKind::Rocking);
         assert_relative_eq!(mode.frequency_hz, expected, max_relative = 1e-7);
     }
-    // For a slow tilt of the base the head tilts by k / (k - m g h) of it; shifts and yaw are followed one to one.
-    let response = model.frequency_response(&model.usual_points());
+    // Tilted slowly, the base lifts the head by k / (k - m g h); shifted and turned about the vertical, it takes it
+    // along.
+    let response = model.frequency_response(&model.default_points());
     let gain = |axis| response.gain(axis, 1e-6, zsim::dynamics::Quantity::Kinematic);
     assert_relative_eq!(gain(zsim::motion::Axis::Pitch), k / (k - M * G * h), max_relative = 1e-6);
     for axis in [zsim::motion::Axis::Z, zsim::motion::Axis::Yaw] {

@@ -80,7 +80,7 @@ fn invalid_springs_are_refused() {
     let soft = given("400.0 400.0 4000.0 5.0 -5.0 0.8", 1).unwrap_err().to_string();
     assert!(soft.starts_with("head.ron:") && soft.contains("not positive definite"), "{soft}");
     let cut = given("400.0 400.0 4000.0 5.0 5.0 0.8", 2).unwrap_err().to_string();
-    assert!(cut.contains("only a coil can be cut"), "{cut}");
+    assert!(cut.contains("only a coil can be divided"), "{cut}");
 }
 
 #[test]
@@ -107,24 +107,24 @@ fn invalid_suspensions_are_errors_with_the_reason() {
     assert!(loose.contains("nothing holds it against a turn about z"), "{loose}");
     // Ropes cannot push: the head falls to a pose below them.
     let above = refused([0.0, 0.0, 0.45], &(rope(0.03) + &rope(-0.03)));
-    assert!(above.contains("from where base_from_head puts it"), "{above}");
+    assert!(above.contains("away from base_from_head"), "{above}");
     let joints = refused([0.0, 0.0, 0.07], &jointed(0.7).repeat(2));
     assert!(joints.contains("at most one universal_joint"), "{joints}");
     // 0.40 kg at 70 mm above a joint need 0.27 N m/rad.
     let falls = refused([0.0, 0.0, 0.07], &jointed(0.2));
-    assert!(falls.contains("cannot stand on its elements") && falls.contains("they carry at most"), "{falls}");
-    // The buoyancy of a cylinder of 1.2 litres is too small in a fluid of a third of water's density.
+    assert!(falls.contains("cannot stand on the elements") && falls.contains("they support at most"), "{falls}");
+    // A cylinder of 1.2 litres does not carry it in a fluid of a third of water's density.
     let sinks = floating([0.0; 4]).replace("density_kg_per_m3: 1000.0", "density_kg_per_m3: 300.0");
     let sinks = refused([0.0, 0.0, 0.05], &(sinks + &moored()));
-    assert!(sinks.contains("cannot stand") && sinks.contains("they carry at most 0."), "{sinks}");
+    assert!(sinks.contains("cannot stand") && sinks.contains("they support at most 0."), "{sinks}");
 }
 
 #[test]
 fn invalid_wires_and_cables_are_refused() {
     let cable = "cable: (length_m: 0.1, tension_n: 50.0, stiffness_n_per_m: 400.0, damping_n_s_per_m: 0.0),";
-    let error = built(&ReferenceHead { more: cable, ..ReferenceHead::default() }.text()).unwrap_err().to_string();
-    assert!(error.starts_with("head.ron:") && error.contains("-0.025 m long without its tension"), "{error}");
-    let text = ReferenceHead { more: "spring_mass: included,", ..ReferenceHead::default() }.text();
+    let error = built(&Table { more: cable, ..Table::default() }.text()).unwrap_err().to_string();
+    assert!(error.starts_with("head.ron:") && error.contains("-0.025 m long without tension"), "{error}");
+    let text = Table { more: "spring_mass: included,", ..Table::default() }.text();
     let unknown = text.replace("spring_steel", "moduli(youngs_gpa: 206.0, shear_gpa: 79.3)");
     let error = built(&unknown).unwrap_err().to_string();
     assert!(error.contains("density_kg_per_m3"), "{error}");

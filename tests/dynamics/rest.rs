@@ -48,7 +48,7 @@ fn a_head_on_a_tilted_base_rests_at_the_inclination_of_the_loaded_column() {
     // In base axes gravity acts with m g tilt along x at 70 mm above the top. The top's (x, theta) solve
     // [K_xx, K_xt; K_xt, K_tt - m g h] (x, theta) = m g tilt (1, h), with the stiffness K of the loaded column.
     let moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
-    let column = Coil::new(0.025, 0.003, 12.0, 0.12, moduli).unwrap().under(0.40 * G).unwrap();
+    let column = Coil::new(0.025, 0.003, 12.0, 0.12, moduli).unwrap().under_load(0.40 * G).unwrap();
     let k = loaded_stiffness(&column).unwrap();
     let (weight, h) = (0.40 * G, 0.07);
     let stiffness = Matrix2::new(k[(0, 0)], k[(0, 4)], k[(0, 4)], k[(4, 4)] - weight * h);

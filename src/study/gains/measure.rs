@@ -2,7 +2,7 @@
 
 use super::drive::{Schedule, Shaken};
 use super::{AXES, GainCurve, GainPlan, GainPoint};
-use crate::dynamics::{HeadModel, HeadSimulation, HeadState, Peak, Points, Quantity};
+use crate::dynamics::{GainPoints, HeadModel, HeadSimulation, HeadState, Peak, Quantity};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::motion::Axis;
 use crate::signal::{Segments, TransferPoint, transfer_function};
@@ -62,7 +62,7 @@ pub fn gain_curve(
 }
 
 fn checked(head: &HeadModel, plan: &GainPlan) -> Result<Schedule, StudyError> {
-    if let Some(why) = head.unyielding() {
+    if let Some(why) = head.rigid_mount_reason() {
         return Err(StudyError::Plan { what: "head", message: why.to_owned() });
     }
     if !REALISATIONS.contains(&plan.realisations) {
@@ -100,7 +100,7 @@ fn record(
     plan: &GainPlan,
     schedule: Schedule,
 ) -> Result<Record, StudyError> {
-    let points = plan.points.unwrap_or_else(|| head.usual_points());
+    let points = plan.points.unwrap_or_else(|| head.default_points());
     let shaken = Shaken::new(axis, index, plan, schedule, &points.base_in_base)?;
     let watch = Watch::new(head, axis, &points, plan.quantity);
     let mut record = Record::default();
@@ -124,7 +124,7 @@ struct Watch {
 }
 
 impl Watch {
-    fn new(head: &HeadModel, axis: Axis, points: &Points, quantity: Quantity) -> Self {
+    fn new(head: &HeadModel, axis: Axis, points: &GainPoints, quantity: Quantity) -> Self {
         let at = |point: &Vector| Pose::from_parts((*point).into(), Rotation::identity());
         Self {
             axis: axis as usize % 3,
@@ -166,7 +166,7 @@ fn curve(
     let joined = |of: fn(&Record) -> &Vec<f64>| records.iter().flat_map(|r| of(r).iter().copied()).collect::<Vec<_>>();
     let (base, moved) = (joined(|r| &r.base), joined(|r| &r.head));
     let measured = transfer_function(&base, &moved, 1.0 / plan.step_s, Segments::periods(schedule.period))?;
-    let points = plan.points.unwrap_or_else(|| head.usual_points());
+    let points = plan.points.unwrap_or_else(|| head.default_points());
     let response = head.frequency_response(&points);
     let point = |p: &TransferPoint| GainPoint {
         freq_hz: p.freq_hz,

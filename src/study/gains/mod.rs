@@ -18,7 +18,7 @@ pub use measure::{gain_curve, gain_curves};
 pub use swing::{SwingPoint, SwingStudy, swing_study};
 pub use table::{csv, swing_csv};
 
-use crate::dynamics::{DampingSpec, HeadSpec, Peak, Points, Quantity};
+use crate::dynamics::{DampingSpec, GainPoints, HeadSpec, Peak, Quantity};
 use crate::motion::Axis;
 use crate::random::Seed;
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,7 @@ pub struct GainPlan {
     /// What is compared along x, y, z.
     pub quantity: Quantity,
     /// Where; `None` for the spring's foot and the IMU.
-    pub points: Option<Points>,
+    pub points: Option<GainPoints>,
     /// Highest frequency, Hz.
     pub up_to_hz: f64,
     /// The multisine's period, s; `None` for one that puts two lines or more into the narrowest resonance.

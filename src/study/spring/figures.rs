@@ -1,7 +1,7 @@
 //! A design in figures: at once from the linearised head, or from a simulation.
 
 use super::{Shake, SpringMounting, Wire};
-use crate::dynamics::{FrequencyResponse, HeadModel, HeadSpec, HeadState, LinkageSpec, Points, Quantity};
+use crate::dynamics::{FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState, LinkageSpec, Quantity};
 use crate::elasticity::{SpringDesign, split};
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
 use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
@@ -43,11 +43,11 @@ const PEAKS_UP_TO_HZ: f64 = 20.0;
 /// # Errors
 /// When the spec is wrong or the head does not stand; the error does not say how nearly.
 pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignFigures, StudyError> {
-    let head = HeadModel::attempt(spec, source)?;
+    let head = HeadModel::new_without_advice(spec, source)?;
     let design = Design::of(spec, &head)?;
     let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
-    let foot = head.usual_points().base_in_base;
-    let points = Points { base_in_base: foot, head_in_head: head.body().centre_of_mass_in_head };
+    let foot = head.default_points().base_in_base;
+    let points = GainPoints { base_in_base: foot, head_in_head: head.body().centre_of_mass_in_head };
     let response = head.frequency_response(&points);
     let swing = Swing { head: &head, response: &response, foot, omega: TAU * frequency_hz, shake };
     let pitch = swing.amplitude()[4].norm();
@@ -83,7 +83,7 @@ pub fn simulated(
     let shaker = MotionSpec::Shaker(ShakerSpec { height_m: 1.1, still_s: 0.5, onset_s: 2.0, drives });
     let duration_s = plan.from_s + plan.duration_s;
     let shake = shaker.build(&Source::in_memory("the hand's shake", ""), None, duration_s, Seed(1))?;
-    let base_from_shaken = Pose::from_parts(head.usual_points().base_in_base.into(), Rotation::identity());
+    let base_from_shaken = Pose::from_parts(head.default_points().base_in_base.into(), Rotation::identity());
     let motion = AboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
     let (mut stress, mut step) = (None, 0_usize);
     let seen = coverage(&head, &motion, lidar, plan, |state| {
@@ -157,7 +157,7 @@ impl Design {
     }
 
     fn figures(&self, head: &HeadModel, swung: &Swung) -> DesignFigures {
-        let response = head.frequency_response(&head.usual_points());
+        let response = head.frequency_response(&head.default_points());
         let peak = response.peak(Axis::Pitch, PEAKS_UP_TO_HZ, Quantity::Kinematic);
         let yields = self.wire.and_then(|wire| wire.yield_pa());
         DesignFigures {

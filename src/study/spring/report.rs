@@ -3,7 +3,7 @@
 use super::figures::Design;
 use super::{DesignFigures, Shake, closed_form, simulated};
 use crate::dynamics::{
-    Bearing, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, heaviest_kg,
+    ElementLoad, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, max_head_mass_kg,
 };
 use crate::elasticity::{Coil, Matrix6, SpringDesign, buckling_load_n, loaded_stiffness};
 use crate::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2, roll_pitch_yaw};
@@ -26,7 +26,7 @@ pub struct SpringReport {
     /// The heaviest head of this shape that stands, kg; nothing where none falls.
     pub heaviest_head_kg: Option<f64>,
     /// What each element of the linkage bears at rest.
-    pub bearings: Vec<Bearing>,
+    pub bearings: Vec<ElementLoad>,
     /// The coil of a head on one spring; nothing for a spring known by its stiffness.
     pub coil: Option<CoilReport>,
     /// Where the head rests, if it does.
@@ -123,7 +123,7 @@ pub fn spring_report(
     lidar: &Lidar,
     plan: &CoveragePlan,
 ) -> Result<SpringReport, StudyError> {
-    let heaviest_head_kg = heaviest_kg(spec, source)?;
+    let heaviest_head_kg = max_head_mass_kg(spec, source)?;
     let head = match HeadModel::new(spec, source) {
         Ok(head) => head,
         // A head that no mass brings down does not fall: it is wrong.
@@ -131,7 +131,7 @@ pub fn spring_report(
         // Numbers of a spring that are wrong have been refused above: what is left is a head that falls.
         Err(error) => return fallen(spec, heaviest_head_kg, error.to_string()),
     };
-    if let Some(why) = head.unyielding() {
+    if let Some(why) = head.rigid_mount_reason() {
         return Err(StudyError::Plan { what: "head", message: why.to_owned() });
     }
     let mass_kg = head.body().mass_kg;
@@ -143,14 +143,14 @@ pub fn spring_report(
     };
     let stress_pa = design.stress_pa(&at_rest);
     let coil = coil_of(spec)?.map(|coil| coil_report(&coil, &design, mass_kg, stress_pa));
-    let response = head.frequency_response(&head.usual_points());
+    let response = head.frequency_response(&head.default_points());
     let peak = |axis| (axis_name(axis), response.peak(axis, 20.0, Quantity::Kinematic));
     Ok(SpringReport {
         head_mass_kg: mass_kg,
         stands: true,
         falls_because: None,
         heaviest_head_kg,
-        bearings: head.bearings(),
+        bearings: head.element_loads(),
         coil,
         rest: Some(rest_report(&head, design.free_length_m.map(|_| design.sag_m(&head)))),
         stiffness: head.linear().map(|linear| rows(&linear.stiffness)),
@@ -222,7 +222,7 @@ fn coil_report(coil: &Coil, design: &Design, head_mass_kg: f64, stress_pa: Optio
     let (radius_m, wire_m) = design.wire.map_or((f64::NAN, f64::NAN), |w| (w.coil_radius_m, w.diameter_m));
     let coils = coil.solid_length_m() / wire_m;
     let buckling = buckling_load_n(coil);
-    let at_top = coil.under(weight_n).and_then(|column| loaded_stiffness(&column)).ok();
+    let at_top = coil.under_load(weight_n).and_then(|column| loaded_stiffness(&column)).ok();
     CoilReport {
         index: 2.0 * radius_m / wire_m,
         mass_g: design.mass_kg.map(|mass_kg| mass_kg * 1e3),
@@ -318,6 +318,6 @@ mod tests {
         let report = spring_report(&spec, &source, &Shake::default(), &utm30lx(), &plan).unwrap();
         assert!(!report.stands && report.modes.is_empty());
         assert!(report.heaviest_head_kg.unwrap() < 2.14, "{report:?}");
-        assert!(report.falls_because.unwrap().contains("carries at most"));
+        assert!(report.falls_because.unwrap().contains("supports at most"));
     }
 }

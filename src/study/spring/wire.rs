@@ -34,7 +34,7 @@ impl Wire {
     /// # Errors
     /// When a named spring is not there.
     pub fn of(spec: &SpringSpec) -> Result<Option<Self>, crate::spec::SpecError> {
-        Ok(match spec.described()? {
+        Ok(match spec.resolved()? {
             SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, material, .. } => {
                 Some(Self { coil_radius_m: 0.5e-3 * coil_diameter_mm, diameter_m: 1e-3 * wire_diameter_mm, material })
             }

@@ -199,7 +199,7 @@ impl Component {
 /// The head with its spring described where it was named, so that its settings are there to change.
 fn described(mut head: HeadSpec) -> Result<HeadSpec, SpecError> {
     if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
-        *spring = spring.described()?;
+        *spring = spring.resolved()?;
     }
     Ok(head)
 }
