@@ -65,7 +65,10 @@ fn invalid_maps_and_starts_are_errors_and_create_no_folder() {
     std::fs::write(here.path().join("broken.ply"), "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n").unwrap();
     std::fs::write(here.path().join("a.mcap"), "").unwrap();
     let (code, _, talk) = run(here.path(), "estimate a.mcap --map broken.ply --out out");
-    assert!(code == 1 && talk.contains("broken.ply:4: this is a PLY file, and no map of ours"), "{code} {talk}");
+    assert!(
+        code == 1 && talk.contains("broken.ply:4: this is a PLY file, but not a surfel map of zsim"),
+        "{code} {talk}"
+    );
     let (code, _, talk) = run(here.path(), "map merge broken.ply absent.ply --out both.ply");
     assert!(code == 1 && talk.contains("broken.ply:4"), "{code} {talk}");
     let (code, _, talk) = run(here.path(), "estimate a.mcap --map broken.ply --start 1,2");

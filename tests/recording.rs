@@ -174,7 +174,7 @@ fn a_full_disk_is_an_error_at_any_point() {
             writer.finish().map_err(|e| e.to_string())
         });
         let message = result.unwrap_err();
-        assert!(message.starts_with("writing stopped: ") && message.contains("what was written before"), "{message}");
+        assert!(message.starts_with("writing stopped: ") && message.contains("the part written before"), "{message}");
     }
 }
 

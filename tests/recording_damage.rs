@@ -77,7 +77,7 @@ fn info_reports_a_file_without_summary() {
     let reader = Reader::new("killed", Cursor::new(bytes[..end + 100].to_vec())).unwrap();
     let info = reader.info(Span::from_seconds(0.5)).unwrap();
     assert!(info.loss.cut_short && info.loss.lost_bytes <= 100);
-    assert!(info.loss.to_string().starts_with("The file ends without its summary"), "{}", info.loss);
+    assert!(info.loss.to_string().starts_with("The file is truncated"), "{}", info.loss);
     assert!(info.topics.iter().any(|topic| topic.topic == "/scan" && topic.messages > 30));
 }
 

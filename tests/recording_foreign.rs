@@ -111,8 +111,8 @@ fn a_scan_without_beam_times_is_read_with_a_note() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/imu", IMU, 0, &imu(0, "imu")).message("/front", SCAN, 0, &scan(0, 0.0, 0.1));
     let reader = foreign.reader();
-    assert!(select(&reader).notes[0].starts_with("/front tells no time between beams; an even turn"));
-    // 0.1 rad of a revolution of 0.1 s: 0.1 / (2 pi) * 0.1 s = 1.591549 ms.
+    assert!(select(&reader).notes[0].starts_with("/front states no time between beams; uniform rotation"));
+    // 0.1 rad of a turn that takes 0.1 s: 0.1 / (2 pi) * 0.1 s = 1.591549 ms.
     assert_eq!(scans(&reader)[0].returns[1].offset.nanos(), 1_591_549);
 }
 
@@ -131,8 +131,8 @@ fn a_lidar_with_beam_times_is_preferred_and_other_sensors_are_listed() {
     assert_eq!(
         selection.notes,
         [
-            "Of several lidar topics, /points is read, not /untimed.",
-            "Of several IMU topics, /imu/data_raw is read, not /a/imu/data, /b/imu/data."
+            "Of several lidar topics, /points is used, not /untimed.",
+            "Of several IMU topics, /imu/data_raw is used, not /a/imu/data, /b/imu/data."
         ]
     );
     let asked = Preference { lidar_topic: Some("/untimed".into()), imu_topic: Some("/b/imu/data".into()) };
@@ -140,7 +140,10 @@ fn a_lidar_with_beam_times_is_preferred_and_other_sensors_are_listed() {
     assert_eq!((&*selection.lidar_topic, &*selection.imu_frame), ("/untimed", "b"));
     let wrong = Preference { lidar_topic: Some("/velodyne".into()), imu_topic: None };
     let error = reader.select(&wrong).unwrap_err().to_string();
-    assert!(error.starts_with("foreign: topic /velodyne is not there as sensor_msgs/msg/LaserScan or"), "{error}");
+    assert!(
+        error.starts_with("foreign: topic /velodyne is missing or not of type sensor_msgs/msg/LaserScan or"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -179,7 +182,7 @@ fn accelerations_in_g_are_distinguished_from_m_per_s2() {
         foreign.message("/scan", SCAN, 0, &scan(0, 0.001, 0.1));
         let reader = foreign.reader();
         let selection = select(&reader);
-        assert_eq!(selection.notes.iter().any(|note| note.contains("units of gravity")), !in_m_per_s2);
+        assert_eq!(selection.notes.iter().any(|note| note.contains("accelerations in g")), !in_m_per_s2);
         let samples = reader.measurements(&selection).filter_map(|measurement| match measurement.unwrap() {
             Measurement::Imu(sample) => Some(sample.specific_force_m_per_s2),
             Measurement::Lidar(_) => None,
@@ -265,23 +268,23 @@ fn a_folder_must_be_one_recording() {
     let folder = tempfile::tempdir().unwrap();
     let message = || Reader::open(folder.path()).map(|reader| reader.name().to_owned()).map_err(|e| e.to_string());
     let put = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
-    assert!(message().unwrap_err().contains("has no recording in it (.mcap, .db3, .bag)"));
+    assert!(message().unwrap_err().contains("contains no recording (.mcap, .db3, .bag)"));
     put("metadata.yaml", b"");
     let (bytes, _) = recordings::record(recordings::run(), 1);
     put("run_0.mcap", &bytes);
     assert!(message().unwrap().ends_with("run_0.mcap"));
     put("other.mcap", &bytes);
-    assert!(message().unwrap_err().contains("has 2 recordings in it, name one of them"));
+    assert!(message().unwrap_err().contains("contains 2 recordings; specify one of them"));
     put(
         "metadata.yaml",
         b"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [run_0.mcap, run_1.mcap]\n",
     );
-    assert!(message().unwrap_err().contains("has no file `run_1.mcap`, which its metadata.yaml names"));
+    assert!(message().unwrap_err().contains("lacks the file `run_1.mcap`, which its metadata.yaml lists"));
     put("run_1.mcap.zstd", &bytes);
     put("metadata.yaml", b"rosbag2_bagfile_information:\n  relative_file_paths:\n    - run_1.mcap.zstd\n");
     assert!(message().unwrap_err().contains("decompress it with `zstd -d --rm "));
     put("run_1.mcap", &bytes);
     assert!(message().unwrap().ends_with("run_1.mcap"));
     put("metadata.yaml", b"a: [");
-    assert!(message().unwrap_err().contains("has a metadata.yaml that cannot be read"));
+    assert!(message().unwrap_err().contains("has an unreadable metadata.yaml"));
 }

@@ -90,15 +90,18 @@ fn another_ply_reader_reads_the_surfels() {
 #[test]
 fn files_that_are_not_a_map_are_errors_of_one_line() {
     let said = |file: &[u8]| read(file).unwrap_err();
-    assert_eq!(said(b"solid x\n"), "map.ply:1: this is not a PLY file: it does not begin with `ply`");
+    assert_eq!(said(b"solid x\n"), "map.ply:1: this is not a PLY file: it does not start with `ply`");
     let cloud = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n";
-    assert_eq!(said(cloud), "map.ply:5: this is a PLY file, and no map of ours: no comment says `zsim surfel map`");
+    assert_eq!(
+        said(cloud),
+        "map.ply:5: this is a PLY file, but not a surfel map of zsim: no comment `zsim surfel map`"
+    );
     let next = said(&with("zsim surfel map 1", "zsim surfel map 2"));
-    assert!(next.ends_with("this is a map of version 2; this program reads version 1"), "{next}");
-    assert!(said(&with("property double sigma\n", "")).ends_with("a map's surfels have other properties than these"));
-    assert!(said(&with("comment levels 4\n", "")).ends_with("there is no comment `levels`"));
-    assert!(said(&with("levels 4", "levels many")).ends_with("`many` is no `levels`"));
-    assert!(said(&with("element vertex 40", "element vertex 39")).ends_with("the file goes on behind its 39 surfels"));
+    assert!(next.ends_with("the map has version 2; this program reads version 1"), "{next}");
+    assert!(said(&with("property double sigma\n", "")).ends_with("the properties are not those of surfels"));
+    assert!(said(&with("comment levels 4\n", "")).ends_with("the comment `levels` is missing"));
+    assert!(said(&with("levels 4", "levels many")).ends_with("`many` is not a valid `levels`"));
+    assert!(said(&with("element vertex 40", "element vertex 39")).ends_with("the file has data after its 39 surfels"));
     let huge = said(&with("element vertex 40", "element vertex 18446744073709551615"));
     assert!(huge.ends_with("the file ends 18446744073709551575 surfels early"), "{huge}");
     assert!(said(&FILE[..FILE.len() - 1]).ends_with("the file ends 1 surfels early"));
@@ -108,17 +111,17 @@ fn files_that_are_not_a_map_are_errors_of_one_line() {
 fn invalid_surfels_with_a_correct_checksum_are_refused() {
     let end = header_end(&FILE);
     for (at, value, about) in [
-        (0, f64::NAN, "a number of it is not finite"),
-        (3, 5.0, "its normal is not of length one"),
-        (6, -1.0, "its second moment is none of points"),
-        (12, 0.0, "it has less than one point"),
-        (13, -0.1, "its standard deviation is below zero"),
+        (0, f64::NAN, "one of its numbers is not finite"),
+        (3, 5.0, "its normal is not of unit length"),
+        (6, -1.0, "its second moment is not that of points"),
+        (12, 0.0, "it has fewer than one point"),
+        (13, -0.1, "its standard deviation is negative"),
     ] {
         let mut file = FILE.clone();
         // Surfel 2 of 113 bytes each.
         file[end + 2 * 113 + 8 * at..][..8].copy_from_slice(&f64::to_le_bytes(value));
-        assert!(read(&file).unwrap_err().contains("its checksum is not that of what it holds"));
-        let said = read(&with_checksum(file, 40)).unwrap_err();
+        assert!(read(&file).unwrap_err().contains("its checksum does not match"));
+        let said = read(&sealed(file, 40)).unwrap_err();
         assert!(said.ends_with(&format!("surfel 2: {about}")), "{said}");
     }
 }

@@ -1,5 +1,5 @@
 use crate::geometry::{Pose, Trajectory};
-use crate::recording::{RecordingError, Truth, Truths};
+use crate::recording::{RecordingError, Truth, TruthReader};
 use crate::simulation::EPOCH;
 use crate::time::{Span, Stamp};
 use std::collections::VecDeque;
@@ -20,7 +20,7 @@ pub(super) struct TrueState {
 
 /// The truth at instants that go forward, but for a second: read as it is asked for, never held as a whole.
 pub(super) struct TruthCursor<'r> {
-    truths: Truths<'r>,
+    truths: TruthReader<'r>,
     heads: Near,
     bases: Near,
     /// As the clocks said it last; they drift by microseconds from one time to the next.
@@ -32,7 +32,7 @@ pub(super) struct TruthCursor<'r> {
 struct Near(VecDeque<(Stamp, Pose)>);
 
 impl<'r> TruthCursor<'r> {
-    pub(super) fn new(truths: Truths<'r>) -> Self {
+    pub(super) fn new(truths: TruthReader<'r>) -> Self {
         Self { truths, heads: Near::default(), bases: Near::default(), lidar_ahead: Span::ZERO }
     }
 

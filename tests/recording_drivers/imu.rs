@@ -61,7 +61,7 @@ fn split_imu_messages_are_paired_or_refused() {
     }
     let error = |topics| record(topics).select(&Preference::default()).unwrap_err().to_string();
     let lacks = error([Some("/imu/gyro"), None, None]);
-    assert!(lacks.contains("IMU topic /imu/gyro has zeros for acceleration, and no other topic carries it"), "{lacks}");
+    assert!(lacks.contains("IMU topic /imu/gyro has zeros for acceleration, and no other topic has it"), "{lacks}");
     let lacks = error([None, Some("/imu/acc"), None]);
     assert!(lacks.contains("IMU topic /imu/acc has zeros for angular velocity, and no other topic"), "{lacks}");
     let lacks = error([None, None, Some("/imu")]);
@@ -86,7 +86,7 @@ fn accelerations_without_gravity_are_refused_and_units_of_gravity_are_not() {
     assert!(error.contains("IMU topic /phone/imu has accelerations without gravity (median 1."), "{error}");
     assert!(error.contains("TYPE_ACCELEROMETER"), "{error}");
     let (in_g, notes) = samples(&record(12, &|force| force.map(|c| c / 9.806_65)));
-    assert!(notes.iter().any(|note| note.contains("units of gravity")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("accelerations in g")), "{notes:?}");
     assert!((in_g[0].specific_force_m_per_s2.z - 9.8).abs() < 1e-9);
     let (fall, _) = samples(&record(3, &|[x, y, z]| [0.01 * x, 0.01 * y, 0.01 * (z - 9.8)]));
     assert_eq!(fall.len(), 300);
@@ -111,7 +111,7 @@ fn stamps_of_another_epoch_are_shifted_by_log_times() {
     for ahead_ns in [-START_NS + 5_000_000_000, 37_000_000_000, -60_000_000_000, 200 * MS] {
         let (first_ns, notes) = record(ahead_ns, 2);
         assert!(first_ns.abs() < 10 * MS, "{ahead_ns}: {first_ns}");
-        assert!(notes[0].starts_with("The stamps of /imu and /scan are "), "{notes:?}");
+        assert!(notes[0].starts_with("By log times, the stamps of /imu and /scan differ by "), "{notes:?}");
     }
     // Offsets that the estimator determines better, and offsets below the jitter of log times.
     assert_eq!(record(15 * MS, 2), (15 * MS, Vec::new()));

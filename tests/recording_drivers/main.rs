@@ -87,8 +87,5 @@ fn duplicates_are_used_once() {
     assert_eq!(all.len(), 100 + 10);
     let loss = measurements.loss();
     assert_eq!((loss.repeated_samples, loss.repeated_scans, loss.is_none()), (50, 20, true));
-    assert_eq!(
-        loss.notes(),
-        ["20 scans came twice and were used once", "50 IMU samples came twice and were used once"]
-    );
+    assert_eq!(loss.notes(), ["20 duplicate scans were ignored", "50 duplicate IMU samples were ignored"]);
 }

@@ -1,30 +1,30 @@
-//! Messages that come twice: bags that were merged, drivers that publish a scan again.
+//! Removes duplicate messages: merged bags, and drivers that publish a scan twice.
 
 use crate::measurement::{ImuSample, LidarScan, Measurement};
 use crate::time::Stamp;
 
-/// Fewest returns whose equality is no chance.
-const FEWEST_RETURNS: usize = 100;
+/// Minimum number of returns of a scan for equality to be significant.
+const MIN_RETURNS: usize = 100;
 
-/// Beyond these the IMU moves, and a scan that is the one before is no new one: rad/s and m/s^2.
-const MOVING_RAD_PER_S: f64 = 0.1;
-const MOVING_M_PER_S2: f64 = 0.5;
+/// IMU signals above which the head moves, so that two equal scans are duplicates, rad/s and m/s^2.
+const MIN_MOTION_RAD_PER_S: f64 = 0.1;
+const MIN_MOTION_M_PER_S2: f64 = 0.5;
 
-/// Recognises what came before, in measurements that are in the order of their stamps.
+/// Detects duplicates in measurements that are sorted by stamp.
 #[derive(Debug, Default)]
-pub(super) struct Repeats {
+pub(super) struct DuplicateFilter {
     sample: Option<ImuSample>,
     scan: Option<Fingerprint>,
-    /// The first sample after the scan.
+    /// First sample after the scan.
     at_scan: Option<ImuSample>,
     has_moved: bool,
-    /// Scans that came before.
+    /// Number of duplicate scans.
     pub scans: u64,
-    /// Samples that came before.
+    /// Number of duplicate samples.
     pub samples: u64,
 }
 
-/// What a scan is recognised by.
+/// Identity of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Fingerprint {
     header: Stamp,
@@ -45,9 +45,11 @@ impl Fingerprint {
     }
 }
 
-impl Repeats {
-    /// Whether a measurement is new. A scan is not when its stamp is that of the one before, or its points are and the
-    /// IMU moved meanwhile: at rest, and without noise, scans may be equal.
+impl DuplicateFilter {
+    /// Whether a measurement is not a duplicate.
+    ///
+    /// A scan is a duplicate if its stamp equals the previous scan's, or if its points do and the IMU moved in between:
+    /// at rest and without noise, distinct scans may have equal points.
     pub fn is_new(&mut self, measurement: &Measurement) -> bool {
         match measurement {
             Measurement::Imu(sample) => self.is_new_sample(sample),
@@ -62,17 +64,18 @@ impl Repeats {
         }
         let first = *self.at_scan.get_or_insert(*sample);
         let change = (sample.specific_force_m_per_s2 - first.specific_force_m_per_s2).norm();
-        self.has_moved |= sample.angular_velocity_rad_per_s.norm() > MOVING_RAD_PER_S || change > MOVING_M_PER_S2;
+        self.has_moved |=
+            sample.angular_velocity_rad_per_s.norm() > MIN_MOTION_RAD_PER_S || change > MIN_MOTION_M_PER_S2;
         self.sample = Some(*sample);
         true
     }
 
     fn is_new_scan(&mut self, scan: Fingerprint) -> bool {
-        let is_repeated = self.scan.is_some_and(|before| {
+        let is_duplicate = self.scan.is_some_and(|before| {
             let same_points = before.returns == scan.returns && before.checksum == scan.checksum;
-            before.header == scan.header || (same_points && scan.returns >= FEWEST_RETURNS && self.has_moved)
+            before.header == scan.header || (same_points && scan.returns >= MIN_RETURNS && self.has_moved)
         });
-        if is_repeated {
+        if is_duplicate {
             self.scans += 1;
             return false;
         }

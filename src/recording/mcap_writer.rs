@@ -1,8 +1,8 @@
-//! From messages to the file: gathered to chunks here, compressed and written on a thread of their own.
+//! Writes messages to an MCAP file: batches them here, compresses and writes them on a separate thread.
 //!
-//! A batch of messages becomes one chunk, which reaches the system in whole before the next is begun: a process that is
-//! killed loses the batches that were on their way, and nothing before them. At most [`BATCHES`] batches exist, so
-//! memory does not grow with the recording; their bytes do not depend on how threads are scheduled.
+//! A batch of messages becomes one chunk, which is passed to the operating system completely before the next begins. A
+//! killed process loses the batches in flight and nothing before them. At most [`BATCHES`] batches exist, so memory
+//! does not grow with the recording. The bytes written do not depend on thread scheduling.
 
 use crate::recording::RecordingError;
 use crate::recording::topics::Topic;
@@ -16,18 +16,18 @@ use std::ops::Range;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-/// Bytes of messages that make a chunk: more compress a little better, fewer lose less when a process is killed.
+/// Bytes of messages per chunk: more compress slightly better, fewer lose less if the process is killed.
 pub const CHUNK_BYTES: usize = 1 << 20;
 
-/// Batches in being: one that is filled, one that is written, one on its way.
+/// Number of batches: one being filled, one being written, one in flight.
 const BATCHES: usize = 3;
 
-/// Compression level of zstd: 1, as ranges and poses are noise in their low bits, which no level compresses.
+/// Zstd level: 1, because the low bits of ranges and poses are noise, which no level compresses.
 const ZSTD_LEVEL: u32 = 1;
 
-type Mcap<W> = mcap::Writer<NoSeek<BufWriter<W>>>;
+type LibraryWriter<W> = mcap::Writer<NoSeek<BufWriter<W>>>;
 
-/// Messages of one chunk to be.
+/// Messages of the next chunk.
 #[derive(Default)]
 struct Batch {
     bytes: Vec<u8>,
@@ -40,25 +40,25 @@ struct Entry {
     bytes: Range<usize>,
 }
 
-/// Writes messages to an MCAP file, a chunk at a time.
-pub struct Spool {
+/// Writes messages to an MCAP file, one chunk at a time.
+pub struct McapWriter {
     filling: Batch,
     full: Option<SyncSender<Batch>>,
     empty: Receiver<Batch>,
     thread: Option<JoinHandle<Result<(), RecordingError>>>,
 }
 
-impl Spool {
-    /// Begins a recording in `file`, with `metadata` under the name `zsim`.
+impl McapWriter {
+    /// Starts a recording in `file`, with `metadata` under the name `zsim`.
     ///
     /// # Errors
-    /// When the beginning cannot be written.
+    /// When the start of the file cannot be written.
     pub fn new<W: Write + Send + 'static>(file: W, metadata: BTreeMap<String, String>) -> Result<Self, RecordingError> {
-        let writer = begin(file, metadata)?;
+        let writer = start_file(file, metadata)?;
         let (full, to_write) = sync_channel(BATCHES - 2);
         let (written, empty) = sync_channel(BATCHES);
         for _ in 1..BATCHES {
-            // There is room for all of them.
+            // The channel has capacity for all of them.
             let _ = written.send(Batch::default());
         }
         let thread = std::thread::spawn(move || write_batches(writer, &to_write, &written));
@@ -68,7 +68,7 @@ impl Spool {
     /// Appends a message that `encode` writes.
     ///
     /// # Errors
-    /// When `encode` fails, `arrival` lies before the clock's zero, or the file cannot be written.
+    /// When `encode` fails, `arrival` is before time zero, or the file cannot be written.
     pub fn message(
         &mut self,
         topic: Topic,
@@ -78,7 +78,7 @@ impl Spool {
         let log_time_ns = u64::try_from(arrival.nanos()).map_err(|_| RecordingError::Unwritable {
             what: "the time of a message",
             value: format!("{} ns", arrival.nanos()),
-            limit: "a recording begins at 0",
+            limit: "recordings start at 0 ns",
         })?;
         let start = self.filling.bytes.len();
         if let Err(error) = encode(&mut Encoder::new(&mut self.filling.bytes)) {
@@ -89,7 +89,7 @@ impl Spool {
         if self.filling.bytes.len() >= CHUNK_BYTES { self.send() } else { Ok(()) }
     }
 
-    /// Writes what is left, the summary and the index.
+    /// Writes the last chunk, the summary and the index.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -104,7 +104,7 @@ impl Spool {
         self.join()
     }
 
-    /// Hands the batch over, and takes up an empty one.
+    /// Sends the batch to the thread and takes an empty one.
     fn send(&mut self) -> Result<(), RecordingError> {
         let Ok(next) = self.empty.recv() else { return self.stopped() };
         let batch = std::mem::replace(&mut self.filling, next);
@@ -114,7 +114,7 @@ impl Spool {
         }
     }
 
-    /// Lets the thread end, and gives its result. A second call finds nothing left to do.
+    /// Ends the thread and returns the result. A second call has no effect.
     fn join(&mut self) -> Result<(), RecordingError> {
         self.full = None;
         match self.thread.take().map(JoinHandle::join) {
@@ -124,21 +124,22 @@ impl Spool {
         }
     }
 
-    /// The error for which the thread stopped early.
+    /// Returns the error that stopped the thread.
     fn stopped(&mut self) -> Result<(), RecordingError> {
         self.join()?;
         Err(RecordingError::Write(Error::other("the writer has stopped")))
     }
 }
 
-impl Drop for Spool {
+impl Drop for McapWriter {
     fn drop(&mut self) {
-        // Whoever drops a writer unfinished has given up on it: what came so far is made readable, as far as may be.
+        // A writer dropped without `finish` was abandoned after an error: still make the messages readable, if
+        // possible.
         let _ = self.close();
     }
 }
 
-fn begin<W: Write>(file: W, metadata: BTreeMap<String, String>) -> Result<Mcap<W>, RecordingError> {
+fn start_file<W: Write>(file: W, metadata: BTreeMap<String, String>) -> Result<LibraryWriter<W>, RecordingError> {
     let mut writer = mcap::WriteOptions::new()
         .profile("ros2")
         .library(concat!("zsim ", env!("CARGO_PKG_VERSION")))
@@ -152,9 +153,9 @@ fn begin<W: Write>(file: W, metadata: BTreeMap<String, String>) -> Result<Mcap<W
     Ok(writer)
 }
 
-/// Writes batches until there are no more, then the summary.
+/// Writes all batches, then the summary.
 fn write_batches<W: Write>(
-    mut writer: Mcap<W>,
+    mut writer: LibraryWriter<W>,
     full: &Receiver<Batch>,
     written: &SyncSender<Batch>,
 ) -> Result<(), RecordingError> {
@@ -167,14 +168,14 @@ fn write_batches<W: Write>(
         writer.flush()?;
         batch.bytes.clear();
         batch.messages.clear();
-        // Nobody takes it when the recording is being finished.
+        // The receiver is gone when the recording is being finished.
         let _ = written.send(batch);
     }
     writer.finish()?;
     Ok(())
 }
 
-/// The channels so far: a topic gets one with its first message.
+/// Channels written so far; a topic gets one with the first message.
 #[derive(Default)]
 struct Channels {
     known: [Option<Channel>; Topic::COUNT],
@@ -187,7 +188,11 @@ struct Channel {
 }
 
 impl Channels {
-    fn header<W: Write>(&mut self, writer: &mut Mcap<W>, entry: &Entry) -> Result<MessageHeader, RecordingError> {
+    fn header<W: Write>(
+        &mut self,
+        writer: &mut LibraryWriter<W>,
+        entry: &Entry,
+    ) -> Result<MessageHeader, RecordingError> {
         let slot = &mut self.known[entry.topic as usize];
         let channel = match slot {
             Some(channel) => channel,
@@ -200,7 +205,7 @@ impl Channels {
     }
 }
 
-fn add_channel<W: Write>(writer: &mut Mcap<W>, topic: Topic) -> Result<u16, RecordingError> {
+fn add_channel<W: Write>(writer: &mut LibraryWriter<W>, topic: Topic) -> Result<u16, RecordingError> {
     let kind = topic.message_type();
     let schema = writer.add_schema(kind.name(), "ros2msg", kind.definition().as_bytes())?;
     let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), topic.qos())]);

@@ -1,102 +1,104 @@
-//! What a file holds and where, without its messages.
+//! Index of a file: topics, definitions and blocks, without the messages.
 
 use super::bag::{self, BagChunk};
-use super::part::ChannelId;
 use super::record::{self, ChannelRecord, ChunkHeader, SchemaRecord, op};
+use super::recording_file::ChannelId;
 use crate::recording::topics::printable;
-use crate::recording::wire::Wire;
+use crate::recording::wire::WireFormat;
 use std::collections::BTreeMap;
 
-/// A topic and the type of its messages.
+/// Topic and message type.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Channel {
-    /// Its number in the recording.
+    /// Number in the recording.
     pub id: ChannelId,
-    /// Its name, with control characters escaped.
+    /// Topic name, with control characters escaped.
     pub topic: String,
-    /// The type of its messages, `package/msg/Type`; empty where the file does not say.
+    /// Message type, `package/msg/Type`; empty if the file does not state it.
     pub type_name: String,
-    /// Encoding of its messages: `cdr` in ROS 2, `ros1` in ROS 1.
+    /// Message encoding: `cdr` in ROS 2, `ros1` in ROS 1.
     pub encoding: String,
-    /// How its messages are serialised; `None` where they are not decoded.
-    pub wire: Option<Wire>,
-    /// Whether its messages begin with a header, hence with a stamp.
+    /// Serialisation; `None` if it is not supported.
+    pub wire: Option<WireFormat>,
+    /// Whether messages start with a header, hence with a stamp.
     pub has_header: bool,
 }
 
-/// A part of a file that holds messages.
+/// Section of a file with messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Block {
-    /// Where its records (or its compressed bytes) begin in the file.
+    /// Offset of the records (or the compressed bytes) in the file.
     pub offset: u64,
-    /// Bytes of them in the file.
+    /// Length in the file, bytes.
     pub length: u64,
-    /// Log time of its earliest message, ns.
+    /// Log time of the earliest message, ns.
     pub start_ns: u64,
-    /// How it is kept.
+    /// Kind of storage.
     pub kind: BlockKind,
-    /// The channels of its messages, where an index tells.
+    /// Channels of the messages, if an index states them.
     pub indexed: Vec<u16>,
 }
 
-/// How a block is kept.
+/// Storage of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BlockKind {
-    /// As a chunk of MCAP.
+    /// MCAP chunk.
     Chunk(ChunkHeader),
-    /// As plain records of MCAP, one after the other.
+    /// Consecutive MCAP records outside a chunk.
     Plain,
-    /// As a chunk of a ROS 1 bag.
+    /// ROS 1 bag chunk.
     BagChunk(BagChunk),
-    /// As rows of a database.
+    /// Database rows.
     Rows {
-        /// Number of the first.
+        /// First row number.
         first: i64,
-        /// Number of the last.
+        /// Last row number.
         last: i64,
     },
 }
 
 impl Block {
-    /// Whether it seems to hold messages of one of `channels`. A block without an index may hold any; an index has no
-    /// checksum, so what is not found by it is to be looked for without.
-    pub fn seems_to_hold(&self, channels: &[u16]) -> bool {
+    /// Whether the block may contain messages of one of `channels`.
+    ///
+    /// A block without an index may contain any. An index has no checksum, so channels that it does not find must be
+    /// searched without it.
+    pub fn may_contain(&self, channels: &[u16]) -> bool {
         self.indexed.is_empty() || self.indexed.iter().any(|id| channels.contains(id))
     }
 }
 
-/// How a file ends.
+/// Completeness of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// With its summary and footer.
+    /// The file has a summary and a footer.
     Complete,
-    /// With a summary whose checksum does not match: what it says is not used.
+    /// The summary's checksum does not match; it is ignored.
     SummaryDamaged,
-    /// Without: whoever wrote it was stopped, or the file was cut.
+    /// The file has no summary: the writer was stopped, or it is truncated.
     CutShort,
 }
 
-/// What a file holds and where.
+/// Index of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Directory {
-    /// Definitions by number.
+pub struct FileIndex {
+    /// Message definitions by number.
     pub schemas: BTreeMap<u16, SchemaRecord>,
     /// Topics by number.
     pub channels: BTreeMap<u16, ChannelRecord>,
-    /// Where messages are, in the order of the file.
+    /// Blocks with messages, in file order.
     pub blocks: Vec<Block>,
-    /// Metadata records by name; of two with one name, the first.
+    /// Metadata records by name; the first one of each name.
     pub metadata: BTreeMap<String, BTreeMap<String, String>>,
-    /// How the file ends.
+    /// Completeness of the file.
     pub ending: Ending,
     /// Bytes that belong to no readable record.
     pub lost_bytes: u64,
-    /// How many messages the summary counts.
+    /// Number of messages according to the summary.
     pub expected_messages: Option<u64>,
 }
 
-impl Directory {
-    /// A directory of nothing.
+impl FileIndex {
+    /// Creates an empty index.
     pub fn empty() -> Self {
         Self {
             schemas: BTreeMap::new(),
@@ -109,7 +111,7 @@ impl Directory {
         }
     }
 
-    /// Takes up a definition of a type or a topic; of two with one number, the first holds. `false` where it is broken.
+    /// Adds a type or topic definition; the first one of each number applies. `false` if it is damaged.
     pub fn define(&mut self, opcode: u8, fields: &[u8]) -> bool {
         match opcode {
             op::SCHEMA => record::schema(fields).map(|schema| {
@@ -122,7 +124,7 @@ impl Directory {
         .is_some()
     }
 
-    /// Takes up a connection of a bag; of two with one number, the first holds. `false` where it is broken.
+    /// Adds a connection of a bag; the first one of each number applies. `false` if it is damaged.
     pub fn define_connection(&mut self, bytes: &[u8]) -> bool {
         let Some((channel, schema)) = bag::connection(bytes) else { return false };
         self.schemas.entry(schema.id).or_insert(schema);
@@ -130,14 +132,14 @@ impl Directory {
         true
     }
 
-    /// The topics, by number; `id_of` makes a number in the recording of one in the file.
+    /// Topics by number; `id_of` maps a number in the file to one in the recording.
     pub fn channels(&self, id_of: impl Fn(u16) -> ChannelId) -> impl Iterator<Item = Channel> {
         self.channels.values().map(move |record| Channel {
             id: id_of(record.id),
             topic: printable(&record.topic),
             type_name: self.schemas.get(&record.schema).map(|schema| printable(&schema.name)).unwrap_or_default(),
             encoding: printable(&record.encoding),
-            wire: Wire::of_encoding(&record.encoding),
+            wire: WireFormat::from_encoding(&record.encoding),
             has_header: self.schemas.get(&record.schema).is_some_and(|schema| schema.has_header),
         })
     }
