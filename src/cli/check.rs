@@ -15,7 +15,7 @@ use zsim::simulation::{EPOCH, Faults, FaultsSpec};
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::StudyError;
 use zsim::study::reproduction::ExperimentSpec;
-use zsim::study::spring::design::{DesignSpec, Search};
+use zsim::study::spring::design::{DesignSearch, DesignSpec};
 use zsim::study::sweep::{Plan, SweepSpec};
 use zsim::world::{SceneSpec, World, WorldError};
 
@@ -147,7 +147,7 @@ fn study(source: &Source) -> Result<Study, SpecError> {
 impl Study {
     fn build(&self, source: &Source) -> Result<(), StudyError> {
         match self {
-            Self::Design(spec) => Search::new(spec, source).map(drop),
+            Self::Design(spec) => DesignSearch::new(spec, source).map(drop),
             Self::Sweep(spec) => Plan::new("study", spec, source).map(drop),
         }
     }

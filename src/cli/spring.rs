@@ -11,7 +11,7 @@ use zsim::elasticity::SpringSpec;
 use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::coverage::{CoveragePlan, coverage_figure};
-use zsim::study::spring::design::{DesignSpec, Search, csv, pareto_figure};
+use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure};
 use zsim::study::spring::{Shake, mode_figure, spring_report};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
@@ -135,7 +135,7 @@ fn search(design: &Design, global: &Global) -> anyhow::Result<End> {
     let source = find(Kind::Study, &design.file)?;
     let spec: DesignSpec = parse(&source)?;
     let bar = WorkBar::new(global, "searching");
-    let study = Search::new(&spec, &source)?.run(&|share| bar.show(share))?;
+    let study = DesignSearch::new(&spec, &source)?.run(&|fraction| bar.show(fraction))?;
     drop(bar);
     let stem = Path::new(&design.file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{stem}")));

@@ -4,7 +4,7 @@ use super::coverage_words;
 use zsim::dynamics::{Bearing, BearingKind, ModeKind};
 use zsim::report::table;
 use zsim::study::spring::design::DesignStudy;
-use zsim::study::spring::{CoilReport, DesignFigures, ShakeResponse, SpringReport};
+use zsim::study::spring::{CoilReport, DesignMetrics, ShakeResponse, SpringReport};
 
 /// All about a spring.
 pub(super) fn report(report: &SpringReport) -> String {
@@ -105,8 +105,8 @@ fn modes(report: &SpringReport) -> String {
 fn under_shake(shaken: &ShakeResponse) -> String {
     let header = ["nodded by a hand", "closed form", "simulated"];
     let simulated = shaken.simulated.as_ref();
-    let line = |name: &str, of: fn(&DesignFigures) -> Option<f64>, decimals: usize| {
-        let number = |figures: Option<&DesignFigures>| {
+    let line = |name: &str, of: fn(&DesignMetrics) -> Option<f64>, decimals: usize| {
+        let number = |figures: Option<&DesignMetrics>| {
             figures.and_then(of).map_or("-".to_owned(), |x| format!("{x:.decimals$}"))
         };
         vec![name.to_owned(), number(Some(&shaken.closed_form)), number(simulated)]
