@@ -80,7 +80,7 @@ pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> R
 
 /// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
 fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
-    let specs = Manifest::within(reader).and_then(|manifest| manifest.specs);
+    let specs = Manifest::in_recording(reader).and_then(|manifest| manifest.specs);
     let matrix = |of: fn(&ImuSpec) -> (f64, f64)| {
         let (scale_percent, misalignment_deg) = specs.as_ref().map_or((0.0, 0.0), |specs| of(&specs.imu));
         (scale_percent * 1e-2, misalignment_deg.to_radians())
