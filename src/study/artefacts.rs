@@ -65,7 +65,7 @@ pub(super) fn decimated(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -
 
 /// Decimates errors to the maximum number of plot points.
 pub(super) fn decimated_errors(errors: &Errors) -> Errors {
-    errors.every(stride(errors.stamps.len()))
+    errors.decimated(stride(errors.stamps.len()))
 }
 
 /// The decimation factor for `count` points.

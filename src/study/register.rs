@@ -4,7 +4,7 @@ use super::cloud_files::{CloudFiles, CloudOptions};
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{Stage, StudyError, Watch};
 use crate::estimation::{CloudFilter, Fate, Hit, point_sigma_m};
-use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
+use crate::evaluation::{DeadReckoning, EvaluationError, RestDetection, Thinning};
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
 use crate::recording::{CloudPoint, Measurements, Reader, RecordingError, Selection, write_result};
@@ -108,7 +108,7 @@ impl Registration<'_> {
             files: CloudFiles::create(folder, self.options.format)?,
             sampled: Thinning::to(MAX_SAMPLED_BEAMS, self.returns),
             displayed: Thinning::to(MAX_VIEWER_POINTS, self.returns),
-            dead_reckoning: DeadReckoning::new(&self.calibration.head_from_imu, Rest::default()),
+            dead_reckoning: DeadReckoning::new(&self.calibration.head_from_imu, RestDetection::default()),
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
             projected: 0,
