@@ -8,7 +8,7 @@ use zsim::dynamics::{HeadModel, LinkageSpec, load};
 use zsim::elasticity::SpringSpec;
 use zsim::spec::{Kind, find, parse};
 use zsim::study::gains::{GainPlan, gain_curves};
-use zsim::study::spring::design::{DesignSpec, Search};
+use zsim::study::spring::design::{DesignSearch, DesignSpec};
 use zsim::study::spring::{Shake, closed_form};
 
 fn design_points(c: &mut Criterion) {
@@ -32,7 +32,7 @@ fn studies(c: &mut Criterion) {
     let source = find(Kind::Study, "spring_design").unwrap();
     let spec: DesignSpec = parse(&source).unwrap();
     group.bench_function("10,000 designs and their Pareto set", |b| {
-        let search = Search::new(&spec, &source).unwrap();
+        let search = DesignSearch::new(&spec, &source).unwrap();
         b.iter(|| {
             let (found, _) = search.explore(&|_| ());
             let costs: Vec<Vec<f64>> = found.iter().map(|c| c.costs.clone()).collect();

@@ -134,7 +134,7 @@ fn invalid_usage_and_invalid_specs_exit_with_2() {
     for (arguments, words) in [
         ("", "Usage"),
         ("--duration 3s", "--scene"),
-        ("--scene office --duration soon", "no length of time"),
+        ("--scene office --duration soon", "not a duration"),
         ("--scene office --seed x", "invalid value"),
         ("--scene nowhere", "built in are: "),
         ("--scene bad.ron", "bad.ron:3:"),

@@ -184,7 +184,7 @@ fn empty_and_out_of_range_trajectories_are_errors() {
         ("base empty.tum", "empty.tum: a trajectory of 0 poses; 3 are needed"),
         (
             "evaluate --estimate far.tum --truth poses.tum",
-            "far.tum: the pose of t = 2.000000000 s has a coordinate of 1e200 m",
+            "far.tum: the pose at t = 2.000000000 s has a coordinate of 1e200 m",
         ),
         ("evaluate --estimate poses.tum --truth far.tum", "far.tum: "),
     ] {

@@ -4,7 +4,7 @@
 
 use approx::assert_relative_eq;
 use std::convert::Infallible;
-use zsim::evaluation::{BoundModel, Information, InformationBound, Sight};
+use zsim::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
 use zsim::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
 use zsim::measurement::{ImuNoise, ImuSample};
 use zsim::time::{Span, Stamp};
@@ -59,7 +59,7 @@ fn bound(model: BoundModel, along: Along, seconds: f64, towards: &[Vector]) -> I
     let steps = (seconds * 1e3) as i64;
     let pose = |t_s: f64| Pose::translation(along(t_s).0, 0.0, 0.0);
     let heads = (0..=steps).map(|ms| Ok::<_, Infallible>((stamp(ms as f64 * 1e-3), pose(ms as f64 * 1e-3))));
-    let Ok(mut information) = Information::new(model, heads);
+    let Ok(mut information) = FisherInformation::new(model, heads);
     for k in 0..=(seconds / 0.01) as i64 {
         let t_s = k as f64 * 0.01;
         let force = Vector::new(along(t_s).2, 0.0, STANDARD_GRAVITY_M_PER_S2);
@@ -68,13 +68,13 @@ fn bound(model: BoundModel, along: Along, seconds: f64, towards: &[Vector]) -> I
             angular_velocity_rad_per_s: Vector::zeros(),
             specific_force_m_per_s2: force,
         };
-        information.hear(stamp(t_s), &sample);
+        information.add_imu_sample(stamp(t_s), &sample);
     }
     for k in 0..beams(seconds) {
         let t_s = k as f64 * BEAM_S;
         for direction in towards {
             let origin = pose(t_s).translation.vector;
-            information.see(&Sight {
+            information.add_beam(&BeamObservation {
                 stamp: stamp(t_s),
                 world_from_head: pose(t_s),
                 velocity_in_world: Vector::x() * along(t_s).1,
@@ -181,11 +181,11 @@ fn oblique_beams_observe_position_and_yaw() {
     let askew = |side: f64| Vector::new(0.5, side * 0.75_f64.sqrt(), 0.0);
     let n = beams(4.0);
     let heads = (0..=4000).map(|ms| Ok::<_, Infallible>((stamp(f64::from(ms) * 1e-3), Pose::identity())));
-    let Ok(mut information) = Information::new(exact(), heads);
+    let Ok(mut information) = FisherInformation::new(exact(), heads);
     for k in 0..n {
         let t_s = k as f64 * BEAM_S;
         for side in [-1.0, 1.0] {
-            information.see(&Sight {
+            information.add_beam(&BeamObservation {
                 stamp: stamp(t_s),
                 world_from_head: Pose::identity(),
                 velocity_in_world: Vector::zeros(),
@@ -202,7 +202,7 @@ fn oblique_beams_observe_position_and_yaw() {
             angular_velocity_rad_per_s: Vector::zeros(),
             specific_force_m_per_s2: force,
         };
-        information.hear(stamp(t_s), &sample);
+        information.add_imu_sample(stamp(t_s), &sample);
     }
     let found = information.bound().unwrap();
     assert_relative_eq!(found.axis_rmse_m.x.powi(2), mean_variance(3.0, 2 * n) / 4.0, max_relative = 0.01);

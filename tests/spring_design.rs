@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 use zsim::spec::{Kind, Source, find, parse};
-use zsim::study::spring::design::{DesignSpec, DesignStudy, Search, csv, pareto_figure, pareto_set};
+use zsim::study::spring::design::{DesignSearch, DesignSpec, DesignStudy, csv, pareto_figure, pareto_set};
 
 fn load(name: &str) -> (DesignSpec, Source) {
     let source = find(Kind::Study, name).unwrap();
@@ -13,7 +13,7 @@ fn load(name: &str) -> (DesignSpec, Source) {
 fn small(name: &str) -> DesignStudy {
     let (spec, source) = load(name);
     let spec = DesignSpec { evaluations: 800, candidates: 3, ..spec };
-    Search::new(&spec, &source).unwrap().run(&|_| ()).unwrap()
+    DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap()
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn a_search_does_not_depend_on_the_number_of_threads() {
     let spec = DesignSpec { evaluations: 500, ..spec };
     let explore = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Search::new(&spec, &source).unwrap().explore(&|_| ()))
+        pool.install(|| DesignSearch::new(&spec, &source).unwrap().explore(&|_| ()))
     };
     let (once, again) = (explore(1), explore(2));
     assert_eq!(once, again);
@@ -52,7 +52,7 @@ fn optimisation_gives_a_better_front_than_sampling() {
     let (spec, source) = load("spring_design");
     let front = |evaluations: usize| {
         let spec = DesignSpec { evaluations, ..spec.clone() };
-        let (found, _) = Search::new(&spec, &source).unwrap().explore(&|_| ());
+        let (found, _) = DesignSearch::new(&spec, &source).unwrap().explore(&|_| ());
         let costs: Vec<Vec<f64>> = found.iter().map(|c| c.costs.clone()).collect();
         let set = pareto_set(&costs);
         set.into_iter().map(|k| costs[k].clone()).collect::<Vec<_>>()
@@ -67,7 +67,7 @@ fn optimisation_gives_a_better_front_than_sampling() {
 fn a_catalogue_is_searched_completely() {
     let (spec, source) = load("spring_stock");
     let spec = DesignSpec { candidates: 2, ..spec };
-    let study = Search::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
+    let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
     assert_eq!(study.evaluated, 690);
     assert!(study.candidates.iter().all(|v| !v.candidate.coil.name.is_empty()));
     assert!(study.feasible > 3, "{}", study.feasible);
@@ -79,7 +79,7 @@ fn an_invalid_search_is_an_error_with_the_reason() {
     let wrong = |change: fn(&mut DesignSpec)| {
         let mut spec = spec.clone();
         change(&mut spec);
-        Search::new(&spec, &source).map(|_| ()).unwrap_err().to_string()
+        DesignSearch::new(&spec, &source).map(|_| ()).unwrap_err().to_string()
     };
     assert!(wrong(|s| s.goals.clear()).contains("at least one goal"));
     assert!(wrong(|s| s.head = "rigid".to_owned()).contains("no spring"));
@@ -89,5 +89,5 @@ fn an_invalid_search_is_an_error_with_the_reason() {
             *active_coils = [9.0, 3.0];
         }
     };
-    assert!(wrong(bounds).contains("from the smaller to the larger"));
+    assert!(wrong(bounds).contains("exceeds the upper bound"));
 }

@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn a_latency_stands_in_place_of_the_clocks_own_offset() {
         // The IMU's clock is 3 ms ahead at 0 and 5 ms at 2 s: a sample at 1 s of the lidar's clock is stamped 1.004 s.
-        let clock = TrueClock::told(vec![(at(0), 3e-3), (at(2_000_000), 5e-3)]);
+        let clock = TrueClock::from_offsets(vec![(at(0), 3e-3), (at(2_000_000), 5e-3)]);
         let latency = Disturbance { latency_ms: -2.0, noise_ms: 0.0 };
         let timing = Timing::new(latency, &clock, &[at(1_000_000)], Seed(1));
         let scan = Measurement::Lidar(LidarScan {

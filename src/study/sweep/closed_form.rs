@@ -4,7 +4,7 @@ use super::component::{Component, Slot};
 use super::part::Row;
 use super::{Measure, Plan};
 use crate::study::StudyError;
-use crate::study::spring::{DesignFigures, closed_form};
+use crate::study::spring::{DesignMetrics, closed_form};
 use std::time::Instant;
 
 /// What comes of run `index`; that its head falls is a row too.
@@ -17,7 +17,7 @@ pub(super) fn row(plan: &Plan, told: &[Measure], index: u64) -> Row {
     Row { wall_s: Some(started.elapsed().as_secs_f64()), ..row }
 }
 
-fn figures(plan: &Plan, index: u64) -> Result<DesignFigures, StudyError> {
+fn figures(plan: &Plan, index: u64) -> Result<DesignMetrics, StudyError> {
     let changed = plan.changed(index)?;
     let (head, run) = (plan.filled(&changed, Slot::Head)?, plan.filled(&changed, Slot::Run)?);
     let (Component::Head(spec), Component::Nod(nod)) = (&head.component, &run.component) else {
@@ -27,7 +27,7 @@ fn figures(plan: &Plan, index: u64) -> Result<DesignFigures, StudyError> {
     closed_form(spec, &head.source(), &nod.shake)
 }
 
-fn figure(measure: Measure, of: &DesignFigures) -> Option<f64> {
+fn figure(measure: Measure, of: &DesignMetrics) -> Option<f64> {
     match measure {
         Measure::RockingHz => Some(of.rocking_hz),
         Measure::PeakGain => Some(of.peak_gain),

@@ -121,7 +121,7 @@ fn effects(plan: &Plan, summary: &Summary, measure: Measure) -> Figure {
         by_words(&axis.name, measure, &lines)
     });
     let charts: Vec<Chart> = charts.collect();
-    let most = charts.iter().map(|chart| chart.y_marks.len()).max().unwrap_or_default();
+    let most = charts.iter().map(|chart| chart.y_ticks.len()).max().unwrap_or_default();
     let columns = if charts.len() > 1 { 2 } else { 1 };
     let mut figure = Figure::of(charts).in_columns(columns);
     figure.chart_height = figure.chart_height.max(76.0 + ROW_HEIGHT * most as f64);
@@ -147,7 +147,7 @@ fn by_words(axis: &str, measure: Measure, lines: &[&Line]) -> Chart {
         .with(Series::line("", Colour::Backdrop, room))
         .with(Series::line("", Colour::Backdrop, bars.collect()).marked(Mark::Line(4.0)))
         .with(Series::dots("", Colour::Estimate, dots.collect()).marked(Mark::Dots(6.0)))
-        .with_y_marks(marks.collect())
+        .with_y_ticks(marks.collect())
 }
 
 /// A measure's median over two axes, and all else.
@@ -177,8 +177,8 @@ fn map(plan: &Plan, runs: &Runs, figures: &[f64], (x, y, measure): (usize, usize
         cells: medians.iter().enumerate().map(cell).collect(),
     };
     let chart = Chart::new("", &plan.axes()[x].name, &plan.axes()[y].name).with_cells(cells);
-    let chart = if plan.axes()[x].is_number() { chart } else { chart.with_x_marks(words(plan, x)) };
-    if plan.axes()[y].is_number() { chart } else { chart.with_y_marks(words(plan, y)) }
+    let chart = if plan.axes()[x].is_number() { chart } else { chart.with_x_ticks(words(plan, x)) };
+    if plan.axes()[y].is_number() { chart } else { chart.with_y_ticks(words(plan, y)) }
 }
 
 /// From where to where each level of an axis is drawn: half way to its neighbours.
@@ -223,8 +223,8 @@ fn ratios(summary: &Summary, axis: &str, measure: Measure) -> Option<Figure> {
     };
     let title = format!("{}, ratio to the first of {axis}", measure.short());
     let chart = Chart::new(&title, "Ratio (median, least and greatest of all runs)", "")
-        .with_y_marks(lines.iter().enumerate().map(named).collect())
-        .with_x_marks(MARKS.map(|ratio| (ratio.log10(), ratio.to_string())).to_vec())
+        .with_y_ticks(lines.iter().enumerate().map(named).collect())
+        .with_x_ticks(MARKS.map(|ratio| (ratio.log10(), ratio.to_string())).to_vec())
         .with(Series::line("", Colour::Truth, vec![(0.0, -0.5), (0.0, count - 0.5)]).marked(Mark::Dashes(1.0)))
         .with(Series::line("range", Colour::Backdrop, ranges).marked(Mark::Line(4.0)))
         .with(Series::dots("alike", Colour::Estimate, alike).marked(Mark::Dots(6.0)))

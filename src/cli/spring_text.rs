@@ -1,21 +1,21 @@
 //! The output of `zsim spring`.
 
-use super::coverage_words;
-use zsim::dynamics::{ElementKind, ElementLoad, ModeKind};
+use super::coverage_text;
+use zsim::dynamics::{Bearing, BearingKind, ModeKind};
 use zsim::report::table;
 use zsim::study::spring::design::DesignStudy;
-use zsim::study::spring::{CoilReport, DesignFigures, ShakeResponse, SpringReport};
+use zsim::study::spring::{CoilReport, DesignMetrics, ShakeResponse, SpringReport};
 
-/// All about a spring.
+/// The report on a spring.
 pub(super) fn report(report: &SpringReport) -> String {
     let mut rows = vec![row("head", format!("{:.3} kg", report.head_mass_kg))];
-    let heaviest = report.heaviest_head_kg.map_or("any".to_owned(), |kg| format!("{kg:.3} kg"));
-    rows.push(row("stands", if report.stands { "yes" } else { "no" }.to_owned()));
-    rows.push(row("heaviest head of this shape", heaviest));
+    let heaviest = report.heaviest_head_kg.map_or("unlimited".to_owned(), |kg| format!("{kg:.3} kg"));
+    rows.push(row("stable rest pose", if report.stands { "yes" } else { "no" }.to_owned()));
+    rows.push(row("maximum mass of this head", heaviest));
     if let Some(rest) = &report.rest {
-        rows.extend(rest.sag_mm.map(|mm| row("sag", format!("{mm:.2} mm"))));
+        rows.extend(rest.sag_mm.map(|mm| row("static compression", format!("{mm:.2} mm"))));
         let [x, y, z] = rest.position_m.map(|m| (m * 1e4).round() * 0.1 + 0.0);
-        rows.push(row("head at rest", format!("{x:.1}, {y:.1}, {z:.1} mm")));
+        rows.push(row("position at rest", format!("{x:.1}, {y:.1}, {z:.1} mm")));
         let [roll, pitch, yaw] = rest.roll_pitch_yaw_deg;
         rows.push(row("roll, pitch, yaw", format!("{}, {}, {} deg", rounded(roll), rounded(pitch), rounded(yaw))));
     }
@@ -47,15 +47,15 @@ fn row(name: &str, value: String) -> Vec<String> {
 
 fn bearing(bearing: &ElementLoad) -> Vec<String> {
     let name = match bearing.kind {
-        ElementKind::Spring => "a spring is pressed by",
-        ElementKind::Cord => "a cord is pulled by",
-        ElementKind::Float => "a float is lifted by",
-        ElementKind::UniversalJoint => "a universal joint bears",
+        BearingKind::Spring => "load on a spring",
+        BearingKind::Cord => "tension of a cord",
+        BearingKind::Float => "buoyancy of a float",
+        BearingKind::UniversalJoint => "load on a universal joint",
     };
-    row(name, bearing.load_n.map_or("the rest".to_owned(), |n| format!("{n:.2} N")))
+    row(name, bearing.load_n.map_or("remaining weight".to_owned(), |n| format!("{n:.2} N")))
 }
 
-/// To three decimals, nought without a sign.
+/// Formats a number with three decimals, and zero without a sign.
 fn rounded(x: f64) -> String {
     if x.abs() < 5e-4 { "0".to_owned() } else { format!("{x:.3}") }
 }
@@ -63,22 +63,22 @@ fn rounded(x: f64) -> String {
 fn coil(coil: &CoilReport) -> Vec<Vec<String>> {
     let or_dash = |x: Option<f64>, unit: &str| x.map_or("-".to_owned(), |x| format!("{x:.1} {unit}"));
     let buckles = match (coil.buckling_load_n, coil.buckling_margin) {
-        (Some(load_n), Some(margin)) => format!("at {load_n:.1} N with its top guided, {margin:.1} x the weight"),
-        _ => "never with its top guided".to_owned(),
+        (Some(load_n), Some(margin)) => format!("{load_n:.1} N with guided top, {margin:.1} x the weight"),
+        _ => "none with guided top".to_owned(),
     };
     let stress = match (coil.stress_at_rest_mpa, coil.yield_mpa) {
-        (Some(stress), Some(yields)) => format!("{stress:.0} of {yields:.0} MPa at yield"),
+        (Some(stress), Some(yields)) => format!("{stress:.0} MPa (yield {yields:.0} MPa)"),
         (stress, _) => or_dash(stress, "MPa"),
     };
     vec![
         row("spring index", format!("{:.2}", coil.index)),
-        row("mass of the wire", or_dash(coil.mass_g, "g")),
-        row("along its axis", format!("{:.1} N/m", coil.axial_n_per_m)),
-        row("about its axis", format!("{:.4} N m/rad", coil.torsion_nm_per_rad)),
-        row("buckles", buckles),
+        row("wire mass", or_dash(coil.mass_g, "g")),
+        row("axial stiffness", format!("{:.1} N/m", coil.axial_n_per_m)),
+        row("torsional stiffness", format!("{:.4} N m/rad", coil.torsion_nm_per_rad)),
+        row("buckling load", buckles),
         row("stress at rest", stress),
         row("gap between coils", format!("{:.2} mm", coil.gap_mm)),
-        row("coils touch when bent by", format!("{:.0} deg", coil.clash_bend_deg)),
+        row("bending angle at coil contact", format!("{:.0} deg", coil.clash_bend_deg)),
     ]
 }
 
@@ -99,26 +99,26 @@ fn modes(report: &SpringReport) -> String {
             cells
         })
         .collect();
-    table(&["mode", "Hz", "ratio", "x", "y", "z", "rx", "ry", "rz"], &rows, true)
+    table(&["mode", "Hz", "damping", "x", "y", "z", "rx", "ry", "rz"], &rows, true)
 }
 
 fn under_shake(shaken: &ShakeResponse) -> String {
-    let header = ["nodded by a hand", "closed form", "simulated"];
+    let header = ["response to a shake", "closed form", "simulated"];
     let simulated = shaken.simulated.as_ref();
-    let line = |name: &str, of: fn(&DesignFigures) -> Option<f64>, decimals: usize| {
-        let number = |figures: Option<&DesignFigures>| {
+    let line = |name: &str, of: fn(&DesignMetrics) -> Option<f64>, decimals: usize| {
+        let number = |figures: Option<&DesignMetrics>| {
             figures.and_then(of).map_or("-".to_owned(), |x| format!("{x:.decimals$}"))
         };
         vec![name.to_owned(), number(Some(&shaken.closed_form)), number(simulated)]
     };
     let mut rows = vec![
         line("field of view, deg", |f| Some(f.field_of_view_deg), 1),
-        line("greatest rate, deg/s", |f| Some(f.rate_deg_per_s), 0),
-        line("stress over yield", |f| f.stress_share, 3),
+        line("maximum rate, deg/s", |f| Some(f.rate_deg_per_s), 0),
+        line("stress / yield stress", |f| f.stress_share, 3),
         line("peak gain of the pitch rate", |f| Some(f.peak_gain), 2),
     ];
     if let Some(seen) = &shaken.coverage {
-        let of_lidar = coverage_words::rows(seen).into_iter();
+        let of_lidar = coverage_text::rows(seen).into_iter();
         rows.extend(of_lidar.map(|(name, value)| vec![name.to_owned(), "-".to_owned(), value]));
     }
     let failed = shaken.failed.as_ref().map(|why| format!("no simulation: {why}\n")).unwrap_or_default();
@@ -128,7 +128,7 @@ fn under_shake(shaken: &ShakeResponse) -> String {
 /// The result of a search.
 pub(super) fn design(study: &DesignStudy) -> String {
     let header =
-        ["D mm", "d mm", "coils", "L mm", "Hz", "view deg", "simulated", "rate", "sag mm", "g", "stress", "holds"];
+        ["D mm", "d mm", "coils", "L mm", "Hz", "view deg", "simulated", "rate", "sag mm", "g", "stress", "in limits"];
     let rows: Vec<_> = study
         .candidates
         .iter()
@@ -153,11 +153,11 @@ pub(super) fn design(study: &DesignStudy) -> String {
         })
         .collect();
     let counts = format!(
-        "{} designs tried, {} within all limits, {} of them in the Pareto set\n",
+        "{} designs evaluated, {} within all limits, {} in the Pareto set\n",
         study.evaluated, study.feasible, study.pareto
     );
     if rows.is_empty() {
-        return counts + "no design is within all limits: widen the bounds or loosen a limit\n";
+        return counts + "no design is within all limits: widen the bounds or relax a limit\n";
     }
     format!("{counts}\n{}", table(&header, &rows, true))
 }

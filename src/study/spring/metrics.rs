@@ -1,4 +1,4 @@
-//! A design in figures: at once from the linearised head, or from a simulation.
+//! Metrics of a spring design, from the linearised head or from a simulation.
 
 use super::{Shake, SpringMounting, Wire};
 use crate::dynamics::{FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState, LinkageSpec, Quantity};
@@ -14,48 +14,49 @@ use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// What a head on its spring comes to, under a hand's [`Shake`].
+/// Metrics of a head on a spring under a [`Shake`] of the base.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct DesignFigures {
+pub struct DesignMetrics {
     /// Frequency of the slowest mode, Hz.
     pub rocking_hz: f64,
-    /// Greatest gain of the pitch rate.
+    /// Peak gain of the pitch rate.
     pub peak_gain: f64,
-    /// How far the spring shortens under the head, mm.
+    /// Static compression of the spring under the head, mm.
     pub sag_mm: f64,
-    /// Mass of the spring's active wire, g; nothing for a spring or a material known by its stiffness alone.
+    /// Mass of the active wire, g; `None` if spring or material are specified by stiffness only.
     pub spring_mass_g: Option<f64>,
-    /// Twice the amplitude of the head's pitch, degrees; from a simulation the forward beam's range in 95 % of the
-    /// time.
+    /// Field of view, degrees: twice the pitch amplitude, or in a simulation the 95 % elevation range of the forward
+    /// beam.
     pub field_of_view_deg: f64,
-    /// Greatest rate of rotation, degrees/s.
+    /// Maximum angular velocity, degrees/s.
     pub rate_deg_per_s: f64,
-    /// Greatest stress in the wire over its yield.
+    /// Maximum stress in the wire divided by the yield stress; `None` if either is not known.
     pub stress_share: Option<f64>,
 }
 
-/// Frequencies up to which the peak gain is looked for, Hz.
-const PEAKS_UP_TO_HZ: f64 = 20.0;
+/// Upper frequency of the search for the peak gain, Hz: above the modes of interest.
+const MAX_PEAK_HZ: f64 = 20.0;
 
-/// The figures of the linearised head: from geometry to static pose, stiffness, modes and gains, in a fraction of a
-/// millisecond. The swing is the linear one, however large.
+/// Computes the metrics of the linearised head: static pose, stiffness, modes and gains.
+///
+/// The response is linear for any amplitude. The computation takes less than 1 ms.
 ///
 /// # Errors
-/// When the spec is wrong or the head does not stand; the error does not say how nearly.
-pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignFigures, StudyError> {
-    let head = HeadModel::new_without_advice(spec, source)?;
-    let design = Design::of(spec, &head)?;
+/// When the spec is invalid or the head has no stable rest pose; the error does not include the maximum mass.
+pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignMetrics, StudyError> {
+    let head = HeadModel::attempt(spec, source)?;
+    let model = SpringModel::of(spec, &head)?;
     let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
     let foot = head.default_points().base_in_base;
     let points = GainPoints { base_in_base: foot, head_in_head: head.body().centre_of_mass_in_head };
     let response = head.frequency_response(&points);
-    let swing = Swing { head: &head, response: &response, foot, omega: TAU * frequency_hz, shake };
+    let swing = LinearSwing { head: &head, response: &response, foot, omega: TAU * frequency_hz, shake };
     let pitch = swing.amplitude()[4].norm();
     let phases = (0..12).map(|k| f64::from(k) * TAU / 12.0);
-    let stress = phases.filter_map(|phase| design.stress_pa(&swing.state(phase))).reduce(f64::max);
-    Ok(design.figures(
+    let stress = phases.filter_map(|phase| model.stress_pa(&swing.state(phase))).reduce(f64::max);
+    Ok(model.metrics(
         &head,
-        &Swung {
+        &SwingResult {
             field_of_view_deg: 2.0 * pitch.to_degrees(),
             rate_deg_per_s: (swing.omega * pitch).to_degrees(),
             stress,
@@ -63,74 +64,79 @@ pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<De
     ))
 }
 
-/// The same figures from a full simulation of the shake, and what `lidar` saw meanwhile.
+/// Computes the metrics by a full simulation of the shake, with the coverage of `lidar`.
 ///
 /// # Errors
-/// When the spec is wrong, the head does not stand, or its simulation fails.
+/// When the spec is invalid, the head has no stable rest pose, or the simulation fails.
 pub fn simulated(
     spec: &HeadSpec,
     source: &Source,
     shake: &Shake,
     lidar: &Lidar,
     plan: &CoveragePlan,
-) -> Result<(DesignFigures, Coverage), StudyError> {
+) -> Result<(DesignMetrics, Coverage), StudyError> {
     let head = HeadModel::new(spec, source)?;
-    let design = Design::of(spec, &head)?;
+    let model = SpringModel::of(spec, &head)?;
     let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
     let amplitude = Level::Degrees(shake.pitch_deg);
     let signal = SignalSpec::SweptSine { from_hz: frequency_hz, to_hz: frequency_hz, amplitude };
     let drives = vec![DriveSpec { axis: Axis::Pitch, signal }];
     let shaker = MotionSpec::Shaker(ShakerSpec { height_m: 1.1, still_s: 0.5, onset_s: 2.0, drives });
     let duration_s = plan.from_s + plan.duration_s;
-    let shake = shaker.build(&Source::in_memory("the hand's shake", ""), None, duration_s, Seed(1))?;
-    let base_from_shaken = Pose::from_parts(head.default_points().base_in_base.into(), Rotation::identity());
-    let motion = AboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
+    let shake = shaker.build(&Source::in_memory("the shake of the base", ""), None, duration_s, Seed(1))?;
+    let base_from_shaken = Pose::from_parts(head.usual_points().base_in_base.into(), Rotation::identity());
+    let motion = ShakeAboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
     let (mut stress, mut step) = (None, 0_usize);
-    let seen = coverage(&head, &motion, lidar, plan, |state| {
+    let coverage = coverage(&head, &motion, lidar, plan, |state| {
         step += 1;
-        // A swing takes hundreds of steps: a tenth of them will do.
+        // A period has hundreds of steps, so every tenth is sufficient for the maximum.
         if step.is_multiple_of(10) {
-            stress = [stress, design.stress_pa(state)].into_iter().flatten().reduce(f64::max);
+            stress = [stress, model.stress_pa(state)].into_iter().flatten().reduce(f64::max);
         }
     })?;
-    let swung = Swung { field_of_view_deg: seen.field_of_view_deg, rate_deg_per_s: seen.gyro.most_deg_per_s, stress };
-    Ok((design.figures(&head, &swung), seen))
+    let swing = SwingResult {
+        field_of_view_deg: coverage.field_of_view_deg,
+        rate_deg_per_s: coverage.gyro.most_deg_per_s,
+        stress,
+    };
+    Ok((model.metrics(&head, &swing), coverage))
 }
 
-/// A base that is shaken at the spring's foot.
-struct AboutFoot<'a> {
+/// Motion of a base that is shaken about the foot of the spring.
+struct ShakeAboutFoot<'a> {
     shake: &'a dyn BaseMotion,
     shaken_from_base: Pose,
 }
 
-impl BaseMotion for AboutFoot<'_> {
+impl BaseMotion for ShakeAboutFoot<'_> {
     fn at(&self, t_s: f64) -> Kinematics {
         self.shake.at(t_s).of_frame(&self.shaken_from_base)
     }
 }
 
-/// What differs between the linear swing and the simulated one.
-struct Swung {
+/// Response to the shake, linear or simulated.
+struct SwingResult {
     field_of_view_deg: f64,
     rate_deg_per_s: f64,
+    /// Maximum stress, Pa.
     stress: Option<f64>,
 }
 
-/// What a design is before it swings.
-pub(super) struct Design {
+/// Properties of the spring of a head.
+pub(super) struct SpringModel {
     pub wire: Option<Wire>,
     pub mounting: Option<SpringMounting>,
-    /// Whether the spring bears the head alone, without a cable: then its stress follows from the head's motion.
-    pub is_alone: bool,
+    /// Whether the spring carries the head without a cable; the stress then follows from the motion of the head.
+    pub has_no_cable: bool,
     pub free_length_m: Option<f64>,
     pub mass_kg: Option<f64>,
 }
 
-impl Design {
+impl SpringModel {
     pub fn of(spec: &HeadSpec, head: &HeadModel) -> Result<Self, StudyError> {
         let mounting = SpringMounting::of(spec, head.body());
         let LinkageSpec::Spring { spring, cable, .. } = &spec.linkage else {
-            return Ok(Self { mounting, ..Self::unmounted() });
+            return Ok(Self { mounting, ..Self::without_mounting() });
         };
         let coil = match spring.design().map_err(crate::dynamics::DynamicsError::from)? {
             SpringDesign::Coil(coil) => Some(coil),
@@ -139,47 +145,47 @@ impl Design {
         Ok(Self {
             wire: Wire::of(spring)?,
             mounting,
-            is_alone: cable.is_none(),
+            has_no_cable: cable.is_none(),
             free_length_m: coil.map(|coil| coil.free_length_m()),
             mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
         })
     }
 
-    /// Of a head that has no place.
-    pub fn unmounted() -> Self {
-        Self { wire: None, mounting: None, is_alone: false, free_length_m: None, mass_kg: None }
+    /// A model without wire and mounting, for a head without a rest pose or a spring.
+    pub fn without_mounting() -> Self {
+        Self { wire: None, mounting: None, has_no_cable: false, free_length_m: None, mass_kg: None }
     }
 
-    /// Greatest stress in the wire at an instant, Pa; nothing where there is no one spring that bears the head alone.
+    /// Maximum stress in the wire in a state, Pa; `None` unless a single spring without a cable carries the head.
     pub fn stress_pa(&self, state: &HeadState) -> Option<f64> {
-        let (wire, mounting) = self.wire.zip(self.mounting).filter(|_| self.is_alone)?;
+        let (wire, mounting) = self.wire.zip(self.mounting).filter(|_| self.has_no_cable)?;
         Some(mounting.stress_pa(&wire, state))
     }
 
-    fn figures(&self, head: &HeadModel, swung: &Swung) -> DesignFigures {
-        let response = head.frequency_response(&head.default_points());
-        let peak = response.peak(Axis::Pitch, PEAKS_UP_TO_HZ, Quantity::Kinematic);
-        let yields = self.wire.and_then(|wire| wire.yield_pa());
-        DesignFigures {
+    fn metrics(&self, head: &HeadModel, swing: &SwingResult) -> DesignMetrics {
+        let response = head.frequency_response(&head.usual_points());
+        let peak = response.peak(Axis::Pitch, MAX_PEAK_HZ, Quantity::Kinematic);
+        let yield_pa = self.wire.and_then(|wire| wire.yield_pa());
+        DesignMetrics {
             rocking_hz: head.linear_modes().first().map_or(f64::INFINITY, |mode| mode.frequency_hz),
             peak_gain: peak.map_or(1.0, |peak| peak.gain),
             sag_mm: self.sag_m(head) * 1e3,
             spring_mass_g: self.mass_kg.map(|mass_kg| mass_kg * 1e3),
-            field_of_view_deg: swung.field_of_view_deg,
-            rate_deg_per_s: swung.rate_deg_per_s,
-            stress_share: swung.stress.zip(yields).map(|(stress, yields)| stress / yields),
+            field_of_view_deg: swing.field_of_view_deg,
+            rate_deg_per_s: swing.rate_deg_per_s,
+            stress_share: swing.stress.zip(yield_pa).map(|(stress, yield_pa)| stress / yield_pa),
         }
     }
 
-    /// How much nearer foot and top are at rest than without load; 0 where the length without load is not known.
+    /// Compression at rest: free length minus distance from foot to top, m; 0 if the free length is not known.
     pub fn sag_m(&self, head: &HeadModel) -> f64 {
         let (Some(mounting), Some(free_length_m)) = (&self.mounting, self.free_length_m) else { return 0.0 };
         free_length_m - mounting.length_m(head.rest_pose_base_from_head())
     }
 }
 
-/// The linear swing under a hand's shake.
-struct Swing<'a> {
+/// The linear response to a shake.
+struct LinearSwing<'a> {
     head: &'a HeadModel,
     response: &'a FrequencyResponse,
     foot: Vector,
@@ -187,16 +193,15 @@ struct Swing<'a> {
     shake: &'a Shake,
 }
 
-impl Swing<'_> {
-    /// Complex displacement and turn of the centre of mass.
+impl LinearSwing<'_> {
+    /// Complex amplitude of translation (m) and rotation (rad) of the centre of mass.
     fn amplitude(&self) -> [Complex<f64>; 6] {
-        let of_base = self.shake.pitch_deg.to_radians();
+        let base_rad = self.shake.pitch_deg.to_radians();
         let per_base = self.response.displacement(Axis::Pitch, self.omega / TAU);
-        std::array::from_fn(|k| per_base[k] * of_base)
+        std::array::from_fn(|k| per_base[k] * base_rad)
     }
 
-    /// Base and head when the base's pitch is at `phase` of its cosine. Velocities are left out: what they add to
-    /// forces is of second order.
+    /// State of base and head at `phase` of the shake, rad. Velocities are zero: their forces are of second order.
     fn state(&self, phase: f64) -> HeadState {
         let turning = Complex::from_polar(1.0, phase);
         let now = crate::elasticity::Vector6::from(self.amplitude().map(|a| (a * turning).re));

@@ -1,26 +1,26 @@
-//! A sweep in words.
+//! Text output of `zsim sweep`.
 
 use zsim::report;
 use zsim::study::sweep::{Status, Sweep};
 
 /// Summary of a plan.
-pub(super) fn plan_words(sweep: &Sweep) -> String {
+pub(super) fn plan_text(sweep: &Sweep) -> String {
     format!("{} runs in {} tasks", sweep.plan().points(), sweep.tasks())
 }
 
 /// Progress of a sweep.
-pub(super) fn status_words(status: &Status) -> String {
+pub(super) fn status_text(status: &Status) -> String {
     let mut rows = vec![
         ("runs", status.points.to_string()),
-        ("done", status.done.to_string()),
-        ("failed among them", status.failed.to_string()),
+        ("completed", status.done.to_string()),
+        ("failed", status.failed.to_string()),
         ("missing", status.missing.to_string()),
     ];
     if status.damaged > 0 {
-        rows.push(("damaged among them", status.damaged.to_string()));
+        rows.push(("damaged", status.damaged.to_string()));
     }
-    let left = status.thread_s_left.filter(|_| status.missing > 0);
-    rows.extend(left.map(|seconds| ("remaining, on one thread", duration(seconds))));
+    let remaining = status.thread_s_left.filter(|_| status.missing > 0);
+    rows.extend(remaining.map(|seconds| ("remaining time, one thread", duration(seconds))));
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
     report::table(&[], &rows, true)
 }
