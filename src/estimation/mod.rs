@@ -92,7 +92,7 @@ mod window;
 pub use base::{BaseEstimate, BaseFix, BaseImu, FixSigmas, smooth_base};
 use clock::Clock;
 pub use cloud::{CloudFilter, Fate, Hit, point_sigma_m};
-pub use error::{EstimationError, LeftOut, Warning, WarningKind};
+pub use error::{Discarded, EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use integrity::{Cause, Evidence, Finding, Status, blocks, doubt, findings, radius_99};
 pub use map::{Located, locate_map, map_of, merge_maps};

@@ -12,7 +12,7 @@ use nalgebra::Matrix6;
 
 /// Where the head is looked for.
 #[derive(Debug)]
-pub(super) struct Whereabouts {
+pub(super) struct MapLocalisation {
     locator: Locator,
     covariance: Matrix6<f64>,
     /// Where it is about, until it is looked for.
@@ -21,7 +21,7 @@ pub(super) struct Whereabouts {
     found: Option<Located>,
 }
 
-impl Whereabouts {
+impl MapLocalisation {
     /// In `map`, where the head begins about at `map_from_head`.
     pub(super) fn about(map: &SurfelMap, map_from_head: Pose, spec: &EstimatorSpec) -> Self {
         let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
@@ -90,7 +90,7 @@ fn not_here(found: &Located, better: &Located, map_from_head: &Pose) -> String {
 
 /// What had been seen when the IMU fell silent for too long, in which the head is looked for behind the silence.
 #[derive(Debug)]
-pub(super) struct Before {
+pub(super) struct GapRelocalisation {
     views: Views,
     consider: Consider,
     /// What the window last showed, beside the views.
@@ -99,7 +99,7 @@ pub(super) struct Before {
     until_s: f64,
 }
 
-impl Before {
+impl GapRelocalisation {
     pub(super) fn new((views, consider): (Views, Consider), last: Vec<Patch>, until_s: f64) -> Self {
         Self { views, consider, last, until_s }
     }

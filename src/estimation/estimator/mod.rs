@@ -8,15 +8,15 @@ use self::gauging::Gauging;
 use self::verdict::{leaves_to_the_imu, report, trouble};
 use crate::estimation::border::Border;
 use crate::estimation::consider::{Consider, OfBeginning, Sensitivity};
-use crate::estimation::initial::{self, Beginning, Carried, Noisier};
-use crate::estimation::intake::{Intake, Stretch};
+use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
+use crate::estimation::intake::{Intake, Segment};
 use crate::estimation::spent::Stopwatch;
 use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::strapdown::Interval;
 use crate::estimation::surfel::{Beam, Patch, SurfelMaker};
 use crate::estimation::survey::Survey;
 use crate::estimation::views::Views;
-use crate::estimation::whereabouts::{Before, Whereabouts};
+use crate::estimation::whereabouts::{GapRelocalisation, MapLocalisation};
 use crate::estimation::window::{Linearised, Window};
 use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Trajectory, Vector};
@@ -34,7 +34,7 @@ const MOVING: (f64, f64) = (0.3, 0.5);
 const RELUCTANTLY: f64 = 3.0;
 
 /// An estimated noise above the specification by more than this factor is reported.
-const TELLING: f64 = 1.5;
+const REPORTED_NOISE_FACTOR: f64 = 1.5;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
@@ -46,16 +46,16 @@ pub struct Estimator {
     spec: EstimatorSpec,
     calibration: Calibration,
     intake: Intake,
-    /// Stretches that wait until there are enough to begin.
-    waiting: Vec<Stretch>,
+    /// Segments that wait until there are enough to begin.
+    waiting: Vec<Segment>,
     window: Option<Window>,
     /// The state at the start of the last IMU gap, until the first window after the gap is level.
-    carried: Option<Carried>,
+    carried: Option<StateBeforeGap>,
     views: Views,
     /// A map in which the head is, where one is given.
-    whereabouts: Option<Whereabouts>,
+    whereabouts: Option<MapLocalisation>,
     /// Surfaces from before the IMU gap, until relocalisation in them is done.
-    before: Option<Before>,
+    before: Option<GapRelocalisation>,
     /// Observed surfaces, where the caller requests them.
     survey: Option<Survey>,
     consider: Consider,
@@ -118,17 +118,17 @@ impl Estimator {
     /// `map_from_head`: within a metre on the level and twenty degrees about the vertical. Every window is
     /// matched with the map too. The first pose follows after the first full window, when the head is localised.
     pub fn in_map(self, map: &SurfelMap, map_from_head: &Pose) -> Self {
-        Self { whereabouts: Some(Whereabouts::about(map, *map_from_head, &self.spec)), ..self }
+        Self { whereabouts: Some(MapLocalisation::about(map, *map_from_head, &self.spec)), ..self }
     }
 
-    /// Takes a measurement, in about the order of time; when a stretch of time is complete, the window moves over it.
+    /// Takes a measurement, in about the order of time; when a segment of time is complete, the window moves over it.
     ///
     /// # Errors
     /// When the measurement is not finite, or the head is not found in the map that was given.
     pub fn push(&mut self, measurement: Measurement) -> Result<(), EstimationError> {
-        self.intake.take(measurement)?;
-        while let Some(stretch) = self.intake.next_stretch(false) {
-            self.advance(stretch)?;
+        self.intake.push(measurement)?;
+        while let Some(segment) = self.intake.next_segment(false) {
+            self.advance(segment)?;
         }
         Ok(())
     }
@@ -144,8 +144,8 @@ impl Estimator {
     /// When there was no IMU, no lidar, or too little of both to start, or the head is not found in the map that was
     /// given.
     pub fn finish(mut self) -> Result<OpenLoop, EstimationError> {
-        while let Some(stretch) = self.intake.next_stretch(true) {
-            self.advance(stretch)?;
+        while let Some(segment) = self.intake.next_segment(true) {
+            self.advance(segment)?;
         }
         self.begin(true);
         self.find_in_map()?;
@@ -172,29 +172,29 @@ impl Estimator {
 
     /// Processes one segment: it joins the window, the window is solved, the oldest segment leaves, its poses are
     /// final, and its surfels may become a fixed view.
-    fn advance(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
+    fn advance(&mut self, segment: Segment) -> Result<(), EstimationError> {
         // While the head is still to be found, beginning once more would be to lose it.
-        self.intake.bridge(if self.before.is_some() { RELUCTANTLY } else { 1.0 });
+        self.intake.bridge_gaps_up_to(if self.before.is_some() { RELUCTANTLY } else { 1.0 });
         self.warnings.extend(self.intake.take_warnings());
-        if stretch.after_silence {
+        if segment.after_gap {
             self.find_in_map()?;
             self.find_again();
             self.pause();
         }
-        self.waiting.push(stretch);
+        self.waiting.push(segment);
         self.begin(false);
         if self.window.is_some() {
-            for stretch in std::mem::take(&mut self.waiting) {
-                self.take_in(stretch)?;
+            for segment in std::mem::take(&mut self.waiting) {
+                self.take_in(segment)?;
             }
         }
         Ok(())
     }
 
-    fn take_in(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
+    fn take_in(&mut self, segment: Segment) -> Result<(), EstimationError> {
         let Some(window) = &mut self.window else { return Ok(()) };
         let started = Instant::now();
-        let mut spent = window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
+        let mut spent = window.extend(&segment.intervals, segment.beams, segment.end_s);
         let (mut solved, mut linearised) = window.solve(&self.views);
         spent += solved.spent;
         let mut watch = Stopwatch::start();
@@ -224,12 +224,12 @@ impl Estimator {
         let took = (elapsed_s + spent.views_s, spent);
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving =
-            window.speed_m_per_s() > MOVING.0 || stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
+            window.speed_m_per_s() > MOVING.0 || segment.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
         let trouble = trouble(&solved, &self.spec, moving);
-        let at = (self.intake.stamp(stretch.end_s), moving);
+        let at = (self.intake.stamp(segment.end_s), moving);
         self.windows.push(report(&solved, at, window, trouble.clone(), took));
         self.carried_s += if trouble.as_ref().is_some_and(leaves_to_the_imu) { self.spec.step_s } else { 0.0 };
-        self.say(trouble, stretch.end_s);
+        self.say(trouble, segment.end_s);
         if let Some(until_s) = final_until_s {
             self.hand_out(until_s);
             let Some(window) = &mut self.window else { return Ok(()) };
@@ -267,18 +267,18 @@ impl Estimator {
         let (map_from_here, views, consider) = match before.find(window, &self.spec) {
             Ok(found) => found,
             Err(why) => {
-                self.warnings.push(Warning { stamp, kind: WarningKind::LostAgain { why } });
+                self.warnings.push(Warning { stamp, kind: WarningKind::NotRelocalised { why } });
                 return false;
             }
         };
         let away_m = (consider.pivot() - self.consider.pivot()).norm();
-        self.warnings.push(Warning { stamp, kind: WarningKind::FoundAgain { away_m } });
+        self.warnings.push(Warning { stamp, kind: WarningKind::Relocalised { away_m } });
         window.found_at(&map_from_here);
         (self.views, self.consider) = (views, consider);
         true
     }
 
-    /// Lets the oldest stretch go if the window is full. Until when, IMU time, the poses are final then, s.
+    /// Lets the oldest segment go if the window is full. Until when, IMU time, the poses are final then, s.
     fn let_go(&mut self, linearised: Option<&Linearised>) -> Option<f64> {
         let window = self.window.as_mut()?;
         let end_s = window.nominal.end_s();
@@ -310,7 +310,7 @@ impl Estimator {
         self.survey_window(Window::survey_all, Window::end_s);
         let Some(window) = self.window.take() else { return };
         self.next_pose = None;
-        // Where the head is now in the old views is unknown: matched by chance, they would bend the new stretch.
+        // Where the head is now in the old views is unknown: matched by chance, they would bend the new segment.
         let mut views = std::mem::replace(&mut self.views, Views::new(&self.spec.views, self.spec.fixed_views));
         if let Some(whereabouts) = &mut self.whereabouts {
             self.poses.last().into_iter().for_each(|last| whereabouts.look_again(last.map_from_head));
@@ -318,7 +318,7 @@ impl Estimator {
             let last = window.patches();
             let taken = views.take(&last, self.spec.views.length_s, (window.matcher(), self.consider.pivot()));
             self.consider.take(taken);
-            self.before = Some(Before::new((views, self.consider.clone()), last, window.nominal.end_s()));
+            self.before = Some(GapRelocalisation::new((views, self.consider.clone()), last, window.nominal.end_s()));
         }
     }
 
@@ -345,11 +345,11 @@ impl Estimator {
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
         let seen = self.seen_standstill();
         let may_rest = seen != Standstill::Moves;
-        let beginning = initial::begin((&intervals[..resting], may_rest), head_from_imu, noise, &fitting);
+        let beginning = initial::estimate((&intervals[..resting], may_rest), head_from_imu, noise, &fitting);
         let start_s = *start_s;
-        self.make_noisier(beginning.noisier, start_s);
+        self.raise_noise(beginning.noise_factors, start_s);
         let (beginning, goes_on) = match &self.carried {
-            Some(carried) => (beginning.going_on_from(carried, start_s), true),
+            Some(carried) => (beginning.continued_from(carried, start_s), true),
             None => (beginning, false),
         };
         if !goes_on && beginning.rest.is_none() {
@@ -370,7 +370,7 @@ impl Estimator {
 
     /// The evidence of the lidar on whether the head moved in the assumed rest.
     fn seen_standstill(&self) -> Standstill {
-        let beams: Vec<Beam> = self.waiting.iter().flat_map(|stretch| &stretch.beams).copied().collect();
+        let beams: Vec<Beam> = self.waiting.iter().flat_map(|segment| &segment.beams).copied().collect();
         let (Some(first), Some(last)) = (beams.first(), beams.last()) else { return Standstill::Unknown };
         let quarter_s = 0.25 * (last.tau_s.min(first.tau_s + self.spec.inertial.rest_s) - first.tau_s);
         let until_s = first.tau_s + 4.0 * quarter_s;
@@ -381,23 +381,23 @@ impl Estimator {
     }
 
     /// Raises the assumed IMU noise from now on, for the queued samples too.
-    fn make_noisier(&mut self, noisier: Noisier, start_s: f64) {
-        if noisier == Noisier::NOT {
+    fn raise_noise(&mut self, factors: NoiseFactors, start_s: f64) {
+        if factors == NoiseFactors::ONE {
             return;
         }
-        noisier.raise(&mut self.calibration.imu);
-        self.intake.make_noisier(noisier);
-        for (_, interval) in self.waiting.iter_mut().flat_map(|stretch| &mut stretch.intervals) {
-            *interval = noisier.of(*interval);
+        factors.scale_noise(&mut self.calibration.imu);
+        self.intake.raise_noise(factors);
+        for (_, interval) in self.waiting.iter_mut().flat_map(|segment| &mut segment.intervals) {
+            *interval = factors.scale(*interval);
         }
-        let Noisier { gyro, accel } = noisier;
-        if gyro.max(accel) > TELLING {
+        let NoiseFactors { gyro, accel } = factors;
+        if gyro.max(accel) > REPORTED_NOISE_FACTOR {
             let stamp = self.intake.stamp(start_s);
             self.warnings.push(Warning { stamp, kind: WarningKind::NoisyImu { gyro, accel } });
         }
     }
 
-    fn first_window(&self, spec: &EstimatorSpec, beginning: &Beginning, start_s: f64) -> Window {
+    fn first_window(&self, spec: &EstimatorSpec, beginning: &InitialState, start_s: f64) -> Window {
         let imu_from_laser = self.calibration.head_from_imu.inverse() * self.calibration.head_from_laser;
         let maker = SurfelMaker {
             spec: spec.surfels.clone(),

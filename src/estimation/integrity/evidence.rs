@@ -1,7 +1,7 @@
 //! Evidence for and against a result.
 
 use super::finding::{Cause, Finding, Status};
-use crate::estimation::{LeftOut, Warning, WarningKind, WindowReport};
+use crate::estimation::{Discarded, Warning, WarningKind, WindowReport};
 use crate::time::{Span, Stamp};
 
 /// Above this fraction of clipped samples the head may be lost.
@@ -196,7 +196,7 @@ fn of_warning(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
     let from = warning.stamp;
     let lasting = |seconds: f64| from + Span::from_seconds(seconds);
     let (status, cause, to) = match &warning.kind {
-        WarningKind::BeganAgain { seconds } => {
+        WarningKind::Restarted { seconds } => {
             (Status::Degraded, Cause::Gap { sensor: "IMU", seconds: *seconds }, lasting(*seconds))
         }
         WarningKind::ImuGap { seconds } if *seconds > GAP_S => {
@@ -206,15 +206,15 @@ fn of_warning(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
             (Status::Degraded, Cause::Gap { sensor: "lidar", seconds: *seconds }, from)
         }
         WarningKind::Lost { seconds, .. } => (Status::Lost, Cause::FewMatches { seconds: *seconds }, end),
-        WarningKind::LostAgain { .. } | WarningKind::LostInMap => (Status::Lost, Cause::NotRelocalised, end),
+        WarningKind::NotRelocalised { .. } | WarningKind::LostInMap => (Status::Lost, Cause::NotRelocalised, end),
         WarningKind::Saturated { samples } if *samples as f64 > CLIPPED * evidence.samples as f64 => {
             let share = *samples as f64 / evidence.samples.max(1) as f64;
             (Status::Degraded, Cause::Clipped { share }, end)
         }
-        WarningKind::LeftOut { what: LeftOut::RepeatedSamples, count } if *count > FROZEN.0 => {
+        WarningKind::Discarded { what: Discarded::RepeatedSamples, count } if *count > FROZEN.0 => {
             (Status::Degraded, Cause::Frozen { sensor: "IMU", count: *count }, end)
         }
-        WarningKind::LeftOut { what: LeftOut::RepeatedScans, count } if *count > FROZEN.1 => {
+        WarningKind::Discarded { what: Discarded::RepeatedScans, count } if *count > FROZEN.1 => {
             (Status::Degraded, Cause::Frozen { sensor: "lidar", count: *count }, end)
         }
         _ => return None,
@@ -407,7 +407,7 @@ mod tests {
     fn gaps_of_one_sensor_are_one_finding_with_the_longest() {
         let windows = sound(80);
         let gap =
-            |k: usize, seconds: f64| Warning { stamp: windows[k].stamp, kind: WarningKind::BeganAgain { seconds } };
+            |k: usize, seconds: f64| Warning { stamp: windows[k].stamp, kind: WarningKind::Restarted { seconds } };
         let found = judged(&windows, &[gap(10, 0.5), gap(30, 2.0), gap(50, 1.0)]);
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].cause, Cause::Gap { sensor: "IMU", seconds: 2.0 });

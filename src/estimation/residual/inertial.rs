@@ -311,7 +311,7 @@ mod tests {
     use crate::estimation::normal_equations::Factor;
     use crate::estimation::residual::BORDER;
     use crate::estimation::residual::prior::Start;
-    use crate::estimation::strapdown::Exaggerates;
+    use crate::estimation::strapdown::ImuScaleMisalignment;
     use crate::geometry::{from_roll_pitch_yaw, gravity_in_world};
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector, SVector};
@@ -412,11 +412,11 @@ mod tests {
             }
         };
         let matrix = |at: usize| Matrix::from_fn(|r, c| x[border + at + 3 * r + c]);
-        let exaggerates = Exaggerates { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
+        let scale_misalignment = ImuScaleMisalignment { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
         let tilt = Vector::new(x[border + GRAVITY], x[border + GRAVITY + 1], 0.0);
         let moved = Case {
             states: case.states.iter().zip(case.bases()).map(moved).collect(),
-            intervals: case.intervals.iter().map(|interval| interval.without(&exaggerates)).collect(),
+            intervals: case.intervals.iter().map(|interval| interval.corrected_by(&scale_misalignment)).collect(),
             biases: Biases { gyro: case.biases.gyro + three(GYRO_BIAS), accel: case.biases.accel + three(ACCEL_BIAS) },
             gravity: Rotation::from_scaled_axis(tilt) * case.gravity,
             start_s: case.start_s,

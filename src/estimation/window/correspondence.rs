@@ -1,6 +1,6 @@
 //! Surfel matching: pairs within the window, and window surfels with patches of the fixed views.
 
-use super::{Stretch, Window};
+use super::{Segment, Window};
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::surfel::{Patch, Placed, Surfel};
@@ -30,7 +30,7 @@ pub(super) struct Neighbours {
 
 /// Cached fixed-view neighbours of a surfel, and the position at which they were searched.
 ///
-/// Views do not move, and a surfel hardly moves once the stretch has been solved: most surfels are searched once.
+/// Views do not move, and a surfel hardly moves once the segment has been solved: most surfels are searched once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct CachedNeighbours {
     centre: Vector,
@@ -169,22 +169,18 @@ impl Window {
     pub(super) fn scene(&self) -> Vec<Placed> {
         let placing = self.placing();
         let homes = self.homes();
-        homes
-            .par_iter()
-            .with_min_len(512)
-            .map(|(k, index)| self.stretches[*k].surfels[*index].place(&placing))
-            .collect()
+        homes.par_iter().with_min_len(512).map(|(k, index)| self.segments[*k].surfels[*index].place(&placing)).collect()
     }
 
-    /// For each surfel of the scene: the stretch, and the index into the surfels of that stretch.
+    /// For each surfel of the scene: the segment, and the index into the surfels of that segment.
     fn homes(&self) -> Vec<(usize, usize)> {
         let (from, to) = (self.start.u_s, self.nominal.end_s());
         let is_within = |surfel: &Surfel| (from..=to).contains(&self.clock.imu_s(surfel.tau_s));
-        let of_stretch = |(k, stretch): (usize, &'_ Stretch)| {
-            let within = stretch.surfels.iter().enumerate().filter(|(_, surfel)| is_within(surfel));
+        let of_segment = |(k, segment): (usize, &'_ Segment)| {
+            let within = segment.surfels.iter().enumerate().filter(|(_, surfel)| is_within(surfel));
             within.map(|(index, _)| (k, index)).collect::<Vec<_>>()
         };
-        self.stretches.iter().enumerate().flat_map(of_stretch).collect()
+        self.segments.iter().enumerate().flat_map(of_segment).collect()
     }
 
     /// The `neighbours` in `scene` that pass the match gates.
@@ -243,7 +239,7 @@ impl Window {
         let pairs = self.matcher.among(scene, &self.matcher.plant(&patches));
         let homes = self.homes();
         let mut cached: Vec<CachedNeighbours> =
-            homes.iter().map(|(k, index)| std::mem::take(&mut self.stretches[*k].cached[*index])).collect();
+            homes.iter().map(|(k, index)| std::mem::take(&mut self.segments[*k].cached[*index])).collect();
         let search = |(a, (patch, cached)): (usize, (&Patch, &mut CachedNeighbours))| {
             cached.update(patch, (views, chosen), &self.matcher, self.spec.views.neighbours);
             let in_view = |index: &usize| {
@@ -255,7 +251,7 @@ impl Window {
         let both = patches.par_iter().zip(cached.par_iter_mut()).enumerate();
         let fixed: Vec<_> = both.with_min_len(256).map(search).collect();
         for ((k, index), cached) in homes.into_iter().zip(cached) {
-            self.stretches[k].cached[index] = cached;
+            self.segments[k].cached[index] = cached;
         }
         Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), of: scene.len(), moved_m: 0.0 }
     }

@@ -12,7 +12,7 @@ pub(super) use uncertainty::Linearised;
 
 use super::border::Border;
 use super::clock::Clock;
-use super::initial::{Beginning, Carried, Rest};
+use super::initial::{InitialState, RestReadings, StateBeforeGap};
 use super::matching::Matcher;
 use super::nominal::Nominal;
 use super::residual::contradiction::contradiction;
@@ -20,7 +20,7 @@ use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
-use super::strapdown::{Biases, Exaggerates, Interval};
+use super::strapdown::{Biases, ImuScaleMisalignment, Interval};
 use super::surfel::{Beam, Patch, Placing, Surfel, SurfelMaker};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
@@ -31,14 +31,14 @@ use std::collections::VecDeque;
 
 /// The head may move this long before the IMU shows the first motion, s.
 const REST_MARGIN_S: f64 = 0.3;
-/// The window grows to at most this multiple of the nominal length while the stretches contain few surfaces.
+/// The window grows to at most this multiple of the nominal length while the segments contain few surfaces.
 const MAX_LENGTH: f64 = 3.0;
-/// A stretch counts as swept if it has this fraction of the patches of the richest stretch.
+/// A segment counts as swept if it has this fraction of the patches of the richest segment.
 const SWEPT: f64 = 0.25;
 
 /// A head whose initial velocity has at least this standard deviation counts as moving, m/s.
 const UNDER_WAY_M_PER_S: f64 = 5.0;
-/// A velocity uncertainty above this in one stretch, m/s, widens the match gate for [`SHAKEN_S`].
+/// A velocity uncertainty above this in one segment, m/s, widens the match gate for [`SHAKEN_S`].
 const SHOCK_M_PER_S: f64 = 0.1;
 /// Duration of the wide match gate after a shock, s.
 const SHAKEN_S: f64 = 2.0;
@@ -48,7 +48,7 @@ const RELOCALISED_SIGMA: [f64; 2] = [0.05, 0.2];
 
 /// A time step of the window.
 #[derive(Debug)]
-struct Stretch {
+struct Segment {
     end_tau_s: f64,
     beams: Vec<Beam>,
     surfels: Vec<Surfel>,
@@ -69,18 +69,18 @@ pub(super) struct Window {
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
     /// Estimated scale errors and misalignments of the IMU.
-    exaggerates: Exaggerates,
+    scale_misalignment: ImuScaleMisalignment,
     border: Border,
-    stretches: VecDeque<Stretch>,
+    segments: VecDeque<Segment>,
     start: Start,
     /// Whether this is the first window and starts in motion: level and biases are guesses, and the match gate is wide.
     wide_matching: bool,
-    /// Whether the newest stretch bridges an IMU gap, or a shock or clipping makes the velocity uncertain.
+    /// Whether the newest segment bridges an IMU gap, or a shock or clipping makes the velocity uncertain.
     bridged_gap: bool,
     /// End of the wide match gate after a shock, IMU time, s.
     shaken_until_s: f64,
     /// The IMU readings at rest, until the head first moves.
-    rest: Option<Rest>,
+    rest: Option<RestReadings>,
     /// End of the initial rest, IMU time, s.
     rested_until_s: f64,
     /// Later rests.
@@ -97,7 +97,7 @@ impl Window {
     pub(super) fn new(
         spec: &EstimatorSpec,
         maker: SurfelMaker,
-        beginning: &Beginning,
+        beginning: &InitialState,
         start_u_s: f64,
         border: Border,
     ) -> Self {
@@ -107,13 +107,13 @@ impl Window {
             matcher: Matcher::new(&spec.matching, &spec.surfels),
             maker,
             surveyor: None,
-            nominal: Nominal::beginning(start_u_s, beginning.state),
+            nominal: Nominal::starting(start_u_s, beginning.state),
             clock,
             biases: beginning.biases,
             gravity: crate::geometry::gravity_in_world(),
-            exaggerates: Exaggerates::nothing(),
+            scale_misalignment: ImuScaleMisalignment::zero(),
             border,
-            stretches: VecDeque::new(),
+            segments: VecDeque::new(),
             start: Start::first(start_u_s, beginning.velocity_sigma),
             wide_matching: beginning.rest.is_none(),
             bridged_gap: false,
@@ -128,25 +128,25 @@ impl Window {
     }
 
     /// The states that continue across an IMU gap.
-    pub(super) fn carried(&self) -> Option<Carried> {
+    pub(super) fn carried(&self) -> Option<StateBeforeGap> {
         let state = *self.nominal.states().last()?;
-        let (exaggerates, lidar) = (self.exaggerates, self.maker.lidar);
+        let (scale_misalignment, lidar) = (self.scale_misalignment, self.maker.lidar);
         let until_s = self.nominal.end_s();
         let way = state.position - self.begins().translation.vector;
         let mean_velocity = way / (until_s - self.start.u_s).max(self.spec.step_s);
         let Self { biases, gravity, clock, .. } = *self;
-        Some(Carried { until_s, state, mean_velocity, biases, gravity, clock, exaggerates, lidar })
+        Some(StateBeforeGap { until_s, state, mean_velocity, biases, gravity, clock, scale_misalignment, lidar })
     }
 
     /// Initialises clock and sensor corrections with the values from before the IMU gap.
-    pub(super) fn take_over(&mut self, carried: &Carried) {
+    pub(super) fn take_over(&mut self, carried: &StateBeforeGap) {
         self.clock = carried.clock.after_gap((carried.until_s, self.start.u_s));
-        self.exaggerates = carried.exaggerates;
+        self.scale_misalignment = carried.scale_misalignment;
         self.maker.lidar = carried.lidar;
     }
 
     /// Rotates the window about the start, by the smallest angle that aligns gravity with the map of `carried`.
-    pub(super) fn level_as(&mut self, carried: &Carried) {
+    pub(super) fn level_as(&mut self, carried: &StateBeforeGap) {
         let turn = Rotation::rotation_between(&self.gravity, &carried.gravity).unwrap_or_else(Rotation::identity);
         self.nominal.turn(&turn, &carried.state.position);
         self.gravity = carried.gravity;
@@ -219,12 +219,12 @@ impl Window {
         &self.matcher
     }
 
-    /// Appends a stretch: integrates the intervals and builds surfels of the beams. Returns the run time.
+    /// Appends a segment: integrates the intervals and builds surfels of the beams. Returns the run time.
     pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) -> TimeSpent {
         let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
-            self.nominal.extend(interval.without(&self.exaggerates), &self.biases, &self.gravity);
-            self.rest = self.rest.filter(|rest| rest.goes_on(interval));
+            self.nominal.extend(interval.corrected_by(&self.scale_misalignment), &self.biases, &self.gravity);
+            self.rest = self.rest.filter(|rest| rest.agrees_with(interval));
             let at_end = (self.nominal.end_s(), self.speed_m_per_s());
             if self.knows_speed {
                 self.rests.take(interval, &self.biases, at_end);
@@ -244,19 +244,19 @@ impl Window {
         let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         let cached = vec![CachedNeighbours::default(); surfels.len()];
-        self.stretches.push_back(Stretch { end_tau_s, beams, surfels, cached });
+        self.segments.push_back(Segment { end_tau_s, beams, surfels, cached });
         let surfels_s = watch.lap_s();
         // Reference time of the clock: the middle of the window, where offset and rate are least correlated.
-        let length_s = self.spec.step_s * self.stretches.len() as f64;
+        let length_s = self.spec.step_s * self.segments.len() as f64;
         let middle_s = end_tau_s - 0.5 * length_s;
         self.border.clock_told_from(middle_s - self.clock.at_s);
         self.clock = self.clock.told_from(middle_s);
         TimeSpent { integration_s, surfels_s, ..TimeSpent::default() }
     }
 
-    /// Rebuilds the surfels of the newest stretch with the current trajectory.
+    /// Rebuilds the surfels of the newest segment with the current trajectory.
     pub(super) fn remake_newest(&mut self) {
-        if let Some(newest) = self.stretches.back_mut() {
+        if let Some(newest) = self.segments.back_mut() {
             newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
             newest.cached = vec![CachedNeighbours::default(); newest.surfels.len()];
             if self.surveyor.is_none() {
@@ -265,72 +265,72 @@ impl Window {
         }
     }
 
-    /// Whether the oldest stretch can be removed.
+    /// Whether the oldest segment can be removed.
     ///
-    /// The rest of the window must contain `window_s` of swept stretches, or the oldest stretch must have few surfaces.
+    /// The rest of the window must contain `window_s` of swept segments, or the oldest segment must have few surfaces.
     /// A head at rest measures only lines and needs the older patches.
     pub(super) fn is_full(&self) -> bool {
-        let richest = self.stretches.iter().map(|stretch| stretch.surfels.len()).max().unwrap_or(0);
+        let richest = self.segments.iter().map(|segment| segment.surfels.len()).max().unwrap_or(0);
         let enough = (richest as f64 * SWEPT) as usize;
-        let is_swept = |stretch: &Stretch| stretch.surfels.len() >= enough;
-        let swept = self.stretches.iter().filter(|stretch| is_swept(stretch)).count();
-        let windows = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
-        let all = windows(self.stretches.len());
-        windows(swept) > 1.0 || all > MAX_LENGTH || (all > 1.0 && !self.stretches.front().is_some_and(is_swept))
+        let is_swept = |segment: &Segment| segment.surfels.len() >= enough;
+        let swept = self.segments.iter().filter(|segment| is_swept(segment)).count();
+        let windows = |segments: usize| segments as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
+        let all = windows(self.segments.len());
+        windows(swept) > 1.0 || all > MAX_LENGTH || (all > 1.0 && !self.segments.front().is_some_and(is_swept))
     }
 
-    /// Start of the window after the removal of the oldest stretch, IMU time, s.
+    /// Start of the window after the removal of the oldest segment, IMU time, s.
     pub(super) fn next_start_s(&self) -> Option<f64> {
-        // After a gap the IMU intervals may end before the stretch does.
+        // After a gap the IMU intervals may end before the segment does.
         let end_s = self.nominal.end_s();
-        Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).min(end_s).max(self.start.u_s))
+        Some(self.clock.imu_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
-    /// The survey patches of the oldest stretch in the map frame, each with the measurement time, s.
+    /// The survey patches of the oldest segment in the map frame, each with the measurement time, s.
     pub(super) fn survey_oldest(&self) -> Vec<(f64, Patch)> {
-        self.stretches.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
+        self.segments.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
     }
 
-    /// The survey patches of all stretches of the window, as [`Self::survey_oldest`].
+    /// The survey patches of all segments of the window, as [`Self::survey_oldest`].
     pub(super) fn survey_all(&self) -> Vec<(f64, Patch)> {
-        self.stretches.iter().flat_map(|stretch| self.survey(stretch)).collect()
+        self.segments.iter().flat_map(|segment| self.survey(segment)).collect()
     }
 
-    /// End of the oldest stretch, lidar time, s.
+    /// End of the oldest segment, lidar time, s.
     pub(super) fn oldest_end_s(&self) -> f64 {
-        self.stretches.front().map_or(f64::NEG_INFINITY, |oldest| oldest.end_tau_s)
+        self.segments.front().map_or(f64::NEG_INFINITY, |oldest| oldest.end_tau_s)
     }
 
-    /// End of the newest stretch, lidar time, s.
+    /// End of the newest segment, lidar time, s.
     pub(super) fn end_s(&self) -> f64 {
-        self.stretches.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
+        self.segments.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
     }
 
-    fn survey(&self, stretch: &Stretch) -> Vec<(f64, Patch)> {
+    fn survey(&self, segment: &Segment) -> Vec<(f64, Patch)> {
         let Some(surveyor) = &self.surveyor else { return Vec::new() };
         let surveyor = SurfelMaker { lidar: self.maker.lidar, ..surveyor.clone() };
-        let seen = surveyor.build(&stretch.beams, &self.nominal, &self.clock, &self.biases);
+        let seen = surveyor.build(&segment.beams, &self.nominal, &self.clock, &self.biases);
         let placing = self.placing();
         seen.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
     }
 
-    /// Removes the oldest stretch, whose states become final. Returns the patches of it in the map frame.
+    /// Removes the oldest segment, whose states become final. Returns the patches of it in the map frame.
     pub(super) fn let_go(&mut self, linearised: Option<&Linearised>) -> Option<Vec<Patch>> {
         let start_s = self.next_start_s()?;
-        let oldest = self.stretches.pop_front()?;
+        let oldest = self.segments.pop_front()?;
         let placed = oldest.surfels.iter().map(|surfel| surfel.place(&self.placing()).patch).collect();
         let by_lidar = linearised.and_then(|at| self.hangs_on_lidar(start_s, at));
         self.start = Start { by_lidar, ..Start::held(start_s) };
         self.rests.forget_before(start_s);
         self.wide_matching = false;
-        let share = 1.0 / (self.stretches.len() + 1) as f64;
+        let share = 1.0 / (self.segments.len() + 1) as f64;
         self.border.remember(share, self.spec.step_s);
         Some(placed)
     }
 
     /// The largest estimated scale error or misalignment of the IMU.
     pub(super) fn imu_matrix(&self) -> f64 {
-        self.exaggerates.gyro.amax().max(self.exaggerates.accel.amax())
+        self.scale_misalignment.gyro.amax().max(self.scale_misalignment.accel.amax())
     }
 
     /// The estimated corrections of the lidar calibration.
@@ -347,7 +347,7 @@ impl Window {
         if !self.spec.extrinsics.estimated {
             return lidar;
         }
-        let imu_from_gyro = Rotation::from_scaled_axis(self.exaggerates.accel_against_gyro() * 0.5);
+        let imu_from_gyro = Rotation::from_scaled_axis(self.scale_misalignment.accel_against_gyro() * 0.5);
         let place = self.maker.laser_in_imu + lidar.shift;
         let shift = lidar.shift + imu_from_gyro * place - place;
         LidarCorrection { turn: imu_from_gyro * lidar.turn, shift, ..lidar }

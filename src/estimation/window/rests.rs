@@ -1,6 +1,6 @@
 //! Rests after the start: zero-velocity and zero-rate measurements.
 
-use crate::estimation::initial::Rest;
+use crate::estimation::initial::RestReadings;
 use crate::estimation::strapdown::{Biases, Interval};
 
 /// A rest lasts at least this long, s.
@@ -19,7 +19,7 @@ const SPEED_M_PER_S: f64 = 0.15;
 #[derive(Debug, Default)]
 pub(super) struct Rests {
     /// The IMU readings of a possible rest, and the start of it, IMU time, s.
-    candidate: Option<(Rest, f64)>,
+    candidate: Option<(RestReadings, f64)>,
     /// Duration of the missing samples so far, s.
     missing_s: f64,
     /// Start and end of each rest, in order, IMU time, s.
@@ -33,12 +33,12 @@ impl Rests {
         if interval.bridged && self.missing_s < MISSING_S {
             return;
         }
-        let goes_on = self.candidate.is_some_and(|(rest, _)| rest.goes_on(interval));
+        let continues = self.candidate.is_some_and(|(rest, _)| rest.agrees_with(interval));
         let is_still = (interval.gyro - biases.gyro).norm() < RATE_RAD_PER_S + 6.0 * interval.gyro_sigma
             && !interval.bridged
             && speed_m_per_s < SPEED_M_PER_S;
-        if !(goes_on && is_still) {
-            self.candidate = is_still.then(|| (Rest::from(interval), end_s));
+        if !(continues && is_still) {
+            self.candidate = is_still.then(|| (RestReadings::from(interval), end_s));
             return;
         }
         let Some((_, since_s)) = self.candidate else { return };

@@ -11,7 +11,7 @@ use crate::estimation::residual::{
     RANGE,
 };
 use crate::estimation::spent::{Stopwatch, TimeSpent};
-use crate::estimation::strapdown::Exaggerates;
+use crate::estimation::strapdown::ImuScaleMisalignment;
 use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
@@ -53,7 +53,7 @@ impl Window {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
         let lidar = self.maker.lidar;
-        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.exaggerates);
+        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.scale_misalignment);
         self.border.begin_window();
         let mut total = vec![0.0; layout.border()];
         let mut solved = Solved::default();
@@ -99,7 +99,7 @@ impl Window {
             }
         }
         if solved.trouble.is_some() {
-            (self.nominal, self.clock, self.biases, self.gravity, self.exaggerates) = backup;
+            (self.nominal, self.clock, self.biases, self.gravity, self.scale_misalignment) = backup;
             self.maker.lidar = lidar;
             self.border.take_back();
             linearised = None;
@@ -137,9 +137,9 @@ impl Window {
         self.clock.rate += border[CLOCK_RATE];
         self.border.moved(border, &self.workspace.factor);
         let matrix = |at: usize| Matrix::from_fn(|r, c| border[at + 3 * r + c]);
-        let more = Exaggerates { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
-        self.nominal.measured_without(&more);
-        self.exaggerates.add(&more);
+        let more = ImuScaleMisalignment { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
+        self.nominal.correct_readings(&more);
+        self.scale_misalignment.add(&more);
         self.maker.lidar.range_m += border[RANGE];
         self.maker.lidar.turn = Rotation::from_scaled_axis(three(LIDAR_TURN)) * self.maker.lidar.turn;
         self.maker.lidar.shift += three(LIDAR_SHIFT);
