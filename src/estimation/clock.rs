@@ -31,7 +31,7 @@ impl Clock {
     }
 
     /// The same clock, told from another instant.
-    pub(super) fn told_from(&self, at_s: f64) -> Self {
+    pub(super) fn with_reference_at(&self, at_s: f64) -> Self {
         Self { offset_s: self.offset_at(at_s), rate: self.rate, at_s }
     }
 }

@@ -11,9 +11,9 @@ use crate::geometry::Vector;
 /// Edge of the cells by which views are compared, m.
 const CELL_M: f64 = 1.0;
 /// An older view is preferred when it adds at least this fraction of what the best one adds.
-const ABOUT_EQUAL: f64 = 0.7;
+const OLDER_VIEW_RATIO: f64 = 0.7;
 /// A view that adds less than this fraction of the window's cells is not worth its matches.
-const WORTHWHILE: f64 = 0.02;
+const MIN_ADDED_FRACTION: f64 = 0.02;
 
 /// The number of the view that is a map.
 pub(super) const MAP: u64 = u64::MAX;
@@ -32,18 +32,18 @@ pub(super) struct View {
 
 /// What became of a stretch's patches.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Taken {
+pub(super) struct ViewUpdate {
     /// The number of the view that was kept.
-    pub(super) kept: Option<u64>,
-    /// The number of the one forgotten for it.
-    pub(super) forgotten: Option<u64>,
+    pub(super) added: Option<u64>,
+    /// The number of the one removed for it.
+    pub(super) removed: Option<u64>,
 }
 
 /// The views kept, and the stretch that may become the next one.
 #[derive(Debug)]
 pub(super) struct Views {
     spec: ViewSpec,
-    active: usize,
+    max_active: usize,
     kept: Vec<View>,
     gathering: Vec<Patch>,
     gathered_s: f64,
@@ -51,12 +51,12 @@ pub(super) struct Views {
 }
 
 impl Views {
-    pub(super) fn new(spec: &ViewSpec, active: usize) -> Self {
-        Self { spec: spec.clone(), active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
+    pub(super) fn new(spec: &ViewSpec, max_active: usize) -> Self {
+        Self { spec: spec.clone(), max_active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
     }
 
-    /// The same views, and a map, which every window matches and which is never forgotten.
-    pub(super) fn in_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
+    /// The same views, and a map, which every window matches and which is never removed.
+    pub(super) fn with_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
         let (forest, cells) = (matcher.plant(patches), cells_of(patches.iter()));
         self.kept.insert(0, View { patches: patches.to_vec(), forest, cells, number: MAP, pivot });
         self
@@ -68,14 +68,19 @@ impl Views {
     }
 
     /// Takes the patches of a stretch of `seconds` that has left the window, the IMU being at `pivot` in the end.
-    pub(super) fn take(&mut self, patches: &[Patch], seconds: f64, (matcher, pivot): (&Matcher, Vector)) -> Taken {
-        if self.active == 0 {
-            return Taken::default();
+    pub(super) fn add_segment(
+        &mut self,
+        patches: &[Patch],
+        seconds: f64,
+        (matcher, pivot): (&Matcher, Vector),
+    ) -> ViewUpdate {
+        if self.max_active == 0 {
+            return ViewUpdate::default();
         }
         self.gathering.extend(patches);
         self.gathered_s += seconds;
         if self.gathered_s < self.spec.length_s - 1e-9 {
-            return Taken::default();
+            return ViewUpdate::default();
         }
         self.gathered_s = 0.0;
         let patches = std::mem::take(&mut self.gathering);
@@ -86,17 +91,18 @@ impl Views {
         }
         let covered = 1.0 - seen.len() as f64 / cells.len().max(1) as f64;
         if cells.is_empty() || covered >= self.spec.keep_below_coverage {
-            return Taken::default();
+            return ViewUpdate::default();
         }
-        let forgotten = if self.kept.len() - self.maps() >= self.spec.max_kept { self.forget_one() } else { None };
+        let removed =
+            if self.kept.len() - self.maps() >= self.spec.max_kept { self.remove_most_redundant() } else { None };
         let (forest, number) = (matcher.plant(&patches), self.next);
         self.next += 1;
         self.kept.push(View { patches, forest, cells, number, pivot });
-        Taken { kept: Some(number), forgotten }
+        ViewUpdate { added: Some(number), removed }
     }
 
     /// Forgets the view whose cells the others cover best; the first such. Its number.
-    fn forget_one(&mut self) -> Option<u64> {
+    fn remove_most_redundant(&mut self) -> Option<u64> {
         let own = |index: usize| {
             let mut cells = self.kept[index].cells.clone();
             for (other, view) in self.kept.iter().enumerate() {
@@ -111,19 +117,19 @@ impl Views {
     }
 
     /// The views to use for a window that sees `placed`: indices into [`Views::view`].
-    pub(super) fn choose(&self, placed: &[Placed]) -> Vec<usize> {
+    pub(super) fn select(&self, placed: &[Placed]) -> Vec<usize> {
         let mut missing = cells_of(placed.iter().map(|surfel| &surfel.patch));
-        let worthwhile = ((missing.len() as f64 * WORTHWHILE) as usize).max(1);
+        let worthwhile = ((missing.len() as f64 * MIN_ADDED_FRACTION) as usize).max(1);
         let mut chosen: Vec<usize> = (0..self.maps()).collect();
         chosen.iter().for_each(|map| remove(&mut missing, &self.kept[*map].cells));
-        let most = self.maps() + self.active.min(self.kept.len() - self.maps());
+        let most = self.maps() + self.max_active.min(self.kept.len() - self.maps());
         while chosen.len() < most {
             let adds: Vec<usize> = self.kept.iter().map(|view| common(&missing, &view.cells)).collect();
             let best = adds.iter().copied().max().unwrap_or(0);
             if best < worthwhile {
                 break;
             }
-            let enough = (best as f64 * ABOUT_EQUAL) as usize;
+            let enough = (best as f64 * OLDER_VIEW_RATIO) as usize;
             let Some(oldest) = adds.iter().position(|count| *count >= enough.max(worthwhile)) else { break };
             remove(&mut missing, &self.kept[oldest].cells);
             chosen.push(oldest);

@@ -5,7 +5,8 @@ use super::atomic_file::AtomicFile;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{
-    Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, blocks, doubt, findings, radius_99,
+    Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, bound_factors, covariance_blocks, findings,
+    radius_99,
 };
 use crate::evaluation::{Errors, Pairs, align_poses};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
@@ -16,7 +17,7 @@ use std::path::Path;
 
 /// The bound of a position is at least this, m.
 const LEAST_BOUND_M: f64 = 0.001;
-/// The error after the alignment is this share of what the covariance says, in runs without doubt: the covariance takes
+/// The error after the alignment is this share of what the covariance says, in runs without bound_factors: the covariance takes
 /// the matches of one surface for independent with a standard deviation of 10 mm each, and what they err in common the
 /// alignment takes away. With 0.47, 99 % of the poses were within their bound in each of 56 runs of 14 kinds; with 0.36
 /// in 86 % of them. A run shorter than 40 s is aligned over less and keeps more, up to all of it: as the root of the
@@ -41,7 +42,7 @@ struct PoseBound {
 
 /// The bounds of the poses of `trajectory`.
 fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
-    let doubts = doubt(&run.windows);
+    let doubts = bound_factors(&run.windows);
     let aligned_until = aligned_until(trajectory).unwrap_or(run.recorded.0);
     let share = aligned_share(trajectory);
     let radii_m = radii(run);
@@ -52,7 +53,7 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
             current = Some((covariance, *radius_m));
         }
         let (covariance, radius_m) = current?;
-        let (position, attitude) = blocks(covariance);
+        let (position, attitude) = covariance_blocks(covariance);
         // What is aligned together is as doubtful as its end.
         let after =
             doubts.partition_point(|(at, _)| *at < stamp.max(aligned_until)).min(doubts.len().saturating_sub(1));
@@ -85,7 +86,8 @@ fn radii(run: &OpenLoopRun) -> Vec<f64> {
     let mut radii_m = run.radii_m.clone();
     let Some(((first, _), (last, _))) = run.covariances.first().zip(run.covariances.last()) else { return radii_m };
     let is_short = last.seconds_since(*first) < 2.0 * GAUGED_S;
-    let marks_m: Vec<f64> = run.gauged.iter().map(|(_, covariance)| radius_99(&blocks(covariance).0)).collect();
+    let marks_m: Vec<f64> =
+        run.gauged.iter().map(|(_, covariance)| radius_99(&covariance_blocks(covariance).0)).collect();
     let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| is_short || stamp.seconds_since(*first) < GAUGED_S;
     let aligned = run.covariances.partition_point(is_aligned);
     let end_m = aligned.checked_sub(1).filter(|_| !is_short).map_or(0.0, |last| radii_m[last]);

@@ -7,7 +7,7 @@ use self::samples::{Coverage, SampleQueue};
 use self::scans::ScanQueue;
 use super::inertial::InertialStream;
 use super::initial::NoiseFactors;
-use super::sight::Sight;
+use super::scan_geometry::ScanGeometry;
 use super::spec::EstimatorSpec;
 use super::stamps::StampFilter;
 use super::strapdown::Interval;
@@ -119,8 +119,8 @@ impl Intake {
     }
 
     /// The scanning geometry of the lidar, according to the first scans.
-    pub(super) fn sight(&self) -> Sight {
-        self.scans.sight()
+    pub(super) fn scan_geometry(&self) -> ScanGeometry {
+        self.scans.scan_geometry()
     }
 
     /// Numbers of IMU samples and lidar scans received.

@@ -1,7 +1,7 @@
 //! Lidar input: queues scans, discards frozen ones, and converts them to beams with smoothed times.
 
 use crate::estimation::EstimationError;
-use crate::estimation::sight::{Sight, is_in_plane};
+use crate::estimation::scan_geometry::{ScanGeometry, is_in_plane};
 use crate::estimation::spec::EstimatorSpec;
 use crate::estimation::stamps::StampFilter;
 use crate::estimation::surfel::Beam;
@@ -37,7 +37,7 @@ pub(super) struct ScanQueue {
     pub(super) frozen: usize,
     /// Number of repeats of the newest scan, and the fingerprint of it.
     repeated: (usize, u64),
-    sight: Sight,
+    scan_geometry: ScanGeometry,
     /// Whether all points so far lie in the x-y plane of the lidar.
     planar: bool,
     filter: Option<StampFilter>,
@@ -56,7 +56,7 @@ impl ScanQueue {
             late: 0,
             frozen: 0,
             repeated: (0, 0),
-            sight: Sight::default(),
+            scan_geometry: ScanGeometry::default(),
             planar: true,
             filter: None,
             beams: VecDeque::new(),
@@ -112,8 +112,8 @@ impl ScanQueue {
     }
 
     /// The scanning geometry of the lidar, according to the first scans.
-    pub(super) fn sight(&self) -> Sight {
-        self.sight
+    pub(super) fn scan_geometry(&self) -> ScanGeometry {
+        self.scan_geometry
     }
 
     /// Estimates the scan period and the scanning geometry from the scans up to `enough_s`.
@@ -121,7 +121,8 @@ impl ScanQueue {
         let first_scans = || self.waiting.iter().filter(|(s, ..)| *s <= enough_s);
         let stamps: Vec<f64> = first_scans().map(|(s, scan, _)| s + scan.stamped_after.seconds()).collect();
         let scanning = Regularity::of(&stamps)?;
-        self.sight = Sight::of(first_scans().map(|(_, scan, _)| scan), enough_s - first_scan, scanning.period_s);
+        self.scan_geometry =
+            ScanGeometry::of(first_scans().map(|(_, scan, _)| scan), enough_s - first_scan, scanning.period_s);
         self.filter = Some(StampFilter::new(scanning, self.spec.clock.jitter_s));
         Some(())
     }

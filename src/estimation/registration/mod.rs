@@ -44,7 +44,7 @@ use super::EstimatorSpec;
 use super::gaps::{Gaps, restored};
 use super::matching::Matcher;
 use super::survey::Survey;
-use super::window::Moved;
+use super::window::Displacement;
 use crate::geometry::{PoseCovariance, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
 use crate::time::Stamp;
@@ -274,7 +274,7 @@ impl<'a> Registration<'a> {
                 let (x, step) = equations.solve().ok_or("its equations are singular")?;
                 let three = Vector::from_column_slice;
                 let knots = x.chunks_exact(6).map(|knot| (three(&knot[..3]), three(&knot[3..])));
-                let Moved { shift, turn } = Moved::greatest(knots);
+                let Displacement { shift, turn } = Displacement::max_of(knots);
                 if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
                     return Err("its correction is too large");
                 }

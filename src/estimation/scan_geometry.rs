@@ -20,7 +20,7 @@ const ONE_WAY: f64 = 0.8;
 
 /// What the first scans show of the lidar.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Sight {
+pub(super) struct ScanGeometry {
     /// Beams that came back, a second.
     points_per_s: f64,
     /// Length of the mean of their directions, 0..1.
@@ -29,7 +29,7 @@ pub(super) struct Sight {
     planar_period_s: Option<f64>,
 }
 
-impl Sight {
+impl ScanGeometry {
     /// Of scans that took `seconds`, one every `period_s`.
     pub(super) fn of<'a>(scans: impl Iterator<Item = &'a LidarScan>, seconds: f64, period_s: f64) -> Self {
         let (mut sum, mut count, mut planar) = (Vector::zeros(), 0.0, true);
@@ -102,26 +102,29 @@ mod tests {
     fn a_fan_is_one_sided_by_the_sine_of_its_half_angle_over_it() {
         for half_deg in [20.0_f64, 90.0, 135.0] {
             let half = half_deg.to_radians();
-            let sight = Sight::of([fan(half_deg, 20_001)].iter(), 1.0, 0.025);
+            let sight = ScanGeometry::of([fan(half_deg, 20_001)].iter(), 1.0, 0.025);
             assert!((sight.one_sidedness - half.sin().abs() / half).abs() < 1e-3, "{half_deg}: {sight:?}");
         }
-        assert!(Sight::of([fan(20.0, 500)].iter(), 1.0, 0.025).is_one_way());
-        assert!(!Sight::of([fan(90.0, 500)].iter(), 1.0, 0.025).is_one_way());
+        assert!(ScanGeometry::of([fan(20.0, 500)].iter(), 1.0, 0.025).is_one_way());
+        assert!(!ScanGeometry::of([fan(90.0, 500)].iter(), 1.0, 0.025).is_one_way());
     }
 
     #[test]
     fn a_dense_lidar_changes_nothing_and_a_sparse_one_asks_for_fewer_points() {
         let spec = load("default").unwrap();
         let dense: Vec<LidarScan> = (0..40).map(|_| fan(135.0, 1081)).collect();
-        assert_eq!(Sight::of(dense.iter(), 1.0, 0.025).fit(&spec), spec);
+        assert_eq!(ScanGeometry::of(dense.iter(), 1.0, 0.025).fit(&spec), spec);
         let sparse: Vec<LidarScan> = (0..40).map(|_| fan(135.0, 350)).collect();
-        assert_eq!(Sight::of(sparse.iter(), 1.0, 0.025).fit(&spec).surfels.min_points, spec.surfels.min_points / 2);
-        let poor = Sight::of([fan(135.0, 100)].iter(), 1.0, 0.025).fit(&spec);
+        assert_eq!(
+            ScanGeometry::of(sparse.iter(), 1.0, 0.025).fit(&spec).surfels.min_points,
+            spec.surfels.min_points / 2
+        );
+        let poor = ScanGeometry::of([fan(135.0, 100)].iter(), 1.0, 0.025).fit(&spec);
         assert_eq!(poor.surfels.min_points, FEWEST_POINTS);
         // Asked for fewer still, it has its way.
         let mut few = spec;
         few.surfels.min_points = 5;
-        assert_eq!(Sight::of([fan(135.0, 100)].iter(), 1.0, 0.025).fit(&few).surfels.min_points, 5);
+        assert_eq!(ScanGeometry::of([fan(135.0, 100)].iter(), 1.0, 0.025).fit(&few).surfels.min_points, 5);
     }
 
     #[test]
@@ -129,7 +132,7 @@ mod tests {
         let spec = load("default").unwrap();
         let at = |period_s: f64, elevation: f64| {
             let scans = [scan((0..2000).map(|k| k as f64 * 0.003), elevation), fan(180.0, 2000)];
-            Sight::of(scans.iter(), 0.1, period_s).fit(&spec).surfels
+            ScanGeometry::of(scans.iter(), 0.1, period_s).fit(&spec).surfels
         };
         assert!(at(0.1, 0.0).split_gap_s > 0.11 && at(0.2, 0.0).max_duration_s > 0.4);
         assert_eq!(at(0.025, 0.0), spec.surfels);
@@ -138,8 +141,8 @@ mod tests {
 
     #[test]
     fn of_nothing_seen_nothing_is_said() {
-        let nothing = Sight::of([scan(std::iter::empty(), 0.0)].iter(), 1.0, 0.025);
-        assert_eq!(nothing, Sight::default());
+        let nothing = ScanGeometry::of([scan(std::iter::empty(), 0.0)].iter(), 1.0, 0.025);
+        assert_eq!(nothing, ScanGeometry::default());
         assert!(!nothing.is_one_way());
         let spec = load("default").unwrap();
         assert_eq!(nothing.fit(&spec), spec);
