@@ -1,45 +1,45 @@
-//! Fixed views: stretches of the past whose surfels stand still in the map, for the window's surfels to match.
+//! Fixed views (keyframes): surfels of past segments, fixed in the map, with which the window is matched.
 //!
-//! A stretch that left the window is kept when it shows cells that the kept ones do not. Of those kept, a window uses
-//! the few that cover most of what it sees now, and the oldest of about equal ones: an old view has drifted less.
+//! Segments that left the window become a view if they cover cells that the stored views do not. A window uses the few
+//! views that cover most of its cells. Of about equal ones it uses the oldest, which has drifted least.
 
 use super::matching::{Forest, Matcher};
 use super::spec::ViewSpec;
 use super::surfel::{Patch, Placed};
 use crate::geometry::Vector;
 
-/// Edge of the cells by which views are compared, m.
+/// Edge length of the cells with which the coverage of views is compared, m.
 const CELL_M: f64 = 1.0;
-/// An older view is preferred when it adds at least this fraction of what the best one adds.
+/// An older view is preferred if it adds at least this fraction of the cells that the best one adds.
 const OLDER_VIEW_RATIO: f64 = 0.7;
-/// A view that adds less than this fraction of the window's cells is not worth its matches.
+/// Minimum fraction of the cells of the window that a view must add to be used.
 const MIN_ADDED_FRACTION: f64 = 0.02;
 
-/// The number of the view that is a map.
+/// View number of the given map.
 pub(super) const MAP: u64 = u64::MAX;
 
-/// A stretch of the past, or a map.
+/// A fixed view, or a given map.
 #[derive(Debug)]
 pub(super) struct View {
     pub(super) patches: Vec<Patch>,
     pub(super) forest: Forest,
     cells: Vec<u64>,
-    /// Its number, counted from the first view kept.
+    /// View number, in order of storage.
     pub(super) number: u64,
-    /// About what its errors turn: where the IMU was when it was kept, m.
+    /// Reference point of the rotation error: the IMU position when the view was stored, m.
     pub(super) pivot: Vector,
 }
 
-/// What became of a stretch's patches.
+/// Change of the stored views.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct ViewUpdate {
-    /// The number of the view that was kept.
+    /// Number of the new view, if any.
     pub(super) added: Option<u64>,
-    /// The number of the one removed for it.
+    /// Number of the view removed in exchange, if any.
     pub(super) removed: Option<u64>,
 }
 
-/// The views kept, and the stretch that may become the next one.
+/// The stored views, and the segments collected for the next one.
 #[derive(Debug)]
 pub(super) struct Views {
     spec: ViewSpec,
@@ -55,19 +55,19 @@ impl Views {
         Self { spec: spec.clone(), max_active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
     }
 
-    /// The same views, and a map, which every window matches and which is never removed.
+    /// Adds a given map, with which every window is matched and which is never removed.
     pub(super) fn with_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
         let (forest, cells) = (matcher.plant(patches), cells_of(patches.iter()));
         self.kept.insert(0, View { patches: patches.to_vec(), forest, cells, number: MAP, pivot });
         self
     }
 
-    /// How many of those kept are a map: the first, or none.
+    /// Number of maps among the views, 0 or 1; the map is the first view.
     fn maps(&self) -> usize {
         usize::from(self.kept.first().is_some_and(|view| view.number == MAP))
     }
 
-    /// Takes the patches of a stretch of `seconds` that has left the window, the IMU being at `pivot` in the end.
+    /// Adds the patches of a segment of `seconds` that left the window; `pivot` is the IMU position at the end of it, m.
     pub(super) fn add_segment(
         &mut self,
         patches: &[Patch],
@@ -101,7 +101,7 @@ impl Views {
         ViewUpdate { added: Some(number), removed }
     }
 
-    /// Forgets the view whose cells the others cover best; the first such. Its number.
+    /// Removes the view with the fewest cells that no other view covers; returns its number.
     fn remove_most_redundant(&mut self) -> Option<u64> {
         let own = |index: usize| {
             let mut cells = self.kept[index].cells.clone();
@@ -116,7 +116,7 @@ impl Views {
         Some(self.kept.remove(least).number)
     }
 
-    /// The views to use for a window that sees `placed`: indices into [`Views::view`].
+    /// Selects the views for a window with the surfels `placed`; returns indices for [`Views::view`].
     pub(super) fn select(&self, placed: &[Placed]) -> Vec<usize> {
         let mut missing = cells_of(placed.iter().map(|surfel| &surfel.patch));
         let worthwhile = ((missing.len() as f64 * MIN_ADDED_FRACTION) as usize).max(1);
@@ -137,7 +137,7 @@ impl Views {
         chosen
     }
 
-    /// All that the views show.
+    /// The patches of all views.
     pub(super) fn patches(&self) -> impl Iterator<Item = &Patch> {
         self.kept.iter().flat_map(|view| &view.patches)
     }
@@ -147,7 +147,7 @@ impl Views {
     }
 }
 
-/// The cells in which patches lie, sorted; the side from which they are seen counts.
+/// Sorted keys of the cells that contain patches; patches seen from different sides have different keys.
 pub(super) fn cells_of<'a>(patches: impl Iterator<Item = &'a Patch>) -> Vec<u64> {
     let part = |x: f64| (((x / CELL_M).floor() as i64).wrapping_add(1 << 19)) as u64 & 0xf_ffff;
     let facing = |patch: &Patch| {
@@ -165,7 +165,7 @@ pub(super) fn cells_of<'a>(patches: impl Iterator<Item = &'a Patch>) -> Vec<u64>
     cells
 }
 
-/// How many cells two sorted lists have in common.
+/// Number of common cells of two sorted lists.
 fn common(a: &[u64], b: &[u64]) -> usize {
     let (mut i, mut j, mut count) = (0, 0, 0);
     while i < a.len() && j < b.len() {
@@ -180,7 +180,7 @@ fn common(a: &[u64], b: &[u64]) -> usize {
     count
 }
 
-/// Removes from a sorted list what another has.
+/// Removes the cells of a sorted list from another one.
 fn remove(from: &mut Vec<u64>, others: &[u64]) {
     from.retain(|cell| others.binary_search(cell).is_err());
 }

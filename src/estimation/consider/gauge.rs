@@ -1,4 +1,4 @@
-//! Covariance of the pose error after the trajectory is aligned with the truth over the first seconds.
+//! Covariance of the pose error after alignment of the trajectory with the truth over the first seconds.
 
 use super::{Consider, START_STATES, View, pose_error_matrix};
 use crate::estimation::output::TURN_LEVER_M;
@@ -8,21 +8,22 @@ use nalgebra::{Matrix6, SMatrix};
 
 /// The view number of the gauge; the last number is that of the map.
 const GAUGE: u64 = u64::MAX - 1;
-/// The number of the first start marked while the gauge is built; later ones count down from it.
+/// The view number of the first window start marked while the gauge is built; later ones count down from it.
 const FIRST_MARK: u64 = GAUGE - 1;
 
-/// The rigid transform that aligns the beginnings so far with the truth, by least squares: relative to it a pose error
-/// is that of a trajectory aligned over the first part of the recording. The right-hand side, a sum over the
-/// beginnings' errors, is stored as a view.
+/// The rigid transform that aligns the first window starts with the truth by least squares.
+///
+/// A pose error relative to it is that of a trajectory aligned over the first seconds of the recording. The right-hand
+/// side, a sum over the errors of the window starts, is stored as a view.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gauge {
     /// Pivot of the rotation, m.
     pivot: Vector,
-    /// The normal matrix; from the positions of the beginnings only.
+    /// The normal matrix, which depends only on the positions of the window starts.
     normal: Matrix6<f64>,
 }
 
-/// A start stored as a view until the gauge is complete.
+/// A window start stored as a view until the gauge is complete.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mark {
     number: u64,
@@ -31,30 +32,30 @@ pub(super) struct Mark {
 }
 
 impl Consider {
-    /// The same of the error against the gauge; against the map where there is none.
-    pub(in crate::estimation) fn covariance_against_gauge(&self, place: &Vector) -> Matrix6<f64> {
+    /// The same as [`Consider::covariance_at`] relative to the gauge; relative to the map if there is no gauge.
+    pub(in crate::estimation) fn covariance_against_gauge(&self, point: &Vector) -> Matrix6<f64> {
         let with_start = |at: usize| self.views[at].with_start.fixed_columns::<6>(0).into_owned();
-        let by = pose_error_matrix(&(place - self.pivot));
-        self.against_gauge(place, (&by, self.start.fixed_view::<6, 6>(0, 0).into_owned()), with_start)
+        let by = pose_error_matrix(&(point - self.pivot));
+        self.against_gauge(point, (&by, self.start.fixed_view::<6, 6>(0, 0).into_owned()), with_start)
     }
 
-    /// The same for an error of covariance `own` that moves `place` by `by`; `with` returns its covariance with the
-    /// view at the given index, the gauge.
+    /// The same for an error with covariance `own` and effect `by` on `point`; `with` returns the covariance of that error
+    /// with the view at an index, here the gauge.
     fn against_gauge(
         &self,
-        place: &Vector,
+        point: &Vector,
         (by, own): (&Matrix6<f64>, Matrix6<f64>),
         with: impl Fn(usize) -> Matrix6<f64>,
     ) -> Matrix6<f64> {
         let own = by * own * by.transpose();
         let solved = self.gauge.and_then(|gauge| Some((gauge.pivot, gauge.normal.cholesky()?.inverse())));
         let (Some((pivot, solved)), Some(at)) = (solved, self.gauge_index()) else { return own };
-        let by_gauge = pose_error_matrix(&(place - pivot)) * solved;
+        let by_gauge = pose_error_matrix(&(point - pivot)) * solved;
         let cross = by_gauge * with(at) * by.transpose();
         own + by_gauge * self.between(at, at) * by_gauge.transpose() - cross - cross.transpose()
     }
 
-    /// Makes the start part of the gauge.
+    /// Adds the current window start to the gauge.
     pub(in crate::estimation) fn add_start_to_gauge(&mut self) {
         let own = self.start.fixed_view::<6, 6>(0, 0).into_owned();
         let with_start = self.start.fixed_rows::<6>(0).into_owned();
@@ -63,7 +64,7 @@ impl Consider {
         self.add_to_gauge(self.pivot, own, with_start, &with_views);
     }
 
-    /// Makes the gauge anew of the beginnings that were marked up to `until`.
+    /// Builds the gauge again, from the window starts marked up to `until`.
     pub(in crate::estimation) fn rebuild_gauge(&mut self, until: Stamp) {
         self.remove_view(GAUGE);
         self.gauge = None;
@@ -74,7 +75,7 @@ impl Consider {
         }
     }
 
-    /// Makes an error about `pivot` part of the gauge, of covariance `own`, and `with` the start and the views.
+    /// Adds an error about `pivot` to the gauge: covariance `own`, and covariances with the window start and the views.
     fn add_to_gauge(
         &mut self,
         pivot: Vector,
@@ -108,31 +109,30 @@ impl Consider {
         self.gauge = Some(Gauge { normal: gauge.normal + by.transpose() * weight * by, ..gauge });
     }
 
-    /// Stores the start at `stamp` until the gauge is complete.
+    /// Stores the current window start, at `stamp`, until the gauge is complete.
     pub(in crate::estimation) fn mark_start(&mut self, stamp: Stamp) {
         let number = self.marks.last().map_or(FIRST_MARK, |last| last.number - 1);
         self.add_view(number);
         self.marks.push(Mark { number, pivot: self.pivot, stamp });
     }
 
-    /// When the first start was that is still marked.
+    /// Stamp of the first marked window start.
     pub(in crate::estimation) fn first_mark(&self) -> Option<Stamp> {
         self.marks.first().map(|mark| mark.stamp)
     }
 
-    /// Completes the gauge: returns the stamps of the marked beginnings and the covariances of their errors relative to
-    /// it.
+    /// Removes the marks; returns their stamps and the covariances of their errors relative to the gauge.
     pub(in crate::estimation) fn take_marks(&mut self) -> Vec<(Stamp, Matrix6<f64>)> {
         let marks = std::mem::take(&mut self.marks);
-        let told = marks.iter().filter_map(|mark| {
+        let covariances = marks.iter().filter_map(|mark| {
             let own = self.views.iter().position(|view| view.number == mark.number)?;
             let with = |at: usize| self.between(at, own);
             let by = pose_error_matrix(&Vector::zeros());
             Some((mark.stamp, self.against_gauge(&mark.pivot, (&by, self.between(own, own)), with)))
         });
-        let told = told.collect();
+        let covariances = covariances.collect();
         marks.iter().for_each(|mark| self.remove_view(mark.number));
-        told
+        covariances
     }
 
     fn gauge_index(&self) -> Option<usize> {
@@ -148,25 +148,25 @@ mod tests {
     use approx::assert_relative_eq;
     use nalgebra::DMatrix;
 
-    /// Relative to a gauge built from the beginnings marked until then.
-    fn anew(consider: &Consider, until_ns: i64, place: &Vector) -> Matrix6<f64> {
+    /// Covariance relative to a gauge built from the window starts marked until then.
+    fn rebuilt(consider: &Consider, until_ns: i64, point: &Vector) -> Matrix6<f64> {
         let mut of_marks = consider.clone();
         of_marks.rebuild_gauge(Stamp::from_nanos(until_ns));
-        of_marks.covariance_against_gauge(place)
+        of_marks.covariance_against_gauge(point)
     }
 
-    /// Against the definition: the least-squares alignment of the beginnings' errors, each a row of coefficients of
-    /// independent noises, by a singular value decomposition of the stacked equations.
+    /// Compares with the definition: least-squares alignment of the errors of the window starts, each a row of coefficients
+    /// of independent noises, by a singular value decomposition of the stacked equations.
     #[test]
-    fn an_error_against_the_gauge_is_what_an_alignment_leaves() {
+    fn an_error_relative_to_the_gauge_is_the_residual_of_the_alignment() {
         let root = wave::<START_STATES>(31);
         let mut consider = Consider::new(Vector::new(0.3, -0.2, 0.1), &(root * root.transpose()));
         let sources = START_STATES * 7;
         let mut start = DMatrix::<f64>::zeros(START_STATES, sources);
         start.view_mut((0, 0), (START_STATES, START_STATES)).copy_from(&root);
-        let place = Vector::new(4.0, -3.0, 1.0);
+        let point = Vector::new(4.0, -3.0, 1.0);
         let at = |start: &DMatrix<f64>, pivot: &Vector| {
-            let by = pose_error_matrix(&(place - pivot));
+            let by = pose_error_matrix(&(point - pivot));
             DMatrix::from_fn(6, 6, |r, c| by[(r, c)]) * start.rows(0, 6)
         };
         let mut weight = DMatrix::<f64>::identity(6, 6);
@@ -197,23 +197,23 @@ mod tests {
         }
         let pivot = consider.pivot();
         let aligned = equations.svd(true, true).solve(&errors, 1e-12).unwrap();
-        let left = |error: &DMatrix<f64>, place: &Vector| {
-            let by = pose_error_matrix(place);
+        let left = |error: &DMatrix<f64>, point: &Vector| {
+            let by = pose_error_matrix(point);
             let error = error - DMatrix::from_fn(6, 6, |r, c| by[(r, c)]) * &aligned;
             &error * error.transpose()
         };
-        let told = consider.covariance_against_gauge(&place);
+        let incremental = consider.covariance_against_gauge(&point);
         let (mark, own) = marked.unwrap();
-        // Rebuilt from the same beginnings the gauge is the same; from half of them it differs.
-        assert!((anew(&consider, 1, &place) - told).norm() > 0.01 * told.norm());
-        let anew = anew(&consider, 3, &place);
+        // Rebuilt from the same window starts, the gauge is the same; from half of them it differs.
+        assert!((rebuilt(&consider, 1, &point) - incremental).norm() > 0.01 * incremental.norm());
+        let rebuilt = rebuilt(&consider, 3, &point);
         let marks = consider.take_marks();
         assert_eq!(marks[2].0, Stamp::from_nanos(2));
-        let expected = left(&at(&start, &pivot), &place);
-        let pairs = [(told, expected.clone()), (anew, expected), (marks[2].1, left(&own, &mark))];
-        for (told, expected) in pairs {
+        let expected = left(&at(&start, &pivot), &point);
+        let pairs = [(incremental, expected.clone()), (rebuilt, expected), (marks[2].1, left(&own, &mark))];
+        for (computed, expected) in pairs {
             for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
-                assert_relative_eq!(told[(r, c)], expected[(r, c)], epsilon = 1e-8, max_relative = 1e-8);
+                assert_relative_eq!(computed[(r, c)], expected[(r, c)], epsilon = 1e-8, max_relative = 1e-8);
             }
         }
     }

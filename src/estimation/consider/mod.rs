@@ -1,17 +1,17 @@
-//! How uncertain the trajectory is, with all that a window takes for exact.
+//! Covariance of the trajectory, including the errors of the quantities that a window holds constant.
 //!
-//! A window is solved with the start and the fixed views held constant. Their errors enter the solution:
-//! with the window's answer linear in them, `e' = A e + sum V_k e_k + q`, the joint covariance of the start and of
-//! all stored views propagates from window to window (Schmidt's consider covariance, 1966; as in the stochastic
+//! A window is solved with its start and the fixed views held constant. Their errors enter the solution linearly,
+//! `e' = A e + sum V_k e_k + q`, so the joint covariance of the start and of all stored views propagates from window to
+//! window (Schmidt's consider covariance, 1966; as in the stochastic
 //! cloning of Roumeliotis and Burdick, 2002, a stored view is a copy of the start's error at that time).
-//! Without views `A` is the identity and the errors random-walk; where an old view is re-observed, `A` vanishes and the
-//! error is the view's.
+//! Without views, `A` is the identity and the errors follow a random walk. If an old view is re-observed, `A` vanishes
+//! and the error is that of the view.
 //!
-//! An error of a view is six numbers: a small rotation (rad) of the view about the pivot, then a shift (m), in
-//! the map. The error of a start is the same about the IMU's position, with the time derivatives, and the IMU state
-//! that the window inherits: biases and gravity's tilt. An error of velocity or bias persists over many windows:
-//! without these terms, the vertical drift of a head that observes neither floor nor ceiling for seconds is four times
-//! what the covariances of the separate windows predict.
+//! The error of a view has six components: a small rotation (rad) about the pivot, then a translation (m), in the map
+//! frame. The error of a window start has the same components about the IMU position, the time derivatives, and the
+//! inherited IMU states: biases and tilt of gravity. An error of velocity or bias persists over many windows. Without
+//! these terms, the vertical drift of a head that observes neither floor nor ceiling for seconds is four times the
+//! prediction.
 
 mod gauge;
 
@@ -21,26 +21,26 @@ use super::views::{MAP, ViewUpdate};
 use crate::geometry::{Vector, skew};
 use nalgebra::{Matrix6, SMatrix};
 
-/// How little is known after a silence: turn, rad, and shift, m.
+/// Standard deviations of the pose after a gap with unknown motion: rotation, rad, and translation, m.
 const GAP_SIGMA: (f64, f64) = (1.0, 1.0);
 
-/// The inherited IMU state: the first of the border's unknowns, biases and gravity's tilt.
+/// Number of inherited IMU states, the first unknowns of the border: biases and tilt of gravity.
 pub(super) const IMU_STATES: usize = 8;
-/// The state at a window's start: rotation and shift, their derivatives, and [`IMU_STATES`].
+/// Number of states at a window start: rotation and translation, their derivatives, and [`IMU_STATES`].
 pub(super) const START_STATES: usize = 12 + IMU_STATES;
-/// Index of the IMU part in it.
+/// Index of the first IMU state.
 pub(super) const IMU_OFFSET: usize = 12;
 const _: () = assert!(GYRO_BIAS == 0, "the border starts with the inherited unknowns");
 
-/// A matrix over the state at a window's start.
+/// A matrix over the states at a window start.
 pub(super) type StartMatrix = SMatrix<f64, START_STATES, START_STATES>;
 
-/// Sensitivity of a window's solution to the errors of its fixed quantities.
+/// Sensitivity of the solution of a window to the errors of the quantities held constant.
 #[derive(Debug, Clone)]
 pub(super) struct Sensitivity {
-    /// Reference point of the error: the IMU's position, m.
+    /// Reference point of the error: the IMU position, m.
     pub(super) pivot: Vector,
-    /// `A`: by the error of the window's start.
+    /// `A`: sensitivity to the error of the window start.
     pub(super) start: StartMatrix,
     /// `V_k`: sensitivity to the error of each view in use, by view number.
     pub(super) views: Vec<(u64, SMatrix<f64, START_STATES, 6>)>,
@@ -48,7 +48,7 @@ pub(super) struct Sensitivity {
     pub(super) noise: StartMatrix,
 }
 
-/// The joint covariance of the window's start and of the stored views.
+/// Consider covariance: the joint covariance of the window start and of the stored views.
 #[derive(Debug, Clone)]
 pub(super) struct Consider {
     pivot: Vector,
@@ -58,18 +58,19 @@ pub(super) struct Consider {
     marks: Vec<Mark>,
 }
 
+/// Covariances of a stored view.
 #[derive(Debug, Clone)]
 struct View {
     number: u64,
-    /// With the start: `E[e_view e_beginning^T]`.
+    /// With the window start: `E[e_view e_start^T]`.
     with_start: SMatrix<f64, 6, START_STATES>,
-    /// With the views before it, then with itself.
+    /// With the previous views, then the variance of the view.
     with_views: Vec<Matrix6<f64>>,
 }
 
 impl Consider {
-    /// For a map with the origin at `pivot`: the pose error there is zero by definition. `known` is the covariance of
-    /// the rest of the start's state.
+    /// For a map with the origin at `pivot`: the pose error there is zero by definition. `known` is the covariance of the
+    /// start states.
     pub(super) fn new(pivot: Vector, known: &StartMatrix) -> Self {
         Self { pivot, start: *known, views: Vec::new(), gauge: None, marks: Vec::new() }
     }
@@ -78,12 +79,11 @@ impl Consider {
     pub(super) fn after_gap(pivot: Vector, known: &StartMatrix) -> Self {
         let mut sigmas = [GAP_SIGMA.0; 6];
         sigmas[3..].fill(GAP_SIGMA.1);
-        let place = Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
-        Self::new(pivot, &with_pose_covariance(known, &place))
+        let pose_block = Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
+        Self::new(pivot, &with_pose_covariance(known, &pose_block))
     }
 
-    /// Of a head that was found at `pivot` in a map, with an error against it of covariance `found`, the map's own
-    /// being `of_map`.
+    /// For a head localised at `pivot` in a map: `found` is the covariance relative to the map, `of_map` that of the map.
     pub(super) fn localised(pivot: Vector, known: &StartMatrix, (found, of_map): (Matrix6<f64>, Matrix6<f64>)) -> Self {
         let mut with_start = SMatrix::<f64, 6, START_STATES>::zeros();
         with_start.fixed_view_mut::<6, 6>(0, 0).copy_from(&of_map);
@@ -91,33 +91,35 @@ impl Consider {
         Self { views: vec![map], ..Self::new(pivot, &with_pose_covariance(known, &(found + of_map))) }
     }
 
-    /// Sets the window's end: the uncertainty of the start, propagated, plus that of the measurements.
+    /// Propagates the covariance to the end of the window, and adds that of the measurements.
     pub(super) fn propagate_to(&mut self, end: &Sensitivity) {
         self.move_rigidly(end.pivot, end.noise);
     }
 
-    /// Relocalised at `pivot` after a gap, with covariance `found`, by surfaces from before the gap, which have the
-    /// uncertainty of that time; `known` as for [`Consider::new`].
+    /// Updates after relocalisation at `pivot` in the surfaces seen before a gap.
+    ///
+    /// These surfaces have the covariance from before the gap, to which `found`, that of the relocalisation, is added;
+    /// `known` as for [`Consider::new`].
     pub(super) fn relocalise(&mut self, pivot: Vector, known: &StartMatrix, found: &Matrix6<f64>) {
         self.move_rigidly(pivot, with_pose_covariance(known, found));
     }
 
-    /// A rotation of the start moves `pivot` too; `noise` is the covariance of the remaining state.
+    /// Moves the reference point rigidly to `pivot` and adds the covariance `noise`.
     fn move_rigidly(&mut self, pivot: Vector, noise: StartMatrix) {
-        let mut place = Matrix6::identity();
-        place.fixed_view_mut::<3, 3>(3, 0).copy_from(&-skew(&(pivot - self.pivot)));
-        let start = with_pose_covariance(&StartMatrix::zeros(), &place);
+        let mut pose_block = Matrix6::identity();
+        pose_block.fixed_view_mut::<3, 3>(3, 0).copy_from(&-skew(&(pivot - self.pivot)));
+        let start = with_pose_covariance(&StartMatrix::zeros(), &pose_block);
         self.advance(&Sensitivity { pivot, start, views: Vec::new(), noise });
     }
 
-    /// Advances the window: the new start depends on the old one and the views as `by` states.
+    /// Advances to the next window start, with the sensitivities `by`.
     pub(super) fn advance(&mut self, by: &Sensitivity) {
         let used: Vec<(usize, SMatrix<f64, START_STATES, 6>)> = by
             .views
             .iter()
             .filter_map(|(number, v)| Some((self.views.iter().position(|view| view.number == *number)?, *v)))
             .collect();
-        // E[e_view e'^T], then E[e_beginning e'^T].
+        // E[e_view e'^T], then E[e_start e'^T].
         let with_new: Vec<SMatrix<f64, 6, START_STATES>> = (0..self.views.len())
             .map(|k| {
                 let start = self.views[k].with_start * by.start.transpose();
@@ -136,12 +138,12 @@ impl Consider {
         }
     }
 
-    /// Pivot of the start's rotation error: the IMU's position at that time, m.
+    /// Reference point of the rotation error of the start: the IMU position at that time, m.
     pub(super) fn pivot(&self) -> Vector {
         self.pivot
     }
 
-    /// Updates the stored views: adds and removes.
+    /// Adds and removes stored views.
     pub(super) fn update_views(&mut self, update: ViewUpdate) {
         if let Some(number) = update.removed {
             self.remove_view(number);
@@ -151,16 +153,16 @@ impl Consider {
         }
     }
 
-    /// Stores a view with the start's error, relative to the current pivot.
+    /// Stores a view with the error of the window start.
     fn add_view(&mut self, number: u64) {
         let with_start = self.start.fixed_rows::<6>(0).into_owned();
-        let place = |of: &SMatrix<f64, 6, START_STATES>| of.fixed_columns::<6>(0).into_owned();
-        let before = self.views.iter().map(|view| place(&view.with_start).transpose());
-        let with_views = before.chain([place(&with_start)]).collect();
+        let pose_block = |of: &SMatrix<f64, 6, START_STATES>| of.fixed_columns::<6>(0).into_owned();
+        let before = self.views.iter().map(|view| pose_block(&view.with_start).transpose());
+        let with_views = before.chain([pose_block(&with_start)]).collect();
         self.views.push(View { number, with_start, with_views });
     }
 
-    /// A view is forgotten.
+    /// Removes a view.
     fn remove_view(&mut self, number: u64) {
         let Some(at) = self.views.iter().position(|view| view.number == number) else { return };
         self.views.remove(at);
@@ -169,10 +171,11 @@ impl Consider {
         }
     }
 
-    /// Covariance of position and then attitude, in the map's axes, of a point at `place` rigidly connected to the
-    /// start: m^2, m rad, rad^2.
-    pub(super) fn covariance_at(&self, place: &Vector) -> Matrix6<f64> {
-        let by = pose_error_matrix(&(place - self.pivot));
+    /// Covariance of position, then attitude, of a point rigidly connected to the window start.
+    ///
+    /// Both are in the map frame: m^2, m rad, rad^2.
+    pub(super) fn covariance_at(&self, point: &Vector) -> Matrix6<f64> {
+        let by = pose_error_matrix(&(point - self.pivot));
         by * self.start.fixed_view::<6, 6>(0, 0) * by.transpose()
     }
 
@@ -182,9 +185,9 @@ impl Consider {
     }
 }
 
-/// Effect of a rotation and a shift of the map on a point at `from_pivot` from the pivot: on position, then attitude.
+/// Effect of a rotation and a translation error on position and attitude of a point at `from_pivot` from the pivot.
 fn pose_error_matrix(from_pivot: &Vector) -> Matrix6<f64> {
-    // shift = t + theta x (place - pivot)
+    // shift = t + theta x (point - pivot)
     let mut by = Matrix6::zeros();
     by.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(from_pivot));
     by.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
@@ -192,10 +195,10 @@ fn pose_error_matrix(from_pivot: &Vector) -> Matrix6<f64> {
     by
 }
 
-/// `known`, with `place` as the covariance of the window's pose.
-fn with_pose_covariance(known: &StartMatrix, place: &Matrix6<f64>) -> StartMatrix {
+/// `known` with the pose block replaced.
+fn with_pose_covariance(known: &StartMatrix, pose_block: &Matrix6<f64>) -> StartMatrix {
     let mut all = *known;
-    all.fixed_view_mut::<6, 6>(0, 0).copy_from(place);
+    all.fixed_view_mut::<6, 6>(0, 0).copy_from(pose_block);
     all
 }
 
@@ -219,9 +222,9 @@ mod tests {
         }
     }
 
-    /// By the definition: every error as a row of coefficients of independent noises.
+    /// Compares with the definition: every error as a row of coefficients of independent noises.
     #[test]
-    fn the_joint_covariance_is_that_of_the_errors_written_out() {
+    fn the_joint_covariance_is_that_of_explicitly_propagated_errors() {
         // The initial covariance, and the contribution of eight windows.
         let root = wave::<START_STATES>(31);
         let mut consider = Consider::new(Vector::zeros(), &(root * root.transpose()));
@@ -260,28 +263,28 @@ mod tests {
     }
 
     #[test]
-    fn a_head_that_a_map_holds_is_as_uncertain_as_the_map_whatever_it_was_when_it_was_found() {
+    fn a_head_constrained_by_a_map_has_the_covariance_of_the_map() {
         let (found, of_map) = (Matrix6::identity() * 0.3, Matrix6::identity() * 0.02);
-        let place = |m: &StartMatrix| m.fixed_view::<6, 6>(0, 0).into_owned();
+        let pose_block = |m: &StartMatrix| m.fixed_view::<6, 6>(0, 0).into_owned();
         let by = |start: f64, map: f64| Sensitivity {
             start: StartMatrix::identity() * start,
             views: vec![(MAP, SMatrix::identity() * map)],
             ..sensitivity(1, &[])
         };
-        let noise = place(&sensitivity(1, &[]).noise);
+        let noise = pose_block(&sensitivity(1, &[]).noise);
         let after = |step: &Sensitivity| {
             let mut consider = Consider::localised(Vector::zeros(), &StartMatrix::zeros(), (found, of_map));
             consider.advance(step);
-            place(&consider.start)
+            pose_block(&consider.start)
         };
         assert_relative_eq!(after(&by(0.0, 1.0)), of_map + noise, epsilon = 1e-12);
         assert_relative_eq!(after(&by(1.0, 0.0)), found + of_map + noise, epsilon = 1e-12);
-        // Half and half: the map's error is in both halves, that of the finding in one.
+        // With equal weights, the map error is in both parts, the localisation error in one.
         assert_relative_eq!(after(&by(0.5, 0.5)), found * 0.25 + of_map + noise, epsilon = 1e-12);
     }
 
     #[test]
-    fn a_head_that_is_found_again_is_as_uncertain_as_what_was_seen_before_and_as_the_finding() {
+    fn relocalisation_adds_its_covariance_to_that_of_the_old_surfaces() {
         let root = wave::<START_STATES>(3);
         let before = root * root.transpose();
         let mut consider = Consider::new(Vector::zeros(), &before);
@@ -294,15 +297,15 @@ mod tests {
         let own = Consider::new(there, &with_pose_covariance(&known, &found));
         let expected = old.covariance_at(&there) + own.covariance_at(&there);
         assert_relative_eq!(consider.covariance_at(&there), expected, epsilon = 1e-12);
-        // Velocity and biases are independent, as at any start.
+        // Velocity and biases are independent of the pose, as at any start.
         assert_relative_eq!(consider.start[(7, 7)], 0.7, epsilon = 1e-12);
         assert_relative_eq!(consider.start[(2, 13)], 0.0, epsilon = 1e-12);
-        // The view's error is in it.
+        // The error is correlated with that of the view.
         assert!(consider.views[0].with_start.norm() > 0.1);
     }
 
     #[test]
-    fn what_is_away_from_the_pivot_moves_with_its_turn() {
+    fn a_rotation_error_moves_a_distant_point() {
         // A rotation of variance s^2 about z only, observed 3 m along x: 9 s^2 along y, correlated with the rotation.
         let mut noise = StartMatrix::zeros();
         noise[(2, 2)] = 1e-6;

@@ -338,14 +338,14 @@ impl Estimator {
             Some(*sum)
         });
         let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
-        let fitting = self.intake.scan_geometry().fit(&self.spec);
+        let adapted = self.intake.scan_geometry().adapt(&self.spec);
         if let Some(survey) = &mut self.survey {
             survey.ranges_are_held = self.intake.scan_geometry().is_one_way();
         }
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
         let seen = self.lidar_standstill();
         let may_rest = seen != Standstill::Moves;
-        let initial_state = initial::estimate((&intervals[..resting], may_rest), head_from_imu, noise, &fitting);
+        let initial_state = initial::estimate((&intervals[..resting], may_rest), head_from_imu, noise, &adapted);
         let start_s = *start_s;
         self.raise_noise(initial_state.noise_factors, start_s);
         let (initial_state, continues) = match &self.before_gap {
@@ -356,7 +356,7 @@ impl Estimator {
             let stamp = self.intake.stamp(start_s);
             self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
         }
-        let mut window = self.first_window(&fitting, &initial_state, start_s);
+        let mut window = self.first_window(&adapted, &initial_state, start_s);
         if seen == Standstill::Unknown {
             window = window.with_unobservable_rest();
         }

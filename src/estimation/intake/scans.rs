@@ -122,7 +122,7 @@ impl ScanQueue {
         let stamps: Vec<f64> = first_scans().map(|(s, scan, _)| s + scan.stamped_after.seconds()).collect();
         let scanning = Regularity::of(&stamps)?;
         self.scan_geometry =
-            ScanGeometry::of(first_scans().map(|(_, scan, _)| scan), enough_s - first_scan, scanning.period_s);
+            ScanGeometry::measure(first_scans().map(|(_, scan, _)| scan), enough_s - first_scan, scanning.period_s);
         self.filter = Some(StampFilter::new(scanning, self.spec.clock.jitter_s));
         Some(())
     }

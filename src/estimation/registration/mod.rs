@@ -124,7 +124,7 @@ pub struct Travelled<'a> {
 /// The same for any number of threads. Memory follows the data: long gaps in time are shortened first.
 pub fn register(travelled: Travelled, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
     let stamps = travelled.map_from_head.stamps();
-    let Some(gaps) = Gaps::of(stamps) else { return register_without_gaps(travelled, calibration, spec) };
+    let Some(gaps) = Gaps::between(stamps) else { return register_without_gaps(travelled, calibration, spec) };
     let map_from_head = &gaps.shorten(travelled.map_from_head);
     let covariances = &gaps.shorten_covariances(travelled.covariances);
     let survey = &gaps.shorten_survey(travelled.survey);
