@@ -5,8 +5,8 @@
 //! `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the vector from the lidar, `u` its direction, and the
 //! lidar rotated by `e` and translated by `s` along the IMU axes. A surfel of a fixed view does not move.
 //!
-//! The unknowns common to all surfels are in the border. `B` of them are used: [`COMMON`], or only the first [`COMMON_WITHOUT_EXTRINSICS`]
-//! if the lidar extrinsics are not estimated.
+//! The unknowns common to all surfels are in the border. `B` of them are used: [`COMMON`], or only the first
+//! [`COMMON_WITHOUT_EXTRINSICS`] if the lidar extrinsics are not estimated.
 
 use super::sums::{SPAN_UNKNOWNS, add_scaled, over_knots};
 use super::{CLOCK, Layout};
