@@ -5,7 +5,9 @@
 mod estimation_fixture;
 
 use estimation_fixture::{Room, Run, Score, Walk, calibration};
-use zsim::estimation::{EstimationError, Estimator, EstimatorSpec, LeftOut, OpenLoop, WarningKind, estimate_all, load};
+use zsim::estimation::{
+    Discarded, EstimationError, Estimator, EstimatorSpec, OpenLoop, WarningKind, estimate_all, load,
+};
 use zsim::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use zsim::measurement::Measurement;
 use zsim::time::{Span, Stamp};
@@ -178,9 +180,9 @@ fn warned(result: &OpenLoop, of: fn(&WarningKind) -> bool) -> usize {
 #[test]
 fn after_a_gap_of_two_seconds_the_head_is_relocalised() {
     let (result, score) = lossy(12, |m| (6.0..8.0).contains(&seconds(m)));
-    let gap = |kind: &WarningKind| matches!(kind, WarningKind::BeganAgain { seconds } if (1.9..2.1).contains(seconds));
+    let gap = |kind: &WarningKind| matches!(kind, WarningKind::Restarted { seconds } if (1.9..2.1).contains(seconds));
     assert_eq!(warned(&result, gap), 1, "{:?}", result.warnings);
-    assert_eq!(warned(&result, |kind| matches!(kind, WarningKind::FoundAgain { .. })), 1, "{:?}", result.warnings);
+    assert_eq!(warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. })), 1, "{:?}", result.warnings);
     assert!(result.trajectory.span().unwrap().1 > Stamp::from_nanos(13_500_000_000));
     // There are no poses during the gap.
     let silence = Stamp::from_nanos(6_200_000_000)..Stamp::from_nanos(7_900_000_000);
@@ -196,7 +198,7 @@ fn if_relocalisation_fails_the_estimate_continues_with_a_warning() {
         _ => (6.0..12.0).contains(&seconds(m)),
     };
     let (result, score) = lossy(12, is_lost);
-    assert!(warned(&result, |kind| matches!(kind, WarningKind::LostAgain { .. })) >= 1, "{:?}", result.warnings);
+    assert!(warned(&result, |kind| matches!(kind, WarningKind::NotRelocalised { .. })) >= 1, "{:?}", result.warnings);
     assert!(score.worst_m < 20.0, "{score:?}");
 }
 
@@ -216,7 +218,7 @@ fn after_longer_gaps_of_the_imu_the_head_is_relocalised() {
     for (seed, gap_s) in [(15, 0.15), (16, 0.3), (17, 1.0)] {
         let is_silent = |m: &Measurement| (6.2..6.2 + gap_s).contains(&seconds(m));
         let (result, score) = lossy(seed, |m| matches!(m, Measurement::Imu(_)) && is_silent(m));
-        let said = warned(&result, |kind| matches!(kind, WarningKind::FoundAgain { .. }));
+        let said = warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. }));
         assert_eq!(said, 1, "{gap_s} s: {:?}", result.warnings);
         assert!(score.worst_m < 0.05, "{gap_s} s: {score:?}");
     }
@@ -231,7 +233,7 @@ fn a_clock_jump_of_a_quarter_of_an_hour_is_a_long_gap() {
         }
     }
     let result = estimate(measurements);
-    assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::BeganAgain { .. })), "{:?}", result.warnings);
+    assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::Restarted { .. })), "{:?}", result.warnings);
     let end = result.trajectory.span().unwrap().1;
     assert!(end > Stamp::from_nanos(1_008_000_000_000), "{end:?}");
     assert!(result.trajectory.len() < 900, "{}", result.trajectory.len());
@@ -246,8 +248,8 @@ fn measurements_with_decreasing_stamps_are_dropped_with_a_warning() {
         }
     }
     let result = estimate(measurements);
-    let left_out = |kind: &WarningKind| matches!(kind, WarningKind::LeftOut { count, .. } if *count > 50);
-    assert!(result.warnings.iter().any(|w| left_out(&w.kind)), "{:?}", result.warnings);
+    let discarded = |kind: &WarningKind| matches!(kind, WarningKind::Discarded { count, .. } if *count > 50);
+    assert!(result.warnings.iter().any(|w| discarded(&w.kind)), "{:?}", result.warnings);
     assert!(result.trajectory.len() > 300);
 }
 
@@ -366,7 +368,8 @@ fn an_outlier_sample_is_removed() {
         sample.angular_velocity_rad_per_s.x += rate;
         sample.specific_force_m_per_s2.y += force;
         let result = estimate(measurements);
-        let counted = |kind: &WarningKind| matches!(kind, WarningKind::LeftOut { what: LeftOut::Outliers, count: 1 });
+        let counted =
+            |kind: &WarningKind| matches!(kind, WarningKind::Discarded { what: Discarded::Outliers, count: 1 });
         assert_eq!(warned(&result, counted), 1, "{rate}, {force}: {:?}", result.warnings);
         let score = Score::of(&result, &run);
         assert!(score.worst_m < 0.02, "{rate}, {force}: {score:?}");

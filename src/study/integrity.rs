@@ -5,7 +5,8 @@ use super::atomic_file::AtomicFile;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{
-    Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, blocks, doubt, findings, radius_99,
+    Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, bound_factors, covariance_blocks, findings,
+    radius_99,
 };
 use crate::evaluation::{Errors, Pairs, align_poses};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
@@ -14,15 +15,14 @@ use crate::time::{Span, Stamp};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Floor of the position bound, added in quadrature, m.
-const MIN_BOUND_M: f64 = 0.001;
-/// Ratio of the error after alignment to the error that the covariance predicts, in runs without findings.
-///
-/// The covariance treats the matches of a surface as independent, with a standard deviation of 10 mm each; the alignment
-/// removes their common error. With 0.47, at least 99 % of the poses are within the bound in each of 56 runs of 14 kinds;
-/// with 0.36, in 86 % of the runs. Runs shorter than 40 s have a shorter alignment, which removes less: the ratio grows
-/// with the inverse square root of its duration, up to 1.
-const ALIGNED_ERROR_RATIO: f64 = 0.47;
+/// The bound of a position is at least this, m.
+const LEAST_BOUND_M: f64 = 0.001;
+/// The error after the alignment is this share of what the covariance says, in runs without bound_factors: the covariance takes
+/// the matches of one surface for independent with a standard deviation of 10 mm each, and what they err in common the
+/// alignment takes away. With 0.47, 99 % of the poses were within their bound in each of 56 runs of 14 kinds; with 0.36
+/// in 86 % of them. A run shorter than 40 s is aligned over less and keeps more, up to all of it: as the root of the
+/// inverse length.
+const GAUGED_SHARE: f64 = 0.47;
 
 /// The status is degraded if the bound exceeds both limits: in m, and as a fraction of the path length.
 const LARGE_BOUND_M: f64 = 0.05;
@@ -42,7 +42,7 @@ struct PoseBound {
 
 /// Computes the error bound of each pose of `trajectory`.
 fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
-    let doubts = doubt(&run.windows);
+    let doubts = bound_factors(&run.windows);
     let aligned_until = aligned_until(trajectory).unwrap_or(run.recorded.0);
     let ratio = aligned_error_ratio(trajectory);
     let radii_m = radii(run);
@@ -53,8 +53,8 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
             current = Some((covariance, *radius_m));
         }
         let (covariance, radius_m) = current?;
-        let (position, attitude) = blocks(covariance);
-        // The poses of the alignment share the largest doubt factor, that at its end.
+        let (position, attitude) = covariance_blocks(covariance);
+        // What is aligned together is as doubtful as its end.
         let after =
             doubts.partition_point(|(at, _)| *at < stamp.max(aligned_until)).min(doubts.len().saturating_sub(1));
         let factor = doubts.get(after).map_or(1.0, |(_, factor)| *factor);
@@ -88,7 +88,8 @@ fn radii(run: &OpenLoopRun) -> Vec<f64> {
     let mut radii_m = run.radii_m.clone();
     let Some(((first, _), (last, _))) = run.covariances.first().zip(run.covariances.last()) else { return radii_m };
     let is_short = last.seconds_since(*first) < 2.0 * GAUGED_S;
-    let marked_m: Vec<f64> = run.gauged.iter().map(|(_, covariance)| radius_99(&blocks(covariance).0)).collect();
+    let marks_m: Vec<f64> =
+        run.gauged.iter().map(|(_, covariance)| radius_99(&covariance_blocks(covariance).0)).collect();
     let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| is_short || stamp.seconds_since(*first) < GAUGED_S;
     let aligned = run.covariances.partition_point(is_aligned);
     let end_m = aligned.checked_sub(1).filter(|_| !is_short).map_or(0.0, |last| radii_m[last]);

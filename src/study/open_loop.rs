@@ -5,7 +5,8 @@ use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
 use super::{MapOptions, Stage, StudyError, Watch};
 use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, blocks, radius_99,
+    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, covariance_blocks,
+    radius_99,
 };
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
@@ -188,7 +189,7 @@ impl PoseOutput {
             pushed.map_err(|source| RecordingError::Trajectory { name, source })?;
             if self.covariances.last().is_none_or(|(last, _)| pose.stamp - *last >= COVARIANCE_PERIOD) {
                 self.covariances.push((pose.stamp, pose.covariance));
-                self.radii_m.push(radius_99(&blocks(&pose.covariance_against_gauge).0));
+                self.radii_m.push(radius_99(&covariance_blocks(&pose.covariance_against_gauge).0));
             }
         }
         Ok(())

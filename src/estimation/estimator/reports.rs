@@ -1,4 +1,4 @@
-//! Reports on windows that have been solved, and warnings that follow from them.
+//! Reports on solved windows, and the warnings derived from them.
 
 use super::Estimator;
 use crate::estimation::window::{Solved, Window};
@@ -6,16 +6,15 @@ use crate::estimation::{EstimatorSpec, TimeSpent, Warning, WarningKind, WindowRe
 use crate::time::Stamp;
 use std::mem::discriminant;
 
-/// The head is lost when it depends on the IMU only for longer than this, s, and for more than this fraction of the
-/// time.
+/// Tracking counts as lost after more dead reckoning than this, s, and than this fraction of the run.
 const LOST: (f64, f64) = (5.0, 0.2);
 
-/// Noise produces a contradiction between IMU and trajectory below this multiple of the noise: the trajectory follows
-/// the IMU, and the noise is assumed half as large again. A larger contradiction over a window means that one of them
-/// is in error.
+/// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise.
+///
+/// Noise causes less: the trajectory follows the IMU, and `noise_inflation` enlarges the assumed noise by half.
 const CONTRADICTED: f64 = 0.6;
 
-/// The report on a window's solution: whether the head moved, the problem found, and the time used.
+/// The report on the solution of a window.
 pub(super) fn report(
     solved: &Solved,
     (stamp, moving): (Stamp, bool),
@@ -62,8 +61,8 @@ pub(super) fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> 
     }
 }
 
-/// Whether a problem means that only the IMU determined the motion.
-pub(super) fn leaves_to_the_imu(trouble: &WarningKind) -> bool {
+/// Whether a problem means that the window is dead reckoning with the IMU.
+pub(super) fn is_dead_reckoning(trouble: &WarningKind) -> bool {
     match trouble {
         WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
         WarningKind::WeakGeometry { conditioning, .. } => *conditioning <= 0.0,
@@ -72,15 +71,15 @@ pub(super) fn leaves_to_the_imu(trouble: &WarningKind) -> bool {
 }
 
 impl Estimator {
-    /// Warns where the IMU was the only constraint for too long: the trajectory is then no estimate.
+    /// Warns if tracking was lost for a large part of the run.
     pub(super) fn warn_of_loss(&mut self) {
-        let (seconds, of_seconds) = (self.carried_s, self.windows.len() as f64 * self.spec.step_s);
+        let (seconds, of_seconds) = (self.dead_reckoning_s, self.windows.len() as f64 * self.spec.step_s);
         if let Some(first) = self.windows.first().filter(|_| seconds > LOST.0 && seconds > LOST.1 * of_seconds) {
             self.warnings.push(Warning { stamp: first.stamp, kind: WarningKind::Lost { seconds, of_seconds } });
         }
     }
 
-    /// Warns where IMU and lidar contradict each other by more than noise explains.
+    /// Warns if IMU and lidar contradict each other by more than noise explains.
     pub(super) fn warn_of_contradiction(&mut self) {
         let all = self.windows.iter().map(|window| window.imu_contradiction);
         let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTED).collect();
@@ -92,17 +91,18 @@ impl Estimator {
         }
     }
 
-    /// Warns of a problem when it lasts for two windows, or at once of a rejected solution; and only once,
-    /// until a window has no problem or another one.
-    pub(super) fn say(&mut self, trouble: Option<WarningKind>, end_s: f64) {
+    /// Warns of a problem of two consecutive windows, or immediately of a rejected solution.
+    ///
+    /// The warning is repeated only after a window without a problem or with another one.
+    pub(super) fn warn_of_trouble(&mut self, trouble: Option<WarningKind>, end_s: f64) {
         let before =
             self.trouble.take().filter(|(kind, _)| Some(discriminant(kind)) == trouble.as_ref().map(discriminant));
         let Some(kind) = trouble else { return };
-        let was_said = before.as_ref().is_some_and(|(_, said)| *said);
-        let says = !was_said && (before.is_some() || matches!(kind, WarningKind::NotSolved { .. }));
-        if says {
+        let was_reported = before.as_ref().is_some_and(|(_, reported)| *reported);
+        let report = !was_reported && (before.is_some() || matches!(kind, WarningKind::NotSolved { .. }));
+        if report {
             self.warnings.push(Warning { stamp: self.intake.stamp(end_s), kind: kind.clone() });
         }
-        self.trouble = Some((kind, was_said || says));
+        self.trouble = Some((kind, was_reported || report));
     }
 }
