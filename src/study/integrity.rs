@@ -15,14 +15,15 @@ use crate::time::{Span, Stamp};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// The bound of a position is at least this, m.
-const LEAST_BOUND_M: f64 = 0.001;
-/// The error after the alignment is this share of what the covariance says, in runs without bound_factors: the covariance takes
-/// the matches of one surface for independent with a standard deviation of 10 mm each, and what they err in common the
-/// alignment takes away. With 0.47, 99 % of the poses were within their bound in each of 56 runs of 14 kinds; with 0.36
-/// in 86 % of them. A run shorter than 40 s is aligned over less and keeps more, up to all of it: as the root of the
-/// inverse length.
-const GAUGED_SHARE: f64 = 0.47;
+/// Floor of the position bound, added in quadrature, m.
+const MIN_BOUND_M: f64 = 0.001;
+/// Ratio of the error after alignment to the error that the covariance predicts, in runs without findings.
+///
+/// The covariance treats the matches of a surface as independent, with a standard deviation of 10 mm each; the alignment
+/// removes their common error. With 0.47, at least 99 % of the poses are within the bound in each of 56 runs of 14 kinds;
+/// with 0.36, in 86 % of the runs. Runs shorter than 40 s have a shorter alignment, which removes less: the ratio grows
+/// with the inverse square root of its duration, up to 1.
+const ALIGNED_ERROR_RATIO: f64 = 0.47;
 
 /// The status is degraded if the bound exceeds both limits: in m, and as a fraction of the path length.
 const LARGE_BOUND_M: f64 = 0.05;
@@ -54,7 +55,7 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
         }
         let (covariance, radius_m) = current?;
         let (position, attitude) = covariance_blocks(covariance);
-        // What is aligned together is as doubtful as its end.
+        // The poses of the alignment share the largest doubt factor, that at its end.
         let after =
             doubts.partition_point(|(at, _)| *at < stamp.max(aligned_until)).min(doubts.len().saturating_sub(1));
         let factor = doubts.get(after).map_or(1.0, |(_, factor)| *factor);
@@ -88,7 +89,7 @@ fn radii(run: &OpenLoopRun) -> Vec<f64> {
     let mut radii_m = run.radii_m.clone();
     let Some(((first, _), (last, _))) = run.covariances.first().zip(run.covariances.last()) else { return radii_m };
     let is_short = last.seconds_since(*first) < 2.0 * GAUGED_S;
-    let marks_m: Vec<f64> =
+    let marked_m: Vec<f64> =
         run.gauged.iter().map(|(_, covariance)| radius_99(&covariance_blocks(covariance).0)).collect();
     let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| is_short || stamp.seconds_since(*first) < GAUGED_S;
     let aligned = run.covariances.partition_point(is_aligned);

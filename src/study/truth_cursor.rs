@@ -24,7 +24,7 @@ pub(super) struct TrueState {
 ///
 /// The truth is read on demand; memory does not grow with the length of the recording.
 pub(super) struct TruthCursor<'r> {
-    truths: Truths<'r>,
+    truths: TruthReader<'r>,
     heads: PoseBuffer,
     bases: PoseBuffer,
     /// Offset of the lidar clock at the last clock message; it changes by microseconds between messages.
@@ -36,7 +36,7 @@ pub(super) struct TruthCursor<'r> {
 struct PoseBuffer(VecDeque<(Stamp, Pose)>);
 
 impl<'r> TruthCursor<'r> {
-    pub(super) fn new(truths: Truths<'r>) -> Self {
+    pub(super) fn new(truths: TruthReader<'r>) -> Self {
         Self { truths, heads: PoseBuffer::default(), bases: PoseBuffer::default(), lidar_ahead: Span::ZERO }
     }
 

@@ -44,7 +44,7 @@ const MAX_PEAK_HZ: f64 = 20.0;
 /// # Errors
 /// When the spec is invalid or the head has no stable rest pose; the error does not include the maximum mass.
 pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignMetrics, StudyError> {
-    let head = HeadModel::attempt(spec, source)?;
+    let head = HeadModel::new_without_advice(spec, source)?;
     let model = SpringModel::of(spec, &head)?;
     let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
     let foot = head.default_points().base_in_base;
@@ -84,7 +84,7 @@ pub fn simulated(
     let shaker = MotionSpec::Shaker(ShakerSpec { height_m: 1.1, still_s: 0.5, onset_s: 2.0, drives });
     let duration_s = plan.from_s + plan.duration_s;
     let shake = shaker.build(&Source::in_memory("the shake of the base", ""), None, duration_s, Seed(1))?;
-    let base_from_shaken = Pose::from_parts(head.usual_points().base_in_base.into(), Rotation::identity());
+    let base_from_shaken = Pose::from_parts(head.default_points().base_in_base.into(), Rotation::identity());
     let motion = ShakeAboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
     let (mut stress, mut step) = (None, 0_usize);
     let coverage = coverage(&head, &motion, lidar, plan, |state| {
@@ -163,7 +163,7 @@ impl SpringModel {
     }
 
     fn metrics(&self, head: &HeadModel, swing: &SwingResult) -> DesignMetrics {
-        let response = head.frequency_response(&head.usual_points());
+        let response = head.frequency_response(&head.default_points());
         let peak = response.peak(Axis::Pitch, MAX_PEAK_HZ, Quantity::Kinematic);
         let yield_pa = self.wire.and_then(|wire| wire.yield_pa());
         DesignMetrics {

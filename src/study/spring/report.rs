@@ -26,7 +26,7 @@ pub struct SpringReport {
     /// Maximum mass of a head of this shape with a stable rest pose, kg; `None` if there is no limit.
     pub heaviest_head_kg: Option<f64>,
     /// Load on each element of the linkage at rest.
-    pub bearings: Vec<Bearing>,
+    pub bearings: Vec<ElementLoad>,
     /// Coil of a head on a single spring; `None` for a spring specified by stiffness.
     pub coil: Option<CoilReport>,
     /// Rest pose of the head.
@@ -143,7 +143,7 @@ pub fn spring_report(
     };
     let stress_pa = model.stress_pa(&at_rest);
     let coil = coil_of(spec)?.map(|coil| coil_report(&coil, &model, mass_kg, stress_pa));
-    let response = head.frequency_response(&head.usual_points());
+    let response = head.frequency_response(&head.default_points());
     let peak = |axis| (axis_name(axis), response.peak(axis, 20.0, Quantity::Kinematic));
     Ok(SpringReport {
         head_mass_kg: mass_kg,
