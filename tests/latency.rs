@@ -1,4 +1,4 @@
-//! The study of latency: what it finds is what was put in, and it goes on where it was stopped.
+//! The latency study: it recovers the simulated latency, and resumes after a stop.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -17,7 +17,7 @@ fn shipped() -> (LatencySpec, Source) {
     (*spec, source)
 }
 
-/// Fourteen seconds of the mocap room: none, 5 ms either way, and 5 ms of noise.
+/// 14 s of the mocap room: no latency, 5 ms in both directions, and 5 ms of timing noise.
 fn small() -> LatencySpec {
     let (spec, _) = shipped();
     let mut small = LatencySpec {
@@ -33,7 +33,7 @@ fn small() -> LatencySpec {
     small
 }
 
-/// Runs it with so many threads, and stops it when this share is done.
+/// Runs the study, and stops it when the fraction `stop_at` is done.
 fn run(folder: &Path, threads: usize, stop_at: f64) -> Result<LatencyResult, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let stop = AtomicBool::new(false);
@@ -43,7 +43,7 @@ fn run(folder: &Path, threads: usize, stop_at: f64) -> Result<LatencyResult, Stu
 }
 
 #[test]
-fn a_latency_blurs_the_cloud_both_ways_the_clock_state_recovers_it_and_a_stop_changes_nothing() {
+fn latency_blurs_the_cloud_clock_estimation_recovers_it_and_a_stop_changes_nothing() {
     let here = tempfile::tempdir().unwrap();
     let (cut, whole) = (here.path().join("cut"), here.path().join("whole"));
     assert!(matches!(run(&cut, 1, 0.2), Err(StudyError::Stopped)));
@@ -59,15 +59,15 @@ fn a_latency_blurs_the_cloud_both_ways_the_clock_state_recovers_it_and_a_stop_ch
         study.run(Disturbance { latency_ms, noise_ms }, clock).unwrap().cloud_sigma_m.value
     };
     let without = sigma(0.0, 0.0, ClockState::Off);
-    // Ranges are good to 10 mm, less across a surface that is met askew; a head that nods at 200 degrees/s puts a wall
-    // 3 m away 5 cm off in 5 ms.
+    // Range noise is 10 mm, and less normal to a surface at oblique incidence. With 5 ms of latency a head that nods at
+    // 200 degrees/s displaces a wall at 3 m by 5 cm.
     assert!((0.005..0.012).contains(&without), "{without}");
     for (latency_ms, noise_ms) in [(-5.0, 0.0), (5.0, 0.0), (0.0, 5.0)] {
         let (off, on) = (sigma(latency_ms, noise_ms, ClockState::Off), sigma(latency_ms, noise_ms, ClockState::On));
         assert!(off > 1.3 * without, "{latency_ms} {noise_ms}: {off} {without}");
         assert!(on < 1.15 * without, "{latency_ms} {noise_ms}: {on} {without}");
     }
-    // Three points 5 ms apart over eleven seconds of motion do not tell it better; figure 4 does.
+    // Three points 5 ms apart over 11 s of motion do not determine it better; figure 4 does.
     let minimum = study.minimum.cloud_ms.unwrap();
     assert!(minimum.value.abs() < 1.0 && study.minimum.rises_on_both_sides, "{minimum:?}");
     for latency_ms in [-5.0, 0.0, 5.0] {
@@ -84,15 +84,15 @@ fn a_latency_blurs_the_cloud_both_ways_the_clock_state_recovers_it_and_a_stop_ch
 }
 
 #[test]
-fn another_study_is_left_alone() {
+fn the_folder_of_another_study_is_not_changed() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("made_from.ron"), "()").unwrap();
     let error = run(here.path(), 1, 2.0).unwrap_err();
-    assert!(error.is_invalid_input() && error.to_string().contains("other work"), "{error}");
+    assert!(error.is_invalid_input() && error.to_string().contains("another experiment"), "{error}");
 }
 
 #[test]
-fn a_study_that_makes_no_sense_says_where() {
+fn an_invalid_study_is_an_error_with_the_line() {
     let (_, source) = shipped();
     for (old, new, sentence) in [
         ("latencies_ms: [-5.0, -2.0, -1.0, -0.5, 0.0,", "latencies_ms: [-5.0,", "needs a 0"),

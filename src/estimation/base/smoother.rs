@@ -199,7 +199,7 @@ impl Step {
 
 /// The IMU's way through an epoch: integrated from its start, and by and by shifted onto its end.
 fn between(start_s: f64, intervals: &[Interval], [begin, end]: [&Estimate; 2]) -> Nominal {
-    let mut way = Nominal::beginning(start_s, begin.state);
+    let mut way = Nominal::starting(start_s, begin.state);
     for interval in intervals {
         way.extend(*interval, &begin.biases, &begin.gravity());
     }

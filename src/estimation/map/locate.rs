@@ -10,7 +10,7 @@ use crate::estimation::matching::{Forest, Matcher};
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
 use crate::estimation::surfel::Patch;
-use crate::estimation::window::LEANING;
+use crate::estimation::window::MIN_SIGNIFICANT_TILT;
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::surfel_map::SurfelMap;
 use nalgebra::{Matrix6, Vector6};
@@ -300,7 +300,7 @@ impl Tally {
         let mut untold = Matrix6::zeros();
         for direction in scatter.symmetric_eigen().eigenvectors.column_iter() {
             let lean = |(normal, weight): &(Vector, f64)| (normal.dot(&direction), *weight);
-            let held = self.normals.iter().map(lean).filter(|(lean, _)| lean.abs() > LEANING);
+            let held = self.normals.iter().map(lean).filter(|(lean, _)| lean.abs() > MIN_SIGNIFICANT_TILT);
             if held.map(|(lean, weight)| lean * lean * weight).sum::<f64>() < WEAK * sum {
                 let mut block = untold.fixed_view_mut::<3, 3>(3, 3);
                 block += direction * direction.transpose();

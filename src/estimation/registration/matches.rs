@@ -12,7 +12,7 @@ use super::neighbours::InUse;
 use super::scene::Scene;
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::window::LEANING;
+use crate::estimation::window::MIN_SIGNIFICANT_TILT;
 use crate::geometry::{Matrix, Vector};
 use nalgebra::Vector6;
 use rayon::prelude::*;
@@ -42,7 +42,7 @@ impl Tally {
         self.squares += weight * plane.distance_m * plane.distance_m;
         self.information += plane.normal * plane.normal.transpose() * weight;
         let lean = plane.normal.dot(weakest);
-        if lean.abs() > LEANING {
+        if lean.abs() > MIN_SIGNIFICANT_TILT {
             self.held += weight * lean * lean;
             self.held_again += if again { weight * lean * lean } else { 0.0 };
         }

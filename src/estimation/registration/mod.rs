@@ -44,7 +44,7 @@ use super::EstimatorSpec;
 use super::gaps::{Gaps, restored};
 use super::matching::Matcher;
 use super::survey::Survey;
-use super::window::Moved;
+use super::window::Displacement;
 use crate::geometry::{PoseCovariance, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
 use crate::time::Stamp;
@@ -124,7 +124,7 @@ pub struct Travelled<'a> {
 /// The same for any number of threads. Memory follows the data: long gaps in time are shortened first.
 pub fn register(travelled: Travelled, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
     let stamps = travelled.map_from_head.stamps();
-    let Some(gaps) = Gaps::of(stamps) else { return register_without_gaps(travelled, calibration, spec) };
+    let Some(gaps) = Gaps::between(stamps) else { return register_without_gaps(travelled, calibration, spec) };
     let map_from_head = &gaps.shorten(travelled.map_from_head);
     let covariances = &gaps.shorten_covariances(travelled.covariances);
     let survey = &gaps.shorten_survey(travelled.survey);
@@ -274,7 +274,7 @@ impl<'a> Registration<'a> {
                 let (x, step) = equations.solve().ok_or("its equations are singular")?;
                 let three = Vector::from_column_slice;
                 let knots = x.chunks_exact(6).map(|knot| (three(&knot[..3]), three(&knot[3..])));
-                let Moved { shift, turn } = Moved::greatest(knots);
+                let Displacement { shift, turn } = Displacement::max_of(knots);
                 if !(shift < BELIEVABLE.0 && turn < BELIEVABLE.1) {
                     return Err("its correction is too large");
                 }

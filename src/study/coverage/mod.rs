@@ -143,7 +143,7 @@ pub fn coverage(
         while next.next_if(|t| *t <= start_s).is_some() {
             sweeps.end(&mut sphere);
         }
-        let laser_rotation = lidar.turned(scan as u64).unwrap_or_else(Rotation::identity);
+        let laser_rotation = lidar.scan_rotation(scan as u64).unwrap_or_else(Rotation::identity);
         for beam in lidar.beams() {
             let heading_from_laser = track.heading_from_laser(start_s + beam.offset_s);
             sphere.count_beam(&(heading_from_laser * (laser_rotation * beam.direction_in_laser)));

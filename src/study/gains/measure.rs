@@ -2,7 +2,7 @@
 
 use super::drive::{Schedule, ShakenBase};
 use super::{AXES, GainCurve, GainPlan, GainPoint};
-use crate::dynamics::{HeadModel, HeadSimulation, HeadState, Peak, Points, Quantity};
+use crate::dynamics::{GainPoints, HeadModel, HeadSimulation, HeadState, Peak, Quantity};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::motion::Axis;
 use crate::signal::{Segments, TransferPoint, transfer_function};
@@ -63,7 +63,7 @@ pub fn gain_curve(
 
 /// Checks the plan and computes the schedule.
 fn checked_schedule(head: &HeadModel, plan: &GainPlan) -> Result<Schedule, StudyError> {
-    if let Some(reason) = head.unyielding() {
+    if let Some(reason) = head.rigid_mount_reason() {
         return Err(StudyError::Plan { what: "head", message: reason.to_owned() });
     }
     if !REALISATIONS.contains(&plan.realisations) {
@@ -102,7 +102,7 @@ fn record(
     plan: &GainPlan,
     schedule: Schedule,
 ) -> Result<Record, StudyError> {
-    let points = plan.points.unwrap_or_else(|| head.usual_points());
+    let points = plan.points.unwrap_or_else(|| head.default_points());
     let base = ShakenBase::new(axis, index, plan, schedule, &points.base_in_base)?;
     let probe = MotionProbe::new(head, axis, &points, plan.quantity);
     let mut record = Record::default();
@@ -126,7 +126,7 @@ struct MotionProbe {
 }
 
 impl MotionProbe {
-    fn new(head: &HeadModel, axis: Axis, points: &Points, quantity: Quantity) -> Self {
+    fn new(head: &HeadModel, axis: Axis, points: &GainPoints, quantity: Quantity) -> Self {
         let at = |point: &Vector| Pose::from_parts((*point).into(), Rotation::identity());
         Self {
             axis: axis as usize % 3,
@@ -171,7 +171,7 @@ fn curve(
     let (base_signal, head_signal) = (joined(|r| &r.base), joined(|r| &r.head));
     let measured =
         transfer_function(&base_signal, &head_signal, 1.0 / plan.step_s, Segments::periods(schedule.period))?;
-    let points = plan.points.unwrap_or_else(|| head.usual_points());
+    let points = plan.points.unwrap_or_else(|| head.default_points());
     let response = head.frequency_response(&points);
     let point = |p: &TransferPoint| GainPoint {
         freq_hz: p.freq_hz,

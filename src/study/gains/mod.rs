@@ -18,7 +18,7 @@ pub use measure::{gain_curve, gain_curves};
 pub use swing::{SwingPoint, SwingStudy, swing_study};
 pub use table::{csv, swing_csv};
 
-use crate::dynamics::{DampingSpec, HeadSpec, Peak, Points, Quantity};
+use crate::dynamics::{DampingSpec, GainPoints, HeadSpec, Peak, Quantity};
 use crate::motion::Axis;
 use crate::random::Seed;
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,7 @@ pub struct GainPlan {
     /// Quantity compared along x, y and z: acceleration or specific force.
     pub quantity: Quantity,
     /// Points of base and head whose motion is compared; `None` for the spring's foot and the IMU.
-    pub points: Option<Points>,
+    pub points: Option<GainPoints>,
     /// Highest frequency, Hz.
     pub up_to_hz: f64,
     /// Period of the multisine, s; `None` for at least two spectral lines in the narrowest resonance.

@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn a_latency_replaces_the_true_clock_offset() {
         // The IMU's clock is ahead by 3 ms at 0 s and by 5 ms at 2 s: a sample at lidar time 1 s has the stamp 1.004 s.
-        let clock = TrueClock::told(vec![(at(0), 3e-3), (at(2_000_000), 5e-3)]);
+        let clock = TrueClock::from_offsets(vec![(at(0), 3e-3), (at(2_000_000), 5e-3)]);
         let latency = Disturbance { latency_ms: -2.0, noise_ms: 0.0 };
         let timing = DisturbedStamps::new(latency, &clock, &[at(1_000_000)], Seed(1));
         let scan = Measurement::Lidar(LidarScan {

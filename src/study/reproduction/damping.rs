@@ -59,7 +59,7 @@ impl DampingFit {
 
     /// Peaks of `head` in comparison with the paper's.
     fn new(head: &HeadModel, damping_ratio: DampingSpec, paper: &PeaksSpec, up_to_hz: f64) -> Self {
-        let response = head.frequency_response(&head.usual_points());
+        let response = head.frequency_response(&head.default_points());
         let peak = |axis| response.peak(axis, up_to_hz, Quantity::Kinematic);
         let peaks = AXES.map(|axis| FittedPeak { axis, paper: paper.peak(axis), peak: peak(axis) });
         Self { damping_ratio, peaks: peaks.to_vec() }

@@ -4,7 +4,7 @@ use super::component::{Component, Slot};
 use super::part::RunOutcome;
 use super::{Measure, Plan};
 use crate::study::StudyError;
-use crate::study::spring::{DesignFigures, closed_form};
+use crate::study::spring::{DesignMetrics, closed_form};
 use std::time::Instant;
 
 /// Evaluates run `index`. A failure, such as a head without static equilibrium, is recorded as an error.
@@ -20,7 +20,7 @@ pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutc
     RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
 }
 
-fn figures(plan: &Plan, index: u64) -> Result<DesignFigures, StudyError> {
+fn figures(plan: &Plan, index: u64) -> Result<DesignMetrics, StudyError> {
     let changed = plan.changed_specs(index)?;
     let (head, run) = (plan.component(&changed, Slot::Head)?, plan.component(&changed, Slot::Run)?);
     let (Component::Head(spec), Component::Shake(settings)) = (&head.component, &run.component) else {
@@ -30,7 +30,7 @@ fn figures(plan: &Plan, index: u64) -> Result<DesignFigures, StudyError> {
     closed_form(spec, &head.source(), &settings.shake)
 }
 
-fn figure(measure: Measure, of: &DesignFigures) -> Option<f64> {
+fn figure(measure: Measure, of: &DesignMetrics) -> Option<f64> {
     match measure {
         Measure::RockingHz => Some(of.rocking_hz),
         Measure::PeakGain => Some(of.peak_gain),

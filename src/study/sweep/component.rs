@@ -201,7 +201,7 @@ impl Component {
 /// Replaces a spring that is given by name by its description, so that its settings can be varied.
 fn with_spring_resolved(mut head: HeadSpec) -> Result<HeadSpec, SpecError> {
     if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
-        *spring = spring.described()?;
+        *spring = spring.resolved()?;
     }
     Ok(head)
 }

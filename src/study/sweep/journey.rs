@@ -13,7 +13,7 @@ use crate::study::calibration::calibration;
 use crate::study::closed_loop::run_closed_loop;
 use crate::study::coverage::{Coverage, CoveragePlan, coverage};
 use crate::study::integrity::{Integrity, path_length_m};
-use crate::study::open_loop::{How, run_open_loop};
+use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
 use crate::study::{CalibrationSpec, StudyError, Watch, judge};
 use std::fs::File;
@@ -178,7 +178,7 @@ fn estimate(
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&Preference::default())?;
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
-        let how = How { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
+        let how = OpenLoopOptions { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
         let known = judge::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
         let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);

@@ -121,7 +121,7 @@ fn effects(plan: &Plan, summary: &Summary, measure: Measure) -> Figure {
         text_level_chart(&axis.name, measure, &lines)
     });
     let charts: Vec<Chart> = charts.collect();
-    let most = charts.iter().map(|chart| chart.y_marks.len()).max().unwrap_or_default();
+    let most = charts.iter().map(|chart| chart.y_ticks.len()).max().unwrap_or_default();
     let columns = if charts.len() > 1 { 2 } else { 1 };
     let mut figure = Figure::of(charts).in_columns(columns);
     figure.chart_height = figure.chart_height.max(76.0 + ROW_HEIGHT * most as f64);
@@ -137,7 +137,7 @@ fn text_level_chart(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Ch
         [ends[0], ends[1], (f64::NAN, f64::NAN)]
     });
     let dots = lines.iter().enumerate().map(|(k, line)| (line.median * per_unit, height(k)));
-    let marks = lines.iter().enumerate().map(|(k, line)| (height(k), line.level.clone()));
+    let ticks = lines.iter().enumerate().map(|(k, line)| (height(k), line.level.clone()));
     // An invisible line reserves half a row above and below.
     let finite = lines.iter().flat_map(|line| [line.quarter, line.three_quarters]).filter(|x| x.is_finite());
     let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
@@ -147,7 +147,7 @@ fn text_level_chart(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Ch
         .with(Series::line("", Colour::Backdrop, room))
         .with(Series::line("", Colour::Backdrop, bars.collect()).marked(Mark::Line(4.0)))
         .with(Series::dots("", Colour::Estimate, dots.collect()).marked(Mark::Dots(6.0)))
-        .with_y_marks(marks.collect())
+        .with_y_ticks(ticks.collect())
 }
 
 /// Map of a measure's median over two axes.
@@ -177,8 +177,8 @@ fn map(plan: &Plan, runs: &Runs, figures: &[f64], (x, y, measure): (usize, usize
         cells: medians.iter().enumerate().map(cell).collect(),
     };
     let chart = Chart::new("", &plan.axes()[x].name, &plan.axes()[y].name).with_cells(cells);
-    let chart = if plan.axes()[x].is_number() { chart } else { chart.with_x_marks(level_ticks(plan, x)) };
-    if plan.axes()[y].is_number() { chart } else { chart.with_y_marks(level_ticks(plan, y)) }
+    let chart = if plan.axes()[x].is_number() { chart } else { chart.with_x_ticks(level_ticks(plan, x)) };
+    if plan.axes()[y].is_number() { chart } else { chart.with_y_ticks(level_ticks(plan, y)) }
 }
 
 /// Extent of each level in a map: half way to its neighbours.
@@ -224,8 +224,8 @@ fn ratios(summary: &Summary, axis: &str, measure: Measure) -> Option<Figure> {
     };
     let title = format!("{}, ratio to the first of {axis}", measure.short());
     let chart = Chart::new(&title, "Ratio (median, minimum and maximum of all runs)", "")
-        .with_y_marks(lines.iter().enumerate().map(named).collect())
-        .with_x_marks(RATIO_TICKS.map(|ratio| (ratio.log10(), ratio.to_string())).to_vec())
+        .with_y_ticks(lines.iter().enumerate().map(named).collect())
+        .with_x_ticks(RATIO_TICKS.map(|ratio| (ratio.log10(), ratio.to_string())).to_vec())
         .with(Series::line("", Colour::Truth, vec![(0.0, -0.5), (0.0, count - 0.5)]).marked(Mark::Dashes(1.0)))
         .with(Series::line("range", Colour::Backdrop, ranges).marked(Mark::Line(4.0)))
         .with(Series::dots("not significant", Colour::Estimate, similar).marked(Mark::Dots(6.0)))
