@@ -104,7 +104,7 @@ fn info_and_estimate_read_a_recording_and_report_loss_when_it_is_truncated() {
     assert!(talk.contains("The file is truncated"), "{talk}");
     let judged = "evaluate --estimate results/cut/open_loop.tum --truth a.tum --cloud results/cut/cloud.ply --scene \
                   mocap_room --json";
-    let (code, out, talk) = run(here.path(), evaluate);
+    let (code, out, talk) = run(here.path(), judged);
     assert_eq!(code, 0, "{talk}");
     let figures: Value = serde_json::from_str(&out).unwrap();
     let metrics = std::fs::read_to_string(here.path().join("results/cut/metrics.json")).unwrap();

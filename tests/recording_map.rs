@@ -121,7 +121,7 @@ fn invalid_surfels_with_a_correct_checksum_are_refused() {
         // Surfel 2 of 113 bytes each.
         file[end + 2 * 113 + 8 * at..][..8].copy_from_slice(&f64::to_le_bytes(value));
         assert!(read(&file).unwrap_err().contains("its checksum does not match"));
-        let said = read(&sealed(file, 40)).unwrap_err();
+        let said = read(&with_checksum(file, 40)).unwrap_err();
         assert!(said.ends_with(&format!("surfel 2: {about}")), "{said}");
     }
 }

@@ -79,14 +79,14 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let truth = arguments.truth.as_deref().map(true_base).transpose()?;
     let by_spring = match &arguments.base_imu {
         Some(_) => study::base_by_law(&head, &head_trajectory)?,
-        None => head.base_under(&head_trajectory)?,
+        None => head.base_from_force_law(&head_trajectory)?,
     };
     let by_imu = arguments.base_imu.as_deref().map(|recording| by_imu(recording, arguments, &head, &head_trajectory));
     let by_imu = by_imu.transpose()?;
 
     let result = |key, name, base| MethodResult { key, name, base };
     let mut results = vec![
-        result("rigid_link", "rigid link", Trajectory::from_poses(head.base_on_rigid_link(&head_trajectory))?),
+        result("rigid_link", "rigid link", Trajectory::from_poses(head.base_from_rigid_link(&head_trajectory))?),
         result("spring", "spring law", Trajectory::from_poses(by_spring)?),
     ];
     let (estimate, loss) = by_imu.unzip();

@@ -1,7 +1,7 @@
 //! The output of `zsim spring`.
 
 use super::coverage_text;
-use zsim::dynamics::{Bearing, BearingKind, ModeKind};
+use zsim::dynamics::{ElementKind, ElementLoad, ModeKind};
 use zsim::report::table;
 use zsim::study::spring::design::DesignStudy;
 use zsim::study::spring::{CoilReport, DesignMetrics, ShakeResponse, SpringReport};
@@ -47,10 +47,10 @@ fn row(name: &str, value: String) -> Vec<String> {
 
 fn bearing(bearing: &ElementLoad) -> Vec<String> {
     let name = match bearing.kind {
-        BearingKind::Spring => "load on a spring",
-        BearingKind::Cord => "tension of a cord",
-        BearingKind::Float => "buoyancy of a float",
-        BearingKind::UniversalJoint => "load on a universal joint",
+        ElementKind::Spring => "load on a spring",
+        ElementKind::Cord => "tension of a cord",
+        ElementKind::Float => "buoyancy of a float",
+        ElementKind::UniversalJoint => "load on a universal joint",
     };
     row(name, bearing.load_n.map_or("remaining weight".to_owned(), |n| format!("{n:.2} N")))
 }

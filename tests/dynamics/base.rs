@@ -42,8 +42,8 @@ fn largest_difference(a: &[(Stamp, Pose)], b: &Trajectory) -> (f64, f64) {
 #[test]
 fn the_spring_model_determines_the_base_and_a_rigid_link_does_not() {
     let (model, heads, bases) = walk("handheld", 1000);
-    let by_spring = apart(&model.base_from_force_law(&heads).unwrap(), &bases);
-    let by_link = apart(&model.base_from_rigid_link(&heads), &bases);
+    let by_spring = largest_difference(&model.base_from_force_law(&heads).unwrap(), &bases);
+    let by_link = largest_difference(&model.base_from_rigid_link(&heads), &bases);
     println!("spring {by_spring:?}, rigid link {by_link:?}");
     assert!(by_spring.0 < 0.001 && by_spring.1 < 0.2, "{by_spring:?}");
     assert!(by_link.0 > 0.03 && by_link.1 > 30.0, "{by_link:?}");
@@ -52,7 +52,7 @@ fn the_spring_model_determines_the_base_and_a_rigid_link_does_not() {
 #[test]
 fn differences_at_the_imu_rate_lose_little_accuracy() {
     let (model, heads, bases) = walk("handheld", 100);
-    let by_spring = apart(&model.base_from_force_law(&heads).unwrap(), &bases);
+    let by_spring = largest_difference(&model.base_from_force_law(&heads).unwrap(), &bases);
     println!("{by_spring:?}");
     assert!(by_spring.0 < 0.02 && by_spring.1 < 3.0, "{by_spring:?}");
 }

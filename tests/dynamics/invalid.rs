@@ -122,9 +122,9 @@ fn invalid_suspensions_are_errors_with_the_reason() {
 #[test]
 fn invalid_wires_and_cables_are_refused() {
     let cable = "cable: (length_m: 0.1, tension_n: 50.0, stiffness_n_per_m: 400.0, damping_n_s_per_m: 0.0),";
-    let error = built(&Table { more: cable, ..Table::default() }.text()).unwrap_err().to_string();
+    let error = built(&ReferenceHead { more: cable, ..ReferenceHead::default() }.text()).unwrap_err().to_string();
     assert!(error.starts_with("head.ron:") && error.contains("-0.025 m long without tension"), "{error}");
-    let text = Table { more: "spring_mass: included,", ..Table::default() }.text();
+    let text = ReferenceHead { more: "spring_mass: included,", ..ReferenceHead::default() }.text();
     let unknown = text.replace("spring_steel", "moduli(youngs_gpa: 206.0, shear_gpa: 79.3)");
     let error = built(&unknown).unwrap_err().to_string();
     assert!(error.contains("density_kg_per_m3"), "{error}");
