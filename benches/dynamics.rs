@@ -1,4 +1,4 @@
-//! How fast a head is simulated: steps of the physics per second.
+//! Speed of the head simulation: physics steps per second.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -14,7 +14,7 @@ impl BaseMotion for Still {
     }
 }
 
-/// A base that goes to and fro at 1.2 Hz, so that the head swings.
+/// A base that oscillates along x at 1.2 Hz, so that the head swings.
 struct Shaken;
 
 impl BaseMotion for Shaken {
@@ -33,7 +33,7 @@ fn handheld(pieces: usize) -> HeadModel {
     if let LinkageSpec::Spring { segments, .. } = &mut spec.linkage {
         *segments = pieces;
     }
-    HeadModel::new(&spec, &source).expect("the head stands")
+    HeadModel::new(&spec, &source).expect("the head has a stable rest pose")
 }
 
 fn steps(criterion: &mut Criterion) {
@@ -49,7 +49,7 @@ fn steps(criterion: &mut Criterion) {
         let model = handheld(pieces);
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
-                let simulation = HeadSimulation::new(&model, motion, 1e-3).expect("a step of 1 ms will do");
+                let simulation = HeadSimulation::new(&model, motion, 1e-3).expect("a step of 1 ms is valid");
                 simulation.take(count as usize).map(|state| state.map_or(0.0, |s| black_box(s).t_s)).sum::<f64>()
             });
         });

@@ -1,4 +1,4 @@
-//! The estimator on a closed-form walk through a furnished hall: how long ten seconds of recording take.
+//! Run time of the estimator on ten seconds of a closed-form walk through a furnished hall.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench fails by panicking")]
 

@@ -1,4 +1,4 @@
-//! Design points by the closed form, and gain curves by simulation.
+//! Speed of the closed form for spring designs, and of simulated gain curves.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark fails by panicking")]
 
@@ -8,21 +8,21 @@ use zsim::dynamics::{HeadModel, LinkageSpec, load};
 use zsim::elasticity::SpringSpec;
 use zsim::spec::{Kind, find, parse};
 use zsim::study::gains::{GainPlan, gain_curves};
-use zsim::study::spring::design::{DesignSpec, Search};
+use zsim::study::spring::design::{DesignSearch, DesignSpec};
 use zsim::study::spring::{Shake, closed_form};
 
 fn design_points(c: &mut Criterion) {
     let (spec, source) = load("handheld").unwrap();
     let shake = Shake::default();
-    c.bench_function("closed form of a design that stands", |b| {
+    c.bench_function("closed form of a stable design", |b| {
         b.iter(|| closed_form(black_box(&spec), &source, &shake).unwrap());
     });
-    let mut falls = spec.clone();
-    if let LinkageSpec::Spring { spring: SpringSpec::Coil { wire_diameter_mm, .. }, .. } = &mut falls.linkage {
+    let mut unstable = spec.clone();
+    if let LinkageSpec::Spring { spring: SpringSpec::Coil { wire_diameter_mm, .. }, .. } = &mut unstable.linkage {
         *wire_diameter_mm = 2.0;
     }
-    c.bench_function("closed form of a design that falls", |b| {
-        b.iter(|| closed_form(black_box(&falls), &source, &shake).unwrap_err());
+    c.bench_function("closed form of an unstable design", |b| {
+        b.iter(|| closed_form(black_box(&unstable), &source, &shake).unwrap_err());
     });
 }
 
@@ -32,7 +32,7 @@ fn studies(c: &mut Criterion) {
     let source = find(Kind::Study, "spring_design").unwrap();
     let spec: DesignSpec = parse(&source).unwrap();
     group.bench_function("10,000 designs and their Pareto set", |b| {
-        let search = Search::new(&spec, &source).unwrap();
+        let search = DesignSearch::new(&spec, &source).unwrap();
         b.iter(|| {
             let (found, _) = search.explore(&|_| ());
             let costs: Vec<Vec<f64>> = found.iter().map(|c| c.costs.clone()).collect();

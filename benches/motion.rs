@@ -1,4 +1,4 @@
-//! How long a motion of the base takes to answer for one instant: the simulator asks at 1 kHz of simulated time.
+//! Time to evaluate a base motion at one time. The simulator evaluates it at 1 kHz of simulated time.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench fails by panicking; its items are criterion's")]
 

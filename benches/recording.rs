@@ -1,4 +1,4 @@
-//! Ten simulated seconds, written and read: 40 sweeps of 1081 beams, 100 IMU samples and 1000 poses a second.
+//! Writing and reading 10 s of recording: per second 40 sweeps of 1081 beams, 100 IMU samples and 1000 poses.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench fails by panicking, and has no readers")]
 
@@ -36,7 +36,7 @@ fn normal(stream: &mut Stream) -> f64 {
     StandardNormal.sample(stream)
 }
 
-/// A sweep of a room 8 m wide, with 10 mm of noise in steps of 1 mm: what it costs to compress is in its low bits.
+/// A sweep of a room 8 m wide, with 10 mm of noise in steps of 1 mm: noisy low bits, as a real scan has for compression.
 fn sweep(stamp: Stamp, stream: &mut Stream) -> LidarScan {
     let (angle_min_rad, angle_increment_rad, time_increment_s) = (-2.356_194_5, 0.004_363_323, 1.736_111_1e-5);
     let (mut ranges_m, mut intensities, mut returns) = (Vec::new(), Vec::new(), Vec::new());
@@ -66,7 +66,7 @@ fn sweep(stamp: Stamp, stream: &mut Stream) -> LidarScan {
     LidarScan { stamp, stamped_after: Span::ZERO, returns, planar: Some(planar) }
 }
 
-/// All that is recorded, made beforehand.
+/// Contents of the recording, generated before timing.
 struct Run {
     truth: Vec<(Stamp, TruthSample)>,
     imu: Vec<ImuSample>,

@@ -1,5 +1,4 @@
-//! What a second of simulated sensing costs: rays of a scan, its errors, samples of an IMU, and the whole simulation
-//! with and without its recording.
+//! Speed of simulated sensors: ray casts and errors of a scan, IMU samples, and a full simulation with and without recording.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench fails by panicking; its items are criterion's")]
 
@@ -11,12 +10,12 @@ use zsim::geometry::{STANDARD_GRAVITY_M_PER_S2, Vector};
 use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::recording::{RunDescription, Writer};
-use zsim::sensors::{Firing, ImuErrors, LidarErrors, MeanMotion, Track};
+use zsim::sensors::{ImuErrors, LidarErrors, MeanMotion, ScanTiming, Track};
 use zsim::simulation::{EPOCH, STEP_S, Scenario, Simulation};
 use zsim::time::Stamp;
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
-/// Simulated time of the whole, s.
+/// Duration of the full simulation, s.
 const DURATION_S: f64 = 8.0;
 
 fn office() -> Simulation {
@@ -28,7 +27,7 @@ fn scan(criterion: &mut Criterion) {
     let states = HeadSimulation::new(office.head(), office.motion(), STEP_S).unwrap().skip(6000).take(30);
     let head = Track::new(6000, STEP_S, states.map(|state| state.unwrap().head).collect()).unwrap();
     let laser = head.of_frame(office.head().head_from_laser());
-    let firing = Firing { index: 7, start_s: 6.005, pace: 1.0, stamp: EPOCH };
+    let firing = ScanTiming { index: 7, start_s: 6.005, pace: 1.0, stamp: EPOCH };
     let (lidar, errors) = (office.lidar(), LidarErrors::new(office.lidar(), Seed(1)));
     let sweep = lidar.sweep(office.world(), &laser, &firing);
 
@@ -48,10 +47,10 @@ fn imu(criterion: &mut Criterion) {
     criterion.bench_function("imu/errors of a sample", |bench| bench.iter(|| errors.measure(black_box(&ideal))));
 }
 
-/// Takes everything, keeps nothing.
-struct Nowhere;
+/// Sink that discards everything.
+struct NullSink;
 
-impl Sink for Nowhere {
+impl Sink for NullSink {
     fn imu(&mut self, _: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
         black_box(sample);
         Ok(())
@@ -63,7 +62,7 @@ impl Sink for Nowhere {
     }
 }
 
-impl TruthSink for Nowhere {
+impl TruthSink for NullSink {
     fn truth(&mut self, _: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
         black_box(sample);
         Ok(())
@@ -75,8 +74,8 @@ impl TruthSink for Nowhere {
     }
 }
 
-/// The whole, so that 50 times real time is 160 ms a run of 8 s.
-fn whole(criterion: &mut Criterion) {
+/// Full simulation of 8 s; 50 times real time is 160 ms per run.
+fn full_simulation(criterion: &mut Criterion) {
     let office = office();
     let run = RunDescription {
         calibration: office.calibration(),
@@ -87,7 +86,7 @@ fn whole(criterion: &mut Criterion) {
     };
     let mut group = criterion.benchmark_group("simulation");
     group.sample_size(10).sampling_mode(SamplingMode::Flat).measurement_time(Duration::from_secs(4));
-    group.bench_function("8 s of the office", |bench| bench.iter(|| office.run(&mut Nowhere, &mut |_| ()).unwrap()));
+    group.bench_function("8 s of the office", |bench| bench.iter(|| office.run(&mut NullSink, &mut |_| ()).unwrap()));
     group.bench_function("8 s of the office, recorded", |bench| {
         bench.iter(|| {
             let mut writer = Writer::new(std::io::sink(), run.clone()).unwrap();
@@ -98,5 +97,5 @@ fn whole(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, scan, imu, whole);
+criterion_group!(benches, scan, imu, full_simulation);
 criterion_main!(benches);

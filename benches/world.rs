@@ -1,4 +1,4 @@
-//! How many rays a second: a laser that swings on its spring while it is carried along the route.
+//! Speed of ray casts for a lidar that swings on its spring along the route: rays per second.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench fails by panicking")]
 
@@ -28,7 +28,7 @@ fn rays(world: &World) -> Vec<Ray> {
     (0..60).flat_map(scan).collect()
 }
 
-/// Rolling ground of a million triangles under trees, as a surveyor's mesh would be.
+/// Rolling ground of a million triangles under trees, as in a surveyed mesh.
 fn million() -> World {
     let text = r#"(
         name: "million",

@@ -1,12 +1,15 @@
-//! Design moving range sensors by computation: a lidar and an IMU on a spring, simulated with exact truth, and the
-//! continuous-time SLAM that makes a trajectory and a map of what they see.
+//! Simulation and SLAM for moving 2-D laser scanners, to design them by computation.
 //!
-//! # The journey of a sample
+//! zsim simulates a lidar and an IMU on a spring with exact ground truth, and estimates trajectory and map from their
+//! measurements by continuous-time SLAM.
 //!
-//! A [scene](world) becomes surfaces. A [motion] carries the base; the [head on its spring](dynamics) swings along. The
-//! [sensors] look from it: a beam at its own time, the IMU over its own interval, each stamped by its own clock. The
-//! [simulation] gives their measurements, and the truth, to a [recording]. The [estimator](estimation) is given the
-//! measurements alone, and answers with a trajectory, which the [evaluation] holds against the truth.
+//! # Data flow
+//!
+//! A [scene](world) is converted to surfaces. A [motion] moves the base, and the [dynamics] of the spring move the
+//! head. The [sensors] measure: each beam at its own time, each IMU sample over its own interval, each sensor with the
+//! stamps of its own clock. The [simulation] writes measurements and ground truth to a [recording]. The
+//! [estimator](estimation) reads the measurements only and computes a trajectory, which the [evaluation] compares with
+//! the ground truth.
 //!
 //! ```
 //! use zsim::estimation::{self, Estimator};
@@ -14,7 +17,7 @@
 //! use zsim::recording::{Preference, Reader, RunDescription, Writer};
 //! use zsim::simulation::{Scenario, Simulation};
 //!
-//! // A walk through a furnished hall, by names that the library knows.
+//! // A walk through a furnished hall, with specs from the library.
 //! let scenario = Scenario { duration_s: 8.0, ..Scenario::in_scene("mocap_room") };
 //! let simulation = Simulation::prepare(&scenario)?;
 //!
@@ -32,7 +35,7 @@
 //! simulation.run(&mut writer, &mut |_fraction| ())?;
 //! writer.finish()?;
 //!
-//! // Estimate, from the measurements alone.
+//! // Estimate from the measurements only.
 //! let reader = Reader::open(&path)?;
 //! let selection = reader.select(&Preference::default())?;
 //! let found = reader.calibration(&selection, &simulation.calibration(), None)?;
@@ -42,19 +45,22 @@
 //! }
 //! let estimate = estimator.finish()?;
 //!
-//! // Evaluate, against the truth.
+//! // Compare with the ground truth.
 //! let pairs = Pairs::associate(&estimate.trajectory, &reader.truth_trajectory()?)?;
 //! let errors = Errors::after(&pairs, &pairs.world_from_map()?);
 //! assert!(errors.position_rmse_m() < 0.1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # The rooms
+//! # Modules
 //!
-//! The ground floor: [time], [random], [geometry], [signal], [spec], [elasticity], [surfel_map], [measurement],
-//! [truth]. The door: [recording]. The wing that makes data: [world], [motion], [dynamics], [sensors], [simulation].
-//! The wing that makes sense of them: [estimation], [evaluation]. On top: [report] and `study`. The two wings never
-//! name each other; a test (`tests/architecture.rs`) keeps them apart.
+//! - Basics: [time], [random], [geometry], [signal], [spec], [elasticity], [surfel_map], [measurement], [truth].
+//! - Input and output: [recording].
+//! - Simulation: [world], [motion], [dynamics], [sensors], [simulation].
+//! - Estimation: [estimation], [evaluation].
+//! - Applications: [report] and [study].
+//!
+//! Simulation and estimation do not depend on each other; the test `tests/architecture.rs` enforces this.
 
 pub mod dynamics;
 pub mod elasticity;

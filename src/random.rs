@@ -1,22 +1,22 @@
-//! The run's seed and its named streams.
+//! Random seed of a run, and named streams.
 //!
-//! Every source of noise draws from a stream of its own, named after what it disturbs (`"imu/gyro/white"`). A stream is
-//! a function of the run's seed and its name alone: adding a source, or drawing more from one, changes no other.
+//! Each source of noise has a separate stream, named after the quantity it disturbs (`"imu/gyro/white"`). A stream depends
+//! on seed and name only: a new source, or more draws from one stream, does not change the others.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// The generator behind every stream: ChaCha with eight rounds, the same bytes on every machine.
+/// Generator of all streams: ChaCha with eight rounds, with the same bytes on every machine.
 pub type Stream = ChaCha8Rng;
 
-/// The seed of a run, from which all of its randomness follows.
+/// Random seed of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(transparent)]
 pub struct Seed(pub u64);
 
 impl Seed {
-    /// The stream called `name`.
+    /// The stream `name`.
     pub fn stream(self, name: &str) -> Stream {
         let mut state = splitmix(self.0 ^ fnv1a(name.as_bytes()));
         let mut key = [0_u8; 32];
@@ -27,20 +27,20 @@ impl Seed {
         Stream::from_seed(key)
     }
 
-    /// Part `index` of the stream called `name`: parts are independent, so that they can be drawn on any thread.
+    /// Part `index` of the stream `name`: parts are independent and can be drawn on any thread.
     pub fn part(self, name: &str, index: u64) -> Stream {
         let mut stream = self.stream(name);
         stream.set_stream(index);
         stream
     }
 
-    /// The seed of a run within this one (a point of a sweep, a scatter of objects).
+    /// Seed of a sub-run (a point of a sweep, a scatter of objects).
     pub fn child(self, name: &str) -> Seed {
         Seed(splitmix(splitmix(self.0) ^ fnv1a(name.as_bytes())))
     }
 }
 
-/// FNV-1a, 64 bits (Fowler, Noll, Vo): spreads names over seeds.
+/// FNV-1a, 64 bits (Fowler, Noll, Vo): hashes the name into the seed.
 fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }

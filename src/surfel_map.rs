@@ -1,32 +1,34 @@
-//! The map that lasts: surfels with their uncertainty. Data only; the estimator makes and uses it, the door keeps it.
+//! Persistent map of surfels with their uncertainty.
+//!
+//! Data only: the estimator builds and uses the map, `recording` reads and writes it.
 
 use crate::geometry::{Matrix, Vector};
 
-/// Most resolutions of a map.
-pub const MOST_LEVELS: usize = 6;
-/// How far the length of a normal may be from one.
-const UNIT: f64 = 1e-6;
-/// By what share of the greatest an eigenvalue of a second moment may be below zero, by rounding.
-const ROUNDING: f64 = 1e-9;
+/// Maximum number of resolutions of a map.
+pub const MAX_LEVELS: usize = 6;
+/// Tolerance on the length of a unit normal: rounding in a text file.
+const NORMAL_TOLERANCE: f64 = 1e-6;
+/// Negative eigenvalues of a second moment are accepted down to this fraction of the largest, as rounding.
+const EIGENVALUE_TOLERANCE: f64 = 1e-9;
 
-/// A patch of surface in the map.
+/// Surface element (surfel) of the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapSurfel {
-    /// Its centre, m.
+    /// Centre, m.
     pub centre_in_map: Vector,
-    /// Its unit normal, to the side from which it was seen.
+    /// Unit normal, towards the side from which the surface was observed.
     pub normal_in_map: Vector,
-    /// Second central moment of its points, m^2.
+    /// Second central moment of the points, m^2.
     pub covariance_in_map: Matrix,
-    /// Number of its points.
+    /// Number of points.
     pub points: f64,
-    /// Standard deviation of its place along its normal, m: by the points' number and by the trajectory.
+    /// Standard deviation of the position along the normal, m: from the number of points and from the trajectory.
     pub sigma_m: f64,
-    /// Resolution, 0 the finest.
+    /// Resolution level; 0 is the finest.
     pub level: usize,
 }
 
-/// Surfels of several resolutions, each double the last, all sound: see [`SurfelMap::new`].
+/// Validated surfels of several resolutions, each twice as coarse as the one before: see [`SurfelMap::new`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfelMap {
     finest_voxel_m: f64,
@@ -34,39 +36,39 @@ pub struct SurfelMap {
     surfels: Vec<MapSurfel>,
 }
 
-/// Why surfels are no map.
+/// Reason why surfels do not form a valid map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurfelMapError {
-    /// The resolutions make no sense.
+    /// The resolutions are out of range.
     #[error(
-        "a map of {levels} resolutions from {finest_voxel_m} m on; there must be 1 to {MOST_LEVELS}, from above 0 m to 100 m"
+        "a map with {levels} resolutions from {finest_voxel_m} m; it needs 1 to {MAX_LEVELS} resolutions and a finest voxel above 0 m and up to 100 m"
     )]
     Resolutions {
-        /// The finest, m.
+        /// Edge of the finest voxel, m.
         finest_voxel_m: f64,
-        /// How many.
+        /// Number of resolutions.
         levels: usize,
     },
-    /// A surfel that cannot be one.
+    /// A surfel is invalid.
     #[error("surfel {index}: {problem}")]
     Surfel {
-        /// Which, from 0.
+        /// Index of the surfel, from 0.
         index: usize,
-        /// What is wrong with it.
+        /// Description of the problem.
         problem: &'static str,
     },
 }
 
 impl SurfelMap {
-    /// A map of surfels from voxels of `finest_voxel_m`, in `levels` resolutions.
+    /// Builds a map from surfels of `levels` resolutions, the finest with voxels of `finest_voxel_m`.
     ///
     /// # Errors
-    /// When the resolutions make no sense, or a surfel has a number that is not finite, a normal that is not of length
-    /// one, a second moment that is none, less than one point, a standard deviation below zero, or a level that the map
-    /// has not.
+    /// When the resolutions are out of range, or a surfel has a number that is not finite, a normal that is not of unit
+    /// length, a second moment that is not positive semi-definite, fewer than one point, a negative standard deviation,
+    /// or a level outside the map's.
     pub fn new(finest_voxel_m: f64, levels: usize, surfels: Vec<MapSurfel>) -> Result<Self, SurfelMapError> {
-        let sound = finest_voxel_m > 0.0 && finest_voxel_m <= 100.0 && (1..=MOST_LEVELS).contains(&levels);
-        if !sound {
+        let is_valid = finest_voxel_m > 0.0 && finest_voxel_m <= 100.0 && (1..=MAX_LEVELS).contains(&levels);
+        if !is_valid {
             return Err(SurfelMapError::Resolutions { finest_voxel_m, levels });
         }
         for (index, surfel) in surfels.iter().enumerate() {
@@ -75,12 +77,12 @@ impl SurfelMap {
         Ok(Self { finest_voxel_m, levels, surfels })
     }
 
-    /// Edge of the finest voxels that the surfels came from, m.
+    /// Edge of the voxels of the finest level, m.
     pub fn finest_voxel_m(&self) -> f64 {
         self.finest_voxel_m
     }
 
-    /// How many resolutions.
+    /// Number of resolutions.
     pub fn levels(&self) -> usize {
         self.levels
     }
@@ -95,26 +97,26 @@ impl MapSurfel {
     fn check(&self, levels: usize) -> Result<(), &'static str> {
         let vectors = self.centre_in_map.iter().chain(&self.normal_in_map).chain(&self.covariance_in_map);
         if !vectors.chain([&self.points, &self.sigma_m]).all(|x| x.is_finite()) {
-            return Err("a number of it is not finite");
+            return Err("one of its numbers is not finite");
         }
-        if (self.normal_in_map.norm() - 1.0).abs() > UNIT {
-            return Err("its normal is not of length one");
+        if (self.normal_in_map.norm() - 1.0).abs() > NORMAL_TOLERANCE {
+            return Err("its normal is not of unit length");
         }
         let eigenvalues = self.covariance_in_map.symmetric_eigenvalues();
         if self.covariance_in_map != self.covariance_in_map.transpose()
             || eigenvalues.max() <= 0.0
-            || eigenvalues.min() < -ROUNDING * eigenvalues.max()
+            || eigenvalues.min() < -EIGENVALUE_TOLERANCE * eigenvalues.max()
         {
-            return Err("its second moment is none of points");
+            return Err("its second moment is not that of points");
         }
         if self.points < 1.0 {
-            return Err("it has less than one point");
+            return Err("it has fewer than one point");
         }
         if self.sigma_m < 0.0 {
-            return Err("its standard deviation is below zero");
+            return Err("its standard deviation is negative");
         }
         if self.level >= levels {
-            return Err("its level is not among the map's");
+            return Err("its level is outside the map's levels");
         }
         Ok(())
     }
@@ -136,22 +138,25 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_surfel_is_refused_and_named() {
+    fn an_invalid_surfel_is_rejected_with_its_index() {
         assert_eq!(SurfelMap::new(0.5, 4, vec![surfel(); 3]).unwrap().surfels().len(), 3);
-        let said = |wrong: MapSurfel| SurfelMap::new(0.5, 4, vec![surfel(), wrong]).unwrap_err().to_string();
-        let of = surfel;
-        for (wrong, about) in [
-            (MapSurfel { centre_in_map: Vector::new(f64::NAN, 0.0, 0.0), ..of() }, "not finite"),
-            (MapSurfel { sigma_m: f64::INFINITY, ..of() }, "not finite"),
-            (MapSurfel { normal_in_map: Vector::new(0.0, 0.0, 1.1), ..of() }, "normal"),
-            (MapSurfel { covariance_in_map: Matrix::from_diagonal(&Vector::new(0.1, 0.1, -0.01)), ..of() }, "moment"),
-            (MapSurfel { covariance_in_map: Matrix::zeros(), ..of() }, "moment"),
-            (MapSurfel { points: 0.0, ..of() }, "point"),
-            (MapSurfel { sigma_m: -1.0, ..of() }, "deviation"),
-            (MapSurfel { level: 4, ..of() }, "level"),
+        let error = |invalid: MapSurfel| SurfelMap::new(0.5, 4, vec![surfel(), invalid]).unwrap_err().to_string();
+        let valid = surfel;
+        for (invalid, cause) in [
+            (MapSurfel { centre_in_map: Vector::new(f64::NAN, 0.0, 0.0), ..valid() }, "not finite"),
+            (MapSurfel { sigma_m: f64::INFINITY, ..valid() }, "not finite"),
+            (MapSurfel { normal_in_map: Vector::new(0.0, 0.0, 1.1), ..valid() }, "normal"),
+            (
+                MapSurfel { covariance_in_map: Matrix::from_diagonal(&Vector::new(0.1, 0.1, -0.01)), ..valid() },
+                "moment",
+            ),
+            (MapSurfel { covariance_in_map: Matrix::zeros(), ..valid() }, "moment"),
+            (MapSurfel { points: 0.0, ..valid() }, "point"),
+            (MapSurfel { sigma_m: -1.0, ..valid() }, "deviation"),
+            (MapSurfel { level: 4, ..valid() }, "level"),
         ] {
-            let said = said(wrong);
-            assert!(said.starts_with("surfel 1: ") && said.contains(about), "{said}");
+            let message = error(invalid);
+            assert!(message.starts_with("surfel 1: ") && message.contains(cause), "{message}");
         }
         for (voxel_m, levels) in [(0.0, 4), (f64::NAN, 4), (0.5, 0), (0.5, 7), (1e9, 2)] {
             assert!(matches!(SurfelMap::new(voxel_m, levels, vec![]), Err(SurfelMapError::Resolutions { .. })));

@@ -1,7 +1,7 @@
 //! Time as integer nanoseconds.
 //!
-//! Every stamp is an `i64` count of nanoseconds on *some* clock; which clock is said where the stamp stands. Seconds as
-//! `f64` appear only as differences of two stamps, inside formulas, where 1 ns of resolution is never at stake.
+//! A stamp is an `i64` count of nanoseconds on a clock; the documentation of each stamp names the clock. Seconds as
+//! `f64` are used only for differences of two stamps in formulas, where a resolution of 1 ns is not needed.
 
 use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign, Sub};
@@ -9,50 +9,50 @@ use std::ops::{Add, AddAssign, Sub};
 /// Nanoseconds in a second.
 pub const NANOS_PER_SECOND: i64 = 1_000_000_000;
 
-/// An instant, in nanoseconds on the clock of whoever wrote it.
+/// A time in nanoseconds on the clock of the writer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Stamp(i64);
 
-/// A signed length of time, in nanoseconds.
+/// A signed duration in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Span(i64);
 
 impl Stamp {
-    /// The instant `nanos` after the clock's zero.
+    /// The time `nanos` after the zero of the clock.
     pub const fn from_nanos(nanos: i64) -> Self {
         Self(nanos)
     }
 
-    /// Nanoseconds since the clock's zero.
+    /// Nanoseconds since the zero of the clock.
     pub const fn nanos(self) -> i64 {
         self.0
     }
 
-    /// Seconds from `origin` to here; exact to 1 ns for spans under 100 days.
+    /// Seconds since `origin`; exact to 1 ns for durations below 100 days.
     pub fn seconds_since(self, origin: Stamp) -> f64 {
         (self - origin).seconds()
     }
 
-    /// The stamp rounded down to a multiple of `step` (the resolution of a coarse clock).
+    /// The stamp rounded down to a multiple of `step`, the resolution of a clock.
     ///
-    /// A step of zero or less leaves the stamp as it is.
+    /// A step of zero or below returns the stamp unchanged.
     pub const fn floor_to(self, step: Span) -> Self {
         if step.0 <= 0 { self } else { Self(self.0.div_euclid(step.0) * step.0) }
     }
 }
 
 impl Span {
-    /// No time at all.
+    /// Zero duration.
     pub const ZERO: Span = Span(0);
 
-    /// A span of `nanos` nanoseconds.
+    /// A duration of `nanos` nanoseconds.
     pub const fn from_nanos(nanos: i64) -> Self {
         Self(nanos)
     }
 
-    /// The span nearest to `seconds`; saturates at the ends of `i64`, and is zero for NaN.
+    /// The duration nearest to `seconds`; saturates at the limits of `i64`, and is zero for NaN.
     pub fn from_seconds(seconds: f64) -> Self {
         Self((seconds * NANOS_PER_SECOND as f64).round() as i64)
     }
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_sum_of_beam_times_loses_no_nanosecond() {
-        // 1440 slots of 25 ms / 1440 make one turn: 17361.1 ns each, so the last of them must come from one product.
+        // 1440 slots of 25 ms / 1440 are one turn: 17361.1 ns each, so the last offset must be computed as one product.
         let slot_s = 0.025 / 1440.0;
         let start = Stamp::from_nanos(1_349_049_600 * NANOS_PER_SECOND);
         let end = start + Span::from_seconds(1440.0 * slot_s);

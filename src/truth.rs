@@ -1,47 +1,51 @@
-//! What really happened: a room of its own, so that estimation can be forbidden to name it.
+//! Ground truth of a simulated run.
+//!
+//! The module is separate so that the architecture can forbid estimation to depend on it.
 
 use crate::geometry::Kinematics;
 use crate::measurement::SinkError;
 use crate::time::{Span, Stamp};
 
-/// How the head and its base moved at an instant, both in the world.
+/// True motion of the head and its base at one time, both in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TruthSample {
-    /// The instant on the lidar's clock, in which trajectories are written.
+    /// The same time on the lidar's clock; trajectories are written in lidar time.
     pub lidar_stamp: Stamp,
-    /// The head: `world_from_head` and its derivatives.
+    /// Head: `world_from_head` and derivatives.
     pub head: Kinematics,
-    /// The base that carries the spring: `world_from_base` and its derivatives.
+    /// Base that carries the spring: `world_from_base` and derivatives.
     pub base: Kinematics,
 }
 
-/// What the sensors' clocks said at an instant, jitter aside; mean quantisation and delays are in it.
+/// True errors of the sensors' clocks at one time.
+///
+/// Jitter is excluded; mean quantisation and delays are included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockTruth {
-    /// How far the lidar's clock was ahead of true time.
+    /// Lidar clock minus true time.
     pub lidar_ahead: Span,
-    /// How far the IMU's stamps were ahead of true time.
+    /// IMU stamps minus true time.
     pub imu_ahead: Span,
 }
 
 impl ClockTruth {
-    /// How much later the IMU stamps an instant than the lidar does: the clock offset that an estimator looks for.
+    /// IMU stamp minus lidar stamp of one event: the time offset that an estimator determines.
     pub fn imu_after_lidar(&self) -> Span {
         self.imu_ahead - self.lidar_ahead
     }
 }
 
-/// Takes the truth, in the order of time.
+/// Receives ground truth in order of time.
 pub trait TruthSink {
-    /// Takes how things moved at the true time `now`.
+    /// Receives the motion at the true time `now`.
     ///
     /// # Errors
-    /// When the sink cannot keep it.
+    /// When the sink cannot store it.
     fn truth(&mut self, now: Stamp, sample: &TruthSample) -> Result<(), SinkError>;
 
-    /// Takes what the clocks said at the true time `now`.
+    /// Receives the clock errors at the true time `now`.
     ///
     /// # Errors
-    /// When the sink cannot keep it.
+    /// When the sink cannot store it.
     fn clock(&mut self, now: Stamp, clock: &ClockTruth) -> Result<(), SinkError>;
 }

@@ -1,17 +1,19 @@
-//! Who may name whom. Reads `src/`, and fails on a room that the table does not know, on a room that names one it may
-//! not, and on a crate named outside the room that keeps it.
+//! Checks the dependencies between the modules of `src/`.
+//!
+//! Fails on a module that the tables do not list, on a dependency that they do not allow, and on a crate that is used
+//! outside the modules it is restricted to.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The ground floor, from the bottom up: each may name those before it.
-const GROUND: [&str; 9] =
+/// Base modules, in order: each may use the modules before it.
+const BASE: [&str; 9] =
     ["time", "random", "geometry", "signal", "spec", "elasticity", "surfel_map", "measurement", "truth"];
 
-/// Every room above the ground floor, with the rooms it may name beside the ground floor.
-const ABOVE: [(&str, &[&str]); 11] = [
+/// Every other module, with the modules that it may use in addition to the base modules.
+const UPPER: [(&str, &[&str]); 11] = [
     ("recording", &[]),
     ("world", &[]),
     ("motion", &["recording"]),
@@ -41,11 +43,11 @@ const BELOW_CLI: &[&str] = &[
     "study",
 ];
 
-/// All of the ground floor that estimation may name: never truth, never where data come from.
+/// The only modules that estimation may use: neither ground truth nor data sources.
 const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
 
-/// Crates that one room keeps to itself (or a few, at the door), and what each is kept for.
-const KEPT: [(&str, &[&str]); 17] = [
+/// Crates that are restricted to some modules, and these modules.
+const RESTRICTED_CRATES: [(&str, &[&str]); 17] = [
     ("parry3d", &["world"]),
     ("rapier3d_f64", &["dynamics"]),
     ("mcap", &["recording"]),
@@ -65,8 +67,8 @@ const KEPT: [(&str, &[&str]); 17] = [
     ("sobol", &["study"]),
 ];
 
-/// Words that no file of the library says: the clock on the wall, and the order of a hash.
-const NOWHERE_IN_THE_LIBRARY: [&str; 3] = ["SystemTime::now", "HashMap", "HashSet"];
+/// Names that the library must not use: the wall clock, and collections with random iteration order.
+const FORBIDDEN_IN_LIBRARY: [&str; 3] = ["SystemTime::now", "HashMap", "HashSet"];
 
 fn sources() -> BTreeMap<PathBuf, String> {
     fn walk(folder: &Path, into: &mut BTreeMap<PathBuf, String>) {
@@ -88,48 +90,48 @@ fn src() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// The room a file stands in: the first name below `src/`.
-fn room_of(path: &Path) -> String {
+/// The module of a file: the first name below `src/`.
+fn module_of(path: &Path) -> String {
     let below = path.strip_prefix(src()).unwrap();
     let first = below.components().next().unwrap().as_os_str().to_str().unwrap();
     first.trim_end_matches(".rs").to_owned()
 }
 
-fn rooms_a_room_may_name(room: &str) -> Option<Vec<&'static str>> {
-    if room == "estimation" {
+fn allowed_modules(module: &str) -> Option<Vec<&'static str>> {
+    if module == "estimation" {
         return Some(ESTIMATION.to_vec());
     }
-    if let Some(floor) = GROUND.iter().position(|r| *r == room) {
-        return Some(GROUND[..floor].to_vec());
+    if let Some(position) = BASE.iter().position(|r| *r == module) {
+        return Some(BASE[..position].to_vec());
     }
-    let (_, more) = ABOVE.iter().find(|(name, _)| *name == room)?;
-    Some(GROUND.iter().chain(more.iter()).copied().collect())
+    let (_, more) = UPPER.iter().find(|(name, _)| *name == module)?;
+    Some(BASE.iter().chain(more.iter()).copied().collect())
 }
 
-/// Code without its comments, so that prose may speak of anything.
+/// Code without comments, so that comments may use any name.
 fn code(text: &str) -> String {
     text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }
 
-/// The rooms that `text` names, as `crate::room`, `zsim::room`, or within `use crate::{...}`.
-fn rooms_named(text: &str) -> Vec<String> {
+/// The modules that `text` uses, as `crate::module`, `zsim::module`, or within `use crate::{...}`.
+fn modules_used(text: &str) -> Vec<String> {
     let code = code(text);
-    let mut named = Vec::new();
+    let mut used = Vec::new();
     for root in ["crate::", "zsim::"] {
         for (at, _) in code.match_indices(root) {
             let rest = &code[at + root.len()..];
             match rest.strip_prefix('{') {
-                Some(group) => named.extend(names_at_top_of(group)),
-                None => named.push(rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()),
+                Some(group) => used.extend(first_segments(group)),
+                None => used.push(rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()),
             }
         }
     }
-    named.retain(|name: &String| name.starts_with(|c: char| c.is_lowercase()));
-    named
+    used.retain(|name: &String| name.starts_with(|c: char| c.is_lowercase()));
+    used
 }
 
-/// The first names of the entries of a use group, whose text begins after its brace.
-fn names_at_top_of(group: &str) -> Vec<String> {
+/// The first path segment of each entry of a use group; `group` starts after the opening brace.
+fn first_segments(group: &str) -> Vec<String> {
     let (mut depth, mut entries, mut entry) = (0, Vec::new(), String::new());
     for c in group.chars() {
         match c {
@@ -146,72 +148,76 @@ fn names_at_top_of(group: &str) -> Vec<String> {
     entries.into_iter().map(first).filter(|e| !e.is_empty()).collect()
 }
 
-/// What is wrong with the house, a sentence a fault.
-fn faults(files: &BTreeMap<PathBuf, String>) -> Vec<String> {
-    let mut faults = Vec::new();
+/// Violations of the tables, one message each.
+fn violations(files: &BTreeMap<PathBuf, String>) -> Vec<String> {
+    let mut violations = Vec::new();
     for (path, text) in files {
-        let room = room_of(path);
-        if room == "lib" || room == "main" {
+        let module = module_of(path);
+        if module == "lib" || module == "main" {
             continue;
         }
-        let Some(allowed) = rooms_a_room_may_name(&room) else {
-            faults.push(format!("{}: the table knows no room `{room}`", path.display()));
+        let Some(allowed) = allowed_modules(&module) else {
+            violations.push(format!("{}: module `{module}` is missing in the tables", path.display()));
             continue;
         };
-        for named in rooms_named(text) {
-            if named != room && !allowed.contains(&named.as_str()) {
-                faults.push(format!("{}: {room} may not name {named}", path.display()));
+        for used in modules_used(text) {
+            if used != module && !allowed.contains(&used.as_str()) {
+                violations.push(format!("{}: {module} must not use {used}", path.display()));
             }
         }
     }
-    faults
+    violations
 }
 
 #[test]
-fn every_room_names_only_those_it_may() {
-    let faults = faults(&sources());
-    assert!(faults.is_empty(), "{}", faults.join("\n"));
+fn modules_use_only_allowed_modules() {
+    let violations = violations(&sources());
+    assert!(violations.is_empty(), "{}", violations.join("\n"));
 }
 
 #[test]
-fn the_check_sees_a_forbidden_name_in_each_form() {
-    let fault_of = |room: &str, text: &str| {
-        let file = src().join(room).join("x.rs");
-        faults(&BTreeMap::from([(file, text.to_owned())])).len()
+fn the_check_finds_every_form_of_a_forbidden_use() {
+    let violations_in = |module: &str, text: &str| {
+        let file = src().join(module).join("x.rs");
+        violations(&BTreeMap::from([(file, text.to_owned())])).len()
     };
-    assert_eq!(fault_of("estimation", "use crate::truth::TruthSample;"), 1);
-    assert_eq!(fault_of("estimation", "use crate::{time::Stamp, simulation};"), 1);
-    assert_eq!(fault_of("estimation", "fn f() { crate::recording::read(); }"), 1);
-    assert_eq!(fault_of("estimation", "use crate::{geometry::{Pose, Vector}, time::Stamp}; // crate::truth"), 0);
-    assert_eq!(fault_of("geometry", "use crate::measurement::ImuSample;"), 1);
-    assert_eq!(fault_of("nowhere", ""), 1);
+    assert_eq!(violations_in("estimation", "use crate::truth::TruthSample;"), 1);
+    assert_eq!(violations_in("estimation", "use crate::{time::Stamp, simulation};"), 1);
+    assert_eq!(violations_in("estimation", "fn f() { crate::recording::read(); }"), 1);
+    assert_eq!(violations_in("estimation", "use crate::{geometry::{Pose, Vector}, time::Stamp}; // crate::truth"), 0);
+    assert_eq!(violations_in("geometry", "use crate::measurement::ImuSample;"), 1);
+    assert_eq!(violations_in("nowhere", ""), 1);
 }
 
 #[test]
-fn each_kept_crate_stays_in_its_room() {
+fn restricted_crates_are_used_only_in_their_modules() {
     for (path, text) in sources() {
-        let (room, code) = (room_of(&path), code(&text));
-        for (kept, rooms) in KEPT {
-            let named = code.contains(&format!("{kept}::")) || code.contains(&format!("use {kept}"));
-            assert!(!named || rooms.contains(&room.as_str()), "{}: {kept} is kept by {rooms:?}", path.display());
+        let (module, code) = (module_of(&path), code(&text));
+        for (name, modules) in RESTRICTED_CRATES {
+            let used = code.contains(&format!("{name}::")) || code.contains(&format!("use {name}"));
+            assert!(
+                !used || modules.contains(&module.as_str()),
+                "{}: {name} is restricted to {modules:?}",
+                path.display()
+            );
         }
     }
 }
 
 #[test]
-fn estimation_opens_no_file() {
-    for (path, text) in sources().iter().filter(|(path, _)| room_of(path) == "estimation") {
+fn estimation_uses_no_files() {
+    for (path, text) in sources().iter().filter(|(path, _)| module_of(path) == "estimation") {
         let code = code(text);
-        assert!(!code.contains("std::fs") && !code.contains("std::io"), "{}: names files", path.display());
+        assert!(!code.contains("std::fs") && !code.contains("std::io"), "{}: uses files", path.display());
     }
 }
 
 #[test]
-fn the_library_reads_no_clock_and_hashes_no_order() {
-    for (path, text) in sources().iter().filter(|(path, _)| !["cli", "main"].contains(&room_of(path).as_str())) {
+fn the_library_uses_no_wall_clock_and_no_hash_order() {
+    for (path, text) in sources().iter().filter(|(path, _)| !["cli", "main"].contains(&module_of(path).as_str())) {
         let code = code(text);
-        for word in NOWHERE_IN_THE_LIBRARY {
-            assert!(!code.contains(word), "{}: says {word}", path.display());
+        for word in FORBIDDEN_IN_LIBRARY {
+            assert!(!code.contains(word), "{}: uses {word}", path.display());
         }
     }
 }

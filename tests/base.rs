@@ -1,4 +1,4 @@
-//! The base's trajectory with an IMU on it, against motions that are known.
+//! Base trajectory from an IMU on the base, compared with known motions.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -23,11 +23,11 @@ fn base_from_imu() -> Pose {
 
 const GYRO_BIAS: Vector = Vector::new(2e-3, -1e-3, 3e-3);
 const ACCEL_BIAS: Vector = Vector::new(0.02, 0.03, -0.01);
-/// How much later the IMU stamps an instant at the start, s, and how fast that grows.
+/// Delay of the IMU's stamps at the start, s, and its rate of change, s/s.
 const OFFSET: (f64, f64) = (0.0237, 20e-6);
 const DURATION_S: f64 = 30.0;
 
-/// A base that walks a circle of 1 m while it nods: `Rz(c t) Ry(b sin w t)`, whose derivatives are written out.
+/// A base that moves on a circle of 1 m and nods: `Rz(c t) Ry(b sin w t)`, with analytic derivatives.
 fn walk(t: f64) -> Kinematics {
     let (w, c, b) = (5.0, 0.5, 0.25);
     let (nod, nod1, nod2) = (b * (w * t).sin(), b * w * (w * t).cos(), -b * w * w * (w * t).sin());
@@ -49,7 +49,7 @@ fn at(seconds: f64) -> Stamp {
     Stamp::from_nanos(1_000_000_000_000) + Span::from_seconds(seconds)
 }
 
-/// What an IMU of 100 Hz says on that walk, with constant biases and a clock of its own and no other error.
+/// Samples of a 100 Hz IMU on that motion, with constant biases and clock offset and no other error.
 fn samples() -> Vec<ImuSample> {
     let moved = |t: f64| walk(t).of_frame(&base_from_imu());
     let sample = |k: i32| {
@@ -64,7 +64,7 @@ fn samples() -> Vec<ImuSample> {
     (0..(DURATION_S * 100.0) as i32).map(sample).collect()
 }
 
-/// Fixes at 100 Hz that scatter by `position_m` and `rotation_rad` on each axis.
+/// Fixes at 100 Hz with noise of `position_m` and `rotation_rad` on each axis.
 fn fixes(position_m: f64, rotation_rad: f64) -> Vec<BaseFix> {
     let mut stream = Seed(7).stream("fixes");
     let mut normal = || Vector::from_fn(|_, _| StandardNormal.sample(&mut stream));
@@ -88,8 +88,8 @@ fn smoothed(fixes: &[BaseFix], samples: &[ImuSample]) -> Result<BaseEstimate, Es
     smooth_base(fixes, samples, &imu(), &load("default").unwrap())
 }
 
-/// Root mean square of distance, m, and angle, rad, to the walk.
-fn off_the_walk(base: &Trajectory) -> (f64, f64) {
+/// RMS distance, m, and angle, rad, from the true motion.
+fn rms_error(base: &Trajectory) -> (f64, f64) {
     let squares = base.iter().map(|(stamp, pose)| {
         let truth = walk((stamp - at(0.0)).seconds()).world_from_body;
         let way = pose.translation.vector - truth.translation.vector;
@@ -100,9 +100,9 @@ fn off_the_walk(base: &Trajectory) -> (f64, f64) {
 }
 
 #[test]
-fn a_walk_in_closed_form_is_found_with_the_clocks_offset() {
+fn a_closed_form_motion_and_the_clock_offset_are_estimated() {
     let estimate = smoothed(&fixes(0.0, 0.0), &samples()).unwrap();
-    let (way_m, turn_rad) = off_the_walk(&estimate.trajectory);
+    let (way_m, turn_rad) = rms_error(&estimate.trajectory);
     assert!(way_m < 2e-4 && turn_rad < 2e-4, "{way_m} m, {turn_rad} rad");
     assert!(estimate.trajectory.len() > 2900, "{}", estimate.trajectory.len());
     assert!(estimate.up_in_world.angle(&Vector::z()) < 1e-3, "{}", estimate.up_in_world);
@@ -111,31 +111,31 @@ fn a_walk_in_closed_form_is_found_with_the_clocks_offset() {
 }
 
 #[test]
-fn fixes_that_scatter_are_smoothed_by_the_imu() {
-    // 5 mm and 5 mrad an axis are 8.7 in all. The filter's memory is some tenths of a second, dozens of fixes; a sixth
-    // is left of what they scatter, if not less.
+fn the_imu_smooths_noisy_fixes() {
+    // 5 mm and 5 mrad per axis are 8.7 in total. The filter averages over some tenths of a second, dozens of fixes, which
+    // leaves at most a sixth of the noise.
     let estimate = smoothed(&fixes(5e-3, 5e-3), &samples()).unwrap();
-    let (way_m, turn_rad) = off_the_walk(&estimate.trajectory);
+    let (way_m, turn_rad) = rms_error(&estimate.trajectory);
     assert!(way_m < 1.5e-3 && turn_rad < 1.5e-3, "{way_m} m, {turn_rad} rad");
-    assert_eq!(smoothed(&fixes(5e-3, 5e-3), &samples()).unwrap(), estimate, "the same bits");
+    assert_eq!(smoothed(&fixes(5e-3, 5e-3), &samples()).unwrap(), estimate, "repeatable to the bit");
 }
 
 #[test]
-fn where_the_imu_is_silent_the_fixes_lead() {
+fn during_an_imu_gap_the_fixes_determine_the_trajectory() {
     let mut samples = samples();
     samples.drain(1000..1080);
     samples.drain(2000..2003);
     let estimate = smoothed(&fixes(1e-3, 1e-3), &samples).unwrap();
-    let (way_m, turn_rad) = off_the_walk(&estimate.trajectory);
+    let (way_m, turn_rad) = rms_error(&estimate.trajectory);
     assert!(way_m < 5e-3 && turn_rad < 1e-2, "{way_m} m, {turn_rad} rad");
     assert!(estimate.trajectory.len() > 2900);
 }
 
 #[test]
-fn what_cannot_be_smoothed_is_told_in_a_sentence() {
+fn input_that_cannot_be_smoothed_is_an_error_with_the_reason() {
     let (fixes, samples) = (fixes(1e-3, 1e-3), samples());
     let words = |fixes: &[BaseFix], samples: &[ImuSample]| match smoothed(fixes, samples) {
-        Ok(_) => panic!("it was smoothed"),
+        Ok(_) => panic!("no error"),
         Err(error) => error.to_string(),
     };
     assert!(words(&fixes, &[]).contains("overlap for 0.000 s"));
@@ -157,12 +157,12 @@ fn what_cannot_be_smoothed_is_told_in_a_sentence() {
 }
 
 #[test]
-fn a_simulated_handle_is_found_best_with_its_own_imu() {
+fn an_imu_on_the_base_improves_a_simulated_handle_trajectory() {
     let here = tempfile::tempdir().unwrap();
     let simulate = "simulate --scene mocap_room --duration 14s --seed 5 --lidar lms291 --base-imu 3dm_gx2 --out a.mcap";
     let (code, _, talk) = run(here.path(), simulate);
     assert_eq!(code, 0, "{talk}");
-    // At an estimate's rate: the truth has a thousand poses a second.
+    // Subsampled to the rate of an estimate; the ground truth has 1000 poses/s.
     let truth = std::fs::read_to_string(here.path().join("a.tum")).unwrap();
     let head: Vec<_> = truth.lines().filter(|line| !line.starts_with('#')).step_by(10).collect();
     std::fs::write(here.path().join("head.tum"), head.join("\n") + "\n").unwrap();
@@ -173,11 +173,11 @@ fn a_simulated_handle_is_found_best_with_its_own_imu() {
     let figure = |way: &str, key: &str| figures[way][key].as_f64().unwrap();
     assert!(figure("imu", "rotation_rmse_deg") < 0.05 * figure("rigid_link", "rotation_rmse_deg"), "{out}");
     assert!(figure("imu", "position_rmse_m") < 0.2 * figure("rigid_link", "position_rmse_m"), "{out}");
-    // As the clocks' spec has it: 3 ms at the start, and 1 ms a minute.
+    // From the clock spec: 3 ms at the start, and 1 ms/min.
     assert!((figure("imu", "clock_offset_ms") - 3.23).abs() < 1.5, "{out}");
     assert!(here.path().join("base/base_imu.tum").exists());
 
-    // The estimator goes on with the head's IMU.
+    // The estimator still uses the IMU of the head.
     let selection = Reader::open(&here.path().join("a.mcap")).unwrap().select(&Preference::default()).unwrap();
     assert_eq!(selection.imu_topic, "/imu/data_raw");
     for (topic, words) in

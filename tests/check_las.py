@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""check_las.py FILE.las EXPECTED.txt: does laspy read from a cloud what was written?
+"""check_las.py FILE.las EXPECTED.txt: compares a LAS cloud, as laspy reads it, with its expected points.
 
-EXPECTED.txt has a point a line: x y z intensity time error. Prints one line, `ok ...`, or `skipped: ...` where laspy is not
-installed; ends with 1 where something is wrong.
+EXPECTED.txt has one point per line: x y z intensity time error. Prints one line, `ok ...`, or `skipped: ...` if laspy is not
+installed; exits with 1 on a difference.
 """
 import sys
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""check_mcap.py FILE.mcap: do independent readers understand a recording?
+"""check_mcap.py FILE.mcap: checks a recording with independent readers.
 
 Reads every message twice: with `mcap` and `mcap-ros2-support` by the definitions in the file, and with `rosbags` by its
-own. Both must give the same values, and the values must be what a recording of zsim has. Prints one line, `ok ...`, or
-`skipped: ...` where a module is not installed; ends with 1 where something is wrong.
+own definitions. Both must agree, and the values must be those of a recording of zsim. Prints one line, `ok ...`, or
+`skipped: ...` if a module is not installed; exits with 1 on a difference.
 """
 import sys
 
@@ -30,7 +30,7 @@ TYPES = {
 
 
 def same(a, b):
-    """Whether what two libraries decoded is the same, field by field."""
+    """Whether two decoded messages are equal, field by field."""
     if isinstance(b, np.ndarray) or isinstance(a, (bytes, bytearray)):
         a = np.frombuffer(a, np.uint8) if isinstance(a, (bytes, bytearray, memoryview)) else np.asarray(a)
         return np.array_equal(a.astype(float), np.asarray(b).astype(float), equal_nan=True)
@@ -43,7 +43,7 @@ def same(a, b):
 
 
 def points_on_scan(scan, cloud):
-    """Whether the cloud's points are the scan's returns, each at its time."""
+    """Whether the cloud's points are the scan's returns with their times."""
     ranges = np.asarray(scan.ranges)
     back = np.flatnonzero((ranges >= scan.range_min) & (ranges <= scan.range_max))
     kinds = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("i", "<f4"), ("t", "<u4")])
@@ -55,7 +55,7 @@ def points_on_scan(scan, cloud):
 
 
 def roots(parents, frames):
-    """The frames that those of `frames` hang from."""
+    """The root frames of `frames` in the transform tree."""
     found = set()
     for frame in frames:
         while frame in parents:
@@ -79,13 +79,13 @@ def main(path):
             if TYPES.get(topic) != schema.name:
                 wrong.add(f"{topic} is {schema.name}")
             if message.log_time < last.get(topic, 0):
-                wrong.add(f"{topic}: log time goes back")
+                wrong.add(f"{topic}: log time decreases")
             last[topic] = message.log_time
             own = store.deserialize_cdr(message.data, schema.name)
             if not same(decoded, own):
-                wrong.add(f"{topic}: the definition in the file decodes to something else")
+                wrong.add(f"{topic}: the definition in the file decodes to other values")
             if bytes(store.serialize_cdr(own, schema.name))[4:] != message.data[4:]:
-                wrong.add(f"{topic}: rosbags writes other bytes")
+                wrong.add(f"{topic}: rosbags serialises to other bytes")
             if not topic.startswith("/ground_truth/") and topic != "/tf_static":
                 frames.add(decoded.header.frame_id)
             if topic == "/tf_static":
@@ -99,9 +99,9 @@ def main(path):
     if "durability: 1" not in qos.get("/tf_static", ""):
         wrong.add("/tf_static is not transient_local")
     if roots(parents, frames) != {"head"}:
-        wrong.add(f"frames of measurements hang from {sorted(roots(parents, frames))}, not all from head")
+        wrong.add(f"root frames of measurements are {sorted(roots(parents, frames))} instead of head")
     if summary is None or summary.statistics.message_count != sum(counts.values()):
-        wrong.add("the summary counts other messages")
+        wrong.add("the summary has another number of messages")
     if wrong:
         print("\n".join(sorted(wrong)))
         return 1

@@ -1,5 +1,4 @@
-//! The commands under attack: files that must not be replaced, numbers that must not be believed, names that must not
-//! reach a terminal, and signals.
+//! The commands with hostile input: protected files, out-of-range numbers, control characters in names, and signals.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -15,7 +14,7 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_simulation_replaces_no_file_that_it_did_not_write() {
+fn simulate_does_not_replace_files_of_other_origin() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("run.tum"), "foreign").unwrap();
     let (code, out, _) = run(here.path(), &format!("{SHORT} --out run.mcap"));
@@ -27,7 +26,7 @@ fn a_simulation_replaces_no_file_that_it_did_not_write() {
 }
 
 #[test]
-fn a_table_of_somebody_else_is_not_replaced() {
+fn reproduce_does_not_replace_a_table_of_other_origin() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("paper-quick.md"), "# My paper").unwrap();
     let (code, _, talk) = run(here.path(), "reproduce fig3 --quick --out .");
@@ -36,7 +35,7 @@ fn a_table_of_somebody_else_is_not_replaced() {
 }
 
 #[test]
-fn with_force_an_input_and_what_fails_are_spared() {
+fn force_does_not_replace_inputs_or_files_of_a_failed_run() {
     let here = tempfile::tempdir().unwrap();
     let motion = r#"Replay((poses: Tum("in.tum"), from_route: false, still_s: 1.0, ease_s: 1.0))"#;
     std::fs::write(here.path().join("replay.ron"), motion).unwrap();
@@ -48,13 +47,13 @@ fn with_force_an_input_and_what_fails_are_spared() {
     assert!(before == ["in.tum", "in.mcap"].map(|name| read(here.path(), name)));
     let (code, out, talk) = run(here.path(), &format!("{SHORT} --seed 2 --out in.mcap --force"));
     assert_eq!((code, out.lines().last()), (0, Some("in.mcap")), "{talk}");
-    assert!(before[1] != read(here.path(), "in.mcap"), "another seed, another recording");
-    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "nothing is left of the replacing");
+    assert!(before[1] != read(here.path(), "in.mcap"), "another seed gives another recording");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "no temporary file remains");
 }
 
 #[cfg(unix)]
 #[test]
-fn a_replaced_folder_has_its_metrics_only_when_it_is_complete() {
+fn a_replaced_folder_has_metrics_only_when_it_is_complete() {
     use std::process::{Command, Stdio};
     let here = tempfile::tempdir().unwrap();
     let has = |name: &str| here.path().join("run").join(name).exists();
@@ -70,38 +69,41 @@ fn a_replaced_folder_has_its_metrics_only_when_it_is_complete() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    // Once the recording is longer than the old one the old one has been replaced.
+    // A recording longer than the old one shows that the old one has been replaced.
     while here.path().join("run/recording.mcap").metadata().map_or(0, |file| file.len()) < 10_000_000 {
-        assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+        assert!(child.try_wait().unwrap().is_none(), "the process ended before the signal");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
     child.kill().unwrap();
     child.wait().unwrap();
-    let of_the_old_run = ["metrics.json", "report.html", "open_loop.tum", "cloud.ply", "plots/loops.svg", ".partial-x"];
-    assert_eq!(of_the_old_run.map(has), [false; 6], "the folder is not taken for a complete one");
+    let old_files = ["metrics.json", "report.html", "open_loop.tum", "cloud.ply", "plots/loops.svg", ".partial-x"];
+    assert_eq!(old_files.map(has), [false; 6], "the incomplete folder has files of the old run");
 
-    // Without loop closures nothing of the first run's closed loop stays.
+    // Without loop closure, no closed-loop file of the first run remains.
     let (code, _, talk) = run(here.path(), &format!("{journey} --duration 8s --open-loop"));
     assert!(code == 0 && has("metrics.json") && has("open_loop.tum"), "{talk}");
     assert_eq!(["closed_loop.tum", "plots/loops.svg", "map.ply"].map(has), [false; 3]);
-    assert_eq!(read(here.path(), "run/notes.txt"), b"mine", "what zsim does not write stays");
+    assert_eq!(read(here.path(), "run/notes.txt"), b"mine", "files of other origin remain");
 }
 
 #[test]
-fn with_force_the_map_that_localises_is_spared() {
+fn force_does_not_replace_the_map_used_for_localisation() {
     let here = tempfile::tempdir().unwrap();
     let (code, _, talk) = run(here.path(), "--scene mocap_room --duration 8s --quiet --out run");
     assert_eq!(code, 0, "{talk}");
     let map = read(here.path(), "run/map.ply");
     let in_place = "estimate run/recording.mcap --map run/map.ply --extend-map --quiet --out run --force";
     let (code, _, talk) = run(here.path(), in_place);
-    assert!(code == 2 && talk.contains("map.ply is read by this command and would be replaced"), "{talk}");
+    assert!(
+        code == 2 && talk.contains("map.ply is an input of this command and would be replaced by the result"),
+        "{talk}"
+    );
     assert!(map == read(here.path(), "run/map.ply"));
 }
 
 #[cfg(unix)]
 #[test]
-fn a_signal_closes_the_files_and_is_the_exit_code() {
+fn a_signal_closes_the_files_and_determines_the_exit_code() {
     use std::process::{Command, Stdio};
     for (signal, code) in [("INT", 130), ("TERM", 143)] {
         let here = tempfile::tempdir().unwrap();
@@ -111,9 +113,9 @@ fn a_signal_closes_the_files_and_is_the_exit_code() {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        // Once a chunk is written the handlers are there.
+        // The signal handlers are installed before the first chunk is written.
         while here.path().join("long.mcap").metadata().map_or(0, |file| file.len()) < 100_000 {
-            assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+            assert!(child.try_wait().unwrap().is_none(), "the process ended before the signal");
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
         assert!(Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap().success());
@@ -124,7 +126,7 @@ fn a_signal_closes_the_files_and_is_the_exit_code() {
 }
 
 #[test]
-fn numbers_that_no_machine_can_bear_are_refused_with_their_bound() {
+fn out_of_range_numbers_are_refused_with_their_limit() {
     let here = tempfile::tempdir().unwrap();
     let write = |name: &str, kind: &str, from: &str, to: &str| {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs").join(kind);
@@ -151,13 +153,13 @@ fn numbers_that_no_machine_can_bear_are_refused_with_their_bound() {
         let (code, _, talk) = run(here.path(), arguments);
         assert!(code == 2 && talk.contains(words), "`{arguments}`: {code} {talk}");
     }
-    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "nothing is left behind");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "no file remains");
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_recording_that_no_disk_can_hold_is_not_begun() {
-    // 2^20 beams at 28 Hz are 3e7 a second, of 16 bytes each: 280 TB in 7 days.
+fn a_recording_larger_than_the_disk_is_not_started() {
+    // 2^20 beams at 28 Hz are 3e7 beams/s of 16 bytes each: 280 TB in 7 days.
     let here = tempfile::tempdir().unwrap();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/lidars/mid360.ron");
     let text = std::fs::read_to_string(path).unwrap();
@@ -170,7 +172,7 @@ fn a_recording_that_no_disk_can_hold_is_not_begun() {
 }
 
 #[test]
-fn trajectories_that_say_nothing_or_too_much_are_errors() {
+fn empty_and_out_of_range_trajectories_are_errors() {
     let here = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(here.path().join(name), text).unwrap();
     let poses = "1 0 0 0 0 0 0 1\n2 0 1 0 0 0 0 1\n3 1 0 0 0 0 0 1\n";
@@ -182,7 +184,7 @@ fn trajectories_that_say_nothing_or_too_much_are_errors() {
         ("base empty.tum", "empty.tum: a trajectory of 0 poses; 3 are needed"),
         (
             "evaluate --estimate far.tum --truth poses.tum",
-            "far.tum: the pose of t = 2.000000000 s has a coordinate of 1e200 m",
+            "far.tum: the pose at t = 2.000000000 s has a coordinate of 1e200 m",
         ),
         ("evaluate --estimate poses.tum --truth far.tum", "far.tum: "),
     ] {
@@ -190,7 +192,7 @@ fn trajectories_that_say_nothing_or_too_much_are_errors() {
         assert!(code == 1 && talk.contains(words), "`{arguments}`: {code} {talk}");
     }
     let (code, out, talk) = run(here.path(), "evaluate --estimate marked.tum --truth poses.tum");
-    assert!(code == 0 && out.contains("position_rmse_m"), "a byte order mark: {talk}");
+    assert!(code == 0 && out.contains("position_rmse_m"), "with a byte order mark: {talk}");
 }
 
 #[test]

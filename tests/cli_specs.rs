@@ -1,4 +1,4 @@
-//! `zsim spec`: the schemas and the reference agree with the types and with the specs that ship.
+//! `zsim spec`: schemas and reference agree with the types and with the shipped specs.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -26,7 +26,7 @@ fn printed(verb: &str, kind: Kind) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The shipped spec `name` as JSON; `None` where the text is not a `T`.
+/// The shipped spec `name` as JSON; `None` if the text is not a `T`.
 fn as_json<T: DeserializeOwned + Serialize>(kind: Kind, name: &str) -> Option<Value> {
     Some(serde_json::to_value(parse::<T>(&find(kind, name).unwrap()).ok()?).unwrap())
 }
@@ -74,7 +74,7 @@ fn a_schema_rejects_what_the_parser_rejects() {
     }
 }
 
-/// Refresh with `for kind in $(ls docs/reference); do zsim spec reference ${kind%.md} > docs/reference/$kind; done`.
+/// Update with `for kind in $(ls docs/reference); do zsim spec reference ${kind%.md} > docs/reference/$kind; done`.
 #[test]
 fn the_reference_in_docs_is_current() {
     for kind in Kind::ALL {
@@ -86,7 +86,7 @@ fn the_reference_in_docs_is_current() {
 }
 
 #[test]
-fn list_and_show_print_the_specs_that_ship() {
+fn list_and_show_print_the_shipped_specs() {
     let zsim = |arguments: &[&str]| {
         let output = Command::new(env!("CARGO_BIN_EXE_zsim")).args(arguments).output().unwrap();
         (output.status.code(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())

@@ -1,4 +1,4 @@
-//! The spring's force law against Haringx and the elastica.
+//! The spring's force law, compared with Haringx's theory and the elastica.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 use approx::assert_relative_eq;
@@ -18,7 +18,7 @@ fn wrench(spring: &Spring, state: &mut SpringState, top: &Pose) -> Vector6 {
     spring.wrench(state, top, &Deformation::of(top)).unwrap()
 }
 
-/// Minus the derivative of the wrench by the top's displacement, by central differences.
+/// Tangent stiffness: minus the derivative of the wrench by the top's displacement, by central differences.
 fn tangent(spring: &Spring, state: &mut SpringState, top: &Pose) -> Matrix6 {
     let columns: Vec<Vector6> = (0..6)
         .map(|k| {
@@ -29,7 +29,7 @@ fn tangent(spring: &Spring, state: &mut SpringState, top: &Pose) -> Matrix6 {
     Matrix6::from_columns(&columns)
 }
 
-/// Where the top comes to rest under a force that keeps its direction, raised in steps.
+/// Equilibrium pose of the top under a force of constant direction, raised in steps.
 fn rest_under(spring: &Spring, force: Vector) -> Pose {
     let mut state = spring.state();
     let mut top = Pose::translation(0.0, 0.0, spring.length_m());
@@ -49,11 +49,11 @@ fn rest_under(spring: &Spring, force: Vector) -> Pose {
 }
 
 #[test]
-fn the_force_law_has_haringxs_stiffness_under_load_for_any_number_of_segments() {
+fn the_tangent_stiffness_under_load_is_haringxs_for_any_number_of_segments() {
     // Up to 60 % of the buckling load, and in tension.
     let coil = Coil::new(0.040, 0.0025, 15.0, 0.120, STEEL).unwrap();
     for load_n in [0.0, 12.1, -12.1] {
-        let column = coil.under(load_n).unwrap();
+        let column = coil.under_load(load_n).unwrap();
         let expected = loaded_stiffness(&column).unwrap();
         for segments in [1, 2, 4, 8] {
             let spring = Spring::of_column(&column, segments).unwrap();
@@ -69,12 +69,12 @@ fn the_force_law_has_haringxs_stiffness_under_load_for_any_number_of_segments() 
 }
 
 #[test]
-fn a_spring_loaded_beyond_its_rest_softens_as_haringx_says() {
-    // Built for 4 N and then pressed with 12.1 N: the load's part in the force law is not a constant put in beforehand.
+fn a_spring_loaded_above_its_design_load_softens_as_in_haringxs_theory() {
+    // Designed for 4 N and loaded with 12.1 N: the force law must follow the actual load, not the design load.
     let coil = Coil::new(0.040, 0.0025, 15.0, 0.120, STEEL).unwrap();
-    let expected = loaded_stiffness(&coil.under(12.1).unwrap()).unwrap();
+    let expected = loaded_stiffness(&coil.under_load(12.1).unwrap()).unwrap();
     for (segments, within) in [(2, 0.03), (4, 0.03), (8, 0.01)] {
-        let spring = Spring::of_column(&coil.under(4.0).unwrap(), segments).unwrap();
+        let spring = Spring::of_column(&coil.under_load(4.0).unwrap(), segments).unwrap();
         let top = rest_under(&spring, Vector::new(0.0, 0.0, -12.1));
         let found = tangent(&spring, &mut spring.state(), &top);
         assert_relative_eq!(found[(0, 0)], expected[(0, 0)], max_relative = within);
@@ -83,9 +83,9 @@ fn a_spring_loaded_beyond_its_rest_softens_as_haringx_says() {
 }
 
 #[test]
-fn a_slender_cantilever_bends_into_the_elastica() {
-    // Tip deflection over length under a lateral tip load, P L^2 / E I = 1, 2, 5, 10 (Bisshopp & Drucker 1945).
-    // Stiff enough in shear and stretch: P / S is 1e-3 at most.
+fn a_slender_cantilever_follows_the_elastica() {
+    // Tip deflection over length under a lateral tip load, P L^2 / E I = 1, 2, 5, 10 (Bisshopp & Drucker 1945). Shear and
+    // extension are negligible: P / S is at most 1e-3.
     let rigid = 1e4;
     let column = Column {
         length_m: 1.0,
@@ -105,10 +105,10 @@ fn a_slender_cantilever_bends_into_the_elastica() {
 }
 
 #[test]
-fn the_wrench_of_a_segmented_spring_does_the_work_its_energy_loses() {
-    // The slope of the energy with the inner nodes at rest, at a large turn off every axis.
+fn the_wrench_of_a_segmented_spring_is_the_gradient_of_its_energy() {
+    // The gradient of the energy with the inner nodes in equilibrium, at a large rotation about no coordinate axis.
     let spring =
-        Spring::of_column(&Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap().under(3.9).unwrap(), 4).unwrap();
+        Spring::of_column(&Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap().under_load(3.9).unwrap(), 4).unwrap();
     let turn = Rotation::from_scaled_axis(Vector::new(0.5, 1.1, 0.4));
     let top = Pose::from_parts(Vector::new(0.06, -0.03, 0.09).into(), turn);
     let mut state = spring.state();
@@ -122,9 +122,9 @@ fn the_wrench_of_a_segmented_spring_does_the_work_its_energy_loses() {
 }
 
 #[test]
-fn inner_nodes_find_the_same_place_from_wherever_they_were() {
+fn the_equilibrium_of_inner_nodes_does_not_depend_on_their_start() {
     let spring =
-        Spring::of_column(&Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap().under(3.9).unwrap(), 8).unwrap();
+        Spring::of_column(&Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap().under_load(3.9).unwrap(), 8).unwrap();
     let at = |angle: f64| {
         let place = skew(&Vector::y()) * Vector::z() * (0.06 * angle) + Vector::z() * 0.11;
         Pose::from_parts(place.into(), Rotation::from_scaled_axis(Vector::y() * angle))

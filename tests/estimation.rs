@@ -1,12 +1,13 @@
-//! The estimator on closed-form walks: accuracy, repeatability, and what it does with recordings that are not as they
-//! should be.
+//! The estimator on closed-form walks: accuracy, repeatability, and imperfect recordings.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod estimation_fixture;
 
 use estimation_fixture::{Room, Run, Score, Walk, calibration};
-use zsim::estimation::{EstimationError, Estimator, EstimatorSpec, LeftOut, OpenLoop, WarningKind, estimate_all, load};
+use zsim::estimation::{
+    Discarded, EstimationError, Estimator, EstimatorSpec, OpenLoop, WarningKind, estimate_all, load,
+};
 use zsim::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use zsim::measurement::Measurement;
 use zsim::time::{Span, Stamp};
@@ -38,13 +39,13 @@ fn seconds(measurement: &Measurement) -> f64 {
 }
 
 #[test]
-fn a_walk_through_a_hall_is_followed_to_a_centimetre_and_the_clock_to_a_fifth_of_a_millisecond() {
+fn a_walk_through_a_hall_is_estimated_to_1_cm_and_the_clock_to_0_2_ms() {
     let run = hall(11, 14.0);
     let result = estimate(run.measurements());
     let score = Score::of(&result, &run);
     assert!(score.rmse_m < 0.01, "{score:?}");
     assert!(score.clock_end_s.abs() < 2e-4, "{score:?}");
-    // Poses stand at whole multiples of the IMU's period, without a hole, over the whole recording.
+    // Poses are at multiples of the IMU's period, without gaps, over the full recording.
     let stamps = result.trajectory.stamps();
     assert!(stamps.iter().all(|stamp| stamp.nanos() % 10_000_000 == 0));
     assert!(stamps.windows(2).all(|pair| (pair[1] - pair[0]).nanos() == 10_000_000));
@@ -53,7 +54,7 @@ fn a_walk_through_a_hall_is_followed_to_a_centimetre_and_the_clock_to_a_fifth_of
 }
 
 #[test]
-fn without_noise_the_walk_is_followed_to_a_few_millimetres() {
+fn without_noise_the_walk_is_estimated_to_a_few_millimetres() {
     let run = Run { noise: 0.0, jitter_s: 0.0, ..hall(1, 10.0) };
     let score = Score::of(&estimate(run.measurements()), &run);
     assert!(score.rmse_m < 0.003 && score.rotation_deg < 0.06, "{score:?}");
@@ -70,13 +71,13 @@ fn the_estimate_is_the_same_to_the_bit_with_one_thread_and_with_three() {
 }
 
 #[test]
-fn turning_and_shifting_the_world_does_not_change_what_is_estimated_of_it() {
+fn the_estimate_is_invariant_to_rotation_and_translation_of_the_world() {
     let here = hall(6, 8.0);
     let mut there = here.clone();
     there.walk.world_from_room =
         Pose::from_parts(Vector::new(40.0, -25.0, 3.0).into(), from_roll_pitch_yaw(0.0, 0.0, 2.1));
     let (a, b) = (estimate(here.measurements()), estimate(there.measurements()));
-    // The map begins at the head, whatever the world; a range rounded the other way is all that can differ.
+    // The map's origin is the initial head pose in any world; only the rounding of ranges can differ.
     for (p, q) in a.poses.iter().zip(&b.poses) {
         let apart = p.map_from_head.translation.vector - q.map_from_head.translation.vector;
         assert!(apart.norm() < 1e-4, "{:?}: {apart}", p.stamp);
@@ -84,7 +85,7 @@ fn turning_and_shifting_the_world_does_not_change_what_is_estimated_of_it() {
 }
 
 #[test]
-fn poses_are_handed_out_in_order_while_measurements_come() {
+fn poses_are_output_in_order_while_measurements_arrive() {
     let mut estimator = Estimator::new(&spec(), &calibration()).unwrap();
     let (mut taken, mut latest_s) = (Vec::new(), 0.0_f64);
     for measurement in hall(7, 8.0).measurements() {
@@ -92,7 +93,7 @@ fn poses_are_handed_out_in_order_while_measurements_come() {
         estimator.push(measurement).unwrap();
         taken.extend(estimator.take_poses());
         if let Some(last) = taken.last() {
-            // The stated latency: window_s + step_s, and 0.1 s for latecomers; a scan more until the next one comes.
+            // Specified latency: window_s + step_s, 0.1 s for late measurements, and one scan period.
             let behind_s = latest_s - last.stamp.nanos() as f64 * 1e-9;
             assert!(behind_s < 4.0 + 2.0 * 0.5 + 0.15, "{behind_s}");
         }
@@ -104,7 +105,7 @@ fn poses_are_handed_out_in_order_while_measurements_come() {
 }
 
 #[test]
-fn arrivals_in_small_disorder_change_nothing() {
+fn slightly_out_of_order_arrivals_do_not_change_the_estimate() {
     let tidy = hall(8, 6.0).measurements();
     let mut untidy = tidy.clone();
     for three in untidy[3..].chunks_exact_mut(3) {
@@ -114,7 +115,7 @@ fn arrivals_in_small_disorder_change_nothing() {
     assert!(estimate(tidy).poses == estimate(untidy).poses);
 }
 
-/// The measurements of a run as a driver passes them on: in order, each sensor's stamps rising.
+/// The measurements of a run as a driver publishes them: in order, with increasing stamps for each sensor.
 fn in_order(run: &Run) -> Vec<Measurement> {
     let mut measurements = run.measurements();
     for is_imu in [true, false] {
@@ -127,16 +128,16 @@ fn in_order(run: &Run) -> Vec<Measurement> {
 }
 
 #[test]
-fn stamps_that_jitter_by_a_whole_period_are_smoothed() {
+fn jitter_of_a_full_period_is_smoothed() {
     let run = Run { jitter_s: 1e-2, ..hall(19, 20.0) };
     let result = estimate(in_order(&run));
     let score = Score::of(&result, &run);
-    // A tenth of the jitter, at up to 400 degrees/s, is 0.4 degrees: 1 cm in two metres.
+    // A tenth of the jitter at up to 400 degrees/s is 0.4 degrees, or 1 cm at 2 m.
     assert!(score.rmse_m < 0.02, "{score:?}");
 }
 
 #[test]
-fn stamps_that_make_no_sense_end_in_no_panic() {
+fn invalid_stamps_do_not_cause_a_panic() {
     for (seed, jitter_s) in [(20, 0.05), (21, 0.2), (22, 1.0)] {
         let run = Run { jitter_s, ..hall(seed, 8.0) };
         for measurements in [in_order(&run), run.measurements()] {
@@ -147,7 +148,7 @@ fn stamps_that_make_no_sense_end_in_no_panic() {
 }
 
 #[test]
-fn a_start_in_motion_is_said_and_survived() {
+fn a_start_in_motion_is_reported_and_estimated() {
     let mut run = hall(9, 12.0);
     run.walk.start_s = -10.0;
     let result = estimate(run.measurements());
@@ -157,14 +158,14 @@ fn a_start_in_motion_is_said_and_survived() {
 }
 
 #[test]
-fn a_tenth_of_all_messages_may_be_lost() {
+fn the_estimator_tolerates_ten_percent_lost_messages() {
     let run = hall(10, 10.0);
     let kept = run.measurements().into_iter().enumerate().filter(|(k, _)| k % 10 != 4).map(|(_, m)| m).collect();
     let score = Score::of(&estimate(kept), &run);
     assert!(score.rmse_m < 0.03, "{score:?}");
 }
 
-/// Of a walk through the hall of 14 s in which messages of a kind are lost.
+/// Estimate and errors of a 14 s walk through the hall without the messages for which `is_lost`.
 fn lossy(seed: u64, is_lost: impl Fn(&Measurement) -> bool) -> (OpenLoop, Score) {
     let run = hall(seed, 14.0);
     let result = estimate(run.measurements().into_iter().filter(|m| !is_lost(m)).collect());
@@ -177,27 +178,27 @@ fn warned(result: &OpenLoop, of: fn(&WarningKind) -> bool) -> usize {
 }
 
 #[test]
-fn behind_a_silence_of_two_seconds_the_head_is_found_again() {
+fn after_a_gap_of_two_seconds_the_head_is_relocalised() {
     let (result, score) = lossy(12, |m| (6.0..8.0).contains(&seconds(m)));
-    let gap = |kind: &WarningKind| matches!(kind, WarningKind::BeganAgain { seconds } if (1.9..2.1).contains(seconds));
+    let gap = |kind: &WarningKind| matches!(kind, WarningKind::Restarted { seconds } if (1.9..2.1).contains(seconds));
     assert_eq!(warned(&result, gap), 1, "{:?}", result.warnings);
-    assert_eq!(warned(&result, |kind| matches!(kind, WarningKind::FoundAgain { .. })), 1, "{:?}", result.warnings);
+    assert_eq!(warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. })), 1, "{:?}", result.warnings);
     assert!(result.trajectory.span().unwrap().1 > Stamp::from_nanos(13_500_000_000));
-    // Nothing is told of the silence itself.
+    // There are no poses during the gap.
     let silence = Stamp::from_nanos(6_200_000_000)..Stamp::from_nanos(7_900_000_000);
     assert!(!result.trajectory.stamps().iter().any(|stamp| silence.contains(stamp)));
     assert!(score.worst_m < 0.05, "{score:?}");
 }
 
 #[test]
-fn a_head_that_is_not_found_again_goes_on_about_where_it_was_and_says_so() {
-    // The lidar comes back 5 s after the IMU: no window in between shows a place.
+fn if_relocalisation_fails_the_estimate_continues_with_a_warning() {
+    // The lidar returns 5 s after the IMU: no window in between can be relocalised.
     let is_lost = |m: &Measurement| match m {
         Measurement::Imu(_) => (6.0..7.0).contains(&seconds(m)),
         _ => (6.0..12.0).contains(&seconds(m)),
     };
     let (result, score) = lossy(12, is_lost);
-    assert!(warned(&result, |kind| matches!(kind, WarningKind::LostAgain { .. })) >= 1, "{:?}", result.warnings);
+    assert!(warned(&result, |kind| matches!(kind, WarningKind::NotRelocalised { .. })) >= 1, "{:?}", result.warnings);
     assert!(score.worst_m < 20.0, "{score:?}");
 }
 
@@ -213,18 +214,18 @@ fn short_gaps_of_the_imu_are_bridged() {
 }
 
 #[test]
-fn behind_longer_gaps_of_the_imu_the_head_is_found_again() {
+fn after_longer_gaps_of_the_imu_the_head_is_relocalised() {
     for (seed, gap_s) in [(15, 0.15), (16, 0.3), (17, 1.0)] {
         let is_silent = |m: &Measurement| (6.2..6.2 + gap_s).contains(&seconds(m));
         let (result, score) = lossy(seed, |m| matches!(m, Measurement::Imu(_)) && is_silent(m));
-        let said = warned(&result, |kind| matches!(kind, WarningKind::FoundAgain { .. }));
+        let said = warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. }));
         assert_eq!(said, 1, "{gap_s} s: {:?}", result.warnings);
         assert!(score.worst_m < 0.05, "{gap_s} s: {score:?}");
     }
 }
 
 #[test]
-fn a_clock_that_jumps_by_a_quarter_of_an_hour_is_a_long_silence() {
+fn a_clock_jump_of_a_quarter_of_an_hour_is_a_long_gap() {
     let mut measurements = hall(13, 9.0).measurements();
     for measurement in &mut measurements {
         if seconds(measurement) > 6.0 {
@@ -232,14 +233,14 @@ fn a_clock_that_jumps_by_a_quarter_of_an_hour_is_a_long_silence() {
         }
     }
     let result = estimate(measurements);
-    assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::BeganAgain { .. })), "{:?}", result.warnings);
+    assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::Restarted { .. })), "{:?}", result.warnings);
     let end = result.trajectory.span().unwrap().1;
     assert!(end > Stamp::from_nanos(1_008_000_000_000), "{end:?}");
     assert!(result.trajectory.len() < 900, "{}", result.trajectory.len());
 }
 
 #[test]
-fn time_that_runs_backwards_is_left_out_and_said() {
+fn measurements_with_decreasing_stamps_are_dropped_with_a_warning() {
     let mut measurements = hall(14, 9.0).measurements();
     for measurement in &mut measurements {
         if seconds(measurement) > 6.0 {
@@ -247,13 +248,13 @@ fn time_that_runs_backwards_is_left_out_and_said() {
         }
     }
     let result = estimate(measurements);
-    let left_out = |kind: &WarningKind| matches!(kind, WarningKind::LeftOut { count, .. } if *count > 50);
-    assert!(result.warnings.iter().any(|w| left_out(&w.kind)), "{:?}", result.warnings);
+    let discarded = |kind: &WarningKind| matches!(kind, WarningKind::Discarded { count, .. } if *count > 50);
+    assert!(result.warnings.iter().any(|w| discarded(&w.kind)), "{:?}", result.warnings);
     assert!(result.trajectory.len() > 300);
 }
 
 #[test]
-fn a_lidar_that_sees_nothing_leaves_the_imu_and_a_warning() {
+fn without_lidar_returns_the_imu_is_integrated_with_a_warning() {
     let mut measurements = hall(15, 8.0).measurements();
     for measurement in &mut measurements {
         if let Measurement::Lidar(scan) = measurement {
@@ -267,10 +268,10 @@ fn a_lidar_that_sees_nothing_leaves_the_imu_and_a_warning() {
     assert!(result.warnings.iter().any(|w| lost(&w.kind)), "{:?}", result.warnings);
 }
 
-/// Outdoors the first beams of a turn often meet the sky: the first that comes back is fired at an uneven pace, while
-/// the sensor's stamps are even. The stamps are what is smoothed.
+/// Outdoors the first beams of a revolution often have no return. The time of the first return is then irregular,
+/// while the sensor's stamps are regular. The estimator must smooth the stamps.
 #[test]
-fn beams_that_do_not_come_back_move_no_others_in_time() {
+fn missing_returns_do_not_shift_the_times_of_other_beams() {
     let run = hall(20, 7.0);
     let estimated = |by_first_return: bool| {
         let mut measurements = run.measurements();
@@ -292,13 +293,13 @@ fn beams_that_do_not_come_back_move_no_others_in_time() {
     }
 }
 
-/// A cheap IMU: its rates are off by 3 degrees/s, and it is five times noisier than its calibration says. The head
-/// rests for 1.5 s, which shows both.
+/// A cheap IMU: a gyroscope bias of 3 degrees/s, and five times the noise of its calibration. The head rests for
+/// 1.5 s, in which both are observable.
 #[test]
-fn an_imu_that_is_worse_than_it_was_told_is_found_out_at_rest() {
+fn bias_and_noise_above_specification_are_estimated_at_rest() {
     let run = hall(19, 12.0);
     let (mut measurements, mut chance) = (run.measurements(), 1_u64);
-    // Of sums of uniform numbers (Irwin and Hall), by Knuth's generator.
+    // Noise as sums of uniform numbers (Irwin-Hall distribution) from Knuth's generator.
     let mut normal = || {
         let mut uniform = || {
             chance = chance.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -324,12 +325,12 @@ fn an_imu_that_is_worse_than_it_was_told_is_found_out_at_rest() {
 }
 
 #[test]
-fn a_lidar_that_falls_silent_leaves_the_imu_and_a_warning() {
+fn after_loss_of_the_lidar_the_imu_is_integrated_with_a_warning() {
     let all = hall(16, 10.0).measurements();
     let kept = all.into_iter().filter(|m| matches!(m, Measurement::Imu(_)) || seconds(m) < 6.0).collect();
     let result = estimate(kept);
     assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::LidarGap { .. })), "{:?}", result.warnings);
-    // Three seconds later the estimate stops.
+    // The estimate stops after three seconds without lidar.
     let end_s = result.trajectory.span().unwrap().1.nanos() as f64 * 1e-9;
     assert!((8.5..9.6).contains(&end_s), "{end_s}");
 }
@@ -347,7 +348,7 @@ fn a_recording_without_one_of_the_sensors_is_an_error() {
 }
 
 #[test]
-fn a_point_that_is_not_a_number_is_refused() {
+fn a_point_with_nan_is_refused() {
     let mut estimator = Estimator::new(&spec(), &calibration()).unwrap();
     let mut scan = hall(18, 1.0).measurements().into_iter().find(|m| matches!(m, Measurement::Lidar(_))).unwrap();
     if let Measurement::Lidar(scan) = &mut scan {
@@ -356,9 +357,9 @@ fn a_point_that_is_not_a_number_is_refused() {
     assert!(matches!(estimator.push(scan).unwrap_err(), EstimationError::NotFinite { sensor: "lidar", .. }));
 }
 
-/// One wild sample, wherever it is and however wild, costs less than 2 cm, and is counted.
+/// A single outlier of any size in rate or force costs less than 2 cm, and is counted.
 #[test]
-fn a_wild_sample_is_left_out() {
+fn an_outlier_sample_is_removed() {
     for (rate, force) in [(10.0, 0.0), (0.0, 1e4), (1e30, 0.0), (f64::NAN, 0.0)] {
         let run = hall(18, 10.0);
         let mut measurements = run.measurements();
@@ -367,7 +368,8 @@ fn a_wild_sample_is_left_out() {
         sample.angular_velocity_rad_per_s.x += rate;
         sample.specific_force_m_per_s2.y += force;
         let result = estimate(measurements);
-        let counted = |kind: &WarningKind| matches!(kind, WarningKind::LeftOut { what: LeftOut::Outliers, count: 1 });
+        let counted =
+            |kind: &WarningKind| matches!(kind, WarningKind::Discarded { what: Discarded::Outliers, count: 1 });
         assert_eq!(warned(&result, counted), 1, "{rate}, {force}: {:?}", result.warnings);
         let score = Score::of(&result, &run);
         assert!(score.worst_m < 0.02, "{rate}, {force}: {score:?}");

@@ -1,6 +1,6 @@
-//! The journey with faults of the sensors: the trajectory stays accurate, or the result states the cause.
+//! Full runs with sensor faults: the trajectory stays accurate, or the result states the cause.
 //!
-//! Limits are about three times the errors that were measured.
+//! Limits are about three times the measured errors.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -10,27 +10,27 @@ use command::run;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// A fault, or a motion, and what the result must be.
-struct Row<'a> {
+/// A fault or a motion, and the expected result.
+struct Case<'a> {
     name: &'static str,
     /// Faults as in `specs/faults`.
     faults: &'a str,
-    /// A spec of the base's motion; `specs/motions/hand.ron` where there is none.
+    /// Spec of the base's motion; `specs/motions/hand.ron` if `None`.
     motion: Option<String>,
     lidar: &'static str,
     scene: &'static str,
     duration_s: u32,
-    /// Exit code: 0 good, 3 with a loss or a cause, 1 refused.
+    /// Expected exit code: 0 good, 3 with a loss or a cause, 1 refused.
     code: i32,
-    /// Largest root mean square errors, m and degrees; without them the result is `degraded` or `lost`.
+    /// Limits of the RMS errors, m and degrees; without them the result must be `degraded` or `lost`.
     within: Option<(f64, f64)>,
-    /// Whether it must be `lost`.
+    /// Whether the result must be `lost`.
     is_lost: bool,
-    /// Causes, losses or notes that must be stated; of a refusal, words of the error.
+    /// Causes, losses or notes that the result must state; for a refusal, parts of the error.
     stated: &'static [&'static str],
 }
 
-const ROW: Row<'static> = Row {
+const CASE: Case<'static> = Case {
     name: "",
     faults: "",
     motion: None,
@@ -47,7 +47,7 @@ fn specs(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("specs").join(path)
 }
 
-/// The motion of `specs/motions/hand.ron` with other settings: each text, and the one in its place.
+/// The motion of `specs/motions/hand.ron` with replacements of text, as (old, new).
 fn hand(changes: &[(&str, &str)]) -> Option<String> {
     let text = std::fs::read_to_string(specs("motions/hand.ron")).unwrap();
     Some(changes.iter().fold(text, |text, (setting, other)| {
@@ -56,16 +56,16 @@ fn hand(changes: &[(&str, &str)]) -> Option<String> {
     }))
 }
 
-/// Exit code, stdout, stderr and trajectory of the journey of a row.
-fn journey(row: &Row) -> (i32, String, String, Option<String>) {
+/// Exit code, stdout, stderr and trajectory of the full run of a case.
+fn full_run(case: &Case) -> (i32, String, String, Option<String>) {
     let here = tempfile::tempdir().unwrap();
-    let faults = row.faults.replace("FAULTS", &specs("faults").display().to_string());
+    let faults = case.faults.replace("FAULTS", &specs("faults").display().to_string());
     std::fs::write(here.path().join("faults.ron"), format!("(faults: [{faults}])")).unwrap();
-    let motion = row.motion.as_ref().map_or("hand", |text| {
+    let motion = case.motion.as_ref().map_or("hand", |text| {
         std::fs::write(here.path().join("motion.ron"), text).unwrap();
         "motion.ron"
     });
-    let Row { scene, lidar, duration_s, .. } = row;
+    let Case { scene, lidar, duration_s, .. } = case;
     let command = format!(
         "--scene {scene} --lidar {lidar} --motion {motion} --duration {duration_s}s --seed 3 --faults faults.ron \
          --open-loop --threads 1 --quiet --json --out run"
@@ -74,14 +74,14 @@ fn journey(row: &Row) -> (i32, String, String, Option<String>) {
     (code, figures, talk, std::fs::read_to_string(here.path().join("run/open_loop.tum")).ok())
 }
 
-/// Keys of what a result states.
+/// Keys of all causes, losses and notes that a result states.
 fn stated(metrics: &Value) -> Vec<&str> {
     let events = [&metrics["integrity"]["causes"], &metrics["losses"], &metrics["notes"]];
     events.iter().flat_map(|list| list.as_array().unwrap()).map(|event| event["kind"].as_str().unwrap()).collect()
 }
 
-/// Position and rotation errors, m and degrees: root mean squares; along a straight line, where the rotation about it
-/// cannot be aligned, the largest position error.
+/// Position and rotation errors, m and degrees: RMSE. For a straight line, whose rotation about itself cannot be
+/// aligned, the largest position error.
 fn errors(metrics: &Value) -> (f64, f64) {
     let open = &metrics["open_loop"];
     match (open["position_rmse_m"].as_f64(), open["rotation_rmse_deg"].as_f64()) {
@@ -90,24 +90,24 @@ fn errors(metrics: &Value) -> (f64, f64) {
     }
 }
 
-fn check(row: &Row) {
-    let name = row.name;
-    let (code, figures, talk, poses) = journey(row);
-    assert_eq!(code, row.code, "{name}: {talk}");
+fn check(case: &Case) {
+    let name = case.name;
+    let (code, figures, talk, poses) = full_run(case);
+    assert_eq!(code, case.code, "{name}: {talk}");
     if code == 1 {
-        assert!(row.stated.iter().all(|words| talk.contains(words)), "{name}: {talk}");
+        assert!(case.stated.iter().all(|words| talk.contains(words)), "{name}: {talk}");
         return;
     }
     let metrics: Value = serde_json::from_str(&figures).unwrap();
     let (status, kinds) = (metrics["status"].as_str().unwrap(), stated(&metrics));
     let (position_m, rotation_deg) = errors(&metrics);
     println!("{name}: {code} {status} {position_m:.4} m, {rotation_deg:.3} deg, {kinds:?}");
-    assert!(row.stated.iter().all(|kind| kinds.contains(kind)), "{name}: {kinds:?}");
-    match row.within {
+    assert!(case.stated.iter().all(|kind| kinds.contains(kind)), "{name}: {kinds:?}");
+    match case.within {
         Some((most_m, most_deg)) => {
             assert!(position_m < most_m && rotation_deg < most_deg, "{name}: {position_m} m, {rotation_deg} degrees");
         }
-        None if row.is_lost => assert_eq!(status, "lost", "{name}"),
+        None if case.is_lost => assert_eq!(status, "lost", "{name}"),
         None => assert_ne!(status, "good", "{name}"),
     }
     let poses = poses.unwrap();
@@ -120,7 +120,7 @@ fn check(row: &Row) {
 }
 
 #[test]
-fn stamps_that_are_late_in_bursts_or_of_another_clock_are_corrected() {
+fn delayed_bursty_and_offset_stamps_are_corrected() {
     for (name, faults, code, within) in [
         ("5 % lost", "(sensor: both, fault: drop(share: 0.05))", 3, (0.006, 0.3)),
         ("IMU delayed", "(sensor: imu, fault: delay(mean_s: 0.004))", 0, (0.003, 0.2)),
@@ -130,17 +130,23 @@ fn stamps_that_are_late_in_bursts_or_of_another_clock_are_corrected() {
         ("IMU ahead by 400 ms", "(sensor: imu, fault: clock_offset(offset_s: 0.4))", 0, (0.003, 0.2)),
         ("IMU behind by 2500 s", "(sensor: imu, fault: clock_offset(offset_s: -2500))", 0, (0.003, 0.2)),
     ] {
-        check(&Row { name, faults, code, within: Some(within), ..ROW });
+        check(&Case { name, faults, code, within: Some(within), ..CASE });
     }
     for offset_s in [0.5, -0.5] {
         let faults = format!("(sensor: imu, fault: clock_offset(offset_s: {offset_s}))");
-        check(&Row { name: "half a second, 6 s", faults: &faults, duration_s: 6, within: Some((0.0015, 0.2)), ..ROW });
+        check(&Case {
+            name: "half a second, 6 s",
+            faults: &faults,
+            duration_s: 6,
+            within: Some((0.0015, 0.2)),
+            ..CASE
+        });
     }
 }
 
 #[test]
 fn every_encoding_of_a_miss_gives_the_same_trajectory() {
-    // Which walls are out of range shows in the office alone.
+    // Only the office has walls out of range.
     for (name, faults) in [
         ("range_max", "(sensor: lidar, fault: misses(encoding: range_max))"),
         ("zero", "(sensor: lidar, fault: misses(encoding: zero))"),
@@ -148,51 +154,51 @@ fn every_encoding_of_a_miss_gives_the_same_trajectory() {
         ("inf", "(sensor: lidar, fault: misses(encoding: inf))"),
         ("-inf", "(sensor: lidar, fault: misses(encoding: minus_inf))"),
     ] {
-        check(&Row { name, faults, scene: "office", duration_s: 10, within: Some((0.006, 1.0)), ..ROW });
+        check(&Case { name, faults, scene: "office", duration_s: 10, within: Some((0.006, 1.0)), ..CASE });
     }
 }
 
 #[test]
-fn a_single_bad_sample_of_the_imu_is_left_out() {
+fn a_single_bad_imu_sample_is_removed() {
     for (name, faults) in [
         ("10 rad/s", "(sensor: imu, fault: spike(gyro_rad_per_s: (10, -10, 10), times_s: [6]))"),
         ("1e4 m/s^2", "(sensor: imu, fault: spike(accel_m_per_s2: (1e4, 1e4, -1e4), times_s: [6]))"),
         ("1e30 m/s^2", "(sensor: imu, fault: spike(accel_m_per_s2: (1e30, 1e30, -1e30), times_s: [6]))"),
         ("1e30 rad/s", "(sensor: imu, fault: spike(gyro_rad_per_s: (1e30, 0, 0), times_s: [6]))"),
     ] {
-        check(&Row { name, faults, within: Some((0.003, 0.15)), stated: &["outliers"], ..ROW });
+        check(&Case { name, faults, within: Some((0.003, 0.15)), stated: &["outliers"], ..CASE });
     }
 }
 
 #[test]
-fn a_head_at_rest_drifts_neither_at_the_start_nor_on_the_way() {
+fn a_head_at_rest_does_not_drift() {
     let start = hand(&[("still_s: 2.5", "still_s: 8.0")]);
-    check(&Row { name: "rest at the start", motion: start, duration_s: 20, within: Some((0.005, 0.5)), ..ROW });
+    check(&Case { name: "rest at the start", motion: start, duration_s: 20, within: Some((0.005, 0.5)), ..CASE });
     let middle = hand(&[
         ("stops: At([])", "stops: At([(5.5, 10.0)])"),
         ("grip_s: 0.5,", "grip_s: 0.5,\n    rests: [(6.0, 9.0)],"),
     ]);
-    check(&Row { name: "rest on the way", motion: middle, duration_s: 20, within: Some((0.005, 0.6)), ..ROW });
+    check(&Case { name: "rest on the way", motion: middle, duration_s: 20, within: Some((0.005, 0.6)), ..CASE });
 }
 
 #[test]
-fn saturated_sensors_are_stated() {
-    let gyro = |name, faults| Row { name, faults, ..ROW };
+fn saturation_is_reported() {
+    let gyro = |name, faults| Case { name, faults, ..CASE };
     let within = Some((0.003, 0.2));
-    check(&Row { within, ..gyro("450 degrees/s", "(sensor: imu, fault: clip(gyro_deg_per_s: 450))") });
-    let row = gyro("250 degrees/s", "(sensor: imu, fault: clip(gyro_deg_per_s: 250))");
-    check(&Row { code: 3, within: Some((0.01, 1.5)), stated: &["clipped"], ..row });
+    check(&Case { within, ..gyro("450 degrees/s", "(sensor: imu, fault: clip(gyro_deg_per_s: 450))") });
+    let case = gyro("250 degrees/s", "(sensor: imu, fault: clip(gyro_deg_per_s: 250))");
+    check(&Case { code: 3, within: Some((0.01, 1.5)), stated: &["clipped"], ..case });
     let drop = "grip_s: 0.5,\n    drops: [(at_s: 6.0, height_m: 0.25, landing_s: 0.035)],";
-    let row = gyro("drop of 0.25 m at 2 g", "(sensor: imu, fault: clip(accel_m_per_s2: 19.6133))");
-    check(&Row { code: 3, motion: hand(&[("grip_s: 0.5,", drop)]), stated: &["clipped"], ..row });
-    // With the range of 5 g of the IMU itself.
+    let case = gyro("drop of 0.25 m at 2 g", "(sensor: imu, fault: clip(accel_m_per_s2: 19.6133))");
+    check(&Case { code: 3, motion: hand(&[("grip_s: 0.5,", drop)]), stated: &["clipped"], ..case });
+    // With the IMU's own range of 5 g.
     let motion = Some(std::fs::read_to_string(specs("motions/hand_drop.ron")).unwrap());
-    let row = Row { scene: "office", duration_s: 25, motion, code: 3, ..ROW };
-    check(&Row { name: "drop of 0.25 m at 5 g", within: Some((0.015, 1.0)), stated: &["clipped"], ..row });
+    let case = Case { scene: "office", duration_s: 25, motion, code: 3, ..CASE };
+    check(&Case { name: "drop of 0.25 m at 5 g", within: Some((0.015, 1.0)), stated: &["clipped"], ..case });
 }
 
 #[test]
-fn sensors_that_fall_silent_or_freeze_are_stated() {
+fn gaps_and_frozen_sensors_are_reported() {
     let micro_controller = "(sensor: imu, fault: thin(file: \"FAULTS/imu_arrivals_mcu.txt\", repeat_s: 57.2))";
     for (name, faults, stated, within) in [
         ("irregular IMU", micro_controller, &["gap", "poor_fit"][..], None),
@@ -209,30 +215,30 @@ fn sensors_that_fall_silent_or_freeze_are_stated() {
         ),
         ("clock jump", "(sensor: both, from_s: 6, fault: clock_jump(jump_s: 86400))", &["gap"], Some((0.003, 0.2))),
     ] {
-        check(&Row { name, faults, code: 3, within, is_lost: within.is_none(), stated, ..ROW });
+        check(&Case { name, faults, code: 3, within, is_lost: within.is_none(), stated, ..CASE });
     }
 }
 
 #[test]
-fn constant_velocity_at_the_start_is_no_rest() {
+fn constant_velocity_at_the_start_is_not_taken_for_rest() {
     let cruise = || Some("Cruise((height_m: 1.1, speed_m_per_s: 0.4))".to_owned());
-    let row = Row { motion: cruise(), duration_s: 8, ..ROW };
-    check(&Row { name: "cruise, plane", code: 3, is_lost: true, stated: &["few_matches"], ..row });
-    let row = Row { motion: cruise(), duration_s: 8, lidar: "vlp16", ..ROW };
-    check(&Row { name: "cruise, 16 rings", within: Some((0.015, 0.1)), stated: &["started_in_motion"], ..row });
+    let case = Case { motion: cruise(), duration_s: 8, ..CASE };
+    check(&Case { name: "cruise, plane", code: 3, is_lost: true, stated: &["few_matches"], ..case });
+    let case = Case { motion: cruise(), duration_s: 8, lidar: "vlp16", ..CASE };
+    check(&Case { name: "cruise, 16 rings", within: Some((0.015, 0.1)), stated: &["started_in_motion"], ..case });
 }
 
 #[test]
-fn wrong_conventions_and_calibrations_are_stated_or_refused() {
+fn incorrect_conventions_and_calibrations_are_reported_or_refused() {
     for (name, faults, duration_s, stated) in [
         ("lidar 5 m off", "(sensor: lidar, fault: extrinsics(position_m: (5, 0, 0)))", 12, &["poor_fit"][..]),
         ("lidar 5 m off, 6 s", "(sensor: lidar, fault: extrinsics(position_m: (5, 0, 0)))", 6, &["poor_fit"]),
         ("gyroscope negated", "(sensor: imu, fault: axes(negate_gyro: true))", 12, &["poor_fit"]),
         ("gyroscope negated, 6 s", "(sensor: imu, fault: axes(negate_gyro: true))", 6, &["poor_fit"]),
     ] {
-        check(&Row { name, faults, duration_s, code: 3, stated, ..ROW });
+        check(&Case { name, faults, duration_s, code: 3, stated, ..CASE });
     }
     let stated = &["/imu/data_raw has accelerations without gravity"];
     let faults = "(sensor: imu, fault: axes(remove_gravity: true))";
-    check(&Row { name: "without gravity", faults, code: 1, stated, ..ROW });
+    check(&Case { name: "without gravity", faults, code: 1, stated, ..CASE });
 }

@@ -1,4 +1,4 @@
-//! The evaluation against evo (Grupp, <https://github.com/MichaelGrupp/evo>), which others judge trajectories with.
+//! The evaluation compared with evo (Grupp, <https://github.com/MichaelGrupp/evo>).
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -37,15 +37,15 @@ fn assert_agree(ours: [f64; 2], evo: [f64; 2]) {
 }
 
 #[test]
-fn a_small_pair_of_trajectories_has_the_errors_that_evo_finds() {
-    // evo 1.38.1, in tests/data/evo: `evo_ape tum truth.tum estimate.tum -a` says rmse 0.029285, and with
+fn errors_agree_with_stored_results_of_evo() {
+    // evo 1.38.1, in tests/data/evo: `evo_ape tum truth.tum estimate.tum -a` gives rmse 0.029285, and with
     // `-r angle_deg` rmse 0.901246.
     assert_agree(ours(&data("truth.tum"), &data("estimate.tum")), [0.029_285, 0.901_246]);
 }
 
 #[test]
-fn evo_agrees_where_it_is_installed() {
-    // A minute of walking with a drift, noise by a recurrence, and an estimate in a frame of its own.
+fn errors_agree_with_evo_if_it_is_installed() {
+    // A minute of walking with a drift, noise from a recurrence, and an estimate in a separate frame.
     let folder = tempfile::tempdir().unwrap();
     let (truth, estimate) = (folder.path().join("truth.tum"), folder.path().join("estimate.tum"));
     std::fs::write(&truth, walk(0.0)).unwrap();
@@ -62,7 +62,7 @@ fn walk(error: f64) -> String {
     let mut noise = 0.5_f64;
     let mut text = String::new();
     for k in 0..6000 {
-        // The logistic map at 4: chaotic, and the same everywhere.
+        // Logistic map with r = 4: chaotic, and the same on every platform.
         noise = 4.0 * noise.mul_add(-noise, noise) + if k == 0 { -0.3 } else { 0.0 };
         let t = f64::from(k) * 0.01;
         let at = Vector::new(4.0 * (0.3 * t).sin(), 3.0 * (0.41 * t).cos(), 0.1 * (12.0 * t).sin());

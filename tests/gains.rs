@@ -1,4 +1,4 @@
-//! Gain curves of the simulated head against the closed form of the linearised one.
+//! Gain curves of the simulated head compared with the closed form of the linearised head.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -16,13 +16,14 @@ fn handheld(ratio: f64) -> HeadModel {
     HeadModel::new(&spec, &source).unwrap()
 }
 
-/// Up to 25 Hz, so that each axis has its peak (bounce has 17 Hz), by two realisations.
+/// Two realisations up to 25 Hz, so that the peaks of all axes are included (bounce is at 17 Hz).
 fn plan() -> GainPlan {
     GainPlan { up_to_hz: 25.0, realisations: 2, ..GainPlan::default() }
 }
 
-/// The greatest deviation from the closed form where coherence is above 0.95, in parts of what is allowed: 3 % or three
-/// sigma.
+/// The largest deviation from the closed form, relative to the tolerance of 3 % or three sigma.
+///
+/// Only points with a coherence above 0.95 count.
 fn worst(curve: &GainCurve) -> (f64, &GainPoint) {
     let allowed = |p: &GainPoint| f64::max(0.03 * p.gain_model, 3.0 * p.gain_sigma);
     let deviation = |p: &GainPoint| (p.gain - p.gain_model).abs() / allowed(p);
@@ -32,7 +33,7 @@ fn worst(curve: &GainCurve) -> (f64, &GainPoint) {
 }
 
 #[test]
-fn small_gains_of_all_six_axes_are_those_of_the_closed_form() {
+fn small_swing_gains_of_all_six_axes_agree_with_the_closed_form() {
     let curves = gain_curves(&handheld(0.02), &plan(), &|_| ()).unwrap();
     assert_eq!(curves.len(), 6);
     for curve in &curves {
@@ -48,7 +49,7 @@ fn small_gains_of_all_six_axes_are_those_of_the_closed_form() {
 }
 
 #[test]
-fn half_the_time_step_changes_the_peak_by_less_than_a_hundredth() {
+fn halving_the_time_step_changes_the_peak_by_less_than_1_percent() {
     let head = handheld(0.06);
     let plan = GainPlan { up_to_hz: 5.0, ..plan() };
     let peak = |step_s: f64| {
@@ -59,7 +60,7 @@ fn half_the_time_step_changes_the_peak_by_less_than_a_hundredth() {
 }
 
 #[test]
-fn specific_force_is_measured_as_its_closed_form_says() {
+fn specific_force_agrees_with_the_closed_form() {
     let head = handheld(0.06);
     let plan = GainPlan { quantity: Quantity::SpecificForce, up_to_hz: 5.0, ..plan() };
     for axis in [Axis::X, Axis::Y] {
@@ -70,7 +71,7 @@ fn specific_force_is_measured_as_its_closed_form_says() {
 }
 
 #[test]
-fn curves_are_the_same_bytes_for_any_number_of_threads() {
+fn gain_curves_do_not_depend_on_the_number_of_threads() {
     let head = handheld(0.2);
     let plan = GainPlan { up_to_hz: 2.0, period_s: Some(2.0), ..plan() };
     let with = |threads: usize| {
@@ -83,8 +84,8 @@ fn curves_are_the_same_bytes_for_any_number_of_threads() {
     assert_eq!(text.lines().count(), 1 + 6 * 4);
 }
 
-/// The handheld head on a joint of this stiffness a millimetre long, with all else stiff; upright or hanging.
-fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
+/// The handheld head on a flexible joint of 1 mm length, stiff in all other directions; upright or hanging.
+fn on_a_joint(stiffness_nm_per_rad: f64, is_hanging: bool) -> HeadModel {
     let (mut spec, source) = load("handheld").unwrap();
     let joint = format!(
         "stiffness(length_mm: 1, rows: ((1e5,0,0,0,0,0),(0,1e5,0,0,0,0),(0,0,1e5,0,0,0),(0,0,0,{k},0,0),(0,0,0,0,{k},0),\
@@ -96,20 +97,20 @@ fn on_a_joint(stiffness_nm_per_rad: f64, hangs: bool) -> HeadModel {
     {
         *spring = parse(&Source::in_memory("a joint", joint)).unwrap();
         *damping_ratio = DampingSpec { rocking: 0.08, sway: 0.08, bounce: 0.08, yaw: 0.08 };
-        base_from_spring.roll_pitch_yaw_deg = [if hangs { 180.0 } else { 0.0 }, 0.0, 0.0];
+        base_from_spring.roll_pitch_yaw_deg = [if is_hanging { 180.0 } else { 0.0 }, 0.0, 0.0];
         (*segments, *end_stop, *hold) = (1, None, None);
     }
-    // Upside down it would hang in its own handle.
+    // Upside down the head would hang inside its carrier.
     spec.carrier.clear();
     HeadModel::new(&spec, &source).unwrap()
 }
 
 #[test]
-fn a_large_swing_hardens_an_upright_head_and_softens_a_hanging_one() {
-    // A pendulum of weight torque w = m g l on a joint k: upright k a - w sin a = (k - w) a + w a^3 / 6, hanging (k +
-    // w) a - w a^3 / 6. Under many sines of random phase its swing is normal, and by statistical linearisation a^3
-    // counts as 3 sigma^2 a: the frequency changes by +- w / (4 (k -+ w)) sigma^2. The base is shaken along x: one that
-    // turned would tell the spring's angle from gravity's.
+fn a_large_swing_raises_the_resonance_of_an_upright_head_and_lowers_that_of_a_hanging_one() {
+    // A pendulum with gravity torque w = m g l on a joint of stiffness k: upright k a - w sin a = (k - w) a + w a^3 / 6,
+    // hanging (k + w) a - w a^3 / 6. With a multisine of random phases the swing is Gaussian, and statistical
+    // linearisation replaces a^3 by 3 sigma^2 a: the frequency changes by +- w / (4 (k -+ w)) sigma^2. The base moves
+    // along x, because on a rotating base the spring's angle would differ from the angle to gravity.
     let (spec, _) = load("handheld").unwrap();
     let lever_m = on_a_joint(1.0, false).body().centre_of_mass_in_head.z
         - match spec.linkage {
@@ -118,9 +119,9 @@ fn a_large_swing_hardens_an_upright_head_and_softens_a_hanging_one() {
         };
     let weight_nm = 0.35 * 9.80665 * lever_m;
     let plan = GainPlan { up_to_hz: 4.0, realisations: 6, ..plan() };
-    for (hangs, sign) in [(false, 1.0), (true, -1.0)] {
-        let stiffness = if hangs { 0.6 * weight_nm } else { 1.6 * weight_nm };
-        let study = swing_study(&on_a_joint(stiffness, hangs), Axis::X, &[0.2, 12.0], &plan, &|_| ()).unwrap();
+    for (is_hanging, sign) in [(false, 1.0), (true, -1.0)] {
+        let stiffness = if is_hanging { 0.6 * weight_nm } else { 1.6 * weight_nm };
+        let study = swing_study(&on_a_joint(stiffness, is_hanging), Axis::X, &[0.2, 12.0], &plan, &|_| ()).unwrap();
         let [small, large] = study.points[..] else { panic!("{study:?}") };
         let sigma = large.swing_rms_deg.to_radians();
         let shift = sign * weight_nm / (4.0 * (stiffness - sign * weight_nm)) * sigma * sigma;
@@ -130,7 +131,7 @@ fn a_large_swing_hardens_an_upright_head_and_softens_a_hanging_one() {
 }
 
 #[test]
-fn a_large_swing_moves_the_resonance_and_shows_in_the_coherence() {
+fn a_large_swing_shifts_the_resonance_and_reduces_the_coherence() {
     let plan = GainPlan { up_to_hz: 3.0, realisations: 3, ..plan() };
     let study = swing_study(&handheld(0.06), Axis::Pitch, &[0.1, 15.0], &plan, &|_| ()).unwrap();
     let [small, large] = study.points[..] else { panic!("{study:?}") };

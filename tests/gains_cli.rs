@@ -18,7 +18,7 @@ fn json(arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn gains_writes_its_table_and_its_plots() {
+fn gains_writes_a_table_and_plots() {
     let here = tempfile::tempdir().unwrap();
     let out = here.path().join("gains");
     let figures = json(&[
@@ -46,7 +46,7 @@ fn gains_writes_its_table_and_its_plots() {
 }
 
 #[test]
-fn spring_tells_of_a_head_and_of_a_bare_spring() {
+fn spring_describes_a_head_and_a_single_spring() {
     let here = tempfile::tempdir().unwrap();
     let head = json(&["spring", "handheld", "--json"]);
     assert_eq!(head["stands"], true);
@@ -61,7 +61,7 @@ fn spring_tells_of_a_head_and_of_a_bare_spring() {
 }
 
 #[test]
-fn coverage_tells_of_a_motion_without_a_scene() {
+fn coverage_needs_no_scene() {
     let here = tempfile::tempdir().unwrap();
     let out = here.path().join("seen");
     let walked = ["coverage", "--motion", "hand", "--duration", "3s", "--json", "--out", out.to_str().unwrap()];
@@ -78,7 +78,7 @@ fn coverage_tells_of_a_motion_without_a_scene() {
 }
 
 #[test]
-fn wrong_usage_has_code_2_and_a_sentence() {
+fn invalid_usage_exits_with_2_and_a_message() {
     for (arguments, sentence) in [
         (&["gains", "--head", "nowhere"][..], "no such head"),
         (&["gains", "--up-to", "0"][..], "--up-to 0"),
@@ -95,16 +95,16 @@ fn wrong_usage_has_code_2_and_a_sentence() {
 }
 
 #[test]
-fn the_shipped_studies_and_springs_are_right() {
+fn the_shipped_studies_and_springs_are_valid() {
     zsim(&["check", "specs/studies/spring_design.ron", "specs/studies/spring_stock.ron"]).assert().success();
 }
 
 #[test]
-fn a_mount_without_a_spring_has_nothing_to_characterise_and_that_is_said() {
+fn gains_and_spring_refuse_a_mount_without_a_spring() {
     for arguments in [["gains", "--head", "spinning"], ["gains", "--head", "trawling"]] {
         let told = predicate::str::contains("there is no spring, hence nothing to characterise");
         zsim(&arguments).assert().code(2).stderr(told);
     }
-    zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns it"));
+    zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns the head"));
     zsim(&["check", "spinning", "nodding", "trawling"]).assert().success();
 }

@@ -1,5 +1,4 @@
-//! Maps that last, over two sessions in the same building: the second is localised in the first one's map, goes on from
-//! it, and their maps are put together.
+//! Persistent maps over two sessions in one building: localisation, extension and merging.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -18,7 +17,7 @@ use zsim::surfel_map::SurfelMap;
 use zsim::time::{Span, Stamp};
 use zsim::world::World;
 
-/// A recording of the office, from and to these seconds of a walk.
+/// A recording of the office between two times of a walk.
 struct Session {
     measurements: Vec<Measurement>,
     calibration: Calibration,
@@ -61,12 +60,12 @@ impl Session {
         estimator.finish()
     }
 
-    /// The error of a trajectory in a map whose place in the world is known: it is not aligned again.
+    /// The error of a trajectory in a map of known pose in the world, without alignment.
     fn error_in(&self, map_from_head: &Trajectory, world_from_map: &Pose) -> Errors {
         Errors::after(&Pairs::associate(map_from_head, &self.truth).unwrap(), world_from_map)
     }
 
-    /// Where the head truly begins in that map.
+    /// True initial pose of the head in that map.
     fn start_in(&self, world_from_map: &Pose) -> Pose {
         let first = self.measurements.iter().find_map(|m| match m {
             Measurement::Imu(sample) => Some(sample.stamp),
@@ -91,7 +90,7 @@ fn covariances(poses: &[EstimatedPose]) -> Vec<(Stamp, PoseCovariance)> {
     poses.iter().map(|pose| (pose.stamp, pose.covariance)).collect()
 }
 
-/// A session, mapped: the map, where it truly is, and the error of the trajectory that made it, m.
+/// A mapped session: the map, its true pose, and the RMSE of its trajectory, m.
 struct Mapped {
     session: Session,
     map: SurfelMap,
@@ -114,24 +113,25 @@ impl Mapped {
         Self { session, map, world_from_map, rmse_m }
     }
 
-    /// Where `other`'s map truly is in this one.
-    fn place_of(&self, other: &Self) -> Pose {
+    /// True pose of `other`'s map in this one.
+    fn pose_of(&self, other: &Self) -> Pose {
         self.world_from_map.inverse() * other.world_from_map
     }
 }
 
-/// The first session walks from the route's beginning, the second begins in motion further along it, with other noise.
+/// The first session starts at the start of the route, the second in motion further along it, with other noise.
 static FIRST: LazyLock<Mapped> = LazyLock::new(|| Mapped::by(Session::record(101, (0.0, 45.0))));
 static SECOND: LazyLock<Mapped> = LazyLock::new(|| Mapped::by(Session::record(202, (18.0, 42.0))));
 
-fn aside(pose: &Pose, by: Vector, yaw_deg: f64) -> Pose {
+fn displaced(pose: &Pose, by: Vector, yaw_deg: f64) -> Pose {
     let turn = Rotation::from_axis_angle(&Vector::z_axis(), yaw_deg.to_radians());
     Pose::from_parts((pose.translation.vector + by).into(), turn * pose.rotation)
 }
 
-/// How far finest surfels are from the true surfaces along their normals, m: root mean square over their points, but
-/// for the worst 5 % of these, which are of edges.
-fn off_surfaces_m(map: &SurfelMap, world_from_map: &Pose, world: &World) -> f64 {
+/// RMS distance of the finest surfels from the true surfaces along their normals, m.
+///
+/// Weighted by points, without the worst 5 %, which are at edges.
+fn surface_rmse_m(map: &SurfelMap, world_from_map: &Pose, world: &World) -> f64 {
     let mut off: Vec<(f64, f64)> = Vec::new();
     for surfel in map.surfels().iter().filter(|surfel| surfel.level == 0) {
         let centre = world_from_map.transform_point(&surfel.centre_in_map.into()).coords;
@@ -153,15 +153,15 @@ fn off_surfaces_m(map: &SurfelMap, world_from_map: &Pose, world: &World) -> f64 
 }
 
 #[test]
-fn a_second_session_is_localised_as_exactly_as_the_map_is_and_does_not_drift() {
+fn a_second_session_is_localised_to_the_accuracy_of_the_map_without_drift() {
     let (first, second) = (&*FIRST, &SECOND.session);
-    let start = aside(&second.start_in(&first.world_from_map), Vector::new(0.5, -0.4, 0.1), 15.0);
+    let start = displaced(&second.start_in(&first.world_from_map), Vector::new(0.5, -0.4, 0.1), 15.0);
     let run = second.estimate(Some((&first.map, &start))).unwrap();
     let errors = second.error_in(&run.trajectory, &first.world_from_map);
     let rmse_m = errors.position_rmse_m();
     println!("mapped to {:.2} mm, localised to {:.2} mm", 1e3 * first.rmse_m, 1e3 * rmse_m);
     assert!(rmse_m < 1.5 * first.rmse_m + 0.003, "{rmse_m} m in a map of {} m", first.rmse_m);
-    // From the first pose on: nothing is told before the head is found.
+    // From the first pose on: there is no pose before the head is localised.
     let (begun, ended) = (run.trajectory.span().unwrap(), second.truth.span().unwrap().1);
     assert!((begun.1 - ended).seconds().abs() < 0.5);
     let part = |from: f64, to: f64| {
@@ -176,7 +176,7 @@ fn a_second_session_is_localised_as_exactly_as_the_map_is_and_does_not_drift() {
 }
 
 #[test]
-fn behind_a_silence_the_head_is_found_again_in_the_map() {
+fn after_a_gap_the_head_is_relocalised_in_the_map() {
     let (first, second) = (&*FIRST, &SECOND.session);
     let begin = second.measurements.iter().map(stamp).min().unwrap();
     let silence = begin + Span::from_seconds(10.0)..begin + Span::from_seconds(11.0);
@@ -184,50 +184,50 @@ fn behind_a_silence_the_head_is_found_again_in_the_map() {
     let gapped = Session { measurements: kept, calibration: second.calibration.clone(), truth: second.truth.clone() };
     let start = second.start_in(&first.world_from_map);
     let run = gapped.estimate(Some((&first.map, &start))).unwrap();
-    assert!(run.warnings.iter().any(|w| matches!(w.kind, WarningKind::BeganAgain { .. })), "{:?}", run.warnings);
+    assert!(run.warnings.iter().any(|w| matches!(w.kind, WarningKind::Restarted { .. })), "{:?}", run.warnings);
     assert!(!run.warnings.iter().any(|w| w.kind == WarningKind::LostInMap), "{:?}", run.warnings);
     let behind = run.trajectory.iter().filter(|(stamp, _)| *stamp > silence.end + Span::from_seconds(1.0));
     let behind = Trajectory::from_poses(behind.map(|(stamp, pose)| (stamp, *pose))).unwrap();
     let rmse_m = second.error_in(&behind, &first.world_from_map).position_rmse_m();
-    println!("behind a silence {:.2} mm", 1e3 * rmse_m);
+    println!("after a gap {:.2} mm", 1e3 * rmse_m);
     assert!(rmse_m < 0.01, "{rmse_m} m");
 }
 
 #[test]
-fn a_start_that_is_elsewhere_is_an_error_and_no_trajectory() {
+fn an_incorrect_start_is_an_error_without_a_trajectory() {
     let (first, second) = (&*FIRST, &SECOND.session);
-    let start = aside(&second.start_in(&first.world_from_map), Vector::new(9.0, 7.0, 0.0), 90.0);
+    let start = displaced(&second.start_in(&first.world_from_map), Vector::new(9.0, 7.0, 0.0), 90.0);
     match second.estimate(Some((&first.map, &start))) {
         Err(error @ EstimationError::NotInMap(_)) => assert!(error.to_string().contains("--start"), "{error}"),
-        Ok(_) => panic!("found 11 m away"),
+        Ok(_) => panic!("localised 11 m away"),
         Err(other) => panic!("{other}"),
     }
 }
 
 #[test]
-fn a_map_that_goes_on_and_one_that_is_put_together_are_as_exact_as_their_parts() {
+fn extended_and_merged_maps_are_as_accurate_as_their_parts() {
     let (first, second) = (&*FIRST, &*SECOND);
     let world = World::load("office").unwrap();
-    let of = |map: &SurfelMap, at: &Pose| off_surfaces_m(map, at, &world);
+    let of = |map: &SurfelMap, at: &Pose| surface_rmse_m(map, at, &world);
     let parts = [of(&first.map, &first.world_from_map), of(&second.map, &second.world_from_map)];
-    // Put together, from a guess.
-    let truly = first.place_of(second);
+    // Merged, from an approximate pose.
+    let truly = first.pose_of(second);
     let found =
-        locate_map(&first.map, &second.map, &aside(&truly, Vector::new(-0.5, 0.5, 0.0), -12.0), &spec()).unwrap();
+        locate_map(&first.map, &second.map, &displaced(&truly, Vector::new(-0.5, 0.5, 0.0), -12.0), &spec()).unwrap();
     let apart = truly.inverse() * found.map_from_query;
     let merged = merge_maps(&first.map, &second.map, &found.map_from_query).unwrap();
     let both = of(&merged, &first.world_from_map);
-    println!("parts {parts:?} m, together {both} m, found {:.4} m off", apart.translation.vector.norm());
+    println!("parts {parts:?} m, merged {both} m, pose error {:.4} m", apart.translation.vector.norm());
     assert!(apart.translation.vector.norm() < 0.02 && apart.rotation.angle() < 0.003, "{apart}");
     assert!(both < 1.1 * parts[0].max(parts[1]), "{parts:?} and {both}");
     assert!(merged.surfels().len() < first.map.surfels().len() + second.map.surfels().len());
-    // Gone on: session two in the map of the first adds what it sees.
+    // Extended: the second session adds surfels to the map of the first.
     let start = second.session.start_in(&first.world_from_map);
     let run = second.session.estimate(Some((&first.map, &start))).unwrap();
     let of_run = (&run.trajectory, &run.trajectory);
     let seen = map_of(&run.survey, of_run, &covariances(&run.poses), &spec().registration).unwrap();
     let longer = merge_maps(&first.map, &seen, &Pose::identity()).unwrap();
     let longer_off = of(&longer, &first.world_from_map);
-    println!("gone on {longer_off} m");
+    println!("extended {longer_off} m");
     assert!(longer_off < 1.1 * parts[0].max(parts[1]), "{parts:?} and {longer_off}");
 }

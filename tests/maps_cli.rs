@@ -1,4 +1,4 @@
-//! The commands about maps and clouds: what they leave, and how they fail.
+//! The commands for maps and clouds: files and errors.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -8,7 +8,7 @@ use command::run;
 use serde_json::Value;
 
 #[test]
-fn a_recording_is_localised_in_the_map_of_another_and_maps_are_put_together() {
+fn a_recording_is_localised_in_the_map_of_another_and_maps_are_merged() {
     let here = tempfile::tempdir().unwrap();
     let done = |arguments: &str| {
         let (code, out, talk) = run(here.path(), arguments);
@@ -21,7 +21,7 @@ fn a_recording_is_localised_in_the_map_of_another_and_maps_are_put_together() {
         done(&format!("estimate {name}.mcap --out {name} --quiet"));
         assert!(has(&format!("{name}/map.ply")) && has(&format!("{name}/cloud.ply")));
     }
-    // Found at rest, where its scan is level, the head's height in the map is uncertain until it swings.
+    // Localised at rest with a level scan, the head's height in the map is uncertain until it swings.
     let localise = "estimate b.mcap --map a/map.ply --start 0.3,0.2,0,5 --extend-map --cloud-format las --out c --json";
     let (code, told, talk) = run(here.path(), localise);
     assert_eq!(code, 3, "{talk}");
@@ -45,7 +45,7 @@ fn a_recording_is_localised_in_the_map_of_another_and_maps_are_put_together() {
 }
 
 #[test]
-fn people_are_left_out_of_a_cloud_and_what_they_walk_through_is_not() {
+fn people_are_removed_from_a_cloud_and_static_surfaces_are_not() {
     let here = tempfile::tempdir().unwrap();
     let done = |arguments: &str| {
         let (code, out, talk) = run(here.path(), arguments);
@@ -60,12 +60,15 @@ fn people_are_left_out_of_a_cloud_and_what_they_walk_through_is_not() {
 }
 
 #[test]
-fn what_is_no_map_and_no_place_is_said_and_leaves_no_folder() {
+fn invalid_maps_and_starts_are_errors_and_create_no_folder() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("broken.ply"), "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n").unwrap();
     std::fs::write(here.path().join("a.mcap"), "").unwrap();
     let (code, _, talk) = run(here.path(), "estimate a.mcap --map broken.ply --out out");
-    assert!(code == 1 && talk.contains("broken.ply:4: this is a PLY file, and no map of ours"), "{code} {talk}");
+    assert!(
+        code == 1 && talk.contains("broken.ply:4: this is a PLY file, but not a surfel map of zsim"),
+        "{code} {talk}"
+    );
     let (code, _, talk) = run(here.path(), "map merge broken.ply absent.ply --out both.ply");
     assert!(code == 1 && talk.contains("broken.ply:4"), "{code} {talk}");
     let (code, _, talk) = run(here.path(), "estimate a.mcap --map broken.ply --start 1,2");

@@ -1,5 +1,4 @@
-//! What every motion of the base promises: exact derivatives, rest at the start, the same bits for the same seed, and a
-//! sentence for what is wrong.
+//! Properties of every base motion: exact derivatives, rest at the start, repeatability, and error messages.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -26,7 +25,7 @@ fn shipped() -> Vec<String> {
     names(Kind::Motion)
 }
 
-/// Times all over the run, and past its end.
+/// Random times over the run, and after its end.
 fn times(seed: u64, count: usize) -> Vec<f64> {
     let mut stream = Seed(seed).stream("times");
     (0..count).map(|_| stream.random::<f64>() * (DURATION_S + 5.0)).collect()
@@ -37,13 +36,13 @@ fn slope(f: impl Fn(f64) -> Vector, t: f64, h: f64) -> Vector {
     ((f(t + h) - f(t - h)) * 8.0 - (f(t + 2.0 * h) - f(t - 2.0 * h))) / (12.0 * h)
 }
 
-fn assert_close(measured: &Vector, told: &Vector, what: &str) {
-    let error = (measured - told).norm();
-    assert!(error < 1e-5 * (1.0 + told.norm()), "{what}: differs by {error} from {told:?}");
+fn assert_close(measured: &Vector, expected: &Vector, name: &str) {
+    let error = (measured - expected).norm();
+    assert!(error < 1e-5 * (1.0 + expected.norm()), "{name}: differs by {error} from {expected:?}");
 }
 
 #[test]
-fn derivatives_are_those_of_the_pose() {
+fn velocities_and_accelerations_are_derivatives_of_the_pose() {
     for name in shipped() {
         let motion = built(&name, 3);
         for t in times(5, 400) {
@@ -76,7 +75,7 @@ fn accelerations_are_continuous() {
         let step_s = 4e-3;
         let mut steps: Vec<f64> = (0..(DURATION_S / step_s) as i64).map(|k| k as f64 * step_s).collect();
         steps.sort_by_cached_key(|t| std::cmp::Reverse((change(*t, step_s) * 1e9) as u64));
-        // The steps of greatest change, halved towards the greater change: a jump would stay, a slope vanishes.
+        // Bisects the steps of largest change: a jump keeps its size, a slope vanishes.
         for mut t in steps.into_iter().take(30) {
             let mut h = step_s;
             while h > 1e-9 {
@@ -99,7 +98,7 @@ fn the_base_starts_at_rest() {
 }
 
 #[test]
-fn a_cruising_base_measures_rest() {
+fn an_imu_on_a_cruising_base_measures_rest() {
     let cruise = built("vehicle_cruise", 1);
     for t in [0.0, 0.5, 7.0] {
         let now = cruise.at(t);
@@ -109,7 +108,7 @@ fn a_cruising_base_measures_rest() {
 }
 
 #[test]
-fn one_seed_moves_one_way_and_another_seed_another() {
+fn motions_depend_only_on_the_seed() {
     for name in shipped() {
         let (first, again, other) = (built(&name, 7), built(&name, 7), built(&name, 8));
         let mut differs = false;
@@ -118,12 +117,12 @@ fn one_seed_moves_one_way_and_another_seed_another() {
             differs |= first.at(t) != other.at(t);
         }
         let (spec, _) = load(&name).unwrap();
-        assert_eq!(differs, has_chance(&spec), "{name}: does another seed move otherwise?");
+        assert_eq!(differs, is_random(&spec), "{name}: dependence on the seed");
     }
 }
 
-/// Whether anything of a motion is left to chance.
-fn has_chance(spec: &MotionSpec) -> bool {
+/// Whether a motion has random parts.
+fn is_random(spec: &MotionSpec) -> bool {
     match spec {
         MotionSpec::Stand(_) | MotionSpec::Cruise(_) | MotionSpec::Replay(_) => false,
         MotionSpec::Shaker(spec) => {
@@ -134,7 +133,7 @@ fn has_chance(spec: &MotionSpec) -> bool {
 }
 
 #[test]
-fn the_hand_is_free_unless_it_stops() {
+fn the_hand_holds_the_head_only_in_stops() {
     for name in shipped() {
         let motion = built(&name, 3);
         let holds = times(9, 2000).into_iter().map(|t| motion.hold(t)).fold(0.0, f64::max);
@@ -147,7 +146,7 @@ fn the_hand_is_free_unless_it_stops() {
 }
 
 #[test]
-fn a_motion_lasts_a_length_of_time() {
+fn a_motion_needs_a_positive_duration() {
     let (spec, source) = load("stand").unwrap();
     for duration_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = spec.build(&source, None, duration_s, Seed(1)).err().unwrap().to_string();
@@ -156,7 +155,7 @@ fn a_motion_lasts_a_length_of_time() {
 }
 
 #[test]
-fn every_shipped_motion_is_written_back_as_it_was_read() {
+fn every_shipped_motion_survives_writing_and_reading() {
     for name in shipped() {
         let (spec, _) = load(&name).unwrap();
         let text = zsim::spec::to_text(&spec).unwrap();

@@ -1,4 +1,4 @@
-//! The hand: it follows its route, within its speed, through corners, stairs, turns and stops.
+//! Motion of the hand: route, speed, corners, stairs, turns, stops, rests and drops.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -29,7 +29,7 @@ fn edited(name: &str, edits: &[(&str, &str)], route: Option<&Route>) -> Result<B
     spec.build(&source, route, 120.0, Seed(4))
 }
 
-/// The walk alone: no gait, no shaking, so that the base is where the walker is.
+/// Replacements for a walk without gait and shaking, so that the base follows the walker.
 const PLAIN: [(&str, &str); 3] = [
     ("gait: (step_hz: 1.9, bob_m: 0.015, sway_m: 0.015, surge_m: 0.006, irregularity_rad: 0.4)", "gait: None"),
     ("pitch_deg: 1.8", "pitch_deg: 0.0"),
@@ -48,9 +48,9 @@ fn distance_to(route: &Route, point: &Vector) -> f64 {
 }
 
 #[test]
-fn the_walk_keeps_to_its_route_and_under_its_speed() {
-    // A right corner at 0.6 m/s changes either component of the velocity by 0.6; smoothed over 0.8 s the walk stays off
-    // either leg by 0.6 * 0.8 * 35/256 = 65.6 mm there. Between corners the walker is on the route at 1 m/s.
+fn the_walk_follows_its_route_below_its_speed() {
+    // A right-angled corner at 0.6 m/s changes each component of the velocity by 0.6 m/s. Smoothing over 0.8 s gives a
+    // distance of 0.6 * 0.8 * 35/256 = 65.6 mm from the route. Between corners the walker is on the route at 1 m/s.
     let square = square();
     let walk = edited("hand", &PLAIN, Some(&square)).unwrap();
     let (mut farthest, mut fastest, mut far): (f64, f64, f64) = (0.0, 0.0, 0.0);
@@ -65,11 +65,11 @@ fn the_walk_keeps_to_its_route_and_under_its_speed() {
     }
     assert!((farthest - 0.6 * 0.8 * 35.0 / 256.0).abs() < 1e-4, "farthest from the route: {farthest}");
     assert!((0.999..1.0 + 1e-12).contains(&fastest), "fastest: {fastest}");
-    assert!(far > 8.0, "never came to the far corner: {far}");
+    assert!(far > 8.0, "did not reach the far corner: {far}");
 }
 
 #[test]
-fn corners_are_walked_slowly_and_faced() {
+fn the_walker_slows_down_and_turns_in_corners() {
     let walk = edited("hand", &PLAIN, Some(&square())).unwrap();
     let samples: Vec<_> = (0..12_000).map(|k| walk.at(0.01 * f64::from(k))).collect();
     let near_corner = samples.iter().filter(|now| {
@@ -84,31 +84,31 @@ fn corners_are_walked_slowly_and_faced() {
         let course = now.velocity_in_world.y.atan2(now.velocity_in_world.x);
         assert!((yaw - course).sin().abs() < 0.25 && (yaw - course).cos() > 0.0, "faces {yaw}, walks {course}");
     }
-    // 90 degrees at 110 degrees/s at most, or over 0.9 s either way: 90 * 35/32 / 0.9 = 109 degrees/s.
+    // 90 degrees at 110 degrees/s at most, or over 0.9 s: 90 * 35/32 / 0.9 = 109 degrees/s.
     let quickest = samples.iter().map(|now| now.angular_velocity_in_world.norm()).fold(0.0, f64::max);
     assert!((105.0..110.01).contains(&quickest.to_degrees()), "quickest turn: {}", quickest.to_degrees());
 }
 
 #[test]
-fn at_the_end_of_an_open_route_the_walker_turns_round_and_comes_back() {
+fn at_the_end_of_an_open_route_the_walker_turns_round() {
     let corridor = route(&[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]], false);
     let walk = edited("hand", &PLAIN, Some(&corridor)).unwrap();
     let samples: Vec<_> = (0..12_000).map(|k| walk.at(0.01 * f64::from(k))).collect();
     let x = |now: &zsim::geometry::Kinematics| now.world_from_body.translation.vector.x;
     assert!(samples.iter().all(|now| (-1e-9..10.0 + 1e-9).contains(&x(now))));
     let backwards = samples.iter().filter(|now| now.velocity_in_world.x < -0.999);
-    let mut seen = 0;
+    let mut returning = 0;
     for now in backwards {
         assert!((now.world_from_body.rotation * Vector::x()).x < -0.9, "walks backwards at {}", x(now));
-        seen += 1;
+        returning += 1;
     }
-    assert!(seen > 1000, "came back for {seen} samples");
+    assert!(returning > 1000, "walks back for {returning} samples");
     let quickest = samples.iter().map(|now| now.angular_velocity_in_world.norm()).fold(0.0, f64::max);
     assert!(quickest.to_degrees() < 110.01, "turns at {} degrees/s", quickest.to_degrees());
 }
 
 #[test]
-fn stairs_are_climbed_smoothly() {
+fn height_on_stairs_is_smooth() {
     // 3 m up over 4 m of floor: a slope of 5 m in 5 s, so 0.6 m/s upwards.
     let stairs = route(&[[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [9.0, 0.0, 3.0], [14.0, 0.0, 3.0]], false);
     let walk = edited("hand", &PLAIN, Some(&stairs)).unwrap();
@@ -122,26 +122,26 @@ fn stairs_are_climbed_smoothly() {
 }
 
 #[test]
-fn the_wrist_shakes_at_its_rhythm_with_its_strength() {
+fn the_wrist_shakes_at_the_specified_frequency_and_amplitude() {
     let straight = route(&[[0.0, 0.0, 0.0], [500.0, 0.0, 0.0]], false);
     let hand = edited("hand", &[], Some(&straight)).unwrap();
     let pitch: Vec<f64> =
         (500..12_000).map(|k| roll_pitch_yaw(&hand.at(0.01 * f64::from(k)).world_from_body.rotation).1).collect();
-    // 1.8 degrees of amplitude that varies by 15 %: an rms of 1.8 sqrt((1 + 0.0225) / 2) = 1.29 degrees.
+    // An amplitude of 1.8 degrees with 15 % variation: RMS of 1.8 sqrt((1 + 0.0225) / 2) = 1.29 degrees.
     let rms = (pitch.iter().map(|p| p * p).sum::<f64>() / pitch.len() as f64).sqrt().to_degrees();
     assert!((1.15..1.45).contains(&rms), "rms pitch {rms} degrees");
-    // A rhythm of 1.2 Hz crosses zero 2.4 times a second, wherever its phase wanders.
+    // A frequency of 1.2 Hz crosses zero 2.4 times a second; the phase varies slowly.
     let crossings = pitch.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
     let rate = crossings as f64 / 115.0;
     assert!((2.3..2.5).contains(&rate), "{rate} crossings a second");
 }
 
 #[test]
-fn a_lasso_circles() {
+fn the_lasso_shake_moves_the_tilt_in_a_circle() {
     let straight = route(&[[0.0, 0.0, 0.0], [500.0, 0.0, 0.0]], false);
     let hand = edited("hand", &[("lasso: false", "lasso: true"), ("roll_deg: 1.0", "roll_deg: 1.8")], Some(&straight))
         .unwrap();
-    // Roll a quarter of a beat after pitch at the same strength: the tilt's size is the strength, which
+    // Roll follows pitch by a quarter period with the same amplitude: the tilt equals the amplitude, which
     // stays within sqrt(12) standard deviations of 15 % about 1.8 degrees.
     for k in 600..12_000 {
         let (roll, pitch, _) = roll_pitch_yaw(&hand.at(0.01 * f64::from(k)).world_from_body.rotation);
@@ -151,7 +151,7 @@ fn a_lasso_circles() {
 }
 
 #[test]
-fn in_a_stop_the_head_is_held_while_the_walk_goes_on() {
+fn in_a_stop_the_head_is_held_while_the_walk_continues() {
     let hand = edited("hand", &[("At([])", "At([(20.0, 4.0), (40.0, 5.0)])")], Some(&square())).unwrap();
     assert_eq!(hand.hold(19.9), 0.0);
     assert_eq!(hand.hold(20.25), 0.5);
@@ -167,14 +167,14 @@ fn in_a_stop_the_head_is_held_while_the_walk_goes_on() {
 }
 
 #[test]
-fn in_a_rest_the_walker_stands_and_goes_on_where_the_way_was_left() {
+fn in_a_rest_the_walker_stands_still_and_then_continues_the_route() {
     let rests = [PLAIN[0], PLAIN[1], PLAIN[2], ("grip_s: 0.5,", "grip_s: 0.5, rests: [(20.0, 40.0)],")];
     let hand = edited("hand", &rests, Some(&square())).unwrap();
     let through = edited("hand", &PLAIN, Some(&square())).unwrap();
     for t in [20.0, 41.3, 60.0] {
         assert!(hand.at(t).velocity_in_world.norm() < 1e-9 && hand.at(t).angular_velocity_in_world.norm() < 1e-9);
     }
-    // Behind by the rest and by half of the 1.5 s before and after it.
+    // The walk is delayed by the rest and by half of the 1.5 s before and after it.
     for t in [5.0, 15.0, 70.0, 100.0] {
         let late_s = if t > 60.0 { 41.5 } else { 0.0 };
         let (now, then) = (hand.at(t), through.at(t - late_s));
@@ -194,7 +194,7 @@ fn after_a_drop_the_hand_is_lower_by_its_height() {
 }
 
 #[test]
-fn random_stops_come_about_as_often_as_told() {
+fn random_stops_have_the_specified_frequency() {
     let (mut held, mut begins, mut before) = (0, 0, 0.0);
     let hand = edited("hand_stops", &[], Some(&square())).unwrap();
     for k in 0..12_000 {
@@ -203,19 +203,19 @@ fn random_stops_come_about_as_often_as_told() {
         begins += usize::from(before == 0.0 && hold > 0.0);
         before = hold;
     }
-    // In 120 s, every 25 s or so for 3 to 6 s: four or so stops.
+    // 120 s with stops of 3 to 6 s about every 25 s: about four stops.
     assert!((2..=7).contains(&begins), "{begins} stops");
     assert!((0.01 * held as f64 / begins as f64 - 4.5).abs() < 1.5);
 }
 
 #[test]
-fn the_wave_goes_twice_round_its_box_and_faces_one_way() {
+fn the_wave_goes_twice_round_its_box_with_constant_heading() {
     let hand =
         edited("wave", &[("pitch_deg: 2.1", "pitch_deg: 0.0"), ("roll_deg: 1.0", "roll_deg: 0.0")], None).unwrap();
     let samples: Vec<_> = (0..6_000).map(|k| hand.at(0.01 * f64::from(k))).collect();
     let path: f64 = samples.iter().map(|now| now.velocity_in_world.norm() * 0.01).sum();
     // Twice 2 (0.6 + 0.5) m, with cut corners.
-    assert!((4.0..4.4).contains(&path), "went {path} m");
+    assert!((4.0..4.4).contains(&path), "path of {path} m");
     for now in &samples {
         let p = now.world_from_body.translation.vector;
         assert!((-1e-9..0.6 + 1e-9).contains(&p.x) && (-1e-9..0.5 + 1e-9).contains(&p.y));
@@ -224,7 +224,7 @@ fn the_wave_goes_twice_round_its_box_and_faces_one_way() {
 }
 
 #[test]
-fn what_is_wrong_with_a_route_is_said_in_a_sentence() {
+fn an_invalid_route_is_an_error_with_the_reason() {
     let said = |route: Option<&Route>| edited("hand", &[], route).err().unwrap().to_string();
     let line = |points: &[[f64; 3]]| route(points, false);
     assert!(said(None).contains("the scene names none"));
@@ -237,14 +237,14 @@ fn what_is_wrong_with_a_route_is_said_in_a_sentence() {
 }
 
 #[test]
-fn what_is_wrong_in_a_spec_is_pointed_at() {
+fn an_invalid_spec_is_an_error_with_line_and_column() {
     let square = square();
     let fault = |from: &str, to: &str| match edited("hand", &[(from, to)], Some(&square)) {
         Err(MotionError::Spec(error)) => error,
         Err(other) => panic!("{other}"),
-        Ok(_) => panic!("{to} is taken"),
+        Ok(_) => panic!("{to} is accepted"),
     };
-    let place = |error: &SpecError| error.line_and_column().unwrap_or_else(|| panic!("{error} has no place"));
+    let place = |error: &SpecError| error.line_and_column().unwrap_or_else(|| panic!("{error} has no line"));
     let negative = fault("speed_m_per_s: 1.0", "speed_m_per_s: -1.0");
     assert!(negative.message().contains("above 0, found -1"), "{negative}");
     assert!(fault("pitch_deg: 1.8", "pitch_deg: NaN").message().contains("NaN"));

@@ -1,5 +1,4 @@
-//! The motions for characterisation, and those of machines: their spectra against what was asked for, replay against
-//! what was recorded, and sentences for what cannot be.
+//! Test signals and machine motions: spectra compared with the spec, replay with its poses, and error messages.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -32,8 +31,8 @@ fn pitch_rates(motion: &dyn BaseMotion, from_s: f64, rate_hz: f64, count: usize)
 }
 
 #[test]
-fn a_multisine_is_periodic_and_has_its_lines_alone() {
-    // 199 lines at the multiples 2..=200 of 0.05 Hz, rms 1 degree/s in all: each has the power (pi/180)^2 / 199.
+fn a_multisine_is_periodic_and_has_only_its_lines() {
+    // 199 lines at the multiples 2..=200 of 0.05 Hz with a total RMS of 1 degree/s: each has the power (pi/180)^2 / 199.
     let motion = edited("multisine", "", "", 120.0).unwrap();
     let rates = pitch_rates(motion.as_ref(), 10.0, 100.0, 4000);
     let spectrum = power_density(&rates, 100.0, Segments::periods(2000)).unwrap();
@@ -42,7 +41,7 @@ fn a_multisine_is_periodic_and_has_its_lines_alone() {
         let expected = if is_line { 1_f64.to_radians().powi(2) / 199.0 / 0.05 } else { 0.0 };
         assert_relative_eq!(*density, expected, max_relative = 1e-6, epsilon = 1e-18);
     }
-    // Schroeder's phases keep the crest near that of a sweep, sqrt(2) to 2 times the rms; equal phases would have 20.
+    // Schroeder phases give a crest factor close to that of a sweep, sqrt(2) to 2; equal phases would give 20.
     let crest = rates.iter().fold(0.0, |most: f64, r| most.max(r.abs())) / 1_f64.to_radians();
     assert!(crest < 2.2, "crest factor {crest}");
 }
@@ -52,8 +51,8 @@ fn band_noise_is_flat_within_its_band_on_every_axis() {
     let motion = edited("band_noise", "", "", 700.0).unwrap();
     let samples: Vec<_> = (0..30_000).map(|k| motion.at(5.0 + 0.02 * f64::from(k))).collect();
     for axis in 0..3 {
-        // 0.1 m/s^2 rms from 0.2 to 10 Hz; 1 degree/s. The axes' angles are small: rates about the axes are nearly
-        // their derivatives.
+        // 0.1 m/s^2 RMS from 0.2 to 10 Hz, and 1 degree/s. The angles are small, so that angular rates are nearly their
+        // derivatives.
         let accelerations: Vec<f64> = samples.iter().map(|now| now.acceleration_in_world[axis]).collect();
         let rates: Vec<f64> = samples.iter().map(|now| now.angular_velocity_in_world[axis]).collect();
         for (signal, rms) in [(accelerations, 0.1_f64), (rates, 1_f64.to_radians())] {
@@ -70,8 +69,8 @@ fn band_noise_is_flat_within_its_band_on_every_axis() {
 }
 
 #[test]
-fn a_sweep_goes_from_end_to_end_at_one_amplitude() {
-    // Exponentially from 0.2 to 10 Hz over 98 s (a rate of ln(50)/98 = 4 % a second): between 97 and 99 s some 9.8 Hz.
+fn a_sweep_covers_its_band_at_constant_amplitude() {
+    // Exponential from 0.2 to 10 Hz over 98 s (a rate of ln(50)/98 = 4 % per second): about 9.8 Hz between 97 and 99 s.
     let motion = edited("swept_sine", "still_s: 1.0", "still_s: 2.0", 100.0).unwrap();
     for (from_s, hz) in [(51.0, 0.2 * 50_f64.powf(50.0 / 98.0)), (97.0, 0.2 * 50_f64.powf(96.0 / 98.0))] {
         let rates = pitch_rates(motion.as_ref(), from_s, 1000.0, 2000);
@@ -83,7 +82,7 @@ fn a_sweep_goes_from_end_to_end_at_one_amplitude() {
 }
 
 #[test]
-fn a_shaker_says_what_it_cannot_do() {
+fn invalid_test_signals_are_errors() {
     let said = |name: &str, from: &str, to: &str| edited(name, from, to, 60.0).err().unwrap().to_string();
     assert!(said("multisine", "DegreesPerS(1.0)", "Metres(1.0)").contains("does not fit the axis Pitch"));
     assert!(said("multisine", "DegreesPerS(1.0)", "DegreesPerS(-1.0)").contains("above 0"));
@@ -94,7 +93,7 @@ fn a_shaker_says_what_it_cannot_do() {
 }
 
 #[test]
-fn a_replay_leads_through_the_recorded_poses() {
+fn a_replay_passes_through_the_recorded_poses() {
     let poses: Vec<(Stamp, Pose)> = (0..200_i64)
         .map(|k| {
             let t = 0.05 * k as f64;
@@ -110,13 +109,13 @@ fn a_replay_leads_through_the_recorded_poses() {
     std::fs::write(folder.path().join("walk.ron"), text).unwrap();
     let source = Source::read(&folder.path().join("walk.ron")).unwrap();
     let motion = parse::<MotionSpec>(&source).unwrap().build(&source, None, 20.0, Seed(1)).unwrap();
-    // Play is up to speed 2 * 0.5 s after the rest, and is 1.5 s behind the recording's own clock.
+    // The replay reaches full speed 2 * 0.5 s after the rest, and is 1.5 s behind the recording.
     for (stamp, pose) in &poses[20..180] {
         let now = motion.at(1.5 + stamp.seconds_since(poses[0].0)).world_from_body;
         assert!((now.translation.vector - pose.translation.vector).norm() < 1e-8);
         assert!(now.rotation.angle_to(&pose.rotation) < 1e-8);
     }
-    // Between poses the spline is near the truth: its rate of yaw, 2 rad/s, is met to some 1e-3.
+    // Between poses the spline is close to the true motion: the yaw rate of 2 rad/s has an error of about 1e-3.
     let (t, now) = (5.025, motion.at(1.5 + 5.025));
     let (_, _, yaw) = roll_pitch_yaw(&now.world_from_body.rotation);
     assert!((yaw - 2.0 * t).sin().abs() < 1e-4);
@@ -126,7 +125,7 @@ fn a_replay_leads_through_the_recorded_poses() {
 }
 
 #[test]
-fn a_replay_says_what_is_wrong_with_its_poses() {
+fn a_replay_of_invalid_poses_is_an_error() {
     let said = |poses: &str| {
         let text = format!("Replay((poses: {poses}, from_route: false, still_s: 1.0, ease_s: 0.5))");
         build("replay", text, 20.0).err().unwrap().to_string()
@@ -143,8 +142,8 @@ fn a_replay_says_what_is_wrong_with_its_poses() {
 }
 
 #[test]
-fn a_rougher_road_shakes_by_its_class() {
-    // Each class of ISO 8608 has four times the power of the one before: twice the acceleration. The engine off.
+fn each_road_class_doubles_the_acceleration() {
+    // Each class of ISO 8608 has four times the power of the previous one: twice the acceleration. The engine is off.
     let text = find(Kind::Motion, "vehicle").unwrap().text;
     let engine = text.find("    // Three cylinders").unwrap();
     let quiet = format!("{}    engine: None,\n))", &text[..engine]);
@@ -155,12 +154,12 @@ fn a_rougher_road_shakes_by_its_class() {
     };
     let (smooth, rough) = (bounce("Class(A)"), bounce("Class(C)"));
     assert_relative_eq!(rough / smooth, 4.0, epsilon = 0.02);
-    // ISO 2631-1: a passenger finds 0.5 to 2.5 m/s^2 uncomfortable; a good road at a walking pace is below that.
+    // ISO 2631-1: 0.5 to 2.5 m/s^2 is uncomfortable for passengers; a good road at walking speed is below that.
     assert!((0.02..0.5).contains(&smooth), "rms of {smooth} m/s^2 on a class A road");
 }
 
 #[test]
-fn a_machine_says_what_it_cannot_do() {
+fn invalid_machine_motions_are_errors() {
     let said = |name: &str, from: &str, to: &str| edited(name, from, to, 60.0).err().unwrap().to_string();
     assert!(said("vehicle", "spring_n_per_m: 20000.0", "spring_n_per_m: 500.0").contains("tips it over"));
     assert!(said("vehicle", "Class(D)", "Class(Z)").contains('Z'));

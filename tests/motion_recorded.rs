@@ -1,4 +1,4 @@
-//! Motions that play a recording: what was recorded is what moves, and what cannot be played is told in a sentence.
+//! Motions that replay a recording.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -10,7 +10,7 @@ use zsim::recording::{Reader, RunDescription, Writer};
 use zsim::simulation::{Scenario, Simulation};
 use zsim::spec::{Source, parse};
 
-/// A walk through the office, recorded into `folder`; returns its simulation.
+/// Simulates a walk through the office and records it into `folder`; returns the simulation.
 fn recorded(folder: &Path) -> Simulation {
     let scenario = Scenario { lidar: "lms291".to_owned(), duration_s: 6.0, ..Scenario::in_scene("office") };
     let simulation = Simulation::prepare(&scenario).unwrap();
@@ -36,12 +36,12 @@ fn replay(folder: &Path, poses: &str) -> Result<Box<dyn BaseMotion>, String> {
     spec.build(&source, None, 6.0, Seed(1)).map_err(|error| error.to_string())
 }
 
-/// Greatest distance, m, and angle, rad, of a replay from the poses it was made of, once it is at full speed.
+/// Largest distance, m, and angle, rad, of a replay from its poses, at full speed.
 fn worst(replay: &dyn BaseMotion, poses: &Trajectory) -> (f64, f64) {
     let (start, end) = poses.span().unwrap();
     let within = poses.iter().filter(|(stamp, _)| stamp.seconds_since(start) > 0.5 && end.seconds_since(*stamp) > 0.5);
     within.fold((0.0, 0.0), |(distance, angle), (stamp, pose)| {
-        // Half a second late: it comes to speed in a second.
+        // Half a second late: it reaches full speed in one second.
         let now = replay.at(0.5 + stamp.seconds_since(start)).world_from_body;
         let off = (now.translation.vector - pose.translation.vector).norm();
         (f64::max(distance, off), f64::max(angle, now.rotation.angle_to(&pose.rotation)))
@@ -49,7 +49,7 @@ fn worst(replay: &dyn BaseMotion, poses: &Trajectory) -> (f64, f64) {
 }
 
 #[test]
-fn a_recorded_base_is_played_as_it_moved_and_the_head_as_it_swung() {
+fn recordings_of_base_and_head_are_replayed() {
     let here = tempfile::tempdir().unwrap();
     let simulation = recorded(here.path());
     let reader = Reader::open(&here.path().join("walk.mcap")).unwrap();
@@ -58,37 +58,36 @@ fn a_recorded_base_is_played_as_it_moved_and_the_head_as_it_swung() {
     let poses = reader.poses(Some("/ground_truth/base")).unwrap();
     let (distance, angle) = worst(base.as_ref(), &poses);
     assert!(distance < 1e-9 && angle < 1e-7, "{distance} m, {angle} rad");
-    // Not only the recording, but the motion that it came from; the clocks' offset and rate shift it by some
-    // milliseconds.
+    // The replay also matches the simulated motion; clock offset and rate shift it by a few milliseconds.
     let (stamp, _) = poses.iter().nth(4_500).unwrap();
     let played = base.at(0.5 + stamp.seconds_since(poses.stamps()[0]));
     let before = simulation.motion().at(4.5);
     assert!((played.velocity_in_world - before.velocity_in_world).norm() < 0.03, "{played:?} {before:?}");
-    assert!(before.velocity_in_world.norm() > 0.5, "it walks by then");
+    assert!(before.velocity_in_world.norm() > 0.5, "the base is walking at that time");
 
-    // What is played unless a topic is named: the head, a hundred times a second.
+    // Without a topic the replay uses the head, with 100 poses/s.
     let head = replay(here.path(), "Recording(file: \"walk.mcap\")").unwrap();
     let odometry = reader.poses(None).unwrap();
     assert!((590..=601).contains(&odometry.len()), "{}", odometry.len());
     let (distance, angle) = worst(head.as_ref(), &odometry);
     assert!(distance < 1e-9 && angle < 1e-7, "{distance} m, {angle} rad");
-    // Between its poses, 10 ms apart, the head is where the poses of a thousand times a second have it.
+    // Between these poses, 10 ms apart, the head matches the poses at 1 kHz.
     let (distance, angle) = worst(head.as_ref(), &reader.poses(Some("/ground_truth/pose")).unwrap());
     assert!(distance < 1e-4 && angle < 2e-3, "{distance} m, {angle} rad");
 }
 
 #[test]
-fn a_recording_that_cannot_be_played_is_told_in_a_sentence() {
+fn a_recording_that_cannot_be_replayed_is_an_error() {
     let here = tempfile::tempdir().unwrap();
     recorded(here.path());
     let told = |poses: &str| replay(here.path(), poses).err().unwrap_or_else(|| panic!("{poses} was played"));
     let of_scans = told("Recording(file: \"walk.mcap\", topic: \"/scan\")");
-    assert!(of_scans.contains("topic /scan is not there as nav_msgs/msg/Odometry"), "{of_scans}");
+    assert!(of_scans.contains("topic /scan is missing or not of type nav_msgs/msg/Odometry"), "{of_scans}");
     assert!(
         of_scans.contains("/ground_truth/base (geometry_msgs/msg/PoseStamped)"),
-        "it says what there is: {of_scans}"
+        "the error lists the topics: {of_scans}"
     );
-    assert!(told("Recording(file: \"walk.mcap\", topic: \"/odom\")").contains("topic /odom is not there"));
+    assert!(told("Recording(file: \"walk.mcap\", topic: \"/odom\")").contains("topic /odom is missing"));
     assert!(told("Recording(file: \"nowhere.mcap\")").contains("nowhere.mcap"));
     assert!(told("Recording(file: \"again.ron\")").contains("not an MCAP file"));
     assert!(told("Recording(path: \"walk.mcap\")").contains("path"));
@@ -97,7 +96,7 @@ fn a_recording_that_cannot_be_played_is_told_in_a_sentence() {
     for kept in [whole.len() - 1, whole.len() / 2, 200] {
         std::fs::write(here.path().join("cut.mcap"), &whole[..kept]).unwrap();
         let cut = told("Recording(file: \"cut.mcap\")");
-        assert!(cut.contains("cut.mcap") && (cut.contains("cut short") || cut.contains("is not there")), "{cut}");
+        assert!(cut.contains("cut.mcap") && (cut.contains("cut short") || cut.contains("is missing")), "{cut}");
         assert!(cut.contains("again.ron:1:"), "it says where: {cut}");
     }
     let mut damaged = whole.clone();

@@ -1,4 +1,4 @@
-//! The handheld head in the shipped hands: it swings as the paper's did, its gyro within its range.
+//! The handheld head in the shipped hand motions: swing as in the paper, gyroscope within its range.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -7,7 +7,7 @@ use zsim::geometry::{Route, Vector, from_roll_pitch_yaw};
 use zsim::motion::load;
 use zsim::random::Seed;
 
-/// When the swing has built up, s.
+/// Time after which the swing is stationary, s.
 const SETTLED_S: f64 = 5.0;
 
 fn run(motion: &str, seed: u64) -> (Vec<HeadState>, Box<dyn zsim::motion::BaseMotion>) {
@@ -21,14 +21,14 @@ fn run(motion: &str, seed: u64) -> (Vec<HeadState>, Box<dyn zsim::motion::BaseMo
     (states, base)
 }
 
-/// How far the head leans forward against the vertical, degrees, in the plane that the base faces along.
+/// Forward inclination of the head from the vertical in the heading plane of the base, degrees.
 fn pitch_deg(state: &HeadState) -> f64 {
     let (_, _, yaw) = state.base.world_from_body.rotation.euler_angles();
     let up = from_roll_pitch_yaw(0.0, 0.0, -yaw) * (state.head.world_from_body.rotation * Vector::z());
     up.x.atan2(up.z).to_degrees()
 }
 
-/// The size of each swing's turning point, ascending.
+/// Amplitudes of all turning points of the swing, ascending.
 fn peaks(states: &[HeadState]) -> Vec<f64> {
     let settled = states.iter().filter(|state| state.t_s > SETTLED_S);
     let size: Vec<f64> = settled.map(|state| pitch_deg(state).abs()).collect();
@@ -44,7 +44,7 @@ fn the_head_swings_by_forty_to_fifty_degrees() {
         for seed in [1, 2, 3, 4] {
             let (states, _) = run(motion, seed);
             let peaks = peaks(&states);
-            // Two turning points a cycle of some 1.2 Hz over 55 s.
+            // Two turning points per cycle of about 1.2 Hz over 55 s.
             assert!((120..145).contains(&peaks.len()), "{motion}, seed {seed}: {} swings", peaks.len());
             let (most, largest) = (peaks[peaks.len() * 9 / 10], peaks[peaks.len() - 1]);
             assert!(
@@ -59,7 +59,7 @@ fn the_head_swings_by_forty_to_fifty_degrees() {
 }
 
 #[test]
-fn a_held_head_hardly_swings_while_its_bearer_walks() {
+fn a_held_head_hardly_swings_while_the_operator_walks() {
     let (states, base) = run("hand_stops", 2);
     let held: Vec<&HeadState> =
         states.iter().filter(|state| base.hold(state.t_s) == 1.0 && base.hold(state.t_s - 0.7) == 1.0).collect();

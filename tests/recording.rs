@@ -1,4 +1,4 @@
-//! What is written is read back, by way of a file.
+//! Recordings survive writing and reading.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -14,7 +14,7 @@ use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
 #[test]
-fn measurements_come_back_bit_for_bit() {
+fn measurements_are_read_back_bit_for_bit() {
     let (bytes, written) = record(run(), 100);
     let reader = Reader::new("memory", Cursor::new(bytes)).unwrap();
     let selection = reader.select(&Preference::default()).unwrap();
@@ -27,7 +27,7 @@ fn measurements_come_back_bit_for_bit() {
 }
 
 #[test]
-fn points_come_back_bit_for_bit() {
+fn points_are_read_back_bit_for_bit() {
     let (bytes, written) = record(run(), 100);
     let reader = Reader::new("memory", Cursor::new(bytes)).unwrap();
     let preference = Preference { lidar_topic: Some("/points".to_owned()), imu_topic: None };
@@ -43,7 +43,7 @@ fn points_come_back_bit_for_bit() {
 }
 
 #[test]
-fn extrinsics_and_manifest_come_back() {
+fn extrinsics_and_manifest_are_read_back() {
     let (bytes, _) = record(run(), 10);
     let reader = Reader::new("memory", Cursor::new(bytes)).unwrap();
     let selection = reader.select(&Preference::default()).unwrap();
@@ -54,7 +54,7 @@ fn extrinsics_and_manifest_come_back() {
     assert_eq!((found.calibration, found.body_frame.as_str()), (calibration(), "head"));
     assert!(found.from_recording);
     assert_eq!(reader.manifest(), Some("(seed: 1)"));
-    // With the IMU as the body, the laser stands where both poses put it.
+    // With the IMU as the body, the laser pose is the composition of both extrinsics.
     let of_imu = reader.calibration(&selection, &defaults, Some("imu_link")).unwrap().calibration;
     let expected = calibration().head_from_imu.inverse() * calibration().head_from_laser;
     assert!((of_imu.head_from_laser.to_homogeneous() - expected.to_homogeneous()).norm() < 1e-12);
@@ -62,7 +62,7 @@ fn extrinsics_and_manifest_come_back() {
 }
 
 #[test]
-fn truth_comes_back_apart_from_measurements() {
+fn ground_truth_is_read_separately_from_measurements() {
     let head = |k: i64| {
         let angle = k as f64 * 0.01;
         Pose::from_parts([angle, 2.0, 0.5].into(), from_roll_pitch_yaw(angle, -angle, 3.0 * angle))
@@ -98,11 +98,11 @@ fn truth_comes_back_apart_from_measurements() {
 }
 
 #[test]
-fn two_recordings_of_one_run_are_the_same_bytes() {
+fn two_recordings_of_one_run_have_the_same_bytes() {
     assert_eq!(record(run(), 100).0, record(run(), 100).0);
 }
 
-/// Any sweep that a `LaserScan` can hold: some beams come back, others as REP-117 has it.
+/// Any sweep that a `LaserScan` can represent: beams with a return, and others encoded as in REP-117.
 fn any_sweep() -> impl Strategy<Value = LidarScan> {
     let range = prop_oneof![0.1_f32..30.0, Just(f32::INFINITY), Just(f32::NEG_INFINITY), 30.01_f32..60.0];
     let beams = prop::collection::vec((range, 0_f32..1e4), 0..300);
@@ -128,7 +128,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn any_sweep_comes_back_bit_for_bit(sweeps in prop::collection::vec(any_sweep(), 1..5)) {
+    fn any_sweep_is_read_back_bit_for_bit(sweeps in prop::collection::vec(any_sweep(), 1..5)) {
         let (file, bytes) = recordings::shared_file();
         let mut writer = Writer::new(file, run()).unwrap();
         for (k, sweep) in (0..).zip(&sweeps) {
@@ -141,7 +141,7 @@ proptest! {
         let read: Vec<_> = reader.measurements(&selection).map(|m| m.unwrap()).collect();
         let mut read: Vec<_> =
             read.into_iter().filter_map(|m| if let Measurement::Lidar(scan) = m { Some(scan) } else { None }).collect();
-        // Sweeps years apart come as they were logged.
+        // Sweeps that are years apart are read in log order.
         let mut sweeps = sweeps;
         read.sort_by_key(|sweep| sweep.stamp);
         sweeps.sort_by_key(|sweep| sweep.stamp);
@@ -149,7 +149,7 @@ proptest! {
     }
 }
 
-/// A disk with room for so many bytes.
+/// A disk with this many free bytes.
 struct FullDisk(usize);
 
 impl std::io::Write for FullDisk {
@@ -164,7 +164,7 @@ impl std::io::Write for FullDisk {
 }
 
 #[test]
-fn a_full_disk_is_an_error_wherever_it_fills_up() {
+fn a_full_disk_is_an_error_at_any_point() {
     for room in [0, 100, 10_000, 500_000, 1_000_000] {
         let result = Writer::new(FullDisk(room), run()).map_err(|e| e.to_string()).and_then(|mut writer| {
             for k in 0..200 {
@@ -174,12 +174,12 @@ fn a_full_disk_is_an_error_wherever_it_fills_up() {
             writer.finish().map_err(|e| e.to_string())
         });
         let message = result.unwrap_err();
-        assert!(message.starts_with("writing stopped: ") && message.contains("what was written before"), "{message}");
+        assert!(message.starts_with("writing stopped: ") && message.contains("the part written before"), "{message}");
     }
 }
 
 #[test]
-fn a_writer_that_is_dropped_leaves_a_whole_file() {
+fn a_dropped_writer_leaves_a_complete_file() {
     let (file, bytes) = recordings::shared_file();
     let mut writer = Writer::new(file, run()).unwrap();
     writer.lidar(Stamp::from_nanos(0), &planar_scan(Stamp::from_nanos(0))).unwrap();

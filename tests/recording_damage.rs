@@ -1,4 +1,4 @@
-//! Recordings that are cut short, damaged, or lie: what is whole is read, what is lost is told, nothing panics.
+//! Truncated, damaged and hostile recordings: intact parts are read, losses are reported, nothing panics.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -15,7 +15,7 @@ use zsim::time::Span;
 /// Three seconds: more than three chunks.
 static RECORDING: LazyLock<(Vec<u8>, Vec<Measurement>)> = LazyLock::new(|| record(run(), 300));
 
-/// All measurements that can be read, and what was lost.
+/// All readable measurements, and the reported loss.
 fn read(bytes: Vec<u8>) -> Result<(Vec<Measurement>, Loss), RecordingError> {
     let reader = Reader::new("memory", Cursor::new(bytes))?;
     let selection = reader.select(&Preference::default())?;
@@ -24,13 +24,13 @@ fn read(bytes: Vec<u8>) -> Result<(Vec<Measurement>, Loss), RecordingError> {
     Ok((read, measurements.loss().clone()))
 }
 
-/// A chunk by the `mcap` crate's own reading.
+/// A chunk as the `mcap` crate reads it.
 struct Chunk {
-    /// Where it begins and ends, bytes.
+    /// Offsets of its start and end, bytes.
     bytes: std::ops::Range<u64>,
-    /// Measurements in it and those before it: on `/scan` and `/imu/data_raw`.
+    /// Measurements on `/scan` and `/imu/data_raw`, in this chunk and all before it.
     measurements_so_far: usize,
-    /// Messages in it, of all topics.
+    /// Messages in it on all topics.
     messages: u64,
 }
 
@@ -50,7 +50,7 @@ fn chunks() -> Vec<Chunk> {
 }
 
 #[test]
-fn a_file_cut_anywhere_gives_all_of_its_whole_chunks() {
+fn a_file_truncated_anywhere_gives_all_complete_chunks() {
     let (bytes, written) = &*RECORDING;
     let chunks = chunks();
     assert!(chunks.len() > 3);
@@ -71,18 +71,18 @@ fn a_file_cut_anywhere_gives_all_of_its_whole_chunks() {
 }
 
 #[test]
-fn a_file_whose_writer_was_killed_tells_that_it_ends_early() {
+fn info_reports_a_file_without_summary() {
     let (bytes, _) = &*RECORDING;
     let end = chunks()[1].bytes.end as usize;
     let reader = Reader::new("killed", Cursor::new(bytes[..end + 100].to_vec())).unwrap();
     let info = reader.info(Span::from_seconds(0.5)).unwrap();
     assert!(info.loss.cut_short && info.loss.lost_bytes <= 100);
-    assert!(info.loss.to_string().starts_with("The file ends without its summary"), "{}", info.loss);
+    assert!(info.loss.to_string().starts_with("The file is truncated"), "{}", info.loss);
     assert!(info.topics.iter().any(|topic| topic.topic == "/scan" && topic.messages > 30));
 }
 
 #[test]
-fn a_damaged_chunk_is_left_out_and_counted() {
+fn a_damaged_chunk_is_skipped_and_counted() {
     let (bytes, written) = &*RECORDING;
     let chunks = chunks();
     let mut damaged = bytes.clone();
@@ -95,12 +95,12 @@ fn a_damaged_chunk_is_left_out_and_counted() {
 }
 
 #[test]
-fn a_record_of_a_wrong_length_loses_no_more_than_its_chunk() {
+fn an_incorrect_record_length_loses_at_most_its_chunk() {
     let (bytes, written) = &*RECORDING;
     let chunks = chunks();
     let at = chunks[1].bytes.start as usize;
     let kept = written.len() - (chunks[1].measurements_so_far - chunks[0].measurements_so_far);
-    // Opcode and length: not a chunk, the end of the file, nothing known; a length of too much and of too little.
+    // Changes of opcode (not a chunk, end of file, unknown) and of length (too large, too small).
     for (byte, value) in [(0, 0x07), (0, 0x02), (0, 0), (0, 0x55), (8, 0xFF), (3, 0xFF), (2, 0)] {
         let mut damaged = bytes.clone();
         damaged[at + byte] = value;
@@ -114,7 +114,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn flipped_bits_never_panic_and_never_make_up_a_measurement(
+    fn flipped_bits_never_panic_and_never_invent_a_measurement(
         flips in prop::collection::vec((any::<prop::sample::Index>(), 0_u8..8), 1..4),
     ) {
         let (bytes, written) = &*RECORDING;
@@ -149,7 +149,7 @@ proptest! {
     }
 }
 
-/// An MCAP file of one chunk that claims to unpack to `claimed` bytes.
+/// An MCAP file of one chunk that declares an uncompressed size of `claimed` bytes.
 fn file_with_chunk(packed: &[u8], compression: &str, claimed: u64) -> Vec<u8> {
     let mut file = b"\x89MCAP0\r\n".to_vec();
     let mut chunk = [0_u64.to_le_bytes(), 0_u64.to_le_bytes(), claimed.to_le_bytes()].concat();
@@ -165,8 +165,8 @@ fn file_with_chunk(packed: &[u8], compression: &str, claimed: u64) -> Vec<u8> {
 }
 
 #[test]
-fn a_decompression_bomb_is_not_unpacked() {
-    // 64 MiB of zeros take a few kilobytes; the chunk that holds them says 1000 bytes, or 1 TB.
+fn a_decompression_bomb_is_not_decompressed() {
+    // 64 MiB of zeros compress to a few kilobytes; the chunk declares 1000 bytes, or 1 TB.
     let zeros = zstd::encode_all([0_u8; 1 << 16].repeat(1024).as_slice(), 1).unwrap();
     for claimed in [1000, 1 << 40, u64::MAX] {
         let reader = Reader::new("bomb", Cursor::new(file_with_chunk(&zeros, "zstd", claimed))).unwrap();
@@ -175,7 +175,7 @@ fn a_decompression_bomb_is_not_unpacked() {
 }
 
 #[test]
-fn what_is_no_recording_is_refused_with_what_it_is() {
+fn other_file_formats_are_refused_by_name() {
     let cases: [(&[u8], &str); 8] = [
         (b"", "an empty file"),
         (b"\x89MCAP", "a file of an unknown format"),

@@ -1,4 +1,4 @@
-//! Recordings by other programs: other topics, kinds of messages, compression and order.
+//! Recordings of other programs: other topics, message types, compression and order.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -19,7 +19,7 @@ fn compression_and_chunks_make_no_difference() {
         let mut foreign = Foreign::new(options);
         for k in 0..200_i64 {
             foreign.message("/sensors/imu/data", IMU, k * 10_000_000, &imu(k * 10_000_000, "imu"));
-            // No two clouds are equal, as of no sensor.
+            // No two clouds are equal, as with a real sensor.
             let times: Vec<_> = (0..100_u32).map(|p| (p * 1000 + k as u32).to_le_bytes().to_vec()).collect();
             foreign.message("/ouster/points", POINTS, k * 10_000_000, &cloud(k * 10_000_000, ("t", UINT32), &times));
         }
@@ -42,7 +42,7 @@ fn compression_and_chunks_make_no_difference() {
 
 #[test]
 fn lz4_chunks_are_read() {
-    // The chunk of a file without compression is packed by the lz4 crate's own frame format, and put in its place.
+    // Compresses the chunk of an uncompressed file in the frame format of the lz4 crate, and replaces it.
     let mut foreign = Foreign::new(mcap::WriteOptions::new().compression(None).emit_summary_records(false));
     foreign.message("/imu", IMU, 1, &imu(1, "imu")).message("/scan", SCAN, 2, &scan(2, 0.001, 0.1));
     foreign.writer.finish().unwrap();
@@ -51,7 +51,7 @@ fn lz4_chunks_are_read() {
     let start = 8 + 9 + length(8 + 1) as usize;
     assert_eq!(plain[start], 6, "the record after the header is the chunk");
     let size = length(start + 9 + 16);
-    // Two times, a size, a CRC, the length of no name, a size: 40 bytes before the data.
+    // Two times, a size, a CRC, the length of an empty name, a size: 40 bytes before the data.
     let data = &plain[start + 9 + 40..start + 9 + 40 + size as usize];
     let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
     std::io::Write::write_all(&mut encoder, data).unwrap();
@@ -70,7 +70,7 @@ fn lz4_chunks_are_read() {
 }
 
 #[test]
-fn messages_that_were_written_topic_after_topic_come_in_the_order_of_time() {
+fn messages_written_by_topic_are_read_in_time_order() {
     let options = mcap::WriteOptions::new().chunk_size(Some(5000));
     let mut foreign = Foreign::new(options);
     for k in 0..500 {
@@ -93,12 +93,12 @@ fn messages_that_were_written_topic_after_topic_come_in_the_order_of_time() {
 }
 
 #[test]
-fn beams_without_a_return_are_told_by_rep_117() {
+fn beams_without_a_return_are_recognised_as_in_rep_117() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/imu", IMU, 0, &imu(0, "imu")).message("/scan", SCAN, 0, &scan(0, 0.001, 0.1));
     let scans = scans(&foreign.reader());
     let offsets: Vec<_> = scans[0].returns.iter().map(|r| r.offset.nanos()).collect();
-    // The time increment is a 32-bit float: 1 ms to 47 ps.
+    // The time increment is a 32-bit float: 1 ms is exact to 47 ps.
     assert_eq!(offsets, [0, 1_000_000, 6_000_000, 7_000_000, 8_000_000, 9_000_000]);
     // Beam 6 points 0.6 rad to the left.
     let p = scans[0].returns[2].point_in_laser;
@@ -107,17 +107,17 @@ fn beams_without_a_return_are_told_by_rep_117() {
 }
 
 #[test]
-fn a_scan_without_times_is_read_with_a_note() {
+fn a_scan_without_beam_times_is_read_with_a_note() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/imu", IMU, 0, &imu(0, "imu")).message("/front", SCAN, 0, &scan(0, 0.0, 0.1));
     let reader = foreign.reader();
-    assert!(select(&reader).notes[0].starts_with("/front tells no time between beams; an even turn"));
+    assert!(select(&reader).notes[0].starts_with("/front states no time between beams; uniform rotation"));
     // 0.1 rad of a turn that takes 0.1 s: 0.1 / (2 pi) * 0.1 s = 1.591549 ms.
     assert_eq!(scans(&reader)[0].returns[1].offset.nanos(), 1_591_549);
 }
 
 #[test]
-fn a_scan_with_times_is_preferred_and_other_sensors_are_named() {
+fn a_lidar_with_beam_times_is_preferred_and_other_sensors_are_listed() {
     let times: Vec<_> = (0..3_u32).map(|k| k.to_le_bytes().to_vec()).collect();
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/points", POINTS, 0, &cloud(0, ("t", UINT32), &times));
@@ -131,8 +131,8 @@ fn a_scan_with_times_is_preferred_and_other_sensors_are_named() {
     assert_eq!(
         selection.notes,
         [
-            "Of several lidar topics, /points is read, not /untimed.",
-            "Of several IMU topics, /imu/data_raw is read, not /a/imu/data, /b/imu/data."
+            "Of several lidar topics, /points is used, not /untimed.",
+            "Of several IMU topics, /imu/data_raw is used, not /a/imu/data, /b/imu/data."
         ]
     );
     let asked = Preference { lidar_topic: Some("/untimed".into()), imu_topic: Some("/b/imu/data".into()) };
@@ -140,11 +140,14 @@ fn a_scan_with_times_is_preferred_and_other_sensors_are_named() {
     assert_eq!((&*selection.lidar_topic, &*selection.imu_frame), ("/untimed", "b"));
     let wrong = Preference { lidar_topic: Some("/velodyne".into()), imu_topic: None };
     let error = reader.select(&wrong).unwrap_err().to_string();
-    assert!(error.starts_with("foreign: topic /velodyne is not there as sensor_msgs/msg/LaserScan or"), "{error}");
+    assert!(
+        error.starts_with("foreign: topic /velodyne is missing or not of type sensor_msgs/msg/LaserScan or"),
+        "{error}"
+    );
 }
 
 #[test]
-fn a_recording_without_an_imu_is_refused_with_what_it_has() {
+fn a_recording_without_an_imu_is_refused_with_its_topics() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/scan", SCAN, 0, &scan(0, 0.001, 0.1));
     let error = foreign.reader().select(&Preference::default()).unwrap_err().to_string();
@@ -153,7 +156,7 @@ fn a_recording_without_an_imu_is_refused_with_what_it_has() {
 }
 
 #[test]
-fn samples_that_are_not_finite_are_left_out_and_counted() {
+fn non_finite_samples_are_dropped_and_counted() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/scan", SCAN, 0, &scan(0, 0.001, 0.1)).message("/imu", IMU, 0, &imu(0, "imu"));
     let broken = Imu { linear_acceleration: [f64::NAN, 0.0, 0.0], ..imu(1, "imu") };
@@ -166,8 +169,8 @@ fn samples_that_are_not_finite_are_left_out_and_counted() {
 }
 
 #[test]
-fn accelerations_in_units_of_gravity_are_told_from_those_in_metres_per_second_squared() {
-    // A head that is swung: what it feels besides gravity comes and goes.
+fn accelerations_in_g_are_distinguished_from_m_per_s2() {
+    // A swinging head: its acceleration other than gravity varies.
     for (unit, in_m_per_s2) in [(1.0, false), (9.80665, true)] {
         let mut foreign = Foreign::new(mcap::WriteOptions::new());
         for k in 0..50_i64 {
@@ -179,7 +182,7 @@ fn accelerations_in_units_of_gravity_are_told_from_those_in_metres_per_second_sq
         foreign.message("/scan", SCAN, 0, &scan(0, 0.001, 0.1));
         let reader = foreign.reader();
         let selection = select(&reader);
-        assert_eq!(selection.notes.iter().any(|note| note.contains("units of gravity")), !in_m_per_s2);
+        assert_eq!(selection.notes.iter().any(|note| note.contains("accelerations in g")), !in_m_per_s2);
         let samples = reader.measurements(&selection).filter_map(|measurement| match measurement.unwrap() {
             Measurement::Imu(sample) => Some(sample.specific_force_m_per_s2),
             Measurement::Lidar(_) => None,
@@ -192,9 +195,9 @@ fn accelerations_in_units_of_gravity_are_told_from_those_in_metres_per_second_sq
 }
 
 #[test]
-fn extrinsics_are_found_along_any_way_through_the_tree() {
+fn extrinsics_are_composed_along_any_path_in_the_tree() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
-    // base -> mast -> laser, base -> box -> imu: x adds up along each way.
+    // base -> mast -> laser, base -> box -> imu: x is summed along each path.
     let tree = vec![transform("base", "mast", 1.0), transform("mast", "laser", 0.25), transform("base", "box", -2.0)];
     foreign.message("/tf_static", TF, 0, &tree).message("/tf_static", TF, 0, &vec![transform("box", "imu", 0.5)]);
     foreign.message("/scan", SCAN, 0, &scan(0, 0.001, 0.1)).message("/imu", IMU, 0, &imu(0, "/imu"));
@@ -202,7 +205,7 @@ fn extrinsics_are_found_along_any_way_through_the_tree() {
     let selection = select(&reader);
     let of = |body: Option<&str>| reader.calibration(&selection, &recordings::calibration(), body);
     let found = of(None).unwrap();
-    // Without a frame `head`, the IMU is the body: the laser lies at 1.25 - (-1.5) in it.
+    // Without a frame `head` the IMU is the body: the laser is at 1.25 - (-1.5) in it.
     assert_eq!(found.body_frame, "imu");
     assert_eq!(found.calibration.head_from_laser, Pose::translation(2.75, 0.0, 0.0));
     assert_eq!(found.calibration.head_from_imu, Pose::identity());
@@ -212,10 +215,10 @@ fn extrinsics_are_found_along_any_way_through_the_tree() {
 }
 
 #[test]
-fn of_several_lidars_one_is_taken_that_stands_beside_the_imu() {
+fn a_lidar_connected_to_the_imu_is_preferred() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/tf_static", TF, 0, &vec![transform("imu", "laser", 0.25)]);
-    // First by name, and better timed: but nobody knows where it is.
+    // First by name and with beam times, but of unknown pose.
     let times: Vec<_> = (0..3_u32).map(|k| k.to_le_bytes().to_vec()).collect();
     foreign.message("/front/points", POINTS, 0, &cloud(0, ("t", UINT32), &times));
     foreign.message("/scan", SCAN, 0, &scan(0, 0.0, 0.1)).message("/imu", IMU, 0, &imu(0, "imu"));
@@ -228,7 +231,7 @@ fn of_several_lidars_one_is_taken_that_stands_beside_the_imu() {
 }
 
 #[test]
-fn a_tree_that_goes_in_a_circle_or_forks_upwards_is_an_error() {
+fn a_transform_tree_with_a_cycle_or_two_parents_is_an_error() {
     let with_tree = |tree: Vec<TransformStamped>| {
         let mut foreign = Foreign::new(mcap::WriteOptions::new());
         foreign.message("/tf_static", TF, 0, &tree);
@@ -243,7 +246,7 @@ fn a_tree_that_goes_in_a_circle_or_forks_upwards_is_an_error() {
 }
 
 #[test]
-fn a_recording_without_tf_static_takes_the_defaults_and_says_so() {
+fn a_recording_without_tf_static_uses_the_defaults_with_a_note() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/scan", SCAN, 0, &scan(0, 0.001, 0.1)).message("/imu", IMU, 0, &imu(0, "imu"));
     let reader = foreign.reader();
@@ -253,7 +256,7 @@ fn a_recording_without_tf_static_takes_the_defaults_and_says_so() {
 }
 
 #[test]
-fn a_type_is_known_without_msg_in_its_name() {
+fn a_type_name_without_msg_is_recognised() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/scan", "sensor_msgs/LaserScan", 0, &scan(0, 0.001, 0.1));
     foreign.message("/imu", "sensor_msgs/Imu", 0, &imu(0, "imu"));
@@ -261,27 +264,27 @@ fn a_type_is_known_without_msg_in_its_name() {
 }
 
 #[test]
-fn a_folder_is_one_recording_or_says_why_not() {
+fn a_folder_must_be_one_recording() {
     let folder = tempfile::tempdir().unwrap();
     let message = || Reader::open(folder.path()).map(|reader| reader.name().to_owned()).map_err(|e| e.to_string());
     let put = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
-    assert!(message().unwrap_err().contains("has no recording in it (.mcap, .db3, .bag)"));
+    assert!(message().unwrap_err().contains("contains no recording (.mcap, .db3, .bag)"));
     put("metadata.yaml", b"");
     let (bytes, _) = recordings::record(recordings::run(), 1);
     put("run_0.mcap", &bytes);
     assert!(message().unwrap().ends_with("run_0.mcap"));
     put("other.mcap", &bytes);
-    assert!(message().unwrap_err().contains("has 2 recordings in it, name one of them"));
+    assert!(message().unwrap_err().contains("contains 2 recordings; specify one of them"));
     put(
         "metadata.yaml",
         b"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [run_0.mcap, run_1.mcap]\n",
     );
-    assert!(message().unwrap_err().contains("has no file `run_1.mcap`, which its metadata.yaml names"));
+    assert!(message().unwrap_err().contains("lacks the file `run_1.mcap`, which its metadata.yaml lists"));
     put("run_1.mcap.zstd", &bytes);
     put("metadata.yaml", b"rosbag2_bagfile_information:\n  relative_file_paths:\n    - run_1.mcap.zstd\n");
     assert!(message().unwrap_err().contains("decompress it with `zstd -d --rm "));
     put("run_1.mcap", &bytes);
     assert!(message().unwrap().ends_with("run_1.mcap"));
     put("metadata.yaml", b"a: [");
-    assert!(message().unwrap_err().contains("has a metadata.yaml that cannot be read"));
+    assert!(message().unwrap_err().contains("has an unreadable metadata.yaml"));
 }

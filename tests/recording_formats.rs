@@ -1,4 +1,4 @@
-//! ROS 1 bags and rosbag2 databases: the same measurements as of an MCAP file with the same messages.
+//! ROS 1 bags and rosbag2 databases give the same measurements as an MCAP file with the same messages.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -12,7 +12,7 @@ use zsim::measurement::{Calibration, ImuNoise, LidarNoise, Measurement};
 use zsim::recording::{Preference, Reader};
 use zsim::time::Span;
 
-/// ROS 1 times do not go back before 1970, nor do they end in 2038.
+/// Start time, ns: ROS 1 times are unsigned 32-bit seconds since 1970.
 const START_NS: i64 = 1_700_000_000_000_000_000;
 
 const TOPICS: [(&str, &str); 4] = [("/imu/data", IMU), ("/scan", SCAN), ("/points", POINTS), ("/tf_static", TF)];
@@ -27,7 +27,7 @@ fn point_times() -> Vec<Vec<u8>> {
     (0..20_u32).map(|k| (k * 1_000_000).to_le_bytes().to_vec()).collect()
 }
 
-/// When messages are logged, and of which topic: an IMU at 100 Hz, a scan and a cloud at 10 Hz.
+/// Topic index and log time of each message: an IMU at 100 Hz, a scan and a cloud at 10 Hz.
 fn schedule() -> Vec<(usize, i64)> {
     let mut schedule = vec![(3, START_NS)];
     for k in 0..100 {
@@ -95,7 +95,7 @@ fn calibration() -> Calibration {
     }
 }
 
-/// NaN is among the ranges of the polar form, and equals nothing.
+/// Drops the polar form, whose NaN ranges cannot be compared.
 fn without_polar_form(mut measurement: Measurement) -> Measurement {
     if let Measurement::Lidar(scan) = &mut measurement {
         scan.planar = None;
@@ -103,7 +103,7 @@ fn without_polar_form(mut measurement: Measurement) -> Measurement {
     measurement
 }
 
-/// All measurements with either lidar, and where the scanner is from the IMU.
+/// All measurements with each lidar, and the scanner's position relative to the IMU.
 fn content(reader: &Reader) -> (Vec<Measurement>, f64) {
     let mut all = Vec::new();
     for topic in ["/scan", "/points"] {
@@ -117,7 +117,7 @@ fn content(reader: &Reader) -> (Vec<Measurement>, f64) {
     (all, found.calibration.head_from_laser.translation.x)
 }
 
-/// What the `mcap` crate's file with the same messages holds.
+/// Content of a file that the `mcap` crate writes with the same messages.
 fn expected() -> (Vec<Measurement>, f64) {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     for (topic, ns, bytes) in ros_2_messages() {
@@ -130,7 +130,7 @@ fn expected() -> (Vec<Measurement>, f64) {
 }
 
 #[test]
-fn a_ros_1_bag_is_read_whatever_its_compression() {
+fn a_ros_1_bag_is_read_with_any_compression() {
     let expected = expected();
     for (compression, indexed) in [("none", true), ("lz4", true), ("bz2", true), ("none", false), ("bz2", false)] {
         let bytes = bag(&ROS_1_TOPICS, &ros_1_messages(), compression, indexed);
@@ -146,7 +146,7 @@ fn a_ros_1_bag_is_read_whatever_its_compression() {
 }
 
 #[test]
-fn a_bag_cut_anywhere_loses_its_end_only() {
+fn a_truncated_bag_loses_only_its_end() {
     let whole = bag(&ROS_1_TOPICS, &ros_1_messages(), "none", true);
     let mut before = 0;
     for cut in (0..whole.len()).step_by(997) {
@@ -163,7 +163,7 @@ fn a_bag_cut_anywhere_loses_its_end_only() {
 }
 
 #[test]
-fn a_damaged_bag_is_read_but_for_what_is_damaged() {
+fn a_damaged_bag_is_read_without_its_damaged_parts() {
     let whole = bag(&ROS_1_TOPICS, &ros_1_messages(), "none", true);
     let mut random = 12345_u64;
     for _ in 0..300 {
@@ -173,14 +173,14 @@ fn a_damaged_bag_is_read_but_for_what_is_damaged() {
         bytes[at] ^= 0x55;
         if let Ok(reader) = Reader::new("damaged.bag", Cursor::new(bytes)) {
             let messages = reader.info(Span::from_seconds(0.5)).unwrap().messages;
-            // The header that says where the index is, or one chunk of ten messages.
+            // Damages the header with the position of the index, or one chunk of ten messages.
             assert!(messages >= 100, "{messages} messages with byte {at} damaged");
         }
     }
 }
 
 #[test]
-fn a_rosbag2_database_is_read_alone_split_and_compressed() {
+fn single_split_and_compressed_rosbag2_databases_are_read() {
     let expected = expected();
     let (messages, folder) = (ros_2_messages(), tempfile::tempdir().unwrap());
     for compressed in [false, true] {
@@ -192,7 +192,7 @@ fn a_rosbag2_database_is_read_alone_split_and_compressed() {
     }
     let split = tempfile::tempdir().unwrap();
     let (first, second) = messages.split_at(50);
-    // Each file has the topics that it needs, in an order of its own: ids differ from file to file.
+    // Each file has only its own topics, in its own order: ids differ between files.
     database(&split.path().join("run_9.db3"), &TOPICS, first, false);
     let turned: Vec<_> = TOPICS.into_iter().rev().collect();
     let second: Vec<_> = second.iter().map(|(topic, ns, bytes)| (3 - topic, *ns, bytes.clone())).collect();
@@ -225,7 +225,7 @@ fn a_database_with_views_or_other_tables_is_refused() {
 }
 
 #[test]
-fn a_damaged_database_ends_in_an_error_or_in_what_is_left() {
+fn a_damaged_database_gives_an_error_or_the_intact_messages() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("run.db3");
     database(&file, &TOPICS, &ros_2_messages(), false);
@@ -244,10 +244,11 @@ fn a_damaged_database_ends_in_an_error_or_in_what_is_left() {
     }
 }
 
-/// Makes every page of the tree of messages below its root the child of all pages above it: an interior page of a table
-/// (type 5) has its cells' offsets from byte 12, each cell begins with its child's number, and the last child is at
-/// byte 8 (sqlite.org/fileformat2.html, section 1.6).
-fn tangle(bytes: &mut [u8], page_size: usize, root: usize) {
+/// Damages the B-tree of messages so that every page below its root is a child of all pages above it.
+///
+/// An interior table page (type 5) has its cell offsets from byte 12, each cell starts with the number of its child,
+/// and the last child is at byte 8 (sqlite.org/fileformat2.html, section 1.6).
+fn link_pages_repeatedly(bytes: &mut [u8], page_size: usize, root: usize) {
     let two = |bytes: &[u8], at: usize| usize::from(u16::from_be_bytes([bytes[at], bytes[at + 1]]));
     let is_interior = |bytes: &[u8], page: usize| bytes[(page - 1) * page_size] == 5;
     let children = |bytes: &[u8], page: usize| -> Vec<usize> {
@@ -261,7 +262,7 @@ fn tangle(bytes: &mut [u8], page_size: usize, root: usize) {
         path.push(page);
         page = child(bytes, children(bytes, page)[0]);
     }
-    // The leaves that follow the first one become interior pages too: copies of the last one of these.
+    // The leaves after the first one become interior pages too, as copies of the last interior page.
     let last = *path.last().unwrap();
     let leaves: Vec<usize> = children(bytes, last).iter().map(|at| child(bytes, *at)).collect();
     let copied = bytes[(last - 1) * page_size..last * page_size].to_vec();
@@ -278,7 +279,7 @@ fn tangle(bytes: &mut [u8], page_size: usize, root: usize) {
 }
 
 #[test]
-fn rows_that_a_damaged_tree_repeats_are_read_once() {
+fn rows_repeated_by_a_damaged_tree_are_read_once() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("run.db3");
     let sql = "PRAGMA page_size = 512; CREATE TABLE topics(id INTEGER PRIMARY KEY, name, type, serialization_format);
@@ -292,10 +293,10 @@ fn rows_that_a_damaged_tree_repeats_are_read_once() {
     let root: i64 = database.query_row(text, [], |row| row.get(0)).unwrap();
     drop(database);
     let mut bytes = std::fs::read(&file).unwrap();
-    tangle(&mut bytes, 512, root as usize);
+    link_pages_repeatedly(&mut bytes, 512, root as usize);
     let reader = Reader::new("tangled.db3", Cursor::new(bytes)).unwrap();
     let info = reader.info(Span::from_seconds(0.5)).unwrap();
-    // A leaf of 512 bytes has two messages of 200 bytes; without a check there would be more than 30^10.
+    // A leaf of 512 bytes has two messages of 200 bytes; without a check more than 30^10 rows would be read.
     assert_eq!(info.messages, 2);
     assert!(!info.loss.is_none());
 }

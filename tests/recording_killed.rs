@@ -1,4 +1,4 @@
-//! A process that is killed while it records leaves all but its last chunk.
+//! A process that is killed while it records loses only its last chunk.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -10,11 +10,11 @@ use zsim::measurement::Sink;
 use zsim::recording::{Preference, Reader, Writer};
 use zsim::time::Stamp;
 
-/// Names the file that the child records to.
+/// Environment variable with the file that the child process records to.
 const FILE: &str = "ZSIM_TEST_RECORDING";
 
 #[test]
-#[ignore = "runs for ever: the other test starts it in a process of its own, and kills that"]
+#[ignore = "never ends: the other test starts it in a child process and kills that"]
 fn record_until_killed() {
     let Ok(path) = std::env::var(FILE) else { return };
     let mut writer = Writer::create(Path::new(&path), recordings::run()).unwrap();
@@ -26,7 +26,7 @@ fn record_until_killed() {
 }
 
 #[test]
-fn a_killed_process_leaves_all_but_its_last_chunk() {
+fn a_killed_process_loses_only_its_last_chunk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut child = Command::new(std::env::current_exe().unwrap())
@@ -37,7 +37,7 @@ fn a_killed_process_leaves_all_but_its_last_chunk() {
         .unwrap();
     let length = || std::fs::metadata(&path).map_or(0, |file| file.len());
     while length() < 2_000_000 {
-        assert!(child.try_wait().unwrap().is_none(), "the child ended by itself");
+        assert!(child.try_wait().unwrap().is_none(), "the child ended before it was killed");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
     child.kill().unwrap();
@@ -49,8 +49,8 @@ fn a_killed_process_leaves_all_but_its_last_chunk() {
     let count = measurements.by_ref().filter(Result::is_ok).count();
     let loss = measurements.loss();
     assert!(loss.cut_short && loss.damaged_chunks == 0, "{loss}");
-    // A chunk is a megabyte of messages; what is lost of the file is less than one packed chunk.
+    // A chunk has 1 MB of messages; the loss is less than one compressed chunk.
     assert!(loss.lost_bytes < 1 << 20, "{loss}");
-    // A sweep and a sample are about 30 kB, packed to no more: what is in the file was read.
+    // A sweep and a sample are at most 30 kB compressed: everything in the file was read.
     assert!(count as u64 * 15_000 > length() - loss.lost_bytes, "{count} measurements of {} bytes", length());
 }

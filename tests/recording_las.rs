@@ -1,4 +1,4 @@
-//! Another program reads the clouds that are written as LAS. It says `skipped` where it is not installed.
+//! laspy reads clouds written as LAS. The test prints `skipped` if laspy is not installed.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -13,7 +13,7 @@ use zsim::time::Stamp;
 fn laspy_reads_coordinates_intensity_time_and_error() {
     let python = std::env::var("ZSIM_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     if Command::new(&python).arg("--version").output().is_err() {
-        return println!("skipped: there is no python");
+        return println!("skipped: python is not installed");
     }
     let folder = tempfile::tempdir().unwrap();
     let (las, expected) = (folder.path().join("cloud.las"), folder.path().join("expected.txt"));

@@ -1,5 +1,4 @@
-//! Maps as files: they come back bit for bit, another reader finds the surfels, and what is no sound map is one clear
-//! error.
+//! Map files: exact round trip, a second PLY reader, and errors for invalid files.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -39,7 +38,7 @@ fn read(bytes: &[u8]) -> Result<SurfelMap, String> {
 
 static FILE: LazyLock<Vec<u8>> = LazyLock::new(|| written(&map(40)));
 
-/// Where the surfels begin.
+/// Offset of the first surfel.
 fn header_end(file: &[u8]) -> usize {
     file.windows(11).position(|w| w == b"end_header\n").unwrap() + 11
 }
@@ -52,9 +51,8 @@ fn with(from: &str, to: &str) -> Vec<u8> {
     [header.replace(from, to).as_bytes(), &FILE[end..]].concat()
 }
 
-/// The file with the checksum that docs/guide/maps.md tells: of the words `1 0.5 4 <count>` and all bytes behind the
-/// header.
-fn sealed(mut file: Vec<u8>, count: usize) -> Vec<u8> {
+/// Replaces the checksum by that of docs/guide/maps.md: of the words `1 0.5 4 <count>` and all bytes after the header.
+fn with_checksum(mut file: Vec<u8>, count: usize) -> Vec<u8> {
     let end = header_end(&file);
     let mut sum = crc32fast::Hasher::new();
     sum.update(format!("1 0.5 4 {count}").as_bytes());
@@ -65,17 +63,17 @@ fn sealed(mut file: Vec<u8>, count: usize) -> Vec<u8> {
 }
 
 #[test]
-fn a_map_comes_back_bit_for_bit_and_its_checksum_is_the_one_that_is_told() {
+fn a_map_is_read_back_bit_for_bit_and_its_checksum_is_as_documented() {
     for count in [0, 1, 1000] {
         let map = map(count);
         let file = written(&map);
         assert_eq!(read(&file).unwrap(), map);
-        assert!(sealed(file.clone(), count) == file);
+        assert!(with_checksum(file.clone(), count) == file);
     }
 }
 
 #[test]
-fn another_reader_of_ply_finds_the_surfels() {
+fn another_ply_reader_reads_the_surfels() {
     let parser = ply_rs_bw::parser::Parser::<ply_rs_bw::ply::DefaultElement>::new();
     let ply = parser.read_ply(&mut FILE.as_slice()).unwrap();
     let vertices = &ply.payload["vertex"];
@@ -90,37 +88,40 @@ fn another_reader_of_ply_finds_the_surfels() {
 }
 
 #[test]
-fn what_is_no_map_of_ours_is_said_in_one_sentence() {
+fn files_that_are_not_a_map_are_errors_of_one_line() {
     let said = |file: &[u8]| read(file).unwrap_err();
-    assert_eq!(said(b"solid x\n"), "map.ply:1: this is not a PLY file: it does not begin with `ply`");
+    assert_eq!(said(b"solid x\n"), "map.ply:1: this is not a PLY file: it does not start with `ply`");
     let cloud = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n";
-    assert_eq!(said(cloud), "map.ply:5: this is a PLY file, and no map of ours: no comment says `zsim surfel map`");
+    assert_eq!(
+        said(cloud),
+        "map.ply:5: this is a PLY file, but not a surfel map of zsim: no comment `zsim surfel map`"
+    );
     let next = said(&with("zsim surfel map 1", "zsim surfel map 2"));
-    assert!(next.ends_with("this is a map of version 2; this program reads version 1"), "{next}");
-    assert!(said(&with("property double sigma\n", "")).ends_with("a map's surfels have other properties than these"));
-    assert!(said(&with("comment levels 4\n", "")).ends_with("there is no comment `levels`"));
-    assert!(said(&with("levels 4", "levels many")).ends_with("`many` is no `levels`"));
-    assert!(said(&with("element vertex 40", "element vertex 39")).ends_with("the file goes on behind its 39 surfels"));
+    assert!(next.ends_with("the map has version 2; this program reads version 1"), "{next}");
+    assert!(said(&with("property double sigma\n", "")).ends_with("the properties are not those of surfels"));
+    assert!(said(&with("comment levels 4\n", "")).ends_with("the comment `levels` is missing"));
+    assert!(said(&with("levels 4", "levels many")).ends_with("`many` is not a valid `levels`"));
+    assert!(said(&with("element vertex 40", "element vertex 39")).ends_with("the file has data after its 39 surfels"));
     let huge = said(&with("element vertex 40", "element vertex 18446744073709551615"));
     assert!(huge.ends_with("the file ends 18446744073709551575 surfels early"), "{huge}");
     assert!(said(&FILE[..FILE.len() - 1]).ends_with("the file ends 1 surfels early"));
 }
 
 #[test]
-fn a_sealed_file_with_what_is_no_surfel_is_refused() {
+fn invalid_surfels_with_a_correct_checksum_are_refused() {
     let end = header_end(&FILE);
     for (at, value, about) in [
-        (0, f64::NAN, "a number of it is not finite"),
-        (3, 5.0, "its normal is not of length one"),
-        (6, -1.0, "its second moment is none of points"),
-        (12, 0.0, "it has less than one point"),
-        (13, -0.1, "its standard deviation is below zero"),
+        (0, f64::NAN, "one of its numbers is not finite"),
+        (3, 5.0, "its normal is not of unit length"),
+        (6, -1.0, "its second moment is not that of points"),
+        (12, 0.0, "it has fewer than one point"),
+        (13, -0.1, "its standard deviation is negative"),
     ] {
         let mut file = FILE.clone();
         // Surfel 2 of 113 bytes each.
         file[end + 2 * 113 + 8 * at..][..8].copy_from_slice(&f64::to_le_bytes(value));
-        assert!(read(&file).unwrap_err().contains("its checksum is not that of what it holds"));
-        let said = read(&sealed(file, 40)).unwrap_err();
+        assert!(read(&file).unwrap_err().contains("its checksum does not match"));
+        let said = read(&with_checksum(file, 40)).unwrap_err();
         assert!(said.ends_with(&format!("surfel 2: {about}")), "{said}");
     }
 }
@@ -138,13 +139,13 @@ proptest! {
         let mut file = FILE.clone();
         file[at] ^= by;
         if let Ok(read) = read(&file) {
-            // In the sentence about the columns.
+            // The byte is in the header comment that describes the columns.
             prop_assert!(read == map(40));
         }
     }
 
     #[test]
-    fn any_bytes_behind_a_header_are_an_error_or_a_sound_map(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
+    fn any_bytes_after_a_header_are_an_error_or_a_valid_map(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
         let file = [&FILE[..header_end(&FILE)], &bytes].concat();
         prop_assert!(read(&file).is_err());
         prop_assert!(read(&bytes).is_err());

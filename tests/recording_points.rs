@@ -1,4 +1,4 @@
-//! The times of points, in each way that drivers tell them.
+//! Point times in the encodings of different drivers.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -8,7 +8,7 @@ use foreign::{FLOAT32, FLOAT64, Foreign, IMU, POINTS, UINT32, cloud, imu, scans,
 use zsim::time::{Span, Stamp};
 
 #[test]
-fn every_way_to_tell_a_points_time_gives_the_same_scan() {
+fn every_encoding_of_point_times_gives_the_same_scan() {
     let stamp_ns = 1_700_000_000_250_000_000_i64;
     let stamp_s = stamp_ns as f64 * 1e-9;
     let at = |k: usize| k as f64 * 1e-3;
@@ -33,7 +33,7 @@ fn every_way_to_tell_a_points_time_gives_the_same_scan() {
         assert_eq!(scan.returns.len(), 50, "{name} {kind}");
         for (k, point) in scan.returns.iter().enumerate() {
             let stamp = scan.stamp + point.offset;
-            // A double of seconds since 1970 holds 0.24 us.
+            // A double of seconds since 1970 has a resolution of 0.24 us.
             let off_ns = (stamp - Stamp::from_nanos(stamp_ns + k as i64 * 1_000_000)).nanos();
             assert!(off_ns.abs() < 500, "{name} {kind}: point {k} is off by {off_ns} ns");
             assert_eq!(point.point_in_laser.z, 3.0 + k as f32);
@@ -42,8 +42,8 @@ fn every_way_to_tell_a_points_time_gives_the_same_scan() {
 }
 
 #[test]
-fn a_unit_that_is_not_the_usual_one_is_told_from_how_long_clouds_last() {
-    // 90 ms of points ten times a second; usual are nanoseconds for integers, seconds for floats.
+fn the_unit_of_point_times_is_determined_from_the_duration_of_clouds() {
+    // Clouds of 90 ms at 10 Hz. The default units are nanoseconds for integers and seconds for floats.
     type Way<'a> = (&'a str, u8, &'a dyn Fn(usize) -> Vec<u8>);
     let ways: [Way<'_>; 5] = [
         ("t", UINT32, &|ms| (ms as u32 * 1_000_000).to_le_bytes().to_vec()),
@@ -68,7 +68,7 @@ fn a_unit_that_is_not_the_usual_one_is_told_from_how_long_clouds_last() {
 
 #[test]
 fn times_by_another_clock_count_from_the_first_point() {
-    // The lidar's clock: since it was switched on, in TAI, in some parts of a second; the stamp is the computer's.
+    // Lidar time since power-up, in TAI, or in fractions of a second; the stamp is from the computer's clock.
     let stamp_ns = 1_700_000_000_250_000_000_i64;
     let tai_s = 1_700_000_037.0;
     for (first, parts) in [(1234.5, 1.0), (tai_s, 1.0), (tai_s * 1e6, 1e6), (77.0e9, 1e9), (77.0e3, 1e3)] {
@@ -88,8 +88,8 @@ fn times_by_another_clock_count_from_the_first_point() {
 }
 
 #[test]
-fn a_cloud_stamped_at_its_end_begins_with_its_first_point() {
-    // Velodyne's driver stamps the last packet: times are negative seconds. Rows are rings, so times go up and down.
+fn a_cloud_stamped_at_its_end_starts_at_its_first_point() {
+    // Velodyne's driver stamps the last packet: times are negative seconds. Rows are rings, so times are not sorted.
     let times: Vec<_> = [-0.09_f32, -0.05, 0.0, -0.10, -0.04].iter().map(|t| t.to_le_bytes().to_vec()).collect();
     let stamp_ns = 1_700_000_000_000_000_000;
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
@@ -104,8 +104,8 @@ fn a_cloud_stamped_at_its_end_begins_with_its_first_point() {
 }
 
 #[test]
-fn times_in_a_simulation_that_starts_at_zero_are_told_apart() {
-    // Absolute seconds, small because the clock is: at 2.0 s, points from 2.00 to 2.09 s.
+fn absolute_times_close_to_zero_are_recognised() {
+    // Absolute seconds of a simulation that starts at zero: at 2.0 s, points from 2.00 to 2.09 s.
     for (stamp_ns, first_s) in [(2_000_000_000_i64, 2.0), (0, 0.0), (50_000_000, 0.05)] {
         let times: Vec<_> = (0..10).map(|k| (first_s + 0.01 * f64::from(k)).to_le_bytes().to_vec()).collect();
         let mut foreign = Foreign::new(mcap::WriteOptions::new());

@@ -1,4 +1,4 @@
-//! Other programs read what is written. Each check says `skipped` where what it needs is not installed.
+//! Independent programs read the recordings. Each test prints `skipped` if a program is not installed.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -9,7 +9,7 @@ use std::process::Command;
 use zsim::geometry::Pose;
 use zsim::recording::{BaseImuDescription, RunDescription};
 
-/// A recording with a message of every topic in it.
+/// A recording with messages on every topic.
 fn recording_in(folder: &Path) -> PathBuf {
     let path = folder.join("run.mcap");
     let run = recordings::run();
@@ -20,7 +20,7 @@ fn recording_in(folder: &Path) -> PathBuf {
     path
 }
 
-/// The interpreter that `ZSIM_PYTHON` names, else `python3`; `None` where there is none.
+/// The Python interpreter named by `ZSIM_PYTHON`, else `python3`; `None` if it is not installed.
 fn python() -> Option<String> {
     let name = std::env::var("ZSIM_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     Command::new(&name).arg("--version").output().ok().filter(|output| output.status.success()).map(|_| name)
@@ -32,7 +32,7 @@ fn here(path: &str) -> PathBuf {
 
 #[test]
 fn mcap_for_python_and_rosbags_agree_on_every_message() {
-    let Some(python) = python() else { return println!("skipped: there is no python") };
+    let Some(python) = python() else { return println!("skipped: python is not installed") };
     let folder = tempfile::tempdir().unwrap();
     let output =
         Command::new(python).arg(here("tests/check_mcap.py")).arg(recording_in(folder.path())).output().unwrap();
@@ -45,10 +45,10 @@ fn mcap_for_python_and_rosbags_agree_on_every_message() {
 #[test]
 fn the_acceptance_check_passes() {
     let script = here("../shared/tools/check_mcap.py");
-    let Some(python) = python() else { return println!("skipped: there is no python") };
+    let Some(python) = python() else { return println!("skipped: python is not installed") };
     let has_modules = Command::new(&python).args(["-c", "import mcap, mcap_ros2, rosbags, numpy"]).output().unwrap();
     if !script.exists() || !has_modules.status.success() {
-        return println!("skipped: the acceptance check or what it needs is not here");
+        return println!("skipped: the acceptance check or its Python modules are not installed");
     }
     let folder = tempfile::tempdir().unwrap();
     let needs = [

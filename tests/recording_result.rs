@@ -1,4 +1,4 @@
-//! An estimate as a recording for viewers, read by the `mcap` crate.
+//! An estimate exported as a recording for viewers, read by the `mcap` crate.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -8,7 +8,7 @@ use zsim::recording::{CloudPoint, write_result};
 use zsim::time::Stamp;
 
 #[test]
-fn a_result_has_a_path_a_transform_a_pose_and_all_points_in_the_order_of_time() {
+fn a_result_has_path_transform_pose_and_all_points_in_time_order() {
     let ms = |ms: i64| Stamp::from_nanos(ms * 1_000_000);
     let poses = (0..300).map(|k| (ms(10 * k), Pose::translation(k as f64, 0.0, 0.0)));
     let trajectory = Trajectory::from_poses(poses).unwrap();
@@ -36,6 +36,6 @@ fn a_result_has_a_path_a_transform_a_pose_and_all_points_in_the_order_of_time() 
         }
     }
     assert_eq!((counts["/path"], counts["/tf"], points), (1, 300, 120_000));
-    // 2.4 s of points, half a second a message, and no more than 50,000.
+    // 2.4 s of points, 0.5 s per message, at most 50,000 points per message.
     assert_eq!(counts["/cloud"], 5);
 }

@@ -1,4 +1,4 @@
-//! The closed loop behind the open loop, on closed-form walks and on scenes.
+//! Loop closure by global registration, on closed-form walks and on scenes.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -13,7 +13,7 @@ use zsim::recording::{Preference, Reader, RunDescription, Writer};
 use zsim::simulation::{Scenario, Simulation};
 use zsim::spec::{Kind, names};
 
-/// A recording that ends before loops have much to say, and one that comes round.
+/// One recording with few loops, and two with several laps or a closed corridor.
 fn runs() -> [Run; 3] {
     let walk = |semi_axes_m, lap_s| Walk { start_s: 1.5, ..Walk::new(semi_axes_m, lap_s) };
     [
@@ -43,7 +43,7 @@ fn closed(open: &OpenLoop) -> OpenLoop {
 }
 
 #[test]
-fn closing_loops_never_costs_more_than_a_twentieth() {
+fn loop_closure_increases_the_error_by_at_most_5_percent() {
     for (index, run) in runs().iter().enumerate() {
         let open = surveyed(run);
         let (before, after) = (Score::of(&open, run).rmse_m, Score::of(&closed(&open), run).rmse_m);
@@ -52,7 +52,7 @@ fn closing_loops_never_costs_more_than_a_twentieth() {
 }
 
 #[test]
-fn keeping_what_is_seen_changes_nothing_of_the_open_loop() {
+fn the_open_loop_does_not_depend_on_the_storage_of_surfels() {
     let run = Run::new(Room::furnished(), Walk { start_s: 1.5, ..Walk::new((1.8, 1.2), 12.0) }, 24, 7.0);
     let mut plain = Estimator::new(&load("default").unwrap(), &calibration()).unwrap();
     run.measurements().into_iter().for_each(|measurement| plain.push(measurement).unwrap());
@@ -86,7 +86,7 @@ fn rmse_m(trajectory: &Trajectory, truth: &Trajectory) -> f64 {
 }
 
 #[test]
-fn closing_loops_costs_no_scene_more_than_a_twentieth() {
+fn loop_closure_increases_the_error_in_no_scene_by_more_than_5_percent() {
     let scenes = names(Kind::Scene);
     assert!(scenes.len() >= 7, "{scenes:?}");
     for scene in &scenes {
@@ -97,8 +97,8 @@ fn closing_loops_costs_no_scene_more_than_a_twentieth() {
     }
 }
 
-/// `trajectory` as one would have it that drifts, gently at either end, by 5 m and 10 degrees.
-fn spoiled(trajectory: &Trajectory) -> Trajectory {
+/// `trajectory` with a smooth drift of 5 m and 10 degrees.
+fn with_drift(trajectory: &Trajectory) -> Trajectory {
     let (first, last) = trajectory.span().unwrap();
     let drifted = |(stamp, pose): (_, &Pose)| {
         let x = last.seconds_since(stamp) / last.seconds_since(first);
@@ -111,17 +111,17 @@ fn spoiled(trajectory: &Trajectory) -> Trajectory {
 }
 
 #[test]
-fn an_open_loop_spoiled_by_5_m_and_10_degrees_is_recovered() {
+fn a_drift_of_5_m_and_10_degrees_is_corrected() {
     let walk = Walk { start_s: 1.5, ..Walk::new((1.8, 1.2), 12.0) };
     let run = Run::new(Room::furnished(), walk, 25, 60.0);
     let open = surveyed(&run);
-    let trajectory = spoiled(&open.trajectory);
+    let trajectory = with_drift(&open.trajectory);
     let survey = open.survey.along(&open.trajectory, &trajectory);
-    let spoiled = OpenLoop { trajectory, survey, ..open.clone() };
-    let recovered = registered(&spoiled, &calibration());
+    let with_drift = OpenLoop { trajectory, survey, ..open.clone() };
+    let recovered = registered(&with_drift, &calibration());
     let score =
         |trajectory: &Trajectory| Score::of(&OpenLoop { trajectory: trajectory.clone(), ..open.clone() }, &run).rmse_m;
-    let (before, after) = (score(&spoiled.trajectory), score(&recovered.trajectory));
+    let (before, after) = (score(&with_drift.trajectory), score(&recovered.trajectory));
     assert!(before > 1.0, "{before} m");
     assert!(recovered.report.loops.closed >= 2, "{:?}", recovered.report);
     assert!(after < 0.03, "{before} m before, {after} m after: {:?}", recovered.report);

@@ -1,4 +1,4 @@
-//! What closes a run: the table on the terminal.
+//! The summary table on the terminal.
 
 use zsim::report::{CloudMetrics, Metrics, OpenLoopMetrics, SimulationMetrics, summary, table};
 
@@ -28,14 +28,14 @@ fn metrics() -> Metrics {
 }
 
 #[test]
-fn the_summary_tells_what_is_known_in_80_columns() {
+fn the_summary_has_the_known_figures_in_80_columns() {
     let text = summary(&metrics());
     println!("{text}");
     assert!(text.starts_with("office, 2.00 min, seed 1\n"));
     for words in ["60.0 x real time", "4.20 s (3.50 % of acquisition)", "12.3 mm", "4.32 km/min", "13.4 mm"] {
         assert!(text.contains(words), "{words} is missing in:\n{text}");
     }
-    assert!(!text.contains("closed loop"), "what is not known is not there");
+    assert!(!text.contains("closed loop"), "the summary has rows without figures");
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
 }
 

@@ -1,4 +1,4 @@
-//! The paper's experiments: the fit of damping, and work that goes on where it was stopped.
+//! The paper's experiments: fit of damping ratios, and resumption after a stop.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -12,11 +12,11 @@ use zsim::study::reproduction::{Experiment, Extent, PeaksSpec, fit_damping};
 
 const RATIOS: (f64, f64) = (0.0005, 0.3);
 
-/// The peaks of the handheld head with a damping.
+/// Gain peaks of the handheld head with a given damping.
 fn peaks(damping: DampingSpec, up_to_hz: f64) -> PeaksSpec {
     let (spec, source) = load("handheld").unwrap();
     let head = HeadModel::new(&with_damping(&spec, damping), &source).unwrap();
-    let response = head.frequency_response(&head.usual_points());
+    let response = head.frequency_response(&head.default_points());
     let peak = |axis| response.peak(axis, up_to_hz, Quantity::Kinematic).map(|peak| peak.gain);
     PeaksSpec {
         x_rot: peak(Axis::Roll),
@@ -29,7 +29,7 @@ fn peaks(damping: DampingSpec, up_to_hz: f64) -> PeaksSpec {
 }
 
 #[test]
-fn the_fit_finds_the_damping_that_made_the_peaks() {
+fn the_fit_recovers_the_damping_of_simulated_peaks() {
     let made = DampingSpec { rocking: 0.03, sway: 0.04, bounce: 0.02, yaw: 0.012 };
     let (spec, source) = load("handheld").unwrap();
     let fit = fit_damping(&spec, &source, &peaks(made, 20.0), RATIOS, 20.0).unwrap();
@@ -41,9 +41,8 @@ fn the_fit_finds_the_damping_that_made_the_peaks() {
 }
 
 #[test]
-fn a_yaw_peak_alone_is_fitted_exactly_and_the_other_ratios_stay() {
-    // About z a head turns alone: H = (1 + 2 i zeta r) / (1 - r^2 + 2 i zeta r) with r = f / f0; its peak, on a fine
-    // grid.
+fn a_single_yaw_peak_is_fitted_exactly_and_the_other_ratios_do_not_change() {
+    // Yaw is decoupled: H = (1 + 2 i zeta r) / (1 - r^2 + 2 i zeta r) with r = f / f0. The peak is taken on a fine grid.
     let (spec, source) = load("handheld").unwrap();
     let paper = PeaksSpec { z_rot: Some(15.0), ..PeaksSpec::default() };
     let fit = fit_damping(&spec, &source, &paper, RATIOS, 20.0).unwrap();
@@ -58,9 +57,8 @@ fn a_yaw_peak_alone_is_fitted_exactly_and_the_other_ratios_stay() {
 }
 
 #[test]
-fn a_peak_out_of_reach_is_told_as_a_misfit() {
-    // With no less damping than 0.02, no gain about z exceeds 1 / (2 zeta) sqrt(1 + 4 zeta^2) by more than a
-    // thousandth.
+fn an_unreachable_peak_is_reported_as_a_misfit() {
+    // With a damping ratio of at least 0.02 no gain about z exceeds 1 / (2 zeta) sqrt(1 + 4 zeta^2) by more than 0.1 %.
     let (spec, source) = load("handheld").unwrap();
     let paper = PeaksSpec { z_rot: Some(100.0), ..PeaksSpec::default() };
     let fit = fit_damping(&spec, &source, &paper, (0.02, 0.3), 20.0).unwrap();
@@ -68,7 +66,7 @@ fn a_peak_out_of_reach_is_told_as_a_misfit() {
     assert!((fit.rms_log_ratio().unwrap() - (100.0_f64 / 25.0).ln()).abs() < 0.02, "{fit:?}");
 }
 
-/// An experiment of one head that is well damped, so that it takes a second.
+/// An experiment with one well damped head, which takes about a second.
 fn small(folder: &Path) -> PathBuf {
     let head = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/heads/handheld.ron")).unwrap();
     std::fs::write(folder.join("head.ron"), head.replace("segments: 2", "segments: 1")).unwrap();
@@ -82,7 +80,7 @@ fn small(folder: &Path) -> PathBuf {
     path
 }
 
-/// All files below a folder with their bytes.
+/// Content of all files below a folder.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -100,21 +98,21 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 #[test]
-fn an_experiment_that_was_stopped_goes_on_and_ends_alike() {
+fn a_stopped_experiment_resumes_with_the_same_result() {
     let here = tempfile::tempdir().unwrap();
     let experiment = Experiment::load(small(here.path()).to_str().unwrap()).unwrap();
     let whole = here.path().join("whole");
     let pool = |threads: usize| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let run = |folder: &Path| experiment.run(folder, Extent::Quick, false, &|_| ()).unwrap();
     let finding = pool(1).install(|| run(&whole));
-    // Six axes, and the misfit of them all.
+    // Six axes, and the misfit over all axes.
     assert_eq!(finding.rows.len(), 7);
     let at_end = files(&whole);
     for name in ["gains.svg", "gains.png", "coherence.svg", "coherence.png", "a/gains.csv", "a/head.ron"] {
         assert!(at_end.contains_key(Path::new(name)), "{name} of {:?}", at_end.keys());
     }
 
-    // Stopped half-way: the fit and two axes are finished, a third has begun, nothing is drawn.
+    // Stopped half-way: the fit and two axes are complete, a third has started, there are no plots.
     let stopped = here.path().join("stopped");
     std::fs::create_dir_all(stopped.join("parts")).unwrap();
     for name in ["made_from.ron", "parts/a-fit.ron", "parts/a-x_rot.ron", "parts/a-y.ron"] {
@@ -125,12 +123,12 @@ fn an_experiment_that_was_stopped_goes_on_and_ends_alike() {
     assert!(experiment.finished(&stopped, Extent::Quick).unwrap().is_none());
     assert_eq!(pool(2).install(|| run(&stopped)), finding);
     assert_eq!(std::fs::metadata(stopped.join("parts/a-y.ron")).unwrap().modified().unwrap(), kept);
-    assert!(files(&stopped) == at_end, "another end than without the stop");
+    assert!(files(&stopped) == at_end, "the result differs from that without a stop");
     assert_eq!(experiment.finished(&stopped, Extent::Quick).unwrap(), Some(finding));
     assert!(experiment.finished(&stopped, Extent::Whole).unwrap().is_none());
 
     let error = experiment.run(&whole, Extent::Whole, false, &|_| ()).unwrap_err();
-    assert!(error.to_string().contains("other work"), "{error}");
+    assert!(error.to_string().contains("another experiment"), "{error}");
 }
 
 fn zsim(folder: &Path, arguments: &[&str]) -> Command {
@@ -140,7 +138,7 @@ fn zsim(folder: &Path, arguments: &[&str]) -> Command {
 }
 
 #[test]
-fn the_command_writes_the_table_and_a_second_start_leaves_it_as_it_is() {
+fn the_command_writes_the_table_and_a_second_call_does_not_change_it() {
     let here = tempfile::tempdir().unwrap();
     let path = small(here.path());
     let arguments = ["reproduce", path.to_str().unwrap(), "--quick", "--json"];
@@ -157,7 +155,7 @@ fn the_command_writes_the_table_and_a_second_start_leaves_it_as_it_is() {
 }
 
 #[test]
-fn wrong_experiments_have_code_2_and_a_sentence() {
+fn invalid_experiments_exit_with_2_and_a_message() {
     let here = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(small(here.path())).unwrap();
     for (name, from, to, sentence) in [
@@ -175,11 +173,11 @@ fn wrong_experiments_have_code_2_and_a_sentence() {
         assert!(String::from_utf8(said).unwrap().contains(sentence), "{name}");
     }
     let said = zsim(here.path(), &["reproduce", "fig99"]).assert().code(2).get_output().stderr.clone();
-    assert!(String::from_utf8(said).unwrap().contains("fig3"), "the names that there are");
+    assert!(String::from_utf8(said).unwrap().contains("fig3"), "the error lists the known experiments");
 }
 
 #[test]
-fn the_shipped_experiments_are_right() {
+fn the_shipped_experiments_are_valid() {
     assert!(!Experiment::all().is_empty());
     for name in Experiment::all() {
         Experiment::load(&name).unwrap();

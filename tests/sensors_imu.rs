@@ -1,4 +1,4 @@
-//! What an IMU says against closed forms, and its noise against its spec.
+//! IMU measurements compared with closed forms, and IMU noise compared with the spec.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -34,7 +34,7 @@ fn every_shipped_imu_loads() {
 }
 
 #[test]
-fn the_noise_of_the_3dm_gx2_is_that_of_its_data_sheet() {
+fn the_noise_of_the_3dm_gx2_agrees_with_its_data_sheet() {
     let noise = imu(&spec_of("3dm_gx2")).noise();
     assert_relative_eq!(noise.gyro_density_rad_per_s_per_sqrt_hz, 5.236e-4, max_relative = 1e-4);
     assert_relative_eq!(noise.accel_density_m_per_s2_per_sqrt_hz, 7.845e-4, max_relative = 1e-4);
@@ -42,7 +42,7 @@ fn the_noise_of_the_3dm_gx2_is_that_of_its_data_sheet() {
     assert_relative_eq!(noise.accel_turn_on_bias_m_per_s2, 0.049_033, max_relative = 1e-4);
 }
 
-/// A motion with every axis of rotation and translation in it, in closed form by differences of its exact pose.
+/// A closed-form motion about and along all axes; derivatives by differences of the exact pose.
 fn tumbling(t: f64) -> Kinematics {
     // Rz(a) Ry(b) with a = 0.7 sin(2 pi 0.9 t), b = 0.8 sin(2 pi 1.3 t); omega = a' z + Rz(a) b' y.
     let (wa, wb) = (2.0 * PI * 0.9, 2.0 * PI * 1.3);
@@ -77,7 +77,7 @@ fn an_ideal_imu_at_1_khz_integrates_to_the_motion() {
     for k in 0..10_000 {
         let t = f64::from(k) * dt;
         let sample = errors.measure(&mean_motion(&tumbling(t), &tumbling(t + dt), dt));
-        // Plain strapdown integration, as a user of /imu/data_raw would write it.
+        // Textbook strapdown integration, as a user of /imu/data_raw would write it.
         let turn = sample.angular_velocity_rad_per_s * dt;
         let middle = rotation * Rotation::from_scaled_axis(turn * 0.5);
         let acceleration = middle * sample.specific_force_m_per_s2 + gravity_in_world();
@@ -91,9 +91,9 @@ fn an_ideal_imu_at_1_khz_integrates_to_the_motion() {
 }
 
 #[test]
-fn on_a_spinning_table_the_arm_feels_the_centripetal_force() {
-    // Rate w about z, arm r along x of the head, sample over T. In the frame half-way, the velocity of a point on a
-    // circle changes by -2 w r sin(w T / 2) along the arm: on average a force of -w^2 r sinc(w T / 2), and gravity.
+fn on_a_rate_table_the_lever_arm_adds_centripetal_acceleration() {
+    // Rate w about z, lever arm r along the head's x, sample interval T. In the frame at mid-interval the velocity of a
+    // point on a circle changes by -2 w r sin(w T / 2) along the arm: a mean force of -w^2 r sinc(w T / 2), plus gravity.
     let (rate, arm, period) = (6.0, 0.1, 0.01);
     let table = |t: f64| {
         let pose = Pose::from_parts(Vector::zeros().into(), from_roll_pitch_yaw(0.0, 0.0, rate * t));
@@ -108,8 +108,8 @@ fn on_a_spinning_table_the_arm_feels_the_centripetal_force() {
 }
 
 #[test]
-fn an_accelerometer_on_a_pendulum_feels_the_rod_alone() {
-    // A point pendulum of length L: the rod pulls along itself, with g cos(a) + L a'^2, and nothing across. The state
+fn an_accelerometer_on_a_pendulum_measures_only_the_rod_tension() {
+    // Point pendulum of length L: the specific force along the rod is g cos(a) + L a'^2, and zero across it. The state
     // is integrated by RK4 at 0.05 ms; energy gives a'^2 = 2 g / L (cos a - cos a0).
     let (length, a0) = (0.8, 1.2_f64);
     let (mut a, mut rate) = (a0, 0.0);
@@ -153,19 +153,19 @@ fn still(spec: &ImuSpec, seed: u64, count: usize) -> (Vec<f64>, Vec<f64>) {
         .unzip()
 }
 
-/// The Allan variance at `tau_s` that a sensor's spec tells, in squares of its SI unit.
+/// Parameters of the Allan variance of a sensor from its spec, in SI units.
 struct AllanOfSpec {
     density: f64,
     walk: f64,
-    /// Spread and time of the bias that wanders.
+    /// Standard deviation and correlation time of the Gauss-Markov bias.
     wander: Option<(f64, f64)>,
-    /// What readings are rounded to.
+    /// Resolution of readings.
     resolution: f64,
     period_s: f64,
 }
 
 impl AllanOfSpec {
-    /// Of gyroscope and accelerometer.
+    /// Parameters of gyroscope and accelerometer.
     fn of(spec: &ImuSpec) -> [Self; 2] {
         let (noise, period_s) = (imu(spec).noise(), 1.0 / spec.rate_hz);
         let wander = |wander: Option<GaussMarkovSpec>, unit: f64| wander.map(|w| (w.sigma * unit, w.time_s));
@@ -186,9 +186,11 @@ impl AllanOfSpec {
         [gyro, accel]
     }
 
-    /// White noise falls as N^2 / tau, a walk rises as K^2 tau / 3, a Gauss-Markov process of spread s and time T has
-    /// `2 s^2 T / tau (1 - T / (2 tau) (3 - 4 exp(-tau / T) + exp(-2 tau / T)))` (IEEE Std 952); they add. Rounding to
-    /// q adds q^2 / 12 a sample, white where the noise of a sample is no less than q.
+    /// Allan variance at `tau_s`, in squares of the SI unit: the sum over all noise sources.
+    ///
+    /// White noise gives N^2 / tau, a random walk K^2 tau / 3, and a Gauss-Markov process of standard deviation s and
+    /// correlation time T `2 s^2 T / tau (1 - T / (2 tau) (3 - 4 exp(-tau / T) + exp(-2 tau / T)))` (IEEE Std 952).
+    /// Rounding to q adds q^2 / 12 per sample, which is white if the noise per sample is at least q.
     fn variance(&self, tau_s: f64) -> f64 {
         let rounding = self.resolution.powi(2) / 12.0 * self.period_s;
         let wander = self.wander.map_or(0.0, |(sigma, time_s)| {
@@ -199,8 +201,9 @@ impl AllanOfSpec {
     }
 }
 
-/// Checks a record at rest of `hours` against the spec: within 10 % up to a thousandth of its length, and beyond that,
-/// where chance alone moves it by more, in the band of 99.9 %.
+/// Compares the Allan deviation of a record of `hours` at rest with the spec.
+///
+/// The tolerance is 10 % up to a thousandth of the record's length, and the 99.9 % confidence band for longer times.
 fn assert_allan_deviation_of_spec(name: &str, hours: f64) {
     let spec = spec_of(name);
     let duration_s = hours * 3600.0;
@@ -215,7 +218,7 @@ fn assert_allan_deviation_of_spec(name: &str, hours: f64) {
                 assert!(point.deviation < 1e-9, "{name}: {point:?}, expected none");
                 continue;
             }
-            let (low, high) = point.band(0.999);
+            let (low, high) = point.confidence_interval(0.999);
             let near = (point.deviation / deviation - 1.0).abs() < 0.10;
             let right = if point.tau_s <= 1e-3 * duration_s { near } else { low < deviation && deviation < high };
             assert!(right, "{name}: {point:?}, expected {deviation}");
@@ -224,19 +227,19 @@ fn assert_allan_deviation_of_spec(name: &str, hours: f64) {
 }
 
 #[test]
-fn six_hours_at_rest_have_the_allan_deviation_of_the_spec() {
+fn the_allan_deviation_of_six_hours_at_rest_agrees_with_the_spec() {
     assert_allan_deviation_of_spec("3dm_gx2", 6.0);
 }
 
 #[test]
-fn every_shipped_imu_has_the_allan_deviation_of_its_spec_in_an_hour_at_rest() {
+fn the_allan_deviation_of_every_shipped_imu_agrees_with_its_spec() {
     for name in spec::names(Kind::Imu) {
         assert_allan_deviation_of_spec(&name, if spec_of(&name).rate_hz > 500.0 { 0.1 } else { 1.0 });
     }
 }
 
 #[test]
-fn the_noise_of_consumer_and_tactical_imus_is_that_of_their_data_sheets() {
+fn the_noise_of_consumer_and_tactical_imus_agrees_with_their_data_sheets() {
     // 0.007 deg/s/sqrt(Hz) and 180 ug/sqrt(Hz); 0.15 deg/sqrt(h) and 0.07 m/s/sqrt(h), by sqrt(3600).
     let noise = imu(&spec_of("consumer")).noise();
     assert_relative_eq!(noise.gyro_density_rad_per_s_per_sqrt_hz, 1.2217e-4, max_relative = 1e-4);
@@ -248,7 +251,7 @@ fn the_noise_of_consumer_and_tactical_imus_is_that_of_their_data_sheets() {
 }
 
 #[test]
-fn a_wandering_bias_has_its_spread_and_forgets_in_its_time() {
+fn a_gauss_markov_bias_has_its_standard_deviation_and_correlation_time() {
     let mut spec = spec_of("ideal_1khz");
     spec.rate_hz = 10.0;
     spec.accel.wander_mg = Some(GaussMarkovSpec { sigma: 0.04, time_s: 2.0 });
@@ -257,14 +260,14 @@ fn a_wandering_bias_has_its_spread_and_forgets_in_its_time() {
         let products = samples.iter().zip(&samples[lag..]).map(|(a, b)| a * b);
         products.sum::<f64>() / (samples.len() - lag) as f64
     };
-    // 20,000 s hold 10,000 correlation times: relative standard error of a variance sqrt(2 / 10,000) = 1.4 %.
+    // 20,000 s are 10,000 correlation times: relative standard error of a variance sqrt(2 / 10,000) = 1.4 %.
     let sigma = 0.04e-3 * G;
     assert_relative_eq!(covariance(0), sigma * sigma, max_relative = 0.06);
     assert_relative_eq!(covariance(20) / covariance(0), (-1.0_f64).exp(), epsilon = 0.05);
 }
 
 #[test]
-fn a_gyroscope_says_no_more_than_its_limit() {
+fn a_gyroscope_saturates_at_its_limit() {
     let spec = spec_of("3dm_gx2");
     let mut errors = ImuErrors::new(&imu(&spec), Seed(1));
     let fast = MeanMotion {
@@ -279,7 +282,7 @@ fn a_gyroscope_says_no_more_than_its_limit() {
 }
 
 #[test]
-fn rounding_is_to_the_resolution() {
+fn readings_are_rounded_to_the_resolution() {
     let mut spec = spec_of("ideal_1khz");
     spec.gyro.resolution_deg_per_s = 0.5;
     let mut errors = ImuErrors::new(&imu(&spec), Seed(1));
@@ -292,7 +295,7 @@ fn rounding_is_to_the_resolution() {
 }
 
 #[test]
-fn scale_misalignment_and_turn_on_bias_spread_over_runs_as_the_spec_says() {
+fn scale_misalignment_and_turn_on_bias_have_the_specified_spread_over_runs() {
     let mut spec = spec_of("ideal_1khz");
     (spec.gyro.scale_percent, spec.gyro.misalignment_deg, spec.gyro.turn_on_bias_deg_per_s) = (0.1, 0.05, 0.2);
     let imu = imu(&spec);
@@ -314,20 +317,20 @@ fn scale_misalignment_and_turn_on_bias_spread_over_runs_as_the_spec_says() {
 }
 
 #[test]
-fn a_walk_leaves_the_white_noise_as_it_was() {
+fn a_random_walk_does_not_change_the_white_noise() {
     let spec = spec_of("3dm_gx2");
     let mut without = spec.clone();
     without.gyro.bias_walk_rad_per_s_per_sqrt_s = 0.0;
     let ((a, accel_a), (b, accel_b)) = (still(&spec, 5, 100), still(&without, 5, 100));
     assert_eq!(accel_a, accel_b);
     assert_eq!(a[0], b[0]);
-    // The difference is the walk itself: sigma 5e-5 sqrt(1 s) after 100 samples, and nothing of the white 5e-3 a
-    // sample.
+    // The difference is only the random walk: sigma 5e-5 sqrt(1 s) after 100 samples, without the white noise of
+    // 5e-3 per sample.
     assert!((a[99] - b[99]).abs() < 2.5e-4 && a[99] != b[99]);
 }
 
 #[test]
-fn nonsense_in_a_spec_is_refused_where_it_stands() {
+fn invalid_values_in_a_spec_are_refused_with_their_line() {
     let text = std::fs::read_to_string("specs/imus/3dm_gx2.ron").unwrap();
     let negative = text.replace("density_ug_per_sqrt_hz: 80", "density_ug_per_sqrt_hz: -80");
     let error = spec::parse::<ImuSpec>(&Source::in_memory("imu.ron", negative)).unwrap_err();

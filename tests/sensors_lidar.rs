@@ -1,4 +1,4 @@
-//! What a lidar reports against worlds in closed form, and its errors against its spec.
+//! Lidar measurements compared with closed-form worlds, and lidar errors compared with the spec.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use zsim::geometry::{Kinematics, Pose, Trajectory, Vector, from_roll_pitch_yaw};
 use zsim::measurement::LidarScan;
 use zsim::random::Seed;
-use zsim::sensors::{Firing, Lidar, LidarErrors, LidarSpec, Rays, Scenery, SurfaceHit, Switch, Track};
+use zsim::sensors::{BeamModel, Lidar, LidarErrors, LidarSpec, ScanTiming, Scenery, SurfaceHit, Switch, Track};
 use zsim::spec::{self, Kind, Source};
 use zsim::time::Stamp;
 use zsim::world::World;
@@ -20,7 +20,7 @@ fn lidar(spec: &LidarSpec) -> Lidar {
     Lidar::new(spec, &Source::in_memory("test.ron", "")).unwrap()
 }
 
-/// The inside of a sphere about the origin of the world.
+/// The inside of a sphere around the world origin.
 struct Globe {
     radius_m: f64,
     reflectance: f32,
@@ -38,7 +38,7 @@ impl Scenery for Globe {
     }
 }
 
-/// Planes across the x axis, in front of the origin; each may end at a y, to its left.
+/// Planes normal to the x axis in front of the origin; each may end at a y on its left.
 struct Walls(Vec<Wall>);
 
 struct Wall {
@@ -71,8 +71,8 @@ fn resting() -> Track {
     Track::new(0, 1e-3, vec![Kinematics::at_rest(Pose::identity()); 101]).unwrap()
 }
 
-fn firing(index: u64) -> Firing {
-    Firing { index, start_s: 0.0, pace: 1.0, stamp: Stamp::from_nanos(1_000_000_000) }
+fn firing(index: u64) -> ScanTiming {
+    ScanTiming { index, start_s: 0.0, pace: 1.0, stamp: Stamp::from_nanos(1_000_000_000) }
 }
 
 /// Scan `index` of a lidar at rest at the origin.
@@ -113,15 +113,15 @@ fn nodding(t: f64) -> Kinematics {
 
 #[test]
 fn beams_projected_by_poses_at_1_khz_lie_on_the_surface() {
-    // A user interpolates the truth linearly: the error of a nod is A w^2 h^2 / 8 = 9 urad, 0.1 mm at 10 m.
+    // Linear interpolation of the ground truth: the error in a nod is A w^2 h^2 / 8 = 9 urad, 0.1 mm at 10 m.
     let track = Track::new(0, 1e-3, (0..200).map(|k| nodding(f64::from(k) * 1e-3)).collect()).unwrap();
     let stamped = (0..200).map(|k| (Stamp::from_nanos(k * 1_000_000), nodding(k as f64 * 1e-3).world_from_body));
     let truth = Trajectory::from_poses(stamped).unwrap();
     let globe = Globe { radius_m: 10.0, reflectance: 0.5 };
-    let firing = Firing { index: 3, start_s: 0.0751, pace: 1.0, stamp: Stamp::from_nanos(75_100_000) };
+    let firing = ScanTiming { index: 3, start_s: 0.0751, pace: 1.0, stamp: Stamp::from_nanos(75_100_000) };
     for (name, beams) in [("utm30lx_exact", 1081), ("lms291_0_25deg", 721), ("vlp16", 28_928), ("mid360", 20_000)] {
         let mut spec = spec_of(name);
-        (spec.noise, spec.beam) = (Switch::Off, Rays::Single);
+        (spec.noise, spec.beam) = (Switch::Off, BeamModel::Single);
         let lidar = lidar(&spec);
         let scan = lidar.measure(&lidar.sweep(&globe, &track, &firing), &LidarErrors::new(&lidar, Seed(1)));
         assert_eq!(scan.returns.len(), beams);
@@ -134,8 +134,8 @@ fn beams_projected_by_poses_at_1_khz_lie_on_the_surface() {
 }
 
 #[test]
-fn a_sweep_meets_first_what_each_ray_meets_alone() {
-    // Rays are sought where the one before them ended; the office has edges, glass and open doors.
+fn a_sweep_hits_the_same_surfaces_as_single_rays() {
+    // A sweep starts each search at the previous hit; the office has edges, glass and open doors.
     let office = World::load("office").unwrap();
     let mut spec = spec_of("utm30lx");
     spec.range_max_m = 12.0;
@@ -157,11 +157,11 @@ fn a_sweep_meets_first_what_each_ray_meets_alone() {
             met += usize::from(alone.is_some());
         }
     }
-    assert!((1..60 * lidar.beams().len()).contains(&met), "some rays meet nothing within reach: {met}");
+    assert!((1..60 * lidar.beams().len()).contains(&met), "some rays must hit nothing within range: {met}");
 }
 
 #[test]
-fn the_polar_form_says_the_same_as_the_points() {
+fn the_polar_form_agrees_with_the_points() {
     let scan = scan(&spec_of("utm30lx"), &Globe { radius_m: 4.0, reflectance: 0.5 }, 1, 0);
     let planar = scan.planar.unwrap();
     assert_eq!((planar.ranges_m.len(), planar.intensities.len()), (1081, 1081));
@@ -178,7 +178,7 @@ fn the_polar_form_says_the_same_as_the_points() {
 }
 
 #[test]
-fn range_noise_is_10_mm_near_20_mm_at_20_m_and_shares_a_bias() {
+fn range_noise_is_10_mm_close_up_and_20_mm_at_20_m_with_a_common_bias() {
     for (radius_m, sigma_m) in [(5.0, 0.010), (20.0, 0.020)] {
         let spec = spec_of("utm30lx");
         let lidar = lidar(&spec);
@@ -189,16 +189,16 @@ fn range_noise_is_10_mm_near_20_mm_at_20_m_and_shares_a_bias() {
             .map(|range| f64::from(range) - radius_m)
             .collect();
         let (mean, sigma) = mean_and_sigma(&ranges);
-        // Weak echoes are late by 10 mm times half power over power: (0.9 / 60^2) / (0.9 / r^2) = (r / 60)^2.
+        // Weak returns are late by 10 mm times the ratio of half power to power: (0.9 / 60^2) / (0.9 / r^2) = (r / 60)^2.
         let late = 0.010 * (radius_m / 60.0).powi(2);
-        // 21,620 ranges: standard errors of 0.7 % and 0.5 % of sigma. Rounding to 1 mm adds 0.3 mm in squares.
+        // 21,620 ranges: standard errors of 0.7 % and 0.5 % of sigma. Rounding to 1 mm adds 0.3 mm in quadrature.
         assert!((mean - errors.bias_m() - late).abs() < 3.5 * 0.007 * sigma_m, "{mean}");
         assert!((sigma / sigma_m - 1.0).abs() < 0.02, "{sigma}");
     }
 }
 
 #[test]
-fn the_bias_spreads_over_runs_by_5_mm() {
+fn the_range_bias_has_a_standard_deviation_of_5_mm_over_runs() {
     let lidar = lidar(&spec_of("utm30lx"));
     let biases: Vec<f64> = (0..4000).map(|seed| LidarErrors::new(&lidar, Seed(seed)).bias_m()).collect();
     let (mean, sigma) = mean_and_sigma(&biases);
@@ -206,7 +206,7 @@ fn the_bias_spreads_over_runs_by_5_mm() {
 }
 
 #[test]
-fn half_of_the_echoes_at_the_threshold_are_missed_and_none_of_strong_ones() {
+fn half_of_the_returns_at_the_threshold_are_missed_and_no_strong_ones() {
     // Power at the threshold: 0.9 / 60^2 = reflectance / r^2, so at 20 m a reflectance of 0.1.
     let mut spec = spec_of("utm30lx");
     spec.errors.range.far_sigma_m = 0.010;
@@ -214,17 +214,17 @@ fn half_of_the_echoes_at_the_threshold_are_missed_and_none_of_strong_ones() {
         let globe = Globe { radius_m: 20.0, reflectance };
         (0..4).map(|k| scan(&spec, &globe, 2, k).returns.len()).sum::<usize>() as f64 / 4324.0
     };
-    // Standard error of a share of half: 0.76 %.
+    // Standard error of a fraction of one half: 0.76 %.
     assert!((seen(0.1) - 0.5).abs() < 0.03, "{}", seen(0.1));
-    // Odds change by e where the logarithm of power changes by 0.15: at 1.15 of it, ln 1.15 / 0.15 = 0.932.
+    // The odds change by a factor e per 0.15 in the logarithm of power: at 1.15 times the power, ln 1.15 / 0.15 = 0.932.
     assert!((seen(0.115) - 1.0 / (1.0 + (-0.932_f64).exp())).abs() < 0.03, "{}", seen(0.115));
     assert_eq!(seen(0.9), 1.0);
     assert!(seen(0.03) < 0.01);
 }
 
 #[test]
-fn grazing_beams_come_back_too_short_and_then_not_at_all() {
-    // A wall along the beams' plane: 0.5 m ahead of a lidar whose beams meet it at up to 89 degrees.
+fn ranges_at_grazing_incidence_are_too_short_and_then_missing() {
+    // A wall 0.5 m from the lidar, which beams hit at up to 89 degrees incidence.
     let mut spec = spec_of("utm30lx");
     spec.errors.range.near_sigma_m = 0.0;
     spec.errors.range.bias_sigma_m = 0.0;
@@ -242,7 +242,7 @@ fn grazing_beams_come_back_too_short_and_then_not_at_all() {
 }
 
 #[test]
-fn glass_lets_most_beams_through_and_makes_them_late() {
+fn glass_transmits_most_beams_and_delays_them() {
     let mut spec = spec_of("utm30lx");
     (spec.errors.range.near_sigma_m, spec.errors.range.bias_sigma_m, spec.errors.detection.weak_bias_m) =
         (0.0, 0.0, 0.0);
@@ -257,7 +257,7 @@ fn glass_lets_most_beams_through_and_makes_them_late() {
     let behind = ranges.iter().filter(|r| (**r - 5.003).abs() < 3e-4).count();
     let from_glass = ranges.iter().filter(|r| **r < 2.008).count();
     assert_eq!(behind + from_glass, 4000);
-    // Two surfaces, each giving an echo one time in twenty: 1 - 0.95^2 = 9.75 %, with a standard error of 0.47 %.
+    // Two surfaces with a return probability of 5 % each: 1 - 0.95^2 = 9.75 %, with a standard error of 0.47 %.
     assert!((from_glass as f64 / 4000.0 - 0.0975).abs() < 0.02, "{from_glass}");
     // Without errors every beam passes, to the exact range.
     spec.noise = Switch::Off;
@@ -266,19 +266,22 @@ fn glass_lets_most_beams_through_and_makes_them_late() {
 }
 
 #[test]
-fn a_divergent_beam_mixes_near_surfaces_and_tells_far_ones_apart() {
-    // The axis of beam 540 lies along x; the near wall ends there, so that it holds what lies right of the axis.
+fn a_divergent_beam_mixes_close_surfaces_and_resolves_distant_ones() {
+    // The axis of beam 540 is along x; the closer wall ends there, so that it covers the right half of the beam.
     let edge = |depth_m: f64| Walls(vec![Wall { ends_at_y_m: -1e-6, ..wall(5.0) }, wall(5.0 + depth_m)]);
     let mut spec = spec_of("utm30lx_exact");
     let middle = |spec: &LidarSpec, depth_m: f64| scan(spec, &edge(depth_m), 1, 0).planar.unwrap().ranges_m[540];
     assert!((middle(&spec, 0.3) - 5.3).abs() < 1e-6, "one ray sees one wall");
-    spec.beam = Rays::Divergent;
+    spec.beam = BeamModel::Divergent;
     // Of seven rays, three of a twelfth fall on the near wall (at 120, 180 and 240 degrees from the left); the powers
     // go as 1 / r^2: (3 / 25, 9 / 5.3^2) / 12.
     let (near, far) = (3.0 / 25.0, 9.0 / (5.3 * 5.3));
     let mixed = (5.0 * near + 5.3 * far) / (near + far);
     assert!((f64::from(middle(&spec, 0.3)) - mixed).abs() < 1e-4, "{} {mixed}", middle(&spec, 0.3));
-    assert!((middle(&spec, 3.0) - 8.0).abs() < 1e-4, "beyond the pulse the strongest counts");
+    assert!(
+        (middle(&spec, 3.0) - 8.0).abs() < 1e-4,
+        "surfaces further apart than the pulse: the strongest return counts"
+    );
 
     spec.echoes = 3;
     let returns = scan(&spec, &edge(3.0), 1, 0).returns;
@@ -289,8 +292,8 @@ fn a_divergent_beam_mixes_near_surfaces_and_tells_far_ones_apart() {
 }
 
 #[test]
-fn a_vlp16_fires_300_000_beams_a_second_in_a_turn_of_100_ms() {
-    // 1808 whole rounds of 55.296 us fit into 100 ms, with 16 beams each; its manual rounds to 300,000 points a second.
+fn a_vlp16_fires_300_000_beams_per_second_in_revolutions_of_100_ms() {
+    // 1808 firing cycles of 55.296 us fit into 100 ms, with 16 beams each; the manual rounds to 300,000 points/s.
     let spec = spec_of("vlp16");
     let vlp = lidar(&spec);
     assert_eq!(vlp.beams().len(), 1808 * 16);
@@ -302,21 +305,21 @@ fn a_vlp16_fires_300_000_beams_a_second_in_a_turn_of_100_ms() {
         (point.z / point.norm()).asin().to_degrees()
     };
     assert!((elevation(0) + 15.0).abs() < 1e-3 && (elevation(1) - 1.0).abs() < 1e-3);
-    // The second round has turned by 360 degrees x 55.296 us / 100 ms = 0.199 degrees to the right.
+    // The second firing cycle is rotated by 360 degrees x 55.296 us / 100 ms = 0.199 degrees to the right.
     let point = scan.returns[16].point_in_laser;
     assert!((point.y.atan2(point.x).to_degrees() + 0.199_07).abs() < 1e-3);
 }
 
 #[test]
-fn an_lms291_scans_13_575_beams_a_second_and_only_its_scans_at_one_degree_have_a_polar_form() {
-    // 181 beams 75 times a second; interlaced, neighbouring scans share the turn's ends: 361 x 37.5 and 721 x 18.75.
+fn an_lms291_scans_13_575_beams_per_second_and_only_its_1_degree_scans_have_a_polar_form() {
+    // 181 beams 75 times a second. Interlaced scans share the end beams: 361 x 37.5 and 721 x 18.75.
     for (name, beams, rate_hz, planar) in
         [("lms291", 181, 75.0, true), ("lms291_0_5deg", 361, 37.5, false), ("lms291_0_25deg", 721, 18.75, false)]
     {
         let scan = scan(&spec_of(name), &Globe { radius_m: 20.0, reflectance: 0.9 }, 1, 0);
         assert_eq!((scan.returns.len(), scan.planar.is_some()), (beams, planar), "{name}");
         assert_eq!(spec_of(name).rate_hz, rate_hz);
-        // The last beam of a scan is fired before the next scan begins, and in the last mirror turn, of 1 / 75 s.
+        // The last beam of a scan is fired before the next scan, and within the last mirror revolution of 1 / 75 s.
         let last_s = scan.returns[beams - 1].offset.seconds();
         assert!(last_s < 1.0 / rate_hz && last_s > 1.0 / rate_hz - 1.0 / 75.0, "{name}: {last_s}");
         for beam in &scan.returns {
@@ -326,7 +329,7 @@ fn an_lms291_scans_13_575_beams_a_second_and_only_its_scans_at_one_degree_have_a
     }
 }
 
-/// Azimuth, 0..360, and elevation of the returns of scan `index` of a Mid-360 amid a globe, degrees.
+/// Azimuth, 0..360, and elevation of the returns of scan `index` of a Mid-360 inside a sphere, degrees.
 fn angles_of_mid360(index: u64) -> Vec<(f64, f64)> {
     let scan = scan(&spec_of("mid360"), &Globe { radius_m: 10.0, reflectance: 0.9 }, 1, index);
     let angles = |point: nalgebra::Vector3<f64>| {
@@ -336,12 +339,12 @@ fn angles_of_mid360(index: u64) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn a_mid360_fires_200_000_beams_a_second_into_its_field_of_view() {
+fn a_mid360_fires_200_000_beams_per_second_into_its_field_of_view() {
     let angles = angles_of_mid360(0);
     assert_eq!(angles.len() as f64 * spec_of("mid360").rate_hz, 200_000.0);
     let (low, high) = angles.iter().fold((90.0_f64, -90.0_f64), |(low, high), (_, e)| (low.min(*e), high.max(*e)));
     assert!((low + 7.0).abs() < 0.01 && (high - 52.0).abs() < 0.01, "{low} {high}");
-    // Each eighth of the circle gets an eighth of the beams, within one of the 16.6 turns' share.
+    // Each eighth of the circle gets an eighth of the beams, to within the beams of one of the 16.6 revolutions.
     for octant in 0..8 {
         let share = angles.iter().filter(|(azimuth, _)| (azimuth / 45.0) as usize == octant).count() as f64 / 20_000.0;
         assert!((share - 0.125).abs() < 0.125 / 16.0, "{octant}: {share}");
@@ -349,8 +352,8 @@ fn a_mid360_fires_200_000_beams_a_second_into_its_field_of_view() {
 }
 
 #[test]
-fn each_scan_of_a_mid360_is_turned_and_fills_the_gaps_of_those_before() {
-    // 16.618034 turns a scan, of which 0.618034 count: 1.854102 turns after three scans, of which 0.854102 count.
+fn each_scan_of_a_mid360_is_rotated_and_fills_the_gaps_of_earlier_scans() {
+    // 16.618034 revolutions per scan, of which 0.618034 matter: 1.854102 after three scans, of which 0.854102 matter.
     let (first, fourth) = (angles_of_mid360(0), angles_of_mid360(3));
     for (a, b) in first.iter().zip(&fourth) {
         let turned = (b.0 - a.0 - 0.854_102 * 360.0 + 180.0).rem_euclid(360.0) - 180.0;
@@ -370,7 +373,7 @@ fn each_scan_of_a_mid360_is_turned_and_fills_the_gaps_of_those_before() {
 }
 
 #[test]
-fn beyond_range_is_plus_and_too_near_is_minus_infinity() {
+fn out_of_range_is_plus_infinity_and_too_close_is_minus_infinity() {
     let spec = spec_of("utm30lx");
     let far = scan(&spec, &Globe { radius_m: 31.0, reflectance: 0.9 }, 1, 0);
     assert!(far.returns.is_empty() && far.planar.unwrap().ranges_m.iter().all(|r| *r == f32::INFINITY));
@@ -379,7 +382,7 @@ fn beyond_range_is_plus_and_too_near_is_minus_infinity() {
 }
 
 #[test]
-fn a_scan_is_the_same_whichever_was_computed_before_and_differs_by_seed() {
+fn a_scan_depends_only_on_its_index_and_the_seed() {
     let spec = spec_of("utm30lx");
     let globe = Globe { radius_m: 6.0, reflectance: 0.5 };
     let alone = scan(&spec, &globe, 1, 5);
@@ -391,7 +394,7 @@ fn a_scan_is_the_same_whichever_was_computed_before_and_differs_by_seed() {
 }
 
 #[test]
-fn nonsense_in_a_spec_is_refused_where_it_stands() {
+fn invalid_values_in_a_spec_are_refused_with_their_line() {
     let text = std::fs::read_to_string("specs/lidars/utm30lx.ron").unwrap();
     let about = |from: &str, to: &str| {
         let source = Source::in_memory("lidar.ron", text.replace(from, to));

@@ -1,4 +1,4 @@
-//! Every shipped lidar, IMU and pair of clocks runs for a while in a simulation, around it a world in closed form.
+//! Every shipped lidar, IMU and pair of clocks runs in a short simulation in a closed-form world.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -16,7 +16,7 @@ const RADIUS_M: f64 = 6.0;
 const DURATION_S: f64 = 0.5;
 const TURN_RAD_PER_S: f64 = 1.5;
 
-/// The inside of a sphere about the origin, where the lidar is.
+/// The inside of a sphere around the lidar.
 struct Globe;
 
 impl Scenery for Globe {
@@ -26,7 +26,7 @@ impl Scenery for Globe {
     }
 }
 
-/// A head that turns about z, in place.
+/// A head that rotates about z at a fixed position.
 fn turning(step: u64) -> HeadState {
     let t_s = step as f64 * STEP_S;
     let world_from_head = Pose::rotation(Vector::z() * (TURN_RAD_PER_S * t_s));
@@ -36,12 +36,12 @@ fn turning(step: u64) -> HeadState {
 }
 
 #[derive(Default)]
-struct Kept {
+struct MemorySink {
     samples: Vec<ImuSample>,
     scans: Vec<LidarScan>,
 }
 
-impl Sink for Kept {
+impl Sink for MemorySink {
     fn imu(&mut self, _: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
         self.samples.push(*sample);
         Ok(())
@@ -53,7 +53,7 @@ impl Sink for Kept {
     }
 }
 
-impl TruthSink for Kept {
+impl TruthSink for MemorySink {
     fn truth(&mut self, _: Stamp, _: &TruthSample) -> Result<(), SinkError> {
         Ok(())
     }
@@ -63,7 +63,7 @@ impl TruthSink for Kept {
     }
 }
 
-/// Runs the three named sensors, and checks what any of them must say.
+/// Runs the named lidar, IMU and clocks, and checks rates and values.
 fn run(lidar: &str, imu: &str, clock: &str) {
     let [of_lidar, of_imu, of_clock] =
         [(Kind::Lidar, lidar), (Kind::Imu, imu), (Kind::Clock, clock)].map(|(kind, name)| find(kind, name).unwrap());
@@ -81,21 +81,24 @@ fn run(lidar: &str, imu: &str, clock: &str) {
         duration_s: DURATION_S,
         seed: Seed(1),
     };
-    let mut kept = Kept::default();
-    simulate(&rig, &mut (0..).map(|step| Ok::<_, DynamicsError>(turning(step))), &mut kept, &mut |_| ()).unwrap();
+    let mut recorded = MemorySink::default();
+    simulate(&rig, &mut (0..).map(|step| Ok::<_, DynamicsError>(turning(step))), &mut recorded, &mut |_| ()).unwrap();
 
     let name = format!("{lidar}, {imu}, {clock}");
-    // One may be missing at the end, and one at the start where a clock is ahead.
+    // One measurement may be missing at the end, and one at the start if a clock is ahead.
     let enough = |count: usize, period_s: f64| count as f64 >= DURATION_S / period_s - 3.0;
-    assert!(enough(kept.samples.len(), imu_model.period_s()), "{name}: {} samples", kept.samples.len());
-    assert!(enough(kept.scans.len(), lidar_model.period_s()), "{name}: {} scans", kept.scans.len());
-    assert!(kept.samples.is_sorted_by(|a, b| a.stamp < b.stamp) && kept.scans.is_sorted_by(|a, b| a.stamp < b.stamp));
+    assert!(enough(recorded.samples.len(), imu_model.period_s()), "{name}: {} samples", recorded.samples.len());
+    assert!(enough(recorded.scans.len(), lidar_model.period_s()), "{name}: {} scans", recorded.scans.len());
+    assert!(
+        recorded.samples.is_sorted_by(|a, b| a.stamp < b.stamp)
+            && recorded.scans.is_sorted_by(|a, b| a.stamp < b.stamp)
+    );
 
     let errors = &lidar_model.spec().errors.range;
     let most_m = 6.0 * errors.near_sigma_m + 4.0 * errors.bias_sigma_m + errors.resolution_m + 1e-5;
-    for scan in &kept.scans {
+    for scan in &recorded.scans {
         assert_eq!(scan.returns.len(), lidar_model.beams().len(), "{name}");
-        assert!(scan.returns.is_sorted_by_key(|beam| beam.offset), "{name}: in the order in which they are fired");
+        assert!(scan.returns.is_sorted_by_key(|beam| beam.offset), "{name}: returns are not in firing order");
         for beam in &scan.returns {
             let range_m = f64::from(beam.point_in_laser.norm());
             assert!((range_m - RADIUS_M).abs() < most_m, "{name}: {range_m} m");
@@ -105,7 +108,7 @@ fn run(lidar: &str, imu: &str, clock: &str) {
     let sample_sigma = spec.density_deg_per_s_per_sqrt_hz.to_radians() / imu_model.period_s().sqrt();
     let steady = spec.turn_on_bias_deg_per_s.to_radians() + spec.scale_percent * 1e-2 * TURN_RAD_PER_S;
     let most = 6.0 * sample_sigma + 4.0 * steady + spec.resolution_deg_per_s.to_radians() + 1e-3;
-    for sample in &kept.samples {
+    for sample in &recorded.samples {
         let rate = sample.angular_velocity_rad_per_s.z;
         assert!((rate - TURN_RAD_PER_S).abs() < most, "{name}: {rate} rad/s");
     }

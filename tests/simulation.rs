@@ -1,10 +1,10 @@
-//! The simulation's pipeline, with a head that moves in closed form through a world in closed form.
+//! The simulation pipeline with a closed-form head motion in a closed-form world.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
-mod simulation_kept;
+mod memory_sink;
 
-use simulation_kept::Kept;
+use memory_sink::MemorySink;
 use std::f64::consts::PI;
 use zsim::dynamics::{DynamicsError, HeadState};
 use zsim::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw, gravity_in_world};
@@ -16,7 +16,7 @@ use zsim::spec::{self, Kind, Source};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
-/// The inside of a box about the origin, 12 x 8 x 5 m.
+/// The inside of a box around the origin, 12 x 8 x 5 m.
 struct Room;
 
 const HALF: [f64; 3] = [6.0, 4.0, 2.5];
@@ -30,18 +30,18 @@ impl Scenery for Room {
     }
 }
 
-/// How far a point is from the nearest wall of the room.
-fn off_the_walls(point: &Vector) -> f64 {
+/// Distance of a point from the closest wall of the room, m.
+fn distance_to_walls(point: &Vector) -> f64 {
     (0..3).map(|k| (point[k].abs() - HALF[k]).abs()).fold(f64::INFINITY, f64::min)
 }
 
-/// A head that nods by 40 degrees at 1.2 Hz while it turns and circles.
+/// A head that nods by 40 degrees at 1.2 Hz while it rotates and moves on a circle.
 struct Nodding {
     step: u64,
 }
 
 fn nodding(t: f64) -> Kinematics {
-    // Rz(c t) Ry(b): omega = c z + b' y', with y' the turned y axis.
+    // Rz(c t) Ry(b): omega = c z + b' y', with y' the rotated y axis.
     let (w, c) = (2.4 * PI, 0.3);
     let (b, b1, b2) = (0.7 * (w * t).sin(), 0.7 * w * (w * t).cos(), -0.7 * w * w * (w * t).sin());
     let node = Rotation::from_scaled_axis(Vector::z() * (c * t)) * Vector::y();
@@ -107,10 +107,10 @@ impl Run {
         simulate(&rig, &mut Nodding { step: 0 }, sink, &mut |_| ())
     }
 
-    fn kept(&self) -> Kept {
-        let mut kept = Kept::default();
-        self.run(&mut kept).unwrap();
-        kept
+    fn recorded(&self) -> MemorySink {
+        let mut recorded = MemorySink::default();
+        self.run(&mut recorded).unwrap();
+        recorded
     }
 }
 
@@ -125,57 +125,56 @@ fn head_from_imu() -> Pose {
 #[test]
 fn beams_projected_by_truth_lie_within_a_millimetre_of_the_walls() {
     let mut run = Run::of("utm30lx_exact", "3dm_gx2", 2.2);
-    // Whatever the lidar's clock says, truth is written in its time.
+    // The ground truth is stamped by the lidar's clock, with any error of that clock.
     run.clocks.lidar = clock(-7.3, 80.0, 0.0, 0.0);
-    let kept = run.kept();
-    let truth = kept.trajectory();
-    assert_eq!(kept.scans.len(), 88);
-    for (_, scan) in &kept.scans {
+    let recorded = run.recorded();
+    let truth = recorded.trajectory();
+    assert_eq!(recorded.scans.len(), 88);
+    for (_, scan) in &recorded.scans {
         assert_eq!(scan.returns.len(), 1081);
         for beam in &scan.returns {
             let world_from_laser = truth.at(scan.stamp + beam.offset).unwrap() * head_from_laser();
             let point = world_from_laser * nalgebra::Point3::from(beam.point_in_laser.cast::<f64>());
-            assert!(off_the_walls(&point.coords) < 1e-3);
+            assert!(distance_to_walls(&point.coords) < 1e-3);
         }
     }
 }
 
 #[test]
-fn what_carries_the_lidar_is_seen_where_it_stands() {
-    // A post of 0.4 m beside the head's circle, from the floor to half a metre above the base, which rests at the
-    // origin.
+fn the_carrier_is_visible_at_its_position() {
+    // A post of 0.4 m diameter next to the head's circle, from the floor to 0.5 m above the base, which is at rest at
+    // the origin.
     let foot_in_base = Vector::new(0.5, -2.0, -HALF[2]);
     let mut run = Run::of("utm30lx_exact", "3dm_gx2", 1.0);
     run.carrier = vec![Cylinder { foot_in_base, radius_m: 0.2, height_m: 3.0, reflectance: 0.4 }];
-    let kept = run.kept();
-    let truth = kept.trajectory();
+    let recorded = run.recorded();
+    let truth = recorded.trajectory();
     let mut on_post = 0;
-    for (_, scan) in &kept.scans {
+    for (_, scan) in &recorded.scans {
         assert_eq!(scan.returns.len(), 1081);
         for beam in &scan.returns {
             let world_from_laser = truth.at(scan.stamp + beam.offset).unwrap() * head_from_laser();
             let point = (world_from_laser * nalgebra::Point3::from(beam.point_in_laser.cast::<f64>())).coords;
             let off_the_side = ((point - foot_in_base).xy().norm() - 0.2).abs();
             let off_the_top = (point.z - 0.5).abs();
-            assert!(off_the_walls(&point).min(off_the_side).min(off_the_top) < 1e-3, "{point}");
-            on_post += usize::from(off_the_walls(&point) > 0.1);
+            assert!(distance_to_walls(&point).min(off_the_side).min(off_the_top) < 1e-3, "{point}");
+            on_post += usize::from(distance_to_walls(&point) > 0.1);
         }
     }
-    // From 2.06 m away, later 2.34 m, it is 2 asin(0.2 / 2.06) = 11.1 degrees wide, later 9.8: 45 to 39 beams of each
-    // of some 40 scans, 1,800 at most while they are level. For a part of each nod the beams behind the head pass over
-    // its top.
+    // At a distance of 2.06 to 2.34 m the post is 2 asin(0.2 / 2.06) = 11.1 to 9.8 degrees wide: 45 to 39 beams in each
+    // of about 40 scans, at most 1,800 if all scans are level. During part of each nod the beams pass above its top.
     assert!((800..1800).contains(&on_post), "{on_post}");
 }
 
 #[test]
 fn the_ideal_imu_integrates_to_the_truth_over_10_s() {
-    let kept = Run::of("utm30lx_exact", "ideal_1khz", 10.0).kept();
-    let start = kept.truth[0].1.head.of_frame(&head_from_imu());
+    let recorded = Run::of("utm30lx_exact", "ideal_1khz", 10.0).recorded();
+    let start = recorded.truth[0].1.head.of_frame(&head_from_imu());
     let (mut rotation, mut velocity) = (start.world_from_body.rotation, start.velocity_in_world);
     let mut position = start.world_from_body.translation.vector;
     let dt = 1e-3;
-    assert_eq!(kept.samples.len(), 10_000);
-    for (_, sample) in &kept.samples {
+    assert_eq!(recorded.samples.len(), 10_000);
+    for (_, sample) in &recorded.samples {
         let turn = sample.angular_velocity_rad_per_s * dt;
         let middle = rotation * Rotation::from_scaled_axis(turn * 0.5);
         let acceleration = middle * sample.specific_force_m_per_s2 + gravity_in_world();
@@ -183,20 +182,20 @@ fn the_ideal_imu_integrates_to_the_truth_over_10_s() {
         velocity += acceleration * dt;
         rotation *= Rotation::from_scaled_axis(turn);
     }
-    let end = kept.truth[10_000].1.head.of_frame(&head_from_imu()).world_from_body;
+    let end = recorded.truth[10_000].1.head.of_frame(&head_from_imu()).world_from_body;
     assert!((position - end.translation.vector).norm() < 2e-3, "{}", position - end.translation.vector);
     assert!(rotation.angle_to(&end.rotation).to_degrees() < 0.02);
 }
 
 #[test]
-fn truth_is_the_motion_at_whole_milliseconds_of_the_lidars_time() {
+fn ground_truth_is_the_motion_at_full_milliseconds_of_lidar_time() {
     let mut run = Run::of("utm30lx_exact", "3dm_gx2", 1.0);
     run.clocks.lidar = clock(2.6, 40.0, 0.0, 1.0);
-    let kept = run.kept();
-    // On average stamps lag by half a tick: the first instant is stamped 2.1 ms on average, the last 1002.14 ms.
+    let recorded = run.recorded();
+    // Stamps are late by half a clock tick on average: the first has a mean of 2.1 ms, the last 1002.14 ms.
     let of = |ms: i64| EPOCH + Span::from_nanos(ms * 1_000_000);
-    assert_eq!((kept.truth[0].1.lidar_stamp, kept.truth.last().unwrap().1.lidar_stamp), (of(3), of(1002)));
-    for (now, truth) in &kept.truth {
+    assert_eq!((recorded.truth[0].1.lidar_stamp, recorded.truth.last().unwrap().1.lidar_stamp), (of(3), of(1002)));
+    for (now, truth) in &recorded.truth {
         // lidar = 1.00004 t + 2.1 ms, so t = (lidar - 2.1 ms) / 1.00004.
         let t = (truth.lidar_stamp.seconds_since(EPOCH) - 2.1e-3) / 1.000_04;
         assert!((now.seconds_since(EPOCH) - t).abs() < 2e-9);
@@ -207,33 +206,33 @@ fn truth_is_the_motion_at_whole_milliseconds_of_the_lidars_time() {
         assert!((truth.head.velocity_in_world - expected.velocity_in_world).norm() < 1e-7);
         assert!(truth.head.world_from_body.rotation.angle_to(&expected.world_from_body.rotation) < 1e-8);
     }
-    let (first, last) = kept.trajectory().span().unwrap();
+    let (first, last) = recorded.trajectory().span().unwrap();
     let sweep = Span::from_nanos(18_750_000);
-    assert!(kept.scans.iter().all(|(_, scan)| scan.stamp >= first && scan.stamp + sweep <= last));
+    assert!(recorded.scans.iter().all(|(_, scan)| scan.stamp >= first && scan.stamp + sweep <= last));
 }
 
 #[test]
-fn the_clocks_are_as_the_truth_tells() {
+fn stamps_agree_with_the_ground_truth_of_the_clocks() {
     let mut run = Run::of("utm30lx_exact", "3dm_gx2", 20.0);
     run.clocks.lidar = clock(1.0, -30.0, 0.2, 1.0);
     run.clocks.imu = clock(-4.0, 100.0, 0.3, 0.5);
-    let kept = run.kept();
-    assert_eq!(kept.clocks.len(), 200, "ten times a second");
+    let recorded = run.recorded();
+    assert_eq!(recorded.clocks.len(), 200, "ten times a second");
     let ahead_at = |t_s: f64, of: fn(&ClockTruth) -> Span| {
-        let (first, last) = (of(&kept.clocks[0].1).seconds(), of(&kept.clocks[199].1).seconds());
-        first + (last - first) * t_s / kept.clocks[199].0.seconds_since(EPOCH)
+        let (first, last) = (of(&recorded.clocks[0].1).seconds(), of(&recorded.clocks[199].1).seconds());
+        first + (last - first) * t_s / recorded.clocks[199].0.seconds_since(EPOCH)
     };
-    // A scan arrives with its last beam, 18.75 ms of the lidar's crystal after the stamped one; a sample arrives 5 ms
-    // of the IMU's after the middle of its interval, which is what is stamped.
-    let scans = kept.scans.iter().map(|(arrival, scan)| {
+    // A scan arrives with its last beam, 18.75 ms of lidar time after the stamped first beam. A sample arrives 5 ms of
+    // IMU time after the middle of its interval, which is the stamp.
+    let scans = recorded.scans.iter().map(|(arrival, scan)| {
         let fired_s = arrival.seconds_since(EPOCH) - 0.01875 / (1.0 - 30e-6);
         scan.stamp.seconds_since(EPOCH) - fired_s - ahead_at(fired_s, |clock| clock.lidar_ahead)
     });
-    let samples = kept.samples.iter().map(|(arrival, sample)| {
+    let samples = recorded.samples.iter().map(|(arrival, sample)| {
         let middle_s = arrival.seconds_since(EPOCH) - 0.005 / (1.0 + 100e-6);
         sample.stamp.seconds_since(EPOCH) - middle_s - ahead_at(middle_s, |clock| clock.imu_ahead)
     });
-    // Spread: jitter, and rounding uniform over a tick (tick / sqrt(12)), in squares.
+    // Standard deviation: jitter and rounding, uniform over a tick (tick / sqrt(12)), in quadrature.
     for (errors, sigma) in [
         (scans.collect::<Vec<f64>>(), 0.2e-3_f64.hypot(1e-3 / 12_f64.sqrt())),
         (samples.collect(), 0.3e-3_f64.hypot(0.5e-3 / 12_f64.sqrt())),
@@ -244,42 +243,42 @@ fn the_clocks_are_as_the_truth_tells() {
 }
 
 #[test]
-fn stamps_increase_whatever_the_jitter() {
+fn stamps_increase_with_any_jitter() {
     let mut run = Run::of("utm30lx", "3dm_gx2", 2.0);
     (run.clocks.lidar.jitter_ms, run.clocks.imu.jitter_ms) = (10.0, 10.0);
-    let kept = run.kept();
-    assert!(kept.samples.windows(2).all(|pair| pair[0].1.stamp < pair[1].1.stamp));
-    assert!(kept.scans.windows(2).all(|pair| pair[0].1.stamp < pair[1].1.stamp));
+    let recorded = run.recorded();
+    assert!(recorded.samples.windows(2).all(|pair| pair[0].1.stamp < pair[1].1.stamp));
+    assert!(recorded.scans.windows(2).all(|pair| pair[0].1.stamp < pair[1].1.stamp));
 }
 
 #[test]
-fn a_seed_gives_the_same_run_with_one_thread_and_two_and_another_seed_another() {
+fn a_run_depends_only_on_the_seed() {
     let mut run = Run::of("utm30lx", "3dm_gx2", 2.3);
     run.clocks.imu = clock(3.0, 16.67, 0.1, 0.0);
     let with_threads = |count: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
-        pool.install(|| run.kept())
+        pool.install(|| run.recorded())
     };
     let one = with_threads(1);
     assert!(one == with_threads(2));
-    assert!(one == run.kept());
+    assert!(one == run.recorded());
     run.seed = 2;
-    let other = run.kept();
+    let other = run.recorded();
     assert!(one.truth == other.truth && one.scans != other.scans && one.samples != other.samples);
 }
 
 #[test]
 fn the_summary_counts_what_was_delivered() {
     let run = Run::of("utm30lx_divergent", "3dm_gx2", 1.2);
-    let mut kept = Kept::default();
-    let summary = run.run(&mut kept).unwrap();
-    assert_eq!((summary.scans, summary.imu_samples), (kept.scans.len() as u64, kept.samples.len() as u64));
+    let mut recorded = MemorySink::default();
+    let summary = run.run(&mut recorded).unwrap();
+    assert_eq!((summary.scans, summary.imu_samples), (recorded.scans.len() as u64, recorded.samples.len() as u64));
     assert_eq!((summary.scans, summary.imu_samples), (48, 120));
     assert_eq!((summary.beams, summary.rays), (48 * 1081, 48 * 1081 * 7));
-    assert_eq!(summary.returns, kept.scans.iter().map(|(_, scan)| scan.returns.len() as u64).sum::<u64>());
+    assert_eq!(summary.returns, recorded.scans.iter().map(|(_, scan)| scan.returns.len() as u64).sum::<u64>());
 }
 
-/// Takes a hundred samples of the IMU, and then no more.
+/// Sink that fails after a hundred IMU samples.
 #[derive(Default)]
 struct Full(u32);
 
@@ -305,7 +304,7 @@ impl TruthSink for Full {
 }
 
 #[test]
-fn a_sink_that_is_full_stops_the_run_with_its_own_words() {
+fn an_error_of_the_sink_stops_the_run_and_is_its_source() {
     let error = Run::of("utm30lx", "3dm_gx2", 60.0).run(&mut Full::default()).unwrap_err();
     assert!(std::error::Error::source(&error).unwrap().to_string().contains("no space left"), "{error}");
 }
@@ -326,14 +325,14 @@ fn a_motion_that_ends_before_the_run_is_an_error() {
         seed: Seed(1),
     };
     let mut short = Nodding { step: 0 }.take(1200);
-    let error = simulate(&rig, &mut short, &mut Kept::default(), &mut |_| ()).unwrap_err();
+    let error = simulate(&rig, &mut short, &mut MemorySink::default(), &mut |_| ()).unwrap_err();
     assert_eq!(error.to_string(), "the head's motion ends 1.200 s after the start, before the run does");
 }
 
 #[test]
-fn a_run_of_no_time_is_refused() {
+fn a_run_of_zero_duration_is_refused() {
     for duration_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = Run::of("utm30lx", "3dm_gx2", duration_s).run(&mut Kept::default()).unwrap_err();
+        let error = Run::of("utm30lx", "3dm_gx2", duration_s).run(&mut MemorySink::default()).unwrap_err();
         assert!(matches!(error, SimulationError::Duration { .. }), "{error}");
     }
 }

@@ -1,9 +1,9 @@
-//! The search for a spring.
+//! Spring design by search.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 use zsim::spec::{Kind, Source, find, parse};
-use zsim::study::spring::design::{DesignSpec, DesignStudy, Search, csv, pareto_figure, pareto_set};
+use zsim::study::spring::design::{DesignSearch, DesignSpec, DesignStudy, csv, pareto_figure, pareto_set};
 
 fn load(name: &str) -> (DesignSpec, Source) {
     let source = find(Kind::Study, name).unwrap();
@@ -13,15 +13,15 @@ fn load(name: &str) -> (DesignSpec, Source) {
 fn small(name: &str) -> DesignStudy {
     let (spec, source) = load(name);
     let spec = DesignSpec { evaluations: 800, candidates: 3, ..spec };
-    Search::new(&spec, &source).unwrap().run(&|_| ()).unwrap()
+    DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap()
 }
 
 #[test]
-fn a_search_over_geometry_meets_its_targets_and_simulation_agrees() {
+fn a_search_over_geometry_meets_its_targets_as_simulation_confirms() {
     let study = small("spring_design");
     assert!(study.feasible > 50 && study.pareto > 3, "{} {}", study.feasible, study.pareto);
     assert_eq!(study.candidates.len(), 3);
-    // The rocking frequency is a goal of its own: the best there is at the target.
+    // The rocking frequency is a goal itself: the optimum is at the target.
     let best = study.candidates.iter().map(|v| (v.candidate.figures.rocking_hz / 1.3 - 1.0).abs()).fold(1.0, f64::min);
     assert!(best < 0.01, "{best}");
     for verified in &study.candidates {
@@ -34,12 +34,12 @@ fn a_search_over_geometry_meets_its_targets_and_simulation_agrees() {
 }
 
 #[test]
-fn a_search_is_the_same_for_any_number_of_threads() {
+fn a_search_does_not_depend_on_the_number_of_threads() {
     let (spec, source) = load("spring_design");
     let spec = DesignSpec { evaluations: 500, ..spec };
     let explore = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Search::new(&spec, &source).unwrap().explore(&|_| ()))
+        pool.install(|| DesignSearch::new(&spec, &source).unwrap().explore(&|_| ()))
     };
     let (once, again) = (explore(1), explore(2));
     assert_eq!(once, again);
@@ -47,39 +47,39 @@ fn a_search_is_the_same_for_any_number_of_threads() {
 }
 
 #[test]
-fn descents_beat_even_samples() {
-    // With as many evaluations in all, those of the search leave a front that even samples alone hardly touch.
+fn optimisation_gives_a_better_front_than_sampling() {
+    // With the same number of evaluations, samples reach hardly any point of the search's front.
     let (spec, source) = load("spring_design");
     let front = |evaluations: usize| {
         let spec = DesignSpec { evaluations, ..spec.clone() };
-        let (found, _) = Search::new(&spec, &source).unwrap().explore(&|_| ());
+        let (found, _) = DesignSearch::new(&spec, &source).unwrap().explore(&|_| ());
         let costs: Vec<Vec<f64>> = found.iter().map(|c| c.costs.clone()).collect();
         let set = pareto_set(&costs);
         set.into_iter().map(|k| costs[k].clone()).collect::<Vec<_>>()
     };
-    // 150 evaluations leave fewer than a population to each descent: samples alone.
+    // With 150 evaluations less than one population remains for each descent, so that only samples are used.
     let (sampled, searched) = (front(150), front(1000));
     let beaten = |c: &&Vec<f64>| searched.iter().any(|s| s.iter().zip(*c).all(|(s, c)| s <= c));
     assert!(sampled.iter().filter(beaten).count() * 10 >= sampled.len() * 7);
 }
 
 #[test]
-fn a_catalogue_is_tried_through() {
+fn a_catalogue_is_searched_completely() {
     let (spec, source) = load("spring_stock");
     let spec = DesignSpec { candidates: 2, ..spec };
-    let study = Search::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
+    let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
     assert_eq!(study.evaluated, 690);
     assert!(study.candidates.iter().all(|v| !v.candidate.coil.name.is_empty()));
     assert!(study.feasible > 3, "{}", study.feasible);
 }
 
 #[test]
-fn a_search_that_makes_no_sense_says_why() {
+fn an_invalid_search_is_an_error_with_the_reason() {
     let (spec, source) = load("spring_design");
     let wrong = |change: fn(&mut DesignSpec)| {
         let mut spec = spec.clone();
         change(&mut spec);
-        Search::new(&spec, &source).map(|_| ()).unwrap_err().to_string()
+        DesignSearch::new(&spec, &source).map(|_| ()).unwrap_err().to_string()
     };
     assert!(wrong(|s| s.goals.clear()).contains("at least one goal"));
     assert!(wrong(|s| s.head = "rigid".to_owned()).contains("no spring"));
@@ -89,5 +89,5 @@ fn a_search_that_makes_no_sense_says_why() {
             *active_coils = [9.0, 3.0];
         }
     };
-    assert!(wrong(bounds).contains("from the smaller to the larger"));
+    assert!(wrong(bounds).contains("exceeds the upper bound"));
 }

@@ -1,4 +1,4 @@
-//! A sweep on a real Slurm of two nodes, which the test brings up and takes down.
+//! A sweep on a real Slurm cluster of two nodes that the test starts and stops.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
 
-/// The cluster's script says by this that it cannot run here.
+/// Exit code of the cluster script if it cannot run on this machine.
 const SKIPPED: i32 = 77;
 
 struct Cluster {
@@ -21,8 +21,8 @@ fn script(verb: &str, folder: &Path) -> Output {
 }
 
 impl Cluster {
-    /// Brings it up; `None`, with a word, where it cannot run.
-    fn up() -> Option<Self> {
+    /// Starts the cluster; `None`, with a message, if it cannot run on this machine.
+    fn start() -> Option<Self> {
         let folder = tempfile::tempdir().unwrap();
         let output = script("up", folder.path());
         let talk = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -70,8 +70,8 @@ const SWEEP: &str = r#"(
 )"#;
 
 #[test]
-fn a_job_array_gives_the_same_bytes() {
-    let Some(cluster) = Cluster::up() else { return };
+fn a_job_array_gives_the_bytes_of_a_local_run() {
+    let Some(cluster) = Cluster::start() else { return };
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("s.ron"), SWEEP).unwrap();
     for name in ["slurm", "local"] {
@@ -102,5 +102,5 @@ fn a_job_array_gives_the_same_bytes() {
         assert!(table("slurm", file) == table("local", file), "{file}");
     }
     let said = zsim(Some(&cluster), here.path(), "sweep submit slurm --slurm --json");
-    assert_eq!(serde_json::from_str::<Value>(&said).unwrap()["elements"], 0, "nothing is missing");
+    assert_eq!(serde_json::from_str::<Value>(&said).unwrap()["elements"], 0, "no run is missing");
 }

@@ -1,4 +1,4 @@
-//! Rays and nearest points against closed forms, and against a search through every triangle.
+//! Ray casts and closest points compared with closed forms and with a search through all triangles.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -9,7 +9,7 @@ use zsim::random::Seed;
 use zsim::spec::{Source, parse};
 use zsim::world::{Ray, World};
 
-/// A world of `items` out of opaque `a` and `b` and transparent `glass`, with more `fields` of a scene.
+/// A world of `items` with the opaque materials `a` and `b` and transparent `glass`, and further scene `fields`.
 fn world(items: &str, fields: &str) -> World {
     let text = format!(
         r#"(
@@ -27,7 +27,7 @@ fn ray(origin_in_world: Vector, towards: Vector) -> Ray {
     Ray { origin_in_world, direction_in_world: towards.normalize() }
 }
 
-/// Directions all over the sphere.
+/// Directions distributed over the sphere.
 fn directions(count: usize) -> Vec<Vector> {
     let mut stream = Seed(5).stream("directions");
     let mut draw = || Vector::from_fn(|_, _| stream.random_range(-1.0..1.0));
@@ -35,8 +35,8 @@ fn directions(count: usize) -> Vec<Vector> {
 }
 
 #[test]
-fn from_inside_a_box_every_ray_reaches_the_wall_it_points_at() {
-    // Slabs: along each axis the wall is at +-size/2 from the middle; the nearest is hit.
+fn rays_from_inside_a_box_hit_its_walls() {
+    // Slab method: along each axis the walls are at +-size/2 from the centre; the closest one is hit.
     let world = world("Solid(shape: Box(size_m: (8, 6, 4)), material: \"a\", at_m_deg: [(100, 50, 10)])", "");
     let eye_in_box = Vector::new(1.0, -0.5, 0.3);
     for direction in directions(20_000) {
@@ -52,9 +52,9 @@ fn from_inside_a_box_every_ray_reaches_the_wall_it_points_at() {
 }
 
 #[test]
-fn a_cylinder_is_hit_within_the_sagitta_of_its_sides() {
-    // A regular polygon of n sides in a circle of radius r lies within r (1 - cos(pi / n)) of it; an oblique ray meets
-    // it that much later at most, divided by the cosine of incidence on the circle.
+fn a_cylinder_is_hit_to_within_the_sagitta_of_its_sides() {
+    // A regular polygon of n sides in a circle of radius r is within r (1 - cos(pi / n)) of it. The range error is at
+    // most that sagitta divided by the cosine of the incidence angle.
     let world = world(
         "Solid(shape: Cylinder(radius_m: 0.5, height_m: 4, sides: 64), material: \"a\", at_m_deg: [(3, 0, -2)])",
         "",
@@ -73,8 +73,8 @@ fn a_cylinder_is_hit_within_the_sagitta_of_its_sides() {
 }
 
 #[test]
-fn a_tilted_plane_far_from_the_origin_is_met_to_a_nanometre() {
-    // The plane through p with normal n: t = n . (p - o) / n . d. 50 km away, single precision alone is 2 mm off.
+fn a_tilted_plane_distant_from_the_origin_is_hit_to_a_nanometre() {
+    // The plane through p with normal n: t = n . (p - o) / n . d. At 50 km single precision has an error of 2 mm.
     let world = world(
         "Solid(shape: Rectangle(size_m: (200, 200)), material: \"b\", at_m_deg: [(50000, -30000, 7, 20, 30, 10)])",
         "",
@@ -92,7 +92,7 @@ fn a_tilted_plane_far_from_the_origin_is_met_to_a_nanometre() {
 }
 
 #[test]
-fn nothing_is_met_beyond_the_range_or_behind_the_eye() {
+fn a_ray_has_no_hit_out_of_range_or_backwards() {
     let world = world("Solid(shape: Box(size_m: (1, 10, 10)), material: \"a\", at_m_deg: [(10.5, 0, -5)])", "");
     let ahead = ray(Vector::zeros(), Vector::x());
     assert_relative_eq!(world.cast(&ahead, 10.001, 0.0).unwrap().distance_m, 10.0, epsilon = 1e-9);
@@ -101,7 +101,7 @@ fn nothing_is_met_beyond_the_range_or_behind_the_eye() {
 }
 
 #[test]
-fn behind_a_pane_of_glass_stands_what_stands_behind_it() {
+fn a_ray_through_glass_hits_the_surface_after_it() {
     let items = r#"Solid(shape: Rectangle(size_m: (2, 2)), material: "glass", at_m_deg: [(2, 0, 0, 0, 90)]),
         Solid(shape: Box(size_m: (1, 4, 4)), material: "b", at_m_deg: [(5.5, 0, -2)])"#;
     let world = world(items, "");
@@ -119,9 +119,9 @@ fn behind_a_pane_of_glass_stands_what_stands_behind_it() {
 }
 
 #[test]
-fn a_door_that_swings_and_a_person_who_walks_are_met_where_they_are_then() {
-    // The person, a box of 0.4 m, walks from y = -4 to 4 m in 8 s at x = 5 m; the door's leaf swings about (2, 0) from
-    // lying along x to lying along y in 2 s.
+fn moving_objects_are_hit_at_their_position_at_the_time_of_the_ray() {
+    // The person, a box of 0.4 m, walks from y = -4 to 4 m in 8 s at x = 5 m. The door leaf rotates about (2, 0) from
+    // the x direction to the y direction in 2 s.
     let fields = r#"
         templates: {
             "person": [Solid(shape: Box(size_m: (0.4, 0.4, 1.8)), material: "b")],
@@ -140,27 +140,28 @@ fn a_door_that_swings_and_a_person_who_walks_are_met_where_they_are_then() {
     assert_relative_eq!(hit.distance_m, 4.8, epsilon = 1e-9);
     assert_relative_eq!(hit.normal_in_world, -Vector::x(), epsilon = 1e-12);
     assert!(world.cast(&towards_x(2.1), 30.0, 4.0).is_none());
-    // At 2 s the leaf stands across the ray at y = 0.5, its face at x = 2 - 0.02; a period later again.
+    // At 2 s the leaf is normal to the ray at y = 0.5, with its face at x = 2 - 0.02; the same one period later.
     for time in [2.0, 6.0] {
         assert_relative_eq!(world.cast(&towards_x(0.5), 30.0, time).unwrap().distance_m, 1.98, epsilon = 1e-9);
     }
-    // At 1 s it stands at 45 degrees: the middle plane is met at x = 2 + y, its face half the thickness x sqrt(2)
-    // nearer.
+    // At 1 s the leaf is at 45 degrees: its middle plane is at x = 2 + y, and its face closer by half the thickness
+    // times sqrt(2).
     let expected = 2.5 - 0.02 * 2_f64.sqrt();
     assert_relative_eq!(world.cast(&towards_x(0.5), 30.0, 1.0).unwrap().distance_m, expected, epsilon = 1e-9);
-    // A ray in front of everything is stopped by the nearer one.
+    // No hit with a range limit in front of the leaf.
     assert!(world.cast(&towards_x(0.5), 1.9, 2.0).is_none());
 }
 
 #[test]
 fn the_nearest_point_of_a_box_is_the_clamped_point() {
-    // Outside a box the nearest point is the coordinate-wise clamp (Ericson 2005, section 5.1.3).
+    // Outside a box the closest point is the coordinate-wise clamp (Ericson 2005, section 5.1.3).
     let world = world("Solid(shape: Box(size_m: (2, 4, 6)), material: \"a\", at_m_deg: [(0, 0, -3)])", "");
     for direction in directions(3000) {
         let point = direction * 8.0;
         let clamped = point.inf(&Vector::new(1.0, 2.0, 3.0)).sup(&Vector::new(-1.0, -2.0, -3.0));
         let found = world.nearest(&point, 10.0).unwrap();
-        // The search compares distances in single precision: at several metres, near ties differ by less than it tells.
+        // The search compares distances in single precision, so that almost equal distances of several metres may be
+        // confused.
         assert_relative_eq!(found.point_in_world, clamped, epsilon = 3e-3);
         assert_relative_eq!((found.point_in_world - point).norm(), (clamped - point).norm(), epsilon = 2e-6);
         assert_relative_eq!(found.normal_in_world.norm(), 1.0, epsilon = 1e-12);
@@ -169,7 +170,7 @@ fn the_nearest_point_of_a_box_is_the_clamped_point() {
     }
 }
 
-/// Triangles thrown into a cube, as a mesh in memory, and as a world by way of a file.
+/// Random triangles in a cube, as a mesh in memory, and as a world loaded from a file.
 fn random_triangles(count: usize) -> (Vec<[Vector; 3]>, World) {
     let mut stream = Seed(9).stream("triangles");
     let mut draw = |size: f64| Vector::from_fn(|_, _| stream.random_range(-size..size));
@@ -189,7 +190,7 @@ fn random_triangles(count: usize) -> (Vec<[Vector; 3]>, World) {
     (triangles, world)
 }
 
-/// Where a ray crosses the plane of a triangle, if within it: barycentric coordinates by areas, in double precision.
+/// Distance to the intersection of a ray with a triangle: barycentric coordinates by areas, in double precision.
 fn crossing(ray: &Ray, [a, b, c]: &[Vector; 3]) -> Option<f64> {
     let normal = (b - a).cross(&(c - a));
     let distance = normal.dot(&(a - ray.origin_in_world)) / normal.dot(&ray.direction_in_world);
@@ -199,7 +200,7 @@ fn crossing(ray: &Ray, [a, b, c]: &[Vector; 3]) -> Option<f64> {
 }
 
 #[test]
-fn the_tree_finds_what_a_search_through_every_triangle_finds() {
+fn the_tree_agrees_with_a_search_through_all_triangles() {
     let (triangles, world) = random_triangles(2000);
     assert_eq!(world.triangle_count(), 2000);
     let mut errors: Vec<f64> = directions(5000)
@@ -212,18 +213,18 @@ fn the_tree_finds_what_a_search_through_every_triangle_finds() {
         })
         .collect();
     errors.sort_by(f64::total_cmp);
-    // A ray that grazes an edge may fall on either side of it, so quantiles and not the worst.
+    // A ray that grazes an edge may hit or miss, so the test uses quantiles instead of the maximum.
     assert!(errors[errors.len() * 999 / 1000] < 1e-9, "{:?}", &errors[errors.len() - 8..]);
 }
 
 #[test]
-fn the_nearest_point_is_as_near_as_a_search_through_every_triangle_says() {
+fn the_closest_point_agrees_with_a_search_through_all_triangles() {
     let (triangles, world) = random_triangles(200);
     for point in directions(100).into_iter().map(|d| d * 4.0) {
         let by_all = triangles.iter().map(|t| distance_by_sampling(&point, t)).fold(f64::INFINITY, f64::min);
         let found = world.nearest(&point, 20.0).unwrap();
         let by_tree = (found.point_in_world - point).norm();
-        // Sampling comes from above, within its step of 1/40 of a triangle of 1 m.
+        // The sampled distance is an upper bound, within its step of 1/40 of a triangle of 1 m.
         assert!(by_tree <= by_all + 1e-6 && by_tree >= by_all - 0.03, "{by_tree} {by_all}");
     }
 }
@@ -234,8 +235,8 @@ fn distance_by_sampling(point: &Vector, [a, b, c]: &[Vector; 3]) -> f64 {
 }
 
 #[test]
-fn no_ray_slips_between_the_triangles_of_a_closed_room() {
-    // Rays at the edges and corners of the boxes' faces and diagonals, where two triangles meet.
+fn no_ray_passes_between_the_triangles_of_a_closed_room() {
+    // Rays at edges, corners and face diagonals of the boxes, where triangles join.
     let world = world("Solid(shape: Box(size_m: (7, 5, 3)), material: \"a\")", "");
     let eye = Vector::new(0.3, -0.2, 1.1);
     for k in 0..=2000 {
@@ -250,7 +251,7 @@ fn no_ray_slips_between_the_triangles_of_a_closed_room() {
 }
 
 #[test]
-fn a_world_can_be_looked_at_from_many_threads() {
+fn a_world_can_be_shared_between_threads() {
     fn is_shared<T: Send + Sync>(_: &T) {}
     is_shared(&World::load("mocap_room").unwrap());
 }

@@ -1,4 +1,4 @@
-//! Scenes made of scenes: what is included is there, and what cannot be is told in the file that it is about.
+//! Scenes that include scenes: contents, and errors with the file that causes them.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -37,17 +37,17 @@ fn built(files: &[(&str, &str)], name: &str) -> Result<World, WorldError> {
 }
 
 #[test]
-fn a_scene_has_what_it_includes_and_its_own() {
+fn a_scene_has_its_own_and_its_included_contents() {
     let world = built(&[("hall.ron", HALL), ("guest.ron", GUEST)], "guest.ron").unwrap();
     assert_eq!(world.name(), "guest");
-    assert_eq!(world.triangle_count(), 24, "the pillar and the post; what moves does not count");
+    assert_eq!(world.triangle_count(), 24, "pillar and post, without movers");
     assert!(world.nearest(&Vector::new(4.49, 0.0, 1.0), 0.02).is_some(), "the hall's pillar");
     assert!(world.nearest(&Vector::new(1.89, 0.0, 1.0), 0.02).is_some(), "the guest's post");
     assert_eq!(world.default_route().unwrap().points_in_world.len(), 2, "the hall's way");
 }
 
 #[test]
-fn a_whole_scene_is_written_with_what_it_included_and_stands_alone() {
+fn a_resolved_scene_is_written_with_its_includes() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("hall.ron"), HALL).unwrap();
     std::fs::write(here.path().join("guest.ron"), GUEST).unwrap();
@@ -66,13 +66,13 @@ fn a_built_in_scene_can_be_included_from_anywhere() {
     assert_eq!(world.triangle_count(), World::load("mocap_room").unwrap().triangle_count() + 12);
 }
 
-/// What is wrong with a scene.
+/// The error message of an invalid scene.
 fn fault(files: &[(&str, &str)], name: &str) -> String {
-    built(files, name).err().unwrap_or_else(|| panic!("{name} was taken")).to_string()
+    built(files, name).err().unwrap_or_else(|| panic!("{name} is accepted")).to_string()
 }
 
 #[test]
-fn what_cannot_be_included_is_told_where_it_stands() {
+fn invalid_includes_are_errors_with_file_and_line() {
     let missing = fault(&[("guest.ron", GUEST)], "guest.ron");
     assert!(missing.contains("guest.ron:3:") && missing.contains("`hall` is missing: no such scene"), "{missing}");
 
@@ -88,7 +88,7 @@ fn what_cannot_be_included_is_told_where_it_stands() {
         fault(&[("hall.ron", HALL), ("guest.ron", &GUEST.replace("[\"hall\"]", "[\"hall\", \"hall\"]"))], "guest.ron");
     assert!(twice.contains("define the material `stone`"), "{twice}");
 
-    // What is wrong with the other is told in the other's text.
+    // An error in the included scene refers to the included file.
     let wrong = fault(&[("hall.ron", &HALL.replace("(1, 1, 3)", "(1, -1, 3)")), ("guest.ron", GUEST)], "guest.ron");
     assert!(wrong.contains("hall.ron:4:") && wrong.contains("found -1"), "{wrong}");
     let unknown = fault(
@@ -99,7 +99,7 @@ fn what_cannot_be_included_is_told_where_it_stands() {
 }
 
 #[test]
-fn a_scene_with_meshes_is_included_from_its_own_folder_alone() {
+fn a_scene_with_meshes_can_only_be_included_from_its_folder() {
     let mesh = "items: [Solid(shape: Mesh(file: \"wall.obj\"), material: \"stone\"), ";
     let hall = HALL.replace("items: [", mesh);
     let wall = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
@@ -112,7 +112,7 @@ fn a_scene_with_meshes_is_included_from_its_own_folder_alone() {
 }
 
 #[test]
-fn a_chain_of_includes_ends_in_an_error_before_the_stack_does() {
+fn a_deep_chain_of_includes_is_an_error() {
     let scene = |name: &str, included: &[String]| {
         format!(
             "(name: \"{name}\", include: {included:?}, materials: {{}}, items: [Solid(shape: Box(size_m: (1, 1, 1)), \

@@ -1,4 +1,4 @@
-//! Meshes from files: the same solid in every format, and files that are wrong.
+//! Mesh files: the same solid in every format, and invalid files.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -8,7 +8,7 @@ use std::path::Path;
 use zsim::geometry::Vector;
 use zsim::world::{Ray, World, WorldError};
 
-/// The corners of a box of 2 x 1 x 3 m about the point (0.5, 0, 0), and its faces, outwards.
+/// Corners of a box of 2 x 1 x 3 m around the point (0.5, 0, 0).
 const CORNERS: [[f32; 3]; 8] = [
     [-0.5, -0.5, -1.5],
     [1.5, -0.5, -1.5],
@@ -97,13 +97,13 @@ fn ply_binary(is_little: bool) -> Vec<u8> {
     bytes
 }
 
-/// The numbers of the box as a glTF buffer: glTF has y up, so z goes there and y to -z.
+/// The box as a glTF buffer: glTF has y up, so z becomes y and y becomes -z.
 fn gltf_buffer() -> Vec<u8> {
     let corners = CORNERS.iter().flat_map(|[x, y, z]| [*x, *z, -*y]).flat_map(f32::to_le_bytes);
     corners.chain(triangles().concat()).collect()
 }
 
-/// The document; the node shifts the box by 10 along x, the node above it back.
+/// The glTF document: the node shifts the box by 10 along x, and its parent shifts it back.
 fn gltf_json(uri: &str) -> String {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
@@ -135,7 +135,7 @@ fn gltf_embedded() -> Vec<u8> {
     gltf_json(&format!(r#","uri":"data:application/octet-stream;base64,{text}""#)).into_bytes()
 }
 
-/// A folder with a scene around one mesh.
+/// A folder with a scene of one mesh.
 struct Scene {
     folder: tempfile::TempDir,
 }
@@ -153,7 +153,7 @@ impl Scene {
         self.build_with(mesh, bytes, "scale: 2")
     }
 
-    /// A world of a mesh with these `keys`.
+    /// A world with one mesh and these `keys`.
     fn build_with(&self, mesh: &str, bytes: &[u8], keys: &str) -> Result<World, WorldError> {
         std::fs::write(self.path().join(mesh), bytes).unwrap();
         let text = format!(
@@ -164,9 +164,9 @@ impl Scene {
         World::load(self.path().join("scene.ron").to_str().unwrap())
     }
 
-    /// The sentence of the error, without its place; the place is the mesh's name in the scene.
+    /// The error message without its location, which is the mesh's name in the scene.
     fn error(&self, mesh: &str, bytes: &[u8]) -> String {
-        match self.build(mesh, bytes).err().unwrap_or_else(|| panic!("{mesh} was taken")) {
+        match self.build(mesh, bytes).err().unwrap_or_else(|| panic!("{mesh} is accepted")) {
             WorldError::Mesh(error) => {
                 assert_eq!(error.line_and_column().unwrap().0, 4, "{error}");
                 error.message().to_owned()
@@ -178,7 +178,7 @@ impl Scene {
 
 #[test]
 fn a_box_is_the_same_box_from_every_format() {
-    // 2 x 1 x 3 m about (0.5, 0, 0); twice as large, turned by 90 degrees about z, and moved to (1, 2, 3): x from
+    // 2 x 1 x 3 m around (0.5, 0, 0), scaled by two, rotated by 90 degrees about z, and shifted to (1, 2, 3): x from
     // 1 - 1 to 1 + 1, y from 2 - 1 to 2 + 3, z from 3 - 3 to 3 + 3.
     let scene = Scene::new();
     std::fs::write(scene.path().join("box data.bin"), gltf_buffer()).unwrap();
@@ -215,8 +215,8 @@ fn a_box_is_the_same_box_from_every_format() {
 
 #[test]
 fn the_unit_and_the_up_axis_of_a_mesh_can_be_specified() {
-    // The box is 2 x 1 x 3 of its units, about (0.5, 0, 0). With y up, its y points along z and its z along -y: 2 x 3 x
-    // 1. It stands turned by 90 degrees about z at (1, 2, 3).
+    // The box is 2 x 1 x 3 of its units, around (0.5, 0, 0). With y up, its y points along z and its z along -y: 2 x 3 x
+    // 1. It is rotated by 90 degrees about z at (1, 2, 3).
     let scene = Scene::new();
     let size = |file: &str, bytes: &[u8], keys: &str| {
         let (lower, upper) = scene.build_with(file, bytes, keys).unwrap_or_else(|error| panic!("{error}")).bounds();
@@ -236,7 +236,7 @@ fn the_unit_and_the_up_axis_of_a_mesh_can_be_specified() {
 }
 
 #[test]
-fn what_is_wrong_with_a_mesh_is_said_in_a_sentence() {
+fn an_invalid_mesh_is_an_error_with_the_reason() {
     let scene = Scene::new();
     let faults: [(&str, Vec<u8>, &str); 18] = [
         ("hall.dae", b"<COLLADA/>".to_vec(), "convert it to glTF"),
@@ -250,11 +250,11 @@ fn what_is_wrong_with_a_mesh_is_said_in_a_sentence() {
         ("overflow.obj", b"v 0 0 0\nf 99999999999999999999 1 1\n".to_vec(), "line 2"),
         ("two.obj", b"v 0 0 0\nv 1 1 1\nf 1 2\n".to_vec(), "at least three corners"),
         ("flat.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n".to_vec(), "1 of its 1 triangles have no area"),
-        ("short.stl", stl_binary("x")[..400].to_vec(), "says it has 12 triangles (684 bytes), but holds 400 bytes"),
+        ("short.stl", stl_binary("x")[..400].to_vec(), "declares 12 triangles (684 bytes), but contains 400 bytes"),
         ("tiny.stl", b"abc".to_vec(), "3 bytes"),
         ("twice.stl", [stl_ascii(), stl_ascii()].concat(), "12 of its 24 facets"),
         ("cut.ply", ply_binary(true)[..250].to_vec(), "PLY"),
-        ("cut.glb", glb()[..500].to_vec(), "says it has"),
+        ("cut.glb", glb()[..500].to_vec(), "declares"),
         ("up.gltf", gltf_json(r#","uri":"../secret.bin""#).into_bytes(), "not a file in the mesh's folder"),
         ("box.fbx", b"x".to_vec(), "ends in neither"),
     ];
@@ -266,7 +266,7 @@ fn what_is_wrong_with_a_mesh_is_said_in_a_sentence() {
 }
 
 #[test]
-fn a_header_that_promises_too_much_is_refused_at_once() {
+fn a_header_that_declares_too_much_is_refused_at_once() {
     let scene = Scene::new();
     let ply = String::from_utf8(ply_ascii()).unwrap().replace("vertex 8", "vertex 4000000000");
     assert!(scene.error("many.ply", ply.as_bytes()).contains("4000000000 of `vertex`"));
@@ -274,7 +274,7 @@ fn a_header_that_promises_too_much_is_refused_at_once() {
     assert!(scene.error("bare.ply", bare.as_bytes()).contains("4000000000 of `vertex` with 0 properties"));
     let mut stl = stl_binary("x");
     stl[80..84].fill(0xff);
-    assert!(scene.error("many.stl", &stl).contains("says it has 4294967295 triangles"));
+    assert!(scene.error("many.stl", &stl).contains("declares 4294967295 triangles"));
     let gltf = gltf_json(r#","uri":"data:x;base64,AAAA""#).replace("132", "4000000000");
     assert!(scene.error("many.gltf", gltf.as_bytes()).contains("4000000000 bytes in a buffer"));
     let count = gltf_json("").replace("\"count\":36", "\"count\":18446744073709551615");
@@ -282,15 +282,15 @@ fn a_header_that_promises_too_much_is_refused_at_once() {
 }
 
 #[test]
-fn nodes_that_go_round_end_in_an_error() {
+fn cyclic_nodes_are_an_error() {
     let scene = Scene::new();
     std::fs::write(scene.path().join("box.bin"), gltf_buffer()).unwrap();
     let round = gltf_json(r#","uri":"box.bin""#).replace("\"mesh\":0,", "\"mesh\":0,\"children\":[0],");
-    assert!(scene.error("round.gltf", round.as_bytes()).contains("go round"));
+    assert!(scene.error("round.gltf", round.as_bytes()).contains("form a cycle"));
 }
 
 #[test]
-fn a_few_triangles_without_area_are_left_out_and_told() {
+fn a_few_triangles_without_area_are_removed_with_a_note() {
     let scene = Scene::new();
     let mut text = String::from_utf8(obj()).unwrap();
     let grid = (0..20).flat_map(|i| (0..20).map(move |j| (i, j)));
@@ -322,7 +322,7 @@ fn a_mesh_of_slivers_is_refused() {
     assert!(scene.error("slivers.obj", text.as_bytes()).contains("1000 of its 1000 triangles have no area"));
 }
 
-/// Every valid file of this test with the ending of its format.
+/// Every valid file of this test with its file name.
 fn valid_files() -> [(&'static str, Vec<u8>); 8] {
     [
         ("m.obj", obj()),
@@ -346,7 +346,7 @@ proptest! {
     }
 
     #[test]
-    fn a_file_that_is_cut_and_changed_is_an_error_or_a_mesh(
+    fn a_truncated_and_changed_file_is_an_error_or_a_mesh(
         which in 0..8_usize,
         keep in 0.0..1.0_f64,
         changes in proptest::collection::vec((any::<proptest::sample::Index>(), any::<u8>()), 0..6),
@@ -361,7 +361,7 @@ proptest! {
         }
         let scene = Scene::new();
         if let Ok(world) = scene.build(name, &bytes) {
-            // Whatever was taken can be looked at.
+            // An accepted mesh must support ray casts.
             let ray = Ray { origin_in_world: Vector::new(1.2, 3.3, -20.0), direction_in_world: Vector::z() };
             let hit = world.cast(&ray, 1e6, 0.0);
             prop_assert!(hit.is_none_or(|hit| hit.distance_m.is_finite() && (hit.normal_in_world.norm() - 1.0).abs() < 1e-9));

@@ -1,4 +1,4 @@
-//! The scenes that zsim brings along: they load, and one can walk through them.
+//! The shipped scenes load, and their routes are passable.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -6,7 +6,7 @@ use zsim::geometry::{Route, Surface, Vector};
 use zsim::spec::{Kind, names};
 use zsim::world::{Ray, World};
 
-/// Points along a route, `step` apart or closer.
+/// Points along a route, at most `step` apart.
 fn along(route: &Route, step: f64) -> Vec<Vector> {
     let points = &route.points_in_world;
     let mut legs: Vec<(Vector, Vector)> = points.windows(2).map(|pair| (pair[0], pair[1])).collect();
@@ -20,13 +20,15 @@ fn along(route: &Route, step: f64) -> Vec<Vector> {
     legs.into_iter().flat_map(on_leg).collect()
 }
 
-/// What a walker who stands at `foot` touches: one of 0.45 m radius, from 0.2 m above the floor (thresholds) to 1.9 m.
+/// The surface that a walker at `foot` touches, as text.
+///
+/// The walker has a radius of 0.45 m, from 0.2 m (above thresholds) to 1.9 m above the floor.
 fn touched_at(world: &World, foot: &Vector) -> Option<String> {
     (0..=12).map(|k| foot + Vector::z() * (0.65 + 0.8 * f64::from(k) / 12.0)).find_map(|here| {
         let surface = world.nearest(&here, 0.45)?;
         let (away, to) = ((surface.point_in_world - here).norm(), surface.point_in_world);
         Some(format!(
-            "{:.2} m from {:.2} {:.2} {:.2} stands {:.2} {:.2} {:.2}",
+            "{:.2} m from {:.2} {:.2} {:.2} is {:.2} {:.2} {:.2}",
             away, here.x, here.y, here.z, to.x, to.y, to.z
         ))
     })
@@ -38,7 +40,7 @@ fn length(route: &Route) -> f64 {
 }
 
 #[test]
-fn nobody_on_a_route_comes_near_a_wall_or_a_chair() {
+fn routes_keep_clear_of_walls_and_furniture() {
     for name in names(Kind::Scene) {
         let world = World::load(&name).unwrap();
         for (route_name, route) in world.routes() {
@@ -49,14 +51,14 @@ fn nobody_on_a_route_comes_near_a_wall_or_a_chair() {
 }
 
 #[test]
-fn a_route_has_its_floor_under_it() {
+fn routes_have_a_floor() {
     for name in names(Kind::Scene) {
         let world = World::load(&name).unwrap();
         for (route_name, route) in world.routes() {
             for foot in along(route, 0.2) {
                 let origin_in_world = foot + Vector::z();
                 let ray = Ray { origin_in_world, direction_in_world: -Vector::z() };
-                // Who walks by at one time is gone at another.
+                // A person who walks by is absent at another time.
                 let below = [0.0, 7.0, 19.0].into_iter().filter_map(|t_s| world.cast(&ray, 3.0, t_s));
                 let floor_m = below.map(|hit| hit.distance_m).fold(0.0, f64::max);
                 assert!((floor_m - 1.0).abs() < 0.35, "{name}, {route_name}: floor {floor_m} m below at {foot:?}");
@@ -77,7 +79,7 @@ fn every_scene_has_a_name_a_route_and_some_structure() {
 }
 
 #[test]
-fn the_office_is_a_floor_whose_round_takes_about_a_minute() {
+fn a_lap_of_the_office_takes_about_a_minute() {
     let world = World::load("office").unwrap();
     let (lower, upper) = world.bounds();
     let size = upper - lower;
@@ -88,7 +90,7 @@ fn the_office_is_a_floor_whose_round_takes_about_a_minute() {
 }
 
 #[test]
-fn in_closed_rooms_every_ray_meets_a_surface() {
+fn in_closed_rooms_every_ray_hits_a_surface() {
     for name in ["office", "mocap_room"] {
         let world = World::load(name).unwrap();
         for foot in along(world.default_route().unwrap(), 0.5) {
@@ -97,7 +99,7 @@ fn in_closed_rooms_every_ray_meets_a_surface() {
                 let (azimuth, elevation) = (f64::from(i) * 5.0_f64.to_radians(), f64::from(j) * 10.0_f64.to_radians());
                 let level = Vector::new(azimuth.cos(), azimuth.sin(), 0.0) * elevation.cos();
                 let ray = Ray { origin_in_world, direction_in_world: level + Vector::z() * elevation.sin() };
-                assert!(world.cast(&ray, 30.0, 0.0).is_some(), "{name}: {ray:?} gets out");
+                assert!(world.cast(&ray, 30.0, 0.0).is_some(), "{name}: {ray:?} hits nothing");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Scenes that are wrong: each is told in a sentence, at the line it is about.
+//! Invalid scenes: each is an error with the reason and the line.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -6,8 +6,8 @@ use proptest::prelude::*;
 use zsim::spec::{Kind, Source, find, names, parse, to_text};
 use zsim::world::{SceneSpec, World, WorldError};
 
-/// A scene that is right, a statement a line.
-const RIGHT: &str = r#"(
+/// A valid scene, with one statement per line.
+const VALID: &str = r#"(
     name: "hall",
     materials: {
         "stone": (reflectance: 0.5),
@@ -42,15 +42,15 @@ fn build(text: &str) -> Result<World, WorldError> {
 }
 
 #[test]
-fn the_scene_that_the_others_are_made_of_is_right() {
-    let world = build(RIGHT).unwrap_or_else(|error| panic!("{error}"));
+fn the_reference_scene_is_valid() {
+    let world = build(VALID).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(world.routes().len(), 1);
     assert_eq!(world.default_route().unwrap().points_in_world.len(), 2);
 }
 
 #[test]
-fn each_fault_is_told_at_its_line() {
-    // What is replaced, by what, the line it is told at, and a part of the sentence.
+fn each_error_has_its_line() {
+    // Text, its replacement, line of the error, and a part of the message.
     let faults = [
         ("(10, 8, 0.2)", "(10, -8, 0.2)", 12, "above 0, found -8"),
         ("(10, 8, 0.2)", "(10, NaN, 0.2)", 12, "NaN"),
@@ -68,7 +68,7 @@ fn each_fault_is_told_at_its_line() {
         ("[Place(template: \"pillar\")]", "[Place(template: \"outer\")]", 9, "nest deeper than 8"),
         ("to_m: 2,", "to_m: 20,", 13, "beyond the wall of 10 m"),
         ("[0.1, 0]]", "[0.1]]", 14, "row 2 of the grid has 1 heights"),
-        ("count: 4,", "count: 4000,", 16, "of 4000 copies of `pillar` found a place"),
+        ("count: 4,", "count: 4000,", 16, "of 4000 copies of `pillar`"),
         ("count: 4,", "count: 0,", 16, "`count` is 0"),
         ("(time_s: 4,", "(time_s: 0,", 18, "times do not increase"),
         ("(3, 0, 0, 90)", "(3, 0, 0, 190)", 18, "turns by 180 degrees"),
@@ -79,11 +79,11 @@ fn each_fault_is_told_at_its_line() {
         ("default_route: \"way\",", "default_route: \"way\"; ", 27, ""),
     ];
     for (right, wrong, line, part) in faults {
-        assert!(RIGHT.contains(right), "{right}");
+        assert!(VALID.contains(right), "{right}");
         let WorldError::Scene(error) =
-            build(&RIGHT.replacen(right, wrong, 1)).err().unwrap_or_else(|| panic!("{wrong} was taken"))
+            build(&VALID.replacen(right, wrong, 1)).err().unwrap_or_else(|| panic!("{wrong} is accepted"))
         else {
-            panic!("{wrong} is no fault of a mesh")
+            panic!("{wrong} gives a mesh error")
         };
         assert!(error.message().contains(part), "{wrong}: {error}");
         assert_eq!(error.line_and_column().map(|(line, _)| line), Some(line), "{wrong}: {error}");
@@ -91,8 +91,8 @@ fn each_fault_is_told_at_its_line() {
 }
 
 #[test]
-fn what_is_absurd_is_refused_before_it_is_built() {
-    let fault = |right: &str, wrong: &str| build(&RIGHT.replacen(right, wrong, 1)).err().unwrap().to_string();
+fn excessive_scenes_are_refused_before_they_are_built() {
+    let fault = |right: &str, wrong: &str| build(&VALID.replacen(right, wrong, 1)).err().unwrap().to_string();
     assert!(fault("(10, 8, 0.2)", "(10, 8e6, 0.2)").contains("100 km"));
     assert!(fault("(0, 0, -0.2)", "(0, 1e300, -0.2)").contains("100 km"));
     assert!(fault("count: 4,", "count: 18446744073709551615,").contains("200000"));
@@ -100,8 +100,8 @@ fn what_is_absurd_is_refused_before_it_is_built() {
     let shape =
         "HeightField(size_m: (4, 4), heights: Rolling(seed: 1, cells: (4000, 4000), amplitude_m: 1, wavelength_m: 1))";
     assert!(fault("Box(size_m: (10, 8, 0.2))", shape).contains("4000 x 4000 cells are more than"));
-    // Five templates that each place the one before a hundred times are 10^10 pillars.
-    let mut text = RIGHT.replacen("[Place(template: \"pillar\")]", "[Place(template: \"t4\")]", 1);
+    // Five templates that each place the previous one a hundred times are 10^10 pillars.
+    let mut text = VALID.replacen("[Place(template: \"pillar\")]", "[Place(template: \"t4\")]", 1);
     let places = "(0, 0),".repeat(100);
     for k in 0..5 {
         let inner = if k == 0 { "pillar".to_owned() } else { format!("t{}", k - 1) };
@@ -116,7 +116,7 @@ fn what_is_absurd_is_refused_before_it_is_built() {
 }
 
 #[test]
-fn a_scene_without_surfaces_and_a_missing_file_are_told() {
+fn a_scene_without_surfaces_and_a_missing_file_are_errors() {
     let empty = r#"(name: "x", materials: {}, items: [])"#;
     assert!(build(empty).err().unwrap().to_string().contains("no surfaces"));
     let missing = World::load("no_such_scene").err().unwrap().to_string();
@@ -140,14 +140,14 @@ proptest! {
 
     #[test]
     fn a_scene_with_a_number_changed_is_a_world_or_an_error(at in any::<proptest::sample::Index>(), number in any::<f64>()) {
-        let numbers: Vec<(usize, &str)> = RIGHT.match_indices(|c: char| c.is_ascii_digit()).collect();
+        let numbers: Vec<(usize, &str)> = VALID.match_indices(|c: char| c.is_ascii_digit()).collect();
         let (from, digit) = numbers[at.index(numbers.len())];
-        let _ = build(&format!("{}{number:e}{}", &RIGHT[..from], &RIGHT[from + digit.len()..]));
+        let _ = build(&format!("{}{number:e}{}", &VALID[..from], &VALID[from + digit.len()..]));
     }
 
     #[test]
     fn a_scene_with_a_byte_changed_is_a_world_or_an_error(at in any::<proptest::sample::Index>(), byte in 32_u8..127) {
-        let mut bytes = RIGHT.as_bytes().to_vec();
+        let mut bytes = VALID.as_bytes().to_vec();
         let at = at.index(bytes.len());
         bytes[at] = byte;
         let _ = build(&String::from_utf8(bytes).unwrap());

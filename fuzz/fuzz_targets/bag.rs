@@ -1,4 +1,4 @@
-//! Any records as a ROS 1 bag.
+//! Parses arbitrary records as a ROS 1 bag.
 
 #![no_main]
 

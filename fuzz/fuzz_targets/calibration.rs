@@ -1,4 +1,4 @@
-//! Any text as a calibration in the YAML of Kalibr.
+//! Parses arbitrary text as a calibration in Kalibr YAML.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Any bytes as an SQLite database of rosbag2.
+//! Parses arbitrary bytes as an SQLite database of rosbag2.
 
 #![no_main]
 

@@ -1,5 +1,6 @@
-//! Any bytes as messages of each kind, of ROS 2 or of ROS 1, in a file that is sound: an IMU sample and a scan, then
-//! the message in question.
+//! Parses arbitrary bytes as a message of each type, in ROS 2 or ROS 1 serialisation.
+//!
+//! The message follows an IMU sample and a scan in a valid file.
 
 #![no_main]
 
@@ -45,7 +46,7 @@ fn define(file: &mut Vec<u8>, id: u16, (topic, kind): (&str, &str), encoding: &s
 fn message(file: &mut Vec<u8>, id: u16, encoding: &str, data: &[u8]) {
     let mut fields = id.to_le_bytes().to_vec();
     fields.extend([0; 20]);
-    // Little-endian CDR leads every message, so that the fuzzer need not find it.
+    // The little-endian CDR header is given, so that the fuzzer need not find it.
     if encoding == "cdr" {
         fields.extend([0, 1, 0, 0]);
     }
@@ -60,7 +61,7 @@ fuzz_target!(|data: &[u8]| {
     for (id, topic) in (1..).zip(TOPICS) {
         define(&mut file, id, topic, encoding);
     }
-    // An IMU sample and an empty scan, all zeros, that a selection can be made from.
+    // An IMU sample and an empty scan, all zeros, so that topics can be selected.
     message(&mut file, 3, encoding, &[0; 400]);
     message(&mut file, 1, encoding, &[0; 64]);
     message(&mut file, u16::from(kind % TOPICS.len() as u8) + 1, encoding, data);

@@ -1,4 +1,4 @@
-//! Any records as an MCAP file.
+//! Parses arbitrary records as an MCAP file.
 
 #![no_main]
 

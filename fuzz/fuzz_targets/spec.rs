@@ -1,4 +1,4 @@
-//! Any text as a spec of each kind. The first byte says which.
+//! Parses arbitrary text as a spec. The first byte selects the kind.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Any bytes as a trajectory, as a cloud, and as a map.
+//! Parses arbitrary bytes as a trajectory, a cloud and a map.
 
 #![no_main]
 

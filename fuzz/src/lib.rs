@@ -1,4 +1,4 @@
-//! What every target that reads a recording does with it.
+//! Reading of a recording, shared by the fuzz targets.
 
 use std::io::{Read, Seek};
 use zsim::geometry::Pose;
@@ -6,7 +6,7 @@ use zsim::measurement::{Calibration, ImuNoise, LidarNoise};
 use zsim::recording::{Preference, Reader};
 use zsim::time::Span;
 
-/// Reads all that can be read of a recording, by each way there is.
+/// Reads all contents of a recording: info, truth, and the measurements for each lidar topic.
 pub fn read_all(file: impl Read + Seek + Send + 'static) {
     let Ok(reader) = Reader::new("fuzz", file) else { return };
     let _ = reader.info(Span::from_seconds(0.1));

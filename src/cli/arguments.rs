@@ -28,11 +28,11 @@ pub(super) struct Global {
 }
 
 /// Maximum number of threads.
-const MOST_THREADS: usize = 1024;
+const MAX_THREADS: usize = 1024;
 
 fn threads(text: &str) -> Result<NonZeroUsize, String> {
-    let wrong = || format!("`{text}` is not a number of threads from 1 to {MOST_THREADS}");
-    text.parse().ok().filter(|threads: &NonZeroUsize| threads.get() <= MOST_THREADS).ok_or_else(wrong)
+    let wrong = || format!("`{text}` is not a number of threads from 1 to {MAX_THREADS}");
+    text.parse().ok().filter(|threads: &NonZeroUsize| threads.get() <= MAX_THREADS).ok_or_else(wrong)
 }
 
 /// Parts of the simulation other than the scene. A name is resolved as a path, then in scenes/ and specs/, then in the

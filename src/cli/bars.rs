@@ -7,27 +7,27 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::time::Duration;
 use zsim::study::{Stage, StudyEvent};
 
-/// Steps of a full bar.
+/// Number of steps of a bar.
 const STEPS: u64 = 1000;
 
-/// A progress bar for the stage that runs, on a terminal; remarks above it.
+/// Progress bar of the current stage, with notes above it.
 pub(super) struct Bars {
     quiet: bool,
-    shown: Option<(Stage, ProgressBar)>,
+    current: Option<(Stage, ProgressBar)>,
 }
 
 impl Bars {
     pub(super) fn new(global: &Global) -> Self {
-        Self { quiet: global.quiet, shown: None }
+        Self { quiet: global.quiet, current: None }
     }
 
-    /// Shows the messages of an experiment.
-    pub(super) fn tell(&mut self, news: StudyEvent) {
+    /// Displays an event of an experiment.
+    pub(super) fn update(&mut self, event: StudyEvent) {
         if self.quiet {
             return;
         }
-        match news {
-            StudyEvent::Note(text) => self.remark(text),
+        match event {
+            StudyEvent::Note(text) => self.note(text),
             StudyEvent::Progress { stage, fraction, done_s } => {
                 let bar = self.bar_of(stage, fraction.is_some());
                 match fraction {
@@ -41,40 +41,40 @@ impl Bars {
         }
     }
 
-    /// Prints a remark above the bar.
-    pub(super) fn remark(&self, text: &str) {
+    /// Prints a note above the bar.
+    pub(super) fn note(&self, text: &str) {
         if self.quiet {
             return;
         }
-        match &self.shown {
+        match &self.current {
             Some((_, bar)) => bar.suspend(|| eprintln!("note: {}", printable(text))),
             None => eprintln!("note: {}", printable(text)),
         }
     }
 
     fn bar_of(&mut self, stage: Stage, has_end: bool) -> &ProgressBar {
-        if self.shown.as_ref().is_none_or(|(shown, _)| *shown != stage) {
+        if self.current.as_ref().is_none_or(|(current, _)| *current != stage) {
             self.finish();
             let bar = bar(has_end);
             bar.set_prefix(name(stage));
-            return &self.shown.insert((stage, bar)).1;
+            return &self.current.insert((stage, bar)).1;
         }
-        &self.shown.get_or_insert_with(|| (stage, ProgressBar::hidden())).1
+        &self.current.get_or_insert_with(|| (stage, ProgressBar::hidden())).1
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(super) fn finish(&mut self) {
-        if let Some((_, bar)) = self.shown.take() {
+        if let Some((_, bar)) = self.current.take() {
             bar.finish_and_clear();
         }
     }
 }
 
-/// A progress bar on a terminal for work that threads do in pieces; removed when it is dropped.
+/// Progress bar of parallel work; removed when it is dropped.
 pub(super) struct WorkBar(ProgressBar);
 
 impl WorkBar {
-    /// A bar that is called `name`; none when the command is to be quiet.
+    /// Creates a bar with the prefix `name`; hidden with `--quiet`.
     pub(super) fn new(global: &Global, name: &'static str) -> Self {
         if global.quiet {
             return Self(ProgressBar::hidden());
@@ -84,14 +84,14 @@ impl WorkBar {
         Self(bar)
     }
 
-    /// Shows the current task.
-    pub(super) fn say(&self, what: String) {
-        self.0.set_message(what);
+    /// Sets the name of the current task.
+    pub(super) fn set_task(&self, task: String) {
+        self.0.set_message(task);
     }
 
-    /// Shows the fraction of the work that is done.
-    pub(super) fn show(&self, share: f64) {
-        self.0.set_position((share * STEPS as f64) as u64);
+    /// Sets the completed fraction of the work.
+    pub(super) fn set_fraction(&self, fraction: f64) {
+        self.0.set_position((fraction * STEPS as f64) as u64);
     }
 }
 

@@ -1,7 +1,7 @@
-//! `zsim base`: where the base was, from the head's trajectory.
+//! `zsim base`: the trajectory of the base from the trajectory of the head.
 
 use super::arguments::{Global, OutArguments};
-use super::{End, output};
+use super::{Completion, output};
 use anyhow::Context;
 use clap::Args;
 use serde_json::{Value, json};
@@ -16,134 +16,138 @@ use zsim::study;
 
 /// Compute the trajectory of the base (handle, vehicle) from that of the head on its spring
 ///
-/// Twice: as if the head were screwed to the base as it rests (base_rigid_link.tum), and by the spring's own law: the
-/// base that moves the head with the observed acceleration (base_spring.tum). The trajectory, a TUM file, has z up and
-/// is of the head's frame, at an IMU's rate or more, as estimates and the truth of zsim are. With a recording of an IMU
-/// on the base a third time: that IMU and the spring's law, smoothed together (base_imu.tum).
+/// There are two methods, three with a base IMU. Rigid link (base_rigid_link.tum): the head is fixed to the base in its
+/// rest pose. Spring law (base_spring.tum): the base pose that gives the observed acceleration of the head. Base IMU
+/// (base_imu.tum): smoother with the samples of an IMU on the base and the spring law. The input is a TUM file of the
+/// head frame with z up, at the IMU rate or more, such as the estimates and the truth of zsim.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim base results/office/closed_loop.tum --head handheld --truth \
                         results/office/recording.mcap\n  zsim base results/office/closed_loop.tum --head handheld \
                         --base-imu results/office/recording.mcap")]
 pub(super) struct Arguments {
-    /// The head's trajectory
+    /// Trajectory of the head
     #[arg(value_name = "HEAD.tum")]
     trajectory: PathBuf,
     /// The head and its spring, a name under specs/heads/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "handheld")]
     head: String,
-    /// The base's true trajectory: a TUM file, or a recording that has it
+    /// True trajectory of the base: a TUM file, or a recording that has it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// A recording of an IMU on the base, as `zsim simulate --base-imu` makes them; where /tf_static has it not in the
-    /// frame base, it is at the base's origin and along its axes
+    /// Recording with an IMU on the base, as from `zsim simulate --base-imu`; if /tf_static does not have the pose of the
+    /// IMU in the frame base, it is the identity
     #[arg(long, value_name = "FILE.mcap")]
     base_imu: Option<PathBuf>,
-    /// The topic of that IMU [default: /base/imu]
+    /// Topic of the base IMU [default: /base/imu]
     #[arg(long, value_name = "TOPIC", requires = "base_imu")]
     base_imu_topic: Option<String>,
-    /// Time offset, IMU stamps minus trajectory stamps, accurate to a millisecond or two [default: found by
-    /// how both turn, and followed as it drifts]
+    /// Time offset, IMU stamps minus trajectory stamps, accurate to 1 to 2 ms [default: estimated from the angular
+    /// velocities, with drift]
     #[arg(long, value_name = "MS", requires = "base_imu", allow_hyphen_values = true)]
     clock_offset_ms: Option<f64>,
     #[command(flatten)]
     out: OutArguments,
 }
 
-/// Poses of which a trajectory has one acceleration.
-const LEAST_POSES: usize = 3;
+/// Minimum number of poses: the acceleration is a second difference.
+const MIN_POSES: usize = 3;
 
-/// A method that computes the base trajectory.
-struct Way {
+/// The base trajectory by one method.
+struct MethodResult {
     key: &'static str,
     name: &'static str,
     base: Trajectory,
 }
 
-impl Way {
+impl MethodResult {
     /// The file name of the trajectory.
     fn file(&self) -> String {
         format!("base_{}.tum", self.key)
     }
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let (head, source) = dynamics::load(&arguments.head)?;
     let head = HeadModel::new(&head, &source)?;
-    let seen = read_tum(&arguments.trajectory)?;
+    let head_trajectory = read_tum(&arguments.trajectory)?;
     anyhow::ensure!(
-        seen.len() >= LEAST_POSES,
-        "{}: a trajectory of {} poses; {LEAST_POSES} are needed, since the head's acceleration is a second difference",
+        head_trajectory.len() >= MIN_POSES,
+        "{}: a trajectory of {} poses; {MIN_POSES} are needed, because the acceleration of the head is a second difference",
         arguments.trajectory.display(),
-        seen.len()
+        head_trajectory.len()
     );
     let truth = arguments.truth.as_deref().map(true_base).transpose()?;
     let by_spring = match &arguments.base_imu {
-        Some(_) => study::base_by_law(&head, &seen)?,
-        None => head.base_under(&seen)?,
+        Some(_) => study::base_by_law(&head, &head_trajectory)?,
+        None => head.base_from_force_law(&head_trajectory)?,
     };
-    let by_imu = arguments.base_imu.as_deref().map(|recording| by_imu(recording, arguments, &head, &seen));
+    let by_imu = arguments.base_imu.as_deref().map(|recording| by_imu(recording, arguments, &head, &head_trajectory));
     let by_imu = by_imu.transpose()?;
 
-    let way = |key, name, base| Way { key, name, base };
-    let mut ways = vec![
-        way("rigid_link", "rigid link", Trajectory::from_poses(head.base_on_rigid_link(&seen))?),
-        way("spring", "spring's law", Trajectory::from_poses(by_spring)?),
+    let result = |key, name, base| MethodResult { key, name, base };
+    let mut results = vec![
+        result("rigid_link", "rigid link", Trajectory::from_poses(head.base_from_rigid_link(&head_trajectory))?),
+        result("spring", "spring law", Trajectory::from_poses(by_spring)?),
     ];
     let (estimate, loss) = by_imu.unzip();
-    ways.extend(estimate.as_ref().map(|imu| way("imu", "with the base's IMU", imu.trajectory.clone())));
+    results.extend(estimate.as_ref().map(|imu| result("imu", "base IMU and spring law", imu.trajectory.clone())));
     let wanted = arguments.out.out.clone().unwrap_or_else(|| PathBuf::from("results/base"));
     let folder = output::folder(&wanted, arguments.out.force)?;
     let inputs: Vec<PathBuf> =
         [Some(&arguments.trajectory), arguments.truth.as_ref()].into_iter().flatten().cloned().collect();
-    let written: Vec<PathBuf> = ways.iter().map(|way| folder.join(way.file())).collect();
-    output::spare_inputs(&inputs, &written)?;
-    let (mut words, mut figures) = tell(&ways, truth.as_ref(), &folder)?;
+    let written: Vec<PathBuf> = results.iter().map(|result| folder.join(result.file())).collect();
+    output::check_not_inputs(&inputs, &written)?;
+    let (mut words, mut figures) = write_results(&results, truth.as_ref(), &folder)?;
     if let Some(imu) = &estimate {
         let (offset_ms, sigma_ms) = (imu.clock_offset_s * 1e3, imu.clock_offset_sigma_s * 1e3);
         let tilt_deg = imu.up_in_world.angle(&Vector::z()).to_degrees();
-        words += &format!("\nclock of the base's IMU ahead by {offset_ms:.2} ms at the end (sigma {sigma_ms:.2} ms)");
-        words += &format!("\nthe trajectory's world leans by {tilt_deg:.2}\u{b0}\n");
+        words += &format!("\nclock offset of the base IMU at the end: {offset_ms:.2} ms (sigma {sigma_ms:.2} ms)");
+        words += &format!("\ntilt of the world frame of the trajectory: {tilt_deg:.2}\u{b0}\n");
         figures["imu"]["tilt_deg"] = json!(tilt_deg);
         figures["imu"]["clock_offset_ms"] = json!(offset_ms);
         figures["imu"]["clock_offset_sigma_ms"] = json!(sigma_ms);
     }
-    output::tell(global, &words, figures, Some(&folder))?;
-    let Some(loss) = loss.filter(|loss| !loss.is_none()) else { return Ok(End::Done) };
+    output::print_result(global, &words, figures, Some(&folder))?;
+    let Some(loss) = loss.filter(|loss| !loss.is_none()) else { return Ok(Completion::Done) };
     loss.sentences().iter().for_each(|loss| eprintln!("loss: {}", output::printable(loss)));
-    Ok(End::WithLoss)
+    Ok(Completion::WithLoss)
 }
 
 fn by_imu(
     recording: &Path,
     arguments: &Arguments,
     head: &HeadModel,
-    seen: &Trajectory,
+    head_trajectory: &Trajectory,
 ) -> anyhow::Result<(BaseEstimate, Loss)> {
     let reader = Reader::open(recording)?;
     let record = reader.base_imu(arguments.base_imu_topic.as_deref())?;
     let offset_s = arguments.clock_offset_ms.map(|ms| ms * 1e-3);
-    let estimate = study::base_by_imu(head, seen, (&reader, &record), offset_s);
+    let estimate = study::base_by_imu(head, head_trajectory, (&reader, &record), offset_s);
     Ok((estimate.with_context(|| recording.display().to_string())?, record.loss))
 }
 
-/// Writes the trajectories to `folder`; their table, and their figures.
-fn tell(ways: &[Way], truth: Option<&Trajectory>, folder: &Path) -> anyhow::Result<(String, Value)> {
+/// Writes the trajectories to `folder`; returns their errors as a table and as JSON.
+fn write_results(
+    results: &[MethodResult],
+    truth: Option<&Trajectory>,
+    folder: &Path,
+) -> anyhow::Result<(String, Value)> {
     let (mut rows, mut figures) = (Vec::new(), json!({}));
-    for way @ Way { key, name, base } in ways {
-        write_tum(&folder.join(way.file()), base)?;
+    for result @ MethodResult { key, name, base } in results {
+        write_tum(&folder.join(result.file()), base)?;
         let errors = truth.filter(|_| !base.is_empty()).map(|truth| errors(base, truth)).transpose()?;
-        let told = errors.as_ref().map(|e| (e.position_rmse_m(), e.rotation_rmse_rad().to_degrees()));
+        let rmse = errors.as_ref().map(|e| (e.position_rmse_m(), e.rotation_rmse_rad().to_degrees()));
         figures[*key] = json!({
             "poses": base.len(),
-            "position_rmse_m": told.map(|(position_m, _)| position_m),
-            "rotation_rmse_deg": told.map(|(_, rotation_deg)| rotation_deg),
+            "position_rmse_m": rmse.map(|(position_m, _)| position_m),
+            "rotation_rmse_deg": rmse.map(|(_, rotation_deg)| rotation_deg),
         });
-        let words = |figure: Option<String>| figure.unwrap_or_else(|| "-".to_owned());
-        let position = words(told.map(|(position_m, _)| format!("{:.2}", position_m * 1e3)));
-        let rotation = words(told.map(|(_, rotation_deg)| format!("{rotation_deg:.3}")));
+        let or_dash = |value: Option<String>| value.unwrap_or_else(|| "-".to_owned());
+        let position = or_dash(rmse.map(|(position_m, _)| format!("{:.2}", position_m * 1e3)));
+        let rotation = or_dash(rmse.map(|(_, rotation_deg)| format!("{rotation_deg:.3}")));
         rows.push(vec![(*name).to_owned(), base.len().to_string(), position, rotation]);
     }
-    let heading = ["base by", "poses", "position RMSE (mm)", "rotation RMSE (\u{b0})"];
+    let heading = ["method", "poses", "position RMSE (mm)", "rotation RMSE (\u{b0})"];
     Ok((report::table(&heading, &rows, true), figures))
 }
 
@@ -153,6 +157,7 @@ fn errors(base: &Trajectory, truth: &Trajectory) -> anyhow::Result<Errors> {
     Ok(Errors::after(&pairs, &pairs.world_from_map()?))
 }
 
+/// The true trajectory of the base in a TUM file or a recording.
 fn true_base(path: &Path) -> anyhow::Result<Trajectory> {
     if path.extension().is_some_and(|ending| ending == "tum" || ending == "txt") {
         return Ok(read_tum(path)?);
@@ -161,9 +166,9 @@ fn true_base(path: &Path) -> anyhow::Result<Trajectory> {
     let mut base = Trajectory::new();
     for truth in reader.truth() {
         if let Truth::Base(stamp, pose) = truth? {
-            base.push(stamp, pose).with_context(|| format!("{}: the base's truth", path.display()))?;
+            base.push(stamp, pose).with_context(|| format!("{}: true trajectory of the base", path.display()))?;
         }
     }
-    anyhow::ensure!(!base.is_empty(), "{} has no truth of the base: leave --truth out", path.display());
+    anyhow::ensure!(!base.is_empty(), "{} has no true trajectory of the base: omit --truth", path.display());
     Ok(base)
 }

@@ -3,7 +3,7 @@
 use super::arguments::Global;
 use super::bars::{Bars, stop_flag};
 use super::failure::Usage;
-use super::{End, output};
+use super::{Completion, output};
 use anyhow::Context;
 use clap::Args;
 use serde_json::{Value, json};
@@ -16,16 +16,16 @@ use zsim::world::World;
 
 /// Compute the Cramer-Rao bound of a recording: the accuracy that no estimator can exceed
 ///
-/// Every beam that hits a surface of the scene counts with its noise and incidence, and the IMU with its noise, biases,
-/// scale errors and clock; the surfaces count as known. Needs a recording with its truth. With --out, writes
-/// bound.csv (by time) and a plot.
+/// The bound includes each beam on a surface of the scene, with noise and incidence, and the IMU, with noise, biases,
+/// scale errors and clock offset. The surfaces are assumed to be known. The recording must have the truth. With --out,
+/// writes bound.csv (by time) and a plot.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim bound run.mcap --scene office.ron --out results/bound")]
 pub(super) struct Arguments {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
     recording: PathBuf,
-    /// The world, a name under scenes/ or a file [default: that in the recording's manifest]
+    /// The scene, a name under scenes/ or a file [default: that in the recording's manifest]
     #[arg(long, value_name = "NAME|FILE")]
     scene: Option<String>,
     /// Folder for results; if it exists and is not empty, a number is appended to the name [default: none is
@@ -37,31 +37,31 @@ pub(super) struct Arguments {
     force: bool,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let reader = Reader::open(&arguments.recording)?;
     let world = world(arguments, &reader)?;
     let mut bars = Bars::new(global);
-    let mut watch = Watch { stop: stop_flag(), report: &mut |news| bars.tell(news) };
+    let mut watch = Watch { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let bounded = information_bound(&reader, &world, &mut watch);
     bars.finish();
     let bounded = bounded?;
-    let folder = arguments.out.as_ref().map(|wanted| leave(&bounded, wanted, arguments.force)).transpose()?;
-    output::tell(global, &words(&bounded), figures(&bounded, world.name()), folder.as_deref())?;
-    Ok(End::Done)
+    let folder = arguments.out.as_ref().map(|wanted| write_results(&bounded, wanted, arguments.force)).transpose()?;
+    output::print_result(global, &text(&bounded), figures(&bounded, world.name()), folder.as_deref())?;
+    Ok(Completion::Done)
 }
 
 fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
     if let Some(scene) = &arguments.scene {
         return Ok(World::load(scene)?);
     }
-    let Some(specs) = Manifest::within(reader).and_then(|manifest| manifest.specs) else {
-        let message = format!("{} does not name its scene: pass it with --scene", reader.name());
+    let Some(specs) = Manifest::in_recording(reader).and_then(|manifest| manifest.specs) else {
+        let message = format!("{} has no scene: pass one with --scene", reader.name());
         return Err(Usage(message).into());
     };
     Ok(World::build(&specs.scene, &Source::in_memory("the recording's scene", ""))?)
 }
 
-fn leave(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
+fn write_results(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
     let path = folder.join("bound.csv");
     std::fs::write(&path, csv(bounded)).with_context(|| format!("{} cannot be written", path.display()))?;
@@ -81,7 +81,7 @@ fn csv(bounded: &RecordingBound) -> String {
     text
 }
 
-fn words(bounded: &RecordingBound) -> String {
+fn text(bounded: &RecordingBound) -> String {
     let bound = &bounded.bound;
     let mm = |m: f64| format!("{:.3} mm", m * 1e3);
     let axes = bound.axis_rmse_m;
@@ -91,7 +91,7 @@ fn words(bounded: &RecordingBound) -> String {
         ("along x, y, z", format!("{}, {}, {}", mm(axes.x), mm(axes.y), mm(axes.z))),
         ("attitude RMSE", format!("{:.4} deg", bound.attitude_rmse_rad.to_degrees())),
         ("clock offset at the end", format!("{:.3} us", bound.clock_offset_s * 1e6)),
-        ("offset of the ranges", mm(bound.range_offset_m)),
+        ("range offset", mm(bound.range_offset_m)),
         ("beams", format!("{} ({} skipped)", bounded.beams, bounded.rejected)),
     ];
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();

@@ -1,7 +1,7 @@
 //! `zsim check`: are these scenes and specs right?
 
 use super::arguments::{Global, any_route};
-use super::{End, failure, output};
+use super::{Completion, failure, output};
 use clap::Args;
 use serde_json::json;
 use std::path::Path;
@@ -15,7 +15,7 @@ use zsim::simulation::{EPOCH, Faults, FaultsSpec};
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::StudyError;
 use zsim::study::reproduction::ExperimentSpec;
-use zsim::study::spring::design::{DesignSpec, Search};
+use zsim::study::spring::design::{DesignSearch, DesignSpec};
 use zsim::study::sweep::{Plan, SweepSpec};
 use zsim::world::{SceneSpec, World, WorldError};
 
@@ -45,7 +45,7 @@ pub(super) struct Arguments {
     files: Vec<String>,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let checked: Vec<_> = arguments.files.iter().map(|file| (file, check(file))).collect();
     let mut words = String::new();
     let mut figures = Vec::new();
@@ -63,12 +63,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
             }
         }
     }
-    output::tell(global, &words, json!({ "files": figures }), None)?;
+    output::print_result(global, &words, json!({ "files": figures }), None)?;
     let invalid = checked.iter().filter(|(_, result)| result.is_err()).count();
     if invalid > 0 {
         return Err(failure::Usage(format!("{invalid} of {} files invalid", checked.len())).into());
     }
-    Ok(End::Done)
+    Ok(Completion::Done)
 }
 
 /// The kind of a valid spec.
@@ -147,7 +147,7 @@ fn study(source: &Source) -> Result<Study, SpecError> {
 impl Study {
     fn build(&self, source: &Source) -> Result<(), StudyError> {
         match self {
-            Self::Design(spec) => Search::new(spec, source).map(drop),
+            Self::Design(spec) => DesignSearch::new(spec, source).map(drop),
             Self::Sweep(spec) => Plan::new("study", spec, source).map(drop),
         }
     }

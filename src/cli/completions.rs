@@ -1,6 +1,6 @@
-//! `zsim completions`: for shells.
+//! `zsim completions`: completion scripts for shells.
 
-use super::{Cli, End, output};
+use super::{Cli, Completion, output};
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 
@@ -13,9 +13,9 @@ pub(super) struct Arguments {
     shell: Shell,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Completion> {
     let mut text = Vec::new();
     clap_complete::generate(arguments.shell, &mut Cli::command(), "zsim", &mut text);
     output::write_to_stdout(&String::from_utf8_lossy(&text))?;
-    Ok(End::Done)
+    Ok(Completion::Done)
 }

@@ -2,7 +2,7 @@
 
 use super::arguments::{Global, OutArguments, any_route};
 use super::bars::WorkBar;
-use super::{End, coverage_words, output, quantity};
+use super::{Completion, coverage_text, output, quantity};
 use anyhow::Context;
 use clap::Args;
 use std::path::Path;
@@ -14,40 +14,40 @@ use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, find, parse};
 use zsim::study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
 
-/// Compute how much of the sphere a lidar on a moving head observes, how densely, how soon, and the gyroscope range it
-/// needs
+/// Compute the coverage of the sphere by a lidar on a moving head: fraction, density and time, and the required gyroscope
+/// range
 ///
-/// Needs no scene: directions count, relative to the base's heading. A motion that walks goes round a hall of 20
-/// m by 10 m. With --out, writes coverage.csv (by time), density.csv (by direction), and a plot.
+/// No scene is needed: the directions of the beams are relative to the heading of the base. Walking motions go around a
+/// hall of 20 m by 10 m. With --out, writes coverage.csv (by time), density.csv (by direction), and a plot.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim coverage --head handheld --motion hand --duration 30s --out results/coverage")]
 pub(super) struct Arguments {
     /// The head and its spring, a name under specs/heads/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "handheld")]
     head: String,
-    /// How the base moves, under specs/motions/
+    /// Motion of the base, a name under specs/motions/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "hand")]
     motion: String,
-    /// The lidar, under specs/lidars/
+    /// The lidar, a name under specs/lidars/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "utm30lx")]
     lidar: String,
-    /// The IMU whose gyroscope range is compared with the angular velocity, under specs/imus/
+    /// The IMU with the gyroscope range for comparison, a name under specs/imus/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "3dm_gx2")]
     imu: String,
     /// Duration of the observation: 30s, 2min, 90
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = quantity::seconds)]
     duration: f64,
-    /// Start of the observation [default: after the motion's first seconds at rest]
+    /// Start of the observation [default: after the initial rest of the motion]
     #[arg(long, value_name = "TIME", default_value = "5s", value_parser = quantity::seconds)]
     from: f64,
-    /// The seed from which the motion's chance follows
+    /// Random seed of the motion
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
     out: OutArguments,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let (head, head_source) = dynamics::load(&arguments.head)?;
     let head = HeadModel::new(&head, &head_source)?;
     let lidar_source = find(Kind::Lidar, &arguments.lidar)?;
@@ -64,15 +64,16 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         ..CoveragePlan::default()
     };
     let bar = WorkBar::new(global, "swinging");
-    let seen = coverage(&head, motion.as_ref(), &lidar, &plan, |state| bar.show(state.t_s / until_s))?;
+    let seen = coverage(&head, motion.as_ref(), &lidar, &plan, |state| bar.set_fraction(state.t_s / until_s))?;
     drop(bar);
 
-    let folder = arguments.out.out.as_ref().map(|wanted| leave(&seen, wanted, arguments.out.force)).transpose()?;
-    output::tell(global, &words(&seen), serde_json::to_value(&seen)?, folder.as_deref())?;
-    Ok(End::Done)
+    let folder =
+        arguments.out.out.as_ref().map(|wanted| write_results(&seen, wanted, arguments.out.force)).transpose()?;
+    output::print_result(global, &text(&seen), serde_json::to_value(&seen)?, folder.as_deref())?;
+    Ok(Completion::Done)
 }
 
-fn leave(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
+fn write_results(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
     for (name, text) in [("coverage.csv", over_time_csv(seen)), ("density.csv", density_csv(seen))] {
         let path = folder.join(name);
@@ -82,18 +83,18 @@ fn leave(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<output::
     Ok(folder)
 }
 
-fn words(seen: &Coverage) -> String {
+fn text(seen: &Coverage) -> String {
     let gyro = &seen.gyro;
-    let mut rows = coverage_words::rows(seen);
+    let mut rows = coverage_text::rows(seen);
     rows.extend([
-        ("time to half of it, s", format!("{:.2}", seen.half_covered_s)),
-        ("beams per sr and s: mean, a tenth below", {
+        ("time to half coverage, s", format!("{:.2}", seen.half_covered_s)),
+        ("beams per sr and s: mean, 10th percentile", {
             format!("{:.0}, {:.0}", seen.density_per_sr_s.mean, seen.density_per_sr_s.p10)
         }),
         ("elevation of the forward beam, deg", format!("{:.1} (95 % of the time)", seen.field_of_view_deg)),
         ("maximum tilt of the scan plane, deg", format!("{:.1}", seen.most_tilt_deg)),
         ("maximum rate on an axis, deg/s", format!("{:.0} of {:.0}", gyro.most_deg_per_s, gyro.limit_deg_per_s)),
-        ("rate not exceeded in 99 % of the time", format!("{:.0}", gyro.p99_deg_per_s)),
+        ("99th percentile of the rate, deg/s", format!("{:.0}", gyro.p99_deg_per_s)),
     ]);
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
     report::table(&[], &rows, false)

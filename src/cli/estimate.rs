@@ -1,6 +1,6 @@
 //! `zsim estimate`: the estimator on any recording.
 
-use super::End;
+use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, calibration, start};
 use super::bars::{Bars, stop_flag};
 use super::{journey, output};
@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     out: OutArguments,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let within = |path: &PathBuf| MapOptions::read(path, arguments.start, arguments.extend_map);
     let options = EstimateOptions {
         map: arguments.map.as_ref().map(within).transpose()?,
@@ -72,12 +72,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let folder = output::folder(&wanted, arguments.out.force)?;
     let inputs = [Some(&arguments.recording), arguments.map.as_ref(), arguments.calibration.as_ref()];
     let written: Vec<PathBuf> = study::estimate_files().iter().map(|name| folder.join(name)).collect();
-    output::spare_inputs(&inputs.into_iter().flatten().cloned().collect::<Vec<_>>(), &written)?;
+    output::check_not_inputs(&inputs.into_iter().flatten().cloned().collect::<Vec<_>>(), &written)?;
 
     let mut bars = Bars::new(global);
-    let mut watch = Watch { stop: stop_flag(), report: &mut |news| bars.tell(news) };
+    let mut watch = Watch { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let outcome = study::estimate_recording(&arguments.recording, &folder, &options, &mut watch);
     bars.finish();
-    let outcome = outcome.inspect_err(|_| journey::left_behind(&folder))?;
-    journey::close(global, &outcome, arguments.estimator.profile, &folder)
+    let outcome = outcome.inspect_err(|_| journey::print_partial_results(&folder))?;
+    journey::print_outcome(global, &outcome, arguments.estimator.profile, &folder)
 }

@@ -12,15 +12,15 @@ use zsim::world::WorldError;
 
 /// Prints the error with its causes and returns the exit code: that of the signal that stopped the run, 2 for invalid
 /// usage or input, else 1.
-pub(super) fn tell(error: &anyhow::Error) -> ExitCode {
-    let mut said = error.to_string();
-    eprintln!("error: {}", printable(&said));
+pub(super) fn report(error: &anyhow::Error) -> ExitCode {
+    let mut message = error.to_string();
+    eprintln!("error: {}", printable(&message));
     for cause in error.chain().skip(1).map(ToString::to_string) {
         // A transparent error repeats the text of the cause.
-        if !said.contains(&cause) {
+        if !message.contains(&cause) {
             eprintln!("  because: {}", printable(&cause));
         }
-        said = cause;
+        message = cause;
     }
     if error.chain().any(is_stopped) {
         return ExitCode::from(signals::exit_code());
@@ -42,7 +42,7 @@ fn is_invalid_input(error: &(dyn Error + 'static)) -> bool {
         || error.downcast_ref::<StudyError>().is_some_and(StudyError::is_invalid_input)
 }
 
-/// A wish that makes no sense.
+/// Invalid usage: arguments that are inconsistent or out of range.
 #[derive(Debug)]
 pub(super) struct Usage(pub String);
 

@@ -3,7 +3,7 @@
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
 use super::failure::Usage;
-use super::{End, output};
+use super::{Completion, output};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -19,8 +19,8 @@ use zsim::study::gains::{
 
 /// Measure a head's gain curves: head motion over base motion by frequency, from simulation and in closed form
 ///
-/// The base is shaken on one axis at a time about the spring's foot by a periodic multisine; the head is observed at
-/// its IMU. Writes gains.csv, swing.csv with --swing, and plots.
+/// The base is excited on one axis at a time, about the foot of the spring, by a periodic multisine; the motion of the
+/// head is measured at the IMU. Writes gains.csv, swing.csv with --swing, and plots.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim gains --head handheld --out results/gains")]
 pub(super) struct Arguments {
@@ -29,30 +29,28 @@ pub(super) struct Arguments {
     head: String,
     #[command(flatten)]
     out: OutArguments,
-    /// The highest frequency, Hz
+    /// Maximum frequency, Hz
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     up_to: f64,
-    /// The multisine's period, s: the reciprocal of the distance between lines [default: two lines in the narrowest
-    /// peak]
+    /// Period of the multisine, s: the reciprocal of the line spacing [default: two lines in the narrowest peak]
     #[arg(long, value_name = "S")]
     period: Option<f64>,
     /// Quantity compared along x, y and z
     #[arg(long, value_enum, default_value_t = Along::Acceleration)]
     along: Along,
-    /// Damp all modes by this ratio instead of the head's own
+    /// Damping ratio of all modes, instead of that of the head
     #[arg(long, value_name = "RATIO")]
     damping: Option<f64>,
-    /// How many realisations, alike but for their phases, are averaged
+    /// Number of realisations with different phases to average
     #[arg(long, value_name = "N", default_value_t = 4)]
     realisations: usize,
-    /// The simulation's time step, s
+    /// Time step of the simulation, s
     #[arg(long, value_name = "S", default_value_t = 1e-3)]
     step: f64,
-    /// The seed of the multisine's phases
+    /// Random seed of the phases
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Also shake so hard that the head would swing by these, degrees rms: how resonance and gain move, about and along
-    /// x and y
+    /// Also measure resonance and gain at these swing amplitudes of the head, degrees RMS, about and along x and y
     #[arg(long, value_name = "DEG,...", value_delimiter = ',', num_args = 0.., default_missing_value = "0.2,2,5,10,15,20")]
     swing: Option<Vec<f64>>,
 }
@@ -60,17 +58,17 @@ pub(super) struct Arguments {
 /// The quantity compared along x, y and z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Along {
-    /// Acceleration as such.
+    /// Acceleration.
     Acceleration,
-    /// The accelerometer readings.
+    /// Specific force, as measured by an accelerometer.
     SpecificForce,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let head = head(arguments)?;
     let plan = plan(arguments)?;
     let bar = WorkBar::new(global, "shaking");
-    let curves = gain_curves(&head, &plan, &|share| bar.show(share))?;
+    let curves = gain_curves(&head, &plan, &|fraction| bar.set_fraction(fraction))?;
     let swings = arguments.swing.as_ref().map(|degrees| swings(&head, degrees, &plan, &bar)).transpose()?;
     drop(bar);
 
@@ -87,11 +85,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         swing_figure(swings).save(&plots, "swing")?;
     }
     let swings = swings.unwrap_or_default();
-    output::tell(global, &words(&curves, &swings), figures(&curves, &swings)?, Some(&folder))?;
-    Ok(End::Done)
+    output::print_result(global, &text(&curves, &swings), figures(&curves, &swings)?, Some(&folder))?;
+    Ok(Completion::Done)
 }
 
-/// The head's name without folder and ending.
+/// Name of the head without folder and extension.
 fn name(arguments: &Arguments) -> String {
     Path::new(&arguments.head).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -100,7 +98,7 @@ fn head(arguments: &Arguments) -> anyhow::Result<HeadModel> {
     let (mut spec, source) = load(&arguments.head)?;
     if let Some(ratio) = arguments.damping {
         if !(ratio.is_finite() && ratio >= 0.0) {
-            return Err(Usage(format!("--damping {ratio}: a damping ratio is a number of at least 0")).into());
+            return Err(Usage(format!("--damping {ratio}: must be at least 0")).into());
         }
         spec = with_damping(&spec, DampingSpec { rocking: ratio, sway: ratio, bounce: ratio, yaw: ratio });
     }
@@ -133,13 +131,13 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
         return Err(Usage(format!("--swing {invalid}: expected degrees above 0")).into());
     }
     let axes = [Axis::Roll, Axis::Pitch, Axis::X, Axis::Y];
-    // The slowest resonance is the interesting one; above it a hard shake adds little.
+    // Large amplitudes affect mainly the slowest resonance.
     let slowest_hz = head.linear_modes().first().map_or(plan.up_to_hz, |mode| mode.frequency_hz);
     let plan = GainPlan { up_to_hz: plan.up_to_hz.min(3.0 * slowest_hz), ..plan.clone() };
     let study = |(before, axis): (usize, &Axis)| {
-        bar.say(format!("swinging, {}", axis_name(*axis)));
-        let hear = |share: f64| bar.show((before as f64 + share) / axes.len() as f64);
-        Ok(swing_study(head, *axis, degrees, &plan, &hear)?)
+        bar.set_task(format!("swinging, {}", axis_name(*axis)));
+        let on_progress = |fraction: f64| bar.set_fraction((before as f64 + fraction) / axes.len() as f64);
+        Ok(swing_study(head, *axis, degrees, &plan, &on_progress)?)
     };
     axes.iter().enumerate().map(study).collect()
 }
@@ -148,16 +146,16 @@ fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     std::fs::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
 }
 
-fn words(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
+fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
     let dash = || "-".to_owned();
     let row = |curve: &GainCurve| {
         let peak = |peak: Option<zsim::dynamics::Peak>| {
             peak.map_or([dash(), dash()], |p| [format!("{:.3}", p.freq_hz), format!("{:.2}", p.gain)])
         };
         let ([hz, gain], [model_hz, model_gain]) = (peak(curve.peak), peak(curve.peak_model));
-        vec![axis_name(curve.axis).to_owned(), hz, gain, model_hz, model_gain, format!("{:.4}", least_coherence(curve))]
+        vec![axis_name(curve.axis).to_owned(), hz, gain, model_hz, model_gain, format!("{:.4}", min_coherence(curve))]
     };
-    let header = ["axis", "peak Hz", "gain", "closed form Hz", "gain", "least coherence"];
+    let header = ["axis", "peak Hz", "gain", "closed form Hz", "gain", "min coherence"];
     let mut words = report::table(&header, &curves.iter().map(row).collect::<Vec<_>>(), true);
     for study in swings {
         let row = |p: &zsim::study::gains::SwingPoint| {
@@ -170,7 +168,7 @@ fn words(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
                 number(p.coherence, 3),
             ]
         };
-        let header = ["swing rms", "most deg", "peak Hz", "gain", "coherence"];
+        let header = ["swing RMS", "max deg", "peak Hz", "gain", "coherence"];
         words += "\n";
         words += &report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
         words += &study.ended.as_ref().map(|why| format!("ended {why}\n")).unwrap_or_default();
@@ -178,15 +176,15 @@ fn words(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
     words
 }
 
-/// The least coherence of a curve's lines.
-fn least_coherence(curve: &GainCurve) -> f64 {
+/// The minimum coherence of a curve.
+fn min_coherence(curve: &GainCurve) -> f64 {
     curve.points.iter().map(|p| p.coherence).fold(1.0, f64::min)
 }
 
 fn figures(curves: &[GainCurve], swings: &[SwingStudy]) -> anyhow::Result<Value> {
     let axes = AXES.iter().zip(curves).map(|(axis, curve)| {
         json!({ "axis": axis_name(*axis), "peak": curve.peak, "peak_model": curve.peak_model,
-            "least_coherence": least_coherence(curve), "swing_rms_deg": curve.swing_rms_deg })
+            "least_coherence": min_coherence(curve), "swing_rms_deg": curve.swing_rms_deg })
     });
     Ok(json!({ "axes": axes.collect::<Vec<_>>(), "swing": serde_json::to_value(swings)? }))
 }

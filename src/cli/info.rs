@@ -2,7 +2,7 @@
 
 use super::arguments::Global;
 use super::output::printable_name;
-use super::{End, output, quantity};
+use super::{Completion, output, quantity};
 use clap::Args;
 use std::path::PathBuf;
 use zsim::recording::{Reader, RecordingInfo, TopicInfo};
@@ -21,18 +21,18 @@ pub(super) struct Arguments {
     gap: f64,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let reader = Reader::open(&arguments.recording)?;
     let info = reader.info(Span::from_seconds(arguments.gap))?;
-    output::tell(global, &words(&info), serde_json::to_value(&info)?, None)?;
+    output::print_result(global, &text(&info), serde_json::to_value(&info)?, None)?;
     if info.loss.is_none() {
-        return Ok(End::Done);
+        return Ok(Completion::Done);
     }
     info.loss.sentences().iter().for_each(|loss| eprintln!("loss: {}", output::printable(loss)));
-    Ok(End::WithLoss)
+    Ok(Completion::WithLoss)
 }
 
-fn words(info: &RecordingInfo) -> String {
+fn text(info: &RecordingInfo) -> String {
     let mebibytes = info.length_bytes as f64 / (1 << 20) as f64;
     let maker = if info.has_manifest { ", made by zsim" } else { "" };
     let head =

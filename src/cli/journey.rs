@@ -1,6 +1,6 @@
 //! `zsim --scene`: the full run, from simulation to report.
 
-use super::End;
+use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
 use super::bars::{Bars, stop_flag};
 use super::{output, recording_size};
@@ -24,23 +24,23 @@ pub(super) struct Arguments {
     out: OutArguments,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let scene = arguments.scene.as_deref().unwrap_or_default();
     let options = arguments.estimator.options()?;
     let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
     let mut bars = Bars::new(global);
-    recording_size::check(&simulation, &wanted, |note| bars.remark(note))?;
+    recording_size::check(&simulation, &wanted, |note| bars.note(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
     let written: Vec<PathBuf> = study::journey_files().iter().map(|name| folder.join(name)).collect();
-    output::spare_inputs(&arguments.scenario.inputs(scene), &written)?;
+    output::check_not_inputs(&arguments.scenario.inputs(scene), &written)?;
 
-    simulation.world().notes().iter().for_each(|note| bars.remark(note));
-    let mut watch = Watch { stop: stop_flag(), report: &mut |news| bars.tell(news) };
+    simulation.world().notes().iter().for_each(|note| bars.note(note));
+    let mut watch = Watch { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let outcome = study::journey(&simulation, &options, &folder, &mut watch);
     bars.finish();
-    let outcome = outcome.inspect_err(|_| left_behind(&folder))?;
-    close(global, &outcome, arguments.estimator.profile, &folder)
+    let outcome = outcome.inspect_err(|_| print_partial_results(&folder))?;
+    print_outcome(global, &outcome, arguments.estimator.profile, &folder)
 }
 
 /// Default folder for results.
@@ -49,7 +49,7 @@ pub(super) fn default_folder(name: &str) -> PathBuf {
 }
 
 /// Prints the folder that has the parts completed before a failure.
-pub(super) fn left_behind(folder: &Path) {
+pub(super) fn print_partial_results(folder: &Path) {
     eprintln!("completed parts are in {}", output::printable(&folder.display().to_string()));
 }
 
@@ -61,7 +61,12 @@ fn seconds_by_part(outcome: &Outcome) -> Value {
 }
 
 /// Prints the results of an estimate, its times with `profile`, and its losses.
-pub(super) fn close(global: &Global, outcome: &Outcome, profile: bool, folder: &Path) -> anyhow::Result<End> {
+pub(super) fn print_outcome(
+    global: &Global,
+    outcome: &Outcome,
+    profile: bool,
+    folder: &Path,
+) -> anyhow::Result<Completion> {
     let mut figures = serde_json::to_value(&outcome.metrics)?;
     if let (true, Value::Object(object)) = (profile, &mut figures) {
         object.insert("profile".to_owned(), seconds_by_part(outcome));
@@ -71,9 +76,9 @@ pub(super) fn close(global: &Global, outcome: &Outcome, profile: bool, folder: &
         words += "\n";
         words += &report::time_spent(&outcome.spent, wall_s);
     }
-    output::tell(global, &words, figures, Some(folder))?;
+    output::print_result(global, &words, figures, Some(folder))?;
     let Metrics { losses, status, .. } = &outcome.metrics;
     losses.iter().for_each(|loss| eprintln!("loss: {}", output::printable(&loss.line())));
     let is_good = status.as_deref().is_none_or(|status| status == "good");
-    Ok(if losses.is_empty() && is_good { End::Done } else { End::WithLoss })
+    Ok(if losses.is_empty() && is_good { Completion::Done } else { Completion::WithLoss })
 }

@@ -2,12 +2,14 @@
 
 use super::arguments::{Global, ScenarioArguments};
 use super::bars::{WorkBar, stop_flag};
-use super::{End, output};
+use super::{Completion, output};
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use zsim::spec::{Kind, SpecError, find, parse};
-use zsim::study::latency::{ClockState, Latency, LatencySpec, Study, csv, curve_figure, map_figure, words};
+use zsim::study::latency::{
+    ClockState, LatencyResult, LatencySpec, LatencyStudy, csv, curve_figure, map_figure, text_table,
+};
 use zsim::study::reproduction::ExperimentSpec;
 
 /// The experiment with the default latencies and noises.
@@ -37,25 +39,25 @@ pub(super) struct Arguments {
     force: bool,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let source = find(Kind::Experiment, FIGURE_4)?;
     let ExperimentSpec::Latency(shipped) = parse(&source)? else {
-        return Err(SpecError::plain(source.name, "is no study of latency").into());
+        return Err(SpecError::plain(source.name, "is not a latency experiment").into());
     };
     let scenario = arguments.scenario.scenario(&arguments.scene);
     let spec = LatencySpec { scenario, estimator: arguments.estimator.clone(), ..*shipped };
-    let latency = Latency::new(&spec, &source)?;
-    let folder = output::continued(&arguments.out)?;
+    let latency = LatencyStudy::new(&spec, &source)?;
+    let folder = output::folder_to_resume(&arguments.out)?;
     let bar = WorkBar::new(global, "estimating");
-    let ran = latency.run(&folder, arguments.force, stop_flag(), &|share| bar.show(share));
+    let ran = latency.run(&folder, arguments.force, stop_flag(), &|fraction| bar.set_fraction(fraction));
     drop(bar);
-    let study = ran.inspect_err(|_| super::journey::left_behind(&folder))?;
-    leave(&study, &folder)?;
-    output::tell(global, &words(&study), serde_json::to_value(&study)?, Some(&folder))?;
-    Ok(End::Done)
+    let study = ran.inspect_err(|_| super::journey::print_partial_results(&folder))?;
+    write_results(&study, &folder)?;
+    output::print_result(global, &text_table(&study), serde_json::to_value(&study)?, Some(&folder))?;
+    Ok(Completion::Done)
 }
 
-fn leave(study: &Study, folder: &Path) -> anyhow::Result<()> {
+fn write_results(study: &LatencyResult, folder: &Path) -> anyhow::Result<()> {
     for (name, text) in [("latency.csv", csv(study)), ("metrics.json", serde_json::to_string_pretty(study)? + "\n")] {
         let path = folder.join(name);
         std::fs::write(&path, text).with_context(|| format!("{} cannot be written", path.display()))?;

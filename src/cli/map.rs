@@ -1,7 +1,7 @@
 //! `zsim map`: maps that last.
 
 use super::arguments::{Global, start};
-use super::{End, output};
+use super::{Completion, output};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::PathBuf;
@@ -18,11 +18,11 @@ use zsim::study;
 #[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --start 4.2,0.5,0,90 --out both.ply")]
 pub(super) struct Arguments {
     #[command(subcommand)]
-    verb: Verb,
+    command: Command,
 }
 
 #[derive(Subcommand)]
-enum Verb {
+enum Command {
     Merge(MergeArguments),
 }
 
@@ -52,30 +52,33 @@ struct MergeArguments {
     force: bool,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
-    let Verb::Merge(merge) = &arguments.verb;
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
+    let Command::Merge(merge) = &arguments.command;
     let estimator = estimation::load(&merge.estimator)?;
     let out = output::file(&merge.out, merge.force)?;
     let merged = study::merge_map_files((&merge.first, &merge.second), &merge.start, &estimator, &out)?;
     let [first, second, both] = merged.surfels;
     let at = merged.located.map_from_query;
-    let (place, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());
-    let (share, residual_m) = (merged.located.inlier_ratio, merged.located.residual_rms_m);
+    let (position, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());
+    let (fraction, residual_m) = (merged.located.inlier_ratio, merged.located.residual_rms_m);
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let rows = [
-        row("surfels of the first", first.to_string()),
-        row("surfels of the second", second.to_string()),
-        row("surfels of both", both.to_string()),
-        row("the second's origin", format!("{:.3}, {:.3}, {:.3} m, {yaw_deg:.3}\u{b0}", place.x, place.y, place.z)),
-        row("of the second on the first", format!("{:.0} %", 100.0 * share)),
-        row("apart there, RMS", format!("{:.1} mm", 1e3 * residual_m)),
+        row("surfels, first map", first.to_string()),
+        row("surfels, second map", second.to_string()),
+        row("surfels, merged map", both.to_string()),
+        row(
+            "second map in the first: x, y, z, yaw",
+            format!("{:.3}, {:.3}, {:.3} m, {yaw_deg:.3}\u{b0}", position.x, position.y, position.z),
+        ),
+        row("matched part of the second map", format!("{:.0} %", 100.0 * fraction)),
+        row("residual, RMS", format!("{:.1} mm", 1e3 * residual_m)),
     ];
     let figures = json!({
         "surfels": { "first": first, "second": second, "both": both },
-        "first_from_second": { "position_m": [place.x, place.y, place.z], "yaw_deg": yaw_deg },
-        "share_on_first": share,
+        "first_from_second": { "position_m": [position.x, position.y, position.z], "yaw_deg": yaw_deg },
+        "share_on_first": fraction,
         "residual_rms_m": residual_m,
     });
-    output::tell(global, &report::table(&[], &rows, true), figures, Some(&out))?;
-    Ok(End::Done)
+    output::print_result(global, &report::table(&[], &rows, true), figures, Some(&out))?;
+    Ok(Completion::Done)
 }

@@ -1,7 +1,7 @@
-//! The command `zsim`: one verb a file.
+//! The command line interface of zsim: one file for each command.
 //!
-//! Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 failed, 2 wrong usage or spec, 3 done
-//! with loss, 130 and 143 stopped by SIGINT and SIGTERM.
+//! Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 failed, 2 invalid usage or spec, 3 done
+//! with losses, 130 and 143 stopped by SIGINT and SIGTERM.
 
 mod arguments;
 mod bars;
@@ -10,7 +10,7 @@ mod bound;
 mod check;
 mod completions;
 mod coverage;
-mod coverage_words;
+mod coverage_text;
 mod estimate;
 mod evaluate;
 mod failure;
@@ -29,10 +29,10 @@ mod simulate;
 mod slurm;
 mod spec;
 mod spring;
-mod spring_words;
+mod spring_text;
 mod study;
 mod sweep;
-mod sweep_words;
+mod sweep_text;
 
 use arguments::Global;
 use clap::error::ErrorKind;
@@ -55,13 +55,13 @@ struct Cli {
     #[command(flatten)]
     journey: journey::Arguments,
     #[command(subcommand)]
-    verb: Option<Verb>,
+    command: Option<Command>,
     #[command(flatten)]
     global: Global,
 }
 
 #[derive(Subcommand)]
-enum Verb {
+enum Command {
     Simulate(simulate::Arguments),
     Estimate(estimate::Arguments),
     Evaluate(evaluate::Arguments),
@@ -81,9 +81,9 @@ enum Verb {
     Completions(completions::Arguments),
 }
 
-/// How a command that did not fail ended.
+/// Result of a command that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum End {
+enum Completion {
     Done,
     WithLoss,
 }
@@ -93,41 +93,40 @@ pub fn run() -> ExitCode {
     // clap itself prints help (code 0) and complaints about usage (code 2).
     let cli = Cli::parse();
     match dispatch(&cli) {
-        Ok(End::Done) => ExitCode::SUCCESS,
-        Ok(End::WithLoss) => ExitCode::from(3),
-        Err(error) => failure::tell(&error),
+        Ok(Completion::Done) => ExitCode::SUCCESS,
+        Ok(Completion::WithLoss) => ExitCode::from(3),
+        Err(error) => failure::report(&error),
     }
 }
 
-fn dispatch(cli: &Cli) -> anyhow::Result<End> {
+fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
     let global = &cli.global;
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
-    let Some(verb) = &cli.verb else { return journey::run(&cli.journey, global) };
+    let Some(command) = &cli.command else { return journey::run(&cli.journey, global) };
     if cli.journey.scene.is_some() {
-        let message =
-            "--scene before a command belongs to no command: put it after the command, or leave the command out";
+        let message = "--scene before a command has no effect: put it after the command, or omit the command";
         Cli::command().error(ErrorKind::ArgumentConflict, message).exit();
     }
-    match verb {
-        Verb::Simulate(arguments) => simulate::run(arguments, global),
-        Verb::Estimate(arguments) => estimate::run(arguments, global),
-        Verb::Evaluate(arguments) => evaluate::run(arguments, global),
-        Verb::Base(arguments) => base::run(arguments, global),
-        Verb::Bound(arguments) => bound::run(arguments, global),
-        Verb::Gains(arguments) => gains::run(arguments, global),
-        Verb::Spring(arguments) => spring::run(arguments, global),
-        Verb::Coverage(arguments) => coverage::run(arguments, global),
-        Verb::Latency(arguments) => latency::run(arguments, global),
-        Verb::Map(arguments) => map::run(arguments, global),
-        Verb::Reproduce(arguments) => reproduce::run(arguments, global),
-        Verb::Study(arguments) => study::run(arguments, global),
-        Verb::Sweep(arguments) => sweep::run(arguments, global),
-        Verb::Check(arguments) => check::run(arguments, global),
-        Verb::Spec(arguments) => spec::run(arguments, global),
-        Verb::Info(arguments) => info::run(arguments, global),
-        Verb::Completions(arguments) => completions::run(arguments),
+    match command {
+        Command::Simulate(arguments) => simulate::run(arguments, global),
+        Command::Estimate(arguments) => estimate::run(arguments, global),
+        Command::Evaluate(arguments) => evaluate::run(arguments, global),
+        Command::Base(arguments) => base::run(arguments, global),
+        Command::Bound(arguments) => bound::run(arguments, global),
+        Command::Gains(arguments) => gains::run(arguments, global),
+        Command::Spring(arguments) => spring::run(arguments, global),
+        Command::Coverage(arguments) => coverage::run(arguments, global),
+        Command::Latency(arguments) => latency::run(arguments, global),
+        Command::Map(arguments) => map::run(arguments, global),
+        Command::Reproduce(arguments) => reproduce::run(arguments, global),
+        Command::Study(arguments) => study::run(arguments, global),
+        Command::Sweep(arguments) => sweep::run(arguments, global),
+        Command::Check(arguments) => check::run(arguments, global),
+        Command::Spec(arguments) => spec::run(arguments, global),
+        Command::Info(arguments) => info::run(arguments, global),
+        Command::Completions(arguments) => completions::run(arguments),
     }
 }
 

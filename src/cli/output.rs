@@ -1,4 +1,4 @@
-//! Where results go: folders that are not overwritten, and stdout.
+//! Output of results: folders and files that are not overwritten, and stdout.
 
 use super::arguments::Global;
 use super::failure::Usage;
@@ -10,13 +10,13 @@ use std::io::{ErrorKind, Write};
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
-/// Most numbered siblings that are tried.
-const SIBLINGS: u32 = 10_000;
+/// Maximum number that is appended to a name.
+const MAX_NUMBER: u32 = 10_000;
 
-/// A folder for results that no other process writes to while this value lives.
+/// A folder for results, locked against other processes while this value exists.
 pub(super) struct Folder {
     path: PathBuf,
-    /// The advisory lock on the folder; the system releases it when the process ends, however it ends.
+    /// The advisory lock on the folder; the system releases it when the process ends for any reason.
     _lock: Option<File>,
 }
 
@@ -60,11 +60,11 @@ pub(super) fn folder(wanted: &Path, force: bool) -> anyhow::Result<Folder> {
     bail!("{} and thousands of numbered folders exist already", wanted.display());
 }
 
-/// Creates and locks a folder in which earlier work is continued.
+/// Creates and locks a folder in which an earlier run can be resumed.
 ///
 /// # Errors
 /// When it cannot be created, or another process uses it.
-pub(super) fn continued(wanted: &Path) -> anyhow::Result<Folder> {
+pub(super) fn folder_to_resume(wanted: &Path) -> anyhow::Result<Folder> {
     std::fs::create_dir_all(wanted).with_context(|| format!("{} cannot be created", wanted.display()))?;
     Folder::locked(wanted)?.ok_or_else(|| anyhow!(in_use(wanted)))
 }
@@ -106,7 +106,7 @@ pub(super) fn file(wanted: &Path, force: bool) -> anyhow::Result<PathBuf> {
 /// Creates the folder that `wanted` will be in.
 pub(super) fn create_parent(wanted: &Path) -> anyhow::Result<()> {
     if wanted.file_name().is_none() {
-        return Err(Usage(format!("--out \"{}\": this is not a name", wanted.display())).into());
+        return Err(Usage(format!("--out \"{}\" is not a file or folder name", wanted.display())).into());
     }
     match wanted.parent() {
         Some(parent) => {
@@ -116,8 +116,8 @@ pub(super) fn create_parent(wanted: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Refuses outputs that are among the files which the command reads.
-pub(super) fn spare_inputs(inputs: &[PathBuf], outputs: &[PathBuf]) -> anyhow::Result<()> {
+/// Rejects outputs that are inputs of the command.
+pub(super) fn check_not_inputs(inputs: &[PathBuf], outputs: &[PathBuf]) -> anyhow::Result<()> {
     let existing = |paths: &[PathBuf]| -> Vec<PathBuf> { paths.iter().flat_map(|path| path.canonicalize()).collect() };
     let inputs = existing(inputs);
     let is_read = |output: &&PathBuf| inputs.iter().any(|input| output.starts_with(input));
@@ -138,7 +138,7 @@ pub(super) fn candidates(wanted: &Path) -> impl Iterator<Item = PathBuf> + '_ {
     let ending = wanted.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
     let stem = wanted.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let numbered = move |number: u32| wanted.with_file_name(format!("{stem}-{number}{ending}"));
-    std::iter::once(wanted.to_path_buf()).chain((2..SIBLINGS).map(numbered))
+    std::iter::once(wanted.to_path_buf()).chain((2..MAX_NUMBER).map(numbered))
 }
 
 fn is_empty(folder: &Path) -> anyhow::Result<bool> {
@@ -146,17 +146,17 @@ fn is_empty(folder: &Path) -> anyhow::Result<bool> {
     Ok(entries.next().is_none())
 }
 
-/// Prints a command's result: words, or with `--json` the figures; where it wrote is the last line, or the key `out`.
-pub(super) fn tell(global: &Global, words: &str, mut figures: Value, out: Option<&Path>) -> anyhow::Result<()> {
+/// Prints the result of a command: text, or JSON with `--json`. The output path is the last line, or the key `out`.
+pub(super) fn print_result(global: &Global, text: &str, mut json: Value, out: Option<&Path>) -> anyhow::Result<()> {
     let out = out.map(|path| path.display().to_string());
     if global.json {
-        if let (Some(out), Some(object)) = (out, figures.as_object_mut()) {
+        if let (Some(out), Some(object)) = (out, json.as_object_mut()) {
             object.insert("out".to_owned(), Value::String(out));
         }
-        return write_to_stdout(&escaped(&(serde_json::to_string_pretty(&figures)? + "\n"), in_json));
+        return write_to_stdout(&escaped(&(serde_json::to_string_pretty(&json)? + "\n"), in_json));
     }
-    let words = if words.is_empty() { String::new() } else { format!("{}\n", words.trim_end()) };
-    print(&(words + &out.map(|out| out + "\n").unwrap_or_default()))
+    let text = if text.is_empty() { String::new() } else { format!("{}\n", text.trim_end()) };
+    print(&(text + &out.map(|out| out + "\n").unwrap_or_default()))
 }
 
 /// Prints to stdout, with control characters escaped.
@@ -164,7 +164,7 @@ pub(super) fn print(text: &str) -> anyhow::Result<()> {
     write_to_stdout(&printable(text))
 }
 
-/// Writes to stdout as it is; a reader that went away is no error.
+/// Writes to stdout without escapes; a closed pipe is not an error.
 pub(super) fn write_to_stdout(text: &str) -> anyhow::Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("stdout cannot be written"),
@@ -172,13 +172,14 @@ pub(super) fn write_to_stdout(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Text with foreign names in it, fit for a terminal: control characters, which could move the cursor or set the
-/// window's title, and characters that reorder the text are escaped. Line ends and tabs stay.
+/// Escapes control characters and characters that reorder text, except line ends and tabs.
+///
+/// Names from files could otherwise move the cursor or set the window title of the terminal.
 pub(super) fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_default().to_string())
 }
 
-/// An escape as JSON has it (RFC 8259, section 7), of a character of the basic plane.
+/// The JSON escape of a character of the basic multilingual plane (RFC 8259, section 7).
 fn in_json(c: char) -> String {
     format!("\\u{:04x}", u32::from(c))
 }
@@ -190,13 +191,13 @@ fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(|c| if is_harmless(c) { c.to_string() } else { escape(c) }).collect())
 }
 
-/// A foreign name within a line or a table: as [`printable`], with line ends escaped too.
+/// As [`printable`], with line ends escaped too, for a name within a line or a table.
 pub(super) fn printable_name(name: &str) -> String {
     printable(name).replace('\n', "\\n")
 }
 
-/// Whether a character is a line end, a tab, or neither a control character nor one that changes the direction of
-/// follows (Unicode Standard Annex 9).
+/// Whether a character needs no escape: a line end, a tab, or neither a control character nor one that changes the
+/// direction of the text (Unicode Standard Annex 9).
 fn is_harmless(c: char) -> bool {
     ['\n', '\t'].contains(&c)
         || !c.is_control() && !matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -207,26 +208,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_with_something_in_it_is_left_alone() {
+    fn a_folder_that_is_not_empty_is_not_used() {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("deep/run");
-        let made = |force| folder(&wanted, force).map(|folder| folder.path.clone()).map_err(|error| error.to_string());
-        assert_eq!(made(false).unwrap(), wanted);
-        assert_eq!(made(false).unwrap(), wanted, "an empty one is as good as none");
+        let created =
+            |force| folder(&wanted, force).map(|folder| folder.path.clone()).map_err(|error| error.to_string());
+        assert_eq!(created(false).unwrap(), wanted);
+        assert_eq!(created(false).unwrap(), wanted, "an empty folder is used");
         std::fs::write(wanted.join("x"), "").unwrap();
-        assert_eq!(made(false).unwrap(), here.path().join("deep/run-2"));
-        assert_eq!(made(true).unwrap(), wanted);
+        assert_eq!(created(false).unwrap(), here.path().join("deep/run-2"));
+        assert_eq!(created(true).unwrap(), wanted);
     }
 
     #[cfg(unix)]
     #[test]
-    fn a_folder_in_use_is_not_shared() {
+    fn a_folder_in_use_is_not_used() {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("run");
         let first = folder(&wanted, false).unwrap();
         let second = folder(&wanted, false).unwrap();
         assert_eq!((&*first, &*second), (wanted.as_path(), here.path().join("run-2").as_path()));
-        for error in [folder(&wanted, true).err(), continued(&wanted).err()] {
+        for error in [folder(&wanted, true).err(), folder_to_resume(&wanted).err()] {
             assert!(error.unwrap().to_string().contains("in use by another zsim"));
         }
         drop(first);
@@ -235,18 +237,18 @@ mod tests {
     }
 
     #[test]
-    fn an_input_is_not_replaced_under_any_of_its_names() {
+    fn an_input_is_not_replaced_under_another_name() {
         let here = tempfile::tempdir().unwrap();
         let input = here.path().join("a.tum");
         std::fs::write(&input, "").unwrap();
         let other_name = here.path().join(".").join("a.tum");
-        assert!(spare_inputs(std::slice::from_ref(&input), &[here.path().join("b.tum"), other_name]).is_err());
-        assert!(spare_inputs(std::slice::from_ref(&input), &[here.path().join("b.tum")]).is_ok());
-        assert!(spare_inputs(&[here.path().to_owned()], &[input]).is_err(), "a recording that is a folder");
+        assert!(check_not_inputs(std::slice::from_ref(&input), &[here.path().join("b.tum"), other_name]).is_err());
+        assert!(check_not_inputs(std::slice::from_ref(&input), &[here.path().join("b.tum")]).is_ok());
+        assert!(check_not_inputs(&[here.path().to_owned()], &[input]).is_err(), "a recording that is a folder");
     }
 
     #[test]
-    fn control_characters_are_escaped_and_text_is_not() {
+    fn only_control_characters_are_escaped() {
         assert_eq!(printable("\u{1b}]0;x\u{7}\n\u{9b}2J\u{202e}"), "\\u{1b}]0;x\\u{7}\n\\u{9b}2J\\u{202e}");
         assert_eq!(printable("0.5\u{b0} \u{4e16}"), "0.5\u{b0} \u{4e16}");
         let json = escaped("\u{9b}\u{202e}", in_json);
@@ -255,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_there_gets_a_numbered_sibling() {
+    fn an_existing_file_is_not_replaced_but_numbered() {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("a.b.mcap");
         assert_eq!(file(&wanted, false).unwrap(), wanted);

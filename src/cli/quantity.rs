@@ -1,9 +1,9 @@
-//! Numbers with units, as people type them.
+//! Parses durations with units.
 
-/// Longest duration that the command line accepts, s: 30 years. Commands have lower limits.
-const MOST_S: f64 = 1e9;
+/// Maximum duration on the command line, s (30 years); most commands have lower limits.
+const MAX_S: f64 = 1e9;
 
-/// Seconds from `120s`, `2min`, `1.5h`, `250ms` or `90`.
+/// Parses a duration such as `120s`, `2min`, `1.5h`, `250ms` or `90`; returns seconds.
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let unit_at = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
@@ -11,19 +11,19 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let number: f64 = number
         .trim()
         .parse()
-        .map_err(|_| format!("`{text}` is no length of time; write a number and a unit, as in 120s or 2min"))?;
+        .map_err(|_| format!("`{text}` is not a duration: write a number and a unit, as in 120s or 2min"))?;
     let factor = match unit {
         "" | "s" | "sec" => 1.0,
         "ms" => 1e-3,
         "min" | "m" => 60.0,
         "h" => 3600.0,
-        _ => return Err(format!("`{unit}` is no unit of time; use ms, s, min or h, as in 120s or 2min")),
+        _ => return Err(format!("`{unit}` is not a unit of time: use ms, s, min or h, as in 120s or 2min")),
     };
     let seconds = number * factor;
-    if seconds > 0.0 && seconds <= MOST_S {
+    if seconds > 0.0 && seconds <= MAX_S {
         Ok(seconds)
     } else {
-        Err(format!("a length of time is above zero, and {MOST_S:e} s at most"))
+        Err(format!("the duration must be above 0 s and at most {MAX_S:e} s"))
     }
 }
 
@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_length_of_time_is_a_number_and_a_unit() {
+    fn a_duration_is_a_number_and_a_unit() {
         for (text, expected) in [("120s", 120.0), ("2min", 120.0), ("90", 90.0), ("1.5 h", 5400.0), ("250ms", 0.25)] {
             assert_eq!(seconds(text), Ok(expected), "{text}");
         }

@@ -1,7 +1,7 @@
 //! The two files of a simulated recording, reserved before anything is computed.
 
 use super::failure::Usage;
-use super::output::{candidates, create_parent, spare_inputs};
+use super::output::{candidates, check_not_inputs, create_parent};
 use anyhow::{Context, bail, ensure};
 use std::fs::OpenOptions;
 use std::io::ErrorKind;
@@ -42,7 +42,7 @@ impl RecordingFiles {
         for path in &outputs {
             ensure!(!path.is_dir(), "{} is a folder; a file's name is needed", path.display());
         }
-        spare_inputs(inputs, &outputs)?;
+        check_not_inputs(inputs, &outputs)?;
         let ending = wanted.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
         Self::first_free(&wanted.with_extension(format!("partial{ending}")), Some(wanted))
     }

@@ -3,13 +3,13 @@
 use super::arguments::Global;
 use super::bars::WorkBar;
 use super::failure::Usage;
-use super::{End, output};
+use super::{Completion, output};
 use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim::report;
-use zsim::study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_table};
+use zsim::study::reproduction::{Experiment, ExperimentResult, Extent, TABLE_HEADING, paper_table};
 
 /// Repeat the paper's experiments: compare the published results with zsim's
 ///
@@ -32,7 +32,7 @@ pub(super) struct Arguments {
     force: bool,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let all = Experiment::all();
     let names = if arguments.names.is_empty() { &all } else { &arguments.names };
     // Check all names before the first experiment runs for hours.
@@ -40,14 +40,14 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let (extent, stem) = if arguments.quick { (Extent::Quick, "paper-quick") } else { (Extent::Whole, "paper") };
     let folder = arguments.out.join(stem);
     check_table(&folder.with_extension("md"), arguments.force)?;
-    let folder = output::continued(&folder)?;
+    let folder = output::folder_to_resume(&folder)?;
     let mut found = Vec::new();
     table(arguments, extent, &folder, &found)?;
     for experiment in &wanted {
         let bar = WorkBar::new(global, "reproducing");
-        bar.say(experiment.name.clone());
-        let finding =
-            experiment.run(&folder.join(&experiment.name), extent, arguments.force, &|share| bar.show(share))?;
+        bar.set_task(experiment.name.clone());
+        let finding = experiment
+            .run(&folder.join(&experiment.name), extent, arguments.force, &|fraction| bar.set_fraction(fraction))?;
         found.push((experiment.given.clone(), finding));
         table(arguments, extent, &folder, &found)?;
     }
@@ -59,8 +59,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     let words = report::table(&["figure", "the paper", "ours"], &rows, false);
     let figures =
         found.iter().map(|(name, finding)| json!({ "name": name, "rows": finding.rows, "notes": finding.notes }));
-    output::tell(global, &words, json!({ "experiments": figures.collect::<Vec<_>>() }), Some(&folder))?;
-    Ok(End::Done)
+    output::print_result(global, &words, json!({ "experiments": figures.collect::<Vec<_>>() }), Some(&folder))?;
+    Ok(Completion::Done)
 }
 
 /// Refuses to replace a table that `zsim reproduce` did not write.
@@ -77,8 +77,13 @@ fn check_table(path: &Path, force: bool) -> anyhow::Result<()> {
 }
 
 /// Writes the table of the findings of this and earlier runs.
-fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[(String, Finding)]) -> anyhow::Result<()> {
-    let mut findings: Vec<(String, Option<Finding>)> = Vec::new();
+fn table(
+    arguments: &Arguments,
+    extent: Extent,
+    folder: &Path,
+    found: &[(String, ExperimentResult)],
+) -> anyhow::Result<()> {
+    let mut findings: Vec<(String, Option<ExperimentResult>)> = Vec::new();
     for name in Experiment::all() {
         let earlier = || Experiment::load(&name)?.finished(&folder.join(&name), extent);
         let finding = match found.iter().find(|(other, _)| *other == name) {

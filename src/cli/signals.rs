@@ -1,4 +1,4 @@
-//! Ctrl-C and termination: the first signal asks for a clean stop, a second one ends the program at once.
+//! SIGINT and SIGTERM: the first signal requests a clean stop, the second one ends the process immediately.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
@@ -8,7 +8,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// The number of the first signal; 0 before it.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
 
-/// A shell adds this to a signal's number for the exit code of the process that the signal ended.
+/// Exit code of a process that a signal ended, minus the number of the signal, as shells report it.
 const BY_SIGNAL: i32 = 128;
 /// SIGINT, the signal of Ctrl-C.
 const INTERRUPT: i32 = 2;

@@ -1,6 +1,6 @@
 //! `zsim simulate`: a recording.
 
-use super::End;
+use super::Completion;
 use super::arguments::{Global, ScenarioArguments};
 use super::bars::{Bars, stop_flag};
 use super::recording_files::RecordingFiles;
@@ -32,20 +32,20 @@ pub(super) struct Arguments {
     truth_tf: bool,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let simulation = Simulation::prepare(&arguments.scenario.scenario(&arguments.scene))?;
     let default = || PathBuf::from(format!("{}.mcap", simulation.world().name()));
     let inputs = arguments.scenario.inputs(&arguments.scene);
     let wanted = arguments.out.clone().unwrap_or_else(default);
     let mut bars = Bars::new(global);
-    recording_size::check(&simulation, &wanted, |note| bars.remark(note))?;
+    recording_size::check(&simulation, &wanted, |note| bars.note(note))?;
     let files = RecordingFiles::reserve(&wanted, arguments.force, &inputs)?;
 
-    simulation.world().notes().iter().for_each(|note| bars.remark(note));
-    let mut watch = Watch { stop: stop_flag(), report: &mut |news| bars.tell(news) };
+    simulation.world().notes().iter().for_each(|note| bars.note(note));
+    let mut watch = Watch { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let recorded = study::record(&simulation, files.recording(), files.truth(), arguments.truth_tf, &mut watch);
     bars.finish();
-    let summary = recorded.inspect_err(|_| super::journey::left_behind(files.recording()))?;
+    let summary = recorded.inspect_err(|_| super::journey::print_partial_results(files.recording()))?;
     let (recording, truth) = files.finish()?;
 
     let mut figures = serde_json::to_value(summary)?;
@@ -54,19 +54,19 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
         object.insert("seed".to_owned(), json!(simulation.scenario().seed));
         object.insert("truth".to_owned(), json!(truth.display().to_string()));
     }
-    output::tell(global, &words(&summary), figures, Some(&recording))?;
-    Ok(End::Done)
+    output::print_result(global, &text(&summary), figures, Some(&recording))?;
+    Ok(Completion::Done)
 }
 
-fn words(summary: &SimulationSummary) -> String {
+fn text(summary: &SimulationSummary) -> String {
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let rows = [
-        row("simulated", format!("{} s", summary.duration_s)),
-        row("took", format!("{:.2} s ({:.0} x real time)", summary.wall_s, summary.duration_s / summary.wall_s)),
+        row("duration", format!("{} s", summary.duration_s)),
+        row("wall time", format!("{:.2} s ({:.0} x real time)", summary.wall_s, summary.duration_s / summary.wall_s)),
         row("scans", summary.scans.to_string()),
         row("beams", summary.beams.to_string()),
-        row("echoes", summary.returns.to_string()),
-        row("IMU samples", format!("{} ({} at its limit)", summary.imu_samples, summary.imu_samples_at_limit)),
+        row("returns", summary.returns.to_string()),
+        row("IMU samples", format!("{} ({} saturated)", summary.imu_samples, summary.imu_samples_at_limit)),
     ];
     report::table(&[], &rows, true)
 }

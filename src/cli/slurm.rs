@@ -2,7 +2,7 @@
 
 use super::arguments::Global;
 use super::failure::Usage;
-use super::{End, output};
+use super::{Completion, output};
 use anyhow::{Context, bail};
 use clap::Args;
 use serde_json::json;
@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use zsim::study::sweep::{Share, Sweep};
 
-/// Runs that an array's element has at least: a scheduler takes about a second for each.
-const RUNS_IN_AN_ELEMENT: u64 = 20;
-/// Most elements: Slurm's own default is 1001.
-const MOST_ELEMENTS: u64 = 1000;
-/// Longest name of a job, characters.
-const LONGEST_NAME: usize = 64;
+/// Default number of runs per array element; a scheduler needs about 1 s for each element.
+const RUNS_PER_ELEMENT: u64 = 20;
+/// Maximum default number of elements; the default limit of Slurm is 1001.
+const MAX_ELEMENTS: u64 = 1000;
+/// Maximum length of a job name, characters.
+const MAX_NAME_LENGTH: usize = 64;
 /// Memory above the limit of a run, MiB: for the process that supervises the runs.
-const MEMORY_BESIDE_MIB: u64 = 256;
+const SUPERVISOR_MEMORY_MIB: u64 = 256;
 
 /// Submit a sweep to a scheduler as a job array; each element does a part of the runs
 ///
@@ -43,19 +43,19 @@ pub(super) struct Arguments {
     dry_run: bool,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let folder = arguments.folder.canonicalize();
     let folder = folder.with_context(|| format!("{} cannot be found", arguments.folder.display()))?;
     let log = log_option(&folder)?;
     let sweep = Sweep::open(&folder)?;
     let status = sweep.status(Share::WHOLE)?;
     if status.missing == 0 {
-        output::tell(global, "nothing is missing", json!({ "job": null, "elements": 0 }), Some(&folder))?;
-        return Ok(End::Done);
+        output::print_result(global, "all runs are complete", json!({ "job": null, "elements": 0 }), Some(&folder))?;
+        return Ok(Completion::Done);
     }
-    let wanted = arguments.elements.unwrap_or_else(|| status.missing.div_ceil(RUNS_IN_AN_ELEMENT).min(MOST_ELEMENTS));
+    let wanted = arguments.elements.unwrap_or_else(|| status.missing.div_ceil(RUNS_PER_ELEMENT).min(MAX_ELEMENTS));
     if wanted == 0 {
-        return Err(Usage("--elements 0: an array has at least one".to_owned()).into());
+        return Err(Usage("--elements 0: must be at least 1".to_owned()).into());
     }
     let elements = wanted.min(sweep.tasks() as u64).max(1);
     let logs = folder.join("slurm");
@@ -65,20 +65,20 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End>
     std::fs::write(&script, text((&sweep, &log), &folder, elements, threads)?)
         .with_context(|| format!("{} cannot be written", script.display()))?;
     if arguments.dry_run {
-        output::tell(global, "", json!({ "job": null, "elements": elements }), Some(&script))?;
-        return Ok(End::Done);
+        output::print_result(global, "", json!({ "job": null, "elements": elements }), Some(&script))?;
+        return Ok(Completion::Done);
     }
-    let job = submitted(&script, &arguments.sbatch)?;
+    let job = submit_script(&script, &arguments.sbatch)?;
     let words = format!("job {job}: {elements} elements for {} runs; then: zsim sweep merge", status.missing);
-    output::tell(global, &words, json!({ "job": job, "elements": elements }), Some(&folder))?;
-    Ok(End::Done)
+    output::print_result(global, &words, json!({ "job": job, "elements": elements }), Some(&folder))?;
+    Ok(Completion::Done)
 }
 
-/// The array's script.
+/// The script of the job array.
 fn text((sweep, log): (&Sweep, &str), folder: &Path, elements: u64, threads: usize) -> anyhow::Result<String> {
     let program = std::env::current_exe().context("this program's own path is not known")?;
     let memory_mib =
-        sweep.limit().map_or(MEMORY_BESIDE_MIB, |limit| limit.memory_mib * threads as u64) + MEMORY_BESIDE_MIB;
+        sweep.limit().map_or(SUPERVISOR_MEMORY_MIB, |limit| limit.memory_mib * threads as u64) + SUPERVISOR_MEMORY_MIB;
     let mut text = "#!/bin/sh\n".to_owned();
     for option in [
         format!("--job-name=zsim-{}", job_name(sweep.plan().name())),
@@ -87,7 +87,7 @@ fn text((sweep, log): (&Sweep, &str), folder: &Path, elements: u64, threads: usi
         format!("--mem={memory_mib}M"),
         log.to_owned(),
     ] {
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "#SBATCH {option}");
     }
     let (program, folder) = (quoted(&program)?, quoted(folder)?);
@@ -98,38 +98,38 @@ fn text((sweep, log): (&Sweep, &str), folder: &Path, elements: u64, threads: usi
     Ok(text)
 }
 
-/// A job's name for a sweep's: letters, digits, `.`, `_` and `-`; others, which sbatch or a shell could read as more
-/// than a name, become `_`.
+/// The job name of a sweep: letters, digits, `.`, `_` and `-`. Other characters are replaced by `_`, because sbatch or a
+/// shell could interpret them.
 fn job_name(name: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || ['.', '_', '-'].contains(&c);
-    name.chars().take(LONGEST_NAME).map(|c| if is_plain(c) { c } else { '_' }).collect()
+    name.chars().take(MAX_NAME_LENGTH).map(|c| if is_plain(c) { c } else { '_' }).collect()
 }
 
-/// The option that names the elements' logs, `folder/slurm/<job>_<element>.log`.
+/// The option with the log files of the elements, `folder/slurm/<job>_<element>.log`.
 ///
 /// # Errors
-/// When the folder's path has a character that a line of sbatch's options cannot hold as it is: sbatch has quoting
-/// rules of its own, and interprets `%` and `\` in this option.
+/// When the path has a character with a special meaning: sbatch has particular quoting rules, and interprets `%` and `\`
+/// in this option.
 fn log_option(folder: &Path) -> anyhow::Result<String> {
     let is_plain = |c: char| c.is_alphanumeric() || " ./_-+=:,@~".contains(c);
     let path = folder.to_str().filter(|path| path.chars().all(is_plain)).ok_or_else(|| {
         let message = format!(
-            "{folder:?}: a job's script can hold a path of letters, digits, spaces and ./_-+=:,@~ only: move the folder \
-             to such a path"
+            "{folder:?}: the path in a job script can only have letters, digits, spaces and ./_-+=:,@~: move the folder to such \
+             a path"
         );
         Usage(message)
     })?;
     Ok(format!("--output='{path}/slurm/%A_%a.log'"))
 }
 
-/// A path as a shell reads it.
+/// A path quoted for the shell.
 fn quoted(path: &Path) -> anyhow::Result<String> {
     let text = path.to_str().with_context(|| format!("{} is not UTF-8", path.display()))?;
     Ok(format!("'{}'", text.replace('\'', "'\\''")))
 }
 
-/// Hands the script to sbatch; returns the job number.
-fn submitted(script: &Path, options: &str) -> anyhow::Result<u64> {
+/// Submits the script with sbatch and returns the job number.
+fn submit_script(script: &Path, options: &str) -> anyhow::Result<u64> {
     let mut sbatch = Command::new("sbatch");
     sbatch.arg("--parsable").args(options.split_whitespace()).arg(script);
     let output = sbatch.output().context("sbatch cannot be run: is Slurm installed here?")?;
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_paths_add_nothing_to_the_script() {
+    fn names_and_paths_cannot_inject_commands() {
         assert_eq!(job_name("spring_sweep-2.b"), "spring_sweep-2.b");
         assert_eq!(job_name("a --uid=0\n#SBATCH -x\ntouch b"), "a_--uid_0__SBATCH_-x_touch_b");
         assert_eq!(log_option(Path::new("/data/my sweep")).unwrap(), "--output='/data/my sweep/slurm/%A_%a.log'");

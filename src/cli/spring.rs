@@ -2,7 +2,7 @@
 
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
-use super::{End, output, spring_words};
+use super::{Completion, output, spring_text};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use zsim::elasticity::SpringSpec;
 use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::coverage::{CoveragePlan, coverage_figure};
-use zsim::study::spring::design::{DesignSpec, Search, csv, pareto_figure};
+use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure};
 use zsim::study::spring::{Shake, mode_figure, spring_report};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
@@ -25,7 +25,7 @@ use zsim::study::spring::{Shake, mode_figure, spring_report};
 )]
 pub(super) struct Arguments {
     #[command(subcommand)]
-    search: Option<Verb>,
+    search: Option<Command>,
     /// A head or a spring: a name under specs/heads/ or specs/springs/, or a file
     #[arg(value_name = "FILE", required = true)]
     file: Option<String>,
@@ -50,7 +50,7 @@ pub(super) struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum Verb {
+enum Command {
     Design(Design),
 }
 
@@ -65,15 +65,15 @@ struct Design {
     out: OutArguments,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     match (&arguments.search, &arguments.file) {
-        (Some(Verb::Design(design)), _) => search(design, global),
-        (None, Some(file)) => tell(file, arguments, global),
+        (Some(Command::Design(design)), _) => search(design, global),
+        (None, Some(file)) => print_report(file, arguments, global),
         (None, None) => Err(super::failure::Usage("name a head or a spring".to_owned()).into()),
     }
 }
 
-fn tell(file: &str, arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let (spec, source) = head_of(file, &arguments.head)?;
     let lidar_source = find(Kind::Lidar, &arguments.lidar)?;
     let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
@@ -104,8 +104,8 @@ fn tell(file: &str, arguments: &Arguments, global: &Global) -> anyhow::Result<En
             Some(folder)
         }
     };
-    output::tell(global, &spring_words::report(&report), serde_json::to_value(&report)?, folder.as_deref())?;
-    Ok(End::Done)
+    output::print_result(global, &spring_text::report(&report), serde_json::to_value(&report)?, folder.as_deref())?;
+    Ok(Completion::Done)
 }
 
 /// The head in `file`, or `head` on the spring in it.
@@ -131,11 +131,11 @@ fn head_of(file: &str, head: &str) -> anyhow::Result<(HeadSpec, Source)> {
     }
 }
 
-fn search(design: &Design, global: &Global) -> anyhow::Result<End> {
+fn search(design: &Design, global: &Global) -> anyhow::Result<Completion> {
     let source = find(Kind::Study, &design.file)?;
     let spec: DesignSpec = parse(&source)?;
     let bar = WorkBar::new(global, "searching");
-    let study = Search::new(&spec, &source)?.run(&|share| bar.show(share))?;
+    let study = DesignSearch::new(&spec, &source)?.run(&|fraction| bar.set_fraction(fraction))?;
     drop(bar);
     let stem = Path::new(&design.file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{stem}")));
@@ -143,8 +143,8 @@ fn search(design: &Design, global: &Global) -> anyhow::Result<End> {
     write(&folder.join("pareto.csv"), &csv(&study))?;
     write(&folder.join("design.ron"), &source.text)?;
     pareto_figure(&study).save(&folder, "pareto")?;
-    output::tell(global, &spring_words::design(&study), serde_json::to_value(&study)?, Some(&folder))?;
-    Ok(if study.candidates.is_empty() { End::WithLoss } else { End::Done })
+    output::print_result(global, &spring_text::design(&study), serde_json::to_value(&study)?, Some(&folder))?;
+    Ok(if study.candidates.is_empty() { Completion::WithLoss } else { Completion::Done })
 }
 
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {

@@ -1,7 +1,7 @@
 //! `zsim study`: a sweep from its spec to its tables.
 
 use super::arguments::Global;
-use super::{End, sweep};
+use super::{Completion, sweep};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use zsim::study::sweep::Share;
@@ -24,10 +24,10 @@ pub(super) struct Arguments {
     force: bool,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let plan = sweep::plan_of(&arguments.file)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(plan.name()));
     let planned = plan.write(&folder, arguments.force)?;
-    sweep::run_sweep(&planned, Share::WHOLE, global).inspect_err(|_| super::journey::left_behind(&folder))?;
+    sweep::run_sweep(&planned, Share::WHOLE, global).inspect_err(|_| super::journey::print_partial_results(&folder))?;
     sweep::merge(&planned, &folder, global)
 }

@@ -3,15 +3,15 @@
 use super::arguments::Global;
 use super::bars::{WorkBar, stop_flag};
 use super::failure::Usage;
-use super::sweep_words::{plan_words, status_words};
-use super::{End, output, slurm};
+use super::sweep_text::{plan_text, status_text};
+use super::{Completion, output, slurm};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use zsim::spec::{Kind, find, parse};
-use zsim::study::sweep::{Plan, Runner, Share, Status, Sweep, confine};
+use zsim::study::sweep::{Plan, Runner, Share, Sweep, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///
@@ -24,11 +24,11 @@ use zsim::study::sweep::{Plan, Runner, Share, Status, Sweep, confine};
 )]
 pub(super) struct Arguments {
     #[command(subcommand)]
-    verb: Verb,
+    command: Command,
 }
 
 #[derive(Subcommand)]
-enum Verb {
+enum Command {
     Plan(PlanArguments),
     Run(RunArguments),
     Status(FolderArguments),
@@ -90,14 +90,16 @@ struct TaskArguments {
     task: usize,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
-    match &arguments.verb {
-        Verb::Plan(plan) => plan_in(plan, global),
-        Verb::Run(run) => run_share(run, global),
-        Verb::Status(folder) => tell(global, &Sweep::open(&folder.folder)?.status(Share::WHOLE)?, &folder.folder),
-        Verb::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
-        Verb::Submit(submit) => slurm::run(submit, global),
-        Verb::Task(task) => run_task(task),
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
+    match &arguments.command {
+        Command::Plan(plan) => plan_in(plan, global),
+        Command::Run(run) => run_share(run, global),
+        Command::Status(folder) => {
+            print_status(global, &Sweep::open(&folder.folder)?.status(Share::WHOLE)?, &folder.folder)
+        }
+        Command::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
+        Command::Submit(submit) => slurm::run(submit, global),
+        Command::Task(task) => run_task(task),
     }
 }
 
@@ -108,28 +110,28 @@ pub(super) fn plan_of(name: &str) -> anyhow::Result<Plan> {
     Ok(Plan::new(&stem, &parse(&source)?, &source)?)
 }
 
-fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<End> {
+fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Completion> {
     let plan = plan_of(&arguments.spec)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(plan.name()));
     let sweep = plan.write(&folder, arguments.force)?;
     let figures = json!({ "points": plan.points(), "tasks": sweep.tasks() });
-    output::tell(global, &plan_words(&sweep), figures, Some(&folder))?;
-    Ok(End::Done)
+    output::print_result(global, &plan_text(&sweep), figures, Some(&folder))?;
+    Ok(Completion::Done)
 }
 
-fn run_share(arguments: &RunArguments, global: &Global) -> anyhow::Result<End> {
+fn run_share(arguments: &RunArguments, global: &Global) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
     let share = share(arguments)?;
     run_sweep(&sweep, share, global)?;
-    tell(global, &sweep.status(share)?, &arguments.folder)
+    print_status(global, &sweep.status(share)?, &arguments.folder)
 }
 
-/// Does the missing runs of a part, with a progress bar.
+/// Runs the missing runs of a part, with a progress bar.
 pub(super) fn run_sweep(sweep: &Sweep, share: Share, global: &Global) -> anyhow::Result<()> {
     let program = std::env::current_exe().context("this program's own path is not known")?;
     let bar = WorkBar::new(global, "sweeping");
-    let hear = |share: f64| bar.show(share);
-    sweep.run(share, &Runner { program: &program, stop: stop_flag(), on_progress: &hear })?;
+    let on_progress = |fraction: f64| bar.set_fraction(fraction);
+    sweep.run(share, &Runner { program: &program, stop: stop_flag(), on_progress: &on_progress })?;
     Ok(())
 }
 
@@ -153,28 +155,28 @@ fn share(arguments: &RunArguments) -> anyhow::Result<Share> {
     }
 }
 
-fn run_task(arguments: &TaskArguments) -> anyhow::Result<End> {
+fn run_task(arguments: &TaskArguments) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
-    confine(sweep.limit())?;
+    limit_process(sweep.limit())?;
     sweep.run_task(arguments.task, &|word| {
         // The supervisor has ended: end this process too.
         if writeln!(std::io::stdout().lock(), "{word}").is_err() {
             std::process::exit(1);
         }
     })?;
-    Ok(End::Done)
+    Ok(Completion::Done)
 }
 
 /// Merges the finished runs and prints a summary.
-pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<End> {
-    let merged = sweep.tell()?;
-    let words = format!("{}\n{}", merged.words, status_words(&merged.status));
+pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<Completion> {
+    let merged = sweep.merge_and_report()?;
+    let words = format!("{}\n{}", merged.text, status_text(&merged.status));
     let figures = json!({ "status": merged.status, "summary": merged.summary });
-    output::tell(global, &words, figures, Some(folder))?;
-    Ok(if merged.status.missing == 0 { End::Done } else { End::WithLoss })
+    output::print_result(global, &words, figures, Some(folder))?;
+    Ok(if merged.status.missing == 0 { Completion::Done } else { Completion::WithLoss })
 }
 
-fn tell(global: &Global, status: &Status, folder: &Path) -> anyhow::Result<End> {
-    output::tell(global, &status_words(status), serde_json::to_value(status)?, Some(folder))?;
-    Ok(End::Done)
+fn print_status(global: &Global, status: &SweepStatus, folder: &Path) -> anyhow::Result<Completion> {
+    output::print_result(global, &status_text(status), serde_json::to_value(status)?, Some(folder))?;
+    Ok(Completion::Done)
 }

@@ -1,49 +1,50 @@
-//! The head's mass.
+//! Mass properties of the head.
 
 use super::spec::{HeadSpec, PartSpec};
 use crate::elasticity::{Matrix6, Vector6, blocks, split};
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::spec::{Source, SpecError};
 
-/// Mass properties of the head.
+/// Mass, centre of mass and inertia of the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Body {
     /// Mass, kg.
     pub mass_kg: f64,
-    /// Centre of mass, m.
+    /// Centre of mass in the head frame, m.
     pub centre_of_mass_in_head: Vector,
-    /// Inertia about the centre of mass, in the head's axes, kg m^2.
+    /// Inertia tensor about the centre of mass, in the axes of the head, kg m^2.
     pub inertia_in_head: Matrix,
 }
 
 impl Body {
-    /// The head's parts as one rigid body.
+    /// Combines the parts of a head into one rigid body.
     ///
     /// # Errors
-    /// When there is no part, or a part's inertia is no rigid body's.
+    /// When there is no part, or the inertia of a part is physically impossible.
     pub(super) fn of(spec: &HeadSpec, source: &Source) -> Result<Self, SpecError> {
         let bodies = spec.parts.iter().map(|part| body_of(part, source)).collect::<Result<Vec<_>, _>>()?;
         if bodies.is_empty() {
-            return Err(SpecError::about(source, "parts", "a head has at least one part"));
+            return Err(SpecError::about(source, "parts", "the head has no parts: give at least one"));
         }
         let mass_kg = bodies.iter().map(|b| b.mass_kg).sum::<f64>();
         let centre = bodies.iter().map(|b| b.centre_of_mass_in_head * b.mass_kg).sum::<Vector>() / mass_kg;
         let inertia = bodies.iter().map(|b| {
-            // Steiner: I + m (r^2 1 - r r^T).
+            // Parallel-axis theorem (Steiner): I + m (r^2 1 - r r^T).
             let r = b.centre_of_mass_in_head - centre;
             b.inertia_in_head + (Matrix::identity() * r.norm_squared() - r * r.transpose()) * b.mass_kg
         });
         Ok(Self { mass_kg, centre_of_mass_in_head: centre, inertia_in_head: inertia.sum() })
     }
 
-    /// The mass matrix of (velocity of the centre of mass, angular velocity), in axes to which `rotation` turns the
-    /// head's.
+    /// The mass matrix for the twist (velocity of the centre of mass, angular velocity).
+    ///
+    /// `rotation` takes the axes of the head to those in which the twist is expressed.
     pub(super) fn mass_matrix(&self, rotation: &Matrix) -> Matrix6 {
         let inertia = rotation * self.inertia_in_head * rotation.transpose();
         blocks(&(Matrix::identity() * self.mass_kg), &Matrix::zeros(), &Matrix::zeros(), &inertia)
     }
 
-    /// A head's pose after a displacement of its centre of mass and a turn about it.
+    /// The pose of the head after a displacement of the centre of mass and a rotation about it.
     pub(super) fn displaced(&self, pose: &Pose, displacement: &Vector6) -> Pose {
         let (shift, turn) = split(displacement);
         let turn = Rotation::from_scaled_axis(turn);
@@ -67,12 +68,12 @@ fn body_of(part: &PartSpec, source: &Source) -> Result<Body, SpecError> {
         PartSpec::Body { name, mass_kg, centre_of_mass_m, inertia_kg_m2: i } => {
             let inertia = Matrix::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
             let principal = inertia.symmetric_eigenvalues();
-            // Of every rigid body each principal moment is positive, and at most the sum of the other two.
+            // Each principal moment of a rigid body is positive and at most the sum of the other two.
             if principal.min() <= 0.0 || 2.0 * principal.max() > principal.sum() * (1.0 + 1e-9) {
                 let [a, b, c] = [principal.x, principal.y, principal.z];
                 let message = format!(
-                    "no rigid body has the inertia of \"{name}\": its principal moments are {a:.3e}, {b:.3e} and {c:.3e} \
-                     kg m^2; each must be positive and at most the sum of the other two"
+                    "the inertia of \"{name}\" is physically impossible: the principal moments are {a:.3e}, {b:.3e} and \
+                     {c:.3e} kg m^2; each must be positive and at most the sum of the other two"
                 );
                 return Err(SpecError::about(source, "inertia_kg_m2", message));
             }

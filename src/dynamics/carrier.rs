@@ -1,4 +1,4 @@
-//! What carries the head, as the head's laser may see it.
+//! Parts of the carrier that the laser can hit: an operator, a handle, a cart.
 
 use super::spec::HeadSpec;
 use crate::geometry::Vector;
@@ -6,22 +6,22 @@ use crate::spec::checked::{FiniteArray, Fraction, Positive};
 use crate::spec::{Source, SpecError};
 use serde::{Deserialize, Serialize};
 
-/// A part of what carries the head: an upright cylinder, closed at both ends, fixed to the base.
+/// A part of the carrier: an upright cylinder, closed at both ends, fixed to the base.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct CarrierSpec {
-    /// What it is.
+    /// Name of the part, for messages.
     pub name: String,
-    /// Where its axis, along the base's z, ends below, in the base, m.
+    /// Lower end of the axis, which is parallel to the base's z, in the base frame, m.
     #[serde(with = "FiniteArray::<3>")]
     pub foot_in_base_m: [f64; 3],
-    /// Its radius, m.
+    /// Radius of the cylinder, m.
     #[serde(with = "Positive")]
     pub radius_m: f64,
-    /// Its height, m.
+    /// Height of the cylinder, m.
     #[serde(with = "Positive")]
     pub height_m: f64,
-    /// Share of the light that comes back diffusely at normal incidence, 0 to 1.
+    /// Diffuse reflectance at normal incidence, 0 to 1.
     #[serde(with = "Fraction")]
     pub reflectance: f64,
 }
@@ -33,12 +33,15 @@ impl CarrierSpec {
     }
 }
 
-/// Checks that a laser at `laser_in_base`, m, while the head rests, is in nothing that carries it.
+/// Checks that the laser is outside all parts of the carrier.
+///
+/// `laser_in_base` is the laser's position with the head in equilibrium, m.
 pub(super) fn check(spec: &HeadSpec, laser_in_base: &Vector, source: &Source) -> Result<(), SpecError> {
     let Some(around) = spec.carrier.iter().find(|part| part.encloses(laser_in_base)) else { return Ok(()) };
     let [x, y, z]: [f64; 3] = (*laser_in_base).into();
     let message = format!(
-        "the laser, at rest at ({x:.3}, {y:.3}, {z:.3}) m in the base, is inside the carrier's `{}`: move one of them",
+        "the laser, with the head in equilibrium at ({x:.3}, {y:.3}, {z:.3}) m in the base frame, is inside the carrier's \
+         `{}`: move one of them",
         around.name
     );
     Err(SpecError::about(source, &around.name, message))

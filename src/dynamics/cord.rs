@@ -1,27 +1,29 @@
-//! A rope or an elastic cable: it pulls, and never pushes.
+//! A rope or an elastic cable: it transmits tension only.
 
 use super::elements::{CableSpec, CordSpec, CordStiffnessSpec};
-use super::push::{Ends, Forces, Instant};
+use super::forces::{EndFrames, Forces, MotionState};
 use crate::elasticity::split;
 use crate::geometry::{Matrix, Pose, Vector};
 use nalgebra::Point3;
 
-/// Stretch over which a cord goes from slack to taut, in parts of its length: fibres that come to bear one by one.
-const TOE: f64 = 1e-4;
+/// Stretch range over which a cord changes from slack to taut, as a fraction of the length.
+///
+/// It smooths the stiffness, as in a real rope whose fibres become taut one after the other.
+const TRANSITION: f64 = 1e-4;
 
-/// A cord without mass.
+/// A massless cord between a point of the base and a point of the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cord {
     pub point_in_base: Vector,
     pub point_in_head: Vector,
-    /// Without tension.
+    /// Length without tension.
     length_m: f64,
     pub stiffness_n_per_m: f64,
     damping_n_s_per_m: f64,
 }
 
 impl Cord {
-    /// The cord of a spec.
+    /// Creates the cord that a spec describes.
     pub fn of(spec: &CordSpec) -> Self {
         Self {
             point_in_base: spec.base_point_m.into(),
@@ -35,8 +37,10 @@ impl Cord {
         }
     }
 
-    /// The cable through a spring; `None` for one that would have no length without its tension.
-    pub fn through(cable: &CableSpec, spring: &Ends) -> Option<Self> {
+    /// Creates the cable through a spring.
+    ///
+    /// `None` if the unstretched length would not be positive.
+    pub fn through(cable: &CableSpec, spring: &EndFrames) -> Option<Self> {
         let length_m = cable.length_m - cable.tension_n / cable.stiffness_n_per_m;
         (length_m > 0.0).then_some(Self {
             point_in_base: spring.base_from_foot.translation.vector,
@@ -47,30 +51,32 @@ impl Cord {
         })
     }
 
-    /// How far it is stretched, smoothly nought where it is slack: the stretch, its derivative, and its integral (m^2).
+    /// The stretch at a distance between the ends: value (m), derivative and integral (m^2).
     ///
-    /// Beyond the toe it is the plain stretch; within, a parabola that joins both branches with their slopes.
+    /// Zero where the cord is slack and equal to `distance - length` above the transition range. In the range it is a
+    /// parabola that joins both with continuous slope.
     fn stretch(&self, distance_m: f64) -> (f64, f64, f64) {
-        let (toe, stretch) = (TOE * self.length_m, distance_m - self.length_m);
-        let into = stretch + 0.5 * toe;
+        let (transition, stretch) = (TRANSITION * self.length_m, distance_m - self.length_m);
+        let into = stretch + 0.5 * transition;
         if into <= 0.0 {
             (0.0, 0.0, 0.0)
-        } else if into < toe {
-            (into * into / (2.0 * toe), into / toe, into.powi(3) / (6.0 * toe))
+        } else if into < transition {
+            (into * into / (2.0 * transition), into / transition, into.powi(3) / (6.0 * transition))
         } else {
-            // The integral over the toe, a sixth of its square, less what the plain branch would have had there.
-            (stretch, 1.0, 0.5 * stretch * stretch + toe * toe / 24.0)
+            // The integral over the transition range is toe^2 / 6; the linear branch has toe^2 / 8 there, hence toe^2 /
+            // 24.
+            (stretch, 1.0, 0.5 * stretch * stretch + transition * transition / 24.0)
         }
     }
 
-    /// Tension at rest with the head at a pose, N.
+    /// Static tension with the head at a pose, N.
     pub fn tension_n(&self, base_from_head: &Pose) -> f64 {
         let between = base_from_head * Point3::from(self.point_in_head) - Point3::from(self.point_in_base);
         self.stiffness_n_per_m * self.stretch(between.norm()).0
     }
 
-    /// Adds the cord's pull at an instant.
-    pub fn push(&self, now: &Instant<'_>, forces: &mut Forces) {
+    /// Adds the tension and damping of the cord.
+    pub fn add_forces(&self, now: &MotionState<'_>, forces: &mut Forces) {
         let lever = now.lever(&self.point_in_head);
         let tied = now.base.world_from_body * Point3::from(self.point_in_base);
         let between = now.centre() + lever - tied.coords;
@@ -84,7 +90,7 @@ impl Cord {
         let (velocity, turning) = split(&relative);
         let damping = self.damping_n_s_per_m * tautness;
         let tension_n = self.stiffness_n_per_m * stretch + damping * along.dot(&(velocity + turning.cross(&lever)));
-        // A damper that would push lets go.
+        // The damping force must not turn the tension into compression.
         if tension_n > 0.0 {
             forces.add_force(&lever, &(along * -tension_n));
             let c: Matrix = along * along.transpose() * damping;
@@ -92,7 +98,7 @@ impl Cord {
         }
     }
 
-    /// Energy in the stretched cord, J.
+    /// Elastic energy of the cord, J.
     pub fn potential_j(&self, base_from_head: &Pose) -> f64 {
         let between = base_from_head * Point3::from(self.point_in_head) - Point3::from(self.point_in_base);
         self.stiffness_n_per_m * self.stretch(between.norm()).2
@@ -105,7 +111,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn a_cord_pulls_by_its_stretch_and_smoothly_goes_slack() {
+    fn cord_tension_is_the_derivative_of_the_energy_and_zero_when_slack() {
         let cord = Cord {
             point_in_base: Vector::zeros(),
             point_in_head: Vector::zeros(),
@@ -116,7 +122,7 @@ mod tests {
         let at = |distance_m: f64| Pose::translation(0.0, 0.0, -distance_m);
         assert_relative_eq!(cord.tension_n(&at(0.51)), 20.0, max_relative = 1e-12);
         assert_eq!(cord.tension_n(&at(0.49)), 0.0);
-        // Tension is the slope of the energy on all three branches.
+        // The tension is the derivative of the energy on all three branches.
         for distance_m in [0.499, 0.4999, 0.5001, 0.50025, 0.502] {
             let h = 1e-7;
             let slope = (cord.potential_j(&at(distance_m + h)) - cord.potential_j(&at(distance_m - h))) / (2.0 * h);

@@ -1,150 +1,153 @@
-//! What a linkage is made of, as it is written.
+//! Spec types of the elements of a linkage.
 
 use super::spec::PlacementSpec;
 use crate::elasticity::SpringSpec;
 use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
-/// Something between base and head that gives, or leaves some motions free.
+/// An element between base and head.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 #[expect(clippy::large_enum_variant, reason = "there are a few a head")]
 pub enum ElementSpec {
-    /// A spring.
+    /// A helical spring, or one given by a stiffness matrix.
     Spring(SpringElementSpec),
     /// A rope or an elastic cable.
     Cord(CordSpec),
-    /// A float in a fluid that the base carries.
+    /// A float on the head, in a fluid that the base carries.
     Float(FloatSpec),
-    /// A universal joint with torsion springs: of one spring, what is left when its bending is all that counts.
+    /// A universal joint with torsion springs: the model of one spring with bending only.
     UniversalJoint(UniversalJointSpec),
 }
 
-/// A spring with its mounting points, one of several elements.
+/// A spring with mounting points, one of several elements.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpringElementSpec {
-    /// The spring.
+    /// The spring: a coil, a stiffness matrix, or the name of a spring spec.
     pub spring: SpringSpec,
-    /// Pieces the spring is cut into for large swings; 1 is fastest.
+    /// Number of segments that model large deflections, 1 to 64; 1 is fastest.
     pub segments: usize,
     /// Pose of the spring's foot in the base; z points along the spring.
     pub base_from_spring: PlacementSpec,
     /// Pose of the spring's top in the head.
     pub head_from_spring: PlacementSpec,
-    /// What becomes of the spring's own mass.
+    /// Whether the mass of the wire is modelled.
     #[serde(default)]
     pub spring_mass: SpringMassSpec,
-    /// A cable through the spring.
+    /// A cable through the spring, parallel to it.
     #[serde(default)]
     pub cable: Option<CableSpec>,
 }
 
-/// What becomes of a spring's own mass.
+/// Model of the mass of a spring's wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum SpringMassSpec {
-    /// It has none: the head alone moves.
+    /// The wire is massless.
     #[default]
     Neglected,
-    /// The wire's mass moves as the spring's top makes it, and half of its weight hangs on the top.
+    /// The wire moves with the deflection of the spring's top, and half of the wire's weight acts on the top.
     Included,
 }
 
-/// A cable through a spring, from the middle of its foot to that of its top: a spring and a damper beside the spring.
+/// A cable through a spring, from the centre of the foot to the centre of the top.
+///
+/// It is a spring and a damper in parallel with the spring, and transmits tension only.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct CableSpec {
-    /// Length at which it has its tension, m.
+    /// Length at which the cable has the tension `tension_n`, m.
     #[serde(with = "checked::Positive")]
     pub length_m: f64,
-    /// Tension at that length, N; at nought it hangs slack below it.
+    /// Tension at that length, N; with 0 the cable is slack below that length.
     #[serde(with = "checked::NonNegative")]
     pub tension_n: f64,
-    /// Stiffness, N/m.
+    /// Axial stiffness, N/m.
     #[serde(with = "checked::Positive")]
     pub stiffness_n_per_m: f64,
-    /// Damping while it is taut, N s/m.
+    /// Axial damping while the cable is taut, N s/m.
     #[serde(with = "checked::NonNegative")]
     pub damping_n_s_per_m: f64,
 }
 
-/// A rope or an elastic cable without mass: it pulls, and never pushes.
+/// A massless rope or elastic cable: it transmits tension only.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct CordSpec {
-    /// Where it is tied to the base, m.
+    /// Attachment point on the base, in the base frame, m.
     #[serde(with = "checked::FiniteArray::<3>")]
     pub base_point_m: [f64; 3],
-    /// Where it is tied to the head, m.
+    /// Attachment point on the head, in the head frame, m.
     #[serde(with = "checked::FiniteArray::<3>")]
     pub head_point_m: [f64; 3],
     /// Length without tension, m.
     #[serde(with = "checked::Positive")]
     pub length_m: f64,
-    /// How it stretches.
+    /// Axial stiffness of the cord, as N/m or as E A.
     pub stiffness: CordStiffnessSpec,
-    /// Damping along it while it is taut, N s/m.
+    /// Axial damping while the cord is taut, N s/m.
     #[serde(with = "checked::NonNegative")]
     pub damping_n_s_per_m: f64,
 }
 
-/// How a cord stretches.
+/// Axial stiffness of a cord.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum CordStiffnessSpec {
-    /// Tension for each metre, N/m.
+    /// Stiffness: tension per metre of stretch, N/m.
     NPerM(#[serde(with = "checked::Positive")] f64),
-    /// Young's modulus times cross-section, N; over the length without tension it is the stiffness.
+    /// Young's modulus times cross-section E A, N; the stiffness is E A over the length without tension.
     EaN(#[serde(with = "checked::Positive")] f64),
 }
 
-/// An upright cylinder fastened to the head that floats in a fluid; the vessel moves with the base.
+/// A cylinder on the head that floats in a fluid; the vessel moves with the base.
 ///
-/// The fluid's surface is level, across the apparent gravity in the vessel, and goes through one point of it: fluid
-/// that sloshes is not modelled. The cylinder's own mass is one of the head's parts.
+/// The fluid surface is a plane perpendicular to the apparent gravity in the vessel, through `base_surface_m`; sloshing
+/// is not modelled. The mass of the cylinder is one of the parts of the head.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct FloatSpec {
-    /// Middle of the fluid's surface in the base, m.
+    /// Centre of the fluid surface in the base frame, m.
     #[serde(with = "checked::FiniteArray::<3>")]
     pub base_surface_m: [f64; 3],
-    /// Middle of the cylinder's bottom in the head, m; its axis is the head's z.
+    /// Centre of the cylinder's bottom in the head frame, m; the axis is parallel to the head's z.
     #[serde(with = "checked::FiniteArray::<3>")]
     pub head_bottom_m: [f64; 3],
-    /// The cylinder's radius, m.
+    /// Radius of the cylinder, m.
     #[serde(with = "checked::Positive")]
     pub radius_m: f64,
-    /// The cylinder's height, m.
+    /// Height of the cylinder, m.
     #[serde(with = "checked::Positive")]
     pub height_m: f64,
-    /// The fluid's density, kg/m^3.
+    /// Density of the fluid, kg/m^3.
     #[serde(with = "checked::Positive")]
     pub density_kg_per_m3: f64,
-    /// Drag of the cylinder's middle through the fluid, N s/m.
+    /// Linear drag coefficient at the cylinder's centre, N s/m.
     #[serde(with = "checked::NonNegative")]
     pub drag_n_s_per_m: f64,
-    /// Drag that grows with the square of the speed, N s^2/m^2.
+    /// Quadratic drag coefficient at the cylinder's centre, N s^2/m^2.
     #[serde(with = "checked::NonNegative")]
     pub drag_n_s2_per_m2: f64,
-    /// Drag against turning, N m s/rad.
+    /// Linear rotational drag coefficient, N m s/rad.
     #[serde(with = "checked::NonNegative")]
     pub drag_nm_s_per_rad: f64,
-    /// Mass of the fluid that moves along with the cylinder, as if in its middle (added mass), kg.
+    /// Added mass: fluid that moves with the cylinder, acting at the cylinder's centre, kg.
     #[serde(with = "checked::NonNegative")]
     pub added_mass_kg: f64,
 }
 
-/// A universal joint: the head turns about an axis of the base and one of its own, which cross at right angles, and has
-/// no other motion.
+/// A universal joint: the head rotates about one axis of the base and one of the head.
+///
+/// The two axes intersect at a right angle. All other motions are constrained.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct UniversalJointSpec {
-    /// Pose of the joint in the base; x is the axis that stays with the base.
+    /// Pose of the joint in the base; x is the rotation axis fixed to the base.
     pub base_from_joint: PlacementSpec,
-    /// Pose of the joint in the head; y is the axis that stays with the head.
+    /// Pose of the joint in the head; y is the rotation axis fixed to the head.
     pub head_from_joint: PlacementSpec,
-    /// Torque for each radian about the base's axis and about the head's, N m/rad; none at nought.
+    /// Torsional stiffness about the base's axis and about the head's axis, N m/rad; 0 for a free axis.
     #[serde(with = "checked::NonNegativeArray::<2>")]
     pub stiffness_nm_per_rad: [f64; 2],
 }

@@ -1,4 +1,4 @@
-//! Rapier: one free body that is pushed. The one file that names the engine and its types.
+//! Time integration of one free body by rapier; the only file that uses rapier's types.
 
 use super::body::Body;
 use crate::elasticity::{Vector6, split, stack};
@@ -7,17 +7,18 @@ use rapier3d_f64::prelude::{MassProperties, PhysicsWorld, RigidBodyBuilder, Rigi
 
 /// A free rigid body in an empty world without gravity.
 ///
-/// A step takes the velocities on by the wrench over the mass, then the pose by the new velocities. With more than one
-/// solver iteration rapier would do so in as many parts with the same wrench, which adds energy to an oscillation. Its
-/// own gyroscopic term is explicit, hence off: it is a part of the wrench.
+/// A step updates the velocities with wrench over mass, then the pose with the new velocities (symplectic Euler). One
+/// solver iteration a step: with several, rapier repeats the update with the same wrench, which adds energy to an
+/// oscillation. The gyroscopic term of rapier is explicit and therefore disabled; it is part of the wrench.
 pub(super) struct Engine {
     world: PhysicsWorld,
     handle: RigidBodyHandle,
 }
 
 impl Engine {
-    /// The body at `world_from_head` with `twist`: the velocity of its centre of mass and its angular velocity, in the
-    /// world.
+    /// Creates the body at `world_from_head` with `twist`.
+    ///
+    /// The twist is the velocity of the centre of mass and the angular velocity, in the world.
     pub fn new(body: &Body, world_from_head: &Pose, twist: &Vector6, step_s: f64) -> Self {
         let mut world = PhysicsWorld::new();
         world.gravity = Default::default();
@@ -42,7 +43,7 @@ impl Engine {
         Self { world, handle }
     }
 
-    /// Pushes the body with a force and a torque about its centre of mass, in the world, for one step.
+    /// Advances one step under a force and a torque about the centre of mass, in the world.
     pub fn step(&mut self, wrench: &Vector6) {
         let (force, torque) = split(wrench);
         if let Some(body) = self.world.bodies.get_mut(self.handle) {
@@ -54,19 +55,23 @@ impl Engine {
         self.world.step();
     }
 
-    /// `world_from_head`.
+    /// The pose `world_from_head`.
     pub fn pose(&self) -> Pose {
         (*self.world.bodies[self.handle].position()).into()
     }
 
-    /// Velocity of the centre of mass and angular velocity, in the world, half a step before the pose's time.
+    /// Velocity of the centre of mass and angular velocity, in the world.
+    ///
+    /// They apply half a step before the time of the pose (leapfrog).
     pub fn twist(&self) -> Vector6 {
         let body = &self.world.bodies[self.handle];
         stack(&body.linvel().into(), &body.angvel().into())
     }
 }
 
-/// The pose to which a step takes a head of `twist`: rapier turns it not by `|w| h` but by `2 atan(|w| h / 2)`.
+/// Predicts the pose after one step with `twist`.
+///
+/// Rapier rotates by `2 atan(|w| h / 2)` instead of `|w| h`.
 pub(super) fn ahead(body: &Body, pose: &Pose, twist: &Vector6, step_s: f64) -> Pose {
     let (shift, turn) = split(&(twist * step_s));
     let angle = turn.norm();

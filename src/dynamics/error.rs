@@ -1,48 +1,49 @@
 use crate::elasticity::ElasticityError;
 use crate::spec::SpecError;
 
-/// Why a head cannot be modelled or simulated.
+/// Errors of the head model and simulation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DynamicsError {
-    /// The spec is wrong, or describes a head that cannot stand.
+    /// The spec is invalid, or the head has no stable equilibrium.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// The spring's force law failed.
+    /// The force law of a spring failed.
     #[error(transparent)]
     Spring(#[from] ElasticityError),
-    /// The head finds no rest on its base as that stands when the simulation begins.
+    /// The head has no equilibrium on the base in the initial attitude of the base.
     #[error(
-        "the head finds no rest on its base as that stands at the start ({reason}): start with the base upright and still"
+        "the head has no equilibrium on the base at the start of the simulation ({reason}): start with the base upright and \
+         at rest"
     )]
-    NoRestAtStart {
-        /// Why not.
+    NoEquilibriumAtStart {
+        /// Cause, as text.
         reason: String,
     },
-    /// A time step that the integrator cannot take.
+    /// The time step is not positive or exceeds the stability limit.
     #[error(
-        "a time step of {step_s} s is no good: it must be above 0 and at most {most_s:.2e} s, a sixth of the period of the \
-         head's fastest oscillation, {fastest_hz:.1} Hz (held by a hand, or at its end stop)"
+        "time step {step_s} s is out of range: it must be above 0 and at most {max_s:.2e} s, the period of the head's fastest \
+         oscillation ({fastest_hz:.1} Hz, hand hold and end stop included) over 2 pi"
     )]
     Step {
-        /// The step asked for, s.
+        /// Requested time step, s.
         step_s: f64,
-        /// The longest that will do, s.
-        most_s: f64,
-        /// Frequency of the fastest oscillation, Hz.
+        /// Maximum time step, s.
+        max_s: f64,
+        /// Highest natural frequency, Hz.
         fastest_hz: f64,
     },
-    /// A head whose motion does not tell what its base does.
-    #[error("the head is held by {holder}, and its motion does not tell where its base is: take the rigid link")]
+    /// The base cannot be computed from the motion of the head in this linkage.
+    #[error("the motion of a head on {constraint} does not determine the pose of the base: use the rigid link instead")]
     BaseUnknown {
-        /// What holds it.
-        holder: &'static str,
+        /// The constraint: a motor or a joint.
+        constraint: &'static str,
     },
-    /// A head that left all bounds.
+    /// The simulation left the valid range of the model.
     #[error("the simulation diverged {t_s:.3} s after the start: {what}")]
     Diverged {
-        /// When, s after the start.
+        /// Time after the start, s.
         t_s: f64,
-        /// What went out of bounds.
+        /// The quantity that is out of range, as text.
         what: String,
     },
 }

@@ -1,38 +1,39 @@
-//! A cylinder that floats: buoyancy, drag, and the fluid that moves along.
+//! A floating cylinder: buoyancy, drag and added mass.
 
 use super::elements::FloatSpec;
-use super::push::{Forces, Instant, at_lever};
+use super::forces::{Forces, MotionState, at_lever};
 use crate::elasticity::{Vector6, split, stack};
 use crate::geometry::{Matrix, Pose, Vector};
 use nalgebra::Point3;
 use std::f64::consts::{PI, TAU};
 
-/// Directions in which the cylinder's cross-section is cut into columns.
+/// Number of columns in each ring of the float's cross-section.
 const DIRECTIONS: usize = 12;
 
-/// Where the columns of a direction stand, in parts of the squared radius (Gauss-Legendre, two points): with equal
-/// shares of the area that gives area and second moment exactly.
+/// Squared radii of the two rings of columns over the squared radius of the cylinder.
+///
+/// Gauss-Legendre points; with columns of equal area they integrate area and second moment of area exactly.
 const SQUARED_RADII: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// A float on the head, and its fluid on the base.
+/// A float on the head in a fluid on the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Float {
     spec: FloatSpec,
 }
 
-/// A column of the cylinder, upright in the head: its bottom in the head, and its cross-section.
+/// A column of the cylinder, parallel to the head's z.
 struct Column {
     bottom_in_head: Vector,
     area_m2: f64,
 }
 
 impl Float {
-    /// The float of a spec.
+    /// Creates the float that a spec describes.
     pub fn of(spec: &FloatSpec) -> Self {
         Self { spec: *spec }
     }
 
-    /// Middle of the cylinder in the head.
+    /// Centre of the cylinder in the head frame.
     pub fn middle_in_head(&self) -> Vector {
         Vector::from(self.spec.head_bottom_m) + Vector::z() * (0.5 * self.spec.height_m)
     }
@@ -42,7 +43,7 @@ impl Float {
         let area_m2 = PI * radius_m * radius_m / (SQUARED_RADII.len() * DIRECTIONS) as f64;
         SQUARED_RADII.into_iter().enumerate().flat_map(move |(ring, squared)| {
             (0..DIRECTIONS).map(move |k| {
-                // The rings are turned against each other by half a step.
+                // The second ring is rotated by half a division.
                 let angle = TAU * (k as f64 + 0.5 * ring as f64) / DIRECTIONS as f64;
                 let out = Vector::new(angle.cos(), angle.sin(), 0.0) * (radius_m * squared.sqrt());
                 Column { bottom_in_head: Vector::from(head_bottom_m) + out, area_m2 }
@@ -50,8 +51,9 @@ impl Float {
         })
     }
 
-    /// Volume under water, m^3, its first moment in the head, m^4, and the integral of depth over it, m^4, where `up`
-    /// and the surface are given in the head.
+    /// Submerged volume (m^3), first moment in the head frame (m^4), and integral of depth (m^4).
+    ///
+    /// `up` and a point of the `surface` are given in the head frame.
     fn submerged(&self, up: &Vector, surface: &Vector) -> (f64, Vector, f64) {
         let height_m = self.spec.height_m;
         let (mut volume, mut moment, mut depth) = (0.0, Vector::zeros(), 0.0);
@@ -60,7 +62,7 @@ impl Float {
                 let at_bottom = up.dot(&(surface - bottom_in_head));
                 (at_bottom, at_bottom - height_m * up.z)
             };
-            // The part of the column, from its bottom, that is below the surface.
+            // The submerged interval of the column, measured from the bottom.
             let (from, to) = match (deep > 0.0, shallow > 0.0) {
                 (true, true) => (0.0, height_m),
                 (true, false) => (0.0, deep / up.z),
@@ -75,8 +77,8 @@ impl Float {
         (volume, moment, depth)
     }
 
-    /// Adds buoyancy, drag and added mass at an instant.
-    pub fn push(&self, now: &Instant<'_>, forces: &mut Forces) {
+    /// Adds buoyancy, drag and added mass.
+    pub fn add_forces(&self, now: &MotionState<'_>, forces: &mut Forces) {
         let spec = &self.spec;
         let surface = now.base.world_from_body * Point3::from(spec.base_surface_m);
         let apparent = now.gravity_in_world - now.carried_acceleration(&surface.coords);
@@ -94,7 +96,7 @@ impl Float {
         forces.inertia += at_lever(&lever, &(Matrix::identity() * spec.added_mass_kg));
     }
 
-    fn drag(&self, now: &Instant<'_>, forces: &mut Forces) {
+    fn drag(&self, now: &MotionState<'_>, forces: &mut Forces) {
         let spec = &self.spec;
         let lever = now.lever(&self.middle_in_head());
         let (velocity, turning) = split(&now.relative_twist());
@@ -112,15 +114,15 @@ impl Float {
         block += Matrix::identity() * spec.drag_nm_s_per_rad;
     }
 
-    /// The centripetal force of the added mass, `-m w x (w x r)`, at the twist `twist` of the head.
-    pub fn bend(&self, now: &Instant<'_>, twist: &Vector6) -> Vector6 {
+    /// The centripetal force of the added mass, `-m w x (w x r)`, at the head's `twist`.
+    pub fn quadratic_forces(&self, now: &MotionState<'_>, twist: &Vector6) -> Vector6 {
         let (_, turning) = split(twist);
         let lever = now.lever(&self.middle_in_head());
         let force = turning.cross(&turning.cross(&lever)) * -self.spec.added_mass_kg;
         stack(&force, &lever.cross(&force))
     }
 
-    /// Energy of the fluid pushed aside, J.
+    /// Potential energy of the displaced fluid, J.
     pub fn potential_j(&self, world_from_base: &Pose, base_from_head: &Pose, gravity_in_world: &Vector) -> f64 {
         let up = (world_from_base.rotation * base_from_head.rotation).inverse() * -gravity_in_world.normalize();
         let surface = base_from_head.inverse_transform_point(&Point3::from(self.spec.base_surface_m)).coords;
@@ -160,7 +162,7 @@ mod tests {
     }
 
     fn forces(head: &Pose, twist: &Vector6) -> Forces {
-        let now = Instant {
+        let now = MotionState {
             base: &Kinematics::at_rest(Pose::identity()),
             world_from_head: head,
             twist,
@@ -169,12 +171,12 @@ mod tests {
             gravity_in_world: gravity_in_world(),
         };
         let mut forces = Forces::none();
-        Float::of(&SPEC).push(&now, &mut forces);
+        Float::of(&SPEC).add_forces(&now, &mut forces);
         forces
     }
 
     #[test]
-    fn a_float_under_water_rises_at_its_terminal_velocity() {
+    fn a_submerged_float_rises_at_the_terminal_velocity() {
         // rho g V - m g = c v + q v^2 with V = pi r^2 h: 3.081 - 0.981 = 2.100 N, v = 0.2334 m/s.
         let lift = 9.80665 * (1000.0 * PI * 0.05 * 0.05 * 0.04 - 0.1);
         let v = (-2.0 + (4.0 + 120.0 * lift).sqrt()) / 60.0;
@@ -184,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn buoyancy_is_the_slope_of_its_energy_at_any_lean() {
+    fn buoyancy_is_the_gradient_of_the_energy_at_any_tilt() {
         let float = Float::of(&SPEC);
         let turn = crate::geometry::Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.2));
         for depth_m in [0.99, 1.0, 1.02, 0.5, 1.2] {

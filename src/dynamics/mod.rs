@@ -1,36 +1,39 @@
-//! The head in its linkage: on a spring, several, cords, a float, or in a joint.
+//! Dynamics of the head: linkage, equilibrium, modes, frequency response and simulation.
 //!
-//! A [`HeadSpec`] says what a head is made of and what holds it; a [`HeadModel`] is that head checked, at rest, with
-//! its modes; a [`HeadSimulation`] moves it on a base that moves. A linkage is the sum of its elements. The springs'
-//! mechanics are [`crate::elasticity`]'s; the body is integrated by rapier (see `engine`), which no other room knows.
+//! A [`HeadSpec`] describes the parts of a head and the linkage to the base: rigid, actuated, one spring, or several
+//! springs, cords, floats and a joint. A [`HeadModel`] is the validated head in equilibrium with its modes. A
+//! [`HeadSimulation`] computes the motion of the head on a moving base. The forces of a linkage are the sum over its
+//! elements. Spring mechanics are in [`crate::elasticity`]; rapier integrates the rigid body (see `engine`), and no
+//! other module uses rapier.
 
 mod actuated;
+mod base_solver;
 mod body;
 mod capacity;
 mod carrier;
+mod compliant;
 mod cord;
 mod elements;
 mod engine;
 mod error;
 mod float;
+mod force_law;
+mod forces;
 mod head;
 mod joint;
-mod law;
 mod modes;
-mod mounted;
-mod push;
+mod mount;
+mod mounted_spring;
 mod response;
 mod simulation;
-mod site;
 mod spec;
-mod sprung;
 mod statics;
-mod under;
 
 pub use actuated::{MotorSpec, TurnSpec};
 pub use body::Body;
-pub use capacity::heaviest_kg;
+pub use capacity::max_head_mass_kg;
 pub use carrier::CarrierSpec;
+pub use compliant::{ElementKind, ElementLoad};
 pub use elements::{
     CableSpec, CordSpec, CordStiffnessSpec, ElementSpec, FloatSpec, SpringElementSpec, SpringMassSpec,
     UniversalJointSpec,
@@ -38,7 +41,6 @@ pub use elements::{
 pub use error::DynamicsError;
 pub use head::HeadModel;
 pub use modes::{LinearModel, Mode, ModeKind};
-pub use response::{FrequencyResponse, Peak, Points, Quantity};
+pub use response::{FrequencyResponse, GainPoints, Peak, Quantity};
 pub use simulation::{HeadSimulation, HeadState};
 pub use spec::{DampingSpec, EndStopSpec, HeadSpec, HoldSpec, InertiaSpec, LinkageSpec, PartSpec, PlacementSpec, load};
-pub use sprung::{Bearing, BearingKind};

@@ -1,4 +1,4 @@
-//! How the linearised head answers to a shaken base: the closed form of its gain curves.
+//! Frequency response of the linearised head to base motion: the closed form of the gain curves.
 
 use super::head::{HeadModel, Linkage};
 use super::modes::{LinearModel, Mode};
@@ -8,87 +8,91 @@ use crate::motion::Axis;
 use nalgebra::{Complex, Matrix6x1};
 use std::f64::consts::TAU;
 
-/// What is compared along x, y and z; about them it is always the rate of rotation.
+/// The quantity whose gain is taken along x, y and z; about the axes it is always the angular rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quantity {
-    /// Acceleration as such, gravity not in it.
+    /// Kinematic acceleration, without gravity.
     #[default]
     Kinematic,
-    /// What an accelerometer reads: a head that leans by phi reads `phi x g` more.
+    /// Specific force, as an accelerometer measures it: a head tilted by phi measures `phi x g` in addition.
     SpecificForce,
 }
 
-/// Where a gain curve is taken: the base moves at one point, the head is watched at another.
+/// The two points of a gain curve: excitation on the base, response on the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Points {
-    /// The point of the base that is shaken, and about which it turns.
+pub struct GainPoints {
+    /// Point of the base whose motion is the input, m; rotations are about it.
     pub base_in_base: Vector,
-    /// The point of the head that is watched.
+    /// Point of the head whose motion is the output, m.
     pub head_in_head: Vector,
 }
 
 /// A local maximum of a gain curve.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Peak {
-    /// Where, Hz.
+    /// Frequency, Hz.
     pub freq_hz: f64,
-    /// How high.
+    /// Gain at that frequency.
     pub gain: f64,
 }
 
 impl HeadModel {
-    /// The points of the paper's gain curves: the base at the spring's foot (the base's origin where there is not one
-    /// spring alone), the head at its IMU.
-    pub fn usual_points(&self) -> Points {
+    /// The points of the paper's gain curves: the base at the foot of the spring, the head at the IMU.
+    ///
+    /// For a linkage other than a single spring or a joint, the base point is the base's origin.
+    pub fn default_points(&self) -> GainPoints {
         let base_in_base = match &self.linkage {
-            Linkage::Sprung(sprung) => sprung.foot_in_base(),
+            Linkage::Compliant(compliant) => compliant.foot_in_base(),
             Linkage::Rigid { .. } | Linkage::Actuated(_) => Vector::zeros(),
         };
-        Points { base_in_base, head_in_head: self.head_from_imu().translation.vector }
+        GainPoints { base_in_base, head_in_head: self.head_from_imu().translation.vector }
     }
 
-    /// The answer of the head, linearised about its rest, to small motions of the base.
-    pub fn frequency_response(&self, points: &Points) -> FrequencyResponse {
+    /// The response of the linearised head to small motions of the base.
+    pub fn frequency_response(&self, points: &GainPoints) -> FrequencyResponse {
         let rest = self.rest_pose_base_from_head();
-        let at_base = arm(&-points.base_in_base);
+        let at_base = lever_matrix(&-points.base_in_base);
         let Some(linear) = self.linear() else {
             let point = rest * nalgebra::Point3::from(points.head_in_head);
-            return FrequencyResponse { stuck: arm(&point.coords) * at_base, terms: Vec::new(), coupling: None };
+            return FrequencyResponse {
+                rigid: lever_matrix(&point.coords) * at_base,
+                terms: Vec::new(),
+                coupling: None,
+            };
         };
-        let at_head = arm(&(rest.rotation * (points.head_in_head - self.body().centre_of_mass_in_head)));
-        let terms = linear.modes.iter().map(|mode| Term::of(mode, linear, &at_head, &at_base)).collect();
-        FrequencyResponse { stuck: at_head * linear.carried * at_base, terms, coupling: Coupling::of(linear) }
+        let at_head = lever_matrix(&(rest.rotation * (points.head_in_head - self.body().centre_of_mass_in_head)));
+        let terms = linear.modes.iter().map(|mode| ModalTerm::of(mode, linear, &at_head, &at_base)).collect();
+        FrequencyResponse { rigid: at_head * linear.rigid_motion * at_base, terms, coupling: Coupling::of(linear) }
     }
 }
 
-/// The displacement of a point at `to_point` from another of the same body, by that one's displacement and the body's
-/// turn.
-fn arm(to_point: &Vector) -> Matrix6 {
+/// The matrix from the displacement of one point of a rigid body to that of another, `to_point` away.
+fn lever_matrix(to_point: &Vector) -> Matrix6 {
     blocks(&Matrix::identity(), &-skew(to_point), &Matrix::zeros(), &Matrix::identity())
 }
 
-/// The answer of a linearised head to its base, as a sum over its modes.
+/// The frequency response of a linearised head to its base, as a sum over modes.
 ///
-/// From `M x'' + C x' + K x = Mb b'' + Cb b' + Kb b` (see [`LinearModel`]) with `x = T b + y`, T what the base carries
-/// along and y the head's own motion in its modes, of shapes `phi_k` with unit modal mass: where damping keeps to the
-/// modes, the head's displacement per that of the base at the angular frequency w is
+/// From `M x'' + C x' + K x = Mb b'' + Cb b' + Kb b` (see [`LinearModel`]) with `x = T b + y`, where T b is the rigid
+/// motion with the base and y is a combination of the mode shapes `phi_k` (unit modal mass). If damping does not couple
+/// the modes, the displacement of the head over that of the base at the angular frequency w is
 ///
-/// `H(w) = T + sum_k phi_k phi_k^T (Kb - K T + i w (Cb - C T) + w^2 (M T - Mb)) / (w_k^2 - w^2 + 2 i zeta_k w_k w)`,
+/// `H(w) = T + sum_k phi_k phi_k^T (Kb - K T + i w (Cb - C T) + w^2 (M T - Mb)) / (w_k^2 - w^2 + 2 i zeta_k w_k w)`.
 ///
-/// and where it couples them the quotients are the solution of six equations, or two in a joint. Points other than the
-/// centre of mass and the base's origin enter by their levers. Everything is written in the axes of the upright base; a
-/// body's own axes differ in second order only.
+/// If it does, the modal amplitudes solve a linear system of six equations (two with a joint). Points other than the
+/// centre of mass and the base's origin enter by lever arms. All quantities are in the axes of the upright base; the
+/// axes of a moving body differ from these in second order only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrequencyResponse {
-    /// What follows the base at once.
-    stuck: Matrix6,
-    terms: Vec<Term>,
+    /// The rigid part: `T` between the two points.
+    rigid: Matrix6,
+    terms: Vec<ModalTerm>,
     coupling: Option<Coupling>,
 }
 
-/// A mode's part in the answer.
+/// The contribution of one mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Term {
+struct ModalTerm {
     omega: f64,
     damping_ratio: f64,
     shape: Vector6,
@@ -97,9 +101,10 @@ struct Term {
     by_acceleration: Vector6,
 }
 
-impl Term {
+impl ModalTerm {
     fn of(mode: &Mode, linear: &LinearModel, at_head: &Matrix6, at_base: &Matrix6) -> Self {
-        let work = |own: &Matrix6, of_base: &Matrix6| ((of_base - own * linear.carried) * at_base).tr_mul(&mode.shape);
+        let work =
+            |own: &Matrix6, of_base: &Matrix6| ((of_base - own * linear.rigid_motion) * at_base).tr_mul(&mode.shape);
         Self {
             omega: TAU * mode.frequency_hz,
             damping_ratio: mode.damping_ratio,
@@ -110,24 +115,24 @@ impl Term {
         }
     }
 
-    /// What the base's displacement along `input` does on the mode at `omega`.
+    /// The modal force of a unit displacement of the base along `input`, at the angular frequency `omega`.
     fn force(&self, input: usize, omega: f64) -> Complex<f64> {
         let still = self.by_displacement[input] - omega * omega * self.by_acceleration[input];
         Complex::new(still, omega * self.by_velocity[input])
     }
 
-    /// What the mode answers to a unit force.
-    fn resists(&self, omega: f64) -> Complex<f64> {
+    /// The dynamic stiffness of the mode: modal force over modal amplitude.
+    fn dynamic_stiffness(&self, omega: f64) -> Complex<f64> {
         Complex::new(self.omega * self.omega - omega * omega, 2.0 * self.damping_ratio * self.omega * omega)
     }
 }
 
-/// Damping between modes, `Phi^T C Phi`, without what each mode has by itself.
+/// The off-diagonal part of the modal damping matrix `Phi^T C Phi`.
 #[derive(Debug, Clone, PartialEq)]
 struct Coupling(Matrix6);
 
 impl Coupling {
-    /// That of a linear model; `None` where damping keeps to the modes.
+    /// The coupling in a linear model; `None` if damping does not couple the modes.
     fn of(linear: &LinearModel) -> Option<Self> {
         let modes = &linear.modes;
         let of_pair = |i: usize, k: usize| match (modes.get(i), modes.get(k)) {
@@ -140,15 +145,16 @@ impl Coupling {
     }
 }
 
-/// Below this the specific force of a base that moves sideways is a quotient of two vanishing numbers, Hz.
-const LOWEST_HZ: f64 = 1e-3;
+/// Lowest frequency for gains of specific force, Hz: below it numerator and denominator both vanish.
+const MIN_FREQUENCY_HZ: f64 = 1e-3;
 
 impl FrequencyResponse {
-    /// Displacement and turn of the head's point, per displacement or turn of the base's along or about `input`, at
-    /// `freq_hz`: order x, y, z, about x, y, z.
+    /// Displacement and rotation at the head's point over the base's displacement along or about `input`.
+    ///
+    /// At `freq_hz`; order x, y, z, about x, about y, about z.
     pub fn displacement(&self, input: Axis, freq_hz: f64) -> Matrix6x1<Complex<f64>> {
         let column = index(input);
-        let start = self.stuck.column(column).map(|x| Complex::new(x, 0.0));
+        let start = self.rigid.column(column).map(|x| Complex::new(x, 0.0));
         let amplitudes = self.amplitudes(column, TAU * freq_hz);
         self.terms
             .iter()
@@ -156,51 +162,52 @@ impl FrequencyResponse {
             .fold(start.into_owned(), |sum, (term, amplitude)| sum + term.shape.map(|x| amplitude * x))
     }
 
-    /// How much of each mode the base's displacement along `input` calls up at `omega`; nought beyond the last mode.
+    /// Modal amplitudes for a unit displacement of the base along `input` at `omega`; zero for absent modes.
     fn amplitudes(&self, input: usize, omega: f64) -> Matrix6x1<Complex<f64>> {
-        let nought = Complex::new(0.0, 0.0);
-        let force = Matrix6x1::from_fn(|k, _| self.terms.get(k).map_or(nought, |term| term.force(input, omega)));
-        let resists = |k: usize| self.terms.get(k).map_or(Complex::new(1.0, 0.0), |term| term.resists(omega));
-        let alone = || Matrix6x1::from_fn(|k, _| force[k] / resists(k));
+        let zero = Complex::new(0.0, 0.0);
+        let force = Matrix6x1::from_fn(|k, _| self.terms.get(k).map_or(zero, |term| term.force(input, omega)));
+        let dynamic_stiffness =
+            |k: usize| self.terms.get(k).map_or(Complex::new(1.0, 0.0), |term| term.dynamic_stiffness(omega));
+        let uncoupled = || Matrix6x1::from_fn(|k, _| force[k] / dynamic_stiffness(k));
         match &self.coupling {
-            None => alone(),
+            None => uncoupled(),
             Some(Coupling(between)) => {
                 let mut all = between.map(|c| Complex::new(0.0, omega * c));
-                (0..6).for_each(|k| all[(k, k)] = resists(k));
-                all.lu().solve(&force).unwrap_or_else(alone)
+                (0..6).for_each(|k| all[(k, k)] = dynamic_stiffness(k));
+                all.lu().solve(&force).unwrap_or_else(uncoupled)
             }
         }
     }
 
-    /// The head's rate or acceleration along `axis` per the base's along the same, at `freq_hz`.
+    /// The head's rate or acceleration over the base's, both along or about `axis`, at `freq_hz`.
     pub fn along(&self, axis: Axis, freq_hz: f64, quantity: Quantity) -> Complex<f64> {
         let row = index(axis);
-        let leans = match (quantity, axis) {
-            // Along x, phi x g is -g phi_y; along y it is g phi_x; over -w^2 it compares with the displacement.
+        let gravity_term = match (quantity, axis) {
+            // (phi x g) is -g phi_y along x and g phi_x along y; dividing by -w^2 converts it to displacement.
             (Quantity::SpecificForce, Axis::X) => Some((4, STANDARD_GRAVITY_M_PER_S2)),
             (Quantity::SpecificForce, Axis::Y) => Some((3, -STANDARD_GRAVITY_M_PER_S2)),
             _ => None,
         };
-        let freq_hz = if leans.is_some() { freq_hz.max(LOWEST_HZ) } else { freq_hz };
+        let freq_hz = if gravity_term.is_some() { freq_hz.max(MIN_FREQUENCY_HZ) } else { freq_hz };
         let omega = TAU * freq_hz;
-        let sees = |of: &dyn Fn(usize) -> f64| match leans {
+        let measured = |of: &dyn Fn(usize) -> f64| match gravity_term {
             Some((turn, g)) => of(row) + of(turn) * g / (omega * omega),
             None => of(row),
         };
-        let start = Complex::new(sees(&|k| self.stuck[(k, row)]), 0.0);
+        let start = Complex::new(measured(&|k| self.rigid[(k, row)]), 0.0);
         let amplitudes = self.amplitudes(row, omega);
         self.terms
             .iter()
             .zip(&amplitudes)
-            .fold(start, |sum, (term, amplitude)| sum + amplitude * sees(&|k| term.shape[k]))
+            .fold(start, |sum, (term, amplitude)| sum + amplitude * measured(&|k| term.shape[k]))
     }
 
-    /// The modulus of [`FrequencyResponse::along`].
+    /// The gain: the modulus of [`FrequencyResponse::along`].
     pub fn gain(&self, axis: Axis, freq_hz: f64, quantity: Quantity) -> f64 {
         self.along(axis, freq_hz, quantity).norm()
     }
 
-    /// The local maxima of a gain curve above 0 and below `up_to_hz`, lowest frequency first.
+    /// The local maxima of a gain curve between 0 and `up_to_hz`, lowest frequency first.
     pub fn peaks(&self, axis: Axis, up_to_hz: f64, quantity: Quantity) -> Vec<Peak> {
         let grid = self.grid(axis, up_to_hz);
         let gain = |freq_hz: f64| self.gain(axis, freq_hz, quantity);
@@ -215,19 +222,22 @@ impl FrequencyResponse {
             .collect()
     }
 
-    /// The highest of the [`FrequencyResponse::peaks`].
+    /// The largest of the [`FrequencyResponse::peaks`].
     pub fn peak(&self, axis: Axis, up_to_hz: f64, quantity: Quantity) -> Option<Peak> {
         self.peaks(axis, up_to_hz, quantity).into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
-    /// Frequencies from 0 to `up_to_hz`, dense by half a bandwidth about the modes that `axis` calls up.
+    /// Frequencies from 0 to `up_to_hz`, refined around the modes that `axis` excites.
+    ///
+    /// The refinement step is half a bandwidth.
     fn grid(&self, axis: Axis, up_to_hz: f64) -> Vec<f64> {
         let column = index(axis);
-        let part =
-            |term: &Term| term.force(column, term.omega).norm() * term.shape[column].abs() / (term.omega * term.omega);
-        let greatest = self.terms.iter().map(part).fold(0.0, f64::max);
+        let part = |term: &ModalTerm| {
+            term.force(column, term.omega).norm() * term.shape[column].abs() / (term.omega * term.omega)
+        };
+        let largest = self.terms.iter().map(part).fold(0.0, f64::max);
         let mut grid: Vec<f64> = (0..=64).map(|k| up_to_hz * f64::from(k) / 64.0).collect();
-        for term in self.terms.iter().filter(|term| part(term) > 1e-9 * greatest) {
+        for term in self.terms.iter().filter(|term| part(term) > 1e-9 * largest) {
             let width = term.damping_ratio.clamp(1e-5, 0.2);
             grid.extend((-16..=16).map(|k| term.omega / TAU * (0.5 * width * f64::from(k)).exp()));
         }
@@ -242,7 +252,7 @@ fn index(axis: Axis) -> usize {
     axis as usize
 }
 
-/// The place of the one maximum between two ends, by golden section, to 1e-8 of it.
+/// The position of the maximum between two limits, by golden-section search to a relative accuracy of 1e-8.
 fn maximum(f: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     let golden = 0.5 * (5_f64.sqrt() - 1.0);
     let (mut low, mut high) = (low, high);
@@ -283,8 +293,8 @@ mod tests {
         })
     }
 
-    /// The head of the mechanics' table, 0.40 kg 70 mm above a spring of 25/3.0/n/L mm, without damping.
-    fn of_the_table(coils: f64, length_mm: f64) -> HeadModel {
+    /// A head of 0.40 kg, centre of mass 70 mm above an undamped spring of 25/3.0/`coils`/`length_mm` mm.
+    fn reference_head(coils: f64, length_mm: f64) -> HeadModel {
         let text = format!(
             "(parts: [body(name: \"h\", mass_kg: 0.4, centre_of_mass_m: (0.0, 0.0, 0.07),
                 inertia_kg_m2: (xx: 9e-4, yy: 9e-4, zz: 9e-4))],
@@ -299,11 +309,11 @@ mod tests {
     }
 
     #[test]
-    fn gravity_lifts_the_turn_of_an_upright_head_at_zero_frequency() {
-        // Published beside the mechanics: 1.58 for 25/3.0/8/80, 2.64 for 25/3.0/12/120.
+    fn gravity_raises_the_static_rotation_gain_of_an_upright_head() {
+        // Expected static gains: 1.58 for 25/3.0/8/80, 2.64 for 25/3.0/12/120.
         for (coils, length_mm, expected) in [(8.0, 80.0, 1.58), (12.0, 120.0, 2.64)] {
-            let head = of_the_table(coils, length_mm);
-            let response = head.frequency_response(&head.usual_points());
+            let head = reference_head(coils, length_mm);
+            let response = head.frequency_response(&head.default_points());
             for axis in [Axis::Roll, Axis::Pitch] {
                 assert_relative_eq!(response.gain(axis, 0.0, Quantity::Kinematic), expected, max_relative = 0.02);
             }
@@ -318,7 +328,7 @@ mod tests {
         // |H|^2 = (1 + (2 zeta r)^2) / ((1 - r^2)^2 + (2 zeta r)^2), r = f / f0: transmissibility.
         let zeta = 0.02;
         let head = damped(zeta);
-        let response = head.frequency_response(&head.usual_points());
+        let response = head.frequency_response(&head.default_points());
         for (axis, kind) in [(Axis::Z, super::super::ModeKind::Bounce), (Axis::Yaw, super::super::ModeKind::Yaw)] {
             let mode = head.linear_modes().iter().find(|mode| mode.kind == kind).unwrap();
             for r in [0.1, 0.9, 1.0, 1.1, 3.0_f64] {
@@ -339,10 +349,10 @@ mod tests {
             let (spec, source) = load(name).unwrap();
             HeadModel::new(&spec, &source).unwrap()
         };
-        // A cable through the spring and drag couple the modes; wire and fluid have mass.
+        // A cable and fluid drag couple the modes; wire and fluid have mass.
         for head in [damped(0.05), shipped("backpack"), shipped("float"), shipped("vehicle_three_springs")] {
             let linear = head.linear().unwrap();
-            let response = head.frequency_response(&Points {
+            let response = head.frequency_response(&GainPoints {
                 base_in_base: Vector::zeros(),
                 head_in_head: head.body().centre_of_mass_in_head,
             });
@@ -365,19 +375,19 @@ mod tests {
     }
 
     #[test]
-    fn a_head_without_spring_follows_its_base() {
+    fn a_rigid_head_has_unit_gain() {
         let (spec, source) = load("rigid").unwrap();
         let head = HeadModel::new(&spec, &source).unwrap();
-        let response = head.frequency_response(&head.usual_points());
+        let response = head.frequency_response(&head.default_points());
         assert!(Axis::ALL.iter().all(|axis| response.gain(*axis, 5.0, Quantity::Kinematic) == 1.0));
         assert!(response.peaks(Axis::X, 10.0, Quantity::Kinematic).is_empty());
     }
 
     #[test]
-    fn a_leaning_head_feels_gravity_in_its_specific_force() {
-        // Along x: (a_x - g phi_y) / b_x with a = -w^2 d: the displacement's answer plus g phi_y / w^2.
+    fn the_specific_force_of_a_tilted_head_includes_gravity() {
+        // Along x: (a_x - g phi_y) / b_x with a = -w^2 d gives the displacement response plus g phi_y / w^2.
         let head = damped(0.05);
-        let response = head.frequency_response(&head.usual_points());
+        let response = head.frequency_response(&head.default_points());
         let (freq_hz, g) = (2.0, STANDARD_GRAVITY_M_PER_S2);
         let column = response.displacement(Axis::X, freq_hz);
         let exact = column[0] + column[4] * (g / (TAU * freq_hz).powi(2));

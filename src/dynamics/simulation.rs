@@ -1,44 +1,44 @@
-//! The head's motion, step by step.
+//! Simulation of the head's motion on a moving base.
 
 use super::actuated::Actuated;
 use super::body::Body;
+use super::compliant::CompliantLinkage;
 use super::engine::Engine;
 use super::error::DynamicsError;
+use super::force_law::ForceLawState;
+use super::forces::{Forces, MotionState};
 use super::head::{HeadModel, Linkage};
-use super::law::LawState;
-use super::push::{Forces, Instant};
-use super::sprung::Sprung;
 use super::statics::Statics;
 use crate::elasticity::{Matrix6, Vector6, split, stack};
 use crate::geometry::{Kinematics, Pose, Rotation, Vector, gravity_in_world};
 use crate::motion::BaseMotion;
 use std::f64::consts::TAU;
 
-/// Head and base at an instant.
+/// The motion of head and base at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadState {
-    /// Seconds since the start.
+    /// Time since the start, s.
     pub t_s: f64,
-    /// The head.
+    /// Motion of the head frame.
     pub head: Kinematics,
-    /// The base.
+    /// Motion of the base frame.
     pub base: Kinematics,
 }
 
 /// The motion of a head on a moving base: an endless iterator of [`HeadState`]s at 0, dt, 2 dt, ...
 ///
-/// At the start the head rests on its base, and moves along if that moves. A rigid head, or one that a motor turns,
-/// moves in closed form. A head that gives is a free body in rapier, pushed by its linkage's wrench (leapfrog):
-/// velocities v live half a step before poses, and at step n
+/// At the start the head is in equilibrium relative to the base and has the velocity of the base. Rigid and actuated
+/// heads move in closed form. On a compliant linkage the head is a free body in rapier under the wrench of the linkage
+/// (leapfrog): velocities v apply half a step before the poses q, and at step n
 ///
 /// `M (v[n+1/2] - v[n-1/2]) / dt = F(q[n]) - C (mean v - v_base) - mean w x I mean w`, `q[n+1] = q[n] + dt v[n+1/2]`,
 ///
-/// where the mean is that of the two half steps. In a joint the wrench that holds it together comes to the right side,
-/// such that `q[n+1]` is in the joint again. The same rule runs backwards in time, so without damping energy has no
-/// trend. What is handed out is of the head's own frame and belongs to the pose: from the steps' mean velocities, which
-/// lead from pose to pose exactly, the velocity at the pose to third order in dt, and the acceleration to second order.
+/// where the mean is over the two half steps. For a joint, the right side includes the constraint wrench such that
+/// `q[n+1]` satisfies the constraint. The scheme is time-reversible, so without damping the energy has no drift. The
+/// output is for the head frame at the time of the pose: the velocity is interpolated from the mean velocities of the
+/// steps to third order in dt, the acceleration to second order.
 ///
-/// It ends after the first error.
+/// The iterator ends after the first error.
 pub struct HeadSimulation<'a> {
     model: &'a HeadModel,
     motion: &'a dyn BaseMotion,
@@ -50,34 +50,33 @@ pub struct HeadSimulation<'a> {
 enum Mechanism<'a> {
     Rigid { base_from_head: Pose },
     Actuated(&'a Actuated),
-    Sprung(Box<SprungMotion<'a>>),
+    Compliant(Box<CompliantMotion<'a>>),
     Failed,
 }
 
 impl<'a> HeadSimulation<'a> {
-    /// The motion of `model` on `motion`, in steps of `step_s`.
+    /// Creates a simulation of `model` on the base motion `motion` with the time step `step_s`.
     ///
     /// # Errors
-    /// When the step is too long for the head's fastest oscillation, or the head finds no rest on the base as that
-    /// starts.
+    /// When the step exceeds the stability limit, or the head has no equilibrium at the initial attitude of the base.
     pub fn new(model: &'a HeadModel, motion: &'a dyn BaseMotion, step_s: f64) -> Result<Self, DynamicsError> {
         let fastest_hz = model.fastest_hz();
-        let most_s = if fastest_hz > 0.0 { 1.0 / (TAU * fastest_hz) } else { f64::INFINITY };
-        if !(step_s > 0.0 && step_s <= most_s && step_s.is_finite()) {
-            return Err(DynamicsError::Step { step_s, most_s, fastest_hz });
+        let max_s = if fastest_hz > 0.0 { 1.0 / (TAU * fastest_hz) } else { f64::INFINITY };
+        if !(step_s > 0.0 && step_s <= max_s && step_s.is_finite()) {
+            return Err(DynamicsError::Step { step_s, max_s, fastest_hz });
         }
         let mechanism = match &model.linkage {
             Linkage::Rigid { base_from_head } => Mechanism::Rigid { base_from_head: *base_from_head },
             Linkage::Actuated(actuated) => Mechanism::Actuated(actuated),
-            Linkage::Sprung(sprung) => {
+            Linkage::Compliant(compliant) => {
                 let start = motion.at(0.0);
-                Mechanism::Sprung(Box::new(SprungMotion::new(&model.body, sprung, &start, step_s)?))
+                Mechanism::Compliant(Box::new(CompliantMotion::new(&model.body, compliant, &start, step_s)?))
             }
         };
         Ok(Self { model, motion, step_s, count: 0, mechanism })
     }
 
-    /// The model that moves.
+    /// The simulated model.
     pub fn model(&self) -> &HeadModel {
         self.model
     }
@@ -93,10 +92,10 @@ impl Iterator for HeadSimulation<'_> {
         let head = match &mut self.mechanism {
             Mechanism::Failed => return None,
             Mechanism::Rigid { base_from_head } => Ok(base.of_frame(base_from_head)),
-            Mechanism::Actuated(actuated) => Ok(actuated.carried(&base, t_s)),
-            Mechanism::Sprung(sprung) => {
+            Mechanism::Actuated(actuated) => Ok(actuated.head_kinematics(&base, t_s)),
+            Mechanism::Compliant(compliant) => {
                 let next_base = || self.motion.at(self.count as f64 * self.step_s).world_from_body;
-                sprung.advance(t_s, &base, self.motion.hold(t_s), &next_base)
+                compliant.advance(t_s, &base, self.motion.hold(t_s), &next_base)
             }
         };
         if head.is_err() {
@@ -106,35 +105,40 @@ impl Iterator for HeadSimulation<'_> {
     }
 }
 
-/// A head that swings.
-struct SprungMotion<'a> {
+/// State of a head on a compliant linkage.
+struct CompliantMotion<'a> {
     body: &'a Body,
-    sprung: &'a Sprung,
+    compliant: &'a CompliantLinkage,
     engine: Engine,
-    state: LawState,
+    state: ForceLawState,
     step_s: f64,
     pose: Pose,
-    /// Mean velocity of the head's origin and mean angular velocity over the step before, in the world.
+    /// Mean velocity of the head's origin and mean angular velocity over the last step, in the world.
     before: Vector6,
-    /// Those over the step before that.
+    /// The same over the second-last step.
     earlier: Vector6,
 }
 
-impl<'a> SprungMotion<'a> {
-    fn new(body: &'a Body, sprung: &'a Sprung, base: &Kinematics, step_s: f64) -> Result<Self, DynamicsError> {
+impl<'a> CompliantMotion<'a> {
+    fn new(
+        body: &'a Body,
+        compliant: &'a CompliantLinkage,
+        base: &Kinematics,
+        step_s: f64,
+    ) -> Result<Self, DynamicsError> {
         let gravity_in_base = base.world_from_body.rotation.inverse() * gravity_in_world();
-        let scale_m = sprung.law.springs.first().map_or(0.1, |mounted| mounted.spring.length_m());
-        let (rest, _) = Statics { law: &sprung.law, body, gravity_in_base, weight: 1.0, scale_m }
-            .settle(&sprung.rest)
-            .map_err(|unrest| DynamicsError::NoRestAtStart { reason: unrest.to_string() })?;
+        let scale_m = compliant.law.springs.first().map_or(0.1, |mounted| mounted.spring.length_m());
+        let (rest, _) = Statics { law: &compliant.law, body, gravity_in_base, weight: 1.0, scale_m }
+            .find_equilibrium(&compliant.rest)
+            .map_err(|failure| DynamicsError::NoEquilibriumAtStart { reason: failure.to_string() })?;
         let head = base.of_frame(&rest);
         let centre = head.of_frame(&Pose::from_parts(body.centre_of_mass_in_head.into(), Rotation::identity()));
         let engine = Engine::new(body, &head.world_from_body, &velocity_before(&centre, 0.5 * step_s), step_s);
         Ok(Self {
             body,
-            sprung,
+            compliant,
             engine,
-            state: sprung.law.state(),
+            state: compliant.law.state(),
             step_s,
             pose: head.world_from_body,
             before: velocity_before(&head, 0.5 * step_s),
@@ -142,7 +146,9 @@ impl<'a> SprungMotion<'a> {
         })
     }
 
-    /// The head at `t_s`, having moved on to the step after, at which the base will be at `next_base`.
+    /// Returns the head's motion at `t_s` and advances to the next step.
+    ///
+    /// `next_base` is the pose of the base at the next step.
     fn advance(
         &mut self,
         t_s: f64,
@@ -152,14 +158,16 @@ impl<'a> SprungMotion<'a> {
     ) -> Result<Kinematics, DynamicsError> {
         let twist = self.engine.twist();
         let gravity_in_world = gravity_in_world();
-        let now = Instant { base, world_from_head: &self.pose, twist: &twist, body: self.body, hold, gravity_in_world };
-        let forces = self.sprung.law.forces(&mut self.state, &now)?;
+        let now =
+            MotionState { base, world_from_head: &self.pose, twist: &twist, body: self.body, hold, gravity_in_world };
+        let forces = self.compliant.law.forces(&mut self.state, &now)?;
         check_bounds(t_s, forces.turn_rad, &twist)?;
         let rotation = self.pose.rotation.to_rotation_matrix().into_inner();
         let mass = self.body.mass_matrix(&rotation);
-        let change = self
-            .change_of_twist(&mass, &forces, &now, next_base)
-            .ok_or_else(|| DynamicsError::Diverged { t_s, what: "mass and damping have no inverse".to_owned() })?;
+        let change = self.change_of_twist(&mass, &forces, &now, next_base).ok_or_else(|| DynamicsError::Diverged {
+            t_s,
+            what: "the matrix of mass and damping is singular".to_owned(),
+        })?;
         self.engine.step(&(mass * change / self.step_s));
         let next = self.engine.pose();
         let after = velocity_between(&self.pose, &next, self.step_s);
@@ -169,36 +177,39 @@ impl<'a> SprungMotion<'a> {
         Ok(head)
     }
 
-    /// The change of the twist over the step, with damping and gyroscopic torque at the mean of old and new twist.
+    /// The change of the twist over the step.
+    ///
+    /// Damping and gyroscopic torque are evaluated at the mean of the old and the new twist.
     fn change_of_twist(
         &self,
         mass: &Matrix6,
         forces: &Forces,
-        now: &Instant<'_>,
+        now: &MotionState<'_>,
         next_base: &dyn Fn() -> Pose,
     ) -> Option<Vector6> {
-        let law = &self.sprung.law;
+        let law = &self.compliant.law;
         let weight = stack(&(now.gravity_in_world * self.body.mass_kg), &Vector::zeros());
         let implicit = (mass + forces.inertia + forces.damping * (0.5 * self.step_s)).cholesky()?;
         let inertia = mass.fixed_view::<3, 3>(3, 3);
         let joint = law.joint.as_ref().map(|joint| (joint, next_base()));
         let mut change = Vector6::zeros();
-        // The gyroscopic torque changes by a hundredth of itself at most from one pass to the next.
+        // Fixed-point iteration: each pass changes the gyroscopic torque by at most 1 %.
         for _ in 0..3 {
             let mean = now.twist + change * 0.5;
             let (_, turning) = split(&mean);
             let gyroscopic = stack(&Vector::zeros(), &-turning.cross(&(inertia * turning)));
-            let push = forces.wrench + weight + gyroscopic + law.bend(now, &mean);
+            let push = forces.wrench + weight + gyroscopic + law.quadratic_forces(now, &mean);
             change = implicit.solve(&(push * self.step_s));
             if let Some((joint, next_base)) = &joint {
-                change = joint.held((now, next_base), self.step_s, &change, |wrenches| implicit.solve(wrenches))?;
+                change = joint
+                    .constrained_change((now, next_base), self.step_s, &change, |wrenches| implicit.solve(wrenches))?;
             }
         }
         Some(change)
     }
 }
 
-/// Velocity and angular velocity `earlier_s` before the instant given.
+/// Velocity and angular velocity `earlier_s` before, by linear extrapolation.
 fn velocity_before(now: &Kinematics, earlier_s: f64) -> Vector6 {
     stack(
         &(now.velocity_in_world - now.acceleration_in_world * earlier_s),
@@ -206,47 +217,49 @@ fn velocity_before(now: &Kinematics, earlier_s: f64) -> Vector6 {
     )
 }
 
-/// The steady velocity and angular velocity that lead from one pose to the next.
+/// The constant velocity and angular velocity that lead from one pose to the next.
 fn velocity_between(from: &Pose, to: &Pose, step_s: f64) -> Vector6 {
     let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
     stack(&(to.translation.vector - from.translation.vector), &turn) / step_s
 }
 
-/// The motion at a pose between two steps.
+/// The motion at a pose, from the mean velocities over the two steps before and the step after it.
 ///
-/// From the mean velocities over the two steps before it and the one after, the velocity in between is
-/// `(2 after + 5 before - earlier) / 6`, of the parabola with those three means, and the acceleration their difference.
+/// The velocity `(2 after + 5 before - earlier) / 6` is that of the parabola with those three means; the acceleration
+/// is the difference of `after` and `before` over the step.
 fn kinematics(pose: &Pose, [earlier, before, after]: [&Vector6; 3], step_s: f64) -> Kinematics {
     let (velocity, turning) = split(&((after * 2.0 + before * 5.0 - earlier) / 6.0));
-    let (acceleration, turning_faster) = split(&((after - before) / step_s));
+    let (acceleration, angular_acceleration) = split(&((after - before) / step_s));
     Kinematics {
         world_from_body: *pose,
         velocity_in_world: velocity,
         angular_velocity_in_world: turning,
         acceleration_in_world: acceleration,
-        angular_acceleration_in_world: turning_faster,
+        angular_acceleration_in_world: angular_acceleration,
     }
 }
 
-/// Greatest turn of a spring's top from its foot, or of the head from its rest, that the force law covers, rad; its
-/// logarithm ends at pi.
-const MOST_TURN_RAD: f64 = 3.0;
+/// Largest rotation that the force law covers, rad.
+///
+/// The rotation of a spring's top or of the head; the logarithm of a rotation is singular at pi.
+const MAX_ROTATION_RAD: f64 = 3.0;
 
-/// Greatest speed of a head, m/s.
-const MOST_SPEED_M_PER_S: f64 = 300.0;
+/// Speed above which the simulation is considered diverged, m/s.
+const MAX_SPEED_M_PER_S: f64 = 300.0;
 
 fn check_bounds(t_s: f64, turn_rad: f64, twist: &Vector6) -> Result<(), DynamicsError> {
     let (velocity, _) = split(twist);
     let what = if !turn_rad.is_finite() || !twist.iter().all(|x| x.is_finite()) {
-        "the head's pose or velocity is no number".to_owned()
-    } else if turn_rad > MOST_TURN_RAD {
+        "the pose or velocity of the head is not finite".to_owned()
+    } else if turn_rad > MAX_ROTATION_RAD {
         format!(
-            "the head has turned by {:.0} degrees; its linkage's force law covers {:.0}: an end stop would hold the head",
+            "the head has rotated by {:.0} degrees, and the force law is valid up to {:.0}: add an end stop or reduce the base \
+             motion",
             turn_rad.to_degrees(),
-            MOST_TURN_RAD.to_degrees()
+            MAX_ROTATION_RAD.to_degrees()
         )
-    } else if velocity.norm() > MOST_SPEED_M_PER_S {
-        format!("the head flies at {:.0} m/s", velocity.norm())
+    } else if velocity.norm() > MAX_SPEED_M_PER_S {
+        format!("the speed of the head is {:.0} m/s, above the limit of {MAX_SPEED_M_PER_S:.0}", velocity.norm())
     } else {
         return Ok(());
     };

@@ -1,4 +1,4 @@
-//! A head as it is written: `specs/heads/NAME.ron`.
+//! Spec of a head: `specs/heads/NAME.ron`.
 
 use super::actuated::MotorSpec;
 use super::carrier::CarrierSpec;
@@ -8,31 +8,32 @@ use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use crate::spec::{Kind, Source, SpecError, checked, find, parse};
 use serde::{Deserialize, Serialize};
 
-/// A head, and what carries it.
+/// A head, the linkage to the base, and the carrier.
 ///
-/// The frame `head` is where the spec puts it: a sane choice has its origin at the laser's optical centre, x forward, y
-/// left, z up along the spring.
+/// The spec chooses the frame `head` freely. Recommended: origin at the laser's optical centre, x forward, y left, z up
+/// along the spring.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeadSpec {
-    /// What the head is made of, and what is fastened to it.
+    /// Rigid parts of the head: sensors, brackets, plates.
     pub parts: Vec<PartSpec>,
     /// Pose of the lidar in the head.
     pub head_from_laser: PlacementSpec,
     /// Pose of the IMU in the head.
     pub head_from_imu: PlacementSpec,
-    /// What holds the head on the base.
+    /// The linkage between base and head.
     pub linkage: LinkageSpec,
-    /// What of its carrier the laser may see, fixed to the base: an operator, a handle, a cart.
+    /// Parts of the carrier that the laser can hit, fixed to the base: an operator, a handle, a cart.
     #[serde(default)]
     pub carrier: Vec<CarrierSpec>,
 }
 
-/// Finds and parses the head called `name`: a path, or a name in the library. The source comes with it, for errors of
-/// [`HeadModel::new`](super::HeadModel::new).
+/// Finds and parses the head called `name`: a path, or a name in the library.
+///
+/// The source is returned too, for the error messages of [`HeadModel::new`](super::HeadModel::new).
 ///
 /// # Errors
-/// When there is none, or it is wrong.
+/// When there is no such head, or the file is invalid.
 pub fn load(name: &str) -> Result<(HeadSpec, Source), SpecError> {
     let source = find(Kind::Head, name)?;
     Ok((parse(&source)?, source))
@@ -42,140 +43,140 @@ pub fn load(name: &str) -> Result<(HeadSpec, Source), SpecError> {
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum PartSpec {
-    /// A homogeneous block, its edges along the head's axes.
+    /// A homogeneous block with edges parallel to the head's axes.
     Block {
-        /// What it is.
+        /// Name of the part.
         name: String,
         /// Mass, kg.
         #[serde(with = "checked::Positive")]
         mass_kg: f64,
-        /// Edges along x, y, z, m.
+        /// Edge lengths along x, y, z, m.
         #[serde(with = "checked::PositiveArray::<3>")]
         size_m: [f64; 3],
-        /// Its centre in the head, m.
+        /// Centre of the block in the head frame, m.
         #[serde(with = "checked::FiniteArray::<3>")]
         centre_m: [f64; 3],
     },
-    /// A body whose mass properties are known.
+    /// A body with given mass properties.
     Body {
-        /// What it is.
+        /// Name of the part.
         name: String,
         /// Mass, kg.
         #[serde(with = "checked::Positive")]
         mass_kg: f64,
-        /// Its centre of mass in the head, m.
+        /// Centre of mass in the head frame, m.
         #[serde(with = "checked::FiniteArray::<3>")]
         centre_of_mass_m: [f64; 3],
-        /// Its inertia about its centre of mass, in the head's axes.
+        /// Inertia tensor about the part's centre of mass, in the axes of the head.
         inertia_kg_m2: InertiaSpec,
     },
 }
 
-/// A tensor of inertia; products are entries of the tensor, so `xy` is minus the integral of x y.
+/// An inertia tensor; `xy`, `xz`, `yz` are tensor entries: `xy` is minus the integral of x y.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct InertiaSpec {
-    /// About x, kg m^2.
+    /// Moment of inertia about x, kg m^2.
     #[serde(with = "checked::Positive")]
     pub xx: f64,
-    /// About y, kg m^2.
+    /// Moment of inertia about y, kg m^2.
     #[serde(with = "checked::Positive")]
     pub yy: f64,
-    /// About z, kg m^2.
+    /// Moment of inertia about z, kg m^2.
     #[serde(with = "checked::Positive")]
     pub zz: f64,
-    /// Product, kg m^2.
+    /// Tensor entry xy, kg m^2.
     #[serde(default, with = "checked::Finite")]
     pub xy: f64,
-    /// Product, kg m^2.
+    /// Tensor entry xz, kg m^2.
     #[serde(default, with = "checked::Finite")]
     pub xz: f64,
-    /// Product, kg m^2.
+    /// Tensor entry yz, kg m^2.
     #[serde(default, with = "checked::Finite")]
     pub yz: f64,
 }
 
-/// Where a frame sits in another.
+/// The pose of a frame in another frame.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlacementSpec {
-    /// Its origin, m.
+    /// Origin of the frame, m.
     #[serde(with = "checked::FiniteArray::<3>")]
     pub position_m: [f64; 3],
-    /// Its roll, pitch and yaw (about fixed x, then y, then z), degrees.
+    /// Roll, pitch and yaw (about fixed x, then y, then z), degrees.
     #[serde(default, with = "checked::FiniteArray::<3>")]
     pub roll_pitch_yaw_deg: [f64; 3],
 }
 
 impl PlacementSpec {
-    /// The pose it describes.
+    /// The pose as a rigid transform.
     pub fn pose(&self) -> Pose {
         let [roll, pitch, yaw] = self.roll_pitch_yaw_deg.map(f64::to_radians);
         Pose::from_parts(Vector::from(self.position_m).into(), from_roll_pitch_yaw(roll, pitch, yaw))
     }
 }
 
-/// What holds the head on the base.
+/// The linkage between base and head.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 #[expect(clippy::large_enum_variant, reason = "there is one a head")]
 pub enum LinkageSpec {
-    /// Nothing moves: the head is screwed to the base.
+    /// Rigid connection: the head is screwed to the base.
     Rigid {
         /// Pose of the head in the base.
         base_from_head: PlacementSpec,
     },
-    /// A motor turns the head, as stiff as a screw.
+    /// A motor rotates the head along a given angle; it has no compliance.
     Actuated {
         /// Pose of the head in the base before the motor starts.
         base_from_head: PlacementSpec,
-        /// The motor.
+        /// Axis and motion of the motor.
         motor: MotorSpec,
     },
-    /// One spring.
+    /// A single spring.
     Spring {
-        /// The spring.
+        /// The spring: a coil, a stiffness matrix, or the name of a spring spec.
         spring: SpringSpec,
-        /// Pieces the spring is cut into for large swings; 1 is fastest.
+        /// Number of segments that model large deflections, 1 to 64; 1 is fastest.
         segments: usize,
         /// Pose of the spring's foot in the base; z points along the spring.
         base_from_spring: PlacementSpec,
         /// Pose of the spring's top in the head.
         head_from_spring: PlacementSpec,
-        /// What becomes of the spring's own mass.
+        /// Whether the mass of the wire is modelled.
         #[serde(default)]
         spring_mass: SpringMassSpec,
-        /// A cable through the spring.
+        /// A cable through the spring, parallel to it.
         #[serde(default)]
         cable: Option<CableSpec>,
-        /// How its modes are damped.
+        /// Damping ratios of the modes.
         damping_ratio: DampingSpec,
-        /// What stops the head when it swings too far.
+        /// End stop that limits the tilt of the head.
         #[serde(default)]
         end_stop: Option<EndStopSpec>,
-        /// The hand that holds the head when the motion says so.
+        /// Hand that holds the head while the base motion specifies a hold.
         #[serde(default)]
         hold: Option<HoldSpec>,
     },
-    /// Several springs, cords, floats, a joint, side by side.
+    /// Several elements in parallel: springs, cords, floats, a joint.
     Suspension {
-        /// What holds the head.
+        /// The elements between base and head.
         elements: Vec<ElementSpec>,
-        /// Pose of the head in the base near which it rests.
+        /// Approximate pose of the head in the base in equilibrium; start of the search for the equilibrium.
         base_from_head: PlacementSpec,
-        /// How its modes are damped, beside what its elements take.
+        /// Damping ratios of the modes, in addition to the dampers of the elements.
         damping_ratio: DampingSpec,
-        /// What stops the head when it swings too far.
+        /// End stop that limits the tilt of the head.
         #[serde(default)]
         end_stop: Option<EndStopSpec>,
-        /// The hand that holds the head when the motion says so.
+        /// Hand that holds the head while the base motion specifies a hold.
         #[serde(default)]
         hold: Option<HoldSpec>,
     },
 }
 
 impl LinkageSpec {
-    /// The damping ratios of its modes; `None` for one that has none.
+    /// The damping ratios of the modes; `None` for a rigid or actuated mount.
     pub fn damping_ratio_mut(&mut self) -> Option<&mut DampingSpec> {
         match self {
             LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => None,
@@ -186,49 +187,52 @@ impl LinkageSpec {
     }
 }
 
-/// Damping ratios of the six modes about rest.
+/// Damping ratios of the six modes about the equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DampingSpec {
-    /// Of the two slowest bending modes, in which the head nods and rolls.
+    /// Damping ratio of the two slowest bending modes, in which the head pitches and rolls.
     #[serde(with = "checked::NonNegative")]
     pub rocking: f64,
-    /// Of the other two bending modes, in which it shifts sideways against its turn.
+    /// Damping ratio of the other two bending modes, in which the head shifts sideways and rotates against the shift.
     #[serde(with = "checked::NonNegative")]
     pub sway: f64,
-    /// Of the mode along the spring.
+    /// Damping ratio of the mode along the spring.
     #[serde(with = "checked::NonNegative")]
     pub bounce: f64,
-    /// Of the mode about the spring.
+    /// Damping ratio of the mode about the spring.
     #[serde(with = "checked::NonNegative")]
     pub yaw: f64,
 }
 
-/// A stop against which the head comes when its axis leans too far: the axis of a spring's top from its foot's, or, on
-/// several elements, the head's from where it rests.
+/// An elastic end stop for the tilt of the head.
+///
+/// The tilt is the angle between the z axes of a single spring's foot and top, or, for several elements, the angle
+/// between the head's present and equilibrium z axes.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct EndStopSpec {
-    /// Lean at which it begins to press, degrees.
+    /// Tilt at which the stop makes contact, degrees.
     #[serde(with = "checked::Positive")]
     pub angle_deg: f64,
-    /// Torque for each radian beyond, N m/rad.
+    /// Stiffness beyond that tilt, N m/rad.
     #[serde(with = "checked::Positive")]
     pub stiffness_nm_per_rad: f64,
-    /// Torque for each rad/s of lean while it presses, N m s/rad.
+    /// Damping of the tilt rate during contact, N m s/rad.
     #[serde(with = "checked::NonNegative")]
     pub damping_nm_s_per_rad: f64,
 }
 
-/// A hand that holds the head: a spring and a damper towards the head's rest, as firm as the motion says at each
-/// instant.
+/// A hand that holds the head: a spring and a damper towards the head's equilibrium pose.
+///
+/// The base motion sets the strength of the hold over time.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct HoldSpec {
-    /// Frequency that the head would have in a firm hand alone, without spring and gravity, Hz.
+    /// Natural frequency of the head with a firm hand as the only support (no spring, no gravity), Hz.
     #[serde(with = "checked::Positive")]
     pub frequency_hz: f64,
-    /// Damping ratio that it would have in it.
+    /// Damping ratio of that oscillation.
     #[serde(with = "checked::NonNegative")]
     pub damping_ratio: f64,
 }

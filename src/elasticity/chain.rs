@@ -1,32 +1,33 @@
-//! Elements end to end; the nodes between them have no mass and are in equilibrium.
+//! A chain of elements in series with massless inner nodes in equilibrium.
 
 use super::deformation::{blocks, split, stack};
 use super::{Deformation, ElasticityError, Element, Matrix6, Vector6};
 use crate::geometry::{Matrix, Pose, Rotation, Vector, left_jacobian, skew};
 
-/// Iterations after which a chain has no equilibrium.
-const MOST_ITERATIONS: usize = 100;
+/// Maximum Newton iterations.
+const MAX_ITERATIONS: usize = 100;
 
-/// Residual of the inner nodes that counts as none, in parts of the segment's stiffness times the spring's length.
+/// Convergence threshold of the residual force, as a fraction of axial stiffness times spring length.
 const TOLERANCE: f64 = 1e-12;
 
-/// The nodes of a chain, from the base (0) to the top (N), and Newton's matrix about where they last were.
+/// The nodes of a chain, from the base (0) to the top (N), and the factorised Newton matrix.
 ///
-/// The residual of a node is the wrench on it, about it, written in the base: that of the element below on its top, and
-/// that of the element above on its base. The matrix is block tridiagonal, and is kept from step to step for as long as
-/// it still brings the residual down tenfold.
+/// The residual of a node is the wrench on it, about it, in the axes of the base: the wrench of the element below on
+/// its top plus that of the element above on its base. The matrix is block tridiagonal. It is reused as long as a step
+/// reduces the residual at least tenfold.
 #[derive(Debug, Clone)]
 pub(super) struct Chain {
     nodes: Vec<Pose>,
     residual: Vec<Vector6>,
     on_top: Vector6,
-    /// Whether the nodes are where a search ended well.
-    settled: bool,
+    /// Whether the nodes are a converged solution, usable as the next start.
+    converged: bool,
     matrix: Option<Matrices>,
 }
 
-/// The elimination of the block tridiagonal matrix: per inner node the inverse of its pivot, and its two neighbours'
-/// blocks.
+/// The factorised block tridiagonal matrix.
+///
+/// For each inner node: the inverse of the pivot block, and the blocks below and above the diagonal.
 #[derive(Debug, Clone)]
 struct Matrices {
     pivot: Vec<Matrix6>,
@@ -41,12 +42,12 @@ impl Chain {
             nodes: vec![Pose::identity(); segments + 1],
             residual: vec![Vector6::zeros(); inner],
             on_top: Vector6::zeros(),
-            settled: false,
+            converged: false,
             matrix: None,
         }
     }
 
-    /// The wrench on the top, about it, in the base.
+    /// The wrench on the top, about the top, in the axes of the base.
     pub(super) fn wrench_on_top(&self) -> Vector6 {
         self.on_top
     }
@@ -56,9 +57,10 @@ impl Chain {
         segments.map(|one_from_next| element.potential_j(&Deformation::of(&one_from_next).coordinates)).sum()
     }
 
-    /// Moves the inner nodes to where they are in equilibrium with the top at `base_from_top`: from where they last
-    /// were, or, should that fail, from an arc.
-    pub(super) fn settle(
+    /// Moves the inner nodes into equilibrium for a top at `base_from_top`.
+    ///
+    /// Starts from the last solution, or, if that fails, from a circular arc.
+    pub(super) fn find_equilibrium(
         &mut self,
         element: &Element,
         length_m: f64,
@@ -67,21 +69,21 @@ impl Chain {
     ) -> Result<(), ElasticityError> {
         let segments = self.nodes.len() - 1;
         self.nodes[segments] = *base_from_top;
-        if self.settled && self.iterate(element, length_m).is_ok() {
+        if self.converged && self.iterate(element, length_m).is_ok() {
             return Ok(());
         }
         self.matrix = None;
-        self.lay_along_an_arc(&deformation.coordinates);
-        let found = self.iterate(element, length_m);
-        self.settled = found.is_ok();
-        found
+        self.place_on_arc(&deformation.coordinates);
+        let result = self.iterate(element, length_m);
+        self.converged = result.is_ok();
+        result
     }
 
-    /// Newton's method for the inner nodes from where they are.
+    /// Runs Newton's method for the inner nodes from the present positions.
     fn iterate(&mut self, element: &Element, length_m: f64) -> Result<(), ElasticityError> {
         let tolerance_n = TOLERANCE * element.stiffness().m33 * length_m;
-        let mut size_n = self.find_residual(element, length_m);
-        for _ in 0..MOST_ITERATIONS {
+        let mut size_n = self.compute_residual(element, length_m);
+        for _ in 0..MAX_ITERATIONS {
             if size_n <= tolerance_n {
                 return Ok(());
             }
@@ -89,7 +91,7 @@ impl Chain {
                 self.matrix = Some(self.linearise(element)?);
             }
             self.advance(length_m);
-            let before_n = std::mem::replace(&mut size_n, self.find_residual(element, length_m));
+            let before_n = std::mem::replace(&mut size_n, self.compute_residual(element, length_m));
             if size_n.is_nan() || size_n > 0.1 * before_n {
                 self.matrix = None;
             }
@@ -97,21 +99,24 @@ impl Chain {
         Err(ElasticityError::InnerNodes { segments: self.nodes.len() - 1, residual_n: size_n })
     }
 
-    /// Puts the inner nodes on the helix of constant curvature from base to top: close to equilibrium wherever loads
-    /// are.
-    fn lay_along_an_arc(&mut self, coordinates: &Vector6) {
+    /// Places the inner nodes on the curve of constant curvature from base to top.
+    ///
+    /// That curve is close to equilibrium for all loads.
+    fn place_on_arc(&mut self, coordinates: &Vector6) {
         let segments = self.nodes.len() - 1;
         let (a, theta) = split(coordinates);
         for (k, node) in self.nodes.iter_mut().enumerate().take(segments) {
-            let share = k as f64 / segments as f64;
-            let turned = theta * share;
-            let place = left_jacobian(&turned) * a * share;
-            *node = Pose::from_parts(place.into(), Rotation::from_scaled_axis(turned));
+            let fraction = k as f64 / segments as f64;
+            let turned = theta * fraction;
+            let position = left_jacobian(&turned) * a * fraction;
+            *node = Pose::from_parts(position.into(), Rotation::from_scaled_axis(turned));
         }
     }
 
-    /// Residuals of the inner nodes; returns the greatest force, a torque counted over the spring's length.
-    fn find_residual(&mut self, element: &Element, length_m: f64) -> f64 {
+    /// Computes the residuals of the inner nodes and returns the largest one as a force, N.
+    ///
+    /// A torque counts as torque over spring length.
+    fn compute_residual(&mut self, element: &Element, length_m: f64) -> f64 {
         let segments = self.nodes.len() - 1;
         self.residual.fill(Vector6::zeros());
         for k in 0..segments {
@@ -120,22 +125,22 @@ impl Chain {
             let reaction = Element::reaction(&below_from_above, &wrench);
             let rotation = &self.nodes[k].rotation;
             if k > 0 {
-                self.residual[k - 1] += turn(rotation, &reaction);
+                self.residual[k - 1] += rotate_wrench(rotation, &reaction);
             }
             match self.residual.get_mut(k) {
-                Some(residual) => *residual += turn(rotation, &wrench),
-                None => self.on_top = turn(rotation, &wrench),
+                Some(residual) => *residual += rotate_wrench(rotation, &wrench),
+                None => self.on_top = rotate_wrench(rotation, &wrench),
             }
         }
         let size = |r: &Vector6| {
             let (force, torque) = split(r);
             force.amax().max(torque.amax() / length_m)
         };
-        // `max` of f64 would hide a NaN.
-        self.residual.iter().map(size).fold(0.0, |most, s| if s > most || s.is_nan() { s } else { most })
+        // `f64::max` would drop a NaN.
+        self.residual.iter().map(size).fold(0.0, |largest, s| if s > largest || s.is_nan() { s } else { largest })
     }
 
-    /// Newton's matrix here, eliminated from the base up.
+    /// Computes and factorises the Newton matrix at the present nodes, from the base upwards.
     fn linearise(&self, element: &Element) -> Result<Matrices, ElasticityError> {
         let segments = self.nodes.len() - 1;
         let tangents: Vec<Tangent> =
@@ -155,32 +160,34 @@ impl Chain {
         Ok(matrix)
     }
 
-    /// One step of Newton's method, at most half a radian and a quarter of the length a node.
+    /// Takes one Newton step, limited to 0.5 rad and to a quarter of the spring's length for each node.
     fn advance(&mut self, length_m: f64) {
         let Some(matrix) = &self.matrix else { return };
         let inner = self.residual.len();
         for k in 1..inner {
-            let carried = matrix.below[k] * (matrix.pivot[k - 1] * self.residual[k - 1]);
-            self.residual[k] -= carried;
+            let eliminated = matrix.below[k] * (matrix.pivot[k - 1] * self.residual[k - 1]);
+            self.residual[k] -= eliminated;
         }
         for k in (0..inner).rev() {
             let from_above = if k + 1 < inner { matrix.above[k] * self.residual[k + 1] } else { Vector6::zeros() };
             self.residual[k] = matrix.pivot[k] * (self.residual[k] - from_above);
         }
-        let most = self.residual.iter().fold(0.0_f64, |most, step| {
+        let largest = self.residual.iter().fold(0.0_f64, |largest, step| {
             let (shift, turned) = split(step);
-            most.max(shift.norm() / (0.25 * length_m)).max(turned.norm() / 0.5)
+            largest.max(shift.norm() / (0.25 * length_m)).max(turned.norm() / 0.5)
         });
-        let share = if most > 1.0 { 1.0 / most } else { 1.0 };
+        let factor = if largest > 1.0 { 1.0 / largest } else { 1.0 };
         for (node, step) in self.nodes[1..].iter_mut().zip(&self.residual) {
-            let (shift, turned) = split(&(step * -share));
+            let (shift, turned) = split(&(step * -factor));
             node.translation.vector += shift;
             node.rotation = Rotation::from_scaled_axis(turned) * node.rotation;
         }
     }
 }
 
-/// How the wrenches at an element's two ends change with its two ends' displacements, all written in the chain's base.
+/// Derivatives of the wrenches at the two ends of an element by the displacements of the two ends.
+///
+/// All are in the axes of the chain's base.
 struct Tangent {
     top_by_top: Matrix6,
     top_by_base: Matrix6,
@@ -189,7 +196,9 @@ struct Tangent {
 }
 
 impl Tangent {
-    /// By central differences in the top's displacement; the rest follows, as a rigid motion turns the wrenches along.
+    /// Computes the derivatives by central differences in the top's displacement.
+    ///
+    /// Those by the base's displacement follow, since a rigid motion rotates the wrenches.
     fn of(element: &Element, base: &Pose, top: &Pose) -> Self {
         let base_from_top = base.inv_mul(top);
         let p = base_from_top.translation.vector;
@@ -205,8 +214,8 @@ impl Tangent {
             let h = 1e-6;
             by_top.set_column(k, &((moved(h) - moved(-h)) / (2.0 * h)));
         }
-        // A displacement (d, phi) of the base is (-d - phi x p, -phi) of the top seen from it, and turns the wrench by
-        // phi.
+        // A displacement (d, phi) of the base equals (-d - phi x p, -phi) of the top relative to the base, and rotates
+        // the wrench by phi.
         let zero = Matrix::zeros();
         let carry = blocks(&-Matrix::identity(), &skew(&p), &zero, &-Matrix::identity());
         let turning = blocks(&zero, &-skew(&force), &zero, &-skew(&torque));
@@ -226,7 +235,7 @@ impl Tangent {
     }
 }
 
-fn turn(rotation: &Rotation, wrench: &Vector6) -> Vector6 {
+fn rotate_wrench(rotation: &Rotation, wrench: &Vector6) -> Vector6 {
     let (force, torque): (Vector, Vector) = split(wrench);
     stack(&(rotation * force), &(rotation * torque))
 }

@@ -12,7 +12,7 @@ pub struct Moduli {
 }
 
 impl Moduli {
-    /// Poisson's ratio, `E / 2G - 1`.
+    /// Poisson's ratio `nu = E / 2G - 1`.
     pub fn poisson(&self) -> f64 {
         self.youngs_pa / (2.0 * self.shear_pa) - 1.0
     }
@@ -29,13 +29,13 @@ pub struct Coil {
 }
 
 impl Coil {
-    /// A coil of mean diameter `coil_diameter_m` and free length `free_length_m`, wound of `active_coils` turns of
-    /// wire.
+    /// Creates a coil with mean diameter `coil_diameter_m` and `active_coils` turns of wire.
     ///
     /// All numbers are finite and above zero.
     ///
     /// # Errors
-    /// When the spring index is below 2, the coils touch already, or the moduli are no solid's.
+    /// When the spring index (coil over wire diameter) is below 2, the coils touch without load, or Poisson's ratio is
+    /// outside -1 to 0.5.
     pub fn new(
         coil_diameter_m: f64,
         wire_diameter_m: f64,
@@ -74,32 +74,34 @@ impl Coil {
         self.free_length_m
     }
 
-    /// Length at which the active coils touch, m; ground or dead end coils come on top.
+    /// Solid length, at which the active coils touch, m; inactive end coils are not included.
     pub fn solid_length_m(&self) -> f64 {
         self.active_coils * self.wire_diameter_m
     }
 
-    /// Axial rate `G d^4 / (8 D^3 n)`, N/m.
+    /// Axial stiffness `G d^4 / (8 D^3 n)`, N/m.
     pub fn axial_n_per_m(&self) -> f64 {
         self.moduli.shear_pa * self.wire_diameter_m.powi(4) / (8.0 * self.coil_diameter_m.powi(3) * self.active_coils)
     }
 
-    /// Torsional rate about the axis `E d^4 / (64 D n)`, N m/rad.
+    /// Torsional stiffness about the axis `E d^4 / (64 D n)`, N m/rad.
     pub fn torsion_nm_per_rad(&self) -> f64 {
         self.moduli.youngs_pa * self.wire_diameter_m.powi(4) / (64.0 * self.coil_diameter_m * self.active_coils)
     }
 
-    /// Volume of the active wire, m^3: a quarter of pi squared times `D n d^2`.
+    /// Volume of the active wire `pi^2 D n d^2 / 4`, m^3.
     pub fn wire_volume_m3(&self) -> f64 {
         let pi = std::f64::consts::PI;
         0.25 * pi * pi * self.coil_diameter_m * self.active_coils * self.wire_diameter_m.powi(2)
     }
 
-    /// The spring under `load_n` along its axis, compression positive, as a column: rigidities for its length then.
+    /// The equivalent column under the axial load `load_n`, compression positive.
+    ///
+    /// The rigidities are those at the loaded length.
     ///
     /// # Errors
-    /// When the load presses the coils together.
-    pub fn under(&self, load_n: f64) -> Result<Column, ElasticityError> {
+    /// When the load compresses the spring to its solid length.
+    pub fn under_load(&self, load_n: f64) -> Result<Column, ElasticityError> {
         let length_m = self.free_length_m - load_n / self.axial_n_per_m();
         if length_m <= self.solid_length_m() {
             let (loaded_mm, solid_mm) = (length_m * 1e3, self.solid_length_m() * 1e3);
@@ -135,9 +137,9 @@ mod tests {
     fn coils_that_touch_are_refused_free_and_under_load() {
         let error = Coil::new(0.025, 0.003, 40.0, 0.12, STEEL).unwrap_err();
         assert!(matches!(error, ElasticityError::CoilsTouch { .. }), "{error}");
-        // k = 79.3e9 * 0.003^4 / (8 * 0.025^3 * 12) = 4282.2 N/m; 400 N would leave 26.6 mm, but 12 coils take 36 mm.
+        // k = 79.3e9 * 0.003^4 / (8 * 0.025^3 * 12) = 4282.2 N/m; 400 N would leave 26.6 mm; the solid length is 36 mm.
         let coil = Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap();
-        let ElasticityError::Clash { loaded_mm, solid_mm, .. } = coil.under(400.0).unwrap_err() else {
+        let ElasticityError::Clash { loaded_mm, solid_mm, .. } = coil.under_load(400.0).unwrap_err() else {
             panic!("no clash");
         };
         assert!((loaded_mm - 26.59).abs() < 0.01 && (solid_mm - 36.0).abs() < 1e-9, "{loaded_mm} {solid_mm}");

@@ -1,31 +1,31 @@
-//! How far a spring's top is from its rest, in coordinates that turn with the spring.
+//! Deformation of a spring in corotational coordinates.
 
 use super::{Matrix6, Vector6};
 use crate::geometry::{Matrix, Pose, Vector, skew};
 
-/// The logarithm of the top's pose seen from the base, and its rate of change.
+/// The logarithm of the top's pose relative to the base, and the rate of change.
 ///
-/// With the top at `p`, turned by the rotation vector `theta`, the six coordinates are `(a, theta)` where `a =
-/// J_l(theta)^-1 p`: the logarithm on SE(3). A spring that bends into an arc of constant curvature keeps `a` at its
-/// length along z, so bending, shear, stretch and twist stay apart however far the top has turned, and the frame of the
-/// strains turns with the spring. Good for turns below pi.
+/// For a top at `p`, rotated by the rotation vector `theta`, the six coordinates are `(a, theta)` with `a =
+/// J_l(theta)^-1 p`, the logarithm on SE(3). A spring bent into an arc of constant curvature keeps `a` equal to the
+/// length along z, so bending, shear, stretch and twist remain separate at large rotations, and the frame of the
+/// strains rotates with the spring. Valid for rotations below pi.
 ///
 /// The rate is `a_dot = A v + W w`, `theta_dot = A w` for the top's velocity `v` and angular velocity `w` in the base,
 /// with `A = J_l(theta)^-1` (Barfoot, State Estimation for Robotics, 7.1.5) and `W = (d a / d theta) A`. The power of a
-/// force law `g` in the coordinates is `g . rate`, so the wrench on the top is the transposed rate of `-g`: this is
-/// what makes a potential's force conservative.
+/// force law `g` in the coordinates is `g . rate`, so the wrench on the top is the transposed Jacobian times `-g`. The
+/// force of a potential is therefore conservative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deformation {
-    /// `(a, theta)`, m and rad.
+    /// The coordinates `(a, theta)`, m and rad.
     pub coordinates: Vector6,
-    /// `A`.
-    pub straight: Matrix,
-    /// `W`.
-    pub mixed: Matrix,
+    /// The Jacobian block `A`.
+    pub jacobian: Matrix,
+    /// The Jacobian block `W`.
+    pub coupling: Matrix,
 }
 
 impl Deformation {
-    /// That of a top at `base_from_top`.
+    /// Computes the deformation for a top at `base_from_top`.
     pub fn of(base_from_top: &Pose) -> Self {
         let p = base_from_top.translation.vector;
         let theta = base_from_top.rotation.scaled_axis();
@@ -33,33 +33,36 @@ impl Deformation {
         let hat = skew(&theta);
         let turned = theta.cross(&p);
         let twice = theta.cross(&turned);
-        let straight = Matrix::identity() - hat * 0.5 + hat * hat * c;
+        let jacobian = Matrix::identity() - hat * 0.5 + hat * hat * c;
         let hat_p = skew(&p);
         let by_theta = hat_p * 0.5 - (skew(&turned) + hat * hat_p) * c + twice * theta.transpose() * c_slope;
         let a = p - turned * 0.5 + twice * c;
-        Self { coordinates: stack(&a, &theta), straight, mixed: by_theta * straight }
+        Self { coordinates: stack(&a, &theta), jacobian, coupling: by_theta * jacobian }
     }
 
-    /// How fast the coordinates change under a twist of the top, written in the base.
+    /// The rate of the coordinates for a twist of the top, in the axes of the base.
     pub fn rate(&self, twist: &Vector6) -> Vector6 {
         let (v, w) = split(twist);
-        stack(&(self.straight * v + self.mixed * w), &(self.straight * w))
+        stack(&(self.jacobian * v + self.coupling * w), &(self.jacobian * w))
     }
 
-    /// The wrench about the top, written in the base, that does the work of `g` in the coordinates: the rate,
-    /// transposed.
+    /// The wrench about the top that is equivalent to the generalised force `g`: transposed Jacobian times g.
+    ///
+    /// In the axes of the base.
     pub fn wrench(&self, g: &Vector6) -> Vector6 {
         let (force, torque) = split(g);
-        stack(&self.straight.tr_mul(&force), &(self.mixed.tr_mul(&force) + self.straight.tr_mul(&torque)))
+        stack(&self.jacobian.tr_mul(&force), &(self.coupling.tr_mul(&force) + self.jacobian.tr_mul(&torque)))
     }
 
-    /// The rate as a matrix.
+    /// The Jacobian of the coordinates by the twist of the top.
     pub fn rate_matrix(&self) -> Matrix6 {
-        blocks(&self.straight, &self.mixed, &Matrix::zeros(), &self.straight)
+        blocks(&self.jacobian, &self.coupling, &Matrix::zeros(), &self.jacobian)
     }
 }
 
-/// `c = (1 - (t/2) cot(t/2)) / t^2` of `J_l^-1 = 1 - [theta]/2 + c [theta]^2`, and `(dc/dt)/t`; of `t` squared.
+/// The coefficient `c = (1 - (t/2) cot(t/2)) / t^2` of `J_l^-1 = 1 - [theta]/2 + c [theta]^2`, and `(dc/dt)/t`.
+///
+/// The argument is `t` squared.
 fn cotangent_series(t2: f64) -> (f64, f64) {
     if t2 < 0.25 {
         // From (x/2) cot(x/2) = 1 - x^2/12 - x^4/720 - ... (Bernoulli numbers); the next terms are below 1e-16.
@@ -82,17 +85,17 @@ fn cotangent_series(t2: f64) -> (f64, f64) {
     (c, -((k - k * k - half * half) / t2 + 2.0 * c) / t2)
 }
 
-/// Translation (or force) and rotation (or torque) in one column.
+/// Stacks translation (or force) and rotation (or torque) in one column.
 pub fn stack(upper: &Vector, lower: &Vector) -> Vector6 {
     Vector6::new(upper.x, upper.y, upper.z, lower.x, lower.y, lower.z)
 }
 
-/// A column's translation (or force) and rotation (or torque).
+/// Splits a column into translation (or force) and rotation (or torque).
 pub fn split(v: &Vector6) -> (Vector, Vector) {
     (Vector::new(v[0], v[1], v[2]), Vector::new(v[3], v[4], v[5]))
 }
 
-/// A matrix of four blocks, `a b` over `c d`.
+/// Assembles a matrix from four blocks: `a b` over `c d`.
 pub fn blocks(a: &Matrix, b: &Matrix, c: &Matrix, d: &Matrix) -> Matrix6 {
     let mut all = Matrix6::zeros();
     all.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
@@ -109,7 +112,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn an_arc_of_constant_curvature_is_bent_and_nothing_else() {
+    fn an_arc_of_constant_curvature_has_a_bending_coordinate_only() {
         // A spring of length L bent by phi about y ends at L/phi (1 - cos phi, 0, sin phi).
         let (length, phi) = (0.12, 1.3_f64);
         let end = Vector::new(1.0 - phi.cos(), 0.0, phi.sin()) * (length / phi);
@@ -126,7 +129,7 @@ mod tests {
             let p = Vector::new(0.02, -0.03, 0.11);
             let top = Pose::from_parts(p.into(), Rotation::from_scaled_axis(theta));
             let here = Deformation::of(&top);
-            assert_relative_eq!(left_jacobian(&theta) * here.straight, Matrix::identity(), epsilon = 1e-12);
+            assert_relative_eq!(left_jacobian(&theta) * here.jacobian, Matrix::identity(), epsilon = 1e-12);
             for k in 0..6 {
                 let h = 1e-5;
                 let moved = |h: f64| {
@@ -142,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn the_series_meets_the_closed_form() {
+    fn series_and_closed_form_agree_where_they_meet() {
         let (below, above) = (cotangent_series(0.25 - 1e-12), cotangent_series(0.25));
         assert_relative_eq!(below.0, above.0, max_relative = 1e-12);
         assert_relative_eq!(below.1, above.1, max_relative = 1e-10);

@@ -1,15 +1,15 @@
-//! One element of a spring: a quadratic potential in the deformation's coordinates.
+//! One element of a spring: a quadratic potential in the deformation coordinates.
 
 use super::deformation::{blocks, split, stack};
 use super::{Column, Deformation, ElasticityError, Matrix6, Vector6, conditioning, loaded_stiffness};
 use crate::geometry::{Matrix, Pose, Vector, skew};
 
-/// A piece of spring between two nodes, straight under an axial load when at rest.
+/// A segment of a spring between two nodes, straight under an axial load in the reference state.
 ///
-/// Its potential is `U = f . e + e . K e / 2` in `e`, the coordinates of [`Deformation`] less those of the straight
-/// piece, with `f` the axial load. `K` is such that the top's stiffness about the straight, loaded piece is exactly the
-/// one given: the coordinates' curvature times the load (the geometric stiffness) is taken out of it. So the softening
-/// by the load is in the force law, and gravity is not.
+/// The potential is `U = f . e + e . K e / 2` in `e`, the [`Deformation`] coordinates minus those of the straight
+/// segment, with the axial load `f`. The geometric stiffness (load times curvature of the coordinates) is subtracted in
+/// `K`, such that the stiffness of the top about the straight, loaded state is exactly the given one. The force law
+/// therefore includes the softening by the load, but not gravity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Element {
     rest: Vector6,
@@ -18,15 +18,16 @@ pub struct Element {
 }
 
 impl Element {
-    /// A piece of `length_m` under `load_n` (compression positive), whose top, its base clamped, then has the stiffness
-    /// `at_top`: order x, y, z, rx, ry, rz, about the top.
+    /// Creates a segment of `length_m` under `load_n` (compression positive).
+    ///
+    /// `at_top` is the stiffness of the top about the top, with the base clamped: order x, y, z, rx, ry, rz.
     ///
     /// # Errors
-    /// When `at_top` is not symmetric, or the piece would give way with both ends clamped.
+    /// When `at_top` is not symmetric, or the segment is unstable with both ends clamped.
     pub fn new(length_m: f64, load_n: f64, at_top: &Matrix6) -> Result<Self, ElasticityError> {
         check_symmetric(at_top)?;
-        // Of the top's displacement (u, theta), a_z = L + u_z + (theta_y u_x - theta_x u_y)/2 - L (theta_x^2 +
-        // theta_y^2)/12 to second order; its Hessian times the force -P along it is the geometric stiffness.
+        // For a displacement (u, theta) of the top, a_z = L + u_z + (theta_y u_x - theta_x u_y)/2 - L (theta_x^2 +
+        // theta_y^2)/12 to second order. The Hessian times the axial force -P is the geometric stiffness.
         let mut geometric = Matrix6::zeros();
         for (shift, turn, sign) in [(0, 4, 1.0), (1, 3, -1.0)] {
             geometric[(shift, turn)] = -0.5 * sign * load_n;
@@ -45,20 +46,20 @@ impl Element {
         })
     }
 
-    /// A piece of a loaded column.
+    /// Creates a segment of a loaded column.
     ///
     /// # Errors
-    /// When the load buckles it.
+    /// When the load buckles the segment.
     pub fn of_column(column: &Column) -> Result<Self, ElasticityError> {
         Self::new(column.length_m, column.load_n, &loaded_stiffness(column)?)
     }
 
-    /// The coordinates of the straight, loaded piece.
+    /// The coordinates of the straight, loaded segment.
     pub fn rest(&self) -> &Vector6 {
         &self.rest
     }
 
-    /// The stiffness in the deformation's coordinates.
+    /// The stiffness in the deformation coordinates.
     pub fn stiffness(&self) -> &Matrix6 {
         &self.stiffness
     }
@@ -68,13 +69,13 @@ impl Element {
         self.load + self.stiffness * (coordinates - self.rest)
     }
 
-    /// The potential, zero for the straight, loaded piece, J.
+    /// The potential, zero for the straight, loaded segment, J.
     pub fn potential_j(&self, coordinates: &Vector6) -> f64 {
         let e = coordinates - self.rest;
         e.dot(&(self.load + self.stiffness * e * 0.5))
     }
 
-    /// The wrench on the top, about the top, in the base's frame.
+    /// The wrench on the top, about the top, in the axes of the base.
     pub fn wrench(&self, base_from_top: &Pose) -> Vector6 {
         let deformation = Deformation::of(base_from_top);
         -deformation.wrench(&self.gradient(&deformation.coordinates))
@@ -87,7 +88,7 @@ impl Element {
     }
 }
 
-/// Refuses a stiffness that lets go in some direction.
+/// Returns an error unless a stiffness is positive definite.
 pub(super) fn check_positive_definite(k: &Matrix6) -> Result<(), ElasticityError> {
     let least = conditioning(k);
     if least.is_nan() || least <= 1e-12 { Err(ElasticityError::NotPositiveDefinite { least }) } else { Ok(()) }
@@ -112,7 +113,7 @@ mod tests {
     use crate::geometry::Rotation;
     use approx::assert_relative_eq;
 
-    /// A stiffness of a spring of 120 mm with every coupling there may be, N, m, rad.
+    /// A stiffness of a spring of 120 mm with couplings between all coordinates, N, m, rad.
     fn coupled() -> Matrix6 {
         let skewed = Matrix6::from_fn(|i, j| ((3 * i + 5 * j * j) as f64).sin());
         let scale = Matrix6::from_diagonal(&Vector6::new(20.0, 20.0, 60.0, 1.0, 1.0, 0.8));
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tangent_at_rest_is_the_stiffness_given_whatever_the_load() {
+    fn the_tangent_in_the_reference_state_is_the_given_stiffness_for_any_load() {
         for load in [0.0, 3.9, -3.9] {
             let element = Element::new(0.12, load, &coupled()).unwrap();
             let rest = Pose::translation(0.0, 0.0, 0.12);
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wrench_is_the_slope_of_the_potential_at_large_turns() {
+    fn the_wrench_is_minus_the_gradient_of_the_potential_at_large_rotations() {
         let element = Element::new(0.12, 3.9, &coupled()).unwrap();
         let turn = Rotation::from_scaled_axis(Vector::new(0.9, -1.2, 0.5));
         let top = Pose::from_parts(Vector::new(0.05, 0.03, 0.08).into(), turn);
@@ -153,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stiffness_that_lets_go_is_refused() {
+    fn an_indefinite_or_asymmetric_stiffness_is_rejected() {
         let mut soft = coupled();
         soft.set_row(3, &(soft.row(0) * 0.01));
         soft.set_column(3, &(soft.column(0) * 0.01));

@@ -4,7 +4,7 @@ use super::{Coil, ElasticityError, Matrix6};
 use nalgebra::{Matrix2, Matrix4};
 use std::f64::consts::PI;
 
-/// A straight elastic column under an axial load: length and rigidities as they are under it.
+/// A straight elastic column; length and rigidities are those under the axial load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Column {
     /// Length under the load, m.
@@ -13,32 +13,33 @@ pub struct Column {
     pub bending_nm2: f64,
     /// Shear rigidity S, N.
     pub shear_n: f64,
-    /// Axial rate, N/m.
+    /// Axial stiffness, N/m.
     pub axial_n_per_m: f64,
-    /// Torsional rate, N m/rad.
+    /// Torsional stiffness, N m/rad.
     pub torsion_nm_per_rad: f64,
     /// Axial load P, compression positive, N.
     pub load_n: f64,
 }
 
 impl Column {
-    /// One of `segments` equal pieces of the column, end to end.
-    pub fn piece(&self, segments: usize) -> Self {
-        let share = segments as f64;
+    /// One of `segments` equal segments of the column in series.
+    pub fn segment(&self, segments: usize) -> Self {
+        let count = segments as f64;
         Self {
-            length_m: self.length_m / share,
-            axial_n_per_m: self.axial_n_per_m * share,
-            torsion_nm_per_rad: self.torsion_nm_per_rad * share,
+            length_m: self.length_m / count,
+            axial_n_per_m: self.axial_n_per_m * count,
+            torsion_nm_per_rad: self.torsion_nm_per_rad * count,
             ..*self
         }
     }
 
-    /// Stiffness of the top against a lateral force and the moment in its plane, the base clamped: rows (force,
-    /// moment), columns (displacement, rotation that leans the same way).
+    /// Lateral stiffness of the top in one plane, with the base clamped.
+    ///
+    /// Rows (force, moment), columns (displacement, rotation that tilts the same way). `None` if the column has buckled
+    /// with the top clamped too.
     ///
     /// With the state (y, theta, M, V) along the column: `y' = theta + (V + P theta)/S`, `theta' = M/B`, `M' = -(V + P
-    /// y')`, `V' = 0`; so the state at the top is `exp(A L)` times that at the base, for either sign of P. `None` where
-    /// the column has buckled with its top clamped too.
+    /// y')`, `V' = 0`. The state at the top is `exp(A L)` times that at the base, for either sign of P.
     pub fn lateral_stiffness(&self) -> Option<Matrix2<f64>> {
         let (p, b, s) = (self.load_n, self.bending_nm2, self.shear_n);
         let soften = 1.0 + p / s;
@@ -50,7 +51,7 @@ impl Column {
             0.0, 0.0, 0.0, 0.0,
         );
         let transfer = (along * self.length_m).exp();
-        // At the base y = theta = 0: the top's (y, theta) and (M, V) both follow from the base's (M, V).
+        // At the base y = theta = 0, so (y, theta) and (M, V) of the top follow from (M, V) of the base.
         let displaced = transfer.fixed_view::<2, 2>(0, 2).into_owned();
         let loaded = transfer.fixed_view::<2, 2>(2, 2).into_owned();
         let moment_and_force = loaded * displaced.try_inverse()?;
@@ -64,15 +65,16 @@ impl Column {
     }
 }
 
-/// Stiffness of the column's top with the base clamped, order x, y, z, rx, ry, rz, the axial load in it.
+/// Stiffness of the column's top with the base clamped, axial load included.
 ///
-/// A rotation about +y leans the top towards +x, one about +x towards -y: hence the signs of the two couplings.
+/// Order x, y, z, rx, ry, rz. A rotation about +y tilts the top towards +x, one about +x towards -y: hence the opposite
+/// signs of the two couplings.
 ///
-/// Beyond the load at which the column would fall over if its top were free, this is not positive definite; whether
-/// something stands on it is a matter of what holds the top.
+/// Above the buckling load for a free top, the matrix is not positive definite; whether a body on the spring is stable
+/// depends on the constraints of the top.
 ///
 /// # Errors
-/// When the load buckles the column even with its top guided (free to move sideways, not to turn).
+/// When the load buckles the column even with the top guided (free to translate sideways, not to rotate).
 pub fn loaded_stiffness(column: &Column) -> Result<Matrix6, ElasticityError> {
     let lateral = column
         .lateral_stiffness()
@@ -90,17 +92,18 @@ pub fn loaded_stiffness(column: &Column) -> Result<Matrix6, ElasticityError> {
     Ok(stiffness)
 }
 
-/// The load at which a coil buckles with its base clamped and its top guided (free to move sideways, not to turn), N:
-/// where `q L = pi`, with `q^2 = P (1 + P/S) / B` for the length L under the load. `None` for a coil that can be
-/// pressed together without buckling.
+/// The buckling load of a coil with clamped base and guided top, N.
+///
+/// Guided: free to translate sideways, not to rotate. The condition is `q L = pi` with `q^2 = P (1 + P/S) / B` and the
+/// length L under the load. `None` if the coil reaches the solid length without buckling.
 pub fn buckling_load_n(coil: &Coil) -> Option<f64> {
     let excess = |load_n: f64| {
-        let column = coil.under(load_n).ok()?;
+        let column = coil.under_load(load_n).ok()?;
         let q = (load_n * (1.0 + load_n / column.shear_n) / column.bending_nm2).sqrt();
         Some(q * column.length_m - PI)
     };
     let (mut low, mut high) = (0.0, (coil.free_length_m() - coil.solid_length_m()) * coil.axial_n_per_m());
-    // q L first rises with the load and falls towards the end, as L shrinks: walk up to the first crossing, then
+    // q L first increases with the load and then decreases as L shrinks: search for the first crossing in steps, then
     // bisect.
     let step = high / 1000.0;
     high = (1..1000).map(|k| k as f64 * step).find(|load| excess(*load).is_some_and(|e| e >= 0.0))?;
@@ -124,9 +127,9 @@ mod tests {
     }
 
     #[test]
-    fn without_load_it_is_timoshenkos_beam() {
+    fn without_load_the_column_is_a_timoshenko_beam() {
         // K_xx = 12 B / (L^3 (1 + Phi)), K_ry = (4 + Phi) B / (L (1 + Phi)), K_x,ry = -6 B / (L^2 (1 + Phi)).
-        let column = steel(25.0, 3.0, 12.0, 120.0).under(0.0).unwrap();
+        let column = steel(25.0, 3.0, 12.0, 120.0).under_load(0.0).unwrap();
         let (b, l) = (column.bending_nm2, column.length_m);
         let phi = 12.0 * b / (column.shear_n * l * l);
         let k = loaded_stiffness(&column).unwrap();
@@ -138,8 +141,8 @@ mod tests {
     }
 
     #[test]
-    fn guided_lateral_stiffness_is_haringxs_and_within_2_percent_of_the_rods() {
-        // D, d, n, L0 in mm, load in N; guided lateral stiffness in N/m of a geometrically exact rod along the helix,
+    fn guided_lateral_stiffness_agrees_with_haringx_and_an_exact_rod() {
+        // D, d, n, L0 in mm; load in N; guided lateral stiffness in N/m of a geometrically exact rod along the helix,
         // and of the column.
         let table = [
             ([50.0, 4.0, 10.0, 120.0], 0.0, 979.5, 974.1),
@@ -149,9 +152,9 @@ mod tests {
             ([30.0, 2.0, 8.0, 60.0], 11.0, 465.9, 460.3),
         ];
         for ([coil, wire, coils, length], load, rod, expected) in table {
-            let column = steel(coil, wire, coils, length).under(load).unwrap();
+            let column = steel(coil, wire, coils, length).under_load(load).unwrap();
             let guided = loaded_stiffness(&column).unwrap()[(0, 0)];
-            // The loads are given to 0.05 N, which is up to 0.5 % of the stiffness of the softest.
+            // The loads are rounded to 0.05 N, which is up to 0.5 % of the stiffness of the softest spring.
             assert_relative_eq!(guided, expected, max_relative = 5e-3);
             assert_relative_eq!(guided, rod, max_relative = 0.025);
             if load > 0.0 {
@@ -165,17 +168,17 @@ mod tests {
     }
 
     #[test]
-    fn tension_stiffens_and_the_buckling_load_leaves_nothing() {
+    fn tension_stiffens_and_lateral_stiffness_vanishes_at_the_buckling_load() {
         let coil = steel(40.0, 2.5, 15.0, 120.0);
-        let guided = |load: f64| coil.under(load).unwrap().lateral_stiffness().unwrap()[(0, 0)];
+        let guided = |load: f64| coil.under_load(load).unwrap().lateral_stiffness().unwrap()[(0, 0)];
         assert!(guided(-10.0) > guided(0.0) && guided(0.0) > guided(10.0));
         let critical = buckling_load_n(&coil).unwrap();
         assert!(guided(critical).abs() < 1e-6 * guided(0.0), "{critical} N leaves {}", guided(critical));
         assert!(matches!(
-            loaded_stiffness(&coil.under(critical * 1.01).unwrap()),
+            loaded_stiffness(&coil.under_load(critical * 1.01).unwrap()),
             Err(ElasticityError::Buckles { .. })
         ));
-        // Free length over diameter below 5.2 (1 + nu ...)^-1/2, about 2.6 for clamped ends: never buckles.
+        // With clamped ends, a free length below 2.6 diameters never buckles.
         assert_eq!(buckling_load_n(&steel(50.0, 4.0, 10.0, 120.0)), None);
     }
 }

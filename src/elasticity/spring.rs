@@ -1,17 +1,17 @@
-//! A spring of one or several elements.
+//! The force law of a spring of one or several elements.
 
 use super::chain::Chain;
 use super::deformation::Deformation;
 use super::{Column, ElasticityError, Element, Matrix6, Vector6};
 use crate::geometry::Pose;
 
-/// The most segments a spring may be cut into.
-pub const MOST_SEGMENTS: usize = 64;
+/// Maximum number of segments of a spring.
+pub const MAX_SEGMENTS: usize = 64;
 
-/// The force law of a spring between its clamped base and its top, for turns of the top below pi.
+/// The force law of a spring between the clamped base and the top, for rotations of the top below pi.
 ///
-/// The spring has no mass. Cut into segments, its inner nodes are wherever they are in equilibrium; that place is found
-/// by Newton's method from where they last were, which is what a [`SpringState`] remembers.
+/// The spring is massless. The inner nodes of a segmented spring are in equilibrium; Newton's method finds them,
+/// starting from the last solution in [`SpringState`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spring {
     element: Element,
@@ -19,29 +19,30 @@ pub struct Spring {
     length_m: f64,
 }
 
-/// Where a spring's inner nodes last were.
+/// The last solution for the inner nodes of a spring.
 #[derive(Debug, Clone)]
 pub struct SpringState {
     chain: Option<Chain>,
 }
 
 impl Spring {
-    /// A loaded column, cut into `segments` equal elements. Straight, it has the column's stiffness for any number of
-    /// them.
+    /// Creates the spring of a loaded column, divided into `segments` equal elements.
+    ///
+    /// The straight spring has the stiffness of the column for any number of segments.
     ///
     /// # Errors
-    /// When the load buckles the column, or `segments` is not 1 to [`MOST_SEGMENTS`].
+    /// When the load buckles the column, or `segments` is not 1 to [`MAX_SEGMENTS`].
     pub fn of_column(column: &Column, segments: usize) -> Result<Self, ElasticityError> {
-        if !(1..=MOST_SEGMENTS).contains(&segments) {
-            return Err(ElasticityError::Segments { segments, most: MOST_SEGMENTS });
+        if !(1..=MAX_SEGMENTS).contains(&segments) {
+            return Err(ElasticityError::Segments { segments, most: MAX_SEGMENTS });
         }
-        // The whole column must not buckle either, though each piece of it be short enough not to.
+        // The full column must not buckle either, even if each segment is short enough.
         super::loaded_stiffness(column)?;
-        let element = Element::of_column(&column.piece(segments))?;
+        let element = Element::of_column(&column.segment(segments))?;
         Ok(Self { element, segments, length_m: column.length_m })
     }
 
-    /// A single element that has the stiffness `at_top` when straight, `length_m` long, under `load_n`.
+    /// Creates a single element of length `length_m` under `load_n` with the stiffness `at_top` when straight.
     ///
     /// # Errors
     /// When `at_top` is not symmetric or not positive definite.
@@ -56,20 +57,22 @@ impl Spring {
         self.length_m
     }
 
-    /// Segments.
+    /// Number of segments.
     pub fn segments(&self) -> usize {
         self.segments
     }
 
-    /// Inner nodes that nobody has looked at yet.
+    /// A state without a solution for the inner nodes.
     pub fn state(&self) -> SpringState {
         SpringState { chain: (self.segments > 1).then(|| Chain::new(self.segments)) }
     }
 
-    /// The wrench of the spring on whatever holds its top at `base_from_top`, whose deformation is given too.
+    /// The wrench of the spring on the body at the top.
+    ///
+    /// `deformation` must be that of `base_from_top`.
     ///
     /// # Errors
-    /// When the inner nodes find no equilibrium.
+    /// When the equilibrium of the inner nodes does not converge.
     pub fn wrench(
         &self,
         state: &mut SpringState,
@@ -79,22 +82,22 @@ impl Spring {
         match &mut state.chain {
             None => Ok(-deformation.wrench(&self.element.gradient(&deformation.coordinates))),
             Some(chain) => {
-                chain.settle(&self.element, self.length_m, base_from_top, deformation)?;
+                chain.find_equilibrium(&self.element, self.length_m, base_from_top, deformation)?;
                 Ok(chain.wrench_on_top())
             }
         }
     }
 
-    /// The energy in the spring with its top at `base_from_top`, zero when straight under its load, J.
+    /// The elastic energy with the top at `base_from_top`, J; zero when straight under the reference load.
     ///
     /// # Errors
-    /// When the inner nodes find no equilibrium.
+    /// When the equilibrium of the inner nodes does not converge.
     pub fn potential_j(&self, state: &mut SpringState, base_from_top: &Pose) -> Result<f64, ElasticityError> {
         let deformation = Deformation::of(base_from_top);
         match &mut state.chain {
             None => Ok(self.element.potential_j(&deformation.coordinates)),
             Some(chain) => {
-                chain.settle(&self.element, self.length_m, base_from_top, &deformation)?;
+                chain.find_equilibrium(&self.element, self.length_m, base_from_top, &deformation)?;
                 Ok(chain.potential_j(&self.element))
             }
         }

@@ -1,102 +1,108 @@
-//! What is remembered of biases, gravity and clock from window to window.
+//! Prior on the border unknowns (biases, gravity, clock, calibration), carried from window to window.
 
-use super::consider::{AT_IMU, IMU, OfBeginning};
+use super::consider::{IMU_OFFSET, IMU_STATES, StartMatrix};
 use super::normal_equations::{Factor, NormalEquations};
 use super::residual::prior::add_border;
 use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
 use crate::measurement::ImuNoise;
 use nalgebra::{SMatrix, SVector};
 
-/// Wander of the clock offset that its rate does not explain, s per square root of a second.
-const CLOCK_WALK: f64 = 5e-6;
-/// Wander of the clock's rate, 1 per square root of a second.
-const RATE_WALK: f64 = 2e-7;
+/// Random walk of the clock offset in addition to the rate, s per square root of a second.
+const CLOCK_WALK_S_PER_SQRT_S: f64 = 5e-6;
+/// Random walk of the clock rate, 1 per square root of a second.
+const CLOCK_RATE_WALK_PER_SQRT_S: f64 = 2e-7;
 
-/// So much of what a window adds is believed for good: what its matches err they err together, and in the next windows
-/// again.
-const BELIEVED: f64 = 0.1;
+/// Fraction of the information of a window that counts as independent: match errors are correlated, in the window and
+/// with those of the next windows.
+const INDEPENDENT_FRACTION: f64 = 0.1;
 
-/// What is known of the border before a window, and by it.
+/// Prior and posterior of the border unknowns.
 ///
-/// Windows overlap: what a window adds to the prior is mostly measured again by the next one. So only the leaving
-/// stretch's share of it is remembered, of mean and of information, and the walks of biases and clock wear it down.
+/// Windows overlap, so the next window measures most of the information of a window again. Therefore only a fraction,
+/// that of the segment that leaves the window, is added to the prior, in mean and information. The random walks of
+/// biases and clock reduce it.
 #[derive(Debug, Clone)]
 pub(super) struct Border {
     prior: SMatrix<f64, BORDER, BORDER>,
-    /// From the values with which the window began to the prior's mean.
+    /// Difference from the values at the start of the window's solution to the prior mean.
     to_mean: SVector<f64, BORDER>,
-    /// The window's information, whose mean its solution is, where it has one.
+    /// Information of the posterior, the mean of which is the solution; none without a solution.
     posterior: Option<SMatrix<f64, BORDER, BORDER>>,
-    moved: SVector<f64, BORDER>,
-    walks: [f64; BORDER],
+    /// Sum of the steps in this window.
+    step: SVector<f64, BORDER>,
+    /// Random walks, unit of the unknown per square root of a second.
+    random_walks: [f64; BORDER],
 }
 
 impl Border {
-    /// Knows `prior` at first; a clock that is not estimated does not wander.
+    /// Starts with the information `prior`; without `clock_wanders`, the clock has no random walk.
     pub(super) fn new(prior: SMatrix<f64, BORDER, BORDER>, noise: &ImuNoise, clock_wanders: bool) -> Self {
-        let mut walks = [0.0; BORDER];
-        walks[GYRO_BIAS..GYRO_BIAS + 3].fill(noise.gyro_bias_walk_rad_per_s_per_sqrt_s);
-        walks[ACCEL_BIAS..ACCEL_BIAS + 3].fill(noise.accel_bias_walk_m_per_s2_per_sqrt_s);
-        walks[GRAVITY..GRAVITY + 2].fill(1e-6);
+        let mut random_walks = [0.0; BORDER];
+        random_walks[GYRO_BIAS..GYRO_BIAS + 3].fill(noise.gyro_bias_walk_rad_per_s_per_sqrt_s);
+        random_walks[ACCEL_BIAS..ACCEL_BIAS + 3].fill(noise.accel_bias_walk_m_per_s2_per_sqrt_s);
+        random_walks[GRAVITY..GRAVITY + 2].fill(1e-6);
         if clock_wanders {
-            walks[CLOCK] = CLOCK_WALK;
-            walks[CLOCK_RATE] = RATE_WALK;
+            random_walks[CLOCK] = CLOCK_WALK_S_PER_SQRT_S;
+            random_walks[CLOCK_RATE] = CLOCK_RATE_WALK_PER_SQRT_S;
         }
-        Self { prior, to_mean: SVector::zeros(), posterior: None, moved: SVector::zeros(), walks }
+        Self { prior, to_mean: SVector::zeros(), posterior: None, step: SVector::zeros(), random_walks }
     }
 
-    /// A window begins from the values as they are.
-    pub(super) fn begin_window(&mut self) {
-        self.to_mean -= self.moved;
-        self.take_back();
+    /// Starts a window with the current values.
+    pub(super) fn start_window(&mut self) {
+        self.to_mean -= self.step;
+        self.reset_to_window_start();
     }
 
-    /// The values are again those with which the window began.
-    pub(super) fn take_back(&mut self) {
-        self.moved = SVector::zeros();
+    /// Discards the steps of the window: the values are reset to those at the start of the window.
+    pub(super) fn reset_to_window_start(&mut self) {
+        self.step = SVector::zeros();
         self.posterior = None;
     }
 
-    /// A solve moved the border by `by`; `factor` is that of its equations.
-    pub(super) fn moved(&mut self, by: &[f64], factor: &Factor) {
-        self.moved += SVector::from_column_slice(by);
+    /// Adds the step `by` of a solution; `factor` is the factor of the equations.
+    pub(super) fn add_step(&mut self, by: &[f64], factor: &Factor) {
+        self.step += SVector::from_column_slice(by);
         self.posterior = Some(factor.information_of_last::<BORDER>());
     }
 
-    /// What the window knew before of the IMU's part, all else being unknown.
-    pub(super) fn imu_information(&self) -> Option<SMatrix<f64, IMU, IMU>> {
-        self.prior.try_inverse()?.fixed_view::<IMU, IMU>(0, 0).try_inverse()
+    /// Prior information on the IMU states, with all other unknowns marginalised.
+    pub(super) fn imu_information(&self) -> Option<SMatrix<f64, IMU_STATES, IMU_STATES>> {
+        self.prior.try_inverse()?.fixed_view::<IMU_STATES, IMU_STATES>(0, 0).try_inverse()
     }
 
-    /// By how much the IMU's part of what a window begins with wanders in `seconds`.
-    pub(super) fn imu_wanders(&self, seconds: f64) -> OfBeginning {
-        let mut by = OfBeginning::zeros();
-        (0..IMU).for_each(|k| by[(AT_IMU + k, AT_IMU + k)] = self.walks[k].powi(2) * seconds);
+    /// Covariance of the random walk of the IMU states in `seconds`.
+    pub(super) fn imu_random_walk(&self, seconds: f64) -> StartMatrix {
+        let mut by = StartMatrix::zeros();
+        (0..IMU_STATES).for_each(|k| by[(IMU_OFFSET + k, IMU_OFFSET + k)] = self.random_walks[k].powi(2) * seconds);
         by
     }
 
-    /// How far it has moved in this window.
-    pub(super) fn moved_so_far(&self) -> &SVector<f64, BORDER> {
-        &self.moved
+    /// Sum of the steps in this window.
+    pub(super) fn total_step(&self) -> &SVector<f64, BORDER> {
+        &self.step
     }
 
+    /// Adds the prior to the equations.
     pub(super) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
-        add_border(equations, layout, &self.prior, &(self.moved - self.to_mean));
+        add_border(equations, layout, &self.prior, &(self.step - self.to_mean));
     }
 
-    /// A stretch leaves that was `share` of the window: its share of what the window added becomes prior knowledge, and
-    /// the walks of `seconds` wear it.
-    pub(super) fn remember(&mut self, share: f64, seconds: f64) {
-        let share = share * BELIEVED;
-        let pull = self.prior * (self.to_mean - self.moved);
-        let (information, pull) = match self.posterior {
-            // Of two means, weighed by their information, the posterior's is where the values are.
-            Some(posterior) => (self.prior + (posterior - self.prior) * share, pull * (1.0 - share)),
-            None => (self.prior, pull),
+    /// Updates the prior when a segment, a `fraction` of the window, leaves.
+    ///
+    /// That fraction of the information of the window is added to the prior; then the random walks over `seconds` are
+    /// applied.
+    pub(super) fn carry_over(&mut self, fraction: f64, seconds: f64) {
+        let fraction = fraction * INDEPENDENT_FRACTION;
+        let vector = self.prior * (self.to_mean - self.step);
+        let (information, vector) = match self.posterior {
+            // The information-weighted mean; the posterior mean is at the current values.
+            Some(posterior) => (self.prior + (posterior - self.prior) * fraction, vector * (1.0 - fraction)),
+            None => (self.prior, vector),
         };
         let Some(mut covariance) = information.try_inverse() else { return };
-        (self.to_mean, self.moved) = (covariance * pull, SVector::zeros());
-        for (k, walk) in self.walks.iter().enumerate() {
+        (self.to_mean, self.step) = (covariance * vector, SVector::zeros());
+        for (k, walk) in self.random_walks.iter().enumerate() {
             covariance[(k, k)] += walk * walk * seconds;
         }
         if let Some(information) = covariance.try_inverse() {
@@ -104,13 +110,13 @@ impl Border {
         }
     }
 
-    /// The clock's offset is told from an instant `later_s` later: the offset's error gets the rate's share.
-    pub(super) fn clock_told_from(&mut self, later_s: f64) {
-        // offset_new = offset + rate later, so for information the columns change by the inverse map.
+    /// Moves the reference time of the clock offset by `later_s`: the offset changes by the rate times `later_s`.
+    pub(super) fn shift_clock_reference(&mut self, later_s: f64) {
+        // offset_new = offset + rate * later_s; the information transforms with the inverse.
         let mut back = SMatrix::<f64, BORDER, BORDER>::identity();
         back[(CLOCK, CLOCK_RATE)] = -later_s;
         self.prior = back.transpose() * self.prior * back;
-        for values in [&mut self.to_mean, &mut self.moved] {
+        for values in [&mut self.to_mean, &mut self.step] {
             values[CLOCK] += values[CLOCK_RATE] * later_s;
         }
     }
@@ -125,7 +131,7 @@ mod tests {
     type Values = SVector<f64, BORDER>;
     const LAYOUT: Layout = Layout { first_knot: 0, knots: 0 };
 
-    /// Some information of full rank.
+    /// An information matrix of full rank.
     fn wave(seed: usize) -> Information {
         let root = Information::from_fn(|r, c| ((seed * 7 + r * 5 + c * 3 + r * c) as f64 * 0.61).sin());
         root * root.transpose() + Information::identity()
@@ -145,22 +151,21 @@ mod tests {
         Border::new(prior, &noise, false)
     }
 
-    /// Solves a window that measures the border itself, to be `measured` with `information`; the values behind it,
-    /// which were `values`.
+    /// Solves a window with a direct measurement of the border and returns the values after it.
     fn solved(border: &mut Border, values: Values, (measured, information): (&Values, &Information)) -> Values {
         let mut equations = NormalEquations::new(LAYOUT.size());
-        border.begin_window();
+        border.start_window();
         border.add_to(&mut equations, &LAYOUT);
         add_border(&mut equations, &LAYOUT, information, &(values - measured));
         let mut factor = Factor::default();
         equations.factor(&mut factor).unwrap();
         let x = equations.solve(&factor);
-        border.moved(&x, &factor);
+        border.add_step(&x, &factor);
         values + Values::from_vec(x)
     }
 
     #[test]
-    fn what_a_window_measures_again_moves_nothing() {
+    fn a_repeated_measurement_does_not_change_the_values() {
         let (prior, by) = (wave(1), wave(2));
         let measured = Values::from_fn(|k, _| 0.1 * (k as f64 + 1.0));
         let mut border = known(prior);
@@ -169,47 +174,47 @@ mod tests {
         assert_relative_eq!(solved(&mut border, once, (&measured, &by)), once, epsilon = 1e-9);
     }
 
-    /// As if what is believed of the leaving stretch had been all that was measured.
+    /// Compares with a measurement that has only the information carried over.
     #[test]
-    fn what_is_remembered_is_the_share_of_mean_and_information() {
+    fn the_fraction_of_mean_and_information_is_carried_over() {
         let (prior, by) = (wave(1), wave(2));
         let measured = Values::from_fn(|k, _| 0.1 * (k as f64 + 1.0));
         let mut border = known(prior);
         let values = solved(&mut border, Values::zeros(), (&measured, &by));
-        border.remember(0.25, 0.5);
-        let remembered = by * (0.25 * BELIEVED);
-        let mean = (prior + remembered).lu().solve(&(remembered * measured)).unwrap();
+        border.carry_over(0.25, 0.5);
+        let carried_over = by * (0.25 * INDEPENDENT_FRACTION);
+        let mean = (prior + carried_over).lu().solve(&(carried_over * measured)).unwrap();
         let nothing = (&Values::zeros(), &Information::zeros());
         assert_relative_eq!(solved(&mut border, values, nothing), mean, epsilon = 1e-6);
-        // Worn by the walk of gravity alone.
-        assert_relative_eq!(border.prior, prior + remembered, epsilon = 1e-6, max_relative = 1e-6);
+        // Only the random walk of gravity reduces it.
+        assert_relative_eq!(border.prior, prior + carried_over, epsilon = 1e-6, max_relative = 1e-6);
     }
 
     #[test]
-    fn a_window_that_came_to_nothing_teaches_nothing() {
+    fn a_rejected_solution_does_not_change_the_prior() {
         let (prior, measured) = (wave(1), Values::repeat(0.1));
         let mut border = known(prior);
         let values = solved(&mut border, Values::zeros(), (&measured, &wave(2)));
         solved(&mut border, values, (&Values::repeat(7.0), &wave(3)));
-        border.take_back();
-        border.remember(0.25, 0.0);
+        border.reset_to_window_start();
+        border.carry_over(0.25, 0.0);
         assert_relative_eq!(border.prior, prior, max_relative = 1e-6);
         let nothing = (&Values::zeros(), &Information::zeros());
         assert_relative_eq!(solved(&mut border, values, nothing), Values::zeros(), epsilon = 1e-6);
     }
 
     #[test]
-    fn a_clock_told_from_later_is_off_by_its_rates_share_more() {
+    fn a_later_reference_time_changes_the_clock_offset_by_the_rate() {
         let (prior, measured) = (wave(1), Values::from_fn(|k, _| 0.1 * k as f64));
-        let told = |later_s: f64| {
+        let shifted = |later_s: f64| {
             let mut border = known(prior);
             let mut values = solved(&mut border, Values::zeros(), (&measured, &wave(2)));
-            border.remember(0.5, 0.0);
-            border.clock_told_from(later_s);
+            border.carry_over(0.5, 0.0);
+            border.shift_clock_reference(later_s);
             values[CLOCK] += values[CLOCK_RATE] * later_s;
             solved(&mut border, values, (&Values::zeros(), &Information::zeros()))
         };
-        let (before, after) = (told(0.0), told(3.0));
+        let (before, after) = (shifted(0.0), shifted(3.0));
         assert_relative_eq!(after[CLOCK], before[CLOCK] + 3.0 * before[CLOCK_RATE], epsilon = 1e-6);
         assert_relative_eq!(after[CLOCK_RATE], before[CLOCK_RATE], epsilon = 1e-6);
     }

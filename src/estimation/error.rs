@@ -2,87 +2,87 @@ use crate::geometry::Vector;
 use crate::time::Stamp;
 use std::fmt;
 
-/// Why there is no estimate.
+/// The reason why there is no estimate.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum EstimationError {
-    /// A setting that makes no sense by itself or beside another.
+    /// A setting out of range, or inconsistent with another one.
     #[error("estimator setting `{key}`: {message}")]
     Setting {
-        /// Which setting.
+        /// The key of the setting.
         key: &'static str,
-        /// What is wrong with it.
+        /// The error, and the valid values.
         message: String,
     },
-    /// A calibration that nothing can be computed with.
+    /// An invalid calibration.
     #[error("calibration: {0}")]
     Calibration(String),
-    /// What makes no map, or maps that cannot be put together.
+    /// An invalid map, or maps that cannot be merged.
     #[error("map: {0}")]
     Map(String),
-    /// A base that nothing can be said of.
+    /// Insufficient or inconsistent data for the base trajectory.
     #[error("base: {0}")]
     Base(String),
-    /// The head, or another map, is not where in the map it was said to be.
+    /// Localisation in the map failed near the given start.
     #[error(
-        "not found in the map: {0}; it is looked for within a metre and twenty degrees of a start, which `--start x,y,z,yaw` \
-         gives (m, degrees)"
+        "localisation in the map failed: {0}; the search covers 1 m and 20 degrees about the start; set the start with \
+         `--start x,y,z,yaw` (m, degrees)"
     )]
     NotInMap(String),
-    /// A measurement with NaN or infinity in it.
+    /// A measurement with NaN or infinite values.
     #[error("the {sensor} measurement stamped {stamp_ns} ns is not finite")]
     NotFinite {
         /// `"IMU"` or `"lidar"`.
         sensor: &'static str,
-        /// Its stamp.
+        /// Stamp of the measurement, ns.
         stamp_ns: i64,
     },
     /// A recording without IMU samples.
-    #[error("there is no IMU sample among {scans} lidar scans; the estimator needs both")]
+    #[error("the recording has {scans} lidar scans but no IMU samples; the estimator needs both")]
     NoImu {
-        /// How many scans there were.
+        /// Number of scans.
         scans: usize,
     },
     /// A recording without lidar scans.
-    #[error("there is no lidar scan among {samples} IMU samples; the estimator needs both")]
+    #[error("the recording has {samples} IMU samples but no lidar scans; the estimator needs both")]
     NoLidar {
-        /// How many samples there were.
+        /// Number of samples.
         samples: usize,
     },
-    /// The two sensors never spoke in the same seconds.
+    /// The data of the two sensors overlap too little in time.
     #[error("IMU and lidar have {common_s:.3} s in common; at least {needed_s:.3} s are needed to start")]
     TooShort {
-        /// The time both cover, s.
+        /// Length of the overlap, s.
         common_s: f64,
-        /// What is needed, s.
+        /// Required length, s.
         needed_s: f64,
     },
 }
 
-/// A stretch of the estimate that is worse than it should be, or missing, and why.
+/// An event that degrades the estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Warning {
-    /// When, lidar time.
+    /// Time of the event, lidar time.
     pub stamp: Stamp,
-    /// What happened.
+    /// Kind of event.
     pub kind: WarningKind,
 }
 
-/// Measurements that are not used.
+/// Kinds of discarded measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LeftOut {
-    /// IMU samples that came late, or whose stamp runs backwards.
+pub enum Discarded {
+    /// IMU samples that arrived late, or with decreasing stamps.
     LateSamples,
-    /// Lidar scans that came late, or whose stamp runs backwards.
+    /// Lidar scans that arrived late, or with decreasing stamps.
     LateScans,
-    /// IMU samples that are far from their neighbours, or not finite.
+    /// IMU samples that are outliers or not finite.
     Outliers,
-    /// IMU samples that repeat the reading before them.
+    /// IMU samples that repeat the previous reading.
     RepeatedSamples,
-    /// Lidar scans that repeat the scan before them while the head turns, or have one range on all beams.
+    /// Lidar scans that repeat the previous scan while the head turns, or have the same range on all beams.
     RepeatedScans,
 }
 
-impl LeftOut {
+impl Discarded {
     /// A key for scripts.
     fn name(self) -> &'static str {
         match self {
@@ -95,100 +95,100 @@ impl LeftOut {
     }
 }
 
-impl fmt::Display for LeftOut {
+impl fmt::Display for Discarded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::LateSamples => "IMU samples that came late or ran backwards in time",
-            Self::LateScans => "lidar scans that came late or ran backwards in time",
-            Self::Outliers => "IMU samples that are outliers",
-            Self::RepeatedSamples => "IMU samples that repeat the reading before them",
-            Self::RepeatedScans => "lidar scans that repeat the scan before them, or have one range on all beams",
+            Self::LateSamples => "late IMU samples (or decreasing stamps)",
+            Self::LateScans => "late lidar scans (or decreasing stamps)",
+            Self::Outliers => "outliers among the IMU samples",
+            Self::RepeatedSamples => "repeated IMU samples",
+            Self::RepeatedScans => "repeated lidar scans (or scans of constant range)",
         })
     }
 }
 
-/// What can degrade an estimate.
+/// Kinds of events that degrade an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum WarningKind {
-    /// The estimator started while the head moved, so level and gyro bias began less well known.
+    /// The head moved at the start, so initial tilt and gyroscope bias are uncertain.
     StartedInMotion,
-    /// At rest the IMU is noisier than it was told, by these factors, and taken for so noisy.
+    /// The noise measured at rest exceeds the specification by these factors, and is used instead.
     NoisyImu {
-        /// Of the gyroscope's noise, 1 or more.
+        /// Factor of the gyroscope noise, at least 1.
         gyro: f64,
-        /// Of the accelerometer's.
+        /// Factor of the accelerometer noise, at least 1.
         accel: f64,
     },
-    /// No IMU sample for `seconds`; the motion was bridged.
+    /// An IMU gap, bridged by interpolation.
     ImuGap {
-        /// How long, s.
+        /// Duration, s.
         seconds: f64,
     },
-    /// No lidar scan for `seconds`; the IMU alone carried the estimate.
+    /// A lidar gap, bridged by dead reckoning with the IMU.
     LidarGap {
-        /// How long, s.
+        /// Duration, s.
         seconds: f64,
     },
-    /// No IMU sample for `seconds`, too long to bridge: the estimate began again behind it.
-    BeganAgain {
-        /// How long the gap was, s.
+    /// An IMU gap too long to bridge: the estimate restarted after it.
+    Restarted {
+        /// Length of the gap, s.
         seconds: f64,
     },
-    /// Behind the silence the head was found again in what was seen before it.
-    FoundAgain {
-        /// How far from where it had stopped, m.
+    /// Relocalisation after the gap succeeded.
+    Relocalised {
+        /// Distance from the position before the gap, m.
         away_m: f64,
     },
-    /// It was not: the estimate goes on about where it had stopped, and what the head did meanwhile is missing from it.
-    LostAgain {
-        /// Why it was not.
+    /// Relocalisation after the gap failed: the motion during the gap is missing from the trajectory.
+    NotRelocalised {
+        /// Reason of the failure.
         why: String,
     },
-    /// Measurements that were left out.
-    LeftOut {
-        /// Which ones.
-        what: LeftOut,
-        /// How many.
+    /// Discarded measurements.
+    Discarded {
+        /// Kind of measurements.
+        what: Discarded,
+        /// Number of measurements.
         count: usize,
     },
-    /// Too few matches to say anything against the IMU, which alone carried this window.
+    /// Too few surfel matches: this window is dead reckoning with the IMU.
     FewMatches {
-        /// How many there were.
+        /// Number of matches.
         matches: usize,
     },
-    /// The surfaces in view leave a direction undetermined; the IMU held it.
+    /// Degenerate geometry: the lidar does not constrain a direction, which is dead reckoning with the IMU.
     WeakGeometry {
-        /// Least over greatest information about the position, 0..1.
+        /// Smallest over largest eigenvalue of the position information, 0..1.
         conditioning: f64,
-        /// The direction, a unit vector in the map.
+        /// The unconstrained direction, a unit vector in the map frame.
         direction_in_map: Vector,
     },
-    /// For much of the time too little was seen again to hold the head, which the IMU alone carried: it is lost.
+    /// Tracking was lost for a large part of the recording, with dead reckoning by the IMU only.
     Lost {
-        /// How long, s.
+        /// Duration, s.
         seconds: f64,
-        /// Of how long, s.
+        /// Length of the recording, s.
         of_seconds: f64,
     },
-    /// For much of the time the IMU was farther from what the lidar saw than its noise has it.
+    /// IMU and lidar contradicted each other for a large part of the recording by more than the IMU noise.
     Contradicted {
-        /// How many times as far, in the median over that time; 0.1 to 0.4 where all is well.
+        /// Median contradiction over that time, as a multiple of the IMU noise; 0.1 to 0.4 in a sound run.
         times: f64,
-        /// How long, s.
+        /// Duration, s.
         seconds: f64,
-        /// Of how long, s.
+        /// Length of the recording, s.
         of_seconds: f64,
     },
-    /// A window's solution was not believed, and the IMU's prediction kept.
+    /// The solution of a window was rejected and the IMU prediction used.
     NotSolved {
-        /// Why.
+        /// Reason of the rejection.
         reason: &'static str,
     },
-    /// After a silence the head was not found again in the map.
+    /// Relocalisation in the map failed after a gap.
     LostInMap,
-    /// IMU samples at the end of the sensor's range, which say only "at least".
+    /// Clipped IMU samples, at the end of the range of the sensor.
     Saturated {
-        /// How many so far.
+        /// Number of clipped samples so far.
         samples: usize,
     },
 }
@@ -200,14 +200,14 @@ impl fmt::Display for Warning {
 }
 
 impl WarningKind {
-    /// How large it is, where that can be said: s, samples, or a ratio; the larger, the worse.
+    /// Magnitude of the event, if it has one: s, m, number, or ratio; larger is worse.
     pub fn size(&self) -> Option<f64> {
         match self {
-            Self::ImuGap { seconds } | Self::LidarGap { seconds } | Self::BeganAgain { seconds } => Some(*seconds),
+            Self::ImuGap { seconds } | Self::LidarGap { seconds } | Self::Restarted { seconds } => Some(*seconds),
             Self::Lost { seconds, .. } => Some(*seconds),
-            Self::FoundAgain { away_m } => Some(*away_m),
+            Self::Relocalised { away_m } => Some(*away_m),
             Self::NoisyImu { gyro, accel } => Some(gyro.max(*accel)),
-            Self::LeftOut { count, .. } => Some(*count as f64),
+            Self::Discarded { count, .. } => Some(*count as f64),
             Self::Saturated { samples } => Some(*samples as f64),
             Self::Contradicted { times, .. } => Some(*times),
             _ => None,
@@ -221,10 +221,10 @@ impl WarningKind {
             Self::NoisyImu { .. } => "noisy_imu",
             Self::ImuGap { .. } => "imu_gap",
             Self::LidarGap { .. } => "lidar_gap",
-            Self::BeganAgain { .. } => "restarted",
-            Self::FoundAgain { .. } => "relocalised",
-            Self::LostAgain { .. } => "not_relocalised",
-            Self::LeftOut { what, .. } => what.name(),
+            Self::Restarted { .. } => "restarted",
+            Self::Relocalised { .. } => "relocalised",
+            Self::NotRelocalised { .. } => "not_relocalised",
+            Self::Discarded { what, .. } => what.name(),
             Self::FewMatches { .. } => "few_matches",
             Self::WeakGeometry { .. } => "weak_geometry",
             Self::Lost { .. } => "lost",
@@ -236,10 +236,10 @@ impl WarningKind {
     }
 }
 
-/// A direction in words.
-fn named(direction: &Vector) -> String {
+/// Text for a direction in the map frame.
+fn direction_text(direction: &Vector) -> String {
     if direction.z.abs() > 0.9 {
-        return "the vertical".to_owned();
+        return "z".to_owned();
     }
     format!("({:.2}, {:.2}, {:.2})", direction.x, direction.y, direction.z)
 }
@@ -247,57 +247,55 @@ fn named(direction: &Vector) -> String {
 impl fmt::Display for WarningKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::StartedInMotion => write!(f, "the head moved at the start; level and gyro bias start less certain"),
+            Self::StartedInMotion => {
+                write!(f, "the head moved at the start; initial tilt and gyroscope bias are uncertain")
+            }
             Self::Lost { seconds, of_seconds } => write!(
                 f,
-                "in {seconds:.0} of {of_seconds:.0} s too little was seen again to hold the head, and the IMU alone carried \
-                 it: do not trust this trajectory"
+                "tracking lost for {seconds:.0} of {of_seconds:.0} s (too few matched surfaces); trajectory unreliable"
             ),
             Self::Contradicted { times, seconds, of_seconds } => write!(
                 f,
-                "in {seconds:.0} of {of_seconds:.0} s the IMU contradicts what the lidar saw, by {times:.1} times its noise (0.1 \
-                 to 0.4 are usual): where the sensors sit, the IMU's units and signs, or the times of beams may not be what \
-                 was told"
+                "IMU and lidar contradict each other for {seconds:.0} of {of_seconds:.0} s, by {times:.1} times the IMU noise \
+                 (0.1 to 0.4 is usual); check the extrinsics, the units and signs of the IMU, and the beam times"
             ),
             Self::NoisyImu { gyro, accel } => write!(
                 f,
-                "at rest the IMU is noisier than it was told, the gyroscope {gyro:.1} and the accelerometer {accel:.1} times, \
-                 and is taken for that"
+                "the IMU noise at rest exceeds the specification by a factor of {gyro:.1} (gyroscope) and {accel:.1} \
+                 (accelerometer); the measured noise is used"
             ),
             Self::ImuGap { seconds } => {
-                write!(f, "no IMU sample for {seconds:.3} s; bridged by how the head moved before and behind")
+                write!(f, "no IMU sample for {seconds:.3} s; bridged by interpolation")
             }
-            Self::LidarGap { seconds } => write!(f, "no lidar scan for {seconds:.3} s; carried by the IMU alone"),
-            Self::BeganAgain { seconds } => {
-                write!(f, "no IMU sample for {seconds:.3} s, too long to bridge; began again behind it")
+            Self::LidarGap { seconds } => write!(f, "no lidar scan for {seconds:.3} s; dead reckoning with the IMU"),
+            Self::Restarted { seconds } => {
+                write!(f, "no IMU sample for {seconds:.3} s, too long to bridge; re-initialised after the gap")
             }
-            Self::FoundAgain { away_m } => write!(
+            Self::Relocalised { away_m } => {
+                write!(f, "relocalised after the IMU gap, {away_m:.2} m from the position before it")
+            }
+            Self::NotRelocalised { why } => write!(
                 f,
-                "behind the silence the head was found again in what was seen before, {away_m:.2} m from where it had stopped"
+                "relocalisation failed after the IMU gap ({why}); the motion during the gap is missing from the trajectory"
             ),
-            Self::LostAgain { why } => write!(
-                f,
-                "behind the silence the head was not found again in what was seen before ({why}); it goes on about where it \
-                 had stopped, so what it did meanwhile is missing"
-            ),
-            Self::LeftOut { what, count } => write!(f, "left out: {count} {what}"),
+            Self::Discarded { what, count } => write!(f, "discarded {count} {what}"),
             Self::FewMatches { matches } => {
-                write!(f, "only {matches} surfaces seen again; carried by the IMU alone")
+                write!(f, "only {matches} surfel matches; dead reckoning with the IMU")
             }
             Self::WeakGeometry { conditioning, direction_in_map } => write!(
                 f,
-                "the surfaces in view say next to nothing of the motion along {} of the map (conditioning \
-                 {conditioning:.1e}); the IMU alone holds it",
-                named(direction_in_map)
+                "degenerate geometry: the lidar does not constrain {} in the map frame (conditioning {conditioning:.1e}); dead \
+                 reckoning with the IMU along it",
+                direction_text(direction_in_map)
             ),
-            Self::NotSolved { reason } => write!(f, "the window's solution was not believed ({reason})"),
+            Self::NotSolved { reason } => write!(f, "window solution rejected ({reason}); IMU prediction used"),
             Self::LostInMap => {
-                write!(f, "behind the silence the head was not found again in the map; it goes on without it")
+                write!(f, "relocalisation in the map failed after the gap; continuing without the map")
             }
             Self::Saturated { samples } => write!(
                 f,
-                "{samples} IMU samples so far at the end of the sensor's range (read as rad/s and m/s^2; the calibration's \
-                 `gyro_limit_rad_per_s` and `accel_limit_m_per_s2` tell the range)"
+                "{samples} clipped IMU samples so far; check the units (rad/s, m/s^2), and the range in the calibration \
+                 (`gyro_limit_rad_per_s`, `accel_limit_m_per_s2`)"
             ),
         }
     }

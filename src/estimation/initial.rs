@@ -1,4 +1,4 @@
-//! Where an estimate begins: level, biases, and whether the head rested.
+//! Initial state: attitude, biases, and detection of an initial rest.
 
 use super::clock::Clock;
 use super::residual::{
@@ -6,79 +6,81 @@ use super::residual::{
     RANGE,
 };
 use super::spec::EstimatorSpec;
-use super::strapdown::{Biases, Exaggerates, Interval, State};
+use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
 use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
 use crate::measurement::{ImuNoise, LidarCorrection};
 use nalgebra::{SMatrix, SVector};
 
-/// Standard deviations of offset (s) and rate of a clock that is not estimated: nothing moves them.
-const HELD_CLOCK: (f64, f64) = (1e-9, 1e-12);
+/// Standard deviations of offset (s) and rate (s/s) if the clock is not estimated: small enough to fix both.
+const FIXED_CLOCK_SIGMA: (f64, f64) = (1e-9, 1e-12);
 
-/// How exactly poses stand along the gyroscope's axes when the lidar's attitude is estimated, rad.
+/// If the lidar attitude is estimated, the IMU frame is that of the gyroscope axes, to this standard deviation, rad.
 const GYRO_AXES_SIGMA: f64 = 1e-6;
 
-/// For so long a head goes on as it went before the IMU fell silent, s.
-const ON_ITS_WAY_S: f64 = 2.0;
+/// The mean velocity from before an IMU gap is extrapolated for at most this long, s.
+const MAX_COASTING_S: f64 = 2.0;
 
-/// A sample's deviation from the mean, as a multiple of its noise, up to which the head is at rest.
+/// At rest, a sample deviates from the mean by less than this multiple of the noise.
 const REST_SIGMAS: f64 = 6.0;
-/// No IMU at rest is noisier than it was told by more than this factor: what scatters more moves.
-const MOST_NOISIER: f64 = 20.0;
+/// Upper limit of the factor between measured noise at rest and specified noise; more scatter is motion.
+const MAX_NOISE_FACTOR: f64 = 20.0;
 
-/// The state at the first instant, and what is believed of it.
+/// The initial state and the prior on it.
 #[derive(Debug, Clone)]
-pub(super) struct Beginning {
+pub(super) struct InitialState {
     pub(super) state: State,
     pub(super) biases: Biases,
     /// Standard deviation of the velocity, m/s.
     pub(super) velocity_sigma: f64,
-    /// What is known of the border.
+    /// Prior information on the border unknowns.
     pub(super) information: SMatrix<f64, BORDER, BORDER>,
-    /// What the IMU says while the head rests, if it does.
-    pub(super) rest: Option<Rest>,
-    /// How many times noisier than it was told the IMU is at rest; 1 of one that is not.
-    pub(super) noisier: Noisier,
+    /// IMU readings at rest, if the head rests at the start.
+    pub(super) rest: Option<RestReadings>,
+    /// Measured noise at rest relative to the specification; 1 if the head does not rest.
+    pub(super) noise_factors: NoiseFactors,
 }
 
-/// By how much the noise of gyroscope and accelerometer exceeds what was told of it: factors, 1 or more.
+/// Ratio of the measured to the specified noise of gyroscope and accelerometer, at least 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Noisier {
+pub(super) struct NoiseFactors {
     pub(super) gyro: f64,
     pub(super) accel: f64,
 }
 
-/// The head at rest: what the IMU says then, by which the end of the rest is seen.
+/// Mean IMU readings at rest, with which the end of the rest is detected.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rest {
+pub(super) struct RestReadings {
     gyro: Vector,
     force: Vector,
 }
 
-/// What an estimate knew when the IMU fell silent, from which it begins again.
+/// The states at the start of an IMU gap, which initialise the estimate after it.
 #[derive(Debug, Clone)]
-pub(super) struct Carried {
-    /// When it fell silent, IMU time, s.
+pub(super) struct StateBeforeGap {
+    /// Start of the gap, IMU time, s.
     pub(super) until_s: f64,
     pub(super) state: State,
-    /// Velocity of the window's whole way, m/s: a head that rocks goes where its mean velocity takes it.
+    /// Mean velocity over the window, m/s: it predicts the position of a rocking head better than the last velocity.
     pub(super) mean_velocity: Vector,
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
     pub(super) clock: Clock,
-    /// By how much the IMU exaggerates.
-    pub(super) exaggerates: Exaggerates,
-    /// What is known of the lidar beyond its calibration.
+    /// Estimated scale errors and misalignments of the IMU.
+    pub(super) scale_misalignment: ImuScaleMisalignment,
+    /// Estimated corrections of the lidar calibration.
     pub(super) lidar: LidarCorrection,
 }
 
-impl Beginning {
-    /// The same beginning at `start_s`, IMU time, where an estimate had stopped: level as the force says now, the
-    /// heading as it was, and the place to which it was on its way.
-    pub(super) fn going_on_from(mut self, carried: &Carried, start_s: f64) -> Self {
+impl InitialState {
+    /// Combines this state at `start_s`, IMU time, with the state before a gap.
+    ///
+    /// Roll and pitch are from the accelerometer after the gap, the heading is that before it, and the position is
+    /// extrapolated with the mean velocity.
+    pub(super) fn continued_from(mut self, carried: &StateBeforeGap, start_s: f64) -> Self {
         let yaw = |rotation: &Rotation| roll_pitch_yaw(rotation).2;
         let turn = yaw(&carried.state.rotation) - yaw(&self.state.rotation);
         self.state.rotation = Rotation::from_axis_angle(&Vector::z_axis(), turn) * self.state.rotation;
-        let seconds = (start_s - carried.until_s).clamp(0.0, ON_ITS_WAY_S);
+        let seconds = (start_s - carried.until_s).clamp(0.0, MAX_COASTING_S);
         self.state.position = carried.state.position + carried.mean_velocity * seconds;
         if self.rest.is_none() {
             self.state.velocity = carried.mean_velocity;
@@ -88,71 +90,73 @@ impl Beginning {
     }
 }
 
-impl Noisier {
-    /// As it was told.
-    pub(super) const NOT: Self = Self { gyro: 1.0, accel: 1.0 };
+impl NoiseFactors {
+    /// Noise as specified.
+    pub(super) const ONE: Self = Self { gyro: 1.0, accel: 1.0 };
 
-    /// By the differences of successive intervals, which motion hardly changes (von Neumann's estimate of the
-    /// variance).
-    fn seen_in(intervals: &[Interval]) -> Self {
+    /// Estimates the factors from differences of successive intervals, on which slow motion has little effect (von
+    /// Neumann's variance estimate).
+    fn estimated_from(intervals: &[Interval]) -> Self {
         let factor = |of: fn(&Interval) -> (Vector, f64)| {
             let square = |pair: &[Interval]| {
                 let ((a, a_sigma), (b, b_sigma)) = (of(&pair[0]), of(&pair[1]));
                 (b - a).norm_squared() / (3.0 * (a_sigma.powi(2) + b_sigma.powi(2)))
             };
             let mean = intervals.windows(2).map(square).sum::<f64>() / (intervals.len() as f64 - 1.0).max(1.0);
-            mean.sqrt().clamp(1.0, MOST_NOISIER)
+            mean.sqrt().clamp(1.0, MAX_NOISE_FACTOR)
         };
         Self { gyro: factor(|i| (i.gyro, i.gyro_sigma)), accel: factor(|i| (i.accel, i.accel_sigma)) }
     }
 
-    /// The noise of an IMU that is so much noisier.
-    pub(super) fn raise(self, noise: &mut ImuNoise) {
+    /// Multiplies the noise densities by the factors.
+    pub(super) fn scale_noise(self, noise: &mut ImuNoise) {
         noise.gyro_density_rad_per_s_per_sqrt_hz *= self.gyro;
         noise.accel_density_m_per_s2_per_sqrt_hz *= self.accel;
     }
 
-    /// An interval of an IMU that is so much noisier.
-    pub(super) fn of(self, interval: Interval) -> Interval {
+    /// The interval with the standard deviations multiplied by the factors.
+    pub(super) fn scale(self, interval: Interval) -> Interval {
         let (gyro_sigma, accel_sigma) = (interval.gyro_sigma * self.gyro, interval.accel_sigma * self.accel);
         Interval { gyro_sigma, accel_sigma, ..interval }
     }
 }
 
-impl Rest {
-    /// A head that rests from `interval` on, if it does.
+impl RestReadings {
+    /// The readings of a possible rest that starts with `interval`.
     pub(super) fn from(interval: &Interval) -> Self {
         Self { gyro: interval.gyro, force: interval.accel }
     }
 
-    /// Whether an interval says the same, within its noise.
-    pub(super) fn goes_on(&self, interval: &Interval) -> bool {
+    /// Whether an interval agrees with the readings at rest, within the noise.
+    pub(super) fn agrees_with(&self, interval: &Interval) -> bool {
         (interval.gyro - self.gyro).norm() < REST_SIGMAS * interval.gyro_sigma
             && (interval.accel - self.force).norm() < REST_SIGMAS * interval.accel_sigma
     }
 }
 
-/// Looks at the first intervals: at rest their mean is the gyroscope's bias and the way up. In motion the mean force is
-/// taken for the way up all the same, turned back by the gyroscope to where the head began (over a second or more a
-/// hand's accelerations cancel), with little trust.
+/// Estimates the initial state from the first intervals.
 ///
-/// The map's origin is the head's first position, and its x axis points where the head's does.
+/// At rest, the mean rate is the gyroscope bias and the mean specific force points up. In motion the mean specific force,
+/// rotated to the initial attitude with the gyroscope, also gives the vertical, with a large standard deviation: the
+/// accelerations of a hand cancel over a second or more.
 ///
-/// `may_rest` is whether the lidar lets the head rest: one that moves evenly feels the same.
-pub(super) fn begin(
+/// The origin of the map is the first position of the head; the x axis is the initial heading.
+///
+/// `may_rest`: the lidar does not exclude a rest. To the IMU, constant velocity looks like rest.
+pub(super) fn estimate(
     (intervals, may_rest): (&[Interval], bool),
     head_from_imu: &Pose,
     noise: &ImuNoise,
     spec: &EstimatorSpec,
-) -> Beginning {
+) -> InitialState {
     let duration: f64 = intervals.iter().map(|i| i.h).sum();
     let mean = |of: fn(&Interval) -> Vector| intervals.iter().map(|i| of(i) * i.h).sum::<Vector>() / duration;
     let (gyro, force) = (mean(|i| i.gyro), mean(|i| i.accel));
-    let rest = Rest { gyro, force };
-    let seen = Noisier::seen_in(intervals);
-    let feels_rest = intervals.iter().all(|interval| rest.goes_on(&seen.of(*interval)))
+    let rest = RestReadings { gyro, force };
+    let seen = NoiseFactors::estimated_from(intervals);
+    let imu_rests = intervals.iter().all(|interval| rest.agrees_with(&seen.scale(*interval)))
         && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
-    let at_rest = may_rest && feels_rest;
+    let at_rest = may_rest && imu_rests;
     let upward = if at_rest { force } else { mean_force_at_start(intervals) };
     let up = Rotation::rotation_between(&upward, &Vector::z()).unwrap_or_else(Rotation::identity);
     let (_, _, yaw) = roll_pitch_yaw(&(up * head_from_imu.rotation.inverse()));
@@ -160,32 +164,34 @@ pub(super) fn begin(
     let head_in_imu = head_from_imu.inverse().translation.vector;
     let state = State { rotation, position: -(rotation * head_in_imu), velocity: Vector::zeros() };
     let gyro_bias = if at_rest { gyro } else { Vector::zeros() };
-    // At rest, what the force is more than gravity is bias; the rest of the bias hides in the level.
+    // At rest, the specific force in excess of gravity is bias; the horizontal bias is not separable from the tilt.
     let excess = force.norm() - gravity_in_world().norm();
     let accel_bias = if at_rest { force.normalize() * excess } else { Vector::zeros() };
-    let noisier = if at_rest { seen } else { Noisier::NOT };
+    let noise_factors = if at_rest { seen } else { NoiseFactors::ONE };
     let gyro_sigma = if at_rest {
-        3.0 * noisier.gyro * noise.gyro_density_rad_per_s_per_sqrt_hz / duration.sqrt()
+        3.0 * noise_factors.gyro * noise.gyro_density_rad_per_s_per_sqrt_hz / duration.sqrt()
     } else {
         noise.gyro_turn_on_bias_rad_per_s
     };
-    Beginning {
+    InitialState {
         state,
         biases: Biases { gyro: gyro_bias, accel: accel_bias },
         rest: at_rest.then_some(rest),
-        noisier,
-        velocity_sigma: match (at_rest, feels_rest) {
+        noise_factors,
+        velocity_sigma: match (at_rest, imu_rests) {
             (true, _) => 0.01,
             (false, false) => 2.0,
-            // A vehicle under way.
+            // Constant velocity, as of a vehicle.
             (false, true) => 10.0,
         },
         information: information(gyro_sigma, at_rest, noise, spec),
     }
 }
 
-/// The mean force over `intervals` in the body as it stood at their start: the gyroscope turns it back, so a nod of the
-/// head does not tilt it; what is left beside gravity is the change of velocity by the time it took.
+/// Mean specific force over `intervals`, in the body frame at the start.
+///
+/// The gyroscope rotates each reading into that frame, so a nod of the head causes no tilt. The remaining error is the
+/// change of velocity divided by the duration.
 fn mean_force_at_start(intervals: &[Interval]) -> Vector {
     let mut start_from_body = Rotation::identity();
     let mut impulse = Vector::zeros();
@@ -197,21 +203,22 @@ fn mean_force_at_start(intervals: &[Interval]) -> Vector {
     impulse / intervals.iter().map(|interval| interval.h).sum::<f64>()
 }
 
+/// Prior information on the border unknowns.
 fn information(
     gyro_sigma: f64,
     at_rest: bool,
     noise: &ImuNoise,
     EstimatorSpec { inertial, clock, surfels, extrinsics, .. }: &EstimatorSpec,
 ) -> SMatrix<f64, BORDER, BORDER> {
-    // A level found in motion is off by the mean acceleration over g, one found at rest by the bias over g.
+    // The tilt error is the mean acceleration over g in motion, and the accelerometer bias over g at rest.
     let tilt_sigma = if at_rest { 0.02 } else { 0.2 };
     let mut sigmas = [0.0; BORDER];
     sigmas[GYRO_BIAS..GYRO_BIAS + 3].fill(gyro_sigma);
     sigmas[ACCEL_BIAS..ACCEL_BIAS + 3].fill(noise.accel_turn_on_bias_m_per_s2.max(1e-4));
     sigmas[GRAVITY..GRAVITY + 2].fill(tilt_sigma);
     (sigmas[CLOCK], sigmas[CLOCK_RATE]) =
-        if clock.estimated { (clock.start_sigma_s, (clock.drift_ppm * 1e-6).max(1e-9)) } else { HELD_CLOCK };
-    // What is left at zero is held there.
+        if clock.estimated { (clock.start_sigma_s, (clock.drift_ppm * 1e-6).max(1e-9)) } else { FIXED_CLOCK_SIGMA };
+    // An unknown with a sigma of zero is fixed.
     sigmas[RANGE] = surfels.range_offset_sigma_m.max(1e-9);
     let (turn, shift) = extrinsics.sigmas();
     sigmas[LIDAR_TURN..LIDAR_TURN + 3].fill(turn.max(1e-9));
@@ -220,7 +227,7 @@ fn information(
     sigmas[ACCEL_MATRIX..ACCEL_MATRIX + 9].fill(inertial.accel_matrix_sigma.max(1e-9));
     let mut information = SMatrix::from_diagonal(&SVector::from(sigmas.map(|sigma| sigma.powi(-2))));
     if extrinsics.estimated {
-        // Against what is the lidar turned? Poses then stand along the axes about which the gyroscope measures.
+        // The lidar attitude needs a reference: the IMU frame is that of the gyroscope axes.
         for (i, j) in [(0, 1), (0, 2), (1, 2)] {
             let mut turn = SVector::<f64, BORDER>::zeros();
             (turn[GYRO_MATRIX + 3 * i + j], turn[GYRO_MATRIX + 3 * j + i]) = (1.0, -1.0);

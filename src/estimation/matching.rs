@@ -1,12 +1,11 @@
-//! Which surfels show the same surface: near each other in position and normal, from both sides, and at different
-//! times.
+//! Surfel matching: nearest neighbours in position and normal, with gates on normals, distance and time.
 
 use super::spec::{MatchingSpec, SurfelSpec};
 use super::surfel::{Patch, Placed};
 use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 use rayon::prelude::*;
 
-/// Position in voxel edges and scaled normal.
+/// Point of the six-dimensional search space: position in voxel edges, and scaled normal.
 #[derive(Debug, Clone, Copy, Default)]
 struct Feature([NotNan<f32>; 6]);
 
@@ -20,7 +19,7 @@ impl Point<f32> for Feature {
     }
 }
 
-/// The metric of the six dimensions, and the gates.
+/// Metric of the neighbour search, and match gates.
 #[derive(Debug, Clone)]
 pub(super) struct Matcher {
     pub(super) spec: MatchingSpec,
@@ -28,11 +27,12 @@ pub(super) struct Matcher {
     pub(super) levels: usize,
 }
 
-/// The patches of each resolution in a tree.
+/// A k-d tree of patches for each resolution.
 pub(super) struct Forest {
     levels: Vec<Level>,
 }
 
+/// The tree of a resolution; `members` are indices into the patches.
 struct Level {
     members: Vec<u32>,
     tree: Option<KDTree<f32, Feature>>,
@@ -75,7 +75,7 @@ impl Matcher {
         Feature([x, y, z, a, b, c])
     }
 
-    /// Plants a tree a resolution.
+    /// Builds a tree for each resolution.
     pub(super) fn plant(&self, patches: &[Patch]) -> Forest {
         let plant = |level| Level::of(level, patches, |patch| self.feature(patch));
         Forest { levels: (0..self.levels).map(plant).collect() }
@@ -87,7 +87,7 @@ impl Matcher {
         level.map_or_else(Vec::new, |level| level.nearest(&self.feature(patch), count, self.spec.max_distance))
     }
 
-    /// Pairs among the window's own patches, planted in `forest`, in order: indices `(i, j)`, `i < j`.
+    /// Pairs of neighbouring patches in `placed`, with the trees in `forest`: ordered indices `(i, j)`, `i < j`.
     pub(super) fn among(&self, placed: &[Placed], forest: &Forest) -> Vec<(u32, u32)> {
         let near: Vec<Vec<u32>> = placed
             .par_iter()
@@ -107,12 +107,12 @@ impl Matcher {
         pairs
     }
 
-    /// Whether two surfels were seen at times different enough.
+    /// Whether the times of two surfels differ by at least the minimum.
     pub(super) fn apart(&self, a: &Placed, b: &Placed) -> bool {
         (a.tau_s - b.tau_s).abs() >= self.spec.min_time_difference_s
     }
 
-    /// Whether two patches can be the same surface, as far as normals and the distance along them say.
+    /// Whether two patches pass the gates on the angle between normals and on the distance along them.
     pub(super) fn agree(&self, a: &Patch, b: &Patch, gate_m: f64) -> bool {
         let apart = a.centre - b.centre;
         a.normal.dot(&b.normal) > self.spec.max_normal_angle_deg.to_radians().cos()

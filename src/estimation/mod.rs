@@ -1,61 +1,61 @@
-//! The reader that makes sense of it: continuous-time SLAM over a sliding window. Measurements in, estimate out.
+//! Continuous-time SLAM over a sliding window: measurements in, trajectory, covariance and surfaces out.
 //!
 //! The method is that of Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012), with the changes listed
 //! below.
 //!
-//! # A stretch's way
+//! # Processing of a segment
 //!
-//! 1. [`Estimator::push`] puts measurements in order, smooths the stamps of both sensors by counting their samples, and
-//!    cuts time into stretches of `step_s`.
-//! 2. A new stretch is integrated from the IMU (coning, sculling: samples are averages), and its beams, projected by
-//!    the trajectory, are gathered in voxels of several sizes on two grids: each cell's points of one passing make a
-//!    *surfel*.
-//! 3. The window's surfels are placed in the map, matched with each other in six dimensions (position and normal, from
-//!    both sides, at different times) and with those of *fixed views*, stretches of the past that stand still.
-//! 4. The window's corrections are solved for, and 3 begins again, until nothing moves.
-//! 5. The oldest stretch leaves: its poses are final, its surfels may become a fixed view.
-//! 6. Behind the open loop, [`register`] lays all that was seen on what was seen of it at other times.
-//! 7. Beams become a cloud by the trajectory; [`CloudFilter`] tells which of them are no surface.
-//! 8. Where the base was that carries the head, an IMU on it tells beside the head's trajectory: [`smooth_base`].
+//! 1. [`Estimator::push`] sorts measurements, smooths the stamps of both sensors, and cuts time into segments of
+//!    `step_s`.
+//! 2. A new segment is integrated from the IMU, with coning and sculling corrections because samples are averages. Its
+//!    beams are projected with the trajectory into voxels of several sizes on two grids. The points of a voxel from one
+//!    sweep form a *surfel*.
+//! 3. The surfels of the window are transformed into the map frame. They are matched with each other by position and
+//!    normal, reciprocally and at different times, and with those of *fixed views* (keyframes).
+//! 4. The corrections of the window are solved for. Steps 3 and 4 are repeated until convergence.
+//! 5. The oldest segment is removed: its poses are final, and its surfels may become a fixed view.
+//! 6. After the open loop, [`register`] closes loops: it matches all observed surfaces at different times.
+//! 7. The trajectory converts beams to a point cloud; [`CloudFilter`] removes points that are not on static surfaces.
+//! 8. With an IMU on the base that carries the head, [`smooth_base`] estimates the trajectory of the base.
 //!
 //! # The problem
 //!
-//! Unknown are a correction of the trajectory, `R' = exp(dr) R`, `t' = t + dt` (paper eq. 1-2), with `dr` and `dt`
-//! uniform cubic B-splines; the biases of gyroscope and accelerometer; the scale and misalignment of both; the tilt of
-//! gravity in the map; the clock offset and its rate; an offset of all ranges. Minimised is
+//! Unknowns are a correction of the trajectory, `R' = exp(dr) R`, `t' = t + dt` (paper eq. 1-2), with `dr` and `dt`
+//! uniform cubic B-splines; the biases of gyroscope and accelerometer; the scale errors and misalignments of both; the
+//! tilt of gravity in the map; the clock offset and its rate; a range bias; optionally the lidar extrinsics. The cost is
 //!
 //! ```text
 //! sum over IMU intervals  |e_w / sigma_w|^2 + |e_a / sigma_a|^2
 //! + sum over matches      rho(zeta n^T (mu_i - mu_j))          rho: Cauchy
-//! + the beginning of the window held to the window before + what is remembered of biases, gravity and clock
+//! + prior on the start of the window + prior on biases, gravity, clock and calibration
 //! ```
 //!
 //! # Choices
 //!
-//! Reasoned, and not yet compared with their alternatives; the same holds for the numbers in `default.ron`.
+//! These choices, and the numbers in `default.ron`, have a reason but were not all compared with alternatives.
 //!
-//! - The trajectory is that of the IMU, in the IMU's time; the clock offset `l` enters where a beam's time is looked
-//!   up, `u = tau + l(tau)`. The paper keeps the trajectory in lidar time and has `l` in the IMU's terms. Here a change
-//!   of `l` moves the fast part of the motion, which the IMU alone knows, along by itself; otherwise the slow splines
-//!   would have to follow it at the head's rocking frequency. The lever arm disappears from the IMU's terms too.
-//! - The IMU's terms compare velocities, corrected by the spline's exact derivative: no second difference is taken.
-//! - A match links any two times of the window, so its knots fill the window's triangle; the solver stores an envelope,
-//!   which is a band where matches are near or with views alone.
-//! - The beginning of a window is held (value and two derivatives). Of biases, gravity and clock the leaving stretch's
-//!   share of the information goes on.
-//! - Offset of the ranges, scale and misalignment of the gyroscope are unknowns: in trials they were the greatest
-//!   errors (in the office and the courtyard the position's error fell to about a third). Those of the accelerometer
-//!   are told by gravity nearly alone, and only with their mean remembered; then they help where surfaces say little of
-//!   the height.
-//! - Attitude and place of the lidar beside the IMU are unknowns too, when asked: then the poses stand along the
-//!   gyroscope's axes, and the beginning of a window is held to where the lidar, as it is found to sit, would have put
-//!   it.
-//! - While the head is held still no patches are seen: the window keeps those it has until as much has been swept
-//!   again, and the IMU carries it (within 3 cm over stops of 2 to 5 s). Matching the lines that a still scan draws
-//!   with patches was tried: it holds the level directions to millimetres, but errors of the patches' normals pass for
-//!   knowledge of the height, by decimetres where the carrier climbs meanwhile.
-//! - Gravity's direction is unknown rather than the map's level: views once frozen need not be turned when it is
-//!   learnt.
+//! - The trajectory is that of the IMU, in IMU time. The clock offset `l` enters in the lookup of the beam times, `u =
+//!   tau + l(tau)`. The paper has the trajectory in lidar time and `l` in the IMU residuals. Here a change of `l` also
+//!   shifts the fast motion, which only the IMU measures; otherwise the smooth splines would have to follow it at the
+//!   rocking frequency of the head. The IMU residuals need no lever arm either.
+//! - The IMU residuals compare velocities, corrected by the exact derivative of the spline, so no second difference of
+//!   positions is needed.
+//! - A match may link any two times of the window, so the information matrix of the knots may be full. The solver stores
+//!   an envelope, which is a band if matches are close in time or only with views.
+//! - The start of a window is constrained in value and two derivatives. The information on biases, gravity and clock is
+//!   carried over in proportion to the segment that leaves the window.
+//! - Range bias, and scale and misalignment of the gyroscope are unknowns, because they caused the largest errors in
+//!   tests (in the office and the courtyard the position error fell to about a third). Scale and misalignment of the
+//!   accelerometer are observable almost only by gravity, and only if the prior mean is carried over; they help where
+//!   surfaces constrain the height weakly.
+//! - The lidar extrinsics are optional unknowns. The IMU frame is then that of the gyroscope axes, and the prior on the
+//!   start of a window depends on the extrinsics.
+//! - A head at rest yields no new surfels. The window then retains the old ones until the lidar has swept as much again,
+//!   and the pose is dead reckoning with the IMU (within 3 cm over stops of 2 to 5 s). Matching the lines of a scan at
+//!   rest with surfels was tested: it constrains the horizontal position to millimetres, but errors of the normals count
+//!   as information on the height and cause errors of decimetres while the carrier climbs.
+//! - The direction of gravity is an unknown, instead of the level of the map, so fixed views need no rotation when the
+//!   estimate of gravity improves.
 
 mod base;
 mod border;
@@ -69,6 +69,7 @@ mod inertial;
 mod initial;
 mod intake;
 mod integrity;
+mod localisation;
 mod map;
 mod matching;
 mod nominal;
@@ -76,7 +77,7 @@ mod normal_equations;
 mod output;
 mod registration;
 mod residual;
-mod sight;
+mod scan_geometry;
 mod spec;
 mod spent;
 mod spline;
@@ -86,15 +87,14 @@ mod strapdown;
 mod surfel;
 mod survey;
 mod views;
-mod whereabouts;
 mod window;
 
 pub use base::{BaseEstimate, BaseFix, BaseImu, FixSigmas, smooth_base};
 use clock::Clock;
 pub use cloud::{CloudFilter, Fate, ProjectedReturn, point_sigma_m};
-pub use error::{EstimationError, LeftOut, Warning, WarningKind};
+pub use error::{Discarded, EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
-pub use integrity::{Cause, Evidence, Finding, Status, blocks, doubt, findings, radius_99};
+pub use integrity::{Cause, Evidence, Finding, Status, bound_factors, covariance_blocks, findings, radius_99};
 pub use map::{Located, locate_map, map_of, merge_maps};
 pub use output::{EstimatedPose, GAUGED_S, OpenLoop, TURN_LEVER_M, WindowReport};
 pub use registration::{

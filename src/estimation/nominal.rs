@@ -1,23 +1,23 @@
-//! The trajectory of the IMU as it stands: strapdown integration, corrected by every window so far.
+//! Nominal trajectory of the IMU: strapdown integration plus the corrections of all windows so far.
 
 use super::spline::Basis;
-use super::strapdown::{Biases, Exaggerates, Interval, State};
+use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 
-/// Nodes at the boundaries of the IMU's intervals, in IMU time, and the intervals between them.
+/// Nominal trajectory: states at the boundaries of the IMU intervals, in IMU time.
 ///
-/// Keeping it in the IMU's time has one reason: when the clock offset changes, the trajectory's fast part, which only
-/// the IMU knows, moves along by itself. Lidar time `tau` is looked up at `u = tau + l(tau)`.
+/// In IMU time a change of the clock offset does not change the trajectory. In lidar time, the corrections would have to
+/// shift the fast motion, which only the IMU measures. Lidar time `tau` corresponds to `u = tau + l(tau)`.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Nominal {
     times_s: Vec<f64>,
     states: Vec<State>,
-    /// Angular velocity at the nodes as measured, bias included, in the body.
+    /// Measured angular velocity at the nodes, including the bias, in the IMU frame, rad/s.
     rates: Vec<Vector>,
     intervals: Vec<Interval>,
 }
 
-/// Pose and velocities of the IMU at an instant, in the map.
+/// Pose, velocity and angular velocity of the IMU at a time, in the map frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion {
     pub(super) rotation: Matrix,
@@ -27,8 +27,8 @@ pub(super) struct Motion {
 }
 
 impl Nominal {
-    /// A trajectory that begins at `start_s` in `state`.
-    pub(super) fn beginning(start_s: f64, state: State) -> Self {
+    /// A trajectory that starts at `start_s` with `state`.
+    pub(super) fn starting(start_s: f64, state: State) -> Self {
         Self { times_s: vec![start_s], states: vec![state], rates: vec![Vector::zeros()], intervals: Vec::new() }
     }
 
@@ -44,16 +44,16 @@ impl Nominal {
         &self.intervals
     }
 
-    /// The last node's time, or minus infinity.
+    /// Time of the last node, s; minus infinity without nodes.
     pub(super) fn end_s(&self) -> f64 {
         self.times_s.last().copied().unwrap_or(f64::NEG_INFINITY)
     }
 
-    /// Integrates one interval further.
+    /// Integrates the next interval.
     pub(super) fn extend(&mut self, interval: Interval, biases: &Biases, gravity: &Vector) {
         let (Some(time), Some(state)) = (self.times_s.last(), self.states.last()) else { return };
         let (time, state) = (time + interval.h, state.after(&interval, biases, gravity));
-        // At a boundary the measured rate is about the mean of both sides; the outermost nodes see one side alone.
+        // At a boundary the measured rate is about the mean of both sides; the outermost nodes have one side only.
         let half_slope = interval.gyro_slope * (0.5 * interval.h);
         if let Some(rate) = self.rates.last_mut() {
             let from_this = interval.gyro - half_slope;
@@ -65,7 +65,7 @@ impl Nominal {
         self.intervals.push(interval);
     }
 
-    /// Forgets the nodes before `time_s`, but for the one at or just before it.
+    /// Removes the nodes before `time_s`, except the last one at or before it.
     pub(super) fn forget_before(&mut self, time_s: f64) {
         let keep = self.times_s.partition_point(|t| *t <= time_s).saturating_sub(1);
         self.times_s.drain(..keep);
@@ -74,8 +74,9 @@ impl Nominal {
         self.intervals.drain(..keep);
     }
 
-    /// Adds a spline of corrections to the nodes from `first` on: `R' = exp(dr) R`, `t' = t + dt` (paper eq. 1-2), and
-    /// the velocity by the spline's derivative.
+    /// Adds a correction spline to the nodes from `first` on: `R' = exp(dr) R`, `t' = t + dt` (Bosse et al. 2012, eq. 1-2).
+    ///
+    /// The velocity changes by the derivative of the spline.
     pub(super) fn correct(&mut self, first: usize, curve: impl Fn(usize) -> Correction) {
         for (index, state) in self.states.iter_mut().enumerate().skip(first) {
             let correction = curve(index);
@@ -86,17 +87,17 @@ impl Nominal {
         }
     }
 
-    /// Takes what the IMU exaggerates out of what was measured; where the trajectory stands does not change.
-    pub(super) fn measured_without(&mut self, exaggerates: &Exaggerates) {
+    /// Corrects the stored readings for scale errors and misalignments; the states do not change.
+    pub(super) fn correct_readings(&mut self, scale_misalignment: &ImuScaleMisalignment) {
         for interval in &mut self.intervals {
-            *interval = interval.without(exaggerates);
+            *interval = interval.corrected_by(scale_misalignment);
         }
         for rate in &mut self.rates {
-            *rate -= exaggerates.gyro * *rate;
+            *rate -= scale_misalignment.gyro * *rate;
         }
     }
 
-    /// Turns the whole trajectory about `pivot`.
+    /// Rotates the trajectory about `pivot`.
     pub(super) fn turn(&mut self, turn: &Rotation, pivot: &Vector) {
         for state in &mut self.states {
             state.rotation = turn * state.rotation;
@@ -105,7 +106,7 @@ impl Nominal {
         }
     }
 
-    /// Puts the whole trajectory where `a_from_b` has it.
+    /// Transforms the trajectory by `a_from_b`.
     pub(super) fn move_by(&mut self, a_from_b: &Pose) {
         for state in &mut self.states {
             state.rotation = a_from_b.rotation * state.rotation;
@@ -114,13 +115,13 @@ impl Nominal {
         }
     }
 
-    /// Pose and velocities at `u_s`, IMU time; held at the ends.
+    /// Pose and velocities at `u_s`, IMU time; constant before the first and after the last node.
     pub(super) fn at(&self, u_s: f64, gyro_bias: &Vector) -> Motion {
         let after = self.times_s.partition_point(|t| *t <= u_s).clamp(1, self.times_s.len().max(2) - 1);
         self.within(after - 1, u_s, gyro_bias)
     }
 
-    /// As [`Nominal::at`], where `cursor` is near the interval and is moved to it: for a run of instants in order.
+    /// The same as [`Nominal::at`] for ordered times: `cursor` is the index of the last interval, and is updated.
     pub(super) fn at_cursor(&self, cursor: &mut usize, u_s: f64, gyro_bias: &Vector) -> Motion {
         while *cursor + 2 < self.times_s.len() && self.times_s[*cursor + 1] <= u_s {
             *cursor += 1;
@@ -128,7 +129,7 @@ impl Nominal {
         self.within(*cursor, u_s, gyro_bias)
     }
 
-    /// Cubic Hermite in position, and in the rotation vector from the interval's start.
+    /// Cubic Hermite interpolation of the position, and of the rotation vector from the start of the interval.
     fn within(&self, k: usize, u_s: f64, gyro_bias: &Vector) -> Motion {
         if self.intervals.is_empty() {
             let state = &self.states[0];
@@ -143,7 +144,7 @@ impl Nominal {
         let position = a.position + (b.position - a.position) * h01 + (a.velocity * h10 + b.velocity * h11) * h;
         let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
         let (rate_a, rate_b) = (self.rates[k] - gyro_bias, self.rates[k + 1] - gyro_bias);
-        // The rotation vector's own rate at the end is J_r(turn)^-1 rate ~ rate + turn x rate / 2: a step turns little.
+        // Derivative of the rotation vector at the end: J_r(turn)^-1 rate ~ rate + turn x rate / 2, for a small rotation.
         let rate_end = rate_b + turn.cross(&rate_b) * 0.5;
         let turned = turn * h01 + (rate_a * h10 + rate_end * h11) * h;
         let rotation = (a.rotation * Rotation::from_scaled_axis(turned)).to_rotation_matrix().into_inner();
@@ -156,19 +157,19 @@ impl Nominal {
     }
 }
 
-/// A correction of a pose at an instant, in the map.
+/// A pose correction, in the map frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Correction {
     /// Rotation vector, rad.
     pub(super) rotation: Vector,
     /// Translation, m.
     pub(super) translation: Vector,
-    /// The translation's derivative, m/s.
+    /// Derivative of the translation, m/s.
     pub(super) velocity: Vector,
 }
 
 impl Correction {
-    /// The value of a spline whose coefficients (`[dr, dt]` a knot, the first of index `first`) are `coefficients`.
+    /// The value of the correction spline; `coefficients` has `[dr, dt]` for each knot from index `first` on.
     pub(super) fn of_spline(basis: &Basis, first: i64, coefficients: &[f64]) -> Self {
         let mut sum = Self { rotation: Vector::zeros(), translation: Vector::zeros(), velocity: Vector::zeros() };
         let from = (basis.first - first) as usize * 6;

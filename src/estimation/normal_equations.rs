@@ -1,9 +1,9 @@
-//! Normal equations of a window, and their solution.
+//! Normal equations of a window and their solution by Cholesky factorisation.
 //!
-//! Unknowns are ordered knots first, in time, then the dense border (biases, gravity, clock). Stored is the lower
-//! triangle by rows with each row's envelope: from its first non-zero column to the diagonal. Cholesky fills nothing
-//! outside the envelope (George and Liu 1981), so a band costs a band's work, a dense border its own rows, and a window
-//! whose matches link all times with all others the full triangle, by the same code.
+//! The unknowns are the knots in order of time, then the dense border (biases, gravity, clock, calibration). The lower
+//! triangle is stored by rows, with the envelope of each row: from the first non-zero column to the diagonal. Cholesky
+//! factorisation causes no fill-in outside the envelope (George and Liu 1981). So a band matrix, a dense border and a
+//! full triangle each cost only the necessary work.
 
 use pulp::Arch;
 
@@ -11,9 +11,9 @@ use pulp::Arch;
 #[derive(Debug, Clone)]
 pub(super) struct NormalEquations {
     size: usize,
-    /// First column of each row that is not zero.
+    /// First non-zero column of each row.
     first: Vec<usize>,
-    /// Lower triangle, row-major over the full square; the upper part is empty.
+    /// Lower triangle, row-major in a full square; the upper part is zero.
     h: Vec<f64>,
     b: Vec<f64>,
 }
@@ -26,7 +26,7 @@ pub(super) struct Factor {
     l: Vec<f64>,
 }
 
-/// The matrix is not positive definite: the unknown of this index is not determined.
+/// The matrix is not positive definite: the unknown with this index is not determined.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NotDetermined(pub(super) usize);
 
@@ -36,7 +36,7 @@ impl NormalEquations {
         Self { size, first: (0..size).collect(), h: vec![0.0; size * size], b: vec![0.0; size] }
     }
 
-    /// Empties them, for `size` unknowns.
+    /// Resets the equations to `size` unknowns.
     pub(super) fn reset(&mut self, size: usize) {
         self.size = size;
         self.first.clear();
@@ -54,7 +54,7 @@ impl NormalEquations {
         self.h[row * self.size + column] += value;
     }
 
-    /// Adds entries of a row of `H` from a column on, none of them beyond the diagonal.
+    /// Adds consecutive entries to a row of `H`, starting at `column` and at most up to the diagonal.
     #[inline]
     pub(super) fn add_row(&mut self, row: usize, column: usize, entries: &[f64]) {
         debug_assert!(column + entries.len() <= row + 1, "the upper triangle is empty");
@@ -70,10 +70,10 @@ impl NormalEquations {
         self.b[row] += value;
     }
 
-    /// Factors `H` into `into`, whose memory is used again.
+    /// Factors `H`; reuses the memory of `into`.
     ///
     /// # Errors
-    /// When an unknown is not determined.
+    /// If an unknown is not determined.
     pub(super) fn factor(&self, into: &mut Factor) -> Result<(), NotDetermined> {
         into.size = self.size;
         into.first.clone_from(&self.first);
@@ -81,14 +81,14 @@ impl NormalEquations {
         Arch::new().dispatch(|| into.decompose())
     }
 
-    /// The solution, by a factor of these equations.
+    /// The solution, with the factor of these equations.
     pub(super) fn solve(&self, factor: &Factor) -> Vec<f64> {
         factor.solve(&self.b)
     }
 }
 
 impl Factor {
-    /// From the lower triangle of `H` to that of `L`, row by row within the envelope.
+    /// Replaces the lower triangle of `H` by that of `L`, row by row within the envelope.
     #[inline(always)]
     fn decompose(&mut self) -> Result<(), NotDetermined> {
         let n = self.size;
@@ -130,7 +130,7 @@ impl Factor {
         &self.l[i * self.size..=i * self.size + i]
     }
 
-    /// The information that is left about the last `N` unknowns when all others are solved for: `L_bb L_bb^T`.
+    /// Information on the last `N` unknowns, with all others marginalised: `L_bb L_bb^T`.
     pub(super) fn information_of_last<const N: usize>(&self) -> nalgebra::SMatrix<f64, N, N> {
         let from = self.size - N;
         let block =
@@ -141,28 +141,29 @@ impl Factor {
 
 #[cfg(test)]
 impl NormalEquations {
-    /// The whole of `H`, for comparison.
+    /// The full matrix `H`, for tests.
     pub(super) fn dense(&self) -> nalgebra::DMatrix<f64> {
         let n = self.size;
         nalgebra::DMatrix::from_fn(n, n, |r, c| self.h[r.max(c) * n + r.min(c)])
     }
 
-    /// The right-hand side, for comparison.
+    /// The right-hand side, for tests.
     pub(super) fn right(&self) -> nalgebra::DVector<f64> {
         nalgebra::DVector::from_column_slice(&self.b)
     }
 }
 
+/// `into += scale * from`.
 fn axpy(into: &mut [f64], from: &[f64], scale: f64) {
     for (sum, term) in into.iter_mut().zip(from) {
         *sum += scale * term;
     }
 }
 
-/// Sums beside each other: two registers of four, so that one need not wait for the other.
+/// Number of partial sums of a dot product: two independent vector registers of four.
 const LANES: usize = 8;
 
-/// A dot product in lanes: the order of its sums is fixed, and vector units can take it.
+/// Dot product in lanes: vectorises, with a fixed order of summation.
 #[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
@@ -182,14 +183,14 @@ mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    /// Products `u v^T + v u^T` with their starts, over 20 unknowns and a border of 3, on a heavy diagonal.
+    /// Products `u v^T + v u^T` with their start indices, for 20 unknowns and a border of 3.
     fn products() -> Vec<(usize, [f64; 3], usize, [f64; 2])> {
         let wave = |k: usize, m: usize| ((k * k * 3 + m * m * 5 + k * m * 11) as f64 * 0.37).sin();
         (0..60_usize)
             .map(|k| {
                 let start = k % 16;
-                let far = [start + 2, start + 1, start, 20 + k % 2, (start + 5).min(18)][k % 5];
-                (start, std::array::from_fn(|m| wave(k, m)), far, std::array::from_fn(|m| wave(k, m + 3)))
+                let other = [start + 2, start + 1, start, 20 + k % 2, (start + 5).min(18)][k % 5];
+                (start, std::array::from_fn(|m| wave(k, m)), other, std::array::from_fn(|m| wave(k, m + 3)))
             })
             .collect()
     }
@@ -233,7 +234,7 @@ mod tests {
         equations.factor(&mut factor).unwrap();
         let x = DVector::from_vec(equations.solve(&factor));
         assert_relative_eq!(x, dense.clone().cholesky().unwrap().solve(&right), epsilon = 1e-9);
-        // The border's information is the inverse of its block of the inverse.
+        // The marginal information of the border is the inverse of the border block of the covariance.
         let covariance = dense.try_inverse().unwrap().view((20, 20), (3, 3)).into_owned();
         let information = factor.information_of_last::<3>();
         let back = information.try_inverse().unwrap();
@@ -245,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_that_nothing_measures_is_named() {
+    fn an_undetermined_unknown_is_reported() {
         let mut equations = NormalEquations::new(3);
         equations.add_entry(0, 0, 1.0);
         equations.add_entry(1, 0, 0.15);

@@ -1,43 +1,43 @@
-//! What comes out of the estimator.
+//! Output of the estimator.
 
 use super::{Located, Survey, TimeSpent, Warning, WarningKind};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
 
-/// Over so many seconds at the start a trajectory is aligned when its error is stated, s.
+/// Length of the initial part over which a trajectory is aligned with the truth when errors are reported, s.
 pub const GAUGED_S: f64 = 20.0;
 
-/// A turn counts in an alignment as much as a shift by this times the angle, m: it holds one of a head that stays in
-/// one place, and counts for nothing on a walk.
+/// Lever arm that converts a rotation error to a position error in the alignment, m.
+///
+/// It makes the alignment regular for a head that stays in one place, and has no effect on a longer trajectory.
 pub const TURN_LEVER_M: f64 = 0.05;
 
-/// The head at an instant, and what the estimator thought of its sensors then.
+/// Estimated pose, velocity, biases and clock offset at a time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatedPose {
-    /// When, lidar time: a whole multiple of the IMU's period, itself rounded to a whole number of milliseconds.
+    /// Lidar time: a multiple of the IMU period, which is rounded to milliseconds.
     pub stamp: Stamp,
-    /// The pose. The map's z axis points up (gravity as it was known at the start), its origin is the first pose's.
+    /// The pose. The origin of the map is the first pose; z points up, by the initial estimate of gravity.
     pub map_from_head: Pose,
-    /// How uncertain it is against the map, which is where the first pose puts it: m^2, m rad, rad^2.
+    /// Covariance relative to the map, which the first pose defines: position, then attitude; m^2, m rad, rad^2.
     pub covariance: PoseCovariance,
-    /// How uncertain it is against a trajectory that is aligned with the truth over its first [`GAUGED_S`] seconds,
-    /// likewise; over these seconds themselves against the alignment so far.
+    /// Covariance relative to the alignment over the first [`GAUGED_S`] seconds, or over the time so far during these.
     pub covariance_against_gauge: PoseCovariance,
-    /// Velocity of the head's origin, m/s.
+    /// Velocity of the head origin, m/s.
     pub velocity_in_map_m_per_s: Vector,
-    /// Bias of the gyroscope, in the IMU's frame, rad/s.
+    /// Gyroscope bias, in the IMU frame, rad/s.
     pub gyro_bias_rad_per_s: Vector,
-    /// Bias of the accelerometer, in the IMU's frame, m/s^2.
+    /// Accelerometer bias, in the IMU frame, m/s^2.
     pub accel_bias_m_per_s2: Vector,
-    /// How much later the IMU stamps an instant than the lidar does, s.
+    /// Clock offset, s: positive if IMU stamps are later than lidar stamps.
     pub clock_offset_s: f64,
 }
 
-/// What a window's solution rested on.
+/// Diagnostics of the solution of a window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WindowReport {
-    /// The window's end, lidar time.
+    /// End of the window, lidar time.
     pub stamp: Stamp,
     /// Surfels in the window.
     pub surfels: usize,
@@ -47,17 +47,15 @@ pub struct WindowReport {
     pub view_matches: usize,
     /// Fixed views in use.
     pub views: usize,
-    /// Weighted root mean square of the matches' distances along their normals, m.
+    /// Weighted root mean square of the match distances along the normals, m.
     pub residual_rms_m: f64,
-    /// Iterations of place, match, solve.
+    /// Number of iterations: match, then solve.
     pub iterations: usize,
-    /// Size of the last iteration's correction: greatest translation of a knot, m.
+    /// Largest correction in the last iteration, m or rad.
     pub last_correction_m: f64,
-    /// Least over greatest eigenvalue of the information that the matches hold about the position, 0..1; 0 without
-    /// matches.
+    /// Smallest over largest eigenvalue of the position information of the matches, 0..1; 0 without matches.
     pub conditioning: f64,
-    /// How many times as far as their noise has it the IMU's samples are from the trajectory, which follows them: 0.1
-    /// to 0.4 where all is well.
+    /// Disagreement between IMU samples and trajectory, as a multiple of the IMU noise: 0.1 to 0.4 in a sound run.
     pub imu_contradiction: f64,
     /// Clock offset after the window, s.
     pub clock_offset_s: f64,
@@ -67,46 +65,50 @@ pub struct WindowReport {
     pub range_correction_m: f64,
     /// Largest entry of the estimated scale errors and misalignments of gyroscope and accelerometer.
     pub imu_matrix: f64,
-    /// Speed of the IMU at its end, m/s.
+    /// Speed of the IMU at the end of the window, m/s.
     pub speed_m_per_s: f64,
-    /// Whether the head moves, so that surfaces should be observed again.
+    /// Whether the head moves, so that surfaces should be matched.
     pub moving: bool,
-    /// Whether it rests at the window's end, as far as the IMU and the estimated speed show.
+    /// Whether the head rests at the end of the window, according to the IMU and the estimated speed.
     pub resting: bool,
-    /// Whether the lidar would show it if it did not rest.
+    /// Whether the lidar would show a motion of a resting head.
     pub sees_rest: bool,
-    /// What is wrong with the window's solution, if anything.
+    /// Problem of the solution, if any.
     pub trouble: Option<WarningKind>,
-    /// Time it took, s. With its parts the one figure that differs from run to run.
+    /// Run time, s. With its parts, the only value that differs between identical runs.
     pub elapsed_s: f64,
-    /// The parts of that time; what they leave of it is the bookkeeping between them.
+    /// Parts of the run time; their sum is slightly smaller.
     pub spent: TimeSpent,
 }
 
 /// An open-loop estimate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OpenLoop {
-    /// `map_from_head` over lidar time: of every pose in `poses`.
+    /// `map_from_head` over lidar time, for each pose in `poses`.
     pub trajectory: Trajectory,
     /// The poses with velocity, biases and clock offset.
     pub poses: Vec<EstimatedPose>,
-    /// How uncertain poses of the first twice [`GAUGED_S`] seconds are against the alignment that the first seconds
-    /// give, [`GAUGED_S`] or half of a shorter run: m^2, m
-    /// rad, rad^2. Empty where the estimate began anew in this time.
+    /// Covariances of some poses during twice [`GAUGED_S`] seconds from the start, relative to the alignment: m^2, m rad,
+    /// rad^2.
+    ///
+    /// The alignment covers the first [`GAUGED_S`] seconds, or half of a shorter run. Empty if the estimate restarted in
+    /// this time.
     pub gauged: Vec<(Stamp, PoseCovariance)>,
-    /// The clock offset after each window: how much later the IMU stamps an instant than the lidar, s, by lidar time.
+    /// The clock offset after each window, s, positive if IMU stamps are later; over lidar time.
     pub clock_offsets: Vec<(Stamp, f64)>,
-    /// What was learnt of the lidar beyond its calibration, at the end, as the poses go with it.
+    /// Estimated corrections of the lidar calibration at the end, consistent with the poses.
     pub lidar: LidarCorrection,
-    /// The same as a calibration has it: where it was estimated how the lidar sits, the poses stand along the
-    /// gyroscope's axes, and this along the IMU's, midway between the gyroscope's and the accelerometer's.
+    /// The same corrections in the axes of the IMU calibration.
+    ///
+    /// If the extrinsics are estimated, the poses refer to the gyroscope axes; this refers to the axes midway between
+    /// those of gyroscope and accelerometer.
     pub calibrated_lidar: LidarCorrection,
-    /// Where in a map the head was found at first, where one was given.
+    /// Result of the first localisation in the given map, if any.
     pub located: Option<Located>,
-    /// A report a window.
+    /// One report per window.
     pub windows: Vec<WindowReport>,
-    /// What degraded the estimate; empty when nothing did.
+    /// Events that degraded the estimate.
     pub warnings: Vec<Warning>,
-    /// What was seen on the way, where that was asked for.
+    /// The observed surfaces, if requested.
     pub survey: Survey,
 }

@@ -1,34 +1,34 @@
-//! Where the time of a window goes. Measured walls of time are told, and enter no result.
+//! Run time of the parts of a window. It is reported and does not affect results.
 
 use std::iter::Sum;
 use std::ops::AddAssign;
 use std::time::Instant;
 
-/// Time that the parts of the estimator's work took, s.
+/// Run time of the parts of the estimator, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TimeSpent {
-    /// Integrating the IMU.
+    /// IMU integration.
     pub integration_s: f64,
-    /// Making surfels of beams: projection, voxels, shapes.
+    /// Surfel extraction: projection, voxels, shapes.
     pub surfels_s: f64,
-    /// Placing the window's surfels in the map.
+    /// Transformation of the surfels into the map frame.
     pub placing_s: f64,
-    /// Looking for neighbours in six dimensions: trees and searches.
+    /// Neighbour search in six dimensions.
     pub neighbours_s: f64,
-    /// Telling which neighbours match, and by which plane.
+    /// Match gates and common planes.
     pub matches_s: f64,
-    /// Summing the normal equations: IMU, priors, weighted matches.
+    /// Assembly of the normal equations: IMU, priors, weighted matches.
     pub equations_s: f64,
-    /// Factoring and solving them.
+    /// Solution of the normal equations.
     pub solve_s: f64,
-    /// Correcting the trajectory by their solution.
+    /// Correction of the trajectory.
     pub correction_s: f64,
-    /// Keeping and choosing fixed views.
+    /// Storage and selection of fixed views.
     pub views_s: f64,
 }
 
 impl TimeSpent {
-    /// Each part by its name, in the order of the work.
+    /// Name and run time of each part, in order of execution.
     pub fn parts(&self) -> [(&'static str, f64); 9] {
         [
             ("integration", self.integration_s),
@@ -67,7 +67,7 @@ impl Sum for TimeSpent {
     }
 }
 
-/// Tells the time from one look to the next.
+/// Measures the run time between laps.
 pub(super) struct Stopwatch(Instant);
 
 impl Stopwatch {
@@ -75,7 +75,7 @@ impl Stopwatch {
         Self(Instant::now())
     }
 
-    /// The time since the last look, or the start, s.
+    /// Time since the last lap, or since the start, s.
     pub(super) fn lap_s(&mut self) -> f64 {
         let now = Instant::now();
         let passed = now - std::mem::replace(&mut self.0, now);

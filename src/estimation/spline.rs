@@ -1,6 +1,6 @@
-//! Uniform cubic B-splines, the curves of the corrections.
+//! Uniform cubic B-splines for the trajectory corrections.
 //!
-//! With knots every `spacing` and `x` in 0..1 the place between two of them, a curve is
+//! With a knot spacing `spacing` and the position `x` in 0..1 between two knots, the spline is
 //! `c(u) = sum_a B_a(x) c_(first + a)`, a = 0..3, with the basis of de Boor (A Practical Guide to Splines, 1978):
 //!
 //! ```text
@@ -8,12 +8,13 @@
 //! 6 B_2 = -3 x^3 + 3 x^2 + 3 x + 1          6 B_3 = x^3
 //! ```
 //!
-//! It is twice continuously differentiable, and its derivatives are exact: no second difference of noisy poses appears.
+//! The spline is twice continuously differentiable with analytic derivatives, so no differences of noisy poses are
+//! needed.
 
-/// The four basis functions that are not zero at an instant, with two derivatives.
+/// The four non-zero basis functions at a time, with two derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Basis {
-    /// Index of the first of the four coefficients, counted from the start of time.
+    /// Index of the first of the four coefficients; index 0 is at time 0.
     pub(super) first: i64,
     /// Values.
     pub(super) value: [f64; 4],
@@ -24,21 +25,21 @@ pub(super) struct Basis {
 }
 
 impl Basis {
-    /// The basis at `u_s` seconds, for knots every `spacing_s`.
+    /// The basis at time `u_s`, s, for a knot spacing of `spacing_s`, s.
     pub(super) fn at(u_s: f64, spacing_s: f64) -> Self {
-        let place = u_s / spacing_s;
-        let segment = place.floor();
-        let x = place - segment;
+        let position = u_s / spacing_s;
+        let segment = position.floor();
+        let x = position - segment;
         let (y, x2) = (1.0 - x, x * x);
-        let per = 1.0 / spacing_s;
+        let inverse = 1.0 / spacing_s;
         let value = [y * y * y, (3.0 * x - 6.0) * x2 + 4.0, ((3.0 - 3.0 * x) * x + 3.0) * x + 1.0, x2 * x];
         let rate = [-y * y, (3.0 * x - 4.0) * x, (2.0 - 3.0 * x) * x + 1.0, x2];
         let acceleration = [y, 3.0 * x - 2.0, 1.0 - 3.0 * x, x];
         Self {
             first: segment as i64,
             value: value.map(|b| b / 6.0),
-            rate: rate.map(|b| b * (0.5 * per)),
-            acceleration: acceleration.map(|b| b * (per * per)),
+            rate: rate.map(|b| b * (0.5 * inverse)),
+            acceleration: acceleration.map(|b| b * (inverse * inverse)),
         }
     }
 }
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn curve_and_two_derivatives_are_continuous_at_a_knot() {
+    fn the_spline_and_two_derivatives_are_continuous_at_a_knot() {
         let (before, after) = (Basis::at(0.6 - 1e-12, 0.2), Basis::at(0.6 + 1e-12, 0.2));
         assert_eq!(before.first + 1, after.first);
         for a in 0..3 {

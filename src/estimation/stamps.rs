@@ -1,57 +1,61 @@
-//! Smoothing of a regular sensor's stamps.
+//! Smoothing of the stamps of a sensor with a constant sampling rate.
 //!
-//! A sensor that samples at a steady rate but is stamped with jitter (by a host, over a bus) says more about its times
-//! by counting than by any single stamp. A Kalman filter over (time of the last sample, period) follows the count: with
-//! jitter `s` and a rate that wanders slowly, the smoothed stamps are good to a few hundredths of `s` within a minute.
+//! If stamps have jitter (from the host or the bus), the number of samples determines the time better than a single
+//! stamp. A Kalman filter with the states time of the last sample and period combines both. With jitter `s` and a slowly
+//! drifting rate, the error of the smoothed stamps is a few hundredths of `s` after a minute.
 
 use super::EstimatorSpec;
 use crate::signal::{Regularity, StampPattern};
 use crate::time::{Span, Stamp};
 
-/// Wander of a sensor's rate, relative, per square root of a second: 0.2 ppm, a quartz in a room.
+/// Random walk of the sampling rate, relative, per square root of a second: 0.2 ppm, as of a quartz at room temperature.
 const RATE_WALK_PER_SQRT_S: f64 = 2e-7;
-/// So many stamps in a row far from the count mean that the count is wrong.
-const STRIKES: usize = 5;
-/// Variance of the least late of many delayed stamps, as a multiple of that of the jitter.
-const ON_TIME: f64 = 0.1;
-/// Relative standard deviation of a period that was learnt from jittered stamps, and from delayed ones, whose lower
-/// envelope is a line to 0.02 %. A larger one lets the first stamp's own delay pass for a wrong period.
-const LEARNT: (f64, f64) = (0.01, 5e-4);
-/// A stamp that is later than this is behind a gap, not delayed, s.
-const LONGEST_DELAY_S: f64 = 0.12;
-/// Of so many late stamps in a row the least late is on time.
-const LATE_IN_A_ROW: usize = 25;
+/// Number of consecutive outlying stamps after which the filter is reset: samples were lost, or the clock was set.
+const MAX_OUTLIERS: usize = 5;
+/// Variance of the smallest of many delays, as a multiple of the jitter variance.
+const MIN_DELAY_VARIANCE: f64 = 0.1;
+/// Relative standard deviation of the initial period, from stamps with jitter and from delayed stamps.
+///
+/// The lower envelope of delayed stamps is a line to 0.02 %. A larger value would let the delay of the first stamp change
+/// the period.
+const INITIAL_PERIOD_SIGMA: (f64, f64) = (0.01, 5e-4);
+/// Maximum delay of a stamp, s; a later stamp follows a gap.
+const MAX_DELAY_S: f64 = 0.12;
+/// Number of consecutive late stamps of which the one with the smallest delay counts as on time.
+const MAX_LATE: usize = 25;
 
-/// Follows the stamps of a regular sensor. Seconds on the sensor's own clock.
+/// Kalman filter of the stamps of a sensor, in seconds of the sensor clock.
 #[derive(Debug, Clone)]
 pub(super) struct StampFilter {
     last_s: f64,
     period_s: f64,
     covariance: [f64; 3],
     jitter2: f64,
-    strikes: usize,
+    outliers: usize,
     started: bool,
     off: bool,
-    /// Whether stamps are delayed, so that the earliest are the truest.
+    /// Whether stamps are only delayed, so that the earliest ones are accurate.
     delayed: bool,
-    /// How many stamps in a row are late, and the least delay among them, s.
+    /// Number of consecutive late stamps, and the smallest delay of them, s.
     late: (usize, f64),
 }
 
 impl StampFilter {
-    /// A filter for a sensor whose first stamps showed `regularity`, and that jitters by at least `jitter_s`; zero
-    /// passes every stamp as it is, and so does a sensor without a period.
+    /// A filter with period and jitter from `regularity`, and a jitter of at least `jitter_s`.
+    ///
+    /// A `jitter_s` of 0, or an irregular sensor, disables the filter.
     pub(super) fn new(regularity: Regularity, jitter_s: f64) -> Self {
         let Regularity { period_s, jitter_s: seen_s, pattern } = regularity;
         let off = jitter_s <= 0.0 || pattern == StampPattern::Irregular;
         let jitter_s = jitter_s.max(seen_s);
-        let learnt = if pattern == StampPattern::Delayed { LEARNT.1 } else { LEARNT.0 };
+        let period_sigma =
+            if pattern == StampPattern::Delayed { INITIAL_PERIOD_SIGMA.1 } else { INITIAL_PERIOD_SIGMA.0 };
         Self {
             last_s: 0.0,
             period_s,
-            covariance: [jitter_s * jitter_s, 0.0, (learnt * period_s).powi(2)],
+            covariance: [jitter_s * jitter_s, 0.0, (period_sigma * period_s).powi(2)],
             jitter2: jitter_s * jitter_s,
-            strikes: 0,
+            outliers: 0,
             started: false,
             off,
             delayed: pattern == StampPattern::Delayed,
@@ -59,12 +63,12 @@ impl StampFilter {
         }
     }
 
-    /// The sensor's period as far as known, s.
+    /// Estimated sampling period, s.
     pub(super) fn period_s(&self) -> f64 {
         self.period_s
     }
 
-    /// When the next sample, stamped `raw_s`, was really taken.
+    /// The smoothed time of the next sample, stamped `raw_s`, s.
     pub(super) fn smooth(&mut self, raw_s: f64) -> f64 {
         if self.off || !self.started {
             self.started = true;
@@ -72,9 +76,9 @@ impl StampFilter {
             return raw_s;
         }
         let since = raw_s - self.last_s;
-        // One period unless the stamp is far off: a late stamp must not be taken for a lost sample.
+        // One period unless the stamp is an outlier: a late stamp must not count as a lost sample.
         let tolerance = (0.5 * self.period_s).max(4.0 * self.jitter2.sqrt());
-        let is_one = (since - self.period_s).abs() < tolerance || (self.delayed && since < LONGEST_DELAY_S);
+        let is_one = (since - self.period_s).abs() < tolerance || (self.delayed && since < MAX_DELAY_S);
         let periods = if is_one { 1.0 } else { (since / self.period_s).round().max(0.0) };
         self.predict(periods);
         if self.delayed {
@@ -83,28 +87,30 @@ impl StampFilter {
         }
         let innovation = raw_s - self.last_s;
         if innovation.abs() > tolerance {
-            // One such stamp is a chance, many are a jitter that has grown.
+            // Many outliers are an increase of the jitter.
             self.jitter2 += 0.01 * (tolerance * tolerance - self.jitter2);
-            self.strikes += 1;
-            if self.strikes >= STRIKES || innovation.abs() > 20.0 * tolerance {
-                self.strikes = 0;
+            self.outliers += 1;
+            if self.outliers >= MAX_OUTLIERS || innovation.abs() > 20.0 * tolerance {
+                self.outliers = 0;
                 self.last_s = raw_s;
                 self.covariance[0] = self.jitter2;
                 self.covariance[1] = 0.0;
             }
             return self.last_s;
         }
-        self.strikes = 0;
+        self.outliers = 0;
         self.correct(innovation, 1.0);
         self.last_s
     }
 
-    /// Delays only ever make a stamp late: an early one lies near the truth, a late one says nothing, but the least
-    /// late of many in a row is on time. Where that is late by periods, samples were lost.
+    /// Follows the lower envelope of delayed stamps.
+    ///
+    /// An early stamp is accurate, a late one is not used. Of many consecutive late stamps, the one with the smallest delay
+    /// counts as on time; if that delay is several periods, samples were lost.
     fn follow_envelope(&mut self, raw_s: f64) {
         let delay_s = raw_s - self.last_s;
         let (count, least_s) = (self.late.0 + 1, self.late.1.min(delay_s));
-        if delay_s > 0.0 && count < LATE_IN_A_ROW {
+        if delay_s > 0.0 && count < MAX_LATE {
             self.late = (count, least_s);
             self.measure_jitter(delay_s);
             return;
@@ -112,9 +118,10 @@ impl StampFilter {
         self.late = (0, f64::INFINITY);
         let lost = (least_s / self.period_s).round().max(0.0);
         self.predict(lost);
-        self.correct(least_s - lost * self.period_s, ON_TIME);
+        self.correct(least_s - lost * self.period_s, MIN_DELAY_VARIANCE);
     }
 
+    /// Kalman prediction over a number of periods.
     fn predict(&mut self, periods: f64) {
         let [xx, xp, pp] = self.covariance;
         self.last_s += periods * self.period_s;
@@ -122,30 +129,32 @@ impl StampFilter {
         self.covariance = [xx + 2.0 * periods * xp + periods * periods * pp, xp + periods * pp, pp + walk];
     }
 
-    /// By a stamp with so many times the variance of the jitter.
-    fn correct(&mut self, innovation: f64, share: f64) {
+    /// Kalman update with a stamp of variance `factor` times the jitter variance.
+    fn correct(&mut self, innovation: f64, factor: f64) {
         self.measure_jitter(innovation);
         let [xx, xp, pp] = self.covariance;
-        // Never believed below 10 us.
-        let total = xx + share * self.jitter2.max(1e-10);
+        // The jitter is at least 10 us.
+        let total = xx + factor * self.jitter2.max(1e-10);
         let (gain_x, gain_p) = (xx / total, xp / total);
         self.last_s += gain_x * innovation;
         self.period_s += gain_p * innovation;
         self.covariance = [xx * (1.0 - gain_x), xp * (1.0 - gain_x), pp - gain_p * xp];
     }
 
+    /// Updates the jitter estimate.
     fn measure_jitter(&mut self, innovation: f64) {
         self.jitter2 += 0.01 * (innovation * innovation - self.jitter2);
     }
 }
 
-/// When the samples of a regular sensor were really taken, as the estimator takes it: their stamps, in the order in
-/// which they came, smoothed by these settings. Whoever projects beams by an estimate needs the times that it used.
+/// Smooths the stamps of a regular sensor, in order of arrival, in the same way as the estimator.
+///
+/// A projection of beams with the estimated trajectory needs these times.
 pub fn smoothed_stamps(stamps: &[Stamp], spec: &EstimatorSpec) -> Vec<Stamp> {
     let Some(first) = stamps.first() else { return Vec::new() };
     let seconds: Vec<f64> = stamps.iter().map(|stamp| stamp.seconds_since(*first)).collect();
-    let learning = seconds.partition_point(|s| *s <= spec.inertial.rest_s + spec.step_s);
-    let Some(regularity) = Regularity::of(&seconds[..learning]) else { return stamps.to_vec() };
+    let initial = seconds.partition_point(|s| *s <= spec.inertial.rest_s + spec.step_s);
+    let Some(regularity) = Regularity::of(&seconds[..initial]) else { return stamps.to_vec() };
     let mut filter = StampFilter::new(regularity, spec.clock.jitter_s);
     seconds.iter().map(|raw_s| *first + Span::from_seconds(filter.smooth(*raw_s))).collect()
 }
@@ -155,7 +164,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
-    /// Stamps of a sensor of period 10 ms and 20 ppm whose jitter is Gaussian (sum of twelve uniform numbers).
+    /// True times and stamps of a sensor with a period of 10 ms and 20 ppm, and Gaussian jitter (sum of 12 uniform numbers).
     fn stamps(count: usize, jitter_s: f64) -> Vec<(f64, f64)> {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
@@ -172,24 +181,24 @@ mod tests {
 
     #[test]
     fn jitter_of_two_milliseconds_is_smoothed_to_a_tenth_of_one() {
-        // A line through 3000 stamps would know its end to 2 * 2 ms / sqrt(3000) = 0.07 ms.
+        // A line fit through 3000 stamps has an error at the end of 2 * 2 ms / sqrt(3000) = 0.07 ms.
         assert!(error_after(&stamps(6000, 2e-3), 3000) < 1.5e-4);
         assert!(error_after(&stamps(6000, 1e-4), 500) < 2e-5);
     }
 
     #[test]
     fn jitter_as_long_as_the_period_is_smoothed_too() {
-        // A driver passes samples on in order, with stamps that increase.
+        // The driver outputs samples in order, with increasing stamps.
         let mut noisy = stamps(6000, 1e-2);
         let mut raw: Vec<f64> = noisy.iter().map(|(_, raw)| *raw).collect();
         raw.sort_by(f64::total_cmp);
         noisy.iter_mut().zip(raw).for_each(|(stamp, raw)| stamp.1 = raw);
-        // A line through 3000 stamps would know its end to 2 * 10 ms / sqrt(3000) = 0.37 ms.
+        // A line fit through 3000 stamps has an error at the end of 2 * 10 ms / sqrt(3000) = 0.37 ms.
         let error_s = error_after(&noisy, 3000);
         assert!(error_s < 7e-4, "{error_s}");
     }
 
-    /// USB and operating systems delay stamps by an exponential time, and keep their order.
+    /// USB and operating system delay stamps by an exponentially distributed time, without changing their order.
     #[test]
     fn delayed_stamps_are_followed_along_their_lower_envelope() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(8);
@@ -206,7 +215,7 @@ mod tests {
         assert_eq!(regularity.pattern, StampPattern::Delayed);
         let mut filter = StampFilter::new(regularity, 5e-4);
         let errors: Vec<f64> = delayed.iter().map(|(t, raw)| filter.smooth(*raw) - t).collect();
-        // A constant delay is the clock offset's to find; what counts is how far it wanders.
+        // A constant delay is part of the clock offset; only its variation matters.
         let spread = |errors: &[f64]| {
             let mean = errors.iter().sum::<f64>() / errors.len() as f64;
             (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / errors.len() as f64).sqrt()
@@ -215,9 +224,9 @@ mod tests {
         assert!(spread(&errors[150..]) < 4e-4, "{}", spread(&errors[150..]));
     }
 
-    /// The first stamps' own delays must not pass for another period: forty recordings of 15 s.
+    /// The delays of the first stamps must not change the period: forty recordings of 15 s.
     #[test]
-    fn delayed_stamps_are_followed_from_the_start_whatever_the_first_delays() {
+    fn delayed_stamps_are_followed_from_the_start_for_any_first_delays() {
         for seed in 0..40 {
             let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
             let mut last = 0.0_f64;
@@ -237,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn jitter_that_grows_is_followed() {
+    fn increasing_jitter_is_followed() {
         let (calm, wild) = (stamps(1000, 1e-4), stamps(6000, 8e-3));
         let grown: Vec<(f64, f64)> = calm.into_iter().chain(wild.into_iter().skip(1000)).collect();
         let error_s = error_after(&grown, 4000);
@@ -256,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_jumps_is_followed() {
+    fn a_step_of_the_clock_is_followed() {
         let mut jumped = stamps(2000, 1e-4);
         for (t, raw) in &mut jumped[1000..] {
             *t += 0.5;

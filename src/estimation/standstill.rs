@@ -1,44 +1,43 @@
-//! Whether the lidar shows a head at rest: a head that moves evenly feels like one at rest to its IMU.
+//! Detects rest or motion with the lidar; the IMU cannot distinguish constant velocity from rest.
 //!
-//! The ranges of one direction, early and late, differ by what the head moved: along a ray `u` that meets a surface of
-//! normal `n`, a shift `d` changes the range `r` by `-n.d / n.u`. Of many directions least squares gives the shift,
-//! where the surfaces constrain it: between two parallel walls it is unknown along them.
+//! A translation `d` of the head changes the range along a ray `u`, which meets a surface with normal `n`, by `-n.d / n.u`.
+//! Least squares over many directions gives the translation, in the directions that the surfaces constrain: along two
+//! parallel walls it is unknown.
 
 use super::surfel::Beam;
 use crate::geometry::Vector;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::BTreeMap;
 
-/// Directions are compared in cells of this size, rad.
+/// Cell size in azimuth and elevation, rad.
 const CELL_RAD: f64 = 0.05;
-/// Ranges of one direction differ when they do by more than this, m, and this share.
+/// Two ranges in a cell are different if they differ by more than this, m, plus this fraction.
 const DIFFER: (f64, f64) = (0.1, 0.03);
-/// A head moves when more than this share of the directions differ, of at least so many.
+/// The head moves if more than this fraction of the cells have different ranges, out of at least this number.
 const MOVED: (f64, usize) = (0.12, 20);
-/// Or when it shifted by more than this, m.
+/// The head moves if its translation exceeds this, m.
 const SHIFTED_M: f64 = 0.03;
-/// Directions whose shift is off by more than this, m, hardly count: something moves there, or an edge. Narrower from
-/// one solution to the next.
+/// Cauchy threshold of the residuals in successive solutions, m. Outliers are edges and moving objects.
 const OUTLIERS_M: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.03, 0.03];
-/// A cell is of one surface when its points leave a line by less than this share of their extent, and it is met at a
-/// cosine of more than this.
+/// A cell is used if its points are within this fraction of their extent from a line.
 const STRAIGHT: f64 = 0.1;
+/// A cell is used if the cosine of the incidence angle exceeds this.
 const MIN_COSINE: f64 = 0.1;
-/// A shift is known along a direction that so large a share of the surfaces face (an eigenvalue of their mean `n n^T`).
-const FACED: f64 = 0.03;
+/// The translation is observable along eigenvectors of the mean `n n^T` with an eigenvalue above this.
+const MIN_EIGENVALUE: f64 = 0.03;
 
-/// What the lidar shows of a head whose IMU feels rest.
+/// Evidence of the lidar on motion or rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Standstill {
-    /// What it sees moves.
+    /// The head moves.
     Moves,
-    /// What it sees stands still, and would not if the head moved within the plane of its scan.
+    /// The head rests: a motion in the scan plane would be visible.
     Rests,
-    /// What it sees stands still, and might do so in motion.
+    /// No motion is visible, but the surfaces do not constrain it.
     Unknown,
 }
 
-/// The points that were seen in one direction.
+/// The points in one cell of directions.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cell {
     count: f64,
@@ -52,7 +51,8 @@ impl Cell {
         self.range_m / self.count
     }
 
-    /// Its direction, and the normal of its surface within the scan, towards which the ray goes.
+    /// The direction of the cell, and the surface normal in the scan plane, on the side away from the lidar; none if the
+    /// points are not on one surface.
     fn facing(&self) -> Option<(Vector, Vector)> {
         let mean = self.sum / self.count;
         let scatter = SymmetricEigen::new(self.squares / self.count - mean * mean.transpose());
@@ -69,13 +69,13 @@ impl Cell {
     }
 }
 
-/// What `early` and `late` beams of the head's beginning show; with no beams, nothing.
+/// Compares `early` and `late` beams of the assumed initial rest.
 pub(super) fn standstill(early: &[Beam], late: &[Beam]) -> Standstill {
     let (early, late) = (by_direction(early), by_direction(late));
     let both: Vec<(&Cell, f64)> =
         early.iter().filter_map(|(key, cell)| Some((cell, late.get(key)?.mean_range_m()))).collect();
-    let is_other = |a: f64, b: f64| (a - b).abs() > DIFFER.0 + DIFFER.1 * a.min(b);
-    let differ = both.iter().filter(|(a, b)| is_other(a.mean_range_m(), *b)).count();
+    let is_different = |a: f64, b: f64| (a - b).abs() > DIFFER.0 + DIFFER.1 * a.min(b);
+    let differ = both.iter().filter(|(a, b)| is_different(a.mean_range_m(), *b)).count();
     if both.len() >= MOVED.1 && differ as f64 > MOVED.0 * both.len() as f64 {
         return Standstill::Moves;
     }
@@ -83,9 +83,10 @@ pub(super) fn standstill(early: &[Beam], late: &[Beam]) -> Standstill {
         let (direction, normal) = cell.facing()?;
         Some((normal, (cell.mean_range_m() - late_m) * normal.dot(&direction)))
     });
-    shift(&facing.collect::<Vec<_>>())
+    from_displacements(&facing.collect::<Vec<_>>())
 }
 
+/// Sorts beams into cells of direction.
 fn by_direction(beams: &[Beam]) -> BTreeMap<(i32, i32), Cell> {
     let mut cells: BTreeMap<(i32, i32), Cell> = BTreeMap::new();
     for beam in beams {
@@ -101,29 +102,31 @@ fn by_direction(beams: &[Beam]) -> BTreeMap<(i32, i32), Cell> {
     cells
 }
 
-/// What normals, and how far the head came along each of them, m, say.
-fn shift(facing: &[(Vector, f64)]) -> Standstill {
+/// Estimates the translation from normals and the displacement along each of them, m.
+fn from_displacements(facing: &[(Vector, f64)]) -> Standstill {
     if facing.len() < MOVED.1 {
         return Standstill::Unknown;
     }
     let mean = facing.iter().map(|(normal, _)| normal * normal.transpose()).sum::<Matrix3<f64>>() / facing.len() as f64;
     let parts = SymmetricEigen::new(mean);
-    let known: Vec<Vector> =
-        (0..3).filter(|k| parts.eigenvalues[*k] > FACED).map(|k| parts.eigenvectors.column(k).into()).collect();
-    // Along the other directions the shift stays zero.
-    let within = known.iter().map(|along| along * along.transpose()).sum::<Matrix3<f64>>();
+    let observable: Vec<Vector> = (0..3)
+        .filter(|k| parts.eigenvalues[*k] > MIN_EIGENVALUE)
+        .map(|k| parts.eigenvectors.column(k).into())
+        .collect();
+    // The translation along the other directions stays zero.
+    let within = observable.iter().map(|along| along * along.transpose()).sum::<Matrix3<f64>>();
     let mut shift = Vector::zeros();
     for outlier_m in OUTLIERS_M {
         let (mut information, mut right) = (Matrix3::identity() - within, Vector::zeros());
-        for (normal, came_m) in facing {
-            let weight = 1.0 / (1.0 + ((came_m - normal.dot(&shift)) / outlier_m).powi(2));
+        for (normal, displacement_m) in facing {
+            let weight = 1.0 / (1.0 + ((displacement_m - normal.dot(&shift)) / outlier_m).powi(2));
             let normal = within * normal;
             information += weight * normal * normal.transpose();
-            right += weight * came_m * normal;
+            right += weight * displacement_m * normal;
         }
         shift = information.try_inverse().unwrap_or_default() * right;
     }
-    match known.len() {
+    match observable.len() {
         _ if shift.norm() > SHIFTED_M => Standstill::Moves,
         0 | 1 => Standstill::Unknown,
         _ => Standstill::Rests,
@@ -134,8 +137,8 @@ fn shift(facing: &[(Vector, f64)]) -> Standstill {
 mod tests {
     use super::*;
 
-    /// Beams of a sensor in a hall of 6 m width whose ends are 12 and 8 m away, or of a corridor without ends; it has
-    /// gone `moved_m` along it; range noise by a fixed pattern, beams end at 30 m.
+    /// Beams in a hall 6 m wide with ends at 12 and 8 m, or in a corridor without ends, after a motion of `moved_m` along
+    /// it. The range noise is a fixed pattern; the maximum range is 30 m.
     fn beams(moved_m: f64, has_ends: bool) -> Vec<Beam> {
         let beam = |k: i32| {
             let azimuth = f64::from(k) * 0.004_363;
@@ -150,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_that_moves_evenly_is_seen_to_move() {
+    fn constant_velocity_is_detected_as_motion() {
         let seen = |moved_m: f64| standstill(&beams(0.0, true), &beams(moved_m, true));
         assert_eq!(seen(0.0), Standstill::Rests);
         assert_eq!(seen(0.01), Standstill::Rests);
@@ -161,13 +164,13 @@ mod tests {
     }
 
     #[test]
-    fn along_a_corridor_without_ends_rest_is_unknown() {
+    fn rest_is_unknown_in_a_corridor_without_ends() {
         assert_eq!(standstill(&beams(0.0, false), &beams(5.0, false)), Standstill::Unknown);
         assert_eq!(standstill(&beams(0.0, true), &[]), Standstill::Unknown);
     }
 
     #[test]
-    fn somebody_who_walks_by_is_not_the_head() {
+    fn a_passing_person_is_not_a_motion_of_the_head() {
         let mut late = beams(0.0, true);
         for beam in &mut late[100..200] {
             beam.range_m *= 0.8;

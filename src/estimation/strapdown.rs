@@ -1,72 +1,74 @@
-//! Integration of an IMU whose samples are averages over their intervals.
+//! Strapdown integration of IMU samples that are averages over intervals.
 //!
-//! A sample is the mean of rate and force over an interval of length `h`, its slope taken from the neighbouring
-//! samples. About the interval's middle, w(s) = w0 + w1 s, f(s) = f0 + f1 s, to third order in `h` (Magnus expansion;
-//! Savage, Strapdown Inertial Navigation Integration, 1998):
+//! A sample is the mean of angular velocity and specific force over an interval of length `h`; the slopes are from the
+//! neighbouring samples. About the middle of the interval, w(s) = w0 + w1 s and f(s) = f0 + f1 s. To third order in `h`
+//! (Magnus expansion; Savage, Strapdown Inertial Navigation Integration, 1998):
 //!
 //! ```text
 //! turn       phi = w h + h^3/12 w0 x w1                                            (coning)
 //! velocity   R_mid (f h + h^3/12 w0 x f1 + h^3/24 (w1 x f0 + w0 x (w0 x f0)))      (sculling, rotation)
 //! ```
 //!
-//! At 400 degrees/s and 100 Hz the last term alone is 2 mm/s^2: leaving it out would look like a bias.
+//! At 400 degrees/s and 100 Hz the last term is 2 mm/s^2; without it, the error would look like a bias.
 
 use crate::geometry::{Matrix, Rotation, Vector};
 
-/// What the IMU said about one interval of time, in the IMU's frame.
+/// IMU readings over an interval, in the IMU frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Interval {
-    /// Its length, s.
+    /// Length, s.
     pub(super) h: f64,
     /// Mean angular velocity, rad/s.
     pub(super) gyro: Vector,
-    /// Its slope, rad/s^2.
+    /// Slope of the angular velocity, rad/s^2.
     pub(super) gyro_slope: Vector,
     /// Mean specific force, m/s^2.
     pub(super) accel: Vector,
-    /// Its slope, m/s^3.
+    /// Slope of the specific force, m/s^3.
     pub(super) accel_slope: Vector,
     /// Standard deviation of `gyro` on each axis, rad/s.
     pub(super) gyro_sigma: f64,
     /// Standard deviation of `accel` on each axis, m/s^2.
     pub(super) accel_sigma: f64,
-    /// Whether no sample was there: its readings are interpolated.
+    /// Whether the readings are interpolated because samples are missing.
     pub(super) bridged: bool,
 }
 
-/// The biases of gyroscope and accelerometer, in the IMU's frame.
+/// Biases of gyroscope and accelerometer, in the IMU frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Biases {
-    /// rad/s.
+    /// Gyroscope bias, rad/s.
     pub(super) gyro: Vector,
-    /// m/s^2.
+    /// Accelerometer bias, m/s^2.
     pub(super) accel: Vector,
 }
 
-/// By how much an IMU exaggerates: the truth is `(1 - m) reading`, with scale factors on the diagonal of `m` and
-/// misalignment beside it.
+/// Scale errors and misalignments of an IMU: the true value is `(1 - m) reading`.
+///
+/// The diagonal of `m` has the scale errors, the other entries have the misalignments, rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Exaggerates {
-    /// The gyroscope.
+pub(super) struct ImuScaleMisalignment {
+    /// `m` of the gyroscope.
     pub(super) gyro: Matrix,
-    /// The accelerometer.
+    /// `m` of the accelerometer.
     pub(super) accel: Matrix,
 }
 
-impl Exaggerates {
-    /// An IMU that tells what is true.
-    pub(super) fn nothing() -> Self {
+impl ImuScaleMisalignment {
+    /// No scale error or misalignment.
+    pub(super) fn zero() -> Self {
         Self { gyro: Matrix::zeros(), accel: Matrix::zeros() }
     }
 
-    /// By how much the accelerometer's axes are turned against the gyroscope's, a rotation vector, rad: a misalignment
-    /// that is no symmetric matrix is a turn of the whole.
+    /// Rotation of the accelerometer axes relative to the gyroscope axes, a rotation vector, rad.
+    ///
+    /// It is the antisymmetric part of the difference of the matrices.
     pub(super) fn accel_against_gyro(&self) -> Vector {
         let m = self.accel - self.gyro;
         Vector::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]) * 0.5
     }
 
-    /// Exaggerates more, by `more`.
+    /// Adds `more` to both matrices.
     pub(super) fn add(&mut self, more: &Self) {
         self.gyro += more.gyro;
         self.accel += more.accel;
@@ -74,29 +76,29 @@ impl Exaggerates {
 }
 
 impl Interval {
-    /// The same interval by an IMU that exaggerates less, by `of`.
-    pub(super) fn without(&self, of: &Exaggerates) -> Self {
+    /// The interval with readings corrected for `errors`.
+    pub(super) fn corrected_by(&self, errors: &ImuScaleMisalignment) -> Self {
         Self {
-            gyro: self.gyro - of.gyro * self.gyro,
-            gyro_slope: self.gyro_slope - of.gyro * self.gyro_slope,
-            accel: self.accel - of.accel * self.accel,
-            accel_slope: self.accel_slope - of.accel * self.accel_slope,
+            gyro: self.gyro - errors.gyro * self.gyro,
+            gyro_slope: self.gyro_slope - errors.gyro * self.gyro_slope,
+            accel: self.accel - errors.accel * self.accel,
+            accel_slope: self.accel_slope - errors.accel * self.accel_slope,
             ..*self
         }
     }
 
-    /// The rotation vector from the interval's start to its end, in the body.
+    /// Rotation vector from the start to the end of the interval, in the body frame, rad.
     pub(super) fn turn(&self, biases: &Biases) -> Vector {
         let rate = self.gyro - biases.gyro;
         rate * self.h + rate.cross(&self.gyro_slope) * (self.h.powi(3) / 12.0)
     }
 
-    /// The rotation vector from the interval's start to its middle.
+    /// Rotation vector from the start to the middle of the interval, rad.
     pub(super) fn turn_to_middle(&self, biases: &Biases) -> Vector {
         (self.gyro - biases.gyro) * (0.5 * self.h) - self.gyro_slope * (self.h * self.h / 8.0)
     }
 
-    /// The mean specific force as the body's attitude in the middle sees it, without its bias.
+    /// Bias-corrected mean specific force in the body frame at the middle of the interval, m/s^2.
     pub(super) fn force_in_middle(&self, biases: &Biases) -> Vector {
         let (rate, force) = (self.gyro - biases.gyro, self.accel - biases.accel);
         let turning = rate.cross(&self.accel_slope) / 12.0
@@ -108,7 +110,7 @@ impl Interval {
 /// Attitude, position and velocity of the IMU in the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct State {
-    /// `map_from_imu`, the rotation.
+    /// Rotation `map_from_imu`.
     pub(super) rotation: Rotation,
     /// Position, m.
     pub(super) position: Vector,
@@ -117,7 +119,7 @@ pub(super) struct State {
 }
 
 impl State {
-    /// The state one interval later, under gravity `gravity` (m/s^2, in the map).
+    /// The state after an interval; `gravity` is in the map frame, m/s^2.
     pub(super) fn after(&self, interval: &Interval, biases: &Biases, gravity: &Vector) -> State {
         let h = interval.h;
         let middle = self.rotation * Rotation::from_scaled_axis(interval.turn_to_middle(biases));
@@ -125,7 +127,7 @@ impl State {
         let acceleration = middle * force + gravity;
         let jerk = middle * (interval.accel_slope + (interval.gyro - biases.gyro).cross(&force));
         let velocity = self.velocity + acceleration * h;
-        // The trapezium of the velocities, less what a linear acceleration bends the velocity in between.
+        // Trapezoidal rule for the velocity, with the correction for a linear acceleration.
         let position = self.position + (self.velocity + velocity) * (0.5 * h) - jerk * (h.powi(3) / 12.0);
         let mut rotation = self.rotation * Rotation::from_scaled_axis(interval.turn(biases));
         rotation.renormalize_fast();
@@ -139,24 +141,24 @@ mod tests {
     use crate::geometry::gravity_in_world;
 
     #[test]
-    fn an_accelerometer_that_is_turned_is_told_by_how_much() {
-        // What it reads are the forces along its own axes: the truth is what turns back, (1 - m) reading.
+    fn the_rotation_between_accelerometer_and_gyroscope_axes_is_recovered() {
+        // The readings are along the rotated axes: the true value is the reading rotated back, (1 - m) reading.
         let turn = Vector::new(1e-3, -2e-3, 3e-3);
         let back = Rotation::from_scaled_axis(-turn).to_rotation_matrix().into_inner();
         let scale = Matrix::from_diagonal(&Vector::new(1e-3, 2e-3, -3e-3));
-        let turned = Exaggerates { accel: Matrix::identity() - back + scale, ..Exaggerates::nothing() };
+        let turned = ImuScaleMisalignment { accel: Matrix::identity() - back + scale, ..ImuScaleMisalignment::zero() };
         assert!((turned.accel_against_gyro() - turn).norm() < 1e-7, "{}", turned.accel_against_gyro());
-        let both = Exaggerates { gyro: turned.accel, ..turned };
+        let both = ImuScaleMisalignment { gyro: turned.accel, ..turned };
         assert!(both.accel_against_gyro().norm() < 1e-12);
     }
 
-    /// Body rate and force of a body whose axis cones and whose force turns with it.
+    /// Angular velocity and specific force of a body in coning motion.
     fn signal(t_s: f64) -> (Vector, Vector) {
         let (s, c) = (8.0 * t_s).sin_cos();
         (Vector::new(4.0 * s, 6.0 * c, 1.0), Vector::new(3.0 * c, -2.0 * s, 9.8 + s))
     }
 
-    /// Means over intervals of length `h`, and slopes as a recording gives them: from the neighbouring means.
+    /// Means over intervals of length `h`, with slopes from the neighbouring means.
     fn intervals(h: f64, count: usize) -> Vec<Interval> {
         let mean = |centre: f64| {
             let samples = 200;
@@ -185,7 +187,8 @@ mod tests {
 
     #[test]
     fn averaged_samples_at_100_hz_integrate_to_the_fine_solution() {
-        // Coning of 24 rad^2/s at 8 rad/s: without its correction the axis would drift by h^2/12 w x w' ~ 1.6e-3 rad/s.
+        // Coning of 24 rad^2/s at 8 rad/s: without the coning correction the attitude would drift by h^2/12 w x w' ~ 1.6e-3
+        // rad/s.
         let (coarse, fine) = (integrate(0.01, 2.0), integrate(0.000_5, 2.0));
         assert!(coarse.rotation.angle_to(&fine.rotation) < 2e-5, "{}", coarse.rotation.angle_to(&fine.rotation));
         assert!((coarse.velocity - fine.velocity).norm() < 4e-4, "{}", coarse.velocity - fine.velocity);

@@ -1,4 +1,4 @@
-//! What the open loop saw, for the registration of the whole.
+//! Surfaces observed by the open loop, the input of the global registration.
 
 use super::surfel::Patch;
 use crate::geometry::Trajectory;
@@ -6,56 +6,58 @@ use crate::measurement::LidarCorrection;
 use crate::time::{Span, Stamp};
 use rayon::prelude::*;
 
-/// Patches of surface that the open loop saw, where its trajectory puts them in the map, each at its time. Made by
-/// [`super::Estimator::surveying`], taken by [`super::register`].
+/// Surface patches observed by the open loop, in the map frame, each with its time.
+///
+/// [`super::Estimator::surveying`] records it; [`super::register`] uses it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Survey {
-    /// From when the sightings' seconds count.
+    /// Origin of the times in seconds.
     pub(super) origin: Stamp,
+    /// The observed patches.
     pub(super) sightings: Vec<Sighting>,
-    /// What was known of the lidar when sightings were made, in the order of time.
+    /// The lidar corrections with which the patches were built, in order of time.
     pub(super) lidars: Vec<KnownLidar>,
-    /// Whether the lidar looks one way, so that nothing tells an offset of its ranges.
+    /// Whether the range bias is unobservable and fixed, because the lidar looks in one direction only.
     pub(super) ranges_are_held: bool,
-    /// Time that making it took, s.
+    /// Run time spent on the survey, s.
     pub(super) took_s: f64,
 }
 
-/// What was known of the lidar for a while.
+/// The lidar correction during a part of the trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct KnownLidar {
     pub(super) lidar: LidarCorrection,
-    /// Until when the trajectory became final with it, lidar time, s from the survey's origin.
+    /// End of the part of the trajectory that became final with it, lidar time, s from the origin of the survey.
     pub(super) until_s: f64,
 }
 
-/// A patch at the mean time of its points.
+/// An observed patch at the mean time of its points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sighting {
-    /// Lidar time, s from the survey's origin.
+    /// Lidar time, s from the origin of the survey.
     pub(super) tau_s: f64,
     pub(super) patch: Patch,
-    /// By which of the survey's corrections of the lidar it was made.
+    /// Index of the lidar correction with which the patch was built.
     pub(super) lidar: u32,
 }
 
 impl Survey {
-    /// How many patches.
+    /// Number of patches.
     pub fn len(&self) -> usize {
         self.sightings.len()
     }
 
-    /// Whether nothing was seen, or nobody asked.
+    /// Whether there are no patches, for example because none were requested.
     pub fn is_empty(&self) -> bool {
         self.sightings.is_empty()
     }
 
-    /// Time that making it took, s: like every wall of time it differs from run to run.
+    /// Run time spent on the survey, s; it differs between identical runs.
     pub fn took_s(&self) -> f64 {
         self.took_s
     }
 
-    /// What was seen along the trajectory `from`, where `to` puts it, both `map_from_head`.
+    /// Moves each patch from the trajectory `from` to the trajectory `to`, both `map_from_head`.
     pub fn along(&self, from: &Trajectory, to: &Trajectory) -> Self {
         let within = |stamp: Stamp, trajectory: &Trajectory| {
             let (first, last) = trajectory.span()?;
@@ -69,14 +71,14 @@ impl Survey {
         Self { sightings: self.sightings.par_iter().filter_map(moved).collect(), ..self.clone() }
     }
 
-    /// What was known of the lidar when the trajectory at `stamp` became final; behind the end, at the end.
+    /// The lidar correction with which the trajectory at `stamp` became final; after the end, the last one.
     pub(super) fn lidar_at(&self, stamp: Stamp) -> Option<&LidarCorrection> {
         let tau_s = stamp.seconds_since(self.origin);
         let known = self.lidars.partition_point(|known| known.until_s < tau_s);
         self.lidars.get(known).or(self.lidars.last()).map(|known| &known.lidar)
     }
 
-    /// Adds what was seen further up to `until_s`, its seconds counting from `origin`, made by `lidar`.
+    /// Adds patches up to `until_s` (s from `origin`), built with the correction `lidar`.
     pub(super) fn extend(
         &mut self,
         origin: Stamp,

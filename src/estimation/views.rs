@@ -1,49 +1,49 @@
-//! Fixed views: stretches of the past whose surfels stand still in the map, for the window's surfels to match.
+//! Fixed views (keyframes): surfels of past segments, fixed in the map, with which the window is matched.
 //!
-//! A stretch that left the window is kept when it shows cells that the kept ones do not. Of those kept, a window uses
-//! the few that cover most of what it sees now, and the oldest of about equal ones: an old view has drifted less.
+//! Segments that left the window become a view if they cover cells that the stored views do not. A window uses the few
+//! views that cover most of its cells. Of about equal ones it uses the oldest, which has drifted least.
 
 use super::matching::{Forest, Matcher};
 use super::spec::ViewSpec;
 use super::surfel::{Patch, Placed};
 use crate::geometry::Vector;
 
-/// Edge of the cells by which views are compared, m.
+/// Edge length of the cells with which the coverage of views is compared, m.
 const CELL_M: f64 = 1.0;
-/// An older view is preferred when it adds at least this fraction of what the best one adds.
-const ABOUT_EQUAL: f64 = 0.7;
-/// A view that adds less than this fraction of the window's cells is not worth its matches.
-const WORTHWHILE: f64 = 0.02;
+/// An older view is preferred if it adds at least this fraction of the cells that the best one adds.
+const OLDER_VIEW_RATIO: f64 = 0.7;
+/// Minimum fraction of the cells of the window that a view must add to be used.
+const MIN_ADDED_FRACTION: f64 = 0.02;
 
-/// The number of the view that is a map.
+/// View number of the given map.
 pub(super) const MAP: u64 = u64::MAX;
 
-/// A stretch of the past, or a map.
+/// A fixed view, or a given map.
 #[derive(Debug)]
 pub(super) struct View {
     pub(super) patches: Vec<Patch>,
     pub(super) forest: Forest,
     cells: Vec<u64>,
-    /// Its number, counted from the first view kept.
+    /// View number, in order of storage.
     pub(super) number: u64,
-    /// About what its errors turn: where the IMU was when it was kept, m.
+    /// Reference point of the rotation error: the IMU position when the view was stored, m.
     pub(super) pivot: Vector,
 }
 
-/// What became of a stretch's patches.
+/// Change of the stored views.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Taken {
-    /// The number of the view that was kept.
-    pub(super) kept: Option<u64>,
-    /// The number of the one forgotten for it.
-    pub(super) forgotten: Option<u64>,
+pub(super) struct ViewUpdate {
+    /// Number of the new view, if any.
+    pub(super) added: Option<u64>,
+    /// Number of the view removed in exchange, if any.
+    pub(super) removed: Option<u64>,
 }
 
-/// The views kept, and the stretch that may become the next one.
+/// The stored views, and the segments collected for the next one.
 #[derive(Debug)]
 pub(super) struct Views {
     spec: ViewSpec,
-    active: usize,
+    max_active: usize,
     kept: Vec<View>,
     gathering: Vec<Patch>,
     gathered_s: f64,
@@ -51,31 +51,36 @@ pub(super) struct Views {
 }
 
 impl Views {
-    pub(super) fn new(spec: &ViewSpec, active: usize) -> Self {
-        Self { spec: spec.clone(), active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
+    pub(super) fn new(spec: &ViewSpec, max_active: usize) -> Self {
+        Self { spec: spec.clone(), max_active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
     }
 
-    /// The same views, and a map, which every window matches and which is never forgotten.
-    pub(super) fn in_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
+    /// Adds a given map, with which every window is matched and which is never removed.
+    pub(super) fn with_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
         let (forest, cells) = (matcher.plant(patches), cells_of(patches.iter()));
         self.kept.insert(0, View { patches: patches.to_vec(), forest, cells, number: MAP, pivot });
         self
     }
 
-    /// How many of those kept are a map: the first, or none.
+    /// Number of maps among the views, 0 or 1; the map is the first view.
     fn maps(&self) -> usize {
         usize::from(self.kept.first().is_some_and(|view| view.number == MAP))
     }
 
-    /// Takes the patches of a stretch of `seconds` that has left the window, the IMU being at `pivot` in the end.
-    pub(super) fn take(&mut self, patches: &[Patch], seconds: f64, (matcher, pivot): (&Matcher, Vector)) -> Taken {
-        if self.active == 0 {
-            return Taken::default();
+    /// Adds the patches of a segment of `seconds` that left the window; `pivot` is the IMU position at the end of it, m.
+    pub(super) fn add_segment(
+        &mut self,
+        patches: &[Patch],
+        seconds: f64,
+        (matcher, pivot): (&Matcher, Vector),
+    ) -> ViewUpdate {
+        if self.max_active == 0 {
+            return ViewUpdate::default();
         }
         self.gathering.extend(patches);
         self.gathered_s += seconds;
         if self.gathered_s < self.spec.length_s - 1e-9 {
-            return Taken::default();
+            return ViewUpdate::default();
         }
         self.gathered_s = 0.0;
         let patches = std::mem::take(&mut self.gathering);
@@ -86,17 +91,18 @@ impl Views {
         }
         let covered = 1.0 - seen.len() as f64 / cells.len().max(1) as f64;
         if cells.is_empty() || covered >= self.spec.keep_below_coverage {
-            return Taken::default();
+            return ViewUpdate::default();
         }
-        let forgotten = if self.kept.len() - self.maps() >= self.spec.max_kept { self.forget_one() } else { None };
+        let removed =
+            if self.kept.len() - self.maps() >= self.spec.max_kept { self.remove_most_redundant() } else { None };
         let (forest, number) = (matcher.plant(&patches), self.next);
         self.next += 1;
         self.kept.push(View { patches, forest, cells, number, pivot });
-        Taken { kept: Some(number), forgotten }
+        ViewUpdate { added: Some(number), removed }
     }
 
-    /// Forgets the view whose cells the others cover best; the first such. Its number.
-    fn forget_one(&mut self) -> Option<u64> {
+    /// Removes the view with the fewest cells that no other view covers; returns its number.
+    fn remove_most_redundant(&mut self) -> Option<u64> {
         let own = |index: usize| {
             let mut cells = self.kept[index].cells.clone();
             for (other, view) in self.kept.iter().enumerate() {
@@ -110,20 +116,20 @@ impl Views {
         Some(self.kept.remove(least).number)
     }
 
-    /// The views to use for a window that sees `placed`: indices into [`Views::view`].
-    pub(super) fn choose(&self, placed: &[Placed]) -> Vec<usize> {
+    /// Selects the views for a window with the surfels `placed`; returns indices for [`Views::view`].
+    pub(super) fn select(&self, placed: &[Placed]) -> Vec<usize> {
         let mut missing = cells_of(placed.iter().map(|surfel| &surfel.patch));
-        let worthwhile = ((missing.len() as f64 * WORTHWHILE) as usize).max(1);
+        let worthwhile = ((missing.len() as f64 * MIN_ADDED_FRACTION) as usize).max(1);
         let mut chosen: Vec<usize> = (0..self.maps()).collect();
         chosen.iter().for_each(|map| remove(&mut missing, &self.kept[*map].cells));
-        let most = self.maps() + self.active.min(self.kept.len() - self.maps());
+        let most = self.maps() + self.max_active.min(self.kept.len() - self.maps());
         while chosen.len() < most {
             let adds: Vec<usize> = self.kept.iter().map(|view| common(&missing, &view.cells)).collect();
             let best = adds.iter().copied().max().unwrap_or(0);
             if best < worthwhile {
                 break;
             }
-            let enough = (best as f64 * ABOUT_EQUAL) as usize;
+            let enough = (best as f64 * OLDER_VIEW_RATIO) as usize;
             let Some(oldest) = adds.iter().position(|count| *count >= enough.max(worthwhile)) else { break };
             remove(&mut missing, &self.kept[oldest].cells);
             chosen.push(oldest);
@@ -131,7 +137,7 @@ impl Views {
         chosen
     }
 
-    /// All that the views show.
+    /// The patches of all views.
     pub(super) fn patches(&self) -> impl Iterator<Item = &Patch> {
         self.kept.iter().flat_map(|view| &view.patches)
     }
@@ -141,7 +147,7 @@ impl Views {
     }
 }
 
-/// The cells in which patches lie, sorted; the side from which they are seen counts.
+/// Sorted keys of the cells that contain patches; patches seen from different sides have different keys.
 pub(super) fn cells_of<'a>(patches: impl Iterator<Item = &'a Patch>) -> Vec<u64> {
     let part = |x: f64| (((x / CELL_M).floor() as i64).wrapping_add(1 << 19)) as u64 & 0xf_ffff;
     let facing = |patch: &Patch| {
@@ -159,7 +165,7 @@ pub(super) fn cells_of<'a>(patches: impl Iterator<Item = &'a Patch>) -> Vec<u64>
     cells
 }
 
-/// How many cells two sorted lists have in common.
+/// Number of common cells of two sorted lists.
 fn common(a: &[u64], b: &[u64]) -> usize {
     let (mut i, mut j, mut count) = (0, 0, 0);
     while i < a.len() && j < b.len() {
@@ -174,7 +180,7 @@ fn common(a: &[u64], b: &[u64]) -> usize {
     count
 }
 
-/// Removes from a sorted list what another has.
+/// Removes the cells of a sorted list from another one.
 fn remove(from: &mut Vec<u64>, others: &[u64]) {
     from.retain(|cell| others.binary_search(cell).is_err());
 }

@@ -5,7 +5,7 @@ use crate::time::Stamp;
 /// The errors of an estimate over time, in the world.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Errors {
-    /// When, lidar time.
+    /// Stamps, lidar time.
     pub stamps: Vec<Stamp>,
     /// Estimated minus true position, m.
     pub position_m: Vec<Vector>,
@@ -14,7 +14,7 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// The errors that remain when the estimate is moved by `world_from_map`.
+    /// Errors of the estimate after the alignment `world_from_map`.
     pub fn after(pairs: &Pairs, world_from_map: &Pose) -> Self {
         let (position_m, rotation_rad) = (Vec::with_capacity(pairs.len()), Vec::with_capacity(pairs.len()));
         let mut errors = Self { stamps: pairs.stamps().to_vec(), position_m, rotation_rad };
@@ -26,9 +26,9 @@ impl Errors {
         errors
     }
 
-    /// The errors of every `stride`-th pair.
+    /// Decimates the errors: every `stride`-th pair.
     #[must_use]
-    pub fn every(&self, stride: usize) -> Self {
+    pub fn decimated(&self, stride: usize) -> Self {
         let thin = |vectors: &[Vector]| vectors.iter().step_by(stride).copied().collect();
         Self {
             stamps: self.stamps.iter().step_by(stride).copied().collect(),
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trajectory_that_is_merely_moved_has_no_error() {
+    fn a_rigidly_moved_trajectory_has_no_error() {
         let moved = walk()
             .transformed(&Pose::from_parts(Vector::new(5.0, 1.0, -2.0).into(), from_roll_pitch_yaw(0.1, 0.2, 2.0)));
         let pairs = Pairs::associate(&moved, &walk()).unwrap();
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alternating_error_is_its_own_root_mean_square() {
+    fn an_alternating_error_has_an_rmse_of_its_amplitude() {
         // +-3 cm along x, alternating from pose to pose, cannot be aligned: RMSE is 3 cm. A constant rotation of the
         // head in the head frame by 2 degrees does not move the positions: rotation RMSE is 2 degrees.
         let turn = Pose::from_parts(Vector::zeros().into(), from_roll_pitch_yaw(0.0, 0.0, 2_f64.to_radians()));

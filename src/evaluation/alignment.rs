@@ -2,10 +2,10 @@ use super::EvaluationError;
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use nalgebra::Rotation3;
 
-/// The second singular value of the scatter, relative to the first, below which the points lie on a line.
-const LINE: f64 = 1e-12;
+/// Ratio of the second to the first singular value of the scatter below which points are collinear.
+const COLLINEAR: f64 = 1e-12;
 
-/// The rigid transform `to_from_from` that brings the points `from` nearest to `to`, pair by pair, in least squares.
+/// Computes the rigid transform that maps the points `from` to the points `to` in least squares.
 ///
 /// Umeyama (1991), eq. 40-42, with the scale fixed at 1: the rotation is `U S V^T` of the singular value decomposition
 /// of the cross covariance, with the sign in `S` that makes it proper.
@@ -13,11 +13,12 @@ const LINE: f64 = 1e-12;
 /// # Errors
 /// When there are fewer than three pairs, or all points lie on a line.
 pub fn align(to: &[Vector], from: &[Vector]) -> Result<Pose, EvaluationError> {
-    nearest(to, from, &Matrix::zeros())
+    least_squares(to, from, &Matrix::zeros())
 }
 
-/// The rigid transform that brings the poses `from` nearest to `to`, pair by pair, positions and attitudes alike: a
-/// turn by an angle counts as a shift by `lever_m` times the angle.
+/// Computes the rigid transform that maps the poses `from` to the poses `to` in least squares.
+///
+/// A rotation by an angle has the weight of a translation by `lever_m` times the angle.
 ///
 /// The squared distance of two rotation matrices is twice the squared angle between them, so attitudes enter the cross
 /// covariance as `lever_m^2 / 2 R_to R_from^T`.
@@ -29,11 +30,11 @@ pub fn align_poses(to: &[Pose], from: &[Pose], lever_m: f64) -> Result<Pose, Eva
     let turns: Matrix = to.iter().zip(from).map(turn).sum();
     let positions = |poses: &[Pose]| poses.iter().map(|pose| pose.translation.vector).collect::<Vec<Vector>>();
     let each = 0.5 * lever_m * lever_m / to.len().min(from.len()).max(1) as f64;
-    nearest(&positions(to), &positions(from), &(turns * each))
+    least_squares(&positions(to), &positions(from), &(turns * each))
 }
 
 /// As [`align`], with the contribution of the attitudes to the mean cross covariance.
-fn nearest(to: &[Vector], from: &[Vector], turns: &Matrix) -> Result<Pose, EvaluationError> {
+fn least_squares(to: &[Vector], from: &[Vector], turns: &Matrix) -> Result<Pose, EvaluationError> {
     let pairs = to.len().min(from.len());
     if pairs < 3 {
         return Err(EvaluationError::TooFew { pairs });
@@ -47,7 +48,7 @@ fn nearest(to: &[Vector], from: &[Vector], turns: &Matrix) -> Result<Pose, Evalu
 
     let svd = scatter.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Err(EvaluationError::OnALine) };
-    if svd.singular_values[1] <= LINE * svd.singular_values[0].max(f64::MIN_POSITIVE) {
+    if svd.singular_values[1] <= COLLINEAR * svd.singular_values[0].max(f64::MIN_POSITIVE) {
         return Err(EvaluationError::OnALine);
     }
     let handedness = (u.determinant() * v_t.determinant()).signum();
@@ -68,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn a_planted_transform_is_found() {
+    fn a_known_transform_is_recovered() {
         let points = helix(80);
         for yaw in [0.3, -2.8] {
             let planted = Pose::from_parts(Vector::new(1.0, -2.0, 0.5).into(), from_roll_pitch_yaw(0.2, -0.4, yaw));
@@ -79,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn attitudes_tell_the_turn_about_a_line_that_its_points_do_not() {
+    fn attitudes_determine_the_rotation_about_a_straight_path() {
         let line =
             |k: i32| Pose::from_parts(Vector::x().scale(f64::from(k)).into(), from_roll_pitch_yaw(0.1, 0.2, 0.3));
         let from: Vec<Pose> = (0..10).map(line).collect();
@@ -91,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mirror_image_is_met_by_a_rotation_all_the_same() {
+    fn the_alignment_of_a_mirror_image_is_a_proper_rotation() {
         // Points in a plane fit their mirror image exactly by a half turn; the rotation must be proper.
         let flat: Vec<Vector> = helix(80).iter().map(|p| Vector::new(p.x, p.y, 0.0)).collect();
         let mirrored: Vec<Vector> = flat.iter().map(|p| Vector::new(-p.x, p.y, 0.0)).collect();
@@ -101,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn points_on_a_line_and_two_points_are_refused() {
+    fn collinear_points_and_two_points_are_rejected() {
         let line: Vec<Vector> = (0..10).map(|k| Vector::new(k as f64, 2.0 * k as f64, 0.0)).collect();
         assert_eq!(align(&line, &line), Err(EvaluationError::OnALine));
         assert_eq!(align(&[Vector::zeros(); 5], &[Vector::zeros(); 5]), Err(EvaluationError::OnALine));

@@ -3,7 +3,7 @@ use crate::time::Stamp;
 /// Error of an estimated clock offset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClockError {
-    /// Root mean square over all estimates, the first ones included, s.
+    /// RMS over all estimates, including the first ones, s.
     pub offset_rmse_s: f64,
     /// Estimated minus true offset at the end, s.
     pub offset_end_error_s: f64,
@@ -19,7 +19,7 @@ pub fn clock_error(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Option<
     Some(ClockError { offset_rmse_s: mean_square.sqrt(), offset_end_error_s: last })
 }
 
-/// The offset at `stamp` between the two given around it.
+/// The offset at `stamp`, interpolated linearly.
 fn offset_at(offsets: &[(Stamp, f64)], stamp: Stamp) -> Option<f64> {
     let after = offsets.partition_point(|(at, _)| *at <= stamp);
     let (t0, y0) = offsets[after.checked_sub(1)?];
@@ -36,7 +36,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn an_estimate_that_starts_from_zero_and_settles_is_told_by_both_numbers() {
+    fn rmse_includes_the_convergence_and_the_end_error_does_not() {
         // Truth 3 ms + 1 ms/min, given at 0 and 60 s. Estimates: 0 at the start (3 ms off), 3.6 at 30 s (+0.1), 3.9 at
         // 60 s.
         let at = |s: i64| Stamp::from_nanos(s * 1_000_000_000);

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn planted_heights_over_a_floor_are_found() {
+    fn known_heights_above_a_floor_are_recovered() {
         // Heights 0.00, 0.01, ..., 0.99 m observed from above: mean 0.495, variance (100^2 - 1)/12 cm^2, p95 at 0.94.
         let from = Some(Vector::new(0.0, 0.0, 2.0));
         let points: Vec<_> = (0..100).map(|k| (Vector::new(k as f64, 0.0, 0.01 * k as f64), from)).collect();
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_below_the_floor_is_behind_it_for_who_sees_it_from_above() {
+    fn a_point_below_the_floor_has_a_negative_distance() {
         let point = Vector::new(0.0, 0.0, -0.02);
         let seen = |from| CloudErrors::to_surface(&Floor, &[(point, from)], 1.0).signed_m[0];
         assert_relative_eq!(seen(Some(Vector::z())), -0.02);

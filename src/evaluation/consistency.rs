@@ -2,8 +2,8 @@ use super::Pairs;
 use crate::geometry::{Matrix, Pose, PoseCovariance, Vector};
 use crate::time::{Span, Stamp};
 
-/// Time between the samples; errors change slowly, and more samples would only repeat each other.
-const EVERY: Span = Span::from_nanos(1_000_000_000);
+/// Time between samples of the errors; errors within a shorter time are highly correlated.
+const SAMPLE_PERIOD: Span = Span::from_nanos(1_000_000_000);
 
 /// Whether the errors agree with the covariances of the estimator.
 ///
@@ -13,9 +13,9 @@ const EVERY: Span = Span::from_nanos(1_000_000_000);
 /// pose of both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Consistency {
-    /// Mean over the run, of the position.
+    /// Mean over the run, position.
     pub position_nees: f64,
-    /// Mean over the run, of the attitude.
+    /// Mean over the run, attitude.
     pub attitude_nees: f64,
     /// The same at the end.
     pub end: [f64; 2],
@@ -33,14 +33,14 @@ pub fn consistency(pairs: &Pairs, covariances: &[(Stamp, PoseCovariance)]) -> Op
         let Some((_, covariance)) = rest.peek().filter(|(at, _)| at == stamp && *stamp >= next) else { continue };
         if let Some(nees) = nees(estimate, &(map_from_world * truth), covariance) {
             told.push(nees);
-            next = *stamp + EVERY;
+            next = *stamp + SAMPLE_PERIOD;
         }
     }
     let mean = |of: usize| told.iter().map(|nees| nees[of]).sum::<f64>() / told.len() as f64;
     Some(Consistency { end: *told.last()?, position_nees: mean(0), attitude_nees: mean(1) })
 }
 
-/// Of position and attitude; `None` where a covariance is not positive definite.
+/// Normalised errors squared of position and attitude; `None` if a covariance is not positive definite.
 fn nees(estimate: &Pose, truth: &Pose, covariance: &PoseCovariance) -> Option<[f64; 2]> {
     let shift = estimate.translation.vector - truth.translation.vector;
     let turn = (estimate.rotation * truth.rotation.inverse()).scaled_axis();
@@ -58,7 +58,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn an_error_of_one_standard_deviation_on_each_axis_is_three() {
+    fn an_error_of_one_standard_deviation_on_each_axis_has_a_nees_of_three() {
         let stamp = |k: i64| Stamp::from_nanos(k * 1_000_000_000);
         let truth = Trajectory::from_poses((0..5).map(|k| (stamp(k), Pose::translation(k as f64, 0.0, 0.0)))).unwrap();
         // From the second pose on it is 2, 3, 4 cm off, and turned by 1, 2, 2 mrad.

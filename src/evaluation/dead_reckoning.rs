@@ -5,23 +5,23 @@ use crate::time::{Span, Stamp};
 use std::collections::VecDeque;
 
 /// Time between output poses.
-const KEPT_EVERY: Span = Span::from_nanos(100_000_000);
+const OUTPUT_PERIOD: Span = Span::from_nanos(100_000_000);
 
 /// Limits that define rest at the start.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rest {
+pub struct RestDetection {
     /// Maximum deviation of the angular velocity from the running mean, rad/s.
     pub gyro_rad_per_s: f64,
     /// Maximum deviation of the specific force from the running mean, m/s^2.
     pub accel_m_per_s2: f64,
-    /// Least length of the rest, s.
+    /// Minimum duration of the rest, s.
     pub least_s: f64,
     /// Delay with which a motion is detected, s: the last part of the rest of this length is not averaged.
     pub onset_s: f64,
 }
 
-impl Default for Rest {
-    /// Ten standard deviations of a 3DM-GX2's noise at 100 Hz; half a second twice.
+impl Default for RestDetection {
+    /// Ten standard deviations of the noise of a 3DM-GX2 at 100 Hz; 0.5 s for both times.
     fn default() -> Self {
         Self { gyro_rad_per_s: 0.06, accel_m_per_s2: 0.3, least_s: 0.5, onset_s: 0.5 }
     }
@@ -35,11 +35,11 @@ impl Default for Rest {
 /// is arbitrary.
 #[derive(Debug, Clone)]
 pub struct DeadReckoning {
-    rest: Rest,
+    rest: RestDetection,
     imu_from_head: Pose,
     start: RestMean,
     still: bool,
-    /// The last part of the rest, which may include the onset of a motion.
+    /// The last samples of the rest, which can include the onset of motion.
     held: VecDeque<ImuSample>,
     latest: Option<Stamp>,
     previous: Option<ImuSample>,
@@ -74,8 +74,8 @@ impl RestMean {
 }
 
 impl DeadReckoning {
-    /// Dead reckoning of a head whose IMU is at `head_from_imu`.
-    pub fn new(head_from_imu: &Pose, rest: Rest) -> Self {
+    /// Creates the dead reckoning of a head with the IMU at `head_from_imu`.
+    pub fn new(head_from_imu: &Pose, rest: RestDetection) -> Self {
         Self {
             rest,
             imu_from_head: head_from_imu.inverse(),
@@ -91,7 +91,7 @@ impl DeadReckoning {
         }
     }
 
-    /// Takes the next sample.
+    /// Processes the next sample.
     pub fn push(&mut self, sample: &ImuSample) {
         let finite = |v: &Vector| v.iter().all(|x| x.is_finite());
         let usable = finite(&sample.angular_velocity_rad_per_s) && finite(&sample.specific_force_m_per_s2);
@@ -100,7 +100,7 @@ impl DeadReckoning {
         }
         self.latest = Some(sample.stamp);
         if self.still && self.is_at_rest(sample) {
-            self.hold(sample);
+            self.delay(sample);
         } else {
             self.still = false;
             for held in std::mem::take(&mut self.held) {
@@ -110,14 +110,14 @@ impl DeadReckoning {
         }
     }
 
-    /// Delays a sample until it certainly belongs to the rest.
-    fn hold(&mut self, sample: &ImuSample) {
+    /// Delays a sample, so that the onset of motion is not averaged.
+    fn delay(&mut self, sample: &ImuSample) {
         self.held.push_back(*sample);
         while self.held.front().is_some_and(|held| sample.stamp.seconds_since(held.stamp) >= self.rest.onset_s) {
             let Some(settled) = self.held.pop_front() else { return };
             self.start.take(&settled);
             self.map_from_imu = level(&self.start.accel);
-            self.keep(&settled);
+            self.output_pose(&settled);
         }
     }
 
@@ -133,7 +133,7 @@ impl DeadReckoning {
     }
 
     fn step(&mut self, sample: &ImuSample) {
-        let Some(before) = self.previous else { return self.keep(sample) };
+        let Some(before) = self.previous else { return self.output_pose(sample) };
         let dt_s = sample.stamp.seconds_since(before.stamp);
         let rate = (before.angular_velocity_rad_per_s + sample.angular_velocity_rad_per_s) / 2.0 - self.start.gyro;
         let turned = self.map_from_imu * Rotation::from_scaled_axis(rate * dt_s);
@@ -143,21 +143,20 @@ impl DeadReckoning {
         self.position_in_map += self.velocity_in_map * dt_s + acceleration * (dt_s * dt_s / 2.0);
         self.velocity_in_map += acceleration * dt_s;
         self.map_from_imu = turned;
-        self.keep(sample);
+        self.output_pose(sample);
     }
 
-    fn keep(&mut self, sample: &ImuSample) {
+    fn output_pose(&mut self, sample: &ImuSample) {
         self.previous = Some(*sample);
         let map_from_imu = Pose::from_parts(self.position_in_map.into(), self.map_from_imu);
-        if self.trajectory.span().is_some_and(|(_, last)| sample.stamp - last < KEPT_EVERY) {
+        if self.trajectory.span().is_some_and(|(_, last)| sample.stamp - last < OUTPUT_PERIOD) {
             return;
         }
-        // Only a run that diverged is not finite; the trajectory ends there.
+        // The pose is not finite only if the integration diverged; the trajectory ends there.
         let _ = self.trajectory.push(sample.stamp, map_from_imu * self.imu_from_head);
     }
 
-    /// `map_from_head` ten times a second, on the IMU's clock; a recording that rests to its end lacks the last half
-    /// second.
+    /// Returns `map_from_head` at 10 Hz on the IMU clock. If the recording is at rest to the end, the last 0.5 s are missing.
     ///
     /// # Errors
     /// When the rest at the start was too short.
@@ -171,9 +170,9 @@ impl DeadReckoning {
     }
 }
 
-/// The attitude without heading in which the specific force at rest points up.
+/// The attitude with zero heading in which the specific force at rest points up.
 fn level(specific_force: &Vector) -> Rotation {
-    // Straight down has no shortest arc to up: any half turn about a level axis will do.
+    // If it points straight down, the shortest rotation is not unique: use a half turn about a horizontal axis.
     Rotation::rotation_between(specific_force, &Vector::z())
         .unwrap_or_else(|| Rotation::from_scaled_axis(Vector::x() * std::f64::consts::PI))
 }
@@ -206,7 +205,7 @@ mod tests {
     }
 
     fn reckon(head_from_imu: &Pose, gyro_bias: Vector, seconds: f64) -> Result<Trajectory, EvaluationError> {
-        let mut reckoning = DeadReckoning::new(head_from_imu, Rest::default());
+        let mut reckoning = DeadReckoning::new(head_from_imu, RestDetection::default());
         for k in 0..(seconds * 1000.0) as i64 {
             let imu = motion(k as f64 * 1e-3).of_frame(head_from_imu);
             reckoning.push(&ImuSample {
@@ -219,9 +218,9 @@ mod tests {
     }
 
     #[test]
-    fn a_perfect_imu_finds_its_way_with_its_lever_arm_and_bias() {
-        // 2 mm and 0.02 degrees over 10 s at 1 kHz. The map's origin is the IMU at rest, level and facing as the head
-        // does.
+    fn a_noise_free_imu_with_lever_arm_and_bias_gives_the_true_trajectory() {
+        // 2 mm and 0.02 degrees over 10 s at 1 kHz. The map origin is the IMU at rest, level, with the heading of the
+        // head.
         let head_from_imu = Pose::from_parts(Vector::new(0.02, -0.01, -0.06).into(), Rotation::identity());
         let found = reckon(&head_from_imu, Vector::new(0.01, -0.02, 0.005), 12.0).unwrap();
         let map_from_world = head_from_imu.inverse();

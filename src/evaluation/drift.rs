@@ -1,7 +1,7 @@
 use super::{Errors, EvaluationError, Pairs};
 use crate::estimation::GAUGED_S;
 
-/// Length of the stretch at the end over which the error is averaged, s.
+/// Duration of the interval at the end over which the error is averaged, s.
 pub const TAIL_S: f64 = 5.0;
 
 /// Weight of a rotation in the alignment: equivalent shift per angle, m; small compared with a path that is not
@@ -10,7 +10,7 @@ const TURN_LEVER_M: f64 = 0.3;
 
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
-/// How fast an estimate leaves the truth.
+/// Drift of an estimate relative to the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
     /// Growth of the distance to the true position, m/min.
@@ -30,7 +30,7 @@ pub struct Drift {
 /// last interval minus that over the first. So a constant drift that a test adds is returned unchanged.
 ///
 /// # Errors
-/// When the two stretches overlap, or the first has too little motion to align.
+/// When the two intervals overlap, or the first has too little motion for an alignment.
 pub fn drift(pairs: &Pairs) -> Result<Drift, EvaluationError> {
     let (needed_s, found_s) = (GAUGED_S + TAIL_S, pairs.duration_s());
     if found_s < needed_s {
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn an_even_drift_is_returned_as_planted() {
+    fn a_constant_drift_is_recovered() {
         // 6 cm/min upwards. The alignment tilts a little to follow the drift within its 20 s (2 cm over a room of 6 m,
         // of which the part that correlates with the path), so to a few per cent.
         let found = drift_of(|minutes| Pose::translation(0.0, 0.0, 0.06 * minutes));
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_of_the_head_alone_is_yaw_drift_without_position_drift() {
+    fn a_yaw_error_without_position_error_is_pure_yaw_drift() {
         let yawed = walk(|_| Pose::identity());
         let turned = yawed.iter().map(|(stamp, pose)| {
             let yaw = 0.01 * stamp.nanos() as f64 * 1e-9 / 60.0;
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_of_twenty_seconds_has_no_drift_to_speak_of() {
+    fn a_run_of_twenty_seconds_is_too_short_for_a_drift() {
         let short = Trajectory::from_poses(walk(|_| Pose::identity()).iter().take(1000).map(|(s, p)| (s, *p))).unwrap();
         let error = drift(&Pairs::associate(&short, &short).unwrap()).unwrap_err();
         assert_eq!(error, EvaluationError::TooShort { measure: "drift", needed_s: 25.0, found_s: 19.98 });

@@ -5,9 +5,9 @@
 //! alignment over the first seconds only ([`drift()`]), the error of the motion within a minute ([`relative_error`]).
 //! [`clock_error`] compares clock offsets, [`CloudErrors`] the distances of a cloud to the true surfaces. For
 //! comparison there are the dead reckoning of the raw IMU ([`DeadReckoning`]) and the smallest error that the
-//! measurements allow ([`Information`]).
+//! measurements allow ([`FisherInformation`]).
 //!
-//! Everything here is pure: numbers in, numbers out.
+//! The functions have no side effects.
 
 mod absolute;
 mod alignment;
@@ -23,11 +23,11 @@ mod relative;
 
 pub use absolute::Errors;
 pub use alignment::{align, align_poses};
-pub use bound::{BoundModel, Information, InformationBound, Sight};
+pub use bound::{BeamObservation, BoundModel, FisherInformation, InformationBound};
 pub use clock::{ClockError, clock_error};
 pub use cloud::{CloudErrors, CloudSummary, Thinning};
 pub use consistency::{Consistency, consistency};
-pub use dead_reckoning::{DeadReckoning, Rest};
+pub use dead_reckoning::{DeadReckoning, RestDetection};
 pub use drift::{Drift, TAIL_S, drift};
 pub use error::EvaluationError;
 pub use pairs::Pairs;

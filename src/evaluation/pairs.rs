@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_outside_the_truth_have_no_partner() {
+    fn poses_outside_the_truth_are_not_paired() {
         // Truth covers 0..90 ms with x = t / 10 ms; the estimate's stamps are 45, 55, ..., 135 ms: five lie within.
         let pairs = Pairs::associate(&line(45, 10), &line(0, 10)).unwrap();
         assert_eq!(pairs.len(), 5);
@@ -156,13 +156,13 @@ mod tests {
     }
 
     #[test]
-    fn trajectories_of_different_clocks_are_refused_with_both_spans() {
+    fn the_error_for_trajectories_without_overlap_has_both_spans() {
         let error = Pairs::associate(&line(1_000_000, 10), &line(0, 10)).unwrap_err().to_string();
         assert!(error.contains("10 poses from 1000.000 s to 1000.090 s") && error.contains("from 0.000 s"), "{error}");
     }
 
     #[test]
-    fn the_first_and_last_seconds_hold_their_ends() {
+    fn the_first_and_last_seconds_include_their_ends() {
         let pairs = Pairs::associate(&line(0, 101), &line(0, 101)).unwrap();
         assert_eq!((pairs.first_seconds(0.2).len(), pairs.last_seconds(0.2).len()), (21, 21));
         assert!((pairs.duration_s() - 1.0).abs() < 1e-12);

@@ -48,7 +48,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn a_scale_error_shows_in_proportion_to_the_way_gone() {
+    fn a_scale_error_is_proportional_to_the_distance() {
         // 1 m/s along x, overestimated by 1 %: within 2 s the error is 2 cm, for any start time.
         let line = |speed: f64| {
             let pose =

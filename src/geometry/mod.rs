@@ -1,13 +1,13 @@
-//! Rotations, poses, motion of rigid bodies, trajectories, surfaces.
+//! Rotations, poses, kinematics of rigid bodies, trajectories, routes and surfaces.
 //!
 //! # Frames
 //!
-//! A transform is named for what it does: `world_from_head` takes a point's coordinates in the head to its coordinates
-//! in the world, so `point_in_world = world_from_head * point_in_head`, and `world_from_head * head_from_laser`
-//! composes. A vector is named for the frame it is written in: `velocity_in_world`. Frames are right-handed (REP-103):
-//! in a body x points forward, y left, z up; in the world z points up, against gravity.
+//! The name of a transform gives the two frames: `world_from_head` maps coordinates in the head to coordinates in the
+//! world, so `point_in_world = world_from_head * point_in_head`, and `world_from_head * head_from_laser` composes. The
+//! name of a vector gives the frame of the coordinates: `velocity_in_world`. Frames are right-handed (REP-103): in a
+//! body x points forward, y left, z up; in the world z points up, against gravity.
 //!
-//! Positions are metres, angles radians, unless a name says otherwise.
+//! Positions are in metres and angles in radians, unless a name states another unit.
 
 mod kinematics;
 mod rotation;
@@ -32,14 +32,16 @@ pub type Rotation = nalgebra::UnitQuaternion<f64>;
 /// A rigid transform: rotation, then translation.
 pub type Pose = nalgebra::Isometry3<f64>;
 
-/// Covariance of a pose, of its position (m), then of its attitude (rad): a small turn in the axes of the frame that
-/// the pose is told in. The order of `geometry_msgs/PoseWithCovariance`.
+/// Covariance of a pose: position (m), then attitude (rad).
+///
+/// The attitude error is a small rotation in the axes of the parent frame of the pose. The order is that of
+/// `geometry_msgs/PoseWithCovariance`.
 pub type PoseCovariance = nalgebra::Matrix6<f64>;
 
 /// Standard gravity, m/s^2 (CGPM 1901), along -z of the world.
 pub const STANDARD_GRAVITY_M_PER_S2: f64 = 9.806_65;
 
-/// The acceleration of free fall in the world, m/s^2.
+/// The gravitational acceleration in the world, m/s^2.
 pub fn gravity_in_world() -> Vector {
     Vector::new(0.0, 0.0, -STANDARD_GRAVITY_M_PER_S2)
 }

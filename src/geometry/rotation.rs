@@ -1,16 +1,18 @@
-//! The rotation group: its hat, its Jacobians, and roll-pitch-yaw for people.
+//! The rotation group SO(3): skew matrix, Jacobians, and roll-pitch-yaw.
 
 use super::{Matrix, Rotation, Vector};
 
-/// The matrix of a cross product: `skew(a) * b == a.cross(&b)`.
+/// The cross-product matrix: `skew(a) * b == a.cross(&b)`.
 pub fn skew(a: &Vector) -> Matrix {
     a.cross_matrix()
 }
 
-/// The left Jacobian of SO(3): `exp(theta + d) ~ exp(left_jacobian(theta) d) exp(theta)` to first order in `d`.
+/// The left Jacobian of SO(3).
+///
+/// `exp(theta + d) ~ exp(left_jacobian(theta) d) exp(theta)` to first order in `d`.
 ///
 /// `J_l = I + (1 - cos t)/t^2 [theta]x + (t - sin t)/t^3 [theta]x^2` with `t = |theta|` (Barfoot, State Estimation for
-/// Robotics, eq. 7.77b); below 1e-4 rad its series, where the closed form would cancel.
+/// Robotics, eq. 7.77b). Below 1e-4 rad a series avoids the cancellation in the closed form.
 pub fn left_jacobian(theta: &Vector) -> Matrix {
     let t2 = theta.norm_squared();
     let (a, b) = if t2 < 1e-8 {
@@ -23,17 +25,21 @@ pub fn left_jacobian(theta: &Vector) -> Matrix {
     Matrix::identity() + hat * a + hat * hat * b
 }
 
-/// The right Jacobian of SO(3): `exp(theta + d) ~ exp(theta) exp(right_jacobian(theta) d)`, the left one at `-theta`.
+/// The right Jacobian of SO(3), equal to the left one at `-theta`.
+///
+/// `exp(theta + d) ~ exp(theta) exp(right_jacobian(theta) d)` to first order in `d`.
 pub fn right_jacobian(theta: &Vector) -> Matrix {
     left_jacobian(&-theta)
 }
 
-/// The rotation about fixed x, then y, then z (REP-103): `R = Rz(yaw) Ry(pitch) Rx(roll)`, radians.
+/// The rotation `Rz(yaw) Ry(pitch) Rx(roll)` about fixed x, then y, then z (REP-103); radians.
 pub fn from_roll_pitch_yaw(roll: f64, pitch: f64, yaw: f64) -> Rotation {
     Rotation::from_euler_angles(roll, pitch, yaw)
 }
 
-/// Roll, pitch and yaw of a rotation, radians; the inverse of [`from_roll_pitch_yaw`] for pitch within +-pi/2.
+/// Roll, pitch and yaw of a rotation, radians.
+///
+/// Inverse of [`from_roll_pitch_yaw`] for pitch within +-pi/2.
 pub fn roll_pitch_yaw(rotation: &Rotation) -> (f64, f64, f64) {
     rotation.euler_angles()
 }
@@ -62,8 +68,8 @@ mod tests {
     }
 
     #[test]
-    fn a_pitch_turns_forward_down() {
-        // Positive rotation about y takes +x towards -z: a head that pitches up by 30 degrees nods down in REP-103.
+    fn positive_pitch_points_x_down() {
+        // A positive rotation about y turns +x towards -z: in REP-103 a pitch of +30 degrees points the head down.
         let nod = from_roll_pitch_yaw(0.0, 30_f64.to_radians(), 0.0);
         let forward = nod * Vector::x();
         assert_relative_eq!(forward, Vector::new(0.75_f64.sqrt(), 0.0, -0.5), epsilon = 1e-12);

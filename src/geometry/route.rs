@@ -1,10 +1,12 @@
 use super::Vector;
 
-/// A way through a world: a polyline on its floor that a carrier follows, rounding the corners as it can.
+/// A route through a world: a polyline on the floor that a carrier follows.
+///
+/// The carrier rounds the corners within the limits of its motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Route {
-    /// Corners on the floor, m, in the world; at least two.
+    /// Corners on the floor, in the world, m; at least two.
     pub points_in_world: Vec<Vector>,
-    /// Whether the way goes round, from the last point to the first and on.
+    /// Whether the route is a closed loop: from the last point back to the first.
     pub closed: bool,
 }

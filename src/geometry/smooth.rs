@@ -1,14 +1,14 @@
-//! A trajectory followed smoothly.
+//! Smooth interpolation of a trajectory.
 
 use super::{Pose, Rotation, Trajectory, Vector};
 use crate::time::Stamp;
 
-/// Tells a trajectory's pose at any instant, smoothly between its poses: for beams that are fired between the poses of
-/// an IMU's rate, where straight lines would cut the corners of a swing.
+/// Interpolates a trajectory with cubics, for beams fired between poses at the IMU rate.
 ///
-/// Between two poses it is a cubic in position and in the rotation vector from the first of the two, with the slopes
-/// that parabolas through three neighbouring poses have (Bessel tangents): exact for motion with constant acceleration,
-/// of third order in the poses' spacing for any other. Made for instants that go forward in time: the cubic is kept.
+/// Linear interpolation would cut the corners of a swing. Between two poses, position and the rotation vector from the
+/// first of the two are cubics; the slopes at the poses are those of parabolas through three neighbouring poses (Bessel
+/// tangents). Exact for constant acceleration, otherwise of third order in the pose spacing. The last cubic is cached,
+/// so queries with increasing stamps are fastest.
 #[derive(Debug, Clone)]
 pub struct SmoothCursor<'a> {
     trajectory: &'a Trajectory,
@@ -26,12 +26,12 @@ struct Segment {
 }
 
 impl<'a> SmoothCursor<'a> {
-    /// A cursor over `trajectory`.
+    /// Creates a cursor over `trajectory`.
     pub fn new(trajectory: &'a Trajectory) -> Self {
         Self { trajectory, segment: None }
     }
 
-    /// The pose at `stamp`, or `None` outside the trajectory's span.
+    /// The pose at `stamp`; `None` outside the time span of the trajectory.
     pub fn at(&mut self, stamp: Stamp) -> Option<Pose> {
         if !self.segment.as_ref().is_some_and(|segment| (segment.start..=segment.end).contains(&stamp)) {
             self.segment = Segment::around(self.trajectory, stamp);
@@ -44,25 +44,25 @@ impl Segment {
     fn around(trajectory: &Trajectory, stamp: Stamp) -> Option<Self> {
         let (stamps, poses) = (trajectory.stamps(), trajectory.poses());
         let after = stamps.partition_point(|s| *s <= stamp);
-        let one = after.checked_sub(1)?;
-        if after == stamps.len() && stamps[one] != stamp {
+        let first = after.checked_sub(1)?;
+        if after == stamps.len() && stamps[first] != stamp {
             return None;
         }
-        // The last pose itself belongs to the segment before it, where there is one.
-        let one = one.min(stamps.len().checked_sub(2)?);
-        let two = one + 1;
-        let (from, origin) = (poses[one].rotation, stamps[one]);
+        // The last pose belongs to the last segment, if there is one.
+        let first = first.min(stamps.len().checked_sub(2)?);
+        let second = first + 1;
+        let (from, origin) = (poses[first].rotation, stamps[first]);
         let neighbour = |index: usize| {
             let turn = (from.inverse() * poses[index].rotation).scaled_axis();
             (stamps[index].seconds_since(origin), poses[index].translation.vector, turn)
         };
-        let before = one.checked_sub(1).map(neighbour);
-        let beyond = (two + 1 < stamps.len()).then(|| neighbour(two + 1));
-        let (start, end) = (neighbour(one), neighbour(two));
+        let before = first.checked_sub(1).map(neighbour);
+        let after = (second + 1 < stamps.len()).then(|| neighbour(second + 1));
+        let (start, end) = (neighbour(first), neighbour(second));
         let position =
-            cubic(before.map(|n| (n.0, n.1)), [(start.0, start.1), (end.0, end.1)], beyond.map(|n| (n.0, n.1)));
-        let turn = cubic(before.map(|n| (n.0, n.2)), [(start.0, start.2), (end.0, end.2)], beyond.map(|n| (n.0, n.2)));
-        Some(Self { start: origin, end: stamps[two], from, position, turn })
+            cubic(before.map(|n| (n.0, n.1)), [(start.0, start.1), (end.0, end.1)], after.map(|n| (n.0, n.1)));
+        let turn = cubic(before.map(|n| (n.0, n.2)), [(start.0, start.2), (end.0, end.2)], after.map(|n| (n.0, n.2)));
+        Some(Self { start: origin, end: stamps[second], from, position, turn })
     }
 
     fn at(&self, stamp: Stamp) -> Pose {
@@ -72,14 +72,16 @@ impl Segment {
     }
 }
 
-/// Coefficients by powers of `u` of the cubic between `ends`, with Bessel tangents where a neighbour is there.
-fn cubic(before: Option<(f64, Vector)>, ends: [(f64, Vector); 2], beyond: Option<(f64, Vector)>) -> [Vector; 4] {
+/// Coefficients in powers of `u` of the cubic between `ends`.
+///
+/// Bessel tangents; at an end without neighbour, the slope of the chord.
+fn cubic(before: Option<(f64, Vector)>, ends: [(f64, Vector); 2], after: Option<(f64, Vector)>) -> [Vector; 4] {
     let [(t1, x1), (t2, x2)] = ends;
     let step = t2 - t1;
     let slope = (x2 - x1) / step;
-    // Slope at a pose: that of the parabola through it and its neighbours.
+    // Slope at a pose: that of the parabola through the pose and both neighbours.
     let at_start = before.map_or(slope, |(t0, x0)| ((x1 - x0) / (t1 - t0) * step + slope * (t1 - t0)) / (t2 - t0));
-    let at_end = beyond.map_or(slope, |(t3, x3)| (slope * (t3 - t2) + (x3 - x2) / (t3 - t2) * step) / (t3 - t1));
+    let at_end = after.map_or(slope, |(t3, x3)| (slope * (t3 - t2) + (x3 - x2) / (t3 - t2) * step) / (t3 - t1));
     let (d1, d2, rise) = (at_start * step, at_end * step, x2 - x1);
     [x1, d1, rise * 3.0 - d1 * 2.0 - d2, d1 + d2 - rise * 2.0]
 }
@@ -90,7 +92,7 @@ mod tests {
     use crate::geometry::from_roll_pitch_yaw;
     use approx::assert_relative_eq;
 
-    /// A head that pitches by 45 degrees at 1.3 Hz and sways with it.
+    /// A head that pitches by 45 degrees at 1.3 Hz and sways in phase.
     fn swing(t_s: f64) -> Pose {
         let angle = std::f64::consts::FRAC_PI_4 * (8.17 * t_s).sin();
         Pose::from_parts(Vector::new(0.1 * angle, t_s, 0.0).into(), from_roll_pitch_yaw(0.0, angle, 0.3 * t_s))
@@ -101,7 +103,7 @@ mod tests {
         Trajectory::from_poses((0..=1000 / step_ms).map(pose)).unwrap()
     }
 
-    /// Greatest angle between the swing and what is told of it, rad, away from the ends.
+    /// Largest angle between the exact and the interpolated rotation, rad, except near the ends.
     fn worst(step_ms: i64) -> f64 {
         let trajectory = sampled(step_ms);
         let mut cursor = SmoothCursor::new(&trajectory);
@@ -113,15 +115,16 @@ mod tests {
     }
 
     #[test]
-    fn a_swing_between_poses_of_100_hz_is_followed_to_ten_microradians() {
-        // Bessel slopes are off by f''' h^2 / 6, which a cubic passes on as 0.096 f''' h^3 / 6 at most: with
-        // f''' = (pi/4) 8.17^3 = 428 rad/s^3 and h = 10 ms, 6.8e-6 rad. A straight line would miss by 6.5e-4.
+    fn a_swing_sampled_at_100_hz_is_interpolated_within_10_microradians() {
+        // Error bound: Bessel slopes have an error of f''' h^2 / 6, which the cubic turns into at most 0.096 f''' h^3 /
+        // 6. With f''' = (pi/4) 8.17^3 = 428 rad/s^3 and h = 10 ms that is 6.8e-6 rad. Linear interpolation would have
+        // 6.5e-4 rad.
         assert!(worst(10) < 8e-6, "{}", worst(10));
         assert_relative_eq!(worst(20) / worst(10), 8.0, epsilon = 1.0);
     }
 
     #[test]
-    fn at_its_poses_it_is_exact_and_outside_it_is_silent() {
+    fn interpolation_is_exact_at_poses_and_none_outside_the_span() {
         let trajectory = sampled(10);
         let mut cursor = SmoothCursor::new(&trajectory);
         for (stamp, pose) in trajectory.iter() {

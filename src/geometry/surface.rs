@@ -1,18 +1,18 @@
-//! What an evaluation needs to know of the true surfaces, without knowing what they are made of.
+//! Interface to the true surfaces, independent of the scene representation.
 
 use super::Vector;
 
-/// The point of a surface that is nearest to some other point.
+/// The point of a surface nearest to a query point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
-    /// The nearest point, m.
+    /// The nearest point, in the world, m.
     pub point_in_world: Vector,
-    /// Unit normal there, of either sign.
+    /// Unit normal at that point, of either sign.
     pub normal_in_world: Vector,
 }
 
-/// Surfaces that a cloud can be compared with.
+/// Reference surfaces for the evaluation of a point cloud.
 pub trait Surface: Sync {
-    /// The nearest point of the surface within `reach_m` of `point_in_world`, or `None` where there is none.
+    /// The nearest surface point within `reach_m` (m) of `point_in_world`, or `None`.
     fn nearest(&self, point_in_world: &Vector, reach_m: f64) -> Option<SurfacePoint>;
 }

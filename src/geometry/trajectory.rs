@@ -1,46 +1,46 @@
-//! Poses over time.
+//! Trajectories: poses over time.
 
 use super::{Pose, Vector};
 use crate::time::Stamp;
 
-/// Poses at strictly increasing stamps, interpolated in between.
+/// Poses at strictly increasing stamps, with linear interpolation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trajectory {
     stamps: Vec<Stamp>,
     poses: Vec<Pose>,
 }
 
-/// Why stamped poses are not a trajectory.
+/// Errors of a sequence of stamped poses.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum TrajectoryError {
-    /// A stamp not after the one before it.
-    #[error("pose {index} is stamped {stamp_ns} ns, not after the one before it at {before_ns} ns")]
+    /// A stamp is not later than the previous one.
+    #[error("pose {index} has stamp {stamp_ns} ns, not later than the previous stamp {before_ns} ns")]
     NotIncreasing {
-        /// Which pose, from 0.
+        /// Index of the pose, from 0.
         index: usize,
-        /// Its stamp.
+        /// Stamp of that pose, ns.
         stamp_ns: i64,
-        /// The stamp before it.
+        /// Stamp of the previous pose, ns.
         before_ns: i64,
     },
-    /// A pose with NaN or infinity in it.
+    /// A pose contains NaN or infinity.
     #[error("pose {index} is not finite")]
     NotFinite {
-        /// Which pose, from 0.
+        /// Index of the pose, from 0.
         index: usize,
     },
 }
 
 impl Trajectory {
-    /// A trajectory without poses.
+    /// Creates an empty trajectory.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A trajectory of `stamped` poses, in order of time.
+    /// Creates a trajectory from `stamped` poses in order of time.
     ///
     /// # Errors
-    /// When a stamp does not come after the one before it, or a pose is not finite.
+    /// When a stamp is not later than the previous one, or a pose is not finite.
     pub fn from_poses(stamped: impl IntoIterator<Item = (Stamp, Pose)>) -> Result<Self, TrajectoryError> {
         let mut trajectory = Self::new();
         for (stamp, pose) in stamped {
@@ -52,7 +52,7 @@ impl Trajectory {
     /// Appends a pose.
     ///
     /// # Errors
-    /// When `stamp` does not come after the last one, or the pose is not finite.
+    /// When `stamp` is not later than the last one, or the pose is not finite.
     pub fn push(&mut self, stamp: Stamp, pose: Pose) -> Result<(), TrajectoryError> {
         let index = self.len();
         if let Some(before) = self.stamps.last().filter(|before| stamp <= **before) {
@@ -67,12 +67,12 @@ impl Trajectory {
         Ok(())
     }
 
-    /// How many poses.
+    /// Number of poses.
     pub fn len(&self) -> usize {
         self.stamps.len()
     }
 
-    /// Whether there is no pose.
+    /// Whether the trajectory has no poses.
     pub fn is_empty(&self) -> bool {
         self.stamps.is_empty()
     }
@@ -82,7 +82,7 @@ impl Trajectory {
         &self.stamps
     }
 
-    /// The poses, one a stamp.
+    /// The poses, one for each stamp.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
@@ -92,12 +92,14 @@ impl Trajectory {
         Some((*self.stamps.first()?, *self.stamps.last()?))
     }
 
-    /// Stamped poses in order.
+    /// Stamped poses in order of time.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (Stamp, &Pose)> {
         self.stamps.iter().copied().zip(&self.poses)
     }
 
-    /// The pose at `stamp`: linear in position, the shortest arc in rotation; `None` outside the span.
+    /// The pose at `stamp`; `None` outside the time span.
+    ///
+    /// Linear in position, shortest arc in rotation.
     pub fn at(&self, stamp: Stamp) -> Option<Pose> {
         let after = self.stamps.partition_point(|s| *s <= stamp);
         let before = after.checked_sub(1)?;
@@ -112,7 +114,7 @@ impl Trajectory {
         Some(Pose::from_parts(position.into(), super::Rotation::from_scaled_axis(turn * u) * a.rotation))
     }
 
-    /// The same poses seen in another world frame: each `a_from_b * b_from_body`.
+    /// The same poses relative to another world frame: each `a_from_b * b_from_body`.
     pub fn transformed(&self, a_from_b: &Pose) -> Self {
         Self { stamps: self.stamps.clone(), poses: self.poses.iter().map(|pose| a_from_b * pose).collect() }
     }
@@ -129,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quarter_of_the_way_is_a_quarter_of_the_turn() {
+    fn interpolation_is_linear_in_position_and_rotation() {
         let end = Pose::from_parts(Vector::new(4.0, 0.0, 0.0).into(), from_roll_pitch_yaw(0.0, 0.0, 1.0));
         let line = Trajectory::from_poses([(stamp(0), Pose::identity()), (stamp(100), end)]).unwrap();
         let pose = line.at(stamp(25)).unwrap();
@@ -141,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn time_running_backwards_is_refused() {
+    fn decreasing_stamps_and_non_finite_poses_are_rejected() {
         let poses = [(stamp(2), Pose::identity()), (stamp(1), Pose::identity())];
         let error = Trajectory::from_poses(poses).unwrap_err();
         assert_eq!(error, TrajectoryError::NotIncreasing { index: 1, stamp_ns: 1_000_000, before_ns: 2_000_000 });

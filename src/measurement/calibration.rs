@@ -1,7 +1,7 @@
 use crate::geometry::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
-/// How the sensors sit in the head, and how well they measure.
+/// Extrinsics of the sensors in the head, and their noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// Pose of the lidar in the head.
@@ -14,14 +14,14 @@ pub struct Calibration {
     pub lidar: LidarNoise,
 }
 
-/// By how much a lidar is not what its calibration says, along the IMU's axes.
+/// Correction to a lidar's calibration, in the axes of the IMU.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LidarCorrection {
-    /// To be added to every range, m.
+    /// Added to every range, m.
     pub range_m: f64,
-    /// Turn of the lidar about its own place.
+    /// Rotation of the lidar about the lidar origin.
     pub turn: Rotation,
-    /// Shift of its place, m.
+    /// Translation of the lidar, m.
     pub shift: Vector,
 }
 
@@ -32,20 +32,21 @@ impl Default for LidarCorrection {
 }
 
 impl LidarCorrection {
-    /// The way from the lidar to a point, m, which its calibration takes for `reach`.
+    /// Corrects a vector from the lidar to a point, m, given as the calibration yields it (`reach`).
     pub fn reach(&self, reach: &Vector) -> Vector {
         self.turn * (reach * (1.0 + self.range_m / reach.norm()))
     }
 
-    /// What the calibration takes for the way to a point that is `reach` from the lidar, m: the inverse of
-    /// [`Self::reach`].
+    /// Inverse of [`Self::reach`].
+    ///
+    /// The vector, m, that the calibration yields for a point at `reach` from the lidar.
     pub fn calibrated(&self, reach: &Vector) -> Vector {
         self.turn.inverse() * (reach * (1.0 - self.range_m / reach.norm()))
     }
 }
 
 impl Calibration {
-    /// Pose of the lidar in the head, corrected.
+    /// Pose of the lidar in the head, with the correction applied.
     pub fn head_from_corrected_laser(&self, correction: &LidarCorrection) -> Pose {
         let mut imu_from_laser = self.head_from_imu.inverse() * self.head_from_laser;
         imu_from_laser.rotation = correction.turn * imu_from_laser.rotation;
@@ -54,44 +55,44 @@ impl Calibration {
     }
 }
 
-/// Noise of an IMU as Kalibr writes it: densities of white noise, and of the walks of the biases.
+/// Noise of an IMU in Kalibr's model: densities of white noise and of the random walks of the biases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImuNoise {
-    /// White noise of the gyroscope, rad/s/sqrt(Hz).
+    /// White noise density of the gyroscope, rad/s/sqrt(Hz).
     pub gyro_density_rad_per_s_per_sqrt_hz: f64,
-    /// White noise of the accelerometer, m/s^2/sqrt(Hz).
+    /// White noise density of the accelerometer, m/s^2/sqrt(Hz).
     pub accel_density_m_per_s2_per_sqrt_hz: f64,
-    /// Walk of the gyroscope's bias, rad/s/sqrt(s).
+    /// Random walk of the gyroscope bias, rad/s/sqrt(s).
     pub gyro_bias_walk_rad_per_s_per_sqrt_s: f64,
-    /// Walk of the accelerometer's bias, m/s^2/sqrt(s).
+    /// Random walk of the accelerometer bias, m/s^2/sqrt(s).
     pub accel_bias_walk_m_per_s2_per_sqrt_s: f64,
-    /// Standard deviation of the gyroscope's bias when switched on, rad/s.
+    /// Standard deviation of the gyroscope bias at power-on, rad/s.
     pub gyro_turn_on_bias_rad_per_s: f64,
-    /// Standard deviation of the accelerometer's bias when switched on, m/s^2.
+    /// Standard deviation of the accelerometer bias at power-on, m/s^2.
     pub accel_turn_on_bias_m_per_s2: f64,
-    /// Greatest angular velocity on an axis that the gyroscope reports, rad/s.
+    /// Measuring range of the gyroscope per axis, rad/s: larger rates saturate.
     pub gyro_limit_rad_per_s: f64,
-    /// Greatest specific force on an axis that the accelerometer reports, m/s^2.
+    /// Measuring range of the accelerometer per axis, m/s^2: larger specific forces saturate.
     pub accel_limit_m_per_s2: f64,
 }
 
-/// Noise of a lidar's range.
+/// Range noise of a lidar: constant up to `near_m`, then linear through `far_sigma_m` at `far_m`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LidarNoise {
-    /// Standard deviation of a range up to `near_m`, m.
+    /// Standard deviation of ranges up to `near_m`, m.
     pub near_sigma_m: f64,
-    /// Up to where `near_sigma_m` holds, m.
+    /// Range up to which `near_sigma_m` applies, m.
     pub near_m: f64,
-    /// Standard deviation at `far_m`, to which it rises linearly, m.
+    /// Standard deviation at `far_m`, m.
     pub far_sigma_m: f64,
-    /// Where `far_sigma_m` holds, m.
+    /// Range at which `far_sigma_m` applies, m.
     pub far_m: f64,
 }
 
 impl LidarNoise {
-    /// Standard deviation of a range of `range_m`, m: constant, then linear, never less than `near_sigma_m`.
+    /// Standard deviation of a range of `range_m`, m: constant, then linear, never below `near_sigma_m`.
     pub fn sigma_m(&self, range_m: f64) -> f64 {
         let beyond = (range_m - self.near_m).max(0.0) / (self.far_m - self.near_m);
         self.near_sigma_m + (self.far_sigma_m - self.near_sigma_m) * beyond

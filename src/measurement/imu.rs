@@ -4,7 +4,7 @@ use crate::time::Stamp;
 /// One sample of an inertial measurement unit, in the IMU's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuSample {
-    /// When, on the IMU's clock.
+    /// Time on the IMU's clock.
     pub stamp: Stamp,
     /// Angular velocity, rad/s.
     pub angular_velocity_rad_per_s: Vector,

@@ -1,35 +1,38 @@
 use crate::time::{Span, Stamp};
 
-/// The beams of one turn (or frame) of a lidar that came back.
+/// Returns of one revolution (or frame) of a lidar.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LidarScan {
-    /// When the first beam was fired, on the lidar's clock.
+    /// Time at which the first beam with a return was fired, on the lidar's clock.
     pub stamp: Stamp,
-    /// How much later than that the sensor's own stamp is, which comes at an even pace where the first beam that came
-    /// back does not: zero of a sensor that stamps the start.
+    /// Sensor's own stamp minus `stamp`; zero if the sensor stamps the start.
+    ///
+    /// The sensor's own stamps are evenly spaced; the first beam with a return is not.
     pub stamped_after: Span,
-    /// The beams that came back, in the order in which they were fired.
+    /// Returns in firing order.
     pub returns: Vec<LidarReturn>,
-    /// The scan in polar form, with the beams that did not come back, for a lidar that scans a plane.
+    /// The scan in polar form, beams without a return included; only for a planar lidar.
     pub planar: Option<PlanarScan>,
 }
 
-/// A beam that came back.
+/// A lidar return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LidarReturn {
-    /// When it was fired, after the scan's stamp.
+    /// Firing time after the scan's stamp.
     pub offset: Span,
-    /// Where it hit, in the lidar's frame, m.
+    /// Point hit, in the lidar's frame, m.
     pub point_in_laser: nalgebra::Vector3<f32>,
-    /// Strength of the echo, in the sensor's own unit; 0 where the sensor does not say.
+    /// Echo intensity in the sensor's own unit; 0 if the sensor does not report it.
     pub intensity: f32,
 }
 
-/// One sweep in a plane, as `sensor_msgs/LaserScan` has it (REP-103, REP-117): beam `k` at `angle_min + k increment`,
-/// counter-clockwise about z of the lidar's frame, fired at `stamp + k time_increment`.
+/// One planar sweep in the conventions of `sensor_msgs/LaserScan` (REP-103, REP-117).
+///
+/// Beam `k` points at `angle_min + k increment`, counter-clockwise about z of the lidar's frame, and is fired at `stamp
+/// + k time_increment`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanarScan {
-    /// Angle of beam 0 from x, rad.
+    /// Angle of beam 0 from the x axis, rad.
     pub angle_min_rad: f64,
     /// Angle between beams, rad.
     pub angle_increment_rad: f64,
@@ -37,12 +40,12 @@ pub struct PlanarScan {
     pub time_increment_s: f64,
     /// Time between scans, s.
     pub scan_time_s: f64,
-    /// Least range the sensor reports, m.
+    /// Minimum range that the sensor reports, m.
     pub range_min_m: f32,
-    /// Greatest range the sensor reports, m.
+    /// Maximum range that the sensor reports, m.
     pub range_max_m: f32,
-    /// A range a beam, m; `+inf` where nothing came back, `-inf` where it was too near.
+    /// Range of each beam, m; `+inf` without a return, `-inf` below the minimum range.
     pub ranges_m: Vec<f32>,
-    /// An intensity a beam, or empty.
+    /// Intensity of each beam, or empty.
     pub intensities: Vec<f32>,
 }

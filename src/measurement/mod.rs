@@ -1,6 +1,6 @@
-//! What sensors say, and the sink that takes it.
+//! Sensor measurements, and the sink that receives them.
 //!
-//! Stamps here are the sensors' own: an [`ImuSample`] is stamped by the IMU's clock, a [`LidarScan`] by the lidar's.
+//! Stamps are from the sensors' own clocks: an [`ImuSample`] has IMU time, a [`LidarScan`] lidar time.
 
 mod calibration;
 mod imu;
@@ -12,7 +12,7 @@ pub use lidar::{LidarReturn, LidarScan, PlanarScan};
 
 use crate::time::Stamp;
 
-/// One message of a recording, whichever sensor it is from.
+/// One message of a recording, from either sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Measurement {
     /// From the IMU.
@@ -21,30 +21,32 @@ pub enum Measurement {
     Lidar(LidarScan),
 }
 
-/// Why a sink took nothing: the sink's own error, which the sender passes on.
+/// Error of a sink, which the sender passes on.
 pub type SinkError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Takes measurements in the order in which they arrive.
+/// Receives measurements in order of arrival.
 ///
-/// `arrival` is true time, never decreasing; the stamps within are what the sensors' clocks said.
+/// `arrival` is true time and never decreases; the stamps inside the measurements are from the sensors' clocks.
 pub trait Sink {
-    /// Takes an IMU sample.
+    /// Receives an IMU sample.
     ///
     /// # Errors
-    /// When the sink cannot keep it.
+    /// When the sink cannot store it.
     fn imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError>;
 
-    /// Takes a sample of the base's IMU, in that IMU's frame; a sink that has no use for it lets it pass.
+    /// Receives a sample of the base's IMU, in the frame of that IMU.
+    ///
+    /// The default implementation ignores it.
     ///
     /// # Errors
-    /// When the sink cannot keep it.
+    /// When the sink cannot store it.
     fn base_imu(&mut self, _arrival: Stamp, _sample: &ImuSample) -> Result<(), SinkError> {
         Ok(())
     }
 
-    /// Takes a lidar scan.
+    /// Receives a lidar scan.
     ///
     /// # Errors
-    /// When the sink cannot keep it.
+    /// When the sink cannot store it.
     fn lidar(&mut self, arrival: Stamp, scan: &LidarScan) -> Result<(), SinkError>;
 }

@@ -2,12 +2,14 @@
 
 use super::BaseMotion;
 use super::jet::PoseJet;
-use super::stand::standpoint;
+use super::stand::start_on_route;
 use crate::geometry::{Kinematics, Route, Vector};
 use serde::{Deserialize, Serialize};
 
-/// A base at constant velocity from the start of the run on, from where the route begins, along its heading there. It
-/// goes straight on where the route bends: the scene has to be long enough.
+/// A base at constant velocity from the start of the run.
+///
+/// It starts at the first point of the route and keeps the heading there, straight on past corners: the scene must be
+/// long enough.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CruiseSpec {
@@ -27,7 +29,7 @@ pub(super) struct Cruise {
 
 impl Cruise {
     pub fn new(spec: &CruiseSpec, route: Option<&Route>) -> Self {
-        let (floor, heading) = standpoint(route);
+        let (floor, heading) = start_on_route(route);
         let start = PoseJet::at_rest(&(floor + Vector::z() * spec.height_m), heading).kinematics();
         Self { start, velocity_in_world: Vector::new(heading.cos(), heading.sin(), 0.0) * spec.speed_m_per_s }
     }

@@ -1,4 +1,4 @@
-//! Drops: the carrier steps down, falls freely, and lands hard.
+//! Drops: the walker steps down, falls freely, and lands with a shock.
 
 use super::jet::Jet;
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
@@ -6,30 +6,30 @@ use crate::spec::checked::{NonNegative, Positive};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// A step down: a free fall that ends in a landing shock. The base stays lower by its height.
+/// A step down: a free fall that ends in a landing shock. The base stays lower by `height_m` afterwards.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DropSpec {
-    /// When the fall begins, s.
+    /// Start of the fall, s.
     #[serde(with = "NonNegative")]
     pub at_s: f64,
     /// Height of the fall, m; the fall lasts `sqrt(2 height / g)`.
     #[serde(with = "Positive")]
     pub height_m: f64,
-    /// Duration of the landing, s; the fall begins as smoothly.
+    /// Duration of the landing shock, s: a shorter landing is harder. The fall sets in over the same time.
     #[serde(with = "Positive")]
     pub landing_s: f64,
 }
 
-/// A unit step from 0 on that takes `lasts_s`, half a cosine, with its derivative and its first and second integral.
-struct Eased {
+/// A unit step that starts at 0 and takes `lasts_s`, half a cosine, with derivative and first two integrals.
+struct SmoothStep {
     rate: f64,
     level: f64,
     ramp: f64,
     parabola: f64,
 }
 
-impl Eased {
+impl SmoothStep {
     fn at(t_s: f64, lasts_s: f64) -> Self {
         if t_s <= 0.0 {
             return Self { rate: 0.0, level: 0.0, ramp: 0.0, parabola: 0.0 };
@@ -52,15 +52,16 @@ impl Eased {
 }
 
 impl DropSpec {
-    /// How far the base is below its way at an instant, m, negative.
+    /// Height of the base relative to the path without the drop, m; negative.
     ///
-    /// With the eased step `s` and the end of the fall `T = sqrt(2 h / g)`, `z'' = -g (s(t) - s(t - T)) + g T s'(t -
-    /// T)`: the pulse of the landing takes the speed `g T` of the fall, and `z` ends at `-g T^2 / 2 = -h`.
+    /// With the smooth step `s` and the end of the fall `T = sqrt(2 h / g)`,
+    /// `z'' = -g (s(t) - s(t - T)) + g T s'(t - T)`: the landing pulse removes the speed `g T` of the fall, and `z`
+    /// ends at `-g T^2 / 2 = -h`.
     pub(super) fn at(&self, t_s: f64) -> Jet {
         let g = STANDARD_GRAVITY_M_PER_S2;
         let fall_s = (2.0 * self.height_m / g).sqrt();
-        let fall = Eased::at(t_s - self.at_s, self.landing_s);
-        let landing = Eased::at(t_s - self.at_s - fall_s, self.landing_s);
+        let fall = SmoothStep::at(t_s - self.at_s, self.landing_s);
+        let landing = SmoothStep::at(t_s - self.at_s - fall_s, self.landing_s);
         Jet {
             x: g * (fall_s * landing.ramp - fall.parabola + landing.parabola),
             d: g * (fall_s * landing.level - fall.ramp + landing.ramp),
@@ -83,8 +84,8 @@ mod tests {
         assert!((end.x + 0.25).abs() < 1e-12 && end.d.abs() < 1e-12 && end.dd.abs() < 1e-9, "{end:?}");
         let later = drop.at(1000.0);
         assert!((later.x + 0.25).abs() < 1e-8 && later.d.abs() < 1e-9, "{later:?}");
-        // The pulse is half a sine of area g T, so its peak is pi / 2 g T / 35 ms; half of gravity is compensated by
-        // then.
+        // The pulse is half a sine of area g T, so its peak is pi / 2 g T / 35 ms; by then half of gravity is
+        // compensated.
         let peak = drop.at(2.0 + fall_s + 0.0175).dd;
         let expected = STANDARD_GRAVITY_M_PER_S2 * (fall_s * PI / 2.0 / 0.035 - 0.5);
         assert!((peak - expected).abs() < 1e-9, "{peak}, {expected}");

@@ -1,66 +1,68 @@
 use crate::spec::SpecError;
 
-/// Longest run, s: 7 days, whose recording takes 600 GB and more.
-pub const LONGEST_S: f64 = 604_800.0;
+/// Longest run, s: 7 days. A recording of that length exceeds 600 GB.
+pub const MAX_DURATION_S: f64 = 604_800.0;
 
 /// Why a motion cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum MotionError {
-    /// The motion's spec is wrong.
+    /// The spec of the motion is invalid.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// A motion that follows a route, in a scene that has none.
+    /// The motion follows a route, but the scene has none.
     #[error(
-        "the motion {motion} follows a route, but the scene names none; give the scene a route, or choose a motion that needs none, such as `stand`"
+        "the motion {motion} follows a route, but the scene names none; add a route to the scene, or choose a motion without one, such as `stand`"
     )]
     NoRoute {
-        /// The motion's name.
+        /// Name of the motion.
         motion: String,
     },
-    /// A route of too few points.
-    #[error("the route has {points} point(s); a way to follow needs at least two (three where it is closed)")]
+    /// The route has too few points.
+    #[error("the route has {points} point(s); an open route needs at least 2, a closed one 3")]
     RouteTooFew {
-        /// How many it has.
+        /// Number of points.
         points: usize,
     },
-    /// A route too short to follow.
+    /// The route is too short.
     #[error("the route is {length_m:.2} m long; this motion needs at least {needed_m:.2} m to follow")]
     RouteTooShort {
-        /// Its length.
+        /// Length of the route, m.
         length_m: f64,
-        /// The least length.
+        /// Shortest length that the motion can follow, m.
         needed_m: f64,
     },
-    /// Two successive points of a route at one place.
+    /// Two successive points of the route coincide.
     #[error(
-        "points {first} and {second} of the route (counted from 0) are at one place, {gap_m:.4} m apart; leave one of them out (a closed route returns to its first point by itself)"
+        "points {first} and {second} of the route (counted from 0) coincide (distance {gap_m:.4} m); remove one of them (a closed route returns to the first point by itself)"
     )]
     RouteRepeats {
-        /// The first of them.
+        /// Index of the first point.
         first: usize,
-        /// The other.
+        /// Index of the second point.
         second: usize,
-        /// How far they are apart.
+        /// Distance between them, m.
         gap_m: f64,
     },
-    /// A route with NaN or infinity in it.
+    /// A point of the route contains NaN or infinity.
     #[error("point {index} of the route (counted from 0) is not finite")]
     RouteNotFinite {
-        /// Which point.
+        /// Index of the point.
         index: usize,
     },
-    /// A length of time that is no length of time.
-    #[error("a run of {duration_s} s: it lasts more than 0 s, and {LONGEST_S} s (7 days) at most")]
+    /// The duration is not positive, or too long.
+    #[error("a run of {duration_s} s is not possible: give more than 0 s and at most {MAX_DURATION_S} s (7 days)")]
     Duration {
-        /// What was asked for.
+        /// Requested duration, s.
         duration_s: f64,
     },
-    /// A motion that would need too many pieces.
-    #[error("{duration_s} s of this motion take more than {most} pieces; make it shorter, slower, or its route longer")]
+    /// The motion would need too many path segments.
+    #[error(
+        "{duration_s} s of this motion need more than {most} path segments; shorten the run, lower the speed, or lengthen the route"
+    )]
     TooLong {
-        /// What was asked for.
+        /// Requested duration, s.
         duration_s: f64,
-        /// The most pieces kept.
+        /// Maximum number of path segments.
         most: usize,
     },
 }

@@ -1,12 +1,11 @@
-//! Forward differentiation: a function of time with its first and second derivative.
+//! Forward-mode differentiation: a function of time with first and second derivative.
 
 use crate::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// The value of a function of time at an instant, with its first and second derivative by time.
+/// Value of a function of time with first and second derivative.
 ///
-/// Sums and products of jets are the jets of sums and products (Leibniz), so that a motion written with them carries
-/// exact derivatives.
+/// Sums and products of jets follow the rules of Leibniz, so that a motion computed with jets has exact derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Jet {
     /// Value.
@@ -34,8 +33,8 @@ impl Jet {
         Self { x, d: rate * x, dd: rate * rate * x }
     }
 
-    /// This function of an argument, whose derivatives are by the argument, as a function of time.
-    pub fn of(self, argument: Jet) -> Self {
+    /// Composition with `argument`: derivatives with respect to the argument become derivatives with respect to time.
+    pub fn compose(self, argument: Jet) -> Self {
         Self { x: self.x, d: self.d * argument.d, dd: self.dd * argument.d * argument.d + self.d * argument.dd }
     }
 
@@ -95,7 +94,7 @@ impl Mul<f64> for Jet {
     }
 }
 
-/// Position and attitude of a frame, each number with its derivatives.
+/// Position and attitude of a frame, each component with derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct PoseJet {
     /// Position in the world, m.
@@ -109,7 +108,7 @@ pub(super) struct PoseJet {
 }
 
 impl PoseJet {
-    /// A frame that stands still.
+    /// A frame at rest.
     pub fn at_rest(position: &Vector, yaw: f64) -> Self {
         let position = [position.x, position.y, position.z].map(Jet::constant);
         Self { position, yaw: Jet::constant(yaw), ..Self::default() }
@@ -117,11 +116,10 @@ impl PoseJet {
 
     /// Pose, velocities and accelerations.
     ///
-    /// With `R = Rz(yaw) Ry(pitch) Rx(roll)` the angular velocity is `omega = yaw' z + pitch' b + roll' c`, where
-    /// `b = Rz y` and `c = Rz Ry x` are carried round by the turns before them: `b' = yaw' z x b` and
-    /// `c' = (yaw' z + pitch' b) x c`.
+    /// With `R = Rz(yaw) Ry(pitch) Rx(roll)` the angular velocity is `omega = yaw' z + pitch' b + roll' c`. The axes
+    /// `b = Rz y` and `c = Rz Ry x` rotate themselves: `b' = yaw' z x b` and `c' = (yaw' z + pitch' b) x c`.
     pub fn kinematics(&self) -> Kinematics {
-        let part = |of: fn(&Jet) -> f64| Vector::from(self.position.each_ref().map(of));
+        let part = |component: fn(&Jet) -> f64| Vector::from(self.position.each_ref().map(component));
         let (sin_yaw, cos_yaw) = self.yaw.x.sin_cos();
         let (sin_pitch, cos_pitch) = self.pitch.x.sin_cos();
         let pitch_axis = Vector::new(-sin_yaw, cos_yaw, 0.0);
@@ -150,7 +148,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn products_and_sines_obey_leibniz() {
+    fn products_and_sines_have_exact_derivatives() {
         // f = t^2 sin(3 t): f' = 2 t sin 3t + 3 t^2 cos 3t, f'' = 2 sin 3t + 12 t cos 3t - 9 t^2 sin 3t.
         let t = 0.7;
         let time = Jet::linear(t, 1.0, 0.0);
@@ -162,9 +160,9 @@ mod tests {
     }
 
     #[test]
-    fn a_steady_cone_turns_as_euler_says() {
-        // Yaw at rate w with a constant pitch: omega = w z, no angular acceleration. With a roll rate r on top, the
-        // roll axis is carried round: alpha = w z x r c.
+    fn a_steady_coning_motion_has_the_angular_acceleration_of_its_roll_axis() {
+        // Yaw at rate w with constant pitch: omega = w z, no angular acceleration. With an additional roll rate r, the
+        // roll axis c rotates: alpha = w z x r c.
         let (w, r, pitch) = (0.8, 1.7, 0.4);
         let cone = PoseJet {
             yaw: Jet::linear(0.3, w, 0.0),

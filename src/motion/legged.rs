@@ -1,9 +1,9 @@
-//! A legged machine: it follows the route, and every stride shakes its body in the same way, more or less.
+//! A legged robot that follows a route; each stride moves the body periodically.
 
 use super::jet::{Jet, PoseJet};
-use super::rhythm::Wander;
-use super::sines::{Line, Sines};
-use super::walk::{Walk, WalkSpec};
+use super::oscillator::BandLimitedNoise;
+use super::sines::{SineSum, SpectralLine};
+use super::walk::{RouteMotion, WalkSpec};
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Route};
 use crate::random::Seed;
@@ -12,26 +12,25 @@ use crate::spec::checked::{Finite, FiniteArray, NonNegative, Positive};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
-/// A legged machine that carries the base.
+/// A legged robot that carries the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeggedSpec {
-    /// How long everything is at rest first, s.
+    /// Time at rest at the start, s.
     #[serde(with = "NonNegative")]
     pub still_s: f64,
     /// Height of the base above the floor, m.
     #[serde(with = "Finite")]
     pub height_m: f64,
-    /// How it walks along the route.
+    /// How the robot follows the route.
     pub follow: WalkSpec,
-    /// Strides a second, Hz: a stride is a whole cycle of all legs.
+    /// Stride frequency, Hz. A stride is one full cycle of all legs.
     #[serde(with = "Positive")]
     pub stride_hz: f64,
-    /// How far the strides wander off their beat, turns rms, at up to a tenth of their frequency.
+    /// Phase noise of the strides, turns rms, with power up to a tenth of the stride frequency.
     #[serde(with = "NonNegative")]
     pub irregularity_turns: f64,
-    /// What a stride does to the body, as its harmonics; all grow with the speed, to the amplitudes given at full
-    /// speed.
+    /// Harmonics of the body motion in a stride. Their amplitudes apply at full speed and scale with the speed.
     pub harmonics: Vec<StrideSpec>,
 }
 
@@ -39,43 +38,43 @@ pub struct LeggedSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StrideSpec {
-    /// Cycles a stride: a trot bounces twice, a walk on four legs four times.
+    /// Cycles per stride: 2 for the bounce of a trot, 4 for a walk on four legs.
     #[serde(with = "Positive")]
     pub order: f64,
-    /// Amplitudes forward, to the left and up, m.
+    /// Amplitudes forward, left and up, m.
     #[serde(with = "FiniteArray::<3>")]
     pub position_m: [f64; 3],
-    /// Their phases, degrees.
+    /// Phases of these amplitudes, degrees.
     #[serde(with = "FiniteArray::<3>")]
     pub position_phase_deg: [f64; 3],
     /// Amplitudes of roll, pitch and yaw, degrees.
     #[serde(with = "FiniteArray::<3>")]
     pub rotation_deg: [f64; 3],
-    /// Their phases, degrees.
+    /// Phases of these amplitudes, degrees.
     #[serde(with = "FiniteArray::<3>")]
     pub rotation_phase_deg: [f64; 3],
 }
 
 impl StrideSpec {
-    fn line(&self) -> Line<6> {
+    fn line(&self) -> SpectralLine<6> {
         let amplitude = |size: f64, phase_deg: f64| Complex::from_polar(size, phase_deg.to_radians());
         let amplitudes = std::array::from_fn(|k| match k {
             0..3 => amplitude(self.position_m[k], self.position_phase_deg[k]),
             _ => amplitude(self.rotation_deg[k - 3].to_radians(), self.rotation_phase_deg[k - 3]),
         });
-        Line { cycles: self.order, amplitudes }
+        SpectralLine { cycles: self.order, amplitudes }
     }
 }
 
-/// A machine that walks.
+/// Motion of a legged robot.
 pub(super) struct Legged {
-    walk: Walk,
+    walk: RouteMotion,
     height_m: f64,
     stride_hz: f64,
     irregularity_turns: f64,
-    wander: Wander,
-    /// Offsets forward, left, up, in roll, pitch and yaw, over strides.
-    stride: Sines<6>,
+    phase_noise: BandLimitedNoise,
+    /// Offsets forward, left, up, in roll, pitch and yaw, over the number of strides.
+    stride: SineSum<6>,
 }
 
 impl Legged {
@@ -93,19 +92,19 @@ impl Legged {
             height_m: spec.height_m,
             stride_hz: spec.stride_hz,
             irregularity_turns: spec.irregularity_turns,
-            wander: Wander::new(spec.stride_hz / 10.0, &mut seed.stream("motion/legged/stride")),
-            stride: Sines::new(spec.harmonics.iter().map(StrideSpec::line)),
+            phase_noise: BandLimitedNoise::new(spec.stride_hz / 10.0, &mut seed.stream("motion/legged/stride")),
+            stride: SineSum::new(spec.harmonics.iter().map(StrideSpec::line)),
         })
     }
 }
 
 impl BaseMotion for Legged {
     fn at(&self, t_s: f64) -> Kinematics {
-        let mut position = self.walk.way.at(t_s);
+        let mut position = self.walk.path.at(t_s);
         let heading = self.walk.heading.at(t_s);
-        let share = self.walk.speed_share.at(t_s);
-        let strides = Jet::linear(t_s, self.stride_hz, 0.0) + self.wander.at(t_s) * self.irregularity_turns;
-        let [ahead, left, up, roll, pitch, yaw] = self.stride.at(strides.x).map(|jet| jet.of(strides) * share);
+        let fraction = self.walk.speed_fraction.at(t_s);
+        let strides = Jet::linear(t_s, self.stride_hz, 0.0) + self.phase_noise.at(t_s) * self.irregularity_turns;
+        let [ahead, left, up, roll, pitch, yaw] = self.stride.at(strides.x).map(|jet| jet.compose(strides) * fraction);
         let (sin, cos) = heading.sin_cos();
         position[0] += ahead * cos - left * sin;
         position[1] += ahead * sin + left * cos;
@@ -125,7 +124,7 @@ mod tests {
     #[test]
     fn a_trot_bounces_twice_a_stride() {
         let (spec, source) = load("legged").unwrap();
-        let MotionSpec::Legged(mut spec) = spec else { panic!("legged.ron is no legged machine") };
+        let MotionSpec::Legged(mut spec) = spec else { panic!("legged.ron is not a legged motion") };
         spec.irregularity_turns = 0.0;
         let straight = Route { points_in_world: vec![Vector::zeros(), Vector::x() * 500.0], closed: false };
         let machine = Legged::new(&spec, &source, Some(&straight), 60.0, Seed(1)).unwrap();

@@ -1,14 +1,14 @@
 //! A small vessel in waves.
 //!
-//! The sea is a sum of plane waves in deep water (`w^2 = g k`), with a JONSWAP spectrum; a peakedness of 1 makes it the
-//! one of Pierson and Moskowitz. The vessel follows the waves that are long against it, and the shorter the less:
-//! heave, pitch and roll are the surface's height and slopes averaged over its waterplane and taken off with depth,
-//! roll besides with its own resonance; surge and sway are those of the water.
+//! The sea is a sum of plane waves in deep water (`w^2 = g k`) with a JONSWAP spectrum; a peakedness of 1 gives the
+//! Pierson-Moskowitz spectrum. The vessel follows waves that are long compared with the hull. Heave, pitch and roll are
+//! the height and the slopes of the surface, averaged over the waterplane and attenuated with draught; roll also has
+//! a resonance. Surge and sway are the displacement of the water.
 
 use super::jet::{Jet, PoseJet};
-use super::sines::{Line, Part, Sines, geometric_parts};
-use super::smooth::Steps;
-use super::stand::standpoint;
+use super::sines::{FrequencyBin, SineSum, SpectralLine, log_bins};
+use super::smooth::SmoothSteps;
+use super::stand::start_on_route;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Pose, Route, STANDARD_GRAVITY_M_PER_S2};
 use crate::random::{Seed, Stream};
@@ -19,17 +19,17 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// A vessel that lies in waves and carries the base.
+/// A vessel in waves that carries the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MarineSpec {
-    /// How long everything is at rest first, s.
+    /// Time at rest at the start, s.
     #[serde(with = "NonNegative")]
     pub still_s: f64,
-    /// How long the waves take to reach their full height, s.
+    /// Time in which the waves rise to their full height, s.
     #[serde(with = "Positive")]
     pub onset_s: f64,
-    /// Where the base is, from the middle of the waterplane: forward, to the left, up, m.
+    /// Position of the base relative to the centre of the waterplane: forward, left, up, m.
     #[serde(with = "FiniteArray::<3>")]
     pub base_m: [f64; 3],
     /// The waves.
@@ -45,31 +45,32 @@ pub struct SeaSpec {
     /// Significant wave height, m: four times the standard deviation of the surface.
     #[serde(with = "Positive")]
     pub significant_height_m: f64,
-    /// Period of the spectrum's peak, s.
+    /// Period of the spectral peak, s.
     #[serde(with = "Positive")]
     pub peak_period_s: f64,
-    /// JONSWAP's peak enhancement: 3.3 in a growing wind sea, 1 for Pierson and Moskowitz's fully developed one.
+    /// JONSWAP peak enhancement factor: 3.3 in a growing wind sea, 1 in a fully developed sea (Pierson-Moskowitz).
     #[serde(with = "Positive")]
     pub peakedness: f64,
-    /// Where the waves go to, against the bow, degrees to the left: 0 from astern, 180 on the bow.
+    /// Mean direction of propagation relative to the bow, degrees to the left: 0 for waves from astern, 180 for head
+    /// seas.
     #[serde(with = "Finite")]
     pub going_deg: f64,
-    /// The exponent s of the spreading `cos^2s` of single waves about that direction.
+    /// Exponent s of the directional spreading `cos^2s`. A larger value gives longer crests.
     #[serde(with = "NonNegative")]
     pub spreading: f64,
 }
 
-/// A vessel's shape, and its roll.
+/// Hull dimensions and roll dynamics of a vessel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HullSpec {
     /// Length of the waterplane, m.
     #[serde(with = "NonNegative")]
     pub length_m: f64,
-    /// Its breadth, m.
+    /// Breadth of the waterplane, m.
     #[serde(with = "NonNegative")]
     pub beam_m: f64,
-    /// How deep it lies, m.
+    /// Draught, m.
     #[serde(with = "NonNegative")]
     pub draught_m: f64,
     /// Natural period of roll, s.
@@ -80,46 +81,49 @@ pub struct HullSpec {
     pub roll_damping: f64,
 }
 
-/// Waves in a sea.
+/// Plane waves in a sea.
 const WAVES: usize = 200;
 
 impl SeaSpec {
-    /// Checks what the formulas are made for.
+    /// Checks that the values are within the range of the formulas.
     fn check(&self, source: &Source) -> Result<(), SpecError> {
         if !(1.0..=7.0).contains(&self.peakedness) {
-            let message = format!("JONSWAP's peakedness lies from 1 to 7 (DNV-RP-C205), not at {}", self.peakedness);
+            let message = format!("JONSWAP's peakedness must be from 1 to 7 (DNV-RP-C205), not {}", self.peakedness);
             return Err(SpecError::about(source, "peakedness", message));
         }
         if self.spreading > 1000.0 {
-            let message = format!("waves spread as cos^2s with s up to 1000, not {}", self.spreading);
+            let message = format!("the spreading exponent s of cos^2s can be up to 1000, not {}", self.spreading);
             return Err(SpecError::about(source, "spreading", message));
         }
         Ok(())
     }
 
-    /// The one-sided density of the surface's height at `freq_hz`, m^2/Hz: `S(f) = A 5/16 Hs^2 fp^4 f^-5
-    /// exp(-5/4 (f/fp)^-4) G^b` with `b = exp(-(f/fp - 1)^2 / (2 s^2))`, s = 0.07 below the peak and 0.09 above, and
-    /// `A = 1 - 0.287 ln G` (DNV-RP-C205, section 3.5.5, there over the angular frequency).
+    /// One-sided spectral density of the surface height at `freq_hz`, m^2/Hz.
+    ///
+    /// `S(f) = A 5/16 Hs^2 fp^4 f^-5 exp(-5/4 (f/fp)^-4) G^b` with `b = exp(-(f/fp - 1)^2 / (2 s^2))`, s = 0.07 below
+    /// the peak and 0.09 above, and `A = 1 - 0.287 ln G` (DNV-RP-C205, section 3.5.5, given there over the angular
+    /// frequency).
     pub(super) fn density(&self, freq_hz: f64) -> f64 {
         let r = freq_hz * self.peak_period_s;
         let width = if r <= 1.0 { 0.07 } else { 0.09 };
         let peak = self.peakedness.powf((-0.5 * ((r - 1.0) / width).powi(2)).exp());
-        let share = 1.0 - 0.287 * self.peakedness.ln();
+        let normalisation = 1.0 - 0.287 * self.peakedness.ln();
         let moskowitz = 0.3125 * self.significant_height_m.powi(2) * self.peak_period_s * r.powi(-5);
-        share * moskowitz * (-1.25 * r.powi(-4)).exp() * peak
+        normalisation * moskowitz * (-1.25 * r.powi(-4)).exp() * peak
     }
 
-    /// Plane waves from half to five times the peak's frequency: frequency, complex amplitude, direction (rad).
+    /// Plane waves from 0.5 to 5 times the peak frequency: frequency, complex amplitude, direction (rad).
     fn waves(&self, stream: &mut Stream) -> Vec<(f64, Complex<f64>, f64)> {
         let peak_hz = 1.0 / self.peak_period_s;
-        let parts = geometric_parts((0.5 * peak_hz, 5.0 * peak_hz), WAVES, stream);
+        let bins = log_bins((0.5 * peak_hz, 5.0 * peak_hz), WAVES, stream);
         let mean = self.going_deg.to_radians();
-        let wave = |part: &Part| (part.at, part.amplitude(self.density(part.at)), mean + self.deviation(stream));
-        parts.iter().map(wave).collect()
+        let wave =
+            |bin: &FrequencyBin| (bin.at, bin.amplitude(self.density(bin.at)), mean + self.draw_spreading(stream));
+        bins.iter().map(wave).collect()
     }
 
-    /// A direction drawn from `cos^2s` on either side of the mean, by rejection.
-    fn deviation(&self, stream: &mut Stream) -> f64 {
+    /// Draws a deviation from the mean direction, rad, distributed as `cos^2s`, by rejection.
+    fn draw_spreading(&self, stream: &mut Stream) -> f64 {
         loop {
             let angle = FRAC_PI_2 * (2.0 * stream.random::<f64>() - 1.0);
             if stream.random::<f64>() < angle.cos().powf(2.0 * self.spreading) {
@@ -130,28 +134,29 @@ impl SeaSpec {
 }
 
 impl HullSpec {
-    /// How the hull follows a plane wave: surge, sway, heave (m), roll and pitch (rad).
+    /// Response of the hull to a plane wave: surge, sway, heave (m), roll and pitch (rad).
     ///
-    /// With the height `Re(a exp(i w t - i k (x cos d + y sin d)))` the slopes forward and to the left are `-i k cos d
-    /// a` and `-i k sin d a`, and the water's own displacement is `-i a` along the wave. A slope up forward lifts the
-    /// bow (pitch is its negative), one up to the left lifts that side (roll is it).
-    fn follows(&self, (freq_hz, height, direction): (f64, Complex<f64>, f64)) -> Line<5> {
+    /// For the height `Re(a exp(i w t - i k (x cos d + y sin d)))` the slopes forward and to the left are
+    /// `-i k cos d a` and `-i k sin d a`, and the displacement of the water is `-i a` along the wave. A slope that
+    /// rises forward lifts the bow: pitch is the negative. A slope that rises to the left lifts the left side: roll
+    /// equals it.
+    fn wave_response(&self, (freq_hz, height, direction): (f64, Complex<f64>, f64)) -> SpectralLine<5> {
         let rate = TAU * freq_hz;
         let k = rate * rate / STANDARD_GRAVITY_M_PER_S2;
         let (sin, cos) = direction.sin_cos();
-        let averaged = sinc(0.5 * k * self.length_m * cos) * sinc(0.5 * k * self.beam_m * sin);
-        let felt = height * (averaged * (-k * self.draught_m).exp());
+        let averaging = sinc(0.5 * k * self.length_m * cos) * sinc(0.5 * k * self.beam_m * sin);
+        let effective = height * (averaging * (-k * self.draught_m).exp());
         let r = freq_hz * self.roll_period_s;
         let resonance = Complex::new(1.0 - r * r, 2.0 * self.roll_damping * r).inv();
         let quarter = Complex::new(0.0, -1.0);
         let amplitudes = [
-            felt * quarter * cos,
-            felt * quarter * sin,
-            felt,
-            felt * quarter * (k * sin) * resonance,
-            -felt * quarter * (k * cos),
+            effective * quarter * cos,
+            effective * quarter * sin,
+            effective,
+            effective * quarter * (k * sin) * resonance,
+            -effective * quarter * (k * cos),
         ];
-        Line { cycles: freq_hz, amplitudes }
+        SpectralLine { cycles: freq_hz, amplitudes }
     }
 }
 
@@ -159,29 +164,29 @@ fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-6 { 1.0 } else { x.sin() / x }
 }
 
-/// A vessel that moves with the waves.
+/// Motion of a vessel in waves.
 pub(super) struct Marine {
     rest: PoseJet,
     start_s: f64,
-    onset: Steps,
+    onset: SmoothSteps,
     /// Surge, sway, heave, roll and pitch.
-    waves: Sines<5>,
+    waves: SineSum<5>,
     waterplane_from_base: Pose,
 }
 
 impl Marine {
     pub fn new(spec: &MarineSpec, source: &Source, route: Option<&Route>, seed: Seed) -> Result<Self, MotionError> {
         spec.sea.check(source)?;
-        let (water, heading) = standpoint(route);
+        let (water, heading) = start_on_route(route);
         let waves = spec.sea.waves(&mut seed.stream("motion/marine/sea"));
-        let mut onset = Steps::from_level(0.0);
+        let mut onset = SmoothSteps::from_level(0.0);
         onset.push(spec.still_s + spec.onset_s / 2.0, spec.onset_s / 2.0, 1.0);
         let [x, y, z] = spec.base_m;
         Ok(Self {
             rest: PoseJet::at_rest(&water, heading),
             start_s: spec.still_s,
             onset,
-            waves: Sines::new(waves.into_iter().map(|wave| spec.hull.follows(wave))),
+            waves: SineSum::new(waves.into_iter().map(|wave| spec.hull.wave_response(wave))),
             waterplane_from_base: Pose::translation(x, y, z),
         })
     }
@@ -191,8 +196,8 @@ impl BaseMotion for Marine {
     fn at(&self, t_s: f64) -> Kinematics {
         let mut pose = self.rest;
         if t_s > self.start_s {
-            let share: Jet = self.onset.at(t_s);
-            let [surge, sway, heave, roll, pitch] = self.waves.at(t_s).map(|jet| jet * share);
+            let fraction: Jet = self.onset.at(t_s);
+            let [surge, sway, heave, roll, pitch] = self.waves.at(t_s).map(|jet| jet * fraction);
             let (sin, cos) = pose.yaw.x.sin_cos();
             pose.position[0] += surge * cos - sway * sin;
             pose.position[1] += surge * sin + sway * cos;
@@ -213,7 +218,7 @@ mod tests {
         SeaSpec { significant_height_m: 2.0, peak_period_s: 8.0, peakedness, going_deg: 0.0, spreading: 50.0 }
     }
 
-    /// A raft so small that it goes with the water.
+    /// A raft so small that it moves with the water.
     const RAFT: HullSpec =
         HullSpec { length_m: 0.0, beam_m: 0.0, draught_m: 0.0, roll_period_s: 1e-3, roll_damping: 1.0 };
 
@@ -224,7 +229,7 @@ mod tests {
         let (w, wp) = (TAU * f, TAU / 8.0);
         let expected = TAU * 5.0 / 16.0 * 4.0 * wp.powi(4) * w.powi(-5) * (-1.25 * (w / wp).powi(-4)).exp();
         assert_relative_eq!(sea(1.0).density(f), expected, max_relative = 1e-12);
-        // At the peak JONSWAP is higher by the peakedness, times the normalising share.
+        // At the peak JONSWAP is higher by the peakedness times the normalisation.
         let ratio = sea(3.3).density(0.125) / sea(1.0).density(0.125);
         assert_relative_eq!(ratio, 3.3 * (1.0 - 0.287 * 3.3_f64.ln()), max_relative = 1e-12);
     }
@@ -237,9 +242,10 @@ mod tests {
             let height: Vec<f64> =
                 (0..40_000).map(|k| raft.at(10.0 + 0.5 * f64::from(k)).world_from_body.translation.z).collect();
             let spectrum = power_density(&height, 2.0, Segments::hann(2048)).unwrap();
-            // Hs = 4 sqrt(m0): JONSWAP's share is a fit, good to a per cent or two.
+            // Hs = 4 sqrt(m0). The normalisation of JONSWAP is a fit, good to 1 or 2 %.
             assert_relative_eq!(4.0 * spectrum.power_between(0.0, 1.1).sqrt(), 2.0, max_relative = 0.02);
-            // Bands of a fifth of the peak's frequency, each of several waves, against the formula's integral.
+            // Compares bands of a fifth of the peak frequency, with several waves each, with the integral of the
+            // formula.
             for band in 0..12 {
                 let low = 0.1 + 0.025 * f64::from(band);
                 let steps = 1000;
@@ -251,11 +257,12 @@ mod tests {
     }
 
     #[test]
-    fn a_following_sea_lifts_the_stern_first_and_the_surface_is_followed() {
-        // One wave of 100 m from astern, amplitude 1 m: when the surface rises the crest is behind, so the bow is down.
+    fn a_raft_follows_the_surface_of_a_wave_from_astern() {
+        // One wave of 100 m from astern, amplitude 1 m: when the surface rises, the crest is astern and the bow is
+        // down.
         let k = TAU / 100.0;
         let freq_hz = (STANDARD_GRAVITY_M_PER_S2 * k).sqrt() / TAU;
-        let line = RAFT.follows((freq_hz, Complex::new(1.0, 0.0), 0.0));
+        let line = RAFT.wave_response((freq_hz, Complex::new(1.0, 0.0), 0.0));
         // A quarter of a period before the crest: exp(-i pi / 2).
         let rising = Complex::new(0.0, -1.0);
         let [surge, sway, heave, roll, pitch] = line.amplitudes.map(|a| (a * rising).re);
@@ -263,9 +270,9 @@ mod tests {
         assert_relative_eq!(pitch, k, epsilon = 1e-12);
         assert_relative_eq!(surge, -1.0, epsilon = 1e-12);
         assert_eq!((sway.abs() < 1e-12, roll.abs() < 1e-12), (true, true));
-        // A long hull averages the wave away: half a wave along 50 m leaves 2/pi, times pitch and heave alike.
+        // A long hull averages the wave: half a wavelength along 50 m leaves 2/pi of heave and pitch.
         let ship = HullSpec { length_m: 50.0, ..RAFT };
-        let heave = ship.follows((freq_hz, Complex::new(1.0, 0.0), 0.0)).amplitudes[2].re;
+        let heave = ship.wave_response((freq_hz, Complex::new(1.0, 0.0), 0.0)).amplitudes[2].re;
         assert_relative_eq!(heave, std::f64::consts::FRAC_2_PI, epsilon = 1e-9);
     }
 }

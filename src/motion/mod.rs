@@ -1,11 +1,11 @@
-//! How the carrier moves: the pose of the base that the spring stands on, as a smooth function of time.
+//! Motion of the base, the body to which the spring is clamped, as a smooth function of time.
 //!
-//! A motion is data ([`MotionSpec`], the files of `specs/motions/`) until [`MotionSpec::build`] makes a [`BaseMotion`]
-//! of it, which answers for any instant with the pose and its exact first and second derivatives. There is no state and
-//! no step: a motion is a closed form of time (smoothed polylines, sums of sinusoids with seeded phases, splines), so
-//! that whoever asks, at whatever times and on whatever thread, gets the same bits.
+//! [`MotionSpec`] is the data (the files of `specs/motions/`). [`MotionSpec::build`] turns it into a [`BaseMotion`],
+//! which evaluates the pose and the exact first and second derivatives at any time. A motion has no state and no time
+//! step: it is a closed form of time (smoothed polylines, sums of sinusoids with seeded phases, splines). The result
+//! therefore does not depend on the order of evaluation or on the thread.
 //!
-//! The base's frame stands where the spring is clamped: x forward, y left, z up (REP-103).
+//! The base frame is at the clamped end of the spring: x forward, y left, z up (REP-103).
 
 mod cruise;
 mod drops;
@@ -14,10 +14,10 @@ mod hand;
 mod jet;
 mod legged;
 mod marine;
+mod oscillator;
 mod phasor;
 mod replay;
 mod rests;
-mod rhythm;
 mod shaker;
 mod sines;
 mod smooth;
@@ -30,7 +30,7 @@ mod walk;
 
 pub use cruise::CruiseSpec;
 pub use drops::DropSpec;
-pub use error::{LONGEST_S, MotionError};
+pub use error::{MAX_DURATION_S, MotionError};
 pub use hand::{CarrySpec, GaitSpec, HandSpec, ShakeSpec};
 pub use legged::{LeggedSpec, StrideSpec};
 pub use marine::{HullSpec, MarineSpec, SeaSpec};
@@ -47,11 +47,11 @@ use crate::geometry::Kinematics;
 
 /// The prescribed motion of the base.
 pub trait BaseMotion: Send + Sync {
-    /// How the base moves `t_s` seconds after the start: `world_from_base` with its exact derivatives. Accelerations
-    /// are continuous; at the start the base is at rest, unless it cruises.
+    /// The motion at `t_s` seconds after the start: `world_from_base` with exact derivatives. Accelerations are
+    /// continuous. The base is at rest at the start, except in a cruise.
     fn at(&self, t_s: f64) -> Kinematics;
 
-    /// How firmly a hand holds the head still, from 0 (not at all) to 1.
+    /// Grip of the hand on the head: 0 is free, 1 is held still.
     fn hold(&self, _t_s: f64) -> f64 {
         0.0
     }

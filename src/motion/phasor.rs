@@ -1,19 +1,21 @@
-//! Sine and cosine by the turn, for sums of many sinusoids.
+//! Sine and cosine of an angle in turns, for sums of many sinusoids.
 //!
-//! Polynomials instead of the system's library: a loop over them is vectorised, and the bits are the same on every
-//! machine.
+//! Polynomials replace the system's library: the compiler vectorises a loop over them, and the result has the same bits
+//! on every machine.
 
-/// Sine and cosine of `turns` whole turns, to 1e-15 for a fraction of a turn; an argument of `n` turns has the rounding
-/// of `n`. Below 2^49 turns.
+/// Sine and cosine of `turns` turns.
+///
+/// The error is 1e-15 within one turn; for a larger argument the rounding of `turns` adds to it. Valid below 2^49
+/// turns.
 #[inline]
 pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
-    // Adding 1.5 * 2^52 rounds to the nearest integer, and leaves it in the lowest bits.
+    // Adding 1.5 * 2^52 rounds to the nearest integer and leaves it in the lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     let rounded = turns * 4.0 + ROUND;
     let quarter = rounded.to_bits();
     let (sin, cos) = eighth((turns - (rounded - ROUND) * 0.25) * std::f64::consts::TAU);
 
-    // Odd quarters swap the two; sine is negative in quarters 2 and 3, cosine in 1 and 2. All without a branch.
+    // Odd quarters swap sine and cosine; sine is negative in quarters 2 and 3, cosine in 1 and 2. No branches.
     let (sin, cos) = (sin.to_bits(), cos.to_bits());
     let swapped = (sin ^ cos) & 0_u64.wrapping_sub(quarter & 1);
     let sin_sign = (quarter & 2) << 62;
@@ -21,7 +23,7 @@ pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     (f64::from_bits(sin ^ swapped ^ sin_sign), f64::from_bits(cos ^ swapped ^ cos_sign))
 }
 
-/// Sine and cosine within an eighth of a turn, by Taylor's polynomials: the first term left out is below 1e-16.
+/// Sine and cosine within an eighth of a turn by Taylor polynomials; the first omitted term is below 1e-16.
 #[inline]
 fn eighth(y: f64) -> (f64, f64) {
     const SIN: [f64; 8] = [
@@ -59,7 +61,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn the_library_agrees() {
+    fn sine_and_cosine_agree_with_the_standard_library() {
         for k in -100_000..100_000 {
             let turns = f64::from(k) * 5e-6;
             let (sin, cos) = sin_cos_turns(turns);

@@ -1,12 +1,12 @@
-//! A recorded trajectory played again, from a file of poses or a recording.
+//! Replay of a recorded trajectory, from a file of poses or a recording.
 //!
-//! A natural cubic spline leads through the recorded poses, in position and in the components of the quaternion, which
-//! is then normalised: twice continuously differentiable, and through every pose. Play starts and ends by easing the
-//! time in and out, so that the base is at rest before and after, whatever the recording did.
+//! A natural cubic spline interpolates the recorded positions and quaternion components; the quaternion is then
+//! normalised. The result is twice continuously differentiable and passes through every pose. The replay speeds up from
+//! rest and slows down to rest, whatever the recorded motion.
 
 use super::jet::{Jet, PoseJet};
-use super::smooth::Way;
-use super::stand::standpoint;
+use super::smooth::SmoothPath;
+use super::stand::start_on_route;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Pose, Rotation, Route, Trajectory, Vector, from_roll_pitch_yaw};
 use crate::recording::{Reader, read_tum};
@@ -17,49 +17,49 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// A trajectory of the base to play.
+/// A recorded trajectory that the base follows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReplaySpec {
     /// The poses `world_from_base`.
     pub poses: PosesSpec,
-    /// Whether the trajectory is moved and turned, about the vertical, so that it starts where the scene's route
-    /// begins; else it is played where it was recorded.
+    /// If true, the trajectory is translated and turned about the vertical so that it starts at the start of the
+    /// scene's route; if false, it is replayed as recorded.
     pub from_route: bool,
-    /// How long the base is at rest first, s.
+    /// Time at rest at the start, s.
     #[serde(with = "NonNegative")]
     pub still_s: f64,
-    /// Half of the time that play takes to come to its speed, and to end, s.
+    /// Half of the time in which the replay reaches full speed, and stops, s.
     #[serde(with = "Positive")]
     pub ease_s: f64,
 }
 
-/// Where recorded poses are.
+/// Source of recorded poses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum PosesSpec {
-    /// In a file in the TUM format; a relative path is from the spec's folder.
+    /// A file in the TUM format; a relative path is resolved from the folder of the spec.
     Tum(String),
-    /// In an MCAP recording, of zsim's or another's.
+    /// An MCAP recording, by zsim or another system.
     Recording {
-        /// The file, or the folder that holds it; a relative path is from the spec's folder.
+        /// The file, or the folder that contains it; a relative path is resolved from the folder of the spec.
         file: String,
-        /// The topic, of `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`; `/ground_truth/odom`, or the first such
-        /// topic by name, unless it is told.
+        /// Topic of type `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`. Default: `/ground_truth/odom`, else the
+        /// first such topic by name.
         #[serde(default)]
         topic: Option<String>,
     },
-    /// Here: time in s, position in m, roll, pitch and yaw in degrees.
+    /// Poses in this file: time in s, position in m, roll, pitch and yaw in degrees.
     Here(Vec<(f64, [f64; 3], [f64; 3])>),
 }
 
-/// Between two poses the spline turns by less than this.
-const MOST_TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
+/// Maximum rotation between two poses, rad: beyond 90 degrees the direction of rotation is ambiguous.
+const MAX_TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
-/// A trajectory that is played.
+/// Motion along a recorded trajectory.
 pub(super) struct Replay {
-    /// Played time over time, on the first axis.
-    play: Way,
+    /// Time of the recording over time, on the first axis.
+    play: SmoothPath,
     spline: Spline<7>,
     world_from_recorded: Pose,
 }
@@ -67,26 +67,27 @@ pub(super) struct Replay {
 impl Replay {
     pub fn new(spec: &ReplaySpec, source: &Source, route: Option<&Route>) -> Result<Self, MotionError> {
         let trajectory = spec.poses.trajectory(source)?;
-        let fault = |message: String| SpecError::about(source, "poses", message);
+        let error = |message: String| SpecError::about(source, "poses", message);
         let (Some((start, end)), Some(first)) = (trajectory.span(), trajectory.poses().first()) else {
-            return Err(fault("a trajectory of no poses cannot be played".to_owned()).into());
+            return Err(error("the trajectory has no poses".to_owned()).into());
         };
         if trajectory.len() < 3 {
             return Err(
-                fault(format!("a spline needs 3 poses at least, the trajectory has {}", trajectory.len())).into()
+                error(format!("a spline needs at least 3 poses; the trajectory has {}", trajectory.len())).into()
             );
         }
-        let world_from_recorded = if spec.from_route { onto(&standpoint(route), first) } else { Pose::identity() };
+        let world_from_recorded =
+            if spec.from_route { align_start(&start_on_route(route), first) } else { Pose::identity() };
         let length_s = end.seconds_since(start);
-        let mut play = Way::new(Vector::zeros(), spec.still_s + spec.ease_s, spec.ease_s);
-        play.go(Vector::new(length_s, 0.0, 0.0), length_s);
-        let spline = through(&trajectory, start).map_err(fault)?;
+        let mut play = SmoothPath::new(Vector::zeros(), spec.still_s + spec.ease_s, spec.ease_s);
+        play.move_to(Vector::new(length_s, 0.0, 0.0), length_s);
+        let spline = fit_spline(&trajectory, start).map_err(error)?;
         Ok(Self { play, spline, world_from_recorded })
     }
 }
 
-/// The transform about the vertical that takes `first` to a standpoint, at its own height above the floor.
-fn onto((floor, heading): &(Vector, f64), first: &Pose) -> Pose {
+/// Translation and turn about the vertical that move `first` to the start of the route; the height does not change.
+fn align_start((floor, heading): &(Vector, f64), first: &Pose) -> Pose {
     let (_, _, yaw) = first.rotation.euler_angles();
     let turn = from_roll_pitch_yaw(0.0, 0.0, heading - yaw);
     let below = Vector::new(first.translation.x, first.translation.y, 0.0);
@@ -98,7 +99,7 @@ fn from_folder(source: &Source, file: &str) -> PathBuf {
 }
 
 impl PosesSpec {
-    /// The file, or the folder of a recording; a relative path is from the folder of `source`.
+    /// The file, or the folder of a recording; a relative path is resolved from the folder of `source`.
     pub(super) fn file(&self, source: &Source) -> Option<PathBuf> {
         match self {
             PosesSpec::Tum(file) | PosesSpec::Recording { file, .. } => Some(from_folder(source, file)),
@@ -107,13 +108,13 @@ impl PosesSpec {
     }
 
     fn trajectory(&self, source: &Source) -> Result<Trajectory, SpecError> {
-        let fault = |message: String| SpecError::about(source, "poses", message);
-        let beside = |file: &str| from_folder(source, file);
+        let error = |message: String| SpecError::about(source, "poses", message);
+        let resolve = |file: &str| from_folder(source, file);
         match self {
-            PosesSpec::Tum(file) => read_tum(&beside(file)).map_err(|error| fault(error.to_string())),
+            PosesSpec::Tum(file) => read_tum(&resolve(file)).map_err(|cause| error(cause.to_string())),
             PosesSpec::Recording { file, topic } => {
-                let poses = Reader::open(&beside(file)).and_then(|reader| reader.poses(topic.as_deref()));
-                poses.map_err(|error| fault(error.to_string()))
+                let poses = Reader::open(&resolve(file)).and_then(|reader| reader.poses(topic.as_deref()));
+                poses.map_err(|cause| error(cause.to_string()))
             }
             PosesSpec::Here(rows) => {
                 let stamped = rows.iter().map(|(t_s, position_m, degrees)| {
@@ -123,30 +124,30 @@ impl PosesSpec {
                     (Stamp::from_nanos(nanos), Pose::from_parts(Vector::from(*position_m).into(), rotation))
                 });
                 if let Some(bad) = rows.iter().position(|row| !row.0.is_finite()) {
-                    return Err(fault(format!("the time of pose {bad} (counted from 0) is not finite")));
+                    return Err(error(format!("the time of pose {bad} (counted from 0) is not finite")));
                 }
-                Trajectory::from_poses(stamped).map_err(|error| fault(error.to_string()))
+                Trajectory::from_poses(stamped).map_err(|cause| error(cause.to_string()))
             }
         }
     }
 }
 
-/// The spline through a trajectory's positions and quaternions.
-fn through(trajectory: &Trajectory, start: Stamp) -> Result<Spline<7>, String> {
+/// Fits the spline to the positions and quaternions of a trajectory.
+fn fit_spline(trajectory: &Trajectory, start: Stamp) -> Result<Spline<7>, String> {
     let mut times_s = Vec::with_capacity(trajectory.len());
     let mut values: Vec<[f64; 7]> = Vec::with_capacity(trajectory.len());
     let mut last: Option<Rotation> = None;
     for (stamp, pose) in trajectory.iter() {
         let mut rotation = pose.rotation;
         if let Some(last) = &last {
-            // q and -q are one rotation: the spline takes the nearer.
+            // q and -q are the same rotation: take the one closer to the previous quaternion.
             if last.coords.dot(&rotation.coords) < 0.0 {
                 rotation = UnitQuaternion::new_unchecked(-rotation.into_inner());
             }
             let turn = last.angle_to(&rotation);
-            if turn > MOST_TURN_RAD {
+            if turn > MAX_TURN_RAD {
                 return Err(format!(
-                    "at {:.3} s the trajectory turns by {:.0} degrees from one pose to the next; more than 90 leave open which way, so it needs more poses",
+                    "at {:.3} s the trajectory turns by {:.0} degrees between two poses; above 90 degrees the direction of rotation is ambiguous: provide more poses",
                     stamp.seconds_since(start),
                     turn.to_degrees()
                 ));
@@ -163,9 +164,9 @@ fn through(trajectory: &Trajectory, start: Stamp) -> Result<Spline<7>, String> {
 impl BaseMotion for Replay {
     fn at(&self, t_s: f64) -> Kinematics {
         let [played, ..] = self.play.at(t_s);
-        let [x, y, z, q @ ..] = self.spline.at(played.x).map(|jet| jet.of(played));
-        let part = |of: fn(&Jet) -> f64| {
-            let [i, j, k, w] = q.each_ref().map(of);
+        let [x, y, z, q @ ..] = self.spline.at(played.x).map(|jet| jet.compose(played));
+        let part = |component: fn(&Jet) -> f64| {
+            let [i, j, k, w] = q.each_ref().map(component);
             Quaternion::new(w, i, j, k)
         };
         let (q, rate, rise) = (part(|jet| jet.x), part(|jet| jet.d), part(|jet| jet.dd));
@@ -196,11 +197,11 @@ struct Spline<const N: usize> {
 }
 
 impl<const N: usize> Spline<N> {
-    /// Through `values` at increasing times, at least two.
+    /// The spline through `values` at increasing times, at least two.
     ///
-    /// The second derivatives m solve `h[i-1] m[i-1] + 2 (h[i-1] + h[i]) m[i] + h[i] m[i+1] = 6 (slope[i] -
-    /// slope[i-1])` with zero at both ends: a tridiagonal system, by elimination (diagonally dominant, so without
-    /// pivots).
+    /// The second derivatives m solve
+    /// `h[i-1] m[i-1] + 2 (h[i-1] + h[i]) m[i] + h[i] m[i+1] = 6 (slope[i] - slope[i-1])` with zero at both ends. The
+    /// tridiagonal system is diagonally dominant, so elimination needs no pivoting.
     fn natural(times_s: Vec<f64>, values: Vec<[f64; N]>) -> Self {
         let count = times_s.len();
         let mut upper = vec![0.0; count];
@@ -247,9 +248,9 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn a_spline_through_a_sine_is_a_sine_to_fourth_order() {
-        // sin has no second derivative at 0 and at pi, so the natural spline has no boundary error:
-        // |error| <= 5/384 h^4 max|y''''|.
+    fn the_error_of_a_spline_through_a_sine_is_of_fourth_order() {
+        // The second derivative of sin is zero at 0 and at pi, so the natural spline has no boundary error: |error| <=
+        // 5/384 h^4 max|y''''|.
         let error = |count: i32| {
             let h = std::f64::consts::PI / f64::from(count);
             let times: Vec<f64> = (0..=count).map(|k| h * f64::from(k)).collect();

@@ -1,58 +1,58 @@
-//! Rests in the middle of a way: the carrier slows down, stands still, and goes on.
+//! Rests along a route: the walker slows down, stops, and sets off after the rest.
 
 use super::jet::Jet;
-use super::smooth::{Steps, Way};
+use super::smooth::{SmoothPath, SmoothSteps};
 use crate::geometry::Vector;
 use crate::spec::{Source, SpecError};
 
-/// Half of the time in which a carrier comes to rest or sets off again, s.
+/// Half of the time in which the walker stops or sets off, s: a stop from 1 m/s in 1.5 s.
 const HALF_S: f64 = 0.75;
-/// Most rests in a run.
-const MOST_RESTS: usize = 10_000;
+/// Maximum number of rests in a run: a guard against a malformed spec.
+const MAX_RESTS: usize = 10_000;
 
-/// The time that has passed without the rests: where a carrier is on its way.
-pub(super) struct Progress {
-    /// Elapsed time on the first axis, s.
-    elapsed: Way,
-    moving: Steps,
+/// Time spent moving: the clock that drives the motion along the route, and that pauses in each rest.
+pub(super) struct MovingTime {
+    /// Moving time on the first axis, s.
+    elapsed: SmoothPath,
+    speed_fraction: SmoothSteps,
 }
 
-impl Progress {
-    /// The progress with rests that begin and last so long, s, in a run of `duration_s`; `None` without any.
+impl MovingTime {
+    /// The moving time of a run of `duration_s` with `rests` (start, duration; s). `None` without rests.
     pub fn new(rests: &[(f64, f64)], source: &Source, duration_s: f64) -> Result<Option<Self>, SpecError> {
         if rests.is_empty() {
             return Ok(None);
         }
         check(rests).map_err(|message| SpecError::about(source, "rests", message))?;
         let before_s = -4.0 * HALF_S;
-        let mut elapsed = Way::new(Vector::new(before_s, 0.0, 0.0), before_s, HALF_S);
+        let mut elapsed = SmoothPath::new(Vector::new(before_s, 0.0, 0.0), before_s, HALF_S);
         for (at_s, lasts_s) in rests {
             let moving_s = at_s - HALF_S - elapsed.end_s();
-            elapsed.go(elapsed.end() + Vector::x() * moving_s, moving_s);
-            elapsed.go(elapsed.end(), lasts_s + 2.0 * HALF_S);
+            elapsed.move_to(elapsed.end() + Vector::x() * moving_s, moving_s);
+            elapsed.move_to(elapsed.end(), lasts_s + 2.0 * HALF_S);
         }
         let left_s = (duration_s - elapsed.end_s()).max(0.0) + 4.0 * HALF_S;
-        elapsed.go(elapsed.end() + Vector::x() * left_s, left_s);
-        let moving = elapsed.speed_share(1.0);
-        Ok(Some(Self { elapsed, moving }))
+        elapsed.move_to(elapsed.end() + Vector::x() * left_s, left_s);
+        let speed_fraction = elapsed.speed_fraction(1.0);
+        Ok(Some(Self { elapsed, speed_fraction }))
     }
 
-    /// The elapsed time at an instant, s.
+    /// The moving time at `t_s`, s.
     pub fn at(&self, t_s: f64) -> Jet {
         let [elapsed, ..] = self.elapsed.at(t_s);
         elapsed
     }
 
-    /// The share of its speed with which the carrier moves, 0 at rest.
-    pub fn moving(&self, t_s: f64) -> Jet {
-        self.moving.at(t_s)
+    /// Fraction of the full speed at `t_s`: 0 at rest.
+    pub fn speed_fraction(&self, t_s: f64) -> Jet {
+        self.speed_fraction.at(t_s)
     }
 }
 
-/// Checks that rests follow each other with time to set off and to stop in between.
+/// Checks that rests are in order, with time to set off and to stop in between.
 fn check(rests: &[(f64, f64)]) -> Result<(), String> {
-    if rests.len() > MOST_RESTS {
-        return Err(format!("{} rests; {MOST_RESTS} at most", rests.len()));
+    if rests.len() > MAX_RESTS {
+        return Err(format!("{} rests; {MAX_RESTS} at most", rests.len()));
     }
     let mut free_s = 0.0;
     for (index, &(at_s, lasts_s)) in rests.iter().enumerate() {
@@ -73,18 +73,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_stands_still_in_a_rest_and_is_behind_by_its_length_and_the_stopping() {
+    fn moving_time_pauses_in_a_rest_and_loses_the_time_to_stop_and_start() {
         let source = Source::in_memory("test", "");
-        let progress = Progress::new(&[(20.0, 40.0)], &source, 100.0).unwrap().unwrap();
-        assert!((progress.at(10.0).x - 10.0).abs() < 1e-12 && (progress.at(10.0).d - 1.0).abs() < 1e-12);
-        // A linear slowdown in the mean: half of the 1.5 s before and behind a rest is lost.
+        let moving_time = MovingTime::new(&[(20.0, 40.0)], &source, 100.0).unwrap().unwrap();
+        assert!((moving_time.at(10.0).x - 10.0).abs() < 1e-12 && (moving_time.at(10.0).d - 1.0).abs() < 1e-12);
+        // The speed changes linearly on average, so each stop and each start loses half of 1.5 s.
         for t_s in [20.0, 33.0, 60.0] {
-            let at = progress.at(t_s);
+            let at = moving_time.at(t_s);
             assert!((at.x - (20.0 - HALF_S)).abs() < 1e-12 && at.d.abs() < 1e-12 && at.dd.abs() < 1e-9, "{at:?}");
-            assert!(progress.moving(t_s).x.abs() < 1e-12);
+            assert!(moving_time.speed_fraction(t_s).x.abs() < 1e-12);
         }
-        assert!((progress.at(90.0).x - (50.0 - 2.0 * HALF_S)).abs() < 1e-12);
-        assert!(Progress::new(&[(1.0, 5.0)], &source, 100.0).is_err(), "no time to stop");
-        assert!(Progress::new(&[(10.0, f64::NAN)], &source, 100.0).is_err());
+        assert!((moving_time.at(90.0).x - (50.0 - 2.0 * HALF_S)).abs() < 1e-12);
+        assert!(MovingTime::new(&[(1.0, 5.0)], &source, 100.0).is_err(), "no time to stop");
+        assert!(MovingTime::new(&[(10.0, f64::NAN)], &source, 100.0).is_err());
     }
 }

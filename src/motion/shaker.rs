@@ -1,9 +1,9 @@
-//! A shaker: the base driven along or about its axes by test signals, to characterise a head.
+//! A shaker: test signals along or about the axes of the base, to characterise a head.
 
 use super::jet::{Jet, PoseJet};
-use super::sines::{Line, Part, Sines, even_parts};
-use super::smooth::Steps;
-use super::stand::standpoint;
+use super::sines::{FrequencyBin, SineSum, SpectralLine, linear_bins};
+use super::smooth::SmoothSteps;
+use super::stand::start_on_route;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Route, Vector};
 use crate::random::{Seed, Stream};
@@ -14,24 +14,24 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-/// A base that is driven along or about its axes.
+/// A base that a shaker drives along or about an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShakerSpec {
     /// Height of the base above the floor, m.
     #[serde(with = "Finite")]
     pub height_m: f64,
-    /// How long everything is at rest first, s.
+    /// Time at rest at the start, s.
     #[serde(with = "NonNegative")]
     pub still_s: f64,
-    /// How long the signals take to reach their full strength, s.
+    /// Time in which the signals rise to their full amplitude, s.
     #[serde(with = "Positive")]
     pub onset_s: f64,
-    /// The signals; those of one axis add up.
+    /// The signals. Signals on the same axis are added.
     pub drives: Vec<DriveSpec>,
 }
 
-/// A signal on an axis.
+/// A signal on one axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DriveSpec {
@@ -41,28 +41,28 @@ pub struct DriveSpec {
     pub signal: SignalSpec,
 }
 
-/// An axis of the base at rest: along x (forward), y (left), z (up), or about them.
+/// An axis of the base at rest: x forward, y left, z up, or a rotation about one of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Axis {
-    /// Forward.
+    /// x, forward.
     X,
-    /// To the left.
+    /// y, left.
     Y,
-    /// Up.
+    /// z, up.
     Z,
-    /// About x.
+    /// Rotation about x.
     Roll,
-    /// About y.
+    /// Rotation about y.
     Pitch,
-    /// About z.
+    /// Rotation about z.
     Yaw,
 }
 
 impl Axis {
-    /// Every axis.
+    /// All axes.
     pub const ALL: [Axis; 6] = [Axis::X, Axis::Y, Axis::Z, Axis::Roll, Axis::Pitch, Axis::Yaw];
 
-    /// Whether this is a rotation.
+    /// Whether the axis is a rotation.
     pub fn is_rotation(self) -> bool {
         matches!(self, Axis::Roll | Axis::Pitch | Axis::Yaw)
     }
@@ -72,7 +72,7 @@ impl Axis {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum SignalSpec {
-    /// A sine whose frequency goes exponentially from one end to the other until the end of the run.
+    /// A sine whose frequency changes exponentially until the end of the run.
     SweptSine {
         /// Frequency at the start, Hz.
         #[serde(with = "Positive")]
@@ -80,11 +80,11 @@ pub enum SignalSpec {
         /// Frequency at the end, Hz.
         #[serde(with = "Positive")]
         to_hz: f64,
-        /// Amplitude, held over the sweep.
+        /// Amplitude, constant over the sweep.
         amplitude: Level,
     },
-    /// Equal sines at the multiples of `1 / period_s` within a band: periodic, so that a spectrum over whole periods
-    /// does not leak.
+    /// Equal sines at the multiples of `1 / period_s` within a band. The signal is periodic, so a spectrum over whole
+    /// periods has no leakage.
     Multisine {
         /// The period, s.
         #[serde(with = "Positive")]
@@ -95,7 +95,7 @@ pub enum SignalSpec {
         /// Highest frequency, Hz.
         #[serde(with = "Positive")]
         high_hz: f64,
-        /// Root mean square of the whole.
+        /// Root mean square of the sum.
         rms: Level,
         /// The sines' phases.
         #[serde(default)]
@@ -109,7 +109,7 @@ pub enum SignalSpec {
         /// Highest frequency, Hz.
         #[serde(with = "Positive")]
         high_hz: f64,
-        /// Root mean square of the whole.
+        /// Root mean square of the sum.
         rms: Level,
     },
 }
@@ -117,14 +117,14 @@ pub enum SignalSpec {
 /// The phases of a multisine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Phases {
-    /// Schroeder's: a low crest.
+    /// Schroeder phases: low crest factor.
     #[default]
     Schroeder,
-    /// Drawn at random from the run's seed: seeds differ in nothing else, so what differs in the answers is not linear.
+    /// Drawn from the run's seed. Runs differ in the phases only, so a difference in the response is nonlinear.
     Random,
 }
 
-/// How strong a signal is, and in which derivative it is so at every frequency alike.
+/// Amplitude of a signal, and the derivative in which it is the same at every frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Level {
     /// Displacement, m.
@@ -142,7 +142,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// The level in SI units, and how often the displacement is differentiated to have it.
+    /// The level in SI units, and the order of the derivative to which it applies.
     fn parts(self) -> (f64, i32) {
         match self {
             Level::Metres(x) => (x, 0),
@@ -158,29 +158,29 @@ impl Level {
         matches!(self, Level::Degrees(_) | Level::DegreesPerS(_) | Level::DegreesPerS2(_))
     }
 
-    /// The displacement of a sine of this level at `freq_hz`, m or rad.
+    /// Displacement amplitude of a sine of this level at `freq_hz`, m or rad.
     fn displacement(self, freq_hz: f64) -> f64 {
         let (level, order) = self.parts();
         level / (TAU * freq_hz).powi(order)
     }
 }
 
-/// Lines in band noise.
+/// Sinusoids in band-limited noise.
 const NOISE_LINES: usize = 256;
 
-/// Most lines of a multisine.
-const MOST_LINES: f64 = 1e5;
+/// Maximum number of lines of a multisine: each costs time at every evaluation.
+const MAX_LINES: f64 = 1e5;
 
-/// A base on a shaker.
+/// Motion of a base on a shaker.
 pub(super) struct Shaker {
     rest: PoseJet,
-    onset: Steps,
+    onset: SmoothSteps,
     start_s: f64,
     drives: Vec<(Axis, Drive)>,
 }
 
 enum Drive {
-    Sines(Sines<1>),
+    Sines(SineSum<1>),
     Sweep { from_hz: f64, growth_per_s: f64, displacement: f64, order: i32 },
 }
 
@@ -192,14 +192,14 @@ impl Shaker {
         duration_s: f64,
         seed: Seed,
     ) -> Result<Self, MotionError> {
-        let (floor, heading) = standpoint(route);
+        let (floor, heading) = start_on_route(route);
         let sweep_s = duration_s - spec.still_s;
         let mut drives = Vec::new();
         for (index, drive) in spec.drives.iter().enumerate() {
             let stream_seed = seed.child(&format!("motion/shaker/{index}"));
-            drives.push((drive.axis, drive.built(source, sweep_s, stream_seed)?));
+            drives.push((drive.axis, drive.build(source, sweep_s, stream_seed)?));
         }
-        let mut onset = Steps::from_level(0.0);
+        let mut onset = SmoothSteps::from_level(0.0);
         onset.push(spec.still_s + spec.onset_s / 2.0, spec.onset_s / 2.0, 1.0);
         let rest = PoseJet::at_rest(&(floor + Vector::z() * spec.height_m), heading);
         Ok(Self { rest, onset, start_s: spec.still_s, drives })
@@ -207,25 +207,28 @@ impl Shaker {
 }
 
 impl DriveSpec {
-    fn built(&self, source: &Source, sweep_s: f64, seed: Seed) -> Result<Drive, SpecError> {
-        let fault = |key: &str, message: String| Err(SpecError::about(source, key, message));
+    fn build(&self, source: &Source, sweep_s: f64, seed: Seed) -> Result<Drive, SpecError> {
+        let error = |key: &str, message: String| Err(SpecError::about(source, key, message));
         let (level, key) = match &self.signal {
             SignalSpec::SweptSine { amplitude, .. } => (*amplitude, "amplitude"),
             SignalSpec::Multisine { rms, .. } | SignalSpec::BandNoise { rms, .. } => (*rms, "rms"),
         };
         if level.is_rotation() != self.axis.is_rotation() {
-            return fault(
+            return error(
                 key,
-                format!("{level:?} does not fit the axis {:?}: lengths along x, y, z; angles about them", self.axis),
+                format!(
+                    "{level:?} does not fit the axis {:?}: give a length for x, y, z and an angle for rotations",
+                    self.axis
+                ),
             );
         }
         if !(level.parts().0.is_finite() && level.parts().0 > 0.0) {
-            return fault(key, format!("{level:?}: a level is a finite number above 0"));
+            return error(key, format!("{level:?}: a level must be a finite number above 0"));
         }
         match self.signal {
             SignalSpec::SweptSine { from_hz, to_hz, .. } => {
                 if sweep_s <= 0.0 {
-                    return fault("still_s", format!("the run ends {} s before the sweep begins", -sweep_s));
+                    return error("still_s", format!("the run ends {} s before the sweep begins", -sweep_s));
                 }
                 let (displacement, order) = (level.displacement(from_hz), level.parts().1);
                 Ok(Drive::Sweep { from_hz, growth_per_s: (to_hz / from_hz).ln() / sweep_s, displacement, order })
@@ -233,16 +236,16 @@ impl DriveSpec {
             SignalSpec::Multisine { low_hz, high_hz, .. } | SignalSpec::BandNoise { low_hz, high_hz, .. }
                 if high_hz <= low_hz =>
             {
-                fault("high_hz", format!("the band ends at {high_hz} Hz, not above its begin at {low_hz} Hz"))
+                error("high_hz", format!("the band ends at {high_hz} Hz, not above its begin at {low_hz} Hz"))
             }
             SignalSpec::Multisine { period_s, low_hz, high_hz, phases, .. } => {
                 let (first, last) = ((low_hz * period_s - 1e-9).ceil(), (high_hz * period_s + 1e-9).floor());
-                if last < first || last - first >= MOST_LINES {
+                if last < first || last - first >= MAX_LINES {
                     let message = format!(
-                        "a period of {period_s} s has {} lines from {low_hz} to {high_hz} Hz; a multisine has 1 to {MOST_LINES}",
+                        "a period of {period_s} s has {} lines from {low_hz} to {high_hz} Hz; a multisine has 1 to {MAX_LINES}",
                         last - first + 1.0
                     );
-                    return fault("period_s", message);
+                    return error("period_s", message);
                 }
                 let mut random = match phases {
                     Phases::Schroeder => None,
@@ -251,21 +254,22 @@ impl DriveSpec {
                 Ok(Drive::Sines(multisine((first as u32, last as u32), period_s, level, random.as_mut())))
             }
             SignalSpec::BandNoise { low_hz, high_hz, .. } => {
-                let parts = even_parts((low_hz, high_hz), NOISE_LINES, &mut seed.stream("noise"));
-                let share = (2.0 / NOISE_LINES as f64).sqrt();
-                let line = |part: &Part| Line {
-                    cycles: part.at,
-                    amplitudes: [part.phase * (share * level.displacement(part.at))],
+                let bins = linear_bins((low_hz, high_hz), NOISE_LINES, &mut seed.stream("noise"));
+                let amplitude = (2.0 / NOISE_LINES as f64).sqrt();
+                let line = |bin: &FrequencyBin| SpectralLine {
+                    cycles: bin.at,
+                    amplitudes: [bin.phase * (amplitude * level.displacement(bin.at))],
                 };
-                Ok(Drive::Sines(Sines::new(parts.iter().map(line))))
+                Ok(Drive::Sines(SineSum::new(bins.iter().map(line))))
             }
         }
     }
 }
 
-/// Equal sines at the multiples `first..=last` of `1 / period_s`, with random phases, or without a stream for them with
-/// the phases `-pi k (k - 1) / n` (Schroeder 1970).
-fn multisine((first, last): (u32, u32), period_s: f64, level: Level, mut random: Option<&mut Stream>) -> Sines<1> {
+/// Equal sines at the multiples `first..=last` of `1 / period_s`.
+///
+/// The phases are drawn from `random`; without it they are `-pi k (k - 1) / n` (Schroeder 1970).
+fn multisine((first, last): (u32, u32), period_s: f64, level: Level, mut random: Option<&mut Stream>) -> SineSum<1> {
     let count = f64::from(last - first + 1);
     let line = |multiple: u32| {
         let (freq_hz, k) = (f64::from(multiple) / period_s, f64::from(multiple - first + 1));
@@ -274,13 +278,13 @@ fn multisine((first, last): (u32, u32), period_s: f64, level: Level, mut random:
             Some(stream) => TAU * stream.random::<f64>(),
             None => -PI * k * (k - 1.0) / count,
         };
-        Line { cycles: freq_hz, amplitudes: [Complex::from_polar(amplitude, phase)] }
+        SpectralLine { cycles: freq_hz, amplitudes: [Complex::from_polar(amplitude, phase)] }
     };
-    Sines::new((first..=last).map(line))
+    SineSum::new((first..=last).map(line))
 }
 
 impl Drive {
-    /// The displacement `t_s` after the start.
+    /// Displacement at `t_s` after the start of the signal, m or rad.
     fn at(&self, t_s: f64) -> Jet {
         match self {
             Drive::Sines(sines) => {
@@ -288,7 +292,8 @@ impl Drive {
                 jet
             }
             Drive::Sweep { from_hz, growth_per_s, displacement, order } => {
-                // Phase: the integral of from_hz exp(growth t). Equal ends make no sweep, and no growth to divide by.
+                // Phase: the integral of from_hz exp(growth t). With equal end frequencies the growth is 0: no division
+                // by it.
                 let phase = if *growth_per_s == 0.0 {
                     Jet::linear(t_s, TAU * from_hz, 0.0)
                 } else {
@@ -306,11 +311,11 @@ impl BaseMotion for Shaker {
         if t_s <= self.start_s {
             return self.rest.kinematics();
         }
-        let share = self.onset.at(t_s);
+        let fraction = self.onset.at(t_s);
         let mut pose = self.rest;
         let (sin, cos) = self.rest.yaw.x.sin_cos();
         for (axis, drive) in &self.drives {
-            let moved = drive.at(t_s - self.start_s) * share;
+            let moved = drive.at(t_s - self.start_s) * fraction;
             match axis {
                 Axis::X => {
                     pose.position[0] += moved * cos;

@@ -9,23 +9,23 @@ use std::f64::consts::TAU;
 
 /// One frequency of a sum with `N` outputs.
 #[derive(Debug, Clone)]
-pub(super) struct Line<const N: usize> {
+pub(super) struct SpectralLine<const N: usize> {
     /// Cycles per unit of the argument: Hz, or cycles per metre.
     pub cycles: f64,
-    /// Complex amplitude of each output: it is the real part of `amplitude exp(i 2 pi cycles u)`.
+    /// Complex amplitude of each output, which is the real part of `amplitude exp(i 2 pi cycles u)`.
     pub amplitudes: [Complex<f64>; N],
 }
 
-/// How many lines are worked on side by side.
+/// Spectral lines evaluated together, so that the compiler vectorises over them.
 const LANES: usize = 8;
 
-/// `N` signals that are sums of sinusoids of the same frequencies.
+/// `N` sums of sinusoids that share their frequencies.
 #[derive(Debug, Clone)]
-pub(super) struct Sines<const N: usize> {
+pub(super) struct SineSum<const N: usize> {
     groups: Vec<Group<N>>,
 }
 
-/// Some lines side by side, the last ones of a sum filled up with silence.
+/// A group of lines that are evaluated together; the last group is padded with zero amplitudes.
 #[derive(Debug, Clone)]
 struct Group<const N: usize> {
     cycles: [f64; LANES],
@@ -34,8 +34,9 @@ struct Group<const N: usize> {
 }
 
 impl<const N: usize> Group<N> {
-    fn of(lines: &[Line<N>]) -> Self {
-        let lane = |of: &dyn Fn(&Line<N>) -> f64| std::array::from_fn(|lane| lines.get(lane).map_or(0.0, of));
+    fn new(lines: &[SpectralLine<N>]) -> Self {
+        let lane =
+            |value: &dyn Fn(&SpectralLine<N>) -> f64| std::array::from_fn(|lane| lines.get(lane).map_or(0.0, value));
         Self {
             cycles: lane(&|line| line.cycles),
             re: std::array::from_fn(|output| lane(&|line| line.amplitudes[output].re)),
@@ -44,16 +45,16 @@ impl<const N: usize> Group<N> {
     }
 }
 
-impl<const N: usize> Sines<N> {
+impl<const N: usize> SineSum<N> {
     /// The sum of `lines`.
-    pub fn new(lines: impl IntoIterator<Item = Line<N>>) -> Self {
-        let lines: Vec<Line<N>> = lines.into_iter().collect();
-        Self { groups: lines.chunks(LANES).map(Group::of).collect() }
+    pub fn new(lines: impl IntoIterator<Item = SpectralLine<N>>) -> Self {
+        let lines: Vec<SpectralLine<N>> = lines.into_iter().collect();
+        Self { groups: lines.chunks(LANES).map(Group::new).collect() }
     }
 
-    /// The signals at the argument `u`, with their derivatives by it.
+    /// The outputs at the argument `u`, with their derivatives with respect to it.
     pub fn at(&self, u: f64) -> [Jet; N] {
-        // Value, first and second derivative of each output, a sum a lane: the lanes are added up at the end, in order.
+        // Value, first and second derivative of each output, one sum per lane; the lanes are added in order at the end.
         let mut sums = [[[0.0; LANES]; 3]; N];
         for Group { cycles, re, im } in &self.groups {
             let phasors = cycles.map(|cycles| sin_cos_turns(cycles * u));
@@ -73,46 +74,45 @@ impl<const N: usize> Sines<N> {
     }
 }
 
-/// A part of a spectrum that one sinusoid stands for.
+/// A bin of a spectrum, represented by one sinusoid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Part {
-    /// Where in the part the sinusoid is: drawn at random, so that the sum does not repeat.
+pub(super) struct FrequencyBin {
+    /// Frequency of the sinusoid: drawn at random within the bin, so that the sum does not repeat.
     pub at: f64,
-    /// How wide the part is.
+    /// Width of the bin.
     pub width: f64,
-    /// A phase drawn at random, as a complex number of modulus 1.
+    /// Random phase, as a complex number of modulus 1.
     pub phase: Complex<f64>,
 }
 
-impl Part {
-    /// The complex amplitude of a sinusoid with the power of a one-sided `density` over this part: `sqrt(2 density
-    /// width)`.
+impl FrequencyBin {
+    /// Complex amplitude of a sinusoid with the power of the one-sided `density` in this bin: `sqrt(2 density width)`.
     pub fn amplitude(&self, density: f64) -> Complex<f64> {
         self.phase * (2.0 * density * self.width).sqrt()
     }
 }
 
-/// `count` parts of equal width between `low` and `high`.
-pub(super) fn even_parts((low, high): (f64, f64), count: usize, stream: &mut Stream) -> Vec<Part> {
+/// `count` bins of equal width between `low` and `high`.
+pub(super) fn linear_bins((low, high): (f64, f64), count: usize, stream: &mut Stream) -> Vec<FrequencyBin> {
     let width = (high - low) / count as f64;
-    let part = |k| {
+    let bin = |k| {
         let at = low + width * (k as f64 + stream.random::<f64>());
-        Part { at, width, phase: random_phase(stream) }
+        FrequencyBin { at, width, phase: random_phase(stream) }
     };
-    (0..count).map(part).collect()
+    (0..count).map(bin).collect()
 }
 
-/// `count` parts between `low` (above zero) and `high`, each wider than the one before by the same factor.
-pub(super) fn geometric_parts((low, high): (f64, f64), count: usize, stream: &mut Stream) -> Vec<Part> {
+/// `count` bins between `low` (above zero) and `high` whose widths grow by a constant factor.
+pub(super) fn log_bins((low, high): (f64, f64), count: usize, stream: &mut Stream) -> Vec<FrequencyBin> {
     let ratio = (high / low).powf(1.0 / count as f64);
-    let part = |k| {
+    let bin = |k| {
         let start = low * ratio.powf(f64::from(k));
         let at = start * ratio.powf(stream.random::<f64>());
-        // The width at the place drawn, so that the expected power of the part is the integral of the density over it:
-        // drawn evenly in the logarithm, density * f * ln(ratio) has that mean.
-        Part { at, width: at * ratio.ln(), phase: random_phase(stream) }
+        // The width at the drawn frequency makes the expected power of the bin equal to the integral of the density:
+        // with a uniform logarithm, density * f * ln(ratio) has that mean.
+        FrequencyBin { at, width: at * ratio.ln(), phase: random_phase(stream) }
     };
-    (0..count as u32).map(part).collect()
+    (0..count as u32).map(bin).collect()
 }
 
 fn random_phase(stream: &mut Stream) -> Complex<f64> {
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn a_line_is_its_cosine() {
         // Amplitude 2 exp(i 0.3) at 1.5 cycles: 2 cos(2 pi 1.5 u + 0.3).
-        let sines = Sines::new([Line { cycles: 1.5, amplitudes: [Complex::from_polar(2.0, 0.3)] }]);
+        let sines = SineSum::new([SpectralLine { cycles: 1.5, amplitudes: [Complex::from_polar(2.0, 0.3)] }]);
         let (u, rate) = (0.77, TAU * 1.5);
         let [jet] = sines.at(u);
         let (sin, cos) = (rate * u + 0.3).sin_cos();
@@ -139,13 +139,14 @@ mod tests {
     }
 
     #[test]
-    fn parts_hold_the_power_of_the_spectrum() {
-        // Density 1 / f^2 from 0.1 to 10 has the power 9.9; a part's power is |amplitude|^2 / 2.
+    fn bins_have_the_power_of_the_spectrum() {
+        // The density 1 / f^2 from 0.1 to 10 has the power 9.9. The power of a bin is |amplitude|^2 / 2.
         let mut stream = Seed(1).stream("parts");
-        let power = |parts: &[Part]| parts.iter().map(|p| p.amplitude(p.at.powi(-2)).norm_sqr() / 2.0).sum::<f64>();
-        let geometric = geometric_parts((0.1, 10.0), 400, &mut stream);
+        let power =
+            |bins: &[FrequencyBin]| bins.iter().map(|p| p.amplitude(p.at.powi(-2)).norm_sqr() / 2.0).sum::<f64>();
+        let geometric = log_bins((0.1, 10.0), 400, &mut stream);
         assert_relative_eq!(power(&geometric), 9.9, max_relative = 2e-3);
-        let even = even_parts((1.0, 2.0), 400, &mut stream);
+        let even = linear_bins((1.0, 2.0), 400, &mut stream);
         assert_relative_eq!(power(&even), 0.5, max_relative = 1e-3);
         assert!(
             even.iter().all(|p| (1.0..2.0).contains(&p.at)) && geometric.iter().all(|p| (0.1..10.0).contains(&p.at))

@@ -1,17 +1,16 @@
-//! Piecewise motion made smooth: what is constant or linear in pieces, convolved with a bump.
+//! Piecewise constant or linear motion, smoothed by convolution with a kernel.
 //!
-//! The bump is the triweight kernel `k(u) = 35/32 (1 - u^2)^3` on -1..1, stretched over a half-width in time. A
-//! smoothed quantity is a moving average: it never leaves the range (a position: the convex hull) of what it averages,
-//! has compact memory, and a position made of straight pieces gets three continuous derivatives, a level made of steps
-//! as many.
+//! The kernel is the triweight `k(u) = 35/32 (1 - u^2)^3` on -1..1, scaled to a half-width in time. The smoothed value
+//! is a moving average: it stays within the range (a position: the convex hull) of the input and depends on a bounded
+//! interval. A path of straight segments, and a level that changes in steps, get three continuous derivatives.
 
 use super::jet::Jet;
 use crate::geometry::Vector;
 
-/// The kernel's greatest value, at its middle: the peak rate of a smoothed unit step is this over the half-width.
+/// Maximum of the kernel, at the centre. The peak rate of a smoothed unit step is this divided by the half-width.
 pub(super) const PEAK: f64 = 35.0 / 32.0;
 
-/// How far the smoothed corner of a unit change of slope stays from it, in half-widths: the ramp's value at the corner.
+/// Deviation of a smoothed corner with a unit change of slope, in half-widths: the value of the ramp at the corner.
 #[cfg(test)]
 pub(super) const CORNER_CUT: f64 = 35.0 / 256.0;
 
@@ -33,7 +32,7 @@ fn step(t_s: f64, centre_s: f64, half_s: f64) -> Jet {
     }
 }
 
-/// The rate of a unit step at `centre_s`, smoothed over `half_s` on either side: the bump itself.
+/// Rate of a unit step at `centre_s`, smoothed over `half_s` on either side: the kernel itself.
 fn bump(t_s: f64, centre_s: f64, half_s: f64) -> Jet {
     let u = (t_s - centre_s) / half_s;
     if u.abs() >= 1.0 {
@@ -48,7 +47,7 @@ fn bump(t_s: f64, centre_s: f64, half_s: f64) -> Jet {
     }
 }
 
-/// A ramp of unit slope from `centre_s` on, smoothed over `half_s` on either side, minus the sharp ramp.
+/// Ramp of unit slope from `centre_s` on, smoothed over `half_s` on either side, minus the unsmoothed ramp.
 fn ramp_rounding(t_s: f64, centre_s: f64, half_s: f64) -> Jet {
     let u = (t_s - centre_s) / half_s;
     if u.abs() >= 1.0 {
@@ -62,24 +61,24 @@ fn ramp_rounding(t_s: f64, centre_s: f64, half_s: f64) -> Jet {
     Jet { x: (smooth - sharp) * half_s, d: slope.x - sharp_slope, dd: slope.d }
 }
 
-/// A level that changes in smoothed steps.
+/// A piecewise constant level with smoothed steps.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Steps {
+pub(super) struct SmoothSteps {
     centres_s: Vec<f64>,
     halves_s: Vec<f64>,
     changes: Vec<f64>,
-    /// The level before each step, and after the last: one more than there are steps.
+    /// The level before each step, and after the last one: one more than there are steps.
     levels: Vec<f64>,
     widest_s: f64,
 }
 
-impl Steps {
-    /// A level that stays `level`.
+impl SmoothSteps {
+    /// A level that stays at `level`.
     pub fn from_level(level: f64) -> Self {
         Self { levels: vec![level], ..Self::default() }
     }
 
-    /// The same, and a change by `change` about `centre_s`, which is not before the last one's.
+    /// Adds a step of `change` centred on `centre_s`, which must not precede the previous step.
     pub fn push(&mut self, centre_s: f64, half_s: f64, change: f64) {
         self.centres_s.push(centre_s);
         self.halves_s.push(half_s);
@@ -93,19 +92,19 @@ impl Steps {
         self.levels.last().copied().unwrap_or_default()
     }
 
-    /// The level at an instant.
+    /// The level at `t_s`.
     pub fn at(&self, t_s: f64) -> Jet {
         let first = self.first_near(t_s);
         let before = self.levels.get(first).copied().unwrap_or_default();
         self.sum_near(first, t_s, Jet::constant(before), step)
     }
 
-    /// How fast the level changes at an instant, with two more derivatives.
+    /// Rate of change of the level at `t_s`, with two further derivatives.
     pub fn rate_at(&self, t_s: f64) -> Jet {
         self.sum_near(self.first_near(t_s), t_s, Jet::default(), bump)
     }
 
-    /// The first step that may not be over yet.
+    /// Index of the first step that may still be in progress at `t_s`.
     fn first_near(&self, t_s: f64) -> usize {
         self.centres_s.partition_point(|centre| centre + self.widest_s <= t_s)
     }
@@ -122,10 +121,9 @@ impl Steps {
     }
 }
 
-/// A way through space in straight pieces of constant velocity, smoothed; at rest before the first and after the last
-/// knot.
+/// A path of straight segments at constant velocity, smoothed; at rest before the first knot and after the last.
 #[derive(Debug, Clone)]
-pub(super) struct Way {
+pub(super) struct SmoothPath {
     half_s: f64,
     times_s: Vec<f64>,
     points: Vec<Vector>,
@@ -133,14 +131,14 @@ pub(super) struct Way {
     velocities: Vec<Vector>,
 }
 
-impl Way {
-    /// A way that stays at `start` until `from_s`, to be smoothed over `half_s` on either side.
+impl SmoothPath {
+    /// A path that stays at `start` until `from_s`, smoothed over `half_s` on either side.
     pub fn new(start: Vector, from_s: f64, half_s: f64) -> Self {
         Self { half_s, times_s: vec![from_s], points: vec![start], velocities: vec![Vector::zeros()] }
     }
 
-    /// Goes to `point` in `duration_s`, above zero.
-    pub fn go(&mut self, point: Vector, duration_s: f64) {
+    /// Adds a segment to `point` that takes `duration_s`, above zero.
+    pub fn move_to(&mut self, point: Vector, duration_s: f64) {
         let last = self.points.len() - 1;
         self.velocities[last] = (point - self.points[last]) / duration_s;
         self.times_s.push(self.times_s[last] + duration_s);
@@ -148,44 +146,44 @@ impl Way {
         self.velocities.push(Vector::zeros());
     }
 
-    /// When the last knot is reached.
+    /// Time of the last knot, s.
     pub fn end_s(&self) -> f64 {
         self.times_s[self.times_s.len() - 1]
     }
 
-    /// Where the last knot is.
+    /// Position of the last knot, m.
     pub fn end(&self) -> Vector {
         self.points[self.points.len() - 1]
     }
 
-    /// How many knots.
+    /// Number of knots.
     pub fn knots(&self) -> usize {
         self.times_s.len()
     }
 
-    /// The speed along the way, as a share of `full_m_per_s`, smoothed alike.
-    pub fn speed_share(&self, full_m_per_s: f64) -> Steps {
-        let mut share = Steps::from_level(0.0);
+    /// Speed along the path as a fraction of `full_m_per_s`, smoothed with the same kernel.
+    pub fn speed_fraction(&self, full_m_per_s: f64) -> SmoothSteps {
+        let mut fraction = SmoothSteps::from_level(0.0);
         for (time_s, velocity) in self.times_s.iter().zip(&self.velocities) {
-            let change = velocity.norm() / full_m_per_s - share.last();
+            let change = velocity.norm() / full_m_per_s - fraction.last();
             if change != 0.0 {
-                share.push(*time_s, self.half_s, change);
+                fraction.push(*time_s, self.half_s, change);
             }
         }
-        share
+        fraction
     }
 
-    /// The same timing along a straight line: how far the way has led, m, on the first axis.
-    pub fn odometer(&self) -> Way {
+    /// Distance along the path, m: a straight path on the first axis with the same timing.
+    pub fn odometer(&self) -> SmoothPath {
         let mut odometer = Self::new(Vector::zeros(), self.times_s[0], self.half_s);
         for (points, times) in self.points.windows(2).zip(self.times_s.windows(2)) {
             let led_m = odometer.end().x + (points[1] - points[0]).norm();
-            odometer.go(Vector::new(led_m, 0.0, 0.0), times[1] - times[0]);
+            odometer.move_to(Vector::new(led_m, 0.0, 0.0), times[1] - times[0]);
         }
         odometer
     }
 
-    /// The position at an instant, m.
+    /// Position at `t_s`, m.
     pub fn at(&self, t_s: f64) -> [Jet; 3] {
         let after = self.times_s.partition_point(|time| *time <= t_s);
         let mut position = self.straight(after, t_s);
@@ -204,7 +202,7 @@ impl Way {
         position
     }
 
-    /// The unsmoothed position, where `after` knots lie at or before the instant.
+    /// Position without smoothing; `after` is the number of knots at or before `t_s`.
     fn straight(&self, after: usize, t_s: f64) -> [Jet; 3] {
         match after.checked_sub(1) {
             None => std::array::from_fn(|axis| Jet::constant(self.points[0][axis])),
@@ -236,30 +234,30 @@ mod tests {
 
     #[test]
     fn closed_forms_are_the_convolutions() {
-        let mut steps = Steps::from_level(1.0);
+        let mut steps = SmoothSteps::from_level(1.0);
         steps.push(1.0, 0.5, 2.0);
         steps.push(1.3, 0.5, -0.7);
         let sharp = |t: f64| 1.0 + if t >= 1.0 { 2.0 } else { 0.0 } - if t >= 1.3 { 0.7 } else { 0.0 };
-        let mut way = Way::new(Vector::zeros(), 1.0, 0.5);
-        way.go(Vector::new(2.0, 0.0, 0.0), 1.0);
-        way.go(Vector::new(2.0, -0.3, 0.0), 0.2);
+        let mut path = SmoothPath::new(Vector::zeros(), 1.0, 0.5);
+        path.move_to(Vector::new(2.0, 0.0, 0.0), 1.0);
+        path.move_to(Vector::new(2.0, -0.3, 0.0), 0.2);
         let sharp_y = |t: f64| -0.3 * ((t - 2.0) / 0.2).clamp(0.0, 1.0);
         for k in 0..60 {
             let t = 0.4 + 0.043 * f64::from(k);
             assert_relative_eq!(steps.at(t).x, smoothed(sharp, t, 0.5), epsilon = 2e-4);
-            assert_relative_eq!(way.at(t)[0].x, smoothed(|s| 2.0 * (s - 1.0).clamp(0.0, 1.0), t, 0.5), epsilon = 1e-7);
-            assert_relative_eq!(way.at(t)[1].x, smoothed(sharp_y, t, 0.5), epsilon = 1e-7);
+            assert_relative_eq!(path.at(t)[0].x, smoothed(|s| 2.0 * (s - 1.0).clamp(0.0, 1.0), t, 0.5), epsilon = 1e-7);
+            assert_relative_eq!(path.at(t)[1].x, smoothed(sharp_y, t, 0.5), epsilon = 1e-7);
         }
     }
 
     #[test]
     fn a_corner_is_cut_by_a_known_distance() {
-        // At the corner the smoothed ramp stands half_s * E[max(0, u)] = half_s * 35/256 off, along the change of
+        // At the corner the smoothed ramp deviates by half_s * E[max(0, u)] = half_s * 35/256 along the change of
         // velocity.
-        let mut way = Way::new(Vector::zeros(), 0.0, 0.8);
-        way.go(Vector::new(2.0, 0.0, 0.0), 2.0);
-        way.go(Vector::new(2.0, 2.0, 0.0), 2.0);
-        let at_corner = way.at(2.0);
+        let mut path = SmoothPath::new(Vector::zeros(), 0.0, 0.8);
+        path.move_to(Vector::new(2.0, 0.0, 0.0), 2.0);
+        path.move_to(Vector::new(2.0, 2.0, 0.0), 2.0);
+        let at_corner = path.at(2.0);
         assert_relative_eq!(2.0 - at_corner[0].x, 0.8 * CORNER_CUT, epsilon = 1e-14);
         assert_relative_eq!(at_corner[1].x, 0.8 * CORNER_CUT, epsilon = 1e-14);
         assert_relative_eq!(at_corner[1].dd, PEAK / 0.8, epsilon = 1e-14);
@@ -267,7 +265,7 @@ mod tests {
 
     #[test]
     fn the_rate_of_a_level_is_its_derivative() {
-        let mut steps = Steps::from_level(0.3);
+        let mut steps = SmoothSteps::from_level(0.3);
         steps.push(1.0, 0.5, 2.0);
         let h = 1e-4;
         for k in 0..30 {
@@ -281,8 +279,8 @@ mod tests {
     }
 
     #[test]
-    fn steps_of_unlike_widths_add_up() {
-        let mut steps = Steps::from_level(0.0);
+    fn steps_of_different_widths_add_up() {
+        let mut steps = SmoothSteps::from_level(0.0);
         steps.push(1.0, 2.0, 1.0);
         steps.push(1.5, 0.1, 1.0);
         let expected = |t: f64| step(t, 1.0, 2.0).x + step(t, 1.5, 0.1).x;

@@ -7,48 +7,49 @@ use super::shaker::{Shaker, ShakerSpec};
 use super::stand::{Stand, StandSpec};
 use super::uav::{Uav, UavSpec};
 use super::vehicle::{Vehicle, VehicleSpec};
-use super::{BaseMotion, LONGEST_S, MotionError};
+use super::{BaseMotion, MAX_DURATION_S, MotionError};
 use crate::geometry::Route;
 use crate::random::Seed;
 use crate::spec::{Kind, Source, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// How the base moves, as a file of `specs/motions/` says it.
+/// Motion of the base, as written in a file of `specs/motions/`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum MotionSpec {
-    /// It stands still.
+    /// Stationary base.
     Stand(StandSpec),
-    /// It moves straight on at constant velocity.
+    /// Straight motion at constant velocity.
     Cruise(CruiseSpec),
-    /// A hand carries and shakes it.
+    /// Handheld: a walker shakes the base with the wrist.
     Hand(Box<HandSpec>),
-    /// A wheeled vehicle carries it.
+    /// Wheeled vehicle.
     Vehicle(Box<VehicleSpec>),
-    /// A legged machine carries it.
+    /// Legged robot.
     Legged(Box<LeggedSpec>),
-    /// A small multirotor carries it.
+    /// Small multirotor.
     Uav(Box<UavSpec>),
-    /// A vessel in waves carries it.
+    /// Vessel in waves.
     Marine(Box<MarineSpec>),
-    /// It moves as it was recorded.
+    /// Replay of a recorded trajectory.
     Replay(ReplaySpec),
-    /// A shaker drives it along or about its axes.
+    /// Shaker: test signals along or about the axes of the base.
     Shaker(ShakerSpec),
 }
 
-/// Finds and parses the motion called `name`: a path, or a name in the library. The source comes with it, for errors of
-/// [`MotionSpec::build`].
+/// Finds and parses the motion called `name`: a path, or a name in the library.
+///
+/// Returns the source too, for the errors of [`MotionSpec::build`].
 ///
 /// # Errors
-/// When there is none, or it is wrong.
+/// If there is no such motion, or the spec is invalid.
 pub fn load(name: &str) -> Result<(MotionSpec, Source), SpecError> {
     let source = find(Kind::Motion, name)?;
     Ok((parse(&source)?, source))
 }
 
 impl MotionSpec {
-    /// The file, or the folder of a recording, that a recorded motion is read from; `source` is the spec's text.
+    /// The file, or the folder of a recording, from which a replay reads; `source` is the spec's text.
     pub fn recorded_file(&self, source: &Source) -> Option<PathBuf> {
         match self {
             MotionSpec::Replay(spec) => spec.poses.file(source),
@@ -56,12 +57,14 @@ impl MotionSpec {
         }
     }
 
-    /// Builds the motion for a run of `duration_s` along `route` (m, on the floor), with all of its chance drawn from
-    /// `seed`. `source` is the spec's text, which errors point into.
+    /// Builds the motion for a run of `duration_s`.
+    ///
+    /// `route` is in metres on the floor. All random numbers derive from `seed`. Errors point into `source`, the text
+    /// of the spec.
     ///
     /// # Errors
-    /// When numbers of the spec contradict each other, the route is missing or cannot be followed, or the duration is
-    /// not above 0 s and at most [`LONGEST_S`].
+    /// If values of the spec contradict each other, if the route is missing or cannot be followed, or if the duration
+    /// is not above 0 s and at most [`MAX_DURATION_S`].
     pub fn build(
         &self,
         source: &Source,
@@ -69,7 +72,7 @@ impl MotionSpec {
         duration_s: f64,
         seed: Seed,
     ) -> Result<Box<dyn BaseMotion>, MotionError> {
-        if !(duration_s > 0.0 && duration_s <= LONGEST_S) {
+        if !(duration_s > 0.0 && duration_s <= MAX_DURATION_S) {
             return Err(MotionError::Duration { duration_s });
         }
         Ok(match self {

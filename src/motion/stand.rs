@@ -1,11 +1,11 @@
-//! A base that stands still.
+//! A stationary base.
 
 use super::BaseMotion;
 use super::jet::PoseJet;
 use crate::geometry::{Kinematics, Route, Vector};
 use serde::{Deserialize, Serialize};
 
-/// A base that stands still where the route begins, facing along it; without a route at the world's origin, facing x.
+/// A stationary base at the start of the route, facing along it; without a route, at the origin of the world, facing x.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StandSpec {
@@ -14,12 +14,12 @@ pub struct StandSpec {
     pub height_m: f64,
 }
 
-/// Where a carrier that follows no route stands: the route's first point and its heading there, or the origin.
-pub(super) fn standpoint(route: Option<&Route>) -> (Vector, f64) {
+/// Position and heading, rad, at the start of the route; without a route, the origin and 0.
+pub(super) fn start_on_route(route: Option<&Route>) -> (Vector, f64) {
     let points = route.map_or(&[][..], |route| &route.points_in_world);
     let start = points.first().copied().unwrap_or_else(Vector::zeros);
-    let ahead = points.iter().map(|point| point - start).find(|way| way.xy().norm() > 1e-6);
-    (start, ahead.map_or(0.0, |way| way.y.atan2(way.x)))
+    let ahead = points.iter().map(|point| point - start).find(|offset| offset.xy().norm() > 1e-6);
+    (start, ahead.map_or(0.0, |offset| offset.y.atan2(offset.x)))
 }
 
 /// A base at rest.
@@ -27,7 +27,7 @@ pub(super) struct Stand(Kinematics);
 
 impl Stand {
     pub fn new(spec: &StandSpec, route: Option<&Route>) -> Self {
-        let (floor, heading) = standpoint(route);
+        let (floor, heading) = start_on_route(route);
         Self(PoseJet::at_rest(&(floor + Vector::z() * spec.height_m), heading).kinematics())
     }
 }

@@ -1,40 +1,41 @@
-//! Stops: times in which the hand holds the head still.
+//! Stops: intervals in which the hand grips the head while the walk continues.
 
-use super::smooth::Steps;
+use super::smooth::SmoothSteps;
 use crate::random::Stream;
 use crate::spec::{Source, SpecError};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-/// When the hand holds the head still, while whatever else it does goes on.
+/// When the hand grips the head. The rest of the motion continues.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum StopsSpec {
-    /// At these times: when each begins, and how long it lasts with grasping and letting go, s. None of them: never.
+    /// At given times: start and duration of each stop, s, grasp and release included. An empty list: never.
     At(Vec<(f64, f64)>),
     /// At random times.
     Random {
-        /// Mean time from the end of one to the begin of the next, s; each is between half and one and a half of it.
+        /// Mean time from the end of a stop to the start of the next, s; drawn uniformly from 0.5 to 1.5 times this
+        /// value.
         #[serde(with = "crate::spec::checked::Positive")]
         every_s: f64,
-        /// The shortest, s.
+        /// Shortest stop, s.
         #[serde(with = "crate::spec::checked::Positive")]
         shortest_s: f64,
-        /// The longest, s.
+        /// Longest stop, s.
         #[serde(with = "crate::spec::checked::Positive")]
         longest_s: f64,
     },
 }
 
 impl StopsSpec {
-    /// The grip over time, 0..1: each stop rises for `grip_s`, holds, and falls for `grip_s`.
+    /// Grip over time, 0 to 1: in each stop it rises for `grip_s`, stays at 1, and falls for `grip_s`.
     pub(super) fn grip(
         &self,
         source: &Source,
         grip_s: f64,
         (from_s, until_s): (f64, f64),
         stream: &mut Stream,
-    ) -> Result<Steps, SpecError> {
+    ) -> Result<SmoothSteps, SpecError> {
         let stops = match self {
             StopsSpec::At(stops) => stops.clone(),
             StopsSpec::Random { every_s, shortest_s, longest_s } => {
@@ -46,7 +47,7 @@ impl StopsSpec {
                 let mut draw = |low: f64, high: f64| low + (high - low) * stream.random::<f64>();
                 let mut stops = Vec::new();
                 let mut next_s = from_s + every_s * draw(0.5, 1.5);
-                while next_s < until_s && stops.len() <= MOST_STOPS {
+                while next_s < until_s && stops.len() <= MAX_STOPS {
                     let length_s = draw(*shortest_s, *longest_s);
                     stops.push((next_s, length_s));
                     next_s += length_s + every_s * draw(0.5, 1.5);
@@ -55,7 +56,7 @@ impl StopsSpec {
             }
         };
         check(&stops, grip_s).map_err(|message| SpecError::about(source, "stops", message))?;
-        let mut grip = Steps::from_level(0.0);
+        let mut grip = SmoothSteps::from_level(0.0);
         for (at_s, length_s) in stops {
             grip.push(at_s + grip_s / 2.0, grip_s / 2.0, 1.0);
             grip.push(at_s + length_s - grip_s / 2.0, grip_s / 2.0, -1.0);
@@ -64,13 +65,13 @@ impl StopsSpec {
     }
 }
 
-/// Most stops in a run.
-const MOST_STOPS: usize = 100_000;
+/// Maximum number of stops in a run: a guard against a malformed spec.
+const MAX_STOPS: usize = 100_000;
 
-/// Checks that stops follow each other, and are long enough to grasp and let go.
+/// Checks that stops do not overlap, and that each is long enough to grasp and release.
 fn check(stops: &[(f64, f64)], grip_s: f64) -> Result<(), String> {
-    if stops.len() > MOST_STOPS {
-        return Err(format!("more than {MOST_STOPS} stops in one run; make them rarer, or the run shorter"));
+    if stops.len() > MAX_STOPS {
+        return Err(format!("more than {MAX_STOPS} stops in one run; increase every_s or shorten the run"));
     }
     let mut free_s = 0.0;
     for (index, &(at_s, length_s)) in stops.iter().enumerate() {
@@ -78,11 +79,11 @@ fn check(stops: &[(f64, f64)], grip_s: f64) -> Result<(), String> {
             return Err(format!("stop {index} (counted from 0) is at {at_s} s for {length_s} s, which is not finite"));
         }
         if length_s < 2.0 * grip_s {
-            return Err(format!("a stop of {length_s} s is too short to grasp and let go, {grip_s} s each"));
+            return Err(format!("a stop of {length_s} s is too short to grasp and release, {grip_s} s each"));
         }
         if at_s < free_s {
             return Err(format!(
-                "the stop at {at_s} s begins before {free_s} s, when the one before it (or nothing) ends"
+                "the stop at {at_s} s begins before {free_s} s, the end of the previous stop (or the start of the run)"
             ));
         }
         free_s = at_s + length_s;

@@ -1,62 +1,63 @@
-//! Walking along a route: a way with rounded corners, and the heading that goes with it.
+//! Following a route: a path with rounded corners, and the heading along it.
 
 use super::MotionError;
-use super::smooth::{PEAK, Steps, Way};
+use super::smooth::{PEAK, SmoothPath, SmoothSteps};
 use crate::geometry::{Route, Vector};
 use crate::spec::{Source, SpecError};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// How a walker follows a route.
+/// How a walker or a vehicle follows a route.
 ///
-/// The walk is the route at piecewise constant speed, convolved with a bump in time ([`super`]): corners are cut by at
-/// most `0.137 smoothing_s |change of velocity|`, and the speed never exceeds `speed_m_per_s`. At the end of an open
-/// route the walker turns round and goes back; a closed one is walked round and round.
+/// The motion is the route at piecewise constant speed, convolved in time with a smoothing kernel. Corners are cut by
+/// at most `0.137 smoothing_s |change of velocity|`, and the speed never exceeds `speed_m_per_s`. At the end of an open
+/// route the walker turns round and goes back; a closed route is repeated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WalkSpec {
-    /// Speed on the straight, m/s.
+    /// Speed on straight legs, m/s.
     #[serde(with = "crate::spec::checked::Positive")]
     pub speed_m_per_s: f64,
-    /// Speed about a corner of 90 degrees or more, m/s; about a smaller one in proportion nearer to the full speed.
+    /// Speed at a corner of 90 degrees or more, m/s. At a smaller corner the speed is interpolated linearly in the
+    /// angle.
     #[serde(with = "crate::spec::checked::Positive")]
     pub corner_speed_m_per_s: f64,
-    /// How far before and after a corner the walker is slow, m.
+    /// Distance before and after a corner over which the speed is reduced, m.
     #[serde(with = "crate::spec::checked::NonNegative")]
     pub corner_reach_m: f64,
-    /// Half-width of the bump that rounds the walk, s.
+    /// Half-width of the smoothing kernel, s. A larger value cuts corners more and accelerates more gently.
     #[serde(with = "crate::spec::checked::Positive")]
     pub smoothing_s: f64,
-    /// Least half-width of a turn of the body, s.
+    /// Minimum half-width of a turn in heading, s.
     #[serde(with = "crate::spec::checked::Positive")]
     pub turn_s: f64,
-    /// Greatest rate of a turn, degrees/s: greater turns take longer.
+    /// Maximum turn rate, degrees/s. A larger turn takes longer.
     #[serde(with = "crate::spec::checked::Positive")]
     pub turn_rate_deg_per_s: f64,
-    /// How much later than the walk the body turns, s.
+    /// Delay of the turn in heading after the turn of the path, s.
     #[serde(with = "crate::spec::checked::Finite")]
     pub turn_lag_s: f64,
 }
 
-/// Where a walker is, and which way they face.
+/// Motion along a route: position, heading and speed.
 #[derive(Debug, Clone)]
-pub(super) struct Walk {
-    /// The point on the floor.
-    pub way: Way,
-    /// The heading, rad, unwrapped.
-    pub heading: Steps,
-    /// The speed as a share of the full one.
-    pub speed_share: Steps,
+pub(super) struct RouteMotion {
+    /// Position on the floor, m.
+    pub path: SmoothPath,
+    /// Heading, rad, unwrapped.
+    pub heading: SmoothSteps,
+    /// Speed as a fraction of the full speed.
+    pub speed_fraction: SmoothSteps,
 }
 
-/// Most pieces of a way that are kept: 10 hours round a small room.
-const MOST_KNOTS: usize = 1 << 18;
+/// Maximum number of path segments: 10 hours of walking round a small room.
+const MAX_KNOTS: usize = 1 << 18;
 
-/// Two points of a route nearer than this are one.
-const SAME_PLACE_M: f64 = 1e-3;
+/// Two points of a route closer than this coincide, m: a leg of 1 mm has no useful direction.
+const SAME_POINT_M: f64 = 1e-3;
 
 impl WalkSpec {
-    /// Checks what concerns several fields.
+    /// Checks the relations between fields.
     pub(super) fn check(&self, source: &Source) -> Result<(), SpecError> {
         if self.corner_speed_m_per_s > self.speed_m_per_s {
             let message = format!(
@@ -68,28 +69,28 @@ impl WalkSpec {
         Ok(())
     }
 
-    /// The walk along `route` from `from_s` until `until_s` at least.
-    pub(super) fn along(&self, route: &Route, from_s: f64, until_s: f64) -> Result<Walk, MotionError> {
+    /// The motion along `route` from `from_s` until at least `until_s`.
+    pub(super) fn along(&self, route: &Route, from_s: f64, until_s: f64) -> Result<RouteMotion, MotionError> {
         check_route(route, self.speed_m_per_s * self.smoothing_s)?;
         let mut walker = Walker::new(self, route, from_s);
-        let order = visits(route.points_in_world.len(), route.closed);
+        let order = visit_order(route.points_in_world.len(), route.closed);
         for (next, after) in order {
-            walker.go(route.points_in_world[next], route.points_in_world[after]);
-            if walker.way.end_s() > until_s + self.smoothing_s {
+            walker.walk_to(route.points_in_world[next], route.points_in_world[after]);
+            if walker.path.end_s() > until_s + self.smoothing_s {
                 break;
             }
-            if walker.way.knots() > MOST_KNOTS {
-                return Err(MotionError::TooLong { duration_s: until_s, most: MOST_KNOTS });
+            if walker.path.knots() > MAX_KNOTS {
+                return Err(MotionError::TooLong { duration_s: until_s, most: MAX_KNOTS });
             }
         }
-        let speed_share = walker.way.speed_share(self.speed_m_per_s);
-        Ok(Walk { way: walker.way, heading: walker.heading, speed_share })
+        let speed_fraction = walker.path.speed_fraction(self.speed_m_per_s);
+        Ok(RouteMotion { path: walker.path, heading: walker.heading, speed_fraction })
     }
 
-    /// The speed about a corner that turns by `angle` rad.
+    /// Speed at a corner that turns by `angle` rad, m/s.
     fn corner_speed(&self, angle: f64) -> f64 {
-        let share = (angle / FRAC_PI_2).min(1.0);
-        self.speed_m_per_s + (self.corner_speed_m_per_s - self.speed_m_per_s) * share
+        let fraction = (angle / FRAC_PI_2).min(1.0);
+        self.speed_m_per_s + (self.corner_speed_m_per_s - self.speed_m_per_s) * fraction
     }
 
     /// Half-width of a turn by `angle` rad, s.
@@ -98,9 +99,9 @@ impl WalkSpec {
     }
 }
 
-/// The points that a walker who stands on point 0 visits, each with the one after it, for ever: round a closed route,
-/// to and fro on an open one.
-fn visits(points: usize, closed: bool) -> impl Iterator<Item = (usize, usize)> {
+/// Pairs (point, following point) in the order of visit, without end, for a walker that starts at point 0: round a
+/// closed route, back and forth on an open one.
+fn visit_order(points: usize, closed: bool) -> impl Iterator<Item = (usize, usize)> {
     let period = if closed { points } else { 2 * (points - 1) };
     let point = move |visit: usize| {
         let k = visit % period;
@@ -109,7 +110,7 @@ fn visits(points: usize, closed: bool) -> impl Iterator<Item = (usize, usize)> {
     (1..).map(move |visit| (point(visit), point(visit + 1)))
 }
 
-/// Checks that a route can be followed: `shortest_m` and more of it, no point twice in a row.
+/// Checks that a route is at least `shortest_m` long, and that no two successive points coincide.
 fn check_route(route: &Route, shortest_m: f64) -> Result<(), MotionError> {
     let points = &route.points_in_world;
     if points.len() < if route.closed { 3 } else { 2 } {
@@ -123,7 +124,7 @@ fn check_route(route: &Route, shortest_m: f64) -> Result<(), MotionError> {
     for first in 0..legs {
         let second = (first + 1) % points.len();
         let gap_m = (points[second] - points[first]).norm();
-        if gap_m < SAME_PLACE_M {
+        if gap_m < SAME_POINT_M {
             return Err(MotionError::RouteRepeats { first, second, gap_m });
         }
         length_m += gap_m;
@@ -134,12 +135,12 @@ fn check_route(route: &Route, shortest_m: f64) -> Result<(), MotionError> {
     Ok(())
 }
 
-/// Someone half-way through a walk.
+/// A walk under construction.
 struct Walker<'a> {
     spec: &'a WalkSpec,
-    way: Way,
-    heading: Steps,
-    /// Speed about the corner where the walker stands.
+    path: SmoothPath,
+    heading: SmoothSteps,
+    /// Speed at the corner at which the walker is, m/s.
     corner_m_per_s: f64,
     turns: usize,
 }
@@ -147,20 +148,20 @@ struct Walker<'a> {
 impl<'a> Walker<'a> {
     fn new(spec: &'a WalkSpec, route: &Route, from_s: f64) -> Self {
         let start = route.points_in_world[0];
-        let ways = route.points_in_world.iter().map(|point| point - start);
-        let heading = ways.filter_map(|way| heading_of(&way)).next().unwrap_or(0.0);
+        let offsets = route.points_in_world.iter().map(|point| point - start);
+        let heading = offsets.filter_map(|offset| heading_of(&offset)).next().unwrap_or(0.0);
         Self {
             spec,
-            way: Way::new(start, from_s + spec.smoothing_s, spec.smoothing_s),
-            heading: Steps::from_level(heading),
+            path: SmoothPath::new(start, from_s + spec.smoothing_s, spec.smoothing_s),
+            heading: SmoothSteps::from_level(heading),
             corner_m_per_s: spec.speed_m_per_s,
             turns: 0,
         }
     }
 
-    /// Walks to `next`, and turns there towards `after`.
-    fn go(&mut self, next: Vector, after: Vector) {
-        let start = self.way.end();
+    /// Adds the leg to `next`, and the turn there towards `after`.
+    fn walk_to(&mut self, next: Vector, after: Vector) {
+        let start = self.path.end();
         let (leg, leaving) = (next - start, after - next);
         let angle = leg.angle(&leaving);
         let turns_round = angle > PI - 1e-6;
@@ -170,40 +171,40 @@ impl<'a> Walker<'a> {
         let slow_m = self.spec.corner_reach_m.min(length_m / 2.0);
         let fast_m = length_m - 2.0 * slow_m;
         if slow_m > 0.0 {
-            self.way.go(start + leg * (slow_m / length_m), slow_m / self.corner_m_per_s);
+            self.path.move_to(start + leg * (slow_m / length_m), slow_m / self.corner_m_per_s);
         }
         if fast_m > 1e-9 {
-            self.way.go(start + leg * ((length_m - slow_m) / length_m), fast_m / self.spec.speed_m_per_s);
+            self.path.move_to(start + leg * ((length_m - slow_m) / length_m), fast_m / self.spec.speed_m_per_s);
         }
         if slow_m > 0.0 {
-            self.way.go(next, slow_m / ahead_m_per_s);
+            self.path.move_to(next, slow_m / ahead_m_per_s);
         }
         self.corner_m_per_s = ahead_m_per_s;
         if turns_round { self.turn_round() } else { self.turn_to(&leaving) }
     }
 
-    /// Turns about on the spot, to the left and to the right by turns.
+    /// Adds a turn by 180 degrees on the spot, alternately to the left and to the right.
     fn turn_round(&mut self) {
         let half_s = self.spec.turn_half_s(PI);
-        let middle_s = self.way.end_s() + half_s / 2.0 + self.spec.turn_lag_s;
-        self.way.go(self.way.end(), half_s);
+        let middle_s = self.path.end_s() + half_s / 2.0 + self.spec.turn_lag_s;
+        self.path.move_to(self.path.end(), half_s);
         self.heading.push(middle_s, half_s, if self.turns.is_multiple_of(2) { PI } else { -PI });
         self.turns += 1;
     }
 
-    /// Turns the body towards `leaving`, the shorter way; a leg straight up or down keeps the heading.
+    /// Adds a turn of the heading towards `leaving` through the smaller angle. A vertical leg keeps the heading.
     fn turn_to(&mut self, leaving: &Vector) {
         let Some(new) = heading_of(leaving) else { return };
         let change = (new - self.heading.last() + PI).rem_euclid(TAU) - PI;
         if change != 0.0 {
-            self.heading.push(self.way.end_s() + self.spec.turn_lag_s, self.spec.turn_half_s(change), change);
+            self.heading.push(self.path.end_s() + self.spec.turn_lag_s, self.spec.turn_half_s(change), change);
         }
     }
 }
 
-/// The heading of a direction, rad; `None` for straight up or down.
-fn heading_of(way: &Vector) -> Option<f64> {
-    (way.xy().norm() > 1e-6).then(|| way.y.atan2(way.x))
+/// Heading of a direction, rad; `None` for a vertical one.
+fn heading_of(direction: &Vector) -> Option<f64> {
+    (direction.xy().norm() > 1e-6).then(|| direction.y.atan2(direction.x))
 }
 
 #[cfg(test)]
@@ -211,11 +212,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_open_route_is_walked_to_and_fro_and_a_closed_one_round() {
-        let first = |points, closed| visits(points, closed).take(5).map(|(next, _)| next).collect::<Vec<_>>();
+    fn an_open_route_is_walked_back_and_forth_and_a_closed_one_round() {
+        let first = |points, closed| visit_order(points, closed).take(5).map(|(next, _)| next).collect::<Vec<_>>();
         assert_eq!(first(3, false), [1, 2, 1, 0, 1]);
         assert_eq!(first(2, false), [1, 0, 1, 0, 1]);
         assert_eq!(first(3, true), [1, 2, 0, 1, 2]);
-        assert_eq!(visits(3, false).nth(1), Some((2, 1)));
+        assert_eq!(visit_order(3, false).nth(1), Some((2, 1)));
     }
 }

@@ -1,138 +1,135 @@
 use crate::geometry::TrajectoryError;
 use std::path::PathBuf;
 
-/// What is wrong with a recording, a trajectory file or a cloud file.
+/// Error of reading or writing a recording, a trajectory, a point cloud or a surfel map.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The file cannot be opened or made.
+    /// The file cannot be opened or created.
     #[error("{}: {source}", path.display())]
     File {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Reading went wrong midway.
+    /// A read failed after the file was opened.
     #[error("reading stopped: {0}")]
     Read(std::io::Error),
-    /// Writing went wrong midway.
-    #[error("writing stopped: {0}; what was written before can be read")]
+    /// A write failed after the file was created.
+    #[error("writing stopped: {0}; the part written before is readable")]
     Write(std::io::Error),
-    /// The file is not a recording that is read here.
+    /// The file is not a recording in a supported format.
     #[error("{name}: {found}, not an MCAP file, a ROS 1 bag or a rosbag2 database; {remedy}")]
     NotRecording {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// What it seems to be.
+        /// Detected type of the file.
         found: String,
-        /// How to make a recording of it.
+        /// How to convert it into a recording.
         remedy: String,
     },
-    /// A folder that is not one recording.
+    /// The folder does not contain exactly one recording.
     #[error("{}: the folder {problem}", path.display())]
     Folder {
-        /// Which folder.
+        /// Path of the folder.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the problem.
         problem: String,
     },
     /// An SQLite database that rosbag2 did not write, or that is damaged.
     #[error(
-        "{name}: not a readable rosbag2 database: {problem}; `sqlite3 {name} .recover` makes a new one of what is left"
+        "{name}: not a readable rosbag2 database: {problem}; recover the readable rows with `sqlite3 {name} .recover`"
     )]
     Database {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// What is wrong.
+        /// Description of the problem.
         problem: String,
     },
-    /// A value that a message cannot hold.
+    /// A value exceeds what the message format can represent.
     #[error("{what} is {value}, but {limit}")]
     Unwritable {
-        /// Which value.
+        /// Name of the value.
         what: &'static str,
-        /// What it is.
+        /// The value.
         value: String,
-        /// What the message can hold.
+        /// Limit of the format.
         limit: &'static str,
     },
-    /// The recording has no messages of a sensor that is needed.
+    /// The recording has no messages of a required sensor.
     #[error("{name}: no {sensor} in the recording ({needs}); it has {has}")]
     NoSensor {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// Which sensor: "lidar" or "IMU".
+        /// Sensor: "lidar" or "IMU".
         sensor: &'static str,
-        /// Which message types would do.
+        /// Message types that are supported.
         needs: &'static str,
-        /// The topics that are there.
+        /// Topics of the recording.
         has: String,
     },
-    /// The recording has topics of a sensor, and none of them can be used.
+    /// The recording has topics of the sensor, but none is usable.
     #[error("{name}: no {sensor} topic can be used: {reasons}")]
     Unusable {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// Which sensor: "lidar" or "IMU".
+        /// Sensor: "lidar" or "IMU".
         sensor: &'static str,
         /// The topics, each with the reason.
         reasons: String,
     },
-    /// The IMU's messages lack what an estimate needs.
+    /// The IMU's messages lack data that an estimate needs.
     #[error("{name}: IMU topic {topic} {problem}")]
     Imu {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// Which topic.
+        /// Name of the topic.
         topic: String,
-        /// What is wrong.
+        /// Description of the problem.
         problem: String,
     },
-    /// A topic that was asked for is not there, or carries another type.
+    /// A requested topic is missing or has another type.
     #[error("{name}: topic {topic} {problem}; it has {has}")]
     Topic {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// Which topic.
+        /// Name of the topic.
         topic: String,
-        /// What is the matter with it.
+        /// Description of the problem.
         problem: String,
-        /// The topics that are there.
+        /// Topics of the recording.
         has: String,
     },
-    /// A recording of which all is needed, and not all can be read.
-    #[error(
-        "{name}: the recording is cut short or damaged, so that poses may be missing; `mcap recover` makes a whole one of what is \
-         left"
-    )]
+    /// The recording is incomplete, but all of it is needed.
+    #[error("{name}: the recording is cut short or damaged, so poses may be missing; repair it with `mcap recover`")]
     NotWhole {
-        /// Which file.
+        /// Name of the file.
         name: String,
     },
-    /// The tree of `/tf_static` does not lead where it must.
+    /// The transform tree of `/tf_static` is not usable.
     #[error("{name}: /tf_static {problem}")]
     Frames {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// What is the matter.
+        /// Description of the problem.
         problem: String,
     },
-    /// A line or a part of a text or cloud file that does not say what it must.
+    /// A line or an element of a text or cloud file is invalid.
     #[error("{name}:{line}: {problem}")]
     Line {
-        /// Which file.
+        /// Name of the file.
         name: String,
-        /// Which line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong there.
+        /// Description of the problem.
         problem: String,
     },
-    /// Poses that are not a trajectory.
+    /// Poses that do not form a trajectory.
     #[error("{name}: {source}")]
     Trajectory {
-        /// Which file or topic.
+        /// Name of the file or topic.
         name: String,
-        /// Why.
+        /// Cause.
         source: TrajectoryError,
     },
 }

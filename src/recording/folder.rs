@@ -1,4 +1,4 @@
-//! The files of a recording that is a folder, as rosbag2 makes them.
+//! Files of a recording that is a folder, as rosbag2 writes them.
 
 use crate::recording::RecordingError;
 use serde::Deserialize;
@@ -6,20 +6,20 @@ use std::ffi::OsStr;
 use std::io::{Error, Read};
 use std::path::{Path, PathBuf};
 
-/// Endings of files of recordings.
-const ENDINGS: [&str; 3] = ["mcap", "db3", "bag"];
+/// Extensions of recording files.
+const EXTENSIONS: [&str; 3] = ["mcap", "db3", "bag"];
 
-/// Ending of files that rosbag2 compressed as a whole.
-const COMPRESSED: &str = "zstd";
+/// Extension of files that rosbag2 compressed as a whole.
+const COMPRESSED_EXTENSION: &str = "zstd";
 
-/// What rosbag2 writes beside a recording.
-const METADATA: &str = "metadata.yaml";
+/// Metadata file that rosbag2 writes into the folder.
+const METADATA_FILE: &str = "metadata.yaml";
 
-/// Greatest length of `metadata.yaml`, bytes: its quality of service takes most of it.
-const LONGEST_METADATA: u64 = 16 << 20;
+/// Maximum length of `metadata.yaml`, bytes; quality-of-service settings dominate it.
+const MAX_METADATA_BYTES: u64 = 16 << 20;
 
-/// Most files of a recording.
-const MOST_FILES: usize = 1 << 16;
+/// Maximum number of files of a recording.
+const MAX_FILES: usize = 1 << 16;
 
 #[derive(Deserialize)]
 struct Metadata {
@@ -32,105 +32,113 @@ struct Information {
     relative_file_paths: Vec<String>,
 }
 
-/// The files of the recording at `path`, in the order in which they were recorded: `path` itself where it is a file;
-/// of a folder those that its `metadata.yaml` names, or else the only recording in it.
+/// Lists the files of the recording at `path`, in the order in which they were recorded.
+///
+/// A file is returned as it is. For a folder these are the files in its `metadata.yaml`, or else the only recording in
+/// it.
 ///
 /// # Errors
-/// When the folder cannot be read, a file is missing or compressed, or it is open which recording is meant.
-pub fn files_of(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+/// When the folder cannot be read, a file is missing or compressed, or the folder contains several recordings.
+pub fn list_files(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);
     }
-    let folder = |problem: String| RecordingError::Folder { path: path.to_owned(), problem };
-    let named = named_by_metadata(path)?;
-    let files = if named.is_empty() { found_in(path)? } else { named };
-    if files.len() > MOST_FILES {
-        return Err(folder(format!("names {} files, more than the {MOST_FILES} that are read", files.len())));
+    let folder_error = |problem: String| RecordingError::Folder { path: path.to_owned(), problem };
+    let listed = files_in_metadata(path)?;
+    let files = if listed.is_empty() { find_files(path)? } else { listed };
+    if files.len() > MAX_FILES {
+        return Err(folder_error(format!("lists {} files, but at most {MAX_FILES} are supported", files.len())));
     }
-    if let Some(compressed) = files.iter().find(|file| file.extension() == Some(OsStr::new(COMPRESSED))) {
+    if let Some(compressed) = files.iter().find(|file| file.extension() == Some(OsStr::new(COMPRESSED_EXTENSION))) {
         let name = compressed.display();
-        return Err(folder(format!(
-            "has {name}, a file compressed as a whole; decompress it with `zstd -d --rm {name}`"
-        )));
+        return Err(folder_error(format!("has the compressed file {name}; decompress it with `zstd -d --rm {name}`")));
     }
     Ok(files)
 }
 
-/// The files that `metadata.yaml` names; none where there is no such file, or it names none.
-fn named_by_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
-    let metadata = path.join(METADATA);
+/// Files listed in `metadata.yaml`; empty if there is no such file, or it lists none.
+fn files_in_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+    let metadata = path.join(METADATA_FILE);
     let Ok(file) = std::fs::File::open(&metadata) else { return Ok(Vec::new()) };
     let mut text = String::new();
     let length = file
-        .take(LONGEST_METADATA + 1)
+        .take(MAX_METADATA_BYTES + 1)
         .read_to_string(&mut text)
         .map_err(|source| RecordingError::File { path: metadata.clone(), source })?;
-    let broken = |problem: String| RecordingError::Folder {
+    let metadata_error = |problem: String| RecordingError::Folder {
         path: path.to_owned(),
         problem: format!(
-            "has a {METADATA} that cannot be read ({problem}); write it anew with `ros2 bag reindex {}`",
+            "has an unreadable {METADATA_FILE} ({problem}); regenerate it with `ros2 bag reindex {}`",
             path.display()
         ),
     };
-    if length as u64 > LONGEST_METADATA {
-        return Err(broken("it is longer than 16 MiB".to_owned()));
+    if length as u64 > MAX_METADATA_BYTES {
+        return Err(metadata_error("it is longer than 16 MiB".to_owned()));
     }
     if text.trim().is_empty() {
         return Ok(Vec::new());
     }
     let parsed: Metadata =
-        serde_saphyr::from_str(&text).map_err(|error| broken(error.without_snippet().to_string()))?;
+        serde_saphyr::from_str(&text).map_err(|error| metadata_error(error.without_snippet().to_string()))?;
     let names =
         parsed.rosbag2_bagfile_information.map(|information| information.relative_file_paths).unwrap_or_default();
-    names.iter().map(|name| named_file(path, name)).collect()
+    names.iter().map(|name| find_listed_file(path, name)).collect()
 }
 
-/// The file that metadata call `name`: old versions name it with its folder, and a compressed one may have been
-/// decompressed since.
-fn named_file(folder: &Path, name: &str) -> Result<PathBuf, RecordingError> {
+/// Finds the file listed as `name`.
+///
+/// Old versions of rosbag2 include the folder in the name, and a compressed file may have been decompressed since.
+fn find_listed_file(folder: &Path, name: &str) -> Result<PathBuf, RecordingError> {
     let file = Path::new(name).file_name().map(|name| folder.join(name));
-    let decompressed = file.as_ref().filter(|file| file.extension() == Some(OsStr::new(COMPRESSED)));
+    let decompressed = file.as_ref().filter(|file| file.extension() == Some(OsStr::new(COMPRESSED_EXTENSION)));
     let decompressed = decompressed.map(|file| file.with_extension(""));
     [decompressed, file].into_iter().flatten().find(|file| file.is_file()).ok_or_else(|| RecordingError::Folder {
         path: folder.to_owned(),
-        problem: format!("has no file `{}`, which its {METADATA} names", crate::recording::topics::printable(name)),
+        problem: format!(
+            "lacks the file `{}`, which its {METADATA_FILE} lists",
+            crate::recording::topics::printable(name)
+        ),
     })
 }
 
-/// The recording in a folder without metadata: one file, or several of one name that are numbered.
-fn found_in(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+/// Finds the recording in a folder without metadata: one file, or several numbered files of one name.
+fn find_files(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let at = |source: Error| RecordingError::File { path: path.to_owned(), source };
     let entries = std::fs::read_dir(path).map_err(at)?.collect::<Result<Vec<_>, _>>().map_err(at)?;
     let mut files: Vec<_> = entries.into_iter().map(|entry| entry.path()).filter(|file| is_recording(file)).collect();
-    files.sort_by_key(|file| (numbered(file).map(|(stem, number, _)| (stem, number)), file.clone()));
+    files.sort_by_key(|file| (parse_split_name(file).map(|(stem, number, _)| (stem, number)), file.clone()));
     let problem = match files.len() {
-        0 => format!("has no recording in it ({})", ENDINGS.map(|ending| format!(".{ending}")).join(", ")),
+        0 => format!("contains no recording ({})", EXTENSIONS.map(|ending| format!(".{ending}")).join(", ")),
         1 => return Ok(files),
-        _ if is_split(&files) => return Ok(files),
+        _ if is_split_recording(&files) => return Ok(files),
         count => {
             let names: Vec<_> = files.iter().map(|file| file.display().to_string()).collect();
-            format!("has {count} recordings in it, name one of them: {}", names.join(", "))
+            format!("contains {count} recordings; specify one of them: {}", names.join(", "))
         }
     };
     Err(RecordingError::Folder { path: path.to_owned(), problem })
 }
 
 fn is_recording(file: &Path) -> bool {
-    let whole =
-        if file.extension() == Some(OsStr::new(COMPRESSED)) { file.with_extension("") } else { file.to_owned() };
-    whole.extension().and_then(OsStr::to_str).is_some_and(|ending| ENDINGS.contains(&ending)) && file.is_file()
+    let uncompressed = if file.extension() == Some(OsStr::new(COMPRESSED_EXTENSION)) {
+        file.with_extension("")
+    } else {
+        file.to_owned()
+    };
+    uncompressed.extension().and_then(OsStr::to_str).is_some_and(|ending| EXTENSIONS.contains(&ending))
+        && file.is_file()
 }
 
-/// The name of a split recording's file before its number, the number, and its ending.
-fn numbered(file: &Path) -> Option<(String, u64, String)> {
+/// Stem before the number, number and extension of a split recording's file.
+fn parse_split_name(file: &Path) -> Option<(String, u64, String)> {
     let ending = file.extension()?.to_str()?.to_owned();
     let (stem, number) = file.file_stem()?.to_str()?.rsplit_once('_')?;
     Some((stem.to_owned(), number.parse().ok()?, ending))
 }
 
-/// Whether sorted files are those of one recording: of one name and ending, and numbered.
-fn is_split(files: &[PathBuf]) -> bool {
-    let names: Option<Vec<_>> = files.iter().map(|file| numbered(file)).collect();
+/// Whether sorted files form one split recording: same stem and extension, increasing numbers.
+fn is_split_recording(files: &[PathBuf]) -> bool {
+    let names: Option<Vec<_>> = files.iter().map(|file| parse_split_name(file)).collect();
     names.is_some_and(|names| {
         names.windows(2).all(|pair| pair[0].0 == pair[1].0 && pair[0].2 == pair[1].2 && pair[0].1 < pair[1].1)
     })

@@ -1,4 +1,4 @@
-//! What a recording holds: topics, rates, gaps, and what its clocks do.
+//! Summary of a recording: topics, rates, gaps and clock statistics.
 
 mod clock;
 mod intervals;
@@ -14,69 +14,69 @@ use intervals::Intervals;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What a recording holds.
+/// Summary of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordingInfo {
-    /// The file.
+    /// File name.
     pub name: String,
-    /// Bytes in it.
+    /// File size, bytes.
     pub length_bytes: u64,
-    /// From the first message's log time to the last's, s.
+    /// Log time of the last message minus that of the first, s.
     pub duration_s: f64,
-    /// Messages that could be read.
+    /// Number of readable messages.
     pub messages: u64,
-    /// Whether zsim's manifest is in it.
+    /// Whether the file contains zsim's manifest.
     pub has_manifest: bool,
-    /// The topics, by name.
+    /// Topics, sorted by name.
     pub topics: Vec<TopicInfo>,
-    /// What could not be read.
+    /// Data that could not be read.
     pub loss: Loss,
 }
 
-/// What a topic holds.
+/// Summary of a topic.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TopicInfo {
-    /// Its name.
+    /// Topic name.
     pub topic: String,
-    /// Type of its messages.
+    /// Message type.
     pub type_name: String,
-    /// Encoding of its messages.
+    /// Message encoding.
     pub encoding: String,
-    /// How many could be read.
+    /// Number of readable messages.
     pub messages: u64,
-    /// Log time of the first, ns.
+    /// Log time of the first message, ns.
     pub first_log_ns: Option<i64>,
-    /// Log time of the last, ns.
+    /// Log time of the last message, ns.
     pub last_log_ns: Option<i64>,
-    /// How often they come, Hz, at the start.
+    /// Message rate at the start, Hz.
     pub rate_hz: Option<f64>,
-    /// How their stamps lie about that: `regular`, `delayed`, `bursts` or `irregular`.
+    /// Pattern of the stamps about that rate: `regular`, `delayed`, `bursts` or `irregular`.
     pub pattern: Option<&'static str>,
-    /// Longest time between one and the next, s.
+    /// Longest interval between consecutive messages, s.
     pub longest_gap_s: Option<f64>,
-    /// Times between one and the next beyond the length that was asked for.
+    /// Number of intervals longer than the requested gap length.
     pub gaps: u64,
-    /// How many seem to be missing: what the rate would have put into the longer intervals.
+    /// Estimated number of missing messages, from the rate and the longer intervals.
     pub missing: u64,
-    /// How many are stamped before the one that came before them.
+    /// Number of messages stamped before their predecessor.
     pub out_of_order: u64,
-    /// What the stamps say against the log times; of topics whose messages are stamped.
+    /// Clock of the stamps relative to log time; only for messages with stamps.
     pub clock: Option<ClockStatistics>,
 }
 
-/// Stamps against log times: `stamp - log = offset + drift (log - first log) + jitter`.
+/// Fit of stamps to log times: `stamp - log = offset + drift (log - first log) + jitter`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ClockStatistics {
-    /// At the first message, s; positive where stamps are ahead.
+    /// Offset at the first message, s; positive if stamps are ahead.
     pub offset_s: f64,
-    /// Parts per million; positive where the stamps' clock is fast.
+    /// Drift, parts per million; positive if the clock of the stamps is fast.
     pub drift_ppm: f64,
-    /// Standard deviation about the line, s.
+    /// Standard deviation of the residuals, s.
     pub jitter_s: f64,
 }
 
-/// What is gathered of a topic while messages go by.
-struct Gathered {
+/// Accumulates the statistics of a topic.
+struct TopicAccumulator {
     messages: u64,
     first: Option<Stamp>,
     last: Option<Stamp>,
@@ -84,12 +84,12 @@ struct Gathered {
     clock: Option<ClockFit>,
 }
 
-impl Gathered {
+impl TopicAccumulator {
     fn new() -> Self {
         Self { messages: 0, first: None, last: None, intervals: Intervals::default(), clock: None }
     }
 
-    /// Counts a message; intervals are of stamps where there are, as log times bunch up.
+    /// Counts a message. Intervals are between stamps if there are any, because log times are bunched.
     fn add(&mut self, message: &RawMessage<'_>, channel: &Channel, gap: Span) {
         let log = Stamp::from_nanos(i64::try_from(message.log_time_ns).unwrap_or(i64::MAX));
         self.messages += 1;
@@ -104,33 +104,34 @@ impl Gathered {
 }
 
 impl Reader {
-    /// Reads all of the recording, and tells what is in it. Between messages of a topic, more than `gap` is a gap.
+    /// Reads the whole recording and summarises it. An interval longer than `gap` counts as a gap.
     ///
     /// # Errors
     /// When the file cannot be read.
     pub fn info(&self, gap: Span) -> Result<RecordingInfo, RecordingError> {
-        // A topic is one channel in each file of a split recording.
-        let mut firsts = BTreeMap::new();
+        // In a split recording a topic has one channel per file.
+        let mut first_ids = BTreeMap::new();
         let mut known: BTreeMap<ChannelId, (ChannelId, &Channel)> = BTreeMap::new();
         for channel in self.channels() {
-            let first = *firsts.entry((&channel.topic, &channel.type_name)).or_insert(channel.id);
+            let first = *first_ids.entry((&channel.topic, &channel.type_name)).or_insert(channel.id);
             known.insert(channel.id, (first, channel));
         }
-        let mut gathered: BTreeMap<ChannelId, Gathered> = firsts.values().map(|id| (*id, Gathered::new())).collect();
+        let mut accumulators: BTreeMap<ChannelId, TopicAccumulator> =
+            first_ids.values().map(|id| (*id, TopicAccumulator::new())).collect();
         let mut loss = self.loss().clone();
         let mut messages = self.messages();
         while let Some(message) = messages.next()? {
             let channel = known.get(&message.channel);
-            match channel.and_then(|(first, channel)| Some((channel, gathered.get_mut(first)?))) {
+            match channel.and_then(|(first, channel)| Some((channel, accumulators.get_mut(first)?))) {
                 Some((channel, topic)) => topic.add(&message, channel, gap),
                 None => loss.unreadable_messages += 1,
             }
         }
         loss.add_pass(&messages, self.expected_messages());
-        let first = gathered.values().filter_map(|topic| topic.first).min();
-        let last = gathered.values().filter_map(|topic| topic.last).max();
+        let first = accumulators.values().filter_map(|topic| topic.first).min();
+        let last = accumulators.values().filter_map(|topic| topic.last).max();
         let mut topics: Vec<_> =
-            self.channels().iter().filter_map(|c| Some(topic_info(c, gathered.remove(&c.id)?))).collect();
+            self.channels().iter().filter_map(|c| Some(topic_info(c, accumulators.remove(&c.id)?))).collect();
         topics.sort_by(|a, b| a.topic.cmp(&b.topic));
         Ok(RecordingInfo {
             name: self.name().to_owned(),
@@ -144,31 +145,31 @@ impl Reader {
     }
 }
 
-fn topic_info(channel: &Channel, gathered: Gathered) -> TopicInfo {
-    let intervals = gathered.intervals.finish();
+fn topic_info(channel: &Channel, accumulator: TopicAccumulator) -> TopicInfo {
+    let intervals = accumulator.intervals.finish();
     TopicInfo {
         topic: channel.topic.clone(),
         type_name: channel.type_name.clone(),
         encoding: channel.encoding.clone(),
-        messages: gathered.messages,
-        first_log_ns: gathered.first.map(Stamp::nanos),
-        last_log_ns: gathered.last.map(Stamp::nanos),
+        messages: accumulator.messages,
+        first_log_ns: accumulator.first.map(Stamp::nanos),
+        last_log_ns: accumulator.last.map(Stamp::nanos),
         rate_hz: intervals.period.map(|period| 1.0 / period.seconds()),
         pattern: intervals.pattern.map(StampPattern::name),
         longest_gap_s: intervals.longest.map(Span::seconds),
         gaps: intervals.gaps,
         missing: intervals.missing,
         out_of_order: intervals.out_of_order,
-        clock: gathered.clock.and_then(|fit| fit.statistics()),
+        clock: accumulator.clock.and_then(|fit| fit.statistics()),
     }
 }
 
-/// The stamp that a message begins with, where its type has one.
+/// Stamp at the start of a message, if the type has one.
 fn stamp_of(message: &RawMessage<'_>, channel: &Channel) -> Option<Stamp> {
     channel.wire?;
     let mut input = Decoder::new(message.data).ok()?;
     if MessageType::Transforms.is_named(&channel.type_name) {
-        // The stamp of the first transform, behind their number.
+        // The stamp of the first transform, after the number of transforms.
         let count = input.u32().ok()?;
         return if count > 0 { input.time().ok() } else { None };
     }

@@ -1,4 +1,6 @@
-//! Clouds as LAS 1.4, for surveyors: point format 6 (ASPRS LAS specification 1.4 R15), and the error in extra bytes.
+//! Point clouds as LAS 1.4 for surveying.
+//!
+//! Point format 6 (ASPRS LAS specification 1.4 R15), with the error in extra bytes.
 
 use crate::recording::{CloudPoint, RecordingError};
 use crate::time::Stamp;
@@ -7,59 +9,61 @@ use las::{Builder, Point, Transform, Vector, Vlr};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::sync::{Arc, OnceLock};
 
-/// Coordinates are whole multiples of this, m.
+/// Resolution of the coordinates, m.
 const SCALE_M: f64 = 1e-4;
-/// Greatest coordinate that fits then, m.
-const FARTHEST_M: f64 = 214_000.0;
-/// Who defines the records that say what is in the file.
-const SPECIFIED_BY: &str = "LASF_Spec";
-/// Record of a text about the file.
+/// Maximum coordinate at this resolution, m: below 2^31 times the resolution.
+const MAX_COORDINATE_M: f64 = 214_000.0;
+/// User id of records defined by the LAS specification.
+const USER_ID: &str = "LASF_Spec";
+/// Record id of a text description.
 const TEXT_RECORD: u16 = 3;
-/// Record of what extra bytes are.
+/// Record id of the extra bytes' description.
 const EXTRA_BYTES_RECORD: u16 = 4;
-/// What the columns are; LAS knows no other clock than that of GPS.
-const ABOUT: &str = "metres in the map; gps_time is seconds on the lidar's clock; intensity in the sensor's unit, rounded; \
+/// Description of the columns; LAS has no other time than GPS time.
+const DESCRIPTION: &str = "metres in the map; gps_time is seconds on the lidar's clock; intensity in the sensor's unit, rounded; \
                      error (extra bytes) is the standard deviation of the point's place, metres";
 
-/// Writes points as they come: x, y, z to a tenth of a millimetre, intensity rounded to a whole number from 0 to 65535,
-/// the lidar's time in seconds as GPS time, and `error` in metres as an extra dimension.
+/// Writes points sequentially.
+///
+/// x, y, z to 0.1 mm, intensity rounded to an integer from 0 to 65535, the lidar's time in seconds as GPS time, and
+/// `error` in metres as an extra dimension.
 pub struct LasWriter<W: Write + Seek + Send + Sync + 'static> {
-    writer: las::Writer<Patient<BufWriter<W>>>,
+    writer: las::Writer<DeferredErrors<BufWriter<W>>>,
     failure: Arc<OnceLock<io::Error>>,
 }
 
 impl<W: Write + Seek + Send + Sync + 'static> LasWriter<W> {
-    /// Begins to write at the start of `out`.
+    /// Starts to write at the start of `out`.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn new(out: W) -> Result<Self, RecordingError> {
         let failure = Arc::new(OnceLock::new());
-        let out = Patient { out: BufWriter::with_capacity(1 << 16, out), failure: failure.clone() };
-        let writer = header().and_then(|header| las::Writer::new(out, header)).map_err(unwritten)?;
-        let begun = Self { writer, failure };
-        begun.check()?;
-        Ok(begun)
+        let out = DeferredErrors { out: BufWriter::with_capacity(1 << 16, out), failure: failure.clone() };
+        let writer = header().and_then(|header| las::Writer::new(out, header)).map_err(write_error)?;
+        let started = Self { writer, failure };
+        started.check()?;
+        Ok(started)
     }
 
     /// Writes a point.
     ///
     /// # Errors
-    /// When it cannot be written, or is farther from the origin than the format goes.
+    /// When it cannot be written, or a coordinate exceeds the range of the format.
     pub fn point(&mut self, point: &CloudPoint) -> Result<(), RecordingError> {
         let p = point.point_in_map.cast::<f64>();
-        if let Some(far) = p.iter().find(|x| x.is_nan() || x.abs() > FARTHEST_M) {
+        if let Some(outside) = p.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE_M) {
             return Err(RecordingError::Unwritable {
                 what: "a coordinate of a point",
-                value: format!("{far} m"),
-                limit: "LAS files of ours hold up to 214 km; write PLY instead",
+                value: format!("{outside} m"),
+                limit: "the LAS output is limited to 214 km; write PLY instead",
             });
         }
         let row = Point {
             x: p.x,
             y: p.y,
             z: p.z,
-            // What is outside is put at the end, what is no number at 0.
+            // The conversion saturates; NaN becomes 0.
             intensity: point.intensity.round() as u16,
             return_number: 1,
             number_of_returns: 1,
@@ -67,16 +71,16 @@ impl<W: Write + Seek + Send + Sync + 'static> LasWriter<W> {
             extra_bytes: point.error_m.to_le_bytes().to_vec(),
             ..Point::default()
         };
-        self.writer.write_point(row).map_err(unwritten)?;
+        self.writer.write_point(row).map_err(write_error)?;
         self.check()
     }
 
-    /// Writes what is left, and into the header what is known at the end.
+    /// Flushes the points and completes the header.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn finish(mut self) -> Result<(), RecordingError> {
-        self.writer.close().map_err(unwritten)?;
+        self.writer.close().map_err(write_error)?;
         self.check()
     }
 
@@ -94,19 +98,19 @@ fn header() -> las::Result<las::Header> {
     builder.generating_software = concat!("zsim ", env!("CARGO_PKG_VERSION")).to_owned();
     builder.system_identifier = "OTHER".to_owned();
     let record = |record_id: u16, description: &str, data: Vec<u8>| Vlr {
-        user_id: SPECIFIED_BY.to_owned(),
+        user_id: USER_ID.to_owned(),
         record_id,
         description: description.to_owned(),
         data,
     };
     builder.vlrs = vec![
-        record(TEXT_RECORD, "what the columns are", [ABOUT.as_bytes(), &[0]].concat()),
+        record(TEXT_RECORD, "what the columns are", [DESCRIPTION.as_bytes(), &[0]].concat()),
         record(EXTRA_BYTES_RECORD, "error", extra_bytes()),
     ];
     builder.into_header()
 }
 
-/// What the extra bytes of a point are (table 24 and 25 of the specification): one float, `error`.
+/// Extra bytes record (tables 24 and 25 of the specification): one float, `error`.
 fn extra_bytes() -> Vec<u8> {
     const FLOAT: u8 = 9;
     let mut record = vec![0; 192];
@@ -117,22 +121,23 @@ fn extra_bytes() -> Vec<u8> {
     record
 }
 
-fn unwritten(error: las::Error) -> RecordingError {
+fn write_error(error: las::Error) -> RecordingError {
     RecordingError::Write(match error {
         las::Error::Io(error) => error,
         other => io::Error::other(other),
     })
 }
 
-/// Keeps a failure for whoever asks, and says that all is well: a writer of the `las` crate that is dropped unfinished
-/// writes its header, and panics where it cannot.
-struct Patient<W> {
+/// Stores the first I/O error and reports success.
+///
+/// A `las` writer that is dropped unfinished writes its header, and panics if that fails.
+struct DeferredErrors<W> {
     out: W,
     failure: Arc<OnceLock<io::Error>>,
 }
 
-impl<W> Patient<W> {
-    fn keep<T>(&mut self, done: impl FnOnce(&mut W) -> io::Result<T>, otherwise: T) -> io::Result<T> {
+impl<W> DeferredErrors<W> {
+    fn defer_error<T>(&mut self, done: impl FnOnce(&mut W) -> io::Result<T>, otherwise: T) -> io::Result<T> {
         if self.failure.get().is_some() {
             return Ok(otherwise);
         }
@@ -143,19 +148,19 @@ impl<W> Patient<W> {
     }
 }
 
-impl<W: Write> Write for Patient<W> {
+impl<W: Write> Write for DeferredErrors<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.keep(|out| out.write(bytes), bytes.len())
+        self.defer_error(|out| out.write(bytes), bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.keep(Write::flush, ())
+        self.defer_error(Write::flush, ())
     }
 }
 
-impl<W: Seek> Seek for Patient<W> {
+impl<W: Seek> Seek for DeferredErrors<W> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.keep(|out| out.seek(to), 0)
+        self.defer_error(|out| out.seek(to), 0)
     }
 }
 
@@ -173,7 +178,7 @@ mod tests {
         }
     }
 
-    /// Bytes in memory that outlive their writer, up to a limit.
+    /// Shared memory buffer of limited size.
     #[derive(Clone)]
     struct Limited(Arc<std::sync::Mutex<Cursor<Vec<u8>>>>, usize);
 
@@ -202,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cloud_comes_back_to_a_tenth_of_a_millimetre_with_time_intensity_and_error() {
+    fn a_written_cloud_is_read_to_a_tenth_of_a_millimetre_with_time_intensity_and_error() {
         let out = file(usize::MAX);
         let mut writer = LasWriter::new(out.clone()).unwrap();
         (0..1000).for_each(|k| writer.point(&point(k)).unwrap());
@@ -222,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_is_an_error_and_no_panic() {
+    fn a_full_disk_is_an_error_and_not_a_panic() {
         for limit in [0, 100, 5000, 70_000] {
             let write = || -> Result<(), RecordingError> {
                 let mut writer = LasWriter::new(file(limit))?;
@@ -236,10 +241,10 @@ mod tests {
     }
 
     #[test]
-    fn a_point_farther_than_the_format_goes_is_refused() {
+    fn a_point_outside_the_range_of_the_format_is_rejected() {
         let mut writer = LasWriter::new(file(usize::MAX)).unwrap();
-        let far = CloudPoint { point_in_map: nalgebra::Vector3::new(0.0, 3e5, 0.0), ..point(1) };
-        let said = writer.point(&far).unwrap_err().to_string();
-        assert!(said.contains("300000 m") && said.contains("PLY"), "{said}");
+        let outside = CloudPoint { point_in_map: nalgebra::Vector3::new(0.0, 3e5, 0.0), ..point(1) };
+        let message = writer.point(&outside).unwrap_err().to_string();
+        assert!(message.contains("300000 m") && message.contains("PLY"), "{message}");
     }
 }

@@ -1,76 +1,77 @@
-use super::container::{Directory, Ending, Messages};
+use super::container::{Ending, FileIndex, Messages};
 use serde::Serialize;
 use std::fmt;
 
-/// What of a recording could not be read. Whoever uses the rest says so.
+/// Data of a recording that could not be read.
+///
+/// Whoever uses the remaining data reports it.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Loss {
-    /// Whether the file ends without its summary: its writer was stopped, or the file was cut.
+    /// Whether the file has no summary: the writer was stopped, or the file is truncated.
     pub cut_short: bool,
-    /// Whether the summary's checksum does not match; then it is not used.
+    /// Whether the summary's checksum does not match; the summary is then ignored.
     pub damaged_summary: bool,
-    /// Bytes that could not be read.
+    /// Number of unreadable bytes.
     pub lost_bytes: u64,
-    /// Chunks that do not decompress, or whose checksum does not match.
+    /// Number of chunks that do not decompress, or whose checksum does not match.
     pub damaged_chunks: u64,
-    /// Messages that the summary counts and that were not there, of all topics together.
+    /// Number of messages that the summary counts but that were not found, all topics together.
     pub missing_messages: u64,
-    /// Messages whose bytes are not what their type says.
+    /// Number of messages whose bytes do not match their type.
     pub unreadable_messages: u64,
-    /// IMU samples with NaN or infinity in them.
+    /// Number of IMU samples with NaN or infinity.
     pub samples_not_finite: u64,
-    /// Scans that came twice and were used once; not a loss.
+    /// Number of duplicate scans, each used once; not a loss.
     pub repeated_scans: u64,
-    /// IMU samples that came twice and were used once; not a loss.
+    /// Number of duplicate IMU samples, each used once; not a loss.
     pub repeated_samples: u64,
 }
 
 impl Loss {
-    /// What the files as a whole lost.
-    pub(super) fn of_files<'d>(directories: impl Iterator<Item = &'d Directory>) -> Self {
-        directories.fold(Self::default(), |loss, directory| Self {
-            cut_short: loss.cut_short || directory.ending == Ending::CutShort,
-            damaged_summary: loss.damaged_summary || directory.ending == Ending::SummaryDamaged,
-            lost_bytes: loss.lost_bytes + directory.lost_bytes,
+    /// Losses of the files, according to their indices.
+    pub(super) fn of_files<'d>(indices: impl Iterator<Item = &'d FileIndex>) -> Self {
+        indices.fold(Self::default(), |loss, index| Self {
+            cut_short: loss.cut_short || index.ending == Ending::CutShort,
+            damaged_summary: loss.damaged_summary || index.ending == Ending::SummaryDamaged,
+            lost_bytes: loss.lost_bytes + index.lost_bytes,
             ..loss
         })
     }
 
-    /// Adds what a pass through all messages met, `expected` of them by the summary.
+    /// Adds the losses of a pass through all messages, of which the summary counts `expected`.
     pub(super) fn add_pass(&mut self, pass: &Messages<'_>, expected: Option<u64>) {
         self.damaged_chunks += pass.damaged().len() as u64;
         self.lost_bytes += pass.damaged().iter().map(|block| block.bytes).sum::<u64>();
         self.missing_messages += expected.map_or(0, |expected| expected.saturating_sub(pass.count()));
     }
 
-    /// Whether nothing was lost.
+    /// Whether no data were lost.
     pub fn is_none(&self) -> bool {
         *self
             == Self { repeated_scans: self.repeated_scans, repeated_samples: self.repeated_samples, ..Self::default() }
     }
 
-    /// What was left out without loss, a sentence each.
+    /// Notes on data skipped without loss, one sentence each.
     pub fn notes(&self) -> Vec<String> {
-        let counted =
-            |count: u64, what: &str| (count > 0).then(|| format!("{count} {what} came twice and were used once"));
+        let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} duplicate {what} were ignored"));
         [counted(self.repeated_scans, "scans"), counted(self.repeated_samples, "IMU samples")]
             .into_iter()
             .flatten()
             .collect()
     }
 
-    /// What was lost, a sentence each.
+    /// Descriptions of the losses, one sentence each.
     pub fn sentences(&self) -> Vec<String> {
         let counted = |count: u64, sentence: &str| (count > 0).then(|| format!("{count} {sentence}"));
         let stated = |holds: bool, sentence: &str| holds.then(|| sentence.to_owned());
         [
-            stated(self.cut_short, "The file ends without its summary; what was complete before is used."),
-            stated(self.damaged_summary, "The file's summary is damaged; what it says was found by reading."),
-            counted(self.lost_bytes, "bytes could not be read."),
-            counted(self.damaged_chunks, "chunks are damaged and were left out."),
-            counted(self.missing_messages, "messages, of all topics together, are missing."),
-            counted(self.unreadable_messages, "messages are not what their type says and were left out."),
-            counted(self.samples_not_finite, "IMU samples are not finite and were left out."),
+            stated(self.cut_short, "The file is truncated (no summary); its complete part is used."),
+            stated(self.damaged_summary, "The file's summary is damaged; the index was rebuilt from the data."),
+            counted(self.lost_bytes, "bytes are unreadable."),
+            counted(self.damaged_chunks, "chunks are damaged and were skipped."),
+            counted(self.missing_messages, "messages (all topics together) are missing."),
+            counted(self.unreadable_messages, "messages do not match their type and were skipped."),
+            counted(self.samples_not_finite, "IMU samples are not finite and were skipped."),
         ]
         .into_iter()
         .flatten()

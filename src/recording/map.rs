@@ -1,7 +1,8 @@
-//! Maps as PLY: surfels with their uncertainty, which CloudCompare and Open3D show as points with normals. The format
-//! is told in `docs/guide/maps.md`.
+//! Surfel maps as PLY, which CloudCompare and Open3D display as points with normals.
+//!
+//! `docs/guide/maps.md` documents the format.
 
-use super::ply::header::{self, Form, Header, Problem, Property, Scalar};
+use super::ply::header::{self, Header, PlyFormat, Problem, Property, Scalar};
 use crate::geometry::{Matrix, Vector};
 use crate::recording::RecordingError;
 use crate::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
@@ -9,48 +10,48 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Read, Write};
 use std::path::Path;
 
-/// Version of the format.
+/// Version of the file format.
 const VERSION: u32 = 1;
-/// The comment that says what the file is, before the version.
+/// Comment that identifies the file, before the version.
 const TITLE: &str = "zsim surfel map ";
-/// Numbers of a surfel, all double but the last.
-const NUMBERS: [&str; 14] =
+/// Properties of a surfel of type double.
+const PROPERTIES: [&str; 14] =
     ["x", "y", "z", "nx", "ny", "nz", "cxx", "cxy", "cxz", "cyy", "cyz", "czz", "points", "sigma"];
-/// The last one, of one byte.
+/// Last property of a surfel, of type uchar.
 const LEVEL: &str = "level";
-/// Bytes of a surfel.
-const ROW_BYTES: usize = 8 * NUMBERS.len() + 1;
+/// Size of a surfel, bytes.
+const ROW_BYTES: usize = 8 * PROPERTIES.len() + 1;
 
-/// Writes a map.
+/// Writes a surfel map.
 ///
 /// # Errors
 /// When it cannot be written.
 pub fn write_surfel_map(out: impl Write, map: &SurfelMap) -> Result<(), RecordingError> {
     let mut out = BufWriter::new(out);
     let count = map.surfels().len() as u64;
-    let mut sum = checksum_of(map.finest_voxel_m(), map.levels(), count);
-    map.surfels().iter().for_each(|surfel| sum.update(&row_of(surfel)));
-    let (voxel_m, levels, sum) = (map.finest_voxel_m(), map.levels(), sum.finalize());
+    let mut checksum = start_checksum(map.finest_voxel_m(), map.levels(), count);
+    map.surfels().iter().for_each(|surfel| checksum.update(&encode_surfel(surfel)));
+    let (voxel_m, levels, checksum) = (map.finest_voxel_m(), map.levels(), checksum.finalize());
     let mut write = || -> std::io::Result<()> {
         write!(
             out,
             "ply\nformat binary_little_endian 1.0\ncomment {TITLE}{VERSION}\ncomment metres; sigma: standard deviation along \
-             the normal; c: second moment\ncomment finest_voxel_m {voxel_m}\ncomment levels {levels}\ncomment crc32 {sum:08x}\n\
+             the normal; c: second moment\ncomment finest_voxel_m {voxel_m}\ncomment levels {levels}\ncomment crc32 {checksum:08x}\n\
              element vertex {count}\n"
         )?;
-        for name in NUMBERS {
+        for name in PROPERTIES {
             writeln!(out, "property double {name}")?;
         }
         write!(out, "property uchar {LEVEL}\nend_header\n")?;
         for surfel in map.surfels() {
-            out.write_all(&row_of(surfel))?;
+            out.write_all(&encode_surfel(surfel))?;
         }
         out.flush()
     };
     write().map_err(RecordingError::Write)
 }
 
-/// Reads the map at `path`.
+/// Reads the surfel map at `path`.
 ///
 /// # Errors
 /// As [`parse_surfel_map`], and when the file cannot be opened.
@@ -59,27 +60,27 @@ pub fn read_surfel_map(path: &Path) -> Result<SurfelMap, RecordingError> {
     parse_surfel_map(&path.display().to_string(), file)
 }
 
-/// Reads a map from `input`, which messages call `name`.
+/// Reads a surfel map from `input`, called `name` in messages.
 ///
 /// # Errors
-/// When it is no map of ours, of another version, ends early or goes on, is damaged (by its checksum), or holds what is
-/// no surfel.
+/// When it is not a surfel map of zsim, has another version, is truncated or too long, fails its checksum, or contains
+/// an invalid surfel.
 pub fn parse_surfel_map(name: &str, input: impl Read) -> Result<SurfelMap, RecordingError> {
     let mut input = BufReader::with_capacity(1 << 16, input);
     read(&mut input).map_err(|(line, problem)| RecordingError::Line { name: name.to_owned(), line, problem })
 }
 
-/// What the header says.
-struct About {
+/// Content of the header comments.
+struct MapHeader {
     finest_voxel_m: f64,
     levels: usize,
-    sum: u32,
+    checksum: u32,
 }
 
 fn read(input: &mut impl BufRead) -> Result<SurfelMap, Problem> {
     let header = header::read(input)?;
-    let about = about(&header)?;
-    let mut sum = checksum_of(about.finest_voxel_m, about.levels, header.count);
+    let map_header = parse_header(&header)?;
+    let mut checksum = start_checksum(map_header.finest_voxel_m, map_header.levels, header.count);
     let mut surfels = Vec::new();
     let end = header.lines + 1;
     for index in 0..header.count {
@@ -88,57 +89,59 @@ fn read(input: &mut impl BufRead) -> Result<SurfelMap, Problem> {
             ErrorKind::UnexpectedEof => (end, format!("the file ends {} surfels early", header.count - index)),
             _ => (end, error.to_string()),
         })?;
-        sum.update(&row);
-        surfels.push(surfel_of(&row));
+        checksum.update(&row);
+        surfels.push(decode_surfel(&row));
     }
     let rest = input.fill_buf().map_err(|error| (end, error.to_string()))?;
     if !rest.is_empty() {
-        return Err((end, format!("the file goes on behind its {} surfels", header.count)));
+        return Err((end, format!("the file has data after its {} surfels", header.count)));
     }
-    if sum.finalize() != about.sum {
-        return Err((end, "the file is damaged: its checksum is not that of what it holds".to_owned()));
+    if checksum.finalize() != map_header.checksum {
+        return Err((end, "the file is damaged: its checksum does not match".to_owned()));
     }
-    SurfelMap::new(about.finest_voxel_m, about.levels, surfels)
+    SurfelMap::new(map_header.finest_voxel_m, map_header.levels, surfels)
         .map_err(|error: SurfelMapError| (end, error.to_string()))
 }
 
-fn about(header: &Header) -> Result<About, Problem> {
+fn parse_header(header: &Header) -> Result<MapHeader, Problem> {
     let problem = |problem: String| (header.lines, problem);
     let find = |key: &str| header.comments.iter().find_map(|comment| comment.strip_prefix(key));
     let Some(version) = find(TITLE) else {
-        let said = format!("this is a PLY file, and no map of ours: no comment says `{}`", TITLE.trim_end());
-        return Err(problem(said));
+        let missing = format!("this is a PLY file, but not a surfel map of zsim: no comment `{}`", TITLE.trim_end());
+        return Err(problem(missing));
     };
     if version.trim() != VERSION.to_string() {
         let version = version.trim();
-        return Err(problem(format!("this is a map of version {version}; this program reads version {VERSION}")));
+        return Err(problem(format!("the map has version {version}; this program reads version {VERSION}")));
     }
-    let wanted = NUMBERS.iter().map(|name| (*name, Scalar::Double)).chain([(LEVEL, Scalar::Unsigned(1))]);
-    let wanted: Vec<Property> = wanted.map(|(name, scalar)| Property { name: name.to_owned(), scalar }).collect();
-    if header.form != Form::LittleEndian || header.properties != wanted {
-        return Err(problem("a map's surfels have other properties than these".to_owned()));
+    let expected = PROPERTIES.iter().map(|name| (*name, Scalar::Double)).chain([(LEVEL, Scalar::Unsigned(1))]);
+    let expected: Vec<Property> = expected.map(|(name, scalar)| Property { name: name.to_owned(), scalar }).collect();
+    if header.format != PlyFormat::LittleEndian || header.properties != expected {
+        return Err(problem("the properties are not those of surfels".to_owned()));
     }
     let number = |key: &str| {
         let text = find(key).map(str::trim);
-        text.ok_or_else(|| problem(format!("there is no comment `{}`", key.trim_end())))
+        text.ok_or_else(|| problem(format!("the comment `{}` is missing", key.trim_end())))
     };
-    let wrong = |key: &str, text: &str| problem(format!("`{text}` is no `{}`", key.trim_end()));
-    let (voxel, levels, sum) = (number("finest_voxel_m ")?, number("levels ")?, number("crc32 ")?);
-    Ok(About {
-        finest_voxel_m: voxel.parse().map_err(|_| wrong("finest_voxel_m ", voxel))?,
-        levels: levels.parse().map_err(|_| wrong("levels ", levels))?,
-        sum: u32::from_str_radix(sum, 16).map_err(|_| wrong("crc32 ", sum))?,
+    let invalid = |key: &str, text: &str| problem(format!("`{text}` is not a valid `{}`", key.trim_end()));
+    let (voxel, levels, checksum) = (number("finest_voxel_m ")?, number("levels ")?, number("crc32 ")?);
+    Ok(MapHeader {
+        finest_voxel_m: voxel.parse().map_err(|_| invalid("finest_voxel_m ", voxel))?,
+        levels: levels.parse().map_err(|_| invalid("levels ", levels))?,
+        checksum: u32::from_str_radix(checksum, 16).map_err(|_| invalid("crc32 ", checksum))?,
     })
 }
 
-/// A checksum (CRC-32 of IEEE 802.3) of what the header says, to which the surfels' bytes come.
-fn checksum_of(finest_voxel_m: f64, levels: usize, count: u64) -> crc32fast::Hasher {
-    let mut sum = crc32fast::Hasher::new();
-    sum.update(format!("{VERSION} {finest_voxel_m} {levels} {count}").as_bytes());
-    sum
+/// Starts a checksum (CRC-32 of IEEE 802.3) with the header's content.
+///
+/// The caller adds the surfels' bytes.
+fn start_checksum(finest_voxel_m: f64, levels: usize, count: u64) -> crc32fast::Hasher {
+    let mut checksum = crc32fast::Hasher::new();
+    checksum.update(format!("{VERSION} {finest_voxel_m} {levels} {count}").as_bytes());
+    checksum
 }
 
-fn row_of(surfel: &MapSurfel) -> [u8; ROW_BYTES] {
+fn encode_surfel(surfel: &MapSurfel) -> [u8; ROW_BYTES] {
     let (p, n, c) = (&surfel.centre_in_map, &surfel.normal_in_map, &surfel.covariance_in_map);
     let (xx, xy, xz, yy, yz, zz) = (c[(0, 0)], c[(0, 1)], c[(0, 2)], c[(1, 1)], c[(1, 2)], c[(2, 2)]);
     let numbers = [p.x, p.y, p.z, n.x, n.y, n.z, xx, xy, xz, yy, yz, zz, surfel.points, surfel.sigma_m];
@@ -146,13 +149,13 @@ fn row_of(surfel: &MapSurfel) -> [u8; ROW_BYTES] {
     for (bytes, number) in row.chunks_exact_mut(8).zip(numbers) {
         bytes.copy_from_slice(&number.to_le_bytes());
     }
-    // A sound map has few levels.
+    // A valid map has at most 6 levels.
     row[ROW_BYTES - 1] = surfel.level as u8;
     row
 }
 
-fn surfel_of(row: &[u8; ROW_BYTES]) -> MapSurfel {
-    let mut numbers = [0.0; NUMBERS.len()];
+fn decode_surfel(row: &[u8; ROW_BYTES]) -> MapSurfel {
+    let mut numbers = [0.0; PROPERTIES.len()];
     for (number, bytes) in numbers.iter_mut().zip(row.as_chunks::<8>().0) {
         *number = f64::from_le_bytes(*bytes);
     }

@@ -1,48 +1,49 @@
-//! A recording's measurements, one after the other, without its truth.
+//! Reads a recording's measurements sequentially, without ground truth.
 
 use crate::measurement::{ImuSample, LidarScan, Measurement};
 use crate::recording::container::{ChannelId, Messages, RawMessage};
+use crate::recording::duplicates::DuplicateFilter;
 use crate::recording::message::scan::Projector;
 use crate::recording::message::{imu, livox, multi_echo, points, scan};
-use crate::recording::order::InOrder;
-use crate::recording::pairing::Pairing;
-use crate::recording::repeats::Repeats;
-use crate::recording::selection::{ImuReading, Layout, LidarKind, LidarReading};
+use crate::recording::pairing::ImuPairing;
+use crate::recording::selection::{ImuDecoding, ImuLayout, LidarDecoding, LidarKind};
+use crate::recording::stamp_sorter::StampSorter;
 use crate::recording::wire::DecodeError;
 use crate::recording::{Loss, Reader, RecordingError, Selection};
 
-/// Reads measurements in the order of their stamps, whenever they were logged: half a second of them waits for its
-/// turn, and where one of the sensors lags behind the other as much as thirty.
+/// Reads measurements in order of their stamps, independent of log times.
 ///
-/// An item is an error only where the file cannot be read on. Messages that cannot be used are left out and counted in
-/// [`loss`](Self::loss); so are those that repeat the one before.
+/// Half a second of measurements is queued for sorting, up to 30 s if one sensor is logged later than the other.
+///
+/// An item is an error only if the file cannot be read further. Unusable messages are skipped and counted in
+/// [`loss`](Self::loss), and so are duplicates.
 pub struct Measurements<'r> {
     messages: Messages<'r>,
     lidar: Vec<ChannelId>,
     imu: Vec<ChannelId>,
-    /// Where accelerations are, where that is another topic.
+    /// Channels of the accelerations, if they have their own topic.
     accelerations: Vec<ChannelId>,
-    decoding: Decoding,
+    decoder: MeasurementDecoder,
     loss: Loss,
     expected: Option<u64>,
-    order: InOrder,
-    repeats: Repeats,
+    sorter: StampSorter,
+    duplicates: DuplicateFilter,
     ended: bool,
 }
 
-/// How messages become measurements.
-struct Decoding {
-    lidar: LidarReading,
-    imu: ImuReading,
+/// Converts messages to measurements.
+struct MeasurementDecoder {
+    lidar: LidarDecoding,
+    imu: ImuDecoding,
     projector: Projector,
-    pairing: Pairing,
+    pairing: ImuPairing,
 }
 
 impl Reader {
-    /// The measurements of the selected sensors, in the order of their stamps.
+    /// Reads the measurements of the selected sensors, in order of their stamps.
     pub fn measurements(&self, selection: &Selection) -> Measurements<'_> {
         let accelerations = match &selection.imu.layout {
-            Layout::Separate { acceleration_topic: Some(topic), .. } => self.ids_of(topic),
+            ImuLayout::Separate { acceleration_topic: Some(topic), .. } => self.ids_of(topic),
             _ => Vec::new(),
         };
         Measurements {
@@ -50,44 +51,44 @@ impl Reader {
             lidar: self.ids_of(&selection.lidar_topic),
             imu: self.ids_of(&selection.imu_topic),
             accelerations,
-            decoding: Decoding {
+            decoder: MeasurementDecoder {
                 lidar: selection.lidar,
                 imu: selection.imu.clone(),
                 projector: Projector::default(),
-                pairing: Pairing::default(),
+                pairing: ImuPairing::default(),
             },
             loss: self.loss().clone(),
             expected: self.expected_messages(),
-            order: InOrder::default(),
-            repeats: Repeats::default(),
+            sorter: StampSorter::default(),
+            duplicates: DuplicateFilter::default(),
             ended: false,
         }
     }
 }
 
-impl LidarReading {
-    /// Reads a scan.
+impl LidarDecoding {
+    /// Decodes a scan.
     ///
     /// # Errors
-    /// When the bytes are not what the lidar's type says.
+    /// When the bytes do not match the lidar's message type.
     pub fn decode(&self, message: &RawMessage<'_>, projector: &mut Projector) -> Result<LidarScan, DecodeError> {
         let (stamp, planar) = match self.kind {
-            LidarKind::Points => return points::decode(message.data, self.point_times, self.farthest_m),
-            LidarKind::Livox => return livox::decode(message.data, self.farthest_m),
+            LidarKind::Points => return points::decode(message.data, self.time_unit, self.no_return_range_m),
+            LidarKind::Livox => return livox::decode(message.data, self.no_return_range_m),
             LidarKind::Scan => scan::decode(message.data)?,
             LidarKind::MultiEcho => multi_echo::decode(message.data)?,
         };
-        Ok(projector.project(stamp, planar, self.farthest_m))
+        Ok(projector.project(stamp, planar, self.no_return_range_m))
     }
 }
 
 impl Measurements<'_> {
-    /// What could not be read so far, the file's own loss with it.
+    /// Data lost so far, the damage of the file included.
     pub fn loss(&self) -> &Loss {
         &self.loss
     }
 
-    /// Reads one message of the sensors, and hands what it makes to the order; `false` after the last.
+    /// Reads one message of the sensors and queues its measurement; `false` at the end of the recording.
     fn step(&mut self) -> Result<bool, RecordingError> {
         loop {
             let Some(message) = self.messages.next()? else {
@@ -96,14 +97,14 @@ impl Measurements<'_> {
             };
             let is_imu = self.imu.contains(&message.channel);
             if is_imu || self.accelerations.contains(&message.channel) {
-                match imu::decode(message.data, self.decoding.imu.unit) {
+                match imu::decode(message.data, self.decoder.imu.unit) {
                     Ok(sample) if !is_finite(&sample) => self.loss.samples_not_finite += 1,
-                    Ok(sample) => self.decoding.imu_sample(sample, is_imu, &mut self.order),
+                    Ok(sample) => self.decoder.imu_sample(sample, is_imu, &mut self.sorter),
                     Err(_) => self.loss.unreadable_messages += 1,
                 }
             } else if self.lidar.contains(&message.channel) {
-                match self.decoding.lidar.decode(&message, &mut self.decoding.projector) {
-                    Ok(scan) => self.order.put(Measurement::Lidar(scan)),
+                match self.decoder.lidar.decode(&message, &mut self.decoder.projector) {
+                    Ok(scan) => self.sorter.put(Measurement::Lidar(scan)),
                     Err(_) => self.loss.unreadable_messages += 1,
                 }
             } else {
@@ -114,12 +115,12 @@ impl Measurements<'_> {
     }
 }
 
-impl Decoding {
-    /// Takes a message of the IMU (`is_imu`), or of the topic of its accelerations.
-    fn imu_sample(&mut self, mut sample: ImuSample, is_imu: bool, order: &mut InOrder) {
+impl MeasurementDecoder {
+    /// Processes a message of the IMU topic (`is_imu`) or of the acceleration topic.
+    fn imu_sample(&mut self, mut sample: ImuSample, is_imu: bool, sorter: &mut StampSorter) {
         sample.stamp += self.imu.shift;
-        let Layout::Separate { acceleration_topic, apart } = &self.imu.layout else {
-            return order.put(Measurement::Imu(sample));
+        let ImuLayout::Separate { acceleration_topic, max_separation } = &self.imu.layout else {
+            return sorter.put(Measurement::Imu(sample));
         };
         let (rate, force) = (sample.angular_velocity_rad_per_s, sample.specific_force_m_per_s2);
         let in_one_topic = acceleration_topic.is_none();
@@ -129,16 +130,16 @@ impl Decoding {
         if (in_one_topic || !is_imu) && force.iter().any(|x| *x != 0.0) {
             self.pairing.put_force(sample.stamp, force);
         }
-        while let Some(pair) = self.pairing.take(*apart, false) {
-            order.put(Measurement::Imu(pair));
+        while let Some(pair) = self.pairing.take(*max_separation, false) {
+            sorter.put(Measurement::Imu(pair));
         }
     }
 
-    /// Hands on the pairs that are left.
-    fn finish(&mut self, order: &mut InOrder) {
-        if let Layout::Separate { apart, .. } = &self.imu.layout {
-            while let Some(pair) = self.pairing.take(*apart, true) {
-                order.put(Measurement::Imu(pair));
+    /// Queues the remaining pairs.
+    fn finish(&mut self, sorter: &mut StampSorter) {
+        if let ImuLayout::Separate { max_separation, .. } = &self.imu.layout {
+            while let Some(pair) = self.pairing.take(*max_separation, true) {
+                sorter.put(Measurement::Imu(pair));
             }
         }
     }
@@ -154,11 +155,12 @@ impl Iterator for Measurements<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            if let Some(measurement) = self.order.take(self.ended) {
-                if self.repeats.is_new(&measurement) {
+            if let Some(measurement) = self.sorter.take(self.ended) {
+                if self.duplicates.is_new(&measurement) {
                     return Some(Ok(measurement));
                 }
-                (self.loss.repeated_scans, self.loss.repeated_samples) = (self.repeats.scans, self.repeats.samples);
+                (self.loss.repeated_scans, self.loss.repeated_samples) =
+                    (self.duplicates.scans, self.duplicates.samples);
                 continue;
             }
             if self.ended {
@@ -168,7 +170,7 @@ impl Iterator for Measurements<'_> {
                 Ok(true) => {}
                 Ok(false) => {
                     self.ended = true;
-                    self.decoding.finish(&mut self.order);
+                    self.decoder.finish(&mut self.sorter);
                 }
                 Err(error) => {
                     self.ended = true;

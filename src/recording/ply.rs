@@ -1,6 +1,6 @@
-//! Clouds as PLY: written as binary little-endian, read in each of the format's three forms.
+//! Point clouds as PLY: written in binary little-endian form, read in all three forms of the format.
 //!
-//! PLY is a text header that names elements and their properties, then the elements, one after the other (Turk 1994).
+//! A PLY file is a text header that declares elements and their properties, followed by the elements (Turk 1994).
 
 pub(super) mod header;
 mod reader;
@@ -39,13 +39,13 @@ mod tests {
     }
 
     #[test]
-    fn a_cloud_comes_back_bit_for_bit() {
+    fn a_written_cloud_is_read_bit_for_bit() {
         assert_eq!(read(&written(1000)).unwrap(), (0..1000).map(point).collect::<Vec<_>>());
         assert_eq!(read(&written(0)).unwrap(), []);
     }
 
     #[test]
-    fn another_reader_of_ply_finds_the_points() {
+    fn another_ply_reader_reads_the_points() {
         let parser = ply_rs_bw::parser::Parser::<ply_rs_bw::ply::DefaultElement>::new();
         let ply = parser.read_ply(&mut written(3).as_slice()).unwrap();
         let vertices = &ply.payload["vertex"];
@@ -74,15 +74,15 @@ mod tests {
     }
 
     #[test]
-    fn an_error_names_file_and_line() {
+    fn an_error_states_file_and_line() {
         let start = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n";
         let message = |text: String| read(text.as_bytes()).unwrap_err();
-        assert_eq!(message("solid\n".into()), "a.ply:1: this is not a PLY file: it does not begin with `ply`");
+        assert_eq!(message("solid\n".into()), "a.ply:1: this is not a PLY file: it does not start with `ply`");
         assert_eq!(message(format!("{start}end_header\n")), "a.ply:6: the points have no properties x, y and z");
         assert_eq!(message(start.to_owned()), "a.ply:6: the header does not end");
         let start = format!("{start}property float z\nend_header\n");
         assert_eq!(message(format!("{start}1 2 3\n")), "a.ply:9: the file ends 1 points early");
-        assert_eq!(message(format!("{start}1 2\n")), "a.ply:8: a point has 3 numbers; here are 2");
+        assert_eq!(message(format!("{start}1 2\n")), "a.ply:8: a point needs 3 numbers, but the line has 2");
         assert_eq!(message(format!("{start}1 2 nan\n")), "a.ply:8: the point is not finite");
         let short = &written(2)[..];
         assert!(read(&short[..short.len() - 1]).unwrap_err().ends_with("the file ends 1 points early"));

@@ -1,4 +1,4 @@
-//! A recording's poses over time: those of one topic, all of them.
+//! Reads all poses of one topic.
 
 use crate::geometry::Trajectory;
 use crate::recording::container::Channel;
@@ -7,17 +7,18 @@ use crate::recording::schema::MessageType;
 use crate::recording::topics::Topic;
 use crate::recording::{Reader, RecordingError};
 
-/// The types of messages that carry a pose.
-const TYPES: [MessageType; 2] = [MessageType::Odometry, MessageType::PoseStamped];
+/// Message types with a pose that are supported.
+const POSE_TYPES: [MessageType; 2] = [MessageType::Odometry, MessageType::PoseStamped];
 
 impl Reader {
-    /// The poses of `topic`, `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`, in the frame and at the stamps that
-    /// its messages tell; unless one is named those of `/ground_truth/odom`, or where that is not, of the first such
+    /// Reads the poses of `topic`, of type `nav_msgs/Odometry` or `geometry_msgs/PoseStamped`.
+    ///
+    /// Frame and stamps are those of the messages. The default topic is `/ground_truth/odom`, or else the first pose
     /// topic by name.
     ///
     /// # Errors
-    /// When there is no such topic, its stamps do not increase, or not all of the file could be read: a trajectory with
-    /// gaps would be another one.
+    /// When there is no such topic, its stamps do not increase, or the file is not completely readable: a trajectory
+    /// with gaps would be a different one.
     pub fn poses(&self, topic: Option<&str>) -> Result<Trajectory, RecordingError> {
         let (topic, kind) = self.pose_topic(topic)?;
         let ids = self.ids_of(topic);
@@ -43,25 +44,25 @@ impl Reader {
         if loss.is_none() { Ok(trajectory) } else { Err(RecordingError::NotWhole { name: self.name().to_owned() }) }
     }
 
-    /// The topic of poses that is asked for, or else taken, and what its messages are.
-    fn pose_topic(&self, asked: Option<&str>) -> Result<(&str, MessageType), RecordingError> {
-        let kind_of = |channel: &Channel| TYPES.into_iter().find(|kind| kind.is_named(&channel.type_name));
+    /// The requested or default topic of poses, and the message type.
+    fn pose_topic(&self, requested: Option<&str>) -> Result<(&str, MessageType), RecordingError> {
+        let kind_of = |channel: &Channel| POSE_TYPES.into_iter().find(|kind| kind.is_named(&channel.type_name));
         let readable = self.channels().iter().filter(|channel| channel.wire.is_some());
         let mut topics: Vec<_> =
             readable.filter_map(|channel| Some((channel.topic.as_str(), kind_of(channel)?))).collect();
         topics.sort_unstable();
         topics.dedup();
         let named = |name: &str| topics.iter().find(|(topic, _)| *topic == name);
-        let found = match asked {
+        let found = match requested {
             Some(name) => named(name),
             None => named(Topic::TruthOdometry.name()).or(topics.first()),
         };
         found.copied().ok_or_else(|| {
-            let kinds = TYPES.map(MessageType::name).join(" or ");
-            let (name, has) = (self.name().to_owned(), self.what_it_has());
-            let (topic, problem) = match asked {
-                Some(asked) => (asked.to_owned(), format!("is not there as {kinds}")),
-                None => ("of poses".to_owned(), format!("({kinds}) is not there")),
+            let kinds = POSE_TYPES.map(MessageType::name).join(" or ");
+            let (name, has) = (self.name().to_owned(), self.topic_list());
+            let (topic, problem) = match requested {
+                Some(requested) => (requested.to_owned(), format!("is missing or not of type {kinds}")),
+                None => ("of poses".to_owned(), format!("({kinds}) is missing")),
             };
             RecordingError::Topic { name, topic, problem, has }
         })

@@ -1,30 +1,32 @@
-//! An estimate as a recording, for viewers: where the head was, its path, and the cloud that it saw.
+//! Writes an estimate as a recording for viewers: pose of the head, path, and point cloud.
 
 use crate::geometry::{Pose, PoseCovariance, Trajectory};
+use crate::recording::mcap_writer::McapWriter;
 use crate::recording::message::transforms::Transform;
 use crate::recording::message::{points, pose, transforms};
-use crate::recording::spool::Spool;
 use crate::recording::topics::{MAP, Topic};
 use crate::recording::{CloudPoint, RecordingError};
 use crate::time::{Span, Stamp};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Time between poses of `/path`.
+/// Interval between poses of `/path`.
 const PATH_PERIOD: Span = Span::from_nanos(100_000_000);
 
-/// Longest time that one message of `/cloud` gathers.
+/// Maximum time span of one `/cloud` message.
 const CLOUD_PERIOD: Span = Span::from_nanos(500_000_000);
 
-/// Most points in one message of `/cloud`: 20 bytes each.
+/// Maximum number of points in one `/cloud` message: 20 bytes each.
 const CLOUD_POINTS: usize = 50_000;
 
-/// Writes an estimate to a new MCAP file at `path`: `/path`, `/pose` (with the covariances that are given, each at the
-/// stamp of a pose, in order of time), `/tf` (`map` to `body_frame`, a transform a pose) and `/cloud` (x, y, z,
-/// intensity, error, in `map`), which takes the points in the order in which they come.
+/// Writes an estimate to a new MCAP file at `path`.
+///
+/// Topics: `/path`; `/pose` with the given covariances, each at the stamp of a pose and in order of time; `/tf` (`map`
+/// to `body_frame`, one transform per pose); `/cloud` (x, y, z, intensity, error, in `map`), in the order of the given
+/// points.
 ///
 /// # Errors
-/// When the file cannot be made or written, or a stamp does not fit a message.
+/// When the file cannot be created or written, or a stamp does not fit into a message.
 pub fn write_result(
     path: &Path,
     body_frame: &str,
@@ -32,8 +34,8 @@ pub fn write_result(
     cloud: impl IntoIterator<Item = CloudPoint>,
 ) -> Result<(), RecordingError> {
     let file = std::fs::File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
-    let spool = Spool::new(file, BTreeMap::new())?;
-    let mut result = ResultWriter { spool, body_frame, covariances, last: Stamp::from_nanos(0), gathered: Vec::new() };
+    let mcap = McapWriter::new(file, BTreeMap::new())?;
+    let mut result = ResultWriter { mcap, body_frame, covariances, last: Stamp::from_nanos(0), gathered: Vec::new() };
     result.path(map_from_body)?;
     let mut poses = map_from_body.iter().peekable();
     for point in cloud {
@@ -49,14 +51,14 @@ pub fn write_result(
         result.transform(stamp, pose)?;
     }
     result.cloud()?;
-    result.spool.finish()
+    result.mcap.finish()
 }
 
 struct ResultWriter<'a> {
-    spool: Spool,
+    mcap: McapWriter,
     body_frame: &'a str,
     covariances: &'a [(Stamp, PoseCovariance)],
-    /// Log time of the message before: it never goes back, though points may.
+    /// Log time of the previous message: it never decreases, although point stamps may.
     last: Stamp,
     gathered: Vec<CloudPoint>,
 }
@@ -70,27 +72,27 @@ impl ResultWriter<'_> {
     fn path(&mut self, map_from_body: &Trajectory) -> Result<(), RecordingError> {
         let Some((first, _)) = map_from_body.span() else { return Ok(()) };
         let mut next = first;
-        let mut kept = Vec::new();
+        let mut selected = Vec::new();
         for (stamp, pose) in map_from_body.iter() {
             if stamp >= next {
-                kept.push((stamp, pose));
+                selected.push((stamp, pose));
                 next = stamp + PATH_PERIOD;
             }
         }
         let log_time = self.log_time(first);
-        self.spool.message(Topic::Path, log_time, |out| pose::encode_path(out, MAP, first, kept.into_iter()))
+        self.mcap.message(Topic::Path, log_time, |out| pose::encode_path(out, MAP, first, selected.into_iter()))
     }
 
     fn transform(&mut self, stamp: Stamp, map_from_body: &Pose) -> Result<(), RecordingError> {
         let transform =
             Transform { parent: MAP.to_owned(), child: self.body_frame.to_owned(), parent_from_child: *map_from_body };
         let log_time = self.log_time(stamp);
-        self.spool.message(Topic::Tf, log_time, |out| transforms::encode(out, stamp, &[transform]))?;
+        self.mcap.message(Topic::Tf, log_time, |out| transforms::encode(out, stamp, &[transform]))?;
         while let Some(((at, covariance), rest)) = self.covariances.split_first().filter(|((at, _), _)| *at <= stamp) {
             self.covariances = rest;
             if *at == stamp {
                 let pose = (map_from_body, covariance);
-                self.spool.message(Topic::Pose, log_time, |out| pose::encode_uncertain(out, MAP, stamp, pose))?;
+                self.mcap.message(Topic::Pose, log_time, |out| pose::encode_uncertain(out, MAP, stamp, pose))?;
             }
         }
         Ok(())
@@ -117,7 +119,7 @@ impl ResultWriter<'_> {
             [p.x, p.y, p.z, point.intensity, point.error_m]
         });
         let names = ["x", "y", "z", "intensity", "error"];
-        self.spool.message(Topic::Cloud, log_time, |out| points::encode_floats(out, (stamp, MAP), names, rows))?;
+        self.mcap.message(Topic::Cloud, log_time, |out| points::encode_floats(out, (stamp, MAP), names, rows))?;
         self.gathered = gathered;
         self.gathered.clear();
         Ok(())

@@ -1,10 +1,10 @@
-//! The message types that a recording is made of, as `ros2msg` text.
+//! Message types of recordings, as `ros2msg` definitions.
 //!
-//! Fields are those of the ROS 2 interface packages (`common_interfaces`, `geometry2`, `rcl_interfaces`), whose names,
-//! types and order are what makes two programs understand each other; comments and constants are left out, save those
-//! of `PointField`.
+//! Names, types and order of the fields are those of the ROS 2 interface packages (`common_interfaces`, `geometry2`,
+//! `rcl_interfaces`), since they determine compatibility. Comments and constants are omitted, except those of
+//! `PointField`.
 
-/// A definition of each type, by its short name `package/Type`.
+/// Definition of each type, by short name `package/Type`.
 const DEFINITIONS: [(&str, &str); 21] = [
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"),
@@ -47,8 +47,8 @@ const DEFINITIONS: [(&str, &str); 21] = [
     ),
 ];
 
-/// Types that begin with a header, and that zsim does not write.
-const HEADED: [&str; 12] = [
+/// Types with a header that zsim does not write.
+const OTHER_TYPES_WITH_HEADER: [&str; 12] = [
     "sensor_msgs/CompressedImage",
     "sensor_msgs/CameraInfo",
     "sensor_msgs/FluidPressure",
@@ -63,7 +63,7 @@ const HEADED: [&str; 12] = [
     "livox_ros_driver2/CustomMsg",
 ];
 
-/// A message type that recordings carry.
+/// Message type of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MessageType {
     /// `sensor_msgs/msg/LaserScan`.
@@ -93,7 +93,7 @@ pub enum MessageType {
 }
 
 impl MessageType {
-    /// The full name, `package/msg/Type`.
+    /// Full name, `package/msg/Type`.
     pub fn name(self) -> &'static str {
         match self {
             Self::LaserScan => "sensor_msgs/msg/LaserScan",
@@ -111,20 +111,20 @@ impl MessageType {
         }
     }
 
-    /// Whether `name` is this type's; some writers leave `msg` out of it.
+    /// Whether `name` denotes this type; some writers omit `msg`.
     pub fn is_named(self, name: &str) -> bool {
         let full = self.name();
         name == full
             || full.split_once("/msg/").is_some_and(|(package, kind)| name.split_once('/') == Some((package, kind)))
     }
 
-    /// Whether messages of the type called `name` begin with a header.
-    pub fn known_with_header(name: &str) -> bool {
+    /// Whether messages of the type `name` start with a header.
+    pub fn has_header(name: &str) -> bool {
         let short = name.replace("/msg/", "/");
-        fields_of(&short).starts_with("std_msgs/Header") || HEADED.contains(&short.as_str())
+        fields_of(&short).starts_with("std_msgs/Header") || OTHER_TYPES_WITH_HEADER.contains(&short.as_str())
     }
 
-    /// The definition with those it depends on, as `ros2msg` wants it: each after a line of `=` and its name.
+    /// Definition with its dependencies in `ros2msg` format: each after a line of `=` and the type name.
     pub fn definition(self) -> String {
         let root = self.name().replace("/msg/", "/");
         let mut names = vec![root.as_str()];
@@ -136,9 +136,9 @@ impl MessageType {
             }
             let fields = fields_of(name);
             text.push_str(fields);
-            for needed in fields.lines().filter_map(type_of_field) {
-                if !names.contains(&needed) {
-                    names.push(needed);
+            for dependency in fields.lines().filter_map(type_of_field) {
+                if !names.contains(&dependency) {
+                    names.push(dependency);
                 }
             }
             next += 1;
@@ -151,7 +151,7 @@ fn fields_of(name: &str) -> &'static str {
     DEFINITIONS.iter().find(|(known, _)| *known == name).map_or("", |(_, fields)| fields)
 }
 
-/// The message type that a field is made of, `None` where it is a primitive.
+/// Message type of a field; `None` if it is a primitive type.
 fn type_of_field(line: &'static str) -> Option<&'static str> {
     let kind = line.split_whitespace().next()?;
     let kind = kind.split('[').next()?;
@@ -163,16 +163,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_type_that_a_definition_uses_is_defined() {
+    fn every_type_used_in_a_definition_is_defined() {
         for (name, fields) in DEFINITIONS {
-            for needed in fields.lines().filter_map(type_of_field) {
-                assert!(!fields_of(needed).is_empty(), "{name} uses {needed}");
+            for dependency in fields.lines().filter_map(type_of_field) {
+                assert!(!fields_of(dependency).is_empty(), "{name} uses {dependency}");
             }
         }
     }
 
     #[test]
-    fn a_definition_carries_each_dependency_once() {
+    fn a_definition_contains_each_dependency_once() {
         let text = MessageType::Odometry.definition();
         for name in ["std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Vector3", "geometry_msgs/Point"] {
             assert_eq!(text.matches(&format!("MSG: {name}\n")).count(), 1, "{name}");

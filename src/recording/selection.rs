@@ -1,72 +1,74 @@
-//! Which topics of a recording are the lidar and the IMU, and how their messages are to be read.
+//! Selects the lidar and IMU topics of a recording and determines how to decode them.
 
 mod candidates;
 mod clocks;
 mod content;
-mod inertial;
-mod listen;
+mod imu_choice;
+mod preview;
 
-use crate::recording::message::misses::Census;
+use crate::recording::message::no_returns::NoReturnDetector;
 use crate::recording::message::{imu, multi_echo, points, scan};
 use crate::recording::schema::MessageType;
 use crate::recording::{Reader, RecordingError};
 use crate::time::Span;
 use candidates::BeamTimes;
-pub(super) use candidates::{Candidate, LidarKind, inertial as imu_candidate};
-pub(super) use inertial::Layout;
+pub(super) use candidates::{Candidate, LidarKind, probe_imu};
+pub(super) use imu_choice::ImuLayout;
 
-/// Topics that somebody asks for; those not named are found.
+/// Topics that the caller requests; topics not given are detected.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Preference {
-    /// The lidar's topic.
+    /// Lidar topic.
     pub lidar_topic: Option<String>,
-    /// The IMU's topic.
+    /// IMU topic.
     pub imu_topic: Option<String>,
 }
 
-/// The topics that measurements are read from.
+/// Topics from which measurements are read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
-    /// The lidar's topic.
+    /// Lidar topic.
     pub lidar_topic: String,
-    /// The frame in which its points are.
+    /// Frame of the lidar's points.
     pub lidar_frame: String,
-    /// The IMU's topic.
+    /// IMU topic.
     pub imu_topic: String,
-    /// The frame in which it measures.
+    /// Frame of the IMU's measurements.
     pub imu_frame: String,
-    /// What was chosen among several, and how what is unusual is read, a sentence each.
+    /// Choices among several topics and corrections of unusual encodings, one sentence each.
     pub notes: Vec<String>,
-    pub(super) lidar: LidarReading,
-    pub(super) imu: ImuReading,
+    pub(super) lidar: LidarDecoding,
+    pub(super) imu: ImuDecoding,
 }
 
 impl Selection {
-    /// What is added to the IMU's stamps to bring them to the lidar's epoch; zero but for clocks that are far apart.
+    /// Offset added to the IMU's stamps to bring them to the lidar's epoch.
+    ///
+    /// Zero unless log times show that the clocks differ by more than 50 ms.
     pub fn imu_shift(&self) -> Span {
         self.imu.shift
     }
 }
 
-/// How a lidar's messages are read.
+/// How to decode a lidar's messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LidarReading {
-    /// How they encode beams.
+pub struct LidarDecoding {
+    /// Message encoding.
     pub kind: LidarKind,
-    /// The unit of points' times, where clouds show another than the usual one.
-    pub point_times: Option<points::Unit>,
-    /// The constant range that encodes beams without a return, m, where there is one.
-    pub farthest_m: Option<f32>,
+    /// Unit of the points' times, if the clouds show that it is not the usual one.
+    pub time_unit: Option<points::TimeUnit>,
+    /// Constant range that encodes beams without a return, m, if there is one.
+    pub no_return_range_m: Option<f32>,
 }
 
-/// How an IMU's messages are read.
+/// How to decode an IMU's messages.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct ImuReading {
-    /// The unit of specific force.
+pub struct ImuDecoding {
+    /// Unit of specific force.
     pub unit: imu::ForceUnit,
-    /// How messages make samples.
-    pub layout: Layout,
-    /// What is added to stamps to bring them to the lidar's clock.
+    /// How messages form samples.
+    pub layout: ImuLayout,
+    /// Offset added to the stamps to bring them to the lidar's clock.
     pub shift: Span,
 }
 
@@ -78,28 +80,30 @@ const LIDAR_TYPES: [MessageType; 5] = [
     MessageType::Livox2,
 ];
 
-/// Clouds by which the unit of their points' times is recognised, and the length of a scan.
-const LOOKED_AT: usize = 20;
+/// Clouds used to detect the unit of point times, and scans used to measure their duration: enough for a median.
+const PREVIEW_MESSAGES: usize = 20;
 
-/// Parts of the recording in which misses are counted, and messages in each.
-const SAMPLED: (usize, usize) = (24, 4);
+/// Parts of the recording in which beams without a return are counted, and messages per part.
+const NO_RETURN_SAMPLES: (usize, usize) = (24, 4);
 
 impl Reader {
-    /// Finds the lidar and the IMU: of lidars one that `/tf_static`, where there is one, connects to the IMU. A scan
-    /// whose beams' times are stated is taken first, then a cloud whose points have times; of several the first by
-    /// name. Truth, the recording's own, is never a candidate.
+    /// Selects the lidar and the IMU.
+    ///
+    /// If there is a `/tf_static`, a lidar that it connects to the IMU is preferred. Then a planar scan with stated
+    /// beam times is preferred, then a cloud with point times, then the first topic by name. The recording's own ground
+    /// truth is never a candidate.
     ///
     /// # Errors
-    /// When there is no lidar or no IMU that can be decoded, or not the one that is asked for, or the IMU lacks a part.
+    /// When no lidar or no IMU can be decoded, a requested topic is missing, or the IMU lacks rates or accelerations.
     pub fn select(&self, preference: &Preference) -> Result<Selection, RecordingError> {
-        let lidars = self.candidates(&LIDAR_TYPES, preference.lidar_topic.as_deref(), candidates::lidar)?;
-        let asked = preference.imu_topic.as_deref();
-        let imus = self.candidates(&[MessageType::Imu], asked, imu_candidate)?;
-        let others = match asked {
-            Some(_) => self.candidates(&[MessageType::Imu], None, imu_candidate)?.found,
+        let lidars = self.candidates(&LIDAR_TYPES, preference.lidar_topic.as_deref(), candidates::probe_lidar)?;
+        let requested = preference.imu_topic.as_deref();
+        let imus = self.candidates(&[MessageType::Imu], requested, probe_imu)?;
+        let others = match requested {
+            Some(_) => self.candidates(&[MessageType::Imu], None, probe_imu)?.found,
             None => Vec::new(),
         };
-        let all_imus = if asked.is_some() { &others } else { &imus.found };
+        let all_imus = if requested.is_some() { &others } else { &imus.found };
         let imu = self.choose_imu(&imus.found, all_imus)?;
         let is_connected =
             |lidar: &Candidate| imu.as_ref().is_none_or(|imu| self.connects(&imu.candidate.frame, &lidar.frame));
@@ -113,22 +117,22 @@ impl Reader {
                 )
             })?;
         let imu = imu.ok_or_else(|| self.no_sensor("IMU", "sensor_msgs/msg/Imu", &imus.unusable))?;
-        let census = self.count_misses(lidar, kind)?;
-        let point_times = match kind {
-            LidarKind::Points => self.unit_of_point_times(&lidar.topic)?,
+        let detector = self.detect_no_returns(lidar, kind)?;
+        let time_unit = match kind {
+            LidarKind::Points => self.point_time_unit(&lidar.topic)?,
             _ => None,
         };
-        let lidar_reading = LidarReading { kind, point_times, farthest_m: census.farthest_m() };
-        let scan_s = self.scan_s(lidar, lidar_reading)?;
-        let shift = clocks::shift(&imu.heard.logged, &self.logged(&lidar.topic)?, scan_s);
+        let lidar_reading = LidarDecoding { kind, time_unit, no_return_range_m: detector.no_return_range_m() };
+        let scan_duration_s = self.scan_duration_s(lidar, lidar_reading)?;
+        let shift = clocks::find_offset(&imu.preview.log_times, &self.log_times(&lidar.topic)?, scan_duration_s);
         let notes = [
             note_on_choice("lidar", lidar, &lidars.found),
             note_on_choice("IMU", &imu.candidate, &imus.found),
             note_on_times(lidar),
-            point_times.map(|unit| note_on_unit(lidar, unit)),
+            time_unit.map(|unit| note_on_unit(lidar, unit)),
             (imu.unit != imu::ForceUnit::default()).then(|| note_on_force(&imu.candidate.topic)),
             note_on_layout(&imu.candidate, &imu.layout),
-            census.note(&lidar.topic),
+            detector.note(&lidar.topic),
             (kind == LidarKind::MultiEcho).then(|| note_on_echoes(lidar)),
             shift.map(|shift| note_on_shift(&imu.candidate, lidar, shift)),
         ];
@@ -140,67 +144,67 @@ impl Reader {
             imu_frame: imu.candidate.frame.clone(),
             notes: notes.into_iter().flatten().chain(unusable).collect(),
             lidar: lidar_reading,
-            imu: ImuReading { unit: imu.unit, layout: imu.layout, shift: shift.unwrap_or(Span::ZERO) },
+            imu: ImuDecoding { unit: imu.unit, layout: imu.layout, shift: shift.unwrap_or(Span::ZERO) },
         })
     }
 
-    /// The unit that a topic's first clouds show, see [`points::Unit::shown_by`].
-    fn unit_of_point_times(&self, topic: &str) -> Result<Option<points::Unit>, RecordingError> {
+    /// Detects the time unit of a topic from the first clouds, see [`points::TimeUnit::detect`].
+    fn point_time_unit(&self, topic: &str) -> Result<Option<points::TimeUnit>, RecordingError> {
         let ids = self.ids_of(topic);
-        let (mut messages, mut lasting) = (self.messages_near(&ids), Vec::new());
-        while lasting.len() < LOOKED_AT {
+        let (mut messages, mut durations) = (self.messages_in_blocks_of(&ids), Vec::new());
+        while durations.len() < PREVIEW_MESSAGES {
             let Some(message) = messages.next()? else { break };
             if ids.contains(&message.channel) {
-                let Some(cloud) = points::lasting(message.data) else { return Ok(None) };
-                lasting.push(cloud);
+                let Some(cloud) = points::duration(message.data) else { return Ok(None) };
+                durations.push(cloud);
             }
         }
-        Ok(points::Unit::shown_by(&lasting))
+        Ok(points::TimeUnit::detect(&durations))
     }
 
-    /// How the lidar encodes beams without a return, by messages from all over the recording.
-    fn count_misses(&self, lidar: &Candidate, kind: LidarKind) -> Result<Census, RecordingError> {
-        let mut census = Census::default();
-        self.sample(&self.ids_of(&lidar.topic), SAMPLED, |message| {
-            // A message that cannot be decoded is counted where measurements are read.
+    /// Detects how the lidar encodes beams without a return, from messages across the recording.
+    fn detect_no_returns(&self, lidar: &Candidate, kind: LidarKind) -> Result<NoReturnDetector, RecordingError> {
+        let mut detector = NoReturnDetector::default();
+        self.sample(&self.ids_of(&lidar.topic), NO_RETURN_SAMPLES, |message| {
+            // Messages that cannot be decoded are counted as loss when measurements are read.
             let planar = match kind {
                 LidarKind::Scan => scan::decode(message.data),
                 LidarKind::MultiEcho => multi_echo::decode(message.data),
                 LidarKind::Points => {
-                    let _ = points::count_misses(message.data, &mut census);
+                    let _ = points::count_no_returns(message.data, &mut detector);
                     return;
                 }
                 LidarKind::Livox => return,
             };
             let Ok((_, planar)) = planar else { return };
             let limits = (planar.range_min_m, planar.range_max_m);
-            planar.ranges_m.iter().for_each(|range| census.add_range(*range, limits));
+            planar.ranges_m.iter().for_each(|range| detector.add_range(*range, limits));
         })?;
-        Ok(census)
+        Ok(detector)
     }
 
-    /// How long a scan lasts after its stamp, s: the median of the first ones.
-    fn scan_s(&self, lidar: &Candidate, reading: LidarReading) -> Result<f64, RecordingError> {
+    /// Duration of a scan after the stamp, s: the median of the first scans.
+    fn scan_duration_s(&self, lidar: &Candidate, reading: LidarDecoding) -> Result<f64, RecordingError> {
         let ids = self.ids_of(&lidar.topic);
-        let (mut messages, mut lasts) = (self.messages_near(&ids), Vec::new());
+        let (mut messages, mut durations_s) = (self.messages_in_blocks_of(&ids), Vec::new());
         let mut projector = scan::Projector::default();
-        while lasts.len() < LOOKED_AT {
+        while durations_s.len() < PREVIEW_MESSAGES {
             let Some(message) = messages.next()? else { break };
             if !ids.contains(&message.channel) {
                 continue;
             }
             if let Ok(scan) = reading.decode(&message, &mut projector) {
                 let last = scan.returns.last().map_or(Span::ZERO, |last| last.offset);
-                lasts.push((last - scan.stamped_after).seconds());
+                durations_s.push((last - scan.stamped_after).seconds());
             }
         }
-        Ok(content::quantile(lasts, 0.5))
+        Ok(content::quantile(durations_s, 0.5))
     }
 
     fn no_sensor(&self, sensor: &'static str, needs: &'static str, unusable: &[String]) -> RecordingError {
         let name = self.name().to_owned();
         if unusable.is_empty() {
-            return RecordingError::NoSensor { name, sensor, needs, has: self.what_it_has() };
+            return RecordingError::NoSensor { name, sensor, needs, has: self.topic_list() };
         }
         RecordingError::Unusable { name, sensor, reasons: unusable.join("; ") }
     }
@@ -210,27 +214,26 @@ fn is_cloud(lidar: &Candidate) -> bool {
     matches!(lidar.kind, Some(LidarKind::Points | LidarKind::Livox))
 }
 
-/// Says which of several sensors was taken; another message kind of the same sensor is no other sensor.
+/// Reports which of several sensors is used. Another topic in the same frame is the same sensor.
 fn note_on_choice(sensor: &str, chosen: &Candidate, all: &[Candidate]) -> Option<String> {
     let mut others: Vec<_> =
         all.iter().filter(|c| c.topic != chosen.topic && c.frame != chosen.frame).map(|c| c.topic.as_str()).collect();
     others.sort_unstable();
     (!others.is_empty())
-        .then(|| format!("Of several {sensor} topics, {} is read, not {}.", chosen.topic, others.join(", ")))
+        .then(|| format!("Of several {sensor} topics, {} is used, not {}.", chosen.topic, others.join(", ")))
 }
 
-fn note_on_layout(imu: &Candidate, layout: &Layout) -> Option<String> {
-    let Layout::Separate { acceleration_topic, apart } = layout else { return None };
-    let apart_ms = 1e3 * apart.seconds();
+fn note_on_layout(imu: &Candidate, layout: &ImuLayout) -> Option<String> {
+    let ImuLayout::Separate { acceleration_topic, max_separation } = layout else { return None };
+    let max_ms = 1e3 * max_separation.seconds();
     Some(match acceleration_topic {
         Some(forces) => format!(
-            "{} has angular velocities only: each is paired with the nearest acceleration of {forces}, at most {apart_ms:.1} ms \
-             apart.",
+            "{} has angular velocities only: each is paired with the nearest acceleration of {forces}, within {max_ms:.1} ms.",
             imu.topic
         ),
         None => format!(
-            "{} has angular velocities and accelerations in separate messages: they are paired by their stamps, at most \
-             {apart_ms:.1} ms apart.",
+            "{} has angular velocities and accelerations in separate messages: they are paired by stamp, within \
+             {max_ms:.1} ms.",
             imu.topic
         ),
     })
@@ -238,14 +241,14 @@ fn note_on_layout(imu: &Candidate, layout: &Layout) -> Option<String> {
 
 fn note_on_echoes(lidar: &Candidate) -> String {
     format!(
-        "{} has several echoes a beam: the strongest is used, or the first where there are no intensities.",
+        "{} has several echoes per beam: the strongest is used, or the first if there are no intensities.",
         lidar.topic
     )
 }
 
 fn note_on_shift(imu: &Candidate, lidar: &Candidate, shift: Span) -> String {
     format!(
-        "The stamps of {} and {} are {:.3} s apart by their log times: {0} is shifted by {:+.3} s; the estimator finds the rest.",
+        "By log times, the stamps of {} and {} differ by {:.3} s: {0} is shifted by {:+.3} s; the estimator determines the remainder.",
         imu.topic,
         lidar.topic,
         shift.seconds().abs(),
@@ -254,30 +257,28 @@ fn note_on_shift(imu: &Candidate, lidar: &Candidate, shift: Span) -> String {
 }
 
 fn note_on_force(imu: &str) -> String {
-    format!("{imu} tells accelerations in units of gravity, not in m/s^2: they are taken times 9.80665.")
+    format!("{imu} has accelerations in g, not in m/s^2: they are multiplied by 9.80665.")
 }
 
-fn note_on_unit(lidar: &Candidate, unit: points::Unit) -> String {
+fn note_on_unit(lidar: &Candidate, unit: points::TimeUnit) -> String {
     let (topic, unit) = (&lidar.topic, unit.name());
-    format!(
-        "{topic} counts its points' times in {unit}: as they are usually read, its clouds would last far too long or short."
-    )
+    format!("{topic} has point times in {unit}: in the usual unit its clouds would last implausibly long or short.")
 }
 
 fn note_on_times(lidar: &Candidate) -> Option<String> {
     match lidar.times {
         BeamTimes::Stated => None,
-        BeamTimes::OfOtherClock => Some(format!(
-            "{} tells its points' times by another clock than its clouds' stamps: they are counted from each cloud's first \
-             point, which is taken to be fired at the stamp.",
+        BeamTimes::OtherClock => Some(format!(
+            "{} has point times of another clock than its clouds' stamps: they are counted from each cloud's first \
+             point, which is assumed to be fired at the stamp.",
             lidar.topic
         )),
         BeamTimes::Implied => Some(format!(
-            "{} tells no time between beams; an even turn of the mirror is assumed, scan_time a turn.",
+            "{} states no time between beams; uniform rotation is assumed, one revolution per scan_time.",
             lidar.topic
         )),
         BeamTimes::Unknown => Some(format!(
-            "{} tells no times of its beams; all of a scan are taken to be fired at its stamp, so motion blurs it.",
+            "{} states no beam times; all beams of a scan are assumed to be fired at its stamp, so motion distorts it.",
             lidar.topic
         )),
     }

@@ -1,4 +1,4 @@
-//! The topics and frames of a recording that zsim writes.
+//! Topics and frames of recordings that zsim writes.
 
 use crate::recording::schema::MessageType;
 
@@ -6,23 +6,23 @@ use crate::recording::schema::MessageType;
 pub const LASER: &str = "laser";
 /// Frame of the IMU.
 pub const IMU: &str = "imu_link";
-/// Frame of the rigid body that carries both.
+/// Frame of the head, the rigid body that carries both.
 pub const HEAD: &str = "head";
-/// Frame of the body that carries the head on its spring.
+/// Frame of the base, which carries the head on a spring.
 pub const BASE: &str = "base";
-/// Frame of the base's IMU.
+/// Frame of the IMU on the base.
 pub const BASE_IMU: &str = "base_imu";
-/// Frame of the world as an estimate has it.
+/// World frame of an estimate.
 pub const MAP: &str = "map";
-/// Frame of the true world.
+/// World frame of ground truth.
 pub const TRUTH_MAP: &str = "truth/map";
-/// Frame of the true head.
+/// Frame of the head in ground truth.
 pub const TRUTH_HEAD: &str = "truth/head";
 
-/// What every topic of truth begins with.
+/// Prefix of the ground truth topics.
 pub const TRUTH_PREFIX: &str = "/ground_truth/";
 
-/// A name as it is printed: control characters, and those that turn the direction of text, are escaped.
+/// Printable form of a name: control characters and text-direction characters are escaped.
 pub fn printable(name: &str) -> String {
     let is_hidden = |c: char| {
         c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -34,7 +34,7 @@ pub fn printable(name: &str) -> String {
     printed
 }
 
-/// A topic that zsim writes.
+/// Topic that zsim writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Topic {
     /// `/scan`.
@@ -66,10 +66,10 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// How many topics there are.
+    /// Number of topics.
     pub const COUNT: usize = 13;
 
-    /// The topic's name.
+    /// Topic name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scan => "/scan",
@@ -88,7 +88,7 @@ impl Topic {
         }
     }
 
-    /// What its messages are.
+    /// Message type.
     pub fn message_type(self) -> MessageType {
         match self {
             Self::Scan => MessageType::LaserScan,
@@ -103,8 +103,9 @@ impl Topic {
         }
     }
 
-    /// Its quality of service, as rosbag2 keeps it with a channel: reliable, and for what holds for ever (transforms
-    /// that stand, a whole path) kept for those who come late.
+    /// Quality of service in the format that rosbag2 stores with a channel.
+    ///
+    /// Reliable; transient local for messages that remain valid (static transforms, a complete path).
     pub fn qos(self) -> String {
         let (depth, durability) = match self {
             Self::TfStatic | Self::Path => (1, TRANSIENT_LOCAL),

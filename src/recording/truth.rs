@@ -1,4 +1,4 @@
-//! A recording's truth: only for those who judge an estimate, never for the estimator.
+//! Reads the ground truth of a recording: for evaluation only, never for the estimator.
 
 use crate::geometry::{Pose, Trajectory};
 use crate::recording::container::{ChannelId, Messages, RawMessage};
@@ -8,35 +8,35 @@ use crate::recording::{Loss, Reader, RecordingError};
 use crate::time::Stamp;
 use crate::truth::ClockTruth;
 
-/// Something true at a time.
+/// One item of ground truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Truth {
-    /// Where the head was, at a time on the lidar's clock.
+    /// Pose of the head, at a time on the lidar's clock.
     Head(Stamp, Pose),
-    /// Where the base that carries it was, at a time on the lidar's clock.
+    /// Pose of the base that carries the spring, at a time on the lidar's clock.
     Base(Stamp, Pose),
-    /// What the clocks said, at a true time.
+    /// Clock errors, at a true time.
     Clock(Stamp, ClockTruth),
 }
 
-/// Reads the truth in the order in which it was written.
-pub struct Truths<'r> {
+/// Reads ground truth in the order in which it was written.
+pub struct TruthReader<'r> {
     messages: Messages<'r>,
     heads: Vec<ChannelId>,
     bases: Vec<ChannelId>,
     clocks: Vec<ChannelId>,
-    lidar: Option<clock::Reading<'static>>,
+    lidar: Option<clock::ClockReading<'static>>,
     loss: Loss,
     expected: Option<u64>,
     ended: bool,
 }
 
 impl Reader {
-    /// The truth under `/ground_truth/`; nothing in a recording of the real world.
-    pub fn truth(&self) -> Truths<'_> {
+    /// Reads the ground truth under `/ground_truth/`; empty for a recording of real sensors.
+    pub fn truth(&self) -> TruthReader<'_> {
         let ids = |topic: Topic| self.ids_of(topic.name());
         let (heads, bases, clocks) = (ids(Topic::TruthPose), ids(Topic::TruthBase), ids(Topic::TruthClock));
-        Truths {
+        TruthReader {
             messages: self.messages(),
             ended: heads.is_empty() && bases.is_empty() && clocks.is_empty(),
             heads,
@@ -48,10 +48,10 @@ impl Reader {
         }
     }
 
-    /// The head's true trajectory in lidar time, all of it in memory.
+    /// Reads the head's true trajectory in lidar time into memory.
     ///
     /// # Errors
-    /// When the file cannot be read, or its stamps do not increase.
+    /// When the file cannot be read, or the stamps do not increase.
     pub fn truth_trajectory(&self) -> Result<Trajectory, RecordingError> {
         let mut trajectory = Trajectory::new();
         for truth in self.truth() {
@@ -64,8 +64,8 @@ impl Reader {
     }
 }
 
-impl Truths<'_> {
-    /// What could not be read so far, the file's own loss with it.
+impl TruthReader<'_> {
+    /// Data lost so far, the damage of the file included.
     pub fn loss(&self) -> &Loss {
         &self.loss
     }
@@ -76,13 +76,13 @@ impl Truths<'_> {
                 self.loss.add_pass(&self.messages, self.expected);
                 return Ok(None);
             };
-            let posed = |truth: fn(Stamp, Pose) -> Truth| {
+            let decode_pose = |truth: fn(Stamp, Pose) -> Truth| {
                 pose::decode(message.data).map(|(stamp, pose)| Some(truth(stamp, pose))).ok()
             };
             let read = if self.heads.contains(&message.channel) {
-                posed(Truth::Head)
+                decode_pose(Truth::Head)
             } else if self.bases.contains(&message.channel) {
-                posed(Truth::Base)
+                decode_pose(Truth::Base)
             } else if self.clocks.contains(&message.channel) {
                 pair(&mut self.lidar, &message)
             } else {
@@ -97,23 +97,24 @@ impl Truths<'_> {
     }
 }
 
-/// Puts the reading of the IMU's clock together with that of the lidar's before it.
-fn pair(lidar: &mut Option<clock::Reading<'static>>, message: &RawMessage<'_>) -> Option<Option<Truth>> {
+/// Combines the reading of the IMU's clock with the preceding reading of the lidar's.
+fn pair(lidar: &mut Option<clock::ClockReading<'static>>, message: &RawMessage<'_>) -> Option<Option<Truth>> {
     let reading = clock::decode(message.data).ok()?;
     match (reading.source, lidar.take()) {
         ("lidar", _) => {
-            *lidar = Some(clock::Reading { source: "lidar", ..reading });
+            *lidar = Some(clock::ClockReading { source: "lidar", ..reading });
             Some(None)
         }
         ("imu", Some(before)) if before.now == reading.now => {
-            let clock = ClockTruth { lidar_ahead: before.says - before.now, imu_ahead: reading.says - reading.now };
+            let clock =
+                ClockTruth { lidar_ahead: before.clock_time - before.now, imu_ahead: reading.clock_time - reading.now };
             Some(Some(Truth::Clock(reading.now, clock)))
         }
         _ => None,
     }
 }
 
-impl Iterator for Truths<'_> {
+impl Iterator for TruthReader<'_> {
     type Item = Result<Truth, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {

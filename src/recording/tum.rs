@@ -1,4 +1,4 @@
-//! Trajectories as text, as the TUM RGB-D benchmark has them: `t x y z qx qy qz qw` a line, seconds and metres.
+//! Trajectories in the text format of the TUM RGB-D benchmark: `t x y z qx qy qz qw` per line, in s and m.
 
 mod number;
 
@@ -11,23 +11,23 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Read, Write};
 use std::path::Path;
 
-/// Longest line that is read, bytes; a pose takes about 100.
-const LONGEST_LINE: u64 = 4096;
+/// Maximum length of a line, bytes; a pose has about 100.
+const MAX_LINE_BYTES: u64 = 4096;
 
-/// How far the norm of a quaternion may be from 1: files with few decimals come near it.
+/// Maximum deviation of a quaternion's norm from 1: files with few decimals come close to it.
 const NORM_TOLERANCE: f64 = 1e-2;
 
-/// Writes poses as they come, stamps to the nanosecond, metres and quaternions to nine decimals.
+/// Writes poses sequentially: stamps to 1 ns, positions and quaternions to nine decimals.
 pub struct TumWriter<W: Write> {
     out: W,
     line: Vec<u8>,
 }
 
 impl TumWriter<BufWriter<File>> {
-    /// Begins a new file at `path`; one that is there is replaced.
+    /// Creates the file at `path`, replacing an existing one.
     ///
     /// # Errors
-    /// When it cannot be made.
+    /// When it cannot be created.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
         let file = File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         Ok(Self::new(BufWriter::new(file)))
@@ -35,7 +35,7 @@ impl TumWriter<BufWriter<File>> {
 }
 
 impl<W: Write> TumWriter<W> {
-    /// Begins to write to `out`.
+    /// Starts to write to `out`.
     pub fn new(out: W) -> Self {
         Self { out, line: Vec::with_capacity(128) }
     }
@@ -55,7 +55,7 @@ impl<W: Write> TumWriter<W> {
         self.out.write_all(&self.line).map_err(RecordingError::Write)
     }
 
-    /// Writes what is left.
+    /// Flushes the output.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -74,7 +74,7 @@ impl<W: Write> TruthSink for TumWriter<W> {
     }
 }
 
-/// Writes a whole trajectory to a new file at `path`.
+/// Writes a complete trajectory to a new file at `path`.
 ///
 /// # Errors
 /// When it cannot be written.
@@ -89,13 +89,15 @@ pub fn write_tum(path: &Path, trajectory: &Trajectory) -> Result<(), RecordingEr
 /// Reads the trajectory in the file at `path`.
 ///
 /// # Errors
-/// When it cannot be read; with the line, where one is not a pose, or is not later than the one before it.
+/// When it cannot be read; with the line number if a line is not a pose or not later than the previous one.
 pub fn read_tum(path: &Path) -> Result<Trajectory, RecordingError> {
     let file = File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
     parse_tum(&path.display().to_string(), file)
 }
 
-/// Reads a trajectory from `text`, which messages call `name`. Empty lines and those that begin with `#` say nothing.
+/// Reads a trajectory from `text`, called `name` in messages.
+///
+/// Empty lines and lines that start with `#` are ignored.
 ///
 /// # Errors
 /// As [`read_tum`].
@@ -105,17 +107,17 @@ pub fn parse_tum(name: &str, text: impl Read) -> Result<Trajectory, RecordingErr
     let mut bytes = Vec::new();
     for line in 1.. {
         bytes.clear();
-        let read = (&mut text).take(LONGEST_LINE).read_until(b'\n', &mut bytes).map_err(RecordingError::Read)?;
+        let read = (&mut text).take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes).map_err(RecordingError::Read)?;
         if read == 0 {
             break;
         }
         let error = |problem: String| RecordingError::Line { name: name.to_owned(), line, problem };
-        let whole = read < LONGEST_LINE as usize;
+        let is_complete = read < MAX_LINE_BYTES as usize;
         let is_first = line == 1;
-        let line = std::str::from_utf8(&bytes).ok().filter(|_| whole).map(str::trim);
-        // Some editors put a byte order mark before the text.
+        let line = std::str::from_utf8(&bytes).ok().filter(|_| is_complete).map(str::trim);
+        // Some editors write a byte order mark at the start.
         let line = line.map(|line| if is_first { line.trim_start_matches('\u{feff}').trim() } else { line });
-        let line = line.ok_or_else(|| error("this is no line of text of at most 4096 bytes".to_owned()))?;
+        let line = line.ok_or_else(|| error("this is not a line of text of at most 4096 bytes".to_owned()))?;
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
@@ -129,12 +131,13 @@ fn parse_line(line: &str) -> Result<(Stamp, Pose), String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [stamp, rest @ ..] = words.as_slice() else { return Err("the line is empty".to_owned()) };
     if rest.len() != 7 {
-        return Err(format!("a pose is 8 numbers, `t x y z qx qy qz qw`; here are {}", words.len()));
+        return Err(format!("a pose needs 8 numbers, `t x y z qx qy qz qw`, but the line has {}", words.len()));
     }
-    let stamp = number::parse_stamp(stamp).ok_or_else(|| format!("`{stamp}` is no time in seconds"))?;
+    let stamp = number::parse_stamp(stamp).ok_or_else(|| format!("`{stamp}` is not a time in seconds"))?;
     let mut numbers = [0.0; 7];
     for (number, word) in numbers.iter_mut().zip(rest) {
-        *number = word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| format!("`{word}` is no number"))?;
+        *number =
+            word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| format!("`{word}` is not a number"))?;
     }
     let [x, y, z, qx, qy, qz, qw] = numbers;
     let quaternion = nalgebra::Quaternion::new(qw, qx, qy, qz);
@@ -151,7 +154,7 @@ mod tests {
     use crate::geometry::from_roll_pitch_yaw;
 
     #[test]
-    fn a_trajectory_comes_back_to_the_ninth_decimal() {
+    fn a_written_trajectory_is_read_to_the_ninth_decimal() {
         let pose = |k: f64| Pose::from_parts([k, -0.1 * k, 1e-7].into(), from_roll_pitch_yaw(0.1 * k, -0.2, 3.0));
         let poses = (0..5).map(|k| (Stamp::from_nanos(1_349_049_600_000_000_001 + k), pose(k as f64)));
         let written = Trajectory::from_poses(poses).unwrap();
@@ -168,18 +171,18 @@ mod tests {
     }
 
     #[test]
-    fn an_error_names_file_and_line() {
+    fn an_error_states_file_and_line() {
         let message = |text: &str| parse_tum("a.tum", text.as_bytes()).unwrap_err().to_string();
         assert_eq!(
             message("# t x y z\n1.5 0 0 0 0 0 0\n"),
-            "a.tum:2: a pose is 8 numbers, `t x y z qx qy qz qw`; here are 7"
+            "a.tum:2: a pose needs 8 numbers, `t x y z qx qy qz qw`, but the line has 7"
         );
-        assert_eq!(message("1 0 0 nan 0 0 0 1\n"), "a.tum:1: `nan` is no number");
-        assert_eq!(message("x 0 0 0 0 0 0 1\n"), "a.tum:1: `x` is no time in seconds");
+        assert_eq!(message("1 0 0 nan 0 0 0 1\n"), "a.tum:1: `nan` is not a number");
+        assert_eq!(message("x 0 0 0 0 0 0 1\n"), "a.tum:1: `x` is not a time in seconds");
         assert_eq!(message("1 0 0 0 0 0 0 2\n"), "a.tum:1: the quaternion's norm is 2.0000, not 1");
         assert!(
             message("2 0 0 0 0 0 0 1\n\n1 0 0 0 0 0 0 1\n").starts_with("a.tum:3: pose 1 is stamped 1000000000 ns")
         );
-        assert!(message(&" ".repeat(5000)).starts_with("a.tum:1: this is no line of text"));
+        assert!(message(&" ".repeat(5000)).starts_with("a.tum:1: this is not a line of text"));
     }
 }

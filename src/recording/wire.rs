@@ -1,15 +1,15 @@
 //! Serialised messages: written as CDR (ROS 2), read as CDR and as ROS 1.
 //!
-//! CDR aligns numbers to their size; strings and sequences begin with their length (OMG DDSI-RTPS 2.5, section 10; OMG
+//! CDR aligns numbers to their size; strings and sequences start with their length (OMG DDSI-RTPS 2.5, section 10; OMG
 //! CORBA 3.4, part 2, section 9.3). ROS 1 has the same numbers without alignment, always little-endian.
 //!
-//! Written by hand because a scan is thousands of numbers: whole runs of them are copied at once, into a buffer that is
-//! used again for the next message.
+//! The code is written by hand for speed: a scan has thousands of numbers, which are copied as blocks into a buffer
+//! that is reused for the next message.
 
 mod decoder;
 mod encoder;
 
-pub use decoder::{DecodeError, Decoder, Payload, Wire};
+pub use decoder::{DecodeError, Decoder, Payload, WireFormat};
 pub use encoder::Encoder;
 
 #[cfg(test)]
@@ -31,7 +31,7 @@ mod tests {
     }
 
     fn written(frame: &str, numbers: &[f32]) -> Vec<u8> {
-        // Seven bytes before, as messages stand one after the other in a batch: alignment must not count them.
+        // Seven bytes of a previous message in the batch: alignment must not count them.
         let mut bytes = vec![0xAA; 7];
         let mut out = Encoder::new(&mut bytes);
         out.header(Stamp::from_nanos(-1), frame).unwrap();
@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_are_those_of_another_implementation() {
+    fn bytes_match_another_cdr_implementation() {
         for (frame, numbers) in
             [("", &[][..]), ("a", &[1.0]), ("laser", &[1.0, f32::INFINITY]), ("truth/map", &[0.5; 3])]
         {
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_cut_anywhere_is_short_and_a_lying_length_takes_no_memory() {
+    fn a_truncated_message_is_an_error_and_a_false_length_allocates_nothing() {
         let whole = written("laser", &[1.0, 2.0]);
         let read = |bytes: &[u8]| -> Result<u8, DecodeError> {
             let mut input = Decoder::new(Payload::cdr(bytes))?;
@@ -89,12 +89,9 @@ mod tests {
     }
 
     #[test]
-    fn a_stamp_beyond_2038_is_refused() {
+    fn a_stamp_after_2038_is_rejected() {
         let mut bytes = Vec::new();
         let error = Encoder::new(&mut bytes).time(Stamp::from_nanos((1 << 31) * NANOS_PER_SECOND)).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "a stamp is 2147483648000000000 ns, but a ROS 2 stamp ends 2^31 seconds from 1970"
-        );
+        assert_eq!(error.to_string(), "a stamp is 2147483648000000000 ns, but ROS 2 stamps end 2^31 s after 1970");
     }
 }

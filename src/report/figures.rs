@@ -1,4 +1,4 @@
-//! The figures of a run.
+//! Plots of a run.
 
 use super::plot::{Chart, Colour, Figure, Mark, Series};
 use crate::evaluation::{Errors, InformationBound};
@@ -6,26 +6,26 @@ use crate::geometry::{Rotation, Trajectory, Vector};
 use crate::time::Stamp;
 
 const TIME: &str = "Time (s)";
-/// Length of the stretch of the head's pitch that is shown close up, s.
+/// Duration of the enlarged section of the pitch plot, s: several periods of the rocking mode.
 const CLOSE_UP_S: f64 = 10.0;
 
-/// The way of the head from above: true and estimated, over an outline of the world (points of its walls).
+/// Top view of the true and the estimated trajectory, over the outline of the walls.
 ///
-/// `truth` may be empty, where there is none; the estimate is then in its own map.
+/// `truth` is empty if it is not known; the estimate is then in the map frame.
 pub fn trajectory_top_view(truth: &Trajectory, estimate: &Trajectory, outline_in_world: &[Vector]) -> Figure {
     let outline = outline_in_world.iter().map(|point| (point.x, point.y)).collect();
-    let chart = Chart::new("The head from above", "x (m)", "y (m)")
+    let chart = Chart::new("Trajectory, top view", "x (m)", "y (m)")
         .as_map()
         .with(Series::dots("", Colour::Backdrop, outline).marked(Mark::Dots(1.0)));
-    Figure::of(vec![with_both(chart, &from_above(truth), &from_above(estimate))])
+    Figure::of(vec![with_truth_and_estimate(chart, &horizontal_positions(truth), &horizontal_positions(estimate))])
 }
 
-fn from_above(trajectory: &Trajectory) -> Vec<(f64, f64)> {
+fn horizontal_positions(trajectory: &Trajectory) -> Vec<(f64, f64)> {
     trajectory.poses().iter().map(|pose| (pose.translation.x, pose.translation.y)).collect()
 }
 
-/// Truth behind, estimate in front, each where there is any.
-fn with_both(mut chart: Chart, truth: &[(f64, f64)], estimate: &[(f64, f64)]) -> Chart {
+/// Adds the truth, and the estimate in front of it, to a chart; an empty curve is omitted.
+fn with_truth_and_estimate(mut chart: Chart, truth: &[(f64, f64)], estimate: &[(f64, f64)]) -> Chart {
     if !truth.is_empty() {
         chart = chart.with(Series::line("truth", Colour::Truth, truth.to_vec()).marked(Mark::Line(2.2)));
     }
@@ -35,10 +35,10 @@ fn with_both(mut chart: Chart, truth: &[(f64, f64)], estimate: &[(f64, f64)]) ->
     chart
 }
 
-/// Errors of position and attitude over time, along each axis of the world and as a whole.
+/// Position and rotation errors over time: components in the world frame and magnitude.
 pub fn errors_over_time(errors: &Errors) -> Figure {
-    let size = |vectors: &[Vector]| vectors.iter().map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(size(&errors.position_m));
+    let max_norm = |vectors: &[Vector]| vectors.iter().map(Vector::norm).fold(0.0, f64::max);
+    let (unit, per_m) = length_unit(max_norm(&errors.position_m));
     let position = Chart::new("Position error, after alignment", TIME, &format!("Error ({unit})"));
     let rotation = Chart::new("Rotation error, after alignment", TIME, "Error (\u{b0})");
     Figure::of(vec![
@@ -47,10 +47,10 @@ pub fn errors_over_time(errors: &Errors) -> Figure {
     ])
 }
 
-/// Size of the position's error over time, of the open loop and of the closed one, each after an alignment of its own.
+/// Position error over time of the open loop and of the closed loop, each after its own alignment.
 pub fn open_and_closed_loop_errors(open: &Errors, closed: &Errors) -> Figure {
-    let greatest = open.position_m.iter().chain(&closed.position_m).map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(greatest);
+    let max_m = open.position_m.iter().chain(&closed.position_m).map(Vector::norm).fold(0.0, f64::max);
+    let (unit, per_m) = length_unit(max_m);
     let curve = |errors: &Errors| -> Vec<(f64, f64)> {
         seconds_of(&errors.stamps).into_iter().zip(errors.position_m.iter().map(|e| e.norm() * per_m)).collect()
     };
@@ -74,10 +74,10 @@ fn with_axes(mut chart: Chart, stamps: &[Stamp], vectors: &[Vector], factor: f64
     chart.with(Series::line("magnitude", Colour::Truth, curve(&|v| v.norm())).marked(Mark::Line(1.5)))
 }
 
-/// The least standard deviation that position and attitude can be told with, along and about each axis of the world.
+/// Cramer-Rao bound over time: standard deviations of position and attitude on each world axis.
 pub fn bound_over_time(bound: &InformationBound) -> Figure {
-    let most = bound.position_sigma_m.iter().map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(most);
+    let max_m = bound.position_sigma_m.iter().map(Vector::norm).fold(0.0, f64::max);
+    let (unit, per_m) = length_unit(max_m);
     let position = Chart::new("Information bound on the position", TIME, &format!("Sigma ({unit})"));
     let attitude = Chart::new("Information bound on the attitude", TIME, "Sigma (\u{b0})");
     Figure::of(vec![
@@ -86,40 +86,41 @@ pub fn bound_over_time(bound: &InformationBound) -> Figure {
     ])
 }
 
-/// Pitch of the head over the run, and closer over ten seconds in its middle.
+/// Pitch of the head over the run, with an enlarged section of 10 s in the middle.
 pub fn head_pitch(truth: &Trajectory, estimate: &Trajectory) -> Figure {
     let origin = [truth, estimate].into_iter().find_map(Trajectory::span).map(|(first, _)| first).unwrap_or_default();
     let (truth, estimate) = (pitches(truth, origin), pitches(estimate, origin));
     let end_s = truth.last().or(estimate.last()).map_or(0.0, |(t, _)| *t);
     let (from_s, to_s) = ((end_s - CLOSE_UP_S) / 2.0, (end_s + CLOSE_UP_S) / 2.0);
-    let within = |curve: &[(f64, f64)]| -> Vec<(f64, f64)> {
+    let in_section = |curve: &[(f64, f64)]| -> Vec<(f64, f64)> {
         curve.iter().copied().filter(|(t, _)| (from_s..=to_s).contains(t)).collect()
     };
     let label = "Pitch, nose up (\u{b0})";
-    let whole = Chart::new("Pitch of the head", TIME, label);
-    let close = Chart::new("The same, ten seconds of it", TIME, label);
-    let mut charts = vec![with_both(whole, &truth, &estimate)];
+    let full = Chart::new("Pitch of the head", TIME, label);
+    let section = Chart::new("Pitch of the head, 10 s", TIME, label);
+    let mut charts = vec![with_truth_and_estimate(full, &truth, &estimate)];
     if end_s > 2.0 * CLOSE_UP_S {
-        charts.push(with_both(close, &within(&truth), &within(&estimate)));
+        charts.push(with_truth_and_estimate(section, &in_section(&truth), &in_section(&estimate)));
     }
     Figure::of(charts)
 }
 
-/// Angle of the head's x axis above the horizon, degrees, over seconds since `origin`.
+/// Elevation of the head's x axis, degrees, over the time since `origin`, s.
 fn pitches(trajectory: &Trajectory, origin: Stamp) -> Vec<(f64, f64)> {
     let nose_up = |rotation: &Rotation| (rotation * Vector::x()).z.clamp(-1.0, 1.0).asin().to_degrees();
     trajectory.iter().map(|(stamp, pose)| (stamp.seconds_since(origin), nose_up(&pose.rotation))).collect()
 }
 
-/// How much later the IMU stamps an instant than the lidar does, over lidar time: estimated, and true where that is
-/// known.
+/// Clock offset over lidar time, ms: IMU stamp minus lidar stamp of the same time, estimated and true.
+///
+/// `truth` is empty if it is not known.
 pub fn clock_offset(truth: &[(Stamp, f64)], estimate: &[(Stamp, f64)]) -> Figure {
     let origin = truth.first().or(estimate.first()).map(|(stamp, _)| *stamp).unwrap_or_default();
     let curve = |offsets: &[(Stamp, f64)]| -> Vec<(f64, f64)> {
         offsets.iter().map(|(stamp, offset_s)| (stamp.seconds_since(origin), offset_s * 1e3)).collect()
     };
-    let chart = Chart::new("Clock of the IMU after that of the lidar", TIME, "Offset (ms)").starting_at_zero();
-    Figure::of(vec![with_both(chart, &curve(truth), &curve(estimate))])
+    let chart = Chart::new("IMU clock offset relative to the lidar clock", TIME, "Offset (ms)").starting_at_zero();
+    Figure::of(vec![with_truth_and_estimate(chart, &curve(truth), &curve(estimate))])
 }
 
 fn seconds_of(stamps: &[Stamp]) -> Vec<f64> {
@@ -127,9 +128,9 @@ fn seconds_of(stamps: &[Stamp]) -> Vec<f64> {
     stamps.iter().map(|stamp| stamp.seconds_since(origin)).collect()
 }
 
-/// The unit in which lengths up to `greatest_m` are small whole numbers, and how many of it make a metre.
-fn length_unit(greatest_m: f64) -> (&'static str, f64) {
-    match greatest_m {
+/// The unit for an axis with lengths up to `max_m`, and its number of units per metre.
+fn length_unit(max_m: f64) -> (&'static str, f64) {
+    match max_m {
         m if m < 0.02 => ("mm", 1e3),
         m if m < 2.0 => ("cm", 1e2),
         m if m < 2e3 => ("m", 1.0),

@@ -1,68 +1,68 @@
-//! The statement of integrity of a run, as `metrics.json` has it.
+//! Integrity of a run: error bounds, causes of the status and events, as in `metrics.json`.
 
 use super::Metrics;
 use super::quantity::length;
 use serde::{Deserialize, Serialize};
 
-/// What happened to the measurements or the estimate, each kind once.
+/// All events of one kind: losses of measurements, or notes on the estimate.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EventMetrics {
-    /// A key for scripts.
+    /// Key of the kind, for scripts.
     pub kind: String,
-    /// How often.
+    /// Number of events.
     pub count: u64,
-    /// When first and last, s after the first measurement; `None` for what has no time.
+    /// Time of the first event, s after the first measurement; `None` for an event without a time.
     pub first_s: Option<f64>,
-    /// When last.
+    /// Time of the last event, s after the first measurement.
     pub last_s: Option<f64>,
-    /// Size of the worst, where the kind has one: seconds of a gap, samples.
+    /// Magnitude of the worst event, if the kind has one: duration of a gap in s, number of samples.
     pub worst: Option<f64>,
-    /// The worst in words.
+    /// Message of the worst event.
     pub sentence: String,
 }
 
-/// A cause of the verdict.
+/// A cause of a status other than `good`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CauseMetrics {
     /// `degraded` or `lost`.
     pub status: String,
-    /// A key for scripts.
+    /// Key of the kind, for scripts.
     pub kind: String,
-    /// From when, s after the first measurement.
+    /// Start, s after the first measurement.
     pub from_s: f64,
-    /// Until when.
+    /// End, s after the first measurement.
     pub to_s: f64,
-    /// In words.
+    /// Message.
     pub sentence: String,
 }
 
-/// How far the result can be trusted.
+/// Error bounds of a result and causes of its status.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegrityMetrics {
-    /// Median over the poses of the bound that the position error does not exceed with a probability of 99 %, after
-    /// alignment over the first 20 s, m; `None` where more than half of the poses have no bound.
+    /// Median over the poses of the 99 % bound on the position error, aligned over the first 20 s, m; `None` if more
+    /// than half of the poses have no bound.
     pub bound_m_99: Option<f64>,
-    /// Largest bound of a pose that has one, m.
+    /// Largest finite bound of a pose, m.
     pub largest_bound_m: Option<f64>,
-    /// From when the result is not good, s after the first measurement; `None` where it is.
+    /// Start of the first cause, s after the first measurement; `None` if the status is `good`.
     pub since_s: Option<f64>,
-    /// Why, the worst first.
+    /// Causes of the status, most severe first.
     pub causes: Vec<CauseMetrics>,
-    /// Where the truth is known: share of the poses whose error is within their bound.
+    /// Fraction of the poses whose error is within the bound; `None` without truth.
     pub within_bound: Option<f64>,
-    /// Where the truth is known: median of bound over error.
+    /// Median ratio of bound to error; `None` without truth.
     pub bound_over_error: Option<f64>,
-    /// Where the truth is known: position error after that alignment, root mean square, m.
+    /// RMS position error after alignment over the first 20 s, m; `None` without truth.
     pub aligned_rmse_m: Option<f64>,
-    /// Where the truth is known: largest position error after that alignment, m.
+    /// Largest position error after alignment over the first 20 s, m; `None` without truth.
     pub largest_error_m: Option<f64>,
 }
 
 impl EventMetrics {
-    /// One line for a terminal.
+    /// Formats the events as one line: time, message and count.
     pub fn line(&self) -> String {
         let at = self.first_s.map_or_else(String::new, |s| format!("{s:.2} s: "));
         match (self.count, self.last_s) {
@@ -74,7 +74,7 @@ impl EventMetrics {
     }
 }
 
-/// The verdict in one sentence; `None` where there is no estimate.
+/// The status with its bound or its first cause, as one line; `None` without an estimate.
 pub(super) fn verdict(metrics: &Metrics) -> Option<String> {
     let status = metrics.status.as_deref()?;
     let bound = metrics.integrity.bound_m_99.map(|m| format!("99 % of position errors below {}", length(m)));
@@ -89,15 +89,15 @@ pub(super) fn verdict(metrics: &Metrics) -> Option<String> {
 mod tests {
     use super::*;
 
-    fn judged(status: &str, causes: Vec<CauseMetrics>) -> Metrics {
+    fn with_status(status: &str, causes: Vec<CauseMetrics>) -> Metrics {
         let integrity = IntegrityMetrics { bound_m_99: Some(0.0062), causes, ..IntegrityMetrics::default() };
         Metrics { status: Some(status.to_owned()), integrity, ..Metrics::default() }
     }
 
     #[test]
-    fn the_verdict_names_its_first_cause_and_its_time() {
+    fn the_verdict_contains_the_first_cause_and_its_time() {
         assert_eq!(verdict(&Metrics::default()), None);
-        assert_eq!(verdict(&judged("good", vec![])).unwrap(), "good: 99 % of position errors below 6.20 mm");
+        assert_eq!(verdict(&with_status("good", vec![])).unwrap(), "good: 99 % of position errors below 6.20 mm");
         let cause = |status: &str| CauseMetrics {
             status: status.to_owned(),
             kind: "gap".to_owned(),
@@ -105,14 +105,14 @@ mod tests {
             to_s: 4.25,
             sentence: "gap of 1.00 s in the IMU data".to_owned(),
         };
-        let degraded = verdict(&judged("degraded", vec![cause("degraded")])).unwrap();
+        let degraded = verdict(&with_status("degraded", vec![cause("degraded")])).unwrap();
         assert_eq!(degraded, "degraded: gap of 1.00 s in the IMU data, 3.2 to 4.2 s");
-        let lost = verdict(&judged("lost", vec![cause("lost")])).unwrap();
+        let lost = verdict(&with_status("lost", vec![cause("lost")])).unwrap();
         assert_eq!(lost, "lost: gap of 1.00 s in the IMU data, from 3.2 s");
     }
 
     #[test]
-    fn a_kind_of_event_is_one_line() {
+    fn events_of_one_kind_are_one_line() {
         let event = EventMetrics {
             kind: "imu_gap".to_owned(),
             count: 40,

@@ -1,60 +1,62 @@
-//! The figures of a run: `metrics.json`.
+//! Metrics of a run: the contents of `metrics.json`.
 
 use super::{EventMetrics, IntegrityMetrics};
 use serde::{Deserialize, Serialize};
 
-/// All figures of a run, in SI units but for angles, in degrees. `None` (`null` in the file) is what is not known:
-/// there was no truth, or the capability is not there.
+/// Metrics of a run.
+///
+/// All values are in SI units except angles, which are in degrees. A metric is `None` (`null` in the file) if it was not
+/// computed, for example because the recording has no truth.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Metrics {
     /// Version of zsim.
     pub version: String,
-    /// Name of the scene; of a recording by others none.
+    /// Name of the scene; `None` if the recording was not made by zsim.
     pub scene: Option<String>,
-    /// Seed of the run.
+    /// Random seed of the simulation.
     pub seed: Option<u64>,
     /// Length of the recording, s.
     pub duration_s: f64,
-    /// The verdict on the estimate: `good`, `degraded`, `lost`.
+    /// Status of the estimate: `good`, `degraded` or `lost`.
     pub status: Option<String>,
-    /// The simulation.
+    /// Run time and counts of the simulation.
     pub simulation: SimulationMetrics,
-    /// The open loop.
+    /// The open-loop estimate.
     pub open_loop: OpenLoopMetrics,
-    /// The closed loop.
+    /// The closed-loop estimate.
     pub closed_loop: ClosedLoopMetrics,
-    /// The clock offset.
+    /// The estimated clock offset between IMU and lidar.
     pub clock: ClockMetrics,
-    /// What was learnt of the lidar.
+    /// Estimated corrections of the lidar calibration.
     pub lidar: LidarMetrics,
-    /// The cloud.
+    /// The registered cloud.
     pub cloud: CloudMetrics,
-    /// What the verdict rests on.
+    /// Error bounds and causes of the status.
     pub integrity: IntegrityMetrics,
-    /// What of the recording is missing or was not used, and stretches without an estimate.
+    /// Missing or unused measurements, and intervals without an estimate.
     pub losses: Vec<EventMetrics>,
-    /// What a user should know besides.
+    /// Other information for the user.
     pub notes: Vec<EventMetrics>,
-    /// Most memory that the process ever had, MiB.
+    /// Peak resident memory of the process, MiB.
     pub peak_rss_mib: Option<f64>,
 }
 
-/// What the simulation took.
+/// Run time and counts of the simulation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationMetrics {
-    /// Time it took, recording included, s.
+    /// Wall-clock time, including writing the recording, s.
     pub wall_s: Option<f64>,
-    /// Beams fired.
+    /// Emitted beams.
     pub beams: Option<u64>,
-    /// Echoes reported.
+    /// Returns.
     pub returns: Option<u64>,
-    /// Rays cast for the beams.
+    /// Rays cast for these beams.
     pub rays: Option<u64>,
-    /// Time on physics, in parallel to the rest, s.
+    /// Time of the physics thread, in parallel with the ray casting, s.
     pub physics_wall_s: Option<f64>,
-    /// Time on rays, in parallel to the rest, s.
+    /// Time of the ray casting, in parallel with the physics, s.
     pub rays_wall_s: Option<f64>,
 }
 
@@ -62,29 +64,29 @@ pub struct SimulationMetrics {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OpenLoopMetrics {
-    /// Time the estimator took, reading included, s.
+    /// Wall-clock time of the estimator, including reading the recording, s.
     pub wall_s: Option<f64>,
-    /// That time over the recording's length.
+    /// Wall-clock time divided by the length of the recording.
     pub fraction_of_acquisition: Option<f64>,
-    /// How many fixed views it kept.
+    /// Number of fixed views (keyframes) in the estimator.
     pub fixed_views: Option<u64>,
-    /// Position error after rigid alignment, root mean square, m.
+    /// RMS position error after rigid alignment, m.
     pub position_rmse_m: Option<f64>,
-    /// Angle of the rotation error after rigid alignment, root mean square, degrees.
+    /// RMS rotation error after rigid alignment, degrees.
     pub rotation_rmse_deg: Option<f64>,
-    /// Drift of the position, m/min.
+    /// Position drift, m/min.
     pub drift_m_per_min: Option<f64>,
-    /// Drift about the vertical, degrees/min.
+    /// Yaw drift, degrees/min.
     pub yaw_drift_deg_per_min: Option<f64>,
-    /// Position error at the end, with the start aligned, m.
+    /// Position error at the end of the run, aligned at the start, m.
     pub end_error_m: Option<f64>,
-    /// Error of the way made within a minute, root mean square, m.
+    /// RMS relative position error over one minute, m.
     pub relative_error_per_minute_m: Option<f64>,
-    /// Drift of the raw IMU integrated alone, m/min.
+    /// Position drift of IMU dead reckoning without lidar, m/min.
     pub imu_only_drift_m_per_min: Option<f64>,
-    /// Error of the position squared, over its covariance: 3 on average where the covariance is right.
+    /// Mean normalised estimation error squared of the position; 3 for a consistent covariance.
     pub position_nees: Option<f64>,
-    /// The same of the attitude.
+    /// Mean normalised estimation error squared of the attitude; 3 for a consistent covariance.
     pub attitude_nees: Option<f64>,
 }
 
@@ -92,110 +94,109 @@ pub struct OpenLoopMetrics {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ClosedLoopMetrics {
-    /// Time the global registration took, s.
+    /// Wall-clock time of the global registration, s.
     pub wall_s: Option<f64>,
-    /// That time over the recording's length.
+    /// Wall-clock time divided by the length of the recording.
     pub fraction_of_acquisition: Option<f64>,
-    /// Position error after rigid alignment, root mean square, m.
+    /// RMS position error after rigid alignment, m.
     pub position_rmse_m: Option<f64>,
-    /// Angle of the rotation error after rigid alignment, root mean square, degrees.
+    /// RMS rotation error after rigid alignment, degrees.
     pub rotation_rmse_deg: Option<f64>,
-    /// The information bound on the position error, m.
+    /// Cramer-Rao bound of the RMS position error after alignment, m.
     pub bound_rmse_m: Option<f64>,
-    /// Places recognised.
+    /// Loop closures.
     pub loops: LoopMetrics,
-    /// Why the open loop is told as the closed one, where the registration was not believed.
+    /// Reason why the loop closure was not applied; `None` if it was.
     pub left: Option<String>,
 }
 
-/// Places that were seen twice, where the open loop had them out of the matches' reach.
+/// Loop closures: revisited places that the open loop has beyond the matching distance.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LoopMetrics {
-    /// Pairs that look alike.
+    /// Pairs of views proposed by place recognition.
     pub proposed: Option<u64>,
-    /// Of those, verified by their surfaces.
+    /// Proposed pairs whose surfaces match.
     pub verified: Option<u64>,
-    /// Pairs that the trajectory was bent to.
+    /// Verified pairs that constrain the trajectory.
     pub closed: Option<u64>,
 }
 
-/// The estimated offset between the clocks.
+/// The estimated clock offset: IMU stamp minus lidar stamp of the same time.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ClockMetrics {
-    /// By how much the IMU stamps an instant later than the lidar at the end, as estimated, s.
+    /// Estimated offset at the end of the run, s.
     pub offset_end_s: Option<f64>,
-    /// Error over the whole run, root mean square, s.
+    /// RMS error of the offset over the run, s.
     pub offset_rmse_s: Option<f64>,
-    /// Estimated minus true offset at the end, s.
+    /// Estimated minus true offset at the end of the run, s.
     pub offset_end_error_s: Option<f64>,
 }
 
-/// By how much the lidar is not what its calibration says, along the IMU's axes, as the estimator has it at the end.
+/// Estimated corrections of the lidar calibration at the end of the run, along the IMU axes.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LidarMetrics {
-    /// To be added to every range, m.
+    /// Estimated range correction, added to each range, m; `None` if it was not estimated.
     pub range_correction_m: Option<f64>,
-    /// Turn of the lidar about its own place, as a rotation vector, degrees; nothing where it was not estimated.
+    /// Estimated rotation of the lidar about its origin, rotation vector, degrees; `None` if it was not estimated.
     pub rotation_correction_deg: Option<[f64; 3]>,
-    /// Shift of its place, m.
+    /// Estimated translation of the lidar, m; `None` if it was not estimated.
     pub translation_correction_m: Option<[f64; 3]>,
 }
 
-/// The registered cloud.
+/// The registered cloud and its distances to the true surfaces.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudMetrics {
-    /// Echoes that were projected, those included that the filter dropped.
+    /// Projected returns, including those that the filter removed.
     pub points: Option<u64>,
-    /// Of which of them the figures of distance are, in words.
+    /// Description of the returns that the distances include.
     pub judged: Option<String>,
-    /// Mean signed distance to the true surfaces, positive in front of them, m.
+    /// Mean signed distance to the true surfaces, positive on the side of the lidar, m.
     pub bias_m: Option<f64>,
     /// Standard deviation of the signed distance, m.
     pub sigma_m: Option<f64>,
-    /// 95 % of the points are no farther from a surface, m.
+    /// 95th percentile of the distance, m.
     pub p95_m: Option<f64>,
-    /// Share of the points more than a metre from any surface, which are in none of the figures of distance.
+    /// Fraction of points more than 1 m from any surface; the distances exclude them.
     pub far_fraction: Option<f64>,
-    /// Share of the beams that truly ended on what carries the lidar. They are in the cloud, and in none of the figures
-    /// of distance, as none of them is of a surface that stands.
+    /// Fraction of beams that hit the carrier of the lidar; the distances exclude them, the cloud includes them.
     pub on_carrier_fraction: Option<f64>,
-    /// Share of the beams that truly ended on what moves through the scene; left out likewise.
+    /// Fraction of beams that hit moving objects of the scene; the distances exclude them.
     pub on_movers_fraction: Option<f64>,
-    /// Standard deviation for the same beams, projected by the true trajectory, m.
+    /// Standard deviation of the signed distance with the beams projected by the true trajectory, m.
     pub sigma_by_truth_m: Option<f64>,
-    /// What was kept of them.
+    /// Result of the outlier filter.
     pub filter: FilterMetrics,
 }
 
-/// What the filter made of the cloud; nothing where it was not asked.
+/// Result of the outlier filter of the cloud; `None` throughout if the filter is off.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilterMetrics {
-    /// Points in the cloud's files.
+    /// Points in the cloud files.
     pub kept: Option<u64>,
-    /// Echoes of two surfaces at once, left out.
+    /// Removed mixed pixels: returns from two surfaces in one beam.
     pub dropped_mixed: Option<u64>,
-    /// Echoes with next to nothing beside them, left out.
+    /// Removed isolated points: returns with few neighbours.
     pub dropped_isolated: Option<u64>,
-    /// Echoes of what moved, left out.
+    /// Removed returns from moving objects.
     pub dropped_moving: Option<u64>,
-    /// As `sigma_m` of the cloud, of those echoes of what stands that were kept, m.
+    /// Standard deviation of the signed distance of the static points that remain, m.
     pub kept_sigma_m: Option<f64>,
-    /// Share of the echoes of what stands that were left out.
+    /// Fraction of the returns from static surfaces that the filter removed by mistake.
     pub standing_dropped_fraction: Option<f64>,
-    /// Share of the echoes of what moves that were left out.
+    /// Fraction of the returns from moving objects that the filter removed.
     pub movers_dropped_fraction: Option<f64>,
 }
 
 impl Metrics {
-    /// As the text of `metrics.json`.
+    /// Returns the text of `metrics.json`.
     ///
     /// # Errors
-    /// When a figure cannot be written as JSON.
+    /// When a metric cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
@@ -205,7 +206,7 @@ impl Metrics {
 mod tests {
     use super::*;
 
-    /// In the file's order; groups before their keys.
+    /// Keys in the order of the file; each group precedes its keys.
     const KEYS: &[&str] = &[
         "version",
         "scene",
@@ -278,7 +279,7 @@ mod tests {
     ];
 
     #[test]
-    fn the_file_has_the_keys_that_scripts_read_in_their_order() {
+    fn the_file_has_all_keys_in_order() {
         let json = Metrics { scene: Some("office".to_owned()), seed: Some(1), ..Metrics::default() }.to_json().unwrap();
         let mut rest = json.as_str();
         for key in KEYS {

@@ -1,4 +1,6 @@
-//! Results for people: figures of a run ([`Metrics`]), tables, plots, a page. It knows results, not how they came.
+//! Reports of a run: metrics ([`Metrics`]), tables, plots and the HTML page.
+//!
+//! This module formats results; it does not compute them.
 
 mod figures;
 mod integrity;

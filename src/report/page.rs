@@ -1,4 +1,4 @@
-//! The page: one HTML file that needs nothing else.
+//! The report of a run as one HTML file without external resources.
 
 use super::plot::{Figure, PlotError};
 use super::{EventMetrics, Metrics, integrity, rows};
@@ -12,21 +12,21 @@ th{font-weight:600;padding-left:0}td:last-child{text-align:right;font-variant-nu
 tbody tr:first-child>*{border-top:1px solid #d0d0d0}figure{margin:0}svg{width:100%;height:auto}\
 pre{background:#f5f5f5;padding:.8rem;overflow:auto;font-size:.8rem}footer{margin-top:2rem;color:#707070;font-size:.85rem}";
 
-/// A figure on the page, with what it shows.
+/// A plot on the page with a heading.
 pub struct Section {
     /// Heading.
     pub title: String,
-    /// The figure.
+    /// The plot.
     pub figure: Figure,
 }
 
-/// The page of a run: its figures as a table, its plots, and its manifest.
+/// Builds the HTML page of a run: metrics, plots and manifest.
 ///
 /// # Errors
 /// When a plot cannot be drawn.
 pub fn page(metrics: &Metrics, sections: &[Section], manifest: &str) -> Result<String, PlotError> {
     let title = escaped(&rows::title(metrics));
-    let mut body = format!("<h1>{title}</h1>\n{}{}", verdict(metrics), figures_table(metrics));
+    let mut body = format!("<h1>{title}</h1>\n{}{}", verdict(metrics), metrics_table(metrics));
     for section in sections {
         let svg = section.figure.svg()?;
         let svg = &svg[svg.find("<svg").unwrap_or_default()..];
@@ -41,7 +41,7 @@ pub fn page(metrics: &Metrics, sections: &[Section], manifest: &str) -> Result<S
     ))
 }
 
-/// The verdict with its causes, losses and notes.
+/// The verdict with causes, losses and notes, as HTML.
 fn verdict(metrics: &Metrics) -> String {
     let (Some(verdict), Some(status)) = (integrity::verdict(metrics), &metrics.status) else { return String::new() };
     let cause = |cause: &super::CauseMetrics| {
@@ -67,7 +67,7 @@ fn list(title: &str, lines: &[String]) -> String {
     format!("<details><summary>{title} ({})</summary>\n<ul>\n{items}</ul>\n</details>\n", lines.len())
 }
 
-fn figures_table(metrics: &Metrics) -> String {
+fn metrics_table(metrics: &Metrics) -> String {
     let mut html = String::from("<table>\n");
     for group in rows::groups(metrics) {
         html += "<tbody>\n";
@@ -91,7 +91,7 @@ mod tests {
     use crate::report::{CauseMetrics, IntegrityMetrics};
 
     #[test]
-    fn the_verdict_stands_first_with_its_causes() {
+    fn the_verdict_precedes_the_table() {
         let cause = CauseMetrics { status: "lost".to_owned(), sentence: "a < b".to_owned(), ..CauseMetrics::default() };
         let integrity = IntegrityMetrics { causes: vec![cause], ..IntegrityMetrics::default() };
         let metrics = Metrics { status: Some("lost".to_owned()), integrity, ..Metrics::default() };
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_needs_nothing_else_and_escapes_what_it_is_given() {
+    fn the_page_has_no_external_resources_and_escapes_text() {
         let metrics = Metrics { scene: Some("<b>&".to_owned()), duration_s: 12.0, ..Metrics::default() };
         let section = Section { title: "A & B".to_owned(), figure: Figure::of(vec![Chart::new("t", "x", "y")]) };
         let html = page(&metrics, &[section], "(scene: \"a<b\")").unwrap();

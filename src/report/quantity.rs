@@ -1,6 +1,6 @@
-//! Numbers as people read them: three digits and a unit that suits.
+//! Formats quantities with three significant digits and an SI prefix.
 
-/// A length.
+/// Formats a length.
 pub(super) fn length(metres: f64) -> String {
     match metres.abs() {
         m if m < 0.0995 => format!("{} mm", digits(metres * 1e3)),
@@ -10,7 +10,7 @@ pub(super) fn length(metres: f64) -> String {
     }
 }
 
-/// A time.
+/// Formats a duration.
 pub(super) fn time(seconds: f64) -> String {
     match seconds.abs() {
         s if s < 0.995e-3 => format!("{} \u{b5}s", digits(seconds * 1e6)),
@@ -21,27 +21,27 @@ pub(super) fn time(seconds: f64) -> String {
     }
 }
 
-/// A count.
+/// Formats a count, with the prefix k (10^3) or M (10^6).
 pub(super) fn count(number: u64) -> String {
     match number {
         n if n < 10_000 => n.to_string(),
-        n if n < 9_950_000 => format!("{} thousand", digits(n as f64 * 1e-3)),
-        n => format!("{} million", digits(n as f64 * 1e-6)),
+        n if n < 999_500 => format!("{} k", digits(n as f64 * 1e-3)),
+        n => format!("{} M", digits(n as f64 * 1e-6)),
     }
 }
 
-/// A share, in per cent.
+/// Formats a fraction as a percentage.
 pub(super) fn percent(fraction: f64) -> String {
     format!("{} %", digits(fraction * 1e2))
 }
 
-/// The number with three digits that count, and none of an exponent.
+/// Formats a number with three significant digits and without an exponent.
 pub(super) fn digits(number: f64) -> String {
     if number == 0.0 || !number.is_finite() {
         return number.to_string();
     }
     let magnitude = number.abs().log10().floor() as i32;
-    // 9.996 is 10.0 in three digits, not 10.00.
+    // 9.996 rounds to 10.0, not to 10.00.
     let rounded_up = (number.abs() / 10_f64.powi(magnitude - 2)).round() >= 1000.0;
     let decimals = (2 - magnitude - i32::from(rounded_up)).clamp(0, 9) as usize;
     format!("{number:.decimals$}")
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_digits_and_a_unit_that_suits() {
+    fn quantities_have_three_digits_and_a_prefix() {
         assert_eq!(length(0.012_34), "12.3 mm");
         assert_eq!(length(-0.25), "-25.0 cm");
         assert_eq!(length(1234.0), "1.23 km");
@@ -62,6 +62,6 @@ mod tests {
         assert_eq!(digits(0.0), "0");
         assert_eq!(digits(1e-12), "0.000000000");
         assert_eq!(percent(0.0351), "3.51 %");
-        assert_eq!((count(950), count(5_189_000)), ("950".to_owned(), "5189 thousand".to_owned()));
+        assert_eq!((count(950), count(5_189_000)), ("950".to_owned(), "5.19 M".to_owned()));
     }
 }

@@ -1,30 +1,30 @@
-//! A run's figures as rows of words, for the terminal and the page alike.
+//! Metrics of a run as rows of text, for the terminal and for the page.
 
 use super::Metrics;
 use super::quantity::{count, digits, length, percent, time};
 
-/// A figure with its name.
+/// A metric: name and formatted value.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Row {
+pub(super) struct MetricRow {
     pub(super) name: &'static str,
     pub(super) value: String,
 }
 
-/// Figures of one kind.
+/// Rows under a common title.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Group {
     pub(super) title: &'static str,
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<MetricRow>,
 }
 
-/// What the run was, in one line.
+/// Title of a run: scene, duration and seed.
 pub(super) fn title(metrics: &Metrics) -> String {
     let scene = metrics.scene.as_deref().map_or_else(String::new, |scene| format!("{scene}, "));
     let seed = metrics.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
     format!("{scene}{}{seed}", time(metrics.duration_s))
 }
 
-/// The groups that have something to tell.
+/// The groups with at least one known metric.
 pub(super) fn groups(metrics: &Metrics) -> Vec<Group> {
     let all = [
         simulation(metrics),
@@ -38,12 +38,12 @@ pub(super) fn groups(metrics: &Metrics) -> Vec<Group> {
     all.into_iter().filter(|group| !group.rows.is_empty()).collect()
 }
 
-/// Gathers the rows whose figures are known.
-struct Rows(Vec<Row>);
+/// Collects the rows of the known metrics.
+struct RowBuilder(Vec<MetricRow>);
 
-impl Rows {
-    fn add<T: Copy>(&mut self, name: &'static str, figure: Option<T>, words: impl Fn(T) -> String) {
-        self.0.extend(figure.map(|figure| Row { name, value: words(figure) }));
+impl RowBuilder {
+    fn add<T: Copy>(&mut self, name: &'static str, value: Option<T>, format: impl Fn(T) -> String) {
+        self.0.extend(value.map(|value| MetricRow { name, value: format(value) }));
     }
 
     fn titled(self, title: &'static str) -> Group {
@@ -53,89 +53,90 @@ impl Rows {
 
 fn simulation(metrics: &Metrics) -> Group {
     let (m, duration_s) = (&metrics.simulation, metrics.duration_s);
-    let mut rows = Rows(Vec::new());
-    rows.add("took", m.wall_s, |s| format!("{} ({} x real time)", time(s), digits(duration_s / s)));
-    rows.add("physics, in parallel", m.physics_wall_s, time);
-    rows.add("rays, in parallel", m.rays_wall_s, time);
+    let mut rows = RowBuilder(Vec::new());
+    rows.add("wall time", m.wall_s, |s| format!("{} ({} x real time)", time(s), digits(duration_s / s)));
+    rows.add("physics (parallel)", m.physics_wall_s, time);
+    rows.add("ray casting (parallel)", m.rays_wall_s, time);
     rows.add("beams", m.beams, count);
     let returned = m.returns.zip(m.beams).map(|(returns, beams)| (returns, returns as f64 / beams.max(1) as f64));
-    rows.add("echoes", returned, |(returns, share)| format!("{} ({})", count(returns), percent(share)));
+    rows.add("returns", returned, |(returns, fraction)| format!("{} ({})", count(returns), percent(fraction)));
     rows.titled("simulation")
 }
 
 fn open_loop(metrics: &Metrics) -> Group {
     let m = &metrics.open_loop;
-    let mut rows = Rows(Vec::new());
+    let mut rows = RowBuilder(Vec::new());
     let took = m.wall_s.zip(m.fraction_of_acquisition);
-    rows.add("took", took, |(s, share)| format!("{} ({} of acquisition)", time(s), percent(share)));
+    rows.add("wall time", took, |(s, fraction)| format!("{} ({} of acquisition)", time(s), percent(fraction)));
     rows.add("fixed views", m.fixed_views, count);
     rows.add("position RMSE", m.position_rmse_m, length);
     rows.add("rotation RMSE", m.rotation_rmse_deg, degrees);
     rows.add("drift", m.drift_m_per_min, per_minute);
     rows.add("yaw drift", m.yaw_drift_deg_per_min, |deg| format!("{}/min", degrees(deg)));
-    rows.add("error within a minute", m.relative_error_per_minute_m, length);
-    rows.add("error at the end", m.end_error_m, length);
-    rows.add("drift of the IMU alone", m.imu_only_drift_m_per_min, per_minute);
+    rows.add("relative error over 1 min", m.relative_error_per_minute_m, length);
+    rows.add("error at end", m.end_error_m, length);
+    rows.add("drift, IMU only", m.imu_only_drift_m_per_min, per_minute);
     rows.titled("open loop")
 }
 
 fn closed_loop(metrics: &Metrics) -> Group {
     let m = &metrics.closed_loop;
-    let mut rows = Rows(Vec::new());
+    let mut rows = RowBuilder(Vec::new());
     let took = m.wall_s.zip(m.fraction_of_acquisition);
-    rows.add("took", took, |(s, share)| format!("{} ({} of acquisition)", time(s), percent(share)));
+    rows.add("wall time", took, |(s, fraction)| format!("{} ({} of acquisition)", time(s), percent(fraction)));
     rows.add("position RMSE", m.position_rmse_m, length);
     rows.add("rotation RMSE", m.rotation_rmse_deg, degrees);
     rows.add("information bound", m.bound_rmse_m, length);
     let loops = m.loops.proposed.zip(m.loops.verified).zip(m.loops.closed).filter(|((proposed, _), _)| *proposed > 0);
-    rows.add("places recognised", loops, |((proposed, verified), closed)| {
+    rows.add("loop closures", loops, |((proposed, verified), closed)| {
         format!("{} ({} proposed, {} verified)", count(closed), count(proposed), count(verified))
     });
-    rows.add("left as the open loop", m.left.as_deref(), str::to_owned);
+    rows.add("loop closure not applied", m.left.as_deref(), str::to_owned);
     rows.titled("closed loop")
 }
 
 fn clock(metrics: &Metrics) -> Group {
-    let mut rows = Rows(Vec::new());
-    rows.add("offset at the end", metrics.clock.offset_end_s, time);
+    let mut rows = RowBuilder(Vec::new());
+    rows.add("offset at end", metrics.clock.offset_end_s, time);
     rows.add("offset RMSE", metrics.clock.offset_rmse_s, time);
-    rows.add("offset error at the end", metrics.clock.offset_end_error_s, time);
+    rows.add("offset error at end", metrics.clock.offset_end_error_s, time);
     rows.titled("clock")
 }
 
 fn lidar(metrics: &Metrics) -> Group {
     let m = &metrics.lidar;
-    let each = |by: [f64; 3], words: fn(f64) -> String| by.map(words).join(", ");
-    let mut rows = Rows(Vec::new());
-    rows.add("ranges corrected by", m.range_correction_m, length);
-    rows.add("turned (x, y, z) by", m.rotation_correction_deg, |deg| each(deg, degrees));
-    rows.add("shifted (x, y, z) by", m.translation_correction_m, |by_m| each(by_m, length));
+    let each = |by: [f64; 3], format: fn(f64) -> String| by.map(format).join(", ");
+    let mut rows = RowBuilder(Vec::new());
+    rows.add("range correction", m.range_correction_m, length);
+    rows.add("rotation correction (x, y, z)", m.rotation_correction_deg, |deg| each(deg, degrees));
+    rows.add("translation correction (x, y, z)", m.translation_correction_m, |by_m| each(by_m, length));
     rows.titled("lidar")
 }
 
 fn cloud(metrics: &Metrics) -> Group {
     let m = &metrics.cloud;
-    let mut rows = Rows(Vec::new());
+    let mut rows = RowBuilder(Vec::new());
     rows.add("points", m.points, count);
     rows.add("bias", m.bias_m, length);
     rows.add("sigma", m.sigma_m, length);
-    rows.add("sigma by the true trajectory", m.sigma_by_truth_m, length);
-    rows.add("95 % within", m.p95_m, length);
-    rows.add("farther than 1 m", m.far_fraction, percent);
+    rows.add("sigma, true trajectory", m.sigma_by_truth_m, length);
+    rows.add("95th percentile", m.p95_m, length);
+    rows.add("more than 1 m off", m.far_fraction, percent);
     rows.add("on the carrier", m.on_carrier_fraction, percent);
-    rows.add("on what moves", m.on_movers_fraction, percent);
-    let share = |dropped: Option<u64>| dropped.zip(m.points).map(|(dropped, all)| dropped as f64 / all.max(1) as f64);
-    rows.add("left out, of two surfaces", share(m.filter.dropped_mixed), percent);
-    rows.add("left out, isolated", share(m.filter.dropped_isolated), percent);
-    rows.add("left out, moving", share(m.filter.dropped_moving), percent);
-    rows.add("left out of what stands", m.filter.standing_dropped_fraction, percent);
-    rows.add("left out of what moves", m.filter.movers_dropped_fraction, percent);
-    rows.add("sigma of what is kept", m.filter.kept_sigma_m, length);
+    rows.add("on moving objects", m.on_movers_fraction, percent);
+    let fraction =
+        |dropped: Option<u64>| dropped.zip(m.points).map(|(dropped, all)| dropped as f64 / all.max(1) as f64);
+    rows.add("removed: mixed pixels", fraction(m.filter.dropped_mixed), percent);
+    rows.add("removed: isolated", fraction(m.filter.dropped_isolated), percent);
+    rows.add("removed: moving", fraction(m.filter.dropped_moving), percent);
+    rows.add("static points removed by mistake", m.filter.standing_dropped_fraction, percent);
+    rows.add("moving points removed", m.filter.movers_dropped_fraction, percent);
+    rows.add("sigma after filtering", m.filter.kept_sigma_m, length);
     rows.titled("cloud")
 }
 
 fn memory(metrics: &Metrics) -> Group {
-    let mut rows = Rows(Vec::new());
+    let mut rows = RowBuilder(Vec::new());
     rows.add("peak", metrics.peak_rss_mib, |mib| format!("{} MiB", digits(mib)));
     rows.titled("memory")
 }

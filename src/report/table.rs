@@ -1,29 +1,30 @@
-//! Tables for the terminal, 80 columns wide at most.
+//! Tables for the terminal (at most 80 columns) and for Markdown.
 
 use super::{Metrics, integrity, rows};
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle};
 
-/// Widest table, columns.
-const WIDTH: u16 = 80;
+/// Maximum width of a table, columns of the terminal.
+const MAX_WIDTH: u16 = 80;
 
-/// A table without lines between its rows. The first column is words; the others are aligned right when `numbers` is
-/// set.
+/// Formats a table for the terminal, without rules between rows.
+///
+/// The first column is text; with `numbers`, the other columns are right-aligned.
 pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     let mut table = Table::new();
     let rule = LineStyle::none().left('\u{2500}').fill('\u{2500}').junction('\u{2500}').right('\u{2500}');
     table.load_style(TableStyle::new().header_separator(rule));
-    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(MAX_WIDTH);
     if !header.is_empty() {
         table.set_header(header.to_vec());
     }
     table.add_rows(rows.iter().cloned());
-    // Many columns stand closer, and what a row is called is not broken.
+    // Tables of many columns have less padding; row names are not wrapped.
     let padding = if table.column_count() > 6 { (0, 1) } else { (1, 1) };
     table.column_iter_mut().for_each(|column| {
         column.set_padding(padding);
     });
     let widest_name = table.column_max_content_widths().first().copied().unwrap_or_default();
-    if let Some(names) = table.column_mut(0).filter(|_| widest_name <= WIDTH / 2) {
+    if let Some(names) = table.column_mut(0).filter(|_| widest_name <= MAX_WIDTH / 2) {
         names.set_constraint(ColumnConstraint::ContentWidth);
     }
     if numbers {
@@ -35,7 +36,7 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     text.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
 }
 
-/// The same for a page in Markdown: the first column left, and of the others those of numbers right.
+/// Formats a table in Markdown; columns of numbers, except the first, are right-aligned.
 pub fn markdown(header: &[&str], rows: &[Vec<String>]) -> String {
     let line = |cells: &mut dyn Iterator<Item = &str>| {
         cells.fold("|".to_owned(), |line, cell| line + " " + &cell.replace('|', "\\|").replace('\n', " ") + " |") + "\n"
@@ -48,7 +49,7 @@ pub fn markdown(header: &[&str], rows: &[Vec<String>]) -> String {
     line(&mut header.iter().copied()) + "|" + &rule + "\n" + &body.collect::<String>()
 }
 
-/// The figures of a run, as they close a command.
+/// The summary of a run for the terminal: title, verdict and metrics.
 pub fn summary(metrics: &Metrics) -> String {
     let mut cells = Vec::new();
     for group in rows::groups(metrics) {

@@ -1,21 +1,21 @@
 use super::{Scenery, SurfaceHit, Track};
 use crate::geometry::Vector;
 
-/// An upright cylinder, closed at both ends, fixed in the base's frame: an operator's body, a handle, a cart's mast.
+/// An upright cylinder with closed ends, fixed in the base frame: an operator's body, a handle, the mast of a cart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cylinder {
-    /// Where its axis, along z of the base, ends below, in the base's frame, m.
+    /// Lower end of its axis, which is parallel to z of the base, in the base frame, m.
     pub foot_in_base: Vector,
-    /// Its radius, m.
+    /// Radius, m.
     pub radius_m: f64,
-    /// Its height, m.
+    /// Height, m.
     pub height_m: f64,
-    /// Share of the light that comes back diffusely at normal incidence, 0..=1.
+    /// Fraction of light that returns diffusely at normal incidence, 0..=1.
     pub reflectance: f32,
 }
 
 impl Cylinder {
-    /// How far a point of the base's frame is from its surface, m, from inside as from outside.
+    /// Distance of a point in the base frame from the surface, m; positive inside and outside.
     pub fn distance_m(&self, point_in_base: &Vector) -> f64 {
         let from_foot = point_in_base - self.foot_in_base;
         let beyond_side = from_foot.xy().norm() - self.radius_m;
@@ -24,11 +24,11 @@ impl Cylinder {
         if nearest_from_inside >= 0.0 { nearest_from_inside } else { beyond_side.max(0.0).hypot(beyond_end.max(0.0)) }
     }
 
-    /// The first of its surfaces that a ray of the base's frame meets in front of its origin.
+    /// First intersection with a ray in the base frame, in front of the origin of the ray.
     fn first_hit(&self, origin: &Vector, direction: &Vector) -> Option<SurfaceHit> {
         let from = origin - self.foot_in_base;
-        // Along |(from + s direction).xy|^2 = a s^2 + 2 b s + c + radius^2 most rays go away from the axis, or pass it
-        // by.
+        // The distance from the axis satisfies |(from + s direction).xy|^2 = a s^2 + 2 b s + c + radius^2. Most rays
+        // lead away from the axis, or miss the cylinder.
         let a = direction.xy().norm_squared();
         let b = from.xy().dot(&direction.xy());
         let c = from.xy().norm_squared() - self.radius_m * self.radius_m;
@@ -56,18 +56,18 @@ impl Cylinder {
     }
 }
 
-/// What stands around a lidar and, before it, what carries the lidar: solids that move with the base.
+/// Surroundings of a lidar together with the solids that carry it, which move with the base.
 #[derive(Clone, Copy)]
-pub struct Carried<'a> {
-    /// What stands around.
+pub struct SceneryWithCarrier<'a> {
+    /// The surroundings.
     pub scenery: &'a dyn Scenery,
     /// The solids that carry the lidar.
     pub carrier: &'a [Cylinder],
-    /// The track of the base.
+    /// Motion of the base.
     pub base: &'a Track,
 }
 
-impl Scenery for Carried<'_> {
+impl Scenery for SceneryWithCarrier<'_> {
     fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, t_s: f64) -> Option<SurfaceHit> {
         let world_from_base = self.base.pose(t_s);
         let origin_in_base = world_from_base.inverse_transform_point(&(*origin).into()).coords;
@@ -97,13 +97,13 @@ mod tests {
         }
     }
 
-    /// An operator half a metre behind the base, from 1.2 m below it to 0.5 m above.
+    /// An operator half a metre behind the base, from 1.2 m below the base to 0.5 m above.
     fn operator() -> Cylinder {
         Cylinder { foot_in_base: Vector::new(-0.5, 0.0, -1.2), radius_m: 0.2, height_m: 1.7, reflectance: 0.3 }
     }
 
     #[test]
-    fn a_ray_meets_the_side_and_the_ends_of_a_cylinder() {
+    fn a_ray_hits_the_side_and_the_ends_of_a_cylinder() {
         let hit = |origin: Vector, direction: Vector| operator().first_hit(&origin, &direction.normalize());
         // Straight back: 0.5 - 0.2. Passing the axis at 0.12 m: 0.5 - sqrt(0.04 - 0.0144) = 0.34, cosine 0.16 / 0.2.
         let side = hit(Vector::zeros(), -Vector::x()).unwrap();
@@ -111,10 +111,10 @@ mod tests {
         let off = hit(Vector::y() * 0.12, -Vector::x()).unwrap();
         assert_relative_eq!(off.range_m, 0.34, epsilon = 1e-12);
         assert_relative_eq!(off.cos_incidence, 0.8, epsilon = 1e-6);
-        // From 2 m above the base straight down onto the head, at 0.5 m.
+        // From 2 m above the base straight down to the top of the operator, at 0.5 m.
         let top = hit(Vector::new(-0.4, 0.1, 2.0), -Vector::z()).unwrap();
         assert_relative_eq!(top.range_m, 1.5, epsilon = 1e-12);
-        // At 45 degrees up, the side is met at a height of 0.3 m, at 60 degrees (0.52 m) nothing is.
+        // At 45 degrees up, the ray hits the side at a height of 0.3 m; at 60 degrees (0.52 m) it misses.
         assert_relative_eq!(
             hit(Vector::zeros(), Vector::new(-1.0, 0.0, 1.0)).unwrap().range_m,
             0.3 * 2_f64.sqrt(),
@@ -125,24 +125,24 @@ mod tests {
     }
 
     #[test]
-    fn a_point_is_as_far_from_a_cylinder_as_from_its_nearest_side_or_end() {
-        let far = |x: f64, y: f64, z: f64| operator().distance_m(&Vector::new(x, y, z));
+    fn the_distance_to_a_cylinder_is_that_to_the_nearest_side_or_end() {
+        let distance = |x: f64, y: f64, z: f64| operator().distance_m(&Vector::new(x, y, z));
         // The axis is at x = -0.5, from z = -1.2 to 0.5; the radius is 0.2.
-        assert_relative_eq!(far(0.0, 0.0, 0.0), 0.3, epsilon = 1e-12);
-        assert_relative_eq!(far(-0.5, 0.1, 0.9), 0.4, epsilon = 1e-12);
-        assert_relative_eq!(far(-0.5, 0.0, -1.3), 0.1, epsilon = 1e-12);
-        // Beyond the upper edge by 0.3 and 0.4; inside, 0.05 from the side; on the axis, 0.1 below the top.
-        assert_relative_eq!(far(0.0, 0.0, 0.9), 0.5, epsilon = 1e-12);
-        assert_relative_eq!(far(-0.5, 0.15, 0.0), 0.05, epsilon = 1e-12);
-        assert_relative_eq!(far(-0.5, 0.0, 0.4), 0.1, epsilon = 1e-12);
+        assert_relative_eq!(distance(0.0, 0.0, 0.0), 0.3, epsilon = 1e-12);
+        assert_relative_eq!(distance(-0.5, 0.1, 0.9), 0.4, epsilon = 1e-12);
+        assert_relative_eq!(distance(-0.5, 0.0, -1.3), 0.1, epsilon = 1e-12);
+        // Diagonally outside the upper edge by 0.3 and 0.4; inside, 0.05 from the side; on the axis, 0.1 below the top.
+        assert_relative_eq!(distance(0.0, 0.0, 0.9), 0.5, epsilon = 1e-12);
+        assert_relative_eq!(distance(-0.5, 0.15, 0.0), 0.05, epsilon = 1e-12);
+        assert_relative_eq!(distance(-0.5, 0.0, 0.4), 0.1, epsilon = 1e-12);
         let hit = operator().first_hit(&Vector::zeros(), &Vector::new(-1.0, 0.2, 0.3).normalize()).unwrap();
         let end = Vector::new(-1.0, 0.2, 0.3).normalize() * hit.range_m;
-        assert_relative_eq!(far(end.x, end.y, end.z), 0.0, epsilon = 1e-12);
+        assert_relative_eq!(distance(end.x, end.y, end.z), 0.0, epsilon = 1e-12);
     }
 
     #[test]
-    fn the_carrier_moves_with_its_base_before_what_stands_around() {
-        // The base walks along x at 1 m/s and faces y, so that its operator stands half a metre towards -y.
+    fn the_carrier_moves_with_its_base_and_hides_the_surroundings() {
+        // The base moves along x at 1 m/s and faces y, so that the operator is half a metre towards -y.
         let walking = |k: u32| {
             let pose = Pose::from_parts(
                 Vector::new(f64::from(k) * 0.01, 0.0, 0.0).into(),
@@ -152,19 +152,19 @@ mod tests {
         };
         let base = Track::new(0, 0.01, (0..=100).map(walking).collect()).unwrap();
         let carrier = [operator()];
-        let carried = Carried { scenery: &Wall(3.0), carrier: &carrier, base: &base };
+        let carried = SceneryWithCarrier { scenery: &Wall(3.0), carrier: &carrier, base: &base };
         let range = |origin: Vector, direction: Vector, t_s: f64| {
             carried.first_hit(&origin, &direction, 30.0, t_s).map(|hit| hit.range_m)
         };
         assert_relative_eq!(range(Vector::x() * 0.7, -Vector::y(), 0.7).unwrap(), 0.3, epsilon = 1e-9);
-        assert!(range(Vector::zeros(), -Vector::y(), 0.7).is_none(), "it was there at the start, not any more");
-        // Along x at y = -0.5: the operator stands at 0.7 m, its near side at 0.5, the wall at 3; a wall before it
-        // hides it.
+        assert!(range(Vector::zeros(), -Vector::y(), 0.7).is_none(), "the operator has moved on");
+        // Along x at y = -0.5: the operator is at 0.7 m with the near side at 0.5, the wall at 3; a closer wall hides
+        // the operator.
         let along = Vector::new(0.0, -0.5, 0.0);
         assert_relative_eq!(range(along, Vector::x(), 0.7).unwrap(), 0.5, epsilon = 1e-9);
         assert_relative_eq!(range(along + Vector::y(), Vector::x(), 0.7).unwrap(), 3.0, epsilon = 1e-9);
-        let hidden = Carried { scenery: &Wall(0.4), ..carried };
+        let hidden = SceneryWithCarrier { scenery: &Wall(0.4), ..carried };
         assert_relative_eq!(hidden.first_hit(&along, &Vector::x(), 30.0, 0.7).unwrap().range_m, 0.4, epsilon = 1e-9);
-        assert!(carried.first_hit(&along, &Vector::x(), 0.4, 0.7).is_none(), "beyond reach");
+        assert!(carried.first_hit(&along, &Vector::x(), 0.4, 0.7).is_none(), "out of range");
     }
 }

@@ -2,53 +2,53 @@ use crate::spec::{Source, SpecError, checked};
 use crate::time::{Span, Stamp};
 use serde::{Deserialize, Serialize};
 
-/// The clocks of the sensors, one each.
+/// Clocks of the sensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClocksSpec {
-    /// The lidar's. Its time is the one in which trajectories are written.
+    /// Clock of the lidar. Trajectories are written in lidar time.
     pub lidar: ClockSpec,
-    /// The IMU's.
+    /// Clock of the IMU.
     pub imu: ClockSpec,
 }
 
-/// A sensor's clock against true time.
+/// Error model of a sensor clock relative to true time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClockSpec {
-    /// How far it is ahead at the start, ms.
+    /// Offset at the start of the run, ms; positive is ahead of true time.
     #[serde(with = "checked::Finite")]
     pub offset_ms: f64,
-    /// How much faster it runs, parts per million (1 ms a minute is 16.67 ppm).
+    /// Rate error, ppm; positive runs fast (1 ms per minute is 16.67 ppm).
     #[serde(with = "checked::Finite")]
     pub rate_ppm: f64,
-    /// Standard deviation of the white noise on a stamp, ms.
+    /// Jitter: standard deviation of the white noise on a stamp, ms.
     #[serde(with = "checked::NonNegative")]
     pub jitter_ms: f64,
-    /// What stamps are rounded down to a multiple of, ms; 0 for none.
+    /// Resolution, ms: stamps are rounded down to a multiple of it; 0 disables the rounding.
     #[serde(with = "checked::NonNegative")]
     pub resolution_ms: f64,
 }
 
-/// The clocks of the sensors.
+/// Clocks of the sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clocks {
-    /// The lidar's.
+    /// Clock of the lidar.
     pub lidar: Clock,
-    /// The IMU's.
+    /// Clock of the IMU.
     pub imu: Clock,
 }
 
-/// A sensor's clock: what it says at a true time, jitter aside.
+/// A sensor clock without jitter.
 ///
-/// True time `t` is counted in seconds from the start of the run, `epoch`. The crystal says `epoch + offset + (1 +
-/// rate) t`, and the sensor takes its samples by its own crystal. Stamps are the crystal's reading rounded down to the
-/// resolution, so on average they lag by half of that: [`Clock::stamp_of`] is this mean.
+/// True time `t` is in seconds from the start of the run, `epoch`. The crystal reads `epoch + offset + (1 + rate) t`
+/// and triggers the samples of the sensor. Stamps are the reading rounded down to the resolution, so they lag by half
+/// of it on average: [`Clock::stamp_of`] is this mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
     epoch: Stamp,
     offset_s: f64,
-    /// Crystal seconds a true second.
+    /// Crystal seconds per true second.
     pace: f64,
     jitter_s: f64,
     resolution: Span,
@@ -58,7 +58,8 @@ impl Clocks {
     /// The clocks that `spec`, from `source`, describes, in a run that starts at `epoch`.
     ///
     /// # Errors
-    /// When a clock is off by more than a tenth of its rate, or by more than a day.
+    /// If the rate of a clock is off by more than 10 %, its offset exceeds a day, or its jitter or resolution exceeds 1
+    /// s.
     pub fn new(spec: &ClocksSpec, source: &Source, epoch: Stamp) -> Result<Self, SpecError> {
         Ok(Self { lidar: Clock::new(&spec.lidar, source, epoch)?, imu: Clock::new(&spec.imu, source, epoch)? })
     }
@@ -68,7 +69,7 @@ impl Clock {
     /// The clock that `spec`, from `source`, describes, in a run that starts at `epoch`.
     ///
     /// # Errors
-    /// When it is off by more than a tenth of its rate, by more than a day, or jitters or rounds by more than a second.
+    /// If its rate is off by more than 10 %, its offset exceeds a day, or its jitter or resolution exceeds 1 s.
     pub fn new(spec: &ClockSpec, source: &Source, epoch: Stamp) -> Result<Self, SpecError> {
         let limits = [
             ("rate_ppm", spec.rate_ppm, 1e5, "ppm"),
@@ -78,7 +79,7 @@ impl Clock {
         ];
         for (key, value, limit, unit) in limits {
             if value.abs() > limit {
-                let message = format!("{key} is {value} {unit}; a clock is within {limit} {unit}");
+                let message = format!("{key} is {value} {unit}; it must be within {limit} {unit}");
                 return Err(SpecError::about(source, key, message));
             }
         }
@@ -91,41 +92,41 @@ impl Clock {
         })
     }
 
-    /// A clock that tells true time.
+    /// A clock that shows true time.
     pub fn exact(epoch: Stamp) -> Self {
         Self { epoch, offset_s: 0.0, pace: 1.0, jitter_s: 0.0, resolution: Span::ZERO }
     }
 
-    /// Crystal seconds a true second.
+    /// Crystal seconds per true second.
     pub fn pace(&self) -> f64 {
         self.pace
     }
 
-    /// Standard deviation of the noise on a stamp, s.
+    /// Standard deviation of the jitter of a stamp, s.
     pub fn jitter_s(&self) -> f64 {
         self.jitter_s
     }
 
-    /// What stamps are rounded down to a multiple of.
+    /// Resolution to which stamps are rounded down.
     pub fn resolution(&self) -> Span {
         self.resolution
     }
 
-    /// What the crystal says `t_s` true seconds after the start.
+    /// Reading of the crystal at `t_s` true seconds after the start.
     pub fn crystal(&self, t_s: f64) -> Stamp {
         self.epoch + Span::from_seconds(self.offset_s + self.pace * t_s)
     }
 
-    /// When the crystal says `stamp`, true seconds after the start.
+    /// True seconds after the start at which the crystal reads `stamp`.
     pub fn true_s_of_crystal(&self, stamp: Stamp) -> f64 {
         ((stamp - self.epoch).seconds() - self.offset_s) / self.pace
     }
 
-    /// The first instant of the crystal from `stamp` on that lies half-way between two ticks of the resolution.
+    /// The first reading of the crystal from `stamp` on that is half-way between two ticks of the resolution.
     ///
-    /// A sensor that starts there, and whose period is a whole number of ticks, loses exactly half a tick by rounding:
-    /// the mean that [`Clock::ahead`] counts with. Started on a tick it would lose nothing, and the mean would be
-    /// wrong.
+    /// A sensor that starts at such a reading, with a period of whole ticks, loses exactly half a tick by rounding: the
+    /// mean that [`Clock::ahead`] assumes. A sensor that starts on a tick would lose nothing, and that mean would not
+    /// apply.
     pub fn half_tick_from(&self, stamp: Stamp) -> Stamp {
         let half = self.half_tick();
         let tick = (stamp - half).floor_to(self.resolution);
@@ -136,22 +137,22 @@ impl Clock {
         Span::from_nanos(self.resolution.nanos() / 2)
     }
 
-    /// How far stamps are ahead of true time at `t_s`: jitter aside, the mean of the rounding included.
+    /// Mean difference of stamps from true time at `t_s`, rounding included; positive is ahead.
     pub fn ahead(&self, t_s: f64) -> Span {
         Span::from_seconds(self.offset_s + (self.pace - 1.0) * t_s) - self.half_tick()
     }
 
-    /// The mean stamp of the instant `t_s` true seconds after the start.
+    /// Mean stamp at `t_s` true seconds after the start.
     pub fn stamp_of(&self, t_s: f64) -> Stamp {
         self.crystal(t_s) - self.half_tick()
     }
 
-    /// The true time, s after the start, of which `stamp` is the mean stamp.
+    /// True time, s after the start, at which the mean stamp is `stamp`.
     pub fn true_s(&self, stamp: Stamp) -> f64 {
         self.true_s_of_crystal(stamp + self.half_tick())
     }
 
-    /// The first multiple of `step` that is the mean stamp of an instant of the run.
+    /// The first multiple of `step` that is a mean stamp within the run.
     pub fn first_multiple(&self, step: Span) -> Stamp {
         let start = self.stamp_of(0.0);
         let floor = start.floor_to(step);
@@ -207,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn every_shipped_clock_loads() {
+    fn every_built_in_clock_loads() {
         let names = crate::spec::names(Kind::Clock);
         assert!(names.contains(&"drifting".to_owned()), "{names:?}");
         for name in names {
@@ -216,13 +217,13 @@ mod tests {
             assert_eq!(
                 clocks.lidar.ahead(0.0).nanos(),
                 -clocks.lidar.resolution().nanos() / 2,
-                "the reference: {name}"
+                "offset of the reference clock: {name}"
             );
         }
     }
 
     #[test]
-    fn a_clock_that_runs_twice_as_fast_is_refused() {
+    fn a_clock_that_runs_twice_as_fast_is_rejected() {
         let spec = ClockSpec { offset_ms: 0.0, rate_ppm: 1e6, jitter_ms: 0.0, resolution_ms: 0.0 };
         let error = Clock::new(&spec, &Source::in_memory("c.ron", "(\nrate_ppm: 1e6)"), Stamp::default()).unwrap_err();
         assert_eq!(error.line_and_column(), Some((2, 1)));

@@ -1,18 +1,17 @@
-//! Sensors: what a lidar, an inertial measurement unit and their clocks make of the motion and the world.
+//! Sensor models: lidar, inertial measurement unit (IMU), and their clocks.
 //!
-//! Every sensor has three parts. A *spec* is data ([`LidarSpec`], [`ImuSpec`], [`ClocksSpec`]), read from `specs/`. A
-//! *model* is built from it and valid by construction ([`Lidar`], [`Imu`], [`Clocks`]). Its *errors* are what a seed
-//! makes of the spec's noise ([`LidarErrors`], [`ImuErrors`], [`Stamper`]). Exact geometry comes first and errors
-//! second, so that runs that differ in noise alone can share their rays:
+//! Each sensor has three parts. A *spec* is data ([`LidarSpec`], [`ImuSpec`], [`ClocksSpec`]), read from `specs/`. A
+//! *model* is built from the spec and is valid by construction ([`Lidar`], [`Imu`], [`Clocks`]). The *errors* are one
+//! realisation of the noise of the spec, drawn from a seed ([`LidarErrors`], [`ImuErrors`], [`Stamper`]). The exact
+//! geometry is computed first and the errors afterwards, so that runs that differ only in noise can use the same rays:
 //!
-//! - a lidar: [`Lidar::sweep`] casts the rays of one scan, each from where the laser was when that beam was fired;
-//!   [`Lidar::measure`] makes a scan of what they met;
-//! - an IMU: [`mean_motion`] is what an ideal one says over an interval; [`ImuErrors::measure`] is what this one says;
-//! - a clock: [`Clock`] tells when samples are taken and what the clock says, jitter aside; a [`Stamper`] adds the
-//!   jitter.
+//! - lidar: [`Lidar::sweep`] casts the rays of one scan, each from the pose at the firing time of its beam;
+//!   [`Lidar::measure`] computes the scan from the intersections;
+//! - IMU: [`mean_motion`] is the ideal sample over an interval; [`ImuErrors::measure`] adds the errors;
+//! - clock: [`Clock`] determines the sample times and the mean stamps; [`Stamper`] adds the jitter.
 //!
-//! Every source of noise has a stream of its own, named after what it disturbs; a lidar's has one part a scan, so that
-//! scans can be computed in any order, on any thread.
+//! Each source of noise has a separate random stream, named after the quantity it disturbs. The streams of a lidar have
+//! one part per scan, so that scans can be computed in any order and on any thread.
 
 mod carrier;
 mod clock;
@@ -22,12 +21,12 @@ mod scenery;
 mod stamper;
 mod track;
 
-pub use carrier::{Carried, Cylinder};
+pub use carrier::{Cylinder, SceneryWithCarrier};
 pub use clock::{Clock, ClockSpec, Clocks, ClocksSpec};
 pub use imu::{AccelSpec, GaussMarkovSpec, GyroSpec, Imu, ImuErrors, ImuSpec, MeanMotion, mean_motion};
 pub use lidar::{
-    Beam, DetectionSpec, Firing, GlassSpec, GrazingSpec, Lidar, LidarErrors, LidarErrorsSpec, LidarSpec, PatternSpec,
-    RangeNoiseSpec, Rays, Sweep, Switch,
+    Beam, BeamModel, DetectionSpec, GlassSpec, GrazingSpec, Lidar, LidarErrors, LidarErrorsSpec, LidarSpec,
+    PatternSpec, RangeNoiseSpec, ScanTiming, Sweep, Switch,
 };
 pub use scenery::{Scenery, SurfaceHit};
 pub use stamper::Stamper;

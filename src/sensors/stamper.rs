@@ -5,39 +5,38 @@ use rand_distr::{Distribution, StandardNormal};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Jitter is cut off here, in standard deviations: seven in ten million stamps.
-const CUT: f64 = 5.0;
+/// Jitter is limited to this many standard deviations: it affects 6 stamps in 10 million.
+const MAX_JITTER_SIGMAS: f64 = 5.0;
 
-/// The stamps that a clock gives to samples taken evenly by its crystal: with jitter, rounded down, and in order.
+/// Stamps for samples at the constant period of a clock's crystal: with jitter, rounded down, in order.
 ///
-/// Jitter changes stamps, never the order of samples: a driver passes them on in the order in which they were taken,
-/// with stamps that increase strictly. Where jitter would put a stamp before its predecessor's, the two stamps are
-/// exchanged: sample `k` gets the `k`-th smallest of all the noisy stamps. Holding each stamp back to its predecessor's
-/// instead would make them late on average; sorting leaves the mean of the stamps as it is, so that the clock's offset
-/// is what the spec says even where jitter exceeds the period (its spread is then less than the spec's). Two stamps
-/// that rounding makes equal are set 1 ns apart.
+/// Jitter changes stamps, not the order of samples: a driver delivers samples in the order in which they were taken,
+/// with strictly increasing stamps. Sample `k` therefore gets the `k`-th smallest of the noisy stamps. To delay each
+/// stamp to its predecessor's instead would bias the mean; sorting leaves the mean unchanged, so that the clock offset
+/// matches the spec even where the jitter exceeds the period (the spread is then smaller than in the spec). Where
+/// rounding makes two stamps equal, the second is 1 ns later.
 #[derive(Debug, Clone)]
 pub struct Stamper {
     clock: Clock,
     first: Stamp,
     period_s: f64,
     noise: Stream,
-    /// Noisy stamps of samples not yet stamped, and of as many after them as could come before.
-    ahead: BinaryHeap<Reverse<Stamp>>,
+    /// Noisy stamps that are not yet assigned: as many as can precede the stamp of the next sample.
+    pending: BinaryHeap<Reverse<Stamp>>,
     drawn: u64,
-    given: u64,
+    returned: u64,
     last: Option<Stamp>,
 }
 
 impl Stamper {
     /// Stamps for samples at `first`, `first + period_s`, ... on the crystal of `clock`.
     pub fn new(clock: Clock, first: Stamp, period_s: f64, noise: Stream) -> Self {
-        Self { clock, first, period_s, noise, ahead: BinaryHeap::new(), drawn: 0, given: 0, last: None }
+        Self { clock, first, period_s, noise, pending: BinaryHeap::new(), drawn: 0, returned: 0, last: None }
     }
 
     fn draw(&mut self) -> Stamp {
         let z: f64 = StandardNormal.sample(&mut self.noise);
-        let jitter_s = self.clock.jitter_s() * z.clamp(-CUT, CUT);
+        let jitter_s = self.clock.jitter_s() * z.clamp(-MAX_JITTER_SIGMAS, MAX_JITTER_SIGMAS);
         let since_first = self.drawn as f64 * self.period_s + jitter_s;
         self.drawn += 1;
         self.first + Span::from_seconds(since_first)
@@ -47,19 +46,19 @@ impl Stamper {
 impl Iterator for Stamper {
     type Item = Stamp;
 
-    /// The stamp of the next sample; there is always one.
+    /// The stamp of the next sample; never `None`.
     fn next(&mut self) -> Option<Stamp> {
-        // A later sample comes before this one only if their jitters differ by the time between them, 2 CUT sigma at
-        // most.
-        let reach = (2.0 * CUT * self.clock.jitter_s() / self.period_s).ceil() as u64;
-        while self.drawn <= self.given + reach {
+        // A later sample gets an earlier stamp only if their jitters differ by the time between them, which is at most
+        // 2 MAX_JITTER_SIGMAS sigma.
+        let lookahead = (2.0 * MAX_JITTER_SIGMAS * self.clock.jitter_s() / self.period_s).ceil() as u64;
+        while self.drawn <= self.returned + lookahead {
             let stamp = self.draw();
-            self.ahead.push(Reverse(stamp));
+            self.pending.push(Reverse(stamp));
         }
-        let Reverse(noisy) = self.ahead.pop()?;
+        let Reverse(noisy) = self.pending.pop()?;
         let rounded = noisy.floor_to(self.clock.resolution());
         let stamp = self.last.map_or(rounded, |last| rounded.max(last + Span::from_nanos(1)));
-        self.given += 1;
+        self.returned += 1;
         self.last = Some(stamp);
         Some(stamp)
     }
@@ -98,12 +97,12 @@ mod tests {
     fn jitter_as_long_as_the_period_keeps_order_and_mean() {
         let (mean, sigma) = mean_and_sigma(&errors_s(10.0, 0.0, 0.01, 40_000));
         assert!(mean.abs() < 4.0 * 10e-3 / 200.0, "{mean}");
-        assert!(sigma < 10e-3, "sorted stamps spread less: {sigma}");
+        assert!(sigma < 10e-3, "sorting reduces the spread: {sigma}");
     }
 
     #[test]
     fn a_coarse_clock_is_late_by_half_its_resolution() {
-        // Samples half-way between ticks, at a period of whole ticks: every one loses exactly half of one.
+        // Samples half-way between ticks, with a period of whole ticks: each loses exactly half a tick.
         assert!(errors_s(0.0, 1.0, 0.025, 100).iter().all(|e| (e + 0.5e-3).abs() < 1e-9));
         let (mean, _) = mean_and_sigma(&errors_s(1.0, 1.0, 0.025, 40_000));
         assert!((mean + 0.5e-3).abs() < 4.0 * 1.05e-3 / 200.0, "{mean}");

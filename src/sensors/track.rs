@@ -1,13 +1,13 @@
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
 use nalgebra::{Quaternion, Unit};
 
-/// How a frame moved during a while: its kinematics at evenly spaced instants, and the pose at any instant between.
+/// Motion of a frame over an interval: kinematics at evenly spaced nodes, interpolated between them.
 ///
-/// Poses are interpolated by cubic Hermite polynomials in position and in the rotation vector from one instant to the
-/// next (as [`Kinematics::pose_towards`] does), with their coefficients worked out once a step. For a sinusoid of
-/// frequency `f` and amplitude `A` the error is at most `A (2 pi f h)^4 / 384`: at 100 Hz, 1 mm and steps of 1 ms, 0.4
-/// um; a head on a spring moves at 20 Hz and less. A step turns by less than 0.1 rad, else the series used here lose
-/// digits.
+/// Position and rotation vector are interpolated by cubic Hermite polynomials from node to node (as by
+/// [`Kinematics::pose_towards`]); the coefficients are computed once per step. For a sinusoid of frequency `f` and
+/// amplitude `A` the error is at most `A (2 pi f h)^4 / 384`: 0.4 um at 100 Hz, 1 mm and steps of 1 ms. A head on a
+/// spring moves at 20 Hz at most. A step must rotate by less than 0.1 rad, otherwise the series used here lose
+/// accuracy.
 #[derive(Debug, Clone)]
 pub struct Track {
     first: u64,
@@ -25,10 +25,10 @@ struct Segment {
 }
 
 impl Track {
-    /// The track through `nodes`, at the instants `first step_s`, `(first + 1) step_s`, ... after the start.
+    /// The track through `nodes` at the times `first step_s`, `(first + 1) step_s`, ... after the start.
     ///
-    /// Counting steps, and not adding seconds, keeps an instant the same number in whichever track it lies. `None` for
-    /// fewer than two nodes.
+    /// Times are computed from the step count, so that a time has the same bits in all tracks. `None` for fewer than
+    /// two nodes.
     pub fn new(first: u64, step_s: f64, nodes: Vec<Kinematics>) -> Option<Self> {
         if nodes.len() < 2 {
             return None;
@@ -37,26 +37,26 @@ impl Track {
         Some(Self { first, step_s, nodes, segments })
     }
 
-    /// First and last instant, s after the start.
+    /// Time of the first and the last node, s after the start.
     pub fn span_s(&self) -> (f64, f64) {
         let last = self.first + self.segments.len() as u64;
         (self.first as f64 * self.step_s, last as f64 * self.step_s)
     }
 
-    /// The track of another frame fixed in the same body.
+    /// The track of another frame that is fixed to the same body.
     pub fn of_frame(&self, body_from_frame: &Pose) -> Self {
         let nodes: Vec<Kinematics> = self.nodes.iter().map(|node| node.of_frame(body_from_frame)).collect();
         let segments = nodes.windows(2).map(|pair| Segment::between(&pair[0], &pair[1], self.step_s)).collect();
         Self { nodes, segments, ..*self }
     }
 
-    /// `world_from_frame` at `t_s`; beyond the ends the outermost polynomials go on.
+    /// `world_from_frame` at `t_s`; outside the interval the first or last polynomial is extrapolated.
     pub fn pose(&self, t_s: f64) -> Pose {
         let (index, u) = self.locate(t_s);
         self.segments[index].pose(u)
     }
 
-    /// Pose, velocities and accelerations at `t_s`: cubic in the velocities, linear in the accelerations.
+    /// Pose, velocities and accelerations at `t_s`: velocities interpolated by cubics, accelerations linearly.
     pub fn kinematics(&self, t_s: f64) -> Kinematics {
         let (index, u) = self.locate(t_s);
         let (a, b) = (&self.nodes[index], &self.nodes[index + 1]);
@@ -94,17 +94,17 @@ impl Segment {
     fn between(a: &Kinematics, b: &Kinematics, step_s: f64) -> Self {
         let start = a.world_from_body.translation.vector;
         let (v0, v1) = (a.velocity_in_world * step_s, b.velocity_in_world * step_s);
-        let way = b.world_from_body.translation.vector - start;
+        let offset = b.world_from_body.translation.vector - start;
 
         let rotation = a.world_from_body.rotation;
         let turn = (b.world_from_body.rotation * rotation.inverse()).scaled_axis();
-        // The rate of the rotation vector at the end, J_l(turn)^-1 omega, by its series: the next term is turn^4 / 720.
+        // Rate of the rotation vector at the end, J_l(turn)^-1 omega, as a series: the next term is turn^4 / 720.
         let omega = b.angular_velocity_in_world * step_s;
         let cross = turn.cross(&omega);
         let rate_at_end = omega - cross * 0.5 + turn.cross(&cross) / 12.0;
         let rate_at_start = a.angular_velocity_in_world * step_s;
         Self {
-            position: [start, v0, way * 3.0 - v0 * 2.0 - v1, v0 + v1 - way * 2.0],
+            position: [start, v0, offset * 3.0 - v0 * 2.0 - v1, v0 + v1 - offset * 2.0],
             turn: [
                 rate_at_start,
                 turn * 3.0 - rate_at_start * 2.0 - rate_at_end,
@@ -123,7 +123,7 @@ impl Segment {
     }
 }
 
-/// The rotation by a rotation vector of less than 0.1 rad: series of the half angle's cosine and sine, to 1e-15.
+/// Rotation by a rotation vector below 0.1 rad: series of cosine and sine of the half angle, exact to 1e-15.
 fn small_rotation(turn: &Vector) -> Rotation {
     let h2 = turn.norm_squared() * 0.25;
     let cos = 1.0 - h2 * (0.5 - h2 * (1.0 / 24.0 - h2 / 720.0));
@@ -137,7 +137,7 @@ mod tests {
     use crate::geometry::from_roll_pitch_yaw;
     use approx::assert_relative_eq;
 
-    /// A body that nods about y and sways along y, both as sinusoids at 2 Hz.
+    /// A body that rotates about y and moves along y, both as sinusoids at 2 Hz.
     fn nodding(t_s: f64) -> Kinematics {
         let w = 4.0 * std::f64::consts::PI;
         let (sin, cos) = (w * t_s).sin_cos();
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn between_instants_the_track_is_the_motion() {
+    fn the_track_reproduces_the_motion_between_nodes() {
         // Cubic Hermite: A (w h)^4 / 384 = 0.8 (0.01257)^4 / 384 = 5e-11 in the angle, less in position.
         let track = track(100, 200);
         for t in [0.1, 0.1234567, 0.2, 0.29999, 0.3] {
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn the_track_of_another_frame_is_that_frames_motion() {
+    fn the_track_of_another_frame_is_the_motion_of_that_frame() {
         let arm = Pose::from_parts(Vector::new(0.1, -0.2, 0.05).into(), from_roll_pitch_yaw(0.4, 0.1, 2.0));
         let laser = track(0, 50).of_frame(&arm);
         let expected = nodding(0.0203).of_frame(&arm);
@@ -182,14 +182,14 @@ mod tests {
     }
 
     #[test]
-    fn it_agrees_with_the_interpolation_of_the_ground_floor() {
+    fn the_track_agrees_with_pose_towards() {
         let (a, b) = (nodding(0.4), nodding(0.401));
         let ours = Track::new(400, 1e-3, vec![a, b]).unwrap().pose(0.4007);
         assert_relative_eq!(ours, a.pose_towards(&b, 1e-3, 0.7), epsilon = 1e-12);
     }
 
     #[test]
-    fn a_single_instant_is_no_track() {
+    fn a_single_node_is_not_a_track() {
         assert!(Track::new(0, 1e-3, vec![nodding(0.0)]).is_none());
     }
 }

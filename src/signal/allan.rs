@@ -1,47 +1,48 @@
-//! Overlapping Allan deviation, its equivalent degrees of freedom and its confidence band.
+//! Overlapping Allan deviation with equivalent degrees of freedom and confidence interval.
 //!
-//! Formulas: W. J. Riley, Handbook of Frequency Stability Analysis, NIST Special Publication 1065 (2008). A gyroscope's
-//! rate (or an accelerometer's specific force) stands where the handbook has fractional frequency, its integral where
-//! it has phase.
+//! Formulas: W. J. Riley, Handbook of Frequency Stability Analysis, NIST Special Publication 1065 (2008). The rate of a
+//! gyroscope (or the specific force of an accelerometer) takes the role of fractional frequency, the integral that of
+//! phase.
 
 use super::chi_squared_quantile;
 
 /// The Allan deviation at one averaging time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AllanPoint {
-    /// The averaging time, s.
+    /// Averaging time, s.
     pub tau_s: f64,
-    /// The deviation, in the unit of the samples.
+    /// Allan deviation, in the unit of the samples.
     pub deviation: f64,
     /// Equivalent degrees of freedom of the estimated variance.
     pub edf: f64,
 }
 
 impl AllanPoint {
-    /// The interval that holds the true deviation with the given `confidence` (0.95, say), from the chi-squared
-    /// distribution of the estimate: `edf s^2 / sigma^2 ~ chi^2(edf)` (SP 1065, eq. 45).
-    pub fn band(&self, confidence: f64) -> (f64, f64) {
+    /// The interval of the true deviation at the given `confidence`, for example 0.95.
+    ///
+    /// From the chi-squared distribution of the estimate: `edf s^2 / sigma^2 ~ chi^2(edf)` (SP 1065, eq. 45).
+    pub fn confidence_interval(&self, confidence: f64) -> (f64, f64) {
         let tail = (1.0 - confidence) / 2.0;
         let bound = |p: f64| self.deviation * (self.edf / chi_squared_quantile(p, self.edf)).sqrt();
         (bound(1.0 - tail), bound(tail))
     }
 }
 
-/// The overlapping Allan deviation of `samples` taken at `rate_hz`, at the averaging times `averaging[i] / rate_hz`.
+/// The overlapping Allan deviation of `samples` at `rate_hz`, at the times `averaging[i] / rate_hz`.
 ///
 /// `sigma^2(m tau0) = sum_k (x[k+2m] - 2 x[k+m] + x[k])^2 / (2 (m tau0)^2 (n - 2m))` over the `n` points of the
-/// integral x (SP 1065, eq. 11). An averaging factor of zero, or one that needs more samples than there are (`2 m` of
-/// them), has no point in the result.
+/// integral x (SP 1065, eq. 11). The result has no point for an averaging factor m of zero or with `2 m` above the
+/// number of samples.
 ///
-/// The degrees of freedom depend on the kind of noise, which is told at each averaging time from the autocorrelation of
-/// the averaged samples (SP 1065, section 5.5.6), and where they are too few for that, taken from the last time that
-/// had enough.
+/// The degrees of freedom depend on the type of noise. It is identified at each averaging time from the autocorrelation
+/// of the averaged samples (SP 1065, section 5.5.6); with too few averages, the type of the last averaging time with
+/// enough of them is used.
 pub fn allan_deviation(samples: &[f64], rate_hz: f64, averaging: &[usize]) -> Vec<AllanPoint> {
     let integral = integral_of(samples);
     let mut noise = Noise::White;
     let mut points = Vec::with_capacity(averaging.len());
     for &m in averaging.iter().filter(|m| **m > 0 && samples.len() >= 2 * **m) {
-        noise = Noise::of(&integral, m).unwrap_or(noise);
+        noise = Noise::identify(&integral, m).unwrap_or(noise);
         let differences = integral.iter().zip(&integral[m..]).zip(&integral[2 * m..]);
         let count = integral.len() - 2 * m;
         let sum: f64 = differences.map(|((a, b), c)| (c - 2.0 * b + a).powi(2)).sum();
@@ -52,8 +53,9 @@ pub fn allan_deviation(samples: &[f64], rate_hz: f64, averaging: &[usize]) -> Ve
     points
 }
 
-/// The running sum of `samples` about their mean, from 0: their integral in units of a sample's time. The mean, which
-/// the Allan deviation does not see, is taken off so that sums of hours lose no digits.
+/// The integral of `samples` minus their mean, from 0, in units of the sampling interval.
+///
+/// The Allan deviation does not depend on the mean; removing it avoids loss of precision over hours of data.
 fn integral_of(samples: &[f64]) -> Vec<f64> {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     let mut sum = 0.0;
@@ -64,7 +66,7 @@ fn integral_of(samples: &[f64]) -> Vec<f64> {
     std::iter::once(0.0).chain(sums).collect()
 }
 
-/// Kinds of noise by the power of frequency in the rate's spectrum.
+/// Types of noise by the exponent of frequency in the spectrum of the rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Noise {
     /// f^2: quantisation of the integral.
@@ -80,15 +82,17 @@ enum Noise {
 }
 
 impl Noise {
-    /// Least averaged samples from which the kind of noise is told.
-    const ENOUGH: usize = 30;
+    /// Minimum number of averaged samples for the identification of the noise type.
+    const MIN_SAMPLES: usize = 30;
 
-    /// The kind of noise at averaging factor `m`, by the lag-1 autocorrelation r of the averages, differenced until
-    /// stationary: the exponent is -2 (d + r / (1 + r)) after d differences (SP 1065, section 5.5.6).
-    fn of(integral: &[f64], m: usize) -> Option<Self> {
-        let knots: Vec<f64> = integral.iter().step_by(m).copied().collect();
-        let mut series: Vec<f64> = knots.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        if series.len() < Self::ENOUGH {
+    /// Identifies the noise type at averaging factor `m`; `None` with too few averages.
+    ///
+    /// Uses the lag-1 autocorrelation r of the averages, differenced d times until stationary: the exponent is -2 (d +
+    /// r / (1 + r)) (SP 1065, section 5.5.6).
+    fn identify(integral: &[f64], m: usize) -> Option<Self> {
+        let phases: Vec<f64> = integral.iter().step_by(m).copied().collect();
+        let mut series: Vec<f64> = phases.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        if series.len() < Self::MIN_SAMPLES {
             return None;
         }
         let mut differences = 0.0;
@@ -113,8 +117,9 @@ impl Noise {
         }
     }
 
-    /// Degrees of freedom of the overlapping Allan variance from `n` points of the integral at averaging factor `m`
-    /// (SP 1065, table 5).
+    /// Degrees of freedom of the overlapping Allan variance (SP 1065, table 5).
+    ///
+    /// `n` points of the integral, averaging factor `m`.
     fn edf(self, n: f64, m: f64) -> f64 {
         match self {
             Noise::WhitePhase => (n + 1.0) * (n - 2.0 * m) / (2.0 * (n - m)),
@@ -165,7 +170,7 @@ mod tests {
 
     #[test]
     fn a_ramp_has_the_deviation_of_its_slope() {
-        // Means over tau of a ramp of slope s differ by s tau, so the deviation is s tau / sqrt(2).
+        // Averages over tau of a ramp of slope s differ by s tau, so the deviation is s tau / sqrt(2).
         let ramp: Vec<f64> = (0..1000).map(|k| 0.3 * f64::from(k) / 100.0).collect();
         for point in allan_deviation(&ramp, 100.0, &[1, 7, 50, 400]) {
             assert_relative_eq!(point.deviation, 0.3 * point.tau_s / 2_f64.sqrt(), max_relative = 1e-9);
@@ -209,17 +214,18 @@ mod tests {
     }
 
     #[test]
-    fn degrees_of_freedom_are_those_of_repeated_trials() {
-        // By definition edf = 2 E[s^2]^2 / Var[s^2]; 1500 trials know the variance to 4 %, the formulas claim some 5 %.
+    fn degrees_of_freedom_agree_with_repeated_trials() {
+        // By definition edf = 2 E[s^2]^2 / Var[s^2]; 1500 trials determine the variance to 4 %, the formulas are
+        // accurate to some 5 %.
         for (draw, m) in [(white as fn(u64, usize) -> Vec<f64>, 8), (random_walk, 8), (white, 40), (random_walk, 40)] {
             let points: Vec<AllanPoint> =
                 (0..1500).map(|seed| allan_deviation(&draw(seed, 400), 1.0, &[1, m])[1]).collect();
             let variances: Vec<f64> = points.iter().map(|point| point.deviation.powi(2)).collect();
             let mean = variances.iter().sum::<f64>() / 1500.0;
             let spread = variances.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 1499.0;
-            let mut told: Vec<f64> = points.iter().map(|point| point.edf).collect();
-            told.sort_by(f64::total_cmp);
-            assert_relative_eq!(told[750], 2.0 * mean * mean / spread, max_relative = 0.15);
+            let mut edfs: Vec<f64> = points.iter().map(|point| point.edf).collect();
+            edfs.sort_by(f64::total_cmp);
+            assert_relative_eq!(edfs[750], 2.0 * mean * mean / spread, max_relative = 0.15);
         }
     }
 
@@ -229,7 +235,7 @@ mod tests {
         let taus: Vec<f64> = points.iter().map(|point| point.tau_s).collect();
         assert_eq!(taus, [0.01, 0.5]);
         assert!(allan_deviation(&[], 100.0, &[1]).is_empty());
-        let (low, high) = points[0].band(0.95);
+        let (low, high) = points[0].confidence_interval(0.95);
         assert!(low < points[0].deviation && points[0].deviation < high);
     }
 }

@@ -1,9 +1,9 @@
-//! Quantiles of the chi-squared distribution, for the confidence of a measured variance.
+//! Quantiles of the chi-squared distribution, for confidence intervals of a variance.
 
-/// The value that a chi-squared variable of `degrees` degrees of freedom stays below with the given `probability`.
+/// The quantile of the chi-squared distribution with `degrees` degrees of freedom at `probability`.
 ///
-/// `degrees` need not be whole. Solves `P(degrees / 2, x / 2) = probability` by bisection, to 1e-12 of the value; NaN
-/// where `probability` is outside 0..1 or `degrees` is not above zero.
+/// `degrees` need not be an integer. Solves `P(degrees / 2, x / 2) = probability` by bisection to a relative accuracy
+/// of 1e-12. Returns NaN if `probability` is outside 0..1 or `degrees` is not positive.
 pub fn chi_squared_quantile(probability: f64, degrees: f64) -> f64 {
     if !((0.0..1.0).contains(&probability) && degrees > 0.0 && degrees.is_finite()) {
         return f64::NAN;
@@ -13,7 +13,7 @@ pub fn chi_squared_quantile(probability: f64, degrees: f64) -> f64 {
     while below(high) < probability {
         (low, high) = (high, 2.0 * high);
     }
-    // The interval halves until it is as narrow as doubles allow.
+    // Bisect down to the resolution of f64.
     while high - low > 1e-13 * high {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {
@@ -24,8 +24,9 @@ pub fn chi_squared_quantile(probability: f64, degrees: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The regularised lower incomplete gamma function `P(a, x)`: its series below `a + 1`, else the continued fraction of
-/// its complement (Abramowitz & Stegun 6.5.29 and 6.5.31).
+/// The regularised lower incomplete gamma function `P(a, x)`.
+///
+/// Series below `a + 1`, otherwise the continued fraction of the complement (Abramowitz & Stegun 6.5.29 and 6.5.31).
 fn lower_gamma(a: f64, x: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
@@ -44,7 +45,7 @@ fn series(a: f64, x: f64) -> f64 {
     sum
 }
 
-/// Lentz's evaluation of `1 / (x + 1 - a - 1 (1 - a) / (x + 3 - a - ...))`.
+/// Lentz's method for the continued fraction `1 / (x + 1 - a - 1 (1 - a) / (x + 3 - a - ...))`.
 fn fraction(a: f64, x: f64) -> f64 {
     let mut b = x + 1.0 - a;
     let (mut c, mut d) = (1e300, 1.0 / b);
@@ -64,7 +65,9 @@ fn fraction(a: f64, x: f64) -> f64 {
     }
 }
 
-/// Logarithm of the gamma function for `a > 0`: Stirling's series at `a + 10`, stepped down (A&S 6.1.41, 6.1.15).
+/// Logarithm of the gamma function for `a > 0`.
+///
+/// Stirling's series at `a + 10`, then recurrence (A&S 6.1.41, 6.1.15).
 fn ln_gamma(a: f64) -> f64 {
     let steps: f64 = (0..10).map(|k| (a + f64::from(k)).ln()).sum();
     let z = a + 10.0;
@@ -90,7 +93,7 @@ mod tests {
 
     #[test]
     fn two_degrees_of_freedom_are_an_exponential() {
-        // chi^2 with 2 degrees has the distribution 1 - exp(-x / 2).
+        // With 2 degrees of freedom the distribution function is 1 - exp(-x / 2).
         for p in [0.01, 0.3, 0.9, 0.999] {
             assert_relative_eq!(chi_squared_quantile(p, 2.0), -2.0 * (1.0_f64 - p).ln(), max_relative = 1e-11);
         }
@@ -105,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_probability_has_no_quantile() {
+    fn invalid_arguments_give_nan() {
         assert!(chi_squared_quantile(1.0, 3.0).is_nan());
         assert!(chi_squared_quantile(f64::NAN, 3.0).is_nan());
         assert!(chi_squared_quantile(0.5, 0.0).is_nan());

@@ -1,4 +1,4 @@
-//! Spectra, transfer functions and Allan deviation of sampled signals, and the regularity of their stamps; no physics.
+//! Spectra, transfer functions and Allan deviation of sampled signals, and period and jitter of time stamps.
 
 mod allan;
 mod chi_squared;
@@ -14,39 +14,39 @@ pub use segments::{Segments, Window};
 pub use spectrum::{Spectrum, power_density};
 pub use transfer::{TransferPoint, transfer_function};
 
-/// Why a signal cannot be analysed.
+/// Errors of signal analysis.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum SignalError {
-    /// Fewer samples than one segment takes.
-    #[error("{samples} samples do not fill one segment of {segment}; record longer, or take shorter segments")]
+    /// The record is shorter than one segment.
+    #[error("{samples} samples are fewer than one segment of {segment}: record longer or use shorter segments")]
     TooShort {
-        /// How many samples there are.
+        /// Number of samples in the record.
         samples: usize,
-        /// How many a segment takes.
+        /// Number of samples in a segment.
         segment: usize,
     },
-    /// Segments that cannot be made.
+    /// The segment length or overlap is invalid.
     #[error(
-        "segments of {length} samples that overlap by {overlap}: a segment has at least 2, and overlaps by less than itself"
+        "segments of {length} samples with an overlap of {overlap}: the length must be at least 2 and above the overlap"
     )]
     Segments {
-        /// The segment's length.
+        /// Length of a segment, samples.
         length: usize,
-        /// Its overlap with the next.
+        /// Overlap with the next segment, samples.
         overlap: usize,
     },
-    /// An input and an output that do not belong together.
-    #[error("the input has {input} samples, the output {output}; they must be sampled together")]
+    /// Input and output differ in length.
+    #[error("the input has {input} samples, the output {output}: both must have the same number")]
     Mismatch {
-        /// Samples of the input.
+        /// Number of input samples.
         input: usize,
-        /// Samples of the output.
+        /// Number of output samples.
         output: usize,
     },
-    /// A NaN or an infinity in the signal.
+    /// A sample is NaN or infinite.
     #[error("sample {index} is not finite")]
     NotFinite {
-        /// Which sample, from 0.
+        /// Index of the sample, from 0.
         index: usize,
     },
 }

@@ -1,46 +1,48 @@
-//! The period of a sensor, and how its stamps lie about it.
+//! Period, jitter and pattern of a sensor's time stamps.
 
-/// A sensor may have no period when its stamps scatter about a line by more than the first multiple of it, and has none
-/// when the variance of `n` intervals is more than the second fraction of `n` times that of one.
+/// Thresholds for a sensor without period: stamp jitter over period, and variance ratio of intervals.
+///
+/// The sensor is aperiodic if the jitter exceeds the first fraction of the period, and the variance of `n` intervals
+/// exceeds the second fraction of `n` times the variance of one interval.
 const APERIODIC: (f64, f64) = (0.2, 0.4);
-/// Stamps are delayed where their skewness about a line is above this; that of an exponential delay is 2.
+/// Skewness of the residuals above which stamps count as delayed; an exponential delay has 2.
 const DELAYED_SKEWNESS: f64 = 0.8;
-/// Of fewer stamps the skewness says nothing.
+/// Minimum number of stamps for a meaningful skewness.
 const DELAYED_FROM: usize = 30;
-/// Samples were lost where a line with losses leaves less than this share of the jitter, each in its periods.
+/// Samples count as lost if the fit with losses has a relative jitter below this fraction of that without.
 const LOSSES_FIT: f64 = 0.25;
-/// Iterations of the line below delayed stamps, and the weight of a late stamp in them.
+/// Iterations of the lower-envelope fit, and the weight of a late stamp in it.
 const ENVELOPE_ITERATIONS: usize = 30;
 const LATE_WEIGHT: f64 = 1e-3;
-/// Stamps come in bursts where the median interval is less than this fraction of the mean.
+/// Stamps are in bursts if the median interval is below this fraction of the mean.
 const BURST: f64 = 0.3;
 
-/// What the first stamps of a sensor show.
+/// Period, jitter and pattern of a sensor's first stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Regularity {
-    /// From sample to sample, s.
+    /// Sampling period, s.
     pub period_s: f64,
-    /// Standard deviation of the stamps about a line through them, s.
+    /// Standard deviation of the stamps about the fitted line, s.
     pub jitter_s: f64,
-    /// How the stamps lie about that line.
+    /// Distribution of the stamps about the fitted line.
     pub pattern: StampPattern,
 }
 
-/// How the stamps of a sensor lie about a line through them.
+/// Pattern of a sensor's stamps about the fitted line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StampPattern {
-    /// To either side.
+    /// Symmetric jitter.
     Regular,
-    /// To one side: they are delayed by a host or a bus.
+    /// One-sided jitter: a host or a bus delays the stamps.
     Delayed,
-    /// Several samples at once.
+    /// Several samples arrive at once.
     Bursts,
-    /// The samples follow no period; `period_s` is the median interval.
+    /// No period; `period_s` is the median interval.
     Irregular,
 }
 
 impl StampPattern {
-    /// As in what is printed.
+    /// Name of the pattern in printed output.
     pub fn name(self) -> &'static str {
         match self {
             Self::Regular => "regular",
@@ -52,9 +54,11 @@ impl StampPattern {
 }
 
 impl Regularity {
-    /// Of stamps in order: a line through stamps over counts, the counts being such that the stamps lie closest to it.
-    /// Where samples were lost, the intervals tell the count; where stamps jitter by as much as the period, only their
-    /// number does. `None` for fewer than three stamps, or for stamps that do not advance.
+    /// Fits a line through stamps over sample counts; stamps in order of time.
+    ///
+    /// Two counts are compared: one from the intervals, which accounts for lost samples, and the plain number of
+    /// samples, which is right if the jitter is as large as the period. The better fit is used. `None` for fewer than
+    /// three stamps, or for stamps that do not increase.
     pub fn of(stamps_s: &[f64]) -> Option<Self> {
         let mut intervals: Vec<f64> = stamps_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let without_losses = Self::about_line(stamps_s.iter().copied().zip(0..).map(|(s, k)| (f64::from(k), s)));
@@ -67,7 +71,7 @@ impl Regularity {
         }
         let median = intervals[intervals.len() / 2];
         if comes_in_bursts {
-            // Stamps in bursts: the intervals within them say nothing of the period, the number of samples does.
+            // Within bursts the intervals are unrelated to the period, so use the number of samples.
             return without_losses.map(|line| match line.pattern {
                 StampPattern::Regular => Self { pattern: StampPattern::Bursts, ..line },
                 _ => line,
@@ -81,20 +85,20 @@ impl Regularity {
         });
         let by_intervals = Self::about_line(counted);
         let line = match (by_intervals, without_losses) {
-            // A long delay passes for a loss, and among jittered stamps any short interval for the period.
+            // A long delay looks like a loss, and with large jitter a short interval looks like the period.
             (Some(a), Some(b)) => {
                 let fits = a.jitter_s / a.period_s < LOSSES_FIT * b.jitter_s / b.period_s;
                 if fits { a } else { b }
             }
             (a, b) => a.or(b)?,
         };
-        if line.jitter_s > APERIODIC.0 * line.period_s && wanders(stamps_s) {
+        if line.jitter_s > APERIODIC.0 * line.period_s && has_independent_intervals(stamps_s) {
             return Some(Self { period_s: median, jitter_s: 0.0, pattern: StampPattern::Irregular });
         }
         Some(line)
     }
 
-    /// The line through points (count, stamp), if it rises.
+    /// Fits a line through points (count, stamp); `None` unless it increases.
     fn about_line(points: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
         let points: Vec<(f64, f64)> = points.collect();
         let n = points.len() as f64;
@@ -111,8 +115,10 @@ impl Regularity {
         is_line.then_some(Self { period_s, jitter_s, pattern })
     }
 
-    /// The slope of a line below points (count, stamp): least squares in which points above it count for little
-    /// (expectile regression, Newey and Powell, Econometrica 55, 1987), begun from `slope`.
+    /// The slope of the lower envelope of points (count, stamp), starting from `slope`.
+    ///
+    /// Least squares with a small weight for points above the line (expectile regression, Newey and Powell,
+    /// Econometrica 55, 1987).
     fn lower_envelope(points: &[(f64, f64)], slope: f64) -> f64 {
         let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / points.len() as f64;
         let (mut slope, mut offset) = (slope, mean(|p| p.1) - slope * mean(|p| p.0));
@@ -135,9 +141,10 @@ impl Regularity {
     }
 }
 
-/// Whether intervals add up like independent ones: the variance of the time that `n` of them take then grows with `n`,
-/// while jitter of the stamps of a regular sensor leaves it as it is.
-fn wanders(stamps_s: &[f64]) -> bool {
+/// Whether the intervals are independent, as those of a sensor without period.
+///
+/// The variance of the duration of `n` independent intervals grows with `n`; jitter about a constant period does not.
+fn has_independent_intervals(stamps_s: &[f64]) -> bool {
     let variance = |n: usize| {
         let times: Vec<f64> = stamps_s.windows(n + 1).map(|run| run[n] - run[0]).collect();
         let mean = times.iter().sum::<f64>() / times.len() as f64;
@@ -152,7 +159,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
-    /// Stamps of a sensor of period 10 ms and 20 ppm whose jitter is Gaussian (sum of twelve uniform numbers).
+    /// Stamps with a period of 10 ms, a clock error of 20 ppm and Gaussian jitter (sum of twelve uniform numbers).
     fn stamps(count: usize, jitter_s: f64) -> Vec<f64> {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
@@ -160,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn stamps_in_bursts_have_the_period_of_the_samples() {
+    fn stamps_in_bursts_give_the_sample_period() {
         let bursts: Vec<f64> = (0..160).map(|k| f64::from(k / 4) * 0.04 + f64::from(k % 4) * 1e-6).collect();
         let regularity = Regularity::of(&bursts).unwrap();
         assert!(
@@ -185,16 +192,16 @@ mod tests {
     }
 
     #[test]
-    fn the_period_is_found_in_spite_of_losses() {
+    fn the_period_is_found_despite_lost_samples() {
         let mut kept: Vec<f64> = stamps(200, 1e-4);
         kept.retain(|raw| ((raw / 0.01) as usize) % 7 != 2);
         assert!((Regularity::of(&kept).unwrap().period_s - 0.01).abs() < 2e-6);
         assert_eq!(Regularity::of(&[1.0, 1.0, 1.0]), None);
     }
 
-    /// A long delay must not pass for a loss.
+    /// A long delay must not count as a loss.
     #[test]
-    fn delayed_stamps_of_which_none_is_lost_have_their_period() {
+    fn delayed_stamps_without_losses_give_the_period() {
         for seed in 0..40 {
             let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
             let mut last = 0.0_f64;

@@ -1,4 +1,4 @@
-//! A record cut into overlapping windowed segments, and their Fourier transforms (P. D. Welch, 1967).
+//! Overlapping windowed segments of a record and the Fourier transforms (P. D. Welch, 1967).
 
 use super::SignalError;
 use nalgebra::Complex;
@@ -9,9 +9,9 @@ use std::sync::Arc;
 /// The weights over a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Window {
-    /// All alike: for signals whose period is the segment, which do not leak then.
+    /// Constant weights, for signals that are periodic in the segment and therefore do not leak.
     Rectangular,
-    /// Hann's raised cosine, periodic: for everything else.
+    /// Hann window (raised cosine, periodic), for all other signals.
     Hann,
 }
 
@@ -26,32 +26,32 @@ impl Window {
     }
 }
 
-/// How a record is cut.
+/// Segmentation of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Segments {
-    /// Samples in a segment.
+    /// Number of samples in a segment.
     pub length: usize,
-    /// Samples that a segment shares with the next.
+    /// Number of samples shared with the next segment.
     pub overlap: usize,
     /// The weights over a segment.
     pub window: Window,
 }
 
 impl Segments {
-    /// Hann windows that overlap by half.
+    /// Hann windows with 50 % overlap.
     pub fn hann(length: usize) -> Self {
         Self { length, overlap: length / 2, window: Window::Hann }
     }
 
-    /// Whole periods of a periodic signal, side by side.
+    /// Rectangular windows without overlap, for complete periods of a periodic signal.
     pub fn periods(length: usize) -> Self {
         Self { length, overlap: 0, window: Window::Rectangular }
     }
 
-    /// How many segments a record of `samples` holds.
+    /// Number of segments in a record of `samples` samples.
     ///
     /// # Errors
-    /// When it holds none, or there is no such segment.
+    /// When the record is shorter than a segment, or length or overlap is invalid.
     pub fn count(&self, samples: usize) -> Result<usize, SignalError> {
         let Self { length, overlap, .. } = *self;
         if length < 2 || overlap >= length {
@@ -63,10 +63,11 @@ impl Segments {
         Ok((samples - length) / (length - overlap) + 1)
     }
 
-    /// The number of independent averages that `count` overlapping segments of white noise are worth (Welch 1967, eq.
-    /// 12): `count / (1 + 2 sum_j (1 - j / count) rho_j)` with `rho_j` the squared correlation of a window with itself
-    /// `j` hops on.
-    pub fn averages(&self, count: usize) -> f64 {
+    /// The equivalent number of independent averages of `count` overlapping segments of white noise.
+    ///
+    /// `count / (1 + 2 sum_j (1 - j / count) rho_j)`, where `rho_j` is the squared correlation of the window with
+    /// itself shifted by `j` hops (Welch 1967, eq. 12).
+    pub fn equivalent_averages(&self, count: usize) -> f64 {
         let weights = self.window.weights(self.length);
         let hop = self.length - self.overlap;
         let power: f64 = weights.iter().map(|w| w * w).sum();
@@ -79,14 +80,14 @@ impl Segments {
         count as f64 / (1.0 + 2.0 * repeated)
     }
 
-    /// The frequencies of a segment's transform, Hz.
+    /// The frequencies of the transform of a segment, Hz.
     pub(super) fn frequencies(&self, rate_hz: f64) -> impl Iterator<Item = f64> {
         let step_hz = rate_hz / self.length as f64;
         (0..=self.length / 2).map(move |k| k as f64 * step_hz)
     }
 }
 
-/// Transforms segments one after the other, without allocation.
+/// Transforms segments one by one with preallocated buffers.
 pub(super) struct Transformer {
     segments: Segments,
     weights: Vec<f64>,
@@ -102,13 +103,13 @@ impl Transformer {
         Self { segments, weights: segments.window.weights(segments.length), fft, windowed, scratch }
     }
 
-    /// Room for one transform.
-    pub fn room(&self) -> Vec<Complex<f64>> {
+    /// Allocates the output buffer of one transform.
+    pub fn output_buffer(&self) -> Vec<Complex<f64>> {
         self.fft.make_output_vec()
     }
 
-    /// The transform of segment `index` of `samples`, its mean taken off, into `room`.
-    pub fn transform(&mut self, samples: &[f64], index: usize, room: &mut [Complex<f64>]) {
+    /// Writes the transform of segment `index` of `samples`, mean removed, to `output`.
+    pub fn transform(&mut self, samples: &[f64], index: usize, output: &mut [Complex<f64>]) {
         let start = index * (self.segments.length - self.segments.overlap);
         let segment = &samples[start..start + self.segments.length];
         let mean = segment.iter().sum::<f64>() / segment.len() as f64;
@@ -116,19 +117,19 @@ impl Transformer {
             *windowed = (sample - mean) * weight;
         }
         self.fft
-            .process_with_scratch(&mut self.windowed, room, &mut self.scratch)
-            .expect("all rooms are made by the plan, and lengths are the one thing it refuses");
+            .process_with_scratch(&mut self.windowed, output, &mut self.scratch)
+            .expect("all buffers have the lengths of the plan, and a wrong length is the only error");
     }
 
-    /// What the squared modulus of bin `bin` is multiplied with to be a one-sided density, unit^2/Hz.
+    /// The factor from the squared modulus of bin `bin` to one-sided power spectral density, unit^2/Hz.
     pub fn density_scale(&self, bin: usize, rate_hz: f64) -> f64 {
         let power: f64 = self.weights.iter().map(|w| w * w).sum();
-        let is_alone = bin == 0 || 2 * bin == self.segments.length;
-        if is_alone { 1.0 / (power * rate_hz) } else { 2.0 / (power * rate_hz) }
+        let has_no_mirror = bin == 0 || 2 * bin == self.segments.length;
+        if has_no_mirror { 1.0 / (power * rate_hz) } else { 2.0 / (power * rate_hz) }
     }
 }
 
-/// Refuses NaN and infinity.
+/// Returns an error if a sample is NaN or infinite.
 pub(super) fn check_finite(samples: &[f64]) -> Result<(), SignalError> {
     match samples.iter().position(|x| !x.is_finite()) {
         Some(index) => Err(SignalError::NotFinite { index }),
@@ -142,21 +143,21 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn half_overlapped_hann_windows_are_worth_nearly_as_many_averages() {
-        // Welch 1967: Hann windows at 50 % correlate by 1/6, squared 1/36: each is worth 1 / (1 + 2/36) = 0.947
-        // averages.
-        let averages = Segments::hann(1024).averages(10_000);
+    fn half_overlapping_hann_windows_are_nearly_independent() {
+        // Welch 1967: Hann windows at 50 % overlap correlate by 1/6, squared 1/36, so each is worth 1 / (1 + 2/36) =
+        // 0.947 averages.
+        let averages = Segments::hann(1024).equivalent_averages(10_000);
         assert_relative_eq!(averages / 10_000.0, 36.0 / 38.0, epsilon = 1e-5);
-        assert_relative_eq!(Segments::periods(100).averages(7), 7.0);
+        assert_relative_eq!(Segments::periods(100).equivalent_averages(7), 7.0);
     }
 
     #[test]
-    fn segments_that_cannot_be_are_refused() {
+    fn invalid_segments_are_rejected() {
         assert_eq!(Segments::hann(64).count(64), Ok(1));
         assert_eq!(Segments::hann(64).count(128), Ok(3));
         assert_eq!(Segments::hann(64).count(63), Err(SignalError::TooShort { samples: 63, segment: 64 }));
-        let endless = Segments { length: 8, overlap: 8, window: Window::Hann };
-        assert_eq!(endless.count(100), Err(SignalError::Segments { length: 8, overlap: 8 }));
+        let full_overlap = Segments { length: 8, overlap: 8, window: Window::Hann };
+        assert_eq!(full_overlap.count(100), Err(SignalError::Segments { length: 8, overlap: 8 }));
         assert_eq!(Segments::periods(0).count(100), Err(SignalError::Segments { length: 0, overlap: 0 }));
     }
 }

@@ -1,22 +1,22 @@
-//! The transfer function from a measured input to a measured output.
+//! Estimation of the transfer function from a measured input to a measured output.
 
 use super::SignalError;
 use super::segments::{Segments, Transformer, check_finite};
 use nalgebra::Complex;
 
-/// How an output answers to an input at one frequency.
+/// The transfer function at one frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TransferPoint {
     /// Frequency, Hz.
     pub freq_hz: f64,
-    /// Output over input: the modulus is the gain, the argument the phase. NaN where the input has no power.
+    /// Output over input: modulus is gain, argument is phase. NaN if the input has no power.
     pub response: Complex<f64>,
-    /// Share of the output's power that the input explains, 0..1: a gain means little where this is low. Zero where
-    /// either has no power.
+    /// Coherence, 0..1: fraction of the output's power that the input explains. The gain is unreliable where it is low.
+    /// Zero if input or output has no power.
     pub coherence: f64,
     /// Standard error of the gain, in the gain's unit.
     pub gain_sigma: f64,
-    /// Power density of the input, unit^2/Hz.
+    /// Power spectral density of the input, unit^2/Hz.
     pub input_density: f64,
 }
 
@@ -27,15 +27,15 @@ impl TransferPoint {
     }
 }
 
-/// The H1 estimate `S_xy / S_xx` of the transfer function from `input` to `output`, sampled together at `rate_hz`, with
-/// the coherence `|S_xy|^2 / (S_xx S_yy)`: noise on the output does not bias it.
+/// Estimates the transfer function from `input` to `output`, both sampled at `rate_hz`, by H1.
 ///
-/// The gain's relative standard error is `sqrt((1 - c) / (2 n c))` with coherence `c` over `n` averages (Bendat &
-/// Piersol, Random Data, section 9.2). One average alone says nothing of coherence (it is 1 then): average several
-/// segments.
+/// The estimate `S_xy / S_xx` is unbiased by noise on the output; the coherence is `|S_xy|^2 / (S_xx S_yy)`.
+///
+/// The relative standard error of the gain is `sqrt((1 - c) / (2 n c))` with coherence `c` and `n` averages (Bendat &
+/// Piersol, Random Data, section 9.2). With a single segment the coherence is always 1, so average several.
 ///
 /// # Errors
-/// When the two do not match, there is not one segment, or a sample is not finite.
+/// When lengths differ, the record is shorter than a segment, the segmentation is invalid, or a sample is not finite.
 pub fn transfer_function(
     input: &[f64],
     output: &[f64],
@@ -49,7 +49,7 @@ pub fn transfer_function(
     check_finite(input)?;
     check_finite(output)?;
     let mut transformer = Transformer::new(segments);
-    let (mut x, mut y) = (transformer.room(), transformer.room());
+    let (mut x, mut y) = (transformer.output_buffer(), transformer.output_buffer());
     let mut sums = vec![Sums::default(); x.len()];
     for index in 0..count {
         transformer.transform(input, index, &mut x);
@@ -60,7 +60,7 @@ pub fn transfer_function(
             sums.cross += x.conj() * y;
         }
     }
-    let averages = segments.averages(count);
+    let averages = segments.equivalent_averages(count);
     let scaled = segments.frequencies(rate_hz).zip(&sums).enumerate();
     let point = |(bin, (freq_hz, sums)): (usize, (f64, &Sums))| {
         let input_density = sums.input * transformer.density_scale(bin, rate_hz) / count as f64;
@@ -69,7 +69,7 @@ pub fn transfer_function(
     Ok(scaled.map(point).collect())
 }
 
-/// Powers of input and output, and their product, at one frequency.
+/// Sums of the input, output and cross spectra at one frequency.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     input: f64,
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_filter_under_noise_is_recovered_within_its_error() {
+    fn a_filter_with_output_noise_is_recovered_within_the_standard_error() {
         // y[k] = x[k] + 0.5 x[k-1] + 0.3 e: H = 1 + 0.5 exp(-i w), and the coherence is |H|^2 / (|H|^2 + 0.09).
         let (x, e) = (white("x", 100_000), white("e", 100_000));
         let y: Vec<f64> = (0..x.len()).map(|k| x[k] + 0.5 * if k > 0 { x[k - 1] } else { 0.0 } + 0.3 * e[k]).collect();
@@ -117,7 +117,7 @@ mod tests {
             assert_relative_eq!(point.response.arg(), exact.arg(), epsilon = 0.1);
             assert_relative_eq!(point.input_density, 0.2, max_relative = 0.25);
         }
-        // The errors are as large as told: their mean square is 1, known here to some 15 %.
+        // The normalised errors have a mean square of 1, determined here to some 15 %.
         assert!((0.6..1.5).contains(&squares), "mean square error of {squares} sigma^2");
     }
 
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_has_no_gain_and_no_coherence() {
+    fn zero_input_has_no_gain_and_no_coherence() {
         let points = transfer_function(&[0.0; 64], &[0.0; 64], 1.0, Segments::hann(16)).unwrap();
         assert!(points.iter().all(|point| point.gain().is_nan() && point.coherence == 0.0));
         let error = transfer_function(&[0.0; 64], &[0.0; 63], 1.0, Segments::hann(16)).unwrap_err();

@@ -1,4 +1,4 @@
-//! Hands a window's events to the sink, in the order of true time.
+//! Delivery of the events of a motion chunk to the sink, in order of true time.
 
 use super::SimulationError;
 use super::measure::Events;
@@ -6,7 +6,7 @@ use crate::measurement::Sink;
 use crate::time::Stamp;
 use crate::truth::TruthSink;
 
-/// Delivers all events; of one instant truth comes first, then the clocks, the IMUs, the lidar.
+/// Delivers all events. At equal times the order is: truth, clocks, IMUs, lidar.
 pub(super) fn deliver<S: Sink + TruthSink + ?Sized>(events: &Events, sink: &mut S) -> Result<(), SimulationError> {
     let Events { truth, clocks, samples, base_samples, scans, .. } = events;
     let mut at = [0_usize; 5];
@@ -36,7 +36,7 @@ fn time_of<T>(events: &[(Stamp, T)], index: usize) -> Option<Stamp> {
     events.get(index).map(|(stamp, _)| *stamp)
 }
 
-/// The kind whose next event is the earliest, the first of equals, and when that is.
+/// The kind with the earliest next event (the first of equal ones), and the time.
 fn earliest(next: &[Option<Stamp>]) -> Option<(usize, Stamp)> {
     next.iter().enumerate().filter_map(|(kind, at)| at.map(|at| (kind, at))).min_by_key(|(kind, at)| (*at, *kind))
 }

@@ -1,18 +1,18 @@
-//! What the sensors make of a window of motion.
+//! Measurements of all sensors during a motion chunk.
 
-use super::motion::{STEP_S, Window};
-use super::schedule::{ImuInterval, Samples, Schedule};
+use super::motion::{MotionChunk, STEP_S};
+use super::schedule::{ImuInterval, ImuSchedule, Schedule};
 use super::{Rig, SimulationSummary};
 use crate::geometry::{Pose, Vector};
 use crate::measurement::{ImuNoise, ImuSample, LidarScan};
 use crate::random::Seed;
-use crate::sensors::{Carried, Clock, Firing, Imu, ImuErrors, LidarErrors, Scenery, Track, mean_motion};
+use crate::sensors::{Clock, Imu, ImuErrors, LidarErrors, ScanTiming, Scenery, SceneryWithCarrier, Track, mean_motion};
 use crate::time::{Span, Stamp};
 use crate::truth::{ClockTruth, TruthSample};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// All that is to be delivered of a window, each kind in the order of its time, with its true time.
+/// All events of a motion chunk with their true time, each kind in order of time.
 #[derive(Debug, Default)]
 pub(super) struct Events {
     pub truth: Vec<(Stamp, TruthSample)>,
@@ -23,30 +23,30 @@ pub(super) struct Events {
     pub until_s: f64,
 }
 
-/// The sensors of a run, with what changes in them from sample to sample.
+/// The sensors of a run, with their state from sample to sample.
 pub(super) struct Sensors<'a> {
     rig: &'a Rig<'a>,
     schedule: Schedule,
     lidar_errors: LidarErrors,
-    imu: InertialUnit,
-    base_imu: Option<InertialUnit>,
+    imu: SimulatedImu,
+    base_imu: Option<SimulatedImu>,
 }
 
-/// An IMU on a body, with what changes in it from sample to sample.
-struct InertialUnit {
-    samples: Samples,
+/// An IMU on a body, with the state from sample to sample.
+struct SimulatedImu {
+    samples: ImuSchedule,
     errors: ImuErrors,
     noise: ImuNoise,
     body_from_imu: Pose,
 }
 
-impl InertialUnit {
+impl SimulatedImu {
     fn new(imu: &Imu, body_from_imu: Pose, schedule: &Schedule, clock: Clock, seed: Seed) -> Self {
         let samples = schedule.samples(imu, clock, seed);
         Self { samples, errors: ImuErrors::new(imu, seed), noise: imu.noise(), body_from_imu }
     }
 
-    /// Takes the samples that are over by `until_s`, each with the instant at which it is over, s.
+    /// The samples that are complete by `until_s`, each with the completion time, s.
     fn take(&mut self, body: &Track, until_s: f64) -> Vec<(f64, ImuSample)> {
         self.samples.until(until_s).iter().map(|interval| (interval.to_s, self.sample(body, interval))).collect()
     }
@@ -54,15 +54,15 @@ impl InertialUnit {
     fn sample(&mut self, body: &Track, interval: &ImuInterval) -> ImuSample {
         let at = |t_s: f64| body.kinematics(t_s).of_frame(&self.body_from_imu);
         let ideal = mean_motion(&at(interval.from_s), &at(interval.to_s), interval.to_s - interval.from_s);
-        let said = self.errors.measure(&ideal);
+        let measured = self.errors.measure(&ideal);
         ImuSample {
             stamp: interval.stamp,
-            angular_velocity_rad_per_s: said.angular_velocity_rad_per_s,
-            specific_force_m_per_s2: said.specific_force_m_per_s2,
+            angular_velocity_rad_per_s: measured.angular_velocity_rad_per_s,
+            specific_force_m_per_s2: measured.specific_force_m_per_s2,
         }
     }
 
-    /// Whether an axis of the sample is at its limit.
+    /// Whether an axis of the sample is saturated.
     fn is_at_limit(&self, sample: &ImuSample) -> bool {
         let beyond = |v: &Vector, limit: f64| v.amax() >= limit;
         beyond(&sample.angular_velocity_rad_per_s, self.noise.gyro_limit_rad_per_s)
@@ -73,7 +73,7 @@ impl InertialUnit {
 impl<'a> Sensors<'a> {
     pub fn new(rig: &'a Rig<'a>) -> Self {
         let schedule = Schedule::new(rig);
-        let unit = |imu, body_from_imu, seed| InertialUnit::new(imu, body_from_imu, &schedule, rig.clocks.imu, seed);
+        let unit = |imu, body_from_imu, seed| SimulatedImu::new(imu, body_from_imu, &schedule, rig.clocks.imu, seed);
         Self {
             rig,
             lidar_errors: LidarErrors::new(rig.lidar, rig.seed),
@@ -83,7 +83,7 @@ impl<'a> Sensors<'a> {
         }
     }
 
-    /// Takes all but the scans that is over by `until_s`; counts it in `summary`.
+    /// Computes all events except scans that are complete by `until_s`, and counts them in `summary`.
     fn measure_but_scans(
         &mut self,
         head: &Track,
@@ -123,14 +123,14 @@ impl<'a> Sensors<'a> {
     }
 }
 
-/// Takes all samples that are over by the end of `window`, by sensors that differ in the IMUs and the lidar's errors
-/// alone: what each of them delivers. Counts them in `summaries`.
+/// Computes all events that are complete by the end of `chunk`, for each of `sensors`, which differ only in the IMUs
+/// and the lidar errors. Counts them in `summaries`.
 pub(super) fn measure(
     sensors: &mut [Sensors],
-    window: Window,
+    chunk: MotionChunk,
     summaries: &mut [SimulationSummary],
 ) -> Option<Vec<Events>> {
-    let Window { first, heads, bases, until_s } = window;
+    let MotionChunk { first, heads, bases, until_s } = chunk;
     let head = Track::new(first, STEP_S, heads)?;
     let base = Track::new(first, STEP_S, bases)?;
     let each = sensors.iter_mut().zip(summaries.iter_mut());
@@ -145,36 +145,36 @@ pub(super) fn measure(
     Some(events)
 }
 
-/// The scans of each of `sensors`, from rays that are cast once.
+/// The scans of each of `sensors`; the rays are cast once.
 fn scans(
     sensors: &mut [Sensors],
     (head, base): (&Track, &Track),
     until_s: f64,
     summaries: &mut [SimulationSummary],
 ) -> Vec<Vec<(Stamp, LidarScan)>> {
-    let firings: Vec<Vec<Firing>> = sensors.iter_mut().map(|one| one.schedule.scans(until_s)).collect();
-    let (Some(first), Some(firings)) = (sensors.first(), firings.first()) else { return Vec::new() };
+    let timings: Vec<Vec<ScanTiming>> = sensors.iter_mut().map(|one| one.schedule.scans(until_s)).collect();
+    let (Some(first), Some(timings)) = (sensors.first(), timings.first()) else { return Vec::new() };
     let Rig { lidar, scenery, carrier, head_from_laser, .. } = *first.rig;
     let laser = head.of_frame(&head_from_laser);
-    let carried = Carried { scenery, carrier, base };
+    let carried = SceneryWithCarrier { scenery, carrier, base };
     let scenery: &dyn Scenery = if carrier.is_empty() { scenery } else { &carried };
     let started = Instant::now();
     let sensors = &*sensors;
-    let scan = |firing: &Firing| {
-        let sweep = lidar.sweep(scenery, &laser, firing);
-        let over = first.rig.true_stamp(firing.start_s + lidar.sweep_span().seconds() / firing.pace);
-        let said = |one: &Sensors| (over, one.rig.lidar.measure(&sweep, &one.lidar_errors));
-        sensors.iter().map(said).collect::<Vec<_>>()
+    let scan = |timing: &ScanTiming| {
+        let sweep = lidar.sweep(scenery, &laser, timing);
+        let over = first.rig.true_stamp(timing.start_s + lidar.sweep_span().seconds() / timing.pace);
+        let measured = |one: &Sensors| (over, one.rig.lidar.measure(&sweep, &one.lidar_errors));
+        sensors.iter().map(measured).collect::<Vec<_>>()
     };
-    let by_firing: Vec<Vec<(Stamp, LidarScan)>> = firings.par_iter().map(scan).collect();
+    let by_scan: Vec<Vec<(Stamp, LidarScan)>> = timings.par_iter().map(scan).collect();
     let wall_s = started.elapsed().as_secs_f64();
     for summary in summaries {
         summary.rays_wall_s += wall_s;
-        summary.beams += (firings.len() * lidar.beams().len()) as u64;
-        summary.rays += (firings.len() * lidar.beams().len() * lidar.rays_per_beam()) as u64;
+        summary.beams += (timings.len() * lidar.beams().len()) as u64;
+        summary.rays += (timings.len() * lidar.beams().len() * lidar.rays_per_beam()) as u64;
     }
-    let mut by_sensors: Vec<Vec<_>> = sensors.iter().map(|_| Vec::with_capacity(by_firing.len())).collect();
-    for scans in by_firing {
+    let mut by_sensors: Vec<Vec<_>> = sensors.iter().map(|_| Vec::with_capacity(by_scan.len())).collect();
+    for scans in by_scan {
         by_sensors.iter_mut().zip(scans).for_each(|(all, scan)| all.push(scan));
     }
     by_sensors

@@ -1,8 +1,8 @@
-//! From a checked scenario to measurements and truth.
+//! Simulation: from a checked scenario to measurements and ground truth.
 //!
-//! A [`Scenario`] names specs; a [`Simulation`] is these specs found, checked and built; [`Simulation::run`] moves the
-//! head and gives a sink what the sensors say and what really happened, in the order of true time. Below it stands
-//! [`simulate`], the same for sensors on a head ([`Rig`]) that moves in any way ([`HeadMotion`]) through any scenery.
+//! A [`Scenario`] names specs. A [`Simulation`] holds the models built from them. [`Simulation::run`] moves the head
+//! and passes measurements and ground truth to a sink in order of true time. [`simulate`] is the lower level: it runs
+//! the sensors of a [`Rig`] on any [`HeadMotion`] in any scenery.
 
 mod deliver;
 mod error;

@@ -1,63 +1,63 @@
-//! How head and base move, window by window.
+//! Motion of head and base, in chunks.
 
 use super::SimulationError;
 use crate::dynamics::{DynamicsError, HeadState};
 use crate::geometry::Kinematics;
 use std::collections::VecDeque;
 
-/// Time between the instants of a [`HeadMotion`], s.
+/// Time step of a [`HeadMotion`], s: 1 ms resolves vibration up to 100 Hz (see [`Track`](crate::sensors::Track)).
 pub const STEP_S: f64 = 1e-3;
 
-/// A head in motion, at 0, [`STEP_S`], 2 [`STEP_S`], ...: a [`HeadSimulation`](crate::dynamics::HeadSimulation) in
-/// steps of [`STEP_S`], or whatever else tells how a head moves.
+/// States of the head at 0, [`STEP_S`], 2 [`STEP_S`], ...: a [`HeadSimulation`](crate::dynamics::HeadSimulation) with
+/// this step, or another source.
 pub type HeadMotion<'a> = dyn Iterator<Item = Result<HeadState, DynamicsError>> + Send + 'a;
 
-/// The motion in a while: instants `first`, `first + 1`, ... of [`STEP_S`] each.
+/// A chunk of motion: the steps `first`, `first + 1`, ... of [`STEP_S`] each.
 #[derive(Debug, Clone)]
-pub(super) struct Window {
+pub(super) struct MotionChunk {
     pub first: u64,
     pub heads: Vec<Kinematics>,
     pub bases: Vec<Kinematics>,
-    /// Up to where samples are taken from it, s after the start.
+    /// End of the interval in which samples are taken from this chunk, s after the start.
     pub until_s: f64,
 }
 
-/// Cuts a motion into windows. Each begins `overlap` instants before the last one's end, so that a scan or a sample
-/// which began then lies in one window.
-pub(super) struct Windows<'a, 'm> {
+/// Splits a motion into chunks. Each starts `overlap` steps before the end of the previous one, so that a scan or an
+/// IMU sample in progress there lies completely in one chunk.
+pub(super) struct MotionChunks<'a, 'm> {
     motion: &'a mut HeadMotion<'m>,
     recent: VecDeque<HeadState>,
-    /// How many instants were asked of the motion.
-    told: u64,
+    /// Number of steps read from the motion.
+    read: u64,
     last: u64,
-    block: u64,
+    chunk_steps: u64,
     overlap: usize,
 }
 
-impl<'a, 'm> Windows<'a, 'm> {
-    /// Windows of `block` instants each, up to instant `last`.
-    pub fn new(motion: &'a mut HeadMotion<'m>, block: u64, overlap: usize, last: u64) -> Self {
-        Self { motion, recent: VecDeque::new(), told: 0, last, block, overlap }
+impl<'a, 'm> MotionChunks<'a, 'm> {
+    /// Chunks of `chunk_steps` steps each, up to step `last`.
+    pub fn new(motion: &'a mut HeadMotion<'m>, chunk_steps: u64, overlap: usize, last: u64) -> Self {
+        Self { motion, recent: VecDeque::new(), read: 0, last, chunk_steps, overlap }
     }
 
-    /// The next window, or `None` after the last one.
-    pub fn next(&mut self) -> Result<Option<Window>, SimulationError> {
-        if self.told > self.last {
+    /// The next chunk, or `None` after the last one.
+    pub fn next(&mut self) -> Result<Option<MotionChunk>, SimulationError> {
+        if self.read > self.last {
             return Ok(None);
         }
-        let end = (self.told + self.block).min(self.last);
-        while self.told <= end {
-            let ended = SimulationError::MotionEnded { t_s: self.told as f64 * STEP_S };
+        let end = (self.read + self.chunk_steps).min(self.last);
+        while self.read <= end {
+            let ended = SimulationError::MotionEnded { t_s: self.read as f64 * STEP_S };
             self.recent.push_back(self.motion.next().ok_or(ended)??);
-            self.told += 1;
+            self.read += 1;
         }
-        let window = Window {
-            first: self.told - self.recent.len() as u64,
+        let chunk = MotionChunk {
+            first: self.read - self.recent.len() as u64,
             heads: self.recent.iter().map(|state| state.head).collect(),
             bases: self.recent.iter().map(|state| state.base).collect(),
             until_s: end as f64 * STEP_S,
         };
         self.recent.drain(..self.recent.len().saturating_sub(self.overlap));
-        Ok(Some(window))
+        Ok(Some(chunk))
     }
 }

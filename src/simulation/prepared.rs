@@ -10,7 +10,7 @@ use crate::spec::{Source, SpecError};
 use crate::truth::TruthSink;
 use crate::world::World;
 
-/// A scenario whose specs are found and checked, ready to run.
+/// A scenario with all models built, ready to run.
 pub struct Simulation {
     scenario: Scenario,
     specs: Specs,
@@ -26,19 +26,19 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Finds the specs that `scenario` names, and builds all that they describe.
+    /// Loads the specs that `scenario` names, and builds their models.
     ///
     /// # Errors
-    /// When a spec is missing or wrong, alone or with the others.
+    /// If a spec is missing, invalid, or inconsistent with another one.
     pub fn prepare(scenario: &Scenario) -> Result<Self, SimulationError> {
         let (specs, sources) = Specs::load(scenario)?;
         Self::build(scenario, specs, &sources)
     }
 
-    /// Builds what `specs` describe, which need not be what `scenario` names: a sweep changes them in between.
+    /// Builds the models of `specs`, which can differ from those that `scenario` names: a sweep modifies them.
     ///
     /// # Errors
-    /// When they are wrong, alone or with each other.
+    /// If the specs are invalid or inconsistent with each other.
     pub fn build(scenario: &Scenario, specs: Specs, sources: &Sources) -> Result<Self, SimulationError> {
         let world = World::build(&specs.scene, &sources.scene)?;
         let head = HeadModel::new(&specs.head, &sources.head)?;
@@ -55,7 +55,7 @@ impl Simulation {
         Ok(Self { scenario, specs, world, head, carrier, motion, lidar, imu, base_imu, clocks, faults })
     }
 
-    /// What was asked for.
+    /// The scenario.
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
@@ -75,12 +75,12 @@ impl Simulation {
         &self.head
     }
 
-    /// What of its carrier the lidar may see, in the base's frame.
+    /// Solids of the carrier that the lidar can see, in the base frame.
     pub fn carrier(&self) -> &[Cylinder] {
         &self.carrier
     }
 
-    /// How the base moves.
+    /// The motion of the base.
     pub fn motion(&self) -> &dyn BaseMotion {
         self.motion.as_ref()
     }
@@ -95,27 +95,26 @@ impl Simulation {
         &self.imu
     }
 
-    /// The inertial measurement unit on the base, where it has one.
+    /// The IMU on the base, if any.
     pub fn base_imu(&self) -> Option<&Imu> {
         self.base_imu.as_ref()
     }
 
-    /// How the sensors sit in the head, and how well they measure, as it is published: with the errors that faults of
-    /// the extrinsics make.
+    /// Published calibration: mounting poses and noise of the sensors, including the errors of extrinsics faults.
     pub fn calibration(&self) -> Calibration {
         let calibration = self.rig().calibration();
         match &self.faults {
-            Some(faults) => faults.published(calibration),
+            Some(faults) => faults.published_calibration(calibration),
             None => calibration,
         }
     }
 
-    /// Runs it: `sink` takes what the sensors say and what really happened, `progress` hears the fraction that is done.
+    /// Runs the simulation. `sink` receives measurements and ground truth, `progress` the completed fraction.
     ///
-    /// Every run of one scenario gives the same bytes, with any number of threads.
+    /// Each run of a scenario gives the same bytes, with any number of threads.
     ///
     /// # Errors
-    /// When the head's motion fails, or the sink refuses.
+    /// If the head simulation or the sink fails.
     pub fn run<S: Sink + TruthSink + ?Sized>(
         &self,
         sink: &mut S,
@@ -130,11 +129,12 @@ impl Simulation {
         Ok(summary)
     }
 
-    /// Runs simulations that [share their rays](Self::shares_rays_with), each into a sink of its own, which is given
-    /// the same as from a run alone: physics and rays are done once.
+    /// Runs simulations that [share their rays](Self::shares_rays_with), each with its own sink.
+    ///
+    /// Physics and rays are computed once. Each sink receives the same data as from a separate run.
     ///
     /// # Errors
-    /// When they do not share them, the head's motion fails, or a sink refuses.
+    /// If the simulations do not share their rays, or the head simulation or a sink fails.
     pub fn run_together<S: Sink + TruthSink + ?Sized>(
         simulations: &[Self],
         sinks: &mut [&mut S],
@@ -142,7 +142,7 @@ impl Simulation {
     ) -> Result<Vec<SimulationSummary>, SimulationError> {
         let Some(first) = simulations.first() else { return Ok(Vec::new()) };
         if !simulations.iter().all(|other| first.shares_rays_with(other)) {
-            return Err(SimulationError::Apart);
+            return Err(SimulationError::DifferentRays);
         }
         let rigs: Vec<Rig> = simulations.iter().map(Self::rig).collect();
         let mut motion = HeadSimulation::new(&first.head, first.motion.as_ref(), STEP_S)?;
@@ -158,8 +158,7 @@ impl Simulation {
         Ok(summaries)
     }
 
-    /// Whether physics and rays of `other` are the same: it differs in the IMUs, the lidar's errors and
-    /// the faults at most.
+    /// Whether `other` has the same physics and rays: it may differ in the IMUs, the lidar errors and the faults only.
     pub fn shares_rays_with(&self, other: &Self) -> bool {
         let without_noise = |simulation: &Self| {
             let mut specs = simulation.specs.clone();
@@ -190,7 +189,7 @@ impl Simulation {
     }
 }
 
-/// The faults of a run, where it has any.
+/// The faults of a run, if any.
 fn faults(specs: &Specs, sources: &Sources, lidar: &Lidar) -> Result<Option<Faults>, SpecError> {
     let Some(spec) = &specs.faults else { return Ok(None) };
     let unnamed = Source::in_memory("faults", "");
@@ -200,7 +199,7 @@ fn faults(specs: &Specs, sources: &Sources, lidar: &Lidar) -> Result<Option<Faul
     Ok(Some(faults))
 }
 
-/// What of a head's carrier the lidar may see, in the base's frame.
+/// Solids of a head's carrier that the lidar can see, in the base frame.
 pub fn carrier_of(head: &HeadSpec) -> Vec<Cylinder> {
     let cylinder = |part: &CarrierSpec| Cylinder {
         foot_in_base: Vector::from(part.foot_in_base_m),
@@ -211,7 +210,7 @@ pub fn carrier_of(head: &HeadSpec) -> Vec<Cylinder> {
     head.carrier.iter().map(cylinder).collect()
 }
 
-/// The way that is asked for: the named one, or the scene's default, if it has any.
+/// The named route, or the default route of the scene, if any.
 fn route<'w>(scenario: &Scenario, world: &'w World) -> Result<Option<&'w Route>, SpecError> {
     let Some(name) = &scenario.route else { return Ok(world.default_route()) };
     world.routes().get(name).map(Some).ok_or_else(|| {

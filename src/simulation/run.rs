@@ -1,27 +1,27 @@
-//! The run itself: physics, sensors and delivery, one window each at a time, all three at once.
+//! The simulation loop: physics, sensors and delivery, pipelined over chunks of motion.
 
 use super::deliver::deliver;
 use super::measure::{Events, Sensors, measure};
-use super::motion::{HeadMotion, STEP_S, Window, Windows};
+use super::motion::{HeadMotion, MotionChunk, MotionChunks, STEP_S};
 use super::{Rig, SimulationError, SimulationSummary};
 use crate::measurement::Sink;
 use crate::truth::TruthSink;
 use std::time::Instant;
 
-/// Instants of motion in a window: half a second.
-const BLOCK: u64 = 500;
-/// The shortest and the longest run, s.
+/// Steps per chunk: 0.5 s.
+const CHUNK_STEPS: u64 = 500;
+/// Minimum and maximum duration, s.
 const DURATION_S: (f64, f64) = (0.1, 1e6);
 
-/// Simulates `rig` carried by `motion`, and gives `sink` what its sensors say and what really happened, in order.
+/// Simulates `rig` on `motion`, and passes measurements and ground truth to `sink` in order of true time.
 ///
-/// Three stages work at once on three windows that follow each other: the calling thread delivers one, while rayon's
-/// threads take the samples of the next and move the head through the one after it. What is computed depends on none of
-/// this: each stage sees its windows in order, and scans of one window, computed in parallel, are gathered in order.
-/// Memory holds the windows and no more. `progress` hears the fraction that is delivered.
+/// Three stages run in parallel on successive chunks: the calling thread delivers one chunk, while rayon's threads
+/// measure the next and simulate the motion of the one after. The result does not depend on the timing: each stage
+/// processes chunks in order, and scans of a chunk, computed in parallel, are collected in order. Memory holds these
+/// three chunks only. `progress` receives the delivered fraction.
 ///
 /// # Errors
-/// When the run's duration makes no sense, the motion cannot go on, or the sink refuses.
+/// If the duration is out of range, or the motion or the sink fails.
 pub fn simulate<S: Sink + TruthSink + ?Sized>(
     rig: &Rig,
     motion: &mut HeadMotion<'_>,
@@ -32,8 +32,8 @@ pub fn simulate<S: Sink + TruthSink + ?Sized>(
     Ok(summaries.into_iter().next().unwrap_or_default())
 }
 
-/// The same for rigs that differ in the IMUs and the lidar's errors alone, each with a sink of its own: physics and
-/// rays are done once. Each sink is given what it would be given alone.
+/// As [`simulate`], for rigs that differ only in the IMUs and the lidar errors, with one sink each: physics and rays
+/// are computed once. Each sink receives the same data as from a separate run.
 pub(super) fn simulate_together<S: Sink + TruthSink + ?Sized>(
     rigs: &[Rig],
     motion: &mut HeadMotion<'_>,
@@ -41,28 +41,28 @@ pub(super) fn simulate_together<S: Sink + TruthSink + ?Sized>(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<SimulationSummary>, SimulationError> {
     let Some(rig) = rigs.first() else { return Ok(Vec::new()) };
-    let (least_s, most_s) = DURATION_S;
-    if !(least_s..=most_s).contains(&rig.duration_s) {
-        return Err(SimulationError::Duration { duration_s: rig.duration_s, least_s, most_s });
+    let (min_s, max_s) = DURATION_S;
+    if !(min_s..=max_s).contains(&rig.duration_s) {
+        return Err(SimulationError::Duration { duration_s: rig.duration_s, min_s, max_s });
     }
     let started = Instant::now();
     let last = (rig.duration_s / STEP_S).ceil() as u64;
     let overlap = rigs.iter().map(Rig::overlap).max().unwrap_or_default();
-    let mut windows = Windows::new(motion, BLOCK, overlap, last);
+    let mut chunks = MotionChunks::new(motion, CHUNK_STEPS, overlap, last);
     let mut sensors: Vec<Sensors> = rigs.iter().map(Sensors::new).collect();
     let blank = SimulationSummary { duration_s: rig.duration_s, ..SimulationSummary::default() };
     let mut summaries = vec![blank; rigs.len()];
     let mut physics_wall_s = 0.0;
 
-    let mut moved = timed(&mut physics_wall_s, || windows.next())?;
+    let mut moved = timed(&mut physics_wall_s, || chunks.next())?;
     let mut events: Option<Vec<Events>> = None;
     while moved.is_some() || events.is_some() {
-        let mut next_moved: Result<Option<Window>, SimulationError> = Ok(None);
+        let mut next_moved: Result<Option<MotionChunk>, SimulationError> = Ok(None);
         let mut next_events = None;
         let delivered = rayon::in_place_scope(|scope| {
-            if let Some(window) = moved.take() {
-                scope.spawn(|_| next_moved = timed(&mut physics_wall_s, || windows.next()));
-                scope.spawn(|_| next_events = measure(&mut sensors, window, &mut summaries));
+            if let Some(chunk) = moved.take() {
+                scope.spawn(|_| next_moved = timed(&mut physics_wall_s, || chunks.next()));
+                scope.spawn(|_| next_events = measure(&mut sensors, chunk, &mut summaries));
             }
             let mut each = events.iter().flatten().zip(sinks.iter_mut());
             each.try_for_each(|(events, sink)| deliver(events, &mut **sink))

@@ -7,40 +7,39 @@ use crate::spec::{Kind, Source, checked, find, parse};
 use crate::world::SceneSpec;
 use serde::{Deserialize, Serialize};
 
-/// What to simulate, by name: each a path, or a name in the library.
+/// What to simulate: specs by name. A name is a path, or a name in the library.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// The world.
+    /// Scene, from `scenes/`.
     pub scene: String,
-    /// The head and what carries it.
+    /// Head and linkage, from `specs/heads/`.
     pub head: String,
-    /// How the base moves.
+    /// Motion of the base, from `specs/motions/`.
     pub motion: String,
-    /// The lidar.
+    /// Lidar, from `specs/lidars/`.
     pub lidar: String,
-    /// The inertial measurement unit.
+    /// IMU, from `specs/imus/`.
     pub imu: String,
-    /// The sensors' clocks.
+    /// Clocks of the sensors, from `specs/clocks/`.
     pub clock: String,
-    /// A second inertial measurement unit, at the origin of the base and along its axes; `None` for none.
+    /// A second IMU at the origin and along the axes of the base; `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_imu: Option<String>,
     /// Faults of the sensors and of their delivery; `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub faults: Option<String>,
-    /// The scene's way to walk; `None` for its default one.
+    /// Route of the scene; `None` for the default route.
     pub route: Option<String>,
-    /// How long, s.
+    /// Duration, s.
     #[serde(with = "checked::Positive")]
     pub duration_s: f64,
-    /// The seed from which all chance follows.
+    /// Random seed. The same seed and specs give the same bytes.
     pub seed: Seed,
 }
 
 impl Scenario {
-    /// The paper's head carried by hand for two minutes through `scene`: what is simulated unless something else is
-    /// asked.
+    /// Default scenario in `scene`: the paper's handheld head, carried for two minutes.
     pub fn in_scene(scene: &str) -> Self {
         Self {
             scene: scene.to_owned(),
@@ -58,48 +57,48 @@ impl Scenario {
     }
 }
 
-/// The specs of a run as they were used, whole: with them and the scenario a run can be repeated anywhere.
+/// All specs of a run as used. Together with the scenario they reproduce the run on any machine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Specs {
-    /// The world, with the scenes that it includes.
+    /// The scene, with included scenes merged.
     pub scene: SceneSpec,
-    /// The head and what carries it.
+    /// The head and the linkage.
     pub head: HeadSpec,
-    /// How the base moves.
+    /// The motion of the base.
     pub motion: MotionSpec,
     /// The lidar.
     pub lidar: LidarSpec,
     /// The inertial measurement unit.
     pub imu: ImuSpec,
-    /// The sensors' clocks.
+    /// The clocks of the sensors.
     pub clock: ClocksSpec,
-    /// The base's inertial measurement unit, where it has one.
+    /// The IMU of the base, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_imu: Option<ImuSpec>,
-    /// Faults, with the files that they name read.
+    /// The faults, with the content of referenced files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub faults: Option<FaultsSpec>,
 }
 
-/// The texts that the specs of a run came from, for errors about them and for the folder of a scene's meshes.
+/// Source texts of the specs of a run, for errors and for the folder of meshes.
 #[derive(Debug, Clone)]
 pub struct Sources {
-    /// The world's.
+    /// Source of the scene.
     pub scene: Source,
-    /// The head's.
+    /// Source of the head.
     pub head: Source,
-    /// The motion's.
+    /// Source of the motion.
     pub motion: Source,
-    /// The lidar's.
+    /// Source of the lidar.
     pub lidar: Source,
-    /// The IMU's.
+    /// Source of the IMU.
     pub imu: Source,
-    /// The clocks'.
+    /// Source of the clocks.
     pub clock: Source,
-    /// The base's IMU's, where it has one.
+    /// Source of the base IMU, if any.
     pub base_imu: Option<Source>,
-    /// The faults'.
+    /// Source of the faults, if any.
     pub faults: Option<Source>,
 }
 
@@ -107,7 +106,7 @@ impl Specs {
     /// Finds and parses the specs that `scenario` names.
     ///
     /// # Errors
-    /// When one is missing, or its text is wrong.
+    /// If a spec is missing or invalid.
     pub fn load(scenario: &Scenario) -> Result<(Self, Sources), SimulationError> {
         let sources = Sources {
             scene: find(Kind::Scene, &scenario.scene)?,

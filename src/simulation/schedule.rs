@@ -1,49 +1,49 @@
-//! When each sensor takes its samples, and when truth is written.
+//! Sample times of all sensors, and the times at which ground truth is written.
 
 use super::Rig;
 use crate::random::Seed;
-use crate::sensors::{Clock, Firing, Imu, Stamper};
+use crate::sensors::{Clock, Imu, ScanTiming, Stamper};
 use crate::time::{Span, Stamp};
 
-/// Truth is written at whole milliseconds of the lidar's time, so that poses estimated at such stamps find theirs.
+/// Ground truth is written at whole milliseconds of lidar time, so that poses estimated at such stamps have a match.
 const TRUTH_STEP: Span = Span::from_nanos(1_000_000);
-/// Time between two messages about the clocks, s of true time.
+/// Period of the clock messages, s of true time.
 const CLOCK_STEP_S: f64 = 0.1;
-/// Instants this close are one: more than what rounding does to a sum of seconds, less than any clock's nanosecond
-/// counts.
-const SAME_INSTANT_S: f64 = 1e-9;
+/// Times closer than this are equal, s: above the rounding of sums of seconds, and within the 1 ns resolution of
+/// stamps.
+const TIME_TOLERANCE_S: f64 = 1e-9;
 
-/// Instants that follow each other evenly on a clock's crystal.
+/// Periodic times on the crystal of a clock.
 #[derive(Debug, Clone)]
-struct Even {
+struct PeriodicTimes {
     clock: Clock,
     first: Stamp,
     period_s: f64,
-    /// How many were taken.
-    taken: u64,
+    /// Number of times handed out.
+    count: u64,
 }
 
-impl Even {
+impl PeriodicTimes {
     fn new(clock: Clock, first: Stamp, period_s: f64) -> Self {
-        Self { clock, first, period_s, taken: 0 }
+        Self { clock, first, period_s, count: 0 }
     }
 
-    /// Instant `index`, true seconds after the start.
+    /// Time `index`, true seconds after the start.
     fn true_s(&self, index: u64) -> f64 {
         self.clock.true_s_of_crystal(self.first + Span::from_seconds(index as f64 * self.period_s))
     }
 
-    /// The index of the next instant, taken if what begins there is over at `until_s`, `lasts_s` later at most.
-    fn take_until(&mut self, lasts_s: f64, until_s: f64) -> Option<u64> {
-        let index = self.taken;
-        (self.true_s(index) + lasts_s <= until_s + SAME_INSTANT_S).then(|| {
-            self.taken += 1;
+    /// Index of the next time; handed out if an interval of `duration_s` from there ends by `until_s`.
+    fn take_until(&mut self, duration_s: f64, until_s: f64) -> Option<u64> {
+        let index = self.count;
+        (self.true_s(index) + duration_s <= until_s + TIME_TOLERANCE_S).then(|| {
+            self.count += 1;
             index
         })
     }
 }
 
-/// A sample of the IMU to be taken.
+/// The interval of an IMU sample.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ImuInterval {
     pub from_s: f64,
@@ -51,27 +51,27 @@ pub(super) struct ImuInterval {
     pub stamp: Stamp,
 }
 
-/// When an IMU takes its samples, handed out block by block.
-pub(super) struct Samples {
-    instants: Even,
+/// Sample intervals of an IMU, handed out in chunks.
+pub(super) struct ImuSchedule {
+    instants: PeriodicTimes,
     stamps: Stamper,
     end_s: f64,
 }
 
-impl Samples {
-    /// Those of `imu` on `clock` that are over at `end_s`; `seed` makes the stamps' jitter.
+impl ImuSchedule {
+    /// The samples of `imu` on `clock` that end by `end_s`; `seed` determines the jitter of the stamps.
     fn new(imu: &Imu, clock: Clock, seed: Seed, end_s: f64) -> Self {
-        // A sample is stamped `delay` after the middle of its interval.
+        // The stamp is `delay` after the middle of the interval.
         let stamped_after = Span::from_seconds(0.5 * imu.period_s() + imu.delay_s());
         let first_stamp = clock.half_tick_from(clock.crystal(0.0) + stamped_after);
         Self {
-            instants: Even::new(clock, first_stamp - stamped_after, imu.period_s()),
+            instants: PeriodicTimes::new(clock, first_stamp - stamped_after, imu.period_s()),
             stamps: Stamper::new(clock, first_stamp, imu.period_s(), seed.stream("imu/clock")),
             end_s,
         }
     }
 
-    /// The samples that are over at `until_s`, and were not handed out before.
+    /// The samples that end by `until_s` and were not handed out before.
     pub fn until(&mut self, until_s: f64) -> Vec<ImuInterval> {
         let until_s = until_s.min(self.end_s);
         let mut intervals = Vec::new();
@@ -84,12 +84,12 @@ impl Samples {
     }
 }
 
-/// What happens when, each kind in its order, handed out block by block.
+/// Times of scans, ground truth and clock messages, handed out in chunks.
 pub(super) struct Schedule {
-    scans: Even,
+    scans: PeriodicTimes,
     scan_stamps: Stamper,
     sweep_s: f64,
-    truth: Even,
+    truth: PeriodicTimes,
     first_truth: Stamp,
     clocks: u64,
     end_s: f64,
@@ -100,38 +100,38 @@ impl Schedule {
         let (lidar, seed) = (rig.clocks.lidar, rig.seed);
         let first_truth = lidar.first_multiple(TRUTH_STEP);
         let last_truth = lidar.stamp_of(rig.duration_s).floor_to(TRUTH_STEP);
-        // The crystal's reading at the first whole millisecond of the lidar's mean time: stamps lag it by half a tick.
+        // Crystal reading at the first whole millisecond of mean lidar time: stamps lag by half a tick.
         let first_instant = lidar.crystal(lidar.true_s(first_truth));
         let first_scan = lidar.half_tick_from(first_instant);
         let scan_period_s = rig.lidar.period_s();
         Self {
-            scans: Even::new(lidar, first_scan, scan_period_s),
+            scans: PeriodicTimes::new(lidar, first_scan, scan_period_s),
             scan_stamps: Stamper::new(lidar, first_scan, scan_period_s, seed.stream("lidar/clock")),
             sweep_s: rig.lidar.sweep_span().seconds() / lidar.pace(),
-            truth: Even::new(lidar, first_instant, TRUTH_STEP.seconds()),
+            truth: PeriodicTimes::new(lidar, first_instant, TRUTH_STEP.seconds()),
             first_truth,
             clocks: 0,
             end_s: lidar.true_s(last_truth),
         }
     }
 
-    /// The scans that are over at `until_s`, and were not handed out before; each within the time that truth covers.
-    pub fn scans(&mut self, until_s: f64) -> Vec<Firing> {
+    /// The scans that end by `until_s`, within the time covered by ground truth, and were not handed out before.
+    pub fn scans(&mut self, until_s: f64) -> Vec<ScanTiming> {
         let until_s = until_s.min(self.end_s);
-        let mut firings = Vec::new();
+        let mut timings = Vec::new();
         while let Some(index) = self.scans.take_until(self.sweep_s, until_s) {
             let (start_s, pace) = (self.scans.true_s(index), self.scans.clock.pace());
-            firings.extend(self.scan_stamps.next().map(|stamp| Firing { index, start_s, pace, stamp }));
+            timings.extend(self.scan_stamps.next().map(|stamp| ScanTiming { index, start_s, pace, stamp }));
         }
-        firings
+        timings
     }
 
-    /// When `imu` takes its samples on `clock`, within the time that truth covers; `seed` makes the stamps' jitter.
-    pub fn samples(&self, imu: &Imu, clock: Clock, seed: Seed) -> Samples {
-        Samples::new(imu, clock, seed, self.end_s)
+    /// Sample intervals of `imu` on `clock`, within the time covered by ground truth; `seed` determines the jitter.
+    pub fn samples(&self, imu: &Imu, clock: Clock, seed: Seed) -> ImuSchedule {
+        ImuSchedule::new(imu, clock, seed, self.end_s)
     }
 
-    /// The instants at which truth is written up to `until_s`, and was not before: true seconds, and the lidar's stamp.
+    /// Times up to `until_s` at which ground truth is written and was not before: true seconds, and lidar stamp.
     pub fn truths(&mut self, until_s: f64) -> Vec<(f64, Stamp)> {
         let until_s = until_s.min(self.end_s);
         let mut instants = Vec::new();
@@ -142,7 +142,7 @@ impl Schedule {
         instants
     }
 
-    /// The instants, true seconds, up to `until_s` at which the clocks are told, and were not before.
+    /// Times up to `until_s`, true seconds, of clock messages that were not handed out before.
     pub fn clocks(&mut self, until_s: f64) -> Vec<f64> {
         let until_s = until_s.min(self.end_s);
         let mut instants = Vec::new();

@@ -1,6 +1,6 @@
 use serde::Serialize;
 
-/// What a simulation did. Wall times are for people: they enter no data.
+/// Statistics of a simulation. Wall times are for information and are not part of the data.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct SimulationSummary {
     /// Simulated time, s.
@@ -11,16 +11,16 @@ pub struct SimulationSummary {
     pub beams: u64,
     /// Echoes reported.
     pub returns: u64,
-    /// Rays that stood for the beams; those that went on behind glass count once.
+    /// Rays cast for the beams. A ray that continues behind glass counts once.
     pub rays: u64,
     /// Samples of the IMU.
     pub imu_samples: u64,
-    /// Those of them with an axis at its limit.
+    /// Samples of the IMU with a saturated axis.
     pub imu_samples_at_limit: u64,
-    /// Time spent on physics, s; in parallel to the rest.
+    /// Wall time of the physics, s; in parallel with the rest.
     pub physics_wall_s: f64,
-    /// Time spent on rays and their echoes, s; in parallel to the rest.
+    /// Wall time of ray casting and echoes, s; in parallel with the rest.
     pub rays_wall_s: f64,
-    /// Time the whole took, s.
+    /// Total wall time, s.
     pub wall_s: f64,
 }

@@ -1,4 +1,4 @@
-//! Numbers that are checked while a spec is read, so that the error has the line of the number.
+//! Numbers that are checked while a spec is parsed, so that an error has the line of the number.
 //!
 //! Use with `#[serde(with = "crate::spec::checked::Positive")]`. The JSON schema of a spec takes the range from the
 //! same attribute.
@@ -18,7 +18,7 @@ macro_rules! checked {
             /// Reads the number.
             ///
             /// # Errors
-            /// When it is out of range.
+            /// If it is out of range.
             pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
                 let number = f64::deserialize(deserializer)?;
                 let accepts: fn(f64) -> bool = $accepts;
@@ -32,7 +32,7 @@ macro_rules! checked {
             /// Writes the number.
             ///
             /// # Errors
-            /// When the format cannot represent it.
+            /// If the format cannot represent it.
             pub fn serialize<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
                 number.serialize(serializer)
             }
@@ -59,7 +59,7 @@ macro_rules! checked {
             /// Reads the numbers.
             ///
             /// # Errors
-            /// When the count is not `N`, or one of them is out of range.
+            /// If the count is not `N`, or a number is out of range.
             pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; N], D::Error>
             where
                 [f64; N]: Deserialize<'de>,
@@ -75,7 +75,7 @@ macro_rules! checked {
             /// Writes the numbers.
             ///
             /// # Errors
-            /// When the format cannot represent them.
+            /// If the format cannot represent them.
             pub fn serialize<S: Serializer>(numbers: &[f64; N], serializer: S) -> Result<S::Ok, S::Error>
             where
                 [f64; N]: Serialize,

@@ -1,5 +1,4 @@
-//! Where specs are found: as a path, in `scenes/` and `specs/` of the working folder, among those built into the
-//! binary.
+//! Search for specs: as a path, in `scenes/` and `specs/` of the working directory, in the binary.
 
 use super::{MAX_SPEC_BYTES, SpecError};
 use include_dir::{Dir, include_dir};
@@ -8,27 +7,27 @@ use std::path::{Path, PathBuf};
 static SCENES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenes");
 static SPECS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/specs");
 
-/// The text of a spec, and what to call it in an error.
+/// The text of a spec, and the name for errors.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
-    /// The path as the user would write it.
+    /// Name for errors: the path as the user would type it.
     pub name: String,
-    /// The folder against which paths inside the spec are resolved; `None` for one built into the binary.
+    /// Folder from which relative paths in the spec are resolved; `None` for a built-in spec.
     pub folder: Option<PathBuf>,
     /// The text.
     pub text: String,
 }
 
 impl Source {
-    /// A spec that is nowhere but in memory, called `name` in errors.
+    /// A spec in memory, with `name` for errors.
     pub fn in_memory(name: impl Into<String>, text: impl Into<String>) -> Self {
         Self { name: name.into(), folder: None, text: text.into() }
     }
 
-    /// Reads a spec's file.
+    /// Reads the file of a spec.
     ///
     /// # Errors
-    /// When it cannot be read, is not UTF-8, or is far too large for a spec.
+    /// If it cannot be read, is not UTF-8, or is too large.
     pub fn read(path: &Path) -> Result<Self, SpecError> {
         let name = path.display().to_string();
         let io = |error: std::io::Error| SpecError::plain(&name, format!("cannot be read: {error}"));
@@ -42,8 +41,8 @@ impl Source {
         }
         let bytes = std::fs::read(path).map_err(io)?;
         let mut text =
-            String::from_utf8(bytes).map_err(|error| SpecError::plain(&name, format!("is no text: {error}")))?;
-        // Some editors put a byte order mark before the text.
+            String::from_utf8(bytes).map_err(|error| SpecError::plain(&name, format!("is not UTF-8 text: {error}")))?;
+        // Some editors write a byte order mark before the text.
         if text.starts_with('\u{feff}') {
             text.drain(..'\u{feff}'.len_utf8());
         }
@@ -51,12 +50,12 @@ impl Source {
     }
 }
 
-/// What a spec describes; names the folder where such specs are.
+/// Kind of a spec; it determines the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// A world: `scenes/`.
     Scene,
-    /// A head and its linkage: `specs/heads/`.
+    /// A head and linkage: `specs/heads/`.
     Head,
     /// A spring: `specs/springs/`.
     Spring,
@@ -79,7 +78,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Every kind.
+    /// All kinds.
     pub const ALL: [Kind; 11] = [
         Kind::Scene,
         Kind::Head,
@@ -94,7 +93,7 @@ impl Kind {
         Kind::Experiment,
     ];
 
-    /// The folder of such specs, from the project's root.
+    /// Folder of these specs, relative to the project root.
     pub fn folder(self) -> &'static str {
         match self {
             Kind::Scene => "scenes",
@@ -111,7 +110,7 @@ impl Kind {
         }
     }
 
-    /// What to call one of them.
+    /// Name of the kind for messages.
     pub fn noun(self) -> &'static str {
         match self {
             Kind::Scene => "scene",
@@ -129,10 +128,10 @@ impl Kind {
     }
 }
 
-/// Finds a spec: `name` as a path; then in the kind's folder below the working folder; then in the binary.
+/// Finds a spec: `name` as a path, then in the folder of the kind below the working directory, then in the binary.
 ///
 /// # Errors
-/// When it is nowhere (the error lists the names there are), or its file cannot be read.
+/// If there is no such spec (the error lists the known names), or the file cannot be read.
 pub fn find(kind: Kind, name: &str) -> Result<Source, SpecError> {
     let file = if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") };
     let local = Path::new(kind.folder()).join(&file);
@@ -154,10 +153,11 @@ fn built_in(kind: Kind, file: &str) -> Option<Source> {
     Some(Source::in_memory(name, inside.contents_utf8()?))
 }
 
-/// Finds the text file `name` that a spec of `kind` refers to: next to the spec, or in the binary for one built in.
+/// Finds the text file `name` to which a spec of `kind` refers: in the folder of the spec, or in the binary for a
+/// built-in spec.
 ///
 /// # Errors
-/// When it is not there, or cannot be read.
+/// If there is no such file, or it cannot be read.
 pub fn text_file(kind: Kind, spec: &Source, name: &str) -> Result<Source, SpecError> {
     if let Some(folder) = &spec.folder {
         return Source::read(&folder.join(name));
@@ -168,7 +168,7 @@ pub fn text_file(kind: Kind, spec: &Source, name: &str) -> Result<Source, SpecEr
     Source::read(Path::new(name))
 }
 
-/// The names of the specs of a kind that are built into the binary, sorted.
+/// Names of the built-in specs of a kind, sorted.
 pub fn names(kind: Kind) -> Vec<String> {
     let files = folder_in_binary(kind).into_iter().flat_map(Dir::files);
     let mut names: Vec<String> =

@@ -1,9 +1,9 @@
-//! Specs: RON in and out.
+//! Specs: reading and writing RON files.
 //!
-//! A spec is a struct that derives `Deserialize` with `#[serde(deny_unknown_fields)]`, a unit in every key and a
-//! checked number in every field (see [`checked`]). [`parse`] turns text into it; whatever is wrong, syntax, a key
-//! nobody knows, a negative mass, is one [`SpecError`] with file, line and column. What concerns several fields is
-//! checked when the room that owns the spec builds its model from it.
+//! A spec is a struct that derives `Deserialize` with `#[serde(deny_unknown_fields)]`. Each key contains the unit, and
+//! each number is checked (see [`checked`]). [`parse`] converts text to the struct. Any error (syntax, unknown key,
+//! number out of range) is a [`SpecError`] with file, line and column. Relations between fields are checked when the
+//! model is built from the spec.
 
 mod bounds;
 pub mod checked;
@@ -15,10 +15,10 @@ pub use library::{Kind, Source, find, names, text_file};
 
 use serde::de::DeserializeOwned;
 
-/// Greatest length of a spec's text, bytes. More is a wrong file, not a spec.
+/// Maximum size of a spec, bytes. A larger file is not a spec.
 pub const MAX_SPEC_BYTES: u64 = 16 << 20;
 
-/// RON as specs are written: `Some` may be left out around values.
+/// Options of RON for specs: `Some` can be omitted around values.
 fn options() -> ron::Options {
     ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
 }
@@ -26,7 +26,7 @@ fn options() -> ron::Options {
 /// Parses the text of a spec.
 ///
 /// # Errors
-/// A [`SpecError`] with line and column, for bad syntax, unknown or missing keys, and numbers out of their range.
+/// A [`SpecError`] with line and column for invalid syntax, unknown or missing keys, and numbers out of range.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
     options().from_str(&source.text).map_err(|error| {
         let bounds = match error.code {
@@ -40,7 +40,7 @@ pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
 /// Finds and parses the spec of `kind` called `name`: a path, or a name in the library.
 ///
 /// # Errors
-/// When there is none, or it is wrong.
+/// If there is no such spec, or it is invalid.
 pub fn load<T: DeserializeOwned>(kind: Kind, name: &str) -> Result<T, SpecError> {
     parse(&find(kind, name)?)
 }
@@ -48,7 +48,7 @@ pub fn load<T: DeserializeOwned>(kind: Kind, name: &str) -> Result<T, SpecError>
 /// Writes a spec as RON that [`parse`] reads back to the same numbers.
 ///
 /// # Errors
-/// When the value has a form that RON cannot write.
+/// If RON cannot represent the value.
 pub fn to_text<T: serde::Serialize>(value: &T) -> Result<String, SpecError> {
     let pretty = ron::ser::PrettyConfig::new().struct_names(false).depth_limit(12);
     options().to_string_pretty(value, pretty).map_err(|error| SpecError::plain("a spec", error.to_string()))

@@ -65,7 +65,7 @@ pub(super) fn decimated(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -
 
 /// Decimates errors to the maximum number of plot points.
 pub(super) fn decimated_errors(errors: &Errors) -> Errors {
-    errors.every(stride(errors.stamps.len()))
+    errors.decimated(stride(errors.stamps.len()))
 }
 
 /// The decimation factor for `count` points.
@@ -94,7 +94,7 @@ pub(super) fn write(folder: &Path, metrics: &Metrics, plots: Vec<Plot>, manifest
         plot.section.figure.save(&pictures, plot.name)?;
     }
     let sections: Vec<Section> = plots.into_iter().map(|plot| plot.section).collect();
-    let page = report::page(metrics, &sections, &manifest.text()?)?;
+    let page = report::page(metrics, &sections, &manifest.to_ron()?)?;
     write_text(folder, &folder.join("report.html"), &page)?;
     write_text(folder, &folder.join(METRICS), &metrics.to_json()?)
 }

@@ -89,7 +89,7 @@ fn smooth_in_level_world(
         Some((_, pose)) => BaseFix { stamp, world_from_base: *pose, sigmas: FixSigmas::SPRING },
         None => BaseFix { stamp, world_from_base: linked, sigmas: FixSigmas::RIGID_LINK },
     };
-    let fixes: Vec<BaseFix> = head.base_on_rigid_link(world_from_head).into_iter().map(fix).collect();
+    let fixes: Vec<BaseFix> = head.base_from_rigid_link(world_from_head).into_iter().map(fix).collect();
     Ok(smooth_base(&fixes, samples, imu, spec)?)
 }
 
@@ -98,8 +98,8 @@ fn smooth_in_level_world(
 /// # Errors
 /// When the law fails, or a motor turns the head: the head is then too distant from the rest pose.
 pub fn base_by_law(head: &HeadModel, world_from_head: &Trajectory) -> Result<Vec<(Stamp, Pose)>, DynamicsError> {
-    match head.base_under(world_from_head) {
-        Err(DynamicsError::BaseUnknown { .. }) if head.unyielding().is_none() => Ok(Vec::new()),
+    match head.base_from_force_law(world_from_head) {
+        Err(DynamicsError::BaseUnknown { .. }) if head.rigid_mount_reason().is_none() => Ok(Vec::new()),
         poses => poses,
     }
 }

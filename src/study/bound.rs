@@ -4,7 +4,7 @@ use super::calibration::calibration;
 use super::true_clock::TrueClock;
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch};
-use crate::evaluation::{BoundModel, Information, InformationBound, Sight};
+use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::{Calibration, LidarReturn, LidarScan, Measurement};
 use crate::recording::{Preference, Reader, Truth};
@@ -53,7 +53,7 @@ pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> R
         Ok(Truth::Base(..) | Truth::Clock(..)) => None,
         Err(error) => Some(Err(error)),
     });
-    let information = Information::new(model(reader, &found.calibration), heads)?;
+    let information = FisherInformation::new(model(reader, &found.calibration), heads)?;
     let Some((first, last)) = span else {
         let message = "the recording has no true trajectory, which the bound requires".to_owned();
         return Err(StudyError::Plan { what: "information bound", message });
@@ -63,7 +63,9 @@ pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> R
     let mut accumulator = BoundAccumulator { world, calibration, truth, information, beams: 0, rejected: 0 };
     for measurement in reader.measurements(&selection) {
         match measurement? {
-            Measurement::Imu(sample) => accumulator.information.hear(clock.on_lidar_clock(sample.stamp), &sample),
+            Measurement::Imu(sample) => {
+                accumulator.information.add_imu_sample(clock.on_lidar_clock(sample.stamp), &sample)
+            }
             Measurement::Lidar(scan) => {
                 if watch.is_stopped() {
                     return Err(StudyError::Stopped);
@@ -80,9 +82,9 @@ pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> R
 
 /// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
 fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
-    let specs = Manifest::within(reader).and_then(|manifest| manifest.specs);
-    let matrix = |of: fn(&ImuSpec) -> (f64, f64)| {
-        let (scale_percent, misalignment_deg) = specs.as_ref().map_or((0.0, 0.0), |specs| of(&specs.imu));
+    let specs = Manifest::in_recording(reader).and_then(|manifest| manifest.specs);
+    let matrix = |errors: fn(&ImuSpec) -> (f64, f64)| {
+        let (scale_percent, misalignment_deg) = specs.as_ref().map_or((0.0, 0.0), |specs| errors(&specs.imu));
         (scale_percent * 1e-2, misalignment_deg.to_radians())
     };
     BoundModel {
@@ -101,7 +103,7 @@ struct BoundAccumulator<'a> {
     world: &'a World,
     calibration: &'a Calibration,
     truth: TruthCursor<'a>,
-    information: Information,
+    information: FisherInformation,
     beams: u64,
     rejected: u64,
 }
@@ -115,12 +117,12 @@ impl BoundAccumulator<'_> {
             let stamp = scan_motion.first + Span::from_nanos(step * STEP.nanos());
             scan_motion.states.push(self.truth.at(stamp)?);
         }
-        let sights: Vec<Option<Sight>> =
-            scan.returns.par_iter().map(|hit| self.sight(scan, hit, &scan_motion)).collect();
-        for sight in sights {
-            match sight {
-                Some(sight) => {
-                    self.information.see(&sight);
+        let beams: Vec<Option<BeamObservation>> =
+            scan.returns.par_iter().map(|hit| self.observation(scan, hit, &scan_motion)).collect();
+        for beam in beams {
+            match beam {
+                Some(beam) => {
+                    self.information.add_beam(&beam);
                     self.beams += 1;
                 }
                 None => self.rejected += 1,
@@ -130,7 +132,7 @@ impl BoundAccumulator<'_> {
     }
 
     /// The observation of a beam, if it hit a static surface.
-    fn sight(&self, scan: &LidarScan, hit: &LidarReturn, scan_motion: &ScanMotion) -> Option<Sight> {
+    fn observation(&self, scan: &LidarScan, hit: &LidarReturn, scan_motion: &ScanMotion) -> Option<BeamObservation> {
         let stamp = scan.stamp + hit.offset;
         let motion = scan_motion.at(stamp)?;
         let world_from_laser = motion.world_from_head * self.calibration.head_from_laser;
@@ -142,8 +144,8 @@ impl BoundAccumulator<'_> {
         };
         let surface = self.surface_at_range(&ray, range_m, motion.t_s)?;
         let hit_in_world = ray.at(surface.distance_m);
-        let moves = self.world.distance_to_movers_m(&hit_in_world, MOVER_DISTANCE_M, motion.t_s).is_some();
-        (!moves).then(|| Sight {
+        let is_moving = self.world.distance_to_movers_m(&hit_in_world, MOVER_DISTANCE_M, motion.t_s).is_some();
+        (!is_moving).then(|| BeamObservation {
             stamp,
             world_from_head: motion.world_from_head,
             velocity_in_world: motion.velocity_in_world,

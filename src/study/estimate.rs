@@ -1,4 +1,4 @@
-//! From a recording to a judged estimate.
+//! Estimation from a recording, with evaluation and output files.
 
 use super::bound::information_bound;
 use super::calibration::calibration;
@@ -6,8 +6,8 @@ use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
 use super::cloud_files::CloudOptions;
 use super::integrity::{Integrity, write_windows};
-use super::map::{MapOptions, write_map_of};
-use super::open_loop::{How, OpenLoopRun, run_open_loop};
+use super::map::{MapOptions, write_map};
+use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::result_files::{estimate_files, remove};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
@@ -21,30 +21,30 @@ use crate::spec::Source;
 use crate::world::World;
 use std::path::Path;
 
-/// The frame whose truth a recording of ours tells.
+/// The frame of the true poses in recordings of zsim.
 const TRUE_FRAME: &str = "head";
 
-/// What is asked of an estimate.
+/// Options of an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimateOptions {
-    /// The estimator's settings.
+    /// Settings of the estimator.
     pub estimator: EstimatorSpec,
-    /// What is comparison of the sensors beside what the recording says.
+    /// Calibration given by the user; it takes precedence over the recording.
     pub calibration: CalibrationSpec,
-    /// The frame whose pose is told; `None` for `head` where the recording has it, else the IMU's.
+    /// The frame whose pose is estimated; `None` for `head` if the recording has it, else the IMU frame.
     pub body_frame: Option<String>,
-    /// Topics to read; those not named are found.
+    /// Topics to read; topics that are not named are selected automatically.
     pub topics: Preference,
-    /// Whether to register the whole behind the open loop.
+    /// Whether to run the global registration with loop closure after the open loop.
     pub closed_loop: bool,
-    /// What is asked of the cloud.
+    /// Options of the cloud.
     pub cloud: CloudOptions,
-    /// The map in which the recording is to be localised, where there is one.
+    /// The map in which to localise the head; `None` to start a new map.
     pub map: Option<MapOptions>,
 }
 
 impl EstimateOptions {
-    /// An estimate with these settings, loops closed, and no further wish.
+    /// Options with these estimator settings, loop closure, and defaults.
     pub fn with(estimator: EstimatorSpec) -> Self {
         let (calibration, topics) = (CalibrationSpec::default(), Preference::default());
         let cloud = CloudOptions::default();
@@ -52,66 +52,68 @@ impl EstimateOptions {
     }
 }
 
-/// What came of it.
+/// Result of an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// The figures, as in `metrics.json`.
+    /// The metrics, as in `metrics.json`.
     pub metrics: Metrics,
-    /// Of the open loop's time, what the parts of the estimator took.
+    /// Run time of each part of the open-loop estimator.
     pub spent: TimeSpent,
 }
 
-/// Estimates from the recording at `path`, whoever made it, and writes to `folder`: `manifest.ron`, `open_loop.tum`,
-/// `closed_loop.tum`, `map.ply`, `result.mcap`, `cloud.ply` or `cloud.las`, `metrics.json`, `plots/`, `report.html`;
-/// map, cloud and result are the closed loop's unless that is not wanted, or a map holds the trajectory already. Where
-/// the recording has the truth the estimate is judged by it, and where it has the scene the cloud is.
+/// Estimates the trajectory from the recording at `path` and writes the results to `folder`.
+///
+/// The files are `manifest.ron`, `open_loop.tum`, `closed_loop.tum`, `map.ply`, `result.mcap`, `cloud.ply` or `cloud.las`,
+/// `integrity.csv`, `windows.csv`, `metrics.json`, `plots/` and `report.html`. Map, cloud and result are those of the
+/// closed loop if it was computed. If the recording has the truth, the trajectory is evaluated against it; if it also has
+/// the scene, the cloud is evaluated against the surfaces.
 ///
 /// Files of these names from an earlier run are removed first. `metrics.json` is written last: a folder without it is
 /// incomplete.
 ///
 /// # Errors
-/// When the recording cannot be read, there is no estimate, a file cannot be written, or somebody stops it.
+/// When the recording cannot be read, the estimation fails, a file cannot be written, or the run is stopped.
 pub fn estimate_recording(
     path: &Path,
     folder: &Path,
-    wishes: &EstimateOptions,
+    options: &EstimateOptions,
     watch: &mut Watch,
 ) -> Result<Outcome, StudyError> {
     let reader = Reader::open(path)?;
     remove(folder, &estimate_files())?;
-    let manifest = Manifest::within(&reader).unwrap_or_else(Manifest::of_recording_by_others);
+    let manifest = Manifest::in_recording(&reader).unwrap_or_else(Manifest::without_simulation);
     let world = world_of(&manifest, watch);
     let carrier = manifest.specs.as_ref().map(|specs| carrier_of(&specs.head)).unwrap_or_default();
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
-    let origin = Origin { manifest: &manifest.with_estimator(&wishes.estimator), surroundings, simulation: None };
-    estimate_in(&reader, folder, wishes, &origin, watch)
+    let origin = Origin { manifest: &manifest.with_estimator(&options.estimator), surroundings, simulation: None };
+    estimate_in(&reader, folder, options, &origin, watch)
 }
 
-/// What is comparison of how a recording was made, for the figures alone.
+/// Origin of a recording; only the evaluation uses it, not the estimator.
 pub(super) struct Origin<'a> {
-    /// Its manifest, with the estimator's settings.
+    /// Manifest of the recording, with the settings of the estimator.
     pub manifest: &'a Manifest,
-    /// What the beams met.
+    /// Scene and carrier, if they are known.
     pub surroundings: Option<Surroundings<'a>>,
-    /// The simulation, where it has just been.
+    /// Summary of the simulation, if it ran in this process.
     pub simulation: Option<&'a SimulationSummary>,
 }
 
-/// The same with the recording open, and what is comparison of its origin.
+/// As [`estimate_recording`], with an open recording of known origin.
 pub(super) fn estimate_in(
     reader: &Reader,
     folder: &Path,
-    wishes: &EstimateOptions,
+    options: &EstimateOptions,
     origin: &Origin,
     watch: &mut Watch,
 ) -> Result<Outcome, StudyError> {
     origin.manifest.write(&folder.join("manifest.ron"))?;
-    let selection = reader.select(&wishes.topics)?;
-    let found = calibration(reader, &selection, &wishes.calibration, wishes.body_frame.as_deref())?;
-    notes_on(&selection, &found, (wishes, origin), watch);
+    let selection = reader.select(&options.topics)?;
+    let found = calibration(reader, &selection, &options.calibration, options.body_frame.as_deref())?;
+    report_notes(&selection, &found, (options, origin), watch);
 
     let expected_s = origin.simulation.map(|summary| summary.duration_s);
-    let loops = Loops::run((reader, &selection, &found), folder, wishes, expected_s, watch)?;
+    let loops = Loops::run((reader, &selection, &found), folder, options, expected_s, watch)?;
     let (run, comparison, best) = (&loops.open, loops.comparison.as_ref(), loops.best());
     let registration = Registration {
         reader,
@@ -123,12 +125,12 @@ pub(super) fn estimate_in(
         lidar: best.lidar,
         returns: run.returns,
         with_truth: comparison.is_some(),
-        wishes: wishes.cloud,
+        options: options.cloud,
     };
     let registered = registration.run(folder, watch)?;
 
     watch.progress(Stage::Reporting, 0.0, None);
-    let drifting = match comparison {
+    let imu_only_drift = match comparison {
         Some(_) => judge::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
         None => None,
     };
@@ -137,30 +139,31 @@ pub(super) fn estimate_in(
         _ => None,
     };
     let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
-    let fixed_views = Some(wishes.estimator.fixed_views as u64);
+    let fixed_views = Some(options.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
-    let judged = integrity.metrics(run, comparison.map(|_| judge::pairs_of(reader, best.map_from_head)).transpose()?);
+    let integrity_metrics =
+        integrity.metrics(run, comparison.map(|_| judge::pairs_of(reader, best.map_from_head)).transpose()?);
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
-        integrity: judged,
+        integrity: integrity_metrics,
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),
-        open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, comparison, drifting) },
+        open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, comparison, imu_only_drift) },
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
         clock: judge::clock_metrics(run, comparison),
-        lidar: judge::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &wishes.estimator),
+        lidar: judge::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &options.estimator),
         ..metrics(origin, run, &registered, best.comparison)
     };
     integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
-    let open_known = comparison.filter(|_| loops.closed.is_some());
-    let open_errors = open_known.and_then(|comparison| Some(&comparison.errors.as_ref()?.decimated));
+    let open_comparison = comparison.filter(|_| loops.closed.is_some());
+    let open_errors = open_comparison.and_then(|comparison| Some(&comparison.errors.as_ref()?.decimated));
     let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
     Ok(Outcome { metrics, spent: loops.open.spent })
 }
 
-/// Both loops, and what the truth says of each.
+/// Open loop and closed loop, each with its comparison with the truth.
 struct Loops {
     open: OpenLoopRun,
     comparison: Option<judge::Comparison>,
@@ -168,38 +171,39 @@ struct Loops {
     closed_comparison: Option<judge::Comparison>,
 }
 
-/// The estimate that goes into cloud, result and plots: the closed loop's where loops were closed.
+/// The estimate for cloud, result and plots: the closed loop if it was computed, else the open loop.
 pub(super) struct BestEstimate<'a> {
     pub map_from_head: &'a Trajectory,
-    /// From where what was seen was seen, by the open loop.
-    pub seen_from: &'a Trajectory,
-    /// What was learnt of the lidar beyond its calibration.
+    /// The open-loop trajectory that the survey refers to.
+    pub survey_trajectory: &'a Trajectory,
+    /// Estimated correction of the lidar calibration.
     pub lidar: &'a LidarCorrection,
-    /// What the truth says of it.
+    /// Comparison with the truth, if it is known.
     pub comparison: Option<&'a judge::Comparison>,
 }
 
 impl Loops {
-    /// Runs them, and writes their trajectories to `folder`.
+    /// Runs both loops and writes the trajectories and the map to `folder`.
     fn run(
         (reader, selection, found): (&Reader, &Selection, &FoundCalibration),
         folder: &Path,
-        wishes: &EstimateOptions,
+        options: &EstimateOptions,
         expected_s: Option<f64>,
         watch: &mut Watch,
     ) -> Result<Self, StudyError> {
-        let (estimator, calibration) = (&wishes.estimator, &found.calibration);
-        let within = wishes.map.as_ref();
-        let closes = wishes.closed_loop && within.is_none();
-        if wishes.closed_loop && !closes {
-            watch.note("the map holds the trajectory; the global registration, which knows nothing of it, is left out");
+        let (estimator, calibration) = (&options.estimator, &found.calibration);
+        let prior_map = options.map.as_ref();
+        let closes_loops = options.closed_loop && prior_map.is_none();
+        if options.closed_loop && !closes_loops {
+            watch.note("localisation in a given map: no global registration, because it does not use the map");
         }
-        let makes_map = within.map_or(wishes.closed_loop, |within| within.extend);
-        let how = How { estimator, calibration, surveying: closes || makes_map, map: within };
-        let open = run_open_loop(reader, selection, how, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
+        let writes_map = prior_map.map_or(options.closed_loop, |map| map.extend);
+        let open_loop =
+            OpenLoopOptions { estimator, calibration, surveying: closes_loops || writes_map, map: prior_map };
+        let open = run_open_loop(reader, selection, open_loop, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
         open.events.notes.iter().for_each(|note| watch.note(&note.line()));
-        let closed = match closes {
-            true => Some(close_loops(&open, folder, how, watch)?),
+        let closed = match closes_loops {
+            true => Some(close_loops(&open, folder, open_loop, watch)?),
             false => None,
         };
         let mut compare = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
@@ -210,8 +214,8 @@ impl Loops {
         let closed_comparison =
             closed.as_ref().map(|closed| compare(&closed.map_from_head, &[])).transpose()?.flatten();
         let loops = Self { open, comparison, closed, closed_comparison };
-        if makes_map && !loops.open.survey.is_empty() {
-            write_map_of(&loops.open, &loops.best(), (estimator, within), folder)?;
+        if writes_map && !loops.open.survey.is_empty() {
+            write_map(&loops.open, &loops.best(), (estimator, prior_map), folder)?;
         }
         Ok(loops)
     }
@@ -221,13 +225,13 @@ impl Loops {
         match &self.closed {
             Some(ClosedLoopRun { map_from_head, lidar, open_loop_recalibrated, .. }) => BestEstimate {
                 map_from_head,
-                seen_from: open_loop_recalibrated.as_ref().unwrap_or(open),
+                survey_trajectory: open_loop_recalibrated.as_ref().unwrap_or(open),
                 lidar,
                 comparison: self.closed_comparison.as_ref(),
             },
             None => BestEstimate {
                 map_from_head: open,
-                seen_from: open,
+                survey_trajectory: open,
                 lidar: &self.open.lidar,
                 comparison: self.comparison.as_ref(),
             },
@@ -236,21 +240,26 @@ impl Loops {
 
     fn closed_metrics(&self) -> ClosedLoopMetrics {
         let (comparison, acquisition_s) = (self.closed_comparison.as_ref(), self.open.acquisition_s);
-        let told = self.closed.as_ref().map(|closed| judge::closed_loop_metrics(closed, comparison, acquisition_s));
-        told.unwrap_or_default()
+        let metrics = self.closed.as_ref().map(|closed| judge::closed_loop_metrics(closed, comparison, acquisition_s));
+        metrics.unwrap_or_default()
     }
 }
 
-/// Closes loops, and writes the trajectory.
-fn close_loops(run: &OpenLoopRun, folder: &Path, how: How, watch: &mut Watch) -> Result<ClosedLoopRun, StudyError> {
+/// Runs the closed loop and writes the trajectory.
+fn close_loops(
+    run: &OpenLoopRun,
+    folder: &Path,
+    options: OpenLoopOptions,
+    watch: &mut Watch,
+) -> Result<ClosedLoopRun, StudyError> {
     watch.progress(Stage::ClosingLoops, 0.0, None);
-    let closed = run_closed_loop(run, how.calibration, how.estimator);
+    let closed = run_closed_loop(run, options.calibration, options.estimator);
     closed.notes.iter().for_each(|note| watch.note(note));
     write_tum(&folder.join("closed_loop.tum"), &closed.map_from_head)?;
     if watch.is_stopped() { Err(StudyError::Stopped) } else { Ok(closed) }
 }
 
-/// All figures but those of the two loops and the clock.
+/// All metrics except those of the two loops, the clock and the integrity.
 fn metrics(
     origin: &Origin,
     run: &OpenLoopRun,
@@ -271,31 +280,32 @@ fn metrics(
     }
 }
 
-/// The world in a recording's manifest; `None` where there is none, or its meshes are not at hand.
+/// Builds the world of a recording's manifest; `None` if there is none or a mesh file is missing.
 fn world_of(manifest: &Manifest, watch: &mut Watch) -> Option<World> {
     let scene = &manifest.specs.as_ref()?.scene;
     let built = World::build(scene, &Source::in_memory("the recording's scene", ""));
-    built.inspect_err(|error| watch.note(&format!("the cloud is not judged: {error}"))).ok()
+    built.inspect_err(|error| watch.note(&format!("no evaluation of the cloud: {error}"))).ok()
 }
 
-fn notes_on(
+/// Reports notes on the selection and on missing calibration data.
+fn report_notes(
     selection: &Selection,
     found: &FoundCalibration,
-    (wishes, origin): (&EstimateOptions, &Origin),
+    (options, origin): (&EstimateOptions, &Origin),
     watch: &mut Watch,
 ) {
     selection.notes.iter().for_each(|note| watch.note(note));
-    let given = wishes.calibration.head_from_laser.is_some() && wishes.calibration.head_from_imu.is_some();
+    let given = options.calibration.head_from_laser.is_some() && options.calibration.head_from_imu.is_some();
     if !found.from_recording && !given {
         watch.note(
-            "the recording has no /tf_static: lidar and IMU are taken to sit in one place with the same axes; if they do \
-             not, say so with --calibration",
+            "the recording has no /tf_static: assuming that lidar and IMU coincide and have the same axes; if not, pass the \
+             extrinsics with --calibration",
         );
     }
-    if origin.manifest.specs.is_none() && wishes.calibration.imu.is_none() {
+    if origin.manifest.specs.is_none() && options.calibration.imu.is_none() {
         watch.note(
-            "nothing tells how noisy the IMU is; an ordinary one is assumed (specs/imus/unknown.ron): where its data sheet is at \
-             hand, say so with --calibration",
+            "the IMU noise is not known: assuming a typical IMU (specs/imus/unknown.ron); pass the values of the data sheet \
+             with --calibration",
         );
     }
 }

@@ -1,6 +1,6 @@
 //! Losses and notes of a run: one entry for each kind, with count, first and last time, and the worst case.
 
-use crate::estimation::{LeftOut, Warning, WarningKind};
+use crate::estimation::{Discarded, Warning, WarningKind};
 use crate::report::EventMetrics;
 use crate::time::Stamp;
 
@@ -55,11 +55,11 @@ fn is_loss(kind: &WarningKind) -> bool {
     match kind {
         WarningKind::ImuGap { .. }
         | WarningKind::LidarGap { .. }
-        | WarningKind::BeganAgain { .. }
-        | WarningKind::LostAgain { .. }
+        | WarningKind::Restarted { .. }
+        | WarningKind::NotRelocalised { .. }
         | WarningKind::LostInMap
         | WarningKind::Lost { .. } => true,
-        WarningKind::LeftOut { what, .. } => *what != LeftOut::Outliers,
+        WarningKind::Discarded { what, .. } => *what != Discarded::Outliers,
         _ => false,
     }
 }

@@ -1,11 +1,12 @@
-//! The statement of integrity: `integrity.csv`, `windows.csv`, and what the truth says of them.
+//! Integrity of a result: error bounds (`integrity.csv`), window reports (`windows.csv`) and causes of the status.
 
 use super::StudyError;
 use super::atomic_file::AtomicFile;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{
-    Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, blocks, doubt, findings, radius_99,
+    Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, bound_factors, covariance_blocks, findings,
+    radius_99,
 };
 use crate::evaluation::{Errors, Pairs, align_poses};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
@@ -14,36 +15,37 @@ use crate::time::{Span, Stamp};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// The bound of a position is at least this, m.
-const LEAST_BOUND_M: f64 = 0.001;
-/// The error after the alignment is this share of what the covariance says, in runs without doubt: the covariance takes
-/// the matches of one surface for independent with a standard deviation of 10 mm each, and what they err in common the
-/// alignment takes away. With 0.47, 99 % of the poses were within their bound in each of 56 runs of 14 kinds; with 0.36
-/// in 86 % of them. A run shorter than 40 s is aligned over less and keeps more, up to all of it: as the root of the
-/// inverse length.
-const GAUGED_SHARE: f64 = 0.47;
+/// Floor of the position bound, added in quadrature, m.
+const MIN_BOUND_M: f64 = 0.001;
+/// Ratio of the error after alignment to the error that the covariance predicts, in runs without findings.
+///
+/// The covariance treats the matches of a surface as independent, with a standard deviation of 10 mm each; the alignment
+/// removes their common error. With 0.47, at least 99 % of the poses are within the bound in each of 56 runs of 14 kinds;
+/// with 0.36, in 86 % of the runs. Runs shorter than 40 s have a shorter alignment, which removes less: the ratio grows
+/// with the inverse square root of its duration, up to 1.
+const ALIGNED_ERROR_RATIO: f64 = 0.47;
 
-/// A result is not good where the bound exceeds both of these, m and as a share of the way.
+/// The status is degraded if the bound exceeds both limits: in m, and as a fraction of the path length.
 const LARGE_BOUND_M: f64 = 0.05;
-const LARGE_SHARE: f64 = 0.01;
-/// And of no use where it exceeds so many times as much: 1 m and a fifth of the way.
-const USELESS: f64 = 20.0;
+const LARGE_BOUND_FRACTION: f64 = 0.01;
+/// The status is lost if the bound exceeds both limits by this factor: 1 m and 20 % of the path length.
+const LOST_FACTOR: f64 = 20.0;
 
-/// A pose's bound and standard deviations.
+/// Error bound and standard deviations of a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PoseBound {
     pub stamp: Stamp,
-    /// The position error is below this with a probability of 99 %, m.
+    /// 99 % bound on the position error, m.
     pub bound_m_99: f64,
-    /// Standard deviations of the position in the map, m, and of the attitude, degrees.
+    /// Standard deviations of the position in the map frame, m, and of roll, pitch and yaw, degrees.
     pub sigmas: [f64; 6],
 }
 
-/// The bounds of the poses of `trajectory`.
+/// Computes the error bound of each pose of `trajectory`.
 fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
-    let doubts = doubt(&run.windows);
+    let doubts = bound_factors(&run.windows);
     let aligned_until = aligned_until(trajectory).unwrap_or(run.recorded.0);
-    let share = aligned_share(trajectory);
+    let ratio = aligned_error_ratio(trajectory);
     let radii_m = radii(run);
     let mut covariances = run.covariances.iter().zip(&radii_m).peekable();
     let mut current: Option<(&PoseCovariance, f64)> = None;
@@ -52,8 +54,8 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
             current = Some((covariance, *radius_m));
         }
         let (covariance, radius_m) = current?;
-        let (position, attitude) = blocks(covariance);
-        // What is aligned together is as doubtful as its end.
+        let (position, attitude) = covariance_blocks(covariance);
+        // The poses of the alignment share the largest doubt factor, that at its end.
         let after =
             doubts.partition_point(|(at, _)| *at < stamp.max(aligned_until)).min(doubts.len().saturating_sub(1));
         let factor = doubts.get(after).map_or(1.0, |(_, factor)| *factor);
@@ -61,52 +63,55 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
             if k < 3 { position[(k, k)].sqrt() } else { attitude[(k - 3, k - 3)].sqrt().to_degrees() }
         };
         let sigmas = std::array::from_fn(sigma);
-        Some(PoseBound { stamp, bound_m_99: LEAST_BOUND_M.hypot(share * radius_m * factor), sigmas })
+        Some(PoseBound { stamp, bound_m_99: MIN_BOUND_M.hypot(ratio * radius_m * factor), sigmas })
     };
     trajectory.iter().map(|(stamp, _)| stamp).filter_map(bound).collect()
 }
 
-/// The share of the covariance that the alignment leaves of a trajectory.
-fn aligned_share(trajectory: &Trajectory) -> f64 {
+/// Ratio of the error after alignment to the predicted error, for the length of a trajectory.
+fn aligned_error_ratio(trajectory: &Trajectory) -> f64 {
     let aligned_s = trajectory.stamps().first().zip(aligned_until(trajectory)).map(|(from, until)| until - *from);
     let shorter = GAUGED_S / aligned_s.map_or(GAUGED_S, Span::seconds).max(0.1);
-    (GAUGED_SHARE * shorter.sqrt()).min(1.0)
+    (ALIGNED_ERROR_RATIO * shorter.sqrt()).min(1.0)
 }
 
-/// Until when a trajectory is aligned with the truth: over 20 s, or half of a shorter one.
+/// End of the interval of alignment with the truth: the first 20 s, or half of a run shorter than 40 s.
 fn aligned_until(trajectory: &Trajectory) -> Option<Stamp> {
     let (first, last) = (trajectory.stamps().first()?, trajectory.stamps().last()?);
     Some(*first + Span::from_seconds(GAUGED_S.min(0.5 * last.seconds_since(*first))))
 }
 
-/// The radii that follow from the covariances; over the seconds of the alignment, which is known only at their end, the
-/// larger of those of the marked poses before and after. A run that is aligned over its half has them throughout.
+/// Computes the 99 % radii of the position error from the covariances, m.
+///
+/// The alignment is known only at the end of its interval. Within the interval a radius is therefore the larger one of
+/// the marked poses before and after; in a run shorter than 40 s this applies to all poses.
 fn radii(run: &OpenLoopRun) -> Vec<f64> {
     let mut radii_m = run.radii_m.clone();
     let Some(((first, _), (last, _))) = run.covariances.first().zip(run.covariances.last()) else { return radii_m };
     let is_short = last.seconds_since(*first) < 2.0 * GAUGED_S;
-    let marks_m: Vec<f64> = run.gauged.iter().map(|(_, covariance)| radius_99(&blocks(covariance).0)).collect();
+    let marked_m: Vec<f64> =
+        run.gauged.iter().map(|(_, covariance)| radius_99(&covariance_blocks(covariance).0)).collect();
     let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| is_short || stamp.seconds_since(*first) < GAUGED_S;
     let aligned = run.covariances.partition_point(is_aligned);
     let end_m = aligned.checked_sub(1).filter(|_| !is_short).map_or(0.0, |last| radii_m[last]);
     let largest_m = radii_m[..aligned].iter().copied().fold(0.0, f64::max);
     for (radius_m, (stamp, _)) in radii_m[..aligned].iter_mut().zip(&run.covariances) {
         let after = run.gauged.partition_point(|(at, _)| at <= stamp);
-        let before_m = after.checked_sub(1).map(|before| marks_m[before]);
-        let near_m = marks_m.get(after).copied().unwrap_or(end_m).max(before_m.unwrap_or(0.0));
-        *radius_m = if marks_m.is_empty() { largest_m } else { near_m };
+        let before_m = after.checked_sub(1).map(|before| marked_m[before]);
+        let adjacent_m = marked_m.get(after).copied().unwrap_or(end_m).max(before_m.unwrap_or(0.0));
+        *radius_m = if marked_m.is_empty() { largest_m } else { adjacent_m };
     }
     radii_m
 }
 
-/// What is known about how far a result can be trusted.
+/// Error bounds of a result and the findings that affect it.
 pub(super) struct Integrity {
     bounds: Vec<PoseBound>,
     findings: Vec<Finding>,
 }
 
 impl Integrity {
-    /// Of the open loop's run and the trajectory that counts: the closed loop's, where loops were closed.
+    /// Computes the integrity of the result `trajectory`: that of the closed loop if there is one, else of the open loop.
     pub fn of(run: &OpenLoopRun, closed: Option<&ClosedLoopRun>, trajectory: &Trajectory) -> Self {
         let mut bounds = bounds(run, trajectory);
         let ends = |stamps: &[Stamp]| Some((*stamps.first()?, *stamps.last()?));
@@ -119,12 +124,12 @@ impl Integrity {
             estimated,
         };
         let mut findings = findings(&evidence);
-        findings.extend(closed.and_then(|closed| moved_by_closing(run, closed, &bounds)));
+        findings.extend(closed.and_then(|closed| moved_by_loop_closure(run, closed, &bounds)));
         findings.extend(uncertain(&bounds, path_length_m(trajectory)));
         findings.sort_by_key(|finding| std::cmp::Reverse(finding.status));
         let lost = findings.iter().filter(|finding| finding.status == Status::Lost);
         if let Some(lost_from) = lost.map(|finding| finding.from).min() {
-            // From there on nothing bounds the error; nor before, where what is aligned was lost.
+            // The error is unbounded after tracking is lost, and everywhere if this happens during the alignment.
             let is_aligned = aligned_until(trajectory).is_some_and(|until| lost_from >= until);
             let from = if is_aligned { bounds.partition_point(|bound| bound.stamp < lost_from) } else { 0 };
             bounds[from..].iter_mut().for_each(|bound| bound.bound_m_99 = f64::INFINITY);
@@ -132,12 +137,12 @@ impl Integrity {
         Self { bounds, findings }
     }
 
-    /// The verdict.
+    /// The status: the most severe finding.
     pub fn status(&self) -> Status {
         self.findings.iter().map(|finding| finding.status).max().unwrap_or_default()
     }
 
-    /// As in `metrics.json`; `pairs` are the estimated and true poses, where the truth is known.
+    /// The metrics for `metrics.json`; `pairs` are the estimated and true poses, if the truth is known.
     pub fn metrics(&self, run: &OpenLoopRun, pairs: Option<Pairs>) -> IntegrityMetrics {
         let since = |stamp: Stamp| stamp.seconds_since(run.recorded.0);
         let cause = |finding: &Finding| CauseMetrics {
@@ -150,21 +155,21 @@ impl Integrity {
         let finite = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
         let all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
         let largest = all.iter().copied().filter(|bound| bound.is_finite()).fold(0.0, f64::max);
-        let held = pairs.and_then(|pairs| self.held_against(&pairs));
+        let check = pairs.and_then(|pairs| self.check_bounds(&pairs));
         IntegrityMetrics {
             bound_m_99: median(all).and_then(finite),
             largest_bound_m: Some(largest).filter(|bound| *bound > 0.0),
             since_s: self.findings.iter().map(|finding| since(finding.from)).min_by(f64::total_cmp),
             causes: self.findings.iter().map(cause).collect(),
-            within_bound: held.map(|held| held.within),
-            bound_over_error: held.and_then(|held| finite(held.bound_over_error)),
-            aligned_rmse_m: held.map(|held| held.rmse_m),
-            largest_error_m: held.map(|held| held.largest_m),
+            within_bound: check.map(|check| check.fraction_within),
+            bound_over_error: check.and_then(|check| finite(check.bound_over_error)),
+            aligned_rmse_m: check.map(|check| check.rmse_m),
+            largest_error_m: check.map(|check| check.largest_m),
         }
     }
 
-    /// The bounds against the errors, aligned over the first 20 s or half of a shorter run.
-    fn held_against(&self, pairs: &Pairs) -> Option<Held> {
+    /// Compares the bounds with the true errors after alignment over the first 20 s, or half of a run shorter than 40 s.
+    fn check_bounds(&self, pairs: &Pairs) -> Option<BoundCheck> {
         let aligned = pairs.first_seconds(GAUGED_S.min(0.5 * pairs.duration_s()));
         let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
         let errors = Errors::after(pairs, &world_from_map);
@@ -182,8 +187,8 @@ impl Integrity {
             largest_m = largest_m.max(error_m);
             ratios.push(current.bound_m_99 / error_m.max(1e-9));
         }
-        Some(Held {
-            within: within as f64 / ratios.len() as f64,
+        Some(BoundCheck {
+            fraction_within: within as f64 / ratios.len() as f64,
             bound_over_error: median(ratios)?,
             rmse_m: errors.position_rmse_m(),
             largest_m,
@@ -201,16 +206,16 @@ impl Integrity {
     }
 }
 
-/// Bounds held against the true errors.
+/// Comparison of the bounds with the true errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Held {
-    /// Share of the poses whose error is within its bound.
-    within: f64,
-    /// Median.
+struct BoundCheck {
+    /// Fraction of the poses whose error is within the bound.
+    fraction_within: f64,
+    /// Median ratio of bound to error.
     bound_over_error: f64,
-    /// Position error, root mean square, m.
+    /// RMS position error, m.
     rmse_m: f64,
-    /// Position error, largest, m.
+    /// Largest position error, m.
     largest_m: f64,
 }
 
@@ -219,56 +224,57 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-/// How far the head went: its path by positions a second apart, so that its swing does not count, m.
+/// Path length of the head, m, from positions at 1 s intervals, so that the swing on the spring does not count.
 pub(super) fn path_length_m(trajectory: &Trajectory) -> f64 {
     let mut last: Option<(Stamp, Vector)> = None;
     let mut path_m = 0.0;
     for (stamp, pose) in trajectory.iter() {
-        let place = pose.translation.vector;
+        let position = pose.translation.vector;
         match last {
             Some((before, _)) if stamp.seconds_since(before) < 1.0 => {}
             Some((_, from)) => {
-                path_m += (place - from).norm();
-                last = Some((stamp, place));
+                path_m += (position - from).norm();
+                last = Some((stamp, position));
             }
-            None => last = Some((stamp, place)),
+            None => last = Some((stamp, position)),
         }
     }
     path_m
 }
 
-/// A good result errs by less than this over a path of `path_m`, m.
+/// Maximum bound of a good result over a path of `path_m`, m.
 pub(super) fn large_error_m(path_m: f64) -> f64 {
-    LARGE_BOUND_M.max(LARGE_SHARE * path_m)
+    LARGE_BOUND_M.max(LARGE_BOUND_FRACTION * path_m)
 }
 
-/// Where the bound is larger than a good result allows, or any.
+/// The interval in which the bound exceeds the limit of a usable result, or else of a good result.
 fn uncertain(bounds: &[PoseBound], path_m: f64) -> Option<Finding> {
-    let lost = beyond(bounds, USELESS * large_error_m(path_m), Status::Lost);
-    lost.or_else(|| beyond(bounds, large_error_m(path_m), Status::Degraded))
+    let lost = above_limit(bounds, LOST_FACTOR * large_error_m(path_m), Status::Lost);
+    lost.or_else(|| above_limit(bounds, large_error_m(path_m), Status::Degraded))
 }
 
-fn beyond(bounds: &[PoseBound], most_m: f64, status: Status) -> Option<Finding> {
-    let is_large = |bound: &&PoseBound| bound.bound_m_99 > most_m;
+/// The interval from the first to the last pose with a bound above `limit_m`.
+fn above_limit(bounds: &[PoseBound], limit_m: f64, status: Status) -> Option<Finding> {
+    let is_large = |bound: &&PoseBound| bound.bound_m_99 > limit_m;
     let from = bounds.iter().find(is_large)?.stamp;
     let to = bounds.iter().rev().find(is_large)?.stamp;
     let bound_m = bounds.iter().map(|bound| bound.bound_m_99).fold(0.0, f64::max);
     Some(Finding { status, cause: Cause::Uncertain { bound_m }, from, to })
 }
 
-/// Where closing loops moved the trajectory by more than the bound on its error.
-fn moved_by_closing(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Finding> {
+/// The interval in which the loop closure moved the trajectory by more than the error bound.
+fn moved_by_loop_closure(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Finding> {
     let open = closed.open_loop_recalibrated.as_ref().unwrap_or(&run.map_from_head);
     let shift = |((stamp, a), (_, b)): ((Stamp, &Pose), (Stamp, &Pose))| {
         (stamp, (a.translation.vector - b.translation.vector).norm())
     };
     let shifts = open.iter().zip(closed.map_from_head.iter()).map(shift).zip(bounds);
-    let too_far: Vec<(Stamp, f64)> = shifts
+    let moved: Vec<(Stamp, f64)> = shifts
         .filter(|((_, moved_m), bound)| *moved_m > LARGE_BOUND_M.max(2.0 * bound.bound_m_99))
-        .map(|(moved, _)| moved)
+        .map(|(shift, _)| shift)
         .collect();
-    let (from, to) = (too_far.first()?.0, too_far.last()?.0);
-    let moved_m = too_far.iter().map(|(_, moved_m)| *moved_m).fold(0.0, f64::max);
+    let (from, to) = (moved.first()?.0, moved.last()?.0);
+    let moved_m = moved.iter().map(|(_, moved_m)| *moved_m).fold(0.0, f64::max);
     Some(Finding { status: Status::Degraded, cause: Cause::LoopClosure { moved_m }, from, to })
 }
 
@@ -300,7 +306,7 @@ pub(super) fn write_windows(folder: &Path, windows: &[WindowReport]) -> Result<(
     write(folder, "windows.csv", header, rows)
 }
 
-/// Seconds with nine decimals, as in TUM files.
+/// Formats a stamp in seconds with nine decimals, as in TUM files.
 fn seconds(stamp: Stamp) -> String {
     let nanos = stamp.nanos();
     let sign = if nanos < 0 { "-" } else { "" };

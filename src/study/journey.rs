@@ -1,4 +1,4 @@
-//! The whole journey.
+//! The full run: simulation, recording, estimation, evaluation and report.
 
 use super::cloud::Surroundings;
 use super::estimate::{Origin, estimate_in};
@@ -8,31 +8,30 @@ use crate::recording::Reader;
 use crate::simulation::Simulation;
 use std::path::Path;
 
-/// From spring to trajectory error: simulates, records, estimates, judges, reports, all in `folder`, which exists.
+/// Simulates, records, estimates, evaluates and reports, with all files in the existing `folder`.
 ///
-/// The estimator sees what the recording's file says, as of anybody's recording, and nothing else. Nothing is held in
-/// memory that grows with the run but the estimated trajectory. Files of an earlier run are removed first, and
-/// `metrics.json` is written last, as by [`estimate_recording`](super::estimate_recording).
+/// The estimator reads only the recording, as for any other recording. Only the estimated trajectory grows in memory with
+/// the length of the run. Files of an earlier run are removed first, and `metrics.json` is written last, as by
+/// [`estimate_recording`](super::estimate_recording).
 ///
 /// # Errors
-/// When a part fails, or somebody stops it; what came before is in the folder.
+/// When a stage fails or the run is stopped; the files of the completed stages are in the folder.
 pub fn journey(
     simulation: &Simulation,
-    wishes: &EstimateOptions,
+    options: &EstimateOptions,
     folder: &Path,
     watch: &mut Watch,
 ) -> Result<Outcome, StudyError> {
     remove(folder, &journey_files())?;
-    let manifest = Manifest::of(simulation).with_estimator(&wishes.estimator);
+    let manifest = Manifest::of(simulation).with_estimator(&options.estimator);
     manifest.write(&folder.join("manifest.ron"))?;
 
-    // The world, the head on its spring, the sensors: what they say goes to a file.
     let recording = folder.join("recording.mcap");
     let summary = record(simulation, &recording, &folder.join("truth.tum"), false, watch)?;
 
-    // From here on there is only the file: estimate, register, judge by the truth that is kept apart in it, report.
+    // The estimator gets its input only from the file. The truth in it is read only for the evaluation.
     let reader = Reader::open(&recording)?;
     let surroundings = Some(Surroundings { world: simulation.world(), carrier: simulation.carrier() });
     let origin = Origin { manifest: &manifest, surroundings, simulation: Some(&summary) };
-    estimate_in(&reader, folder, wishes, &origin, watch)
+    estimate_in(&reader, folder, options, &origin, watch)
 }

@@ -1,4 +1,4 @@
-//! An estimate against the truth, where the recording has it.
+//! Comparison of an estimate with the truth in the recording.
 
 use super::artefacts::{decimated, decimated_errors};
 use super::closed_loop::ClosedLoopRun;
@@ -16,26 +16,26 @@ use crate::report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, 
 use crate::simulation::SimulationSummary;
 use crate::time::{Span, Stamp};
 
-/// The truth as far as an estimate asks for it.
+/// Comparison of an estimate with the truth.
 pub(super) struct Comparison {
-    /// The true trajectory, `world_from_head`, as far as it is decimated.
+    /// The true trajectory, `world_from_head`, decimated for plots.
     pub truth: Trajectory,
     /// The true clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
-    /// The alignment of the whole estimate, where its positions determine one.
+    /// Rigid alignment of the estimate by all positions; `None` if they do not determine it.
     pub world_from_map: Option<Pose>,
-    /// What remains after it.
+    /// Errors after this alignment.
     pub errors: Option<AlignedErrors>,
     drift: Option<Drift>,
     consistency: Option<Consistency>,
     per_minute: Option<RelativeError>,
 }
 
-/// The errors that remain after alignment.
+/// Errors after alignment.
 pub(super) struct AlignedErrors {
     pub position_rmse_m: f64,
     rotation_rmse_rad: f64,
-    /// Over time, as far as they are decimated.
+    /// Errors over time, decimated for plots.
     pub decimated: Errors,
 }
 
@@ -47,15 +47,16 @@ impl AlignedErrors {
     }
 }
 
-/// An estimate, with the covariances that are known of it, against the truth at its instants; `None` where the
-/// recording has none. What is not asked for afterwards is not kept: poses of an hour are many.
+/// Compares an estimate and its covariances with the truth at the stamps of the estimate.
+///
+/// Returns `None` if the recording has no truth. Poses and errors are decimated, so that memory stays small in long runs.
 pub(super) fn compare_with_truth(
     reader: &Reader,
     (map_from_head, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),
     watch: &mut Watch,
 ) -> Result<Option<Comparison>, StudyError> {
     let mut clock_offsets = Vec::new();
-    let heads = reader.truth().filter_map(|told| match told {
+    let heads = reader.truth().filter_map(|record| match record {
         Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
         Ok(Truth::Clock(now, clock)) => {
             clock_offsets.push(true_offset(now, &clock));
@@ -68,7 +69,7 @@ pub(super) fn compare_with_truth(
     if pairs.is_empty() {
         return Ok(None);
     }
-    let world_from_map = known(pairs.world_from_map(), watch);
+    let world_from_map = or_note(pairs.world_from_map(), watch);
     let errors = world_from_map.map(|world_from_map| AlignedErrors::after(&pairs, &world_from_map));
     Ok(Some(Comparison {
         truth: decimated(pairs.stamps().iter().copied().zip(pairs.truth().iter().copied())),
@@ -81,9 +82,9 @@ pub(super) fn compare_with_truth(
     }))
 }
 
-/// The poses of `map_from_head` with the true ones at their stamps.
+/// Pairs the poses of `map_from_head` with the true poses at the same stamps.
 pub(super) fn pairs_of(reader: &Reader, map_from_head: &Trajectory) -> Result<Pairs, StudyError> {
-    let heads = reader.truth().filter_map(|told| match told {
+    let heads = reader.truth().filter_map(|record| match record {
         Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
         Ok(_) => None,
         Err(error) => Some(Err::<(Stamp, Pose), RecordingError>(error)),
@@ -91,12 +92,12 @@ pub(super) fn pairs_of(reader: &Reader, map_from_head: &Trajectory) -> Result<Pa
     Ok(Pairs::gather(map_from_head, heads)?)
 }
 
-/// A measure, or a note on why there is none.
-fn known<T>(measure: Result<T, EvaluationError>, watch: &mut Watch) -> Option<T> {
-    measure.inspect_err(|error| watch.note(&error.to_string())).ok()
+/// Returns the value, or reports the error as a note.
+fn or_note<T>(result: Result<T, EvaluationError>, watch: &mut Watch) -> Option<T> {
+    result.inspect_err(|error| watch.note(&error.to_string())).ok()
 }
 
-/// The simulation's figures.
+/// Metrics of the simulation.
 pub(super) fn simulation_metrics(summary: &SimulationSummary) -> SimulationMetrics {
     SimulationMetrics {
         wall_s: Some(summary.wall_s),
@@ -108,42 +109,42 @@ pub(super) fn simulation_metrics(summary: &SimulationSummary) -> SimulationMetri
     }
 }
 
-/// The open loop's figures.
+/// Metrics of the open loop.
 pub(super) fn open_loop_metrics(
     run: &OpenLoopRun,
-    known: Option<&Comparison>,
+    comparison: Option<&Comparison>,
     dead_reckoning: Option<ImuOnlyDrift>,
 ) -> OpenLoopMetrics {
-    let drifted = known.and_then(|known| known.drift);
-    let errors = known.and_then(|known| known.errors.as_ref());
-    let consistent = known.and_then(|known| known.consistency);
-    let relative = known.and_then(|known| known.per_minute);
+    let drift = comparison.and_then(|found| found.drift);
+    let errors = comparison.and_then(|found| found.errors.as_ref());
+    let consistency = comparison.and_then(|found| found.consistency);
+    let relative = comparison.and_then(|found| found.per_minute);
     OpenLoopMetrics {
         wall_s: Some(run.wall_s),
-        fraction_of_acquisition: Some(run.wall_s / run.acquisition_s).filter(|share| share.is_finite()),
+        fraction_of_acquisition: Some(run.wall_s / run.acquisition_s).filter(|fraction| fraction.is_finite()),
         fixed_views: None,
         position_rmse_m: errors.map(|errors| errors.position_rmse_m),
         rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
-        drift_m_per_min: drifted.map(|drift| drift.position_m_per_min),
-        yaw_drift_deg_per_min: drifted.map(|drift| drift.yaw_rad_per_min.to_degrees()),
-        end_error_m: drifted.map(|drift| drift.end_error_m),
+        drift_m_per_min: drift.map(|drift| drift.position_m_per_min),
+        yaw_drift_deg_per_min: drift.map(|drift| drift.yaw_rad_per_min.to_degrees()),
+        end_error_m: drift.map(|drift| drift.end_error_m),
         relative_error_per_minute_m: relative.map(|error| error.position_rmse_m),
         imu_only_drift_m_per_min: dead_reckoning.map(|drift| drift.0),
-        position_nees: consistent.map(|found| found.position_nees),
-        attitude_nees: consistent.map(|found| found.attitude_nees),
+        position_nees: consistency.map(|found| found.position_nees),
+        attitude_nees: consistency.map(|found| found.attitude_nees),
     }
 }
 
-/// The closed loop's figures.
+/// Metrics of the closed loop.
 pub(super) fn closed_loop_metrics(
     run: &ClosedLoopRun,
-    known: Option<&Comparison>,
+    comparison: Option<&Comparison>,
     acquisition_s: f64,
 ) -> ClosedLoopMetrics {
-    let errors = known.and_then(|known| known.errors.as_ref());
+    let errors = comparison.and_then(|found| found.errors.as_ref());
     ClosedLoopMetrics {
         wall_s: Some(run.wall_s),
-        fraction_of_acquisition: Some(run.wall_s / acquisition_s).filter(|share| share.is_finite()),
+        fraction_of_acquisition: Some(run.wall_s / acquisition_s).filter(|fraction| fraction.is_finite()),
         position_rmse_m: errors.map(|errors| errors.position_rmse_m),
         rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
         bound_rmse_m: None,
@@ -156,21 +157,22 @@ pub(super) fn closed_loop_metrics(
     }
 }
 
-/// Drift of the IMU alone, m/min.
+/// Position drift of IMU dead reckoning, m/min.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ImuOnlyDrift(f64);
 
-/// How the IMU alone would have drifted; `None` without truth, and where it cannot be told.
+/// Computes the drift of IMU dead reckoning; `None` without truth or if the drift is not defined.
 ///
-/// Its trajectory is on the IMU's clock, which is a few milliseconds from the lidar's: nothing beside its drift.
+/// The trajectory is on the IMU clock, which differs from the lidar clock by milliseconds; the effect is negligible
+/// relative to the drift.
 pub(super) fn imu_only(
     reader: &Reader,
     dead_reckoning: Result<&Trajectory, &EvaluationError>,
     watch: &mut Watch,
 ) -> Result<Option<ImuOnlyDrift>, StudyError> {
-    let told = dead_reckoning.map_err(Clone::clone);
-    let Some(map_from_head) = known(told, watch) else { return Ok(None) };
-    let heads = reader.truth().filter_map(|told| match told {
+    let dead_reckoning = dead_reckoning.map_err(Clone::clone);
+    let Some(map_from_head) = or_note(dead_reckoning, watch) else { return Ok(None) };
+    let heads = reader.truth().filter_map(|record| match record {
         Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
         Ok(Truth::Base(..) | Truth::Clock(..)) => None,
         Err(error) => Some(Err(error)),
@@ -179,9 +181,9 @@ pub(super) fn imu_only(
     Ok(drift(&pairs).ok().map(|drift| ImuOnlyDrift(drift.position_m_per_min)))
 }
 
-/// The clock's figures.
-pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Comparison>) -> ClockMetrics {
-    let error = known.and_then(|known| clock_error(&run.clock_offsets, &known.clock_offsets));
+/// Metrics of the clock offset.
+pub(super) fn clock_metrics(run: &OpenLoopRun, comparison: Option<&Comparison>) -> ClockMetrics {
+    let error = comparison.and_then(|found| clock_error(&run.clock_offsets, &found.clock_offsets));
     ClockMetrics {
         offset_end_s: run.clock_offsets.last().map(|(_, offset_s)| *offset_s),
         offset_rmse_s: error.map(|error| error.offset_rmse_s),
@@ -189,12 +191,13 @@ pub(super) fn clock_metrics(run: &OpenLoopRun, known: Option<&Comparison>) -> Cl
     }
 }
 
-/// What was learnt of the lidar, as far as it was asked for: of its ranges, and how it sits.
-pub(super) fn lidar_metrics(range_m: f64, sits: &LidarCorrection, spec: &EstimatorSpec) -> LidarMetrics {
-    let (refined, ranged) = (spec.extrinsics.estimated, spec.surfels.range_offset_sigma_m > 0.0);
+/// Metrics of the estimated lidar corrections; `None` for each that was not estimated.
+pub(super) fn lidar_metrics(range_m: f64, extrinsics: &LidarCorrection, spec: &EstimatorSpec) -> LidarMetrics {
+    let (estimates_extrinsics, estimates_range) = (spec.extrinsics.estimated, spec.surfels.range_offset_sigma_m > 0.0);
     LidarMetrics {
-        range_correction_m: ranged.then_some(range_m),
-        rotation_correction_deg: refined.then(|| (sits.turn.scaled_axis() * 1_f64.to_degrees()).into()),
-        translation_correction_m: refined.then(|| sits.shift.into()),
+        range_correction_m: estimates_range.then_some(range_m),
+        rotation_correction_deg: estimates_extrinsics
+            .then(|| (extrinsics.turn.scaled_axis() * 1_f64.to_degrees()).into()),
+        translation_correction_m: estimates_extrinsics.then(|| extrinsics.shift.into()),
     }
 }

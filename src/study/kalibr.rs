@@ -1,4 +1,4 @@
-//! Calibrations in the YAML of Kalibr and of allan_variance_ros: an IMU's noise, and where the lidar is from the IMU.
+//! Reads calibrations in the YAML formats of Kalibr and allan_variance_ros: IMU noise and lidar-IMU extrinsics.
 
 use super::StudyError;
 use super::calibration::{CalibrationSpec, typical_imu_noise};
@@ -10,13 +10,13 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::path::Path;
 
-/// Largest deviation of a matrix from a rigid transform: Kalibr writes 16 digits, people 3 or 4.
-const RIGID: f64 = 1e-3;
+/// Maximum deviation of a matrix element from a rigid transform: manually written files have 3 or 4 digits.
+const RIGID_TOLERANCE: f64 = 1e-3;
 
 /// Rows of a 4x4 matrix.
 type Rows = Vec<Vec<f64>>;
 
-/// A file: an IMU's noise at its top level or under `imu0`, transforms at its top level, under `cam0` or `lidar0`.
+/// A calibration file: IMU noise at the top level or under `imu0`; transforms there or under `cam0` or `lidar0`.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct File {
@@ -37,7 +37,7 @@ struct File {
     cam_from_imu: Option<Rows>,
 }
 
-/// An IMU as Kalibr and allan_variance_ros write it; what is not noise has no use here.
+/// An IMU in the format of Kalibr and allan_variance_ros; only the noise is used.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Imu {
@@ -53,7 +53,7 @@ struct Imu {
     imu_from_body: Option<IgnoredAny>,
 }
 
-/// A camera of Kalibr's chain, or a lidar in its place; what is a camera's own has no use here.
+/// A sensor of Kalibr's chain, camera or lidar; only the transform is used.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Sensor {
@@ -74,11 +74,10 @@ struct Sensor {
 }
 
 impl CalibrationSpec {
-    /// Reads a calibration: RON, or the YAML of Kalibr and allan_variance_ros where the file's name ends in `.yaml` or
-    /// `.yml`.
+    /// Reads a calibration file: RON, or YAML of Kalibr or allan_variance_ros (`.yaml`, `.yml`).
     ///
     /// # Errors
-    /// When the file cannot be read, has an unknown key, or a value that cannot be meant.
+    /// When the file cannot be read, has an unknown key or an invalid value.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         let source = crate::spec::Source::read(path)?;
         let is_yaml = path.extension().is_some_and(|ending| ending == "yaml" || ending == "yml");
@@ -89,18 +88,19 @@ impl CalibrationSpec {
         }
     }
 
-    /// Reads the YAML of Kalibr or allan_variance_ros; `name` is for messages. The head is the IMU where a transform is
-    /// given.
+    /// Parses the YAML of Kalibr or allan_variance_ros; `name` is the file name for messages.
+    ///
+    /// If the file has a transform, the head frame is the IMU frame.
     ///
     /// # Errors
-    /// When it has an unknown key, a value that cannot be meant, or nothing that is used.
+    /// When the file has an unknown key or an invalid value, or neither noise nor a transform.
     pub fn from_kalibr(text: &str, name: &str) -> Result<Self, StudyError> {
-        let wrong = |problem: String| StudyError::Calibration { name: name.to_owned(), problem };
-        let file: File = serde_saphyr::from_str(text).map_err(|error| wrong(error.without_snippet().to_string()))?;
-        let transform = file.transform().map_err(wrong)?;
+        let invalid = |problem: String| StudyError::Calibration { name: name.to_owned(), problem };
+        let file: File = serde_saphyr::from_str(text).map_err(|error| invalid(error.without_snippet().to_string()))?;
+        let transform = file.transform().map_err(invalid)?;
         let imu = file.noise(name)?;
         if transform.is_none() && imu.is_none() {
-            return Err(wrong("it has neither an IMU's noise (gyroscope_noise_density, ...) nor T_imu_lidar, T_lidar_imu or T_cam_imu".to_owned()));
+            return Err(invalid("the file has neither IMU noise (gyroscope_noise_density, ...) nor a transform (T_imu_lidar, T_lidar_imu or T_cam_imu)".to_owned()));
         }
         let head_from_imu = transform.map(|_| placement(&Pose::identity()));
         Ok(Self { head_from_laser: transform.as_ref().map(placement), head_from_imu, imu, lidar: None })
@@ -116,16 +116,16 @@ fn placement(pose: &Pose) -> PlacementSpec {
 }
 
 impl File {
-    /// `imu_from_lidar`, where one is given.
+    /// The transform `imu_from_lidar`, if the file has one.
     fn transform(&self) -> Result<Option<Pose>, String> {
-        let own = Sensor {
+        let top_level = Sensor {
             imu_from_lidar: self.imu_from_lidar.clone(),
             lidar_from_imu: self.lidar_from_imu.clone(),
             cam_from_imu: self.cam_from_imu.clone(),
             ..Sensor::default()
         };
         let mut found = Vec::new();
-        for sensor in [Some(&own), self.cam0.as_ref(), self.lidar0.as_ref()].into_iter().flatten() {
+        for sensor in [Some(&top_level), self.cam0.as_ref(), self.lidar0.as_ref()].into_iter().flatten() {
             let given = [
                 ("T_imu_lidar", &sensor.imu_from_lidar, false),
                 ("T_lidar_imu", &sensor.lidar_from_imu, true),
@@ -140,13 +140,13 @@ impl File {
         }
         match found.len() {
             0 | 1 => Ok(found.pop()),
-            count => Err(format!("it gives {count} transforms between lidar and IMU; leave one")),
+            count => Err(format!("the file has {count} transforms between lidar and IMU; keep only one")),
         }
     }
 
-    /// The IMU's noise, where it is given; what these files do not have is that of an ordinary IMU.
+    /// The IMU noise, if the file has it; noise parameters that the formats do not have are those of a typical IMU.
     fn noise(&self, name: &str) -> Result<Option<ImuNoise>, StudyError> {
-        let wrong = |problem: String| StudyError::Calibration { name: name.to_owned(), problem };
+        let invalid = |problem: String| StudyError::Calibration { name: name.to_owned(), problem };
         let nested = self.imu0.as_ref();
         let given = [
             (
@@ -171,12 +171,12 @@ impl File {
         for ((key, flat, nested), value) in given.into_iter().chain([rate]).zip(&mut values) {
             *value = match (flat, nested) {
                 (Some(_), Some(_)) => {
-                    return Err(wrong(format!("it gives {key} twice, at its top level and under imu0")));
+                    return Err(invalid(format!("{key} is given twice, at the top level and under imu0")));
                 }
                 (flat, nested) => flat.or(nested),
             };
             if value.is_some_and(|value| !(value.is_finite() && value > 0.0)) {
-                return Err(wrong(format!("{key} must be a positive number")));
+                return Err(invalid(format!("{key} must be a positive number")));
             }
         }
         match values {
@@ -191,23 +191,25 @@ impl File {
             _ => {
                 let missing = given.iter().zip(values).filter(|(_, value)| value.is_none()).map(|((key, ..), _)| *key);
                 let missing: Vec<_> = missing.collect();
-                Err(wrong(format!("an IMU's noise has no {}", missing.join(" and no "))))
+                Err(invalid(format!("the IMU noise has no {}", missing.join(" and no "))))
             }
         }
     }
 }
 
-/// The rigid transform with such rows.
+/// Converts the rows of a 4x4 matrix to a rigid transform.
 fn rigid(rows: &Rows) -> Result<Pose, String> {
     let is_4_by_4 = rows.len() == 4 && rows.iter().all(|row| row.len() == 4);
     if !is_4_by_4 || !rows.iter().flatten().all(|x| x.is_finite()) {
         return Err("must be four rows of four numbers".to_owned());
     }
     let turn = Matrix3::from_fn(|row, column| rows[row][column]);
-    let off = (turn * turn.transpose() - Matrix3::identity()).abs().max();
-    let last = rows[3].iter().zip([0.0, 0.0, 0.0, 1.0]).all(|(x, expected)| (x - expected).abs() < RIGID);
-    if off > RIGID || turn.determinant() < 0.0 || !last {
-        return Err("is not a rigid transform: a rotation, a shift in metres, and a last row 0, 0, 0, 1".to_owned());
+    let deviation = (turn * turn.transpose() - Matrix3::identity()).abs().max();
+    let last = rows[3].iter().zip([0.0, 0.0, 0.0, 1.0]).all(|(x, expected)| (x - expected).abs() < RIGID_TOLERANCE);
+    if deviation > RIGID_TOLERANCE || turn.determinant() < 0.0 || !last {
+        return Err(
+            "is not a rigid transform: a rotation, a translation in metres and the last row 0, 0, 0, 1".to_owned()
+        );
     }
     let rotation = Rotation::from_rotation_matrix(&Rotation3::from_matrix(&turn));
     Ok(Pose::from_parts(Vector3::new(rows[0][3], rows[1][3], rows[2][3]).into(), rotation))
@@ -242,10 +244,10 @@ mod tests {
 
     #[test]
     fn transforms_are_read_in_both_directions() {
-        // The lidar 0.3 m ahead of the IMU, turned by 90 degrees to the left: its x is the IMU's y.
+        // The lidar is 0.3 m in front of the IMU and yawed by 90 degrees to the left: lidar x is IMU y.
         let imu_from_lidar =
             "- [0.0, -1.0, 0.0, 0.3]\n- [1.0, 0.0, 0.0, 0.0]\n- [0.0, 0.0, 1.0, 0.0]\n- [0.0, 0.0, 0.0, 1.0]\n";
-        // Its inverse, by hand: x_lidar = y_imu, y_lidar = 0.3 - x_imu.
+        // The inverse, computed by hand: x_lidar = y_imu, y_lidar = 0.3 - x_imu.
         let inverse = "[[0, 1, 0, 0], [-1, 0, 0, 0.3], [0, 0, 1, 0], [0, 0, 0, 1]]";
         let files = [
             format!("T_imu_lidar:\n{imu_from_lidar}"),
@@ -263,28 +265,28 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_meant_is_refused() {
-        let refused = |text: &str| read(text).unwrap_err();
-        let unknown = refused("accelerometer_noise: 1.0\n");
+    fn invalid_files_are_rejected() {
+        let error = |text: &str| read(text).unwrap_err();
+        let unknown = error("accelerometer_noise: 1.0\n");
         assert!(unknown.contains("imu.yaml: ") && unknown.contains("accelerometer_noise_density"), "{unknown}");
-        assert!(refused("gyroscope_noise_density: 1e-3\n").contains("has no accelerometer_noise_density and no"));
-        assert!(refused(&NOISE.replace("1.86e-03", "-1.0")).contains("accelerometer_noise_density must be a positive"));
-        assert!(refused(&NOISE.replace("1.86e-03", ".nan")).contains("must be a positive number"));
-        assert!(refused("T_imu_lidar: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n").contains("four rows of four numbers"));
+        assert!(error("gyroscope_noise_density: 1e-3\n").contains("has no accelerometer_noise_density and no"));
+        assert!(error(&NOISE.replace("1.86e-03", "-1.0")).contains("accelerometer_noise_density must be a positive"));
+        assert!(error(&NOISE.replace("1.86e-03", ".nan")).contains("must be a positive number"));
+        assert!(error("T_imu_lidar: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n").contains("four rows of four numbers"));
         let scaled = "T_imu_lidar: [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]]\n";
-        assert!(refused(scaled).contains("is not a rigid transform"));
-        assert!(refused("update_rate: 100\n").contains("neither an IMU's noise"));
-        // Aliases of aliases: 10^9 numbers, were they expanded.
+        assert!(error(scaled).contains("is not a rigid transform"));
+        assert!(error("update_rate: 100\n").contains("neither IMU noise"));
+        // Nested aliases that expand to 10^9 numbers.
         let mut bomb = "a: &a [0,0,0,0,0,0,0,0,0,0]\n".to_owned();
-        for (of, name) in "abcdefgh".chars().zip("bcdefghi".chars()) {
-            bomb.push_str(&format!("{name}: &{name} [{}]\n", vec![format!("*{of}"); 10].join(",")));
+        for (target, name) in "abcdefgh".chars().zip("bcdefghi".chars()) {
+            bomb.push_str(&format!("{name}: &{name} [{}]\n", vec![format!("*{target}"); 10].join(",")));
         }
         bomb.push_str("T_imu_lidar: *i\n");
-        assert!(refused(&bomb).starts_with("imu.yaml: "));
-        let inside = format!(
+        assert!(error(&bomb).starts_with("imu.yaml: "));
+        let nested_in_a_key = format!(
             "rostopic: [{}]\n{NOISE}",
             bomb.replace("T_imu_lidar", "x").replace('\n', "}, {").trim_end_matches(", {")
         );
-        assert!(read(&inside).is_err());
+        assert!(read(&nested_in_a_key).is_err());
     }
 }

@@ -1,3 +1,5 @@
+//! Manifest of a run: version, scenario and specs.
+
 use super::StudyError;
 use crate::estimation::EstimatorSpec;
 use crate::recording::Reader;
@@ -6,19 +8,19 @@ use crate::spec::{self, Source, SpecError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A run as it was: with it and this version of zsim it can be repeated.
+/// Inputs of a run: with these and the same version of zsim, the run can be repeated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// Version of zsim.
     pub version: String,
-    /// What was asked for, the seed with it; of a recording by others nothing.
+    /// Scenario with the random seed; `None` if the recording was not made by zsim.
     #[serde(default)]
     pub scenario: Option<Scenario>,
-    /// The specs of the simulation, whole.
+    /// All specs of the simulation; `None` if the recording was not made by zsim.
     #[serde(default)]
     pub specs: Option<Specs>,
-    /// The estimator's settings; in a recording itself nothing, as it does not depend on them.
+    /// Settings of the estimator; `None` in the manifest of a recording, which does not depend on them.
     #[serde(default)]
     pub estimator: Option<EstimatorSpec>,
 }
@@ -29,36 +31,36 @@ impl Manifest {
         Self {
             scenario: Some(simulation.scenario().clone()),
             specs: Some(simulation.specs().clone()),
-            ..Self::of_recording_by_others()
+            ..Self::without_simulation()
         }
     }
 
     /// The manifest of a run without a simulation.
-    pub fn of_recording_by_others() -> Self {
+    pub fn without_simulation() -> Self {
         Self { version: env!("CARGO_PKG_VERSION").to_owned(), scenario: None, specs: None, estimator: None }
     }
 
-    /// The manifest within a recording; `None` in one by others, or by a version of zsim that wrote it otherwise.
-    pub fn within(reader: &Reader) -> Option<Self> {
+    /// The manifest in a recording; `None` if there is none, or if it has the format of another version of zsim.
+    pub fn in_recording(reader: &Reader) -> Option<Self> {
         spec::parse(&Source::in_memory("the recording's manifest", reader.manifest()?)).ok()
     }
 
-    /// The same with the estimator's settings.
+    /// Adds the settings of the estimator.
     #[must_use]
     pub fn with_estimator(mut self, estimator: &EstimatorSpec) -> Self {
         self.estimator = Some(estimator.clone());
         self
     }
 
-    /// As RON.
+    /// Returns the manifest as RON.
     ///
     /// # Errors
-    /// When it has a form that RON cannot write.
-    pub fn text(&self) -> Result<String, SpecError> {
+    /// When a value cannot be represented in RON.
+    pub fn to_ron(&self) -> Result<String, SpecError> {
         Ok(spec::to_text(self)? + "\n")
     }
 
     pub(super) fn write(&self, path: &Path) -> Result<(), StudyError> {
-        std::fs::write(path, self.text()?).map_err(StudyError::file(path))
+        std::fs::write(path, self.to_ron()?).map_err(StudyError::file(path))
     }
 }

@@ -1,4 +1,4 @@
-/// Most memory that this process ever had, MiB, as Linux tells; `None` elsewhere.
+/// Peak resident memory of this process, MiB; `None` on systems other than Linux.
 pub(super) fn peak_rss_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -9,8 +9,8 @@ pub(super) fn peak_rss_mib() -> Option<f64> {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn a_process_has_some_memory_where_the_system_tells() {
-        let told = std::path::Path::new("/proc/self/status").exists();
-        assert_eq!(super::peak_rss_mib().is_some_and(|mib| mib > 1.0), told);
+    fn linux_reports_a_plausible_peak() {
+        let is_reported = std::path::Path::new("/proc/self/status").exists();
+        assert_eq!(super::peak_rss_mib().is_some_and(|mib| mib > 1.0), is_reported);
     }
 }

@@ -1,12 +1,11 @@
-//! Whole experiments, out of the rooms below.
+//! Experiments: simulation, estimation, evaluation and reports combined.
 //!
-//! [`journey()`] is the one that everything else varies: simulate and record, estimate from the recording, judge,
-//! report. [`estimate_recording`] is its second half, for anybody's recording.
+//! [`journey()`] is the full run: it simulates, records, estimates from the recording, evaluates against the truth and
+//! writes the report. [`estimate_recording`] does the same from an existing recording.
 //!
-//! The paper's experiments are run again by [`reproduction`].
-//!
-//! A head by itself is characterised by its [`gains`], by what its [`spring`] bears and how it moves, and by the
-//! [`coverage`] of its lidar. A [`sweep`] varies any of it, and tells what matters.
+//! Studies of a head without an estimator: the [`gains`] of its modes, the stress and motion of its [`spring`] and the
+//! [`coverage`] of its lidar. [`latency`] measures the effect of timing errors. A [`sweep`] varies parameters of these
+//! runs and reports their effects; [`reproduction`] repeats the experiments of the paper.
 
 mod artefacts;
 mod atomic_file;
@@ -52,7 +51,7 @@ pub use error::StudyError;
 pub use estimate::{EstimateOptions, Outcome, estimate_recording};
 pub use journey::journey;
 pub use manifest::Manifest;
-pub use map::{MapOptions, Merged, merge_map_files};
+pub use map::{MapOptions, MergedMap, merge_map_files};
 pub use record::record;
 pub use result_files::{estimate_files, journey_files};
 pub use watch::{OnProgress, Stage, StudyEvent, Watch};

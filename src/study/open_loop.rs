@@ -1,11 +1,12 @@
-//! The open loop over a recording, as it would run while recording.
+//! Open-loop estimation from a recording, as it would run online.
 
 use super::cadence::Cadence;
 use super::events::Events;
-use super::read_ahead::{Coming, read_ahead};
+use super::read_ahead::{MeasurementStream, read_ahead};
 use super::{MapOptions, Stage, StudyError, Watch};
 use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, blocks, radius_99,
+    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, covariance_blocks,
+    radius_99,
 };
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
@@ -16,103 +17,105 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
-/// Measurements between two looks at the clock of the progress.
-const TELL_EVERY: usize = 200;
+/// Number of measurements between progress reports: about 1 s of data.
+const PROGRESS_INTERVAL: usize = 200;
 
-/// Time between the covariances that are kept.
+/// Time between stored covariances.
 const COVARIANCE_PERIOD: Span = Span::from_nanos(100_000_000);
 
-/// What the open loop made of a recording.
+/// Result of the open-loop estimation.
 pub(super) struct OpenLoopRun {
     /// The estimate.
     pub map_from_head: Trajectory,
-    /// How uncertain the estimate is, ten times a second.
+    /// Covariances of the poses in the map frame, at 10 Hz.
     pub covariances: Vec<(Stamp, PoseCovariance)>,
-    /// The radius of 99 % that follows from the covariance against the gauge at the same stamps, m.
+    /// 99 % radii of the position error relative to the alignment of the first seconds, at the same stamps, m.
     pub radii_m: Vec<f64>,
-    /// Covariances of poses of the first seconds against the alignment that these give.
+    /// Covariances of marked poses of the first seconds relative to the alignment over these.
     pub gauged: Vec<(Stamp, PoseCovariance)>,
     /// The estimated clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
-    /// What was learnt of the lidar beyond its calibration.
+    /// Estimated correction of the lidar calibration that the poses are consistent with (gyroscope axes).
     pub lidar: LidarCorrection,
-    /// The same along the IMU's axes, as a calibration has it.
+    /// The same correction along the IMU axes, as in a calibration file.
     pub calibrated_lidar: LidarCorrection,
-    /// What was lost or left out, and what else a user should know.
+    /// Losses and notes.
     pub events: Events,
-    /// How many IMU samples the recording has.
+    /// Number of IMU samples in the recording.
     pub samples: usize,
-    /// The windows' reports, in order.
+    /// Reports of the windows, in order of time.
     pub windows: Vec<WindowReport>,
-    /// What the estimator reported, in order.
+    /// Warnings of the estimator, in order of time.
     pub warnings: Vec<Warning>,
     /// First and last stamp of the recording's measurements.
     pub recorded: (Stamp, Stamp),
-    /// Echoes in the recording.
+    /// Number of lidar returns in the recording.
     pub returns: usize,
-    /// From the recording's first stamp to its last, s.
+    /// Duration of the recording, s.
     pub acquisition_s: f64,
-    /// What was seen, where that is asked for.
+    /// Observations for the closed loop and the map; empty without `surveying`.
     pub survey: Survey,
-    /// Time it took, reading included but not the survey, s.
+    /// Wall-clock time, including reading but not the survey, s.
     pub wall_s: f64,
-    /// Of that, what the parts of the estimator took.
+    /// Run time of each part of the estimator.
     pub spent: TimeSpent,
 }
 
-/// How to estimate.
+/// Options of the open loop.
 #[derive(Clone, Copy)]
-pub(super) struct How<'a> {
+pub(super) struct OpenLoopOptions<'a> {
     pub estimator: &'a EstimatorSpec,
     pub calibration: &'a Calibration,
-    /// Whether what is seen is kept, for the closed loop and the map.
+    /// Whether to keep the observations for the closed loop and the map.
     pub surveying: bool,
-    /// The map in which the head is, where there is one.
+    /// The map in which to localise the head; `None` to start a new map.
     pub map: Option<&'a MapOptions>,
 }
 
-/// Estimates from what `reader` reads; poses go to the TUM file `tum`, if one is wanted, as they become final.
-/// `expected_s` is the recording's length, where it is known, for the progress.
+/// Runs the estimator over the recording of `reader`.
+///
+/// Poses are written to the TUM file `tum`, if given, as they become final. `expected_s` is the length of the recording,
+/// if it is known, for the progress.
 pub(super) fn run_open_loop(
     reader: &Reader,
     selection: &Selection,
-    how: How,
+    options: OpenLoopOptions,
     tum: Option<&Path>,
     expected_s: Option<f64>,
     watch: &mut Watch,
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
-    let estimator = Estimator::new(how.estimator, how.calibration)?;
-    let estimator = if how.surveying { estimator.surveying() } else { estimator };
-    let mut estimator = match how.map {
-        Some(within) => estimator.in_map(&within.map, &within.map_from_head),
+    let estimator = Estimator::new(options.estimator, options.calibration)?;
+    let estimator = if options.surveying { estimator.surveying() } else { estimator };
+    let mut estimator = match options.map {
+        Some(prior) => estimator.in_map(&prior.map, &prior.map_from_head),
         None => estimator,
     };
     let tum = tum.map(TumWriter::create).transpose()?;
-    let mut written = Written { tum, map_from_head: Trajectory::new(), covariances: Vec::new(), radii_m: Vec::new() };
-    let mut heard = Heard::default();
+    let mut poses = PoseOutput { tum, map_from_head: Trajectory::new(), covariances: Vec::new(), radii_m: Vec::new() };
+    let mut counts = MeasurementCounts::default();
     let (pushed, loss) = read_ahead(reader, selection, |measurements| {
-        push_all(measurements, &mut estimator, (&mut heard, &mut written), expected_s, watch)
+        push_all(measurements, &mut estimator, (&mut counts, &mut poses), expected_s, watch)
     });
     if let Err(StudyError::Stopped) = pushed {
-        written.close()?;
+        poses.close()?;
         return Err(StudyError::Stopped);
     }
     pushed?;
     let result = estimator.finish()?;
-    written.take(&result.poses)?;
-    written.close()?;
-    let Written { map_from_head, covariances, radii_m, .. } = written;
+    poses.take(&result.poses)?;
+    poses.close()?;
+    let PoseOutput { map_from_head, covariances, radii_m, .. } = poses;
 
-    // Offsets are those of the stamps as they were recorded.
+    // The reported offsets relate to the recorded stamps, without the shift that the selection applies.
     let shift_s = selection.imu_shift().seconds();
     let mut events = Events::default();
     loss.sentences().into_iter().for_each(|sentence| events.add_loss("recording", sentence));
-    heard.imu.missing("IMU samples").into_iter().for_each(|sentence| events.add_loss("missing_samples", sentence));
-    heard.lidar.missing("scans").into_iter().for_each(|sentence| events.add_loss("missing_scans", sentence));
-    result.located.iter().for_each(|located| events.add_note("located", found(located)));
+    counts.imu.missing("IMU samples").into_iter().for_each(|sentence| events.add_loss("missing_samples", sentence));
+    counts.lidar.missing("scans").into_iter().for_each(|sentence| events.add_loss("missing_scans", sentence));
+    result.located.iter().for_each(|located| events.add_note("located", located_message(located)));
     loss.notes().into_iter().for_each(|sentence| events.add_note("recording", sentence));
-    let start = heard.start();
+    let start = counts.start();
     events.add_warnings(&result.warnings, start);
     Ok(OpenLoopRun {
         map_from_head,
@@ -124,32 +127,32 @@ pub(super) fn run_open_loop(
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,
         events,
-        samples: heard.imu.count(),
-        recorded: (start, start + Span::from_seconds(heard.seconds())),
+        samples: counts.imu.count(),
+        recorded: (start, start + Span::from_seconds(counts.seconds())),
         windows: result.windows,
         warnings: result.warnings,
-        returns: heard.returns,
-        acquisition_s: heard.seconds(),
+        returns: counts.returns,
+        acquisition_s: counts.seconds(),
         wall_s: started.elapsed().as_secs_f64() - result.survey.took_s(),
         survey: result.survey,
     })
 }
 
-/// Gives `estimator` all that comes; what it hands out is written as it becomes final.
+/// Pushes all measurements into `estimator` and writes the poses that become final.
 fn push_all(
-    measurements: &mut Coming,
+    measurements: &mut MeasurementStream,
     estimator: &mut Estimator,
-    (heard, written): (&mut Heard, &mut Written),
+    (counts, poses): (&mut MeasurementCounts, &mut PoseOutput),
     expected_s: Option<f64>,
     watch: &mut Watch,
 ) -> Result<(), StudyError> {
     for (index, measurement) in measurements.enumerate() {
         let measurement = measurement?;
-        heard.take(&measurement);
+        counts.take(&measurement);
         estimator.push(measurement)?;
-        if index % TELL_EVERY == 0 {
-            written.take(&estimator.take_poses())?;
-            watch.progress(Stage::Estimating, heard.seconds(), expected_s);
+        if index % PROGRESS_INTERVAL == 0 {
+            poses.take(&estimator.take_poses())?;
+            watch.progress(Stage::Estimating, counts.seconds(), expected_s);
             if watch.is_stopped() {
                 return Err(StudyError::Stopped);
             }
@@ -158,55 +161,55 @@ fn push_all(
     Ok(())
 }
 
-/// Where in the map the head was found.
-fn found(located: &Located) -> String {
+/// Message on the localisation in the map.
+fn located_message(located: &Located) -> String {
     format!(
-        "found in the map: {:.0} % of what the first window shows lies on it, to {:.1} mm",
+        "localised in the map: {:.0} % of the surfels of the first window match, residual {:.1} mm RMS",
         100.0 * located.inlier_ratio,
         1e3 * located.residual_rms_m
     )
 }
 
-/// Poses in memory, and on disk where that is wanted.
-struct Written {
+/// Poses in memory, and in a TUM file if requested.
+struct PoseOutput {
     tum: Option<TumWriter<BufWriter<File>>>,
     map_from_head: Trajectory,
     covariances: Vec<(Stamp, PoseCovariance)>,
     radii_m: Vec<f64>,
 }
 
-impl Written {
+impl PoseOutput {
     fn take(&mut self, poses: &[EstimatedPose]) -> Result<(), RecordingError> {
         for pose in poses {
             if let Some(tum) = &mut self.tum {
                 tum.pose(pose.stamp, &pose.map_from_head)?;
             }
             let name = "the estimate".to_owned();
-            let kept = self.map_from_head.push(pose.stamp, pose.map_from_head);
-            kept.map_err(|source| RecordingError::Trajectory { name, source })?;
+            let pushed = self.map_from_head.push(pose.stamp, pose.map_from_head);
+            pushed.map_err(|source| RecordingError::Trajectory { name, source })?;
             if self.covariances.last().is_none_or(|(last, _)| pose.stamp - *last >= COVARIANCE_PERIOD) {
                 self.covariances.push((pose.stamp, pose.covariance));
-                self.radii_m.push(radius_99(&blocks(&pose.covariance_against_gauge).0));
+                self.radii_m.push(radius_99(&covariance_blocks(&pose.covariance_against_gauge).0));
             }
         }
         Ok(())
     }
 
-    /// Closes the file.
+    /// Completes the TUM file.
     fn close(&mut self) -> Result<(), RecordingError> {
         self.tum.take().map_or(Ok(()), TumWriter::finish)
     }
 }
 
-/// What went by.
+/// Counts and time spans of the measurements.
 #[derive(Default)]
-struct Heard {
+struct MeasurementCounts {
     imu: Cadence,
     lidar: Cadence,
     returns: usize,
 }
 
-impl Heard {
+impl MeasurementCounts {
     fn take(&mut self, measurement: &Measurement) {
         match measurement {
             Measurement::Imu(sample) => self.imu.take(sample.stamp),

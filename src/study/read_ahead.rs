@@ -1,33 +1,38 @@
-//! Reads a recording on a thread of its own, so that decompressing and decoding it costs the estimator no time.
+//! Reads a recording on a separate thread, so that the estimator does not wait for decompression and decoding.
 
 use crate::measurement::Measurement;
 use crate::recording::{Loss, Reader, RecordingError, Selection};
 use std::sync::mpsc::sync_channel;
 use std::thread;
 
-/// Measurements that may wait: about a second of them.
-const WAITING: usize = 256;
+/// Capacity of the queue, measurements: about 1 s of data.
+const QUEUE_CAPACITY: usize = 256;
 
-/// What a recording gives, one after the other.
-pub(super) type Coming<'a> = dyn Iterator<Item = Result<Measurement, RecordingError>> + 'a;
+/// The measurements of a recording, in order.
+pub(super) type MeasurementStream<'a> = dyn Iterator<Item = Result<Measurement, RecordingError>> + 'a;
 
-/// Calls `take` with the measurements, in order; what it gives, and what could not be read. They are read ahead where
-/// there is more than one thread to use.
-pub(super) fn read_ahead<T>(reader: &Reader, selection: &Selection, take: impl FnOnce(&mut Coming) -> T) -> (T, Loss) {
+/// Calls `process` with the measurements, and returns its result and the losses of the reader.
+///
+/// The measurements are read ahead if more than one thread is available.
+pub(super) fn read_ahead<T>(
+    reader: &Reader,
+    selection: &Selection,
+    process: impl FnOnce(&mut MeasurementStream) -> T,
+) -> (T, Loss) {
     let mut measurements = reader.measurements(selection);
     if rayon::current_num_threads() < 2 {
-        let taken = take(&mut measurements);
-        return (taken, measurements.loss().clone());
+        let result = process(&mut measurements);
+        return (result, measurements.loss().clone());
     }
     thread::scope(|scope| {
-        let (ahead, coming) = sync_channel(WAITING);
+        let (sender, receiver) = sync_channel(QUEUE_CAPACITY);
         let reading = scope.spawn(move || {
-            // Whoever takes them may stop before the end.
-            let _ = measurements.by_ref().all(|measurement| ahead.send(measurement).is_ok());
+            // `process` can stop before the end of the recording.
+            let _ = measurements.by_ref().all(|measurement| sender.send(measurement).is_ok());
             measurements.loss().clone()
         });
-        let taken = take(&mut coming.into_iter());
+        let result = process(&mut receiver.into_iter());
         let loss = reading.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        (taken, loss)
+        (result, loss)
     })
 }

@@ -1,4 +1,4 @@
-//! A simulation, recorded.
+//! Writes the measurements and the truth of a simulation to files.
 
 use super::{Manifest, Stage, StudyError, Watch};
 use crate::measurement::{ImuSample, LidarScan, Sink, SinkError};
@@ -11,11 +11,13 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Runs `simulation`; its measurements and truth go to the MCAP file `recording` as they come, and the head's true
-/// trajectory, in lidar time, to the TUM file `truth`. With `truth_tf` the recording shows the true head in `/tf` too.
+/// Runs `simulation` and writes its measurements and truth to the MCAP file `recording`.
+///
+/// The true trajectory of the head, in lidar time, is written to the TUM file `truth`. With `truth_tf`, the recording
+/// includes the true pose of the head on `/tf`.
 ///
 /// # Errors
-/// When a file cannot be written, the simulation fails, or somebody stops it; what came so far can be read then.
+/// When a file cannot be written, the simulation fails or it is stopped; the files can then be read up to that time.
 pub fn record(
     simulation: &Simulation,
     recording: &Path,
@@ -24,7 +26,7 @@ pub fn record(
     watch: &mut Watch,
 ) -> Result<SimulationSummary, StudyError> {
     let recording = Writer::create(recording, description(simulation, truth_tf)?)?;
-    let mut files = Files { recording, truth: Some(TumWriter::create(truth)?), stop: watch.stop };
+    let mut files = FileSink { recording, truth: Some(TumWriter::create(truth)?), stop: watch.stop };
     let duration_s = simulation.scenario().duration_s;
     let mut progress = |fraction: f64| watch.progress(Stage::Simulating, fraction * duration_s, Some(duration_s));
     let ran = simulation.run(&mut files, &mut progress);
@@ -35,16 +37,16 @@ pub fn record(
     Ok(ran?)
 }
 
-/// Runs simulations that share physics and rays, each to its recording.
+/// Runs simulations that share physics and ray casting, and writes each to a recording.
 pub(super) fn record_together(
     simulations: &[Simulation],
     recordings: Vec<Writer>,
     watch: &Watch,
 ) -> Result<(), StudyError> {
-    let files = |recording| Files { recording, truth: None, stop: watch.stop };
-    let mut all: Vec<Files> = recordings.into_iter().map(files).collect();
+    let files = |recording| FileSink { recording, truth: None, stop: watch.stop };
+    let mut all: Vec<FileSink> = recordings.into_iter().map(files).collect();
     let ran = Simulation::run_together(simulations, &mut all.iter_mut().collect::<Vec<_>>(), &mut |_| ());
-    all.into_iter().try_for_each(Files::finish)?;
+    all.into_iter().try_for_each(FileSink::finish)?;
     if watch.is_stopped() {
         return Err(StudyError::Stopped);
     }
@@ -52,7 +54,7 @@ pub(super) fn record_together(
     Ok(())
 }
 
-/// What the recording of a simulation says of it.
+/// Description of a simulation in its recording: calibration, rates and manifest.
 pub(super) fn description(simulation: &Simulation, truth_tf: bool) -> Result<RunDescription, StudyError> {
     Ok(RunDescription {
         calibration: simulation.calibration(),
@@ -62,19 +64,19 @@ pub(super) fn description(simulation: &Simulation, truth_tf: bool) -> Result<Run
             rate_hz: 1.0 / imu.period_s(),
             head_from_base: simulation.head().rest_pose_base_from_head().inverse(),
         }),
-        manifest: Manifest::of(simulation).text()?,
+        manifest: Manifest::of(simulation).to_ron()?,
         truth_tf,
     })
 }
 
-/// Takes all of a run to its files.
-struct Files<'a> {
+/// Writes measurements and truth of a run to the recording and to the TUM file.
+struct FileSink<'a> {
     recording: Writer,
     truth: Option<TumWriter<BufWriter<File>>>,
     stop: &'a AtomicBool,
 }
 
-impl Files<'_> {
+impl FileSink<'_> {
     fn finish(self) -> Result<(), StudyError> {
         self.recording.finish()?;
         self.truth.map_or(Ok(()), TumWriter::finish)?;
@@ -82,7 +84,7 @@ impl Files<'_> {
     }
 }
 
-impl Sink for Files<'_> {
+impl Sink for FileSink<'_> {
     fn imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
         if self.stop.load(Ordering::Relaxed) {
             return Err(Box::new(StudyError::Stopped));
@@ -99,7 +101,7 @@ impl Sink for Files<'_> {
     }
 }
 
-impl TruthSink for Files<'_> {
+impl TruthSink for FileSink<'_> {
     fn truth(&mut self, now: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
         if let Some(truth) = &mut self.truth {
             truth.pose(sample.lidar_stamp, &sample.head.world_from_body)?;

@@ -1,40 +1,40 @@
-//! BeamProjection become a cloud: in files, for viewers, and a sample of it to be judged.
+//! Registration of the beams into a cloud: output files, points for viewers and a sample for the evaluation.
 
 use super::cloud_files::{CloudFiles, CloudOptions};
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{Stage, StudyError, Watch};
 use crate::estimation::{CloudFilter, Fate, ProjectedReturn, point_sigma_m};
-use crate::evaluation::{DeadReckoning, EvaluationError, Rest, Thinning};
+use crate::evaluation::{DeadReckoning, EvaluationError, RestDetection, Thinning};
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
 use crate::recording::{CloudPoint, Measurements, Reader, RecordingError, Selection, write_result};
 use crate::time::Stamp;
 use std::path::Path;
 
-/// Most points that are judged.
-const JUDGED: usize = 100_000;
-/// Most points for viewers; the cloud's files have them all.
-const SHOWN: usize = 1_000_000;
+/// Maximum number of beams in the sample for the evaluation.
+const MAX_SAMPLED_BEAMS: usize = 100_000;
+/// Maximum number of points for viewers, in `result.mcap`; the cloud files have all points.
+const MAX_VIEWER_POINTS: usize = 1_000_000;
 
-/// A beam of the sample: where it ended and began.
+/// A projected beam: origin and end point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ProjectedBeam {
     pub point: Vector,
     pub origin: Vector,
 }
 
-/// A beam of the sample, to be judged.
+/// A beam of the sample for the evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SampledBeam {
-    /// By the estimate, in the map.
+    /// Projected by the estimate, in the map frame.
     pub in_map: ProjectedBeam,
-    /// By the true pose, in the world, and what else is true at its instant; `None` where there is no truth.
+    /// Projected by the true pose, in the world frame, with the true state at that time; `None` without truth.
     pub by_truth: Option<(ProjectedBeam, TrueState)>,
-    /// What became of it.
+    /// Decision of the outlier filter.
     pub fate: Fate,
 }
 
-/// How many echoes there were, and what became of them.
+/// Number of returns by decision of the outlier filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct FateCounts {
     pub kept: u64,
@@ -44,7 +44,7 @@ pub(super) struct FateCounts {
 }
 
 impl FateCounts {
-    /// All echoes.
+    /// Total number of returns.
     pub(super) fn all(&self) -> u64 {
         self.kept + self.mixed + self.isolated + self.moving
     }
@@ -59,19 +59,19 @@ impl FateCounts {
     }
 }
 
-/// The cloud, and what else a second reading of the recording gave.
+/// Result of the registration, from a second pass over the recording.
 pub(super) struct Registered {
-    /// What became of the echoes.
+    /// Number of returns by decision of the filter.
     pub fates: FateCounts,
     /// Whether the cloud was filtered.
     pub filtered: bool,
-    /// A sample of the beams, whatever became of them.
+    /// A sample of the beams, before filtering.
     pub sample: Vec<SampledBeam>,
-    /// What the IMU alone says.
+    /// Trajectory by IMU dead reckoning.
     pub dead_reckoning: Result<Trajectory, EvaluationError>,
 }
 
-/// What to register, and by what.
+/// Inputs of the registration.
 pub(super) struct Registration<'a> {
     pub reader: &'a Reader,
     pub selection: &'a Selection,
@@ -79,39 +79,39 @@ pub(super) struct Registration<'a> {
     pub body_frame: &'a str,
     pub map_from_head: &'a Trajectory,
     pub covariances: &'a [(Stamp, PoseCovariance)],
-    /// What is known of the lidar beyond its calibration.
+    /// Estimated correction of the lidar calibration.
     pub lidar: &'a LidarCorrection,
-    /// Echoes in the recording.
+    /// Number of returns in the recording.
     pub returns: usize,
-    /// Whether to project a sample by the truth too.
+    /// Whether to project the sample by the true poses as well.
     pub with_truth: bool,
-    /// What is asked of the cloud.
-    pub wishes: CloudOptions,
+    /// Options of the cloud.
+    pub options: CloudOptions,
 }
 
 impl Registration<'_> {
-    /// Projects every beam by the estimate, into the cloud's files and `result.mcap` in `folder`.
+    /// Projects all beams by the estimate and writes the cloud files and `result.mcap` to `folder`.
     pub(super) fn run(&self, folder: &Path, watch: &mut Watch) -> Result<Registered, StudyError> {
         let noise = self.calibration.lidar;
         let mut beams = BeamProjection {
             measurements: self.reader.measurements(self.selection),
             cursor: SmoothCursor::new(self.map_from_head),
             truth: self.with_truth.then(|| TruthCursor::new(self.reader.truth())),
-            calibrated: Lidar { head_from_laser: self.calibration.head_from_laser, range_m: 0.0 },
-            corrected: Lidar {
+            calibrated: LidarModel { head_from_laser: self.calibration.head_from_laser, range_m: 0.0 },
+            corrected: LidarModel {
                 head_from_laser: self.calibration.head_from_corrected_laser(self.lidar),
                 range_m: self.lidar.range_m,
             },
             noise,
             covariances: self.covariances,
-            filter: (!self.wishes.keep_outliers).then(|| CloudFilter::new(noise)),
-            files: CloudFiles::create(folder, self.wishes.format)?,
-            judged: Thinning::to(JUDGED, self.returns),
-            shown: Thinning::to(SHOWN, self.returns),
-            reckoning: DeadReckoning::new(&self.calibration.head_from_imu, Rest::default()),
+            filter: (!self.options.keep_outliers).then(|| CloudFilter::new(noise)),
+            files: CloudFiles::create(folder, self.options.format)?,
+            sampled: Thinning::to(MAX_SAMPLED_BEAMS, self.returns),
+            displayed: Thinning::to(MAX_VIEWER_POINTS, self.returns),
+            dead_reckoning: DeadReckoning::new(&self.calibration.head_from_imu, RestDetection::default()),
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
-            echoes: 0,
+            projected: 0,
             fates: FateCounts::default(),
             sample: Vec::new(),
             failure: None,
@@ -123,43 +123,45 @@ impl Registration<'_> {
             return Err(failure);
         }
         beams.files.finish()?;
-        let filtered = !self.wishes.keep_outliers;
-        let dead_reckoning = beams.reckoning.finish();
+        let filtered = !self.options.keep_outliers;
+        let dead_reckoning = beams.dead_reckoning.finish();
         Ok(Registered { fates: beams.fates, filtered, sample: beams.sample, dead_reckoning })
     }
 }
 
-/// Where a beam begins and ends by the estimate, and by the truth.
-type Ends = (ProjectedBeam, Option<(ProjectedBeam, TrueState)>);
+/// A beam projected by the estimate and by the truth.
+type ProjectedPair = (ProjectedBeam, Option<(ProjectedBeam, TrueState)>);
 
-/// An echo whose fate is not known yet.
+/// A return that waits for the decision of the filter.
 struct Pending {
     point: CloudPoint,
-    /// Whether viewers are to see it.
-    shown: bool,
-    /// Its ends by the estimate and by the truth, where it is of the sample, as one in fifty is.
-    judged: Option<Box<Ends>>,
+    /// Whether it is a point for viewers.
+    displayed: bool,
+    /// The projected beam if it is in the sample; boxed, because most returns are not.
+    sampled: Option<Box<ProjectedPair>>,
 }
 
-/// Reads scan by scan, writes the points that are kept, and gives those for viewers as an iterator.
+/// Projects the recording scan by scan, writes the cloud files, and iterates over the points for viewers.
 struct BeamProjection<'a, 'w, 's> {
     measurements: Measurements<'a>,
     cursor: SmoothCursor<'a>,
     truth: Option<TruthCursor<'a>>,
-    calibrated: Lidar,
-    corrected: Lidar,
+    /// The lidar as calibrated, for projection by the truth.
+    calibrated: LidarModel,
+    /// The lidar with the estimated correction, for projection by the estimate.
+    corrected: LidarModel,
     noise: LidarNoise,
-    /// Those of the poses from here on.
+    /// Covariances from the current stamp on.
     covariances: &'a [(Stamp, PoseCovariance)],
     filter: Option<CloudFilter<Pending>>,
     files: CloudFiles,
-    judged: Thinning,
-    shown: Thinning,
-    reckoning: DeadReckoning,
+    sampled: Thinning,
+    displayed: Thinning,
+    dead_reckoning: DeadReckoning,
     ready: std::vec::IntoIter<CloudPoint>,
     span: Option<(Stamp, Stamp)>,
-    /// Echoes so far.
-    echoes: usize,
+    /// Number of projected returns.
+    projected: usize,
     fates: FateCounts,
     sample: Vec<SampledBeam>,
     failure: Option<StudyError>,
@@ -187,7 +189,7 @@ impl Iterator for BeamProjection<'_, '_, '_> {
 }
 
 impl BeamProjection<'_, '_, '_> {
-    /// The points for viewers of the next scan.
+    /// Processes the next scan and returns its points for viewers.
     fn next_scan(&mut self) -> Result<Option<Vec<CloudPoint>>, StudyError> {
         loop {
             match self.measurements.next().transpose()? {
@@ -195,14 +197,14 @@ impl BeamProjection<'_, '_, '_> {
                     let Some(filter) = self.filter.take() else { return Ok(None) };
                     return Ok(Some(self.settle(filter.finish())?));
                 }
-                Some(Measurement::Imu(sample)) => self.reckoning.push(&sample),
+                Some(Measurement::Imu(sample)) => self.dead_reckoning.push(&sample),
                 Some(Measurement::Lidar(scan)) => {
                     if self.watch.is_stopped() {
                         return Err(StudyError::Stopped);
                     }
                     if let Some((first, last)) = self.span {
-                        let (done_s, whole_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
-                        self.watch.progress(Stage::Registering, done_s, Some(whole_s));
+                        let (done_s, total_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
+                        self.watch.progress(Stage::Registering, done_s, Some(total_s));
                     }
                     return Ok(Some(self.register(&scan)?));
                 }
@@ -210,20 +212,20 @@ impl BeamProjection<'_, '_, '_> {
         }
     }
 
-    /// Projects a scan; the points for viewers that are known to be kept by now.
+    /// Projects a scan and returns the points for viewers that the filter has accepted.
     fn register(&mut self, scan: &LidarScan) -> Result<Vec<CloudPoint>, RecordingError> {
         let mut pending = Vec::with_capacity(scan.returns.len());
         for beam in &scan.returns {
             let stamp = scan.stamp + beam.offset;
-            // The estimate begins after the recording and ends before it.
+            // The estimate does not cover the start and the end of the recording.
             let Some(map_from_head) = self.cursor.at(stamp) else { continue };
             pending.push(self.project(&map_from_head, beam, stamp)?);
         }
-        let told = match &mut self.filter {
+        let decided = match &mut self.filter {
             Some(filter) => filter.push(pending),
             None => pending.into_iter().map(|(_, pending)| (pending, Fate::Kept)).collect(),
         };
-        self.settle(told)
+        self.settle(decided)
     }
 
     fn project(
@@ -232,26 +234,25 @@ impl BeamProjection<'_, '_, '_> {
         beam: &LidarReturn,
         stamp: Stamp,
     ) -> Result<(ProjectedReturn, Pending), RecordingError> {
-        let index = self.echoes;
-        self.echoes += 1;
+        let index = self.projected;
+        self.projected += 1;
         let point_in_laser: Vector = beam.point_in_laser.cast();
         let in_map = self.corrected.beam(map_from_head, &point_in_laser);
         let arm = in_map.point - map_from_head.translation.vector;
         let range_sigma_m = self.noise.sigma_m(point_in_laser.norm());
         let error_m = self.covariance_at(stamp).map_or(f64::NAN, |c| point_sigma_m(range_sigma_m, c, &arm)) as f32;
         let point = CloudPoint { point_in_map: in_map.point.cast(), intensity: beam.intensity, stamp, error_m };
-        let mut judged = None;
-        if self.judged.keeps(index) {
-            let instant = self.truth.as_mut().map(|truth| truth.at(stamp)).transpose()?.flatten();
-            let by_truth =
-                instant.map(|instant| (self.calibrated.beam(&instant.world_from_head, &point_in_laser), instant));
-            judged = Some(Box::new((in_map, by_truth)));
+        let mut sampled = None;
+        if self.sampled.keeps(index) {
+            let state = self.truth.as_mut().map(|truth| truth.at(stamp)).transpose()?.flatten();
+            let by_truth = state.map(|state| (self.calibrated.beam(&state.world_from_head, &point_in_laser), state));
+            sampled = Some(Box::new((in_map, by_truth)));
         }
         let hit = ProjectedReturn { stamp, point_in_map: in_map.point, origin_in_map: in_map.origin };
-        Ok((hit, Pending { point, shown: self.shown.keeps(index), judged }))
+        Ok((hit, Pending { point, displayed: self.displayed.keeps(index), sampled }))
     }
 
-    /// The covariance of the last pose before `stamp` that has one; of the first, where there is none before.
+    /// The last covariance at or before `stamp`, or the first one if there is none.
     fn covariance_at(&mut self, stamp: Stamp) -> Option<&'_ PoseCovariance> {
         while let [_, (next, _), ..] = self.covariances
             && *next <= stamp
@@ -261,33 +262,34 @@ impl BeamProjection<'_, '_, '_> {
         self.covariances.first().map(|(_, covariance)| covariance)
     }
 
-    /// Writes the points that are kept, and counts the others; those for viewers.
-    fn settle(&mut self, told: Vec<(Pending, Fate)>) -> Result<Vec<CloudPoint>, RecordingError> {
-        let mut shown = Vec::new();
-        for (pending, fate) in told {
+    /// Counts the decisions, writes the accepted points and returns those for viewers.
+    fn settle(&mut self, decided: Vec<(Pending, Fate)>) -> Result<Vec<CloudPoint>, RecordingError> {
+        let mut displayed = Vec::new();
+        for (pending, fate) in decided {
             self.fates.count(fate);
-            self.sample.extend(pending.judged.map(|ends| SampledBeam { in_map: ends.0, by_truth: ends.1, fate }));
+            self.sample.extend(pending.sampled.map(|pair| SampledBeam { in_map: pair.0, by_truth: pair.1, fate }));
             if fate == Fate::Kept {
                 self.files.point(&pending.point)?;
-                shown.extend(pending.shown.then_some(pending.point));
+                displayed.extend(pending.displayed.then_some(pending.point));
             }
         }
-        Ok(shown)
+        Ok(displayed)
     }
 }
 
-/// How the lidar sits in the head, and what its ranges lack.
-struct Lidar {
+/// Extrinsics and range correction of the lidar.
+struct LidarModel {
     head_from_laser: Pose,
+    /// Added to each range, m.
     range_m: f64,
 }
 
-impl Lidar {
-    /// A beam that measured `point_in_laser`, where the head is at `frame_from_head`.
+impl LidarModel {
+    /// Projects the beam that measured `point_in_laser` from the head pose `frame_from_head`.
     fn beam(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> ProjectedBeam {
         let frame_from_laser = frame_from_head * self.head_from_laser;
         let origin = frame_from_laser.translation.vector;
-        let longer = 1.0 + self.range_m / point_in_laser.norm();
-        ProjectedBeam { point: frame_from_laser.rotation * point_in_laser * longer + origin, origin }
+        let scale = 1.0 + self.range_m / point_in_laser.norm();
+        ProjectedBeam { point: frame_from_laser.rotation * point_in_laser * scale + origin, origin }
     }
 }

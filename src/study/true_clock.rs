@@ -1,24 +1,25 @@
+//! True offset between the clocks of IMU and lidar.
+
 use crate::recording::{Reader, RecordingError, Selection, Truth};
 use crate::time::{Span, Stamp};
 use crate::truth::ClockTruth;
 
-/// How much later the IMU's clock truly stamps an instant than the lidar's, s, at lidar time; the clocks tell it at the
-/// true time `now`.
+/// The true clock offset, s, with its lidar time: IMU stamp minus lidar stamp of the same true time `now`.
 pub(super) fn true_offset(now: Stamp, clock: &ClockTruth) -> (Stamp, f64) {
     (now + clock.lidar_ahead, clock.imu_after_lidar().seconds())
 }
 
-/// How much later the IMU's clock truly stamps an instant than the lidar's, over lidar time.
+/// The true clock offset over lidar time, s: IMU stamp minus lidar stamp of the same time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct TrueClock(Vec<(Stamp, f64)>);
 
 impl TrueClock {
-    /// The offset of `selection`'s samples, whose stamps are shifted already where the clocks' epochs differ.
+    /// Reads the true offset, including the shift of the IMU stamps that `selection` applies if the clock epochs differ.
     pub(super) fn read(reader: &Reader, selection: &Selection) -> Result<Self, RecordingError> {
         let shift_s = selection.imu_shift().seconds();
         let mut offsets = Vec::new();
-        for told in reader.truth() {
-            if let Truth::Clock(now, clock) = told? {
+        for record in reader.truth() {
+            if let Truth::Clock(now, clock) = record? {
                 let (at, offset_s) = true_offset(now, &clock);
                 offsets.push((at, offset_s + shift_s));
             }
@@ -26,16 +27,16 @@ impl TrueClock {
         Ok(Self(offsets))
     }
 
-    /// Offsets, s, in order of time.
+    /// A clock with the given offsets, s, in order of time.
     #[cfg(test)]
-    pub(super) fn told(offsets: Vec<(Stamp, f64)>) -> Self {
+    pub(super) fn from_offsets(offsets: Vec<(Stamp, f64)>) -> Self {
         Self(offsets)
     }
 
-    /// What the lidar's clock says when the IMU's says `imu_stamp`.
+    /// Converts an IMU stamp to the lidar clock.
     ///
-    /// The offset is linear between those told, and that of the end beyond them. It is looked up by the IMU's stamp:
-    /// the clocks differ by milliseconds, in which it changes by nanoseconds.
+    /// The offset is interpolated linearly, and constant before the first and after the last record. It is interpolated
+    /// at the IMU stamp: the clocks differ by milliseconds, and in that time the offset changes by nanoseconds.
     pub(super) fn on_lidar_clock(&self, imu_stamp: Stamp) -> Stamp {
         let after = self.0.partition_point(|(at, _)| *at <= imu_stamp);
         let offset_s = match (after.checked_sub(1).map(|before| self.0[before]), self.0.get(after)) {

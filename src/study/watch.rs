@@ -1,43 +1,45 @@
+//! Progress reports and cancellation of experiments.
+
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// What an experiment is at.
+/// Stage of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Physics, rays, recording.
+    /// Physics, ray casting and recording.
     Simulating,
-    /// The open loop.
+    /// Open-loop estimation.
     Estimating,
-    /// The closed loop.
+    /// Global registration with loop closure.
     ClosingLoops,
-    /// Beams become a cloud.
+    /// Registration of the cloud.
     Registering,
-    /// What the measurements could tell at best.
+    /// Computation of the information bound.
     Bounding,
-    /// Errors, plots, the page.
+    /// Evaluation, plots and report.
     Reporting,
 }
 
-/// What an experiment tells while it runs.
+/// Progress or note of a running experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StudyEvent<'a> {
-    /// How far a stage is: from 0 to 1 where its end is known, and by seconds of data.
+    /// Progress of a stage.
     Progress {
         /// The stage.
         stage: Stage,
-        /// The share that is done, where that is known.
+        /// Completed fraction, 0 to 1; `None` if the duration of the data is not known.
         fraction: Option<f64>,
-        /// Seconds of data that are done.
+        /// Processed data, s.
         done_s: f64,
     },
-    /// A remark that whoever started it should read.
+    /// A message for the user.
     Note(&'a str),
 }
 
-/// Who watches an experiment, and may stop it.
+/// Progress callback and stop flag of an experiment.
 pub struct Watch<'a> {
-    /// Set from outside to stop as soon as what is begun can be closed.
+    /// The caller sets this flag to stop the experiment; open files are completed first.
     pub stop: &'a AtomicBool,
-    /// Hears how it goes.
+    /// Called with each event.
     pub report: &'a mut dyn FnMut(StudyEvent),
 }
 
@@ -46,8 +48,8 @@ impl Watch<'_> {
         self.stop.load(Ordering::Relaxed)
     }
 
-    pub(super) fn progress(&mut self, stage: Stage, done_s: f64, whole_s: Option<f64>) {
-        let fraction = whole_s.filter(|whole_s| *whole_s > 0.0).map(|whole_s| (done_s / whole_s).clamp(0.0, 1.0));
+    pub(super) fn progress(&mut self, stage: Stage, done_s: f64, total_s: Option<f64>) {
+        let fraction = total_s.filter(|total_s| *total_s > 0.0).map(|total_s| (done_s / total_s).clamp(0.0, 1.0));
         (self.report)(StudyEvent::Progress { stage, fraction, done_s });
     }
 
@@ -56,24 +58,24 @@ impl Watch<'_> {
     }
 }
 
-/// Hears which share of some work is done, from 0 to 1, on whatever thread did it.
+/// Progress callback with the completed fraction, 0 to 1; it is called from worker threads.
 pub type OnProgress<'a> = &'a (dyn Fn(f64) + Sync);
 
-/// Work in equal pieces that threads finish in any order.
+/// Progress of work in equal pieces that threads complete in any order.
 pub(super) struct PieceProgress<'a> {
-    whole: usize,
+    total: usize,
     done: AtomicUsize,
     on_progress: OnProgress<'a>,
 }
 
 impl<'a> PieceProgress<'a> {
-    pub(super) fn new(whole: usize, on_progress: OnProgress<'a>) -> Self {
-        Self { whole, done: AtomicUsize::new(0), on_progress }
+    pub(super) fn new(total: usize, on_progress: OnProgress<'a>) -> Self {
+        Self { total, done: AtomicUsize::new(0), on_progress }
     }
 
-    /// Counts a piece that is done.
+    /// Counts one completed piece and reports the progress.
     pub(super) fn finish_one(&self) {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        (self.on_progress)(done as f64 / self.whole.max(1) as f64);
+        (self.on_progress)(done as f64 / self.total.max(1) as f64);
     }
 }

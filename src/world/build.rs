@@ -1,4 +1,4 @@
-//! From a scene's spec to triangles: templates are placed, objects scattered, meshes read, and all of it checked.
+//! Builds triangles from the spec of a scene: places templates, scatters objects, reads meshes, and checks everything.
 
 use super::caster::Caster;
 use super::import::{self, MeshTriangles};
@@ -13,23 +13,23 @@ use crate::spec::{Source, SpecError};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Most triangles of a scene: they take about 350 bytes each while it is built.
+/// Maximum number of triangles of a scene: each needs about 350 bytes while the scene is built.
 pub(super) const MAX_TRIANGLES: usize = 10_000_000;
-/// Furthest from the origin that a surface or a route may be, m.
+/// Maximum coordinate of a surface or a route, m: beyond, single precision in the ray search is too coarse.
 const MAX_EXTENT_M: f64 = 100_000.0;
-/// Deepest nesting of templates.
+/// Maximum nesting depth of templates: a guard against a template that contains itself.
 const MAX_DEPTH: usize = 8;
 
-/// What a world is made of.
-pub(super) struct Parts {
+/// The parts from which a world is assembled.
+pub(super) struct WorldParts {
     pub materials: Vec<Material>,
-    pub still: Surfaces,
+    pub static_surfaces: Surfaces,
     pub movers: Vec<Mover>,
     pub routes: BTreeMap<String, Route>,
     pub notes: Vec<String>,
 }
 
-/// Triangles, one material each.
+/// Triangles with one material each.
 #[derive(Default)]
 pub(super) struct Surfaces {
     pub triangles: Vec<Triangle>,
@@ -37,7 +37,7 @@ pub(super) struct Surfaces {
 }
 
 /// Builds all parts of a world.
-pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<Parts, WorldError> {
+pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, WorldError> {
     let mut builder = Builder {
         spec,
         source,
@@ -47,17 +47,17 @@ pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<Parts, WorldErr
         triangle_count: 0,
         notes: Vec::new(),
     };
-    let mut still = Surfaces::default();
-    builder.add_items(&spec.items, &Pose::identity(), 0, &mut still)?;
-    if still.triangles.is_empty() {
+    let mut static_surfaces = Surfaces::default();
+    builder.add_items(&spec.items, &Pose::identity(), 0, &mut static_surfaces)?;
+    if static_surfaces.triangles.is_empty() {
         return Err(SpecError::about(source, "items", "the scene has no surfaces: `items` is empty").into());
     }
     let movers = spec.movers.iter().map(|mover| builder.mover(mover)).collect::<Result<_, _>>()?;
     let Builder { routes, notes, .. } = builder;
-    Ok(Parts { materials: materials(spec), still, movers, routes, notes })
+    Ok(WorldParts { materials: materials(spec), static_surfaces, movers, routes, notes })
 }
 
-/// The materials, in the order of their names, as their ids have it.
+/// The materials in order of their names, which is the order of their ids.
 fn materials(spec: &SceneSpec) -> Vec<Material> {
     let material = |(name, spec): (&String, &super::MaterialSpec)| Material {
         name: name.clone(),
@@ -72,17 +72,16 @@ fn materials(spec: &SceneSpec) -> Vec<Material> {
 
 fn material_ids<'a>(spec: &'a SceneSpec, source: &Source) -> Result<BTreeMap<&'a str, MaterialId>, SpecError> {
     if spec.materials.len() > usize::from(u16::MAX) {
-        let message = format!("the scene has {} materials; it may have {}", spec.materials.len(), u16::MAX);
+        let message = format!("the scene has {} materials; the maximum is {}", spec.materials.len(), u16::MAX);
         return Err(SpecError::about(source, "materials", message));
     }
     for (name, material) in &spec.materials {
         if let MaterialKind::Glass { transmission } = material.kind
             && transmission + material.reflectance > 1.0
         {
-            let message =
-                format!("`{name}` reflects {} and lets {transmission} through: more than all of the light", {
-                    material.reflectance
-                });
+            let message = format!("`{name}` reflects {} and transmits {transmission}: more than all of the light", {
+                material.reflectance
+            });
             return Err(SpecError::about(source, name, message));
         }
     }
@@ -102,14 +101,13 @@ fn routes(spec: &SceneSpec, source: &Source) -> Result<BTreeMap<String, Route>, 
         }
         if route.points_m.windows(2).any(|pair| pair[0] == pair[1]) {
             let message = format!("the route `{name}` has the same point twice in a row");
-            return Err(SpecError::about(source, name, message)
-                .with_help("a walker who stands still is a matter of the motion"));
+            return Err(SpecError::about(source, name, message).with_help("to make a walker rest, use the motion"));
         }
     }
     if let Some(name) = &spec.default_route
         && !spec.routes.contains_key(name)
     {
-        return Err(unknown(source, "route", name, spec.routes.keys()));
+        return Err(unknown_name(source, "route", name, spec.routes.keys()));
     }
     let route = |(name, route): (&String, &super::RouteSpec)| {
         let points_in_world = route.points_m.iter().map(|point| Vector::from(*point)).collect();
@@ -118,8 +116,8 @@ fn routes(spec: &SceneSpec, source: &Source) -> Result<BTreeMap<String, Route>, 
     Ok(spec.routes.iter().map(route).collect())
 }
 
-/// An error about a name that the scene does not define, with those that it does.
-fn unknown<'a>(source: &Source, what: &str, name: &str, known: impl Iterator<Item = &'a String>) -> SpecError {
+/// An error about a name that the scene does not define; lists the names that it defines.
+fn unknown_name<'a>(source: &Source, what: &str, name: &str, known: impl Iterator<Item = &'a String>) -> SpecError {
     let known: Vec<&str> = known.map(String::as_str).collect();
     SpecError::about(source, name, format!("the scene has no {what} `{name}`"))
         .with_help(format!("it has: {}", if known.is_empty() { "none".to_owned() } else { known.join(", ") }))
@@ -148,21 +146,21 @@ impl Builder<'_> {
                 ItemSpec::Solid { shape, material, at_m_deg } => {
                     let id = self.material_id(material)?;
                     let local = self.shape(shape)?;
-                    for place in self.places(at_m_deg, material)? {
-                        self.add(&local, id, &(at * place), into)?;
+                    for pose in self.poses(at_m_deg, material)? {
+                        self.add(&local, id, &(at * pose), into)?;
                     }
                 }
                 ItemSpec::Place { template, at_m_deg } => {
-                    for place in self.places(at_m_deg, template)? {
-                        self.add_template(template, &(at * place), depth, into)?;
+                    for pose in self.poses(at_m_deg, template)? {
+                        self.add_template(template, &(at * pose), depth, into)?;
                     }
                 }
                 ItemSpec::Scatter(scatter) => {
                     let routes: Vec<&Route> = self.routes.values().collect();
-                    let places = scatter::places(scatter, at, &routes)
+                    let poses = scatter::poses(scatter, at, &routes)
                         .map_err(|(key, sentence)| SpecError::about(self.source, key, sentence))?;
-                    for place in places {
-                        self.add_template(&scatter.template, &(at * place), depth, into)?;
+                    for pose in poses {
+                        self.add_template(&scatter.template, &(at * pose), depth, into)?;
                     }
                 }
             }
@@ -172,7 +170,7 @@ impl Builder<'_> {
 
     fn add_template(&mut self, name: &str, at: &Pose, depth: usize, into: &mut Surfaces) -> Result<(), WorldError> {
         let Some(items) = self.spec.templates.get(name) else {
-            return Err(unknown(self.source, "template", name, self.spec.templates.keys()).into());
+            return Err(unknown_name(self.source, "template", name, self.spec.templates.keys()).into());
         };
         if items.is_empty() {
             return Err(SpecError::about(self.source, name, format!("the template `{name}` is empty")).into());
@@ -200,7 +198,7 @@ impl Builder<'_> {
             mover.waypoints.iter().map(|at| (at.time_s, at.at_m_deg.world_from_body())).collect();
         let turns_half = |pair: &[(f64, Pose)]| pair[0].1.rotation.angle_to(&pair[1].1.rotation) > 3.1;
         if waypoints.windows(2).any(turns_half) {
-            return Err(wrong("turns by 180 degrees between two waypoints: say which way, by one more between them"));
+            return Err(wrong("turns by 180 degrees between two waypoints: add a waypoint to fix the direction"));
         }
         let mut surfaces = Surfaces::default();
         self.add_template(&mover.template, &Pose::identity(), 0, &mut surfaces)?;
@@ -209,15 +207,14 @@ impl Builder<'_> {
 
     fn material_id(&self, name: &str) -> Result<MaterialId, SpecError> {
         let id = self.material_ids.get(name).copied();
-        id.ok_or_else(|| unknown(self.source, "material", name, self.spec.materials.keys()))
+        id.ok_or_else(|| unknown_name(self.source, "material", name, self.spec.materials.keys()))
     }
 
-    fn places(&self, places: &[Placement], name: &str) -> Result<Vec<Pose>, SpecError> {
+    fn poses(&self, places: &[Placement], name: &str) -> Result<Vec<Pose>, SpecError> {
         if places.is_empty() {
             let message = format!("`at_m_deg` of an item of `{name}` is an empty list");
-            return Err(
-                SpecError::about(self.source, name, message).with_help("leave it out to place it at the origin")
-            );
+            return Err(SpecError::about(self.source, name, message)
+                .with_help("remove the key to place the item at the origin"));
         }
         Ok(places.iter().map(Placement::world_from_body).collect())
     }
@@ -234,7 +231,9 @@ impl Builder<'_> {
         }
         let wrong = |sentence: String| WorldError::Mesh(SpecError::about(self.source, file, sentence));
         let Some(folder) = &self.source.folder else {
-            return Err(wrong(format!("a scene without a folder of its own cannot name the mesh `{file}`")));
+            return Err(wrong(format!(
+                "the mesh `{file}` needs a folder: a scene without a folder cannot use mesh files"
+            )));
         };
         let mesh = import::read(&folder.join(file), scale, *up)
             .map_err(|error| wrong(format!("the mesh `{file}` {error}")))?;
@@ -259,7 +258,7 @@ impl Builder<'_> {
         for triangle in &mesh.triangles {
             let corners = triangle.map(|corner| at.rotation * corner + at.translation.vector);
             if !corners.iter().flatten().all(|x| x.abs() <= MAX_EXTENT_M) {
-                let message = format!("an item reaches further than {} km from the origin", MAX_EXTENT_M / 1000.0);
+                let message = format!("an item extends to more than {} km from the origin", MAX_EXTENT_M / 1000.0);
                 return Err(SpecError::plain(&self.source.name, message).with_help("lengths are metres"));
             }
             into.triangles.push(corners);

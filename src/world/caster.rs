@@ -1,8 +1,8 @@
-//! Rays against triangles: the one file that names parry.
+//! Ray casting against triangles, with parry's bounding-volume hierarchy; no other file uses parry.
 //!
-//! parry's bounding-volume tree finds the face in single precision, near the middle of the scene; one test against the
-//! face's plane in double precision then gives the distance. So ranges are exact to the corners as given, while the
-//! search, which costs the time, moves half the bytes.
+//! The hierarchy finds the face in single precision, relative to the centre of the scene. The distance is then computed
+//! from the plane of the face in double precision. Ranges are therefore exact for the given corners, while the search,
+//! the costly part, moves half the bytes.
 
 mod face;
 
@@ -16,9 +16,9 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
 type Vec3 = parry3d::math::Vector;
 
-/// Triangles that rays can be cast against.
+/// Triangles in a bounding-volume hierarchy for ray casting.
 pub(super) struct Caster {
-    /// Subtracted from coordinates so that single precision serves.
+    /// Centre of the scene, subtracted from coordinates so that single precision is sufficient.
     middle: Vector,
     lower: Vector,
     upper: Vector,
@@ -29,26 +29,26 @@ pub(super) struct Caster {
     triangle_count: usize,
 }
 
-/// What a ray meets first.
+/// The first intersection of a ray.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crossing {
     /// Distance along the ray, m.
     pub distance: f64,
-    /// Unit normal, turned against the ray.
+    /// Unit normal that points against the ray.
     pub normal: Vector,
-    /// The triangle's material.
+    /// Material of the triangle.
     pub material: MaterialId,
 }
 
 impl Caster {
-    /// A caster for triangles that have an area, one material each.
+    /// A caster for triangles with non-zero area and one material each.
     pub fn new(triangles: &[Triangle], materials: &[MaterialId]) -> Self {
         let (lower, upper) = bounds(triangles);
         let middle = if triangles.is_empty() { Vector::zeros() } else { (lower + upper) / 2.0 };
         let mut order = face::faces(triangles, materials, &middle);
-        face::sort_in_space(&mut order);
+        face::sort_along_curve(&mut order);
         let faces: Vec<SingleFace> = order.iter().map(|(_, face)| SingleFace::new(face)).collect();
-        // Single precision moves corners by half a step at most: boxes reach that much further.
+        // Single precision moves corners by at most half a unit in the last place: enlarge the boxes accordingly.
         let margin = 4.0 * f32::EPSILON * (upper - middle).amax() as f32;
         let boxes: Vec<Aabb> = faces.iter().map(|face| face.bounds(margin)).collect();
         Self {
@@ -63,12 +63,12 @@ impl Caster {
         }
     }
 
-    /// How many triangles there are.
+    /// Number of triangles.
     pub fn len(&self) -> usize {
         self.triangle_count
     }
 
-    /// Two opposite corners of the box around the triangles, the lower first.
+    /// Lower and upper corner of the bounding box.
     pub fn bounds(&self) -> (Vector, Vector) {
         (self.lower, self.upper)
     }
@@ -77,7 +77,7 @@ impl Caster {
     pub fn cast(&self, origin: &Vector, direction: &Vector, reach: f64) -> Option<Crossing> {
         let origin = origin - self.middle;
         let ray = SingleRay::new(&origin, direction);
-        // A little further in single precision, so that the double one decides.
+        // A slightly larger reach in single precision, so that the double-precision distance decides.
         let reach_single = (reach * (1.0 + 1e-6)) as f32;
         let (at, near) = self.tree.find_best(
             reach_single,
@@ -94,9 +94,9 @@ impl Caster {
     pub fn nearest(&self, point: &Vector, reach: f64) -> Option<SurfacePoint> {
         let local = point - self.middle;
         let probe = single(&local);
-        // The search is in single precision; the margin keeps a surface at the very edge of the reach.
+        // The search is in single precision; the margin includes a surface exactly at `reach`.
         let search = (reach * (1.0 + 1e-6) + 1e-5) as f32;
-        let nearest = |leaf: u32| self.faces[leaf as usize].widened().nearest(&local);
+        let nearest = |leaf: u32| self.faces[leaf as usize].to_double().nearest(&local);
         let cost = |leaf: u32, _| Some((nearest(leaf) - local).norm() as f32);
         let box_distance = |node: &BvhNode, _| {
             let outside = (node.mins() - probe).max(probe - node.maxs()).max(Vec3::ZERO);
@@ -104,13 +104,13 @@ impl Caster {
         };
         let (at, _) = self.tree.find_best(search, box_distance, cost)?;
         let plane = &self.planes[at as usize];
-        let nearest = plane.onto(&nearest(at));
+        let nearest = plane.project(&nearest(at));
         let is_within = (nearest - local).norm() <= reach;
         is_within.then(|| SurfacePoint { point_in_world: nearest + self.middle, normal_in_world: plane.normal })
     }
 }
 
-/// A ray as the search reads it.
+/// A ray in the form that the search uses.
 struct SingleRay {
     origin: Vec3,
     direction: Vec3,
@@ -121,13 +121,13 @@ struct SingleRay {
 impl SingleRay {
     fn new(origin: &Vector, direction: &Vector) -> Self {
         let (origin, direction) = (single(origin), single(direction));
-        // Finite for a ray along an axis, so that no product with it is NaN.
+        // Finite also for a ray along an axis, so that no product is NaN.
         let inverse = direction.map(|x| 1.0 / if x.abs() < 1e-20 { 1e-20_f32.copysign(x) } else { x });
         Self { origin, direction, from: origin.into(), inverse: inverse.into() }
     }
 
-    /// How far along the ray it enters a node's box, by slabs, the three at once; the largest number if it does not.
-    /// parry has this test too, number by number.
+    /// Distance at which the ray enters the box of a node, by the slab test on all three axes at once; `f32::MAX` for a
+    /// miss. parry's own test treats one axis at a time.
     #[inline]
     fn enters(&self, node: &BvhNode) -> f32 {
         let to_lower = (Vec3A::from(node.mins()) - self.from) * self.inverse;
@@ -138,7 +138,7 @@ impl SingleRay {
     }
 }
 
-/// The box around triangles; the origin for none.
+/// Bounding box of triangles; the origin for none.
 fn bounds(triangles: &[Triangle]) -> (Vector, Vector) {
     let first = triangles.first().map_or(Vector::zeros(), |[corner, ..]| *corner);
     triangles.iter().flatten().fold((first, first), |(lower, upper), corner| (lower.inf(corner), upper.sup(corner)))

@@ -1,12 +1,12 @@
 use crate::spec::SpecError;
 
-/// Why no world could be built.
+/// Why a world cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WorldError {
-    /// The scene cannot be found, cannot be parsed, or describes what cannot be built.
+    /// The scene cannot be found or parsed, or the content is invalid.
     #[error(transparent)]
     Scene(#[from] SpecError),
-    /// A mesh that the scene names is wrong; the error points at the name in the scene.
+    /// A mesh of the scene is invalid; the error points to the name in the scene.
     #[error(transparent)]
     Mesh(SpecError),
 }

@@ -1,4 +1,4 @@
-//! Scenes that bring other scenes along.
+//! Scenes that include other scenes.
 
 use super::build::build;
 use super::{ItemSpec, SceneSpec, ShapeSpec, WorldError};
@@ -6,58 +6,58 @@ use crate::spec::{Kind, Source, SpecError, find, parse};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Deepest chain of scenes that include each other.
-const MOST_DEEP: usize = 16;
+/// Maximum depth of included scenes.
+const MAX_INCLUDE_DEPTH: usize = 16;
 
 impl SceneSpec {
-    /// This scene and those that it includes as one that includes none. `source` is the text it came from: a scene is
-    /// looked for beside it, and then as everywhere.
+    /// This scene merged with all scenes that it includes.
     ///
-    /// What is included comes first. The name is this scene's own; so is the default route, if it has one, or else that
-    /// of the first included scene that does.
+    /// `source` is the text of this scene. An included scene is searched for in the folder of `source` first, then in
+    /// the library. Items of included scenes come first. The name is that of this scene. The default route is that of
+    /// this scene, otherwise that of the first included scene that has one.
     ///
     /// # Errors
-    /// When an included scene is missing, wrong by itself, or includes itself; when two define one name; and when one
-    /// has meshes, which are looked for beside the scene that includes it, in another folder.
+    /// If an included scene is missing, invalid or includes itself; if two scenes define the same name; or if a scene
+    /// with meshes is in another folder than the scene that includes it, from which mesh paths are resolved.
     pub fn with_includes(&self, source: &Source) -> Result<Self, WorldError> {
-        whole(self, &[source])
+        flatten(self, &[source])
     }
 }
 
-/// `spec`, read from the last of `chain`, each of which is included by the one before it, as a scene that includes
-/// none.
-fn whole(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError> {
+/// `spec` merged with the included scenes. `chain` holds the sources from the outermost scene to `spec`, each included
+/// by the one before.
+fn flatten(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError> {
     let Some(source) = chain.last() else { return Ok(spec.clone()) };
     let own = SceneSpec { include: Vec::new(), ..spec.clone() };
     let mut others: Option<SceneSpec> = None;
     for name in &spec.include {
         let wrong = |what: String| SpecError::about(source, name, format!("the included scene `{name}` {what}"));
-        let other = beside(source, name).map_err(|error| wrong(format!("is missing: {}", error.message())))?;
+        let other = find_included(source, name).map_err(|error| wrong(format!("is missing: {}", error.message())))?;
         if chain.iter().any(|before| before.text == other.text) {
             return Err(wrong("includes itself, directly or through another".to_owned()).into());
         }
-        if chain.len() > MOST_DEEP {
-            return Err(wrong(format!("is included {} levels deep; {MOST_DEEP} at most", chain.len())).into());
+        if chain.len() > MAX_INCLUDE_DEPTH {
+            return Err(wrong(format!("is included {} levels deep; {MAX_INCLUDE_DEPTH} at most", chain.len())).into());
         }
         let other_chain: Vec<&Source> = chain.iter().copied().chain([&other]).collect();
-        let included = whole(&parse(&other)?, &other_chain)?;
+        let included = flatten(&parse(&other)?, &other_chain)?;
         if other.folder != source.folder && has_meshes(&included) {
             return Err(wrong("has meshes: keep it in the folder of the scene that includes it".to_owned()).into());
         }
-        // What is wrong with it is told where it stands, in its own text.
+        // Build it separately, so that errors refer to the included file.
         build(&included, &other)?;
         others = Some(match others {
             None => included,
-            Some(before) => joined(before, included, source)?,
+            Some(before) => merge(before, included, source)?,
         });
     }
     let Some(others) = others else { return Ok(own) };
     let default_route = own.default_route.clone().or_else(|| others.default_route.clone());
-    Ok(SceneSpec { name: own.name.clone(), default_route, ..joined(others, own, source)? })
+    Ok(SceneSpec { name: own.name.clone(), default_route, ..merge(others, own, source)? })
 }
 
-/// The scene called `name` in the folder of `source`, or wherever scenes are.
-fn beside(source: &Source, name: &str) -> Result<Source, SpecError> {
+/// Finds the scene `name` in the folder of `source`, otherwise in the library.
+fn find_included(source: &Source, name: &str) -> Result<Source, SpecError> {
     let file = if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") };
     let path: Option<PathBuf> = source.folder.as_ref().map(|folder| folder.join(file));
     match path.filter(|path| path.is_file()) {
@@ -71,18 +71,18 @@ fn has_meshes(spec: &SceneSpec) -> bool {
     spec.items.iter().chain(spec.templates.values().flatten()).any(is_mesh)
 }
 
-/// All of two scenes, the first one's first, under its name.
-fn joined(mut first: SceneSpec, second: SceneSpec, source: &Source) -> Result<SceneSpec, SpecError> {
-    join(&mut first.materials, second.materials, "material", source)?;
-    join(&mut first.templates, second.templates, "template", source)?;
-    join(&mut first.routes, second.routes, "route", source)?;
+/// Merges two scenes: the parts of `first` come first; the name is that of `first`.
+fn merge(mut first: SceneSpec, second: SceneSpec, source: &Source) -> Result<SceneSpec, SpecError> {
+    merge_named(&mut first.materials, second.materials, "material", source)?;
+    merge_named(&mut first.templates, second.templates, "template", source)?;
+    merge_named(&mut first.routes, second.routes, "route", source)?;
     first.items.extend(second.items);
     first.movers.extend(second.movers);
     first.default_route = first.default_route.or(second.default_route);
     Ok(first)
 }
 
-fn join<T>(
+fn merge_named<T>(
     first: &mut BTreeMap<String, T>,
     second: BTreeMap<String, T>,
     what: &str,
@@ -90,7 +90,9 @@ fn join<T>(
 ) -> Result<(), SpecError> {
     for (name, value) in second {
         if first.contains_key(&name) {
-            let message = format!("two of the scenes that make up this one define the {what} `{name}`: rename one");
+            let message = format!(
+                "this scene and the scenes that it includes define the {what} `{name}` more than once: rename one"
+            );
             return Err(SpecError::about(source, &name, message));
         }
         first.insert(name, value);

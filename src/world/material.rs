@@ -1,20 +1,20 @@
-/// Names a material of one [`World`](super::World).
+/// Identifies a material of a [`World`](super::World).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MaterialId(pub(super) u16);
 
-/// What a surface does with a laser's light.
+/// Optical properties of a surface at the laser wavelength.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
-    /// Its name in the scene.
+    /// Name in the scene.
     pub name: String,
-    /// Fraction of the light that it scatters back at normal incidence, 0 to 1 (1: a white Lambertian target).
+    /// Fraction of light scattered back at normal incidence, 0 to 1 (1: a white Lambertian target).
     pub reflectance: f64,
-    /// Fraction of the light that goes through, 0 for an opaque one.
+    /// Fraction of light transmitted; 0 for an opaque material.
     pub transmission: f64,
 }
 
 impl Material {
-    /// Whether light goes through, so that a caster has to look behind a hit on it.
+    /// Whether the material transmits light, so that the ray continues behind a hit.
     pub fn is_transparent(&self) -> bool {
         self.transmission > 0.0
     }

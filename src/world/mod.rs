@@ -1,9 +1,8 @@
-//! Worlds: a scene's file becomes surfaces that rays can be cast against.
+//! Worlds: surfaces built from the file of a scene, into which rays can be cast.
 //!
 //! A [`SceneSpec`] (RON, under `scenes/`) lists materials, shapes, templates of furniture, scattered objects, meshes
-//! from files, things that move, and routes to walk. [`World::build`] checks it as a whole and turns it into one set of
-//! triangles. [`World::cast`] then answers the only question a lidar asks: what does this ray meet first, how far away,
-//! at what angle, made of what?
+//! from files, movers, and routes to walk. [`World::build`] checks it and builds one set of triangles. [`World::cast`]
+//! returns the first surface on a ray: distance, normal and material.
 //!
 //! ```
 //! use zsim::geometry::Vector;

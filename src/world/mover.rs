@@ -1,13 +1,13 @@
-//! What moves: rigid groups of triangles along timed waypoints.
+//! Movers: rigid groups of triangles that follow timed waypoints.
 
 use super::caster::{Caster, Crossing};
 use crate::geometry::{Pose, Vector};
 
-/// A rigid group of triangles that moves along waypoints.
+/// A rigid group of triangles that follows waypoints.
 pub(super) struct Mover {
     surfaces: Caster,
     path: Path,
-    /// A sphere around the origin of its frame that holds it.
+    /// Radius of the bounding sphere about the origin of the mover's frame, m.
     radius: f64,
 }
 
@@ -18,14 +18,14 @@ impl Mover {
         Self { surfaces, path, radius }
     }
 
-    /// The first crossing of a ray at time `time_s`, within `reach`.
+    /// The first intersection with a ray at `time_s`, within `reach`.
     pub fn cast(&self, origin: &Vector, direction: &Vector, reach: f64, time_s: f64) -> Option<Crossing> {
         let world_from_body = self.path.at(time_s);
-        // Passed by if the ray misses the sphere, or has it behind or beyond its reach.
+        // Skip the mover if the ray misses the bounding sphere, or the sphere is behind the origin or out of range.
         let to_middle = world_from_body.translation.vector - origin;
         let along = to_middle.dot(direction);
-        let beside2 = to_middle.norm_squared() - along * along;
-        if beside2 > self.radius * self.radius || along < -self.radius || along > reach + self.radius {
+        let distance2 = to_middle.norm_squared() - along * along;
+        if distance2 > self.radius * self.radius || along < -self.radius || along > reach + self.radius {
             return None;
         }
         let origin = world_from_body.inverse_transform_point(&(*origin).into()).coords;
@@ -35,7 +35,7 @@ impl Mover {
         Some(crossing)
     }
 
-    /// How far a point is at time `time_s` from its surfaces, where that is within `reach`.
+    /// Distance of a point from the surfaces at `time_s`; `None` above `reach`.
     pub fn distance(&self, point: &Vector, reach: f64, time_s: f64) -> Option<f64> {
         let world_from_body = self.path.at(time_s);
         if (point - world_from_body.translation.vector).norm() > self.radius + reach {
@@ -54,13 +54,14 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// A path through at least one pose; times in seconds, each after the last.
+    /// A path through at least one pose; times in seconds, increasing.
     pub fn new(waypoints: &[(f64, Pose)], repeats: bool) -> Self {
         let (times, poses) = waypoints.iter().copied().unzip();
         Self { times, poses, repeats }
     }
 
-    /// The pose at a time: steady between waypoints, held before the first and after the last unless it repeats.
+    /// The pose at a time, interpolated linearly; constant before the first and after the last waypoint unless it
+    /// repeats.
     pub fn at(&self, time_s: f64) -> Pose {
         let (first, last) = (self.times[0], self.times[self.times.len() - 1]);
         let time = if self.repeats && last > first {
@@ -76,7 +77,7 @@ impl Path {
         let fraction = (time - self.times[before]) / (self.times[next] - self.times[before]);
         let (from, to) = (&self.poses[before], &self.poses[next]);
         let position = from.translation.vector.lerp(&to.translation.vector, fraction);
-        // The shorter way round; half a turn has none, and goes straight over at its end.
+        // Shorter rotation. Half a turn has none: then the rotation jumps at the end.
         let rotation = from.rotation.try_slerp(&to.rotation, fraction, 1e-9).unwrap_or(from.rotation);
         Pose::from_parts(position.into(), rotation)
     }

@@ -3,22 +3,22 @@ use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use serde::ser::{Serialize, Serializer};
 use std::fmt;
 
-/// Where something stands, as scenes write it: `(x, y)`, `(x, y, z)`, `(x, y, z, yaw)`, or all of
-/// `(x, y, z, yaw, pitch, roll)`; metres and degrees, what is left out is 0.
+/// A pose in a scene: `(x, y)`, `(x, y, z)`, `(x, y, z, yaw)`, or `(x, y, z, yaw, pitch, roll)`, in metres and degrees;
+/// omitted numbers are 0.
 ///
-/// The rotation is about the fixed x, then y, then z (roll, pitch, yaw; REP-103).
+/// The rotation is about the fixed x, then y, then z axis (roll, pitch, yaw; REP-103).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     numbers: [f64; 6],
 }
 
 impl Placement {
-    /// The list that holds the origin alone.
+    /// A list with the origin only.
     pub(super) fn at_origin() -> Vec<Self> {
         vec![Self { numbers: [0.0; 6] }]
     }
 
-    /// The pose it describes.
+    /// The pose.
     pub fn world_from_body(&self) -> Pose {
         let [x, y, z, yaw, pitch, roll] = self.numbers;
         let rotation = from_roll_pitch_yaw(roll.to_radians(), pitch.to_radians(), yaw.to_radians());

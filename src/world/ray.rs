@@ -1,23 +1,23 @@
 use super::MaterialId;
 use crate::geometry::Vector;
 
-/// A half-line along which light travels.
+/// A ray of light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it starts, m.
+    /// Origin, m.
     pub origin_in_world: Vector,
-    /// Where it goes; a unit vector.
+    /// Direction; a unit vector.
     pub direction_in_world: Vector,
 }
 
-/// The first surface that a ray meets.
+/// The first surface on a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Distance from the ray's origin, m.
+    /// Distance from the origin of the ray, m.
     pub distance_m: f64,
-    /// The surface's unit normal there, turned towards the ray's origin.
+    /// Unit normal of the surface, towards the origin of the ray.
     pub normal_in_world: Vector,
-    /// What the surface is made of.
+    /// Material of the surface.
     pub material: MaterialId,
 }
 

@@ -1,4 +1,4 @@
-//! Objects thrown into a region: places drawn one after the other, those too close to another thrown again.
+//! Scattered objects: positions are drawn one by one and rejected if too close to another object or a route.
 
 use super::{ScatterSpec, Turn};
 use crate::geometry::{Pose, Rotation, Route, Vector, from_roll_pitch_yaw};
@@ -6,38 +6,42 @@ use crate::random::{Seed, Stream};
 use rand::RngExt;
 use std::collections::BTreeMap;
 
-/// Most copies of one scatter.
+/// Maximum number of copies of one scatter: bounds the build time.
 const MAX_COUNT: usize = 200_000;
-/// Throws for each copy before the region counts as full.
-const THROWS: usize = 100;
+/// Attempts per copy after which the region counts as full.
+const ATTEMPTS_PER_COPY: usize = 100;
 
-type Wrong = (&'static str, String);
+type KeyedMessage = (&'static str, String);
 
-/// The poses of the copies, in the frame of the scatter, which stands at `world_from_scatter`.
+/// Poses of the copies in the frame of the scatter, whose pose is `world_from_scatter`.
 ///
 /// # Errors
-/// The key and a sentence, when the region is wrong or too small for them all.
-pub(super) fn places(spec: &ScatterSpec, world_from_scatter: &Pose, routes: &[&Route]) -> Result<Vec<Pose>, Wrong> {
+/// The key and a message, if the region is invalid or too small for all copies.
+pub(super) fn poses(
+    spec: &ScatterSpec,
+    world_from_scatter: &Pose,
+    routes: &[&Route],
+) -> Result<Vec<Pose>, KeyedMessage> {
     let region = Region::new(spec)?;
     let mut stream = Seed(spec.seed).stream("world/scatter");
-    let mut placed = Spaced { spacing: spec.min_spacing_m, cells: BTreeMap::new() };
+    let mut placed = SpacedPoints { spacing: spec.min_spacing_m, cells: BTreeMap::new() };
     let mut poses = Vec::with_capacity(spec.count);
-    for _ in 0..spec.count.saturating_mul(THROWS) {
+    for _ in 0..spec.count.saturating_mul(ATTEMPTS_PER_COPY) {
         if poses.len() == spec.count {
             break;
         }
         let point = region.draw(&mut stream);
         let turn = turn(spec.turn, &mut stream);
-        let on_the_map = world_from_scatter * nalgebra::Point3::from(point);
+        let in_world = world_from_scatter * nalgebra::Point3::from(point);
         let is_clear = spec.keep_from_routes_m == 0.0
-            || routes.iter().all(|route| distance_on_the_map(&on_the_map.coords, route) >= spec.keep_from_routes_m);
+            || routes.iter().all(|route| horizontal_distance(&in_world.coords, route) >= spec.keep_from_routes_m);
         if is_clear && placed.add(point) {
             poses.push(Pose::from_parts(point.into(), turn));
         }
     }
     if poses.len() < spec.count {
         let message = format!(
-            "only {} of {} copies of `{}` found a place: lower `count`, `min_spacing_m` or `keep_from_routes_m`",
+            "placed only {} of {} copies of `{}`: lower `count`, `min_spacing_m` or `keep_from_routes_m`",
             poses.len(),
             spec.count,
             spec.template
@@ -53,13 +57,13 @@ struct Region {
 }
 
 impl Region {
-    fn new(spec: &ScatterSpec) -> Result<Self, Wrong> {
+    fn new(spec: &ScatterSpec) -> Result<Self, KeyedMessage> {
         let (a, b) = (Vector::from(spec.region_m.0), Vector::from(spec.region_m.1));
         if !a.iter().chain(&b).all(|x| x.is_finite()) {
             return Err(("region_m", "expected finite numbers in `region_m`".to_owned()));
         }
         if spec.count == 0 || spec.count > MAX_COUNT {
-            let message = format!("`count` is {}; a scatter has from 1 to {MAX_COUNT} copies", spec.count);
+            let message = format!("`count` is {}; give 1 to {MAX_COUNT}", spec.count);
             return Err(("count", message));
         }
         Ok(Self { lower: a.inf(&b), size: (a - b).abs() })
@@ -75,12 +79,12 @@ fn turn(turn: Turn, stream: &mut Stream) -> Rotation {
     match turn {
         Turn::Fixed => Rotation::identity(),
         Turn::Upright => from_roll_pitch_yaw(0.0, 0.0, stream.random_range(0.0..std::f64::consts::TAU)),
-        Turn::Any => any_rotation(stream),
+        Turn::Any => random_rotation(stream),
     }
 }
 
-/// A rotation, all equally likely: a point of the unit 3-sphere, by rejection from its cube.
-fn any_rotation(stream: &mut Stream) -> Rotation {
+/// A uniformly distributed rotation: a point of the unit 3-sphere, by rejection from the cube.
+fn random_rotation(stream: &mut Stream) -> Rotation {
     loop {
         let numbers = nalgebra::Vector4::from_fn(|_, _| stream.random_range(-1.0..1.0));
         if (0.01..=1.0).contains(&numbers.norm_squared()) {
@@ -89,14 +93,14 @@ fn any_rotation(stream: &mut Stream) -> Rotation {
     }
 }
 
-/// Points that keep a distance, found by the cell of a grid.
-struct Spaced {
+/// Points with a minimum spacing, in a grid for neighbour search.
+struct SpacedPoints {
     spacing: f64,
     cells: BTreeMap<[i64; 3], Vec<Vector>>,
 }
 
-impl Spaced {
-    /// Adds a point unless another is too close.
+impl SpacedPoints {
+    /// Adds a point unless it is too close to another one; returns whether it was added.
     fn add(&mut self, point: Vector) -> bool {
         if self.spacing == 0.0 {
             return true;
@@ -115,8 +119,8 @@ impl Spaced {
     }
 }
 
-/// Horizontal distance from a point to a route.
-fn distance_on_the_map(point: &Vector, route: &Route) -> f64 {
+/// Horizontal distance from a point to a route, m.
+fn horizontal_distance(point: &Vector, route: &Route) -> f64 {
     let points = &route.points_in_world;
     let closing = route.closed.then(|| (points[points.len() - 1], points[0]));
     let legs = points.windows(2).map(|pair| (pair[0], pair[1])).chain(closing);
@@ -149,7 +153,7 @@ mod tests {
     fn scattered_objects_keep_their_distances_and_depend_on_the_seed_alone() {
         let points_in_world = vec![Vector::new(0.0, 15.0, 0.0), Vector::new(40.0, 15.0, 0.0)];
         let route = Route { points_in_world, closed: false };
-        let draw = |seed| places(&spec(seed, 60), &Pose::identity(), &[&route]).unwrap();
+        let draw = |seed| poses(&spec(seed, 60), &Pose::identity(), &[&route]).unwrap();
         let poses = draw(3);
         assert_eq!(poses, draw(3));
         assert_ne!(poses, draw(4));
@@ -162,12 +166,13 @@ mod tests {
     }
 
     #[test]
-    fn a_region_that_is_too_small_is_told() {
-        // Discs of radius 1 m cover at most 0.9069 of the plane (Thue): 40 x 30 m and a rim of 1 m hold fewer than 388.
-        let (key, sentence) = places(&spec(1, 400), &Pose::identity(), &[]).unwrap_err();
+    fn a_region_that_is_too_small_is_reported() {
+        // Discs of radius 1 m cover at most 0.9069 of the plane (Thue): 40 x 30 m plus a margin of 1 m has room for
+        // fewer than 388.
+        let (key, sentence) = poses(&spec(1, 400), &Pose::identity(), &[]).unwrap_err();
         assert_eq!(key, "Scatter");
         assert!(sentence.contains("of 400 copies of `tree`"), "{sentence}");
-        assert_eq!(places(&spec(1, 0), &Pose::identity(), &[]).unwrap_err().0, "count");
-        assert_eq!(places(&spec(1, usize::MAX), &Pose::identity(), &[]).unwrap_err().0, "count");
+        assert_eq!(poses(&spec(1, 0), &Pose::identity(), &[]).unwrap_err().0, "count");
+        assert_eq!(poses(&spec(1, usize::MAX), &Pose::identity(), &[]).unwrap_err().0, "count");
     }
 }

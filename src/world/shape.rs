@@ -1,4 +1,4 @@
-//! The shapes that scenes are made of, as triangles in a frame of their own.
+//! Shapes of scenes, as triangles in their own frame.
 
 mod height_field;
 mod prism;
@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 /// Three corners, m.
 pub(super) type Triangle = [Vector; 3];
 
-/// Most sides of a cylinder, steps of a flight, nodes along a height field.
+/// Maximum number of sides of a cylinder, steps of stairs, or nodes along a height field.
 const MAX_DIVISIONS: usize = 4096;
 
-/// A shape, in a frame of its own with z up. It stands on the plane z = 0.
+/// A shape in its own frame with z up, on the plane z = 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum ShapeSpec {
@@ -27,13 +27,13 @@ pub enum ShapeSpec {
         #[serde(with = "checked::PositiveArray::<3>")]
         size_m: [f64; 3],
     },
-    /// A rectangle in the plane z = 0, centred on the origin, seen from both sides.
+    /// A rectangle in the plane z = 0, centred on the origin, visible from both sides.
     Rectangle {
         /// Extents along x and y, m.
         #[serde(with = "checked::PositiveArray::<2>")]
         size_m: [f64; 2],
     },
-    /// A wall from the origin along x, its middle plane at y = 0.
+    /// A wall from the origin along x, centred on y = 0.
     Wall {
         /// Extent along x, m.
         #[serde(with = "checked::Positive")]
@@ -44,7 +44,7 @@ pub enum ShapeSpec {
         /// Extent along y, m.
         #[serde(with = "checked::Positive")]
         thickness_m: f64,
-        /// Doorways and windows, in order along x; none unless told.
+        /// Doorways and windows in order along x. Default: none.
         #[serde(default)]
         openings: Vec<OpeningSpec>,
     },
@@ -56,7 +56,7 @@ pub enum ShapeSpec {
         /// Extent along z, m.
         #[serde(with = "checked::Positive")]
         height_m: f64,
-        /// Number of sides, 24 unless told.
+        /// Number of sides. Default: 24.
         #[serde(default = "default_sides")]
         sides: usize,
     },
@@ -73,12 +73,11 @@ pub enum ShapeSpec {
         /// Depth of a step, m.
         #[serde(with = "checked::Positive")]
         tread_m: f64,
-        /// Thickness below the inner edges of the steps, m, with a soffit along the slope; solid down to z = 0 unless
-        /// told.
+        /// Thickness below the inner edges of the steps, m, with a sloped soffit. Default: solid down to z = 0.
         #[serde(default, with = "checked::NonNegative")]
         slab_m: f64,
     },
-    /// Ground with a height at each node of a grid, centred on the origin in x and y.
+    /// Terrain with a height at each node of a grid, centred on the origin in x and y.
     HeightField {
         /// Extents along x and y, m.
         #[serde(with = "checked::PositiveArray::<2>")]
@@ -86,17 +85,17 @@ pub enum ShapeSpec {
         /// The heights.
         heights: HeightsSpec,
     },
-    /// A mesh from a file: OBJ, STL, PLY, glTF, by its ending.
+    /// A mesh from an OBJ, STL, PLY or glTF file, recognised by the extension.
     Mesh {
-        /// The file, from the scene's folder.
+        /// The file, relative to the folder of the scene.
         file: String,
-        /// Metres per unit of the file; 1 unless told.
+        /// Metres per unit of the file. Default: 1.
         #[serde(default = "default_scale", with = "checked::Positive")]
         scale: f64,
-        /// The file's unit of length, by which `scale` is multiplied; metres unless told.
+        /// Unit of length of the file, multiplied by `scale`. Default: metres.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         unit: Option<LengthUnit>,
-        /// The file's axis that points up; unless told y in glTF, as its specification has it, and z in others.
+        /// Axis of the file that points up. Default: y for glTF (by specification), z for other formats.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         up: Option<UpAxis>,
     },
@@ -119,7 +118,7 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// Metres in one of it.
+    /// Metres per unit.
     pub(super) fn metres(self) -> f64 {
         match self {
             LengthUnit::M => 1.0,
@@ -135,7 +134,7 @@ impl LengthUnit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
-    /// y, as in glTF: x stays, z becomes -y.
+    /// y, as in glTF: x is kept, z becomes -y.
     Y,
     /// z, as in scenes.
     Z,
@@ -150,10 +149,10 @@ fn default_scale() -> f64 {
 }
 
 impl ShapeSpec {
-    /// The triangles of the shape; none for a mesh, whose triangles are in its file.
+    /// The triangles of the shape; empty for a mesh, whose triangles are in the file.
     ///
     /// # Errors
-    /// The key and a sentence, when its numbers do not fit together.
+    /// The key and a message, if the values are inconsistent.
     pub(super) fn triangles(&self) -> Result<Vec<Triangle>, (&'static str, String)> {
         match self {
             ShapeSpec::Box { size_m: [x, y, z] } => {
@@ -168,11 +167,11 @@ impl ShapeSpec {
                 wall::triangles(size, openings).map_err(|sentence| ("openings", sentence))
             }
             ShapeSpec::Cylinder { radius_m, height_m, sides } => {
-                within("sides", *sides, 3)?;
+                check_count("sides", *sides, 3)?;
                 Ok(prism::cylinder(*radius_m, *height_m, *sides))
             }
             ShapeSpec::Stairs { steps, width_m, rise_m, tread_m, slab_m } => {
-                within("steps", *steps, 1)?;
+                check_count("steps", *steps, 1)?;
                 Ok(prism::stairs(*steps, Vector::new(*tread_m, *width_m, *rise_m), *slab_m))
             }
             ShapeSpec::HeightField { size_m, heights } => height_field::triangles(*size_m, heights),
@@ -181,8 +180,8 @@ impl ShapeSpec {
     }
 }
 
-/// Checks a number of divisions.
-fn within(key: &'static str, count: usize, least: usize) -> Result<(), (&'static str, String)> {
+/// Checks that a number of divisions is between `least` and the maximum.
+fn check_count(key: &'static str, count: usize, least: usize) -> Result<(), (&'static str, String)> {
     if (least..=MAX_DIVISIONS).contains(&count) {
         Ok(())
     } else {
@@ -190,7 +189,7 @@ fn within(key: &'static str, count: usize, least: usize) -> Result<(), (&'static
     }
 }
 
-/// The two triangles of a parallelogram, which follow each other so that a caster can pair them.
+/// The two triangles of a parallelogram, in sequence, so that the ray caster can pair them.
 fn parallelogram(corner: Vector, u: Vector, v: Vector) -> [Triangle; 2] {
     [[corner, corner + u, corner + u + v], [corner, corner + u + v, corner + v]]
 }
@@ -205,7 +204,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Volume inside a closed surface whose triangles face outwards, by the divergence theorem.
+    /// Volume inside a closed surface with outward faces, by the divergence theorem.
     fn volume(triangles: &[Triangle]) -> f64 {
         triangles.iter().map(|[a, b, c]| a.dot(&b.cross(c)) / 6.0).sum()
     }
@@ -233,7 +232,7 @@ mod tests {
     #[test]
     fn a_flight_of_stairs_holds_the_volume_of_its_steps() {
         // Step k of n (from 1) is k rises high: the sum is n (n + 1) / 2 blocks of tread x width x rise.
-        // With a slab, each step is a trapezoid: slab + rise high at its front, slab at its back.
+        // With a slab, each step is a trapezoid: slab + rise high at the front, slab at the back.
         for (slab_m, expected) in [(0.0, 10.0 * 1.2 * 0.18 * 0.27), (0.2, 4.0 * 1.2 * 0.27 * (0.2 + 0.09))] {
             let faces = triangles(&ShapeSpec::Stairs { steps: 4, width_m: 1.2, rise_m: 0.18, tread_m: 0.27, slab_m });
             assert_relative_eq!(volume(&faces), expected, epsilon = 1e-12);

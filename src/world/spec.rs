@@ -1,65 +1,65 @@
-//! What a scene's file says. Data alone: [`World::build`](super::World::build) checks it as a whole and builds from it.
+//! Data of a scene file. [`World::build`](super::World::build) checks and builds it.
 
 use super::{Placement, ShapeSpec};
 use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A scene: what there is, what it is made of, what moves in it, and where one can walk. Lengths in metres, z up.
+/// A scene: materials, static items, movers, and routes to walk. Lengths in metres, z up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
-    /// What to call it.
+    /// Name of the scene.
     pub name: String,
-    /// Other scenes, by path or name, all of which is a part of this one.
+    /// Other scenes to include, by path or name. All their parts become part of this scene.
     #[serde(default)]
     pub include: Vec<String>,
     /// The materials, by name.
     pub materials: BTreeMap<String, MaterialSpec>,
-    /// Groups of items that are placed as one, each in a frame of its own, by name.
+    /// Groups of items that are placed together, each in its own frame, by name.
     #[serde(default)]
     pub templates: BTreeMap<String, Vec<ItemSpec>>,
-    /// What stands still.
+    /// Static items.
     pub items: Vec<ItemSpec>,
-    /// What moves.
+    /// Movers: templates that move along waypoints.
     #[serde(default)]
     pub movers: Vec<MoverSpec>,
-    /// Ways to walk, by name.
+    /// Routes to walk, by name.
     #[serde(default)]
     pub routes: BTreeMap<String, RouteSpec>,
-    /// The route that is walked unless another is asked for.
+    /// The route that a run follows by default.
     #[serde(default)]
     pub default_route: Option<String>,
 }
 
-/// What a surface does with a laser's light.
+/// Optical properties of a material at the laser wavelength.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
-    /// Fraction scattered back, 0 to 1.
+    /// Fraction of light scattered back, 0 to 1. A lower value reduces the maximum range.
     #[serde(with = "checked::Fraction")]
     pub reflectance: f64,
-    /// Whether light goes through.
+    /// Whether the material transmits light. Default: opaque.
     #[serde(default)]
     pub kind: MaterialKind,
 }
 
-/// Whether light goes through a surface.
+/// Whether a material transmits light.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum MaterialKind {
-    /// Nothing goes through.
+    /// No transmission.
     #[default]
     Opaque,
-    /// A part goes straight through.
+    /// Part of the light passes straight through.
     Glass {
-        /// That part, 0 to 1.
+        /// Fraction transmitted, 0 to 1.
         #[serde(with = "checked::Fraction")]
         transmission: f64,
     },
 }
 
-/// Something in a scene, once or at several places.
+/// An item of a scene, at one or several poses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum ItemSpec {
@@ -67,54 +67,54 @@ pub enum ItemSpec {
     Solid {
         /// The shape.
         shape: ShapeSpec,
-        /// The name of its material.
+        /// Name of the material.
         material: String,
-        /// Where it stands; at the origin unless told.
+        /// Poses. Default: the origin.
         #[serde(default = "Placement::at_origin")]
         at_m_deg: Vec<Placement>,
     },
-    /// A template.
+    /// A template at one or several poses.
     Place {
-        /// Its name.
+        /// Name of the template.
         template: String,
-        /// Where it stands; at the origin unless told.
+        /// Poses. Default: the origin.
         #[serde(default = "Placement::at_origin")]
         at_m_deg: Vec<Placement>,
     },
-    /// A template at many places, drawn from a seed.
+    /// A template at many random poses.
     Scatter(ScatterSpec),
 }
 
-/// Many copies of a template, thrown into a region.
+/// Many copies of a template at random poses in a region.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScatterSpec {
-    /// The template's name.
+    /// Name of the template.
     pub template: String,
-    /// The seed from which places and turns are drawn. It belongs to the scene: every run sees the same one.
+    /// Random seed of the poses. It belongs to the scene, so all runs have the same poses.
     pub seed: u64,
-    /// How many copies.
+    /// Number of copies.
     pub count: usize,
-    /// Two opposite corners of the region, m: the templates' origins lie between them.
+    /// Two opposite corners of the region for the origins of the copies, m.
     pub region_m: ([f64; 3], [f64; 3]),
-    /// Smallest distance between two origins, m.
+    /// Minimum distance between the origins of two copies, m.
     #[serde(with = "checked::NonNegative")]
     pub min_spacing_m: f64,
-    /// Smallest horizontal distance from an origin to any route, m.
+    /// Minimum horizontal distance of an origin from any route, m. Default: 0.
     #[serde(default, with = "checked::NonNegative")]
     pub keep_from_routes_m: f64,
-    /// How the copies are turned.
+    /// Random rotation of the copies.
     pub turn: Turn,
 }
 
-/// How scattered copies are turned.
+/// Random rotation of scattered copies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Turn {
-    /// As the template stands.
+    /// No rotation.
     Fixed,
-    /// By any angle about z.
+    /// About z by a random angle.
     Upright,
-    /// By any rotation.
+    /// Any rotation, uniformly distributed.
     Any,
 }
 
@@ -122,31 +122,32 @@ pub enum Turn {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MoverSpec {
-    /// The template's name.
+    /// Name of the template.
     pub template: String,
-    /// Where it is and when, in order of time. Between two waypoints it moves steadily, turning the shorter way.
+    /// Waypoints in order of time. The mover is interpolated linearly between them and rotates through the smaller
+    /// angle.
     pub waypoints: Vec<WaypointSpec>,
-    /// Whether it starts again after the last waypoint; if not it stays there.
+    /// If true, the waypoints repeat; if false, the mover stays at the last one.
     pub repeats: bool,
 }
 
-/// Where a mover is at one time.
+/// Pose of a mover at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WaypointSpec {
-    /// Time since the run's start, s.
+    /// Time since the start of the run, s.
     #[serde(with = "checked::Finite")]
     pub time_s: f64,
-    /// Its pose then.
+    /// Pose at that time.
     pub at_m_deg: Placement,
 }
 
-/// A way to walk.
+/// A route to walk.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RouteSpec {
-    /// Whether it goes round, from the last point to the first.
+    /// Whether the last point is connected to the first.
     pub closed: bool,
-    /// Its corners on the floor: x, y, z, m.
+    /// Points on the floor: x, y, z, m.
     pub points_m: Vec<[f64; 3]>,
 }

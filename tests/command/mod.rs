@@ -1,11 +1,11 @@
-//! zsim run as a command.
+//! Runs the zsim command.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use assert_cmd::Command;
 use std::path::Path;
 
-/// Exit code, -1 where it was killed, stdout and stderr of zsim run in `folder`.
+/// Runs zsim in `folder`; returns exit code (-1 if it was killed), stdout and stderr.
 pub fn run(folder: &Path, arguments: &str) -> (i32, String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_zsim"));
     let output = command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap();

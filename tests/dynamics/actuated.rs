@@ -1,11 +1,11 @@
-use crate::heads::{Nodding, Still, built, shipped, states};
+use crate::heads::{FixedBase, Nodding, built, shipped, states};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use zsim::dynamics::{HeadModel, HeadState};
 use zsim::geometry::{Kinematics, Pose, Rotation, Vector};
 use zsim::sensors::Lidar;
 use zsim::spec::{Kind, find, parse};
 
-/// A head off its motor's axis, which is askew.
+/// A head off the axis of its motor, with an oblique axis.
 fn text(turn: &str) -> String {
     format!(
         "(
@@ -26,15 +26,15 @@ fn text(turn: &str) -> String {
     )
 }
 
-/// Whether the motor's third derivative has no step within central differences: it has one at the start, one at full
-/// turn.
+/// Whether central differences at `t_s` do not include a step of the motor's third derivative.
+///
+/// The steps are at the start and when the motor reaches full rate.
 fn is_smooth(t_s: f64, step_s: f64) -> bool {
     [0.5, 1.3].iter().all(|step_at_s| (t_s - step_at_s).abs() > 1.5 * step_s)
 }
 
-/// Greatest difference between what a path says of its velocities and accelerations and the central differences of its
-/// poses and velocities, of all instants.
-fn off_its_differences(path: &[HeadState], step_s: f64) -> [f64; 4] {
+/// Largest differences of a path's velocities and accelerations from central differences of its poses and velocities.
+fn derivative_errors(path: &[HeadState], step_s: f64) -> [f64; 4] {
     let mut worst = [0.0_f64; 4];
     for three in path.windows(3).filter(|three| is_smooth(three[1].t_s, step_s)) {
         let [before, now, after] = [&three[0].head, &three[1].head, &three[2].head];
@@ -58,9 +58,9 @@ fn an_actuated_heads_velocities_are_the_derivatives_of_its_poses() {
     for turn in ["spin(rate_hz: 1.3)", "nod(amplitude_deg: 50.0, frequency_hz: 0.9)"] {
         let model = built(&text(turn)).unwrap();
         let base = Nodding { amount_rad: 0.2 };
-        let worst = |step_s: f64| off_its_differences(&states(&model, &base, step_s, 3.0), step_s);
+        let worst = |step_s: f64| derivative_errors(&states(&model, &base, step_s, 3.0), step_s);
         let (coarse, fine) = (worst(2e-3), worst(1e-3));
-        // Central differences are off by h^2 x''' / 6: a quarter at half the step, and nothing else.
+        // The error of central differences is h^2 x''' / 6: a quarter at half the step, if there is no other error.
         for (quantity, (coarse, fine)) in coarse.iter().zip(&fine).enumerate() {
             assert!((3.8..4.2).contains(&(coarse / fine)), "{turn}, quantity {quantity}: {coarse} {fine}");
             assert!(*fine < 0.01, "{turn}, quantity {quantity}: {fine}");
@@ -69,15 +69,14 @@ fn an_actuated_heads_velocities_are_the_derivatives_of_its_poses() {
 }
 
 #[test]
-fn it_starts_at_rest_and_its_acceleration_has_no_steps() {
+fn an_actuated_head_starts_at_rest_with_continuous_acceleration() {
     for turn in ["spin(rate_hz: 1.3)", "nod(amplitude_deg: 50.0, frequency_hz: 0.9)"] {
         let model = built(&text(turn)).unwrap();
-        let path = states(&model, &Still(Pose::identity()), 1e-3, 3.0);
+        let path = states(&model, &FixedBase(Pose::identity()), 1e-3, 3.0);
         for state in &path[..=500] {
             assert_eq!(state.head, Kinematics::at_rest(*model.rest_pose_base_from_head()), "{turn}");
         }
-        // The greatest third derivative of all, at the start: 60 / 0.8^2 times the rate of 8.2 rad/s, and less for the
-        // nod.
+        // The largest third derivative, at the start: 60 / 0.8^2 times the rate of 8.2 rad/s; smaller for the nod.
         let most = 60.0 / 0.64 * 1.3 * TAU * 1e-3;
         for pair in path.windows(2) {
             let [a, b] = [&pair[0].head, &pair[1].head];
@@ -88,21 +87,21 @@ fn it_starts_at_rest_and_its_acceleration_has_no_steps() {
 }
 
 #[test]
-fn the_point_on_the_axis_stays_and_the_turn_is_what_was_asked_for() {
+fn the_rotation_is_as_specified_and_points_on_the_axis_do_not_move() {
     let model = built(&text("spin(rate_hz: 1.3)")).unwrap();
-    let path = states(&model, &Still(Pose::identity()), 1e-3, 3.0);
+    let path = states(&model, &FixedBase(Pose::identity()), 1e-3, 3.0);
     let pivot = |state: &HeadState| state.head.world_from_body * nalgebra::Point3::new(-0.2, 0.1, 0.05);
     assert!(path.iter().all(|state| (pivot(state) - pivot(&path[0])).norm() < 1e-12));
-    // From 1.3 s on at full rate, having turned half of what it would have at full rate since 0.5 s.
+    // At full rate from 1.3 s on, after half of the rotation at full rate since 0.5 s.
     for t_ms in [1_300_usize, 1_777, 2_950] {
         let turned = TAU * 1.3 * (0.4 + t_ms as f64 * 1e-3 - 1.3);
         let axis = nalgebra::Unit::new_normalize(Vector::new(1.0, 2.0, -0.5));
         let expected = model.rest_pose_base_from_head().rotation * Rotation::from_axis_angle(&axis, turned);
         assert!(path[t_ms].head.world_from_body.rotation.angle_to(&expected) < 1e-9, "{t_ms} ms");
     }
-    // A nod of 50 degrees at 0.9 Hz, at its full width at three quarters of its second period.
+    // A nod of 50 degrees at 0.9 Hz, at its amplitude at three quarters of its second period.
     let model = built(&text("nod(amplitude_deg: 50.0, frequency_hz: 0.9)")).unwrap();
-    let path = states(&model, &Still(Pose::identity()), 1e-3, 3.0);
+    let path = states(&model, &FixedBase(Pose::identity()), 1e-3, 3.0);
     let angle = |state: &HeadState| {
         model.rest_pose_base_from_head().rotation.angle_to(&state.head.world_from_body.rotation).to_degrees()
     };
@@ -111,13 +110,13 @@ fn the_point_on_the_axis_stays_and_the_turn_is_what_was_asked_for() {
 }
 
 #[test]
-fn half_a_turn_of_the_spinning_lms291_covers_the_hemisphere_before_it() {
+fn half_a_revolution_of_the_spinning_lms291_covers_the_front_hemisphere() {
     let head = shipped("spinning");
     let source = find(Kind::Lidar, "lms291").unwrap();
     let lidar = Lidar::new(&parse(&source).unwrap(), &source).unwrap();
     let stand = Pose::translation(0.0, 0.0, 0.9);
-    let path = states(&head, &Still(stand), 1e-3, 6.0);
-    // The ray in the middle never moves, 0.75 m above the ground.
+    let path = states(&head, &FixedBase(stand), 1e-3, 6.0);
+    // The middle ray does not move, 0.75 m above the ground.
     let mut seen = Vec::new();
     for scan in 0..38 {
         let start_s = 5.0 + f64::from(scan) * lidar.period_s();
@@ -128,17 +127,17 @@ fn half_a_turn_of_the_spinning_lms291_covers_the_hemisphere_before_it() {
             seen.push(laser.rotation * beam.direction_in_laser);
         }
     }
-    assert!(seen.iter().all(|beam| beam.x > -1e-6), "nothing is seen behind it");
-    // A turn in 75 scans: planes lie 360 / 75 = 4.8 degrees apart at most, a beam within 2.4 + 0.5 of any direction;
-    // the rim's beams are fired while the head turns on, by 2.4 degrees in half a mirror's turn, between two ends of
-    // the plane.
+    assert!(seen.iter().all(|beam| beam.x > -1e-6), "there are returns from the rear");
+    // A revolution has 75 scans: planes are at most 360 / 75 = 4.8 degrees apart, so a beam is within 2.4 + 0.5 degrees
+    // of any direction. At the rim the head rotates by another 2.4 degrees in half a mirror revolution between the two
+    // ends of the scan plane.
     let farthest = directions_before(2_000)
         .map(|to| seen.iter().map(|beam| beam.angle(&to)).fold(f64::INFINITY, f64::min).to_degrees())
         .fold(0.0, f64::max);
     assert!(farthest < 2.9 + 2.4, "{farthest} degrees from every beam");
 }
 
-/// Directions spread evenly over the hemisphere about x (a golden spiral).
+/// Uniform directions over the hemisphere about x (golden spiral).
 fn directions_before(count: u32) -> impl Iterator<Item = Vector> {
     (0..count).map(move |k| {
         let x = (f64::from(k) + 0.5) / f64::from(count);
@@ -149,7 +148,7 @@ fn directions_before(count: u32) -> impl Iterator<Item = Vector> {
 }
 
 #[test]
-fn nonsense_of_a_motor_is_told_where_it_stands() {
+fn invalid_motors_are_refused_with_their_line() {
     let fault = |from: &str, to: &str| {
         let right = text("spin(rate_hz: 1.0)");
         assert!(right.contains(from), "{from}");
@@ -158,11 +157,11 @@ fn nonsense_of_a_motor_is_told_where_it_stands() {
     for (from, to, line, part) in [
         ("rate_hz: 1.0", "rate_hz: 0.0", 10, "above 0, found 0"),
         ("rate_hz: 1.0", "rate_hz: NaN", 10, "found NaN"),
-        ("rate_hz: 1.0", "rate_hz: 40.0", 10, "40.0 turns a second; 15 are most"),
+        ("rate_hz: 1.0", "rate_hz: 40.0", 10, "40.0 revolutions per second; the maximum is 15"),
         ("rate_hz: 1.0", "rate: 1.0", 10, "rate"),
-        ("spin(rate_hz: 1.0)", "nod(amplitude_deg: 200.0, frequency_hz: 0.1)", 10, "overlaps itself"),
-        ("spin(rate_hz: 1.0)", "nod(amplitude_deg: 170.0, frequency_hz: 6.0)", 10, "17.8 turns a second"),
-        ("(1.0, 2.0, -0.5)", "(0.0, 0.0, 0.0)", 8, "points nowhere"),
+        ("spin(rate_hz: 1.0)", "nod(amplitude_deg: 200.0, frequency_hz: 0.1)", 10, "the maximum is 180"),
+        ("spin(rate_hz: 1.0)", "nod(amplitude_deg: 170.0, frequency_hz: 6.0)", 10, "17.8 revolutions per second"),
+        ("(1.0, 2.0, -0.5)", "(0.0, 0.0, 0.0)", 8, "length zero"),
         ("(1.0, 2.0, -0.5)", "(0.0, inf, 0.0)", 8, "finite"),
         ("still_s: 0.5", "still_s: -0.5", 11, "at least 0, found -0.5"),
         ("start_s: 0.8", "start_s: 0.0", 12, "above 0, found 0"),
@@ -173,9 +172,10 @@ fn nonsense_of_a_motor_is_told_where_it_stands() {
 }
 
 #[test]
-fn mounts_that_give_nowhere_say_so_when_asked_for_gains_or_a_spring() {
+fn rigid_mounts_have_no_gains_and_no_spring() {
     use zsim::study::gains::{GainPlan, gain_curves};
-    for (name, because) in [("spinning", "a motor turns it"), ("nodding", "a motor turns it"), ("trawling", "screwed")]
+    for (name, because) in
+        [("spinning", "a motor turns the head"), ("nodding", "a motor turns the head"), ("trawling", "screwed")]
     {
         let head: HeadModel = shipped(name);
         assert!(head.linear_modes().is_empty() && head.linear().is_none());

@@ -1,4 +1,6 @@
-use crate::heads::{Table, Twitch, built, displacement, jointed, shipped, states, suspended, upright_spring};
+use crate::heads::{
+    BasePulse, ReferenceHead, built, displacement, jointed, shipped, states, suspended, upright_spring,
+};
 use approx::assert_relative_eq;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
@@ -23,21 +25,21 @@ fn fitted(q: &[f64], step_s: f64) -> (f64, f64) {
     (omega / TAU, decay / omega)
 }
 
-/// The free decay of one mode after a small twitch of the base along `axis`.
+/// Frequency and damping of the free decay of one mode after a small pulse of the base.
 fn decay_of(model: &HeadModel, mode: &Mode) -> (f64, f64) {
-    // Sideways for what bends about x and y, upwards, and round.
+    // Pulse along or about the axis that excites the mode: sideways for rocking and sway, up for bounce, about z for yaw.
     let axis = match mode.kind {
         ModeKind::Bounce => 2,
         ModeKind::Yaw => 5,
         ModeKind::Rocking | ModeKind::Sway => usize::from(mode.shape[3].abs() > mode.shape[4].abs()),
     };
-    let twitch = Twitch { axis, amount: 2e-4, period_s: 0.5 / mode.frequency_hz };
+    let pulse = BasePulse { axis, amount: 2e-4, period_s: 0.5 / mode.frequency_hz };
     let period_s = 1.0 / mode.frequency_hz;
-    let path = states(model, &twitch, 1e-3, 8.0 * period_s);
+    let path = states(model, &pulse, 1e-3, 8.0 * period_s);
     let mass = model.linear().unwrap().mass;
-    // The mode's own coordinate, in which other modes do not show; a twelfth of a period apart.
+    // The modal coordinate, which excludes other modes, sampled twelve times per period.
     let stride = (period_s / 12.0 / 1e-3).round() as usize;
-    let after = (twitch.period_s / 1e-3).ceil() as usize + 1;
+    let after = (pulse.period_s / 1e-3).ceil() as usize + 1;
     let own: Vec<f64> = path[after..].iter().map(|s| (mass * mode.shape).dot(&displacement(model, s))).collect();
     let sparse: Vec<f64> = own.iter().step_by(stride).copied().collect();
     fitted(&sparse, stride as f64 * 1e-3)
@@ -45,9 +47,8 @@ fn decay_of(model: &HeadModel, mode: &Mode) -> (f64, f64) {
 
 #[test]
 fn each_mode_decays_with_the_frequency_and_damping_of_the_linear_model() {
-    let table = Table { damping: [0.02, 0.03, 0.04, 0.05], ..Table::default() };
+    let table = ReferenceHead { damping: [0.02, 0.03, 0.04, 0.05], ..ReferenceHead::default() };
     for model in [table.model(), shipped("handheld")] {
-        // Sideways for what bends about x and y, upwards, and round.
         for mode in model.linear_modes() {
             let (frequency_hz, damping_ratio) = decay_of(&model, mode);
             assert_relative_eq!(frequency_hz, mode.frequency_hz, max_relative = 0.01);
@@ -57,7 +58,7 @@ fn each_mode_decays_with_the_frequency_and_damping_of_the_linear_model() {
 }
 
 #[test]
-fn modes_of_other_linkages_decay_as_the_linear_model_says_too() {
+fn modes_of_other_linkages_decay_as_in_the_linear_model() {
     let damped = |text: String| {
         let ratios = "rocking: 0.02, sway: 0.03, bounce: 0.04, yaw: 0.05";
         built(&text.replace("rocking: 0.0, sway: 0.0, bounce: 0.0, yaw: 0.0", ratios)).unwrap()
@@ -67,7 +68,8 @@ fn modes_of_other_linkages_decay_as_the_linear_model_says_too() {
             upright_spring([x, y, 0.0], [x, y, -0.04]).replace("segments: 1,", "segments: 1, spring_mass: included,")
         })
         .concat();
-    let wire = Table { damping: [0.02, 0.03, 0.04, 0.05], more: "spring_mass: included,", ..Table::default() };
+    let wire =
+        ReferenceHead { damping: [0.02, 0.03, 0.04, 0.05], more: "spring_mass: included,", ..ReferenceHead::default() };
     let heads = [
         ("springs", damped(suspended([0.0, 0.0, 0.12], &springs))),
         ("joint", damped(suspended([0.0, 0.0, 0.07], &jointed(0.7)))),
@@ -83,10 +85,10 @@ fn modes_of_other_linkages_decay_as_the_linear_model_says_too() {
 }
 
 #[test]
-fn segments_change_nothing_of_a_small_decay() {
+fn a_small_decay_does_not_depend_on_the_number_of_segments() {
     let damping = [0.02, 0.03, 0.04, 0.05];
     let decay = |segments: usize| {
-        let model = Table { damping, segments, ..Table::default() }.model();
+        let model = ReferenceHead { damping, segments, ..ReferenceHead::default() }.model();
         decay_of(&model, &model.linear_modes()[1])
     };
     let one = decay(1);

@@ -1,4 +1,4 @@
-//! Linkages of several elements against closed forms.
+//! Linkages of several elements compared with closed forms.
 
 use crate::heads::{built, cord, floating, jointed, moored, states, suspended, upright_spring};
 use approx::assert_relative_eq;
@@ -22,7 +22,7 @@ fn frequency(model: &HeadModel, kind: ModeKind) -> f64 {
     model.linear_modes().iter().find(|mode| mode.kind == kind).unwrap().frequency_hz
 }
 
-/// Two ropes side by side along x, `half` from the middle, tied `above` the centre of mass.
+/// Two parallel ropes along x, `half` from the middle, attached `above` the centre of mass.
 fn ropes(half: f64, above: f64, length_m: f64) -> HeadModel {
     let rope = |x: f64| cord([x, 0.0, 0.0], [x, 0.0, above], length_m, 2e6);
     model([0.0, 0.0, -length_m - above], &(rope(half) + &rope(-half)))
@@ -32,17 +32,18 @@ fn ropes(half: f64, above: f64, length_m: f64) -> HeadModel {
 fn a_head_on_ropes_swings_as_a_compound_pendulum() {
     let (l, d) = (0.5, 0.06);
     let model = ropes(0.03, d, l);
-    // Across the ropes' plane, a double pendulum: rope l by the angle a, head by b about the knot d above its centre:
-    // M = (m l^2, m l d; m l d, I + m d^2), K = m g diag(l, d).
+    // Across the ropes' plane, a double pendulum: rope l at angle a, head at angle b about the attachment d above its
+    // centre: M = (m l^2, m l d; m l d, I + m d^2), K = m g diag(l, d).
     let mass = Matrix2::new(M * l * l, M * l * d, M * l * d, I + M * d * d);
     let squares = (mass.try_inverse().unwrap() * Matrix2::new(M * G * l, 0.0, 0.0, M * G * d)).complex_eigenvalues();
     for square in squares.iter() {
         let expected = square.re.sqrt() / TAU;
         let nearest = model.linear_modes().iter().map(|mode| mode.frequency_hz / expected - 1.0);
         let nearest = nearest.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap();
-        assert!(nearest.abs() < 1e-4, "{expected} Hz is missed by {nearest}");
+        assert!(nearest.abs() < 1e-4, "no mode at {expected} Hz: nearest has a relative difference of {nearest}");
     }
-    // In the ropes' plane the head stays level, a point mass on l: sqrt(g/l). About the vertical: m g a^2 / (l I_zz).
+    // In the ropes' plane the head stays level, a point mass on length l: sqrt(g/l). About the vertical the square of
+    // the angular frequency is m g a^2 / (l I_zz).
     assert_eq!(model.linear_modes()[0].kind, ModeKind::Rocking);
     let all: Vec<f64> = model.linear_modes().iter().map(|mode| mode.frequency_hz).collect();
     let level = (G / l).sqrt() / TAU;
@@ -52,7 +53,7 @@ fn a_head_on_ropes_swings_as_a_compound_pendulum() {
 }
 
 #[test]
-fn springs_side_by_side_are_parallel_and_turn_by_their_levers() {
+fn parallel_springs_add_up_and_have_rotational_stiffness_from_their_levers() {
     let at = |places: &[[f64; 2]]| {
         let springs: String = places.iter().map(|[x, y]| upright_spring([*x, *y, 0.0], [*x, *y, -0.04])).collect();
         model([0.0, 0.0, 0.12], &springs)
@@ -66,24 +67,24 @@ fn springs_side_by_side_are_parallel_and_turn_by_their_levers() {
         (stiffness(&[[a, 0.0], [-a, 0.0]]), stiffness(&[[0.0; 2]; 2]), 2.0 * a * a),
         (stiffness(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]), stiffness(&[[0.0; 2]; 3]), 1.5 * r * r),
     ] {
-        // Side by side they add up; turned about y each top moves by its lever x along its spring: the sum of k x^2
-        // more. (An axial rate does not depend on the load, and the loads' own levers are the same wherever the springs
-        // stand.)
+        // Axial stiffnesses add up. For a rotation about y each top moves by its lever x along its spring, which adds the sum
+        // of k x^2. (The axial rate does not depend on the load, and the moments of the loads do not depend on the positions
+        // of the springs.)
         assert_relative_eq!(apart[(2, 2)], together[(2, 2)], max_relative = 1e-6);
         assert_relative_eq!(apart[(0, 0)], together[(0, 0)], max_relative = 1e-5);
         assert_relative_eq!(apart[(4, 4)] - together[(4, 4)], along * sum_of_squares, max_relative = 1e-4);
     }
     assert_relative_eq!(stiffness(&[[0.0; 2]; 3])[(2, 2)], 3.0 * along, max_relative = 1e-6);
     // Each carries its part of the weight.
-    for bearing in at(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]).bearings() {
+    for bearing in at(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]).element_loads() {
         assert_relative_eq!(bearing.load_n.unwrap(), M * G / 3.0, max_relative = 1e-6);
     }
 }
 
 #[test]
-fn one_spring_of_a_suspension_is_the_spring_alone() {
-    let table = crate::heads::Table { coil: [20.0, 2.5, 8.0, 80.0], ..Default::default() };
-    // The table's head has its centre 70 mm above the spring, and the same inertias.
+fn a_suspension_of_one_spring_equals_the_single_spring() {
+    let table = crate::heads::ReferenceHead { coil: [20.0, 2.5, 8.0, 80.0], ..Default::default() };
+    // The reference head has its centre 70 mm above the spring, and the same inertias.
     let alone = table.model();
     let one = model([0.0, 0.0, 0.15], &upright_spring([0.0; 3], [0.0, 0.0, -0.07]));
     for (a, b) in one.linear_modes().iter().zip(alone.linear_modes()) {
@@ -93,8 +94,8 @@ fn one_spring_of_a_suspension_is_the_spring_alone() {
 }
 
 #[test]
-fn taut_cables_hold_sideways_by_their_tension_over_length() {
-    // A cross of four cables in the plane of y and z, 0.2 m long, pulled to 50 N: across the plane 4 T / L.
+fn taut_cables_have_the_lateral_stiffness_of_tension_over_length() {
+    // A cross of four cables in the plane of y and z, 0.2 m long, with 50 N of tension: across the plane 4 T / L.
     let (length_m, tension_n, ea_n, r) = (0.2, 50.0, 1e5, 0.03);
     let unstretched_m = length_m / (1.0 + tension_n / ea_n);
     let cables: String = [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]
@@ -102,20 +103,20 @@ fn taut_cables_hold_sideways_by_their_tension_over_length() {
         .concat();
     let stiffness = model([0.0; 3], &cables).linear().unwrap().stiffness;
     assert_relative_eq!(stiffness[(0, 0)], 4.0 * tension_n / length_m, max_relative = 1e-3);
-    // Along y two of them stretch.
+    // Along y two of the cables stretch.
     let along = 2.0 * ea_n / unstretched_m + 2.0 * tension_n / length_m;
     assert_relative_eq!(stiffness[(1, 1)], along, max_relative = 1e-3);
 }
 
 #[test]
-fn a_float_bobs_and_rocks_as_a_ship() {
+fn a_float_heaves_and_rolls_as_a_ship() {
     let added = 0.15;
     let (radius, bottom) = (0.08, -0.07);
     let area = PI * radius * radius;
     let model = model([0.0, 0.0, 0.05], &(floating([0.0, 0.0, 0.0, added]) + &moored()));
     let draft = M / (1000.0 * area);
     let rest = model.rest_pose_base_from_head().translation.z;
-    // The soft cords pull level.
+    // The soft cords pull horizontally.
     assert_relative_eq!(rest + bottom, -draft, max_relative = 0.01);
     let mooring = {
         let without = 1000.0 * G * area;
@@ -124,8 +125,8 @@ fn a_float_bobs_and_rocks_as_a_ship() {
     assert!(mooring.abs() < 0.05 * 1000.0 * G * area, "{mooring} N/m of mooring");
     let bob = ((1000.0 * G * area + mooring) / (M + added)).sqrt() / TAU;
     assert_relative_eq!(frequency(&model, ModeKind::Bounce), bob, max_relative = 0.01);
-    // Righting: rho g (I_water + V (centre of buoyancy - centre of mass)), the second moment of the water line pi r^4 /
-    // 4.
+    // Righting stiffness: rho g (I_water + V (centre of buoyancy - centre of mass)), with the second moment of the
+    // waterline area pi r^4 / 4.
     let without_cords = suspended([0.0, 0.0, 0.05], &floating([0.0; 4]));
     let error = built(&without_cords).unwrap_err().to_string();
     assert!(error.contains("nothing holds it against a shift along"), "{error}");
@@ -134,11 +135,11 @@ fn a_float_bobs_and_rocks_as_a_ship() {
         let stiffness = model.linear().unwrap().stiffness;
         stiffness[(4, 4)] - righting
     };
-    // Three cords of 0.4 N/m, pulled to 0.03 N, at 80 mm.
+    // Three cords of 0.4 N/m with 0.03 N of tension at a radius of 80 mm.
     assert!(of_cords.abs() < 0.1 * righting, "{of_cords} of {righting} N m/rad");
 }
 
-/// A base that takes up a steady rate of turn about the vertical within a tenth of a second.
+/// A base that accelerates to a constant yaw rate within 0.1 s.
 struct Spinning {
     rate_rad_per_s: f64,
 }
@@ -147,7 +148,7 @@ impl BaseMotion for Spinning {
     fn at(&self, t_s: f64) -> Kinematics {
         let (rate, onset_s) = (self.rate_rad_per_s, 0.1);
         let u = (t_s / onset_s).clamp(0.0, 1.0);
-        // Rate (1 - cos(pi u)) / 2 of the whole.
+        // Rate (1 - cos(pi u)) / 2 of the final rate.
         let turned = rate * (onset_s * 0.5 * (u - (PI * u).sin() / PI) + (t_s - onset_s).max(0.0));
         let mut now = Kinematics::at_rest(Pose::rotation(Vector::z() * turned));
         now.angular_velocity_in_world.z = 0.5 * rate * (1.0 - (PI * u).cos());
@@ -157,8 +158,8 @@ impl BaseMotion for Spinning {
 }
 
 #[test]
-fn a_vessel_that_turns_takes_its_float_along_by_drag() {
-    // I w' = -c (w - base) without mooring: what is missing to the base's rate dies as exp(-c t / I).
+fn a_rotating_vessel_drags_its_float() {
+    // I w' = -c (w - base) without mooring: the difference from the base's rate decays as exp(-c t / I).
     let (drag, rate) = (0.002, 0.4);
     let loose: String = [0.0_f64, 120.0, 240.0]
         .map(|degrees| {
@@ -174,11 +175,11 @@ fn a_vessel_that_turns_takes_its_float_along_by_drag() {
 }
 
 #[test]
-fn a_float_goes_where_its_vessel_goes() {
-    // Fluid that speeds up pushes what it carries as hard as what it has replaced: up and down the head follows at
-    // once.
+fn a_float_follows_its_vessel() {
+    // Accelerating fluid exerts on the float the force that it would exert on the displaced fluid, so that the head
+    // follows vertical motion at once.
     let model = model([0.0, 0.0, 0.05], &(floating([0.0; 4]) + &moored()));
-    let response = model.frequency_response(&model.usual_points());
+    let response = model.frequency_response(&model.default_points());
     for freq_hz in [0.5, 2.0, 5.0, 9.0] {
         let gain = response.gain(zsim::motion::Axis::Z, freq_hz, zsim::dynamics::Quantity::Kinematic);
         assert_relative_eq!(gain, 1.0, max_relative = 1e-4);
@@ -186,8 +187,8 @@ fn a_float_goes_where_its_vessel_goes() {
 }
 
 #[test]
-fn drag_damps_a_float_by_its_law() {
-    // Of a bob, c / (2 sqrt(k m)).
+fn drag_damps_a_float_as_in_the_closed_form() {
+    // Damping ratio in heave: c / (2 sqrt(k m)).
     let drag = 0.8;
     let model = model([0.0, 0.0, 0.05], &(floating([drag, 0.0, 0.0, 0.0]) + &moored()));
     let bob = model.linear_modes().iter().find(|mode| mode.kind == ModeKind::Bounce).unwrap();
@@ -195,7 +196,7 @@ fn drag_damps_a_float_by_its_law() {
 }
 
 #[test]
-fn a_joint_leaves_two_turns_that_rock_by_spring_less_weight() {
+fn a_universal_joint_has_two_rocking_modes_with_the_stiffness_of_spring_less_gravity() {
     let (k, h) = (0.7, 0.07);
     let model = model([0.0, 0.0, 0.07], &jointed(k));
     let expected = ((k - M * G * h) / (I + M * h * h)).sqrt() / TAU;
@@ -206,7 +207,7 @@ fn a_joint_leaves_two_turns_that_rock_by_spring_less_weight() {
     }
     // Tilted slowly, the base lifts the head by k / (k - m g h); shifted and turned about the vertical, it takes it
     // along.
-    let response = model.frequency_response(&model.usual_points());
+    let response = model.frequency_response(&model.default_points());
     let gain = |axis| response.gain(axis, 1e-6, zsim::dynamics::Quantity::Kinematic);
     assert_relative_eq!(gain(zsim::motion::Axis::Pitch), k / (k - M * G * h), max_relative = 1e-6);
     for axis in [zsim::motion::Axis::Z, zsim::motion::Axis::Yaw] {
@@ -215,7 +216,7 @@ fn a_joint_leaves_two_turns_that_rock_by_spring_less_weight() {
 }
 
 #[test]
-fn a_joint_holds_together_however_the_base_moves() {
+fn the_axes_of_a_joint_stay_coincident_for_any_base_motion() {
     let model = model([0.0, 0.0, 0.07], &jointed(0.7));
     let mut lean = 0.0_f64;
     for state in states(&model, &crate::heads::Nodding { amount_rad: 0.1 }, 1e-3, 5.0) {
@@ -229,8 +230,8 @@ fn a_joint_holds_together_however_the_base_moves() {
 }
 
 #[test]
-fn a_joint_without_springs_hangs_as_a_pendulum() {
-    // Hung 70 mm below its joint: sqrt(m g h / (I + m h^2)).
+fn a_joint_without_springs_is_a_pendulum() {
+    // Centre of mass 70 mm below the joint: sqrt(m g h / (I + m h^2)).
     let joint = "universal_joint((base_from_joint: (position_m: (0.0, 0.0, 0.0)), head_from_joint: (position_m: (0.0, 0.0, 0.07)),
         stiffness_nm_per_rad: (0.0, 0.0))),";
     let model = model([0.0; 3], joint);

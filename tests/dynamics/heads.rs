@@ -1,4 +1,4 @@
-//! Heads and bases to test with.
+//! Test heads and base motions.
 
 use zsim::dynamics::{DynamicsError, HeadModel, HeadSimulation, HeadSpec, HeadState};
 use zsim::elasticity::{Vector6, stack};
@@ -6,26 +6,25 @@ use zsim::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw};
 use zsim::motion::BaseMotion;
 use zsim::spec::{Source, parse};
 
-/// The head of the rocking table: 0.40 kg, centre of mass 70 mm above the spring, 9e-4 kg m^2. Its frame is the
-/// spring's top.
-pub struct Table {
+/// The reference head: 0.40 kg, centre of mass 70 mm above the spring, 9e-4 kg m^2. Its frame is the spring's top.
+pub struct ReferenceHead {
     /// Mean coil diameter, wire diameter, active coils, free length, mm.
     pub coil: [f64; 4],
     pub segments: usize,
-    /// Rocking, sway, bounce, yaw.
+    /// Damping ratios of rocking, sway, bounce and yaw.
     pub damping: [f64; 4],
     pub hanging: bool,
-    /// More of the linkage, as text.
+    /// Further keys of the linkage, as text.
     pub more: &'static str,
 }
 
-impl Default for Table {
+impl Default for ReferenceHead {
     fn default() -> Self {
         Self { coil: [25.0, 3.0, 12.0, 120.0], segments: 1, damping: [0.0; 4], hanging: false, more: "" }
     }
 }
 
-impl Table {
+impl ReferenceHead {
     pub fn text(&self) -> String {
         let ([coil, wire, coils, length], [rocking, sway, bounce, yaw]) = (self.coil, self.damping);
         let (segments, more) = (self.segments, self.more);
@@ -60,8 +59,9 @@ impl Table {
     }
 }
 
-/// A head of 0.40 kg, 9e-4 kg m^2 about x and y and 4e-4 about z, its centre of mass at its origin, in a suspension of
-/// `elements` near `place` in the base; no damping but its elements'.
+/// A head in a suspension of `elements` close to `place` in the base, as text.
+///
+/// 0.40 kg, 9e-4 kg m^2 about x and y and 4e-4 about z, centre of mass at the origin; damped only by its elements.
 pub fn suspended(place: [f64; 3], elements: &str) -> String {
     let [x, y, z] = place;
     format!(
@@ -92,7 +92,7 @@ pub fn cord(base: [f64; 3], head: [f64; 3], length_m: f64, ea_n: f64) -> String 
     )
 }
 
-/// A spring of 20/2.5/8/80 mm from a point of the base straight up to one of the head.
+/// A vertical spring of 20/2.5/8/80 mm from a point of the base up to a point of the head.
 pub fn upright_spring(base: [f64; 3], head: [f64; 3]) -> String {
     format!(
         "spring((spring: coil(coil_diameter_mm: 20.0, wire_diameter_mm: 2.5, active_coils: 8.0, free_length_mm: 80.0,
@@ -120,7 +120,7 @@ pub fn jointed(stiffness_nm_per_rad: f64) -> String {
     )
 }
 
-/// Three soft cords that keep a float in the middle.
+/// Three soft cords that centre a float.
 pub fn moored() -> String {
     [0.0_f64, 120.0, 240.0]
         .map(|degrees| {
@@ -142,23 +142,22 @@ pub fn shipped(name: &str) -> HeadModel {
 }
 
 /// A base that does not move.
-pub struct Still(pub Pose);
+pub struct FixedBase(pub Pose);
 
-impl BaseMotion for Still {
+impl BaseMotion for FixedBase {
     fn at(&self, _t_s: f64) -> Kinematics {
         Kinematics::at_rest(self.0)
     }
 }
 
-/// A base that makes one jerk, `amount (1 - cos(2 pi t / T)) / 2` out and back along one of x, y, z, roll, pitch, yaw,
-/// and then stays.
-pub struct Twitch {
+/// A base that makes one pulse `amount (1 - cos(2 pi t / T)) / 2` along x, y, z or in roll, pitch, yaw.
+pub struct BasePulse {
     pub axis: usize,
     pub amount: f64,
     pub period_s: f64,
 }
 
-impl BaseMotion for Twitch {
+impl BaseMotion for BasePulse {
     fn at(&self, t_s: f64) -> Kinematics {
         let rate = std::f64::consts::TAU / self.period_s;
         let phase = rate * t_s.clamp(0.0, self.period_s);
@@ -178,7 +177,7 @@ impl BaseMotion for Twitch {
     }
 }
 
-/// A base that walks and nods: smooth, at rest at the start, never twice the same.
+/// A base that walks and nods: smooth, at rest at the start, aperiodic.
 pub struct Nodding {
     pub amount_rad: f64,
 }
@@ -193,7 +192,7 @@ impl Nodding {
 
 impl BaseMotion for Nodding {
     fn at(&self, t_s: f64) -> Kinematics {
-        // sin^3(w t) has no speed and no acceleration at 0.
+        // sin^3(w t) has zero velocity and acceleration at 0.
         let (mut place, mut speed, mut gain) = (Vector6::zeros(), Vector6::zeros(), Vector6::zeros());
         for (axis, amount, omega) in self.parts() {
             let (s, c) = (omega * t_s).sin_cos();
@@ -226,7 +225,7 @@ pub fn states(model: &HeadModel, motion: &dyn BaseMotion, step_s: f64, seconds: 
     HeadSimulation::new(model, motion, step_s).unwrap().take(count).map(Result::unwrap).collect()
 }
 
-/// Displacement of the head's centre of mass, and its turn, from rest, in the base's axes.
+/// Displacement of the head's centre of mass and its rotation from rest, in the base's axes.
 pub fn displacement(model: &HeadModel, state: &HeadState) -> Vector6 {
     let base_from_head = state.base.world_from_body.inv_mul(&state.head.world_from_body);
     let rest = model.rest_pose_base_from_head();

@@ -4,10 +4,10 @@ use zsim::geometry::{Kinematics, Pose, Rotation, Route, Vector, gravity_in_world
 use zsim::motion::BaseMotion;
 use zsim::random::Seed;
 
-/// How a gyroscope's samples become the turn of a step.
+/// Integration rule from gyroscope samples to the rotation of a step.
 #[derive(Clone, Copy, PartialEq)]
 enum Rule {
-    /// The mean of the step's two ends: off by `h^2/12` of the change of the angular acceleration.
+    /// The mean of both ends of the step: error `h^2/12` of the change of angular acceleration.
     Trapezoid,
     /// The cubic through four samples, and the coning term `h^2/12 w x w'`.
     Cubic,
@@ -48,13 +48,13 @@ fn walked(seed: u64) -> Box<dyn BaseMotion> {
 }
 
 #[test]
-fn a_noise_free_imu_integrates_to_the_truths_poses() {
+fn a_noise_free_imu_integrates_to_the_true_poses() {
     let model = shipped("handheld");
     let nodding = Nodding { amount_rad: 0.05 };
     let by_hand = walked(1);
     for motion in [&nodding as &dyn BaseMotion, by_hand.as_ref()] {
         let path = states(&model, motion, 1e-3, 20.0);
-        // From rest by the plainest rule; from the middle of a swing by one whose own error does not show.
+        // From rest with the simplest rule; from mid-swing with a rule of negligible error.
         for (part, rule) in [(&path[..10_001], Rule::Trapezoid), (&path[8_000..18_001], Rule::Cubic)] {
             let (metres, degrees) = worst_error(part, model.head_from_imu(), 1e-3, rule);
             assert!(metres < 1e-3 && degrees < 0.005, "{metres} m, {degrees} degrees");
@@ -63,9 +63,8 @@ fn a_noise_free_imu_integrates_to_the_truths_poses() {
 }
 
 #[test]
-fn velocity_and_acceleration_belong_to_the_pose() {
-    // Against differences of five poses, which are of fourth order: (-1, 8, 0, -8, 1) / 12 h and (-1, 16, -30, 16, -1)
-    // / 12 h^2.
+fn velocity_and_acceleration_are_derivatives_of_the_pose() {
+    // Compared with fourth-order differences of five poses: (-1, 8, 0, -8, 1) / 12 h and (-1, 16, -30, 16, -1) / 12 h^2.
     let step_s = 1e-3;
     let path = states(&shipped("handheld"), &Nodding { amount_rad: 0.05 }, step_s, 3.0);
     for five in path.windows(5) {
@@ -85,9 +84,9 @@ fn velocity_and_acceleration_belong_to_the_pose() {
 }
 
 #[test]
-fn between_two_steps_the_pose_is_where_a_finer_simulation_has_it() {
-    // Halved, the step itself moves the path by its own second-order error; so both are taken from one fine path, of
-    // which every second state is left out and interpolated.
+fn poses_between_steps_agree_with_a_finer_simulation() {
+    // A different step would change the path by its second-order error. So one fine path is used, and every second
+    // state is interpolated from the others.
     let path = states(&shipped("handheld"), &Nodding { amount_rad: 0.05 }, 5e-4, 3.0);
     for three in path.windows(3).step_by(2) {
         let middle = three[0].head.pose_towards(&three[2].head, 1e-3, 0.5);

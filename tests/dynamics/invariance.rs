@@ -3,7 +3,7 @@ use zsim::dynamics::HeadModel;
 use zsim::geometry::{Kinematics, Pose, Vector, from_roll_pitch_yaw};
 use zsim::motion::BaseMotion;
 
-/// A base moved elsewhere, turned about the vertical, and drifting.
+/// A base with a shift, a yaw rotation and a constant velocity added to its motion.
 struct Elsewhere {
     base: Nodding,
     there: Pose,
@@ -27,7 +27,7 @@ impl BaseMotion for Elsewhere {
 }
 
 #[test]
-fn a_head_swings_alike_elsewhere_turned_and_on_a_train() {
+fn the_swing_is_invariant_to_shift_yaw_and_constant_velocity() {
     let model = shipped("handheld");
     let here = states(&model, &Nodding { amount_rad: 0.05 }, 1e-3, 5.0);
     let there = Pose::from_parts(Vector::new(120.0, -70.0, 8.0).into(), from_roll_pitch_yaw(0.0, 0.0, 2.1));
@@ -39,11 +39,11 @@ fn a_head_swings_alike_elsewhere_turned_and_on_a_train() {
         assert!(moved.translation.vector.norm() < 1e-8 && moved.rotation.angle() < 1e-7, "{} s: {moved}", a.t_s);
         lean = lean.max(seen.rotation.angle());
     }
-    assert!(lean > 0.3, "swings by {lean} rad only");
+    assert!(lean > 0.3, "swings by only {lean} rad");
 }
 
 #[test]
-fn two_runs_agree_to_the_last_bit() {
+fn two_runs_are_identical_to_the_bit() {
     let bits = |model: &HeadModel| -> Vec<u64> {
         let path = states(model, &Nodding { amount_rad: 0.05 }, 1e-3, 2.0);
         let numbers = path.iter().flat_map(|state| {

@@ -1,4 +1,4 @@
-use crate::heads::{Nodding, Table, Twitch, displacement, shipped, states};
+use crate::heads::{BasePulse, Nodding, ReferenceHead, displacement, shipped, states};
 use zsim::dynamics::{DynamicsError, HeadSimulation};
 use zsim::geometry::{Kinematics, Pose, Vector};
 use zsim::motion::BaseMotion;
@@ -11,20 +11,20 @@ fn a_rigid_head_moves_with_its_base() {
     for state in states(&model, &base, 1e-3, 1.0) {
         assert_eq!(state.head, base.at(state.t_s).of_frame(model.rest_pose_base_from_head()));
     }
-    // Where the sprung head rests, to the millimetre.
+    // The rest position of the sprung head, to 1 mm.
     let apart = shipped("handheld").rest_pose_base_from_head().inv_mul(model.rest_pose_base_from_head());
     assert!(apart.translation.vector.norm() < 1e-3 && apart.rotation.angle() < 1e-3);
 }
 
-/// A twitch after which a hand takes hold.
+/// A pulse of the base, after which a hand holds the head.
 struct Held {
-    twitch: Twitch,
+    pulse: BasePulse,
     from_s: f64,
 }
 
 impl BaseMotion for Held {
     fn at(&self, t_s: f64) -> Kinematics {
-        self.twitch.at(t_s)
+        self.pulse.at(t_s)
     }
 
     fn hold(&self, t_s: f64) -> f64 {
@@ -34,41 +34,47 @@ impl BaseMotion for Held {
 
 #[test]
 fn a_hand_brings_a_swinging_head_to_rest() {
-    let model = Table { more: "hold: (frequency_hz: 6.0, damping_ratio: 0.8),", ..Table::default() }.model();
-    let twitch = || Twitch { axis: 0, amount: 0.14, period_s: 0.4 };
-    let free = states(&model, &twitch(), 1e-3, 3.0);
-    let held = states(&model, &Held { twitch: twitch(), from_s: 1.0 }, 1e-3, 3.0);
+    let model =
+        ReferenceHead { more: "hold: (frequency_hz: 6.0, damping_ratio: 0.8),", ..ReferenceHead::default() }.model();
+    let pulse = || BasePulse { axis: 0, amount: 0.14, period_s: 0.4 };
+    let free = states(&model, &pulse(), 1e-3, 3.0);
+    let held = states(&model, &Held { pulse: pulse(), from_s: 1.0 }, 1e-3, 3.0);
     let swing =
         |path: &[zsim::dynamics::HeadState]| path.iter().map(|s| displacement(&model, s).norm()).fold(0.0, f64::max);
     assert!(swing(&free[2_000..]) > 0.2, "swings freely by {}", swing(&free[2_000..]));
-    // Critical damping at 6 Hz leaves exp(-0.8 * 2 pi 6 * 0.7) = 1e-9 of it after 0.7 s in a firm hand.
+    // A damping ratio of 0.8 at 6 Hz leaves exp(-0.8 * 2 pi 6 * 0.7) = 1e-9 of the swing after 0.7 s.
     assert!(swing(&held[2_500..]) < 1e-6, "still swings by {}", swing(&held[2_500..]));
 }
 
 #[test]
-fn a_stop_ends_the_swing() {
+fn an_end_stop_limits_the_swing() {
     let stop = "end_stop: (angle_deg: 30.0, stiffness_nm_per_rad: 100.0, damping_nm_s_per_rad: 0.02),";
-    let model = Table { more: stop, ..Table::default() }.model();
+    let model = ReferenceHead { more: stop, ..ReferenceHead::default() }.model();
     let lean = |path: &[zsim::dynamics::HeadState]| {
         let axis = |s: &zsim::dynamics::HeadState| (s.head.world_from_body.rotation * Vector::z()).angle(&Vector::z());
         path.iter().map(axis).fold(0.0, f64::max).to_degrees()
     };
-    let free = lean(&states(&Table::default().model(), &Twitch { axis: 0, amount: 0.14, period_s: 0.4 }, 1e-3, 2.0));
-    let stopped = lean(&states(&model, &Twitch { axis: 0, amount: 0.14, period_s: 0.4 }, 1e-3, 2.0));
+    let free = lean(&states(
+        &ReferenceHead::default().model(),
+        &BasePulse { axis: 0, amount: 0.14, period_s: 0.4 },
+        1e-3,
+        2.0,
+    ));
+    let stopped = lean(&states(&model, &BasePulse { axis: 0, amount: 0.14, period_s: 0.4 }, 1e-3, 2.0));
     assert!(free > 44.0 && (30.0..38.0).contains(&stopped), "{free} free, {stopped} with a stop");
 }
 
 #[test]
-fn a_head_thrown_too_far_is_an_error_with_its_time_and_never_a_nan() {
-    let model = Table::default().model();
-    let twitch = Twitch { axis: 0, amount: 0.6, period_s: 0.3 };
+fn divergence_is_an_error_with_its_time_and_never_nan() {
+    let model = ReferenceHead::default().model();
+    let pulse = BasePulse { axis: 0, amount: 0.6, period_s: 0.3 };
     let mut last = None;
-    for state in HeadSimulation::new(&model, &twitch, 1e-3).unwrap().take(5_000) {
+    for state in HeadSimulation::new(&model, &pulse, 1e-3).unwrap().take(5_000) {
         match &state {
             Ok(state) => {
                 let Kinematics { world_from_body: Pose { rotation, translation }, .. } = state.head;
                 assert!(rotation.coords.iter().chain(translation.vector.iter()).all(|x| x.is_finite()));
-                assert!(last.is_none(), "goes on after an error");
+                assert!(last.is_none(), "continues after an error");
             }
             Err(_) => last = Some(state),
         }
@@ -78,7 +84,7 @@ fn a_head_thrown_too_far_is_an_error_with_its_time_and_never_a_nan() {
 }
 
 #[test]
-fn a_base_that_is_nowhere_is_an_error() {
+fn a_base_pose_with_nan_is_an_error() {
     struct Lost;
     impl BaseMotion for Lost {
         fn at(&self, t_s: f64) -> Kinematics {
@@ -86,7 +92,7 @@ fn a_base_that_is_nowhere_is_an_error() {
             Kinematics::at_rest(Pose::translation(x, 0.0, 0.0))
         }
     }
-    let model = Table::default().model();
+    let model = ReferenceHead::default().model();
     let mut simulation = HeadSimulation::new(&model, &Lost, 1e-3).unwrap().skip_while(Result::is_ok);
     let error = simulation.next().unwrap().unwrap_err();
     assert!(error.to_string().contains("0.010 s after the start"), "{error}");
@@ -95,7 +101,7 @@ fn a_base_that_is_nowhere_is_an_error() {
 
 #[test]
 fn a_step_too_long_for_the_fastest_mode_is_refused() {
-    let model = Table::default().model();
+    let model = ReferenceHead::default().model();
     for step_s in [0.1, 0.0, -1.0, f64::NAN] {
         let error = HeadSimulation::new(&model, &Nodding { amount_rad: 0.0 }, step_s).err().unwrap();
         assert!(error.to_string().contains("fastest oscillation"), "{error}");

@@ -1,16 +1,16 @@
-//! The simulated head against its linear model, closed forms, and laws.
+//! The simulated head compared with its linear model, closed forms and conservation laws.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod actuated;
+mod base;
 mod decay;
 mod elements;
 mod energy;
 mod heads;
 mod imu;
+mod invalid;
 mod invariance;
 mod linkage;
 mod rest;
 mod shipped;
-mod under;
 mod wire;
-mod wrong;

@@ -1,4 +1,4 @@
-use crate::heads::{Still, Table, built, shipped, states};
+use crate::heads::{FixedBase, ReferenceHead, built, shipped, states};
 use approx::assert_relative_eq;
 use nalgebra::{Matrix2, Vector2};
 use zsim::dynamics::{HeadSpec, LinkageSpec, ModeKind};
@@ -8,9 +8,9 @@ use zsim::motion::BaseMotion;
 use zsim::spec::{Kind, load, names};
 
 #[test]
-fn a_head_rocks_as_fast_as_the_table_says_for_any_number_of_segments() {
-    // Frequencies of a 0.40 kg head with 9e-4 kg m^2 and its centre of mass 70 mm above the spring, upright and
-    // hanging, Hz.
+fn rocking_frequencies_agree_with_reference_values_for_any_number_of_segments() {
+    // Reference frequencies of a 0.40 kg head with 9e-4 kg m^2 and its centre of mass 70 mm above the spring, upright
+    // and hanging, Hz.
     let table = [
         ([25.0, 2.5, 10.0, 100.0], true, 1.73),
         ([25.0, 3.0, 12.0, 120.0], false, 0.98),
@@ -20,7 +20,7 @@ fn a_head_rocks_as_fast_as_the_table_says_for_any_number_of_segments() {
     ];
     for (coil, hanging, expected_hz) in table {
         for segments in [1, 2, 4, 8] {
-            let model = Table { coil, hanging, segments, ..Table::default() }.model();
+            let model = ReferenceHead { coil, hanging, segments, ..ReferenceHead::default() }.model();
             let rocking = &model.linear_modes()[0];
             assert_eq!(rocking.kind, ModeKind::Rocking);
             assert_relative_eq!(rocking.frequency_hz, expected_hz, max_relative = 0.02);
@@ -29,32 +29,32 @@ fn a_head_rocks_as_fast_as_the_table_says_for_any_number_of_segments() {
 }
 
 #[test]
-fn a_head_stands_lower_by_its_weight_over_the_axial_rate() {
+fn the_static_deflection_is_weight_over_axial_stiffness() {
     // G d^4 / (8 D^3 n) = 79.3e9 0.003^4 / (8 0.025^3 12) = 4282.2 N/m under 0.40 kg: 0.916 mm.
-    let model = Table::default().model();
+    let model = ReferenceHead::default().model();
     let sag = 0.40 * G / 4282.2;
     let rest = model.rest_pose_base_from_head();
     assert_relative_eq!(rest.translation.vector, Vector::new(0.0, 0.0, 0.12 - sag), epsilon = 1e-8);
-    let hanging = Table { hanging: true, ..Table::default() }.model();
+    let hanging = ReferenceHead { hanging: true, ..ReferenceHead::default() }.model();
     assert_relative_eq!(hanging.rest_pose_base_from_head().translation.z, -(0.12 + sag), epsilon = 1e-8);
 }
 
 #[test]
-fn a_head_on_a_tilted_base_leans_as_the_column_does_and_stays() {
-    let model = Table::default().model();
+fn a_head_on_a_tilted_base_rests_at_the_inclination_of_the_loaded_column() {
+    let model = ReferenceHead::default().model();
     let tilt = 0.002;
     let base = Pose::from_parts(Vector::new(3.0, -2.0, 1.0).into(), from_roll_pitch_yaw(0.0, tilt, 0.4));
-    let path = states(&model, &Still(base), 1e-3, 1.0);
-    // In the base gravity pulls m g tilt along x at 70 mm above the top. The top's (x, theta) solve
-    // [K_xx, K_xt; K_xt, K_tt - m g h] (x, theta) = m g tilt (1, h), K the loaded column's.
+    let path = states(&model, &FixedBase(base), 1e-3, 1.0);
+    // In base axes gravity acts with m g tilt along x at 70 mm above the top. The top's (x, theta) solve
+    // [K_xx, K_xt; K_xt, K_tt - m g h] (x, theta) = m g tilt (1, h), with the stiffness K of the loaded column.
     let moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
-    let column = Coil::new(0.025, 0.003, 12.0, 0.12, moduli).unwrap().under(0.40 * G).unwrap();
+    let column = Coil::new(0.025, 0.003, 12.0, 0.12, moduli).unwrap().under_load(0.40 * G).unwrap();
     let k = loaded_stiffness(&column).unwrap();
     let (weight, h) = (0.40 * G, 0.07);
     let stiffness = Matrix2::new(k[(0, 0)], k[(0, 4)], k[(0, 4)], k[(4, 4)] - weight * h);
     let expected = stiffness.try_inverse().unwrap() * Vector2::new(1.0, h) * weight * tilt;
     let first = base.inv_mul(&path[0].head.world_from_body);
-    // Second order in the lean, which is 0.01 rad.
+    // The error is of second order in the inclination of 0.01 rad.
     assert_relative_eq!(first.translation.x, expected.x, max_relative = 1e-3);
     assert_relative_eq!(first.rotation.scaled_axis().y, expected.y, max_relative = 1e-3);
     for state in &path {
@@ -63,9 +63,9 @@ fn a_head_on_a_tilted_base_leans_as_the_column_does_and_stays() {
     }
 }
 
-struct Gliding;
+struct ConstantVelocity;
 
-impl BaseMotion for Gliding {
+impl BaseMotion for ConstantVelocity {
     fn at(&self, t_s: f64) -> Kinematics {
         let velocity = Vector::new(1.4, -0.3, 0.1);
         let mut now =
@@ -76,9 +76,9 @@ impl BaseMotion for Gliding {
 }
 
 #[test]
-fn a_base_that_glides_takes_its_head_along() {
+fn a_head_on_a_base_at_constant_velocity_stays_at_rest() {
     let model = shipped("handheld");
-    for state in states(&model, &Gliding, 1e-3, 2.0) {
+    for state in states(&model, &ConstantVelocity, 1e-3, 2.0) {
         let relative = state.base.world_from_body.inv_mul(&state.head.world_from_body);
         let moved = relative.inv_mul(model.rest_pose_base_from_head());
         assert!(moved.translation.vector.norm() < 1e-10 && moved.rotation.angle() < 1e-9, "{} s: {moved}", state.t_s);
@@ -102,32 +102,32 @@ fn the_handheld_head_is_light_and_rocks_between_1_and_1_5_hz() {
 }
 
 #[test]
-fn a_slow_tilt_of_the_base_is_lifted_by_gravity() {
-    // Turns of an upright head over those of its base at zero frequency (the table of gains): 1.58 and 2.64; 1 about z.
+fn gravity_amplifies_a_slow_tilt_of_the_base() {
+    // Rotation of an upright head relative to that of its base at zero frequency: 1.58 and 2.64; 1 about z.
     for (coil, gain) in [([25.0, 3.0, 8.0, 80.0], 1.58), ([25.0, 3.0, 12.0, 120.0], 2.64)] {
-        let model = Table { coil, ..Table::default() }.model();
+        let model = ReferenceHead { coil, ..ReferenceHead::default() }.model();
         let linear = model.linear().unwrap();
         let followed = linear.stiffness.try_inverse().unwrap() * linear.base_stiffness;
         assert_relative_eq!(followed[(3, 3)], gain, max_relative = 0.02);
         assert_relative_eq!(followed[(4, 4)], gain, max_relative = 0.02);
-        // Shifts of the base, and turns about the vertical, are followed one to one.
+        // Shifts and yaw of the base are followed one to one.
         for k in [0, 1, 2, 5] {
             assert_relative_eq!(followed[(k, k)], 1.0, epsilon = 1e-6);
         }
-        // A base and a head that move as one meet no damping: Cb is C times the motion that carries the head along.
+        // Joint rigid motion of base and head is undamped: Cb is C times the rigid motion of the head with its base.
         assert_relative_eq!(linear.base_damping.column(2), linear.damping.column(2), epsilon = 1e-12);
     }
 }
 
 #[test]
-fn every_shipped_head_and_spring_is_right_and_stands_for_ten_seconds_or_until_its_motor_starts() {
+fn every_shipped_head_is_valid_and_stays_at_rest() {
     for name in names(Kind::Head) {
         let model = shipped(&name);
         let rests_s = match load::<HeadSpec>(Kind::Head, &name).unwrap().linkage {
             LinkageSpec::Actuated { motor, .. } => motor.still_s,
             _ => 10.0,
         };
-        let path = states(&model, &Still(Pose::identity()), 1e-3, rests_s);
+        let path = states(&model, &FixedBase(Pose::identity()), 1e-3, rests_s);
         let moved = path[path.len() - 1].head.world_from_body.inv_mul(model.rest_pose_base_from_head());
         assert!(moved.translation.vector.norm() < 1e-9, "{name} moves by {moved}");
     }
@@ -137,9 +137,9 @@ fn every_shipped_head_and_spring_is_right_and_stands_for_ten_seconds_or_until_it
 }
 
 #[test]
-fn a_head_names_a_spring_of_the_library() {
-    let text = Table::default().text();
+fn a_head_can_refer_to_a_spring_spec_by_name() {
+    let text = ReferenceHead::default().text();
     let (from, to) = (text.find("coil(").unwrap(), text.find("segments").unwrap());
     let named = built(&format!("{}named(\"25x3x12x120\"), {}", &text[..from], &text[to..])).unwrap();
-    assert_eq!(named.linear_modes(), Table::default().model().linear_modes());
+    assert_eq!(named.linear_modes(), ReferenceHead::default().model().linear_modes());
 }

@@ -1,4 +1,4 @@
-//! The shipped heads: each stands, has modes that make sense, swings in a hand, and answers as its linear model.
+//! The shipped heads: plausible modes, swing in a hand, and small-swing gains of the linear model.
 
 use crate::heads::shipped;
 use zsim::dynamics::{DampingSpec, HeadModel, HeadSimulation, LinkageSpec, MotorSpec, TurnSpec, load};
@@ -7,13 +7,13 @@ use zsim::random::Seed;
 use zsim::spec::{Kind, names};
 use zsim::study::gains::{GainPlan, gain_curve};
 
-/// The heads that give.
+/// Names of the heads with a flexible linkage.
 fn sprung() -> Vec<String> {
     names(Kind::Head).into_iter().filter(|name| !shipped(name).linear_modes().is_empty()).collect()
 }
 
 #[test]
-fn the_product_ships_a_head_for_every_linkage() {
+fn there_is_a_shipped_head_for_every_linkage() {
     let all = names(Kind::Head);
     for name in [
         "handheld",
@@ -36,7 +36,7 @@ fn the_product_ships_a_head_for_every_linkage() {
 }
 
 #[test]
-fn shipped_heads_are_light_and_their_modes_are_a_heads() {
+fn shipped_heads_are_light_with_plausible_modes() {
     for name in sprung() {
         let model = shipped(&name);
         assert!(model.body().mass_kg < 0.5, "{name} has {} kg", model.body().mass_kg);
@@ -48,7 +48,7 @@ fn shipped_heads_are_light_and_their_modes_are_a_heads() {
 }
 
 #[test]
-fn shipped_heads_swing_or_turn_in_a_hand_for_ten_seconds_and_screwed_ones_stay() {
+fn flexible_and_actuated_heads_move_in_a_hand_and_rigid_ones_do_not() {
     let (spec, source) = zsim::motion::load("wave").unwrap();
     let motion = spec.build(&source, None, 12.0, Seed(1)).unwrap();
     for name in names(Kind::Head) {
@@ -61,7 +61,7 @@ fn shipped_heads_swing_or_turn_in_a_hand_for_ten_seconds_and_screwed_ones_stay()
         }
         let expected = match load(&name).unwrap().0.linkage {
             LinkageSpec::Rigid { .. } => 0.0..1e-4,
-            // Up to 45 degrees to either side, and round and round.
+            // A nod of up to 45 degrees, and a continuous rotation.
             LinkageSpec::Actuated { motor: MotorSpec { turn: TurnSpec::Nod { .. }, .. }, .. } => 44.9..45.01,
             LinkageSpec::Actuated { .. } => 179.0..180.1,
             LinkageSpec::Spring { .. } | LinkageSpec::Suspension { .. } => 0.1..120.0,
@@ -70,8 +70,8 @@ fn shipped_heads_swing_or_turn_in_a_hand_for_ten_seconds_and_screwed_ones_stay()
     }
 }
 
-/// A shipped head whose modes ring down in a simulation's time.
-fn calmed(name: &str) -> HeadModel {
+/// A shipped head with enough damping for its modes to decay within a simulation.
+fn damped(name: &str) -> HeadModel {
     let (mut spec, source) = load(name).unwrap();
     if let Some(ratio) = spec.linkage.damping_ratio_mut() {
         *ratio = DampingSpec { rocking: 0.04, sway: 0.04, bounce: 0.04, yaw: 0.04 };
@@ -80,10 +80,10 @@ fn calmed(name: &str) -> HeadModel {
 }
 
 #[test]
-fn small_gains_of_shipped_heads_are_those_of_the_closed_form() {
+fn small_swing_gains_of_shipped_heads_agree_with_the_closed_form() {
     let plan = GainPlan { up_to_hz: 12.0, realisations: 2, period_s: Some(20.0), ..GainPlan::default() };
     for name in sprung().iter().filter(|name| *name != "handheld") {
-        let head = calmed(name);
+        let head = damped(name);
         for axis in [Axis::Pitch, Axis::Z] {
             let curve = gain_curve(&head, axis, &plan, &|_| ()).unwrap();
             let coherent = curve.points.iter().filter(|p| p.coherence > 0.95);

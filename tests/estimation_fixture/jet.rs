@@ -1,6 +1,6 @@
 use std::ops::{Add, Mul, Sub};
 
-/// A number with its first two derivatives by time.
+/// A number with its first two time derivatives.
 #[derive(Debug, Clone, Copy)]
 pub struct Jet {
     pub value: f64,
@@ -18,7 +18,7 @@ impl Jet {
         Self { value, rate: 0.0, acceleration: 0.0 }
     }
 
-    /// A function of this, by its value and two derivatives.
+    /// Chain rule for a function with the value `f` and derivatives `f1`, `f2`.
     fn chain(self, f: f64, f1: f64, f2: f64) -> Self {
         Self { value: f, rate: f1 * self.rate, acceleration: f2 * self.rate * self.rate + f1 * self.acceleration }
     }
@@ -35,7 +35,7 @@ impl Jet {
         self * Self::constant(by)
     }
 
-    /// 0 below 0, 1 above 1, with three continuous derivatives: 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7.
+    /// 0 below 0, 1 above 1, three continuous derivatives: 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7.
     pub fn smoothstep(self) -> Self {
         let x = self.value;
         if x <= 0.0 {
@@ -50,8 +50,7 @@ impl Jet {
         self.chain(f, f1, f2)
     }
 
-    /// Integral of `((t - start) / duration).smoothstep()` over time up to `self`, which must be time itself plus a
-    /// shift.
+    /// Time integral of `((t - start) / duration).smoothstep()` up to `self`, which must be time plus a constant.
     pub fn ramped_time(self, duration_s: f64) -> Self {
         let x = (self.value / duration_s).clamp(0.0, 1.0);
         let below = x.powi(5) * (7.0 + x * (-14.0 + x * (10.0 - 2.5 * x))) * duration_s;

@@ -1,7 +1,9 @@
-//! A head that walks and nods through rooms of boxes, in closed form: rays by slabs, motion by analytic derivatives.
-//! Independent of the simulator, so that the estimator's tests do not rest on it.
+//! Closed-form recordings: a head that walks and nods through rooms of boxes.
+//!
+//! Rays use the slab method, the motion has analytic derivatives. Independent of the simulator, so that the tests of
+//! the estimator do not depend on it.
 
-#![allow(dead_code, unused_imports, reason = "each test uses its part")]
+#![allow(dead_code, unused_imports, reason = "each test uses only a part of it")]
 
 mod jet;
 mod motion;

@@ -7,13 +7,13 @@ pub struct Walk {
     pub semi_axes_m: (f64, f64),
     pub lap_s: f64,
     pub height_m: f64,
-    /// Greatest pitch, rad.
+    /// Amplitude of pitch, rad.
     pub nod_rad: f64,
-    /// Until when the head rests, s; negative to begin in motion.
+    /// End of the initial rest, s; negative to start in motion.
     pub start_s: f64,
-    /// The nodding is held for this stretch, s.
+    /// Interval in which the nodding stops, s.
     pub stop: Option<(f64, f64)>,
-    /// Turns and shifts everything, the walk with its room.
+    /// Pose of walk and room in the world.
     pub world_from_room: Pose,
 }
 
@@ -35,7 +35,7 @@ impl Walk {
             nodding = nodding * (Jet::constant(1.0) - held);
         }
         let lap = walked.scale(tau / self.lap_s);
-        // The rhythm of a hand is irregular.
+        // The frequency of a hand is irregular.
         let phase = since.scale(tau * 1.3) + since.scale(0.9).sin().scale(0.5);
         let strength = nodding * (Jet::constant(0.8) + since.scale(0.37).sin().scale(0.2));
         let pitch = phase.sin() * strength.scale(self.nod_rad);
@@ -61,7 +61,7 @@ impl Walk {
         (rotation, rotation * body)
     }
 
-    /// The head at true time `t_s`, in the world.
+    /// Pose, velocities and accelerations of the head in the world at true time `t_s`.
     pub fn at(&self, t_s: f64) -> Kinematics {
         let (position, _) = self.jets(t_s);
         let (rotation, rate) = self.rates(t_s);
@@ -78,7 +78,7 @@ impl Walk {
         }
     }
 
-    /// The head's pose alone.
+    /// Pose of the head in the world.
     pub fn pose(&self, t_s: f64) -> Pose {
         let (position, [roll, pitch, yaw]) = self.jets(t_s);
         let rotation = from_roll_pitch_yaw(roll.value, pitch.value, yaw.value);

@@ -1,6 +1,6 @@
 use zsim::geometry::Vector;
 
-/// A box, seen from outside (furniture) or inside (the walls), by its least and greatest corner.
+/// A box, seen from outside (furniture) or inside (walls): its minimum and maximum corner.
 type Corners = (Vector, Vector);
 
 /// A closed room with boxes in it, axis-aligned.
@@ -38,7 +38,7 @@ impl Room {
         Self::new([-4.0, -3.0, 0.0, 4.0, 3.0, 4.0], &boxes)
     }
 
-    /// A corridor 2.5 m wide round a block, 18 x 11 x 2.7 m, with cupboards, pillars and niches.
+    /// A corridor of 2.5 m width around a block, 18 x 11 x 2.7 m, with cupboards, pillars and niches.
     pub fn corridor_loop() -> Self {
         let boxes = [
             [-6.0, -2.5, 0.0, 6.0, 2.5, 2.7],
@@ -66,7 +66,7 @@ impl Room {
     }
 }
 
-/// Where a ray enters and leaves a box (Kay and Kajiya 1986).
+/// Distances at which a ray enters and leaves a box (Kay and Kajiya 1986).
 fn slab((least, greatest): &Corners, origin: &Vector, inverse: &Vector) -> (f64, f64) {
     let (a, b) = ((least - origin).component_mul(inverse), (greatest - origin).component_mul(inverse));
     ((a.inf(&b)).max(), (a.sup(&b)).min())

@@ -3,22 +3,22 @@ use zsim::estimation::OpenLoop;
 use zsim::geometry::{Matrix, Pose, Rotation, Vector};
 use zsim::time::Stamp;
 
-/// How far an estimate is from the truth.
+/// Errors of an estimate.
 #[derive(Debug, Clone, Copy)]
 pub struct Score {
-    /// Position after rigid alignment, root mean square, m.
+    /// Position RMSE after rigid alignment, m.
     pub rmse_m: f64,
-    /// Greatest position error after alignment, m.
+    /// Largest position error after alignment, m.
     pub worst_m: f64,
-    /// Rotation after alignment, root mean square, degrees.
+    /// Rotation RMSE after alignment, degrees.
     pub rotation_deg: f64,
-    /// Drift in position, aligned over the first 20 s, mean of the last 5 s by minutes, m/min.
+    /// Position drift after alignment over the first 20 s: mean error of the last 5 s per minute, m/min.
     pub drift_m_per_min: f64,
     /// Clock error at the end, s.
     pub clock_end_s: f64,
-    /// Greatest clock error after 30 s, s.
+    /// Largest clock error after 30 s, s.
     pub clock_worst_s: f64,
-    /// Time spent in windows, s.
+    /// Run time of all windows, s.
     pub elapsed_s: f64,
 }
 
@@ -26,7 +26,7 @@ fn seconds(stamp: Stamp) -> f64 {
     stamp.nanos() as f64 * 1e-9
 }
 
-/// The rigid transform that brings `from` nearest to `to` (Umeyama 1991, without scale).
+/// The least-squares rigid transform from `from` to `to` (Umeyama 1991, without scale).
 fn align(from: &[Vector], to: &[Vector]) -> Pose {
     let n = from.len() as f64;
     let (a, b) = (from.iter().sum::<Vector>() / n, to.iter().sum::<Vector>() / n);
@@ -38,8 +38,9 @@ fn align(from: &[Vector], to: &[Vector]) -> Pose {
     Pose::from_parts((b - rotation * a).into(), rotation)
 }
 
-/// How far an estimate leaves the truth between two instants, m: its greatest error then, with the poses at the first
-/// one laid on each other.
+/// Growth of the position error between two times, m.
+///
+/// The largest error in the interval after alignment of the poses at its start.
 pub fn growth_m(result: &OpenLoop, run: &Run, (from_s, to_s): (f64, f64)) -> f64 {
     let mut within = result
         .trajectory

@@ -8,7 +8,7 @@ use zsim::measurement::{
 use zsim::random::{Seed, Stream};
 use zsim::time::{Span, Stamp};
 
-/// A UTM-30LX above and a 3DM-GX2 below the head's origin, with the normative noise.
+/// A UTM-30LX above and a 3DM-GX2 below the head's origin, with the specified noise.
 pub fn calibration() -> Calibration {
     Calibration {
         head_from_laser: Pose::from_parts(Vector::new(0.01, 0.0, 0.04).into(), from_roll_pitch_yaw(0.0, 0.0, 0.0)),
@@ -30,17 +30,17 @@ pub fn calibration() -> Calibration {
     }
 }
 
-/// Which lidar the head carries.
+/// Lidar of the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scanner {
-    /// As a UTM-30LX: 1081 beams of a plane over three quarters of a turn, forty turns a second.
+    /// As a UTM-30LX: 1081 beams over 270 degrees in a plane at 40 Hz.
     Plane,
-    /// As a VLP-16, with half its azimuths: 16 rings from -15 to 15 degrees fired together, ten turns a second.
+    /// As a VLP-16 with half the azimuths: 16 rings from -15 to 15 degrees fired together, at 10 Hz.
     Rings,
 }
 
 impl Scanner {
-    /// How long a turn takes, s, and each beam with its time within it.
+    /// Duration of a revolution, s, and the beams with their times in it.
     fn beams(self) -> (f64, Vec<(f64, Vector)>) {
         let beam = |azimuth: f64, elevation: f64| {
             let (sin, cos) = elevation.sin_cos();
@@ -61,14 +61,14 @@ impl Scanner {
     }
 }
 
-/// One run through a room.
+/// A recording of a walk through a room.
 #[derive(Debug, Clone)]
 pub struct Run {
     pub room: Room,
     pub walk: Walk,
     pub seed: Seed,
     pub duration_s: f64,
-    /// 1 for the normative noise, 0 for none.
+    /// 1 for the specified noise, 0 for none.
     pub noise: f64,
     pub clock_offset_s: f64,
     pub clock_drift: f64,
@@ -101,12 +101,12 @@ impl Run {
         }
     }
 
-    /// How much later the IMU stamps the instant `t_s`.
+    /// Delay of the IMU's stamps at true time `t_s`, s.
     pub fn offset_s(&self, t_s: f64) -> f64 {
         self.clock_offset_s + self.clock_drift * t_s
     }
 
-    /// All measurements, interleaved as they would arrive.
+    /// All measurements in order of arrival.
     pub fn measurements(&self) -> Vec<Measurement> {
         let mut all: Vec<(f64, Measurement)> = self.imu();
         all.extend(self.lidar());

@@ -1,8 +1,8 @@
-//! ROS 1 bags and rosbag2 databases as their recorders write them, by the formats' descriptions.
+//! Writes ROS 1 bags and rosbag2 databases from the specifications of the formats.
 
 use std::io::Write;
 
-/// Bytes of a ROS 1 message: little-endian, nothing aligned.
+/// Bytes of a ROS 1 message: little-endian without alignment.
 #[derive(Default)]
 pub struct Ros1(pub Vec<u8>);
 
@@ -66,10 +66,10 @@ fn time(ns: i64) -> Vec<u8> {
     [((ns / 1_000_000_000) as u32).to_le_bytes(), ((ns % 1_000_000_000) as u32).to_le_bytes()].concat()
 }
 
-/// A message: the number of its topic, when it was logged, and its bytes.
+/// A message: index of its topic, log time, and its bytes.
 pub type Logged = (usize, i64, Vec<u8>);
 
-/// Compresses a chunk as `compression` says.
+/// Compresses a chunk by `compression`.
 fn packed(compression: &str, bytes: &[u8]) -> Vec<u8> {
     match compression {
         "lz4" => {
@@ -97,7 +97,7 @@ fn connection(id: usize, (topic, kind): (&str, &str)) -> Vec<u8> {
     record(&[("op", &[7]), ("conn", &(id as u32).to_le_bytes()), ("topic", topic.as_bytes())], &inner)
 }
 
-/// The first record, padded with spaces to 4096 bytes, so that the recorder can write it again at the end.
+/// The first record, padded with spaces to 4096 bytes, so that the recorder can overwrite it at the end.
 fn head(index: u64, connections: usize, chunks: usize) -> Vec<u8> {
     let (connections, chunks) = ((connections as u32).to_le_bytes(), (chunks as u32).to_le_bytes());
     let index = index.to_le_bytes();
@@ -111,7 +111,7 @@ fn head(index: u64, connections: usize, chunks: usize) -> Vec<u8> {
     [b"#ROSBAG V2.0\n", &bytes[..]].concat()
 }
 
-/// A chunk at `position` with the records that index it, and its record in the index at the end.
+/// A chunk at `position` with its index records, and its record for the index at the end of the file.
 fn chunk(topics: &[(&str, &str)], messages: &[Logged], compression: &str, position: u64) -> (Vec<u8>, Vec<u8>) {
     let (mut inner, mut counts) = (Vec::new(), vec![0_u32; topics.len()]);
     for (topic, logged, bytes) in messages {
@@ -145,7 +145,7 @@ fn chunk(topics: &[(&str, &str)], messages: &[Logged], compression: &str, positi
     (bytes, record(&fields, &data))
 }
 
-/// A bag of `topics` (name and type) with ten messages a chunk; `indexed` as `rosbag record` leaves it when it ends.
+/// A bag of `topics` (name and type) with ten messages per chunk; `indexed` if `rosbag record` has closed it.
 pub fn bag(topics: &[(&str, &str)], messages: &[Logged], compression: &str, indexed: bool) -> Vec<u8> {
     let start = head(0, 0, 0).len();
     let (mut body, mut infos) = (Vec::new(), Vec::new());
@@ -163,7 +163,7 @@ pub fn bag(topics: &[(&str, &str)], messages: &[Logged], compression: &str, inde
     [head(index, topics.len(), infos.len()), body].concat()
 }
 
-/// Writes a database of rosbag2 to `path`; its messages compressed each by itself where `compressed`.
+/// Writes a rosbag2 database to `path`; with `compressed` each message is compressed separately.
 pub fn database(path: &std::path::Path, topics: &[(&str, &str)], messages: &[Logged], compressed: bool) {
     let database = rusqlite::Connection::open(path).unwrap();
     database

@@ -1,4 +1,4 @@
-//! Files as other programs write them: by the `mcap` crate, their messages by serde and `cdr-encoding`.
+//! Recordings of other programs: files by the `mcap` crate, messages by serde and `cdr-encoding`.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -74,7 +74,7 @@ pub const FLOAT32: u8 = 7;
 pub const FLOAT64: u8 = 8;
 pub const UINT32: u8 = 6;
 
-/// A cloud of points at (1, 2, 3 + k) whose times are `times`, already in bytes of the type `kind`.
+/// A cloud of points at (1, 2, 3 + k) with the times `times`, serialised as the type `kind`.
 pub fn cloud(stamp_ns: i64, (name, kind): (&str, u8), times: &[Vec<u8>]) -> PointCloud2 {
     let size = times[0].len() as u32;
     let names = [("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32), (name, 16, kind)];
@@ -183,7 +183,7 @@ pub fn scans(reader: &Reader) -> Vec<LidarScan> {
     measurements.filter_map(|m| if let Measurement::Lidar(scan) = m { Some(scan) } else { None }).collect()
 }
 
-/// Ten beams over a tenth of a radian each; the third did not come back, the fourth is too near.
+/// Ten beams 0.1 rad apart; the third has no return, the fourth is too close.
 pub fn scan(stamp_ns: i64, time_increment: f32, scan_time: f32) -> LaserScan {
     let mut ranges = vec![2.0; 10];
     (ranges[2], ranges[3], ranges[4], ranges[5]) = (f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.01);

@@ -1,4 +1,4 @@
-//! Halves of an IMU, units and conventions of accelerations, and stamps of another epoch.
+//! Split IMU messages, units and conventions of accelerations, and stamps of another epoch.
 
 use super::foreign::{self, Foreign, IMU, SCAN, select};
 use super::{MS, START_NS, moving, room};
@@ -14,7 +14,7 @@ fn samples(reader: &Reader) -> (Vec<ImuSample>, Vec<String>) {
 }
 
 #[test]
-fn halves_of_an_imu_are_paired_or_refused() {
+fn split_imu_messages_are_paired_or_refused() {
     let rate_of = |ns: i64| foreign::Imu { linear_acceleration: [0.0; 3], ..moving(ns) };
     let force_of = |ns: i64| foreign::Imu { angular_velocity: [0.0; 3], ..moving(ns) };
     let attitude_of =
@@ -26,7 +26,7 @@ fn halves_of_an_imu_are_paired_or_refused() {
             if let Some(topic) = topics[0] {
                 foreign.message(topic, IMU, ns, &rate_of(ns));
             }
-            // Accelerations come at half the rate, 1 ms later.
+            // Accelerations have half the rate and are 1 ms later.
             if let Some(topic) = topics[1].filter(|_| k % 2 == 0) {
                 foreign.message(topic, IMU, ns + MS, &force_of(ns + MS));
             }
@@ -53,7 +53,7 @@ fn halves_of_an_imu_are_paired_or_refused() {
         for sample in &samples {
             let ns = sample.stamp.nanos();
             assert_eq!(sample.angular_velocity_rad_per_s.as_slice(), moving(ns).angular_velocity);
-            // The nearest one is 1 or 4 ms away: at most 12 rad/s^2 in 1 s of 8.2 rad/s.
+            // The nearest acceleration is 1 or 4 ms away; the derivative is at most 1.5 * 8.2 = 12 m/s^3 along x.
             let force = sample.specific_force_m_per_s2;
             let truth = zsim::geometry::Vector::from(moving(ns).linear_acceleration);
             assert!((force - truth).norm() < 0.08, "{force} {truth}");
@@ -61,7 +61,7 @@ fn halves_of_an_imu_are_paired_or_refused() {
     }
     let error = |topics| record(topics).select(&Preference::default()).unwrap_err().to_string();
     let lacks = error([Some("/imu/gyro"), None, None]);
-    assert!(lacks.contains("IMU topic /imu/gyro has zeros for acceleration, and no other topic carries it"), "{lacks}");
+    assert!(lacks.contains("IMU topic /imu/gyro has zeros for acceleration, and no other topic has it"), "{lacks}");
     let lacks = error([None, Some("/imu/acc"), None]);
     assert!(lacks.contains("IMU topic /imu/acc has zeros for angular velocity, and no other topic"), "{lacks}");
     let lacks = error([None, None, Some("/imu")]);
@@ -86,7 +86,7 @@ fn accelerations_without_gravity_are_refused_and_units_of_gravity_are_not() {
     assert!(error.contains("IMU topic /phone/imu has accelerations without gravity (median 1."), "{error}");
     assert!(error.contains("TYPE_ACCELEROMETER"), "{error}");
     let (in_g, notes) = samples(&record(12, &|force| force.map(|c| c / 9.806_65)));
-    assert!(notes.iter().any(|note| note.contains("units of gravity")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("accelerations in g")), "{notes:?}");
     assert!((in_g[0].specific_force_m_per_s2.z - 9.8).abs() < 1e-9);
     let (fall, _) = samples(&record(3, &|[x, y, z]| [0.01 * x, 0.01 * y, 0.01 * (z - 9.8)]));
     assert_eq!(fall.len(), 300);
@@ -107,13 +107,13 @@ fn stamps_of_another_epoch_are_shifted_by_log_times() {
         let (samples, notes) = samples(&foreign.reader());
         (samples[0].stamp.nanos() - START_NS, notes)
     };
-    // The IMU's clock counts from when it was switched on; TAI; a minute off; 0.2 s off.
+    // IMU time since power-up; TAI; 60 s off; 0.2 s off.
     for ahead_ns in [-START_NS + 5_000_000_000, 37_000_000_000, -60_000_000_000, 200 * MS] {
         let (first_ns, notes) = record(ahead_ns, 2);
         assert!(first_ns.abs() < 10 * MS, "{ahead_ns}: {first_ns}");
-        assert!(notes[0].starts_with("The stamps of /imu and /scan are "), "{notes:?}");
+        assert!(notes[0].starts_with("By log times, the stamps of /imu and /scan differ by "), "{notes:?}");
     }
-    // What the estimator finds better itself, and what the jitter of log times hides.
+    // Offsets that the estimator determines better, and offsets below the jitter of log times.
     assert_eq!(record(15 * MS, 2), (15 * MS, Vec::new()));
     assert_eq!(record(200 * MS, 150), (200 * MS, Vec::new()));
 }

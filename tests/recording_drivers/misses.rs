@@ -16,7 +16,7 @@ fn with_scans(range: [f32; 2], miss: f32) -> Reader {
 }
 
 #[test]
-fn every_encoding_of_a_miss_gives_what_rep_117_gives() {
+fn every_encoding_of_a_miss_is_read_as_in_rep_117() {
     let rep_117 = with_scans([0.1, 30.0], f32::INFINITY);
     assert_eq!(select(&rep_117).notes, [""; 0]);
     let expected: Vec<_> = scans(&rep_117).into_iter().map(|scan| (scan.stamp, scan.returns)).collect();
@@ -28,12 +28,12 @@ fn every_encoding_of_a_miss_gives_what_rep_117_gives() {
         ([0.1, 30.0], 30.0, "as its range_max of 30 m or more (14.2 % of its beams)"),
         ([0.1, 30.0], 65.533, "as its range_max of 30 m or more (14.2 % of its beams)"),
         ([0.0, 30.0], 0.0, "as 0 (14.2 % of its beams)"),
-        // Without a range_max that can be meant.
+        // Without a plausible range_max.
         ([0.1, 0.0], f32::INFINITY, ""),
         ([0.1, f32::NAN], f32::NAN, "as NaN"),
         ([0.1, f32::MAX], 81.91, "as a constant 81.91 m (14.2 % of its beams)"),
         ([0.0, 0.0], 81.91, "as a constant 81.91 m"),
-        // A range_max that is not the one that is written.
+        // A range_max that differs from the encoded value.
         ([0.1, 100.0], 65.533, "as a constant 65.533 m"),
     ];
     for (range, miss, note) in encodings {
@@ -47,7 +47,7 @@ fn every_encoding_of_a_miss_gives_what_rep_117_gives() {
 }
 
 #[test]
-fn misses_of_clouds_are_no_walls() {
+fn misses_in_clouds_are_not_returns() {
     let direction = |k: usize| [(k as f32 * 0.01).cos() * 0.8, (k as f32 * 0.01).sin() * 0.8, 0.6];
     let points = |n: usize, miss: &dyn Fn([f32; 3]) -> Option<[f32; 3]>| -> Vec<Vec<u8>> {
         let point = |k: usize| {
@@ -79,7 +79,7 @@ fn misses_of_clouds_are_no_walls() {
 }
 
 #[test]
-fn a_lidar_that_cannot_be_decoded_gets_its_reason() {
+fn a_lidar_that_cannot_be_decoded_is_an_error_with_the_reason() {
     let error = |angles: [f32; 3], times: [f32; 2]| {
         let mut foreign = Foreign::new(mcap::WriteOptions::new());
         let scan = LaserScan { angles, time_increment: times[0], scan_time: times[1], ..room(0, [0.1, 30.0], 0.0) };
@@ -87,10 +87,10 @@ fn a_lidar_that_cannot_be_decoded_gets_its_reason() {
         foreign.reader().select(&Preference::default()).unwrap_err().to_string()
     };
     let unusable = "foreign: no lidar topic can be used: topic /sc\\u{1b}[31man: ";
-    let kind = " in its first message of type sensor_msgs/msg/LaserScan";
+    let kind = " in its first sensor_msgs/msg/LaserScan message";
     assert_eq!(error([0.0, 1.0, f32::NAN], [0.0; 2]), format!("{unusable}angle_increment is NaN or infinite{kind}"));
     assert_eq!(error([0.0, 1.0, 0.0], [0.0; 2]), format!("{unusable}angle_increment is 0 with several ranges{kind}"));
-    assert!(error([0.0, 1.0, 0.1], [1e20, 0.0]).contains("make a scan of more than 60 s"));
+    assert!(error([0.0, 1.0, 0.1], [1e20, 0.0]).contains("give a scan of more than 60 s"));
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     let cloud = point_cloud(0, &[("range", 0, FLOAT32)], 4, &[vec![0; 4]]);
     foreign.message("/imu", IMU, 0, &imu(0, "imu")).message("/points", POINTS, 0, &cloud);
@@ -107,9 +107,9 @@ fn empty_scans_and_clouds_are_valid() {
     foreign.message("/scan", SCAN, 3, &LaserScan { header: header(3, "laser"), ..empty });
     let reader = foreign.reader();
     assert_eq!(scans(&reader).iter().map(|scan| scan.returns.len()).collect::<Vec<_>>(), [0, 6, 0]);
-    // Its beams' times are those of the first scan that has beams.
+    // Beam times come from the first scan that has beams.
     let notes = select(&reader).notes;
-    assert!(!notes.iter().any(|note| note.contains("no time")), "{notes:?}");
+    assert!(!notes.iter().any(|note| note.contains("states no")), "{notes:?}");
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/imu", IMU, 0, &imu(0, "imu"));
     foreign.message("/points", POINTS, 1, &point_cloud(1, &[], 0, &[]));

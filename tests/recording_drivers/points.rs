@@ -1,4 +1,4 @@
-//! Points with times of their own, and lidars with several echoes.
+//! Point times of different drivers, and lidars with several echoes.
 
 use super::foreign::bag::{Ros1, bag};
 use super::foreign::{FLOAT32, FLOAT64, Foreign, Header, IMU, POINTS, UINT32, cdr, header, imu, scans, select};
@@ -7,14 +7,14 @@ use serde::Serialize;
 use zsim::measurement::LidarScan;
 use zsim::recording::Reader;
 
-/// A point as a driver writes it, with its time.
+/// A point as a driver serialises it, with its time after the stamp.
 type Encode = fn(i64, i64) -> Vec<u8>;
 
 fn xyz_i(after_ns: i64) -> Vec<u8> {
     [1.0, 2.0, 3.0 + after_ns as f32 * 1e-9, 40.0].map(f32::to_le_bytes).concat()
 }
 
-/// Name, fields after x, y and z, bytes of a point, when the cloud is stamped after its first point, the point.
+/// Name, fields after x, y and z, bytes per point, delay of the stamp after the first point, the point.
 type Driver = (&'static str, Fields<'static>, u32, i64, Encode);
 
 const DRIVERS: [Driver; 6] = [
@@ -93,7 +93,7 @@ const DRIVERS: [Driver; 6] = [
 ];
 
 #[test]
-fn points_are_timed_as_their_drivers_write_them() {
+fn point_times_of_all_drivers_are_read() {
     for (driver, fields, step, stamped_after_ns, encode) in DRIVERS {
         let fields = [&[("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32)], fields].concat();
         let mut foreign = Foreign::new(mcap::WriteOptions::new());
@@ -110,7 +110,7 @@ fn points_are_timed_as_their_drivers_write_them() {
             assert_eq!(scan.returns.len(), 51, "{driver}");
             for (k, point) in scan.returns.iter().enumerate() {
                 let off_ns = (scan.stamp + point.offset).nanos() - (START_NS + n as i64 * 100 * MS + k as i64 * 2 * MS);
-                // Seconds since 1970 in a double are whole 0.24 us.
+                // Seconds since 1970 in a double have a resolution of 0.24 us.
                 assert!(off_ns.abs() < 500, "{driver}: point {k} of scan {n} is {off_ns} ns off");
                 assert_eq!((point.point_in_laser.x, point.intensity), (1.0, 40.0), "{driver}");
             }

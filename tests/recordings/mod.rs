@@ -1,4 +1,4 @@
-//! A small recording to write and read, for the tests of recordings.
+//! A small recording for the tests of writing and reading.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -12,7 +12,7 @@ use zsim::recording::{RunDescription, Writer};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
-/// Bytes that a writer's thread fills.
+/// Memory that a writer's thread fills.
 #[derive(Clone, Default)]
 pub struct SharedBytes(Arc<Mutex<Vec<u8>>>);
 
@@ -32,7 +32,7 @@ impl Write for SharedBytes {
     }
 }
 
-/// A file in memory, and what will be in it.
+/// A file in memory, and a handle to its content.
 pub fn shared_file() -> (SharedBytes, SharedBytes) {
     let bytes = SharedBytes::default();
     (bytes.clone(), bytes)
@@ -75,7 +75,7 @@ pub fn imu_sample(stamp: Stamp) -> ImuSample {
     }
 }
 
-/// A sweep as a `LaserScan` holds it: 32-bit angles and times; beams without a return among it.
+/// A sweep that a `LaserScan` represents exactly: 32-bit angles and times, some beams without a return.
 pub fn planar_scan(stamp: Stamp) -> LidarScan {
     let beams = 1081;
     let mut planar = PlanarScan {
@@ -100,7 +100,7 @@ pub fn planar_scan(stamp: Stamp) -> LidarScan {
     with_returns(stamp, planar)
 }
 
-/// A sweep with its returns as points: those within the sensor's range.
+/// A sweep with its returns, those within the sensor's range, as points.
 pub fn with_returns(stamp: Stamp, planar: PlanarScan) -> LidarScan {
     let beams = planar.ranges_m.iter().zip(&planar.intensities).enumerate();
     let back = beams.filter(|(_, (range, _))| (planar.range_min_m..=planar.range_max_m).contains(*range));
@@ -116,7 +116,7 @@ pub fn with_returns(stamp: Stamp, planar: PlanarScan) -> LidarScan {
     LidarScan { stamp, stamped_after: Span::ZERO, returns: returns.collect(), planar: Some(planar) }
 }
 
-/// How the head moves: round a circle of 1 m, nodding.
+/// Ground truth of a head that nods and moves on a circle of 1 m.
 pub fn truth_sample(now: Stamp, clock: &ClockTruth) -> TruthSample {
     let t = now.nanos() as f64 * 1e-9;
     let nod = from_roll_pitch_yaw(0.0, 0.7 * (7.0 * t).sin(), t);
@@ -129,7 +129,7 @@ pub fn truth_sample(now: Stamp, clock: &ClockTruth) -> TruthSample {
     }
 }
 
-/// Records `samples` IMU samples at 100 Hz, scans at 40 Hz and truth at 1 kHz; the file.
+/// The file of a recording of `samples` IMU samples at 100 Hz, scans at 40 Hz and ground truth at 1 kHz.
 pub fn record_all(run: RunDescription, samples: i64) -> Vec<u8> {
     let (file, bytes) = shared_file();
     let has_base_imu = run.base_imu.is_some();
@@ -153,8 +153,7 @@ pub fn record_all(run: RunDescription, samples: i64) -> Vec<u8> {
     bytes.take()
 }
 
-/// The measurements in the order in which they are read, that of their stamps; of two with the same one the IMU's
-/// first.
+/// Sorts measurements by stamp as the reader does; an IMU sample precedes a scan with the same stamp.
 pub fn in_order(mut measurements: Vec<Measurement>) -> Vec<Measurement> {
     measurements.sort_by_key(|measurement| match measurement {
         Measurement::Imu(sample) => (sample.stamp, 0),
@@ -163,7 +162,7 @@ pub fn in_order(mut measurements: Vec<Measurement>) -> Vec<Measurement> {
     measurements
 }
 
-/// Records `samples` IMU samples at 100 Hz with scans at 40 Hz between them; the file, and what was written.
+/// The file and the measurements of a recording of `samples` IMU samples at 100 Hz and scans at 40 Hz.
 pub fn record(run: RunDescription, samples: i64) -> (Vec<u8>, Vec<Measurement>) {
     let (file, bytes) = shared_file();
     let mut writer = Writer::new(file, run).unwrap();

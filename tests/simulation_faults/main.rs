@@ -1,14 +1,14 @@
-//! Faults of sensors: what each of them does to a simulation that is otherwise the same.
+//! Sensor faults: the effect of each on an otherwise unchanged simulation.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod delivery;
-#[path = "../simulation_kept/mod.rs"]
-mod simulation_kept;
+#[path = "../memory_sink/mod.rs"]
+mod memory_sink;
 mod spec;
 mod values;
 
-use simulation_kept::Kept;
+use memory_sink::MemorySink;
 use std::sync::OnceLock;
 use zsim::random::Seed;
 use zsim::simulation::{EPOCH, FaultsSpec, Scenario, Simulation, Specs};
@@ -38,15 +38,15 @@ fn simulation(scenario: &Scenario, list: Option<&str>) -> Result<Simulation, Str
     Simulation::build(scenario, specs, &sources).map_err(|error| error.to_string())
 }
 
-fn run(scenario: &Scenario, list: Option<&str>) -> Kept {
-    let mut kept = Kept::default();
-    simulation(scenario, list).unwrap().run(&mut kept, &mut |_| ()).unwrap();
-    kept
+fn run(scenario: &Scenario, list: Option<&str>) -> MemorySink {
+    let mut recorded = MemorySink::default();
+    simulation(scenario, list).unwrap().run(&mut recorded, &mut |_| ()).unwrap();
+    recorded
 }
 
-/// The run without faults that all others are compared with.
-fn without() -> &'static Kept {
-    static KEPT: OnceLock<Kept> = OnceLock::new();
+/// The reference run without faults.
+fn reference() -> &'static MemorySink {
+    static KEPT: OnceLock<MemorySink> = OnceLock::new();
     KEPT.get_or_init(|| run(&usual(), None))
 }
 
@@ -54,7 +54,7 @@ fn usual() -> Scenario {
     scenario("mocap_room", "3dm_gx2", 1)
 }
 
-fn with(list: &str) -> Kept {
+fn with(list: &str) -> MemorySink {
     run(&usual(), Some(list))
 }
 
@@ -64,11 +64,11 @@ fn since_start_s(stamp: Stamp) -> f64 {
 
 #[test]
 fn an_empty_list_changes_nothing() {
-    assert!(with("") == *without());
+    assert!(with("") == *reference());
 }
 
 #[test]
-fn draws_are_those_of_the_seed_with_any_number_of_threads() {
+fn random_faults_depend_only_on_the_seed() {
     let list = "(sensor: both, fault: drop(share: 0.2)), (sensor: imu, fault: delay(mean_s: 0.02)),
         (sensor: lidar, fault: reorder(share: 0.3)), (sensor: imu, fault: duplicate(share: 0.1))";
     let once = with(list);
@@ -76,9 +76,9 @@ fn draws_are_those_of_the_seed_with_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert!(pool.install(|| with(list)) == once);
     }
-    // Of the two seeds other samples are lost: a share of 0.2 twice has so many in common only by chance of 1e-100.
+    // The seeds lose different scans: equal arrivals by chance have a probability of 1e-100.
     let other = run(&scenario("mocap_room", "3dm_gx2", 2), Some(list));
-    let arrivals = |kept: &Kept| kept.scans.iter().map(|(arrival, _)| *arrival).collect::<Vec<_>>();
+    let arrivals = |recorded: &MemorySink| recorded.scans.iter().map(|(arrival, _)| *arrival).collect::<Vec<_>>();
     assert_ne!(arrivals(&once), arrivals(&other));
 }
 
@@ -87,9 +87,9 @@ fn faults_share_physics_and_rays() {
     let lists =
         [None, Some("(sensor: imu, fault: drop(share: 0.5))"), Some("(sensor: lidar, fault: delay(mean_s: 0.1))")];
     let simulations: Vec<_> = lists.iter().map(|list| simulation(&usual(), *list).unwrap()).collect();
-    let mut kept: Vec<Kept> = lists.iter().map(|_| Kept::default()).collect();
-    Simulation::run_together(&simulations, &mut kept.iter_mut().collect::<Vec<_>>(), &mut |_| ()).unwrap();
-    for (together, list) in kept.iter().zip(lists) {
+    let mut recorded: Vec<MemorySink> = lists.iter().map(|_| MemorySink::default()).collect();
+    Simulation::run_together(&simulations, &mut recorded.iter_mut().collect::<Vec<_>>(), &mut |_| ()).unwrap();
+    for (together, list) in recorded.iter().zip(lists) {
         assert!(*together == run(&usual(), list), "{list:?}");
     }
 }
@@ -98,8 +98,9 @@ fn faults_share_physics_and_rays() {
 fn faults_act_in_the_order_listed() {
     let clip = "(sensor: imu, fault: clip(gyro_rad_per_s: 0.1))";
     let step = "(sensor: imu, from_s: 0, fault: bias_step(gyro_rad_per_s: (1, 1, 1)))";
-    let largest =
-        |kept: Kept| kept.samples.iter().map(|(_, s)| s.angular_velocity_rad_per_s.amax()).fold(0.0, f64::max);
+    let largest = |recorded: MemorySink| {
+        recorded.samples.iter().map(|(_, s)| s.angular_velocity_rad_per_s.amax()).fold(0.0, f64::max)
+    };
     assert!((largest(with(&format!("{clip}, {step}"))) - 1.1).abs() < 1e-12);
     assert!((largest(with(&format!("{step}, {clip}"))) - 0.1).abs() < 1e-12);
 }

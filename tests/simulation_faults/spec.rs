@@ -1,6 +1,6 @@
-//! Lists of faults as they are written.
+//! Specs of faults: shipped lists, errors, files of arrival times.
 
-use super::{Kept, simulation, usual};
+use super::{MemorySink, simulation, usual};
 use zsim::simulation::{FaultsSpec, Scenario, Simulation, Specs};
 use zsim::spec::{Kind, Source, names, parse};
 
@@ -9,8 +9,8 @@ fn every_shipped_list_of_faults_builds_and_runs() {
     for name in names(Kind::Faults) {
         let scenario = Scenario { faults: Some(name.clone()), duration_s: 0.5, ..usual() };
         let simulation = Simulation::prepare(&scenario).unwrap_or_else(|error| panic!("{name}: {error}"));
-        simulation.run(&mut Kept::default(), &mut |_| ()).unwrap();
-        // A manifest holds the specs whole: what is read back is what was used, files included.
+        simulation.run(&mut MemorySink::default(), &mut |_| ()).unwrap();
+        // A manifest has the complete specs, including referenced files: it must reproduce the run.
         let text = zsim::spec::to_text(simulation.specs()).unwrap();
         let read: Specs = parse(&Source::in_memory("manifest", text)).unwrap();
         assert_eq!(&read, simulation.specs(), "{name}");
@@ -18,7 +18,7 @@ fn every_shipped_list_of_faults_builds_and_runs() {
 }
 
 #[test]
-fn a_wrong_fault_is_refused_with_its_place_and_a_remedy() {
+fn an_invalid_fault_is_refused_with_its_line_and_a_remedy() {
     for (list, place, words) in [
         ("(sensor: imu, fault: gap)", "2:15", "give from_s and to_s"),
         ("(sensor: imu, fault: drop(share: 1.5))", "2:", "a number from 0 to 1"),
@@ -50,7 +50,7 @@ fn a_wrong_fault_is_refused_with_its_place_and_a_remedy() {
         ("(sensor: imu, fault: thin(file: \"missing.txt\"))", "2:27", "missing.txt"),
         ("(sensor: imu, fault: axes(gyro_scale: 0))", "2:22", "above 0"),
     ] {
-        // A fault before it, and the word in a comment: the place is that of the second fault.
+        // With another fault before it, and its key in a comment, the location must be that of the second fault.
         let Err(first) = simulation(&usual(), Some(list)) else { panic!("{list} is accepted") };
         assert!(first.starts_with(&format!("test.ron:{place}")) && first.contains(words), "{list}: {first}");
         let later = format!(
@@ -63,7 +63,7 @@ fn a_wrong_fault_is_refused_with_its_place_and_a_remedy() {
     let Err(error) = simulation(&round, Some("(sensor: lidar, fault: misses(encoding: zero))")) else {
         panic!("no LaserScan")
     };
-    assert!(error.contains("scans no plane"), "{error}");
+    assert!(error.contains("is not planar"), "{error}");
 }
 
 #[test]

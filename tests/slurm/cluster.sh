@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# A throw-away Slurm of two nodes on this machine, on loopback, without systemd, cgroups or accounting; as root.
-#   cluster.sh up FOLDER      all of its state is in FOLDER; prints what a client must export
-#   cluster.sh down FOLDER    stops the daemons that were begun there, by their pid
-# Needs the packages slurm-wlm and munge; exits with 77 and a word where it cannot run.
+# A temporary Slurm cluster of two nodes on loopback, without systemd, cgroups or accounting; needs root.
+#   cluster.sh up FOLDER      keeps all state in FOLDER; prints the variables that a client must export
+#   cluster.sh down FOLDER    stops the daemons that were started there, by their PID
+# Needs the packages slurm-wlm and munge; exits with 77 and a message if it cannot run.
 set -euo pipefail
 verb=$1 at=$2
 port=${SLURM_TEST_PORT:-16900}
@@ -10,7 +10,7 @@ port=${SLURM_TEST_PORT:-16900}
 skip() { echo "skipped: $*" >&2; exit 77; }
 
 up() {
-  [ "$(id -u)" = 0 ] || skip "a Slurm of one's own needs root here"
+  [ "$(id -u)" = 0 ] || skip "a local Slurm cluster needs root"
   for program in munged slurmctld slurmd sbatch squeue; do
     command -v "$program" >/dev/null || skip "$program is not installed (Debian: slurm-wlm and munge)"
   done
@@ -18,7 +18,7 @@ up() {
   host=$(hostname -s)
   getent hosts "$host" >/dev/null || skip "the host's name $host is not resolvable"
   memory=$(($(awk '/MemTotal/ { print $2 }' /proc/meminfo) / 1024 * 9 / 20))
-  # munged wants its folders private, and nobody else's above them.
+  # munged requires private folders below folders that others cannot write.
   mkdir -p "$at"/{munge,state,log,spool.n0,spool.n1}
   chmod 755 "$at" "$at/munge"
   dd if=/dev/urandom of="$at/munge/key" bs=1024 count=1 status=none
@@ -69,7 +69,7 @@ CONF
     sleep 0.1
   done
   tail -n 20 "$at"/log/*.log >&2
-  echo "the nodes did not come up" >&2
+  echo "the nodes did not start" >&2
   exit 1
 }
 

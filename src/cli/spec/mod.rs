@@ -3,7 +3,7 @@
 mod reference;
 
 use super::arguments::Global;
-use super::{End, output};
+use super::{Completion, output};
 use clap::{Args, Subcommand, ValueEnum};
 use schemars::{Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::json;
@@ -26,11 +26,11 @@ use zsim::world::SceneSpec;
 )]
 pub(super) struct Arguments {
     #[command(subcommand)]
-    verb: Verb,
+    command: Command,
 }
 
 #[derive(Subcommand)]
-enum Verb {
+enum Command {
     /// List the specs that are built into zsim
     List {
         /// List only this kind
@@ -95,20 +95,20 @@ impl From<KindArgument> for Kind {
     }
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<End> {
-    match &arguments.verb {
-        Verb::List { kind } => list(kind.map(Kind::from), global)?,
-        Verb::Show { kind, name } => output::write_to_stdout(&find((*kind).into(), name)?.text)?,
-        Verb::Schema { kind } => {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
+    match &arguments.command {
+        Command::List { kind } => list(kind.map(Kind::from), global)?,
+        Command::Show { kind, name } => output::write_to_stdout(&find((*kind).into(), name)?.text)?,
+        Command::Schema { kind } => {
             let text = serde_json::to_string_pretty(&schema((*kind).into()))? + "\n";
             output::write_to_stdout(&text)?;
         }
-        Verb::Reference { kind } => {
+        Command::Reference { kind } => {
             let kind = (*kind).into();
             output::write_to_stdout(&reference::markdown(kind, &schema(kind)))?;
         }
     }
-    Ok(End::Done)
+    Ok(Completion::Done)
 }
 
 fn list(wanted: Option<Kind>, global: &Global) -> anyhow::Result<()> {
@@ -116,7 +116,7 @@ fn list(wanted: Option<Kind>, global: &Global) -> anyhow::Result<()> {
     let width = kinds.iter().map(|kind| kind.folder().len()).max().unwrap_or_default();
     let lines = kinds.iter().map(|kind| format!("{:width$}  {}\n", kind.folder(), names(*kind).join(", ")));
     let figures = kinds.iter().map(|kind| (kind.folder().to_owned(), json!(names(*kind)))).collect();
-    output::tell(global, &lines.collect::<String>(), serde_json::Value::Object(figures), None)
+    output::print_result(global, &lines.collect::<String>(), serde_json::Value::Object(figures), None)
 }
 
 /// The JSON schema of a kind of spec.

@@ -161,7 +161,7 @@ fn intervals(
     for (k, (raw_s, sample)) in stamped.iter().enumerate() {
         match screen.screen((*raw_s, sample), stamped[k + 1..].iter()) {
             Screened::Measured(clipped) => stream.push(*raw_s, (sample, clipped), &mut placed),
-            Screened::Outlier => stream.leave_out(),
+            Screened::Outlier => stream.note_discarded_outlier(),
             Screened::Frozen => {}
         }
     }

@@ -203,7 +203,7 @@ impl Step {
 
 /// Trajectory within an epoch: integrated from the start, corrected linearly in time to meet the estimate at the end.
 fn between(start_s: f64, intervals: &[Interval], [start_estimate, end]: [&Estimate; 2]) -> Nominal {
-    let mut path = Nominal::beginning(start_s, start_estimate.state);
+    let mut path = Nominal::starting(start_s, start_estimate.state);
     for interval in intervals {
         path.extend(*interval, &start_estimate.biases, &start_estimate.gravity());
     }

@@ -1,22 +1,22 @@
 //! The estimator: measurements in, poses out.
 
-mod gauging;
+mod gauge;
 mod poses;
-mod verdict;
+mod reports;
 
-use self::gauging::Gauging;
-use self::verdict::{leaves_to_the_imu, report, trouble};
+use self::gauge::GaugeBuilder;
+use self::reports::{is_dead_reckoning, report, trouble};
 use crate::estimation::border::Border;
-use crate::estimation::consider::{Consider, OfBeginning, Sensitivity};
-use crate::estimation::initial::{self, Beginning, Carried, Noisier};
-use crate::estimation::intake::{Intake, Stretch};
+use crate::estimation::consider::{Consider, Sensitivity, StartMatrix};
+use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
+use crate::estimation::intake::{Intake, Segment};
+use crate::estimation::localisation::{GapRelocalisation, MapLocalisation};
 use crate::estimation::spent::Stopwatch;
 use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::strapdown::Interval;
 use crate::estimation::surfel::{Beam, Patch, SurfelMaker};
 use crate::estimation::survey::Survey;
 use crate::estimation::views::Views;
-use crate::estimation::whereabouts::{Before, Whereabouts};
 use crate::estimation::window::{Linearised, Window};
 use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
 use crate::geometry::{Pose, Trajectory, Vector};
@@ -25,52 +25,50 @@ use crate::surfel_map::SurfelMap;
 use crate::time::Stamp;
 use std::time::Instant;
 
-/// A head faster than this, m/s, or turning faster than this, rad/s, should match surfaces. Below both the IMU is
-/// sufficient.
+/// Speed (m/s) or rotation rate (rad/s) above which too few matches are a problem. Below both the IMU is sufficient.
 const MOVING: (f64, f64) = (0.3, 0.5);
 
-/// Until the head is relocalised after a gap, the next gap is bridged up to this many times longer than
-/// usual.
-const RELUCTANTLY: f64 = 3.0;
+/// While relocalisation after a gap is pending, gaps of up to this multiple of `max_gap_s` are bridged.
+const BRIDGING_FACTOR_WHILE_LOST: f64 = 3.0;
 
-/// An estimated noise above the specification by more than this factor is reported.
-const TELLING: f64 = 1.5;
+/// An estimated noise above the specification by more than this factor causes a warning.
+const REPORTED_NOISE_FACTOR: f64 = 1.5;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
 /// Latency: [`Estimator::take_poses`] returns a pose when it is final, `window_s` plus `step_s` after the time of the
-/// pose, plus 0.1 s for late measurements. While the head is at rest
-/// the window grows until the lidar has swept for `window_s`, to three times `window_s` at most; the latency grows too.
+/// pose, plus 0.1 s for late measurements. While the head rests, the window grows until the lidar has swept for
+/// `window_s`, up to three times `window_s`, and the latency grows with it.
 #[derive(Debug)]
 pub struct Estimator {
     spec: EstimatorSpec,
     calibration: Calibration,
     intake: Intake,
-    /// Stretches that wait until there are enough to begin.
-    waiting: Vec<Stretch>,
+    /// Segments received before the first window exists.
+    waiting: Vec<Segment>,
     window: Option<Window>,
-    /// The state at the start of the last IMU gap, until the first window after the gap is level.
-    carried: Option<Carried>,
+    /// The state at the start of the last IMU gap, until gravity is aligned after the gap.
+    before_gap: Option<StateBeforeGap>,
     views: Views,
-    /// A map in which the head is, where one is given.
-    whereabouts: Option<Whereabouts>,
-    /// Surfaces from before the IMU gap, until relocalisation in them is done.
-    before: Option<Before>,
-    /// Observed surfaces, where the caller requests them.
+    /// Localisation in the given map, if any.
+    map_localisation: Option<MapLocalisation>,
+    /// Pending relocalisation in the surfaces seen before an IMU gap.
+    gap_relocalisation: Option<GapRelocalisation>,
+    /// Observed surfaces, if the caller requests them.
     survey: Option<Survey>,
     consider: Consider,
-    gauging: Gauging,
-    /// Sensitivity of the newest window's end to the errors of its beginning.
+    gauge: GaugeBuilder,
+    /// Sensitivity of the end of the newest window to the errors at its start.
     at_end: Option<Sensitivity>,
     next_pose: Option<Stamp>,
-    /// Stamp of the last pose that was handed out.
+    /// Stamp of the last pose of the output.
     newest_pose: Option<Stamp>,
     poses: Vec<EstimatedPose>,
     clock_offsets: Vec<(Stamp, f64)>,
     windows: Vec<WindowReport>,
     warnings: Vec<Warning>,
-    /// Time for which only the IMU constrained the motion, s.
-    carried_s: f64,
+    /// Total time of dead reckoning with the IMU, s.
+    dead_reckoning_s: f64,
     /// The problem of the newest window, and whether it was reported.
     trouble: Option<(WarningKind, bool)>,
 }
@@ -79,7 +77,7 @@ impl Estimator {
     /// An estimator without measurements.
     ///
     /// # Errors
-    /// When a setting or the calibration makes no sense.
+    /// If a setting or the calibration is invalid.
     pub fn new(spec: &EstimatorSpec, calibration: &Calibration) -> Result<Self, EstimationError> {
         spec.check()?;
         check(calibration)?;
@@ -89,13 +87,13 @@ impl Estimator {
             intake: Intake::new(spec, calibration),
             waiting: Vec::new(),
             window: None,
-            carried: None,
+            before_gap: None,
             views: Views::new(&spec.views, spec.fixed_views),
-            whereabouts: None,
-            before: None,
+            map_localisation: None,
+            gap_relocalisation: None,
             survey: None,
-            consider: Consider::new(Vector::zeros(), &OfBeginning::zeros()),
-            gauging: Gauging::default(),
+            consider: Consider::new(Vector::zeros(), &StartMatrix::zeros()),
+            gauge: GaugeBuilder::default(),
             at_end: None,
             next_pose: None,
             newest_pose: None,
@@ -103,32 +101,32 @@ impl Estimator {
             clock_offsets: Vec::new(),
             windows: Vec::new(),
             warnings: Vec::new(),
-            carried_s: 0.0,
+            dead_reckoning_s: 0.0,
             trouble: None,
         })
     }
 
-    /// The same estimator, which also stores its observations for [`super::register`]: memory then grows with the
-    /// recording.
+    /// Also stores the observed surfaces for [`super::register`]; memory then grows with the recording.
     pub fn surveying(self) -> Self {
         Self { survey: Some(Survey::default()), ..self }
     }
 
-    /// The same estimator, with the trajectory in the frame of `map`. The head starts near
-    /// `map_from_head`: within a metre on the level and twenty degrees about the vertical. Every window is
-    /// matched with the map too. The first pose follows after the first full window, when the head is localised.
+    /// Estimates the trajectory in the frame of `map`, with every window matched with the map.
+    ///
+    /// The head must start near `map_from_head`: within 1 m horizontally and 20 degrees of heading. The first pose is
+    /// available when the first full window is localised.
     pub fn in_map(self, map: &SurfelMap, map_from_head: &Pose) -> Self {
-        Self { whereabouts: Some(Whereabouts::about(map, *map_from_head, &self.spec)), ..self }
+        Self { map_localisation: Some(MapLocalisation::new(map, *map_from_head, &self.spec)), ..self }
     }
 
-    /// Takes a measurement, in about the order of time; when a stretch of time is complete, the window moves over it.
+    /// Adds a measurement, in approximate order of time; processes each segment that is complete.
     ///
     /// # Errors
-    /// When the measurement is not finite, or the head is not found in the map that was given.
+    /// If the measurement is not finite, or localisation in the given map fails.
     pub fn push(&mut self, measurement: Measurement) -> Result<(), EstimationError> {
-        self.intake.take(measurement)?;
-        while let Some(stretch) = self.intake.next_stretch(false) {
-            self.advance(stretch)?;
+        self.intake.push(measurement)?;
+        while let Some(segment) = self.intake.next_segment(false) {
+            self.advance(segment)?;
         }
         Ok(())
     }
@@ -138,75 +136,74 @@ impl Estimator {
         std::mem::take(&mut self.poses)
     }
 
-    /// Solves the remaining windows; the result has the poses not yet returned, and the reports of all windows.
+    /// Processes the remaining data; the result has the poses not yet returned, and the reports of all windows.
     ///
     /// # Errors
-    /// When there was no IMU, no lidar, or too little of both to start, or the head is not found in the map that was
-    /// given.
+    /// If IMU or lidar data are missing or too short to start, or localisation in the given map fails.
     pub fn finish(mut self) -> Result<OpenLoop, EstimationError> {
-        while let Some(stretch) = self.intake.next_stretch(true) {
-            self.advance(stretch)?;
+        while let Some(segment) = self.intake.next_segment(true) {
+            self.advance(segment)?;
         }
-        self.begin(true);
-        self.find_in_map()?;
-        self.find_again();
+        self.start_if_ready(true);
+        self.localise_in_map()?;
+        self.relocalise();
         self.intake.close();
         self.warnings.extend(self.intake.take_warnings());
         self.warn_of_loss();
         self.warn_of_contradiction();
-        let Some(window) = &self.window else { return Err(self.why_nothing()) };
+        let Some(window) = &self.window else { return Err(self.missing_data_error()) };
         let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
         let (lidar, calibrated_lidar) = (window.lidar(), window.calibrated_lidar());
-        self.consider_the_end();
-        self.hand_out(end_s);
+        self.propagate_to_end();
+        self.output_poses(end_s);
         self.survey_window(Window::survey_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        let gauged = self.gauging.finish(&mut self.consider, self.newest_pose);
-        let Self { poses, clock_offsets, windows, warnings, survey, whereabouts, .. } = self;
+        let gauged = self.gauge.finish(&mut self.consider, self.newest_pose);
+        let Self { poses, clock_offsets, windows, warnings, survey, map_localisation, .. } = self;
         let survey = survey.unwrap_or_default();
-        let located = whereabouts.and_then(|whereabouts| whereabouts.found().cloned());
+        let located = map_localisation.and_then(|map_localisation| map_localisation.found().cloned());
         let learnt = OpenLoop { lidar, calibrated_lidar, located, ..OpenLoop::default() };
         Ok(OpenLoop { trajectory, poses, gauged, clock_offsets, windows, warnings, survey, ..learnt })
     }
 
-    /// Processes one segment: it joins the window, the window is solved, the oldest segment leaves, its poses are
-    /// final, and its surfels may become a fixed view.
-    fn advance(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
-        // While the head is still to be found, beginning once more would be to lose it.
-        self.intake.bridge(if self.before.is_some() { RELUCTANTLY } else { 1.0 });
+    /// Adds a segment: handles a gap before it, starts the first window, and processes the segment.
+    fn advance(&mut self, segment: Segment) -> Result<(), EstimationError> {
+        // A restart before relocalisation would discard the pending search.
+        self.intake.bridge_gaps_up_to(if self.gap_relocalisation.is_some() { BRIDGING_FACTOR_WHILE_LOST } else { 1.0 });
         self.warnings.extend(self.intake.take_warnings());
-        if stretch.after_silence {
-            self.find_in_map()?;
-            self.find_again();
-            self.pause();
+        if segment.after_gap {
+            self.localise_in_map()?;
+            self.relocalise();
+            self.stop_at_gap();
         }
-        self.waiting.push(stretch);
-        self.begin(false);
+        self.waiting.push(segment);
+        self.start_if_ready(false);
         if self.window.is_some() {
-            for stretch in std::mem::take(&mut self.waiting) {
-                self.take_in(stretch)?;
+            for segment in std::mem::take(&mut self.waiting) {
+                self.process(segment)?;
             }
         }
         Ok(())
     }
 
-    fn take_in(&mut self, stretch: Stretch) -> Result<(), EstimationError> {
+    /// Solves the window with the new segment and outputs the poses that become final.
+    fn process(&mut self, segment: Segment) -> Result<(), EstimationError> {
         let Some(window) = &mut self.window else { return Ok(()) };
         let started = Instant::now();
-        let mut spent = window.extend(&stretch.intervals, stretch.beams, stretch.end_s);
+        let mut spent = window.extend(&segment.intervals, segment.beams, segment.end_s);
         let (mut solved, mut linearised) = window.solve(&self.views);
         spent += solved.spent;
         let mut watch = Stopwatch::start();
-        window.remake_newest();
+        window.rebuild_newest_surfels();
         spent.surfels_s += watch.lap_s();
         if window.is_full()
-            && let Some(carried) = self.carried.take()
+            && let Some(before_gap) = self.before_gap.take()
         {
-            window.level_as(&carried);
+            window.align_gravity_with(&before_gap);
         }
-        if window.is_full() && (self.find_in_map()? || self.find_again()) {
-            // Solve a second time, with the surfaces in view there.
+        if window.is_full() && (self.localise_in_map()? || self.relocalise()) {
+            // Solve again, with matches with the map or the old views.
             let Some(window) = &mut self.window else { return Ok(()) };
             (solved, linearised) = window.solve(&self.views);
             spent += solved.spent;
@@ -217,33 +214,35 @@ impl Estimator {
         if window.is_full() {
             self.survey_window(Window::survey_oldest, Window::oldest_end_s);
         }
-        watch.lap_s(); // the survey reports this time itself
-        let final_until_s = self.let_go(linearised.as_ref());
+        watch.lap_s(); // the survey has its own time
+        let final_until_s = self.finish_oldest_segment(linearised.as_ref());
         spent.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return Ok(()) };
         let took = (elapsed_s + spent.views_s, spent);
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving =
-            window.speed_m_per_s() > MOVING.0 || stretch.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
+            window.speed_m_per_s() > MOVING.0 || segment.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
         let trouble = trouble(&solved, &self.spec, moving);
-        let at = (self.intake.stamp(stretch.end_s), moving);
+        let at = (self.intake.stamp(segment.end_s), moving);
         self.windows.push(report(&solved, at, window, trouble.clone(), took));
-        self.carried_s += if trouble.as_ref().is_some_and(leaves_to_the_imu) { self.spec.step_s } else { 0.0 };
-        self.say(trouble, stretch.end_s);
+        self.dead_reckoning_s += if trouble.as_ref().is_some_and(is_dead_reckoning) { self.spec.step_s } else { 0.0 };
+        self.warn_of_trouble(trouble, segment.end_s);
         if let Some(until_s) = final_until_s {
-            self.hand_out(until_s);
+            self.output_poses(until_s);
             let Some(window) = &mut self.window else { return Ok(()) };
             window.nominal.forget_before(until_s - 0.2);
         }
         Ok(())
     }
 
-    /// Puts the window into the map where one is given and the head is not found in it yet; whether it is found now.
-    fn find_in_map(&mut self) -> Result<bool, EstimationError> {
-        let (Some(whereabouts), Some(window)) = (&mut self.whereabouts, &mut self.window) else { return Ok(false) };
-        let found = match whereabouts.find(window, &self.calibration.head_from_imu) {
+    /// Localises the window in the given map, if a search is pending; returns whether it succeeded.
+    fn localise_in_map(&mut self) -> Result<bool, EstimationError> {
+        let (Some(map_localisation), Some(window)) = (&mut self.map_localisation, &mut self.window) else {
+            return Ok(false);
+        };
+        let found = match map_localisation.find(window, &self.calibration.head_from_imu) {
             Some(Ok(found)) => found,
-            Some(Err(_)) if whereabouts.found().is_some() => {
+            Some(Err(_)) if map_localisation.found().is_some() => {
                 let stamp = self.intake.stamp(window.nominal.end_s());
                 self.warnings.push(Warning { stamp, kind: WarningKind::LostInMap });
                 return Ok(false);
@@ -251,35 +250,35 @@ impl Estimator {
             Some(Err(error)) => return Err(error),
             None => return Ok(false),
         };
-        window.found_at(&found.map_from_query);
-        let place = window.begins().translation.vector;
+        window.move_by(&found.map_from_query);
+        let place = window.start_pose().translation.vector;
         let views = Views::new(&self.spec.views, self.spec.fixed_views);
-        self.views = views.in_map(whereabouts.patches(), window.matcher(), place);
+        self.views = views.with_map(map_localisation.patches(), window.matcher(), place);
         let known = window.known_at_start().unwrap_or_default();
-        self.consider = Consider::found(place, &known, (found.covariance, whereabouts.covariance()));
+        self.consider = Consider::localised(place, &known, (found.covariance, map_localisation.covariance()));
         Ok(true)
     }
 
-    /// Relocalises the window in the surfaces from before a gap, if a search is pending; returns whether it succeeded.
-    fn find_again(&mut self) -> bool {
-        let (Some(window), Some(before)) = (&mut self.window, self.before.take()) else { return false };
+    /// Relocalises the window in the surfaces seen before a gap, if a search is pending; returns whether it succeeded.
+    fn relocalise(&mut self) -> bool {
+        let (Some(window), Some(search)) = (&mut self.window, self.gap_relocalisation.take()) else { return false };
         let stamp = self.intake.stamp(window.nominal.end_s());
-        let (map_from_here, views, consider) = match before.find(window, &self.spec) {
+        let (map_from_here, views, consider) = match search.find(window, &self.spec) {
             Ok(found) => found,
             Err(why) => {
-                self.warnings.push(Warning { stamp, kind: WarningKind::LostAgain { why } });
+                self.warnings.push(Warning { stamp, kind: WarningKind::NotRelocalised { why } });
                 return false;
             }
         };
         let away_m = (consider.pivot() - self.consider.pivot()).norm();
-        self.warnings.push(Warning { stamp, kind: WarningKind::FoundAgain { away_m } });
-        window.found_at(&map_from_here);
+        self.warnings.push(Warning { stamp, kind: WarningKind::Relocalised { away_m } });
+        window.move_by(&map_from_here);
         (self.views, self.consider) = (views, consider);
         true
     }
 
-    /// Lets the oldest stretch go if the window is full. Until when, IMU time, the poses are final then, s.
-    fn let_go(&mut self, linearised: Option<&Linearised>) -> Option<f64> {
+    /// Removes the oldest segment if the window is full. Returns the time up to which poses are final, IMU time, s.
+    fn finish_oldest_segment(&mut self, linearised: Option<&Linearised>) -> Option<f64> {
         let window = self.window.as_mut()?;
         let end_s = window.nominal.end_s();
         self.at_end = linearised.and_then(|at| window.sensitivity_at(end_s, at, &self.views));
@@ -291,39 +290,40 @@ impl Estimator {
             self.consider.advance(&by);
         }
         let tau_s = until_s - window.clock.offset_at(until_s);
-        self.gauging.advance(&mut self.consider, until_s, self.intake.stamp(tau_s));
+        self.gauge.advance(&mut self.consider, until_s, self.intake.stamp(tau_s));
         let window = self.window.as_mut()?;
-        let patches = window.let_go(linearised)?;
-        let taken = self.views.take(&patches, self.spec.step_s, (window.matcher(), self.consider.pivot()));
-        self.consider.take(taken);
+        let patches = window.remove_oldest(linearised)?;
+        let update = self.views.add_segment(&patches, self.spec.step_s, (window.matcher(), self.consider.pivot()));
+        self.consider.update_views(update);
         Some(until_s)
     }
 
-    /// Handles an IMU gap: the window's content is final, and the estimate restarts after the gap.
-    fn pause(&mut self) {
+    /// Handles an IMU gap: the content of the window is final, and the estimate restarts after the gap.
+    fn stop_at_gap(&mut self) {
         self.waiting.clear();
         let Some(window) = &self.window else { return };
         let end_s = window.nominal.end_s().min(window.clock.imu_s(self.end_tau_s()));
-        self.carried = window.carried();
-        self.consider_the_end();
-        self.hand_out(end_s);
+        self.before_gap = window.state_before_gap();
+        self.propagate_to_end();
+        self.output_poses(end_s);
         self.survey_window(Window::survey_all, Window::end_s);
         let Some(window) = self.window.take() else { return };
         self.next_pose = None;
-        // Where the head is now in the old views is unknown: matched by chance, they would bend the new stretch.
+        // The pose relative to the old views is unknown after the gap; accidental matches with them would be wrong.
         let mut views = std::mem::replace(&mut self.views, Views::new(&self.spec.views, self.spec.fixed_views));
-        if let Some(whereabouts) = &mut self.whereabouts {
-            self.poses.last().into_iter().for_each(|last| whereabouts.look_again(last.map_from_head));
+        if let Some(map_localisation) = &mut self.map_localisation {
+            self.poses.last().into_iter().for_each(|last| map_localisation.restart_search(last.map_from_head));
         } else {
             let last = window.patches();
-            let taken = views.take(&last, self.spec.views.length_s, (window.matcher(), self.consider.pivot()));
-            self.consider.take(taken);
-            self.before = Some(Before::new((views, self.consider.clone()), last, window.nominal.end_s()));
+            let update = views.add_segment(&last, self.spec.views.length_s, (window.matcher(), self.consider.pivot()));
+            self.consider.update_views(update);
+            self.gap_relocalisation =
+                Some(GapRelocalisation::new((views, self.consider.clone()), last, window.nominal.end_s()));
         }
     }
 
-    /// Starts when the data suffice to distinguish rest from motion; with `last`, with the data available.
-    fn begin(&mut self, last: bool) {
+    /// Creates the first window once there are enough data to distinguish rest from motion; with `last`, with any data.
+    fn start_if_ready(&mut self, last: bool) {
         if self.window.is_some() {
             return;
         }
@@ -338,39 +338,39 @@ impl Estimator {
             Some(*sum)
         });
         let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
-        let fitting = self.intake.sight().fit(&self.spec);
+        let adapted = self.intake.scan_geometry().adapt(&self.spec);
         if let Some(survey) = &mut self.survey {
-            survey.ranges_are_held = self.intake.sight().is_one_way();
+            survey.ranges_are_held = self.intake.scan_geometry().is_one_way();
         }
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let seen = self.seen_standstill();
+        let seen = self.lidar_standstill();
         let may_rest = seen != Standstill::Moves;
-        let beginning = initial::begin((&intervals[..resting], may_rest), head_from_imu, noise, &fitting);
+        let initial_state = initial::estimate((&intervals[..resting], may_rest), head_from_imu, noise, &adapted);
         let start_s = *start_s;
-        self.make_noisier(beginning.noisier, start_s);
-        let (beginning, goes_on) = match &self.carried {
-            Some(carried) => (beginning.going_on_from(carried, start_s), true),
-            None => (beginning, false),
+        self.raise_noise(initial_state.noise_factors, start_s);
+        let (initial_state, continues) = match &self.before_gap {
+            Some(before_gap) => (initial_state.continued_from(before_gap, start_s), true),
+            None => (initial_state, false),
         };
-        if !goes_on && beginning.rest.is_none() {
+        if !continues && initial_state.rest.is_none() {
             let stamp = self.intake.stamp(start_s);
             self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
         }
-        let mut window = self.first_window(&fitting, &beginning, start_s);
+        let mut window = self.first_window(&adapted, &initial_state, start_s);
         if seen == Standstill::Unknown {
-            window = window.without_seeing_rest();
+            window = window.with_unobservable_rest();
         }
-        if let Some(carried) = &self.carried {
-            window.take_over(carried);
+        if let Some(before_gap) = &self.before_gap {
+            window.resume_from(before_gap);
         }
         let (pivot, known) = (self.consider.pivot(), window.known_at_start().unwrap_or_default());
-        self.consider = if goes_on { Consider::lost(pivot, &known) } else { Consider::new(pivot, &known) };
+        self.consider = if continues { Consider::after_gap(pivot, &known) } else { Consider::new(pivot, &known) };
         self.window = Some(window);
     }
 
-    /// The evidence of the lidar on whether the head moved in the assumed rest.
-    fn seen_standstill(&self) -> Standstill {
-        let beams: Vec<Beam> = self.waiting.iter().flat_map(|stretch| &stretch.beams).copied().collect();
+    /// Whether the lidar shows motion or rest during the assumed initial rest.
+    fn lidar_standstill(&self) -> Standstill {
+        let beams: Vec<Beam> = self.waiting.iter().flat_map(|segment| &segment.beams).copied().collect();
         let (Some(first), Some(last)) = (beams.first(), beams.last()) else { return Standstill::Unknown };
         let quarter_s = 0.25 * (last.tau_s.min(first.tau_s + self.spec.inertial.rest_s) - first.tau_s);
         let until_s = first.tau_s + 4.0 * quarter_s;
@@ -380,24 +380,25 @@ impl Estimator {
         standstill(&beams[..early], &beams[late..end])
     }
 
-    /// Raises the assumed IMU noise from now on, for the queued samples too.
-    fn make_noisier(&mut self, noisier: Noisier, start_s: f64) {
-        if noisier == Noisier::NOT {
+    /// Multiplies the assumed IMU noise by factors, also for the queued segments.
+    fn raise_noise(&mut self, factors: NoiseFactors, start_s: f64) {
+        if factors == NoiseFactors::ONE {
             return;
         }
-        noisier.raise(&mut self.calibration.imu);
-        self.intake.make_noisier(noisier);
-        for (_, interval) in self.waiting.iter_mut().flat_map(|stretch| &mut stretch.intervals) {
-            *interval = noisier.of(*interval);
+        factors.scale_noise(&mut self.calibration.imu);
+        self.intake.raise_noise(factors);
+        for (_, interval) in self.waiting.iter_mut().flat_map(|segment| &mut segment.intervals) {
+            *interval = factors.scale(*interval);
         }
-        let Noisier { gyro, accel } = noisier;
-        if gyro.max(accel) > TELLING {
+        let NoiseFactors { gyro, accel } = factors;
+        if gyro.max(accel) > REPORTED_NOISE_FACTOR {
             let stamp = self.intake.stamp(start_s);
             self.warnings.push(Warning { stamp, kind: WarningKind::NoisyImu { gyro, accel } });
         }
     }
 
-    fn first_window(&self, spec: &EstimatorSpec, beginning: &Beginning, start_s: f64) -> Window {
+    /// The window after the start or a restart.
+    fn first_window(&self, spec: &EstimatorSpec, initial_state: &InitialState, start_s: f64) -> Window {
         let imu_from_laser = self.calibration.head_from_imu.inverse() * self.calibration.head_from_laser;
         let maker = SurfelMaker {
             spec: spec.surfels.clone(),
@@ -406,13 +407,13 @@ impl Estimator {
             laser_in_imu: imu_from_laser.translation.vector,
             lidar: LidarCorrection::default(),
         };
-        let border = Border::new(beginning.information, &self.calibration.imu, self.spec.clock.estimated);
+        let border = Border::new(initial_state.information, &self.calibration.imu, self.spec.clock.estimated);
         let surveyor = SurfelMaker { spec: spec.registration.surfels(&spec.surfels), ..maker.clone() };
-        let window = Window::new(spec, maker, beginning, start_s, border);
+        let window = Window::new(spec, maker, initial_state, start_s, border);
         if self.survey.is_some() { window.surveyed_by(surveyor) } else { window }
     }
 
-    /// Adds the window's observations returned by `seen`, up to `until`, to the survey, if there is one.
+    /// Adds the patches returned by `seen`, up to time `until`, to the survey, if there is one.
     fn survey_window(&mut self, seen: fn(&Window) -> Vec<(f64, Patch)>, until: fn(&Window) -> f64) {
         if let (Some(window), Some(survey)) = (&self.window, &mut self.survey) {
             let mut watch = Stopwatch::start();
@@ -421,18 +422,20 @@ impl Estimator {
         }
     }
 
-    /// The window's content is final: the uncertainty is that of the window's end.
-    fn consider_the_end(&mut self) {
+    /// Propagates the covariance to the end of the window, when the content of the window becomes final.
+    fn propagate_to_end(&mut self) {
         if let Some(end) = self.at_end.take() {
-            self.consider.carry(&end);
+            self.consider.propagate_to(&end);
         }
     }
 
+    /// End of the newest window, lidar time, s.
     fn end_tau_s(&self) -> f64 {
         self.windows.last().map_or(0.0, |report| report.stamp.seconds_since(self.intake.origin()))
     }
 
-    fn why_nothing(&self) -> EstimationError {
+    /// The error of a run without any window.
+    fn missing_data_error(&self) -> EstimationError {
         match self.intake.counts() {
             (0, scans) => EstimationError::NoImu { scans },
             (samples, 0) => EstimationError::NoLidar { samples },
@@ -441,15 +444,16 @@ impl Estimator {
     }
 }
 
+/// Checks the noise densities of the calibration.
 fn check(calibration: &Calibration) -> Result<(), EstimationError> {
     let imu = &calibration.imu;
     let numbers = [
-        ("gyroscope's noise density", imu.gyro_density_rad_per_s_per_sqrt_hz),
-        ("accelerometer's noise density", imu.accel_density_m_per_s2_per_sqrt_hz),
-        ("lidar's range noise", calibration.lidar.near_sigma_m),
+        ("gyroscope noise density", imu.gyro_density_rad_per_s_per_sqrt_hz),
+        ("accelerometer noise density", imu.accel_density_m_per_s2_per_sqrt_hz),
+        ("lidar range noise", calibration.lidar.near_sigma_m),
     ];
     match numbers.iter().find(|(_, x)| !(x.is_finite() && *x > 0.0)) {
-        Some((what, x)) => Err(EstimationError::Calibration(format!("the {what} is {x}; it must be above 0"))),
+        Some((what, x)) => Err(EstimationError::Calibration(format!("{what} is {x}; must be above 0"))),
         None => Ok(()),
     }
 }

@@ -1,4 +1,4 @@
-//! The poses that a window no longer changes.
+//! Output of final poses, which later windows do not change.
 
 use super::Estimator;
 use crate::estimation::EstimatedPose;
@@ -7,8 +7,8 @@ use crate::geometry::{Pose, Rotation};
 use crate::time::{Span, Stamp};
 
 impl Estimator {
-    /// Outputs the poses up to `until_u_s` (IMU time) at whole multiples of the IMU's period.
-    pub(super) fn hand_out(&mut self, until_u_s: f64) {
+    /// Outputs the poses up to `until_u_s` (IMU time) at whole multiples of the IMU period.
+    pub(super) fn output_poses(&mut self, until_u_s: f64) {
         let Some(window) = &self.window else { return };
         let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
         let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
@@ -16,7 +16,7 @@ impl Estimator {
             let start_ns = self.intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
             Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
         });
-        // After a gap the window may begin before the last pose: poses increase strictly all the same.
+        // After a gap the window may start before the last pose; the stamps must still increase strictly.
         if let Some(last) = self.newest_pose.filter(|last| stamp <= *last) {
             stamp = Stamp::from_nanos((last.nanos().div_euclid(period_ns) + 1) * period_ns);
         }

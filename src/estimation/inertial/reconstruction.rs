@@ -1,39 +1,41 @@
-//! Reconstructs what an IMU did not measure: gaps between its samples, and axes at the end of their range.
+//! Interpolates IMU readings across gaps and reconstructs clipped axes.
 
 use super::Mean;
 use super::clipping::Clipped;
 use crate::geometry::{Rotation, Vector};
 
-/// So many means to either side of a gap give the course of the readings there.
-pub(super) const EDGE: usize = 5;
-/// Standard deviation of a bridged mean as a multiple of the squared gap, rad/s and m/s^2 per s^2, and at most.
+/// Number of means on each side of a gap to which a line is fitted.
+pub(super) const FIT_MEANS: usize = 5;
+/// Standard deviation of a bridged mean per squared gap length, rad/s and m/s^2 per s^2.
 ///
-/// Interpolation errs by an eighth of the second derivative times the squared gap: a head that rocks by 5 rad/s at 1.2
-/// Hz has 280 rad/s^3.
-const BRIDGED_PER_S2: (f64, f64) = (120.0, 300.0);
-const BRIDGED_AT_MOST: (f64, f64) = (2.0, 5.0);
-/// Gaps shorter than this are bridged by straight lines: the slopes at their ends are known less well than the chord,
-/// s.
-const SHORT_S: f64 = 0.045;
-/// A clipped angular velocity is known to this fraction of what the reconstruction is beyond the limit, and at least,
-/// to this fraction of the limit.
-const CLIPPED_GYRO: (f64, f64) = (0.5, 0.02);
-/// A clipped force is known to this fraction of the limit: a shock can be of any size.
-const CLIPPED_ACCEL: f64 = 1.0;
-/// Clipped for no longer than this, s, and reconstructed to less than this multiple of the limit, a force is that of a
-/// motion that is a little too fast for the range, and known to the fraction of its excess.
-const MILD_ACCEL: (f64, f64, f64) = (0.3, 1.3, 0.5);
+/// The interpolation error is an eighth of the second derivative times the squared gap; a head that rocks with 5 rad/s
+/// at 1.2 Hz has 280 rad/s^3.
+const BRIDGED_SIGMA_PER_S2: (f64, f64) = (120.0, 300.0);
+/// Upper limit of the standard deviation of a bridged mean, rad/s and m/s^2.
+const MAX_BRIDGED_SIGMA: (f64, f64) = (2.0, 5.0);
+/// Shorter gaps are bridged by straight lines, s: the fitted slopes are less accurate than the chord.
+const SHORT_GAP_S: f64 = 0.045;
+/// Standard deviation of a reconstructed angular velocity: fraction of the excess over the limit, plus fraction of the
+/// limit.
+const CLIPPED_GYRO_SIGMA: (f64, f64) = (0.5, 0.02);
+/// Standard deviation of a clipped specific force, as a fraction of the limit: the size of a shock is unknown.
+const CLIPPED_ACCEL_SIGMA: f64 = 1.0;
+/// Mild clipping of the specific force, which is reconstructed: maximum duration, s; maximum reconstruction as a
+/// multiple of the limit; standard deviation as a fraction of the excess over the limit.
+///
+/// Such a motion is slightly too fast for the range, in contrast to a shock.
+const MILD_CLIPPING: (f64, f64, f64) = (0.3, 1.3, 0.5);
 
-/// Angular velocity and specific force along some means: a line through each.
-struct Course {
+/// Straight lines fitted to angular velocity and specific force: value at `centre_s` and slope.
+struct LineFit {
     centre_s: f64,
     gyro: (Vector, Vector),
     accel: (Vector, Vector),
 }
 
-impl Course {
-    /// Of at least one mean: value at their middle, and slope.
-    fn of(means: &[Mean]) -> Self {
+impl LineFit {
+    /// Least-squares lines through at least one mean.
+    fn through(means: &[Mean]) -> Self {
         let count = means.len() as f64;
         let centre_s = means.iter().map(|mean| mean.centre_s).sum::<f64>() / count;
         let spread: f64 = means.iter().map(|mean| (mean.centre_s - centre_s).powi(2)).sum();
@@ -56,47 +58,47 @@ impl Course {
     }
 }
 
-/// A cubic between two values with their slopes, `u` of the way from 0 to 1.
+/// Cubic Hermite interpolation between two values with slopes, at `u` in 0..1.
 fn hermite(from: (Vector, Vector), to: (Vector, Vector), length_s: f64, u: f64) -> Vector {
     let (h01, h10, h11) = (u * u * (3.0 - 2.0 * u), u * (1.0 - u) * (1.0 - u), u * u * (u - 1.0));
     from.0.lerp(&to.0, h01) + (from.1 * h10 + to.1 * h11) * length_s
 }
 
-/// The means that bridge the gap between the last of `before` and the first of `after`, `steps` of them less one.
+/// The `steps - 1` means that bridge the gap between the last of `before` and the first of `after`.
 ///
-/// The angular velocity is a cubic that leaves as the means before the gap go and arrives as those after it, the
-/// specific force is linear along axes that do not turn.
+/// The angular velocity is a cubic that continues the slopes on both sides of the gap. The specific force is linear in
+/// a frame that does not rotate.
 pub(super) fn bridge(before: &[Mean], after: &[Mean], steps: usize) -> Vec<Mean> {
     let (Some(last), Some(first)) = (before.last(), after.first()) else { return Vec::new() };
     let gap_s = first.centre_s - last.centre_s;
-    let (leaves, arrives) = if gap_s < SHORT_S {
+    let (leaves, arrives) = if gap_s < SHORT_GAP_S {
         let chord = (first.gyro - last.gyro) / gap_s;
         ((last.gyro, chord), (first.gyro, chord))
     } else {
-        (Course::of(before).gyro_at(last.centre_s), Course::of(after).gyro_at(first.centre_s))
+        (LineFit::through(before).gyro_at(last.centre_s), LineFit::through(after).gyro_at(first.centre_s))
     };
     let mut turned = vec![Rotation::identity()];
     for step in 0..steps {
         let rate = hermite(leaves, arrives, gap_s, (step as f64 + 0.5) / steps as f64);
         turned.push(turned[step] * Rotation::from_scaled_axis(rate * (gap_s / steps as f64)));
     }
-    let (force_leaves, force_arrives) = if gap_s < SHORT_S {
+    let (force_leaves, force_arrives) = if gap_s < SHORT_GAP_S {
         (last.accel, first.accel)
     } else {
-        (Course::of(before).accel_at(last.centre_s).0, Course::of(after).accel_at(first.centre_s).0)
+        (LineFit::through(before).accel_at(last.centre_s).0, LineFit::through(after).accel_at(first.centre_s).0)
     };
     let force_arrives = turned[steps] * force_arrives;
     let gap2 = gap_s * gap_s;
-    let gyro_doubt = (BRIDGED_PER_S2.0 * gap2).min(BRIDGED_AT_MOST.0);
-    let accel_doubt = (BRIDGED_PER_S2.1 * gap2).min(BRIDGED_AT_MOST.1);
+    let extra_gyro_sigma = (BRIDGED_SIGMA_PER_S2.0 * gap2).min(MAX_BRIDGED_SIGMA.0);
+    let extra_accel_sigma = (BRIDGED_SIGMA_PER_S2.1 * gap2).min(MAX_BRIDGED_SIGMA.1);
     let means = (1..steps).map(|step| {
         let u = step as f64 / steps as f64;
         Mean {
             centre_s: last.centre_s + u * gap_s,
             gyro: hermite(leaves, arrives, gap_s, u),
             accel: turned[step].inverse() * force_leaves.lerp(&force_arrives, u),
-            gyro_doubt,
-            accel_doubt,
+            extra_gyro_sigma,
+            extra_accel_sigma,
             clipped: Clipped::NONE,
             bridged: true,
         }
@@ -104,18 +106,20 @@ pub(super) fn bridge(before: &[Mean], after: &[Mean], steps: usize) -> Vec<Mean>
     means.collect()
 }
 
-/// Replaces what is clipped in `run`, whose means follow each other, by what their neighbours `before` and `after` let
-/// expect, never less than the limit that was read.
+/// Reconstructs the clipped axes of consecutive means by interpolation between `before` and `after`.
+///
+/// The magnitude of the result is at least the reading, which is the limit of the range.
 pub(super) fn reconstruct_clipped(before: &[Mean], run: &mut [Mean], after: &[Mean]) {
     if before.is_empty() || after.is_empty() {
-        // Nothing on one side: the readings stay, and are doubted as much as a shock.
+        // Without data on both sides the readings stay, with the standard deviation of a shock.
         for mean in run.iter_mut() {
-            mean.gyro_doubt = mean.gyro_doubt.max(0.5 * largest_clipped(&mean.gyro, &mean.clipped.gyro));
-            mean.accel_doubt = mean.accel_doubt.max(CLIPPED_ACCEL * largest_clipped(&mean.accel, &mean.clipped.accel));
+            mean.extra_gyro_sigma = mean.extra_gyro_sigma.max(0.5 * largest_clipped(&mean.gyro, &mean.clipped.gyro));
+            mean.extra_accel_sigma =
+                mean.extra_accel_sigma.max(CLIPPED_ACCEL_SIGMA * largest_clipped(&mean.accel, &mean.clipped.accel));
         }
         return;
     }
-    let (leaving, arriving) = (Course::of(before), Course::of(after));
+    let (leaving, arriving) = (LineFit::through(before), LineFit::through(after));
     let (from_s, to_s) = (before[before.len() - 1].centre_s, after[0].centre_s);
     let length_s = to_s - from_s;
     let gyro_ends = (leaving.gyro_at(from_s), arriving.gyro_at(to_s));
@@ -127,28 +131,29 @@ pub(super) fn reconstruct_clipped(before: &[Mean], run: &mut [Mean], after: &[Me
         for axis in 0..3 {
             if mean.clipped.gyro[axis] {
                 let limit = mean.gyro[axis].abs();
-                mean.gyro[axis] = at_least(mean.gyro[axis], gyro[axis], 2.0);
+                mean.gyro[axis] = bounded(mean.gyro[axis], gyro[axis], 2.0);
                 let excess = mean.gyro[axis].abs() - limit;
-                mean.gyro_doubt = mean.gyro_doubt.max(CLIPPED_GYRO.0 * excess + CLIPPED_GYRO.1 * limit);
+                mean.extra_gyro_sigma =
+                    mean.extra_gyro_sigma.max(CLIPPED_GYRO_SIGMA.0 * excess + CLIPPED_GYRO_SIGMA.1 * limit);
             }
             if mean.clipped.accel[axis] {
                 let limit = mean.accel[axis].abs();
-                let (lasts_s, times, share) = MILD_ACCEL;
-                let expected = at_least(mean.accel[axis], accel[axis], times);
+                let (max_duration_s, max_ratio, fraction) = MILD_CLIPPING;
+                let expected = bounded(mean.accel[axis], accel[axis], max_ratio);
                 let excess = expected.abs() - limit;
-                let is_mild = length_s < lasts_s && accel[axis].abs() < times * limit && excess > 0.0;
+                let is_mild = length_s < max_duration_s && accel[axis].abs() < max_ratio * limit && excess > 0.0;
                 mean.accel[axis] = if is_mild { expected } else { mean.accel[axis] };
-                let doubt = if is_mild { share * excess + 0.05 * limit } else { CLIPPED_ACCEL * limit };
-                mean.accel_doubt = mean.accel_doubt.max(doubt);
+                let sigma = if is_mild { fraction * excess + 0.05 * limit } else { CLIPPED_ACCEL_SIGMA * limit };
+                mean.extra_accel_sigma = mean.extra_accel_sigma.max(sigma);
             }
         }
     }
 }
 
-/// `expected`, but no less than `read` on its side of zero, and no more than `times` as much.
-fn at_least(read: f64, expected: f64, times: f64) -> f64 {
-    let beyond = expected * read.signum();
-    read.signum() * beyond.clamp(read.abs(), times * read.abs())
+/// `expected`, with the sign of `read` and a magnitude of 1 to `max_ratio` times that of `read`.
+fn bounded(read: f64, expected: f64, max_ratio: f64) -> f64 {
+    let along = expected * read.signum();
+    read.signum() * along.clamp(read.abs(), max_ratio * read.abs())
 }
 
 fn largest_clipped(reading: &Vector, clipped: &[bool; 3]) -> f64 {

@@ -1,44 +1,47 @@
-//! Screening of IMU samples before they are integrated: outliers, frozen readings, clipped axes.
+//! Screens IMU samples before integration: outliers, frozen readings, clipped axes.
 
 use super::clipping::{Clipped, RangeLimits};
 use crate::geometry::Vector;
 use crate::measurement::{ImuNoise, ImuSample};
 
-/// How far beyond a sample its screening looks, s. The intake holds at least as much when a sample is used.
+/// Length of the later data that the screening of a sample uses, s. The intake queues at least as much.
 pub(in crate::estimation) const LOOKAHEAD_S: f64 = 0.1;
-/// No IMU on a moving head measures more than this: rad/s and m/s^2.
-const ABSURD: (f64, f64) = (100.0, 5000.0);
-/// A sample that differs from both neighbours by more than `floor + factor x` their own difference is an outlier.
+/// Larger readings are implausible on a moving head, rad/s and m/s^2.
+const IMPLAUSIBLE: (f64, f64) = (100.0, 5000.0);
+/// Outlier gate: `(floor, factor)`, rad/s. A sample is an outlier if it differs from both neighbours by more than `floor
+/// + factor x` the difference of the neighbours.
 const OUTLIER_GYRO: (f64, f64) = (0.6, 4.0);
+/// The same for the accelerometer, m/s^2.
 const OUTLIER_ACCEL: (f64, f64) = (30.0, 6.0);
-/// Readings that do not change in any of six numbers for this long, s, and this many samples are frozen: the noise of
-/// a working sensor changes them, even where they are rounded.
+/// All six readings unchanged for this time, s, and this number of samples: the sensor is frozen. The noise of a
+/// working sensor changes even rounded readings.
 const FROZEN: (f64, usize) = (0.08, 4);
 
-/// What screening makes of a sample.
+/// Result of screening a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::estimation) enum Screened {
-    /// A measurement, with the axes on which it is at the end of the range.
+    /// A measurement, with the clipped axes.
     Measured(Clipped),
-    /// Not a measurement: far from its neighbours, or not a finite number.
+    /// Far from both neighbours, implausibly large, or not finite.
     Outlier,
-    /// The sensor repeats its last reading.
+    /// A repetition of the previous reading.
     Frozen,
 }
 
-/// Screens samples in the order of their stamps.
+/// Screens samples in order of time.
 #[derive(Debug)]
 pub(in crate::estimation) struct Screen {
     limits: RangeLimits,
-    /// The two measurements before, the later one first.
+    /// The two previous measurements, the later one first.
     before: [Option<ImuSample>; 2],
-    /// The last sample, whatever it was, and since when its reading has not changed, s.
+    /// The last sample of any kind, and the time since which the reading has not changed, s.
     reading: Option<(ImuSample, f64)>,
 }
 
-fn is_absurd(sample: &ImuSample) -> bool {
+fn is_implausible(sample: &ImuSample) -> bool {
     let exceeds = |v: &Vector, limit: f64| !v.iter().all(|x| x.abs() <= limit);
-    exceeds(&sample.angular_velocity_rad_per_s, ABSURD.0) || exceeds(&sample.specific_force_m_per_s2, ABSURD.1)
+    exceeds(&sample.angular_velocity_rad_per_s, IMPLAUSIBLE.0)
+        || exceeds(&sample.specific_force_m_per_s2, IMPLAUSIBLE.1)
 }
 
 fn is_same_reading(a: &ImuSample, b: &ImuSample) -> bool {
@@ -51,21 +54,21 @@ impl Screen {
         Self { limits: RangeLimits::new(noise), before: [None; 2], reading: None }
     }
 
-    /// Screens the sample stamped `seconds`; `ahead` are the samples after it, in order, of which those within
-    /// [`LOOKAHEAD_S`] count.
+    /// Screens the sample stamped `seconds`. `ahead` has the later samples in order; those within [`LOOKAHEAD_S`] are
+    /// used.
     pub(in crate::estimation) fn screen<'a>(
         &mut self,
         (seconds, sample): (f64, &ImuSample),
         ahead: impl Iterator<Item = &'a (f64, ImuSample)> + Clone,
     ) -> Screened {
         let ahead = ahead.take_while(|(s, _)| *s <= seconds + LOOKAHEAD_S);
-        if is_absurd(sample) {
+        if is_implausible(sample) {
             return Screened::Outlier;
         }
         if self.is_frozen((seconds, sample), ahead.clone()) {
             return Screened::Frozen;
         }
-        let usable = ahead.map(|(_, next)| next).filter(|next| !is_absurd(next));
+        let usable = ahead.map(|(_, next)| next).filter(|next| !is_implausible(next));
         if self.is_outlier(sample, usable.clone()) {
             return Screened::Outlier;
         }
@@ -88,17 +91,17 @@ impl Screen {
         for (s, _) in ahead.take_while(|(_, next)| is_same_reading(next, sample)) {
             repeated = (*s, repeated.1 + 1);
         }
-        // Once a reading counts as frozen the rest of its repetitions does too, whatever lies ahead of them.
+        // Once a reading counts as frozen, all later repetitions do too.
         let lasts_s = repeated.0 - since_s;
         lasts_s >= FROZEN.0 && (repeated.1 >= FROZEN.1 || seconds - since_s >= FROZEN.0)
     }
 
-    /// Whether a sample is far from the measurement before it and from the median of the next three, compared with how
-    /// far these are from each other.
+    /// Whether a sample differs from the previous measurement and from the median of the next three by much more than
+    /// these differ from each other.
     fn is_outlier<'a>(&self, sample: &ImuSample, ahead: impl Iterator<Item = &'a ImuSample>) -> bool {
         let next: Vec<&ImuSample> = ahead.take(3).collect();
         let Some(before) = &self.before[0] else { return is_first_outlier(sample, &next) };
-        let far = |of: fn(&ImuSample) -> Vector, (floor, factor): (f64, f64)| {
+        let exceeds = |of: fn(&ImuSample) -> Vector, (floor, factor): (f64, f64)| {
             let (x, last) = (of(sample), of(before));
             let Some(median) = median(&next, of) else { return false };
             let mut usual = (median - last).norm();
@@ -107,21 +110,21 @@ impl Screen {
             }
             (x - last).norm().min((x - median).norm()) > floor + factor * usual
         };
-        far(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO) || far(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL)
+        exceeds(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO) || exceeds(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL)
     }
 }
 
-/// The very first sample has neighbours on one side: those must agree with each other.
+/// Whether the first sample is an outlier: only later neighbours exist, and they must agree with each other.
 fn is_first_outlier(sample: &ImuSample, next: &[&ImuSample]) -> bool {
-    let far = |of: fn(&ImuSample) -> Vector, (floor, factor): (f64, f64)| {
+    let exceeds = |of: fn(&ImuSample) -> Vector, (floor, factor): (f64, f64)| {
         let Some(median) = median(next, of).filter(|_| next.len() == 3) else { return false };
         let usual = next.iter().map(|other| (of(other) - median).norm()).fold(0.0, f64::max);
         (of(sample) - median).norm() > floor + factor * usual
     };
-    far(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO) || far(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL)
+    exceeds(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO) || exceeds(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL)
 }
 
-/// The median on each axis.
+/// The median of each axis.
 fn median(samples: &[&ImuSample], of: fn(&ImuSample) -> Vector) -> Option<Vector> {
     let middle = samples.len().checked_sub(1)? / 2;
     Some(Vector::from_fn(|axis, _| {
@@ -136,7 +139,7 @@ mod tests {
     use super::*;
     use crate::time::Stamp;
 
-    /// Ten seconds of a head that swings by 5 rad/s at 1.2 Hz, with noise from a multiplicative generator.
+    /// Ten seconds of a head that swings with 5 rad/s at 1.2 Hz, with noise from a linear congruential generator.
     fn samples() -> Vec<(f64, ImuSample)> {
         let mut state = 1_u64;
         let mut noise = move || {
@@ -184,14 +187,14 @@ mod tests {
     }
 
     #[test]
-    fn single_samples_that_no_neighbour_supports_are_outliers_wherever_they_are() {
+    fn a_single_sample_far_from_all_neighbours_is_an_outlier_at_any_position() {
         for at in [0, 1, 500, 998, 999] {
             for (gyro, accel) in [(10.0, 0.0), (0.0, 1e4), (1e30, 0.0), (f64::NAN, 0.0), (0.0, f64::INFINITY)] {
                 let mut samples = samples();
                 samples[at].1.angular_velocity_rad_per_s.y += gyro;
                 samples[at].1.specific_force_m_per_s2.x += accel;
                 let outliers = indices(&screened(&samples), |one| *one == Screened::Outlier);
-                // The last sample has no successor that could disagree: only what is absurd is found there.
+                // The last sample has no successor: only an implausible value is detected.
                 let expected = if at == 999 && gyro == 10.0 { vec![] } else { vec![at] };
                 assert_eq!(outliers, expected, "{at}: {gyro}, {accel}");
             }
@@ -199,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shock_that_lasts_is_no_outlier() {
+    fn a_shock_of_several_samples_is_no_outlier() {
         let mut samples = samples();
         for (k, push) in [(500, 20.0), (501, 60.0), (502, 55.0), (503, 25.0)] {
             samples[k].1.specific_force_m_per_s2.z += push;
@@ -218,12 +221,12 @@ mod tests {
         twice[501].1 = ImuSample { stamp: twice[501].1.stamp, ..twice[500].1 };
         assert!(
             indices(&screened(&twice), |one| *one == Screened::Frozen).is_empty(),
-            "two equal readings are a chance"
+            "two equal readings may be a coincidence"
         );
     }
 
     #[test]
-    fn a_flat_top_that_recurs_is_clipping_from_its_first_sample() {
+    fn a_recurring_flat_top_is_clipping_from_the_first_sample() {
         let mut clipped = samples();
         let limit = 250.0_f64.to_radians();
         for (_, sample) in &mut clipped {

@@ -1,36 +1,36 @@
-//! The IMU's part of the intake: samples wait here, are screened, and leave as intervals.
+//! IMU input: queues and screens samples, and converts them to intervals.
 
 use super::MARGIN_S;
 use crate::estimation::inertial::{InertialStream, Screen, Screened};
-use crate::estimation::initial::Noisier;
+use crate::estimation::initial::NoiseFactors;
 use crate::estimation::strapdown::Interval;
 use crate::measurement::{ImuNoise, ImuSample};
 use std::collections::VecDeque;
 
-/// A sample is used when the newest one is later by this, s: then samples out of order have arrived, and
-/// those that the screening needs ahead.
+/// A sample is used when the newest one is later by this, s. By then delayed samples have arrived, and so have the
+/// later samples that the screening needs.
 const COMPLETE_AFTER_S: f64 = 0.2;
 
-/// Coverage of the samples.
+/// Whether the intervals cover a requested time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Reached {
+pub(super) enum Coverage {
     /// The intervals cover the requested time.
-    All,
+    Complete,
     /// More samples are needed.
-    Waits,
-    /// There are no samples from the first time to the second, IMU time, s, for longer than is bridged.
-    Silence(f64, f64),
+    Waiting,
+    /// No samples between these times (IMU time, s), for longer than is bridged.
+    Gap(f64, f64),
 }
 
-/// Counts of the skipped IMU samples.
+/// Numbers of discarded IMU samples, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct LeftOut {
+pub(super) struct DiscardedCounts {
     pub late: usize,
     pub outliers: usize,
     pub frozen: usize,
 }
 
-/// IMU samples on their way into intervals.
+/// Queue of IMU samples, and the intervals made of them.
 #[derive(Debug)]
 pub(super) struct SampleQueue {
     waiting: VecDeque<(f64, ImuSample)>,
@@ -39,10 +39,10 @@ pub(super) struct SampleQueue {
     /// Stamp of the last sample that was used.
     used_s: f64,
     pub(super) count: usize,
-    pub(super) left_out: LeftOut,
+    pub(super) discarded: DiscardedCounts,
     /// Number of clipped samples.
     pub(super) clipped: usize,
-    /// Gaps bridged since the last query: start and length, s.
+    /// Gaps bridged since the last call of `take_gaps`: start and length, s.
     gaps: Vec<(f64, f64)>,
     screen: Screen,
     stream: Option<InertialStream>,
@@ -56,7 +56,7 @@ impl SampleQueue {
             taken_s: f64::NEG_INFINITY,
             used_s: f64::NEG_INFINITY,
             count: 0,
-            left_out: LeftOut::default(),
+            discarded: DiscardedCounts::default(),
             clipped: 0,
             gaps: Vec::new(),
             screen: Screen::new(noise),
@@ -65,18 +65,18 @@ impl SampleQueue {
         }
     }
 
-    /// Inserts a sample into the queue.
-    pub(super) fn take(&mut self, seconds: f64, sample: ImuSample) {
+    /// Inserts a sample in order of time; discards a late one.
+    pub(super) fn push(&mut self, seconds: f64, sample: ImuSample) {
         self.count += 1;
         if seconds <= self.taken_s {
-            self.left_out.late += 1;
+            self.discarded.late += 1;
             return;
         }
         let at = self.waiting.partition_point(|(s, _)| *s <= seconds);
         self.waiting.insert(at, (seconds, sample));
     }
 
-    /// Stamps of the samples that wait, s.
+    /// Stamps of the queued samples, s.
     pub(super) fn stamps(&self) -> impl Iterator<Item = f64> {
         self.waiting.iter().map(|(seconds, _)| *seconds)
     }
@@ -86,7 +86,7 @@ impl SampleQueue {
         Some((self.waiting.front()?.0, self.waiting.back()?.0))
     }
 
-    /// The newest stamp, s; minus infinity without any.
+    /// The newest queued stamp, s; minus infinity if the queue is empty.
     pub(super) fn newest_s(&self) -> f64 {
         self.waiting.back().map_or(f64::NEG_INFINITY, |(seconds, _)| *seconds)
     }
@@ -96,46 +96,46 @@ impl SampleQueue {
         self.used_s
     }
 
-    /// Starts the integration by `stream` with the samples from `from_s` on: data from before the first lidar scan
-    /// would be dead reckoning.
+    /// Starts the conversion by `stream` with the samples from `from_s` on. Earlier samples precede the first lidar scan
+    /// and would only allow dead reckoning.
     pub(super) fn start(&mut self, stream: InertialStream, from_s: f64) {
         let before = self.waiting.partition_point(|(seconds, _)| *seconds < from_s);
         self.waiting.drain(..before);
         self.stream = Some(stream);
     }
 
-    /// The samples' period, once known, s.
+    /// Sampling period, once known, s.
     pub(super) fn period_s(&self) -> Option<f64> {
         self.stream.as_ref().map(InertialStream::period_s)
     }
 
-    /// Raises the assumed IMU noise by a factor.
-    pub(super) fn make_noisier(&mut self, noisier: Noisier) {
+    /// Multiplies the assumed IMU noise by factors.
+    pub(super) fn raise_noise(&mut self, factors: NoiseFactors) {
         if let Some(stream) = &mut self.stream {
-            stream.make_noisier(noisier);
+            stream.raise_noise(factors);
         }
     }
 
-    /// Uses samples until the intervals reach slightly past `end_s`; gaps of up to `bridged_s` are bridged. `last`:
+    /// Uses samples until the intervals reach slightly past `end_s`, and bridges gaps of up to `max_bridged_s`. `last`:
     /// no more data will arrive.
-    pub(super) fn advance(&mut self, end_s: f64, bridged_s: f64, last: bool) -> Reached {
+    pub(super) fn advance(&mut self, end_s: f64, max_bridged_s: f64, last: bool) -> Coverage {
         let complete_s = if last { f64::INFINITY } else { self.newest_s() - COMPLETE_AFTER_S };
-        let Some(stream) = &mut self.stream else { return Reached::Waits };
+        let Some(stream) = &mut self.stream else { return Coverage::Waiting };
         while let Some((seconds, sample)) = self.waiting.front().copied() {
             if self.used_s > end_s + MARGIN_S && stream.end_s() > end_s + 0.5 * MARGIN_S {
-                return Reached::All;
+                return Coverage::Complete;
             }
             if seconds > complete_s && seconds > end_s + 2.0 * MARGIN_S {
-                return Reached::Waits;
+                return Coverage::Waiting;
             }
             let screened = self.screen.screen((seconds, &sample), self.waiting.iter().skip(1));
             let gap_s = seconds - self.used_s;
             if let Screened::Measured(_) = screened
                 && gap_s.is_finite()
-                && gap_s > bridged_s
+                && gap_s > max_bridged_s
             {
                 stream.flush(&mut self.intervals);
-                return Reached::Silence(self.used_s, seconds);
+                return Coverage::Gap(self.used_s, seconds);
             }
             self.waiting.pop_front();
             self.taken_s = seconds;
@@ -148,17 +148,17 @@ impl SampleQueue {
                     stream.push(seconds, (&sample, clipped), &mut self.intervals);
                 }
                 Screened::Outlier => {
-                    self.left_out.outliers += 1;
-                    stream.leave_out();
+                    self.discarded.outliers += 1;
+                    stream.note_discarded_outlier();
                 }
-                Screened::Frozen => self.left_out.frozen += 1,
+                Screened::Frozen => self.discarded.frozen += 1,
             }
         }
         self.clipped += stream.take_saturated();
         if last {
             stream.flush(&mut self.intervals);
         }
-        if self.used_s > end_s + MARGIN_S { Reached::All } else { Reached::Waits }
+        if self.used_s > end_s + MARGIN_S { Coverage::Complete } else { Coverage::Waiting }
     }
 
     /// The complete intervals, in order, each with the start time.
@@ -169,21 +169,21 @@ impl SampleQueue {
         std::mem::take(&mut self.intervals)
     }
 
-    /// The silences that were bridged since the last call.
+    /// The gaps bridged since the last call: start and length, s.
     pub(super) fn take_gaps(&mut self) -> Vec<(f64, f64)> {
         std::mem::take(&mut self.gaps)
     }
 
-    /// Where the intervals end, IMU time, s.
+    /// End of the last interval, IMU time, s.
     pub(super) fn end_s(&self) -> f64 {
         self.stream.as_ref().map_or(f64::NEG_INFINITY, InertialStream::end_s)
     }
 
     /// Restarts after a gap with the next sample, stamped `until_s`.
-    pub(super) fn begin_again_at(&mut self, until_s: f64) {
+    pub(super) fn restart_at(&mut self, until_s: f64) {
         (self.taken_s, self.used_s) = (until_s - 1e-9, f64::NEG_INFINITY);
         if let Some(stream) = &mut self.stream {
-            stream.begin_again();
+            stream.restart();
         }
     }
 }

@@ -1,7 +1,7 @@
-//! The lidar's part of the intake: scans wait here, and leave as beams with their times.
+//! Lidar input: queues scans, discards frozen ones, and converts them to beams with smoothed times.
 
 use crate::estimation::EstimationError;
-use crate::estimation::sight::{Sight, is_in_plane};
+use crate::estimation::scan_geometry::{ScanGeometry, is_in_plane};
 use crate::estimation::spec::EstimatorSpec;
 use crate::estimation::stamps::StampFilter;
 use crate::estimation::surfel::Beam;
@@ -10,20 +10,20 @@ use crate::measurement::{Calibration, LidarScan};
 use crate::signal::Regularity;
 use std::collections::VecDeque;
 
-/// So many scans that equal the one before are frozen: the noise of a working lidar changes some range.
-const FROZEN: usize = 2;
-/// Scans of at least this many returns whose ranges are all equal to this, m, show no world.
+/// A scan that repeats the previous one for this many times is frozen: noise changes some range of a working lidar.
+const FROZEN_REPEATS: usize = 2;
+/// A scan of at least this many returns whose ranges agree to within this, m, is no valid measurement.
 const CONSTANT: (usize, f32) = (20, 1e-4);
 
-/// Usability of a scan.
+/// Whether a scan repeats the previous ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Content {
     New,
-    /// It equals the scans before it, which only a lidar at rest can see, and only one without noise.
+    /// The scan equals the previous ones; valid only for a noiseless lidar at rest.
     Repeated,
 }
 
-/// Scans on their way to beams.
+/// Queue of scans, and the beams made of them.
 #[derive(Debug)]
 pub(super) struct ScanQueue {
     spec: EstimatorSpec,
@@ -33,15 +33,15 @@ pub(super) struct ScanQueue {
     used_s: f64,
     pub(super) count: usize,
     pub(super) late: usize,
-    /// Number of scans skipped as repeats.
+    /// Number of scans discarded as repeats.
     pub(super) frozen: usize,
-    /// How many scans before the newest equal it, and their fingerprint.
+    /// Number of repeats of the newest scan, and the fingerprint of it.
     repeated: (usize, u64),
-    sight: Sight,
-    /// Whether all points so far were in the lidar's x-y plane.
+    scan_geometry: ScanGeometry,
+    /// Whether all points so far lie in the x-y plane of the lidar.
     planar: bool,
     filter: Option<StampFilter>,
-    /// Beams already placed in time that belong to the next stretches.
+    /// Beams with smoothed times that belong to later segments.
     beams: VecDeque<Beam>,
 }
 
@@ -56,15 +56,15 @@ impl ScanQueue {
             late: 0,
             frozen: 0,
             repeated: (0, 0),
-            sight: Sight::default(),
+            scan_geometry: ScanGeometry::default(),
             planar: true,
             filter: None,
             beams: VecDeque::new(),
         }
     }
 
-    /// Inserts a scan into the queue; skips a repeated one.
-    pub(super) fn take(&mut self, seconds: f64, scan: LidarScan) -> Result<(), EstimationError> {
+    /// Inserts a scan in order of time; discards a late scan and one with constant ranges.
+    pub(super) fn push(&mut self, seconds: f64, scan: LidarScan) -> Result<(), EstimationError> {
         let finite = |p: &nalgebra::Vector3<f32>| p.iter().copied().all(f32::is_finite);
         if !scan.returns.iter().all(|hit| finite(&hit.point_in_laser)) {
             return Err(EstimationError::NotFinite { sensor: "lidar", stamp_ns: scan.stamp.nanos() });
@@ -83,12 +83,12 @@ impl ScanQueue {
         Ok(())
     }
 
-    /// Whether the scans before were the same, point for point.
+    /// Compares a scan with the previous ones, point by point.
     fn content(&mut self, scan: &LidarScan) -> Content {
         let fingerprint = fingerprint(scan);
         let times = if fingerprint == self.repeated.1 && !scan.returns.is_empty() { self.repeated.0 + 1 } else { 0 };
         self.repeated = (times, fingerprint);
-        if times >= FROZEN { Content::Repeated } else { Content::New }
+        if times >= FROZEN_REPEATS { Content::Repeated } else { Content::New }
     }
 
     /// First and last stamp in the queue, s.
@@ -96,7 +96,7 @@ impl ScanQueue {
         Some((self.waiting.front()?.0, self.waiting.back()?.0))
     }
 
-    /// The newest stamp, s; minus infinity without any.
+    /// The newest queued stamp, s; minus infinity if the queue is empty.
     pub(super) fn newest_s(&self) -> f64 {
         self.waiting.back().map_or(f64::NEG_INFINITY, |(seconds, ..)| *seconds)
     }
@@ -106,40 +106,40 @@ impl ScanQueue {
         self.used_s
     }
 
-    /// Whether the lidar scans in one plane, according to the scans so far.
+    /// Whether all scans so far lie in one plane of the lidar frame.
     pub(super) fn is_planar(&self) -> bool {
         self.planar
     }
 
     /// The scanning geometry of the lidar, according to the first scans.
-    pub(super) fn sight(&self) -> Sight {
-        self.sight
+    pub(super) fn scan_geometry(&self) -> ScanGeometry {
+        self.scan_geometry
     }
 
-    /// Learns the lidar's period and how it looks about, from the scans up to `enough_s`.
+    /// Estimates the scan period and the scanning geometry from the scans up to `enough_s`.
     pub(super) fn start(&mut self, first_scan: f64, enough_s: f64) -> Option<()> {
         let first_scans = || self.waiting.iter().filter(|(s, ..)| *s <= enough_s);
         let stamps: Vec<f64> = first_scans().map(|(s, scan, _)| s + scan.stamped_after.seconds()).collect();
         let scanning = Regularity::of(&stamps)?;
-        self.sight = Sight::of(first_scans().map(|(_, scan, _)| scan), enough_s - first_scan, scanning.period_s);
+        self.scan_geometry =
+            ScanGeometry::measure(first_scans().map(|(_, scan, _)| scan), enough_s - first_scan, scanning.period_s);
         self.filter = Some(StampFilter::new(scanning, self.spec.clock.jitter_s));
         Some(())
     }
 
-    /// The beams before `end_s`, lidar time, not yet used; without those of repeated scans if the head
-    /// moves.
-    pub(super) fn take_until(&mut self, end_s: f64, moves: bool) -> Vec<Beam> {
-        self.use_until(end_s, moves);
+    /// Removes and returns the beams before `end_s`, lidar time; discards repeated scans if the head moves.
+    pub(super) fn take_until(&mut self, end_s: f64, moving: bool) -> Vec<Beam> {
+        self.convert_until(end_s, moving);
         let before = self.beams.iter().take_while(|beam| beam.tau_s < end_s).count();
         self.beams.drain(..before).collect()
     }
 
-    fn use_until(&mut self, end_s: f64, moves: bool) {
+    fn convert_until(&mut self, end_s: f64, moving: bool) {
         let Some(filter) = self.filter.as_mut() else { return };
         let (least, most) = (self.spec.surfels.min_range_m, self.spec.surfels.max_range_m);
         while self.waiting.front().is_some_and(|(seconds, ..)| *seconds < end_s) {
             let Some((seconds, scan, content)) = self.waiting.pop_front() else { return };
-            if moves && content == Content::Repeated {
+            if moving && content == Content::Repeated {
                 self.frozen += 1;
                 continue;
             }
@@ -158,7 +158,7 @@ impl ScanQueue {
         }
     }
 
-    /// Forgets scans and beams before `seconds`.
+    /// Removes scans and beams before `seconds`.
     pub(super) fn forget_before(&mut self, seconds: f64) {
         let early = self.waiting.iter().take_while(|(s, ..)| *s < seconds).count();
         self.waiting.drain(..early);
@@ -167,13 +167,13 @@ impl ScanQueue {
     }
 }
 
-/// A number that differs for scans that differ (FNV-1a over the bits of all points).
+/// Hash of a scan: FNV-1a over the bits of all points.
 fn fingerprint(scan: &LidarScan) -> u64 {
     let bits = scan.returns.iter().flat_map(|hit| hit.point_in_laser.iter().map(|x| x.to_bits()));
     bits.fold(0xcbf2_9ce4_8422_2325, |hash, word| (hash ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// Whether all beams return one and the same range.
+/// Whether all returns have the same range.
 fn is_constant(scan: &LidarScan) -> bool {
     let Some(first) = scan.returns.first().map(|hit| hit.point_in_laser.norm()) else { return false };
     scan.returns.len() >= CONSTANT.0

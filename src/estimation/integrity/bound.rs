@@ -1,4 +1,4 @@
-//! The bound on the error of a pose.
+//! Error bound of a pose.
 
 use crate::geometry::{Matrix, PoseCovariance};
 use crate::signal::chi_squared_quantile;
@@ -6,8 +6,9 @@ use crate::signal::chi_squared_quantile;
 /// Probability that a position is within the bound.
 const PROBABILITY: f64 = 0.99;
 
-/// The radius that contains a Gaussian error of covariance `covariance` with a probability of 99 %, in the unit of
-/// the covariance's square root; infinite where the matrix is no covariance.
+/// The radius that contains a Gaussian error with a probability of 99 %, in the unit of the standard deviations.
+///
+/// Infinite if the matrix is not a valid covariance.
 ///
 /// The squared error is a weighted sum of chi-squared variables, approximated by one scaled chi-squared variable of the
 /// same mean `tr P` and variance `2 tr P^2` (Satterthwaite, Biometrics Bulletin 2, 1946), which is exact for equal
@@ -24,8 +25,8 @@ pub fn radius_99(covariance: &Matrix) -> f64 {
     (0.5 * variance / mean * chi_squared_quantile(PROBABILITY, degrees)).sqrt()
 }
 
-/// Position's and attitude's blocks of a pose's covariance, m^2 and rad^2.
-pub fn blocks(covariance: &PoseCovariance) -> (Matrix, Matrix) {
+/// The position and attitude blocks of a pose covariance, m^2 and rad^2.
+pub fn covariance_blocks(covariance: &PoseCovariance) -> (Matrix, Matrix) {
     (covariance.fixed_view::<3, 3>(0, 0).into_owned(), covariance.fixed_view::<3, 3>(3, 3).into_owned())
 }
 
@@ -47,13 +48,13 @@ mod tests {
     }
 
     #[test]
-    fn ninety_nine_of_a_hundred_errors_lie_within_it() {
+    fn ninety_nine_of_a_hundred_errors_are_within_the_radius() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(4);
         for sigmas in [Vector::new(1.0, 1.0, 3.0), Vector::new(0.2, 1.0, 1.0)] {
             let radius = radius_99(&Matrix::from_diagonal(&sigmas.component_mul(&sigmas)));
             let mut error = || sigmas.map(|sigma| sigma * random.sample::<f64, _>(StandardNormal)).norm();
             let within = (0..20_000).filter(|_| error() <= radius).count() as f64 / 20_000.0;
-            // Binomial: 0.07 %.
+            // The binomial standard deviation is 0.07 %.
             assert!((within - 0.99).abs() < 0.004, "{within}");
         }
     }

@@ -3,20 +3,20 @@
 use crate::time::Stamp;
 use std::fmt;
 
-/// The verdict on a result, best first.
+/// Status of a result, best first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Status {
-    /// Within the bound, which is small.
+    /// The error is within a small bound.
     #[default]
     Good,
-    /// Usable within the bound, which is larger than usual, or incomplete.
+    /// Usable, with a larger bound or with missing parts.
     Degraded,
     /// Not usable from some time on.
     Lost,
 }
 
 impl Status {
-    /// As in `metrics.json`.
+    /// The value in `metrics.json`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Good => "good",
@@ -32,54 +32,54 @@ impl fmt::Display for Status {
     }
 }
 
-/// A cause of degradation or loss, over a stretch of time.
+/// A cause of degradation or loss, over an interval of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// Effect on the result.
     pub status: Status,
     /// The cause.
     pub cause: Cause,
-    /// From when, lidar time.
+    /// Start, lidar time.
     pub from: Stamp,
-    /// Until when.
+    /// End, lidar time.
     pub to: Stamp,
 }
 
 /// A cause that degrades an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cause {
-    /// IMU and lidar contradict each other by so many times the IMU's noise.
+    /// IMU and lidar contradict each other by more than the IMU noise explains.
     Contradiction {
-        /// Median over the stretch; 0.1 to 0.4 in a sound run.
+        /// Median multiple of the IMU noise over the interval; 0.1 to 0.4 in a sound run.
         times: f64,
     },
-    /// Too few surfaces were matched for this long, s.
+    /// Too few surfaces were matched; dead reckoning with the IMU.
     FewMatches {
-        /// How long, s.
+        /// Duration, s.
         seconds: f64,
     },
     /// Rest is assumed from the IMU only: uniform motion would not change the lidar's view.
     RestAssumed {
-        /// For how long, s.
+        /// Duration, s.
         seconds: f64,
     },
-    /// Matched surfaces do not fit, root mean square, m.
+    /// Matched surfaces fit badly.
     PoorFit {
-        /// Median over the stretch, m.
+        /// Root mean square residual, median over the interval, m.
         residual_m: f64,
     },
     /// Relocalisation in the map failed after a gap, so the trajectory has an unknown offset.
     NotRelocalised,
     /// The estimated velocity is not plausible.
     Speed {
-        /// The largest, m/s.
+        /// Largest speed, m/s.
         speed_m_per_s: f64,
     },
-    /// A gap in a sensor's data, longer than is bridged without doubt.
+    /// A gap in the data of a sensor.
     Gap {
         /// `"IMU"` or `"lidar"`.
         sensor: &'static str,
-        /// How long, s.
+        /// Duration, s.
         seconds: f64,
     },
     /// The estimate does not cover the full recording.
@@ -90,16 +90,16 @@ pub enum Cause {
     /// The gyroscope or accelerometer was at the end of its range.
     Clipped {
         /// Fraction of the samples, 0..1.
-        share: f64,
+        fraction: f64,
     },
     /// A sensor repeats the same reading.
     Frozen {
         /// `"IMU"` or `"lidar"`.
         sensor: &'static str,
-        /// Number of skipped measurements.
+        /// Number of discarded measurements.
         count: usize,
     },
-    /// The estimated correction of all ranges is not plausible, m.
+    /// The estimated correction of all ranges is not plausible.
     RangeCorrection {
         /// The correction, m.
         correction_m: f64,
@@ -109,17 +109,17 @@ pub enum Cause {
         /// Largest entry.
         entry: f64,
     },
-    /// The estimated rate of the clock offset is not plausible, s/s.
+    /// The estimated rate of the clock offset is not plausible.
     ClockRate {
         /// The rate, s/s.
         rate: f64,
     },
-    /// The bound on the position error is large, m.
+    /// The bound on the position error is large.
     Uncertain {
         /// Largest bound, m.
         bound_m: f64,
     },
-    /// Loop closure moved the trajectory by more than the uncertainty, m.
+    /// Loop closure moved the trajectory by more than the uncertainty.
     LoopClosure {
         /// Largest shift, m.
         moved_m: f64,
@@ -127,15 +127,15 @@ pub enum Cause {
 }
 
 impl Finding {
-    /// Whether the cause is the behaviour of a sensor, not a consequence.
-    pub(super) fn is_of_sensor(&self) -> bool {
+    /// Whether the cause is a sensor fault, not a consequence of one.
+    pub(super) fn is_sensor_fault(&self) -> bool {
         matches!(self.cause, Cause::Clipped { .. } | Cause::Frozen { .. })
     }
 }
 
 impl Cause {
     /// Magnitude, in the unit of the kind.
-    pub(super) fn size(&self) -> f64 {
+    pub(super) fn magnitude(&self) -> f64 {
         match self {
             Self::Contradiction { times } => *times,
             Self::FewMatches { seconds }
@@ -145,7 +145,7 @@ impl Cause {
             Self::PoorFit { residual_m } => *residual_m,
             Self::NotRelocalised => 0.0,
             Self::Speed { speed_m_per_s } => *speed_m_per_s,
-            Self::Clipped { share } => *share,
+            Self::Clipped { fraction } => *fraction,
             Self::Frozen { count, .. } => *count as f64,
             Self::RangeCorrection { correction_m } => correction_m.abs(),
             Self::ImuScale { entry } => *entry,
@@ -155,7 +155,7 @@ impl Cause {
         }
     }
 
-    /// A key for scripts.
+    /// The key in `metrics.json`.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Contradiction { .. } => "contradiction",
@@ -183,7 +183,7 @@ impl fmt::Display for Cause {
             Self::Contradiction { times } => write!(
                 f,
                 "IMU and lidar contradict each other by {times:.1} times the IMU noise (0.1 to 0.4 is usual); check the \
-                 extrinsics, the IMU's units, signs and range, and the clocks"
+                 extrinsics, the units, signs and range of the IMU, and the clocks"
             ),
             Self::FewMatches { seconds } => {
                 write!(f, "tracking lost for {seconds:.1} s (too few matched surfaces); position from the IMU only")
@@ -205,10 +205,10 @@ impl fmt::Display for Cause {
             Self::NotCovered { seconds } => {
                 write!(f, "{seconds:.1} s of the recording have no estimate (a sensor is missing there)")
             }
-            Self::Clipped { share } => {
-                write!(f, "{:.1} % of the IMU samples are clipped at the end of the sensor's range", share * 1e2)
+            Self::Clipped { fraction } => {
+                write!(f, "{:.1} % of the IMU samples are clipped at the end of the sensor's range", fraction * 1e2)
             }
-            Self::Frozen { sensor, count } => write!(f, "the {sensor} repeats the same reading ({count} skipped)"),
+            Self::Frozen { sensor, count } => write!(f, "the {sensor} repeats the same reading ({count} discarded)"),
             Self::RangeCorrection { correction_m } => {
                 write!(f, "implausible range correction of {:.0} mm", correction_m * 1e3)
             }

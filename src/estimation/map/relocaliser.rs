@@ -10,7 +10,7 @@ use crate::estimation::matching::{Forest, Matcher};
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
 use crate::estimation::surfel::Patch;
-use crate::estimation::window::LEANING;
+use crate::estimation::window::MIN_SIGNIFICANT_TILT;
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::surfel_map::SurfelMap;
 use nalgebra::{Matrix6, Vector6};
@@ -315,7 +315,8 @@ impl MatchSums {
         let mut unobservable = Matrix6::zeros();
         for direction in scatter.symmetric_eigen().eigenvectors.column_iter() {
             let component = |(normal, weight): &(Vector, f64)| (normal.dot(&direction), *weight);
-            let large = self.normals.iter().map(component).filter(|(component, _)| component.abs() > LEANING);
+            let large =
+                self.normals.iter().map(component).filter(|(component, _)| component.abs() > MIN_SIGNIFICANT_TILT);
             if large.map(|(component, weight)| component * component * weight).sum::<f64>() < MIN_NORMAL_SQUARE * sum {
                 let mut block = unobservable.fixed_view_mut::<3, 3>(3, 3);
                 block += direction * direction.transpose();

@@ -11,7 +11,7 @@ use super::neighbours::ActiveNeighbours;
 use super::scene::Scene;
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::window::LEANING;
+use crate::estimation::window::MIN_SIGNIFICANT_TILT;
 use crate::geometry::{Matrix, Vector};
 use nalgebra::Vector6;
 use rayon::prelude::*;
@@ -41,7 +41,7 @@ impl MatchStatistics {
         self.squares += weight * plane.distance_m * plane.distance_m;
         self.information += plane.normal * plane.normal.transpose() * weight;
         let component = plane.normal.dot(weakest);
-        if component.abs() > LEANING {
+        if component.abs() > MIN_SIGNIFICANT_TILT {
             self.weak_information += weight * component * component;
             self.revisited_information += if is_revisit { weight * component * component } else { 0.0 };
         }

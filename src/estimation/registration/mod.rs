@@ -40,7 +40,7 @@ use super::EstimatorSpec;
 use super::gaps::{Gaps, restored};
 use super::matching::Matcher;
 use super::survey::Survey;
-use super::window::Moved;
+use super::window::Displacement;
 use crate::geometry::{PoseCovariance, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
 use crate::time::Stamp;
@@ -120,7 +120,7 @@ pub struct RegistrationInput<'a> {
 /// data and not with the time span.
 pub fn register(input: RegistrationInput, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
     let stamps = input.map_from_head.stamps();
-    let Some(gaps) = Gaps::of(stamps) else { return register_without_gaps(input, calibration, spec) };
+    let Some(gaps) = Gaps::between(stamps) else { return register_without_gaps(input, calibration, spec) };
     let map_from_head = &gaps.shorten(input.map_from_head);
     let covariances = &gaps.shorten_covariances(input.covariances);
     let survey = &gaps.shorten_survey(input.survey);
@@ -280,7 +280,7 @@ impl<'a> Registration<'a> {
                 let (x, step) = equations.solve().ok_or("the normal equations are singular")?;
                 let three = Vector::from_column_slice;
                 let knots = x.chunks_exact(6).map(|knot| (three(&knot[..3]), three(&knot[3..])));
-                let Moved { shift, turn } = Moved::greatest(knots);
+                let Displacement { shift, turn } = Displacement::max_of(knots);
                 if !(shift < MAX_CORRECTION.0 && turn < MAX_CORRECTION.1) {
                     return Err("the correction is implausibly large");
                 }

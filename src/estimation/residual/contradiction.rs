@@ -1,4 +1,4 @@
-//! Contradiction between an IMU and a trajectory.
+//! Contradiction between the IMU measurements and a trajectory.
 
 use super::inertial::Inertial;
 use crate::estimation::strapdown::{Biases, Interval, State};
@@ -10,24 +10,24 @@ const SUMMED_S: f64 = 0.2;
 /// Residuals of rotation (rad) and velocity (m/s) summed over a time span, and the variance of each on an axis.
 #[derive(Default)]
 struct SummedResidual {
-    lasts_s: f64,
-    off: [Vector; 2],
+    duration_s: f64,
+    residuals: [Vector; 2],
     variances: [f64; 2],
 }
 
 impl SummedResidual {
     fn add(&mut self, terms: &Inertial, interval: &Interval) {
         let h = interval.h;
-        self.lasts_s += h;
-        self.off[0] += terms.map_from_end * terms.rate * h;
-        self.off[1] += terms.map_from_middle * terms.force * h;
+        self.duration_s += h;
+        self.residuals[0] += terms.map_from_end * terms.rate * h;
+        self.residuals[1] += terms.map_from_middle * terms.force * h;
         self.variances[0] += (interval.gyro_sigma * h).powi(2);
         self.variances[1] += (interval.accel_sigma * h).powi(2);
     }
 
     /// Both residuals as multiples of the standard deviations.
-    fn times(&self) -> [f64; 2] {
-        [0, 1].map(|k| self.off[k].norm() / (3.0 * self.variances[k]).sqrt())
+    fn multiples(&self) -> [f64; 2] {
+        [0, 1].map(|k| self.residuals[k].norm() / (3.0 * self.variances[k]).sqrt())
     }
 }
 
@@ -43,8 +43,8 @@ pub(in crate::estimation) fn contradiction(
     let (mut sum, mut times) = (SummedResidual::default(), [Vec::new(), Vec::new()]);
     for (ends, interval) in states.windows(2).zip(intervals) {
         sum.add(&Inertial::between((&ends[0], &ends[1]), interval, biases, gravity), interval);
-        if sum.lasts_s >= SUMMED_S {
-            let multiples = std::mem::take(&mut sum).times();
+        if sum.duration_s >= SUMMED_S {
+            let multiples = std::mem::take(&mut sum).multiples();
             times.iter_mut().zip(multiples).for_each(|(all, one)| all.push(one));
         }
     }
@@ -98,7 +98,7 @@ mod tests {
             interval.gyro += noise(interval.gyro_sigma);
             interval.accel += noise(interval.accel_sigma);
         }
-        // The median of chi-squared with three degrees of freedom is 2.366. With 200 spans the sample median has an
+        // The median of chi-squared with three degrees of freedom is 2.366. Counterpart 200 spans the sample median has an
         // error of 6 %; the larger of two medians is above it.
         let expected = (2.366_f64 / 3.0).sqrt();
         assert!((multiples(&intervals) / expected - 1.0).abs() < 0.15, "{}", multiples(&intervals));

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Both compare means over the interval, so the rate belongs to the middle and no second difference of positions is
-//! needed: `v` is the integrated velocity, corrected by the exact derivative of the spline. With `R' = exp(dr) R`, `t'
+//! needed: `v` is the integrated velocity, corrected by the exact derivative of the spline. Counterpart `R' = exp(dr) R`, `t'
 //! = t + dt`, in the map's axes:
 //!
 //! ```text
@@ -27,11 +27,11 @@ use crate::estimation::spline::Basis;
 use crate::estimation::strapdown::{Biases, Interval, State};
 use crate::geometry::{Matrix, Rotation, Vector, skew};
 
-/// Intervals whose sigmas differ by more than this factor are not summed.
-const UNLIKE: f64 = 3.0;
-/// Factor on the noise of a single accelerometer sample, since the correction cannot follow it within a knot's span.
+/// Intervals whose sigmas differ by more than this factor are not put into one sum.
+const MAX_SIGMA_RATIO: f64 = 3.0;
+/// Factor on the sigma of a single accelerometer sample, because the correction cannot follow it within a knot span.
 /// Without the single samples the correction could oscillate between the ends of the sums.
-const WITHIN_SPAN: f64 = 3.0;
+const SINGLE_SAMPLE_FACTOR: f64 = 3.0;
 
 /// IMU gaps up to this length, s, cause no significant velocity step, and the predicted pose stays within the match
 /// gate.
@@ -80,9 +80,9 @@ impl Inertial {
 ///
 /// If the head rocks, a change of the accelerometer bias becomes a changing acceleration in the map. The second
 /// derivative of the correction is linear between knots, so it follows this acceleration on average over a knot spacing
-/// but not from sample to sample. With full weight on single samples, the difference would count as information and
+/// but not from sample to sample. Counterpart full weight on single samples, the difference would count as information and
 /// freeze the bias at any value. Therefore velocities have full weight when summed from the middle of one knot span to
-/// the next, and single samples have less ([`WITHIN_SPAN`]). Where sigmas change, for example at a dropout, a new sum
+/// the next, and single samples have less ([`SINGLE_SAMPLE_FACTOR`]). Where sigmas change, for example at a dropout, a new sum
 /// starts, so that the accurate samples retain their weight.
 pub(in crate::estimation) fn add_inertial(
     equations: &mut NormalEquations,
@@ -92,33 +92,33 @@ pub(in crate::estimation) fn add_inertial(
     (biases, gravity): (&Biases, &Vector),
 ) {
     let (mut each, mut whole) = (ResidualSums::none(), ResidualSums::none());
-    let mut sum: Option<Speed> = None;
+    let mut sum: Option<AccelResidual> = None;
     let near_steps = near_steps(intervals);
     for (k, interval) in intervals.iter().enumerate() {
-        let interval = &if near_steps[k] { loosened(interval) } else { *interval };
+        let interval = &if near_steps[k] { with_step_margin(interval) } else { *interval };
         let terms = Inertial::between((&states[k], &states[k + 1]), interval, biases, gravity);
         let bases = (&bases[k], &bases[k + 1]);
-        Turn::of(&terms, bases, interval).add_to(&mut each, equations, layout);
-        let alone = Speed::of(&terms, bases, interval, gravity);
-        alone.add_to(WITHIN_SPAN, &mut each, equations, layout);
-        if let Some(sum) = sum.as_mut().filter(|sum| sum.goes_on_with(&alone)) {
-            sum.join(&alone);
-        } else if let Some(done) = sum.replace(alone) {
+        GyroResidual::of(&terms, bases, interval).add_to(&mut each, equations, layout);
+        let single = AccelResidual::of(&terms, bases, interval, gravity);
+        single.add_to(SINGLE_SAMPLE_FACTOR, &mut each, equations, layout);
+        if let Some(sum) = sum.as_mut().filter(|sum| sum.can_be_summed_with(&single)) {
+            sum.append(&single);
+        } else if let Some(done) = sum.replace(single) {
             done.add_to(1.0, &mut whole, equations, layout);
         }
     }
     if let Some(last) = sum {
         last.add_to(1.0, &mut whole, equations, layout);
     }
-    each.move_to(equations, layout);
-    whole.move_to(equations, layout);
+    each.flush_to(equations, layout);
+    whole.flush_to(equations, layout);
 }
 
 /// Marks intervals close to a run of weakly measured ones (a bridged gap, clipped readings).
 ///
 /// After such a run velocity or attitude are uncertain by more than [`STEP`], so the correction needs a step. The
 /// correction is smooth over some knot spacings and spreads the step to both sides of the run, where it contradicts
-/// valid samples. With their nominal sigmas these samples would move the biases instead.
+/// valid samples. Counterpart their nominal sigmas these samples would move the biases instead.
 fn near_steps(intervals: &[Interval]) -> Vec<bool> {
     let mut near = vec![false; intervals.len()];
     let (mut step2, mut since_s) = ((0.0, 0.0), f64::INFINITY);
@@ -144,7 +144,7 @@ fn near_steps(intervals: &[Interval]) -> Vec<bool> {
 }
 
 /// The same interval with [`STEP_MARGIN_SIGMA`] added to the sigmas.
-fn loosened(interval: &Interval) -> Interval {
+fn with_step_margin(interval: &Interval) -> Interval {
     let (gyro_sigma, accel_sigma) =
         (interval.gyro_sigma.hypot(STEP_MARGIN_SIGMA.0), interval.accel_sigma.hypot(STEP_MARGIN_SIGMA.1));
     Interval { gyro_sigma, accel_sigma, ..*interval }
@@ -157,7 +157,7 @@ fn span_of(basis: &Basis) -> i64 {
 
 /// A residual on three axes, rad or m/s, with the variance and the knots that it depends on.
 #[derive(Debug, Clone, Copy)]
-struct Sum {
+struct ResidualSum {
     /// Index of the first knot.
     first: i64,
     /// How many knots.
@@ -166,35 +166,35 @@ struct Sum {
     variance: f64,
 }
 
-impl Sum {
+impl ResidualSum {
     /// The sum of a mean residual over an interval, between the bases at both ends.
     fn over(deviation: &Vector, sigma: f64, h: f64, ends: (&Basis, &Basis)) -> Self {
-        let used = 4 + place(ends.1.first, ends.0.first);
+        let used = 4 + offset(ends.1.first, ends.0.first);
         Self { first: ends.0.first, used, deviation: deviation * h, variance: (sigma * h).powi(2) }
     }
 }
 
 /// The offset of a knot from `first`.
-fn place(knot: i64, first: i64) -> usize {
+fn offset(knot: i64, first: i64) -> usize {
     ((knot - first).max(0) as usize).min(KNOTS - 4)
 }
 
 /// The gyroscope residual over an interval, with the derivatives by the unknowns.
 #[derive(Debug, Clone, Copy)]
-struct Turn {
-    sum: Sum,
+struct GyroResidual {
+    sum: ResidualSum,
     by_turn: [f64; KNOTS],
     /// By the bias, and by the columns of the scale and misalignment matrix.
     by_gyro: [Matrix; 4],
 }
 
-impl Turn {
+impl GyroResidual {
     fn of(terms: &Inertial, (a, b): (&Basis, &Basis), interval: &Interval) -> Self {
         let h = interval.h;
-        let sum = Sum::over(&(terms.map_from_end * terms.rate), interval.gyro_sigma, h, (a, b));
+        let sum = ResidualSum::over(&(terms.map_from_end * terms.rate), interval.gyro_sigma, h, (a, b));
         let mut by_turn = [0.0; KNOTS];
         for (basis, sign) in [(a, -1.0), (b, 1.0)] {
-            for (sum, value) in by_turn[place(basis.first, a.first)..].iter_mut().zip(basis.value) {
+            for (sum, value) in by_turn[offset(basis.first, a.first)..].iter_mut().zip(basis.value) {
                 *sum += sign * value;
             }
         }
@@ -204,7 +204,7 @@ impl Turn {
     }
 
     fn add_to(&self, rows: &mut ResidualSums, equations: &mut NormalEquations, layout: &Layout) {
-        let Sum { first, used, deviation, variance } = self.sum;
+        let ResidualSum { first, used, deviation, variance } = self.sum;
         for axis in 0..3 {
             let mut row = ResidualRow::from(first);
             for (knot, by) in self.by_turn[..used].iter().enumerate() {
@@ -223,10 +223,10 @@ impl Turn {
 
 /// The accelerometer residual over one or more intervals, with the derivatives by the unknowns.
 #[derive(Debug, Clone, Copy)]
-struct Speed {
+struct AccelResidual {
     span: i64,
     sigma: f64,
-    sum: Sum,
+    sum: ResidualSum,
     by_shift: [f64; KNOTS],
     by_turn: [Matrix; KNOTS],
     /// By the bias, and by the columns of the scale and misalignment matrix.
@@ -234,22 +234,22 @@ struct Speed {
     by_tilt: Matrix,
 }
 
-impl Speed {
+impl AccelResidual {
     fn of(terms: &Inertial, (a, b): (&Basis, &Basis), interval: &Interval, gravity: &Vector) -> Self {
         let (h, f) = (interval.h, &interval.accel);
         let by_middle = skew(&terms.acceleration) * (0.5 * h);
         let (mut by_shift, mut by_turn) = ([0.0; KNOTS], [Matrix::zeros(); KNOTS]);
         for (basis, sign) in [(a, -1.0), (b, 1.0)] {
-            let place = place(basis.first, a.first);
+            let offset = offset(basis.first, a.first);
             for k in 0..4 {
-                by_shift[place + k] += sign * basis.rate[k];
-                by_turn[place + k] += by_middle * basis.value[k];
+                by_shift[offset + k] += sign * basis.rate[k];
+                by_turn[offset + k] += by_middle * basis.value[k];
             }
         }
         Self {
             span: span_of(a),
             sigma: interval.accel_sigma,
-            sum: Sum::over(&(terms.map_from_middle * terms.force), interval.accel_sigma, h, (a, b)),
+            sum: ResidualSum::over(&(terms.map_from_middle * terms.force), interval.accel_sigma, h, (a, b)),
             by_shift,
             by_turn,
             by_accel: [1.0, f.x, f.y, f.z].map(|reading| terms.map_from_middle * (h * reading)),
@@ -258,28 +258,28 @@ impl Speed {
     }
 
     /// Whether another interval belongs to the same span and has a similar sigma.
-    fn goes_on_with(&self, next: &Self) -> bool {
-        next.span == self.span && next.sigma < UNLIKE * self.sigma && self.sigma < UNLIKE * next.sigma
+    fn can_be_summed_with(&self, next: &Self) -> bool {
+        next.span == self.span && next.sigma < MAX_SIGMA_RATIO * self.sigma && self.sigma < MAX_SIGMA_RATIO * next.sigma
     }
 
     /// Adds the residual of the next interval.
-    fn join(&mut self, next: &Self) {
-        let place = place(next.sum.first, self.sum.first);
-        let used = next.sum.used.min(KNOTS - place);
+    fn append(&mut self, next: &Self) {
+        let offset = offset(next.sum.first, self.sum.first);
+        let used = next.sum.used.min(KNOTS - offset);
         for knot in 0..used {
-            self.by_shift[place + knot] += next.by_shift[knot];
-            self.by_turn[place + knot] += next.by_turn[knot];
+            self.by_shift[offset + knot] += next.by_shift[knot];
+            self.by_turn[offset + knot] += next.by_turn[knot];
         }
         self.by_accel.iter_mut().zip(&next.by_accel).for_each(|(by, next)| *by += next);
         self.by_tilt += next.by_tilt;
-        self.sum.used = self.sum.used.max(place + used);
+        self.sum.used = self.sum.used.max(offset + used);
         self.sum.deviation += next.sum.deviation;
         self.sum.variance += next.sum.variance;
     }
 
     /// Adds the residual to the equations, with the sigma multiplied by `looser`.
     fn add_to(&self, looser: f64, rows: &mut ResidualSums, equations: &mut NormalEquations, layout: &Layout) {
-        let Sum { first, used, deviation, variance } = self.sum;
+        let ResidualSum { first, used, deviation, variance } = self.sum;
         let weight = (variance * looser * looser).recip();
         for axis in 0..3 {
             let mut row = ResidualRow::from(first);
@@ -311,7 +311,7 @@ mod tests {
     use crate::estimation::normal_equations::Factor;
     use crate::estimation::residual::BORDER;
     use crate::estimation::residual::prior::Start;
-    use crate::estimation::strapdown::Exaggerates;
+    use crate::estimation::strapdown::ImuScaleMisalignment;
     use crate::geometry::{from_roll_pitch_yaw, gravity_in_world};
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector, SVector};
@@ -350,14 +350,14 @@ mod tests {
                 whole += speed * interval.h;
                 variance += (interval.accel_sigma * interval.h).powi(2);
                 each.push(terms.map_from_end * terms.rate / interval.gyro_sigma);
-                each.push(speed / (interval.accel_sigma * WITHIN_SPAN));
+                each.push(speed / (interval.accel_sigma * SINGLE_SAMPLE_FACTOR));
             }
             each.push(whole / variance.sqrt());
             each.iter().flatten().copied().collect()
         }
     }
 
-    /// A head that pitches by 40 degrees at 1.2 Hz, from `start_s` on.
+    /// A head that pitches by 40 degrees at 1.2 Hz, starting at `start_s`.
     fn rocking(start_s: f64, count: usize) -> Case {
         let w = 1.2 * TAU;
         let biases = Biases { gyro: Vector::new(0.01, -0.02, 0.005), accel: Vector::new(0.03, 0.01, -0.02) };
@@ -412,11 +412,11 @@ mod tests {
             }
         };
         let matrix = |at: usize| Matrix::from_fn(|r, c| x[border + at + 3 * r + c]);
-        let exaggerates = Exaggerates { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
+        let scale_misalignment = ImuScaleMisalignment { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
         let tilt = Vector::new(x[border + GRAVITY], x[border + GRAVITY + 1], 0.0);
         let moved = Case {
             states: case.states.iter().zip(case.bases()).map(moved).collect(),
-            intervals: case.intervals.iter().map(|interval| interval.without(&exaggerates)).collect(),
+            intervals: case.intervals.iter().map(|interval| interval.corrected_by(&scale_misalignment)).collect(),
             biases: Biases { gyro: case.biases.gyro + three(GYRO_BIAS), accel: case.biases.accel + three(ACCEL_BIAS) },
             gravity: Rotation::from_scaled_axis(tilt) * case.gravity,
             start_s: case.start_s,
@@ -460,13 +460,18 @@ mod tests {
     }
 
     #[test]
-    fn an_imu_without_other_sensors_does_not_observe_its_bias() {
+    fn the_imu_without_other_sensors_does_not_observe_the_accelerometer_bias() {
         // Any accelerometer bias is consistent with some trajectory with the same initial state. Four seconds of
         // rocking would determine a constant to 10 mm/s^2 / sqrt(400); the bias sigma stays above 25 times that.
         let case = rocking(0.013, 400);
         let layout = Layout { first_knot: 0, knots: 24 };
         let mut equations = case.equations(&layout);
-        Start::held(0.013).add_to(&mut equations, &layout, (&vec![0.0; layout.border()], &SVector::zeros()), SPACING_S);
+        Start::continuing(0.013).add_to(
+            &mut equations,
+            &layout,
+            (&vec![0.0; layout.border()], &SVector::zeros()),
+            SPACING_S,
+        );
         (0..layout.size()).for_each(|unknown| equations.add_entry(unknown, unknown, 1e-3));
         let mut factor = Factor::default();
         equations.factor(&mut factor).unwrap();

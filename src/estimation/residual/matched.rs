@@ -5,10 +5,10 @@
 //! `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the vector from the lidar, `u` its direction, and the
 //! lidar rotated by `e` and translated by `s` along the IMU axes. A surfel of a fixed view does not move.
 //!
-//! The unknowns common to all surfels are in the border. `B` of them are used: [`COMMON`], or only the first [`ALWAYS`]
-//! if the lidar extrinsics are not estimated.
+//! The unknowns common to all surfels are in the border. `B` of them are used: [`COMMON`], or only the first
+//! [`COMMON_WITHOUT_EXTRINSICS`] if the lidar extrinsics are not estimated.
 
-use super::sums::{OF_SPAN, add_scaled, over_knots};
+use super::sums::{SPAN_UNKNOWNS, add_scaled, over_knots};
 use super::{CLOCK, Layout};
 use crate::estimation::surfel::{Patch, Placed};
 use crate::geometry::{Matrix, Vector};
@@ -27,7 +27,7 @@ pub(in crate::estimation) struct Plane {
 }
 
 impl Plane {
-    /// The common plane of two patches; `sigma_m` is the match error in addition to thickness and roughness.
+    /// The common plane of two patches; `sigma_m` is the match error in addition to the variances of the patches.
     pub(in crate::estimation) fn of(a: &Patch, b: &Patch, sigma_m: f64) -> Self {
         let both = a.covariance + b.covariance;
         let start = a.normal + b.normal;
@@ -47,7 +47,7 @@ impl Plane {
     }
 
     /// Removes the component of the normal along `direction`, a unit vector.
-    pub(in crate::estimation) fn forget(&mut self, direction: &Vector) {
+    pub(in crate::estimation) fn remove_component(&mut self, direction: &Vector) {
         let left = self.normal - direction * self.normal.dot(direction);
         self.normal = left.try_normalize(1e-3).unwrap_or(self.normal);
         self.distance_m = self.normal.dot(&self.apart);
@@ -60,32 +60,36 @@ fn adjugate(m: &Matrix) -> Matrix {
 }
 
 /// Common unknowns without extrinsics: clock offset, clock rate and range bias.
-pub(in crate::estimation) const ALWAYS: usize = 3;
+pub(in crate::estimation) const COMMON_WITHOUT_EXTRINSICS: usize = 3;
 /// Common unknowns with extrinsics: also rotation and translation of the lidar.
 pub(in crate::estimation) const COMMON: usize = 9;
 
 /// The derivatives of `e` by the unknowns of one matched surfel.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Side<const B: usize> {
+pub(in crate::estimation) struct SurfelJacobian<const B: usize> {
     /// By rotation and translation of the surfel.
     pub(super) own: [f64; 6],
     /// By the common unknowns, which are contiguous in the border.
     pub(super) common: [f64; B],
 }
 
-impl<const B: usize> Side<B> {
+impl<const B: usize> SurfelJacobian<B> {
     /// The derivatives for `surfel`, with `normal` pointing towards it.
     #[inline(always)]
-    pub(in crate::estimation) fn of(surfel: &Placed, normal: &Vector, clock_at_s: f64) -> Self {
+    pub(in crate::estimation) fn of(surfel: &Placed, normal: &Vector, clock_reference_s: f64) -> Self {
         let turn = surfel.arm.cross(normal);
         let later = normal.dot(&surfel.velocity);
         let mut common = [0.0; B];
-        common[..ALWAYS].copy_from_slice(&[later, later * (surfel.tau_s - clock_at_s), normal.dot(&surfel.beam)]);
+        common[..COMMON_WITHOUT_EXTRINSICS].copy_from_slice(&[
+            later,
+            later * (surfel.tau_s - clock_reference_s),
+            normal.dot(&surfel.beam),
+        ]);
         if B == COMMON {
             let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.ray().cross(normal));
             let lidar_shift = surfel.map_from_imu.tr_mul(normal);
-            common[ALWAYS..ALWAYS + 3].copy_from_slice(lidar_turn.as_slice());
-            common[ALWAYS + 3..].copy_from_slice(lidar_shift.as_slice());
+            common[COMMON_WITHOUT_EXTRINSICS..COMMON_WITHOUT_EXTRINSICS + 3].copy_from_slice(lidar_turn.as_slice());
+            common[COMMON_WITHOUT_EXTRINSICS + 3..].copy_from_slice(lidar_shift.as_slice());
         }
         Self { own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], common }
     }
@@ -104,20 +108,20 @@ pub(in crate::estimation) fn add_scaled_row(
     layout: &Layout,
     (surfel, normal): (&Placed, &Vector),
     scales: &[f64; 6],
-    clock_at_s: f64,
+    clock_reference_s: f64,
 ) {
-    let side = Side::<COMMON>::of(surfel, normal, clock_at_s);
+    let side = SurfelJacobian::<COMMON>::of(surfel, normal, clock_reference_s);
     let (first, common, knots) =
         (layout.knot(surfel.basis.first), layout.border() + CLOCK, over_knots(&side.own, &surfel.basis));
     for (column, scale) in columns.iter_mut().zip(scales) {
-        add_scaled(&mut column[first..first + OF_SPAN], &knots, *scale);
+        add_scaled(&mut column[first..first + SPAN_UNKNOWNS], &knots, *scale);
         add_scaled(&mut column[common..common + COMMON], &side.common, *scale);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::sums::{Coupling, OfSpan, Own};
+    use super::super::sums::{Coupling, SpanSums, SurfelSums};
     use super::super::{BORDER, LIDAR_SHIFT, LIDAR_TURN, RANGE};
     use super::*;
     use crate::estimation::nominal::Correction;
@@ -181,11 +185,11 @@ mod tests {
             (distance(&step(1e-6)) - distance(&step(-1e-6))) / 2e-6
         });
         let mut equations = NormalEquations::new(layout.size());
-        let one = Side::<COMMON>::of(a, &plane.normal, AT_S);
-        let other = b.map(|b| (b, Side::of(b, &-plane.normal, AT_S)));
+        let one = SurfelJacobian::<COMMON>::of(a, &plane.normal, AT_S);
+        let other = b.map(|b| (b, SurfelJacobian::of(b, &-plane.normal, AT_S)));
         let both = other.as_ref().map_or(one, |(_, other)| one.together_with(other));
         for (surfel, side) in [(a, both)].into_iter().chain(other.map(|(b, side)| (b, side.together_with(&one)))) {
-            let (mut own, mut of_span) = (Own::NONE, OfSpan::NONE);
+            let (mut own, mut of_span) = (SurfelSums::NONE, SpanSums::NONE);
             own.add(&side, plane.distance_m, 3.0);
             of_span.add(&own, &surfel.basis);
             if std::ptr::eq(surfel, a) {

@@ -1,4 +1,4 @@
-//! The terms of the window's cost, each with derivatives: inertial, matched surfaces, priors.
+//! Residuals of the window with derivatives: IMU, matched surfels, priors.
 
 pub(super) mod contradiction;
 pub(super) mod inertial;
@@ -7,9 +7,10 @@ pub(super) mod prior;
 mod rows;
 pub(super) mod sums;
 
-/// Number of border unknowns, which follow the knots.
+/// Number of border unknowns.
 ///
-/// Gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate, range bias, rotation and translation of
+/// The border has the unknowns that all times share; they follow the knots and make the last rows of the equations
+/// dense: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate, range bias, rotation and translation of
 /// the lidar, and scale and misalignment of gyroscope and accelerometer, each three by three.
 pub(super) const BORDER: usize = 35;
 /// Offsets of the unknowns in the border.
@@ -27,14 +28,14 @@ pub(super) const ACCEL_MATRIX: usize = 26;
 /// The order of a window's unknowns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
-    /// Index of the first knot, counted from the start of time.
+    /// Index of the first knot; knot 0 is at time 0.
     pub(super) first_knot: i64,
     /// Number of knots.
     pub(super) knots: usize,
 }
 
 impl Layout {
-    /// How many unknowns.
+    /// Number of unknowns.
     pub(super) fn size(&self) -> usize {
         self.knots * 6 + BORDER
     }

@@ -29,9 +29,10 @@ pub(in crate::estimation) type ByLidar = [Matrix6<f64>; 3];
 
 impl Start {
     /// The continuation of the previous window.
+    ///
     /// Pose and velocity are continuous. The acceleration is continuous only approximately, because an update of a bias
     /// estimate changes it immediately.
-    pub(in crate::estimation) fn held(u_s: f64) -> Self {
+    pub(in crate::estimation) fn continuing(u_s: f64) -> Self {
         Self { u_s, sigmas: [[1e-5, 1e-5], [1e-4, 1e-4], [1e-2, 0.3]], by_lidar: None }
     }
 
@@ -40,7 +41,7 @@ impl Start {
         Self { u_s, sigmas: [[1e-5, 1e-5], [0.1, velocity_sigma], [10.0, 10.0]], by_lidar: None }
     }
 
-    /// Adds the prior; `total` has the sum of this window's corrections so far, and `moved` that of the border.
+    /// Adds the prior; `total` is the sum of the corrections of this window so far, `moved` that of the border.
     pub(in crate::estimation) fn add_to(
         &self,
         equations: &mut NormalEquations,
@@ -55,8 +56,8 @@ impl Start {
                 let weight = self.sigmas[order][axis / 3].powi(-2);
                 let column = |a: usize| first + 6 * a + axis;
                 let by_lidar = self.by_lidar.map(|by_lidar| -by_lidar[order].row(axis));
-                let asked = by_lidar.map_or(0.0, |by_lidar| (by_lidar * moved.fixed_rows::<6>(LIDAR_TURN))[0]);
-                let residual = (0..4).map(|a| by[a] * total[column(a)]).sum::<f64>() + asked;
+                let target = by_lidar.map_or(0.0, |by_lidar| (by_lidar * moved.fixed_rows::<6>(LIDAR_TURN))[0]);
+                let residual = (0..4).map(|a| by[a] * total[column(a)]).sum::<f64>() + target;
                 for a in 0..4 {
                     equations.add_right(column(a), -weight * by[a] * residual);
                     for c in 0..=a {
@@ -87,14 +88,14 @@ impl Start {
         let basis = Basis::at(self.u_s, knot_spacing_s);
         let first = layout.knot(basis.first);
         let mut right = vec![0.0; layout.size()];
-        for (order, (by, asked)) in [(basis.value, value), (basis.rate, rate)].into_iter().enumerate() {
+        for (order, (by, target)) in [(basis.value, value), (basis.rate, rate)].into_iter().enumerate() {
             for axis in 0..6 {
                 let weight = self.sigmas[order][axis / 3].powi(-2);
                 for a in 0..4 {
-                    right[first + 6 * a + axis] += weight * by[a] * asked[axis];
+                    right[first + 6 * a + axis] += weight * by[a] * target[axis];
                 }
                 for (k, by_lidar) in (0..6).filter_map(|k| Some((k, self.by_lidar?[order][(axis, k)]))) {
-                    right[layout.border() + LIDAR_TURN + k] -= weight * by_lidar * asked[axis];
+                    right[layout.border() + LIDAR_TURN + k] -= weight * by_lidar * target[axis];
                 }
             }
         }
@@ -103,29 +104,29 @@ impl Start {
 }
 
 /// Adds a zero-velocity measurement at a node: `v + dt' = 0`, to `sigma` (m/s).
-pub(in crate::estimation) fn add_standstill(
+pub(in crate::estimation) fn add_zero_velocity(
     equations: &mut NormalEquations,
     layout: &Layout,
     basis: &Basis,
     velocity: &Vector,
     sigma: f64,
 ) {
-    add_zero_rate(equations, (layout, 3), basis, velocity, sigma);
+    add_zero_derivative(equations, (layout, 3), basis, velocity, sigma);
 }
 
 /// Adds a zero-rate measurement at a node with rate `rate` (rad/s, in the map): `w + dr' = 0`, to `sigma`.
-pub(in crate::estimation) fn add_no_turn(
+pub(in crate::estimation) fn add_zero_rotation_rate(
     equations: &mut NormalEquations,
     layout: &Layout,
     basis: &Basis,
     rate: &Vector,
     sigma: f64,
 ) {
-    add_zero_rate(equations, (layout, 0), basis, rate, sigma);
+    add_zero_derivative(equations, (layout, 0), basis, rate, sigma);
 }
 
-/// Adds that a rate plus the derivative of the correction is zero; `of` is the first axis of the correction.
-fn add_zero_rate(
+/// Adds a measurement that `rate` plus the derivative of the correction is zero, from axis `of` of the correction on.
+fn add_zero_derivative(
     equations: &mut NormalEquations,
     (layout, of): (&Layout, usize),
     basis: &Basis,
@@ -185,11 +186,11 @@ mod tests {
             let mut all = Vec::new();
             for (order, by) in [basis.value, basis.rate, basis.acceleration].iter().enumerate() {
                 let lidar = moved.fixed_rows::<6>(LIDAR_TURN) + x.rows(layout.border() + LIDAR_TURN, 6);
-                let asked = by_lidar[order] * lidar;
+                let target = by_lidar[order] * lidar;
                 for axis in 0..6 {
                     let knot = |a: usize| layout.knot(basis.first) + 6 * a + axis;
-                    let is: f64 = (0..4).map(|a| by[a] * (total[knot(a)] + x[knot(a)])).sum();
-                    all.push((is - asked[axis]) / sigmas[order][axis / 3]);
+                    let value: f64 = (0..4).map(|a| by[a] * (total[knot(a)] + x[knot(a)])).sum();
+                    all.push((value - target[axis]) / sigmas[order][axis / 3]);
                 }
             }
             DVector::from_vec(all)
@@ -215,8 +216,8 @@ mod tests {
             1 => rate[axis] / sigmas[1][axis / 3],
             _ => 0.0,
         };
-        let asked = jacobian.transpose() * DVector::from_fn(18, |k, _| whitened(k / 6, k % 6));
+        let target = jacobian.transpose() * DVector::from_fn(18, |k, _| whitened(k / 6, k % 6));
         let right = DVector::from_vec(start.right_hand_side(&layout, (&value, &rate), SPACING_S));
-        assert_relative_eq!(right, asked, epsilon = 1e-9 * asked.amax());
+        assert_relative_eq!(right, target, epsilon = 1e-9 * target.amax());
     }
 }

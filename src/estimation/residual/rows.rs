@@ -9,9 +9,9 @@ use pulp::Arch;
 /// Maximum number of knots that a residual depends on.
 pub(super) const KNOTS: usize = 6;
 /// Unknowns of the knots.
-const OF_KNOTS: usize = 6 * KNOTS;
+const KNOT_UNKNOWNS: usize = 6 * KNOTS;
 /// Knots, then biases and tilt (start of the border), then both scale and misalignment matrices (end of the border).
-const UNKNOWNS: usize = OF_KNOTS + CLOCK + 18;
+const UNKNOWNS: usize = KNOT_UNKNOWNS + CLOCK + 18;
 
 /// The derivatives of a residual.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ impl ResidualRow {
     /// The derivative by an unknown of the border: bias, tilt, scale or misalignment.
     pub(super) fn border(&mut self, unknown: usize) -> &mut f64 {
         let place = if unknown < CLOCK { unknown } else { CLOCK + unknown - GYRO_MATRIX };
-        &mut self.by[OF_KNOTS + place]
+        &mut self.by[KNOT_UNKNOWNS + place]
     }
 }
 
@@ -63,7 +63,7 @@ impl ResidualSums {
         layout: &Layout,
     ) {
         if self.first != Some(row.first) {
-            self.move_to(equations, layout);
+            self.flush_to(equations, layout);
             self.first = Some(row.first);
         }
         Arch::new().dispatch(|| self.add_products(&row.by, residual, weight));
@@ -81,27 +81,27 @@ impl ResidualSums {
     }
 
     /// Moves the sum into the equations and clears it.
-    pub(super) fn move_to(&mut self, equations: &mut NormalEquations, layout: &Layout) {
+    pub(super) fn flush_to(&mut self, equations: &mut NormalEquations, layout: &Layout) {
         let Some(first) = self.first.take().map(|first| layout.knot(first)) else { return };
         // Knots after the last used one may be outside of the window.
-        let used = self.square[..OF_KNOTS].iter().rposition(|row| row.iter().any(|sum| *sum != 0.0));
+        let used = self.square[..KNOT_UNKNOWNS].iter().rposition(|row| row.iter().any(|sum| *sum != 0.0));
         let knots = used.map_or(0, |last| last + 1);
-        for row in (0..knots).chain(OF_KNOTS..UNKNOWNS) {
-            let unknown = if row < OF_KNOTS { first + row } else { place_in_border(row, layout) };
+        for row in (0..knots).chain(KNOT_UNKNOWNS..UNKNOWNS) {
+            let unknown = if row < KNOT_UNKNOWNS { first + row } else { border_index(row, layout) };
             let sums = std::mem::replace(&mut self.square[row], [0.0; UNKNOWNS]);
             if sums[row] == 0.0 {
                 continue; // no residual depends on it
             }
             equations.add_right(unknown, std::mem::take(&mut self.right[row]));
             equations.add_row(unknown, first, &sums[..knots.min(row + 1)]);
-            for (other, sum) in sums.iter().enumerate().take(row + 1).skip(OF_KNOTS) {
-                equations.add_entry(unknown, place_in_border(other, layout), *sum);
+            for (other, sum) in sums.iter().enumerate().take(row + 1).skip(KNOT_UNKNOWNS) {
+                equations.add_entry(unknown, border_index(other, layout), *sum);
             }
         }
     }
 }
 
-fn place_in_border(unknown: usize, layout: &Layout) -> usize {
-    let place = unknown - OF_KNOTS;
+fn border_index(unknown: usize, layout: &Layout) -> usize {
+    let place = unknown - KNOT_UNKNOWNS;
     layout.border() + if place < CLOCK { place } else { GYRO_MATRIX + place - CLOCK }
 }

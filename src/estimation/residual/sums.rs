@@ -3,14 +3,14 @@
 //! All surfels of a span depend on the same four knots. Their terms are summed in small dense blocks, which fit into
 //! the L1 cache, and enter the equations a block at a time.
 
-use super::matched::Side;
+use super::matched::SurfelJacobian;
 use super::{CLOCK, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Placed;
 
 /// Unknowns of the four knots about a span.
-pub(super) const OF_SPAN: usize = 24;
+pub(super) const SPAN_UNKNOWNS: usize = 24;
 
 /// The terms of all matches of a surfel by the motion of that surfel.
 ///
@@ -19,19 +19,19 @@ pub(super) const OF_SPAN: usize = 24;
 ///
 /// A surfel has several matches, and its motion depends on many unknowns: this intermediate sum keeps a match cheap.
 #[derive(Debug)]
-pub(in crate::estimation) struct Own<const B: usize> {
+pub(in crate::estimation) struct SurfelSums<const B: usize> {
     square: [[f64; 6]; 6],
     common: [[f64; 6]; B],
     right: [f64; 6],
 }
 
-impl<const B: usize> Own<B> {
+impl<const B: usize> SurfelSums<B> {
     /// No match yet.
     pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; 6]; 6], common: [[0.0; 6]; B], right: [0.0; 6] };
 
     /// Adds a match with derivatives `side`.
     #[inline(always)]
-    pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
+    pub(in crate::estimation) fn add(&mut self, side: &SurfelJacobian<B>, distance_m: f64, weight: f64) {
         for (square, by) in self.square.iter_mut().zip(side.own) {
             add_scaled(square, &side.own, weight * by);
         }
@@ -44,25 +44,25 @@ impl<const B: usize> Own<B> {
 
 /// The terms of all matches of the surfels of a span, by their motion and by the common unknowns.
 #[derive(Debug)]
-pub(in crate::estimation) struct OfSpan<const B: usize> {
-    square: [[f64; OF_SPAN]; OF_SPAN],
-    by_border: [[f64; OF_SPAN]; B],
-    right: [f64; OF_SPAN],
+pub(in crate::estimation) struct SpanSums<const B: usize> {
+    square: [[f64; SPAN_UNKNOWNS]; SPAN_UNKNOWNS],
+    by_border: [[f64; SPAN_UNKNOWNS]; B],
+    right: [f64; SPAN_UNKNOWNS],
     pub(in crate::estimation) common: CommonSums<B>,
 }
 
-impl<const B: usize> OfSpan<B> {
+impl<const B: usize> SpanSums<B> {
     /// No surfel yet.
     pub(in crate::estimation) const NONE: Self = Self {
-        square: [[0.0; OF_SPAN]; OF_SPAN],
-        by_border: [[0.0; OF_SPAN]; B],
-        right: [0.0; OF_SPAN],
+        square: [[0.0; SPAN_UNKNOWNS]; SPAN_UNKNOWNS],
+        by_border: [[0.0; SPAN_UNKNOWNS]; B],
+        right: [0.0; SPAN_UNKNOWNS],
         common: CommonSums::NONE,
     };
 
     /// Adds the terms of a surfel; `basis` is the spline basis at the time of the surfel.
     #[inline(always)]
-    pub(in crate::estimation) fn add(&mut self, own: &Own<B>, basis: &Basis) {
+    pub(in crate::estimation) fn add(&mut self, own: &SurfelSums<B>, basis: &Basis) {
         let square = own.square.map(|row| over_knots(&row, basis));
         for (rows, value) in self.square.chunks_exact_mut(6).zip(basis.value) {
             for (sums, row) in rows.iter_mut().zip(&square) {
@@ -102,7 +102,7 @@ impl<const B: usize> CommonSums<B> {
 
     /// Adds a match; `side` has the derivatives of both surfels.
     #[inline(always)]
-    pub(in crate::estimation) fn add(&mut self, side: &Side<B>, distance_m: f64, weight: f64) {
+    pub(in crate::estimation) fn add(&mut self, side: &SurfelJacobian<B>, distance_m: f64, weight: f64) {
         for (square, by) in self.square.iter_mut().zip(side.common) {
             add_scaled(square, &side.common, weight * by);
         }
@@ -120,18 +120,18 @@ impl<const B: usize> CommonSums<B> {
 
 /// The off-diagonal block of the matches between two spans: rows by the unknowns of the later span.
 #[derive(Debug)]
-pub(in crate::estimation) struct Coupling([[f64; OF_SPAN]; OF_SPAN]);
+pub(in crate::estimation) struct Coupling([[f64; SPAN_UNKNOWNS]; SPAN_UNKNOWNS]);
 
 impl Coupling {
     /// No match yet.
-    pub(in crate::estimation) const NONE: Self = Self([[0.0; OF_SPAN]; OF_SPAN]);
+    pub(in crate::estimation) const NONE: Self = Self([[0.0; SPAN_UNKNOWNS]; SPAN_UNKNOWNS]);
 
     /// Adds a match of a surfel of the earlier span with one of the later.
     #[inline(always)]
     pub(in crate::estimation) fn add<const B: usize>(
         &mut self,
-        (early, early_side): (&Placed, &Side<B>),
-        (late, late_side): (&Placed, &Side<B>),
+        (early, early_side): (&Placed, &SurfelJacobian<B>),
+        (late, late_side): (&Placed, &SurfelJacobian<B>),
         weight: f64,
     ) {
         let row = over_knots(&early_side.own, &early.basis);
@@ -151,7 +151,7 @@ impl Coupling {
         for (row, sums) in self.0.iter().enumerate().map(|(k, sums)| (first_row + k, sums)) {
             // If the spans have common knots, the columns reach the diagonal; those after it belong to the mirrored
             // block.
-            let below = row.saturating_sub(first_column).min(OF_SPAN);
+            let below = row.saturating_sub(first_column).min(SPAN_UNKNOWNS);
             equations.add_row(row, first_column, &sums[..below]);
             for (column, sum) in sums.iter().enumerate().skip(below).map(|(k, sum)| (first_column + k, sum)) {
                 equations.add_entry(row, column, if row == column { 2.0 * sum } else { *sum });
@@ -162,8 +162,8 @@ impl Coupling {
 
 /// Converts six derivatives by a surfel's motion to derivatives by the four knots of the span.
 #[inline(always)]
-pub(super) fn over_knots(by_motion: &[f64; 6], basis: &Basis) -> [f64; OF_SPAN] {
-    let mut knots = [0.0; OF_SPAN];
+pub(super) fn over_knots(by_motion: &[f64; 6], basis: &Basis) -> [f64; SPAN_UNKNOWNS] {
+    let mut knots = [0.0; SPAN_UNKNOWNS];
     for (knot, value) in knots.chunks_exact_mut(6).zip(basis.value) {
         add_scaled(knot, by_motion, value);
     }

@@ -254,7 +254,7 @@ mod tests {
         let nodding = Vector::new(-1.0, 1.0, 0.0).normalize() * rate;
         let none = Vector::zeros();
         let start = State { rotation: Rotation::identity(), position: none, velocity: none };
-        let mut nominal = Nominal::beginning(0.0, start);
+        let mut nominal = Nominal::starting(0.0, start);
         let interval = Interval {
             h: 0.01,
             gyro: nodding,

@@ -1,6 +1,6 @@
 //! Surfel matching: pairs within the window, and window surfels with patches of the fixed views.
 
-use super::{Stretch, Window};
+use super::{Window, WindowSegment};
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::surfel::{Patch, Placed, Surfel};
@@ -20,17 +20,17 @@ const SIGNIFICANT: f64 = 4.0;
 pub(super) struct Neighbours {
     /// Within the window: indices into the scene.
     pairs: Vec<(u32, u32)>,
-    /// With views: a surfel of the scene, a view, a patch of the view.
+    /// Counterpart views: a surfel of the scene, a view, a patch of the view.
     fixed: Vec<(u32, u32, u32)>,
     /// Number of surfels in the scene at the time of the search.
-    of: usize,
+    scene_len: usize,
     /// Upper bound on the motion of any surfel since the search, m.
     moved_m: f64,
 }
 
 /// Cached fixed-view neighbours of a surfel, and the position at which they were searched.
 ///
-/// Views do not move, and a surfel hardly moves once the stretch has been solved: most surfels are searched once.
+/// Views do not move, and a surfel moves little after the first solutions, so most surfels are searched once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct CachedNeighbours {
     centre: Vector,
@@ -44,14 +44,14 @@ pub(super) struct Match {
     /// Index into the scene.
     pub a: u32,
     /// The other side of the match.
-    pub with: With,
+    pub with: Counterpart,
     /// The surface, its normal from the other surfel to `a`.
     pub plane: Plane,
 }
 
 /// The other side of a match of a live surfel.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum With {
+pub(super) enum Counterpart {
     /// Another surfel of the window: an index into the scene.
     Live(u32),
     /// A patch of a fixed view.
@@ -82,7 +82,7 @@ pub(super) struct Runs<K> {
 impl Match {
     /// The other surfel if it is live: an index into the scene.
     pub fn other(&self) -> Option<usize> {
-        if let With::Live(b) = self.with { Some(b as usize) } else { None }
+        if let Counterpart::Live(b) = self.with { Some(b as usize) } else { None }
     }
 }
 
@@ -160,7 +160,7 @@ impl Neighbours {
 
     /// Whether the neighbours are still valid for `scene`.
     pub fn are_valid_for(&self, scene: &[Placed]) -> bool {
-        self.of == scene.len() && self.moved_m < MOVED_M
+        self.scene_len == scene.len() && self.moved_m < MOVED_M
     }
 }
 
@@ -168,23 +168,23 @@ impl Window {
     /// The window's surfels in the map frame, except surfels that a clock correction moved out of the window's knots.
     pub(super) fn scene(&self) -> Vec<Placed> {
         let placing = self.placing();
-        let homes = self.homes();
-        homes
+        let surfel_indices = self.surfel_indices();
+        surfel_indices
             .par_iter()
             .with_min_len(512)
-            .map(|(k, index)| self.stretches[*k].surfels[*index].place(&placing))
+            .map(|(k, index)| self.segments[*k].surfels[*index].place(&placing))
             .collect()
     }
 
-    /// For each surfel of the scene: the stretch, and the index into the surfels of that stretch.
-    fn homes(&self) -> Vec<(usize, usize)> {
+    /// For each surfel of the scene: the segment, and the index into the surfels of that segment.
+    fn surfel_indices(&self) -> Vec<(usize, usize)> {
         let (from, to) = (self.start.u_s, self.nominal.end_s());
         let is_within = |surfel: &Surfel| (from..=to).contains(&self.clock.imu_s(surfel.tau_s));
-        let of_stretch = |(k, stretch): (usize, &'_ Stretch)| {
-            let within = stretch.surfels.iter().enumerate().filter(|(_, surfel)| is_within(surfel));
+        let of_segment = |(k, segment): (usize, &'_ WindowSegment)| {
+            let within = segment.surfels.iter().enumerate().filter(|(_, surfel)| is_within(surfel));
             within.map(|(index, _)| (k, index)).collect::<Vec<_>>()
         };
-        self.stretches.iter().enumerate().flat_map(of_stretch).collect()
+        self.segments.iter().enumerate().flat_map(of_segment).collect()
     }
 
     /// The `neighbours` in `scene` that pass the match gates.
@@ -195,8 +195,8 @@ impl Window {
         neighbours: &Neighbours,
         iteration: usize,
     ) -> Matches {
-        let wider = if self.wide_matching || self.bridged_gap { WIDE_GATE } else { 1.0 };
-        let gate_m = wider * self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
+        let widening = if self.wide_matching || self.bridged_gap { WIDE_GATE } else { 1.0 };
+        let gate_m = widening * self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, other: &Patch| {
             let patch = &scene[a as usize].patch;
@@ -204,11 +204,11 @@ impl Window {
         };
         let live = |(a, b): &(u32, u32)| {
             let plane = plane(*a, &scene[*b as usize].patch)?;
-            Some(Match { a: *a, with: With::Live(*b), plane })
+            Some(Match { a: *a, with: Counterpart::Live(*b), plane })
         };
         let fixed = |(a, view, patch): &(u32, u32, u32)| {
             let plane = plane(*a, &views.view(*view as usize).patches[*patch as usize])?;
-            Some(Match { a: *a, with: With::Fixed { view: *view, patch: *patch }, plane })
+            Some(Match { a: *a, with: Counterpart::Fixed { view: *view, patch: *patch }, plane })
         };
         let mut all: Vec<Option<Match>> = neighbours.pairs.par_iter().with_min_len(512).map(live).collect();
         all.par_extend(neighbours.fixed.par_iter().with_min_len(512).map(fixed));
@@ -227,13 +227,13 @@ impl Window {
     ) {
         for Match { a, with, plane } in &mut matches.all {
             let other = match *with {
-                With::Live(b) => &scene[b as usize].patch,
-                With::Fixed { view, patch } => &views.view(view as usize).patches[patch as usize],
+                Counterpart::Live(b) => &scene[b as usize].patch,
+                Counterpart::Fixed { view, patch } => &views.view(view as usize).patches[patch as usize],
             };
             let variance =
                 scene[*a as usize].patch.normal_tilt_variance(direction) + other.normal_tilt_variance(direction);
             if plane.normal.dot(direction).abs() < SIGNIFICANT * variance.sqrt() {
-                plane.forget(direction);
+                plane.remove_component(direction);
             }
         }
     }
@@ -242,9 +242,9 @@ impl Window {
     pub(super) fn search_neighbours(&mut self, scene: &[Placed], (views, chosen): (&Views, &[usize])) -> Neighbours {
         let patches: Vec<Patch> = scene.iter().map(|surfel| surfel.patch).collect();
         let pairs = self.matcher.among(scene, &self.matcher.plant(&patches));
-        let homes = self.homes();
+        let surfel_indices = self.surfel_indices();
         let mut cached: Vec<CachedNeighbours> =
-            homes.iter().map(|(k, index)| std::mem::take(&mut self.stretches[*k].cached[*index])).collect();
+            surfel_indices.iter().map(|(k, index)| std::mem::take(&mut self.segments[*k].cached[*index])).collect();
         let search = |(a, (patch, cached)): (usize, (&Patch, &mut CachedNeighbours))| {
             cached.update(patch, (views, chosen), &self.matcher, self.spec.views.neighbours);
             let in_view = |index: &usize| {
@@ -255,10 +255,10 @@ impl Window {
         };
         let both = patches.par_iter().zip(cached.par_iter_mut()).enumerate();
         let fixed: Vec<_> = both.with_min_len(256).map(search).collect();
-        for ((k, index), cached) in homes.into_iter().zip(cached) {
-            self.stretches[k].cached[index] = cached;
+        for ((k, index), cached) in surfel_indices.into_iter().zip(cached) {
+            self.segments[k].cached[index] = cached;
         }
-        Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), of: scene.len(), moved_m: 0.0 }
+        Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), scene_len: scene.len(), moved_m: 0.0 }
     }
 }
 

@@ -6,9 +6,9 @@ use crate::estimation::nominal::Correction;
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
 use crate::estimation::residual::inertial::add_inertial;
-use crate::estimation::residual::matched::{ALWAYS, COMMON, Plane, Side};
+use crate::estimation::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Plane, SurfelJacobian};
 use crate::estimation::residual::prior;
-use crate::estimation::residual::sums::{Coupling, OfSpan, Own};
+use crate::estimation::residual::sums::{Coupling, SpanSums, SurfelSums};
 use crate::estimation::spec::SolveSpec;
 use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::spline::Basis;
@@ -61,16 +61,16 @@ impl Robust {
 
 /// The largest displacement of the trajectory by a correction.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Moved {
+pub(in crate::estimation) struct Displacement {
     /// Translation, m.
     pub shift: f64,
     /// Rotation, rad.
     pub turn: f64,
 }
 
-impl Moved {
+impl Displacement {
     /// The maximum over corrections, each rotation and translation.
-    pub fn greatest(corrections: impl Iterator<Item = (Vector, Vector)>) -> Self {
+    pub fn max_of(corrections: impl Iterator<Item = (Vector, Vector)>) -> Self {
         // A NaN must not count as small.
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
         corrections.fold(Self { shift: 0.0, turn: 0.0 }, |most, (turn, shift)| Self {
@@ -80,7 +80,7 @@ impl Moved {
     }
 
     /// The larger of rotation (rad) and translation (m).
-    pub fn most(self) -> f64 {
+    pub fn max(self) -> f64 {
         self.shift.max(self.turn)
     }
 }
@@ -104,16 +104,16 @@ impl Window {
         (matches, robust): (&Matches, &Robust),
         layout: &Layout,
         spent: &mut TimeSpent,
-    ) -> Option<(Vec<f64>, Moved)> {
+    ) -> Option<(Vec<f64>, Displacement)> {
         let mut watch = Stopwatch::start();
         self.assemble_inertial(first, layout, total);
-        let weighted = WeightedMatches { scene, matches, robust, clock_at_s: self.clock.at_s };
+        let weighted = WeightedMatches { scene, matches, robust, clock_reference_s: self.clock.at_s };
         weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
         spent.equations_s += watch.lap_s();
         let Workspace { equations, factor, bases } = &mut self.workspace;
         equations.factor(factor).ok()?;
         let x = equations.solve(factor);
-        let moved = Moved::greatest(bases.iter().map(|basis| {
+        let moved = Displacement::max_of(bases.iter().map(|basis| {
             let correction = Correction::of_spline(basis, layout.first_knot, &x);
             (correction.rotation, correction.translation)
         }));
@@ -128,17 +128,17 @@ impl Window {
         let states = self.nominal.states();
         let known = (&self.biases, &self.gravity);
         add_inertial(equations, layout, (&states[first..], bases), &self.nominal.intervals()[first..], known);
-        self.start.add_to(equations, layout, (total, self.border.moved_so_far()), self.spec.knot_spacing_s);
+        self.start.add_to(equations, layout, (total, self.border.total_step()), self.spec.knot_spacing_s);
         self.border.add_to(equations, layout);
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);
         for ((_, state), basis) in nodes.zip(&*bases).take_while(|((time, _), _)| **time < self.rested_until_s) {
-            prior::add_standstill(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
+            prior::add_zero_velocity(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
         }
         for k in (first..self.nominal.intervals().len()).filter(|k| self.rests.at(self.nominal.times_s()[*k])) {
             let (state, next, basis) = (&states[k], &states[k + 1], &bases[k - first]);
             let turn = (next.rotation * state.rotation.inverse()).scaled_axis() / self.nominal.intervals()[k].h;
-            prior::add_standstill(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
-            prior::add_no_turn(equations, layout, basis, &turn, REST_RATE_SIGMA);
+            prior::add_zero_velocity(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
+            prior::add_zero_rotation_rate(equations, layout, basis, &turn, REST_RATE_SIGMA);
         }
         // The outermost knots are hardly observed: a weak prior of 1 m and 1 rad keeps the system regular.
         for unknown in 0..layout.border() {
@@ -152,7 +152,7 @@ struct WeightedMatches<'a> {
     scene: &'a [Placed],
     matches: &'a Matches,
     robust: &'a Robust,
-    clock_at_s: f64,
+    clock_reference_s: f64,
 }
 
 impl WeightedMatches<'_> {
@@ -163,7 +163,7 @@ impl WeightedMatches<'_> {
         if extrinsics {
             self.add_weighted::<COMMON>(&weights, equations, layout);
         } else {
-            self.add_weighted::<ALWAYS>(&weights, equations, layout);
+            self.add_weighted::<COMMON_WITHOUT_EXTRINSICS>(&weights, equations, layout);
         }
     }
 
@@ -181,11 +181,11 @@ impl WeightedMatches<'_> {
 
     /// The normal equations of all matches of the surfels of a span, by the motion of each surfel.
     #[inline(always)]
-    fn of_span<const B: usize>(&self, surfels: impl Iterator<Item = usize>, weights: &[f64]) -> OfSpan<B> {
-        let mut sum = OfSpan::NONE;
+    fn of_span<const B: usize>(&self, surfels: impl Iterator<Item = usize>, weights: &[f64]) -> SpanSums<B> {
+        let mut sum = SpanSums::NONE;
         for index in surfels {
             let surfel = &self.scene[index];
-            let mut own = Own::NONE;
+            let mut own = SurfelSums::NONE;
             for k in self.matches.of_surfel(index).iter().map(|k| *k as usize) {
                 let (one, weight) = (&self.matches.all[k], weights[k]);
                 let is_first = one.a as usize == index;
@@ -219,9 +219,9 @@ impl WeightedMatches<'_> {
 
     /// The derivative of the match distance by the motion of the first surfel, or of the other one.
     #[inline(always)]
-    fn side<const B: usize>(&self, one: &Match, first: bool) -> Side<B> {
+    fn side<const B: usize>(&self, one: &Match, first: bool) -> SurfelJacobian<B> {
         let normal = if first { one.plane.normal } else { -one.plane.normal };
         let surfel = if first { one.a as usize } else { one.other().unwrap_or(one.a as usize) };
-        Side::of(&self.scene[surfel], &normal, self.clock_at_s)
+        SurfelJacobian::of(&self.scene[surfel], &normal, self.clock_reference_s)
     }
 }

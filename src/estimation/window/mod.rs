@@ -6,13 +6,13 @@ mod rests;
 mod solve;
 mod uncertainty;
 
-pub(super) use equations::Moved;
-pub(super) use solve::{LEANING, Solved};
+pub(super) use equations::Displacement;
+pub(super) use solve::{MIN_SIGNIFICANT_TILT, Solved};
 pub(super) use uncertainty::Linearised;
 
 use super::border::Border;
 use super::clock::Clock;
-use super::initial::{Beginning, Carried, Rest};
+use super::initial::{InitialState, RestReadings, StateBeforeGap};
 use super::matching::Matcher;
 use super::nominal::Nominal;
 use super::residual::contradiction::contradiction;
@@ -20,7 +20,7 @@ use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
-use super::strapdown::{Biases, Exaggerates, Interval};
+use super::strapdown::{Biases, ImuScaleMisalignment, Interval};
 use super::surfel::{Beam, Patch, PlacementState, Surfel, SurfelMaker};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
@@ -29,26 +29,26 @@ use equations::Workspace;
 use rests::Rests;
 use std::collections::VecDeque;
 
-/// The head may move this long before the IMU shows the first motion, s.
+/// The head may move for this time before the IMU shows it, s.
 const REST_MARGIN_S: f64 = 0.3;
-/// The window grows to at most this multiple of the nominal length while the stretches contain few surfaces.
+/// The window grows to at most this multiple of the nominal length while the segments contain few surfaces.
 const MAX_LENGTH: f64 = 3.0;
-/// A stretch counts as swept if it has this fraction of the patches of the richest stretch.
+/// A segment counts as swept if it has this fraction of the largest number of surfels in a segment.
 const SWEPT: f64 = 0.25;
 
-/// A head whose initial velocity has at least this standard deviation counts as moving, m/s.
-const UNDER_WAY_M_PER_S: f64 = 5.0;
-/// A velocity uncertainty above this in one stretch, m/s, widens the match gate for [`SHAKEN_S`].
+/// If the initial velocity has at least this standard deviation, the head may move at constant velocity, m/s.
+const MOVING_SIGMA_M_PER_S: f64 = 5.0;
+/// A velocity uncertainty above this in one segment, m/s, widens the match gate for [`SHOCK_GATE_S`].
 const SHOCK_M_PER_S: f64 = 0.1;
 /// Duration of the wide match gate after a shock, s.
-const SHAKEN_S: f64 = 2.0;
+const SHOCK_GATE_S: f64 = 2.0;
 
 /// Standard deviations of the pose after relocalisation in a map, before the window is matched with it, rad and m.
 const RELOCALISED_SIGMA: [f64; 2] = [0.05, 0.2];
 
-/// A time step of the window.
+/// A time segment of the window, `step_s` long.
 #[derive(Debug)]
-struct Stretch {
+struct WindowSegment {
     end_tau_s: f64,
     beams: Vec<Beam>,
     surfels: Vec<Surfel>,
@@ -69,24 +69,24 @@ pub(super) struct Window {
     pub(super) biases: Biases,
     pub(super) gravity: Vector,
     /// Estimated scale errors and misalignments of the IMU.
-    exaggerates: Exaggerates,
+    scale_misalignment: ImuScaleMisalignment,
     border: Border,
-    stretches: VecDeque<Stretch>,
+    segments: VecDeque<WindowSegment>,
     start: Start,
-    /// Whether this is the first window and starts in motion: level and biases are guesses, and the match gate is wide.
+    /// Whether this is the first window and starts in motion: tilt and biases are uncertain, and the match gate is wide.
     wide_matching: bool,
-    /// Whether the newest stretch bridges an IMU gap, or a shock or clipping makes the velocity uncertain.
+    /// Whether the newest segment bridges an IMU gap, or a shock or clipping makes the velocity uncertain.
     bridged_gap: bool,
     /// End of the wide match gate after a shock, IMU time, s.
-    shaken_until_s: f64,
+    wide_gate_until_s: f64,
     /// The IMU readings at rest, until the head first moves.
-    rest: Option<Rest>,
+    rest: Option<RestReadings>,
     /// End of the initial rest, IMU time, s.
     rested_until_s: f64,
     /// Later rests.
     rests: Rests,
     /// Whether the speed is known. Constant motion looks like rest to the IMU until surfaces are matched.
-    knows_speed: bool,
+    speed_is_known: bool,
     /// Whether the lidar would show a motion of a head that the IMU reports at rest.
     sees_rest: bool,
     workspace: Workspace,
@@ -97,7 +97,7 @@ impl Window {
     pub(super) fn new(
         spec: &EstimatorSpec,
         maker: SurfelMaker,
-        beginning: &Beginning,
+        initial_state: &InitialState,
         start_u_s: f64,
         border: Border,
     ) -> Self {
@@ -107,49 +107,49 @@ impl Window {
             matcher: Matcher::new(&spec.matching, &spec.surfels),
             maker,
             surveyor: None,
-            nominal: Nominal::beginning(start_u_s, beginning.state),
+            nominal: Nominal::starting(start_u_s, initial_state.state),
             clock,
-            biases: beginning.biases,
+            biases: initial_state.biases,
             gravity: crate::geometry::gravity_in_world(),
-            exaggerates: Exaggerates::nothing(),
+            scale_misalignment: ImuScaleMisalignment::zero(),
             border,
-            stretches: VecDeque::new(),
-            start: Start::first(start_u_s, beginning.velocity_sigma),
-            wide_matching: beginning.rest.is_none(),
+            segments: VecDeque::new(),
+            start: Start::first(start_u_s, initial_state.velocity_sigma),
+            wide_matching: initial_state.rest.is_none(),
             bridged_gap: false,
-            shaken_until_s: f64::NEG_INFINITY,
-            rest: beginning.rest,
+            wide_gate_until_s: f64::NEG_INFINITY,
+            rest: initial_state.rest,
             rested_until_s: f64::NEG_INFINITY,
             rests: Rests::default(),
-            knows_speed: beginning.velocity_sigma < UNDER_WAY_M_PER_S,
+            speed_is_known: initial_state.velocity_sigma < MOVING_SIGMA_M_PER_S,
             sees_rest: true,
             workspace: Workspace::default(),
         }
     }
 
-    /// The states that continue across an IMU gap.
-    pub(super) fn carried(&self) -> Option<Carried> {
+    /// The states that initialise the estimate after an IMU gap.
+    pub(super) fn state_before_gap(&self) -> Option<StateBeforeGap> {
         let state = *self.nominal.states().last()?;
-        let (exaggerates, lidar) = (self.exaggerates, self.maker.lidar);
+        let (scale_misalignment, lidar) = (self.scale_misalignment, self.maker.lidar);
         let until_s = self.nominal.end_s();
-        let way = state.position - self.begins().translation.vector;
-        let mean_velocity = way / (until_s - self.start.u_s).max(self.spec.step_s);
+        let displacement = state.position - self.start_pose().translation.vector;
+        let mean_velocity = displacement / (until_s - self.start.u_s).max(self.spec.step_s);
         let Self { biases, gravity, clock, .. } = *self;
-        Some(Carried { until_s, state, mean_velocity, biases, gravity, clock, exaggerates, lidar })
+        Some(StateBeforeGap { until_s, state, mean_velocity, biases, gravity, clock, scale_misalignment, lidar })
     }
 
-    /// Initialises clock and sensor corrections with the values from before the IMU gap.
-    pub(super) fn take_over(&mut self, carried: &Carried) {
-        self.clock = carried.clock.after_gap((carried.until_s, self.start.u_s));
-        self.exaggerates = carried.exaggerates;
-        self.maker.lidar = carried.lidar;
+    /// Sets clock and sensor corrections to the values before an IMU gap.
+    pub(super) fn resume_from(&mut self, before_gap: &StateBeforeGap) {
+        self.clock = before_gap.clock.after_gap((before_gap.until_s, self.start.u_s));
+        self.scale_misalignment = before_gap.scale_misalignment;
+        self.maker.lidar = before_gap.lidar;
     }
 
-    /// Rotates the window about the start, by the smallest angle that aligns gravity with the map of `carried`.
-    pub(super) fn level_as(&mut self, carried: &Carried) {
-        let turn = Rotation::rotation_between(&self.gravity, &carried.gravity).unwrap_or_else(Rotation::identity);
-        self.nominal.turn(&turn, &carried.state.position);
-        self.gravity = carried.gravity;
+    /// Rotates the window by the smallest angle that aligns gravity with that before the gap.
+    pub(super) fn align_gravity_with(&mut self, before_gap: &StateBeforeGap) {
+        let turn = Rotation::rotation_between(&self.gravity, &before_gap.gravity).unwrap_or_else(Rotation::identity);
+        self.nominal.turn(&turn, &before_gap.state.position);
+        self.gravity = before_gap.gravity;
     }
 
     /// All patches of the window, in the map frame.
@@ -158,19 +158,19 @@ impl Window {
     }
 
     /// Moves the window to the pose from relocalisation; from then on the map constrains it.
-    pub(super) fn found_at(&mut self, map_from_here: &Pose) {
+    pub(super) fn move_by(&mut self, map_from_here: &Pose) {
         self.nominal.move_by(map_from_here);
         self.gravity = map_from_here.rotation * self.gravity;
         self.start.sigmas[0] = RELOCALISED_SIGMA;
     }
 
     /// Whether the window was relocalised and has not advanced since.
-    fn is_just_found(&self) -> bool {
+    fn is_just_relocalised(&self) -> bool {
         self.start.sigmas[0] == RELOCALISED_SIGMA
     }
 
     /// The IMU pose at the start of the window.
-    pub(super) fn begins(&self) -> Pose {
+    pub(super) fn start_pose(&self) -> Pose {
         let motion = self.nominal.at(self.start.u_s, &self.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
         Pose::from_parts(motion.position.into(), rotation)
@@ -201,12 +201,12 @@ impl Window {
     }
 
     /// The same window, in which rest is unobserved by the lidar until surfaces are matched.
-    pub(super) fn without_seeing_rest(self) -> Self {
+    pub(super) fn with_unobservable_rest(self) -> Self {
         Self { sees_rest: false, ..self }
     }
 
     /// Start of the window, IMU time, s.
-    pub(super) fn begins_s(&self) -> f64 {
+    pub(super) fn start_s(&self) -> f64 {
         self.start.u_s
     }
 
@@ -219,14 +219,14 @@ impl Window {
         &self.matcher
     }
 
-    /// Appends a stretch: integrates the intervals and builds surfels of the beams. Returns the run time.
+    /// Appends a segment: integrates the intervals and builds surfels of the beams. Returns the run time.
     pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) -> TimeSpent {
         let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
-            self.nominal.extend(interval.without(&self.exaggerates), &self.biases, &self.gravity);
-            self.rest = self.rest.filter(|rest| rest.goes_on(interval));
+            self.nominal.extend(interval.corrected_by(&self.scale_misalignment), &self.biases, &self.gravity);
+            self.rest = self.rest.filter(|rest| rest.agrees_with(interval));
             let at_end = (self.nominal.end_s(), self.speed_m_per_s());
-            if self.knows_speed {
+            if self.speed_is_known {
                 self.rests.take(interval, &self.biases, at_end);
             }
             if self.rest.is_some() {
@@ -234,29 +234,29 @@ impl Window {
             }
         }
         let bridged = intervals.iter().filter(|(_, interval)| interval.bridged);
-        let unseen =
+        let velocity_sigma =
             intervals.iter().map(|(_, interval)| (interval.accel_sigma * interval.h).powi(2)).sum::<f64>().sqrt();
-        if unseen > SHOCK_M_PER_S {
-            self.shaken_until_s = self.nominal.end_s() + SHAKEN_S;
+        if velocity_sigma > SHOCK_M_PER_S {
+            self.wide_gate_until_s = self.nominal.end_s() + SHOCK_GATE_S;
         }
         self.bridged_gap = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
-            || self.nominal.end_s() < self.shaken_until_s;
+            || self.nominal.end_s() < self.wide_gate_until_s;
         let integration_s = watch.lap_s();
         let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
         let cached = vec![CachedNeighbours::default(); surfels.len()];
-        self.stretches.push_back(Stretch { end_tau_s, beams, surfels, cached });
+        self.segments.push_back(WindowSegment { end_tau_s, beams, surfels, cached });
         let surfels_s = watch.lap_s();
         // Reference time of the clock: the middle of the window, where offset and rate are least correlated.
-        let length_s = self.spec.step_s * self.stretches.len() as f64;
+        let length_s = self.spec.step_s * self.segments.len() as f64;
         let middle_s = end_tau_s - 0.5 * length_s;
-        self.border.clock_told_from(middle_s - self.clock.at_s);
-        self.clock = self.clock.told_from(middle_s);
+        self.border.shift_clock_reference(middle_s - self.clock.at_s);
+        self.clock = self.clock.with_reference_at(middle_s);
         TimeSpent { integration_s, surfels_s, ..TimeSpent::default() }
     }
 
-    /// Rebuilds the surfels of the newest stretch with the current trajectory.
-    pub(super) fn remake_newest(&mut self) {
-        if let Some(newest) = self.stretches.back_mut() {
+    /// Rebuilds the surfels of the newest segment with the current trajectory.
+    pub(super) fn rebuild_newest_surfels(&mut self) {
+        if let Some(newest) = self.segments.back_mut() {
             newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
             newest.cached = vec![CachedNeighbours::default(); newest.surfels.len()];
             if self.surveyor.is_none() {
@@ -265,72 +265,72 @@ impl Window {
         }
     }
 
-    /// Whether the oldest stretch can be removed.
+    /// Whether the oldest segment can be removed.
     ///
-    /// The rest of the window must contain `window_s` of swept stretches, or the oldest stretch must have few surfaces.
+    /// The rest of the window must contain `window_s` of swept segments, or the oldest segment must have few surfaces.
     /// A head at rest measures only lines and needs the older patches.
     pub(super) fn is_full(&self) -> bool {
-        let richest = self.stretches.iter().map(|stretch| stretch.surfels.len()).max().unwrap_or(0);
+        let richest = self.segments.iter().map(|segment| segment.surfels.len()).max().unwrap_or(0);
         let enough = (richest as f64 * SWEPT) as usize;
-        let is_swept = |stretch: &Stretch| stretch.surfels.len() >= enough;
-        let swept = self.stretches.iter().filter(|stretch| is_swept(stretch)).count();
-        let windows = |stretches: usize| stretches as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
-        let all = windows(self.stretches.len());
-        windows(swept) > 1.0 || all > MAX_LENGTH || (all > 1.0 && !self.stretches.front().is_some_and(is_swept))
+        let is_swept = |segment: &WindowSegment| segment.surfels.len() >= enough;
+        let swept = self.segments.iter().filter(|segment| is_swept(segment)).count();
+        let windows = |segments: usize| segments as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
+        let all = windows(self.segments.len());
+        windows(swept) > 1.0 || all > MAX_LENGTH || (all > 1.0 && !self.segments.front().is_some_and(is_swept))
     }
 
-    /// Start of the window after the removal of the oldest stretch, IMU time, s.
+    /// Start of the window after removal of the oldest segment, IMU time, s.
     pub(super) fn next_start_s(&self) -> Option<f64> {
-        // After a gap the IMU intervals may end before the stretch does.
+        // After a gap the IMU intervals may end before the segment does.
         let end_s = self.nominal.end_s();
-        Some(self.clock.imu_s(self.stretches.front()?.end_tau_s).min(end_s).max(self.start.u_s))
+        Some(self.clock.imu_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
-    /// The survey patches of the oldest stretch in the map frame, each with the measurement time, s.
+    /// The survey patches of the oldest segment in the map frame, each with the measurement time, s.
     pub(super) fn survey_oldest(&self) -> Vec<(f64, Patch)> {
-        self.stretches.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
+        self.segments.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
     }
 
-    /// The survey patches of all stretches of the window, as [`Self::survey_oldest`].
+    /// The survey patches of all segments of the window, as [`Self::survey_oldest`].
     pub(super) fn survey_all(&self) -> Vec<(f64, Patch)> {
-        self.stretches.iter().flat_map(|stretch| self.survey(stretch)).collect()
+        self.segments.iter().flat_map(|segment| self.survey(segment)).collect()
     }
 
-    /// End of the oldest stretch, lidar time, s.
+    /// End of the oldest segment, lidar time, s.
     pub(super) fn oldest_end_s(&self) -> f64 {
-        self.stretches.front().map_or(f64::NEG_INFINITY, |oldest| oldest.end_tau_s)
+        self.segments.front().map_or(f64::NEG_INFINITY, |oldest| oldest.end_tau_s)
     }
 
-    /// End of the newest stretch, lidar time, s.
+    /// End of the newest segment, lidar time, s.
     pub(super) fn end_s(&self) -> f64 {
-        self.stretches.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
+        self.segments.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
     }
 
-    fn survey(&self, stretch: &Stretch) -> Vec<(f64, Patch)> {
+    fn survey(&self, segment: &WindowSegment) -> Vec<(f64, Patch)> {
         let Some(surveyor) = &self.surveyor else { return Vec::new() };
         let surveyor = SurfelMaker { lidar: self.maker.lidar, ..surveyor.clone() };
-        let seen = surveyor.build(&stretch.beams, &self.nominal, &self.clock, &self.biases);
+        let seen = surveyor.build(&segment.beams, &self.nominal, &self.clock, &self.biases);
         let placing = self.placing();
         seen.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
     }
 
-    /// Removes the oldest stretch, whose states become final. Returns the patches of it in the map frame.
-    pub(super) fn let_go(&mut self, linearised: Option<&Linearised>) -> Option<Vec<Patch>> {
+    /// Removes the oldest segment, whose states become final; returns the patches of that segment in the map frame.
+    pub(super) fn remove_oldest(&mut self, linearised: Option<&Linearised>) -> Option<Vec<Patch>> {
         let start_s = self.next_start_s()?;
-        let oldest = self.stretches.pop_front()?;
+        let oldest = self.segments.pop_front()?;
         let placed = oldest.surfels.iter().map(|surfel| surfel.place(&self.placing()).patch).collect();
-        let by_lidar = linearised.and_then(|at| self.hangs_on_lidar(start_s, at));
-        self.start = Start { by_lidar, ..Start::held(start_s) };
+        let by_lidar = linearised.and_then(|at| self.regression_on_lidar(start_s, at));
+        self.start = Start { by_lidar, ..Start::continuing(start_s) };
         self.rests.forget_before(start_s);
         self.wide_matching = false;
-        let share = 1.0 / (self.stretches.len() + 1) as f64;
-        self.border.remember(share, self.spec.step_s);
+        let fraction = 1.0 / (self.segments.len() + 1) as f64;
+        self.border.carry_over(fraction, self.spec.step_s);
         Some(placed)
     }
 
     /// The largest estimated scale error or misalignment of the IMU.
     pub(super) fn imu_matrix(&self) -> f64 {
-        self.exaggerates.gyro.amax().max(self.exaggerates.accel.amax())
+        self.scale_misalignment.gyro.amax().max(self.scale_misalignment.accel.amax())
     }
 
     /// The estimated corrections of the lidar calibration.
@@ -347,9 +347,9 @@ impl Window {
         if !self.spec.extrinsics.estimated {
             return lidar;
         }
-        let imu_from_gyro = Rotation::from_scaled_axis(self.exaggerates.accel_against_gyro() * 0.5);
-        let place = self.maker.laser_in_imu + lidar.shift;
-        let shift = lidar.shift + imu_from_gyro * place - place;
+        let imu_from_gyro = Rotation::from_scaled_axis(self.scale_misalignment.accel_against_gyro() * 0.5);
+        let position = self.maker.laser_in_imu + lidar.shift;
+        let shift = lidar.shift + imu_from_gyro * position - position;
         LidarCorrection { turn: imu_from_gyro * lidar.turn, shift, ..lidar }
     }
 

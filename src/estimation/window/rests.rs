@@ -1,25 +1,24 @@
 //! Rests after the start: zero-velocity and zero-rate measurements.
 
-use crate::estimation::initial::Rest;
+use crate::estimation::initial::RestReadings;
 use crate::estimation::strapdown::{Biases, Interval};
 
-/// A rest lasts at least this long, s.
-const LASTS_S: f64 = 0.7;
-/// No rest is assumed for this long at either end, s.
+/// Minimum duration of a rest, s.
+const MIN_DURATION_S: f64 = 0.7;
+/// Margin at both ends of a rest, in which no rest is assumed, s.
 const MARGIN_S: f64 = 0.15;
-/// Missing samples end a candidate after this long, s: a driver drops single samples, but in a longer gap the head
-/// could move and stop.
-const MISSING_S: f64 = 0.1;
+/// Longer runs of missing samples end a rest, s: in a gap of this length the head could move and stop.
+const MAX_MISSING_S: f64 = 0.1;
 /// Maximum turn rate at rest after subtraction of the gyroscope bias, rad/s; the sample noise is added to it.
-const RATE_RAD_PER_S: f64 = 0.01;
+const MAX_RATE_RAD_PER_S: f64 = 0.01;
 /// Maximum estimated speed at rest, m/s: the IMU cannot distinguish constant motion from rest.
-const SPEED_M_PER_S: f64 = 0.15;
+const MAX_SPEED_M_PER_S: f64 = 0.15;
 
-/// Detects rests in the stream of intervals.
+/// Detects rests in the sequence of intervals.
 #[derive(Debug, Default)]
 pub(super) struct Rests {
     /// The IMU readings of a possible rest, and the start of it, IMU time, s.
-    candidate: Option<(Rest, f64)>,
+    candidate: Option<(RestReadings, f64)>,
     /// Duration of the missing samples so far, s.
     missing_s: f64,
     /// Start and end of each rest, in order, IMU time, s.
@@ -30,19 +29,19 @@ impl Rests {
     /// Adds the interval that ends at `end_s`, where the estimated speed is `speed_m_per_s`.
     pub(super) fn take(&mut self, interval: &Interval, biases: &Biases, (end_s, speed_m_per_s): (f64, f64)) {
         self.missing_s = if interval.bridged { self.missing_s + interval.h } else { 0.0 };
-        if interval.bridged && self.missing_s < MISSING_S {
+        if interval.bridged && self.missing_s < MAX_MISSING_S {
             return;
         }
-        let goes_on = self.candidate.is_some_and(|(rest, _)| rest.goes_on(interval));
-        let is_still = (interval.gyro - biases.gyro).norm() < RATE_RAD_PER_S + 6.0 * interval.gyro_sigma
+        let continues = self.candidate.is_some_and(|(rest, _)| rest.agrees_with(interval));
+        let is_still = (interval.gyro - biases.gyro).norm() < MAX_RATE_RAD_PER_S + 6.0 * interval.gyro_sigma
             && !interval.bridged
-            && speed_m_per_s < SPEED_M_PER_S;
-        if !(goes_on && is_still) {
-            self.candidate = is_still.then(|| (Rest::from(interval), end_s));
+            && speed_m_per_s < MAX_SPEED_M_PER_S;
+        if !(continues && is_still) {
+            self.candidate = is_still.then(|| (RestReadings::from(interval), end_s));
             return;
         }
         let Some((_, since_s)) = self.candidate else { return };
-        if end_s - since_s < LASTS_S {
+        if end_s - since_s < MIN_DURATION_S {
             return;
         }
         let rest = (since_s + MARGIN_S, end_s - MARGIN_S);

@@ -1,7 +1,7 @@
 //! The window's iterations: place the surfels, match, solve, until the correction converges.
 
 use super::Window;
-use super::correspondence::{Matches, Neighbours, With};
+use super::correspondence::{Counterpart, Matches, Neighbours};
 use super::equations::Robust;
 use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
@@ -11,7 +11,7 @@ use crate::estimation::residual::{
     RANGE,
 };
 use crate::estimation::spent::{Stopwatch, TimeSpent};
-use crate::estimation::strapdown::Exaggerates;
+use crate::estimation::strapdown::ImuScaleMisalignment;
 use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
@@ -19,9 +19,9 @@ use crate::geometry::{Matrix, Rotation, Vector};
 /// A correction above this (m, rad) in one iteration is rejected.
 const MAX_CORRECTION: (f64, f64) = (2.0, 0.8);
 /// Lever arm that converts a rotation of the head into surfel motion, m; more distant surfaces are in larger cells.
-const ARM_M: f64 = 5.0;
-/// A normal that tilts towards a direction by less than this sine may do so only by measurement error.
-pub(in crate::estimation) const LEANING: f64 = 0.3;
+const LEVER_ARM_M: f64 = 5.0;
+/// Sine of the tilt of a normal towards a direction below which the tilt may be measurement error.
+pub(in crate::estimation) const MIN_SIGNIFICANT_TILT: f64 = 0.3;
 /// Conditioning below which a just relocalised window is not corrected along the weakest direction. Only a few matches
 /// constrain it, and some of them are false.
 const UNCONSTRAINED: f64 = 0.01;
@@ -53,8 +53,8 @@ impl Window {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
         let lidar = self.maker.lidar;
-        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.exaggerates);
-        self.border.begin_window();
+        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.scale_misalignment);
+        self.border.start_window();
         let mut total = vec![0.0; layout.border()];
         let mut solved = Solved::default();
         let mut neighbours = Neighbours::default();
@@ -64,7 +64,7 @@ impl Window {
         for iteration in 0..self.spec.solve.max_iterations {
             let scene = self.scene();
             solved.spent.placing_s += watch.lap_s();
-            let chosen = chosen.get_or_insert_with(|| views.choose(&scene));
+            let chosen = chosen.get_or_insert_with(|| views.select(&scene));
             solved.spent.views_s += watch.lap_s();
             if !neighbours.are_valid_for(&scene) {
                 neighbours = self.search_neighbours(&scene, (views, chosen));
@@ -88,20 +88,20 @@ impl Window {
                 break;
             }
             self.apply(&x, first, &layout, &mut total);
-            self.knows_speed |= !matches.all.is_empty();
+            self.speed_is_known |= !matches.all.is_empty();
             self.sees_rest |= !matches.all.is_empty();
-            neighbours.moved(by.shift + ARM_M * by.turn);
+            neighbours.moved(by.shift + LEVER_ARM_M * by.turn);
             solved.spent.correction_s += watch.lap_s();
-            solved.last_correction_m = by.most();
+            solved.last_correction_m = by.max();
             linearised = Some(Linearised { layout, scene, matches, robust });
             if solved.last_correction_m < self.spec.solve.settled_m {
                 break;
             }
         }
         if solved.trouble.is_some() {
-            (self.nominal, self.clock, self.biases, self.gravity, self.exaggerates) = backup;
+            (self.nominal, self.clock, self.biases, self.gravity, self.scale_misalignment) = backup;
             self.maker.lidar = lidar;
-            self.border.take_back();
+            self.border.reset_to_window_start();
             linearised = None;
         }
         (solved, linearised)
@@ -112,8 +112,8 @@ impl Window {
         if matches.all.len() < self.spec.solve.min_matches {
             return Matches::default();
         }
-        if self.is_just_found() && solved.conditioning < UNCONSTRAINED {
-            matches.all.iter_mut().for_each(|found| found.plane.forget(&solved.weakest));
+        if self.is_just_relocalised() && solved.conditioning < UNCONSTRAINED {
+            matches.all.iter_mut().for_each(|found| found.plane.remove_component(&solved.weakest));
         } else if solved.conditioning < self.spec.solve.weak_conditioning {
             self.remove_insignificant_tilt(&mut matches, scene, views, &solved.weakest);
         }
@@ -135,11 +135,11 @@ impl Window {
         self.gravity = Rotation::from_scaled_axis(tilt) * self.gravity;
         self.clock.offset_s += border[CLOCK];
         self.clock.rate += border[CLOCK_RATE];
-        self.border.moved(border, &self.workspace.factor);
+        self.border.add_step(border, &self.workspace.factor);
         let matrix = |at: usize| Matrix::from_fn(|r, c| border[at + 3 * r + c]);
-        let more = Exaggerates { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
-        self.nominal.measured_without(&more);
-        self.exaggerates.add(&more);
+        let more = ImuScaleMisalignment { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
+        self.nominal.correct_readings(&more);
+        self.scale_misalignment.add(&more);
         self.maker.lidar.range_m += border[RANGE];
         self.maker.lidar.turn = Rotation::from_scaled_axis(three(LIDAR_TURN)) * self.maker.lidar.turn;
         self.maker.lidar.shift += three(LIDAR_SHIFT);
@@ -149,7 +149,7 @@ impl Window {
 impl Solved {
     /// Records number, residual and conditioning of a set of matches.
     fn record(&mut self, matches: &Matches, robust: &Robust) {
-        self.matches = matches.all.iter().filter(|one| matches!(one.with, With::Live(_))).count();
+        self.matches = matches.all.iter().filter(|one| matches!(one.with, Counterpart::Live(_))).count();
         self.view_matches = matches.all.len() - self.matches;
         let (mut weights, mut squares, mut information) = (0.0, 0.0, Matrix::zeros());
         for plane in matches.planes() {
@@ -165,9 +165,10 @@ impl Solved {
             let weakest: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
             // In a smooth tunnel normals tilt along the axis only by error; the sum of the errors would count as
             // information.
-            let along = |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|lean| lean.abs() > LEANING);
+            let along =
+                |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|tilt| tilt.abs() > MIN_SIGNIFICANT_TILT);
             let information_of =
-                |plane: &Plane| along(plane).map(|lean| robust.weight(plane, plane.distance_m) * lean * lean);
+                |plane: &Plane| along(plane).map(|tilt| robust.weight(plane, plane.distance_m) * tilt * tilt);
             let least = matches.planes().filter_map(information_of).fold(0.0, |sum, term| sum + term);
             (self.conditioning, self.weakest) = (least / eigen.eigenvalues.max(), weakest);
         }

@@ -1,9 +1,9 @@
 //! Sensitivity of a window's solution to the start, to the views, and to the measurements.
 
 use super::Window;
-use super::correspondence::{Match, Matches, With};
+use super::correspondence::{Counterpart, Match, Matches};
 use super::equations::Robust;
-use crate::estimation::consider::{AT_IMU, CARRIED, IMU, OfBeginning, Sensitivity};
+use crate::estimation::consider::{IMU_OFFSET, IMU_STATES, START_STATES, Sensitivity, StartMatrix};
 use crate::estimation::residual::prior::ByLidar;
 use crate::estimation::residual::{LIDAR_TURN, Layout, matched};
 use crate::estimation::spline::Basis;
@@ -30,43 +30,43 @@ impl Window {
         views: &Views,
     ) -> Option<Sensitivity> {
         let size = at.layout.size();
-        let taken_over = self.columns_at(u_s, &at.layout);
+        let inherited = self.columns_at(u_s, &at.layout);
         // H^-1 is symmetric: the solutions for these rows serve all fixed quantities.
-        let solved: Vec<Vec<f64>> = taken_over.iter().map(|column| self.workspace.factor.solve(column)).collect();
+        let solved: Vec<Vec<f64>> = inherited.iter().map(|column| self.workspace.factor.solve(column)).collect();
         let by = |r: usize, column: &[f64]| (0..size).map(|k| solved[r][k] * column[k]).sum::<f64>();
         let by_start = self.columns_of_start(&at.layout);
-        let of_start = SMatrix::<f64, CARRIED, 12>::from_fn(|r, c| by(r, &by_start[c]));
+        let of_start = SMatrix::<f64, START_STATES, 12>::from_fn(|r, c| by(r, &by_start[c]));
         let imu = self.border.imu_information()?;
-        let of_imu = SMatrix::<f64, CARRIED, IMU>::from_fn(|r, c| solved[r][at.layout.border() + c]) * imu;
-        let mut beginning = OfBeginning::zeros();
-        beginning.fixed_columns_mut::<12>(0).copy_from(&of_start);
-        beginning.fixed_columns_mut::<IMU>(AT_IMU).copy_from(&of_imu);
+        let of_imu = SMatrix::<f64, START_STATES, IMU_STATES>::from_fn(|r, c| solved[r][at.layout.border() + c]) * imu;
+        let mut start = StartMatrix::zeros();
+        start.fixed_columns_mut::<12>(0).copy_from(&of_start);
+        start.fixed_columns_mut::<IMU_STATES>(IMU_OFFSET).copy_from(&of_imu);
         // The remainder of the covariance after subtraction of the start's part, which `Consider` propagates.
-        let all = OfBeginning::from_fn(|r, c| by(r, &taken_over[c]));
-        let own = all - beginning * self.known_at_start()? * beginning.transpose();
+        let all = StartMatrix::from_fn(|r, c| by(r, &inherited[c]));
+        let own = all - start * self.known_at_start()? * start.transpose();
         let by_views = self.columns_of_views(at, views);
         Some(Sensitivity {
             pivot: self.nominal.at(u_s, &self.biases.gyro).position,
-            beginning,
+            start,
             views: by_views.iter().map(|(number, c)| (*number, SMatrix::from_fn(|r, k| by(r, &c[k])))).collect(),
-            noise: own * self.spec.solve.covariance_inflation + self.border.imu_wanders(self.spec.step_s),
+            noise: own * self.spec.solve.covariance_inflation + self.border.imu_random_walk(self.spec.step_s),
         })
     }
 
     /// Covariance of the start states, as the window's equations assume it.
-    pub(in crate::estimation) fn known_at_start(&self) -> Option<OfBeginning> {
+    pub(in crate::estimation) fn known_at_start(&self) -> Option<StartMatrix> {
         let sigma = |k: usize| self.start.sigmas[k / 6][k % 6 / 3];
-        let mut known = OfBeginning::zeros();
+        let mut known = StartMatrix::zeros();
         (0..12).for_each(|k| known[(k, k)] = sigma(k).powi(2));
         let imu = self.border.imu_information()?.try_inverse()?;
-        known.fixed_view_mut::<IMU, IMU>(AT_IMU, AT_IMU).copy_from(&imu);
+        known.fixed_view_mut::<IMU_STATES, IMU_STATES>(IMU_OFFSET, IMU_OFFSET).copy_from(&imu);
         Some(known)
     }
 
     /// Regression of the corrections at `u_s` (IMU time) and of their derivatives on the lidar extrinsics.
     ///
-    /// With all other unknowns solved: `P_xl P_ll^-1` of the covariances `P`. None if the extrinsics are not estimated.
-    pub(super) fn hangs_on_lidar(&self, u_s: f64, at: &Linearised) -> Option<ByLidar> {
+    /// Counterpart all other unknowns solved: `P_xl P_ll^-1` of the covariances `P`. None if the extrinsics are not estimated.
+    pub(super) fn regression_on_lidar(&self, u_s: f64, at: &Linearised) -> Option<ByLidar> {
         if !self.spec.extrinsics.estimated {
             return None;
         }
@@ -94,13 +94,13 @@ impl Window {
 
     /// The states that the next window inherits at `u_s`, as rows over the window's unknowns: the six corrections,
     /// rotation then translation, the derivatives, and the IMU part of the border.
-    fn columns_at(&self, u_s: f64, layout: &Layout) -> [Vec<f64>; CARRIED] {
+    fn columns_at(&self, u_s: f64, layout: &Layout) -> [Vec<f64>; START_STATES] {
         let basis = Basis::at(u_s, self.spec.knot_spacing_s);
         let first = layout.knot(basis.first);
         std::array::from_fn(|of| {
             let mut column = vec![0.0; layout.size()];
-            if of >= AT_IMU {
-                column[layout.border() + of - AT_IMU] = 1.0;
+            if of >= IMU_OFFSET {
+                column[layout.border() + of - IMU_OFFSET] = 1.0;
                 return column;
             }
             let by = if of < 6 { basis.value } else { basis.rate };
@@ -112,9 +112,9 @@ impl Window {
     /// Change of the right-hand side per unit rotation, translation, and rate of each, of the window's start.
     fn columns_of_start(&self, layout: &Layout) -> [Vec<f64>; 12] {
         std::array::from_fn(|of| {
-            let mut asked = [[0.0; 6]; 2];
-            asked[of / 6][of % 6] = 1.0;
-            self.start.right_hand_side(layout, (&asked[0], &asked[1]), self.spec.knot_spacing_s)
+            let mut target = [[0.0; 6]; 2];
+            target[of / 6][of % 6] = 1.0;
+            self.start.right_hand_side(layout, (&target[0], &target[1]), self.spec.knot_spacing_s)
         })
     }
 
@@ -122,9 +122,9 @@ impl Window {
     fn columns_of_views(&self, at: &Linearised, views: &Views) -> Vec<(u64, [Vec<f64>; 6])> {
         let mut columns: Vec<(u32, [Vec<f64>; 6])> = Vec::new();
         for Match { a, with, plane } in &at.matches.all {
-            let With::Fixed { view: index, .. } = *with else { continue };
+            let Counterpart::Fixed { view: index, .. } = *with else { continue };
             let found = columns.iter().position(|(other, _)| *other == index);
-            let place = found.unwrap_or_else(|| {
+            let index_in_columns = found.unwrap_or_else(|| {
                 columns.push((index, std::array::from_fn(|_| vec![0.0; at.layout.size()])));
                 columns.len() - 1
             });
@@ -134,7 +134,13 @@ impl Window {
             let turn: Vector = lever.cross(&plane.normal) * weight;
             let shift = plane.normal * weight;
             let by = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
-            matched::add_scaled_row(&mut columns[place].1, &at.layout, (surfel, &plane.normal), &by, self.clock.at_s);
+            matched::add_scaled_row(
+                &mut columns[index_in_columns].1,
+                &at.layout,
+                (surfel, &plane.normal),
+                &by,
+                self.clock.at_s,
+            );
         }
         columns.into_iter().map(|(index, columns)| (views.view(index as usize).number, columns)).collect()
     }

@@ -7,32 +7,32 @@ use nalgebra::{SMatrix, SVector};
 
 /// A beam that hit a static surface, without noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sight {
-    /// When it was fired, lidar time.
+pub struct BeamObservation {
+    /// Time of emission, lidar time.
     pub stamp: Stamp,
-    /// Where the head was.
+    /// True pose of the head.
     pub world_from_head: Pose,
     /// Velocity of the head's origin, m/s.
     pub velocity_in_world: Vector,
     /// Angular velocity of the head, rad/s.
     pub angular_velocity_in_world: Vector,
-    /// Where it met the surface, m.
+    /// Point on the surface, m.
     pub hit_in_world: Vector,
-    /// Where it went: a unit vector.
+    /// Direction of the beam, unit vector.
     pub direction_in_world: Vector,
-    /// The surface's unit normal, of either sign.
+    /// Unit normal of the surface, of either sign.
     pub normal_in_world: Vector,
     /// Standard deviation of the range, m.
     pub range_sigma_m: f64,
 }
 
-/// Beams along a surface to within this cosine are skipped: the first-order model does not apply to them.
-const GRAZING: f64 = 0.02;
+/// Minimum cosine of the incidence angle; the first-order model does not apply at grazing incidence.
+const MIN_INCIDENCE_COSINE: f64 = 0.02;
 
-/// Errors that a beam measures: attitude, position, current clock offset, range offset.
-pub(super) type Seen = SMatrix<f64, 8, 8>;
-/// Entries of the lower triangle.
-const TOLD: usize = 36;
+/// Information of beams on attitude, position, current clock offset and range offset.
+pub(super) type BeamInformation = SMatrix<f64, 8, 8>;
+/// Number of entries of the lower triangle.
+const TRIANGLE: usize = 36;
 
 /// An epoch: the motion of the IMU, the mean of the IMU samples, and the information of the beams.
 #[derive(Debug, Clone)]
@@ -45,7 +45,7 @@ pub(super) struct Epoch {
     force_sum: Vector,
     samples: f64,
     /// Fisher information of the beams: the lower triangle, row by row.
-    told: [f64; TOLD],
+    triangle: [f64; TRIANGLE],
 }
 
 impl Epoch {
@@ -59,48 +59,48 @@ impl Epoch {
             rate_sum: Vector::zeros(),
             force_sum: Vector::zeros(),
             samples: 0.0,
-            told: [0.0; TOLD],
+            triangle: [0.0; TRIANGLE],
         }
     }
 
-    pub(super) fn hear(&mut self, sample: &ImuSample) {
+    pub(super) fn add_imu_sample(&mut self, sample: &ImuSample) {
         self.rate_sum += sample.angular_velocity_rad_per_s;
         self.force_sum += sample.specific_force_m_per_s2;
         self.samples += 1.0;
     }
 
-    /// Mean angular velocity and specific force, in the IMU's frame; `None` where the IMU was silent.
-    pub(super) fn heard(&self) -> Option<(Vector, Vector)> {
+    /// Mean angular velocity and specific force in the IMU frame; `None` without IMU samples.
+    pub(super) fn mean_imu(&self) -> Option<(Vector, Vector)> {
         (self.samples > 0.0).then(|| (self.rate_sum / self.samples, self.force_sum / self.samples))
     }
 
-    pub(super) fn see(&mut self, sight: &Sight, head_from_imu: &Pose) {
-        let along = sight.normal_in_world.dot(&sight.direction_in_world);
-        if along.abs() < GRAZING {
+    pub(super) fn add_beam(&mut self, beam: &BeamObservation, head_from_imu: &Pose) {
+        let along = beam.normal_in_world.dot(&beam.direction_in_world);
+        if along.abs() < MIN_INCIDENCE_COSINE {
             return;
         }
-        let arm = sight.world_from_head.rotation * head_from_imu.translation.vector;
-        let imu_in_world = sight.world_from_head.translation.vector + arm;
-        let velocity = sight.velocity_in_world + sight.angular_velocity_in_world.cross(&arm);
-        let to_hit = sight.hit_in_world - imu_in_world;
+        let arm = beam.world_from_head.rotation * head_from_imu.translation.vector;
+        let imu_in_world = beam.world_from_head.translation.vector + arm;
+        let velocity = beam.velocity_in_world + beam.angular_velocity_in_world.cross(&arm);
+        let to_hit = beam.hit_in_world - imu_in_world;
         // dr = -n (dp + dtheta x rho) / (n u), and n (dtheta x rho) = dtheta (rho x n).
-        let by_position = -sight.normal_in_world / along;
+        let by_position = -beam.normal_in_world / along;
         let by_attitude = to_hit.cross(&by_position);
-        let by_clock = by_position.dot(&velocity) + by_attitude.dot(&sight.angular_velocity_in_world);
+        let by_clock = by_position.dot(&velocity) + by_attitude.dot(&beam.angular_velocity_in_world);
         let mut row = SVector::<f64, 8>::zeros();
         row.fixed_rows_mut::<3>(0).copy_from(&by_attitude);
         row.fixed_rows_mut::<3>(3).copy_from(&by_position);
         (row[6], row[7]) = (by_clock, 1.0);
-        row /= sight.range_sigma_m;
+        row /= beam.range_sigma_m;
         let products = (0..8).flat_map(|i| (0..=i).map(move |j| row[i] * row[j]));
-        self.told.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        self.triangle.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
     }
 
     /// Fisher information of the beams.
-    pub(super) fn seen(&self) -> Seen {
-        Seen::from_fn(|i, j| {
+    pub(super) fn beam_information(&self) -> BeamInformation {
+        BeamInformation::from_fn(|i, j| {
             let (row, column) = (i.max(j), i.min(j));
-            self.told[row * (row + 1) / 2 + column]
+            self.triangle[row * (row + 1) / 2 + column]
         })
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! The covariance of the errors of any unbiased estimator is at least the inverse of the Fisher information of the
 //! measurements. Here these are all beams, of known noise, on surfaces that are known exactly, and an inertial
-//! measurement unit of known noise whose biases walk. An estimator without the map has less information, so the bound
+//! measurement unit of known noise with random-walk biases. An estimator without the map has less information, so the bound
 //! applies to it too, but is optimistic.
 //!
 //! # The model
 //!
 //! Errors of the estimate, all to first order about the truth: attitude `dtheta` (`R' = exp(dtheta) R`), velocity and
 //! position of the IMU in the world, the biases of gyroscope and accelerometer, and the constants of the run:
-//! clock offset `l` and its rate, an offset of all ranges, and the scale and misalignment of both triads. They move as
+//! clock offset `l` and its rate, an offset of all ranges, and the scale and misalignment of both triads. The model is
 //!
 //! ```text
 //! dtheta' = -R (db_g + dM_g w + n_g)      dv' = -[R f]x dtheta - R (db_a + dM_a f + n_a)      dp' = dv      db' = n_b
@@ -21,8 +21,8 @@
 //!
 //! # Omitted effects, all of which would raise the bound
 //!
-//! Rounding of ranges, jitter and rounding of stamps, missed echoes and their biases at grazing incidence, beams that
-//! hit moving objects, and samples at their limit: assumed known. The IMU samples are averages over adjacent intervals.
+//! Rounding of ranges, jitter and rounding of stamps, missed returns and range biases at grazing incidence, beams on
+//! moving objects, and saturated samples: assumed known. The IMU samples are averages over adjacent intervals.
 //! Gravity is known.
 
 mod epoch;
@@ -30,8 +30,8 @@ mod motion;
 mod smoother;
 mod state;
 
+pub use epoch::BeamObservation;
 use epoch::Epoch;
-pub use epoch::Sight;
 
 use super::EvaluationError;
 use crate::geometry::{Pose, Vector};
@@ -44,59 +44,60 @@ const EPOCH: Span = Span::from_nanos(20_000_000);
 /// Prior standard deviations of the sensors' errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoundModel {
-    /// Where the IMU is in the head.
+    /// Pose of the IMU in the head.
     pub head_from_imu: Pose,
-    /// The IMU's noise.
+    /// Noise of the IMU.
     pub imu: ImuNoise,
-    /// The gyroscope's scale (the diagonal) and misalignment (the rest of the matrix), 1 and rad.
+    /// Scale error (diagonal, 1) and misalignment (off-diagonal, rad) of the gyroscope.
     pub gyro_matrix: (f64, f64),
-    /// The same of the accelerometer.
+    /// Scale error (diagonal, 1) and misalignment (off-diagonal, rad) of the accelerometer.
     pub accel_matrix: (f64, f64),
-    /// The offset common to all ranges of the run, m.
+    /// Common offset of all ranges of the run, m.
     pub range_offset_m: f64,
-    /// The offset between the clocks, s.
+    /// Clock offset, s.
     pub clock_offset_s: f64,
     /// Rate of the clock offset, s/s.
     pub clock_rate: f64,
 }
 
-/// The information in a recording, accumulated while it is read.
+/// Fisher information of a recording, accumulated while it is read.
 ///
 /// Stores some hundred bytes for each 20 ms: the information of the beams and the motion of the head.
 #[derive(Debug, Clone)]
-pub struct Information {
+pub struct FisherInformation {
     model: BoundModel,
     start: Stamp,
     epochs: Vec<Epoch>,
 }
 
-/// The least errors, root mean square or standard deviation, that any unbiased estimator can have.
+/// Cramer-Rao bounds: minimum RMS errors and standard deviations of any unbiased estimator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InformationBound {
-    /// When, lidar time.
+    /// Stamps of the epochs, lidar time.
     pub stamps: Vec<Stamp>,
-    /// Of the head's position along each axis of the world, m.
+    /// Standard deviation of the head position along each world axis, m.
     pub position_sigma_m: Vec<Vector>,
-    /// Of the head's attitude about each axis of the world, rad.
+    /// Standard deviation of the head attitude about each world axis, rad.
     pub attitude_sigma_rad: Vec<Vector>,
-    /// Of the position over the run, in the world, m.
+    /// RMS position error over the run in the world frame, m.
     pub position_rmse_m: f64,
-    /// The same along each axis of the world, m.
+    /// RMS position error along each world axis, m.
     pub axis_rmse_m: Vector,
     /// RMSE of the position after the rigid alignment that the evaluation uses, m: comparable with the RMSE of an
     /// estimate.
     pub aligned_position_rmse_m: f64,
-    /// Of the attitude over the run, in the world, rad.
+    /// RMS attitude error over the run in the world frame, rad.
     pub attitude_rmse_rad: f64,
-    /// Of the clock offset at the end, s.
+    /// Standard deviation of the clock offset at the end, s.
     pub clock_offset_s: f64,
-    /// Of the offset of all ranges, m.
+    /// Standard deviation of the range offset, m.
     pub range_offset_m: f64,
 }
 
-impl Information {
-    /// No measurements yet; the true trajectory is `heads`: `world_from_head` in lidar time, in order, at
-    /// least 50 a second.
+impl FisherInformation {
+    /// Creates an accumulator without measurements.
+    ///
+    /// `heads` is the true trajectory `world_from_head` in lidar time, in order, at 50 Hz or more.
     pub fn new<E>(model: BoundModel, heads: impl Iterator<Item = Result<(Stamp, Pose), E>>) -> Result<Self, E> {
         let mut epochs: Vec<Epoch> = Vec::new();
         let (mut start, mut before): (Option<Stamp>, Option<(Stamp, Pose)>) = (None, None);
@@ -106,26 +107,26 @@ impl Information {
             let start = *start.get_or_insert(stamp);
             let due = start + Span::from_nanos(epochs.len() as i64 * EPOCH.nanos());
             if stamp >= due {
-                let past = before.unwrap_or((stamp - EPOCH, world_from_imu));
-                epochs.push(Epoch::new(&world_from_imu, &past.1, stamp.seconds_since(past.0)));
+                let previous = before.unwrap_or((stamp - EPOCH, world_from_imu));
+                epochs.push(Epoch::new(&world_from_imu, &previous.1, stamp.seconds_since(previous.0)));
             }
             before = Some((stamp, world_from_imu));
         }
         Ok(Self { model, start: start.unwrap_or_default(), epochs })
     }
 
-    /// Adds a sample of the IMU with the stamp `stamp` of the lidar's clock.
-    pub fn hear(&mut self, stamp: Stamp, sample: &ImuSample) {
+    /// Adds an IMU sample; `stamp` is on the lidar clock.
+    pub fn add_imu_sample(&mut self, stamp: Stamp, sample: &ImuSample) {
         if let Some(epoch) = self.epoch_at(stamp) {
-            epoch.hear(sample);
+            epoch.add_imu_sample(sample);
         }
     }
 
-    /// Sees a beam that met a surface.
-    pub fn see(&mut self, sight: &Sight) {
+    /// Adds the observation of a surface by a beam.
+    pub fn add_beam(&mut self, beam: &BeamObservation) {
         let head_from_imu = self.model.head_from_imu;
-        if let Some(epoch) = self.epoch_at(sight.stamp) {
-            epoch.see(sight, &head_from_imu);
+        if let Some(epoch) = self.epoch_at(beam.stamp) {
+            epoch.add_beam(beam, &head_from_imu);
         }
     }
 
@@ -135,10 +136,10 @@ impl Information {
         (index >= 0.0).then(|| self.epochs.get_mut(index as usize)).flatten()
     }
 
-    /// The bound.
+    /// Computes the bound.
     ///
     /// # Errors
-    /// When the truth is shorter than a tenth of a second.
+    /// When the truth is shorter than 0.1 s.
     pub fn bound(self) -> Result<InformationBound, EvaluationError> {
         let found_s = self.epochs.len() as f64 * EPOCH.seconds();
         if found_s < 0.1 {

@@ -3,9 +3,9 @@
 use super::BoundModel;
 use nalgebra::{SMatrix, SVector};
 
-/// How many there are.
+/// Number of states.
 pub(super) const N: usize = 42;
-/// Attitude, velocity, position: of the IMU in the world.
+/// Attitude, velocity and position of the IMU in the world.
 pub(super) const ATTITUDE: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const POSITION: usize = 6;
@@ -26,12 +26,12 @@ pub(super) const ACCEL_MATRIX: usize = 33;
 pub(super) type State = SMatrix<f64, N, N>;
 
 /// Prior standard deviations of attitude, rad, velocity, m/s, and position, m: nearly uninformative.
-const UNKNOWN: [f64; 3] = [1.0, 10.0, 10.0];
+const POSE_PRIOR: [f64; 3] = [1.0, 10.0, 10.0];
 
-/// The covariance before anything is heard.
+/// The prior covariance.
 pub(super) fn prior(model: &BoundModel) -> State {
     let mut sigma = SVector::<f64, N>::zeros();
-    for (at, value) in [(ATTITUDE, UNKNOWN[0]), (VELOCITY, UNKNOWN[1]), (POSITION, UNKNOWN[2])] {
+    for (at, value) in [(ATTITUDE, POSE_PRIOR[0]), (VELOCITY, POSE_PRIOR[1]), (POSITION, POSE_PRIOR[2])] {
         sigma.fixed_rows_mut::<3>(at).fill(value);
     }
     sigma.fixed_rows_mut::<3>(GYRO_BIAS).fill(model.imu.gyro_turn_on_bias_rad_per_s);

@@ -1,49 +1,50 @@
-//! Gusts of wind, and what a hovering craft makes of them.
+//! Wind gusts, and the response of a hovering craft.
 
 use super::UavSpec;
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
-use crate::motion::sines::{Line, Part, Sines, geometric_parts};
+use crate::motion::sines::{FrequencyBin, SineSum, SpectralLine, log_bins};
 use crate::random::Stream;
 use crate::spec::checked::{NonNegative, Positive};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-/// Wind with Dryden's gusts.
+/// Wind with Dryden gusts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GustSpec {
-    /// Mean wind at 6 m (20 feet) above the ground, m/s: gusts grow with it. Light turbulence: 7.7, moderate: 15.4.
+    /// Mean wind at 6 m (20 feet) above the ground, m/s; gusts scale with it. Light turbulence: 7.7, moderate: 15.4.
     #[serde(with = "NonNegative")]
     pub wind_m_per_s: f64,
-    /// Speed at which the craft meets the air, m/s.
+    /// Airspeed of the craft, m/s. A higher airspeed shifts gusts to higher frequencies.
     #[serde(with = "Positive")]
     pub airspeed_m_per_s: f64,
 }
 
-/// A direction of gusts.
+/// Direction of a gust component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Axis {
     /// Along the airspeed.
     Along,
-    /// Across it, level.
+    /// Horizontal, across the airspeed.
     Across,
-    /// Up.
+    /// Vertical.
     Up,
 }
 
 const FOOT_M: f64 = 0.3048;
 
-/// Frequencies of gusts, Hz.
+/// Frequency band of the gusts, Hz.
 const BAND_HZ: (f64, f64) = (0.005, 5.0);
 
-/// Sinusoids in the gusts of an axis.
+/// Sinusoids per gust component.
 const LINES: usize = 150;
 
 impl GustSpec {
-    /// Standard deviation (m/s) and scale (m) of the gusts at a height (MIL-F-8785C, section 3.7.3.4): `L_w = h`, `L_u
-    /// = L_v = h / (0.177 + 0.000823 h)^1.2`, `s_w = 0.1 W`, `s_u = s_v = s_w / (0.177 + 0.000823 h)^0.4` with h in
-    /// feet, from 10 to 1000 of them; below and above, the values there.
+    /// Standard deviation (m/s) and length scale (m) of the gusts at a height (MIL-F-8785C, section 3.7.3.4).
+    ///
+    /// `L_w = h`, `L_u = L_v = h / (0.177 + 0.000823 h)^1.2`, `s_w = 0.1 W`,
+    /// `s_u = s_v = s_w / (0.177 + 0.000823 h)^0.4` with h in feet, clamped to 10 to 1000 feet.
     fn scales(&self, axis: Axis, height_m: f64) -> (f64, f64) {
         let h = (height_m / FOOT_M).clamp(10.0, 1000.0);
         let base = 0.177 + 0.000_823 * h;
@@ -54,9 +55,10 @@ impl GustSpec {
         }
     }
 
-    /// The one-sided density of the gusts along an axis at `freq_hz`, (m/s)^2/Hz. Over the angular frequency w, with
-    /// `x = L w / V` (MIL-F-8785C, section 3.7.1.2): along `s^2 2L/(pi V) / (1 + x^2)`, across and up
-    /// `s^2 L/(pi V) (1 + 3 x^2) / (1 + x^2)^2`.
+    /// One-sided spectral density of a gust component at `freq_hz`, (m/s)^2/Hz.
+    ///
+    /// Over the angular frequency w, with `x = L w / V` (MIL-F-8785C, section 3.7.1.2): along
+    /// `s^2 2L/(pi V) / (1 + x^2)`, across and up `s^2 L/(pi V) (1 + 3 x^2) / (1 + x^2)^2`.
     pub(super) fn density(&self, axis: Axis, height_m: f64, freq_hz: f64) -> f64 {
         let (deviation, scale_m) = self.scales(axis, height_m);
         let passing_s = scale_m / self.airspeed_m_per_s;
@@ -68,40 +70,40 @@ impl GustSpec {
         TAU * deviation * deviation * passing_s / PI * form
     }
 
-    fn parts(&self, axis: Axis, height_m: f64, stream: &mut Stream) -> Vec<(f64, Complex<f64>)> {
-        let parts = geometric_parts(BAND_HZ, LINES, stream);
-        parts.iter().map(|part: &Part| (part.at, part.amplitude(self.density(axis, height_m, part.at)))).collect()
+    fn components(&self, axis: Axis, height_m: f64, stream: &mut Stream) -> Vec<(f64, Complex<f64>)> {
+        let bins = log_bins(BAND_HZ, LINES, stream);
+        bins.iter().map(|bin: &FrequencyBin| (bin.at, bin.amplitude(self.density(axis, height_m, bin.at)))).collect()
     }
 }
 
-/// Displacement for a gust of 1 m/s: the craft is dragged by the air and held by `x'' = -2 z w0 x' - w0^2 x + d (g -
-/// x')`.
+/// Displacement per gust of 1 m/s: the air drags the craft, and position control holds it,
+/// `x'' = -2 z w0 x' - w0^2 x + d (g - x')`.
 fn displacement(spec: &UavSpec, rate: f64) -> Complex<f64> {
     let natural = TAU * spec.hold_hz;
     let damping = 2.0 * spec.hold_damping * natural + spec.drag_per_s;
     Complex::from(spec.drag_per_s) / Complex::new(natural * natural - rate * rate, damping * rate)
 }
 
-/// Displacement (m) and tilt (rad, towards the displacement) by the gusts of a level axis: the tilt is the controller's
+/// Displacement (m) and tilt (rad, towards the displacement) due to horizontal gusts. The tilt is the commanded
 /// acceleration over gravity.
-pub(super) fn horizontal(spec: &UavSpec, axis: Axis, stream: &mut Stream) -> Sines<2> {
+pub(super) fn horizontal(spec: &UavSpec, axis: Axis, stream: &mut Stream) -> SineSum<2> {
     let natural = TAU * spec.hold_hz;
     let line = |(freq_hz, gust): (f64, Complex<f64>)| {
         let rate = TAU * freq_hz;
         let moved = gust * displacement(spec, rate);
         let command = -moved * Complex::new(natural * natural, 2.0 * spec.hold_damping * natural * rate);
-        Line { cycles: freq_hz, amplitudes: [moved, command / STANDARD_GRAVITY_M_PER_S2] }
+        SpectralLine { cycles: freq_hz, amplitudes: [moved, command / STANDARD_GRAVITY_M_PER_S2] }
     };
-    Sines::new(spec.gust.parts(axis, spec.height_m, stream).into_iter().map(line))
+    SineSum::new(spec.gust.components(axis, spec.height_m, stream).into_iter().map(line))
 }
 
-/// Displacement (m) by the gusts up and down.
-pub(super) fn vertical(spec: &UavSpec, stream: &mut Stream) -> Sines<1> {
-    let line = |(freq_hz, gust): (f64, Complex<f64>)| Line {
+/// Vertical displacement (m) due to gusts.
+pub(super) fn vertical(spec: &UavSpec, stream: &mut Stream) -> SineSum<1> {
+    let line = |(freq_hz, gust): (f64, Complex<f64>)| SpectralLine {
         cycles: freq_hz,
         amplitudes: [gust * displacement(spec, TAU * freq_hz)],
     };
-    Sines::new(spec.gust.parts(Axis::Up, spec.height_m, stream).into_iter().map(line))
+    SineSum::new(spec.gust.components(Axis::Up, spec.height_m, stream).into_iter().map(line))
 }
 
 #[cfg(test)]
@@ -115,7 +117,7 @@ mod tests {
 
     #[test]
     fn the_variance_is_that_of_the_model() {
-        // All power from 0 to infinity is s^2; at 100 feet s_w = 0.77 m/s and s_u = 0.77 / 0.2593^0.4 = 1.321 m/s.
+        // The total power is s^2; at 100 feet s_w = 0.77 m/s and s_u = 0.77 / 0.2593^0.4 = 1.321 m/s.
         for (axis, deviation) in [(Axis::Along, 1.3213), (Axis::Across, 1.3213), (Axis::Up, 0.77)] {
             let steps = 400_000;
             let h = 200.0 / f64::from(steps);
@@ -128,11 +130,11 @@ mod tests {
     fn synthesised_gusts_have_drydens_spectrum() {
         for axis in [Axis::Along, Axis::Across, Axis::Up] {
             let mut stream = Seed(4).stream("gust");
-            let line = |(freq_hz, gust)| Line { cycles: freq_hz, amplitudes: [gust] };
-            let gusts = Sines::new(WIND.parts(axis, 30.48, &mut stream).into_iter().map(line));
+            let line = |(freq_hz, gust)| SpectralLine { cycles: freq_hz, amplitudes: [gust] };
+            let gusts = SineSum::new(WIND.components(axis, 30.48, &mut stream).into_iter().map(line));
             let samples: Vec<f64> = (0..60_000).map(|k| gusts.at(0.05 * f64::from(k))[0].x).collect();
             let spectrum = power_density(&samples, 20.0, Segments::hann(4096)).unwrap();
-            // Octaves of some 15 sinusoids against the formula's integral.
+            // Compares octaves of about 15 sinusoids with the integral of the formula.
             for octave in 0..6 {
                 let low = 0.05 * f64::from(1 << octave);
                 let h = low / 1000.0;

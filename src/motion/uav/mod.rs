@@ -1,8 +1,7 @@
-//! A small multirotor: it flies along the route, tilts to accelerate, is pushed about by gusts, and shaken by its
-//! rotors.
+//! A small multirotor: it follows the route, tilts to accelerate, and is disturbed by gusts and rotor vibration.
 //!
-//! Gusts are Dryden's in the low-altitude form of MIL-F-8785C. The craft holds its place like a damped oscillator; what
-//! its controller commands, it does by tilting: `a / g` for an acceleration a.
+//! Gusts are Dryden gusts in the low-altitude form of MIL-F-8785C. Position control acts as a damped oscillator; an
+//! acceleration `a` that it commands needs a tilt of `a / g`.
 
 mod gust;
 mod rotors;
@@ -11,9 +10,9 @@ pub use gust::GustSpec;
 pub use rotors::RotorSpec;
 
 use super::jet::{Jet, PoseJet};
-use super::sines::Sines;
-use super::smooth::Steps;
-use super::walk::{Walk, WalkSpec};
+use super::sines::SineSum;
+use super::smooth::SmoothSteps;
+use super::walk::{RouteMotion, WalkSpec};
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Route, STANDARD_GRAVITY_M_PER_S2};
 use crate::random::Seed;
@@ -27,43 +26,43 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UavSpec {
-    /// How long everything is at rest first, s.
+    /// Time at rest at the start, s.
     #[serde(with = "NonNegative")]
     pub still_s: f64,
-    /// How long gusts and vibration take to reach their full strength, s.
+    /// Time in which gusts and vibration rise to their full amplitude, s.
     #[serde(with = "Positive")]
     pub onset_s: f64,
-    /// Height of the base above the route's floor, m.
+    /// Height of the base above the floor of the route, m.
     #[serde(with = "Positive")]
     pub height_m: f64,
-    /// How it flies along the route.
+    /// How the craft follows the route.
     pub follow: WalkSpec,
     /// The wind.
     pub gust: GustSpec,
-    /// Natural frequency with which it holds its place, Hz.
+    /// Natural frequency of the position control, Hz. A higher value reduces the response to gusts.
     #[serde(with = "Positive")]
     pub hold_hz: f64,
-    /// Damping ratio of that.
+    /// Damping ratio of the position control.
     #[serde(with = "Positive")]
     pub hold_damping: f64,
-    /// How the air drags it: acceleration for each m/s of wind, 1/s.
+    /// Drag: acceleration per m/s of relative wind, 1/s.
     #[serde(with = "NonNegative")]
     pub drag_per_s: f64,
     /// The rotors.
     pub rotors: RotorSpec,
 }
 
-/// A multirotor in flight.
+/// Motion of a multirotor.
 pub(super) struct Uav {
-    flight: Walk,
+    flight: RouteMotion,
     speed_m_per_s: f64,
     height_m: f64,
     start_s: f64,
-    onset: Steps,
-    /// Displacement and tilt by gusts forward, then to the left.
-    gusts: [Sines<2>; 2],
-    /// Displacement by gusts upwards.
-    heave: Sines<1>,
+    onset: SmoothSteps,
+    /// Displacement and tilt due to gusts: forward, then left.
+    gusts: [SineSum<2>; 2],
+    /// Vertical displacement due to gusts.
+    heave: SineSum<1>,
     rotors: Rotors,
 }
 
@@ -77,7 +76,7 @@ impl Uav {
     ) -> Result<Self, MotionError> {
         spec.follow.check(source)?;
         let route = route.ok_or_else(|| MotionError::NoRoute { motion: source.name.clone() })?;
-        let mut onset = Steps::from_level(0.0);
+        let mut onset = SmoothSteps::from_level(0.0);
         onset.push(spec.still_s + spec.onset_s / 2.0, spec.onset_s / 2.0, 1.0);
         let stream = |name: &str| seed.stream(&format!("motion/uav/{name}"));
         Ok(Self {
@@ -98,28 +97,28 @@ impl Uav {
 
 impl BaseMotion for Uav {
     fn at(&self, t_s: f64) -> Kinematics {
-        let mut position = self.flight.way.at(t_s);
+        let mut position = self.flight.path.at(t_s);
         position[2] += Jet::constant(self.height_m);
         let yaw = self.flight.heading.at(t_s);
-        // It leans into its own accelerations: forward to speed up, to the left to turn left (roll is positive to the
+        // The craft tilts into its own accelerations: forward to speed up, left to turn left (positive roll is to the
         // right).
-        let speed = self.flight.speed_share.at(t_s) * self.speed_m_per_s;
-        let ahead = self.flight.speed_share.rate_at(t_s) * self.speed_m_per_s;
+        let speed = self.flight.speed_fraction.at(t_s) * self.speed_m_per_s;
+        let ahead = self.flight.speed_fraction.rate_at(t_s) * self.speed_m_per_s;
         let left = speed * self.flight.heading.rate_at(t_s);
         let mut pitch = ahead * (1.0 / STANDARD_GRAVITY_M_PER_S2);
         let mut roll = left * (-1.0 / STANDARD_GRAVITY_M_PER_S2);
         if t_s > self.start_s {
-            let share = self.onset.at(t_s);
+            let fraction = self.onset.at(t_s);
             let t_s = t_s - self.start_s;
-            let [ahead, forward] = self.gusts[0].at(t_s).map(|jet| jet * share);
-            let [left, leftward] = self.gusts[1].at(t_s).map(|jet| jet * share);
+            let [ahead, forward] = self.gusts[0].at(t_s).map(|jet| jet * fraction);
+            let [left, leftward] = self.gusts[1].at(t_s).map(|jet| jet * fraction);
             let [up] = self.heave.at(t_s);
-            let shaking = self.rotors.at(t_s).map(|jet| jet * share);
+            let shaking = self.rotors.at(t_s).map(|jet| jet * fraction);
             let (sin, cos) = yaw.sin_cos();
             let (ahead, left) = (ahead + shaking[0], left + shaking[1]);
             position[0] += ahead * cos - left * sin;
             position[1] += ahead * sin + left * cos;
-            position[2] += up * share + shaking[2];
+            position[2] += up * fraction + shaking[2];
             pitch += forward;
             roll += -leftward;
         }

@@ -1,7 +1,7 @@
-//! Vibration by rotors: each turns at its own speed, unbalanced, its blades beating the air.
+//! Rotor vibration: each rotor has a different speed, an imbalance, and a blade-pass oscillation.
 
 use crate::motion::jet::Jet;
-use crate::motion::sines::{Line, Sines};
+use crate::motion::sines::{SineSum, SpectralLine};
 use crate::random::Stream;
 use crate::spec::checked::{NonNegative, Positive};
 use nalgebra::Complex;
@@ -9,30 +9,30 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Rotors of a craft.
+/// Rotors of a multirotor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotorSpec {
-    /// How many, up to 255.
+    /// Number of rotors, up to 255.
     pub count: u8,
-    /// Their mean speed, turns/s.
+    /// Mean rotor speed, revolutions/s.
     #[serde(with = "Positive")]
     pub speed_hz: f64,
-    /// By how much their speeds differ, as a share of the mean, either way.
+    /// Maximum deviation of a rotor's speed from the mean, as a fraction of it; drawn uniformly.
     #[serde(with = "crate::spec::checked::Fraction")]
     pub speed_spread: f64,
-    /// Blades of a rotor.
+    /// Blades per rotor.
     pub blades: u8,
-    /// What the imbalance of one shakes the craft with: a circle in the level, m/s^2.
+    /// Acceleration of the craft due to the imbalance of one rotor, rotating in the horizontal plane, m/s^2.
     #[serde(with = "NonNegative")]
     pub imbalance_m_per_s2: f64,
-    /// What the blades of one beat the craft with, up and down, m/s^2.
+    /// Vertical acceleration of the craft at the blade-pass frequency of one rotor, amplitude, m/s^2.
     #[serde(with = "NonNegative")]
     pub beat_m_per_s2: f64,
 }
 
-/// Rotors that turn.
-pub(super) struct Rotors(Sines<3>);
+/// Vibration of the craft by the rotors.
+pub(super) struct Rotors(SineSum<3>);
 
 impl Rotors {
     pub fn new(spec: &RotorSpec, stream: &mut Stream) -> Self {
@@ -43,17 +43,17 @@ impl Rotors {
             let mut phase = || Complex::from_polar(1.0, TAU * stream.random::<f64>());
             let displacement = |acceleration: f64, freq_hz: f64| -acceleration / (TAU * freq_hz).powi(2);
             let circle = phase() * displacement(spec.imbalance_m_per_s2, speed_hz);
-            // Neighbours turn against each other: the circle's sense alternates.
+            // Neighbouring rotors turn in opposite directions.
             let quarter = Complex::new(0.0, if rotor.is_multiple_of(2) { -1.0 } else { 1.0 });
-            lines.push(Line { cycles: speed_hz, amplitudes: [circle, circle * quarter, Complex::default()] });
+            lines.push(SpectralLine { cycles: speed_hz, amplitudes: [circle, circle * quarter, Complex::default()] });
             let beating_hz = speed_hz * f64::from(spec.blades.max(1));
             let beat = phase() * displacement(spec.beat_m_per_s2, beating_hz);
-            lines.push(Line { cycles: beating_hz, amplitudes: [Complex::default(), Complex::default(), beat] });
+            lines.push(SpectralLine { cycles: beating_hz, amplitudes: [Complex::default(), Complex::default(), beat] });
         }
-        Self(Sines::new(lines))
+        Self(SineSum::new(lines))
     }
 
-    /// Displacement forward, to the left and up, m.
+    /// Displacement forward, left and up, m.
     pub fn at(&self, t_s: f64) -> [Jet; 3] {
         self.0.at(t_s)
     }
@@ -83,7 +83,7 @@ mod tests {
             beat = beat.max(z.dd.abs());
         }
         assert_relative_eq!(beat, 2.0, epsilon = 0.01);
-        // Two blades: 180 Hz, so that z'' = -(2 pi 180)^2 z.
+        // With two blades the frequency is 180 Hz, so z'' = -(2 pi 180)^2 z.
         let [_, _, z] = samples[7];
         assert_relative_eq!(z.dd, -(TAU * 180.0).powi(2) * z.x, epsilon = 1e-9);
     }

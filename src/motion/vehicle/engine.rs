@@ -1,8 +1,8 @@
-//! What an engine shakes a body with: harmonics of its speed.
+//! Engine vibration: harmonics of the engine speed.
 
 use crate::motion::jet::Jet;
-use crate::motion::rhythm::Wander;
-use crate::motion::sines::{Line, Sines};
+use crate::motion::oscillator::BandLimitedNoise;
+use crate::motion::sines::{SineSum, SpectralLine};
 use crate::random::Stream;
 use crate::spec::checked::{FiniteArray, NonNegative, Positive};
 use nalgebra::Complex;
@@ -10,39 +10,39 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// An engine that runs at one speed, more or less.
+/// An engine at nearly constant speed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EngineSpec {
-    /// Its speed, revolutions a minute.
+    /// Engine speed, rev/min.
     #[serde(with = "Positive")]
     pub speed_rpm: f64,
-    /// How far its phase wanders, turns rms, at up to 0.5 Hz.
+    /// Phase noise, turns rms, with power up to 0.5 Hz.
     #[serde(with = "NonNegative")]
     pub irregularity_turns: f64,
-    /// Its harmonics.
+    /// The harmonics.
     pub orders: Vec<OrderSpec>,
 }
 
-/// A harmonic of an engine's speed.
+/// A harmonic of the engine speed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OrderSpec {
-    /// Cycles a revolution: 1 is imbalance; a four-stroke engine of n cylinders fires n / 2 times.
+    /// Cycles per revolution: 1 for imbalance; n / 2 for the firing of a four-stroke engine with n cylinders.
     #[serde(with = "Positive")]
     pub order: f64,
-    /// Amplitude of acceleration forward, to the left and up, m/s^2.
+    /// Amplitude of acceleration forward, left and up, m/s^2.
     #[serde(with = "FiniteArray::<3>")]
     pub acceleration_m_per_s2: [f64; 3],
 }
 
-/// An engine that runs.
+/// Vibration of a body by the engine.
 pub(super) struct Engine {
     turns_per_s: f64,
     irregularity_turns: f64,
-    wander: Wander,
-    /// Displacement forward, to the left and up, m, over the engine's turns.
-    shaking: Sines<3>,
+    phase_noise: BandLimitedNoise,
+    /// Displacement forward, left and up, m, over the number of revolutions.
+    shaking: SineSum<3>,
 }
 
 impl Engine {
@@ -51,17 +51,17 @@ impl Engine {
         let line = |order: &OrderSpec| {
             let square = (TAU * order.order * turns_per_s).powi(2);
             let phase = Complex::from_polar(1.0, TAU * stream.random::<f64>());
-            Line { cycles: order.order, amplitudes: order.acceleration_m_per_s2.map(|a| phase * (a / square)) }
+            SpectralLine { cycles: order.order, amplitudes: order.acceleration_m_per_s2.map(|a| phase * (a / square)) }
         };
-        let shaking = Sines::new(spec.orders.iter().map(line));
-        let wander = Wander::new(0.5, stream);
-        Self { turns_per_s, irregularity_turns: spec.irregularity_turns, wander, shaking }
+        let shaking = SineSum::new(spec.orders.iter().map(line));
+        let phase_noise = BandLimitedNoise::new(0.5, stream);
+        Self { turns_per_s, irregularity_turns: spec.irregularity_turns, phase_noise, shaking }
     }
 
-    /// Displacement forward, to the left and up, m.
+    /// Displacement forward, left and up, m.
     pub fn at(&self, t_s: f64) -> [Jet; 3] {
-        let turns = Jet::linear(t_s, self.turns_per_s, 0.0) + self.wander.at(t_s) * self.irregularity_turns;
-        self.shaking.at(turns.x).map(|jet| jet.of(turns))
+        let turns = Jet::linear(t_s, self.turns_per_s, 0.0) + self.phase_noise.at(t_s) * self.irregularity_turns;
+        self.shaking.at(turns.x).map(|jet| jet.compose(turns))
     }
 }
 
@@ -73,7 +73,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn harmonics_stand_at_multiples_of_the_speed_with_their_strength() {
+    fn harmonics_have_their_amplitude_at_multiples_of_the_engine_speed() {
         // 1500 rpm is 25 Hz: order 1 at 25 Hz, order 2 at 50 Hz; a sine of amplitude a has the power a^2 / 2.
         let order = |order, up| OrderSpec { order, acceleration_m_per_s2: [0.0, 0.0, up] };
         let orders = vec![order(1.0, 0.5), order(2.0, 2.0)];

@@ -1,8 +1,10 @@
-//! A wheeled vehicle: a cart, a robot, a car. It follows the route on a rough road, on springs, with an engine that
-//! shakes it; it squats, dives and leans as it speeds up, brakes and turns.
+//! A wheeled vehicle: a cart, a robot, a car.
 //!
-//! The road is felt over the distance driven, so that it slows and stops with the vehicle. How the suspension answers
-//! is taken at the cruising speed throughout.
+//! It follows the route on a rough road with a suspension and an engine; the body pitches when it accelerates and
+//! brakes, and rolls in turns.
+//!
+//! Road excitation is a function of the distance driven, so it slows down and stops with the vehicle. The suspension
+//! response is evaluated at the cruising speed throughout.
 
 mod engine;
 mod road;
@@ -13,9 +15,9 @@ pub use road::{RoadClass, RoadSpec};
 pub use suspension::SuspensionSpec;
 
 use super::jet::{Jet, PoseJet};
-use super::sines::Sines;
-use super::smooth::{Steps, Way};
-use super::walk::{Walk, WalkSpec};
+use super::sines::SineSum;
+use super::smooth::{SmoothPath, SmoothSteps};
+use super::walk::{RouteMotion, WalkSpec};
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Pose, Route};
 use crate::random::Seed;
@@ -24,39 +26,38 @@ use crate::spec::{Source, SpecError};
 use engine::Engine;
 use serde::{Deserialize, Serialize};
 
-/// A wheeled vehicle that carries the base. It turns on the spot where a route is bent sharply, as a skid-steered one
-/// does.
+/// A wheeled vehicle that carries the base. It turns on the spot at sharp corners, as a skid-steered vehicle does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleSpec {
-    /// How long everything is at rest first, s.
+    /// Time at rest at the start, s.
     #[serde(with = "NonNegative")]
     pub still_s: f64,
-    /// Where the base is, from the body's centre of mass: forward, to the left, up, m.
+    /// Position of the base relative to the body's centre of mass: forward, left, up, m.
     #[serde(with = "FiniteArray::<3>")]
     pub base_m: [f64; 3],
-    /// How it drives along the route.
+    /// How the vehicle follows the route.
     pub follow: WalkSpec,
-    /// The road.
+    /// Road roughness.
     pub road: RoadSpec,
-    /// The body and its springs.
+    /// The body and the suspension.
     pub suspension: SuspensionSpec,
-    /// The engine, started at the end of the rest.
+    /// The engine, started at the end of the rest; `None` for no engine.
     pub engine: Option<EngineSpec>,
 }
 
-/// A vehicle that drives.
+/// Motion of a wheeled vehicle.
 pub(super) struct Vehicle {
-    drive: Walk,
+    drive: RouteMotion,
     speed_m_per_s: f64,
-    odometer: Way,
+    odometer: SmoothPath,
     /// Heave, roll and pitch over the distance driven.
-    road: Sines<3>,
-    /// Those at the start.
+    road: SineSum<3>,
+    /// Heave, roll and pitch at the start.
     road_at_rest: [f64; 3],
     centre_height_m: f64,
     lean: (f64, f64),
-    engine: Option<(Engine, Steps)>,
+    engine: Option<(Engine, SmoothSteps)>,
     centre_from_base: Pose,
 }
 
@@ -69,24 +70,23 @@ impl Vehicle {
         seed: Seed,
     ) -> Result<Self, MotionError> {
         spec.follow.check(source)?;
-        if !spec.suspension.stands() {
-            let message =
-                "the springs do not hold the body up: its weight tips it over; make them stiffer, or the body lower";
+        if !spec.suspension.is_stable() {
+            let message = "the springs do not support the body: its weight tips it over; increase the stiffness, or lower the centre of mass";
             return Err(SpecError::about(source, "spring_n_per_m", message).into());
         }
         let route = route.ok_or_else(|| MotionError::NoRoute { motion: source.name.clone() })?;
         let drive = spec.follow.along(route, spec.still_s, duration_s)?;
         let speed_m_per_s = spec.follow.speed_m_per_s;
         let tracks = spec.road.tracks(spec.suspension.track_m, &mut seed.stream("motion/vehicle/road"));
-        let road = Sines::new(spec.suspension.response(&tracks, speed_m_per_s));
+        let road = SineSum::new(spec.suspension.response(&tracks, speed_m_per_s));
         let engine = spec.engine.as_ref().map(|engine| {
-            let mut running = Steps::from_level(0.0);
+            let mut running = SmoothSteps::from_level(0.0);
             running.push(spec.still_s + STARTING_S / 2.0, STARTING_S / 2.0, 1.0);
             (Engine::new(engine, &mut seed.stream("motion/vehicle/engine")), running)
         });
         let [x, y, z] = spec.base_m;
         Ok(Self {
-            odometer: drive.way.odometer(),
+            odometer: drive.path.odometer(),
             drive,
             speed_m_per_s,
             road_at_rest: road.at(0.0).map(|jet| jet.x),
@@ -99,22 +99,22 @@ impl Vehicle {
     }
 }
 
-/// How long an engine takes to start, s.
+/// Time in which the engine reaches full speed, s.
 const STARTING_S: f64 = 1.0;
 
 impl BaseMotion for Vehicle {
     fn at(&self, t_s: f64) -> Kinematics {
-        let mut position = self.drive.way.at(t_s);
+        let mut position = self.drive.path.at(t_s);
         let yaw = self.drive.heading.at(t_s);
         let [distance, ..] = self.odometer.at(t_s);
-        let [mut heave, mut roll, mut pitch] = self.road.at(distance.x).map(|jet| jet.of(distance));
+        let [mut heave, mut roll, mut pitch] = self.road.at(distance.x).map(|jet| jet.compose(distance));
         heave += Jet::constant(self.centre_height_m - self.road_at_rest[0]);
         roll += Jet::constant(-self.road_at_rest[1]);
         pitch += Jet::constant(-self.road_at_rest[2]);
 
-        let speed = self.drive.speed_share.at(t_s) * self.speed_m_per_s;
+        let speed = self.drive.speed_fraction.at(t_s) * self.speed_m_per_s;
         roll += speed * self.drive.heading.rate_at(t_s) * self.lean.0;
-        pitch += self.drive.speed_share.rate_at(t_s) * (self.speed_m_per_s * self.lean.1);
+        pitch += self.drive.speed_fraction.rate_at(t_s) * (self.speed_m_per_s * self.lean.1);
 
         if let Some((engine, running)) = &self.engine {
             let running = running.at(t_s);

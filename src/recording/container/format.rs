@@ -1,21 +1,21 @@
-//! What container a file is, by its first bytes, and what to do with one that is not read.
+//! Detects the container format of a file from the first bytes, and advises on unsupported ones.
 
-use super::chunk::Loaded;
-use super::directory::{BlockKind, Directory, Ending};
-use super::part::{Part, Store};
-use super::rows::{self, Rows};
+use super::database::{self, SqliteDatabase};
+use super::file_index::{BlockKind, Ending, FileIndex};
+use super::loaded_block::LoadedBlock;
+use super::recording_file::{RecordingFile, Store};
 use super::source::{Input, Source};
-use super::{bag, record, walk};
+use super::{bag, mcap_indexer, record};
 use crate::recording::RecordingError;
 use std::path::Path;
 
-/// First bytes that tell formats apart.
-const LONGEST_MAGIC: usize = 16;
+/// Number of first bytes that identify a format.
+const MAGIC_BYTES: usize = 16;
 
-/// Greatest database that is read into memory, bytes: those in files are not.
-const LARGEST_IN_MEMORY: u64 = 1 << 30;
+/// Maximum size of a database that is read into memory, bytes; databases in files are not.
+const MAX_IN_MEMORY_BYTES: u64 = 1 << 30;
 
-/// A container that is read.
+/// Supported container format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Mcap,
@@ -23,8 +23,8 @@ enum Format {
     Database,
 }
 
-/// Formats that are not read: first bytes, what they are, and what to do.
-const OTHERS: [(&[u8], &str, &str); 19] = [
+/// Unsupported formats: first bytes, description, and advice.
+const UNSUPPORTED: [(&[u8], &str, &str); 19] = [
     (b"#ROSBAG V1", "a ROS 1 bag of format 1.x", "convert it with `rosbag fix old.bag new.bag` of ROS 1"),
     (&[0xD4, 0xC3, 0xB2, 0xA1], PCAP, REPLAY),
     (&[0xA1, 0xB2, 0xC3, 0xD4], PCAP, REPLAY),
@@ -45,7 +45,7 @@ const OTHERS: [(&[u8], &str, &str); 19] = [
     (
         b"ULog",
         "a PX4 log",
-        "convert its topics to a bag with `ulog2rosbag`, part of pyulog; a lidar's are rarely in it",
+        "convert its topics to a bag with `ulog2rosbag` of pyulog; lidar topics are rarely included",
     ),
     (b"PAR1", "a Parquet table", "write its scans and samples as MCAP, see docs/guide/recordings.md"),
 ];
@@ -58,96 +58,96 @@ const RECORD: &str =
     "record the topics of lidar and IMU with `ros2 bag record -s mcap`, or see docs/guide/recordings.md";
 
 impl Format {
-    /// The format that begins with `magic`.
-    fn of(magic: &[u8], name: &str) -> Result<Self, RecordingError> {
+    /// Detects the format from the first bytes.
+    fn detect(magic: &[u8], name: &str) -> Result<Self, RecordingError> {
         if magic.starts_with(&record::MAGIC) {
             return Ok(Self::Mcap);
         }
         if magic.starts_with(bag::MAGIC) {
             return Ok(Self::Bag);
         }
-        if magic.starts_with(rows::MAGIC) {
+        if magic.starts_with(database::MAGIC) {
             return Ok(Self::Database);
         }
-        let known = OTHERS.iter().find(|(first, _, _)| magic.starts_with(first));
+        let known = UNSUPPORTED.iter().find(|(first, _, _)| magic.starts_with(first));
         let (found, remedy) = match known {
             Some((_, found, remedy)) => (*found, *remedy),
-            None if magic.is_empty() => ("an empty file", "its recorder was stopped before it wrote anything"),
+            None if magic.is_empty() => ("an empty file", "the recorder was stopped before it wrote data"),
             None => ("a file of an unknown format", RECORD),
         };
         Err(RecordingError::NotRecording { name: name.to_owned(), found: found.to_owned(), remedy: remedy.to_owned() })
     }
 }
 
-impl Part {
-    /// Opens the file at `path`, at `place` among those of a recording.
+impl RecordingFile {
+    /// Opens the file at `path`, which has the given number among the files of the recording.
     ///
     /// # Errors
-    /// When it cannot be opened or read, or is of no format that is read.
-    pub fn open(place: u16, path: &Path) -> Result<Self, RecordingError> {
+    /// When it cannot be opened or read, or the format is not supported.
+    pub fn open(number: u16, path: &Path) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
         let file =
             std::fs::File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         let source = Source::new(file)?;
-        let format = format_of(&source, &name)?;
+        let format = detect_format(&source, &name)?;
         match format {
-            Format::Database => Self::of_rows(place, Rows::open(path)?, &name),
-            Format::Mcap | Format::Bag => Self::of_records(place, source, format, &name),
+            Format::Database => Self::from_database(number, SqliteDatabase::open(path)?, &name),
+            Format::Mcap | Format::Bag => Self::from_records(number, source, format, &name),
         }
     }
 
-    /// Opens `input`, which messages call `name`.
+    /// Opens `input`, called `name` in messages.
     ///
     /// # Errors
-    /// When it cannot be read, or is of no format that is read.
-    pub fn new_input(name: &str, input: impl Input + 'static) -> Result<Self, RecordingError> {
+    /// When it cannot be read, or the format is not supported.
+    pub fn from_input(name: &str, input: impl Input + 'static) -> Result<Self, RecordingError> {
         let source = Source::new(input)?;
-        let format = format_of(&source, name)?;
+        let format = detect_format(&source, name)?;
         if format != Format::Database {
-            return Self::of_records(0, source, format, name);
+            return Self::from_records(0, source, format, name);
         }
         let length = source.length();
-        if length > LARGEST_IN_MEMORY {
-            let problem = "it is larger than the 1 GiB that is read from a stream".to_owned();
+        if length > MAX_IN_MEMORY_BYTES {
+            let problem = "it exceeds the 1 GiB limit for a stream".to_owned();
             return Err(RecordingError::Database { name: name.to_owned(), problem });
         }
         let mut bytes = Vec::new();
         source.read_at(0, length as usize, &mut bytes)?;
-        Self::of_rows(0, Rows::in_memory(&bytes)?, name)
+        Self::from_database(0, SqliteDatabase::in_memory(&bytes)?, name)
     }
 
-    fn of_rows(place: u16, rows: Rows, name: &str) -> Result<Self, RecordingError> {
-        let directory = rows.directory(name)?;
-        Ok(Self::new(place, Store::Rows(rows), directory))
+    fn from_database(number: u16, database: SqliteDatabase, name: &str) -> Result<Self, RecordingError> {
+        let index = database.build_index(name)?;
+        Ok(Self::new(number, Store::Database(database), index))
     }
 
-    fn of_records(place: u16, source: Source, format: Format, name: &str) -> Result<Self, RecordingError> {
-        let mut directory = match format {
-            Format::Bag => bag::walk(&source, name)?,
-            _ => walk::walk(&source)?,
+    fn from_records(number: u16, source: Source, format: Format, name: &str) -> Result<Self, RecordingError> {
+        let mut index = match format {
+            Format::Bag => bag::index_bag(&source, name)?,
+            _ => mcap_indexer::index_mcap(&source)?,
         };
         let store = Store::Records(source);
-        if directory.ending != Ending::Complete || directory.channels.is_empty() {
-            find_definitions(&store, &mut directory)?;
+        if index.ending != Ending::Complete || index.channels.is_empty() {
+            find_definitions(&store, &mut index)?;
         }
-        Ok(Self::new(place, store, directory))
+        Ok(Self::new(number, store, index))
     }
 }
 
-fn format_of(source: &Source, name: &str) -> Result<Format, RecordingError> {
+fn detect_format(source: &Source, name: &str) -> Result<Format, RecordingError> {
     let mut magic = Vec::new();
-    source.read_at(0, LONGEST_MAGIC.min(usize::try_from(source.length()).unwrap_or(usize::MAX)), &mut magic)?;
-    Format::of(&magic, name)
+    source.read_at(0, MAGIC_BYTES.min(usize::try_from(source.length()).unwrap_or(usize::MAX)), &mut magic)?;
+    Format::detect(&magic, name)
 }
 
-/// Reads the definitions that stand in chunks, where no summary repeats them.
-fn find_definitions(store: &Store, directory: &mut Directory) -> Result<(), RecordingError> {
-    let mut loaded = Loaded::default();
-    for k in 0..directory.blocks.len() {
-        let block = &directory.blocks[k];
+/// Reads the definitions inside chunks, if no summary repeats them.
+fn find_definitions(store: &Store, index: &mut FileIndex) -> Result<(), RecordingError> {
+    let mut loaded = LoadedBlock::default();
+    for k in 0..index.blocks.len() {
+        let block = &index.blocks[k];
         let may_define = matches!(block.kind, BlockKind::Chunk(_) | BlockKind::BagChunk(_));
         if may_define && loaded.load(store, block)?.is_ok() {
-            loaded.define_in(directory);
+            loaded.add_definitions_to(index);
         }
     }
     Ok(())

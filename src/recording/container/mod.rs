@@ -1,21 +1,22 @@
-//! The containers of recordings, read: MCAP, ROS 1 bags and the databases of rosbag2; each as a directory of blocks,
-//! and messages in the order of their log time.
+//! Reads the containers of recordings: MCAP, ROS 1 bags and rosbag2 databases.
 //!
-//! Written for files that may be cut short, damaged, or made by anybody: nothing is allocated on the word of a length
-//! field alone, every record is bounded by what is there, and what cannot be read is counted, not feared.
+//! Each file is indexed as a list of blocks; messages are read in order of log time.
+//!
+//! Files may be truncated, damaged or malicious: memory is never allocated on the basis of an unchecked length field, every
+//! record is checked against the available bytes, and unreadable data are counted and skipped.
 
 mod bag;
-mod chunk;
-mod directory;
+mod database;
+mod file_index;
 mod format;
+mod loaded_block;
+mod mcap_indexer;
+mod mcap_summary;
 mod messages;
-mod part;
 mod record;
-mod rows;
-mod signposts;
+mod recording_file;
 mod source;
-mod walk;
 
-pub use directory::{Block, Channel, Directory, Ending};
+pub use file_index::{Block, Channel, Ending, FileIndex};
 pub use messages::{Messages, RawMessage};
-pub use part::{ChannelId, Part};
+pub use recording_file::{ChannelId, RecordingFile};

@@ -1,57 +1,57 @@
-//! Records of the MCAP format (mcap.dev/spec, version 0): an opcode, a length, fields in little-endian order.
+//! Records of the MCAP format (mcap.dev/spec, version 0): an opcode, a length, little-endian fields.
 
 use std::collections::BTreeMap;
 
-/// What every MCAP file begins and ends with.
+/// First and last bytes of every MCAP file.
 pub const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
 
-/// Bytes of a record before its fields: opcode and length.
+/// Bytes of a record before the fields: opcode and length.
 pub const PREFIX: u64 = 9;
 
-/// Bytes of a message record's fields before its data.
+/// Bytes of a message record's fields before the data.
 pub const MESSAGE_FIELDS: usize = 22;
 
 /// Opcodes of the records that are read.
 pub mod op {
-    /// The end of the file.
+    /// End of the file.
     pub const FOOTER: u8 = 0x02;
-    /// A message definition.
+    /// Message definition.
     pub const SCHEMA: u8 = 0x03;
-    /// A topic.
+    /// Topic.
     pub const CHANNEL: u8 = 0x04;
-    /// A message.
+    /// Message.
     pub const MESSAGE: u8 = 0x05;
-    /// Many records, compressed.
+    /// Compressed group of records.
     pub const CHUNK: u8 = 0x06;
-    /// Where the messages of a topic stand in a chunk.
+    /// Offsets of a topic's messages in a chunk.
     pub const MESSAGE_INDEX: u8 = 0x07;
-    /// Where a chunk stands in the file.
+    /// Offset of a chunk in the file.
     pub const CHUNK_INDEX: u8 = 0x08;
-    /// How many messages there are.
+    /// Number of messages.
     pub const STATISTICS: u8 = 0x0B;
     /// Names and values.
     pub const METADATA: u8 = 0x0C;
-    /// The end of the data.
+    /// End of the data section.
     pub const DATA_END: u8 = 0x0F;
 
-    /// Whether the format knows the opcode, or leaves it to programs.
+    /// Whether the opcode is part of the format or reserved for applications.
     pub fn is_known(op: u8) -> bool {
         (0x01..=DATA_END).contains(&op) || op >= 0x80
     }
 }
 
-/// Reads the fields of a record, one after the other; `None` where the record ends too early.
+/// Reads consecutive fields of a record; `None` if the record is too short.
 pub struct Fields<'a> {
     rest: &'a [u8],
 }
 
 impl<'a> Fields<'a> {
-    /// The fields in `bytes`.
+    /// Reads the fields in `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { rest: bytes }
     }
 
-    /// What is left.
+    /// Bytes not yet read.
     pub fn rest(&self) -> &'a [u8] {
         self.rest
     }
@@ -62,40 +62,40 @@ impl<'a> Fields<'a> {
         Some(*taken)
     }
 
-    /// One byte.
+    /// Reads one byte.
     pub fn u8(&mut self) -> Option<u8> {
         self.array().map(u8::from_le_bytes)
     }
 
-    /// Two bytes.
+    /// Reads two bytes.
     pub fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_le_bytes)
     }
 
-    /// Four bytes.
+    /// Reads four bytes.
     pub fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
-    /// Eight bytes.
+    /// Reads eight bytes.
     pub fn u64(&mut self) -> Option<u64> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// `length` bytes.
+    /// Reads `length` bytes.
     pub fn bytes(&mut self, length: usize) -> Option<&'a [u8]> {
         let (taken, rest) = self.rest.split_at_checked(length)?;
         self.rest = rest;
         Some(taken)
     }
 
-    /// A string, led by its length.
+    /// Reads a string with a length prefix.
     pub fn string(&mut self) -> Option<&'a str> {
         let length = self.u32()? as usize;
         std::str::from_utf8(self.bytes(length)?).ok()
     }
 
-    /// Names and values, led by their length in bytes.
+    /// Reads names and values, prefixed by their total length in bytes.
     pub fn map(&mut self) -> Option<BTreeMap<String, String>> {
         let length = self.u32()? as usize;
         let mut inner = Fields::new(self.bytes(length)?);
@@ -107,55 +107,55 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// A message definition's name and encoding.
+/// Message type definition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SchemaRecord {
-    /// Its number in the file.
+    /// Number in the file.
     pub id: u16,
-    /// Its name: `package/msg/Type`.
+    /// Type name: `package/msg/Type`.
     pub name: String,
-    /// Whether its first field is a `std_msgs/Header`.
+    /// Whether the first field is a `std_msgs/Header`.
     pub has_header: bool,
 }
 
-/// A topic.
+/// Topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChannelRecord {
-    /// Its number in the file.
+    /// Number in the file.
     pub id: u16,
-    /// Number of the definition of its messages.
+    /// Number of the message definition.
     pub schema: u16,
-    /// Its name.
+    /// Topic name.
     pub topic: String,
-    /// `cdr` in the ROS 2 profile.
+    /// Message encoding: `cdr` in the ROS 2 profile.
     pub encoding: String,
 }
 
-/// What is said of a chunk before its bytes.
+/// Header of a chunk.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChunkHeader {
-    /// Log time of its earliest message, ns.
+    /// Log time of the earliest message, ns.
     pub start_ns: u64,
-    /// Log time of its latest message, ns.
+    /// Log time of the latest message, ns.
     pub end_ns: u64,
-    /// Bytes, decompressed.
+    /// Uncompressed size, bytes.
     pub uncompressed_size: u64,
-    /// CRC-32 of the decompressed bytes, 0 where there is none.
+    /// CRC-32 of the uncompressed bytes, 0 if there is none.
     pub crc: u32,
-    /// `zstd`, `lz4` or nothing.
+    /// `zstd`, `lz4` or empty.
     pub compression: String,
-    /// Bytes as they are in the file.
+    /// Compressed size, bytes.
     pub compressed_size: u64,
-    /// Bytes of the header itself.
+    /// Size of this header, bytes.
     pub header_size: u64,
 }
 
-/// A message without its data.
+/// Header of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MessageHeader {
-    /// Number of its topic.
+    /// Channel number of the topic.
     pub channel: u16,
-    /// When it was written down, ns.
+    /// Log time, ns.
     pub log_time_ns: u64,
 }
 
@@ -182,7 +182,7 @@ pub fn channel(bytes: &[u8]) -> Option<ChannelRecord> {
     Some(ChannelRecord { id, schema, topic: fields.string()?.to_owned(), encoding: fields.string()?.to_owned() })
 }
 
-/// Reads what a chunk record says before its bytes.
+/// Reads the header of a chunk record.
 pub fn chunk_header(bytes: &[u8]) -> Option<ChunkHeader> {
     let mut fields = Fields::new(bytes);
     let (start_ns, end_ns) = (fields.u64()?, fields.u64()?);
@@ -193,7 +193,7 @@ pub fn chunk_header(bytes: &[u8]) -> Option<ChunkHeader> {
     Some(ChunkHeader { start_ns, end_ns, uncompressed_size, crc, compression, compressed_size, header_size })
 }
 
-/// Reads a message's fields before its data.
+/// Reads the header of a message record.
 pub fn message_header(bytes: &[u8]) -> Option<MessageHeader> {
     let mut fields = Fields::new(bytes);
     let channel = fields.u16()?;
@@ -203,7 +203,7 @@ pub fn message_header(bytes: &[u8]) -> Option<MessageHeader> {
     Some(MessageHeader { channel, log_time_ns })
 }
 
-/// Reads a metadata record's fields: its name, then names and values.
+/// Reads the fields of a metadata record: record name, then names and values.
 pub fn metadata(bytes: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
     let mut fields = Fields::new(bytes);
     Some((fields.string()?.to_owned(), fields.map()?))

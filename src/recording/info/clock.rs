@@ -1,12 +1,12 @@
-//! How a clock runs against another: a line fitted as pairs of times go by.
+//! Incremental line fit of one clock to another.
 
 use super::ClockStatistics;
 use crate::time::Stamp;
 
-/// Least messages from which a drift is told.
-const LEAST: u64 = 3;
+/// Minimum number of messages for a fit: two parameters and one residual.
+const MIN_MESSAGES: u64 = 3;
 
-/// Means and co-moments of log time and of stamp minus log time, updated pair by pair (Welford 1962).
+/// Means and co-moments of log time and of stamp minus log time, updated incrementally (Welford 1962).
 #[derive(Debug, Clone)]
 pub struct ClockFit {
     log_0: Stamp,
@@ -20,7 +20,7 @@ pub struct ClockFit {
 }
 
 impl ClockFit {
-    /// A fit whose numbers count from a first pair, so that they stay small.
+    /// Starts a fit relative to a first pair, so that the numbers remain small.
     pub fn starting(log: Stamp, stamp: Stamp) -> Self {
         Self {
             log_0: log,
@@ -34,7 +34,7 @@ impl ClockFit {
         }
     }
 
-    /// Takes a pair.
+    /// Adds a pair.
     pub fn add(&mut self, log: Stamp, stamp: Stamp) {
         let x = log.seconds_since(self.log_0);
         let y = (stamp - log).nanos().saturating_sub(self.ahead_0_ns) as f64 * 1e-9;
@@ -48,9 +48,9 @@ impl ClockFit {
         self.ahead_ahead += dy * (y - self.mean_ahead_s);
     }
 
-    /// The line; `None` from fewer than three pairs, or where all have one log time.
+    /// Fitted line; `None` with fewer than three pairs, or if all have one log time.
     pub fn statistics(&self) -> Option<ClockStatistics> {
-        if self.count < LEAST || self.log_log <= 0.0 {
+        if self.count < MIN_MESSAGES || self.log_log <= 0.0 {
             return None;
         }
         let drift = self.log_ahead / self.log_log;
@@ -69,8 +69,8 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn a_known_clock_is_found_again() {
-        // 3 ms ahead, fast by 17 ppm, alternately 100 us early and late: sigma 100 us.
+    fn the_fit_recovers_a_known_clock() {
+        // 3 ms ahead, 17 ppm fast, alternately 100 us early and late: sigma 100 us.
         let pair = |k: i64| {
             let log = Stamp::from_nanos(1_349_049_600_000_000_000 + k * 25_000_000);
             let t_ns = (k * 25_000_000) as f64;

@@ -1,37 +1,37 @@
-//! `sensor_msgs/TimeReference`: what a sensor's clock said at a true time.
+//! `sensor_msgs/TimeReference`: time on a sensor's clock at a true time.
 
 use crate::recording::RecordingError;
 use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::Stamp;
 
-/// A sensor's clock beside true time.
+/// Reading of a sensor's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Reading<'a> {
+pub struct ClockReading<'a> {
     /// True time.
     pub now: Stamp,
-    /// What the clock says.
-    pub says: Stamp,
-    /// Whose clock: `lidar` or `imu`.
+    /// Time on the sensor's clock.
+    pub clock_time: Stamp,
+    /// Sensor of the clock: `lidar` or `imu`.
     pub source: &'a str,
 }
 
-/// Writes a reading of the clock of the sensor in `frame`.
+/// Encodes a reading of the clock of the sensor in `frame`.
 ///
 /// # Errors
-/// When a stamp does not fit a message.
-pub fn encode(out: &mut Encoder<'_>, frame: &str, reading: &Reading<'_>) -> Result<(), RecordingError> {
+/// When a stamp does not fit into a message.
+pub fn encode(out: &mut Encoder<'_>, frame: &str, reading: &ClockReading<'_>) -> Result<(), RecordingError> {
     out.header(reading.now, frame)?;
-    out.time(reading.says)?;
+    out.time(reading.clock_time)?;
     out.string(reading.source)
 }
 
-/// Reads a reading.
+/// Decodes a reading.
 ///
 /// # Errors
 /// When the bytes are not a `TimeReference` message.
-pub fn decode(message: Payload<'_>) -> Result<Reading<'_>, DecodeError> {
+pub fn decode(message: Payload<'_>) -> Result<ClockReading<'_>, DecodeError> {
     let mut input = Decoder::new(message)?;
     let (now, _) = input.header()?;
-    let says = input.time()?;
-    Ok(Reading { now, says, source: input.string()? })
+    let clock_time = input.time()?;
+    Ok(ClockReading { now, clock_time, source: input.string()? })
 }

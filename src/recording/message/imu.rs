@@ -1,21 +1,23 @@
-//! `sensor_msgs/Imu` (REP-145: gravity included, `orientation_covariance[0] = -1` where orientation is not measured).
+//! `sensor_msgs/Imu` messages.
+//!
+//! REP-145: gravity is included; `orientation_covariance[0] = -1` if orientation is not measured.
 
 use crate::measurement::{ImuNoise, ImuSample};
 use crate::recording::RecordingError;
 use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 
-/// Variances that an IMU's messages state.
+/// Noise variances in an IMU's messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variances {
-    /// Of the angular velocity on each axis, (rad/s)^2.
+    /// Variance of the angular velocity on each axis, (rad/s)^2.
     pub gyro: f64,
-    /// Of the specific force on each axis, (m/s^2)^2.
+    /// Variance of the specific force on each axis, (m/s^2)^2.
     pub accel: f64,
 }
 
 impl Variances {
-    /// The white noise of a sample at `rate_hz`: a density `s` gives the variance `s^2 rate`.
-    pub fn of(noise: &ImuNoise, rate_hz: f64) -> Self {
+    /// Variances of white noise in samples at `rate_hz`: a density `s` gives the variance `s^2 rate`.
+    pub fn from_noise(noise: &ImuNoise, rate_hz: f64) -> Self {
         Self {
             gyro: noise.gyro_density_rad_per_s_per_sqrt_hz.powi(2) * rate_hz,
             accel: noise.accel_density_m_per_s2_per_sqrt_hz.powi(2) * rate_hz,
@@ -23,18 +25,18 @@ impl Variances {
     }
 }
 
-/// In what an IMU's messages tell specific force.
+/// Unit of specific force in an IMU's messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ForceUnit {
-    /// As `sensor_msgs/Imu` asks for.
+    /// m/s^2, as `sensor_msgs/Imu` requires.
     #[default]
     MetresPerSecondSquared,
-    /// As some drivers pass on what the sensor says.
+    /// Standard gravity, as some drivers publish the sensor's own unit.
     StandardGravity,
 }
 
 impl ForceUnit {
-    /// One of it, m/s^2.
+    /// Size of the unit, m/s^2.
     fn in_m_per_s2(self) -> f64 {
         match self {
             Self::MetresPerSecondSquared => 1.0,
@@ -43,7 +45,7 @@ impl ForceUnit {
     }
 }
 
-/// By definition (3rd CGPM 1901).
+/// Standard gravity by definition (3rd CGPM 1901), m/s^2.
 const STANDARD_GRAVITY_M_PER_S2: f64 = 9.806_65;
 
 fn diagonal(variance: f64) -> [f64; 9] {
@@ -51,10 +53,10 @@ fn diagonal(variance: f64) -> [f64; 9] {
     [v, 0.0, 0.0, 0.0, v, 0.0, 0.0, 0.0, v]
 }
 
-/// Writes a sample measured in `frame`.
+/// Encodes a sample measured in `frame`.
 ///
 /// # Errors
-/// When the stamp does not fit a message.
+/// When the stamp does not fit into a message.
 pub fn encode(
     out: &mut Encoder<'_>,
     frame: &str,
@@ -71,7 +73,7 @@ pub fn encode(
     Ok(())
 }
 
-/// Reads a sample whose specific force is told in `unit`, whatever its numbers are.
+/// Decodes a sample whose specific force has the given `unit`; the numbers may be infinite or NaN.
 ///
 /// # Errors
 /// When the bytes are not an `Imu` message.
@@ -92,7 +94,7 @@ mod tests {
     use crate::time::Stamp;
 
     #[test]
-    fn orientation_is_not_measured_and_variances_are_those_of_a_sample() {
+    fn orientation_is_marked_unmeasured_and_variances_are_per_sample() {
         let sample = ImuSample {
             stamp: Stamp::from_nanos(1),
             angular_velocity_rad_per_s: Vector::new(1.0, 2.0, 3.0),
@@ -123,7 +125,7 @@ mod tests {
             gyro_limit_rad_per_s: 1.0,
             accel_limit_m_per_s2: 1.0,
         };
-        let variances = Variances::of(&noise, 100.0);
+        let variances = Variances::from_noise(&noise, 100.0);
         assert!((variances.gyro.sqrt() - 5e-3).abs() < 1e-15 && (variances.accel.sqrt() - 8e-3).abs() < 1e-15);
     }
 }

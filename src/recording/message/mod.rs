@@ -1,10 +1,10 @@
-//! The messages of a recording, a file a kind: each to bytes and back.
+//! Messages of a recording, one file per kind: encoding and decoding.
 
 pub mod clock;
 pub mod imu;
 pub mod livox;
-pub mod misses;
 pub mod multi_echo;
+pub mod no_returns;
 pub mod points;
 pub mod pose;
 pub mod scan;

@@ -1,18 +1,18 @@
-//! `sensor_msgs/MultiEchoLaserScan`: a sweep in a plane with several echoes a beam.
+//! `sensor_msgs/MultiEchoLaserScan`: a planar sweep with several echoes per beam.
 
 use crate::measurement::PlanarScan;
-use crate::recording::message::scan::{Angles, planar};
+use crate::recording::message::scan::{ScanHeader, build_planar};
 use crate::recording::wire::{DecodeError, Decoder, Payload};
 use crate::time::Stamp;
 
-/// Reads a sweep with one echo a beam: the strongest where there is an intensity for each, else the first.
+/// Decodes a sweep with one echo per beam: the strongest if each has an intensity, else the first.
 ///
 /// # Errors
-/// When the bytes are not a `MultiEchoLaserScan`, or its angles or times cannot be used.
+/// When the bytes are not a `MultiEchoLaserScan`, or its angles or times are unusable.
 pub fn decode(message: Payload<'_>) -> Result<(Stamp, PlanarScan), DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
-    let angles = Angles::decode(&mut input)?;
+    let header = ScanHeader::decode(&mut input)?;
     let ranges = echoes(&mut input, message)?;
     let intensities = echoes(&mut input, message)?;
     let has_intensities = !intensities.is_empty()
@@ -26,10 +26,10 @@ pub fn decode(message: Payload<'_>) -> Result<(Stamp, PlanarScan), DecodeError> 
     let chosen: Vec<_> = (0..ranges.len()).map(strongest).collect();
     let ranges_m = ranges.iter().zip(&chosen).map(|(echoes, (k, _))| echoes.get(*k).copied().unwrap_or(f32::INFINITY));
     let strengths = if has_intensities { chosen.iter().map(|(_, strength)| *strength).collect() } else { Vec::new() };
-    Ok((stamp, planar(angles, ranges_m.collect(), strengths)?))
+    Ok((stamp, build_planar(header, ranges_m.collect(), strengths)?))
 }
 
-/// The echoes of each beam.
+/// Decodes the echoes of each beam.
 fn echoes(input: &mut Decoder<'_>, message: Payload<'_>) -> Result<Vec<Vec<f32>>, DecodeError> {
     let count = input.u32()? as usize;
     if count > message.bytes.len() / 4 {

@@ -1,39 +1,41 @@
-//! `sensor_msgs/PointCloud2`: points with whatever fields their maker gave them.
+//! `sensor_msgs/PointCloud2`: points with driver-specific fields.
 
 mod fields;
-mod unit;
+mod time_unit;
 
 use crate::measurement::{LidarReturn, LidarScan};
 use crate::recording::RecordingError;
-use crate::recording::message::misses::{Census, Limits};
-use crate::recording::message::scan::from_earliest;
+use crate::recording::message::no_returns::{NoReturnDetector, RangeLimits};
+use crate::recording::message::scan::sort_by_firing_time;
 use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::Span;
 pub use fields::TimeField;
 use fields::{FLOAT32, Field, UINT32};
-pub use unit::{Lasting, Unit};
+pub use time_unit::{CloudDuration, TimeUnit};
 
-/// Bytes of a point as [`encode`] writes it: x, y, z, intensity, t.
+/// Bytes of a point written by [`encode`]: x, y, z, intensity, t.
 const POINT_STEP: usize = 20;
 
-/// Most points that room is made for beforehand.
-const MOST_EXPECTED: usize = 1 << 20;
+/// Maximum number of points for which memory is reserved in advance.
+const MAX_PREALLOCATED: usize = 1 << 20;
 
-/// Most fields of a point that a cloud may name.
-const MOST_FIELDS: usize = 256;
+/// Maximum number of fields of a point.
+const MAX_FIELDS: usize = 256;
 
-/// Writes the returns of the lidar in `frame`: x, y, z, intensity as 32-bit floats, t as nanoseconds after the stamp.
+/// Encodes the returns of the lidar in `frame`.
+///
+/// x, y, z and intensity are 32-bit floats, t is nanoseconds after the stamp.
 ///
 /// # Errors
-/// When a stamp, an offset or the number of points does not fit a message.
+/// When a stamp, a firing time or the number of points does not fit into a message.
 pub fn encode(out: &mut Encoder<'_>, frame: &str, scan: &LidarScan) -> Result<(), RecordingError> {
     out.header(scan.stamp, frame)?;
-    begin(out, scan.returns.len(), &["x", "y", "z", "intensity"], Some("t"))?;
+    encode_layout(out, scan.returns.len(), &["x", "y", "z", "intensity"], Some("t"))?;
     for (bytes, point) in out.room(scan.returns.len() * POINT_STEP).chunks_exact_mut(POINT_STEP).zip(&scan.returns) {
         let offset = u32::try_from(point.offset.nanos()).map_err(|_| RecordingError::Unwritable {
-            what: "a point's time after its scan",
+            what: "the time of a point in its scan",
             value: format!("{} ns", point.offset.nanos()),
-            limit: "a point holds 0 to 4.29 s",
+            limit: "the format is limited to 0 to 4.29 s",
         })?;
         let p = &point.point_in_laser;
         let words = [p.x.to_bits(), p.y.to_bits(), p.z.to_bits(), point.intensity.to_bits(), offset];
@@ -45,10 +47,10 @@ pub fn encode(out: &mut Encoder<'_>, frame: &str, scan: &LidarScan) -> Result<()
     Ok(())
 }
 
-/// Writes a cloud of `points`, each a row of 32-bit floats called `names`, in `frame`.
+/// Encodes a cloud of `points`, each a row of 32-bit floats with the given `names`, in `frame`.
 ///
 /// # Errors
-/// When the stamp or the number of points does not fit a message.
+/// When the stamp or the number of points does not fit into a message.
 pub fn encode_floats<const N: usize>(
     out: &mut Encoder<'_>,
     (stamp, frame): (crate::time::Stamp, &str),
@@ -56,7 +58,7 @@ pub fn encode_floats<const N: usize>(
     points: impl ExactSizeIterator<Item = [f32; N]>,
 ) -> Result<(), RecordingError> {
     out.header(stamp, frame)?;
-    begin(out, points.len(), &names, None)?;
+    encode_layout(out, points.len(), &names, None)?;
     for (bytes, point) in out.room(points.len() * 4 * N).chunks_exact_mut(4 * N).zip(points) {
         for (word, value) in bytes.chunks_exact_mut(4).zip(point) {
             word.copy_from_slice(&value.to_le_bytes());
@@ -66,8 +68,13 @@ pub fn encode_floats<const N: usize>(
     Ok(())
 }
 
-/// All of a cloud from its height to the length of its data: float fields, then a field of integers where there is one.
-fn begin(out: &mut Encoder<'_>, count: usize, floats: &[&str], integer: Option<&str>) -> Result<(), RecordingError> {
+/// Encodes a cloud's fields from height to data length: float fields, then an optional integer field.
+fn encode_layout(
+    out: &mut Encoder<'_>,
+    count: usize,
+    floats: &[&str],
+    integer: Option<&str>,
+) -> Result<(), RecordingError> {
     out.u32(1);
     out.length(count)?;
     let named = floats.iter().map(|name| (*name, FLOAT32)).chain(integer.map(|name| (name, UINT32)));
@@ -86,7 +93,7 @@ fn begin(out: &mut Encoder<'_>, count: usize, floats: &[&str], integer: Option<&
     out.length(count * point_step)
 }
 
-/// The layout of a cloud, and its data.
+/// Layout and data of a cloud.
 struct Cloud<'a> {
     stamp: crate::time::Stamp,
     fields: Vec<Field<'a>>,
@@ -103,8 +110,8 @@ impl<'a> Cloud<'a> {
         let (stamp, _) = input.header()?;
         let (height, width) = (input.u32()? as usize, input.u32()? as usize);
         let count = input.u32()? as usize;
-        if count > MOST_FIELDS {
-            return Err(DecodeError::Contradiction("a cloud names more than 256 fields"));
+        if count > MAX_FIELDS {
+            return Err(DecodeError::Contradiction("a cloud has more than 256 fields"));
         }
         let fields = (0..count)
             .map(|_| {
@@ -119,16 +126,16 @@ impl<'a> Cloud<'a> {
         let (point_step, row_step) = (input.u32()? as usize, input.u32()? as usize);
         let data = input.bytes()?;
         let row = width.checked_mul(point_step).ok_or(DecodeError::Short)?;
-        // Of a cloud in one row, some writers leave out how long the row is.
+        // Some writers omit the row length of a cloud with one row.
         let row_step = if height == 1 { row } else { row_step };
-        let whole = height.checked_mul(row_step).ok_or(DecodeError::Short)?;
-        if whole > data.len() || row > row_step {
-            return Err(DecodeError::Contradiction("a cloud has less data than its width and height say"));
+        let size = height.checked_mul(row_step).ok_or(DecodeError::Short)?;
+        if size > data.len() || row > row_step {
+            return Err(DecodeError::Contradiction("a cloud has less data than its width and height require"));
         }
         if fields.iter().any(|field| !field.fits(point_step)) {
-            return Err(DecodeError::Contradiction("a field of a cloud lies outside its points"));
+            return Err(DecodeError::Contradiction("a field of a cloud exceeds the size of a point"));
         }
-        Ok(Self { stamp, fields, big_endian, width, point_step, row_step, data: &data[..whole] })
+        Ok(Self { stamp, fields, big_endian, width, point_step, row_step, data: &data[..size] })
     }
 
     fn field(&self, name: &str) -> Option<&Field<'a>> {
@@ -150,16 +157,21 @@ impl<'a> Cloud<'a> {
     }
 }
 
-/// Reads a cloud's returns in the order in which they were fired; points that are not finite or lie in the origin are
-/// beams that did not come back, and so are those at `farthest_m` and beyond. Their times after the stamp are counted
-/// in `unit`, where another than the usual one is known.
+/// Decodes a cloud's returns in firing order.
+///
+/// Points that are not finite, at the origin, or at `no_return_range_m` or farther are beams without a return. Their
+/// times after the stamp have the given `unit`; without one it is detected.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2` with x, y and z.
-pub fn decode(message: Payload<'_>, unit: Option<Unit>, farthest_m: Option<f32>) -> Result<LidarScan, DecodeError> {
+pub fn decode(
+    message: Payload<'_>,
+    unit: Option<TimeUnit>,
+    no_return_range_m: Option<f32>,
+) -> Result<LidarScan, DecodeError> {
     let cloud = Cloud::decode(message)?;
     if cloud.is_empty() {
-        // A cloud without points may come without fields.
+        // A cloud without points may also lack fields.
         return Ok(LidarScan { stamp: cloud.stamp, stamped_after: Span::ZERO, returns: Vec::new(), planar: None });
     }
     let [x, y, z] = cloud.coordinates()?;
@@ -167,12 +179,12 @@ pub fn decode(message: Payload<'_>, unit: Option<Unit>, farthest_m: Option<f32>)
     let mut time = TimeField::find(&cloud.fields);
     if let Some(time) = &mut time {
         match unit {
-            Some(unit) => time.count_in(unit),
-            None => time.learn(cloud.stamp, cloud.points(), cloud.big_endian),
+            Some(unit) => time.set_unit(unit),
+            None => time.detect_encoding(cloud.stamp, cloud.points(), cloud.big_endian),
         }
     }
-    let limits = Limits::new(0.0, 0.0, farthest_m);
-    let mut returns = Vec::with_capacity((cloud.data.len() / cloud.point_step.max(1)).min(MOST_EXPECTED));
+    let limits = RangeLimits::new(0.0, 0.0, no_return_range_m);
+    let mut returns = Vec::with_capacity((cloud.data.len() / cloud.point_step.max(1)).min(MAX_PREALLOCATED));
     for bytes in cloud.points() {
         let number = |field: &Field<'_>| field.number(bytes, cloud.big_endian) as f32;
         let point_in_laser = nalgebra::Vector3::new(number(x), number(y), number(z));
@@ -184,7 +196,7 @@ pub fn decode(message: Payload<'_>, unit: Option<Unit>, farthest_m: Option<f32>)
                 Some(offset) => offset,
                 None => {
                     return Err(DecodeError::Contradiction(
-                        "a point's time is not finite, or far from its cloud's stamp",
+                        "a point's time is not finite, or more than 60 s from its cloud's stamp",
                     ));
                 }
             },
@@ -192,15 +204,15 @@ pub fn decode(message: Payload<'_>, unit: Option<Unit>, farthest_m: Option<f32>)
         };
         returns.push(LidarReturn { offset, point_in_laser, intensity: intensity.map_or(0.0, number) });
     }
-    let stamped_after = from_earliest(&mut returns);
+    let stamped_after = sort_by_firing_time(&mut returns);
     Ok(LidarScan { stamp: cloud.stamp - stamped_after, stamped_after, returns, planar: None })
 }
 
-/// Counts how the points of a cloud encode misses.
+/// Counts the encodings of beams without a return in a cloud.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2` with x, y and z.
-pub fn count_misses(message: Payload<'_>, census: &mut Census) -> Result<(), DecodeError> {
+pub fn count_no_returns(message: Payload<'_>, detector: &mut NoReturnDetector) -> Result<(), DecodeError> {
     let cloud = Cloud::decode(message)?;
     if cloud.is_empty() {
         return Ok(());
@@ -209,7 +221,7 @@ pub fn count_misses(message: Payload<'_>, census: &mut Census) -> Result<(), Dec
     for bytes in cloud.points() {
         let [x, y, z] = coordinates.map(|field| field.number(bytes, cloud.big_endian) as f32);
         let distance_m = nalgebra::Vector3::new(x, y, z).norm();
-        if distance_m.is_nan() { census.add_no_point() } else { census.add_distance(distance_m) }
+        if distance_m.is_nan() { detector.add_invalid_point() } else { detector.add_distance(distance_m) }
     }
     Ok(())
 }
@@ -217,29 +229,29 @@ pub fn count_misses(message: Payload<'_>, census: &mut Census) -> Result<(), Dec
 /// Whether a cloud has no points.
 ///
 /// # Errors
-/// When the bytes are not a `PointCloud2`, or its points have no x, y and z.
+/// When the bytes are not a `PointCloud2`, or the points have no x, y and z.
 pub fn is_empty(message: Payload<'_>) -> Result<bool, DecodeError> {
     let cloud = Cloud::decode(message)?;
     if cloud.is_empty() { Ok(true) } else { cloud.coordinates().map(|_| false) }
 }
 
-/// Whether a cloud's points tell their times by another clock than its stamp, `None` where they tell none.
+/// Whether a cloud's point times are on another clock than the stamp; `None` if it has no point times.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2`.
-pub fn by_other_clock(message: Payload<'_>) -> Result<Option<bool>, DecodeError> {
+pub fn has_other_clock(message: Payload<'_>) -> Result<Option<bool>, DecodeError> {
     let cloud = Cloud::decode(message)?;
     Ok(TimeField::find(&cloud.fields).map(|mut time| {
-        time.learn(cloud.stamp, cloud.points(), cloud.big_endian);
-        time.is_of_other_clock()
+        time.detect_encoding(cloud.stamp, cloud.points(), cloud.big_endian);
+        time.is_other_clock()
     }))
 }
 
-/// How long a cloud lasts by its points' times; `None` where they carry none, or tell instants.
-pub fn lasting(message: Payload<'_>) -> Option<Lasting> {
+/// Duration of a cloud from the point times; `None` if it has none, or they are absolute.
+pub fn duration(message: Payload<'_>) -> Option<CloudDuration> {
     let cloud = Cloud::decode(message).ok()?;
     let mut time = TimeField::find(&cloud.fields)?;
-    time.learn(cloud.stamp, cloud.points(), cloud.big_endian);
-    let (numbers, seconds) = time.spread(cloud.points(), cloud.big_endian)?;
-    Some(Lasting { stamp: cloud.stamp, numbers, seconds })
+    time.detect_encoding(cloud.stamp, cloud.points(), cloud.big_endian);
+    let (raw_spread, usual_s) = time.spread(cloud.points(), cloud.big_endian)?;
+    Some(CloudDuration { stamp: cloud.stamp, raw_spread, usual_s })
 }

@@ -5,20 +5,20 @@ use crate::recording::RecordingError;
 use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::Stamp;
 
-/// Writes a `PoseStamped` in `frame`.
+/// Encodes a `PoseStamped` in `frame`.
 ///
 /// # Errors
-/// When the stamp does not fit a message.
+/// When the stamp does not fit into a message.
 pub fn encode(out: &mut Encoder<'_>, frame: &str, stamp: Stamp, pose: &Pose) -> Result<(), RecordingError> {
     out.header(stamp, frame)?;
     out.pose(pose);
     Ok(())
 }
 
-/// Writes a `PoseWithCovarianceStamped` in `frame`.
+/// Encodes a `PoseWithCovarianceStamped` in `frame`.
 ///
 /// # Errors
-/// When the stamp does not fit a message.
+/// When the stamp does not fit into a message.
 pub fn encode_uncertain(
     out: &mut Encoder<'_>,
     frame: &str,
@@ -27,25 +27,25 @@ pub fn encode_uncertain(
 ) -> Result<(), RecordingError> {
     out.header(stamp, frame)?;
     out.pose(pose);
-    // Rows one after the other; of a symmetric matrix that is columns too.
+    // The message is row-major, the slice column-major; the matrix is symmetric.
     out.f64s(covariance.as_slice());
     Ok(())
 }
 
-/// Reads a `PoseStamped`.
+/// Decodes a `PoseStamped`.
 ///
 /// # Errors
-/// When the bytes are not such a message, or the pose is not a rigid one.
+/// When the bytes are not such a message, or the pose is invalid.
 pub fn decode(message: Payload<'_>) -> Result<(Stamp, Pose), DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
     Ok((stamp, input.pose()?))
 }
 
-/// Reads the pose of an `Odometry`.
+/// Decodes the pose of an `Odometry`.
 ///
 /// # Errors
-/// When the bytes are not such a message, or the pose is not a rigid one.
+/// When the bytes are not such a message, or the pose is invalid.
 pub fn decode_odometry(message: Payload<'_>) -> Result<(Stamp, Pose), DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
@@ -53,10 +53,10 @@ pub fn decode_odometry(message: Payload<'_>) -> Result<(Stamp, Pose), DecodeErro
     Ok((stamp, input.pose()?))
 }
 
-/// Writes an `Odometry`: the pose in `frame`, the twist in the moving frame `child`.
+/// Encodes an `Odometry`: the pose in `frame`, the twist in the moving frame `child`.
 ///
 /// # Errors
-/// When the stamp does not fit a message.
+/// When the stamp does not fit into a message.
 pub fn encode_odometry(
     out: &mut Encoder<'_>,
     (frame, child): (&str, &str),
@@ -73,10 +73,10 @@ pub fn encode_odometry(
     Ok(())
 }
 
-/// Writes a `Path` in `frame`.
+/// Encodes a `Path` in `frame`.
 ///
 /// # Errors
-/// When a stamp does not fit a message.
+/// When a stamp does not fit into a message.
 pub fn encode_path<'p>(
     out: &mut Encoder<'_>,
     frame: &str,
@@ -100,8 +100,7 @@ mod tests {
 
     #[test]
     fn the_twist_of_odometry_is_in_the_moving_frame() {
-        // Facing left of the world's x (yaw 90 degrees), moving along the world's y: forward. Turning about z is the
-        // same in both.
+        // Yaw 90 degrees, moving along the world's y axis, hence forward. Rotation about z is the same in both frames.
         let pose = Pose::from_parts([1.0, 2.0, 3.0].into(), from_roll_pitch_yaw(0.0, 0.0, std::f64::consts::FRAC_PI_2));
         let body = Kinematics {
             velocity_in_world: Vector::new(0.0, 2.0, 0.5),

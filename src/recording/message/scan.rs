@@ -1,18 +1,18 @@
-//! `sensor_msgs/LaserScan`: one sweep in a plane (REP-103, REP-117).
+//! `sensor_msgs/LaserScan`: one planar sweep (REP-103, REP-117).
 
 use crate::measurement::{LidarReturn, LidarScan, PlanarScan};
 use crate::recording::RecordingError;
-use crate::recording::message::misses::Limits;
+use crate::recording::message::no_returns::RangeLimits;
 use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::{Span, Stamp};
 
-/// Longest sweep that is credible, s.
-const LONGEST_S: f64 = 60.0;
+/// Maximum credible duration of a sweep, s.
+const MAX_SWEEP_S: f64 = 60.0;
 
-/// Writes a sweep of the lidar in `frame` that began at `stamp`.
+/// Encodes a sweep of the lidar in `frame` that starts at `stamp`.
 ///
 /// # Errors
-/// When the stamp or the number of beams does not fit a message.
+/// When the stamp or the number of beams does not fit into a message.
 pub fn encode(out: &mut Encoder<'_>, frame: &str, stamp: Stamp, scan: &PlanarScan) -> Result<(), RecordingError> {
     out.header(stamp, frame)?;
     let last = scan.ranges_m.len().saturating_sub(1) as f64;
@@ -31,9 +31,9 @@ pub fn encode(out: &mut Encoder<'_>, frame: &str, stamp: Stamp, scan: &PlanarSca
     out.f32_sequence(&scan.intensities)
 }
 
-/// What a sweep says before its ranges.
+/// Fields of a sweep before the ranges.
 #[derive(Debug, Clone, Copy)]
-pub struct Angles {
+pub struct ScanHeader {
     angle_min_rad: f64,
     angle_increment_rad: f64,
     time_increment_s: f64,
@@ -42,18 +42,18 @@ pub struct Angles {
     range_max_m: f32,
 }
 
-impl Angles {
-    /// Reads the fields from `angle_min` to `range_max`.
+impl ScanHeader {
+    /// Decodes the fields from `angle_min` to `range_max`.
     ///
     /// # Errors
-    /// When the message ends before, or an angle or a time is not finite.
+    /// When the message is truncated, or an angle or a time is not finite.
     pub fn decode(input: &mut Decoder<'_>) -> Result<Self, DecodeError> {
         let mut finite = |field: &'static str| {
             let value = f64::from(input.f32()?);
             if value.is_finite() { Ok(value) } else { Err(DecodeError::NotFinite { field }) }
         };
         let angle_min_rad = finite("angle_min")?;
-        // Unused: some drivers leave it out of step with the number of ranges.
+        // Unused: in some drivers it does not match the number of ranges.
         let _ = finite("angle_max");
         let angle_increment_rad = finite("angle_increment")?;
         let (time_increment_s, scan_time_s) = (finite("time_increment")?, finite("scan_time")?);
@@ -62,20 +62,21 @@ impl Angles {
     }
 }
 
-/// Puts a sweep together.
+/// Combines the fields of a sweep.
 ///
 /// # Errors
-/// When its parts contradict each other.
-pub fn planar(angles: Angles, ranges_m: Vec<f32>, intensities: Vec<f32>) -> Result<PlanarScan, DecodeError> {
-    let Angles { angle_min_rad, angle_increment_rad, time_increment_s, scan_time_s, range_min_m, range_max_m } = angles;
+/// When they are inconsistent.
+pub fn build_planar(header: ScanHeader, ranges_m: Vec<f32>, intensities: Vec<f32>) -> Result<PlanarScan, DecodeError> {
+    let ScanHeader { angle_min_rad, angle_increment_rad, time_increment_s, scan_time_s, range_min_m, range_max_m } =
+        header;
     if !intensities.is_empty() && intensities.len() != ranges_m.len() {
-        return Err(DecodeError::Contradiction("a scan has another number of intensities than of ranges"));
+        return Err(DecodeError::Contradiction("a scan has different numbers of intensities and ranges"));
     }
     if angle_increment_rad == 0.0 && ranges_m.len() > 1 {
         return Err(DecodeError::Contradiction("angle_increment is 0 with several ranges"));
     }
-    if time_increment_s.abs() * ranges_m.len() as f64 > LONGEST_S || scan_time_s.abs() > LONGEST_S {
-        return Err(DecodeError::Contradiction("time_increment or scan_time make a scan of more than 60 s"));
+    if time_increment_s.abs() * ranges_m.len() as f64 > MAX_SWEEP_S || scan_time_s.abs() > MAX_SWEEP_S {
+        return Err(DecodeError::Contradiction("time_increment or scan_time give a scan of more than 60 s"));
     }
     Ok(PlanarScan {
         angle_min_rad,
@@ -89,21 +90,22 @@ pub fn planar(angles: Angles, ranges_m: Vec<f32>, intensities: Vec<f32>) -> Resu
     })
 }
 
-/// Reads the polar form of a sweep: its stamp, and the sweep.
+/// Decodes a sweep in polar form, with the stamp.
 ///
 /// # Errors
-/// When the bytes are not a `LaserScan`, or its angles or times cannot be used.
+/// When the bytes are not a `LaserScan`, or its angles or times are unusable.
 pub fn decode(message: Payload<'_>) -> Result<(Stamp, PlanarScan), DecodeError> {
     let mut input = Decoder::new(message)?;
     let (stamp, _) = input.header()?;
-    let angles = Angles::decode(&mut input)?;
+    let header = ScanHeader::decode(&mut input)?;
     let ranges_m = input.f32_sequence()?;
     let intensities = input.f32_sequence()?;
-    Ok((stamp, planar(angles, ranges_m, intensities)?))
+    Ok((stamp, build_planar(header, ranges_m, intensities)?))
 }
 
-/// Time between beams, s: as the sweep says, or, where it says nothing, what its angles and its period imply for a
-/// mirror that turns evenly.
+/// Time between beams, s.
+///
+/// If the sweep does not state it, it follows from the angles and the period of a uniformly rotating mirror.
 pub fn time_increment_s(scan: &PlanarScan) -> f64 {
     if scan.time_increment_s != 0.0 {
         return scan.time_increment_s;
@@ -111,7 +113,7 @@ pub fn time_increment_s(scan: &PlanarScan) -> f64 {
     scan.scan_time_s * scan.angle_increment_rad.abs() / std::f64::consts::TAU
 }
 
-/// Turns sweeps to points; keeps the beams' directions from sweep to sweep.
+/// Converts sweeps to points; caches the beam directions between sweeps.
 #[derive(Debug, Default)]
 pub struct Projector {
     angle_min_rad: f64,
@@ -120,13 +122,13 @@ pub struct Projector {
 }
 
 impl Projector {
-    /// The scan of a sweep that began at `stamp`: the beams that came back as points, in the order in which they were
-    /// fired.
-    /// `farthest_m` is a constant that encodes misses; its polar form is as the message states it.
-    pub fn project(&mut self, stamp: Stamp, planar: PlanarScan, farthest_m: Option<f32>) -> LidarScan {
+    /// Projects a sweep that starts at `stamp`: the returns become points in firing order.
+    ///
+    /// `no_return_range_m` is the constant for beams without a return. The polar form is unchanged.
+    pub fn project(&mut self, stamp: Stamp, planar: PlanarScan, no_return_range_m: Option<f32>) -> LidarScan {
         self.prepare(&planar);
         let step_s = time_increment_s(&planar);
-        let limits = Limits::new(planar.range_min_m, planar.range_max_m, farthest_m);
+        let limits = RangeLimits::new(planar.range_min_m, planar.range_max_m, no_return_range_m);
         let mut returns = Vec::with_capacity(planar.ranges_m.len());
         for (k, (range, (cos, sin))) in planar.ranges_m.iter().zip(&self.directions).enumerate() {
             if limits.is_return(*range) {
@@ -138,7 +140,7 @@ impl Projector {
                 });
             }
         }
-        let stamped_after = if step_s < 0.0 { from_earliest(&mut returns) } else { Span::ZERO };
+        let stamped_after = if step_s < 0.0 { sort_by_firing_time(&mut returns) } else { Span::ZERO };
         LidarScan { stamp: stamp - stamped_after, stamped_after, returns, planar: Some(planar) }
     }
 
@@ -155,9 +157,12 @@ impl Projector {
     }
 }
 
-/// Puts returns in the order in which they were fired, offsets counted from the earliest where that was fired before
-/// the message's stamp: by how much before, or zero.
-pub fn from_earliest(returns: &mut [LidarReturn]) -> Span {
+/// Sorts returns by firing time.
+///
+/// The result is how long before the message's stamp the first beam was fired, or zero.
+///
+/// If it was fired before the stamp, times are relative to it afterwards.
+pub fn sort_by_firing_time(returns: &mut [LidarReturn]) -> Span {
     if !returns.is_sorted_by_key(|r| r.offset) {
         returns.sort_by_key(|r| r.offset);
     }

@@ -6,24 +6,24 @@ use crate::recording::topics::printable;
 use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
 use crate::time::Stamp;
 
-/// Least bytes that a transform takes on the wire: time, two strings, seven doubles.
-const LEAST_BYTES: usize = 8 + 5 + 5 + 56;
+/// Minimum bytes of a serialised transform: time, two strings, seven doubles.
+const MIN_BYTES: usize = 8 + 5 + 5 + 56;
 
-/// Where a frame stands in its parent.
+/// Pose of a frame in the parent frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transform {
-    /// The parent's name.
+    /// Name of the parent frame.
     pub parent: String,
-    /// The frame's name.
+    /// Name of the frame.
     pub child: String,
     /// `parent_from_child`.
     pub parent_from_child: Pose,
 }
 
-/// Writes transforms that hold at `stamp`.
+/// Encodes transforms valid at `stamp`.
 ///
 /// # Errors
-/// When the stamp does not fit a message.
+/// When the stamp does not fit into a message.
 pub fn encode(out: &mut Encoder<'_>, stamp: Stamp, transforms: &[Transform]) -> Result<(), RecordingError> {
     out.length(transforms.len())?;
     for transform in transforms {
@@ -34,27 +34,27 @@ pub fn encode(out: &mut Encoder<'_>, stamp: Stamp, transforms: &[Transform]) -> 
     Ok(())
 }
 
-/// Reads transforms.
+/// Decodes transforms.
 ///
 /// # Errors
-/// When the bytes are not a `TFMessage`, or a transform is not a rigid one.
+/// When the bytes are not a `TFMessage`, or a transform is not rigid.
 pub fn decode(message: Payload<'_>) -> Result<Vec<Transform>, DecodeError> {
     let mut input = Decoder::new(message)?;
     let count = input.u32()? as usize;
-    if count > message.bytes.len() / LEAST_BYTES {
+    if count > message.bytes.len() / MIN_BYTES {
         return Err(DecodeError::Short);
     }
     (0..count)
         .map(|_| {
             let (_, parent) = input.header()?;
-            let parent = plain(parent);
-            let child = plain(input.string()?);
+            let parent = printable_frame(parent);
+            let child = printable_frame(input.string()?);
             Ok(Transform { parent, child, parent_from_child: input.pose()? })
         })
         .collect()
 }
 
-/// A frame's name as it is printed, without the slash that tf (the first one) put before it.
-pub fn plain(frame: &str) -> String {
+/// Printable name of a frame, without the leading slash of tf 1.
+pub fn printable_frame(frame: &str) -> String {
     printable(frame.trim_start_matches('/'))
 }

@@ -1,39 +1,39 @@
-//! The header of a PLY file.
+//! Header of a PLY file.
 
 use std::io::{BufRead, Read};
 
-/// Longest line that is read, bytes.
-pub const LONGEST_LINE: u64 = 4096;
+/// Maximum length of a line, bytes.
+pub const MAX_LINE_BYTES: u64 = 4096;
 
-/// Most lines of a header.
-const MOST_LINES: usize = 1000;
+/// Maximum number of lines of a header.
+const MAX_LINES: usize = 1000;
 
-/// How the elements are written.
+/// Encoding of the elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
-    /// As text, an element a line.
+pub enum PlyFormat {
+    /// Text, one element per line.
     Ascii,
-    /// As bytes, the least significant first.
+    /// Binary, least significant byte first.
     LittleEndian,
-    /// As bytes, the most significant first.
+    /// Binary, most significant byte first.
     BigEndian,
 }
 
-/// A type of number.
+/// Numeric type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scalar {
-    /// A signed integer of so many bytes.
+    /// Signed integer with this number of bytes.
     Signed(usize),
-    /// An unsigned integer of so many bytes.
+    /// Unsigned integer with this number of bytes.
     Unsigned(usize),
-    /// A float of four bytes.
+    /// Float of four bytes.
     Float,
-    /// A float of eight bytes.
+    /// Float of eight bytes.
     Double,
 }
 
 impl Scalar {
-    fn named(name: &str) -> Option<Self> {
+    fn parse(name: &str) -> Option<Self> {
         Some(match name {
             "char" | "int8" => Self::Signed(1),
             "uchar" | "uint8" => Self::Unsigned(1),
@@ -47,7 +47,7 @@ impl Scalar {
         })
     }
 
-    /// Bytes of it.
+    /// Size, bytes.
     pub fn size(self) -> usize {
         match self {
             Self::Signed(size) | Self::Unsigned(size) => size,
@@ -56,7 +56,7 @@ impl Scalar {
         }
     }
 
-    /// The number whose bytes, the least significant first, lead `word`; the others are zero.
+    /// Value of a number whose bytes are at the start of `word`, least significant first; the others are zero.
     pub fn number(self, word: [u8; 8]) -> f64 {
         let [a, b, c, d, ..] = word;
         match self {
@@ -70,76 +70,77 @@ impl Scalar {
     }
 }
 
-/// A number of each point.
+/// Numeric property of each point.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Property {
-    /// Its name.
+    /// Property name.
     pub name: String,
-    /// Its type.
+    /// Numeric type.
     pub scalar: Scalar,
 }
 
-/// What a header says of the points.
+/// Content of a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
-    /// How they are written.
-    pub form: Form,
-    /// How many there are.
+    /// Encoding of the points.
+    pub format: PlyFormat,
+    /// Number of points.
     pub count: u64,
-    /// The numbers of each, in order.
+    /// Properties of each point, in order.
     pub properties: Vec<Property>,
-    /// What its comments say.
+    /// Comments.
     pub comments: Vec<String>,
-    /// Lines of the header.
+    /// Number of lines of the header.
     pub lines: usize,
 }
 
-/// What is wrong, and in which line.
+/// Line number and description of a problem.
 pub type Problem = (usize, String);
 
 /// Reads a header; the points must be the file's first element.
 pub fn read(input: &mut impl BufRead) -> Result<Header, Problem> {
-    let mut header = Header { form: Form::Ascii, count: 0, properties: Vec::new(), comments: Vec::new(), lines: 0 };
-    let (mut form, mut elements) = (None, 0);
+    let mut header =
+        Header { format: PlyFormat::Ascii, count: 0, properties: Vec::new(), comments: Vec::new(), lines: 0 };
+    let (mut format, mut elements) = (None, 0);
     loop {
         let text = next_line(input, &mut header)?;
         let problem = |problem: &str| Err((header.lines, problem.to_owned()));
         let words: Vec<&str> = text.split_whitespace().collect();
         match words.as_slice() {
             ["ply"] if header.lines == 1 => {}
-            _ if header.lines == 1 => return problem("this is not a PLY file: it does not begin with `ply`"),
+            _ if header.lines == 1 => return problem("this is not a PLY file: it does not start with `ply`"),
             ["comment", ..] => header.comments.push(text.trim().trim_start_matches("comment").trim().to_owned()),
             ["obj_info", ..] | [] => {}
-            ["format", name, "1.0"] => form = form_named(name),
+            ["format", name, "1.0"] => format = parse_format(name),
             ["element", "vertex", count] if elements == 0 => {
                 elements = 1;
                 header.count =
-                    count.parse().map_err(|_| (header.lines, format!("`{count}` is no number of points")))?;
+                    count.parse().map_err(|_| (header.lines, format!("`{count}` is not a number of points")))?;
             }
             ["element", ..] if elements == 0 => return problem("the first element is not `vertex`"),
             ["element", ..] => elements += 1,
             ["property", ..] if elements != 1 => {}
-            ["property", "list", ..] => return problem("a point with a list in it cannot be read"),
-            ["property", kind, name] => match Scalar::named(kind) {
+            ["property", "list", ..] => return problem("list properties of points are not supported"),
+            ["property", kind, name] => match Scalar::parse(kind) {
                 Some(scalar) => header.properties.push(Property { name: (*name).to_owned(), scalar }),
-                None => return problem("the property's type is not known"),
+                None => return problem("unknown property type"),
             },
             ["end_header"] => break,
             _ => return problem("this line is not part of a PLY header"),
         }
     }
-    header.form = form.ok_or((header.lines, "the header names no format that is known".to_owned()))?;
+    header.format = format.ok_or((header.lines, "the header has no known format".to_owned()))?;
     if elements == 0 {
         return Err((header.lines, "there is no element `vertex`".to_owned()));
     }
     Ok(header)
 }
 
-fn form_named(name: &str) -> Option<Form> {
+fn parse_format(name: &str) -> Option<PlyFormat> {
     match name {
-        "ascii" => Some(Form::Ascii),
-        "binary_little_endian" => Some(Form::LittleEndian),
-        "binary_big_endian" => Some(Form::BigEndian),
+        "ascii" => Some(PlyFormat::Ascii),
+        "binary_little_endian" => Some(PlyFormat::LittleEndian),
+        "binary_big_endian" => Some(PlyFormat::BigEndian),
         _ => None,
     }
 }
@@ -148,8 +149,8 @@ fn next_line(input: &mut impl BufRead, header: &mut Header) -> Result<String, Pr
     header.lines += 1;
     let line = header.lines;
     let mut bytes = Vec::new();
-    let read = input.take(LONGEST_LINE).read_until(b'\n', &mut bytes).map_err(|error| (line, error.to_string()))?;
-    if read == 0 || line > MOST_LINES {
+    let read = input.take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes).map_err(|error| (line, error.to_string()))?;
+    if read == 0 || line > MAX_LINES {
         return Err((line, "the header does not end".to_owned()));
     }
     String::from_utf8(bytes).map_err(|_| (line, "this is not a PLY file: its header is not text".to_owned()))

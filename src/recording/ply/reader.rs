@@ -1,15 +1,15 @@
-use super::header::{self, Form, Property};
+use super::header::{self, PlyFormat, Property};
 use crate::recording::{CloudPoint, RecordingError};
 use crate::time::{Span, Stamp};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-/// Reads the points of a cloud, one after the other.
+/// Reads the points of a cloud sequentially.
 pub struct PlyReader<R: Read> {
     name: String,
     input: BufReader<R>,
-    form: Form,
+    format: PlyFormat,
     columns: Columns,
     properties: Vec<Property>,
     left: u64,
@@ -17,7 +17,7 @@ pub struct PlyReader<R: Read> {
     row: Vec<f64>,
 }
 
-/// Where in a row the numbers of a point are.
+/// Indices of a point's properties in a row.
 struct Columns {
     position: [usize; 3],
     intensity: Option<usize>,
@@ -26,10 +26,10 @@ struct Columns {
 }
 
 impl PlyReader<File> {
-    /// Opens the cloud at `path`.
+    /// Opens the point cloud at `path`.
     ///
     /// # Errors
-    /// When it cannot be opened, or its header is not that of a cloud.
+    /// When it cannot be opened, or the header is not that of a point cloud.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let file = File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         Self::new(&path.display().to_string(), file)
@@ -37,11 +37,13 @@ impl PlyReader<File> {
 }
 
 impl<R: Read> PlyReader<R> {
-    /// Opens the cloud in `input`, which messages call `name`. Its points are the element `vertex`, with properties x,
-    /// y, z, and as they are there intensity, time and error; others are passed over.
+    /// Opens the point cloud in `input`, called `name` in messages.
+    ///
+    /// Points are the element `vertex` with properties x, y, z and optionally intensity, time and error; others are
+    /// ignored.
     ///
     /// # Errors
-    /// When the header is not that of a cloud.
+    /// When the header is not that of a point cloud.
     pub fn new(name: &str, input: R) -> Result<Self, RecordingError> {
         let mut input = BufReader::with_capacity(1 << 16, input);
         let header = header::read(&mut input).map_err(|(line, problem)| RecordingError::Line {
@@ -65,7 +67,7 @@ impl<R: Read> PlyReader<R> {
         Ok(Self {
             name: name.to_owned(),
             input,
-            form: header.form,
+            format: header.format,
             columns,
             properties: header.properties,
             left: header.count,
@@ -74,16 +76,16 @@ impl<R: Read> PlyReader<R> {
         })
     }
 
-    /// Points still to come, as the header has it.
+    /// Number of points not yet read, according to the header.
     pub fn left(&self) -> u64 {
         self.left
     }
 
     fn next_point(&mut self) -> Result<CloudPoint, String> {
-        match self.form {
-            Form::Ascii => self.read_line()?,
-            Form::LittleEndian => self.read_binary(false)?,
-            Form::BigEndian => self.read_binary(true)?,
+        match self.format {
+            PlyFormat::Ascii => self.read_line()?,
+            PlyFormat::LittleEndian => self.read_binary(false)?,
+            PlyFormat::BigEndian => self.read_binary(true)?,
         }
         let number = |column: Option<usize>| column.and_then(|column| self.row.get(column).copied());
         let [x, y, z] = self.columns.position.map(|column| number(Some(column)).unwrap_or(f64::NAN) as f32);
@@ -116,16 +118,20 @@ impl<R: Read> PlyReader<R> {
     fn read_line(&mut self) -> Result<(), String> {
         self.row.clear();
         let mut text = Vec::new();
-        let read = (&mut self.input).take(header::LONGEST_LINE).read_until(b'\n', &mut text);
+        let read = (&mut self.input).take(header::MAX_LINE_BYTES).read_until(b'\n', &mut text);
         if read.map_err(|error| error.to_string())? == 0 {
             return Err(format!("the file ends {} points early", self.left));
         }
         let text = std::str::from_utf8(&text).map_err(|_| "this is not text".to_owned())?;
         for word in text.split_whitespace() {
-            self.row.push(word.parse().map_err(|_| format!("`{word}` is no number"))?);
+            self.row.push(word.parse().map_err(|_| format!("`{word}` is not a number"))?);
         }
         if self.row.len() < self.properties.len() {
-            return Err(format!("a point has {} numbers; here are {}", self.properties.len(), self.row.len()));
+            return Err(format!(
+                "a point needs {} numbers, but the line has {}",
+                self.properties.len(),
+                self.row.len()
+            ));
         }
         Ok(())
     }

@@ -4,29 +4,29 @@ use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Bytes of a point as it is written.
+/// Size of a written point, bytes.
 const POINT_BYTES: usize = 4 * 4 + 8 + 4;
 
-/// The header up to the number of points, which is written when it is known.
-const BEFORE_COUNT: &str = "ply\nformat binary_little_endian 1.0\ncomment metres, seconds; error: standard deviation of the place, metres\nelement vertex ";
+/// Header before the number of points, which is filled in at the end.
+const HEADER_BEFORE_COUNT: &str = "ply\nformat binary_little_endian 1.0\ncomment metres, seconds; error: standard deviation of the place, metres\nelement vertex ";
 
-/// Digits that are kept free for the number of points.
+/// Digits reserved for the number of points.
 const COUNT_DIGITS: usize = 20;
 
-/// The header after the number of points.
-const AFTER_COUNT: &str = "\nproperty float x\nproperty float y\nproperty float z\nproperty float intensity\nproperty double time\nproperty float error\nend_header\n";
+/// Header after the number of points.
+const HEADER_AFTER_COUNT: &str = "\nproperty float x\nproperty float y\nproperty float z\nproperty float intensity\nproperty double time\nproperty float error\nend_header\n";
 
-/// Writes points as they come; their number is put into the header at the end.
+/// Writes points sequentially; their number is filled into the header at the end.
 pub struct PlyWriter<W: Write + Seek> {
     out: BufWriter<W>,
     count: u64,
 }
 
 impl PlyWriter<File> {
-    /// Begins a new file at `path`; one that is there is replaced.
+    /// Creates the file at `path`, replacing an existing one.
     ///
     /// # Errors
-    /// When it cannot be made or written.
+    /// When it cannot be created or written.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
         let file = File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         Self::new(file)
@@ -34,13 +34,13 @@ impl PlyWriter<File> {
 }
 
 impl<W: Write + Seek> PlyWriter<W> {
-    /// Begins to write at the start of `out`.
+    /// Starts to write at the start of `out`.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn new(out: W) -> Result<Self, RecordingError> {
         let mut out = BufWriter::with_capacity(1 << 16, out);
-        write!(out, "{BEFORE_COUNT}{:<COUNT_DIGITS$}{AFTER_COUNT}", 0).map_err(RecordingError::Write)?;
+        write!(out, "{HEADER_BEFORE_COUNT}{:<COUNT_DIGITS$}{HEADER_AFTER_COUNT}", 0).map_err(RecordingError::Write)?;
         Ok(Self { out, count: 0 })
     }
 
@@ -61,12 +61,12 @@ impl<W: Write + Seek> PlyWriter<W> {
         self.out.write_all(&bytes).map_err(RecordingError::Write)
     }
 
-    /// Writes what is left, and the number of points.
+    /// Flushes the points and writes their number.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn finish(mut self) -> Result<(), RecordingError> {
-        self.out.seek(SeekFrom::Start(BEFORE_COUNT.len() as u64)).map_err(RecordingError::Write)?;
+        self.out.seek(SeekFrom::Start(HEADER_BEFORE_COUNT.len() as u64)).map_err(RecordingError::Write)?;
         write!(self.out, "{:<COUNT_DIGITS$}", self.count).map_err(RecordingError::Write)?;
         self.out.flush().map_err(RecordingError::Write)
     }

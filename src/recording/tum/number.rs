@@ -1,22 +1,22 @@
-//! Numbers as decimals: exact for stamps, and quick.
+//! Decimal numbers: exact for stamps, and fast.
 
 use crate::time::{NANOS_PER_SECOND, Stamp};
 use std::io::Write;
 
-/// Decimals of every number.
+/// Decimals of each number.
 const DECIMALS: usize = 9;
 
-/// Largest number whose billionfold is an exact `i64`, with room to spare.
-const QUICK_BELOW: f64 = 1e6;
+/// Upper limit of the fast path: 1e9 times the value is below 2^53, so it is an exact integer in a double.
+const EXACT_BELOW: f64 = 1e6;
 
-/// Appends seconds with nine decimals: every nanosecond.
+/// Appends seconds with nine decimals, i.e. exact to the nanosecond.
 pub fn write_stamp(out: &mut Vec<u8>, stamp: Stamp) {
     write_billionths(out, stamp.nanos());
 }
 
 /// Appends `value` with nine decimals.
 pub fn write(out: &mut Vec<u8>, value: f64) {
-    if value.abs() < QUICK_BELOW {
+    if value.abs() < EXACT_BELOW {
         write_billionths(out, (value * 1e9).round() as i64);
     } else {
         // Writing to memory does not fail.
@@ -45,8 +45,9 @@ fn write_digits(out: &mut Vec<u8>, mut value: u64, least: usize) {
     out[start..].reverse();
 }
 
-/// Reads seconds as a decimal, with or without an exponent, to the nearest nanosecond below; exact where a `f64` is
-/// not.
+/// Parses seconds as a decimal number with optional exponent, rounded down to a nanosecond.
+///
+/// It is exact where a `f64` is not.
 pub fn parse_stamp(text: &str) -> Option<Stamp> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
@@ -60,7 +61,7 @@ pub fn parse_stamp(text: &str) -> Option<Stamp> {
     if whole.is_empty() && fraction.is_empty() {
         return None;
     }
-    // The point stands after `places` digits of all; nanoseconds are the digits before the ninth place after it.
+    // The decimal point follows the first `places - 9` digits, so the first `places` digits are the nanoseconds.
     let places = i32::try_from(whole.len()).ok()?.checked_add(exponent)?.checked_add(DECIMALS as i32)?;
     let mut nanos = 0_i64;
     let mut digits = whole.bytes().chain(fraction.bytes());
@@ -86,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn decimals_are_those_of_the_standard_formatter() {
+    fn decimals_match_the_standard_formatter() {
         for value in [0.0, 1.0, -1.5, 0.123_456_789_4, -0.000_000_001, 999_999.999_999_9, 3e7, -1e-12] {
             let standard = format!("{value:.9}");
             let standard = if standard == "-0.000000000" { "0.000000000".to_owned() } else { standard };
@@ -103,8 +104,8 @@ mod tests {
         assert_eq!(nanos("12"), Some(12_000_000_000));
         assert_eq!(nanos("5e-3"), Some(5_000_000));
         assert_eq!(nanos("1e-30"), Some(0));
-        for wrong in ["", ".", "-", "1.2.3", "nan", "inf", "1e", "1e99", "99999999999999", "0x10", "1_0"] {
-            assert_eq!(nanos(wrong), None, "{wrong}");
+        for invalid in ["", ".", "-", "1.2.3", "nan", "inf", "1e", "1e99", "99999999999999", "0x10", "1_0"] {
+            assert_eq!(nanos(invalid), None, "{invalid}");
         }
     }
 }

@@ -1,18 +1,18 @@
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::time::{NANOS_PER_SECOND, Stamp};
 
-/// How a message is serialised.
+/// Serialisation of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wire {
+pub enum WireFormat {
     /// CDR of ROS 2: an encapsulation header, numbers aligned to their size.
     Cdr,
     /// ROS 1: little-endian, no alignment, headers with a sequence number.
     Ros1,
 }
 
-impl Wire {
-    /// The serialisation that a container calls `encoding`; `None` for one that is not read.
-    pub fn of_encoding(encoding: &str) -> Option<Self> {
+impl WireFormat {
+    /// Serialisation that a container names `encoding`; `None` if it is not supported.
+    pub fn from_encoding(encoding: &str) -> Option<Self> {
         match encoding {
             "cdr" => Some(Self::Cdr),
             "ros1" => Some(Self::Ros1),
@@ -24,28 +24,28 @@ impl Wire {
 /// A serialised message.
 #[derive(Debug, Clone, Copy)]
 pub struct Payload<'a> {
-    /// Its bytes.
+    /// Serialised bytes.
     pub bytes: &'a [u8],
-    /// How they are serialised.
-    pub wire: Wire,
+    /// Serialisation.
+    pub wire: WireFormat,
 }
 
 impl<'a> Payload<'a> {
-    /// A message in CDR.
+    /// A CDR message.
     #[cfg(test)]
     pub fn cdr(bytes: &'a [u8]) -> Self {
-        Self { bytes, wire: Wire::Cdr }
+        Self { bytes, wire: WireFormat::Cdr }
     }
 }
 
-/// Why a message's bytes are not what its type says.
+/// Reason why a message cannot be decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
     /// The encapsulation header is not that of plain CDR.
     #[error("not plain CDR")]
     Encapsulation,
-    /// The message ends before its type does.
-    #[error("the message is cut short")]
+    /// The message is shorter than its type requires.
+    #[error("the message is truncated")]
     Short,
     /// A string is not UTF-8.
     #[error("a string is not UTF-8")]
@@ -53,20 +53,21 @@ pub enum DecodeError {
     /// A number that must be finite is not.
     #[error("{field} is NaN or infinite")]
     NotFinite {
-        /// Which number.
+        /// Name of the field.
         field: &'static str,
     },
-    /// Lengths or fields that contradict each other.
+    /// Lengths or fields are inconsistent.
     #[error("{0}")]
     Contradiction(&'static str),
 }
 
-/// Reads one message. Nothing is allocated on the word of a length field: every length is checked against what is
-/// there.
+/// Decodes one message.
+///
+/// Every length field is checked against the available bytes before memory is allocated.
 pub struct Decoder<'a> {
     rest: &'a [u8],
-    whole: usize,
-    wire: Wire,
+    length: usize,
+    wire: WireFormat,
     big_endian: bool,
 }
 
@@ -81,14 +82,14 @@ macro_rules! number {
 }
 
 impl<'a> Decoder<'a> {
-    /// Begins to read `message`; in CDR its first four bytes are the encapsulation header.
+    /// Starts to decode `message`; in CDR its first four bytes are the encapsulation header.
     ///
     /// # Errors
-    /// When the header is not that of plain CDR.
+    /// When the encapsulation header is not that of plain CDR.
     pub fn new(message: Payload<'a>) -> Result<Self, DecodeError> {
         let Payload { bytes, wire } = message;
-        if wire == Wire::Ros1 {
-            return Ok(Self { rest: bytes, whole: bytes.len(), wire, big_endian: false });
+        if wire == WireFormat::Ros1 {
+            return Ok(Self { rest: bytes, length: bytes.len(), wire, big_endian: false });
         }
         let (header, rest) = bytes.split_at_checked(4).ok_or(DecodeError::Short)?;
         let big_endian = match header[..2] {
@@ -96,7 +97,7 @@ impl<'a> Decoder<'a> {
             [0, 1] => false,
             _ => return Err(DecodeError::Encapsulation),
         };
-        Ok(Self { rest, whole: rest.len(), wire, big_endian })
+        Ok(Self { rest, length: rest.len(), wire, big_endian })
     }
 
     fn take(&mut self, length: usize) -> Result<&'a [u8], DecodeError> {
@@ -106,10 +107,10 @@ impl<'a> Decoder<'a> {
     }
 
     fn align(&mut self, size: usize) -> Result<(), DecodeError> {
-        if self.wire == Wire::Ros1 {
+        if self.wire == WireFormat::Ros1 {
             return Ok(());
         }
-        let at = self.whole - self.rest.len();
+        let at = self.length - self.rest.len();
         self.take(at.next_multiple_of(size) - at).map(|_| ())
     }
 
@@ -141,10 +142,10 @@ impl<'a> Decoder<'a> {
         f64
     }
 
-    /// `N` 64-bit floats.
+    /// Reads `N` 64-bit floats.
     ///
     /// # Errors
-    /// When the message is cut short.
+    /// When the message is truncated.
     pub fn f64s<const N: usize>(&mut self) -> Result<[f64; N], DecodeError> {
         let mut values = [0.0; N];
         for value in &mut values {
@@ -153,10 +154,10 @@ impl<'a> Decoder<'a> {
         Ok(values)
     }
 
-    /// A string, without the zero that ends it on the wire.
+    /// Reads a string, without the terminating zero.
     ///
     /// # Errors
-    /// When the message is cut short, or the string is not UTF-8.
+    /// When the message is truncated, or the string is not UTF-8.
     pub fn string(&mut self) -> Result<&'a str, DecodeError> {
         let length = self.u32()? as usize;
         let bytes = self.take(length)?;
@@ -164,19 +165,19 @@ impl<'a> Decoder<'a> {
         std::str::from_utf8(text).map_err(|_| DecodeError::Text)
     }
 
-    /// The bytes of a sequence of bytes.
+    /// Reads a sequence of bytes.
     ///
     /// # Errors
-    /// When the message is cut short.
+    /// When the message is truncated.
     pub fn bytes(&mut self) -> Result<&'a [u8], DecodeError> {
         let length = self.u32()? as usize;
         self.take(length)
     }
 
-    /// A sequence of 32-bit floats.
+    /// Reads a sequence of 32-bit floats.
     ///
     /// # Errors
-    /// When the message is cut short.
+    /// When the message is truncated.
     pub fn f32_sequence(&mut self) -> Result<Vec<f32>, DecodeError> {
         let length = self.u32()? as usize;
         let bytes = self.take(length.checked_mul(4).ok_or(DecodeError::Short)?)?;
@@ -185,51 +186,52 @@ impl<'a> Decoder<'a> {
         Ok(words.iter().map(|word| from(*word)).collect())
     }
 
-    /// `builtin_interfaces/Time`, or the `time` of ROS 1, whose seconds have no sign.
+    /// Reads a `builtin_interfaces/Time`, or a ROS 1 `time`, whose seconds are unsigned.
     ///
     /// # Errors
-    /// When the message is cut short.
+    /// When the message is truncated.
     pub fn time(&mut self) -> Result<Stamp, DecodeError> {
         let seconds = self.u32()?;
         let seconds = match self.wire {
-            Wire::Cdr => i64::from(seconds.cast_signed()),
-            Wire::Ros1 => i64::from(seconds),
+            WireFormat::Cdr => i64::from(seconds.cast_signed()),
+            WireFormat::Ros1 => i64::from(seconds),
         };
         Ok(Stamp::from_nanos(seconds * NANOS_PER_SECOND + i64::from(self.u32()?)))
     }
 
-    /// `std_msgs/Header`: stamp and frame.
+    /// Reads a `std_msgs/Header`: stamp and frame.
     ///
     /// # Errors
-    /// When the message is cut short, or the frame is not UTF-8.
+    /// When the message is truncated, or the frame is not UTF-8.
     pub fn header(&mut self) -> Result<(Stamp, &'a str), DecodeError> {
-        if self.wire == Wire::Ros1 {
+        if self.wire == WireFormat::Ros1 {
             self.u32()?;
         }
         let stamp = self.time()?;
         Ok((stamp, self.string()?))
     }
 
-    /// `geometry_msgs/Vector3` (and `Point`).
+    /// Reads a `geometry_msgs/Vector3` (or `Point`).
     ///
     /// # Errors
-    /// When the message is cut short.
+    /// When the message is truncated.
     pub fn vector(&mut self) -> Result<Vector, DecodeError> {
         Ok(self.f64s::<3>()?.into())
     }
 
-    /// `geometry_msgs/Pose` (and `Transform`). A quaternion of norm 1 to the last bits is taken as it is, another is
-    /// normalised.
+    /// Reads a `geometry_msgs/Pose` (or `Transform`).
+    ///
+    /// A quaternion of unit norm up to rounding is unchanged; others are normalised.
     ///
     /// # Errors
-    /// When the message is cut short, a number is not finite, or the quaternion is far from a unit one.
+    /// When the message is truncated, a number is not finite, or the norm of the quaternion is far from 1.
     pub fn pose(&mut self) -> Result<Pose, DecodeError> {
         let position = self.vector()?;
         let [x, y, z, w] = self.f64s::<4>()?;
         let quaternion = nalgebra::Quaternion::new(w, x, y, z);
         let off = (quaternion.norm_squared() - 1.0).abs();
         if !position.iter().all(|c| c.is_finite()) || !off.is_finite() || off > 1e-2 {
-            return Err(DecodeError::Contradiction("a pose is not finite, or its quaternion is not a unit one"));
+            return Err(DecodeError::Contradiction("a pose is not finite, or its quaternion is not a unit quaternion"));
         }
         let rotation =
             if off < 1e-12 { Rotation::new_unchecked(quaternion) } else { Rotation::from_quaternion(quaternion) };

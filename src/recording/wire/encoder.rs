@@ -12,7 +12,7 @@ pub struct Encoder<'a> {
 }
 
 impl<'a> Encoder<'a> {
-    /// Begins a message at the end of `out`.
+    /// Starts a message at the end of `out`.
     pub fn new(out: &'a mut Vec<u8>) -> Self {
         out.extend_from_slice(&LITTLE_ENDIAN_CDR);
         let origin = out.len();
@@ -24,23 +24,23 @@ impl<'a> Encoder<'a> {
         self.out.resize(self.origin + length.next_multiple_of(size), 0);
     }
 
-    /// One byte.
+    /// Writes one byte.
     pub fn byte(&mut self, value: u8) {
         self.out.push(value);
     }
 
-    /// A 32-bit unsigned integer.
+    /// Writes a 32-bit unsigned integer.
     pub fn u32(&mut self, value: u32) {
         self.align(4);
         self.out.extend_from_slice(&value.to_le_bytes());
     }
 
-    /// A 32-bit float.
+    /// Writes a 32-bit float.
     pub fn f32(&mut self, value: f32) {
         self.u32(value.to_bits());
     }
 
-    /// 64-bit floats one after the other, without a length before them.
+    /// Writes consecutive 64-bit floats, without a length.
     pub fn f64s(&mut self, values: &[f64]) {
         self.align(8);
         for value in values {
@@ -48,24 +48,24 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// The length of a sequence or string.
+    /// Writes the length of a sequence or string.
     ///
     /// # Errors
-    /// When it does not fit 32 bits.
+    /// When the length does not fit into 32 bits.
     pub fn length(&mut self, length: usize) -> Result<(), RecordingError> {
         let fits = u32::try_from(length).map_err(|_| RecordingError::Unwritable {
             what: "a sequence's length",
             value: length.to_string(),
-            limit: "a message holds 32 bits of it",
+            limit: "a length is limited to 32 bits",
         })?;
         self.u32(fits);
         Ok(())
     }
 
-    /// A string, zero-terminated on the wire.
+    /// Writes a string and a terminating zero.
     ///
     /// # Errors
-    /// When it is longer than 32 bits can say.
+    /// When the length does not fit into 32 bits.
     pub fn string(&mut self, text: &str) -> Result<(), RecordingError> {
         self.length(text.len() + 1)?;
         self.out.extend_from_slice(text.as_bytes());
@@ -73,10 +73,10 @@ impl<'a> Encoder<'a> {
         Ok(())
     }
 
-    /// A sequence of 32-bit floats.
+    /// Writes a sequence of 32-bit floats.
     ///
     /// # Errors
-    /// When it is longer than 32 bits can say.
+    /// When the length does not fit into 32 bits.
     pub fn f32_sequence(&mut self, values: &[f32]) -> Result<(), RecordingError> {
         self.length(values.len())?;
         for (bytes, value) in self.room(values.len() * 4).chunks_exact_mut(4).zip(values) {
@@ -85,30 +85,30 @@ impl<'a> Encoder<'a> {
         Ok(())
     }
 
-    /// The next `length` bytes, for the caller to fill.
+    /// Appends `length` bytes for the caller to fill.
     pub fn room(&mut self, length: usize) -> &mut [u8] {
         let start = self.out.len();
         self.out.resize(start + length, 0);
         &mut self.out[start..]
     }
 
-    /// `builtin_interfaces/Time`.
+    /// Writes a `builtin_interfaces/Time`.
     ///
     /// # Errors
-    /// When the seconds do not fit 32 bits, signed.
+    /// When the seconds do not fit into a signed 32-bit integer.
     pub fn time(&mut self, stamp: Stamp) -> Result<(), RecordingError> {
         let nanos = stamp.nanos();
         let seconds = i32::try_from(nanos.div_euclid(NANOS_PER_SECOND)).map_err(|_| RecordingError::Unwritable {
             what: "a stamp",
             value: format!("{nanos} ns"),
-            limit: "a ROS 2 stamp ends 2^31 seconds from 1970",
+            limit: "ROS 2 stamps end 2^31 s after 1970",
         })?;
         self.u32(seconds.cast_unsigned());
         self.u32(nanos.rem_euclid(NANOS_PER_SECOND) as u32);
         Ok(())
     }
 
-    /// `std_msgs/Header`.
+    /// Writes a `std_msgs/Header`.
     ///
     /// # Errors
     /// As [`time`](Self::time).
@@ -117,13 +117,13 @@ impl<'a> Encoder<'a> {
         self.string(frame)
     }
 
-    /// `geometry_msgs/Pose` (and `Transform`, which has the same layout).
+    /// Writes a `geometry_msgs/Pose` (or `Transform`, which has the same layout).
     pub fn pose(&mut self, pose: &Pose) {
         let (p, q) = (&pose.translation.vector, &pose.rotation.coords);
         self.f64s(&[p.x, p.y, p.z, q.x, q.y, q.z, q.w]);
     }
 
-    /// `geometry_msgs/Vector3` (and `Point`).
+    /// Writes a `geometry_msgs/Vector3` (or `Point`).
     pub fn vector(&mut self, vector: &Vector) {
         self.f64s(&[vector.x, vector.y, vector.z]);
     }

@@ -1,4 +1,4 @@
-//! A sheet to draw on, in points from its top left corner, whatever is below: SVG or pixels.
+//! Drawing primitives on an SVG or bitmap backend, in points from the top left corner.
 
 use super::palette::{INK, Rgb};
 use super::{PlotError, font};
@@ -7,35 +7,35 @@ use plotters::prelude::{DrawingArea, DrawingBackend, IntoFont, PathElement, Poly
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontTransform, IntoTextStyle, ShapeStyle};
 
-/// A place on the sheet, in points, y downwards.
-pub(super) type At = (f64, f64);
+/// A position on the canvas, points, y downwards.
+pub(super) type CanvasPoint = (f64, f64);
 
-/// How a text stands about its place.
+/// Alignment of a text relative to its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
-    /// Begins at it, at middle height.
+    /// Starts at the position, vertically centred.
     Left,
-    /// Ends at it, at middle height.
+    /// Ends at the position, vertically centred.
     Right,
-    /// Centred below it.
+    /// Horizontally centred below the position.
     Below,
-    /// Centred on it, turned to be read from the right.
+    /// Centred on the position, rotated by 90 degrees anticlockwise.
     Sideways,
 }
 
-/// What a backend does with a line and a letter.
+/// How lines and text are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pen {
-    /// Keeps them as they are (SVG).
+    /// As vector elements (SVG).
     Vector,
-    /// Sets pixels. plotters' wide lines break at sharp turns, so here a line is the pixels within half its width.
+    /// As pixels. The wide lines of plotters have gaps at sharp corners, so lines are rasterised here.
     Pixels,
 }
 
-/// How far below where plotters sets it a letter stands in an SVG, in ems.
-const LETTER_DROP: f64 = 0.17;
+/// Vertical offset of SVG text relative to bitmap text in plotters, in ems; bitmap text is shifted to match.
+const SVG_TEXT_OFFSET: f64 = 0.17;
 
-/// A sheet whose points are `scale` units of the backend long: backends draw at whole units only.
+/// A canvas with `scale` backend units per point; the backends have integer coordinates.
 pub(super) struct Canvas<'a, DB: DrawingBackend> {
     pub(super) area: &'a DrawingArea<DB, Shift>,
     pub(super) scale: f64,
@@ -43,7 +43,7 @@ pub(super) struct Canvas<'a, DB: DrawingBackend> {
 }
 
 impl<DB: DrawingBackend> Canvas<'_, DB> {
-    fn unit(&self, at: At) -> (i32, i32) {
+    fn unit(&self, at: CanvasPoint) -> (i32, i32) {
         ((at.0 * self.scale).round() as i32, (at.1 * self.scale).round() as i32)
     }
 
@@ -55,7 +55,7 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
         self.area.fill(&RGBColor(255, 255, 255)).map_err(PlotError::drawing)
     }
 
-    pub(super) fn line(&self, points: &[At], colour: Rgb, width: f64) -> Result<(), PlotError> {
+    pub(super) fn line(&self, points: &[CanvasPoint], colour: Rgb, width: f64) -> Result<(), PlotError> {
         let mut units: Vec<(i32, i32)> = points.iter().map(|at| self.unit(*at)).collect();
         units.dedup();
         if units.len() < 2 {
@@ -69,7 +69,7 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
         }
     }
 
-    /// Sets every pixel within half the width of the segment from `a` to `b`: round ends join one to the next.
+    /// Draws all pixels within half the width of the segment from `a` to `b`; the round ends join the segments.
     fn segment(&self, a: (i32, i32), b: (i32, i32), colour: Rgb, width: f64) -> Result<(), PlotError> {
         let reach = (width * self.scale / 2.0).max(0.5);
         let margin = reach.ceil() as i32;
@@ -81,7 +81,7 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
             (to.0 - u * along.0).hypot(to.1 - u * along.1)
         };
         for y in a.1.min(b.1) - margin..=a.1.max(b.1) + margin {
-            // Only where the segment passes this row: its pixels within the reach, and no more.
+            // Visit only the columns near the part of the segment that crosses this row.
             let at_row = |edge: f64| match b.1 - a.1 {
                 0 => edge,
                 rise => f64::from(a.0) + along.0 * ((edge - f64::from(a.1)) / f64::from(rise)).clamp(0.0, 1.0),
@@ -100,37 +100,37 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
         Ok(())
     }
 
-    pub(super) fn area_between(&self, outline: &[At], colour: Rgb, opacity: f64) -> Result<(), PlotError> {
+    pub(super) fn polygon(&self, outline: &[CanvasPoint], colour: Rgb, opacity: f64) -> Result<(), PlotError> {
         let units: Vec<(i32, i32)> = outline.iter().map(|at| self.unit(*at)).collect();
         self.area.draw(&Polygon::new(units, rgb(colour).mix(opacity).filled())).map_err(PlotError::drawing)
     }
 
-    /// A filled rectangle from its upper left to its lower right corner.
-    pub(super) fn rectangle(&self, from: At, to: At, colour: Rgb) -> Result<(), PlotError> {
+    /// Draws a filled rectangle from the upper left to the lower right corner.
+    pub(super) fn rectangle(&self, from: CanvasPoint, to: CanvasPoint, colour: Rgb) -> Result<(), PlotError> {
         let filled = Rectangle::new([self.unit(from), self.unit(to)], rgb(colour).filled());
         self.area.draw(&filled).map_err(PlotError::drawing)
     }
 
-    /// A square dot of this size about `at`: for many small ones, which no one tells from discs.
-    pub(super) fn dot(&self, at: At, colour: Rgb, size: f64) -> Result<(), PlotError> {
+    /// Draws a square dot centred on `at`; at small sizes it looks like a disc.
+    pub(super) fn dot(&self, at: CanvasPoint, colour: Rgb, size: f64) -> Result<(), PlotError> {
         let corner = self.unit((at.0 - size / 2.0, at.1 - size / 2.0));
         let side = (size * self.scale).round().max(1.0) as i32;
         let square = Rectangle::new([corner, (corner.0 + side, corner.1 + side)], rgb(colour).filled());
         self.area.draw(&square).map_err(PlotError::drawing)
     }
 
-    pub(super) fn text(&self, text: &str, at: At, anchor: Anchor, size: f64) -> Result<(), PlotError> {
+    pub(super) fn text(&self, text: &str, at: CanvasPoint, anchor: Anchor, size: f64) -> Result<(), PlotError> {
         let (h, v) = match anchor {
             Anchor::Left => (HPos::Left, VPos::Center),
             Anchor::Right => (HPos::Right, VPos::Center),
             Anchor::Below => (HPos::Center, VPos::Top),
             Anchor::Sideways => (HPos::Center, VPos::Center),
         };
-        let (em, drop) = match self.pen {
-            Pen::Vector => (font::SIZE_OF_EM_IN_SVG, 0.0),
-            Pen::Pixels => (font::SIZE_OF_EM_IN_PIXELS, LETTER_DROP * size),
+        let (em, offset) = match self.pen {
+            Pen::Vector => (font::SVG_SIZE_PER_EM, 0.0),
+            Pen::Pixels => (font::BITMAP_SIZE_PER_EM, SVG_TEXT_OFFSET * size),
         };
-        let at = if anchor == Anchor::Sideways { (at.0 + drop, at.1) } else { (at.0, at.1 + drop) };
+        let at = if anchor == Anchor::Sideways { (at.0 + offset, at.1) } else { (at.0, at.1 + offset) };
         let upright = (font::NAME, size * em * self.scale).into_font();
         let font = if anchor == Anchor::Sideways { upright.transform(FontTransform::Rotate270) } else { upright };
         let ink = rgb(INK);
@@ -138,9 +138,9 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
         self.area.draw(&Text::new(text.to_owned(), self.unit(at), style)).map_err(PlotError::drawing)
     }
 
-    /// Width of a text, points.
+    /// The width of a text, points.
     pub(super) fn width_of(&self, text: &str, size: f64) -> Result<f64, PlotError> {
-        let font = (font::NAME, size * font::SIZE_OF_EM_IN_PIXELS * self.scale).into_font();
+        let font = (font::NAME, size * font::BITMAP_SIZE_PER_EM * self.scale).into_font();
         let (width, _) = font.box_size(text).map_err(|error| PlotError::Drawing(error.to_string()))?;
         Ok(f64::from(width) / self.scale)
     }

@@ -1,6 +1,6 @@
 use super::Colour;
 
-/// How a series is drawn.
+/// Line style or marker of a series.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mark {
     /// A line of this width in points.
@@ -11,47 +11,47 @@ pub enum Mark {
     Dots(f64),
 }
 
-/// Points of one kind in a chart.
+/// A data series of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Its name in the legend; empty for none.
+    /// Name in the legend; an empty name has no entry.
     pub name: String,
-    /// Its colour.
+    /// Colour.
     pub colour: Colour,
-    /// Line, dashes or dots.
+    /// Line style or marker.
     pub mark: Mark,
-    /// Abscissa and ordinate, in the axes' units; where one is not finite the line is broken.
+    /// Points (x, y) in the units of the axes; a non-finite point interrupts the line.
     pub points: Vec<(f64, f64)>,
-    /// A band behind the points: abscissa, lower and upper end (a confidence interval).
+    /// A band behind the points, such as a confidence interval: x, lower and upper end.
     pub band: Vec<(f64, f64, f64)>,
 }
 
 impl Series {
-    /// A line.
+    /// A series drawn as a line.
     pub fn line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self { name: name.to_owned(), colour, mark: Mark::Line(1.5), points, band: Vec::new() }
     }
 
-    /// Dots.
+    /// A series drawn as dots.
     pub fn dots(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self { mark: Mark::Dots(1.5), ..Self::line(name, colour, points) }
     }
 
-    /// The same, marked in another way.
+    /// Sets the line style or marker.
     #[must_use]
     pub fn marked(mut self, mark: Mark) -> Self {
         self.mark = mark;
         self
     }
 
-    /// The same, with a band behind it.
+    /// Sets the band.
     #[must_use]
     pub fn with_band(mut self, band: Vec<(f64, f64, f64)>) -> Self {
         self.band = band;
         self
     }
 
-    /// All finite points, the band's ends among them.
+    /// All finite points, including the ends of the band.
     pub(super) fn extent(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         let band = self.band.iter().flat_map(|(x, low, high)| [(*x, *low), (*x, *high)]);
         self.points.iter().copied().chain(band).filter(|(x, y)| x.is_finite() && y.is_finite())
@@ -61,67 +61,67 @@ impl Series {
 /// A rectangle of a [`Cells`] map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// From left to right, in the abscissa's unit.
+    /// Left and right edge, in the unit of the x axis.
     pub x: (f64, f64),
-    /// From below to above, in the ordinate's unit.
+    /// Lower and upper edge, in the unit of the y axis.
     pub y: (f64, f64),
-    /// The amount that its colour shows; one that is no number is not drawn.
+    /// The value that the colour represents; a cell with NaN is not drawn.
     pub value: f64,
 }
 
-/// Amounts as colours, behind all series.
+/// A heat map behind all series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cells {
-    /// What the amounts are, with their unit.
+    /// Quantity and unit of the values, for the legend.
     pub unit: String,
-    /// The amounts of the lightest and the darkest colour.
+    /// The values of the lightest and the darkest colour.
     pub range: (f64, f64),
     /// The rectangles.
     pub cells: Vec<Cell>,
 }
 
-/// Dots whose colour shows an amount of either sign, in front of all series. Those beyond the axes are not drawn.
+/// Dots with colours by a signed value, in front of all series; dots outside the axes are not drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignedDots {
-    /// What the amounts are, with their unit, for the legend; empty for none.
+    /// Quantity and unit of the values, for the legend; an empty text has no entry.
     pub unit: String,
-    /// The amount, of either sign, from which on the colour is the end's.
+    /// Magnitude of the value at which the colour saturates.
     pub limit: f64,
-    /// Diameter in points.
+    /// Diameter, points.
     pub size: f64,
-    /// Abscissa, ordinate, amount.
+    /// Position x, y and value.
     pub dots: Vec<(f64, f64, f64)>,
 }
 
-/// One pair of axes with what is drawn on it.
+/// A pair of axes with its data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// What it shows, above it; empty for none.
+    /// Title above the axes; can be empty.
     pub title: String,
-    /// Label of the abscissa with its unit, `"Time (s)"`.
+    /// Label of the x axis with unit, such as `"Time (s)"`.
     pub x_label: String,
-    /// Label of the ordinate with its unit.
+    /// Label of the y axis with unit.
     pub y_label: String,
-    /// Whether a unit is as long on both axes, as on a map.
+    /// Whether both axes have the same scale, as on a map.
     pub equal_axes: bool,
-    /// Whether the ordinate begins at zero at the latest.
+    /// Whether the y axis includes zero.
     pub from_zero: bool,
-    /// Ends of abscissa and ordinate; without, those of what is drawn.
+    /// Ranges of the x and y axes; `None` for the range of the data.
     pub range: Option<[(f64, f64); 2]>,
-    /// Amounts as colours.
+    /// Heat map.
     pub cells: Option<Cells>,
-    /// Dots coloured by an amount.
+    /// Dots with colours by a signed value.
     pub signed_dots: Option<SignedDots>,
-    /// Marks of the abscissa with their words, instead of round numbers; those beyond the data are left out.
-    pub x_marks: Vec<(f64, String)>,
-    /// The same of the ordinate.
-    pub y_marks: Vec<(f64, String)>,
-    /// What is drawn, from the back to the front.
+    /// Custom ticks of the x axis: value and label. Ticks outside the data range are omitted; empty for round numbers.
+    pub x_ticks: Vec<(f64, String)>,
+    /// Custom ticks of the y axis, as `x_ticks`.
+    pub y_ticks: Vec<(f64, String)>,
+    /// The series, from back to front.
     pub series: Vec<Series>,
 }
 
 impl Chart {
-    /// A chart without series.
+    /// A chart without data.
     pub fn new(title: &str, x_label: &str, y_label: &str) -> Self {
         Self {
             title: title.to_owned(),
@@ -132,69 +132,69 @@ impl Chart {
             range: None,
             cells: None,
             signed_dots: None,
-            x_marks: Vec::new(),
-            y_marks: Vec::new(),
+            x_ticks: Vec::new(),
+            y_ticks: Vec::new(),
             series: Vec::new(),
         }
     }
 
-    /// The same with another series in front.
+    /// Adds a series in front of the others.
     #[must_use]
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
-    /// The same with amounts as colours behind its series.
+    /// Sets the heat map.
     #[must_use]
     pub fn with_cells(mut self, cells: Cells) -> Self {
         self.cells = Some(cells);
         self
     }
 
-    /// The same with dots coloured by an amount in front.
+    /// Sets the dots with colours by a signed value.
     #[must_use]
     pub fn with_signed_dots(mut self, dots: SignedDots) -> Self {
         self.signed_dots = Some(dots);
         self
     }
 
-    /// The same with abscissa and ordinate between these ends.
+    /// Sets the ranges of the axes.
     #[must_use]
     pub fn between(mut self, x: (f64, f64), y: (f64, f64)) -> Self {
         self.range = Some([x, y]);
         self
     }
 
-    /// The same with marks of its own on the abscissa.
+    /// Sets custom ticks of the x axis.
     #[must_use]
-    pub fn with_x_marks(mut self, marks: Vec<(f64, String)>) -> Self {
-        self.x_marks = marks;
+    pub fn with_x_ticks(mut self, ticks: Vec<(f64, String)>) -> Self {
+        self.x_ticks = ticks;
         self
     }
 
-    /// The same with marks of its own on the ordinate.
+    /// Sets custom ticks of the y axis.
     #[must_use]
-    pub fn with_y_marks(mut self, marks: Vec<(f64, String)>) -> Self {
-        self.y_marks = marks;
+    pub fn with_y_ticks(mut self, ticks: Vec<(f64, String)>) -> Self {
+        self.y_ticks = ticks;
         self
     }
 
-    /// The same as a map.
+    /// Gives both axes the same scale, as on a map.
     #[must_use]
     pub fn as_map(mut self) -> Self {
         self.equal_axes = true;
         self
     }
 
-    /// The same with zero on its ordinate.
+    /// Extends the y axis to zero.
     #[must_use]
     pub fn starting_at_zero(mut self) -> Self {
         self.from_zero = true;
         self
     }
 
-    /// Least and greatest abscissa and ordinate of all that is drawn; a unit square where nothing is.
+    /// Range of the data in x and y; the unit square if there are no data.
     pub(super) fn extent(&self) -> [(f64, f64); 2] {
         let mut ends = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         let corners = |cell: &Cell| [(cell.x.0, cell.y.0), (cell.x.1, cell.y.1)];

@@ -3,33 +3,33 @@ use super::{Chart, PlotError, font, frame};
 use plotters::prelude::{BitMapBackend, BitMapElement, DrawingBackend, IntoDrawingArea, SVGBackend};
 use std::path::Path;
 
-/// Backends draw at whole units, so an SVG has this many of them to a point.
-const SVG_UNITS: u32 = 4;
-/// Pixels of a PNG to a point.
-const PNG_PIXELS: u32 = 2;
-/// Pixels are averaged from so many drawn ones each way: the pen does not smooth its edges.
-const OVERSAMPLED: u32 = 2;
+/// SVG units per point; the backends have integer coordinates, so one unit per point would be too coarse.
+const SVG_UNITS_PER_POINT: u32 = 4;
+/// Pixels of a PNG per point.
+const PNG_PIXELS_PER_POINT: u32 = 2;
+/// Oversampling factor of a PNG in each direction, for antialiasing: the backend draws without it.
+const OVERSAMPLING: u32 = 2;
 
-/// Charts below each other, or in columns.
+/// A plot of one or more charts, in one or more columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Width, points.
     pub width: f64,
-    /// Height of each chart that is no map, points; a map has the height it needs.
+    /// Height of each chart, points; the height of a map follows from its range.
     pub chart_height: f64,
-    /// How many charts stand beside each other.
+    /// Number of charts in a row.
     pub columns: usize,
     /// The charts, row by row from the top.
     pub charts: Vec<Chart>,
 }
 
 impl Figure {
-    /// A figure as wide as a page, with these charts.
+    /// A figure of page width with these charts, in one column.
     pub fn of(charts: Vec<Chart>) -> Self {
         Self { width: 720.0, chart_height: 250.0, columns: 1, charts }
     }
 
-    /// The same with so many charts in a row, at least one.
+    /// Sets the number of charts in a row, at least 1.
     #[must_use]
     pub fn in_columns(mut self, columns: usize) -> Self {
         self.columns = columns.max(1);
@@ -63,24 +63,24 @@ impl Figure {
         area.present().map_err(PlotError::drawing)
     }
 
-    /// The figure as the text of an SVG.
+    /// Draws the figure as an SVG and returns the text.
     ///
     /// # Errors
     /// When it cannot be drawn.
     pub fn svg(&self) -> Result<String, PlotError> {
         let (width, height) = self.size();
-        let (wide, high) = (width * SVG_UNITS, height * SVG_UNITS);
+        let (wide, high) = (width * SVG_UNITS_PER_POINT, height * SVG_UNITS_PER_POINT);
         let mut text = String::new();
-        self.draw(SVGBackend::with_string(&mut text, (wide, high)), SVG_UNITS, Pen::Vector)?;
-        let drawn = format!("width=\"{wide}\" height=\"{high}\"");
-        let shown = format!("width=\"{width}\" height=\"{height}\"");
-        Ok(text.replacen(&drawn, &shown, 1))
+        self.draw(SVGBackend::with_string(&mut text, (wide, high)), SVG_UNITS_PER_POINT, Pen::Vector)?;
+        let size_in_units = format!("width=\"{wide}\" height=\"{high}\"");
+        let size_in_points = format!("width=\"{width}\" height=\"{height}\"");
+        Ok(text.replacen(&size_in_units, &size_in_points, 1))
     }
 
     /// Writes `NAME.svg` and `NAME.png` into `folder`.
     ///
     /// # Errors
-    /// When the figure cannot be drawn, or a file not be written.
+    /// When the figure cannot be drawn, or a file cannot be written.
     pub fn save(&self, folder: &Path, name: &str) -> Result<(), PlotError> {
         let svg = folder.join(format!("{name}.svg"));
         std::fs::write(&svg, self.svg()?)
@@ -90,24 +90,24 @@ impl Figure {
 
     fn save_png(&self, path: &Path) -> Result<(), PlotError> {
         let (width, height) = self.size();
-        let scale = PNG_PIXELS * OVERSAMPLED;
+        let scale = PNG_PIXELS_PER_POINT * OVERSAMPLING;
         let (wide, high) = (width * scale, height * scale);
         let mut drawn = vec![0_u8; wide as usize * high as usize * 3];
         self.draw(BitMapBackend::with_buffer(&mut drawn, (wide, high)), scale, Pen::Pixels)?;
 
-        let size = (width * PNG_PIXELS, height * PNG_PIXELS);
-        let pixels = averaged(&drawn, wide as usize, OVERSAMPLED as usize);
+        let size = (width * PNG_PIXELS_PER_POINT, height * PNG_PIXELS_PER_POINT);
+        let pixels = downsampled(&drawn, wide as usize, OVERSAMPLING as usize);
         let area = BitMapBackend::new(path, size).into_drawing_area();
-        let Some(picture) = BitMapElement::with_owned_buffer((0, 0), size, pixels) else {
-            return Err(PlotError::Drawing("the picture has another size than it was drawn for".to_owned()));
+        let Some(image) = BitMapElement::with_owned_buffer((0, 0), size, pixels) else {
+            return Err(PlotError::Drawing("the PNG buffer does not have the size of the image".to_owned()));
         };
-        area.draw(&picture).map_err(PlotError::drawing)?;
+        area.draw(&image).map_err(PlotError::drawing)?;
         area.present().map_err(PlotError::drawing)
     }
 }
 
-/// A picture of RGB bytes with every `side` x `side` pixels made one, their mean.
-fn averaged(drawn: &[u8], wide: usize, side: usize) -> Vec<u8> {
+/// Downsamples an RGB image: each output pixel is the mean of `side` x `side` pixels.
+fn downsampled(drawn: &[u8], wide: usize, side: usize) -> Vec<u8> {
     let high = drawn.len() / 3 / wide;
     let mut pixels = Vec::with_capacity(drawn.len() / (side * side));
     for row in 0..high / side {
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn an_svg_holds_its_words_and_is_well_formed() {
+    fn an_svg_contains_its_text_and_is_complete() {
         let svg = figure().svg().unwrap();
         for word in ["A wave", "Time (s)", "Height (m)", "sine &amp; &lt;co&gt;", "width=\"720\""] {
             assert!(svg.contains(word), "{word} is missing");
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_is_the_same_each_time_and_on_disk_in_both_forms() {
+    fn a_figure_is_saved_in_both_formats_and_is_reproducible() {
         let folder = tempfile::tempdir().unwrap();
         figure().save(folder.path(), "wave").unwrap();
         let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn no_data_is_an_empty_chart_and_no_panic() {
+    fn a_chart_without_finite_data_is_drawn_empty() {
         let empty = Figure::of(vec![Chart::new("", "x", "y"), Chart::new("", "x", "y").as_map()]);
         assert!(empty.svg().is_ok());
         let nan = Series::line("nan", Colour::Truth, vec![(0.0, f64::NAN), (f64::INFINITY, 1.0)]);

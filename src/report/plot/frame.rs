@@ -1,28 +1,28 @@
-//! One chart on a canvas: title, legend, grid, labels, and the data within.
+//! Draws one chart: header, grid, labels and data.
 
 use super::axis::Axis;
-use super::canvas::{Anchor, At, Canvas};
+use super::canvas::{Anchor, Canvas, CanvasPoint};
 use super::legend::Header;
 use super::palette::{GRID, INK, shade, signed_shade};
 use super::stroke::dashes;
 use super::{Chart, Mark, PlotError, Series, SignedDots};
 use plotters::prelude::DrawingBackend;
 
-/// Sizes of letters, points.
+/// Font sizes, points.
 pub(super) const TEXT: f64 = 12.0;
 pub(super) const SMALL: f64 = 11.0;
-/// Room for one line of title and legend, below the axis for numbers and label, and left and right of it.
+/// Margins around the axes, points: above for one line of title and legend, below and left for tick labels and axis label.
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;
 const LEFT: f64 = 68.0;
 const RIGHT: f64 = 18.0;
-/// Points from one tick to the next, at least about.
+/// Approximate minimum distance between ticks, points.
 const TICK_X: f64 = 85.0;
 const TICK_Y: f64 = 28.0;
-/// However narrow a chart is, its scale is told by about so many.
-const LEAST_TICKS: usize = 4;
+/// Approximate minimum number of ticks, so that the scale of a narrow chart can be read.
+const MIN_TICKS: usize = 4;
 
-/// Where a chart's axes stand on the sheet.
+/// The axes of a chart on the canvas.
 struct Frame {
     left: f64,
     top: f64,
@@ -33,7 +33,7 @@ struct Frame {
 }
 
 impl Frame {
-    fn at(&self, (x, y): (f64, f64)) -> At {
+    fn at(&self, (x, y): (f64, f64)) -> CanvasPoint {
         (self.left + self.x.fraction(x) * self.width, self.top + (1.0 - self.y.fraction(y)) * self.height)
     }
 
@@ -46,7 +46,7 @@ impl Frame {
     }
 }
 
-/// Height of a chart that is `width` wide: that of the map for a map, else `wanted`.
+/// Height of a chart of the given width, points: `wanted`, or for a map the height that its range requires.
 pub(super) fn height_of(chart: &Chart, width: f64, wanted: f64) -> f64 {
     if !chart.equal_axes {
         return wanted;
@@ -56,19 +56,19 @@ pub(super) fn height_of(chart: &Chart, width: f64, wanted: f64) -> f64 {
     ((width - LEFT - RIGHT) * shape).clamp(150.0, 620.0) + TOP + BOTTOM
 }
 
-/// Draws a chart into the rectangle at `corner`.
+/// Draws a chart into the rectangle of `size` at the upper left `corner`.
 pub(super) fn draw<DB: DrawingBackend>(
     canvas: &Canvas<DB>,
     chart: &Chart,
-    corner: At,
+    corner: CanvasPoint,
     size: (f64, f64),
 ) -> Result<(), PlotError> {
-    let left = left_of(canvas, chart)?;
+    let left = left_margin(canvas, chart)?;
     let header = Header::of(canvas, chart, size.0 - left - RIGHT)?;
-    let more = header.more_height();
-    let frame = place(chart, (corner.0, corner.1 + more), (size.0, size.1 - more), left);
+    let extra = header.extra_height();
+    let frame = frame_of(chart, (corner.0, corner.1 + extra), (size.0, size.1 - extra), left);
     grid(canvas, &frame, chart)?;
-    cells(canvas, &frame, chart)?;
+    heat_map(canvas, &frame, chart)?;
     for series in &chart.series {
         band(canvas, &frame, series)?;
     }
@@ -95,8 +95,8 @@ fn ranges(chart: &Chart) -> [Axis; 2] {
     [x_axis, y_axis]
 }
 
-/// Axes that fill their rectangle; for a map, the shorter axis is made longer until a metre is as long on both.
-fn place(chart: &Chart, corner: At, size: (f64, f64), left: f64) -> Frame {
+/// Axes that fill the rectangle; on a map, one range is widened until both axes have the same scale.
+fn frame_of(chart: &Chart, corner: CanvasPoint, size: (f64, f64), left: f64) -> Frame {
     let [x, y] = ranges(chart);
     let (width, height) = (size.0 - left - RIGHT, size.1 - TOP - BOTTOM);
     let mut frame = Frame { left: corner.0 + left, top: corner.1 + TOP, width, height, x, y };
@@ -111,27 +111,27 @@ fn place(chart: &Chart, corner: At, size: (f64, f64), left: f64) -> Frame {
     frame
 }
 
-/// Room left of the axes: words need more than numbers.
-fn left_of<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &Chart) -> Result<f64, PlotError> {
-    chart.y_marks.iter().try_fold(LEFT, |room, (_, words)| Ok(room.max(canvas.width_of(words, SMALL)? + 16.0)))
+/// The left margin, wide enough for custom tick labels, points.
+fn left_margin<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &Chart) -> Result<f64, PlotError> {
+    chart.y_ticks.iter().try_fold(LEFT, |margin, (_, label)| Ok(margin.max(canvas.width_of(label, SMALL)? + 16.0)))
 }
 
-/// The marks that a chart asks for, where they are on its axis; else about `wanted` round numbers.
-fn marks(axis: &Axis, asked: &[(f64, String)], wanted: f64) -> Vec<(f64, String)> {
-    if asked.is_empty() {
-        return axis.ticks((wanted as usize).max(LEAST_TICKS));
+/// The custom ticks within the range of an axis, or about `wanted` round numbers if there are none.
+fn ticks(axis: &Axis, custom: &[(f64, String)], wanted: f64) -> Vec<(f64, String)> {
+    if custom.is_empty() {
+        return axis.ticks((wanted as usize).max(MIN_TICKS));
     }
-    asked.iter().filter(|(value, _)| (axis.low..=axis.high).contains(value)).cloned().collect()
+    custom.iter().filter(|(value, _)| (axis.low..=axis.high).contains(value)).cloned().collect()
 }
 
 fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
-    for (value, label) in marks(&frame.x, &chart.x_marks, frame.width / TICK_X) {
+    for (value, label) in ticks(&frame.x, &chart.x_ticks, frame.width / TICK_X) {
         let (x, _) = frame.at((value, frame.y.low));
         canvas.line(&[(x, frame.top), (x, frame.bottom())], GRID, 0.8)?;
         canvas.line(&[(x, frame.bottom()), (x, frame.bottom() + 4.0)], INK, 0.8)?;
         canvas.text(&label, (x, frame.bottom() + 7.0), Anchor::Below, SMALL)?;
     }
-    for (value, label) in marks(&frame.y, &chart.y_marks, frame.height / TICK_Y) {
+    for (value, label) in ticks(&frame.y, &chart.y_ticks, frame.height / TICK_Y) {
         let (_, y) = frame.at((frame.x.low, value));
         canvas.line(&[(frame.left, y), (frame.right(), y)], GRID, 0.8)?;
         canvas.line(&[(frame.left - 4.0, y), (frame.left, y)], INK, 0.8)?;
@@ -143,12 +143,12 @@ fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -
     canvas.text(&chart.y_label, (frame.left - LEFT + 14.0, frame.top + frame.height / 2.0), Anchor::Sideways, TEXT)
 }
 
-fn cells<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
+fn heat_map<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
     let Some(cells) = &chart.cells else { return Ok(()) };
-    let (least, most) = cells.range;
+    let (min, max) = cells.range;
     cells.cells.iter().filter(|cell| cell.value.is_finite()).try_for_each(|cell| {
         let (upper_left, lower_right) = (frame.at((cell.x.0, cell.y.1)), frame.at((cell.x.1, cell.y.0)));
-        canvas.rectangle(upper_left, lower_right, shade((cell.value - least) / (most - least)))
+        canvas.rectangle(upper_left, lower_right, shade((cell.value - min) / (max - min)))
     })
 }
 
@@ -156,16 +156,16 @@ fn signed_dots<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &C
     let Some(SignedDots { limit, size, dots, .. }) = &chart.signed_dots else { return Ok(()) };
     let within = |axis: &Axis, value: f64| (axis.low..=axis.high).contains(&value);
     dots.iter()
-        .filter(|(x, y, amount)| within(&frame.x, *x) && within(&frame.y, *y) && amount.is_finite())
-        .try_for_each(|(x, y, amount)| canvas.dot(frame.at((*x, *y)), signed_shade(0.5 + 0.5 * amount / limit), *size))
+        .filter(|(x, y, value)| within(&frame.x, *x) && within(&frame.y, *y) && value.is_finite())
+        .try_for_each(|(x, y, value)| canvas.dot(frame.at((*x, *y)), signed_shade(0.5 + 0.5 * value / limit), *size))
 }
 
 fn band<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series) -> Result<(), PlotError> {
     let upper = series.band.iter().map(|(x, _, high)| (*x, *high));
     let lower = series.band.iter().rev().map(|(x, low, _)| (*x, *low));
-    let outline: Vec<At> =
+    let outline: Vec<CanvasPoint> =
         upper.chain(lower).filter(|(x, y)| x.is_finite() && y.is_finite()).map(|point| frame.at(point)).collect();
-    if outline.len() < 3 { Ok(()) } else { canvas.area_between(&outline, series.colour.rgb(), 0.2) }
+    if outline.len() < 3 { Ok(()) } else { canvas.polygon(&outline, series.colour.rgb(), 0.2) }
 }
 
 fn points<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series) -> Result<(), PlotError> {
@@ -174,8 +174,8 @@ fn points<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Serie
     if let Mark::Dots(size) = series.mark {
         return series.points.iter().filter(|p| is_finite(p)).try_for_each(|p| canvas.dot(frame.at(*p), colour, size));
     }
-    for stretch in series.points.split(|point| !is_finite(point)) {
-        let path = thinned(&stretch.iter().map(|point| frame.at(*point)).collect::<Vec<At>>());
+    for section in series.points.split(|point| !is_finite(point)) {
+        let path = decimated(&section.iter().map(|point| frame.at(*point)).collect::<Vec<CanvasPoint>>());
         match series.mark {
             Mark::Dashes(width) => dashes(canvas, &path, series, width)?,
             Mark::Line(width) | Mark::Dots(width) => canvas.line(&path, colour, width)?,
@@ -184,18 +184,19 @@ fn points<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Serie
     Ok(())
 }
 
-/// The path without what a print would not show: of all points within half a point's width, first, least, greatest,
-/// last.
-fn thinned(path: &[At]) -> Vec<At> {
+/// Decimates a path without visible change: within each column of half a point, it keeps the first, lowest, highest
+/// and last point.
+fn decimated(path: &[CanvasPoint]) -> Vec<CanvasPoint> {
+    // Width of a column, points.
     const COLUMN: f64 = 0.5;
-    let mut kept: Vec<At> = Vec::new();
+    let mut kept: Vec<CanvasPoint> = Vec::new();
     let mut rest = path;
     while let Some(first) = rest.first() {
         let count = rest.iter().take_while(|at| (at.0 - first.0).abs() < COLUMN).count();
         let (column, after) = rest.split_at(count);
-        let by_height = |a: &&At, b: &&At| a.1.total_cmp(&b.1);
+        let by_height = |a: &&CanvasPoint, b: &&CanvasPoint| a.1.total_cmp(&b.1);
         let ends = [column.iter().min_by(by_height), column.iter().max_by(by_height)];
-        let mut keep: Vec<At> =
+        let mut keep: Vec<CanvasPoint> =
             [column.first(), ends[0], ends[1], column.last()].into_iter().flatten().copied().collect();
         keep.dedup();
         kept.extend(keep);
@@ -209,11 +210,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thinning_keeps_every_peak() {
-        // 100 000 points over 100 points' width, one spike: a few points a column remain, the spike among them.
+    fn decimation_keeps_every_peak() {
+        // 100 000 points over a width of 100 points (pt), with one spike: a few points per column remain, with the spike.
         let spike = |k: usize| if k == 51_234 { -40.0 } else { 10.0 + (k % 7) as f64 };
-        let path: Vec<At> = (0..100_000).map(|k| (k as f64 * 1e-3, spike(k))).collect();
-        let kept = thinned(&path);
+        let path: Vec<CanvasPoint> = (0..100_000).map(|k| (k as f64 * 1e-3, spike(k))).collect();
+        let kept = decimated(&path);
         assert!(kept.len() < 900, "{}", kept.len());
         assert!(kept.iter().any(|at| at.1 == -40.0));
     }

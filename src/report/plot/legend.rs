@@ -1,40 +1,40 @@
-//! What stands above a chart's axes: its title, and what its series and colours mean.
+//! Header of a chart: title and legend above the axes.
 
-use super::canvas::{Anchor, At, Canvas};
+use super::canvas::{Anchor, Canvas, CanvasPoint};
 use super::frame::{SMALL, TEXT};
 use super::palette::{INK, Rgb, shade, signed_shade};
 use super::{Chart, Mark, PlotError, Series, axis, stroke};
 use plotters::prelude::DrawingBackend;
 
-/// From one line of the legend to the next.
-const LINE: f64 = 17.0;
-/// From the lowest line to the axes.
+/// Line spacing of the legend, points.
+const LINE_SPACING: f64 = 17.0;
+/// Distance from the lowest line to the axes, points.
 const ABOVE_AXES: f64 = 13.0;
-/// Length of a line in the legend.
-const SAMPLE: f64 = 20.0;
-/// Room between two entries, and between an entry's sample and its name.
-const BETWEEN: f64 = 18.0;
-const TO_NAME: f64 = 6.0;
-/// Length of the strip of colours.
-const STRIP: f64 = 96.0;
+/// Length of a line sample in the legend, points.
+const SAMPLE_LENGTH: f64 = 20.0;
+/// Distances between two entries, and between the sample and the name of an entry, points.
+const ENTRY_GAP: f64 = 18.0;
+const NAME_GAP: f64 = 6.0;
+/// Length of the colour bar, points.
+const COLOUR_BAR: f64 = 96.0;
 
-/// Title and legend, broken into lines.
+/// Title and legend, wrapped into lines.
 pub(super) struct Header<'a> {
     title: &'a str,
     lines: Vec<Vec<Entry<'a>>>,
-    /// Whether the title has a line of its own.
-    is_apart: bool,
+    /// Whether the title is on a separate line.
+    title_is_separate: bool,
 }
 
-/// An entry of the legend, and how wide it is, points.
+/// An entry of the legend with its width, points.
 struct Entry<'a> {
-    of: What<'a>,
+    content: EntryContent<'a>,
     width: f64,
 }
 
-enum What<'a> {
+enum EntryContent<'a> {
     Series(&'a Series),
-    Colours { least: String, most: String, shade: fn(f64) -> Rgb },
+    ColourBar { min: String, max: String, shade: fn(f64) -> Rgb },
 }
 
 impl<'a> Header<'a> {
@@ -42,47 +42,51 @@ impl<'a> Header<'a> {
     pub fn of<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &'a Chart, width: f64) -> Result<Self, PlotError> {
         let mut entries = Vec::new();
         for series in chart.series.iter().filter(|series| !series.name.is_empty()) {
-            let wide = SAMPLE + TO_NAME + canvas.width_of(&series.name, SMALL)?;
-            entries.push(Entry { of: What::Series(series), width: wide });
+            let wide = SAMPLE_LENGTH + NAME_GAP + canvas.width_of(&series.name, SMALL)?;
+            entries.push(Entry { content: EntryContent::Series(series), width: wide });
         }
         if let Some(cells) = &chart.cells {
-            entries.push(colours(canvas, cells.range, &cells.unit, shade)?);
+            entries.push(colour_bar(canvas, cells.range, &cells.unit, shade)?);
         }
         if let Some(dots) = chart.signed_dots.as_ref().filter(|dots| !dots.unit.is_empty()) {
-            entries.push(colours(canvas, (-dots.limit, dots.limit), &dots.unit, signed_shade)?);
+            entries.push(colour_bar(canvas, (-dots.limit, dots.limit), &dots.unit, signed_shade)?);
         }
         let mut lines: Vec<Vec<Entry<'a>>> = Vec::new();
         for entry in entries {
             match lines.last_mut() {
-                Some(line) if width_of(line) + BETWEEN + entry.width <= width => line.push(entry),
+                Some(line) if width_of(line) + ENTRY_GAP + entry.width <= width => line.push(entry),
                 _ => lines.push(vec![entry]),
             }
         }
         let title = canvas.width_of(&chart.title, TEXT)?;
-        let beside = lines.first().map_or(0.0, |line| BETWEEN + width_of(line));
-        Ok(Self { title: &chart.title, lines, is_apart: title > 0.0 && beside > 0.0 && title + beside > width })
+        let legend = lines.first().map_or(0.0, |line| ENTRY_GAP + width_of(line));
+        Ok(Self {
+            title: &chart.title,
+            lines,
+            title_is_separate: title > 0.0 && legend > 0.0 && title + legend > width,
+        })
     }
 
-    /// How much higher it is than one line.
-    pub fn more_height(&self) -> f64 {
-        (self.lines.len() + usize::from(self.is_apart)).saturating_sub(1) as f64 * LINE
+    /// Height above that of a single line, points.
+    pub fn extra_height(&self) -> f64 {
+        (self.lines.len() + usize::from(self.title_is_separate)).saturating_sub(1) as f64 * LINE_SPACING
     }
 
-    /// Draws it above axes from `left` to `right` whose top is at `top`.
+    /// Draws the header above axes that extend from `left` to `right` and up to `top`.
     pub fn draw<DB: DrawingBackend>(
         &self,
         canvas: &Canvas<DB>,
         (left, right): (f64, f64),
         top: f64,
     ) -> Result<(), PlotError> {
-        let first = top - ABOVE_AXES - self.more_height();
+        let first = top - ABOVE_AXES - self.extra_height();
         canvas.text(self.title, (left, first), Anchor::Left, TEXT)?;
         for (index, line) in self.lines.iter().enumerate() {
-            let y = first + (index + usize::from(self.is_apart)) as f64 * LINE;
+            let y = first + (index + usize::from(self.title_is_separate)) as f64 * LINE_SPACING;
             let mut x = right - width_of(line);
             for entry in line {
                 entry.draw(canvas, (x, y))?;
-                x += entry.width + BETWEEN;
+                x += entry.width + ENTRY_GAP;
             }
         }
         Ok(())
@@ -90,45 +94,45 @@ impl<'a> Header<'a> {
 }
 
 fn width_of(line: &[Entry<'_>]) -> f64 {
-    line.iter().map(|entry| entry.width).sum::<f64>() + BETWEEN * line.len().saturating_sub(1) as f64
+    line.iter().map(|entry| entry.width).sum::<f64>() + ENTRY_GAP * line.len().saturating_sub(1) as f64
 }
 
-fn colours<'a, DB: DrawingBackend>(
+fn colour_bar<'a, DB: DrawingBackend>(
     canvas: &Canvas<DB>,
-    (least, most): (f64, f64),
+    (min, max): (f64, f64),
     unit: &str,
     shade: fn(f64) -> Rgb,
 ) -> Result<Entry<'a>, PlotError> {
-    let (least, most) = (axis::short(least), format!("{} {unit}", axis::short(most)));
-    let words = canvas.width_of(&least, SMALL)? + canvas.width_of(&most, SMALL)?;
-    Ok(Entry { of: What::Colours { least, most, shade }, width: words + STRIP + 2.0 * TO_NAME })
+    let (min, max) = (axis::short(min), format!("{} {unit}", axis::short(max)));
+    let labels = canvas.width_of(&min, SMALL)? + canvas.width_of(&max, SMALL)?;
+    Ok(Entry { content: EntryContent::ColourBar { min, max, shade }, width: labels + COLOUR_BAR + 2.0 * NAME_GAP })
 }
 
 impl Entry<'_> {
-    fn draw<DB: DrawingBackend>(&self, canvas: &Canvas<DB>, (x, y): At) -> Result<(), PlotError> {
-        match &self.of {
-            What::Series(series) => {
-                let sample = [(x, y), (x + SAMPLE, y)];
+    fn draw<DB: DrawingBackend>(&self, canvas: &Canvas<DB>, (x, y): CanvasPoint) -> Result<(), PlotError> {
+        match &self.content {
+            EntryContent::Series(series) => {
+                let sample = [(x, y), (x + SAMPLE_LENGTH, y)];
                 match series.mark {
                     Mark::Line(width) => canvas.line(&sample, series.colour.rgb(), width.max(1.5))?,
                     Mark::Dashes(width) => stroke::dashes(canvas, &sample, series, width.max(1.5))?,
-                    Mark::Dots(_) => canvas.dot((x + SAMPLE / 2.0, y), series.colour.rgb(), 6.0)?,
+                    Mark::Dots(_) => canvas.dot((x + SAMPLE_LENGTH / 2.0, y), series.colour.rgb(), 6.0)?,
                 }
-                canvas.text(&series.name, (x + SAMPLE + TO_NAME, y), Anchor::Left, SMALL)
+                canvas.text(&series.name, (x + SAMPLE_LENGTH + NAME_GAP, y), Anchor::Left, SMALL)
             }
-            What::Colours { least, most, shade } => {
-                canvas.text(least, (x, y), Anchor::Left, SMALL)?;
-                let start = x + canvas.width_of(least, SMALL)? + TO_NAME;
-                let steps = STRIP as u32;
+            EntryContent::ColourBar { min, max, shade } => {
+                canvas.text(min, (x, y), Anchor::Left, SMALL)?;
+                let start = x + canvas.width_of(min, SMALL)? + NAME_GAP;
+                let steps = COLOUR_BAR as u32;
                 for k in 0..steps {
                     let at = start + f64::from(k);
-                    let share = (f64::from(k) + 0.5) / f64::from(steps);
-                    canvas.rectangle((at, y - 5.0), (at + 1.0, y + 5.0), shade(share))?;
+                    let fraction = (f64::from(k) + 0.5) / f64::from(steps);
+                    canvas.rectangle((at, y - 5.0), (at + 1.0, y + 5.0), shade(fraction))?;
                 }
-                let end = start + STRIP;
+                let end = start + COLOUR_BAR;
                 let outline = [(start, y - 5.0), (end, y - 5.0), (end, y + 5.0), (start, y + 5.0), (start, y - 5.0)];
                 canvas.line(&outline, INK, 0.5)?;
-                canvas.text(most, (end + TO_NAME, y), Anchor::Left, SMALL)
+                canvas.text(max, (end + NAME_GAP, y), Anchor::Left, SMALL)
             }
         }
     }

@@ -1,7 +1,8 @@
 //! Plots as SVG and PNG.
 //!
-//! A [`Figure`] is one or more [`Chart`]s below each other, a chart some [`Series`] on a pair of axes. Legends stand
-//! above the axes, so that they cover no data; labels carry their units. The axes are drawn here; plotters is the pen.
+//! A [`Figure`] has one or more [`Chart`]s; a chart has [`Series`] on a pair of axes. Legends are above the axes, so that
+//! they do not cover data; axis labels include the unit. This module lays out axes and legends; plotters only draws
+//! primitives.
 
 mod axis;
 mod canvas;
@@ -17,18 +18,18 @@ pub use chart::{Cell, Cells, Chart, Mark, Series, SignedDots};
 pub use figure::Figure;
 pub use palette::Colour;
 
-/// Why a figure is not there.
+/// Error when a plot is drawn or saved.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
-    /// The pen refused.
-    #[error("a plot cannot be drawn: {0}")]
+    /// The drawing backend failed.
+    #[error("cannot draw the plot: {0}")]
     Drawing(String),
     /// The file cannot be written.
-    #[error("{path} cannot be written: {source}")]
+    #[error("cannot write {path}: {source}")]
     File {
-        /// Which file.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }

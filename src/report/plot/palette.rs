@@ -1,16 +1,16 @@
-//! Colours that people with any colour vision tell apart (Okabe and Ito 2008), on white.
+//! Colours on white that remain distinct under colour blindness (Okabe and Ito 2008).
 
 /// Red, green, blue.
 pub(super) type Rgb = (u8, u8, u8);
 
 /// Text and axes.
 pub(super) const INK: Rgb = (38, 38, 38);
-/// Lines of the grid.
+/// Grid lines.
 pub(super) const GRID: Rgb = (228, 228, 228);
-/// What stands behind the data.
+/// Background elements, such as walls.
 pub(super) const BACKDROP: Rgb = (196, 200, 204);
 
-/// From light to dark, for amounts: ColorBrewer's YlGnBu (Harrower and Brewer 2003) without its lightest colour.
+/// Sequential colour map: ColorBrewer's YlGnBu (Harrower and Brewer 2003) without the lightest colour.
 const SHADES: [Rgb; 8] = [
     (237, 248, 177),
     (199, 233, 180),
@@ -22,43 +22,43 @@ const SHADES: [Rgb; 8] = [
     (8, 29, 88),
 ];
 
-/// From one sign over little to the other: blue, grey, vermilion.
+/// Diverging colour map: blue for negative, grey for zero, vermilion for positive values.
 const SIGNED_SHADES: [Rgb; 3] = [(0, 114, 178), (206, 206, 200), (213, 94, 0)];
 
-/// The colour of an amount, from 0 to 1; what is beyond has the end's.
-pub(super) fn shade(share: f64) -> Rgb {
-    between(&SHADES, share)
+/// The sequential colour of a value from 0 to 1; values outside are clamped.
+pub(super) fn shade(fraction: f64) -> Rgb {
+    interpolated(&SHADES, fraction)
 }
 
-/// The colour of an amount that has a sign: 0 for the most negative, 1 for the most positive.
-pub(super) fn signed_shade(share: f64) -> Rgb {
-    between(&SIGNED_SHADES, share)
+/// The diverging colour of a value from 0 (most negative) to 1 (most positive); values outside are clamped.
+pub(super) fn signed_shade(fraction: f64) -> Rgb {
+    interpolated(&SIGNED_SHADES, fraction)
 }
 
-fn between(shades: &[Rgb], share: f64) -> Rgb {
-    let place = share.clamp(0.0, 1.0) * (shades.len() - 1) as f64;
-    let below = (place as usize).min(shades.len() - 2);
-    let (a, b, u) = (shades[below], shades[below + 1], place - below as f64);
+fn interpolated(shades: &[Rgb], fraction: f64) -> Rgb {
+    let position = fraction.clamp(0.0, 1.0) * (shades.len() - 1) as f64;
+    let below = (position as usize).min(shades.len() - 2);
+    let (a, b, u) = (shades[below], shades[below + 1], position - below as f64);
     let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * u).round() as u8;
     (mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
 }
 
-/// What a series shows, which decides its colour in every figure alike.
+/// The role of a series, which determines its colour in all figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colour {
-    /// The truth, and closed forms: near black.
+    /// Truth and closed-form results: dark grey.
     Truth,
-    /// The estimate, and what was measured: blue.
+    /// Estimates and measurements: blue.
     Estimate,
-    /// A second kind of what was estimated: vermilion.
+    /// Second category: vermilion.
     Second,
-    /// A third: bluish green.
+    /// Third category: bluish green.
     Third,
-    /// A fourth: orange.
+    /// Fourth category: orange.
     Fourth,
-    /// A fifth: reddish purple.
+    /// Fifth category: reddish purple.
     Fifth,
-    /// What stands behind the data: light grey.
+    /// Background: light grey.
     Backdrop,
 }
 

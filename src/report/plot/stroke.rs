@@ -1,16 +1,17 @@
-//! Lines that are not whole.
+//! Dashed lines.
 
-use super::canvas::{At, Canvas};
+use super::canvas::{Canvas, CanvasPoint};
 use super::{PlotError, Series};
 use plotters::prelude::DrawingBackend;
 
-/// A dashed path of this width in points.
+/// Draws a dashed path; `width` is the line width, points.
 pub(super) fn dashes<DB: DrawingBackend>(
     canvas: &Canvas<DB>,
-    path: &[At],
+    path: &[CanvasPoint],
     series: &Series,
     width: f64,
 ) -> Result<(), PlotError> {
+    // Lengths, points.
     const DASH: f64 = 5.0;
     const GAP: f64 = 3.0;
     let mut along = 0.0;

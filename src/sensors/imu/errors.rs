@@ -3,13 +3,13 @@ use crate::geometry::{Matrix, Vector};
 use crate::random::{Seed, Stream};
 use rand_distr::{Distribution, StandardNormal};
 
-/// The errors of three like axes, in SI units.
+/// Error model of three axes of the same kind, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TriadModel {
     pub density: f64,
     pub turn_on: f64,
     pub walk: f64,
-    pub wander: Option<GaussMarkov>,
+    pub gauss_markov: Option<GaussMarkov>,
     pub scale: f64,
     pub misalignment: f64,
     pub limit: f64,
@@ -29,12 +29,12 @@ impl GaussMarkov {
     }
 }
 
-/// What a seed makes of an IMU's errors: its scale and misalignment in this run, and its biases as they walk.
+/// Errors of an IMU in one run, drawn from a seed: scale, misalignment, and biases that change over time.
 ///
-/// A sample over `dt` is `round(clamp((I + S + M) true + bias + white))`, with white noise of `density / sqrt(dt)` and
-/// a bias `b' = b + walk sqrt(dt) w` from one sample to the next, beside an optional wandering part `b' = phi b + sigma
-/// sqrt(1 - phi^2) w`, `phi = exp(-dt / time)`. (Noise as Kalibr's IMU model writes it; the axes' scale errors `S` are
-/// a diagonal, their misalignments `M` the other six entries.)
+/// A sample over `dt` is `round(clamp((I + S + M) true + bias + white))`, with white noise of `density / sqrt(dt)`. The
+/// bias follows a random walk, `b' = b + walk sqrt(dt) w`, plus an optional Gauss-Markov process,
+/// `b' = phi b + sigma sqrt(1 - phi^2) w` with `phi = exp(-dt / time)`. The noise model is that of Kalibr. `S` (scale
+/// errors) is diagonal; `M` (misalignments) has the other six entries.
 #[derive(Debug, Clone)]
 pub struct ImuErrors {
     gyro: Triad,
@@ -42,7 +42,7 @@ pub struct ImuErrors {
 }
 
 impl ImuErrors {
-    /// The errors of `imu` in the run of `seed`.
+    /// The errors of `imu` in the run with `seed`.
     pub fn new(imu: &Imu, seed: Seed) -> Self {
         let dt_s = imu.period_s();
         Self {
@@ -51,7 +51,7 @@ impl ImuErrors {
         }
     }
 
-    /// What the IMU says next, given what an ideal one would.
+    /// The next sample, given the ideal one.
     pub fn measure(&mut self, ideal: &MeanMotion) -> MeanMotion {
         MeanMotion {
             angular_velocity_rad_per_s: self.gyro.measure(&ideal.angular_velocity_rad_per_s),
@@ -59,9 +59,9 @@ impl ImuErrors {
         }
     }
 
-    /// The biases of gyroscope, rad/s, and accelerometer, m/s^2, that the next sample will have.
+    /// Biases of the next sample: gyroscope, rad/s, and accelerometer, m/s^2.
     pub fn biases(&self) -> (Vector, Vector) {
-        (self.gyro.bias + self.gyro.wandering, self.accel.bias + self.accel.wandering)
+        (self.gyro.bias + self.gyro.gauss_markov_bias, self.accel.bias + self.accel.gauss_markov_bias)
     }
 }
 
@@ -69,17 +69,17 @@ impl ImuErrors {
 struct Triad {
     response: Matrix,
     bias: Vector,
-    wandering: Vector,
-    /// Per sample, as are the two below.
+    gauss_markov_bias: Vector,
+    /// Standard deviation per sample; so is `walk_sigma`.
     white_sigma: f64,
     walk_sigma: f64,
-    /// What is left of the wandering bias after a sample, and what comes in.
-    wander: Option<(f64, f64)>,
+    /// Decay factor of the Gauss-Markov bias per sample, and standard deviation of the increment.
+    gauss_markov: Option<(f64, f64)>,
     limit: f64,
     resolution: f64,
     white: Stream,
     walk: Stream,
-    wander_noise: Stream,
+    gauss_markov_noise: Stream,
 }
 
 impl Triad {
@@ -94,36 +94,39 @@ impl Triad {
             lower.x, 0.0, upper.z,
             lower.y, lower.z, 0.0,
         ) * model.misalignment;
-        let mut wander_noise = stream("wander");
-        let wandering = model.wander.map_or(Vector::zeros(), |wander| normal(&mut wander_noise) * wander.sigma);
+        let mut gauss_markov_noise = stream("wander");
+        let gauss_markov_bias = model
+            .gauss_markov
+            .map_or(Vector::zeros(), |gauss_markov| normal(&mut gauss_markov_noise) * gauss_markov.sigma);
         Self {
             response,
             bias: normal(&mut stream("turn_on")) * model.turn_on,
-            wandering,
+            gauss_markov_bias,
             white_sigma: model.density / dt_s.sqrt(),
             walk_sigma: model.walk * dt_s.sqrt(),
-            wander: model.wander.map(|wander| {
-                let phi = (-dt_s / wander.time_s).exp();
-                (phi, wander.sigma * (1.0 - phi * phi).sqrt())
+            gauss_markov: model.gauss_markov.map(|gauss_markov| {
+                let phi = (-dt_s / gauss_markov.time_s).exp();
+                (phi, gauss_markov.sigma * (1.0 - phi * phi).sqrt())
             }),
             limit: model.limit,
             resolution: model.resolution,
             white: stream("white"),
             walk: stream("walk"),
-            wander_noise,
+            gauss_markov_noise,
         }
     }
 
     fn measure(&mut self, ideal: &Vector) -> Vector {
-        let noisy = self.response * ideal + self.bias + self.wandering + normal(&mut self.white) * self.white_sigma;
+        let noisy =
+            self.response * ideal + self.bias + self.gauss_markov_bias + normal(&mut self.white) * self.white_sigma;
         self.bias += normal(&mut self.walk) * self.walk_sigma;
-        if let Some((left, comes)) = self.wander {
-            self.wandering = self.wandering * left + normal(&mut self.wander_noise) * comes;
+        if let Some((decay, sigma)) = self.gauss_markov {
+            self.gauss_markov_bias = self.gauss_markov_bias * decay + normal(&mut self.gauss_markov_noise) * sigma;
         }
-        noisy.map(|x| self.rounded(x).clamp(-self.limit, self.limit))
+        noisy.map(|x| self.quantised(x).clamp(-self.limit, self.limit))
     }
 
-    fn rounded(&self, x: f64) -> f64 {
+    fn quantised(&self, x: f64) -> f64 {
         if self.resolution > 0.0 { (x / self.resolution).round() * self.resolution } else { x }
     }
 }

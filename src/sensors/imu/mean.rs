@@ -1,6 +1,6 @@
 use crate::geometry::{Kinematics, Rotation, Vector, gravity_in_world};
 
-/// How a frame turned and what force held it, on average over an interval: what an IMU says, in its own frame.
+/// Mean angular velocity and specific force over an interval, in the IMU frame: the content of an IMU sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanMotion {
     /// Angular velocity, rad/s.
@@ -9,13 +9,14 @@ pub struct MeanMotion {
     pub specific_force_m_per_s2: Vector,
 }
 
-/// What an ideal IMU says of the interval from `start` to `end`, `dt_s` later: the rotation and velocity it went
-/// through, divided by the time, as a strapdown unit that integrates at a high rate inside (coning and sculling
-/// included) has them.
+/// The sample of an ideal IMU over the interval from `start` to `end`, of length `dt_s`.
+///
+/// It is the change of attitude and velocity over the interval, divided by the length, as a strapdown unit reports it
+/// that integrates at a high rate inside (coning and sculling included).
 ///
 /// The angular velocity is `log(R_start^T R_end) / dt`. The specific force is `R_mid^T ((v_end - v_start) / dt - g)`,
-/// with `R_mid` half-way along that rotation. So a user who turns by `exp(angular_velocity dt)` and accelerates by
-/// `R_mid specific_force + g` retraces attitude and velocity exactly, whatever happened in between.
+/// with `R_mid` half-way along that rotation. Integration by `exp(angular_velocity dt)` and `R_mid specific_force + g`
+/// therefore reproduces attitude and velocity exactly, for any motion within the interval.
 pub fn mean_motion(start: &Kinematics, end: &Kinematics, dt_s: f64) -> MeanMotion {
     let from = start.world_from_body.rotation;
     let turn = (from.inverse() * end.world_from_body.rotation).scaled_axis();

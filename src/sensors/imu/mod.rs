@@ -1,4 +1,4 @@
-//! Inertial measurement units: what an ideal one says, and what errors make of it.
+//! Inertial measurement units: the ideal sample, and the errors.
 
 mod errors;
 mod mean;
@@ -25,29 +25,28 @@ impl Imu {
     /// The IMU that `spec`, from `source`, describes.
     ///
     /// # Errors
-    /// When its rate is that of no IMU, its stamps are late or early by more than a second, or a resolution exceeds its
-    /// limit.
+    /// If the rate is out of range, stamps are late or early by more than 1 s, or a resolution exceeds the limit.
     pub fn new(spec: &ImuSpec, source: &Source) -> Result<Self, SpecError> {
         spec.check(source)?;
         Ok(Self { gyro: spec.gyro.model(), accel: spec.accel.model(), spec: spec.clone() })
     }
 
-    /// The spec it was built from.
+    /// The spec from which it was built.
     pub fn spec(&self) -> &ImuSpec {
         &self.spec
     }
 
-    /// Time from one sample to the next, over which a sample is averaged, s.
+    /// Sample period, over which a sample is averaged, s.
     pub fn period_s(&self) -> f64 {
         1.0 / self.spec.rate_hz
     }
 
-    /// How much later than the middle of its interval a sample is stamped, s on the IMU's clock.
+    /// Delay of the stamp after the middle of the sample's interval, s on the IMU clock.
     pub fn delay_s(&self) -> f64 {
         self.spec.stamp_delay_ms * 1e-3
     }
 
-    /// Its noise, for an estimator.
+    /// Noise model for an estimator.
     pub fn noise(&self) -> ImuNoise {
         ImuNoise {
             gyro_density_rad_per_s_per_sqrt_hz: self.gyro.density,
@@ -62,5 +61,5 @@ impl Imu {
     }
 }
 
-/// Metres per second squared in a thousandth of standard gravity.
+/// One thousandth of standard gravity, m/s^2.
 const MILLI_G: f64 = STANDARD_GRAVITY_M_PER_S2 * 1e-3;

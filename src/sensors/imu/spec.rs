@@ -5,18 +5,18 @@ use crate::spec::{Source, SpecError, checked};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// Samples a second of any IMU that is simulated, Hz.
+/// Accepted sample rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
 
-/// An inertial measurement unit, as its data sheet has it.
+/// An inertial measurement unit, by the data sheet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImuSpec {
-    /// Samples a second. Each is the average over the time since the one before.
+    /// Samples per second, Hz. A sample is the average over the period before it.
     #[serde(with = "checked::Positive")]
     pub rate_hz: f64,
-    /// How much later than the middle of that time a sample is stamped, ms: half a period for a stamp at its end, less
-    /// for a driver that corrects it, more for a filter or a buffer. The clock's own offset comes on top.
+    /// Delay of the stamp after the middle of that period, ms. Half a period puts the stamp at the end of the period; a
+    /// driver that corrects for it has a smaller value, a filter or a buffer a larger one. The clock offset adds to it.
     #[serde(with = "checked::Finite")]
     pub stamp_delay_ms: f64,
     /// The gyroscope.
@@ -25,60 +25,60 @@ pub struct ImuSpec {
     pub accel: AccelSpec,
 }
 
-/// The errors of a gyroscope, alike and independent on its three axes.
+/// Errors of a gyroscope, independent on three axes, with equal parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GyroSpec {
     /// White noise, deg/s/sqrt(Hz).
     #[serde(with = "checked::NonNegative")]
     pub density_deg_per_s_per_sqrt_hz: f64,
-    /// Standard deviation of the bias when switched on, deg/s.
+    /// Standard deviation of the turn-on bias, deg/s.
     #[serde(with = "checked::NonNegative")]
     pub turn_on_bias_deg_per_s: f64,
     /// Random walk of the bias, rad/s/sqrt(s).
     #[serde(with = "checked::NonNegative")]
     pub bias_walk_rad_per_s_per_sqrt_s: f64,
-    /// A bias that wanders but returns, deg/h.
+    /// Additional Gauss-Markov bias (bias instability), deg/h.
     pub wander_deg_per_h: Option<GaussMarkovSpec>,
-    /// Standard deviation of the scale's error, per cent.
+    /// Standard deviation of the scale error, per cent.
     #[serde(with = "checked::NonNegative")]
     pub scale_percent: f64,
-    /// Standard deviation of the angle of each axis towards each of the others, degrees.
+    /// Standard deviation of the misalignment of each axis towards each other axis, degrees.
     #[serde(with = "checked::NonNegative")]
     pub misalignment_deg: f64,
-    /// Greatest rate on an axis, deg/s.
+    /// Measurement range per axis, deg/s; larger rates saturate.
     #[serde(with = "checked::Positive")]
     pub limit_deg_per_s: f64,
-    /// What rates are rounded to a multiple of, deg/s; 0 for none.
+    /// Resolution, deg/s: rates are rounded to a multiple of it; 0 disables the rounding.
     #[serde(with = "checked::NonNegative")]
     pub resolution_deg_per_s: f64,
 }
 
-/// The errors of an accelerometer, alike and independent on its three axes. One g is 9.80665 m/s^2.
+/// Errors of an accelerometer, independent on three axes, with equal parameters. One g is 9.80665 m/s^2.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AccelSpec {
     /// White noise, ug/sqrt(Hz).
     #[serde(with = "checked::NonNegative")]
     pub density_ug_per_sqrt_hz: f64,
-    /// Standard deviation of the bias when switched on, mg.
+    /// Standard deviation of the turn-on bias, mg.
     #[serde(with = "checked::NonNegative")]
     pub turn_on_bias_mg: f64,
     /// Random walk of the bias, m/s^2/sqrt(s).
     #[serde(with = "checked::NonNegative")]
     pub bias_walk_m_per_s2_per_sqrt_s: f64,
-    /// A bias that wanders but returns, mg.
+    /// Additional Gauss-Markov bias (bias instability), mg.
     pub wander_mg: Option<GaussMarkovSpec>,
-    /// Standard deviation of the scale's error, per cent.
+    /// Standard deviation of the scale error, per cent.
     #[serde(with = "checked::NonNegative")]
     pub scale_percent: f64,
-    /// Standard deviation of the angle of each axis towards each of the others, degrees.
+    /// Standard deviation of the misalignment of each axis towards each other axis, degrees.
     #[serde(with = "checked::NonNegative")]
     pub misalignment_deg: f64,
-    /// Greatest specific force on an axis, g.
+    /// Measurement range per axis, g; larger specific forces saturate.
     #[serde(with = "checked::Positive")]
     pub limit_g: f64,
-    /// What specific forces are rounded to a multiple of, mg; 0 for none.
+    /// Resolution, mg: specific forces are rounded to a multiple of it; 0 disables the rounding.
     #[serde(with = "checked::NonNegative")]
     pub resolution_mg: f64,
 }
@@ -87,24 +87,24 @@ pub struct AccelSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GaussMarkovSpec {
-    /// Standard deviation in the long run, in the unit of the key it stands under.
+    /// Stationary standard deviation, in the unit of the parent key.
     #[serde(with = "checked::NonNegative")]
     pub sigma: f64,
-    /// Time over which it forgets itself by 1/e, s.
+    /// Correlation time, s: the autocorrelation decays by 1/e.
     #[serde(with = "checked::Positive")]
     pub time_s: f64,
 }
 
 impl ImuSpec {
-    /// Checks what concerns several fields.
+    /// Checks the relations between fields.
     pub(super) fn check(&self, source: &Source) -> Result<(), SpecError> {
         if !RATES_HZ.contains(&self.rate_hz) {
-            let message =
-                format!("{} samples a second; an IMU makes {} to {}", self.rate_hz, RATES_HZ.start(), RATES_HZ.end());
+            let message = format!("{} samples a second; give {} to {}", self.rate_hz, RATES_HZ.start(), RATES_HZ.end());
             return Err(SpecError::about(source, "rate_hz", message));
         }
         if self.stamp_delay_ms.abs() > 1e3 {
-            let message = format!("a delay of {} ms; within 1000 ms", self.stamp_delay_ms);
+            let message =
+                format!("a delay of {} ms is too large; give at most 1000 ms either way", self.stamp_delay_ms);
             return Err(SpecError::about(source, "stamp_delay_ms", message));
         }
         let (gyro, accel) = (self.gyro.model(), self.accel.model());
@@ -123,7 +123,7 @@ impl GyroSpec {
             density: self.density_deg_per_s_per_sqrt_hz.to_radians(),
             turn_on: self.turn_on_bias_deg_per_s.to_radians(),
             walk: self.bias_walk_rad_per_s_per_sqrt_s,
-            wander: self.wander_deg_per_h.map(|w| GaussMarkov::from_spec(&w, (1.0_f64 / 3600.0).to_radians())),
+            gauss_markov: self.wander_deg_per_h.map(|w| GaussMarkov::from_spec(&w, (1.0_f64 / 3600.0).to_radians())),
             scale: self.scale_percent * 1e-2,
             misalignment: self.misalignment_deg.to_radians(),
             limit: self.limit_deg_per_s.to_radians(),
@@ -138,7 +138,7 @@ impl AccelSpec {
             density: self.density_ug_per_sqrt_hz * 1e-3 * MILLI_G,
             turn_on: self.turn_on_bias_mg * MILLI_G,
             walk: self.bias_walk_m_per_s2_per_sqrt_s,
-            wander: self.wander_mg.map(|w| GaussMarkov::from_spec(&w, MILLI_G)),
+            gauss_markov: self.wander_mg.map(|w| GaussMarkov::from_spec(&w, MILLI_G)),
             scale: self.scale_percent * 1e-2,
             misalignment: self.misalignment_deg.to_radians(),
             limit: self.limit_g * STANDARD_GRAVITY_M_PER_S2,

@@ -1,22 +1,22 @@
-//! From the surfaces that a beam's rays met to the echoes that its detector sees.
+//! Echoes of a beam, from the surfaces that the rays hit.
 
 use super::{GlassSpec, Lidar, Sweep};
 
-/// Most echoes of a beam: one a ray.
+/// Maximum number of echoes of a beam: one per ray.
 pub(super) const MAX_ECHOES: usize = 7;
 
-/// Light that came back from one distance.
+/// Light returned from one distance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Echo {
-    /// Distance, m: the mean over the rays in it, weighted by power.
+    /// Distance, m: the power-weighted mean over the rays.
     pub range_m: f64,
-    /// `reflectance cos(incidence) / range^2`, summed over rays by their weights, 1/m^2.
+    /// `reflectance cos(incidence) / range^2`, the weighted sum over the rays, 1/m^2.
     pub power: f64,
-    /// Cosine of incidence, the mean weighted by power.
+    /// Cosine of incidence, the power-weighted mean over the rays.
     pub cos_incidence: f64,
 }
 
-/// The echoes of a beam, nearest first.
+/// The echoes of a beam in order of distance.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Echoes {
     list: [Echo; MAX_ECHOES],
@@ -28,7 +28,7 @@ impl Echoes {
         &self.list[..self.count]
     }
 
-    /// Drops the weakest echoes until `count` are left; the others keep their order.
+    /// Removes the weakest echoes until `count` remain, in order of distance.
     pub fn keep_strongest(&mut self, count: usize) {
         while self.count > count {
             let weakest = (0..self.count).min_by(|a, b| self.list[*a].power.total_cmp(&self.list[*b].power));
@@ -38,7 +38,7 @@ impl Echoes {
         }
     }
 
-    /// Puts a ray's echo where its range belongs.
+    /// Inserts the echo of a ray in order of distance.
     fn insert(&mut self, echo: Echo) {
         let at = self.as_slice().partition_point(|other| other.range_m <= echo.range_m);
         self.list.copy_within(at..self.count, at + 1);
@@ -46,37 +46,39 @@ impl Echoes {
         self.count += 1;
     }
 
-    /// Joins the rays' echoes whose pulses overlap into mixed ones.
+    /// Merges echoes whose pulses overlap into mixed pixels.
     fn join_within(&mut self, pulse_m: f64) {
-        let mut kept = 0;
+        let mut joined = 0;
         let mut first_range_m = f64::NEG_INFINITY;
         for next in 0..self.count {
             let echo = self.list[next];
             if echo.range_m - first_range_m <= pulse_m {
-                self.list[kept - 1] = mixed(&self.list[kept - 1], &echo);
+                self.list[joined - 1] = mixed(&self.list[joined - 1], &echo);
             } else {
                 first_range_m = echo.range_m;
-                self.list[kept] = echo;
-                kept += 1;
+                self.list[joined] = echo;
+                joined += 1;
             }
         }
-        self.count = kept;
+        self.count = joined;
     }
 }
 
 fn mixed(a: &Echo, b: &Echo) -> Echo {
     let power = a.power + b.power;
-    let share = if power > 0.0 { b.power / power } else { 0.5 };
+    let fraction = if power > 0.0 { b.power / power } else { 0.5 };
     Echo {
-        range_m: a.range_m + (b.range_m - a.range_m) * share,
+        range_m: a.range_m + (b.range_m - a.range_m) * fraction,
         power,
-        cos_incidence: a.cos_incidence + (b.cos_incidence - a.cos_incidence) * share,
+        cos_incidence: a.cos_incidence + (b.cos_incidence - a.cos_incidence) * fraction,
     }
 }
 
 impl Lidar {
-    /// The echoes of beam `beam`. `glass_draw`, uniform in 0..1, decides at which surface of glass it turns back;
-    /// `None` lets it pass every one, unweakened.
+    /// The echoes of beam `beam`.
+    ///
+    /// `glass_draw`, uniform in 0..1, determines which glass surface reflects the beam. `None` lets the beam pass all
+    /// glass without attenuation.
     pub(super) fn echoes(&self, sweep: &Sweep, beam: usize, glass_draw: Option<f64>) -> Echoes {
         let per_beam = self.rays_per_beam();
         let mut echoes = Echoes::default();
@@ -103,8 +105,8 @@ impl Lidar {
                 return Some(Echo { range_m, power, cos_incidence: cos });
             }
             if glass_draw.is_some() {
-                // Given that the beam passed, the draw is uniform in turns_back..1: stretched, it serves the next
-                // surface.
+                // Given that the beam passed, the draw is uniform in turns_back..1. Rescaled to 0..1 it decides at the
+                // next surface.
                 draw = (draw - turns_back) / (1.0 - turns_back).max(f64::MIN_POSITIVE);
                 light *= f64::from(surface.transmission).powi(2);
                 late_m += delay_m;

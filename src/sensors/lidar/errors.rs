@@ -4,33 +4,33 @@ use crate::random::{Seed, Stream};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Reflectance of the white sheet that data sheets measure with (Kent sheet).
-const WHITE: f64 = 0.9;
-/// Echoes whose chance of being missed is less than one in this many are taken as seen.
-const SURELY: f64 = 1e6;
-/// Odds, most draws' are less, at which the power that passes the threshold is worked out once.
-const MOST_ODDS: f64 = 100.0;
+/// Reflectance of the white target (Kent sheet) with which data sheets specify range.
+const WHITE_REFLECTANCE: f64 = 0.9;
+/// Detection odds above which an echo counts as certain: fewer than one miss in a million.
+const CERTAIN_ODDS: f64 = 1e6;
+/// Detection odds for which the power threshold is precomputed: most draws are below, so most beams need no `powf`.
+const FAST_PATH_ODDS: f64 = 100.0;
 
-/// What a seed makes of a lidar's errors.
+/// Errors of a lidar in one run, drawn from a seed.
 #[derive(Debug, Clone)]
 pub struct LidarErrors {
     seed: Seed,
-    /// The bias that all ranges of the run share, m.
+    /// Bias common to all ranges of the run, m.
     bias_m: f64,
     sigma: LidarNoise,
     spec: LidarErrorsSpec,
-    /// Power that is detected half of the time, 1/m^2.
+    /// Power that is detected with probability 1/2, 1/m^2.
     half_power: f64,
-    /// Power that is surely detected, 1/m^2.
-    sure_power: f64,
-    /// Power that is detected at odds of [`MOST_ODDS`], 1/m^2.
-    most_power: f64,
+    /// Power above which detection is certain, 1/m^2.
+    certain_power: f64,
+    /// Power detected at odds of [`FAST_PATH_ODDS`], 1/m^2.
+    fast_path_power: f64,
     cos_grazing: f64,
     on: bool,
 }
 
-/// The draws of one scan. Each beam takes the same number from each stream, whatever it meets, so that a change in one
-/// beam's surroundings changes no other beam's noise.
+/// Random numbers of one scan. Each beam takes the same count from each stream, whether or not it hits a surface, so
+/// that a change at one beam does not change the noise of another.
 pub(super) struct ScanDraws {
     range: Stream,
     later: Stream,
@@ -38,7 +38,7 @@ pub(super) struct ScanDraws {
     glass: Stream,
 }
 
-/// The draws of one beam.
+/// Random numbers of one beam.
 pub(super) struct BeamDraws {
     pub range: f64,
     pub threshold: f64,
@@ -46,31 +46,31 @@ pub(super) struct BeamDraws {
 }
 
 impl LidarErrors {
-    /// The errors of `lidar` in the run of `seed`.
+    /// The errors of `lidar` in the run with `seed`.
     pub fn new(lidar: &Lidar, seed: Seed) -> Self {
         let spec = lidar.spec().errors.clone();
         let z: f64 = StandardNormal.sample(&mut seed.stream("lidar/bias"));
-        let half_power = WHITE / spec.detection.white_reach_m.powi(2);
+        let half_power = WHITE_REFLECTANCE / spec.detection.white_reach_m.powi(2);
         Self {
             seed,
             bias_m: spec.range.bias_sigma_m * z,
             sigma: lidar.noise(),
             half_power,
-            sure_power: half_power * SURELY.powf(spec.detection.softness),
-            most_power: half_power * MOST_ODDS.powf(spec.detection.softness),
+            certain_power: half_power * CERTAIN_ODDS.powf(spec.detection.softness),
+            fast_path_power: half_power * FAST_PATH_ODDS.powf(spec.detection.softness),
             cos_grazing: spec.grazing.from_deg.to_radians().cos(),
             on: lidar.spec().noise == Switch::On,
             spec,
         }
     }
 
-    /// The bias that all ranges of the run share, m.
+    /// Bias common to all ranges of the run, m.
     pub fn bias_m(&self) -> f64 {
         if self.on { self.bias_m } else { 0.0 }
     }
 
-    /// The draws of a scan, or `None` where the errors are switched off.
-    pub(super) fn of_scan(&self, scan: u64) -> Option<ScanDraws> {
+    /// Random numbers of a scan; `None` if the errors are switched off.
+    pub(super) fn scan_draws(&self, scan: u64) -> Option<ScanDraws> {
         let part = |name: &str| self.seed.part(name, scan);
         self.on.then(|| ScanDraws {
             range: part("lidar/range"),
@@ -80,32 +80,32 @@ impl LidarErrors {
         })
     }
 
-    /// Whether an echo passes the detector's threshold at its draw, uniform in 0..1.
+    /// Whether an echo is detected, given a draw uniform in 0..1.
     pub(super) fn detects(&self, echo: &Echo, draw: f64) -> bool {
         let odds = draw / (1.0 - draw);
-        if echo.power >= self.sure_power || (echo.power > self.most_power && odds <= MOST_ODDS) {
+        if echo.power >= self.certain_power || (echo.power > self.fast_path_power && odds <= FAST_PATH_ODDS) {
             return true;
         }
         // P(power > half_power (u / (1 - u))^softness) is logistic in ln(power / half_power) / softness.
         echo.power > self.half_power * odds.powf(self.spec.detection.softness)
     }
 
-    /// The range that is reported for an echo, m, before rounding; `z` is standard normal.
+    /// The reported range of an echo before rounding, m; `z` is standard normal.
     pub(super) fn range_m(&self, echo: &Echo, z: f64) -> f64 {
         let weak = self.spec.detection.weak_bias_m * (self.half_power / echo.power).min(1.0);
         let grazing = self.spec.grazing.bias_m * (1.0 - echo.cos_incidence / self.cos_grazing).max(0.0);
         echo.range_m + self.bias_m + weak + grazing + self.sigma.sigma_m(echo.range_m) * z
     }
 
-    /// A range as the sensor rounds it, m.
-    pub(super) fn rounded_m(&self, range_m: f64) -> f64 {
+    /// A range rounded to the resolution of the sensor, m.
+    pub(super) fn quantised_m(&self, range_m: f64) -> f64 {
         let step = self.spec.range.resolution_m;
         if step > 0.0 { (range_m / step).round() * step } else { range_m }
     }
 }
 
 impl ScanDraws {
-    pub fn of_beam(&mut self) -> BeamDraws {
+    pub fn next_beam(&mut self) -> BeamDraws {
         BeamDraws {
             range: StandardNormal.sample(&mut self.range),
             threshold: f64::from(self.threshold.random::<f32>()),
@@ -113,8 +113,8 @@ impl ScanDraws {
         }
     }
 
-    /// For an echo after a beam's first.
-    pub fn of_later_echo(&mut self) -> f64 {
+    /// Random number for the second and later echoes of a beam.
+    pub fn next_later_echo(&mut self) -> f64 {
         StandardNormal.sample(&mut self.later)
     }
 }

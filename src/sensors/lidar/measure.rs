@@ -7,11 +7,11 @@ use crate::measurement::{LidarReturn, LidarScan, PlanarScan};
 use crate::time::Span;
 
 impl Lidar {
-    /// The scan that the sensor makes of what its rays met.
+    /// The scan that the sensor reports for the ray intersections of `sweep`.
     ///
-    /// With errors switched off, a beam passes all glass and every echo is reported at its exact range, unrounded.
+    /// With errors switched off, a beam passes all glass, and each echo has the exact range without rounding.
     pub fn measure(&self, sweep: &Sweep, errors: &LidarErrors) -> LidarScan {
-        let mut draws = errors.of_scan(sweep.firing.index);
+        let mut draws = errors.scan_draws(sweep.timing.index);
         let mut returns = Vec::with_capacity(self.beams.len());
         let mut planar = self.empty_scan();
         for beam in 0..self.beams.len() {
@@ -21,10 +21,10 @@ impl Lidar {
                 scan.intensities.push(intensity);
             }
         }
-        LidarScan { stamp: sweep.firing.stamp, stamped_after: Span::ZERO, returns, planar }
+        LidarScan { stamp: sweep.timing.stamp, stamped_after: Span::ZERO, returns, planar }
     }
 
-    /// Appends the returns of a beam; gives range and intensity of its strongest, as REP-117 writes them.
+    /// Appends the returns of a beam, and returns range and intensity of the strongest echo, encoded by REP-117.
     fn measure_beam(
         &self,
         sweep: &Sweep,
@@ -32,18 +32,18 @@ impl Lidar {
         (errors, mut draws): (&LidarErrors, Option<&mut ScanDraws>),
         returns: &mut Vec<LidarReturn>,
     ) -> (f32, f32) {
-        let draw = draws.as_deref_mut().map(ScanDraws::of_beam);
+        let draw = draws.as_deref_mut().map(ScanDraws::next_beam);
         let mut echoes = self.echoes(sweep, beam, draw.as_ref().map(|draw| draw.glass));
         echoes.keep_strongest(usize::from(self.spec.echoes));
         let (mut best, mut best_power) = ((f32::INFINITY, 0.0), f64::NEG_INFINITY);
         for (order, echo) in echoes.as_slice().iter().enumerate() {
             let mut range_m = echo.range_m;
             if let (Some(draw), Some(draws)) = (&draw, draws.as_deref_mut()) {
-                let z = if order == 0 { draw.range } else { draws.of_later_echo() };
+                let z = if order == 0 { draw.range } else { draws.next_later_echo() };
                 if !errors.detects(echo, draw.threshold) {
                     continue;
                 }
-                range_m = errors.rounded_m(errors.range_m(echo, z));
+                range_m = errors.quantised_m(errors.range_m(echo, z));
             }
             let intensity = (self.spec.intensity_at_1_m * echo.power.sqrt()).round() as f32;
             let reported = self.within_limits(range_m);
@@ -52,7 +52,7 @@ impl Lidar {
             }
             if reported.is_finite() {
                 let Beam { direction_in_laser, offset, .. } = self.beams[beam];
-                let direction = sweep.turned.map_or(direction_in_laser, |turn| turn * direction_in_laser);
+                let direction = sweep.rotation.map_or(direction_in_laser, |turn| turn * direction_in_laser);
                 let point: Vector = direction * range_m;
                 returns.push(LidarReturn { offset, point_in_laser: point.cast(), intensity });
             }
@@ -60,7 +60,7 @@ impl Lidar {
         best
     }
 
-    /// A range as REP-117 writes it: `-inf` where too near, `+inf` where too far.
+    /// A range encoded by REP-117: `-inf` below the minimum range, `+inf` above the maximum.
     fn within_limits(&self, range_m: f64) -> f32 {
         if range_m < self.spec.range_min_m {
             f32::NEG_INFINITY
@@ -71,7 +71,7 @@ impl Lidar {
         }
     }
 
-    /// The polar form of a scan without its beams, for a lidar that scans a plane.
+    /// An empty planar scan; `None` for a lidar that is not planar.
     fn empty_scan(&self) -> Option<PlanarScan> {
         self.plane.map(|plane| PlanarScan {
             angle_min_rad: plane.angle_min_rad,

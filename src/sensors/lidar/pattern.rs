@@ -6,96 +6,96 @@ use crate::time::Span;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Greatest number of beams of a scan: more is a slip of the pen.
+/// Maximum number of beams per scan: a guard against a typing error, and for memory.
 pub(super) const MAX_BEAMS: usize = 1 << 20;
 
-/// Where and when the beams of a scan are fired.
+/// Directions and times of the beams of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PatternSpec {
-    /// A mirror that sweeps the plane z = 0 counter-clockwise, one turn a scan.
+    /// A mirror that sweeps the plane z = 0 counter-clockwise, one turn per scan.
     Planar {
-        /// How many beams.
+        /// Number of beams.
         beams: u32,
-        /// Azimuth of the first, degrees from x.
+        /// Azimuth of the first beam, degrees from x.
         #[serde(with = "checked::Finite")]
         first_deg: f64,
-        /// Azimuth from one to the next, degrees.
+        /// Azimuth step between beams, degrees.
         #[serde(with = "checked::Positive")]
         step_deg: f64,
-        /// How many beams would fit into a whole turn, the blind part included: tells the time from beam to beam.
+        /// Number of beams that would fill a full turn, blind sector included. It determines the time between beams.
         slots_per_turn: u32,
     },
-    /// Channels at fixed elevations that turn together clockwise (seen from above) from azimuth 0, one turn a scan.
+    /// Channels at fixed elevations that rotate clockwise (seen from above) from azimuth 0, one turn per scan.
     Spinning {
-        /// Elevation of each channel, degrees above the plane, in the order in which they fire.
+        /// Elevation of each channel in firing order, degrees above the plane z = 0.
         elevations_deg: Vec<f64>,
-        /// Time from one channel's shot to the next one's, us.
+        /// Time between the shots of two channels, us.
         #[serde(with = "checked::NonNegative")]
         channel_period_us: f64,
-        /// Time from one round of all channels to the next, us.
+        /// Time between two firing cycles of all channels, us.
         #[serde(with = "checked::Positive")]
         round_period_us: f64,
     },
-    /// A mirror that sweeps the plane z = 0 counter-clockwise and takes several turns for a scan, each a step further
-    /// on than the one before. As the time of a beam is not linear in its azimuth, such a scan has no polar form.
+    /// A mirror that sweeps the plane z = 0 counter-clockwise in several turns per scan, each offset by one step. Beam
+    /// time is not linear in azimuth, so the scan has no planar form.
     Interlaced {
-        /// How many beams of the whole scan.
+        /// Number of beams per scan.
         beams: u32,
-        /// Azimuth of the first, degrees from x.
+        /// Azimuth of the first beam, degrees from x.
         #[serde(with = "checked::Finite")]
         first_deg: f64,
-        /// Azimuth between neighbours in the whole scan, degrees: beams of one mirror turn are `mirror_turns` steps
-        /// apart.
+        /// Azimuth step between neighbouring beams of the scan, degrees. Beams of one mirror turn are `mirror_turns`
+        /// steps from each other.
         #[serde(with = "checked::Positive")]
         step_deg: f64,
-        /// How many beams of one mirror turn would fit into a whole turn, the blind part included.
+        /// Number of beams of one mirror turn that would fill a full turn, blind sector included.
         slots_per_turn: u32,
-        /// Turns of the mirror a scan.
+        /// Mirror turns per scan.
         mirror_turns: u32,
     },
-    /// A curve that turns counter-clockwise about z while it swings up and down, and is another one in each scan: an
-    /// approximation of lidars whose pattern does not repeat.
+    /// A curve that rotates counter-clockwise about z while the elevation oscillates, different in each scan: an
+    /// approximation of lidars with a non-repetitive pattern.
     Rosette {
-        /// How many beams of a scan, evenly spaced in time over its whole period.
+        /// Number of beams per scan, evenly spaced in time over the scan period.
         beams: u32,
-        /// Elevation at which the curve turns up, degrees above the plane z = 0.
+        /// Minimum elevation of the curve, degrees above the plane z = 0.
         #[serde(with = "checked::Finite")]
         lowest_deg: f64,
-        /// Elevation at which it turns down, degrees.
+        /// Maximum elevation of the curve, degrees.
         #[serde(with = "checked::Finite")]
         highest_deg: f64,
-        /// Turns about z a scan; what it has beyond a whole number turns each scan against the one before.
+        /// Turns about z per scan. The fractional part rotates each scan relative to the previous one.
         #[serde(with = "checked::Positive")]
         turns_per_scan: f64,
-        /// Swings up and down a scan.
+        /// Periods of the elevation per scan.
         waves_per_scan: u32,
     },
 }
 
-/// The beams of scans.
+/// Beams of a lidar over its scans.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Pattern {
-    /// Those of scan 0, in the order in which they are fired.
+    /// Beams of scan 0 in firing order.
     pub beams: Vec<Beam>,
-    /// The plane they lie in, if the polar form of a planar scan can say them.
+    /// Angles and timing of the planar form; `None` if the pattern has none.
     pub plane: Option<Plane>,
-    /// By how much the beams of a scan are turned about z against those of the scan before, turns.
+    /// Rotation of the pattern about z from one scan to the next, turns.
     pub turns_per_scan: f64,
 }
 
-/// One beam of a scan.
+/// A beam of a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
-    /// Unit vector in the lidar's frame.
+    /// Direction, a unit vector in the lidar frame.
     pub direction_in_laser: Vector,
-    /// When it is fired after the first beam, on the lidar's crystal.
+    /// Firing time after the first beam, on the crystal of the lidar.
     pub offset: Span,
-    /// The same, s, without the rounding to 1 ns.
+    /// The same time, s, without rounding to 1 ns.
     pub offset_s: f64,
 }
 
-/// What the polar form of a planar scan needs.
+/// Angles and timing of a planar scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Plane {
     pub angle_min_rad: f64,
@@ -104,13 +104,13 @@ pub(super) struct Plane {
 }
 
 impl PatternSpec {
-    /// The beams of a lidar that scans `rate_hz` times a second.
+    /// The pattern for a lidar with `rate_hz` scans per second.
     pub(super) fn build(&self, rate_hz: f64, source: &Source) -> Result<Pattern, SpecError> {
-        let still = |beams| Pattern { beams, plane: None, turns_per_scan: 0.0 };
+        let unrotated = |beams| Pattern { beams, plane: None, turns_per_scan: 0.0 };
         match self {
             &Self::Planar { beams, first_deg, step_deg, slots_per_turn } => {
                 if beams == 0 || beams > slots_per_turn || beams as usize > MAX_BEAMS {
-                    let message = format!("{beams} beams in {slots_per_turn} slots a turn: 1..={slots_per_turn} fit");
+                    let message = format!("{beams} beams in {slots_per_turn} slots a turn: give 1 to {slots_per_turn}");
                     return Err(SpecError::about(source, "beams", message));
                 }
                 let plane = Plane {
@@ -119,20 +119,20 @@ impl PatternSpec {
                     time_increment_s: 1.0 / (rate_hz * f64::from(slots_per_turn)),
                 };
                 let beams = (0..beams).map(|k| plane.beam(k)).collect();
-                Ok(Pattern { plane: Some(plane), ..still(beams) })
+                Ok(Pattern { plane: Some(plane), ..unrotated(beams) })
             }
             Self::Spinning { elevations_deg, channel_period_us, round_period_us } => {
                 let times = (channel_period_us * 1e-6, round_period_us * 1e-6);
-                Ok(still(spinning(elevations_deg, times, rate_hz, source)?))
+                Ok(unrotated(spinning(elevations_deg, times, rate_hz, source)?))
             }
             &Self::Interlaced { beams, first_deg, step_deg, slots_per_turn, mirror_turns } => {
                 let (first_rad, step_rad) = (first_deg.to_radians(), step_deg.to_radians());
                 let interlaced = Interlaced { beams, first_rad, step_rad, slots_per_turn, mirror_turns };
-                Ok(still(interlaced.beams(rate_hz, source)?))
+                Ok(unrotated(interlaced.beams(rate_hz, source)?))
             }
             &Self::Rosette { beams, lowest_deg, highest_deg, turns_per_scan, waves_per_scan } => {
                 let rosette = Rosette { beams, lowest_deg, highest_deg, turns: turns_per_scan, waves: waves_per_scan };
-                Ok(Pattern { turns_per_scan, ..still(rosette.beams(rate_hz, source)?) })
+                Ok(Pattern { turns_per_scan, ..unrotated(rosette.beams(rate_hz, source)?) })
             }
         }
     }
@@ -146,7 +146,7 @@ impl Plane {
 }
 
 impl Beam {
-    /// The beam at `azimuth_rad` counter-clockwise from x about z, `elevation_rad` above the plane z = 0.
+    /// The beam at `azimuth_rad` counter-clockwise from x about z and `elevation_rad` above the plane z = 0.
     pub fn new(azimuth_rad: f64, elevation_rad: f64, offset_s: f64) -> Self {
         let (sin, cos) = azimuth_rad.sin_cos();
         let (up, level) = elevation_rad.sin_cos();
@@ -165,15 +165,18 @@ fn spinning(
     if elevations_deg.is_empty() || elevations_deg.iter().any(|e| !(-90.0..=90.0).contains(e)) {
         return refuse(
             "elevations_deg",
-            "a spinning lidar has one channel or more, each from -90 to 90 degrees".into(),
+            "give at least one channel, each with an elevation from -90 to 90 degrees".into(),
         );
     }
     if channel_s * (elevations_deg.len() - 1) as f64 > round_s {
-        return refuse("channel_period_us", "the channels of one round last longer than the round".into());
+        return refuse("channel_period_us", "the channels of a firing cycle take longer than the cycle".into());
     }
     let rounds = (1.0 / (rate_hz * round_s)).floor() as usize;
     if rounds == 0 || rounds.saturating_mul(elevations_deg.len()) > MAX_BEAMS {
-        return refuse("round_period_us", format!("{rounds} rounds a turn; at least 1, and {MAX_BEAMS} beams at most"));
+        return refuse(
+            "round_period_us",
+            format!("{rounds} firing cycles a turn; give at least 1, and at most {MAX_BEAMS} beams"),
+        );
     }
     let beam = |round: usize, channel: usize| {
         let offset_s = round as f64 * round_s + channel as f64 * channel_s;
@@ -212,14 +215,15 @@ mod tests {
     }
 
     #[test]
-    fn more_beams_than_slots_are_refused_where_they_stand() {
+    fn more_beams_than_slots_are_rejected_with_their_position() {
         let pattern = PatternSpec::Planar { beams: 1441, first_deg: 0.0, step_deg: 0.25, slots_per_turn: 1440 };
         assert_eq!(pattern.build(40.0, &source()).unwrap_err().line_and_column(), Some((3, 2)));
     }
 
     #[test]
     fn a_spinning_lidar_turns_clockwise_while_its_channels_fire() {
-        // Two channels 1 ms apart, rounds of 25 ms, 10 Hz: 36 degrees are 10 ms, so a round turns 90 and a channel 3.6.
+        // Two channels 1 ms apart, cycles of 25 ms, 10 Hz: 36 degrees take 10 ms, so a cycle rotates by 90 and a
+        // channel by 3.6.
         let (channel_period_us, round_period_us) = (1e3, 25e3);
         let pattern = PatternSpec::Spinning { elevations_deg: vec![-30.0, 30.0], channel_period_us, round_period_us };
         let Pattern { beams, plane, .. } = pattern.build(10.0, &source()).unwrap();

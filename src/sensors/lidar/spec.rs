@@ -5,52 +5,52 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
-/// Scans a second of any lidar that is simulated, Hz.
+/// Accepted scan rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 0.1..=1000.0;
-/// Most beams a second: a hundred times those of a spinning lidar with 16 channels.
-const MOST_BEAMS_PER_S: f64 = 3e7;
+/// Maximum beams per second: a hundred times those of a spinning lidar with 16 channels.
+const MAX_BEAMS_PER_S: f64 = 3e7;
 
-/// A lidar, as its data sheet has it.
+/// A lidar, by the data sheet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LidarSpec {
-    /// Where and when the beams of a scan are fired.
+    /// Directions and times of the beams of a scan.
     pub pattern: PatternSpec,
-    /// Scans a second.
+    /// Scans per second, Hz.
     #[serde(with = "checked::Positive")]
     pub rate_hz: f64,
-    /// Least range that is reported, m.
+    /// Minimum reported range, m. Nearer echoes are reported as too near.
     #[serde(with = "checked::NonNegative")]
     pub range_min_m: f64,
-    /// Greatest range that is reported, m.
+    /// Maximum reported range, m. Rays end there.
     #[serde(with = "checked::Positive")]
     pub range_max_m: f64,
-    /// How many rays stand for a beam.
-    pub beam: Rays,
-    /// Angle from a beam's axis to where its light has fallen to 1/e^2, mrad.
+    /// Number of rays that represent a beam.
+    pub beam: BeamModel,
+    /// Half-angle of the beam divergence at 1/e^2 of the intensity, mrad. A larger value gives more mixed pixels.
     #[serde(with = "checked::NonNegative")]
     pub divergence_half_angle_mrad: f64,
-    /// Surfaces within one beam that are nearer to each other than this, along it, give one mixed echo, m.
+    /// Pulse length, m: echoes of one beam within this distance merge into a mixed pixel.
     #[serde(with = "checked::NonNegative")]
     pub pulse_length_m: f64,
-    /// How many echoes of a beam are reported at most, the strongest first choice; 1..=7.
+    /// Maximum number of reported echoes per beam, strongest first; 1..=7.
     pub echoes: u8,
-    /// Intensity of the echo of a white surface, met squarely at 1 m.
+    /// Intensity of the echo of a white surface at 1 m and normal incidence.
     #[serde(with = "checked::NonNegative")]
     pub intensity_at_1_m: f64,
-    /// Whether the errors below act.
+    /// Whether the errors below are applied.
     pub noise: Switch,
-    /// The errors of ranges.
+    /// Range errors.
     pub errors: LidarErrorsSpec,
 }
 
-/// How many rays stand for a beam.
+/// Number of rays that represent a beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Rays {
-    /// One: no mixed pixels.
+pub enum BeamModel {
+    /// One ray: no mixed pixels.
     Single,
-    /// Seven over the beam's cross-section: mixed pixels at edges, several echoes.
+    /// Seven rays over the cross-section of the beam: mixed pixels at edges, several echoes.
     Divergent,
 }
 
@@ -64,17 +64,17 @@ pub enum Switch {
     Off,
 }
 
-/// The errors of a lidar's ranges.
+/// Range errors of a lidar.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LidarErrorsSpec {
-    /// Noise, bias and resolution of any range.
+    /// Noise, bias and resolution.
     pub range: RangeNoiseSpec,
-    /// Which echoes are too weak, and what weakness does to a range.
+    /// Detection threshold, and range bias of weak echoes.
     pub detection: DetectionSpec,
-    /// What grazing incidence does to a range.
+    /// Range bias at grazing incidence.
     pub grazing: GrazingSpec,
-    /// What glass does.
+    /// Reflection and delay by glass.
     pub glass: GlassSpec,
 }
 
@@ -85,70 +85,70 @@ pub struct RangeNoiseSpec {
     /// Standard deviation up to `near_m`, m.
     #[serde(with = "checked::NonNegative")]
     pub near_sigma_m: f64,
-    /// Up to where it holds, m.
+    /// Range up to which `near_sigma_m` applies, m.
     #[serde(with = "checked::NonNegative")]
     pub near_m: f64,
-    /// Standard deviation at `far_m`, to which it rises linearly, m.
+    /// Standard deviation at `far_m`, m; linear in range between `near_m` and `far_m`.
     #[serde(with = "checked::NonNegative")]
     pub far_sigma_m: f64,
-    /// Where that holds, m.
+    /// Range at which `far_sigma_m` applies, m.
     #[serde(with = "checked::Positive")]
     pub far_m: f64,
-    /// Standard deviation, over runs, of the bias that all ranges of a run share, m.
+    /// Standard deviation over runs of a bias that is constant within a run, m.
     #[serde(with = "checked::NonNegative")]
     pub bias_sigma_m: f64,
-    /// What ranges are rounded to a multiple of, m; 0 for none.
+    /// Resolution, m: ranges are rounded to a multiple of it; 0 disables the rounding.
     #[serde(with = "checked::NonNegative")]
     pub resolution_m: f64,
 }
 
-/// Which echoes are detected. The power of an echo is `reflectance cos(incidence) / range^2`, as of a surface that
-/// scatters evenly and is wider than the beam; whether it passes the detector's threshold is logistic in its logarithm.
+/// Detection of echoes. The power of an echo is `reflectance cos(incidence) / range^2`, for a Lambertian surface wider
+/// than the beam; the detection probability is logistic in the logarithm of the power.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DetectionSpec {
-    /// Range at which half of the echoes of a white sheet (reflectance 0.9), met squarely, are detected, m.
+    /// Range at which half of the echoes of a white target (reflectance 0.9) at normal incidence are detected, m.
     #[serde(with = "checked::Positive")]
     pub white_reach_m: f64,
-    /// Change of the logarithm of the power over which the odds of detection change by e.
+    /// Width of the threshold: the change of the logarithm of the power that changes the detection odds by a factor of
+    /// e.
     #[serde(with = "checked::Positive")]
     pub softness: f64,
-    /// How much too long the range of an echo at the threshold is, m; inversely proportional to power.
+    /// Range bias of an echo at the threshold, m, positive for too long; inversely proportional to the power.
     #[serde(with = "checked::Finite")]
     pub weak_bias_m: f64,
 }
 
-/// What grazing incidence does to a range.
+/// Range bias at grazing incidence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GrazingSpec {
-    /// Incidence from which on ranges are biased, degrees from the normal.
+    /// Angle of incidence above which ranges are biased, degrees from the normal.
     #[serde(with = "checked::NonNegative")]
     pub from_deg: f64,
-    /// Bias at 90 degrees, m, to which it grows linearly in the cosine; negative for too short.
+    /// Bias at 90 degrees, m, negative for too short; linear in the cosine of incidence.
     #[serde(with = "checked::Finite")]
     pub bias_m: f64,
 }
 
-/// What a surface of glass does, beside weakening light by its material's transmission, there and back.
+/// Effects of glass, in addition to the attenuation by transmission in both directions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlassSpec {
-    /// Share of beams, met squarely, that come back from the glass itself; in proportion to the cosine of incidence.
+    /// Fraction of beams that the glass itself reflects at normal incidence; proportional to the cosine of incidence.
     #[serde(with = "checked::Fraction")]
     pub echo: f64,
-    /// How much farther what stands behind it seems, m: thickness times (refractive index - 1).
+    /// Range bias of surfaces seen through the glass, m: thickness times (refractive index - 1).
     #[serde(with = "checked::NonNegative")]
     pub delay_m: f64,
 }
 
 impl LidarSpec {
-    /// Checks what concerns several fields.
+    /// Checks the relations between fields.
     pub(super) fn check(&self, source: &Source) -> Result<(), SpecError> {
         let refuse = |key: &str, message: String| Err(SpecError::about(source, key, message));
         if !RATES_HZ.contains(&self.rate_hz) {
-            let message =
-                format!("{} scans a second; a lidar makes {} to {}", self.rate_hz, RATES_HZ.start(), RATES_HZ.end());
+            let message = format!("{} scans a second; give {} to {}", self.rate_hz, RATES_HZ.start(), RATES_HZ.end());
             return refuse("rate_hz", message);
         }
         if self.range_min_m >= self.range_max_m {
@@ -160,45 +160,46 @@ impl LidarSpec {
             return refuse("near_m", format!("near_m {} is not below far_m {}", range.near_m, range.far_m));
         }
         if !(1..=7).contains(&self.echoes) {
-            return refuse("echoes", format!("{} echoes a beam; a lidar reports 1 to 7", self.echoes));
+            return refuse("echoes", format!("{} echoes a beam; give 1 to 7", self.echoes));
         }
         if self.divergence_half_angle_mrad > 100.0 {
-            let message = format!("a beam of {} mrad is no beam; 100 at most", self.divergence_half_angle_mrad);
+            let message =
+                format!("a divergence of {} mrad is too large; give at most 100", self.divergence_half_angle_mrad);
             return refuse("divergence_half_angle_mrad", message);
         }
         if self.errors.grazing.from_deg >= 90.0 {
-            return refuse("from_deg", "grazing incidence begins below 90 degrees".to_owned());
+            return refuse("from_deg", "grazing incidence must start below 90 degrees".to_owned());
         }
         Ok(())
     }
 
-    /// Checks how many beams a second there are, `beams` of them in a scan.
+    /// Checks the number of beams per second, with `beams` per scan.
     pub(super) fn check_beams(&self, beams: usize, source: &Source) -> Result<(), SpecError> {
         let per_s = beams as f64 * self.rate_hz;
-        if per_s <= MOST_BEAMS_PER_S {
+        if per_s <= MAX_BEAMS_PER_S {
             return Ok(());
         }
         let message = format!(
-            "{beams} beams a scan at {} Hz are {per_s:.3e} beams a second; {MOST_BEAMS_PER_S:.0e} at most",
+            "{beams} beams a scan at {} Hz are {per_s:.3e} beams a second; {MAX_BEAMS_PER_S:.0e} at most",
             self.rate_hz
         );
         Err(SpecError::about(source, "rate_hz", message))
     }
 
-    /// The rays of each beam in turn, and the weight of each ray of a beam.
+    /// The rays, grouped by beam, and the weight of each ray of a beam.
     ///
-    /// A divergent beam is a Gaussian one of half angle `d` at 1/e^2: half of it in the axis, a twelfth in each of six
-    /// rays at `d` about it. This rule has the beam's moments up to the fifth order (Stroud's E2 5-1: mean square of
-    /// the radius d^2/2, of its square d^4/2).
-    pub(super) fn rays_of(&self, beams: &[Beam]) -> (Vec<Vector>, &'static [f64]) {
+    /// A divergent beam is Gaussian with half-angle `d` at 1/e^2: one ray of weight 1/2 on the axis and six of weight
+    /// 1/12 at `d` around it. This quadrature is exact for moments up to the fifth order (Stroud's E2 5-1: the mean
+    /// squared radius is d^2/2, the mean fourth power d^4/2).
+    pub(super) fn rays(&self, beams: &[Beam]) -> (Vec<Vector>, &'static [f64]) {
         const TWELFTH: f64 = 1.0 / 12.0;
-        if self.beam == Rays::Single {
+        if self.beam == BeamModel::Single {
             return (beams.iter().map(|beam| beam.direction_in_laser).collect(), &[1.0]);
         }
         let slope = (self.divergence_half_angle_mrad * 1e-3).tan();
         let rays = beams.iter().flat_map(|beam| {
             let axis = beam.direction_in_laser;
-            // The plane z = 0 holds the axis of a planar lidar: one sideways direction lies in it.
+            // The axis of a planar lidar lies in the plane z = 0, and so does one of the two transverse directions.
             let sideways = if axis.z.abs() < 0.9 { Vector::z().cross(&axis) } else { Vector::x().cross(&axis) };
             let (left, up) = (sideways.normalize(), axis.cross(&sideways).normalize());
             let around = (0..6).map(move |k| {

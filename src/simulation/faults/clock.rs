@@ -2,16 +2,16 @@ use super::{FaultKind, FaultsSpec, FaultySensor};
 use crate::time::Span;
 use crate::truth::ClockTruth;
 
-/// By how much the faults set the sensors' clocks ahead; the truth follows the clocks.
+/// Offsets that faults add to the sensor clocks. Ground truth reports the clocks with these offsets.
 #[derive(Debug, Clone)]
 pub(super) struct ClockFaults {
-    /// From when, since the start, and by how much.
+    /// Start time since the start of the run, and offset from then on.
     imu: Vec<(Span, Span)>,
     lidar: Vec<(Span, Span)>,
 }
 
 impl ClockFaults {
-    pub fn of(spec: &FaultsSpec) -> Self {
+    pub fn from_spec(spec: &FaultsSpec) -> Self {
         let mut faults = Self { imu: Vec::new(), lidar: Vec::new() };
         for fault in &spec.faults {
             let change = match &fault.fault {
@@ -30,13 +30,13 @@ impl ClockFaults {
         faults
     }
 
-    /// By how much the lidar's clock is set ahead `since_start` after the start.
+    /// Offset of the lidar clock at `since_start`.
     pub fn lidar_ahead(&self, since_start: Span) -> Span {
         ahead(&self.lidar, since_start)
     }
 
-    /// What the clocks say with the faults, given what they say without.
-    pub fn applied(&self, since_start: Span, clock: &ClockTruth) -> ClockTruth {
+    /// Clock offsets with the faults, given the offsets without.
+    pub fn apply(&self, since_start: Span, clock: &ClockTruth) -> ClockTruth {
         ClockTruth {
             lidar_ahead: clock.lidar_ahead + ahead(&self.lidar, since_start),
             imu_ahead: clock.imu_ahead + ahead(&self.imu, since_start),

@@ -1,16 +1,16 @@
-//! Files that a spec of faults names.
+//! Files that a spec of faults refers to.
 
 use super::{FaultKind, FaultsSpec, check};
 use crate::spec::{Kind, Source, SpecError, text_file};
 
-/// Most arrival times in a file.
-const MOST_ARRIVALS: usize = 1_000_000;
+/// Maximum number of arrival times in a file: bounds the memory.
+const MAX_ARRIVALS: usize = 1_000_000;
 
 impl FaultsSpec {
-    /// The same with the files that it names read: arrival times in the place of the file of `thin`.
+    /// Reads the files that the spec refers to, and replaces each file of `thin` with the arrival times.
     ///
     /// # Errors
-    /// When a file cannot be read, or a line is not a number.
+    /// If a file cannot be read, or a line is not a number.
     pub fn with_files(mut self, source: &Source) -> Result<Self, SpecError> {
         for (index, fault) in self.faults.iter_mut().enumerate() {
             let FaultKind::Thin { arrivals_s, file, .. } = &mut fault.fault else { continue };
@@ -44,8 +44,8 @@ fn arrivals(file: &Source) -> Result<Vec<f64>, SpecError> {
             Ok(s) => return Err(wrong(format!("an arrival at {s} s, after one at {last} s"))),
             Err(_) => return Err(wrong(format!("expected a number, found \"{number}\""))),
         }
-        if arrivals_s.len() > MOST_ARRIVALS {
-            return Err(wrong(format!("more than {MOST_ARRIVALS} arrival times")));
+        if arrivals_s.len() > MAX_ARRIVALS {
+            return Err(wrong(format!("more than {MAX_ARRIVALS} arrival times")));
         }
     }
     Ok(arrivals_s)

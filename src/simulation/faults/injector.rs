@@ -8,19 +8,19 @@ use crate::time::{Span, Stamp};
 use crate::truth::{ClockTruth, TruthSample, TruthSink};
 use std::collections::{BTreeMap, VecDeque};
 
-/// Applies faults to what a simulation delivers, and hands the rest to a sink in the order of arrival.
+/// Applies faults to the data of a simulation, and passes the result to a sink in order of arrival.
 pub(in crate::simulation) struct Injector<'s, S: ?Sized> {
     sink: &'s mut S,
     imu: Pipeline,
     lidar: Pipeline,
     clock: ClockFaults,
     attitude: Option<Attitude>,
-    /// What has not arrived yet, by arrival and then in the order in which it was sent.
+    /// Events that have not arrived yet, by arrival time and then by order of sending.
     queue: BTreeMap<(Stamp, u64), Event>,
     sent: u64,
 }
 
-/// What is delivered.
+/// A delivered event.
 enum Event {
     Measurement(Measurement),
     BaseImu(ImuSample),
@@ -29,12 +29,12 @@ enum Event {
 }
 
 impl<'s, S: Sink + TruthSink + ?Sized> Injector<'s, S> {
-    /// An injector of `faults` into what `rig` measures; of no faults it passes everything on.
+    /// An injector of `faults` for the sensors of `rig`; without faults it passes on everything.
     pub fn new(faults: Option<&Faults>, rig: &Rig, sink: &'s mut S) -> Self {
         let none = Faults::default();
         let faults = faults.unwrap_or(&none);
         let removes_gravity = |kind: &FaultKind| matches!(kind, FaultKind::Axes { remove_gravity: true, .. });
-        let attitude = faults.of(true).any(|(_, kind, _)| removes_gravity(kind));
+        let attitude = faults.for_sensor(true).any(|(_, kind, _)| removes_gravity(kind));
         let pipeline = |is_imu| Pipeline::new(faults, is_imu, rig.duration_s, rig.seed);
         Self {
             sink,
@@ -47,7 +47,7 @@ impl<'s, S: Sink + TruthSink + ?Sized> Injector<'s, S> {
         }
     }
 
-    /// Delivers all that is held or delayed.
+    /// Delivers all held and delayed events.
     pub fn finish(mut self) -> Result<(), SinkError> {
         let mut emitted = Vec::new();
         self.imu.finish(&mut emitted);
@@ -74,7 +74,7 @@ impl<'s, S: Sink + TruthSink + ?Sized> Injector<'s, S> {
         self.sent += 1;
     }
 
-    /// Delivers what arrives up to `now`, or all; nothing that a held message may come before.
+    /// Delivers events that arrive up to `now` (`None`: all), except those that a held message may precede.
     fn deliver(&mut self, now: Option<Stamp>) -> Result<(), SinkError> {
         let held = self.imu.held().into_iter().chain(self.lidar.held()).min();
         let until = now.into_iter().chain(held).min();
@@ -125,13 +125,13 @@ impl<S: Sink + TruthSink + ?Sized> TruthSink for Injector<'_, S> {
         self.imu.flush_silent(now, &mut emitted);
         self.lidar.flush_silent(now, &mut emitted);
         self.send_all(emitted);
-        let clock = self.clock.applied(now - EPOCH, clock);
+        let clock = self.clock.apply(now - EPOCH, clock);
         self.send(now, Event::Clock(clock));
         self.deliver(Some(now))
     }
 }
 
-/// The IMU's attitude during the interval of its last sample.
+/// Attitude of the IMU during the interval of the last sample.
 struct Attitude {
     head_from_imu: Rotation,
     period: Span,
@@ -151,7 +151,7 @@ impl Attitude {
         self.recent.push_back((now, world_from_head.rotation * self.head_from_imu));
     }
 
-    /// The mean specific force of an IMU that turns so and does not accelerate, in its frame, m/s^2.
+    /// Mean specific force of an IMU with this attitude and no acceleration, in the IMU frame, m/s^2.
     fn force_at_rest(&self) -> Vector {
         let at_rest = |(_, world_from_imu): &(Stamp, Rotation)| world_from_imu.inverse() * -gravity_in_world();
         self.recent.iter().map(at_rest).sum::<Vector>() / self.recent.len().max(1) as f64

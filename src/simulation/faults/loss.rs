@@ -1,4 +1,4 @@
-//! Faults by which messages are lost.
+//! Faults that lose messages.
 
 use super::FaultKind;
 use super::pipeline::{Message, Stage};
@@ -6,10 +6,10 @@ use crate::random::Stream;
 use crate::time::{Span, Stamp};
 use rand::RngExt;
 
-/// The stage of a fault of this group.
+/// The stage of a fault of this group; `None` for other groups.
 pub(super) fn stage(kind: &FaultKind, stream: &Stream) -> Option<Box<dyn Stage>> {
     Some(match kind {
-        FaultKind::Drop { share } => Box::new(Drop { share: *share, stream: stream.clone() }),
+        FaultKind::Drop { share } => Box::new(Drop { probability: *share, stream: stream.clone() }),
         FaultKind::Gap => Box::new(Gap),
         FaultKind::Cut { start_s, end_s } => {
             Box::new(Cut { start: start_s.map(Span::from_seconds), end: end_s.map(Span::from_seconds) })
@@ -21,28 +21,28 @@ pub(super) fn stage(kind: &FaultKind, stream: &Stream) -> Option<Box<dyn Stage>>
     })
 }
 
-/// Messages lost at random.
+/// Loses messages at random.
 struct Drop {
-    share: f64,
+    probability: f64,
     stream: Stream,
 }
 
 impl Stage for Drop {
     fn take(&mut self, message: Message, out: &mut Vec<Message>) {
-        if self.stream.random::<f64>() >= self.share {
+        if self.stream.random::<f64>() >= self.probability {
             out.push(message);
         }
     }
 }
 
-/// All messages lost.
+/// Loses all messages.
 struct Gap;
 
 impl Stage for Gap {
     fn take(&mut self, _: Message, _: &mut Vec<Message>) {}
 }
 
-/// Messages before the start and after the end lost.
+/// Loses messages before the start and after the end.
 struct Cut {
     start: Option<Span>,
     end: Option<Span>,
@@ -57,24 +57,24 @@ impl Stage for Cut {
     }
 }
 
-/// The messages nearest to given arrival times.
+/// Keeps the messages nearest to given arrival times.
 struct Thin {
     arrivals: Vec<Span>,
     repeat: Option<Span>,
-    /// How many arrival times are behind.
+    /// Number of arrival times that have passed.
     next: usize,
-    /// The message that waits for the next one, to know which of the two is nearer to an arrival time.
-    waiting: Option<Message>,
+    /// The last message, which waits for the next one to decide which is nearer to an arrival time.
+    pending: Option<Message>,
 }
 
 impl Thin {
     fn new(arrivals_s: &[f64], repeat_s: Option<f64>) -> Self {
         let arrivals = arrivals_s.iter().map(|s| Span::from_seconds(*s)).collect();
-        Self { arrivals, repeat: repeat_s.map(Span::from_seconds), next: 0, waiting: None }
+        Self { arrivals, repeat: repeat_s.map(Span::from_seconds), next: 0, pending: None }
     }
 
     /// The next arrival time.
-    fn arrival(&self) -> Option<Span> {
+    fn next_arrival(&self) -> Option<Span> {
         let count = self.arrivals.len().max(1);
         let round = (self.next / count) as i64;
         let offset = match self.repeat {
@@ -85,42 +85,42 @@ impl Thin {
         self.arrivals.get(self.next % count).map(|arrival| *arrival + offset)
     }
 
-    /// Emits the waiting message if an arrival time lies before `until`.
-    fn decide(&mut self, until: Span, out: &mut Vec<Message>) {
+    /// Emits the pending message if there is an arrival time before `until`.
+    fn resolve(&mut self, until: Span, out: &mut Vec<Message>) {
         let mut is_nearest = false;
-        while self.arrival().is_some_and(|arrival| arrival < until) {
+        while self.next_arrival().is_some_and(|arrival| arrival < until) {
             self.next += 1;
             is_nearest = true;
         }
-        out.extend(self.waiting.take().filter(|_| is_nearest));
+        out.extend(self.pending.take().filter(|_| is_nearest));
     }
 }
 
 impl Stage for Thin {
     fn take(&mut self, message: Message, out: &mut Vec<Message>) {
-        if let Some(before) = &self.waiting {
+        if let Some(before) = &self.pending {
             let (before, now) = (before.since_start(), message.since_start());
             let middle = before + Span::from_nanos((now - before).nanos() / 2);
-            self.decide(middle, out);
+            self.resolve(middle, out);
         }
-        self.waiting = Some(message);
+        self.pending = Some(message);
     }
 
     fn pass(&mut self, message: Message, out: &mut Vec<Message>) {
         self.finish(out);
-        self.decide(message.since_start(), out);
+        self.resolve(message.since_start(), out);
         out.push(message);
     }
 
     fn finish(&mut self, out: &mut Vec<Message>) {
-        if let Some(last) = &self.waiting {
-            // Half a millisecond: an arrival behind that is one of a message that never came.
+        if let Some(last) = &self.pending {
+            // Half a millisecond: a later arrival time belongs to a message that does not exist.
             let until = last.since_start() + Span::from_nanos(500_000);
-            self.decide(until, out);
+            self.resolve(until, out);
         }
     }
 
     fn held(&self) -> Option<Stamp> {
-        self.waiting.as_ref().map(|message| message.arrival)
+        self.pending.as_ref().map(|message| message.arrival)
     }
 }

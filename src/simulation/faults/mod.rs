@@ -1,10 +1,10 @@
-//! Faults of the sensors and of their delivery, for tests of a design or an estimator with imperfect data.
+//! Faults of the sensors and of their delivery, to test a design or an estimator with imperfect data.
 //!
-//! [`FaultsSpec`] is a list of faults as it is written in `specs/faults/`; [`Faults`] is the same checked; an
-//! [`Injector`] takes what a simulation delivers, applies the faults in the order of the list, and hands the rest to
-//! the sink. Each sensor has a pipeline with one stage a fault. Every fault draws from a stream of its own, and all
-//! stages run on the thread that delivers, in the order of delivery, so that the result does not depend on the number
-//! of threads. Memory holds what is delayed and nothing else.
+//! [`FaultsSpec`] is the list of faults in a file of `specs/faults/`; [`Faults`] is the checked list. An [`Injector`]
+//! takes the data of a simulation, applies the faults in the order of the list, and passes the result to the sink. Each
+//! sensor has a pipeline with one stage per fault. Each fault has a separate random stream, and all stages run on the
+//! delivering thread in order of delivery, so the result does not depend on the number of threads. Memory contains delayed
+//! messages only.
 
 mod check;
 mod clock;
@@ -28,17 +28,17 @@ use crate::spec::{Source, SpecError};
 use clock::ClockFaults;
 use interval::Interval;
 
-/// Faults that were checked.
+/// Checked faults.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Faults {
     spec: FaultsSpec,
 }
 
 impl Faults {
-    /// Checks `spec`, read from `source`, whose files were read before ([`FaultsSpec::with_files`]).
+    /// Checks `spec` from `source`; the files must have been read ([`FaultsSpec::with_files`]).
     ///
     /// # Errors
-    /// When times, values or units of a fault do not go together.
+    /// If times, values or units of a fault are inconsistent.
     pub fn new(spec: &FaultsSpec, source: &Source) -> Result<Self, SpecError> {
         check::check(spec, source)?;
         for (index, fault) in spec.faults.iter().enumerate() {
@@ -61,20 +61,20 @@ impl Faults {
     /// Checks that the faults are possible with `lidar`.
     ///
     /// # Errors
-    /// When missing returns of a lidar that scans no plane are to be encoded: they are not in its messages.
+    /// If misses are to be encoded for a lidar that is not planar: the messages do not contain misses.
     pub(super) fn check_with(&self, lidar: &Lidar, source: &Source) -> Result<(), SpecError> {
         let is_misses = |fault: &FaultSpec| matches!(fault.fault, FaultKind::Misses { .. });
-        match self.spec.faults.iter().position(is_misses).filter(|_| !lidar.scans_plane()) {
+        match self.spec.faults.iter().position(is_misses).filter(|_| !lidar.is_planar()) {
             Some(index) => {
-                let message = format!("fault {index} (misses): this lidar scans no plane, and has no LaserScan");
-                Err(check::about(source, index, "misses", message).with_help("use a lidar that scans a plane: utm30lx"))
+                let message = format!("fault {index} (misses): this lidar is not planar and has no LaserScan");
+                Err(check::about(source, index, "misses", message).with_help("use a planar lidar, such as utm30lx"))
             }
             None => Ok(()),
         }
     }
 
-    /// The calibration that is published, given the true one.
-    pub(super) fn published(&self, mut calibration: Calibration) -> Calibration {
+    /// The published calibration, given the true one.
+    pub(super) fn published_calibration(&self, mut calibration: Calibration) -> Calibration {
         for fault in &self.spec.faults {
             let FaultKind::Extrinsics { position_m, roll_pitch_yaw_deg } = &fault.fault else { continue };
             let head_from_sensor = match fault.sensor {
@@ -91,13 +91,13 @@ impl Faults {
     }
 
     fn clock(&self) -> ClockFaults {
-        ClockFaults::of(&self.spec)
+        ClockFaults::from_spec(&self.spec)
     }
 
-    /// The faults of the IMU (or else of the lidar) with their number in the list and their interval.
-    fn of(&self, is_imu: bool) -> impl Iterator<Item = (usize, &FaultKind, Interval)> {
+    /// The faults of the IMU (or of the lidar) with their index in the list and their interval.
+    fn for_sensor(&self, is_imu: bool) -> impl Iterator<Item = (usize, &FaultKind, Interval)> {
         let other = if is_imu { FaultySensor::Lidar } else { FaultySensor::Imu };
         let faults = self.spec.faults.iter().enumerate().filter(move |(_, fault)| fault.sensor != other);
-        faults.map(|(index, fault)| (index, &fault.fault, Interval::of(fault)))
+        faults.map(|(index, fault)| (index, &fault.fault, Interval::from_spec(fault)))
     }
 }

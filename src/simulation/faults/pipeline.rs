@@ -1,4 +1,4 @@
-//! A sensor's faults in their order: a stage each.
+//! The faults of a sensor in order, one stage each.
 
 use super::interval::Interval;
 use super::{FaultKind, Faults, loss, scan, timing, values};
@@ -8,20 +8,20 @@ use crate::random::Seed;
 use crate::simulation::EPOCH;
 use crate::time::{Span, Stamp};
 
-/// A measurement on its way to the sink.
+/// A measurement between sensor and sink.
 #[derive(Debug, Clone)]
 pub(super) struct Message {
-    /// When it would arrive without faults, true time. Faults' intervals are about this time.
+    /// Arrival in true time without faults. The intervals of faults refer to this time.
     pub taken: Stamp,
-    /// When it arrives, true time.
+    /// Arrival in true time.
     pub arrival: Stamp,
     pub measurement: Measurement,
-    /// Specific force of an IMU at rest in the attitude of this sample, m/s^2, where some fault asks for it.
+    /// Specific force of an IMU at rest in the attitude of this sample, m/s^2; computed only if a fault needs it.
     pub force_at_rest: Vector,
 }
 
 impl Message {
-    /// The time since the start that faults' intervals are about.
+    /// Time since the start of the run, to which the intervals of faults refer.
     pub fn since_start(&self) -> Span {
         self.taken - EPOCH
     }
@@ -41,44 +41,44 @@ impl Message {
     }
 }
 
-/// A fault at work. Messages that it emits arrive no earlier than those that it took.
+/// A stage that applies a fault. Its output messages arrive no earlier than its input messages.
 pub(super) trait Stage {
-    /// Takes a message within the fault's interval.
+    /// Processes a message within the interval of the fault.
     fn take(&mut self, message: Message, out: &mut Vec<Message>);
 
-    /// Takes a message outside of it.
+    /// Processes a message outside the interval.
     fn pass(&mut self, message: Message, out: &mut Vec<Message>) {
         self.finish(out);
         out.push(message);
     }
 
-    /// Emits what is held, as no more messages come.
+    /// Emits all held messages at the end of the run.
     fn finish(&mut self, _out: &mut Vec<Message>) {}
 
-    /// The earliest arrival of a message that is held.
+    /// Earliest arrival of a held message.
     fn held(&self) -> Option<Stamp> {
         None
     }
 }
 
-/// Silence after which a stage emits what it holds: the message that it waits for may never come.
+/// Time without messages after which a stage emits held messages: the message that they wait for may never come.
 const SILENCE: Span = Span::from_nanos(5_000_000_000);
 
-/// All faults of a sensor.
+/// All fault stages of a sensor.
 pub(super) struct Pipeline {
-    stages: Vec<Placed>,
+    stages: Vec<TimedStage>,
 }
 
-/// A stage with its interval.
-struct Placed {
+/// A stage and the interval of the fault.
+struct TimedStage {
     interval: Interval,
     stage: Box<dyn Stage>,
-    /// When the last message reached it.
+    /// Time of the last message.
     last: Stamp,
 }
 
 impl Pipeline {
-    /// The faults of the IMU, or else of the lidar, in a run of `duration_s`.
+    /// The faults of the IMU (or of the lidar) in a run of `duration_s`.
     pub fn new(faults: &Faults, is_imu: bool, duration_s: f64, seed: Seed) -> Self {
         let sensor = if is_imu { "imu" } else { "lidar" };
         let placed = |(index, kind, interval): (usize, &FaultKind, Interval)| {
@@ -87,17 +87,17 @@ impl Pipeline {
                 .or_else(|| timing::stage(kind, &stream, &interval))
                 .or_else(|| values::stage(kind, stream, interval.limits_s(duration_s)))
                 .or_else(|| scan::stage(kind))?;
-            Some(Placed { interval, stage, last: EPOCH })
+            Some(TimedStage { interval, stage, last: EPOCH })
         };
-        Self { stages: faults.of(is_imu).filter_map(placed).collect() }
+        Self { stages: faults.for_sensor(is_imu).filter_map(placed).collect() }
     }
 
-    /// Takes a message from the sensor, and emits what comes of it and of those before.
+    /// Processes a message of the sensor, and emits the resulting messages.
     pub fn take(&mut self, message: Message, out: &mut Vec<Message>) {
         feed(&mut self.stages, message, out);
     }
 
-    /// Emits what is held by stages that no message has reached for long.
+    /// Emits the held messages of stages that have had no message for [`SILENCE`].
     pub fn flush_silent(&mut self, now: Stamp, out: &mut Vec<Message>) {
         let mut stages = self.stages.as_mut_slice();
         while let Some((first, rest)) = stages.split_first_mut() {
@@ -108,7 +108,7 @@ impl Pipeline {
         }
     }
 
-    /// Emits all that is held.
+    /// Emits all held messages.
     pub fn finish(&mut self, out: &mut Vec<Message>) {
         let mut stages = self.stages.as_mut_slice();
         while let Some((first, rest)) = stages.split_first_mut() {
@@ -117,13 +117,13 @@ impl Pipeline {
         }
     }
 
-    /// The earliest arrival of a message that is held.
+    /// Earliest arrival of a held message.
     pub fn held(&self) -> Option<Stamp> {
         self.stages.iter().filter_map(|placed| placed.stage.held()).min()
     }
 }
 
-fn feed(stages: &mut [Placed], message: Message, out: &mut Vec<Message>) {
+fn feed(stages: &mut [TimedStage], message: Message, out: &mut Vec<Message>) {
     let Some((first, rest)) = stages.split_first_mut() else { return out.push(message) };
     first.last = message.taken;
     let mut emitted = Vec::new();
@@ -134,7 +134,7 @@ fn feed(stages: &mut [Placed], message: Message, out: &mut Vec<Message>) {
     emitted.into_iter().for_each(|message| feed(rest, message, out));
 }
 
-fn flush(first: &mut Placed, rest: &mut [Placed], out: &mut Vec<Message>) {
+fn flush(first: &mut TimedStage, rest: &mut [TimedStage], out: &mut Vec<Message>) {
     let mut emitted = Vec::new();
     first.stage.finish(&mut emitted);
     emitted.into_iter().for_each(|message| feed(rest, message, out));
@@ -147,14 +147,14 @@ mod tests {
     use crate::simulation::FaultsSpec;
     use crate::spec::{Source, parse};
 
-    /// The pipeline of the IMU with `list`.
+    /// The IMU pipeline with `list`.
     fn pipeline(list: &str) -> Pipeline {
         let source = Source::in_memory("test", format!("(faults: [{list}])"));
         let faults = Faults::new(&parse::<FaultsSpec>(&source).unwrap(), &source).unwrap();
         Pipeline::new(&faults, true, 100.0, Seed(1))
     }
 
-    /// A message of the IMU that is taken so many ms after the start.
+    /// An IMU message at `ms` after the start.
     fn message(ms: i64) -> Message {
         let taken = EPOCH + Span::from_nanos(ms * 1_000_000);
         let still = Vector::zeros();
@@ -163,10 +163,10 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_for_a_sensor_that_fell_silent_is_emitted_after_seconds() {
+    fn held_messages_are_emitted_after_seconds_of_silence() {
         let at = |s: i64| EPOCH + Span::from_nanos(s * 1_000_000_000);
         for waiting in ["burst(size: 4, spacing_us: 0)", "reorder(share: 1)", "thin(arrivals_s: [0.105, 0.18])"] {
-            // Eleven messages to 0.1 s: the last ones are held, and nothing follows.
+            // Eleven messages up to 0.1 s: the last ones are held, and none follow.
             let mut pipeline = pipeline(&format!("(sensor: imu, fault: {waiting})"));
             let mut out = Vec::new();
             (0..11).for_each(|k| pipeline.take(message(10 * k), &mut out));
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_held_goes_through_the_faults_that_follow() {
+    fn held_messages_pass_through_the_faults_that_follow() {
         let mut pipeline = pipeline(
             "(sensor: imu, fault: burst(size: 4, spacing_us: 0)), (sensor: imu, fault: clock_offset(offset_s: 1))",
         );

@@ -1,14 +1,14 @@
-//! Faults of a lidar's ranges.
+//! Faults of lidar ranges.
 
 use super::pipeline::{Message, Stage};
 use super::{FaultKind, MissEncoding};
 use crate::measurement::{LidarReturn, LidarScan, Measurement, PlanarScan};
 use crate::time::Span;
 
-/// By how much `above_max` exceeds the maximum range, m.
+/// Difference of the encoding `above_max` from the maximum range, m.
 const ABOVE_MAX_M: f32 = 1.0;
 
-/// The stage of a fault of this group.
+/// The stage of a fault of this group; `None` for other groups.
 pub(super) fn stage(kind: &FaultKind) -> Option<Box<dyn Stage>> {
     Some(match kind {
         FaultKind::ConstantRange { range_m } => Box::new(ConstantRange { range_m: *range_m }),
@@ -17,7 +17,7 @@ pub(super) fn stage(kind: &FaultKind) -> Option<Box<dyn Stage>> {
     })
 }
 
-/// One range for all beams: of a lidar that scans a plane also for those without a return.
+/// Sets all ranges to one value; for a planar lidar also those of beams without a return.
 struct ConstantRange {
     range_m: f64,
 }
@@ -59,7 +59,7 @@ impl Stage for ConstantRange {
     }
 }
 
-/// Beams without a return, encoded in another way.
+/// Changes the encoding of beams without a return.
 struct Misses {
     encoding: MissEncoding,
 }

@@ -1,4 +1,4 @@
-//! The faults of a run as they are written: `specs/faults/NAME.ron`.
+//! Data of a faults file, `specs/faults/NAME.ron`.
 
 use crate::spec::checked;
 use serde::{Deserialize, Serialize};
@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultsSpec {
-    /// The faults; each acts on what the ones before it left.
+    /// The faults, applied in order: each acts on the output of the previous ones.
     pub faults: Vec<FaultSpec>,
 }
 
-/// One fault: whose measurements, when, and what happens to them.
+/// One fault: sensor, interval, and effect.
 ///
 /// Times are true seconds since the start of the run. A measurement belongs to the time at which it is complete: the
-/// end of an IMU sample's interval, the end of a lidar's sweep.
+/// end of an IMU sample's interval, the end of a lidar scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultSpec {
@@ -69,7 +69,7 @@ pub enum FaultKind {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         end_s: Option<f64>,
     },
-    /// Only the messages nearest to given arrival times are kept.
+    /// Keeps only the messages nearest to given arrival times.
     Thin {
         /// Arrival times, s after the start, in order.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -96,7 +96,7 @@ pub enum FaultKind {
         #[serde(with = "checked::NonNegative")]
         spacing_us: f64,
     },
-    /// The IMU saturates below the limits of its data sheet. The noise model that is published with the recording
+    /// The IMU saturates below the limits of the data sheet. The noise model that is published with the recording
     /// keeps those of the data sheet.
     Clip {
         /// Maximum rate on an axis, rad/s.
@@ -178,10 +178,10 @@ pub enum FaultKind {
     },
     /// The IMU's driver uses other conventions than REP-145.
     Axes {
-        /// Whether rates have the wrong sign.
+        /// Whether the sign of the rates is inverted.
         #[serde(default)]
         negate_gyro: bool,
-        /// Whether specific forces have the wrong sign.
+        /// Whether the sign of the specific forces is inverted.
         #[serde(default)]
         negate_accel: bool,
         /// Whether gravity is removed, by the true attitude.
@@ -194,18 +194,18 @@ pub enum FaultKind {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         accel_scale: Option<f64>,
     },
-    /// The published calibration (`/tf_static`) is wrong; the sensor itself stays in its place.
+    /// The published calibration (`/tf_static`) is wrong; the mounting of the sensor does not change.
     Extrinsics {
         /// Error of the sensor's position in the head, m.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         position_m: Option<[f64; 3]>,
-        /// Error of its attitude about its own axes, degrees.
+        /// Error of the attitude about the sensor axes, degrees.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         roll_pitch_yaw_deg: Option<[f64; 3]>,
     },
 }
 
-/// How a driver writes a beam that did not come back. The simulated lidar writes `inf` (REP-117).
+/// Encoding of a beam without a return. The simulated lidar uses `inf` (REP-117).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MissEncoding {
@@ -219,12 +219,12 @@ pub enum MissEncoding {
     Nan,
     /// Infinity.
     Inf,
-    /// Minus infinity, which REP-117 keeps for objects that are too near.
+    /// Minus infinity, which REP-117 reserves for objects below the minimum range.
     MinusInf,
 }
 
 impl FaultKind {
-    /// Its name in a spec.
+    /// Name in a spec.
     pub(super) fn name(&self) -> &'static str {
         match self {
             Self::Drop { .. } => "drop",

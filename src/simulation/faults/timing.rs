@@ -1,4 +1,4 @@
-//! Faults of stamps, of arrival and of order.
+//! Faults of stamps, arrival and order.
 
 use super::FaultKind;
 use super::interval::Interval;
@@ -8,7 +8,7 @@ use crate::time::{Span, Stamp};
 use rand::RngExt;
 use rand_distr::{Distribution, Exp1};
 
-/// The stage of a fault of this group.
+/// The stage of a fault of this group; `None` for other groups.
 pub(super) fn stage(kind: &FaultKind, stream: &Stream, interval: &Interval) -> Option<Box<dyn Stage>> {
     let stream = stream.clone();
     Some(match kind {
@@ -22,17 +22,17 @@ pub(super) fn stage(kind: &FaultKind, stream: &Stream, interval: &Interval) -> O
         FaultKind::ClockJump { jump_s } => {
             Box::new(ClockChange { from: interval.from(), by: Span::from_seconds(*jump_s) })
         }
-        FaultKind::Duplicate { share } => Box::new(Duplicate { share: *share, stream }),
-        FaultKind::Reorder { share } => Box::new(Reorder { share: *share, stream, held: None }),
+        FaultKind::Duplicate { share } => Box::new(Duplicate { probability: *share, stream }),
+        FaultKind::Reorder { share } => Box::new(Reorder { probability: *share, stream, held: None }),
         _ => return None,
     })
 }
 
-/// Late stamps and arrivals, as of a queue.
+/// Delays stamps and arrivals, as a queue does.
 struct Delay {
     mean_s: f64,
     stream: Stream,
-    /// Stamp and arrival of the message before.
+    /// Stamp and arrival of the previous message.
     last: Option<(Stamp, Stamp)>,
 }
 
@@ -61,7 +61,7 @@ impl Stage for Delay {
     }
 }
 
-/// Groups of messages that arrive together.
+/// Delivers messages in groups.
 struct Burst {
     size: usize,
     spacing: Span,
@@ -91,7 +91,7 @@ impl Stage for Burst {
     }
 }
 
-/// A clock that is set ahead from some time on.
+/// Adds an offset to the clock from a time on.
 struct ClockChange {
     from: Span,
     by: Span,
@@ -106,24 +106,24 @@ impl Stage for ClockChange {
     }
 }
 
-/// Messages delivered twice.
+/// Delivers messages twice.
 struct Duplicate {
-    share: f64,
+    probability: f64,
     stream: Stream,
 }
 
 impl Stage for Duplicate {
     fn take(&mut self, message: Message, out: &mut Vec<Message>) {
-        if self.stream.random::<f64>() < self.share {
+        if self.stream.random::<f64>() < self.probability {
             out.push(message.clone());
         }
         out.push(message);
     }
 }
 
-/// Neighbours delivered in the wrong order.
+/// Exchanges neighbouring messages.
 struct Reorder {
-    share: f64,
+    probability: f64,
     stream: Stream,
     held: Option<Message>,
 }
@@ -133,7 +133,7 @@ impl Stage for Reorder {
         if let Some(mut before) = self.held.take() {
             before.arrival = message.arrival;
             out.extend([message, before]);
-        } else if self.stream.random::<f64>() < self.share {
+        } else if self.stream.random::<f64>() < self.probability {
             self.held = Some(message);
         } else {
             out.push(message);

@@ -9,7 +9,7 @@ use crate::time::Span;
 use rand::RngExt;
 use std::collections::VecDeque;
 
-/// The stage of a fault of this group; it acts between these times, s after the start.
+/// The stage of a fault of this group, active from `from_s` to `to_s`, s after the start; `None` for other groups.
 pub(super) fn stage(kind: &FaultKind, stream: Stream, (from_s, to_s): (f64, f64)) -> Option<Box<dyn Stage>> {
     Some(match kind {
         FaultKind::Freeze => Box::new(Freeze { last: None }),
@@ -42,17 +42,17 @@ pub(super) fn stage(kind: &FaultKind, stream: Stream, (from_s, to_s): (f64, f64)
     })
 }
 
-/// A rate in rad/s from one in either unit.
+/// A rate in rad/s, from either unit.
 fn rate(rad_per_s: Option<[f64; 3]>, deg_per_s: Option<[f64; 3]>) -> Option<Vector> {
     rad_per_s.or(deg_per_s.map(|rate| rate.map(f64::to_radians))).map(Vector::from)
 }
 
-/// So many numbers from 0 to 1.
+/// `count` random numbers from 0 to 1.
 fn draws(mut stream: Stream, count: u32) -> impl Iterator<Item = f64> {
     (0..count).map(move |_| stream.random::<f64>())
 }
 
-/// The sample in a message of the IMU.
+/// The sample of an IMU message; `None` for the lidar.
 fn sample(message: &mut Message) -> Option<&mut ImuSample> {
     match &mut message.measurement {
         Measurement::Imu(sample) => Some(sample),
@@ -60,7 +60,7 @@ fn sample(message: &mut Message) -> Option<&mut ImuSample> {
     }
 }
 
-/// The last measurement again and again.
+/// Repeats the last measurement.
 struct Freeze {
     last: Option<Measurement>,
 }
@@ -79,7 +79,7 @@ impl Stage for Freeze {
     }
 }
 
-/// Saturation, rad/s and m/s^2.
+/// Saturates values, rad/s and m/s^2.
 struct Clip {
     gyro: Option<f64>,
     accel: Option<f64>,
@@ -100,11 +100,11 @@ impl Stage for Clip {
     }
 }
 
-/// Single bad samples.
+/// Replaces single samples.
 struct Spike {
     gyro: Option<Vector>,
     accel: Option<Vector>,
-    /// When they are due, in order; each affects one sample.
+    /// Times of the bad samples, in order; each affects one sample.
     times: VecDeque<Span>,
 }
 
@@ -120,7 +120,7 @@ impl Stage for Spike {
     }
 }
 
-/// A larger bias, rad/s and m/s^2.
+/// Adds a step to the bias, rad/s and m/s^2.
 struct BiasStep {
     gyro: Vector,
     accel: Vector,
@@ -136,9 +136,9 @@ impl Stage for BiasStep {
     }
 }
 
-/// Signs, units and gravity of another convention.
+/// Changes signs, units and the treatment of gravity.
 struct Axes {
-    /// Signed factors.
+    /// Signed factors on rates and specific forces.
     gyro: f64,
     accel: f64,
     remove_gravity: bool,

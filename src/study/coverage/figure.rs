@@ -1,26 +1,34 @@
+//! Figure of a lidar's coverage.
+
 use super::{Coverage, CoverageCell};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Series};
 
-/// Share of the cells that are darker than the darkest colour: few directions at the ends of a swing would else make
-/// all others light.
-const BEYOND: f64 = 0.02;
+/// Fraction of the cells that saturate the colour scale.
+///
+/// Few directions at the turning points of a swing have a very high density; scaling to them would make all others
+/// pale.
+const SATURATED_FRACTION: f64 = 0.02;
 
-/// Density by direction and by elevation, and the share of the sphere seen by time.
+/// Beam density by direction and by elevation, and observed fraction of the sphere over time.
 pub fn coverage_figure(coverage: &Coverage) -> Figure {
     let density = Series::line("", Colour::Estimate, coverage.by_elevation.clone());
-    let seen = Series::line("", Colour::Estimate, coverage.over_time.clone());
+    let fraction = Series::line("", Colour::Estimate, coverage.over_time.clone());
     Figure::of(vec![
         density_map(&coverage.cells),
         Chart::new("By elevation", "Elevation (degrees)", "Beams per sr and s").with(density).starting_at_zero(),
-        Chart::new("How soon", "Time (s)", "Share of the sphere seen").with(seen).starting_at_zero(),
+        Chart::new("Coverage over time", "Time (s)", "Observed fraction of the sphere")
+            .with(fraction)
+            .starting_at_zero(),
     ])
 }
 
-/// The sphere unrolled as from within, left at the left; what was never seen is white.
+/// Equirectangular map of the sphere as viewed from inside; unobserved cells are white.
 fn density_map(cells: &[CoverageCell]) -> Chart {
-    let mut amounts: Vec<f64> = cells.iter().map(|cell| cell.beams_per_sr_s).filter(|amount| *amount > 0.0).collect();
-    amounts.sort_by(f64::total_cmp);
-    let most = amounts.get(((1.0 - BEYOND) * amounts.len() as f64) as usize).or(amounts.last()).copied();
+    let mut densities: Vec<f64> =
+        cells.iter().map(|cell| cell.beams_per_sr_s).filter(|density| *density > 0.0).collect();
+    densities.sort_by(f64::total_cmp);
+    let maximum =
+        densities.get(((1.0 - SATURATED_FRACTION) * densities.len() as f64) as usize).or(densities.last()).copied();
     let cell = |cell: &CoverageCell| Cell {
         x: (-cell.azimuth_deg.1, -cell.azimuth_deg.0),
         y: (cell.elevation_deg.0, cell.elevation_deg.1),
@@ -28,10 +36,10 @@ fn density_map(cells: &[CoverageCell]) -> Chart {
     };
     let shown = Cells {
         unit: "beams per sr and s".to_owned(),
-        range: (0.0, most.unwrap_or(1.0)),
+        range: (0.0, maximum.unwrap_or(1.0)),
         cells: cells.iter().map(cell).collect(),
     };
-    Chart::new("Where beams go", "Bearing, clockwise from ahead (degrees)", "Elevation (degrees)")
+    Chart::new("Beam density", "Bearing, clockwise from ahead (degrees)", "Elevation (degrees)")
         .between((-180.0, 180.0), (-90.0, 90.0))
         .with_cells(shown)
 }

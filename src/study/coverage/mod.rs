@@ -1,7 +1,7 @@
-//! What a swinging lidar sees of the sphere about it, how densely, how soon, and what its gyroscope makes of it.
+//! Coverage of the sphere of directions by a swinging lidar: fraction, density and time, and use of the gyroscope's range.
 //!
-//! Directions are written in the heading's frame: upright, turned with the base's yaw, so that walking round a corner
-//! does not count as seeing more.
+//! Directions are in the heading frame: vertical z axis, rotated with the base's yaw, so that turning the base does not
+//! increase the coverage.
 
 mod figure;
 mod sphere;
@@ -20,102 +20,101 @@ use serde::Serialize;
 use sphere::Sphere;
 use track::SwingTrack;
 
-/// Latest time that is looked at, s: an hour, of which some 200 MB are held in memory.
-const LONGEST_S: f64 = 3600.0;
+/// Maximum end of the observation, s: one hour takes about 200 MB of memory.
+const MAX_END_S: f64 = 3600.0;
 
-/// What is run and looked at.
+/// Settings of a coverage computation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoveragePlan {
-    /// When looking begins, s after the motion's start: after its first seconds at rest.
+    /// Start of the observation after the motion's start, s; skips the rest at the beginning.
     pub from_s: f64,
-    /// How long is looked, s.
+    /// Duration of the observation, s.
     pub duration_s: f64,
-    /// The simulation's time step, s.
+    /// Time step of the simulation, s.
     pub step_s: f64,
-    /// Greatest rate that the gyroscope reads on an axis, degrees/s.
+    /// Range of the gyroscope per axis, degrees/s.
     pub rate_limit_deg_per_s: f64,
 }
 
 impl Default for CoveragePlan {
-    /// From 5 s on for 30 s, in steps of 1 ms, with the 600 degrees/s of the paper's gyroscope.
+    /// 30 s from 5 s on, steps of 1 ms, 600 degrees/s as the paper's gyroscope.
     fn default() -> Self {
         Self { from_s: 5.0, duration_s: 30.0, step_s: 1e-3, rate_limit_deg_per_s: 600.0 }
     }
 }
 
-/// What a lidar saw.
+/// Coverage of the sphere by a lidar.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Coverage {
-    /// Share of the sphere that was seen at all.
+    /// Observed fraction of the sphere.
     pub fraction_seen: f64,
-    /// Share of the sphere that a sweep sees, from one turning point of the swing to the next; `None` without two of
-    /// them.
+    /// Mean fraction of the sphere observed per sweep, from one turning point of the swing to the next; `None` without a
+    /// complete sweep.
     pub fraction_in_a_sweep: Option<f64>,
-    /// How long a sweep takes, s.
+    /// Mean duration of a sweep, s.
     pub sweep_s: Option<f64>,
-    /// Beams per steradian in a sweep, where it looks at all: the middle one of all places.
+    /// Beams per steradian in a sweep: median over the observed cells, mean over the sweeps.
     pub density_in_a_sweep_per_sr: Option<f64>,
-    /// Beams per steradian and second over the whole time: mean of all that was seen, the tenth part seen least, the
-    /// median.
+    /// Beams per steradian and second over the complete observation, in the observed cells.
     pub density_per_sr_s: Density,
-    /// Time until half of what was ever seen has been seen, s.
+    /// Time until 50 % of the finally observed fraction is observed, s.
     pub half_covered_s: f64,
-    /// Time until nine tenths of it have, s.
+    /// Time until 90 % of the finally observed fraction is observed, s.
     pub covered_s: f64,
     /// Angle between the 2.5 % and 97.5 % quantiles of the forward beam's elevation, degrees.
     pub field_of_view_deg: f64,
-    /// Greatest angle of the lidar's plane from level, degrees.
+    /// Maximum tilt of the lidar's scan plane from horizontal, degrees.
     pub most_tilt_deg: f64,
-    /// What the gyroscope saw.
+    /// Use of the gyroscope's range.
     pub gyro: GyroUsage,
-    /// Beams per steradian and second by elevation (degrees), the whole circle of azimuths averaged.
+    /// Elevation (degrees) and beams per steradian and second, averaged over all azimuths.
     pub by_elevation: Vec<(f64, f64)>,
-    /// Share of the sphere seen by time (s).
+    /// Time (s) and observed fraction of the sphere.
     pub over_time: Vec<(f64, f64)>,
-    /// How densely beams lie in each cell of the sphere, from below.
+    /// Beam density of each cell of the sphere, from the bottom up.
     #[serde(skip)]
     pub cells: Vec<CoverageCell>,
 }
 
-/// A cell of the sphere of directions; all are equally large.
+/// A cell of the sphere of directions; all cells have the same solid angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoverageCell {
-    /// Left and right end, degrees from where the base heads; positive to the left.
+    /// Limits in azimuth, degrees from the base's heading, positive to the left.
     pub azimuth_deg: (f64, f64),
-    /// Lower and upper end, degrees above the horizon.
+    /// Limits in elevation, degrees above the horizon.
     pub elevation_deg: (f64, f64),
-    /// Beams per steradian and second; 0 where none was seen.
+    /// Beams per steradian and second.
     pub beams_per_sr_s: f64,
 }
 
-/// How densely beams lie.
+/// Statistics of the beam density over the observed cells, beams per steradian and second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Density {
-    /// Mean over all places that were seen.
+    /// Mean.
     pub mean: f64,
-    /// A tenth of them got less.
+    /// 10 % quantile.
     pub p10: f64,
-    /// Half of them got less.
+    /// Median.
     pub median: f64,
 }
 
-/// A gyroscope's rates against its limit.
+/// Angular rates in comparison with a gyroscope's range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GyroUsage {
-    /// Greatest rate on an axis that it reads, degrees/s.
+    /// Range per axis, degrees/s.
     pub limit_deg_per_s: f64,
-    /// Greatest rate on an axis that there was, degrees/s.
+    /// Maximum angular rate on an axis, degrees/s.
     pub most_deg_per_s: f64,
-    /// The rate on the busiest axis that was not exceeded in 99 % of the time, degrees/s.
+    /// 99 % quantile over time of the largest rate among the axes, degrees/s.
     pub p99_deg_per_s: f64,
-    /// Share of the time in which some axis was beyond its limit.
+    /// Fraction of the time in which at least one axis is saturated.
     pub saturated: f64,
 }
 
-/// Runs `head` on `motion` and tells what `lidar` sees; `watch` is shown every instant that is looked at.
+/// Simulates `head` on `motion` and computes the coverage of `lidar`; `watch` receives each observed state.
 ///
 /// # Errors
-/// When the plan has no time to look or looks at more than an hour, or the simulation fails.
+/// If the observation is shorter than two scans or ends after one hour, or if the simulation fails.
 pub fn coverage(
     head: &HeadModel,
     motion: &dyn BaseMotion,
@@ -125,12 +124,12 @@ pub fn coverage(
 ) -> Result<Coverage, StudyError> {
     if !(plan.duration_s >= 2.0 * lidar.period_s() && plan.from_s >= 0.0) {
         let message = format!("{} s from {} s on: less than two scans of the lidar", plan.duration_s, plan.from_s);
-        return Err(StudyError::Plan { what: "time to look", message });
+        return Err(StudyError::Plan { what: "observation time", message });
     }
     let until_s = plan.from_s + plan.duration_s;
-    if until_s > LONGEST_S {
-        let message = format!("until {until_s} s; {LONGEST_S} s at most");
-        return Err(StudyError::Plan { what: "time to look", message });
+    if until_s > MAX_END_S {
+        let message = format!("ends at {until_s} s: expected at most {MAX_END_S} s");
+        return Err(StudyError::Plan { what: "observation time", message });
     }
     let track = SwingTrack::record(head, motion, plan, watch)?;
     let turning = track.turning_points();
@@ -144,42 +143,44 @@ pub fn coverage(
         while next.next_if(|t| *t <= start_s).is_some() {
             sweeps.end(&mut sphere);
         }
-        let turned = lidar.turned(scan as u64).unwrap_or_else(Rotation::identity);
+        let laser_rotation = lidar.scan_rotation(scan as u64).unwrap_or_else(Rotation::identity);
         for beam in lidar.beams() {
             let heading_from_laser = track.heading_from_laser(start_s + beam.offset_s);
-            sphere.see(&(heading_from_laser * (turned * beam.direction_in_laser)));
+            sphere.count_beam(&(heading_from_laser * (laser_rotation * beam.direction_in_laser)));
         }
-        over_time.push((start_s + lidar.period_s(), sphere.fraction_seen()));
+        over_time.push((start_s + lidar.period_s(), sphere.observed_fraction()));
     }
-    let reach = |share: f64| {
-        let wanted = share * sphere.fraction_seen();
-        over_time.iter().find(|(_, seen)| *seen >= wanted).map_or(plan.duration_s, |(t, _)| *t)
+    let time_to = |share_of_final: f64| {
+        let target = share_of_final * sphere.observed_fraction();
+        over_time.iter().find(|(_, observed)| *observed >= target).map_or(plan.duration_s, |(t, _)| *t)
     };
-    let looked_s = scans as f64 * lidar.period_s();
+    let observed_s = scans as f64 * lidar.period_s();
     Ok(Coverage {
-        fraction_seen: sphere.fraction_seen(),
+        fraction_seen: sphere.observed_fraction(),
         fraction_in_a_sweep: sweeps.mean(|s| s.fraction),
         sweep_s: (turning.len() > 1).then(|| (turning[turning.len() - 1] - turning[0]) / (turning.len() - 1) as f64),
         density_in_a_sweep_per_sr: sweeps.mean(|s| s.density_per_sr),
-        density_per_sr_s: sphere.density_per_sr(looked_s),
-        half_covered_s: reach(0.5),
-        covered_s: reach(0.9),
+        density_per_sr_s: sphere.density_per_sr(observed_s),
+        half_covered_s: time_to(0.5),
+        covered_s: time_to(0.9),
         field_of_view_deg: track.field_of_view_rad().to_degrees(),
         most_tilt_deg: track.most_tilt_rad.to_degrees(),
         gyro: track.gyro_usage(plan.rate_limit_deg_per_s),
-        by_elevation: sphere.by_elevation(looked_s),
-        cells: sphere.cells(looked_s),
+        by_elevation: sphere.by_elevation(observed_s),
+        cells: sphere.cells(observed_s),
         over_time,
     })
 }
 
-/// What single sweeps saw.
+/// Coverage of single sweeps.
 #[derive(Debug, Default)]
 struct Sweeps {
-    whole: Vec<Sweep>,
-    begun: bool,
+    complete: Vec<Sweep>,
+    /// Whether the first turning point has passed.
+    has_started: bool,
 }
 
+/// Coverage of one sweep.
 #[derive(Debug, Clone, Copy)]
 struct Sweep {
     fraction: f64,
@@ -187,15 +188,16 @@ struct Sweep {
 }
 
 impl Sweeps {
-    /// Ends a sweep. What came before the first turning point was none.
+    /// Ends a sweep at a turning point; the time before the first one is not a sweep.
     fn end(&mut self, sphere: &mut Sphere) {
         let (fraction, density_per_sr) = sphere.end_sweep();
-        if std::mem::replace(&mut self.begun, true) {
-            self.whole.push(Sweep { fraction, density_per_sr });
+        if std::mem::replace(&mut self.has_started, true) {
+            self.complete.push(Sweep { fraction, density_per_sr });
         }
     }
 
-    fn mean(&self, of: fn(&Sweep) -> f64) -> Option<f64> {
-        (!self.whole.is_empty()).then(|| self.whole.iter().map(of).sum::<f64>() / self.whole.len() as f64)
+    /// Mean of a value over the complete sweeps.
+    fn mean(&self, value: fn(&Sweep) -> f64) -> Option<f64> {
+        (!self.complete.is_empty()).then(|| self.complete.iter().map(value).sum::<f64>() / self.complete.len() as f64)
     }
 }

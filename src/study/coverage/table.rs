@@ -1,19 +1,19 @@
-//! What was seen, as CSV.
+//! Coverage as CSV.
 
 use super::Coverage;
 use std::fmt::Write;
 
-/// `time_s,fraction_seen`, a line a scan.
+/// CSV with one row per scan: `time_s,fraction_seen`.
 pub fn over_time_csv(coverage: &Coverage) -> String {
     let mut text = "time_s,fraction_seen\n".to_owned();
-    for (time_s, seen) in &coverage.over_time {
+    for (time_s, fraction) in &coverage.over_time {
         // Writing to a string does not fail.
-        let _ = writeln!(text, "{time_s:.6},{seen:.6}");
+        let _ = writeln!(text, "{time_s:.6},{fraction:.6}");
     }
     text
 }
 
-/// `azimuth_low_deg,azimuth_high_deg,elevation_low_deg,elevation_high_deg,beams_per_sr_s`, a line a cell of the sphere.
+/// CSV with one row per cell: `azimuth_low_deg,azimuth_high_deg,elevation_low_deg,elevation_high_deg,beams_per_sr_s`.
 pub fn density_csv(coverage: &Coverage) -> String {
     let mut text = "azimuth_low_deg,azimuth_high_deg,elevation_low_deg,elevation_high_deg,beams_per_sr_s\n".to_owned();
     for cell in &coverage.cells {

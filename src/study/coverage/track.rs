@@ -1,4 +1,4 @@
-//! How the lidar and the gyroscope turned, instant by instant.
+//! Recorded rotation of the lidar and rates of the gyroscope.
 
 use super::{CoveragePlan, GyroUsage};
 use crate::dynamics::{HeadModel, HeadSimulation, HeadState};
@@ -6,21 +6,22 @@ use crate::geometry::{Rotation, Vector, roll_pitch_yaw};
 use crate::motion::BaseMotion;
 use crate::study::StudyError;
 
-/// A recorded swing, in steps of the simulation.
+/// A recorded swing, one entry per simulation step.
 #[derive(Debug, Clone)]
 pub(super) struct SwingTrack {
     step_s: f64,
+    /// `heading_from_laser`.
     rotations: Vec<Rotation>,
-    /// Of the forward beam above the horizon, rad.
+    /// Elevation of the forward beam above the horizon, rad.
     elevations: Vec<f64>,
-    /// Greatest rate on an axis of the IMU, rad/s.
+    /// Largest absolute rate among the IMU's axes, rad/s.
     rates: Vec<f64>,
-    /// Greatest angle of the lidar's plane from level, rad.
+    /// Maximum tilt of the lidar's scan plane from horizontal, rad.
     pub most_tilt_rad: f64,
 }
 
 impl SwingTrack {
-    /// Simulates, and keeps what is looked at.
+    /// Simulates the head and records the observed part.
     pub fn record(
         head: &HeadModel,
         motion: &dyn BaseMotion,
@@ -39,14 +40,14 @@ impl SwingTrack {
         for (step, state) in simulation.enumerate().take((skipped + steps) as usize) {
             let state = state?;
             if step >= skipped as usize {
-                track.keep(head, &state);
+                track.add(head, &state);
                 watch(&state);
             }
         }
         Ok(track)
     }
 
-    fn keep(&mut self, head: &HeadModel, state: &HeadState) {
+    fn add(&mut self, head: &HeadModel, state: &HeadState) {
         let (_, _, yaw) = roll_pitch_yaw(&state.base.world_from_body.rotation);
         let upright = Rotation::from_axis_angle(&Vector::z_axis(), -yaw);
         let rotation = upright * state.head.world_from_body.rotation * head.head_from_laser().rotation;
@@ -59,28 +60,29 @@ impl SwingTrack {
         self.rotations.push(rotation);
     }
 
-    /// How the lidar stood `t_s` after looking began.
+    /// Rotation of the lidar at `t_s` after the start of the observation.
     pub fn heading_from_laser(&self, t_s: f64) -> Rotation {
         let step = (t_s / self.step_s).round() as usize;
         self.rotations[step.min(self.rotations.len() - 1)]
     }
 
-    /// Angle between the 2.5 % and the 97.5 % quantile of the forward beam's elevation.
+    /// Angle between the 2.5 % and the 97.5 % quantile of the forward beam's elevation, rad.
     pub fn field_of_view_rad(&self) -> f64 {
         quantile(&self.elevations, 0.975) - quantile(&self.elevations, 0.025)
     }
 
-    /// Times at which the forward beam turned back, s after looking began; swings of less than a quarter of the field
-    /// of view, or of 1 degree, do not count.
+    /// Turning points of the forward beam's elevation, s after the start of the observation.
+    ///
+    /// Reversals by less than a quarter of the field of view, or less than 1 degree, are ignored.
     pub fn turning_points(&self) -> Vec<f64> {
-        let least = (0.25 * self.field_of_view_rad()).max(1_f64.to_radians());
+        let threshold = (0.25 * self.field_of_view_rad()).max(1_f64.to_radians());
         let mut turning = Vec::new();
         let (mut rises, mut extreme, mut at) = (true, f64::NEG_INFINITY, 0);
         for (step, elevation) in self.elevations.iter().enumerate() {
             let height = if rises { *elevation } else { -elevation };
             if height > extreme {
                 (extreme, at) = (height, step);
-            } else if height < extreme - least {
+            } else if height < extreme - threshold {
                 turning.push(at as f64 * self.step_s);
                 (rises, extreme, at) = (!rises, -height, step);
             }
@@ -88,23 +90,25 @@ impl SwingTrack {
         turning
     }
 
+    /// Angular rates in comparison with the gyroscope's range.
     pub fn gyro_usage(&self, limit_deg_per_s: f64) -> GyroUsage {
         let limit = limit_deg_per_s.to_radians();
-        let beyond = self.rates.iter().filter(|rate| **rate > limit).count();
+        let saturated = self.rates.iter().filter(|rate| **rate > limit).count();
         GyroUsage {
             limit_deg_per_s,
             most_deg_per_s: self.rates.iter().copied().fold(0.0, f64::max).to_degrees(),
             p99_deg_per_s: quantile(&self.rates, 0.99).to_degrees(),
-            saturated: beyond as f64 / self.rates.len().max(1) as f64,
+            saturated: saturated as f64 / self.rates.len().max(1) as f64,
         }
     }
 }
 
-fn quantile(values: &[f64], share: f64) -> f64 {
+/// Quantile of unsorted values at `fraction`; 0 if there are none.
+fn quantile(values: &[f64], fraction: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let place = (share * sorted.len() as f64) as usize;
-    sorted.get(place.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    let index = (fraction * sorted.len() as f64) as usize;
+    sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -112,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_swing_turns_twice_a_period_and_noise_does_not_count() {
+    fn a_swing_has_two_turning_points_per_period_and_ripple_is_ignored() {
         // 1 Hz, 0.5 rad, with a ripple of 0.01 rad at 20 Hz: turning points half a second apart.
         let elevation = |k: usize| {
             let t = k as f64 * 1e-3;
@@ -128,7 +132,7 @@ mod tests {
         let turning = track.turning_points();
         assert_eq!(turning.len(), 10, "{turning:?}");
         assert!(turning.windows(2).all(|w| (w[1] - w[0] - 0.5).abs() < 0.05), "{turning:?}");
-        // Of a sine, 2.5 % of the time are beyond 0.997 of its amplitude.
+        // A sine exceeds 0.997 of its amplitude in 2.5 % of the time.
         assert!((track.field_of_view_rad() - 1.0).abs() < 0.03);
         assert_eq!(track.gyro_usage(600.0).saturated, 0.5);
     }

@@ -1,4 +1,4 @@
-//! The base on its shaker: periodic, so each pose is computed once.
+//! Periodic motion of the base on a shaker, tabulated over one period.
 
 use super::GainPlan;
 use crate::dynamics::HeadModel;
@@ -8,42 +8,41 @@ use crate::spec::Source;
 use crate::study::StudyError;
 use std::ops::RangeInclusive;
 
-/// How long the shaker takes to reach its full strength, s.
+/// Time in which the shaker reaches its full amplitude, s.
 const ONSET_S: f64 = 1.0;
 
-/// What is left of the settling when recording begins.
-const LEFT_OF_SETTLING: f64 = 1e-5;
+/// Remaining fraction of the slowest transient at the start of the recording.
+const RESIDUAL_TRANSIENT: f64 = 1e-5;
 
-/// Time steps that a simulation may have, s.
+/// Valid time steps of the simulation, s.
 const STEPS_S: RangeInclusive<f64> = 1e-5..=0.1;
-/// Most lines of a multisine: each pose of the base is a sum of so many sines.
-const MOST_LINES: f64 = 10_000.0;
-/// Most steps of a period, each of which is held in memory for each thread.
-const MOST_STEPS: f64 = 1e6;
+/// Maximum number of spectral lines of a multisine: each pose of the base is a sum of as many sines.
+const MAX_LINES: f64 = 10_000.0;
+/// Maximum number of steps per period: each thread keeps one period of the base's motion in memory.
+const MAX_STEPS: f64 = 1e6;
 
-/// Times of a measurement, in steps of the simulation.
+/// Durations of a measurement, in simulation steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Schedule {
-    /// Steps until the head has settled.
+    /// Steps until transients have decayed.
     pub settling: usize,
-    /// Steps in the multisine's period.
+    /// Steps per period of the multisine.
     pub period: usize,
 }
 
 impl Schedule {
-    /// When to record `head` by `plan`.
+    /// Computes settling time and period for `head`.
     ///
     /// # Errors
-    /// When the period holds no line below the highest frequency, or too few steps; when it holds more of either than
-    /// memory and time allow, or the step is that of no simulation.
-    pub fn of(head: &HeadModel, plan: &GainPlan) -> Result<Self, StudyError> {
+    /// If the time step is out of range, or if the period has too few or too many lines or steps.
+    pub fn new(head: &HeadModel, plan: &GainPlan) -> Result<Self, StudyError> {
         if !STEPS_S.contains(&plan.step_s) {
-            let message = format!("{} s; from {} s to {} s", plan.step_s, STEPS_S.start(), STEPS_S.end());
+            let message = format!("{} s: expected {} to {} s", plan.step_s, STEPS_S.start(), STEPS_S.end());
             return Err(StudyError::Plan { what: "step", message });
         }
         let modes = head.linear_modes();
         let decay = modes.iter().map(|mode| mode.decay_per_s());
-        let settling_s = decay.fold(0.0, |most, rate| f64::max(most, -LEFT_OF_SETTLING.ln() / rate));
+        let settling_s = decay.fold(0.0, |longest, rate| f64::max(longest, -RESIDUAL_TRANSIENT.ln() / rate));
         let settling_s = ONSET_S + settling_s.min(plan.longest_settling_s);
         let within = modes.iter().filter(|m| m.frequency_hz < plan.up_to_hz);
         let narrowest_hz = within.map(|m| m.frequency_hz * m.damping_ratio).fold(f64::INFINITY, f64::min);
@@ -51,23 +50,23 @@ impl Schedule {
         let steps_to_highest = 1.0 / (plan.step_s * plan.up_to_hz);
         if !(steps_to_highest >= 4.0 && period_s * plan.up_to_hz >= 1.0) {
             let message = format!(
-                "{} Hz must be above one line of a period of {period_s} s, and below a quarter of the rate of steps of {} s",
+                "{} Hz: expected at least one line of a period of {period_s} s, and at most a quarter of the rate of {} s steps",
                 plan.up_to_hz, plan.step_s
             );
             return Err(StudyError::Plan { what: "highest frequency", message });
         }
-        if period_s * plan.up_to_hz > MOST_LINES {
+        if period_s * plan.up_to_hz > MAX_LINES {
             let message = format!(
-                "{period_s} s and {} Hz make {:.3e} lines; {MOST_LINES} at most: take a shorter period or a lower \
-                 highest frequency",
+                "{period_s} s and {} Hz give {:.3e} lines, more than {MAX_LINES}: use a shorter period or a lower highest \
+                 frequency",
                 plan.up_to_hz,
                 period_s * plan.up_to_hz
             );
             return Err(StudyError::Plan { what: "period", message });
         }
-        if period_s / plan.step_s > MOST_STEPS {
+        if period_s / plan.step_s > MAX_STEPS {
             let message = format!(
-                "{period_s} s in steps of {} s are {:.3e} steps; {MOST_STEPS} at most",
+                "{period_s} s in steps of {} s are {:.3e} steps, more than {MAX_STEPS}: use a shorter period or longer steps",
                 plan.step_s,
                 period_s / plan.step_s
             );
@@ -77,28 +76,29 @@ impl Schedule {
         Ok(Self { settling: steps(settling_s) + 1, period: steps(period_s) })
     }
 
-    /// Steps of a realisation.
+    /// Total steps of a realisation.
     pub fn steps(&self) -> usize {
         self.settling + self.period
     }
 }
 
-/// A base that is shaken along or about one axis, about a point of it.
-pub(super) struct Shaken {
+/// A base that is shaken along or about one axis through a given point.
+pub(super) struct ShakenBase {
     motion: Box<dyn BaseMotion>,
     base_from_point: Pose,
     step_s: f64,
     period: usize,
-    /// Steps until the motion is periodic.
+    /// First step of the periodic motion.
     from: usize,
+    /// Motion at each step of one period.
     table: Vec<Kinematics>,
 }
 
-impl Shaken {
-    /// Realisation `index` of the shaking along `axis` about the base's point `about`.
+impl ShakenBase {
+    /// Realisation `index` of the motion along or about `axis` through the base's point `about`.
     ///
     /// # Errors
-    /// When the plan makes no signal.
+    /// If the plan does not define a valid signal.
     pub fn new(
         axis: Axis,
         index: usize,
@@ -127,12 +127,13 @@ impl Shaken {
         Ok(shaken)
     }
 
+    /// Motion at a time, without the table.
     fn computed(&self, t_s: f64) -> Kinematics {
         self.motion.at(t_s).of_frame(&self.base_from_point.inverse())
     }
 }
 
-impl BaseMotion for Shaken {
+impl BaseMotion for ShakenBase {
     fn at(&self, t_s: f64) -> Kinematics {
         let step = (t_s / self.step_s).round();
         let is_on_step = (t_s - step * self.step_s).abs() < 1e-6 * self.step_s;

@@ -1,10 +1,10 @@
-//! Gain curves: the amplitude of the head's motion over that of its base, by frequency (the paper's figure 3).
+//! Gain curves: ratio of head to base motion amplitude over frequency (the paper's figure 3).
 //!
-//! One axis of the base at a time is shaken by a multisine: sines at the multiples of the reciprocal of a period, so
-//! that a spectrum over that period does not leak. What the head does is simulated, the settling is thrown away, one
-//! period is kept; several realisations that differ in nothing but the sines' phases are averaged (H1, see
-//! [`transfer_function`](crate::signal::transfer_function)). Whatever is not linear answers differently to each, and so
-//! lowers the coherence and widens the confidence band. Beside each curve stands the closed form of the linearised head
+//! The base is shaken on one axis at a time by a multisine, whose frequencies are multiples of the reciprocal of its
+//! period, so that a spectrum over one period has no leakage. The head is simulated until transients have decayed, then
+//! one period is recorded. Several realisations with different phases are averaged (H1 estimator, see
+//! [`transfer_function`](crate::signal::transfer_function)); nonlinearity differs between realisations, which lowers the
+//! coherence and widens the confidence band. Each curve includes the closed form of the linearised head
 //! ([`FrequencyResponse`](crate::dynamics::FrequencyResponse)).
 
 mod drive;
@@ -18,38 +18,38 @@ pub use measure::{gain_curve, gain_curves};
 pub use swing::{SwingPoint, SwingStudy, swing_study};
 pub use table::{csv, swing_csv};
 
-use crate::dynamics::{DampingSpec, HeadSpec, Peak, Points, Quantity};
+use crate::dynamics::{DampingSpec, GainPoints, HeadSpec, Peak, Quantity};
 use crate::motion::Axis;
 use crate::random::Seed;
 use serde::{Deserialize, Serialize};
 
-/// How gains are measured.
+/// Settings of a gain measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GainPlan {
-    /// What is compared along x, y, z.
+    /// Quantity compared along x, y and z: acceleration or specific force.
     pub quantity: Quantity,
-    /// Where; `None` for the spring's foot and the IMU.
-    pub points: Option<Points>,
+    /// Points of base and head whose motion is compared; `None` for the spring's foot and the IMU.
+    pub points: Option<GainPoints>,
     /// Highest frequency, Hz.
     pub up_to_hz: f64,
-    /// The multisine's period, s; `None` for one that puts two lines or more into the narrowest resonance.
+    /// Period of the multisine, s; `None` for at least two spectral lines in the narrowest resonance.
     pub period_s: Option<f64>,
-    /// Root mean square of the base's rate about an axis, degrees/s.
+    /// RMS angular rate of the base about an axis, degrees/s.
     pub rotation_deg_per_s: f64,
-    /// Root mean square of the base's acceleration along an axis, m/s^2.
+    /// RMS acceleration of the base along an axis, m/s^2.
     pub acceleration_m_per_s2: f64,
-    /// How many realisations are averaged.
+    /// Number of averaged realisations, at least 2.
     pub realisations: usize,
-    /// The longest settling that is waited for, s. A head that takes longer shows it in its coherence.
+    /// Maximum settling time, s. A transient that lasts longer lowers the coherence.
     pub longest_settling_s: f64,
-    /// The simulation's time step, s.
+    /// Time step of the simulation, s.
     pub step_s: f64,
-    /// From which the phases are drawn.
+    /// Random seed of the phases.
     pub seed: Seed,
 }
 
 impl Default for GainPlan {
-    /// 0 to 10 Hz at an amplitude so small that the head is linear, four realisations, steps of 1 ms.
+    /// Up to 10 Hz, an amplitude small enough for the head to be linear, four realisations, steps of 1 ms.
     fn default() -> Self {
         Self {
             quantity: Quantity::Kinematic,
@@ -66,14 +66,14 @@ impl Default for GainPlan {
     }
 }
 
-/// The gain at one frequency.
+/// Gain at one frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GainPoint {
     /// Frequency, Hz.
     pub freq_hz: f64,
     /// Measured gain.
     pub gain: f64,
-    /// Share of the head's power that the base's motion explains.
+    /// Coherence: fraction of the head's power that is linear in the base's motion.
     pub coherence: f64,
     /// Standard error of the measured gain.
     pub gain_sigma: f64,
@@ -81,25 +81,25 @@ pub struct GainPoint {
     pub gain_model: f64,
 }
 
-/// The gain along or about one axis.
+/// Gain curve along or about one axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GainCurve {
-    /// The axis: of rate for a rotation, of acceleration for a translation.
+    /// Axis: of angular rate for a rotation, of acceleration for a translation.
     pub axis: Axis,
-    /// The curve, lowest frequency first.
+    /// Points by increasing frequency.
     pub points: Vec<GainPoint>,
-    /// Its highest peak; `None` for a curve that only falls or rises.
+    /// Highest peak; `None` for a monotonic curve.
     pub peak: Option<Peak>,
-    /// That of the linearised head.
+    /// Highest peak of the linearised head.
     pub peak_model: Option<Peak>,
-    /// Root mean square of the head's lean and turn from its rest on the base, degrees.
+    /// RMS rotation angle of the head relative to its rest pose on the base, degrees.
     pub swing_rms_deg: f64,
-    /// Greatest, degrees.
+    /// Maximum rotation angle, degrees.
     pub swing_most_deg: f64,
 }
 
 impl GainCurve {
-    /// Its part up to a frequency, with the peaks that lie there.
+    /// The curve up to a frequency, without peaks above it.
     #[must_use]
     pub fn up_to(&self, freq_hz: f64) -> Self {
         let below = |peak: Option<Peak>| peak.filter(|peak| peak.freq_hz <= freq_hz);
@@ -112,7 +112,7 @@ impl GainCurve {
     }
 }
 
-/// The head with its modes damped by these ratios; one that does not move stays as it is.
+/// Returns the head with these damping ratios; a rigid head is unchanged.
 #[must_use]
 pub fn with_damping(spec: &HeadSpec, ratios: DampingSpec) -> HeadSpec {
     let mut damped = spec.clone();
@@ -122,7 +122,7 @@ pub fn with_damping(spec: &HeadSpec, ratios: DampingSpec) -> HeadSpec {
     damped
 }
 
-/// What an axis is called in tables: `x_rot` is the rate about x, `x` the acceleration along it.
+/// Name of an axis in tables: `x_rot` for the angular rate about x, `x` for the acceleration along x.
 pub fn axis_name(axis: Axis) -> &'static str {
     match axis {
         Axis::X => "x",
@@ -134,5 +134,5 @@ pub fn axis_name(axis: Axis) -> &'static str {
     }
 }
 
-/// The axes in the order of the paper's figure: rotations first.
+/// All axes in the order of the paper's figure, rotations first.
 pub const AXES: [Axis; 6] = [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::X, Axis::Y, Axis::Z];

@@ -1,49 +1,51 @@
-//! Gains at large amplitude, where the head is not linear: how resonance and gain move with the swing.
+//! Gains at large amplitudes, where the head is nonlinear: resonance and peak gain over swing amplitude.
 
 use super::{GainPlan, gain_curve};
 use crate::dynamics::{HeadModel, Peak};
 use crate::motion::Axis;
 use crate::study::{OnProgress, StudyError};
 
-/// The resonance at one strength of the shaking.
+/// The resonance at one excitation amplitude.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct SwingPoint {
-    /// Root mean square of the base's rate (degrees/s) or acceleration (m/s^2).
+    /// RMS angular rate (degrees/s) or acceleration (m/s^2) of the base.
     pub base_rms: f64,
-    /// Root mean square of the head's turn from its rest on the base, degrees.
+    /// RMS rotation angle of the head relative to its rest pose on the base, degrees.
     pub swing_rms_deg: f64,
-    /// Greatest turn, degrees.
+    /// Maximum rotation angle, degrees.
     pub swing_most_deg: f64,
-    /// Peak of the gain.
+    /// Peak of the gain curve; `None` for a monotonic curve.
     pub peak: Option<Peak>,
-    /// Coherence at the line next to the peak: what it lacks to 1 is the share that no linear head would answer.
+    /// Coherence at the spectral line next to the peak; its difference from 1 is the nonlinear fraction of the power.
     pub coherence: Option<f64>,
 }
 
-/// How a resonance moves with the swing.
+/// Resonance over swing amplitude on one axis.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct SwingStudy {
-    /// The axis that is shaken.
+    /// Axis of excitation.
     #[serde(serialize_with = "by_name")]
     pub axis: Axis,
     /// Peak of the linearised head.
     pub peak_model: Option<Peak>,
-    /// From the smallest to the largest swing.
+    /// Points by increasing swing amplitude.
     pub points: Vec<SwingPoint>,
-    /// Why the ladder ended before its top; `None` where it did not.
+    /// Reason of an early end; `None` if all amplitudes were measured.
     pub ended: Option<String>,
 }
 
+/// Serialises an axis by its name in tables.
 fn by_name<S: serde::Serializer>(axis: &Axis, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(super::axis_name(*axis))
 }
 
-/// Measures the gain about or along `axis` at strengths that would swing the linear head by each of `swings_deg` (root
-/// mean square). Ends early, and says why, where the simulation leaves its bounds. `on_progress` is told as
-/// realisations end.
+/// Measures the gain about or along `axis` at several amplitudes.
+///
+/// The excitation is such that the linearised head would swing by each of `swings_deg`, degrees RMS. Ends early, with a
+/// reason, if the simulation diverges. `on_progress` receives the finished fraction.
 ///
 /// # Errors
-/// When the plan cannot be carried out at the smallest swing.
+/// If the plan is invalid.
 pub fn swing_study(
     head: &HeadModel,
     axis: Axis,
@@ -52,20 +54,20 @@ pub fn swing_study(
     on_progress: OnProgress<'_>,
 ) -> Result<SwingStudy, StudyError> {
     let curves = (swings_deg.len() + 1) as f64;
-    let small = gain_curve(head, axis, plan, &|share| on_progress(share / curves))?;
+    let small = gain_curve(head, axis, plan, &|fraction| on_progress(fraction / curves))?;
     let mut study = SwingStudy { axis, peak_model: small.peak_model, points: Vec::new(), ended: None };
     for (before, swing_deg) in swings_deg.iter().enumerate() {
-        let share = swing_deg / small.swing_rms_deg;
+        let scale = swing_deg / small.swing_rms_deg;
         let plan = GainPlan {
-            rotation_deg_per_s: plan.rotation_deg_per_s * share,
-            acceleration_m_per_s2: plan.acceleration_m_per_s2 * share,
+            rotation_deg_per_s: plan.rotation_deg_per_s * scale,
+            acceleration_m_per_s2: plan.acceleration_m_per_s2 * scale,
             ..plan.clone()
         };
-        match gain_curve(head, axis, &plan, &|share| on_progress((before as f64 + 1.0 + share) / curves)) {
+        match gain_curve(head, axis, &plan, &|fraction| on_progress((before as f64 + 1.0 + fraction) / curves)) {
             Ok(curve) => {
                 let next_to = |peak: Peak| {
-                    let away = |f: f64| (f - peak.freq_hz).abs();
-                    curve.points.iter().min_by(|a, b| away(a.freq_hz).total_cmp(&away(b.freq_hz)))
+                    let distance = |f: f64| (f - peak.freq_hz).abs();
+                    curve.points.iter().min_by(|a, b| distance(a.freq_hz).total_cmp(&distance(b.freq_hz)))
                 };
                 study.points.push(SwingPoint {
                     base_rms: if axis.is_rotation() { plan.rotation_deg_per_s } else { plan.acceleration_m_per_s2 },

@@ -1,9 +1,9 @@
-//! Curves as CSV.
+//! Gain curves as CSV.
 
 use super::{GainCurve, SwingStudy, axis_name};
 use std::fmt::Write;
 
-/// `axis,freq_hz,gain,coherence,gain_model,gain_sigma`, a line a frequency.
+/// CSV with one row per frequency: `axis,freq_hz,gain,coherence,gain_model,gain_sigma`.
 pub fn csv(curves: &[GainCurve]) -> String {
     let mut text = "axis,freq_hz,gain,coherence,gain_model,gain_sigma\n".to_owned();
     for curve in curves {
@@ -20,11 +20,12 @@ pub fn csv(curves: &[GainCurve]) -> String {
     text
 }
 
-/// `axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,coherence`, a line a strength; nothing where there is
-/// none.
+/// CSV with one row per amplitude: `axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,coherence`.
+///
+/// The last three are empty without a peak.
 pub fn swing_csv(studies: &[SwingStudy]) -> String {
     let mut text = "axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,coherence\n".to_owned();
-    let or_nothing = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.5}"));
+    let or_empty = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.5}"));
     for study in studies {
         for p in &study.points {
             let _ = writeln!(
@@ -34,9 +35,9 @@ pub fn swing_csv(studies: &[SwingStudy]) -> String {
                 p.base_rms,
                 p.swing_rms_deg,
                 p.swing_most_deg,
-                or_nothing(p.peak.map(|peak| peak.freq_hz)),
-                or_nothing(p.peak.map(|peak| peak.gain)),
-                or_nothing(p.coherence),
+                or_empty(p.peak.map(|peak| peak.freq_hz)),
+                or_empty(p.peak.map(|peak| peak.gain)),
+                or_empty(p.coherence),
             );
         }
     }

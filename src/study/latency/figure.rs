@@ -1,26 +1,27 @@
-//! The paper's figure 4, and the curves that it does not have.
+//! Figures: sections through the map as in the paper's figure 4, and error curves.
 
-use super::{Banded, ClockState, Disturbance, Study, StudyRun};
+use super::{ClockState, ConfidenceInterval, Disturbance, LatencyResult, LatencyRun};
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series, SignedDots};
 
-/// Rates of rotation beyond this have the colours' ends, degrees/s.
+/// Angular rate at the ends of the colour scale, degrees/s; larger rates saturate the colour.
 const FULL_COLOUR_DEG_PER_S: f64 = 150.0;
 /// Width of a panel, points.
 const PANEL_WIDTH: f64 = 400.0;
 
-/// A figure of a run.
-type Told = fn(&StudyRun) -> Banded;
+/// An error measure of a run.
+type ErrorMeasure = fn(&LatencyRun) -> ConfidenceInterval;
 
-/// The vertical cut through the map under each disturbance that is shown, coloured by the rate of rotation at which a
-/// point was seen: a row of latencies and a row of noises, as in the paper.
-pub fn map_figure(study: &Study, clock: ClockState) -> Figure {
+/// Vertical section through the map for each shown disturbance, as in the paper: latencies above, noises below.
+///
+/// Colour is the head's angular rate at the time of a point.
+pub fn map_figure(study: &LatencyResult, clock: ClockState) -> Figure {
     let [latencies, noises] = &study.shown;
     let columns = latencies.len();
     let mut letters = 'a'..;
     let mut charts = Vec::new();
     for row in [latencies, noises] {
         for disturbance in row {
-            let title = format!("({}) {}", letters.next().unwrap_or(' '), said(*disturbance, row == noises));
+            let title = format!("({}) {}", letters.next().unwrap_or(' '), label(*disturbance, row == noises));
             charts.push(panel(study, (*disturbance, clock), &title, charts.is_empty()));
         }
     }
@@ -29,7 +30,7 @@ pub fn map_figure(study: &Study, clock: ClockState) -> Figure {
     figure
 }
 
-fn said(disturbance: Disturbance, is_noise: bool) -> String {
+fn label(disturbance: Disturbance, is_noise: bool) -> String {
     if is_noise {
         format!("{} ms added noise", disturbance.noise_ms)
     } else {
@@ -37,12 +38,12 @@ fn said(disturbance: Disturbance, is_noise: bool) -> String {
     }
 }
 
-fn panel(study: &Study, (disturbance, clock): (Disturbance, ClockState), title: &str, is_first: bool) -> Chart {
-    let points = study.run(disturbance, clock).map(|run| run.cut_m.as_slice()).unwrap_or_default();
-    let dots = points.iter().zip(&study.cut_rates_deg_per_s);
+fn panel(study: &LatencyResult, (disturbance, clock): (Disturbance, ClockState), title: &str, is_first: bool) -> Chart {
+    let points = study.run(disturbance, clock).map(|run| run.section_m.as_slice()).unwrap_or_default();
+    let dots = points.iter().zip(&study.section_rates_deg_per_s);
     let unit = if is_first { "\u{b0}/s" } else { "" };
-    let (along, up) = study.cut_range_m;
-    Chart::new(title, "Along the cut (m)", "Up (m)").as_map().between(along, up).with_signed_dots(SignedDots {
+    let (along, up) = study.section_range_m;
+    Chart::new(title, "Along the section (m)", "Up (m)").as_map().between(along, up).with_signed_dots(SignedDots {
         unit: unit.to_owned(),
         limit: FULL_COLOUR_DEG_PER_S,
         size: 1.6,
@@ -50,16 +51,15 @@ fn panel(study: &Study, (disturbance, clock): (Disturbance, ClockState), title: 
     })
 }
 
-/// Spread of the cloud and error of the position over the latency, and over the noise: with the clock state off and on,
-/// each with its 95 % band.
-pub fn curve_figure(study: &Study) -> Figure {
-    let over_latency = |run: &StudyRun| run.disturbance.latency_ms;
-    let over_noise = |run: &StudyRun| run.disturbance.noise_ms;
-    let (sigma, rmse): (Told, Told) = (|run| run.cloud_sigma_m, |run| run.position_rmse_m);
+/// Cloud standard deviation and position RMSE over latency and over noise, with clock state off and on, and 95 % bands.
+pub fn curve_figure(study: &LatencyResult) -> Figure {
+    let over_latency = |run: &LatencyRun| run.disturbance.latency_ms;
+    let over_noise = |run: &LatencyRun| run.disturbance.noise_ms;
+    let (sigma, rmse): (ErrorMeasure, ErrorMeasure) = (|run| run.cloud_sigma_m, |run| run.position_rmse_m);
     let (cloud, position) = ("Cloud, sigma (mm)", "Position RMSE (mm)");
-    let (latency, noise) = ("Latency of the IMU's stamps (ms)", "Noise on the scans' stamps, sigma (ms)");
-    let chart = |labels: (&str, &str), of: &dyn Fn(ClockState) -> Vec<(f64, Banded)>| {
-        let series = |name: &str, clock, colour| banded(name, colour, &of(clock));
+    let (latency, noise) = ("Latency of the IMU stamps (ms)", "Noise of the scan stamps, sigma (ms)");
+    let chart = |labels: (&str, &str), of: &dyn Fn(ClockState) -> Vec<(f64, ConfidenceInterval)>| {
+        let series = |name: &str, clock, colour| curve(name, colour, &of(clock));
         let dots = |clock, colour| {
             let points = of(clock).iter().map(|(x, y)| (*x, y.value * 1e3)).collect();
             Series::dots("", colour, points).marked(Mark::Dots(4.0))
@@ -71,10 +71,12 @@ pub fn curve_figure(study: &Study) -> Figure {
             .with(dots(ClockState::Off, Colour::Second))
             .with(dots(ClockState::On, Colour::Estimate))
     };
-    let latencies =
-        |figure: Told| move |clock| study.latencies(clock).iter().map(|run| (over_latency(run), figure(run))).collect();
-    let noises =
-        |figure: Told| move |clock| study.noises(clock).iter().map(|run| (over_noise(run), figure(run))).collect();
+    let latencies = |figure: ErrorMeasure| {
+        move |clock| study.latencies(clock).iter().map(|run| (over_latency(run), figure(run))).collect()
+    };
+    let noises = |figure: ErrorMeasure| {
+        move |clock| study.noises(clock).iter().map(|run| (over_noise(run), figure(run))).collect()
+    };
     let mut figure = Figure::of(vec![
         chart((latency, cloud), &latencies(sigma)),
         chart((noise, cloud), &noises(sigma)),
@@ -86,8 +88,9 @@ pub fn curve_figure(study: &Study) -> Figure {
     figure
 }
 
-fn banded(name: &str, colour: Colour, curve: &[(f64, Banded)]) -> Series {
-    let points = curve.iter().map(|(x, y)| (*x, y.value * 1e3)).collect();
-    let band = curve.iter().map(|(x, y)| (*x, y.low * 1e3, y.high * 1e3)).collect();
-    Series::line(name, colour, points).marked(Mark::Line(1.5)).with_band(band)
+/// A curve with its confidence band, in mm.
+fn curve(name: &str, colour: Colour, points: &[(f64, ConfidenceInterval)]) -> Series {
+    let values = points.iter().map(|(x, y)| (*x, y.value * 1e3)).collect();
+    let band = points.iter().map(|(x, y)| (*x, y.low * 1e3, y.high * 1e3)).collect();
+    Series::line(name, colour, values).marked(Mark::Line(1.5)).with_band(band)
 }

@@ -1,57 +1,54 @@
-//! What errors of timing between lidar and IMU do to a map (the paper's figure 4), and what the estimator's clock state
-//! makes good.
+//! Effect of timing errors between lidar and IMU on a map (the paper's figure 4), with and without clock estimation.
 //!
-//! One recording is estimated again and again: with a constant latency on the IMU's stamps, or with noise on the stamps
-//! of the lidar's scans ([`Disturbance`]). Both are put on between the recording and the estimator; nothing is
-//! simulated again. First the clocks' true offset is taken away, which a simulation knows, so that no latency is none.
-//! Each disturbance is estimated with the clock state off (offset held at zero, every stamp believed: what the paper
-//! shows) and on (offset and rate estimated, stamps smoothed from the noise that was put on them: what an estimator can
-//! recover, [`ClockState`]).
+//! One simulated recording is estimated repeatedly with a [`Disturbance`]: a constant latency of the IMU's stamps, or
+//! noise on the stamps of the lidar's scans. The errors are added between recording and estimator, after the true offset
+//! of the clocks, which the simulation knows, is removed. Each disturbance is estimated in both [`ClockState`]s: off
+//! (offset fixed at zero, stamps not smoothed, as in the paper) and on (offset and rate estimated, stamps smoothed).
 //!
-//! A run is judged by the spread of its cloud about the true surfaces and by the error of its trajectory. Their bands
-//! are of 95 %, by drawing blocks of the run's time again and again; a parabola through the squared error over the
-//! latency tells at which latency the estimate is best, which should be none.
+//! A run is evaluated by the standard deviation of its cloud about the true surfaces and by its position error. A block
+//! bootstrap yields 95 % confidence intervals. The minimum of a parabola fitted to the squared error over the latency is
+//! the best latency, which should be zero.
 
-mod band;
-mod cut;
-mod disturb;
+mod bootstrap;
+mod cross_section;
+mod evaluate;
 mod figure;
-mod judge;
 mod output;
-mod probe;
+mod reference;
 mod run;
 mod spec;
+mod stamp_errors;
 
-pub use band::{Banded, Block};
+pub use bootstrap::{Block, ConfidenceInterval};
 pub use figure::{curve_figure, map_figure};
-pub(super) use output::sentences;
-pub use output::{csv, words};
-pub use run::{Latency, Minimum, Recovery, Study, StudyRun};
+pub(super) use output::conclusions;
+pub use output::{csv, text_table};
+pub use run::{LatencyResult, LatencyRun, LatencyStudy, Minimum, Recovery};
 pub use spec::LatencySpec;
 
 use serde::{Deserialize, Serialize};
 
-/// An error of timing.
+/// A timing error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Disturbance {
-    /// How much later the IMU stamps an instant than the lidar does, ms.
+    /// Delay of the IMU's stamps relative to the lidar's for the same time, ms.
     pub latency_ms: f64,
-    /// Standard deviation of white noise on the stamps of the lidar's scans, ms.
+    /// Standard deviation of the white noise on the stamps of the lidar's scans, ms.
     pub noise_ms: f64,
 }
 
 impl Disturbance {
-    /// None.
+    /// No timing error.
     pub const NONE: Self = Self { latency_ms: 0.0, noise_ms: 0.0 };
 }
 
-/// What the estimator does about clocks.
+/// Treatment of clock errors by the estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClockState {
-    /// Nothing: the clocks are taken to be one, and every stamp is believed.
+    /// Offset fixed at zero; stamps are used as they are.
     Off,
-    /// It estimates offset and rate by its settings, and smooths stamps, told by how much they jitter.
+    /// Offset and rate are estimated by the estimator's settings; stamps are smoothed with the known jitter.
     On,
 }

@@ -1,81 +1,81 @@
-//! A study as tables.
+//! Tables of a latency study.
 
-use super::{Banded, ClockState, Disturbance, Study, StudyRun};
+use super::{ClockState, ConfidenceInterval, Disturbance, LatencyResult, LatencyRun};
 use crate::report;
 use std::fmt::Write;
 
-/// A line a run: `latency_ms,noise_ms,clock_state` and its figures, each of the banded ones with the ends of its band.
-pub fn csv(study: &Study) -> String {
+/// CSV with one row per run: `latency_ms,noise_ms,clock_state` and the measures with their confidence limits.
+pub fn csv(study: &LatencyResult) -> String {
     let mut text = "latency_ms,noise_ms,clock_state,cloud_sigma_m,cloud_sigma_low_m,cloud_sigma_high_m,cloud_bias_m,\
         position_rmse_m,position_rmse_low_m,position_rmse_high_m,clock_error_ms\n"
         .to_owned();
     for run in &study.runs {
         let Disturbance { latency_ms, noise_ms } = run.disturbance;
         let clock = if run.clock == ClockState::On { "on" } else { "off" };
-        let Banded { value, low, high } = run.cloud_sigma_m;
+        let ConfidenceInterval { value, low, high } = run.cloud_sigma_m;
         // Writing to a string does not fail.
         let _ = write!(text, "{latency_ms},{noise_ms},{clock},{value},{low},{high},{}", run.cloud_bias_m);
-        let Banded { value, low, high } = run.position_rmse_m;
+        let ConfidenceInterval { value, low, high } = run.position_rmse_m;
         let _ = writeln!(text, ",{value},{low},{high},{}", run.clock_error_ms);
     }
     text
 }
 
-/// The table that closes a command.
-pub fn words(study: &Study) -> String {
+/// Table and conclusions for the terminal.
+pub fn text_table(study: &LatencyResult) -> String {
     let row = |name: String, disturbance: Disturbance| {
-        let of = |clock| study.run(disturbance, clock);
-        let cell = |run: Option<&StudyRun>, figure: fn(&StudyRun) -> Banded| {
-            run.map_or_else(String::new, |run| millimetres(&figure(run)))
+        let run = |clock| study.run(disturbance, clock);
+        let cell = |run: Option<&LatencyRun>, measure: fn(&LatencyRun) -> ConfidenceInterval| {
+            run.map_or_else(String::new, |run| millimetres(&measure(run)))
         };
-        let (off, on) = (of(ClockState::Off), of(ClockState::On));
+        let (off, on) = (run(ClockState::Off), run(ClockState::On));
         let clock = on.map_or_else(String::new, |run| format!("{:+.3}", run.clock_error_ms));
-        let sigma: fn(&StudyRun) -> Banded = |run| run.cloud_sigma_m;
-        let rmse: fn(&StudyRun) -> Banded = |run| run.position_rmse_m;
+        let sigma: fn(&LatencyRun) -> ConfidenceInterval = |run| run.cloud_sigma_m;
+        let rmse: fn(&LatencyRun) -> ConfidenceInterval = |run| run.position_rmse_m;
         vec![name, cell(off, sigma), cell(off, rmse), cell(on, sigma), cell(on, rmse), clock]
     };
     let latencies = study.latencies(ClockState::Off);
-    let latency = |run: &&StudyRun| row(format!("{:+} ms", run.disturbance.latency_ms), run.disturbance);
+    let latency = |run: &&LatencyRun| row(format!("{:+} ms", run.disturbance.latency_ms), run.disturbance);
     let noises = study.noises(ClockState::Off);
-    let noise = |run: &&StudyRun| row(format!("noise {} ms", run.disturbance.noise_ms), run.disturbance);
+    let noise = |run: &&LatencyRun| row(format!("noise {} ms", run.disturbance.noise_ms), run.disturbance);
     let rows: Vec<Vec<String>> = latencies.iter().map(latency).chain(noises.iter().skip(1).map(noise)).collect();
     let header = ["timing", "cloud", "position", "cloud, on", "position, on", "clock ms"];
     format!(
-        "{}\nMillimetres: standard deviation of the cloud about the true surfaces, and position RMSE; the clock state off, then \
-         on, with the error of the offset that it ends with. Bands: 95 %, blocks of {} s.\n\n{}\n",
+        "{}\nCloud: standard deviation about the true surfaces, mm. Position: RMSE, mm. First with the clock state off, then on; clock: \
+         error of the estimated offset at the end. Intervals: 95 %, bootstrap of blocks of {} s.\n\n{}\n",
         report::table(&header, &rows, true),
         study.block_s,
-        sentences(study).join("\n")
+        conclusions(study).join("\n")
     )
 }
 
-/// What the curves say, a sentence each.
-pub(in crate::study) fn sentences(study: &Study) -> Vec<String> {
-    let at = |minimum: Option<Banded>| match minimum {
-        Some(Banded { value, low, high }) => format!("at {value:+.3} ms (95 %: {low:+.3} to {high:+.3})"),
-        None => "nowhere".to_owned(),
+/// Conclusions from the curves, one sentence each.
+pub(in crate::study) fn conclusions(study: &LatencyResult) -> Vec<String> {
+    let at = |minimum: Option<ConfidenceInterval>| match minimum {
+        Some(ConfidenceInterval { value, low, high }) => format!("at {value:+.3} ms (95 %: {low:+.3} to {high:+.3})"),
+        None => "at no latency (no minimum)".to_owned(),
     };
-    let rises = if study.minimum.rises_on_both_sides { "rises" } else { "does not rise everywhere" };
+    let rises = if study.minimum.rises_on_both_sides { "increases" } else { "does not increase monotonically" };
     vec![
         format!(
-            "With the clock state off the cloud is sharpest {}, the position best {}; the cloud's spread {rises} on both sides.",
+            "Clock state off: the cloud's sigma is minimal {}, the position error {}; sigma {rises} on both sides of zero.",
             at(study.minimum.cloud_ms),
             at(study.minimum.position_ms)
         ),
         format!(
-            "Over all constant latencies the cloud's sigma departs from that without by {} at most with the clock state on, \
-             by {} with it off.",
+            "Over all constant latencies, the cloud's sigma deviates from that without latency by at most {} with the clock state \
+             on, and {} with it off.",
             percent(study.recovery.cloud_sigma_departs_by),
             percent(study.recovery.cloud_sigma_departs_by_off)
         ),
     ]
 }
 
-fn millimetres(banded: &Banded) -> String {
-    let half = 0.5e3 * (banded.high - banded.low);
-    format!("{:.2} \u{b1}{half:.2}", banded.value * 1e3)
+fn millimetres(interval: &ConfidenceInterval) -> String {
+    let half = 0.5e3 * (interval.high - interval.low);
+    format!("{:.2} \u{b1}{half:.2}", interval.value * 1e3)
 }
 
-fn percent(share: f64) -> String {
-    format!("{:.1} %", share * 1e2)
+fn percent(fraction: f64) -> String {
+    format!("{:.1} %", fraction * 1e2)
 }

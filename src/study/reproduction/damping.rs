@@ -1,4 +1,4 @@
-//! Damping that brings a head's peaks near the paper's.
+//! Fit of a head's damping ratios to the peak gains in the paper.
 
 use super::PeaksSpec;
 use crate::dynamics::{DampingSpec, HeadModel, HeadSpec, Peak, Quantity};
@@ -10,105 +10,105 @@ use crate::study::gains::{AXES, with_damping};
 use cmaes::{CMAESOptions, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Heads that the fit tries.
-const EVALUATIONS: usize = 1200;
+/// Budget of the fit: evaluations of the closed form's peaks, 120 generations.
+const MAX_EVALUATIONS: usize = 1200;
 
-/// Heads of one generation of the fit.
+/// Population size of CMA-ES, slightly above the default of 8 for four parameters.
 const POPULATION: usize = 10;
 
-/// What a ratio costs for each e-fold that it leaves the head's own: enough to keep those there that no peak depends
-/// on.
-const PULL: f64 = 1e-2;
+/// Weight of the prior, per unit of the logarithm of a damping ratio.
+///
+/// It keeps ratios that no peak depends on at the head's own values.
+const PRIOR_WEIGHT: f64 = 1e-2;
 
-/// A damping, and the peaks it leads to.
+/// Fitted damping ratios and the resulting peaks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fit {
-    /// The ratios.
+pub struct DampingFit {
+    /// Damping ratios.
     pub damping_ratio: DampingSpec,
-    /// The peaks of the closed form, rotations first.
+    /// Peaks of the closed form, rotations first.
     pub peaks: Vec<FittedPeak>,
 }
 
-/// A peak beside the paper's.
+/// A peak and its counterpart in the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FittedPeak {
-    /// Which gain.
+    /// Axis of the gain.
     pub axis: Axis,
-    /// The paper's peak, where it shows one.
+    /// Peak gain in the paper; `None` if the paper shows none.
     pub paper: Option<f64>,
-    /// That of the closed form, where there is one.
+    /// Peak of the closed form; `None` if the curve has no peak.
     pub peak: Option<Peak>,
 }
 
 impl FittedPeak {
-    /// The logarithm of the peak over the paper's. A curve without a peak never rises above the base's own motion by a
-    /// resonance: its gain counts as 1.
+    /// Logarithm of the ratio of the peak to the paper's. A curve without a peak has no resonance: its gain counts as 1.
     pub fn log_ratio(&self) -> Option<f64> {
         Some((self.peak.map_or(1.0, |peak| peak.gain) / self.paper?).ln())
     }
 }
 
-impl Fit {
-    /// Root mean square of the peaks' log ratios; nothing where the paper shows no peak.
+impl DampingFit {
+    /// Root mean square of the log ratios; `None` if the paper shows no peak.
     pub fn rms_log_ratio(&self) -> Option<f64> {
         let ratios: Vec<f64> = self.peaks.iter().filter_map(FittedPeak::log_ratio).collect();
         (!ratios.is_empty()).then(|| (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt())
     }
 
-    fn of(head: &HeadModel, damping_ratio: DampingSpec, paper: &PeaksSpec, up_to_hz: f64) -> Self {
-        let response = head.frequency_response(&head.usual_points());
+    /// Peaks of `head` in comparison with the paper's.
+    fn new(head: &HeadModel, damping_ratio: DampingSpec, paper: &PeaksSpec, up_to_hz: f64) -> Self {
+        let response = head.frequency_response(&head.default_points());
         let peak = |axis| response.peak(axis, up_to_hz, Quantity::Kinematic);
-        let peaks = AXES.map(|axis| FittedPeak { axis, paper: paper.of(axis), peak: peak(axis) });
+        let peaks = AXES.map(|axis| FittedPeak { axis, paper: paper.peak(axis), peak: peak(axis) });
         Self { damping_ratio, peaks: peaks.to_vec() }
     }
 }
 
-/// The damping ratios, one a kind of mode and each within `ratios`, by which the closed form's peaks up to `up_to_hz`
-/// come nearest to the paper's: least root mean square of their log ratios.
+/// Fits one damping ratio per kind of mode, each within `ratios`, to the peaks of the paper.
 ///
-/// CMA-ES (Hansen 2016) descends on the logarithms of the ratios, from those that the head has; ratios that no peak
-/// depends on stay there.
+/// Minimises the root mean square of the log ratios of the closed form's peaks up to `up_to_hz` to the paper's, by CMA-ES
+/// (Hansen 2016) on the logarithms of the damping ratios, starting at the head's own.
 ///
 /// # Errors
-/// When the head does not stand, or has no spring.
+/// If the head has no static equilibrium, or no spring.
 pub fn fit_damping(
     spec: &HeadSpec,
     source: &Source,
     paper: &PeaksSpec,
     ratios: (f64, f64),
     up_to_hz: f64,
-) -> Result<Fit, StudyError> {
+) -> Result<DampingFit, StudyError> {
     let Some(own) = spec.clone().linkage.damping_ratio_mut().copied() else {
-        let message = "a head that does not move has none to fit".to_owned();
+        let message = "the head is rigid: it has no damping to fit".to_owned();
         return Err(StudyError::Plan { what: "damping", message });
     };
     let (low, high) = (ratios.0.ln(), ratios.1.ln());
-    let place_of = |ratio: f64| ((ratio.max(ratios.0).ln() - low) / (high - low)).clamp(0.0, 1.0);
-    let start = [own.rocking, own.sway, own.bounce, own.yaw].map(place_of);
-    let ratios_at = |place: &[f64]| {
-        let ratio = |k: usize| (low + place[k].clamp(0.0, 1.0) * (high - low)).exp();
+    let coordinate = |ratio: f64| ((ratio.max(ratios.0).ln() - low) / (high - low)).clamp(0.0, 1.0);
+    let start = [own.rocking, own.sway, own.bounce, own.yaw].map(coordinate);
+    let ratios_at = |point: &[f64]| {
+        let ratio = |k: usize| (low + point[k].clamp(0.0, 1.0) * (high - low)).exp();
         DampingSpec { rocking: ratio(0), sway: ratio(1), bounce: ratio(2), yaw: ratio(3) }
     };
-    let fit_at = |place: &[f64]| -> Result<Fit, StudyError> {
-        let damping = ratios_at(place);
+    let fit_at = |point: &[f64]| -> Result<DampingFit, StudyError> {
+        let damping = ratios_at(point);
         let head = HeadModel::new(&with_damping(spec, damping), source)?;
-        Ok(Fit::of(&head, damping, paper, up_to_hz))
+        Ok(DampingFit::new(&head, damping, paper, up_to_hz))
     };
-    // Whether the head stands does not depend on its damping: after this nothing fails.
+    // Static equilibrium does not depend on damping: later evaluations cannot fail.
     let at_start = fit_at(&start)?;
-    let objective = |place: &DVector<f64>| {
-        let outside: f64 = place.iter().map(|x| (x - x.clamp(0.0, 1.0)).powi(2)).sum();
-        let away = place.iter().zip(start).map(|(x, own)| ((x - own) * (high - low)).powi(2)).sum::<f64>();
-        let misfit = fit_at(place.as_slice()).map_or(1e3, |fit| fit.rms_log_ratio().unwrap_or(0.0));
-        misfit * misfit + outside + PULL * PULL * away
+    let objective = |point: &DVector<f64>| {
+        let outside: f64 = point.iter().map(|x| (x - x.clamp(0.0, 1.0)).powi(2)).sum();
+        let deviation = point.iter().zip(start).map(|(x, own)| ((x - own) * (high - low)).powi(2)).sum::<f64>();
+        let misfit = fit_at(point.as_slice()).map_or(1e3, |fit| fit.rms_log_ratio().unwrap_or(0.0));
+        misfit * misfit + outside + PRIOR_WEIGHT * PRIOR_WEIGHT * deviation
     };
     let options = CMAESOptions::new(start.to_vec(), 0.2)
         .population_size(POPULATION)
-        .max_function_evals(EVALUATIONS)
+        .max_function_evals(MAX_EVALUATIONS)
         .seed(Seed(1).child("reproduction/damping").0);
-    // The options are sound by construction: a positive step, a population of ten.
-    let best = options.build(objective).ok().and_then(|mut descent| descent.run().overall_best);
+    // The options are valid: a positive step size and a population of ten.
+    let best = options.build(objective).ok().and_then(|mut optimiser| optimiser.run().overall_best);
     best.map_or(Ok(at_start), |best| fit_at(best.point.as_slice()))
 }

@@ -1,7 +1,10 @@
-//! Figure 3: gain curves of several heads.
+//! Figure 3 of the paper: gain curves of several heads.
 
-use super::kept::Kept;
-use super::{DesignedSpec, Extent, Finding, Fit, FittedPeak, GainCurvesSpec, Row, fit_damping, gain_plots};
+use super::part_store::PartStore;
+use super::{
+    ComparedNumber, DampingFit, DesignedSpec, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping,
+    gain_plots,
+};
 use crate::dynamics::{DampingSpec, HeadModel, HeadSpec, Peak};
 use crate::motion::Axis;
 use crate::spec::{self, Source};
@@ -10,130 +13,133 @@ use crate::study::watch::PieceProgress;
 use crate::study::{OnProgress, StudyError};
 use rayon::prelude::*;
 
-/// A head with fitted damping, and how it answers.
-pub(super) struct Answer<'a> {
+/// A head with fitted damping and its gain curves.
+pub(super) struct HeadResponse<'a> {
     pub design: &'a DesignedSpec,
-    pub fit: Fit,
+    pub fit: DampingFit,
     pub curves: Vec<GainCurve>,
 }
 
-/// Fits the heads, measures their gains, draws, and tells.
+/// Fits the damping of the heads, measures their gains, draws figures, and compares with the paper.
 pub(super) fn run(
     spec: &GainCurvesSpec,
     heads: &[HeadSpec],
     extent: Extent,
-    kept: &Kept,
+    store: &PartStore,
     on_progress: OnProgress<'_>,
-) -> Result<Finding, StudyError> {
+) -> Result<ExperimentResult, StudyError> {
     let plan = plan(spec, extent);
     let designs: Vec<(&DesignedSpec, &HeadSpec)> = spec.designs.iter().zip(heads).collect();
     let fitted = designs.par_iter().map(|(design, head)| {
         let source = Source::in_memory(design.head.clone(), "");
-        kept.part(&format!("{}-fit", design.letter), || {
+        store.part(&format!("{}-fit", design.letter), || {
             fit_damping(head, &source, &design.peaks, spec.ratios, spec.up_to_hz)
         })
     });
-    let fitted: Vec<Fit> = fitted.collect::<Result<_, StudyError>>()?;
+    let fitted: Vec<DampingFit> = fitted.collect::<Result<_, StudyError>>()?;
     let tasks: Vec<(usize, Axis)> = (0..designs.len()).flat_map(|k| AXES.map(|axis| (k, axis))).collect();
     let pieces = PieceProgress::new(tasks.len() * plan.realisations, on_progress);
     let curves = tasks.par_iter().map(|(k, axis)| {
         let (design, head) = designs[*k];
         let name = format!("{}-{}", design.letter, axis_name(*axis));
-        if kept.has(&name) {
+        if store.has(&name) {
             (0..plan.realisations).for_each(|_| pieces.finish_one());
         }
-        kept.part(&name, || {
+        store.part(&name, || {
             let head = with_damping(head, fitted[*k].damping_ratio);
             let head = HeadModel::new(&head, &Source::in_memory(design.head.clone(), ""))?;
             gain_curve(&head, *axis, &plan, &|_| pieces.finish_one())
         })
     });
     let curves: Vec<GainCurve> = curves.collect::<Result<_, StudyError>>()?;
-    let answers: Vec<Answer<'_>> = designs
+    let responses: Vec<HeadResponse<'_>> = designs
         .iter()
         .zip(fitted)
         .zip(curves.chunks(AXES.len()))
-        .map(|(((design, _), fit), curves)| Answer { design, fit, curves: curves.to_vec() })
+        .map(|(((design, _), fit), curves)| HeadResponse { design, fit, curves: curves.to_vec() })
         .collect();
-    for (answer, head) in answers.iter().zip(heads) {
-        let letter = &answer.design.letter;
-        kept.write(&format!("{letter}/gains.csv"), &csv(&answer.curves))?;
-        let head = with_damping(head, answer.fit.damping_ratio);
-        kept.write(&format!("{letter}/head.ron"), &(spec::to_text(&head)? + "\n"))?;
+    for (response, head) in responses.iter().zip(heads) {
+        let letter = &response.design.letter;
+        store.write(&format!("{letter}/gains.csv"), &csv(&response.curves))?;
+        let head = with_damping(head, response.fit.damping_ratio);
+        store.write(&format!("{letter}/head.ron"), &(spec::to_text(&head)? + "\n"))?;
     }
-    gain_plots::gains(&answers, spec.shown_to_hz).save(kept.folder(), "gains")?;
-    gain_plots::coherence(&answers, spec.shown_to_hz).save(kept.folder(), "coherence")?;
-    Ok(finding(spec, &answers))
+    gain_plots::gains(&responses, spec.shown_to_hz).save(store.folder(), "gains")?;
+    gain_plots::coherence(&responses, spec.shown_to_hz).save(store.folder(), "coherence")?;
+    Ok(compare(spec, &responses))
 }
 
+/// Settings of the measurement.
 fn plan(spec: &GainCurvesSpec, extent: Extent) -> GainPlan {
-    let whole = GainPlan { up_to_hz: spec.up_to_hz, ..GainPlan::default() };
+    let full = GainPlan { up_to_hz: spec.up_to_hz, ..GainPlan::default() };
     match extent {
-        Extent::Whole => whole,
-        Extent::Quick => GainPlan { realisations: 2, period_s: Some(5.0), longest_settling_s: 2.0, ..whole },
+        Extent::Whole => full,
+        Extent::Quick => GainPlan { realisations: 2, period_s: Some(5.0), longest_settling_s: 2.0, ..full },
     }
 }
 
-fn finding(spec: &GainCurvesSpec, answers: &[Answer<'_>]) -> Finding {
-    let rows = answers.iter().flat_map(|answer| rows(&spec.figure, answer)).collect();
+/// Compares the peaks with the paper's.
+fn compare(spec: &GainCurvesSpec, responses: &[HeadResponse<'_>]) -> ExperimentResult {
+    let rows = responses.iter().flat_map(|response| rows(&spec.figure, response)).collect();
     let mut notes = vec![
-        "The paper's peaks are read off the scales of its plots. They tell neither which axis of a panel reaches the top nor at \
-         which frequency; each axis of a panel is taken to."
+        "The paper's peaks are read off the scales of its plots, which show neither the axis nor the frequency of a peak; here \
+         each axis of a panel is assumed to reach it."
             .to_owned(),
         format!(
-            "\"Fitted\" is the highest peak of the closed form up to {} Hz, with the damping ratios that bring all peaks \
-             nearest to the paper's; \"simulated\" is measured by cross spectra (H1) with the same ratios. In brackets: the \
-             logarithm of the fitted peak over the paper's.",
+            "\"Fitted\" is the highest peak of the closed form up to {} Hz, with damping ratios fitted to all peaks of the paper; \
+             \"simulated\" is measured from cross spectra (H1) with the same ratios. In parentheses: logarithm of the ratio of \
+             the fitted peak to the paper's.",
             spec.up_to_hz
         ),
     ];
-    notes.extend(answers.iter().map(|answer| {
-        let DampingSpec { rocking, sway, bounce, yaw } = answer.fit.damping_ratio;
+    notes.extend(responses.iter().map(|response| {
+        let DampingSpec { rocking, sway, bounce, yaw } = response.fit.damping_ratio;
         format!(
             "{}{}, {} (head `{}`): damping ratios rocking {rocking:.4}, sway {sway:.4}, bounce {bounce:.4}, yaw {yaw:.4}.",
-            spec.figure, answer.design.letter, answer.design.title, answer.design.head
+            spec.figure, response.design.letter, response.design.title, response.design.head
         )
     }));
-    notes.extend(answers.iter().filter_map(|answer| beyond(spec, answer)));
-    Finding { rows, notes }
+    notes.extend(responses.iter().filter_map(|response| out_of_range_note(spec, response)));
+    ExperimentResult { rows, notes }
 }
 
-/// What to say of peaks that the paper's plot would not have shown.
-fn beyond(spec: &GainCurvesSpec, answer: &Answer<'_>) -> Option<String> {
+/// Note on peaks above the frequency range of the paper's plot.
+fn out_of_range_note(spec: &GainCurvesSpec, response: &HeadResponse<'_>) -> Option<String> {
     let outside =
         |fitted: &&FittedPeak| fitted.paper.is_some() && fitted.peak.is_some_and(|p| p.freq_hz > spec.shown_to_hz);
-    let axes: Vec<&str> = answer.fit.peaks.iter().filter(outside).map(|fitted| words_for(fitted.axis)).collect();
+    let axes: Vec<&str> = response.fit.peaks.iter().filter(outside).map(|fitted| axis_label(fitted.axis)).collect();
     (!axes.is_empty()).then(|| {
         format!(
-            "{}{}: the peaks of {} lie above the {} Hz at which the paper's plots end, below which its own must lie: its linkage \
-             was softer there than ours. No damping changes that.",
+            "{}{}: the peaks of {} are above {} Hz, where the paper's plots end and below which its peaks must be: its linkage was \
+             softer in these directions than this model. Damping cannot explain the difference.",
             spec.figure,
-            answer.design.letter,
+            response.design.letter,
             axes.join(" and "),
             spec.shown_to_hz
         )
     })
 }
 
-/// A row an axis, and one for the misfit of all.
-fn rows(figure: &str, answer: &Answer<'_>) -> Vec<Row> {
-    let figure = format!("{figure}{}", answer.design.letter);
-    let of_axis = answer.fit.peaks.iter().zip(&answer.curves).map(|(fitted, curve)| Row {
+/// One row per axis, and one for the misfit of all peaks.
+fn rows(figure: &str, response: &HeadResponse<'_>) -> Vec<ComparedNumber> {
+    let figure = format!("{figure}{}", response.design.letter);
+    let of_axis = response.fit.peaks.iter().zip(&response.curves).map(|(fitted, curve)| ComparedNumber {
         figure: figure.clone(),
-        what: format!("peak gain, {}", words_for(fitted.axis)),
+        what: format!("peak gain, {}", axis_label(fitted.axis)),
         paper: fitted.paper.map_or("-".to_owned(), |peak| format!("about {peak}")),
         ours: ours(fitted, curve),
     });
-    let mut rows: Vec<Row> = of_axis.collect();
-    rows.extend(answer.fit.rms_log_ratio().map(|rms| Row {
+    let mut rows: Vec<ComparedNumber> = of_axis.collect();
+    rows.extend(response.fit.rms_log_ratio().map(|rms| ComparedNumber {
         figure,
         what: "misfit of all peaks".to_owned(),
         paper: "-".to_owned(),
-        ours: format!("{rms:.2} rms of the logarithms (a factor of {:.2})", rms.exp()),
+        ours: format!("{rms:.2} rms of the log ratios (a factor of {:.2})", rms.exp()),
     }));
     rows
 }
 
+/// Fitted and simulated peak as text.
 fn ours(fitted: &FittedPeak, curve: &GainCurve) -> String {
     let peak = |peak: Option<Peak>| match peak {
         Some(peak) => format!("{:.1} at {:.2} Hz", peak.gain, peak.freq_hz),
@@ -143,7 +149,8 @@ fn ours(fitted: &FittedPeak, curve: &GainCurve) -> String {
     format!("fitted {}{ratio}; simulated {}", peak(fitted.peak), peak(curve.peak))
 }
 
-fn words_for(axis: Axis) -> &'static str {
+/// Description of an axis's gain.
+fn axis_label(axis: Axis) -> &'static str {
     match axis {
         Axis::X => "acceleration along x",
         Axis::Y => "acceleration along y",

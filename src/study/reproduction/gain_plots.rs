@@ -1,31 +1,31 @@
-//! Figure 3 as a picture: a column a design, the paper's three panels in each.
+//! Plots of figure 3: one column per design with the paper's three panels.
 
-use super::gain_curves::Answer;
+use super::gain_curves::HeadResponse;
 use crate::report::plot::{Chart, Figure};
 use crate::study::gains::{GainCurve, coherence_panels, gain_panels};
 
-/// The gains: dots as simulated, lines in closed form.
-pub(super) fn gains(answers: &[Answer<'_>], up_to_hz: f64) -> Figure {
-    columns(answers, |answer| gain_panels(&shown(answer, up_to_hz)))
+/// Gain curves: simulation as dots, closed form as lines.
+pub(super) fn gains(responses: &[HeadResponse<'_>], up_to_hz: f64) -> Figure {
+    columns(responses, |response| gain_panels(&shown(response, up_to_hz)))
 }
 
-/// The coherence in the same panels.
-pub(super) fn coherence(answers: &[Answer<'_>], up_to_hz: f64) -> Figure {
-    columns(answers, |answer| coherence_panels(&shown(answer, up_to_hz)))
+/// Coherence in the same panels.
+pub(super) fn coherence(responses: &[HeadResponse<'_>], up_to_hz: f64) -> Figure {
+    columns(responses, |response| coherence_panels(&shown(response, up_to_hz)))
 }
 
-fn shown(answer: &Answer<'_>, up_to_hz: f64) -> Vec<GainCurve> {
-    answer.curves.iter().map(|curve| curve.up_to(up_to_hz)).collect()
+fn shown(response: &HeadResponse<'_>, up_to_hz: f64) -> Vec<GainCurve> {
+    response.curves.iter().map(|curve| curve.up_to(up_to_hz)).collect()
 }
 
-fn columns(answers: &[Answer<'_>], panels: impl Fn(&Answer<'_>) -> Vec<Chart>) -> Figure {
-    let mut of_designs: Vec<std::vec::IntoIter<Chart>> = answers
+fn columns(responses: &[HeadResponse<'_>], panels: impl Fn(&HeadResponse<'_>) -> Vec<Chart>) -> Figure {
+    let mut of_designs: Vec<std::vec::IntoIter<Chart>> = responses
         .iter()
-        .map(|answer| {
-            let mut panels = panels(answer);
+        .map(|response| {
+            let mut panels = panels(response);
             panels.iter_mut().for_each(|panel| panel.title.clear());
             if let Some(top) = panels.first_mut() {
-                top.title = format!("({}) {}", answer.design.letter, answer.design.title);
+                top.title = format!("({}) {}", response.design.letter, response.design.title);
             }
             panels.into_iter()
         })
@@ -34,7 +34,7 @@ fn columns(answers: &[Answer<'_>], panels: impl Fn(&Answer<'_>) -> Vec<Chart>) -
     while of_designs.iter().any(|panels| panels.len() > 0) {
         charts.extend(of_designs.iter_mut().filter_map(Iterator::next));
     }
-    let mut figure = Figure::of(charts).in_columns(answers.len());
-    figure.width = 480.0 * answers.len() as f64;
+    let mut figure = Figure::of(charts).in_columns(responses.len());
+    figure.width = 480.0 * responses.len() as f64;
     figure
 }

@@ -1,58 +1,58 @@
-//! The paper's experiments again, by name: what it found, what we find, and the command that finds it.
+//! Reproduction of the paper's experiments, and comparison with its results.
 //!
-//! An experiment is a spec ([`ExperimentSpec`], the files of `specs/experiments/`). [`Experiment::run`] leaves its
-//! figures in a folder of its own, and what each part of the work came to beside them, so that one that was stopped
-//! goes on. From all that is finished [`paper_table`] makes one table.
+//! An experiment is a spec ([`ExperimentSpec`], the files of `specs/experiments/`). [`Experiment::run`] writes figures and
+//! finished parts to a folder, so that an interrupted experiment can be resumed. [`paper_table`] combines all finished
+//! experiments in one table.
 
 mod damping;
-mod finding;
 mod gain_curves;
 mod gain_plots;
-pub(super) mod kept;
+pub(super) mod part_store;
+mod result;
 mod spec;
 mod timing;
 
-pub use damping::{Fit, FittedPeak, fit_damping};
-pub use finding::{Finding, Row, TABLE_HEADING, paper_table};
+pub use damping::{DampingFit, FittedPeak, fit_damping};
+pub use result::{ComparedNumber, ExperimentResult, TABLE_HEADING, paper_table};
 pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec};
 
-use super::latency::Latency;
+use super::latency::LatencyStudy;
 use super::{OnProgress, StudyError};
 use crate::dynamics::HeadSpec;
 use crate::spec::{Kind, Source, find, names, parse};
-use kept::Kept;
+use part_store::PartStore;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// How much of an experiment is done.
+/// Extent of an experiment: the complete one, or a smoke test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Extent {
-    /// All of it.
+    /// The complete experiment.
     Whole,
-    /// So little that it takes seconds: to see that it runs. Its figures are no results.
+    /// A smoke test that takes seconds; its figures are not results.
     Quick,
 }
 
-/// The part that is finished last.
-const FINDING: &str = "finding";
+/// Name of the part with the result, which is written last.
+const RESULT_PART: &str = "finding";
 
-/// An experiment about to be run.
+/// An experiment with its spec.
 #[derive(Debug, Clone)]
 pub struct Experiment {
-    /// The name that it was found by, perhaps a path.
+    /// Name or path given by the user.
     pub given: String,
-    /// Its name: that of its spec's file, without folder and ending.
+    /// File name of the spec without folder and extension.
     pub name: String,
     spec: ExperimentSpec,
     source: Source,
 }
 
 impl Experiment {
-    /// The experiment called `name`: a path, or a name in the library.
+    /// Loads the experiment `name`: a path, or a name in the library.
     ///
     /// # Errors
-    /// When there is none, its spec is wrong, or names a head that is.
+    /// If there is no such experiment, or if its spec or a spec that it refers to is invalid.
     pub fn load(name: &str) -> Result<Self, StudyError> {
         let source = find(Kind::Experiment, name)?;
         let spec: ExperimentSpec = parse(&source)?;
@@ -61,69 +61,70 @@ impl Experiment {
         Ok(Self { given: name.to_owned(), name: stem, spec, source })
     }
 
-    /// The names of all experiments that are built in, sorted.
+    /// Names of all built-in experiments, sorted.
     pub fn all() -> Vec<String> {
         names(Kind::Experiment)
     }
 
-    /// Does what is not yet done of it in `folder`; `on_progress` is told how far it is.
+    /// Runs the experiment in `folder`, resuming an interrupted one; `on_progress` receives the finished fraction.
     ///
-    /// What it leaves does not depend on the number of threads, nor on where an earlier run was stopped.
+    /// The result does not depend on the number of threads, nor on interruptions.
     ///
     /// # Errors
-    /// When the folder holds another experiment's work (or this one's by another spec or version) and `anew` does not
-    /// allow to throw it away, something cannot be simulated, or a file not be written.
+    /// If the folder contains another experiment (or this one by another spec or version) and `anew` does not permit
+    /// replacing it, if a simulation fails, or if a file cannot be written.
     pub fn run(
         &self,
         folder: &Path,
         extent: Extent,
         anew: bool,
         on_progress: OnProgress<'_>,
-    ) -> Result<Finding, StudyError> {
+    ) -> Result<ExperimentResult, StudyError> {
         match self.work(extent)? {
             Work::GainCurves(spec, heads) => {
-                let kept = Kept::open(folder, &made_from(extent, spec, &heads), anew)?;
-                kept.part(FINDING, || gain_curves::run(spec, &heads, extent, &kept, on_progress))
+                let store = PartStore::open(folder, &inputs(extent, spec, &heads), anew)?;
+                store.part(RESULT_PART, || gain_curves::run(spec, &heads, extent, &store, on_progress))
             }
             Work::Latency(latency) => {
-                let kept = Kept::open(folder, &latency.made_from(), anew)?;
-                kept.part(FINDING, || timing::run(&latency, &kept, on_progress))
+                let store = PartStore::open(folder, &latency.inputs(), anew)?;
+                store.part(RESULT_PART, || timing::run(&latency, &store, on_progress))
             }
         }
     }
 
-    /// What an earlier run found and left in `folder`; `None` where this experiment is not finished there.
+    /// Reads the result of an earlier run from `folder`; `None` if the experiment is not finished there.
     ///
     /// # Errors
-    /// When a spec is gone, or the folder cannot be read.
-    pub fn finished(&self, folder: &Path, extent: Extent) -> Result<Option<Finding>, StudyError> {
-        let kept = match self.work(extent)? {
-            Work::GainCurves(spec, heads) => Kept::existing(folder, &made_from(extent, spec, &heads))?,
-            Work::Latency(latency) => Kept::existing(folder, &latency.made_from())?,
+    /// If a spec is missing, or if the folder cannot be read.
+    pub fn finished(&self, folder: &Path, extent: Extent) -> Result<Option<ExperimentResult>, StudyError> {
+        let store = match self.work(extent)? {
+            Work::GainCurves(spec, heads) => PartStore::existing(folder, &inputs(extent, spec, &heads))?,
+            Work::Latency(latency) => PartStore::existing(folder, &latency.inputs())?,
         };
-        kept.filter(|kept| kept.has(FINDING)).map(|kept| kept.get(FINDING)).transpose()
+        store.filter(|store| store.has(RESULT_PART)).map(|store| store.get(RESULT_PART)).transpose()
     }
 
+    /// Loads the specs that the experiment refers to.
     fn work(&self, extent: Extent) -> Result<Work<'_>, StudyError> {
         Ok(match (&self.spec, extent) {
             (ExperimentSpec::GainCurves(spec), _) => Work::GainCurves(spec, spec.heads(&self.source)?),
             (ExperimentSpec::Latency(spec), Extent::Whole) => {
-                Work::Latency(Box::new(Latency::new(spec, &self.source)?))
+                Work::Latency(Box::new(LatencyStudy::new(spec, &self.source)?))
             }
             (ExperimentSpec::Latency(spec), Extent::Quick) => {
-                Work::Latency(Box::new(Latency::new(&spec.shortened(), &self.source)?))
+                Work::Latency(Box::new(LatencyStudy::new(&spec.shortened(), &self.source)?))
             }
         })
     }
 }
 
-/// An experiment with what its spec names.
+/// An experiment with all specs that it refers to.
 enum Work<'a> {
     GainCurves(&'a GainCurvesSpec, Vec<HeadSpec>),
-    Latency(Box<Latency>),
+    Latency(Box<LatencyStudy>),
 }
 
-/// All that the work on gain curves depends on.
-fn made_from(extent: Extent, spec: &GainCurvesSpec, heads: &[HeadSpec]) -> impl Serialize {
+/// Everything that determines the result of a gain curve experiment.
+fn inputs(extent: Extent, spec: &GainCurvesSpec, heads: &[HeadSpec]) -> impl Serialize {
     (env!("CARGO_PKG_VERSION"), extent, ExperimentSpec::GainCurves(spec.clone()), heads.to_vec())
 }

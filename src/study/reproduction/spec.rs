@@ -1,4 +1,4 @@
-//! An experiment as it is written: `specs/experiments/NAME.ron`.
+//! Spec of an experiment: `specs/experiments/NAME.ron`.
 
 use crate::dynamics::{self, HeadSpec};
 use crate::motion::Axis;
@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum ExperimentSpec {
-    /// Gain curves of several heads, their damping fitted to the paper's peaks.
+    /// Gain curves of several heads with damping fitted to the paper's peaks.
     GainCurves(GainCurvesSpec),
-    /// Maps of one recording under errors of timing.
+    /// Maps of one recording with timing errors.
     Latency(Box<LatencySpec>),
 }
 
@@ -21,43 +21,43 @@ pub enum ExperimentSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainCurvesSpec {
-    /// The paper's figure.
+    /// Number of the figure in the paper.
     pub figure: String,
-    /// Highest frequency that the figure shows, Hz.
+    /// Upper limit of the figure's frequency axis, Hz.
     #[serde(with = "checked::Positive")]
     pub shown_to_hz: f64,
-    /// Highest frequency at which gains are measured and peaks are looked for, Hz.
+    /// Upper frequency limit of the measurement and of the search for peaks, Hz; at least `shown_to_hz`.
     #[serde(with = "checked::Positive")]
     pub up_to_hz: f64,
-    /// Least and greatest damping ratio that the fit may choose.
+    /// Bounds of the fitted damping ratios, lower and upper, between 0 and 1.
     pub ratios: (f64, f64),
-    /// The heads.
+    /// Heads of the figure.
     pub designs: Vec<DesignedSpec>,
 }
 
-/// A head of a figure.
+/// A head in a figure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DesignedSpec {
-    /// Its letter in the paper's figure.
+    /// Letter in the paper's figure; also the name of the folder of its results.
     pub letter: String,
-    /// What it is.
+    /// Title of its plots.
     pub title: String,
-    /// The head, a name under `specs/heads/` or a file.
+    /// Head: a name under `specs/heads/`, or a file.
     pub head: String,
-    /// The paper's peaks.
+    /// Peak gains in the paper.
     pub peaks: PeaksSpec,
 }
 
-/// The highest gain along or about each axis; left out where the paper shows none.
+/// Peak gain per axis, above 1; omit those that the paper does not show.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PeaksSpec {
-    /// Rate about x.
+    /// Angular rate about x.
     pub x_rot: Option<f64>,
-    /// Rate about y.
+    /// Angular rate about y.
     pub y_rot: Option<f64>,
-    /// Rate about z.
+    /// Angular rate about z.
     pub z_rot: Option<f64>,
     /// Acceleration along x.
     pub x: Option<f64>,
@@ -68,8 +68,8 @@ pub struct PeaksSpec {
 }
 
 impl PeaksSpec {
-    /// The peak of an axis.
-    pub fn of(&self, axis: Axis) -> Option<f64> {
+    /// Peak gain of an axis.
+    pub fn peak(&self, axis: Axis) -> Option<f64> {
         match axis {
             Axis::X => self.x,
             Axis::Y => self.y,
@@ -82,10 +82,10 @@ impl PeaksSpec {
 }
 
 impl ExperimentSpec {
-    /// Whether what it says can be done.
+    /// Checks the spec.
     ///
     /// # Errors
-    /// When numbers contradict each other, or a head is missing, wrong, or has no spring.
+    /// If its numbers are inconsistent, or if a head is missing, invalid, or has no spring.
     pub fn check(&self, source: &Source) -> Result<(), SpecError> {
         match self {
             ExperimentSpec::GainCurves(spec) => spec.heads(source).map(drop),
@@ -95,25 +95,28 @@ impl ExperimentSpec {
 }
 
 impl GainCurvesSpec {
-    /// The heads, in the order of the designs.
+    /// Loads the heads, in the order of the designs.
     ///
     /// # Errors
     /// As [`ExperimentSpec::check`].
     pub(super) fn heads(&self, source: &Source) -> Result<Vec<HeadSpec>, SpecError> {
-        let wrong = |key: &str, message: String| Err(SpecError::about(source, key, message));
+        let invalid = |key: &str, message: String| Err(SpecError::about(source, key, message));
         let (least, most) = self.ratios;
         if !(least > 0.0 && least < most && most < 1.0) {
-            return wrong("ratios", format!("damping ratios from {least} to {most}: expected 0 < least < most < 1"));
+            return invalid("ratios", format!("damping ratios from {least} to {most}: expected 0 < least < most < 1"));
         }
         if self.up_to_hz < self.shown_to_hz {
-            return wrong("up_to_hz", format!("{} Hz are less than the {} Hz shown", self.up_to_hz, self.shown_to_hz));
+            return invalid(
+                "up_to_hz",
+                format!("{} Hz are less than the {} Hz shown", self.up_to_hz, self.shown_to_hz),
+            );
         }
         if self.designs.is_empty() {
-            return wrong("designs", "a figure shows at least one head".to_owned());
+            return invalid("designs", "expected at least one head".to_owned());
         }
         for (index, design) in self.designs.iter().enumerate() {
             if self.designs[..index].iter().any(|other| other.letter == design.letter) {
-                return wrong("designs", format!("two designs have the letter \"{}\"", design.letter));
+                return invalid("designs", format!("the letter \"{}\" occurs twice", design.letter));
             }
         }
         self.designs.iter().map(|design| design.head(source)).collect()
@@ -121,19 +124,19 @@ impl GainCurvesSpec {
 }
 
 impl DesignedSpec {
-    /// The head, which has something to damp.
+    /// Loads the head and checks that it has damping.
     fn head(&self, source: &Source) -> Result<HeadSpec, SpecError> {
-        let wrong = |key: &str, message: String| Err(SpecError::about(source, key, message));
+        let invalid = |key: &str, message: String| Err(SpecError::about(source, key, message));
         if self.letter.is_empty() || !self.letter.chars().all(|c| c.is_ascii_alphanumeric()) {
-            return wrong("letter", format!("\"{}\" names a folder: expected letters a to z", self.letter));
+            return invalid("letter", format!("\"{}\" names a folder: expected letters a to z", self.letter));
         }
-        let peaks = AXES.map(|axis| self.peaks.of(axis));
+        let peaks = AXES.map(|axis| self.peaks.peak(axis));
         if let Some(peak) = peaks.into_iter().flatten().find(|peak| !(peak.is_finite() && *peak > 1.0)) {
-            return wrong("peaks", format!("a peak is a gain above 1, not {peak}"));
+            return invalid("peaks", format!("{peak}: expected a gain above 1"));
         }
         let (mut head, _) = dynamics::load(&self.head)?;
         if head.linkage.damping_ratio_mut().is_none() {
-            return wrong("head", format!("the head \"{}\" is rigid: there is nothing to damp", self.head));
+            return invalid("head", format!("the head \"{}\" is rigid: it has no damping to fit", self.head));
         }
         Ok(head)
     }

@@ -1,35 +1,42 @@
-//! Figure 4: latency and timing noise.
+//! Figure 4 of the paper: latency and timing noise.
 
-use super::kept::Kept;
-use super::{Finding, Row};
-use crate::study::latency::{ClockState, Disturbance, Latency, Study, csv, curve_figure, map_figure, sentences};
+use super::part_store::PartStore;
+use super::{ComparedNumber, ExperimentResult};
+use crate::study::latency::{
+    ClockState, Disturbance, LatencyResult, LatencyStudy, conclusions, csv, curve_figure, map_figure,
+};
 use crate::study::{OnProgress, StudyError};
 use std::sync::atomic::AtomicBool;
 
-/// Estimates, draws, and tells.
-pub(super) fn run(latency: &Latency, kept: &Kept, on_progress: OnProgress<'_>) -> Result<Finding, StudyError> {
-    let study = latency.run_in(kept, &AtomicBool::new(false), on_progress)?;
-    kept.write("latency.csv", &csv(&study))?;
-    kept.write("latency.json", &(serde_json::to_string_pretty(&study)? + "\n"))?;
+/// Runs the study, draws figures, and compares with the paper.
+pub(super) fn run(
+    latency: &LatencyStudy,
+    store: &PartStore,
+    on_progress: OnProgress<'_>,
+) -> Result<ExperimentResult, StudyError> {
+    let study = latency.run_in(store, &AtomicBool::new(false), on_progress)?;
+    store.write("latency.csv", &csv(&study))?;
+    store.write("latency.json", &(serde_json::to_string_pretty(&study)? + "\n"))?;
     for (name, figure) in [
         ("maps", map_figure(&study, ClockState::Off)),
         ("maps_clock_on", map_figure(&study, ClockState::On)),
         ("curves", curve_figure(&study)),
     ] {
-        figure.save(kept.folder(), name)?;
+        figure.save(store.folder(), name)?;
     }
-    Ok(finding(&latency.spec().figure, &study))
+    Ok(compare(&latency.spec().figure, &study))
 }
 
-fn finding(figure: &str, study: &Study) -> Finding {
+/// Compares the maps with the paper's.
+fn compare(figure: &str, study: &LatencyResult) -> ExperimentResult {
     let row = |disturbance: Disturbance, (what, paper): (String, &str)| {
         let sigma_mm = |clock| study.run(disturbance, clock).map(|run| run.cloud_sigma_m.value * 1e3);
-        let told = |clock, name: &str| sigma_mm(clock).map_or_else(String::new, |mm| format!("{mm:.1} mm {name}"));
-        Row {
+        let text = |clock, name: &str| sigma_mm(clock).map_or_else(String::new, |mm| format!("{mm:.1} mm {name}"));
+        ComparedNumber {
             figure: figure.to_owned(),
             what,
             paper: paper.to_owned(),
-            ours: format!("{}, {}", told(ClockState::Off, "off"), told(ClockState::On, "on")),
+            ours: format!("{}, {}", text(ClockState::Off, "off"), text(ClockState::On, "on")),
         }
     };
     let misaligned = |disturbed: bool| if disturbed { "visible misalignment" } else { "sharp" };
@@ -44,15 +51,15 @@ fn finding(figure: &str, study: &Study) -> Finding {
         rows.push(row(*shown, (what, "-")));
     }
     let mut notes = vec![
-        "The paper shows maps and no numbers; ours is the spread about the true surfaces, beside the same maps. Its place, its \
-         length and what its noise is added to are not told: here noise is on the stamp of each scan, white from scan to scan, \
-         and with the clock state off no stamp is smoothed."
+        "The paper shows maps without numbers; zsim reports the standard deviation of the cloud about the true surfaces. The \
+         paper does not state location, duration, or which stamps its noise is added to: here white noise is added to the \
+         stamp of each scan, and with the clock state off stamps are not smoothed."
             .to_owned(),
         format!(
-            "One recording ({}, seed {}, {} s). Bands are 95 %, by drawing blocks of {} s.",
+            "One recording ({}, seed {}, {} s). Confidence intervals: 95 %, bootstrap of blocks of {} s.",
             study.scene, study.seed, study.duration_s, study.block_s
         ),
     ];
-    notes.extend(sentences(study));
-    Finding { rows, notes }
+    notes.extend(conclusions(study));
+    ExperimentResult { rows, notes }
 }

@@ -1,33 +1,33 @@
-//! A spring under its head: what a designer asks before winding it, and the search for one that answers.
+//! Design of the spring under a head: metrics of a given spring, and the search for one that meets goals.
 
 pub mod design;
-mod figure;
-mod figures;
+mod metrics;
+mod mode_figure;
 mod outline;
 mod report;
 mod wire;
 
-pub use figure::mode_figure;
-pub use figures::{DesignFigures, closed_form, simulated};
+pub use metrics::{DesignMetrics, closed_form, simulated};
+pub use mode_figure::mode_figure;
 pub use report::{CoilReport, ModeReport, RestReport, ShakeResponse, SpringReport, spring_report};
 pub use wire::{SpringMounting, Wire, WireLoad};
 
 use serde::{Deserialize, Serialize};
 
-/// A hand that nods the base by a sine about the spring's foot.
+/// A sinusoidal pitch motion of the base about the foot of the spring, as by a hand.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shake {
     /// Amplitude of the base's pitch, degrees.
     #[serde(with = "crate::spec::checked::Positive")]
     pub pitch_deg: f64,
-    /// Frequency, Hz; left out, the hand finds the head's slowest mode.
+    /// Frequency, Hz; default: that of the slowest mode of the head.
     #[serde(default)]
     pub frequency_hz: Option<f64>,
 }
 
 impl Default for Shake {
-    /// Two degrees at resonance.
+    /// 2 degrees at the slowest mode.
     fn default() -> Self {
         Self { pitch_deg: 2.0, frequency_hz: None }
     }

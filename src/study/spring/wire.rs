@@ -1,4 +1,4 @@
-//! Stress in the wire of a helical spring, and what it bears.
+//! Stress in the wire of a helical spring, and the load on it.
 
 use crate::dynamics::{Body, HeadSpec, HeadState, LinkageSpec};
 use crate::elasticity::{Material, SpringSpec};
@@ -12,29 +12,29 @@ pub struct Wire {
     pub coil_radius_m: f64,
     /// Diameter of the wire, m.
     pub diameter_m: f64,
-    /// What it is made of.
+    /// Material of the wire.
     pub material: Material,
 }
 
-/// What one side of a cut across the spring does to the other, about the spring's axis there; z along the axis.
+/// Force and moment across a section of the spring, in the frame of the section; z along the spring axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WireLoad {
-    /// N.
+    /// Force, N.
     pub force: Vector,
-    /// N m.
+    /// Moment about the spring axis at the section, N m.
     pub moment: Vector,
 }
 
-/// Around the coil, in so many steps, the most stressed place is looked for: 0.1 % in the stress at most.
-const PLACES: usize = 72;
+/// Number of angles around the coil at which the stress is evaluated: the error of the maximum is at most 0.1 %.
+const ANGLES: usize = 72;
 
 impl Wire {
-    /// The wire of a spring that is given as a coil; `None` for one that is given by its stiffness.
+    /// The wire of a spring specified as a coil; `None` for a spring specified by stiffness.
     ///
     /// # Errors
-    /// When a named spring is not there.
+    /// When a named spring does not exist.
     pub fn of(spec: &SpringSpec) -> Result<Option<Self>, crate::spec::SpecError> {
-        Ok(match spec.described()? {
+        Ok(match spec.resolved()? {
             SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, material, .. } => {
                 Some(Self { coil_radius_m: 0.5e-3 * coil_diameter_mm, diameter_m: 1e-3 * wire_diameter_mm, material })
             }
@@ -42,26 +42,26 @@ impl Wire {
         })
     }
 
-    /// The spring index.
+    /// Spring index: mean coil diameter divided by wire diameter.
     pub fn index(&self) -> f64 {
         2.0 * self.coil_radius_m / self.diameter_m
     }
 
-    /// Greatest equivalent stress (von Mises) in the wire at a cut, Pa.
+    /// Maximum von Mises stress in the wire at a section, Pa.
     ///
-    /// At the angle where the radius is n, the force and the moment less `R n x F` act on the wire. Its torsion about
-    /// the tangent has the curvature factor `(4C - 1) / (4C - 4)`, to which 1.23 times the mean shear comes: for an
-    /// axial force together Wahl's factor (Wahl, Mechanical Springs, chapter 2). Bending about the coil's axis has that
-    /// of a curved bar, `(4C^2 - C - 1) / (4C (C - 1))`; bending about n has none. The pitch angle counts as small, and
-    /// the greatest torsion and bending as if they met in one point.
+    /// At the angle with radial direction n, the force F and the moment `M - R n x F` act on the wire. Torsion about the
+    /// tangent has the curvature factor `(4C - 1) / (4C - 4)`, plus 1.23 times the mean shear; for an axial force the sum
+    /// is Wahl's factor (Wahl, Mechanical Springs, chapter 2). Bending about the coil axis has the factor of a curved
+    /// bar, `(4C^2 - C - 1) / (4C (C - 1))`; bending about n has none. The pitch angle is assumed to be small. The maxima
+    /// of torsion and bending are assumed to occur at the same point, which is conservative.
     pub fn equivalent_stress_pa(&self, section: &WireLoad) -> f64 {
         let c = self.index();
         let (curved_torsion, curved_bending) =
             ((4.0 * c - 1.0) / (4.0 * c - 4.0), (4.0 * c * c - c - 1.0) / (4.0 * c * (c - 1.0)));
         let modulus = PI * self.diameter_m.powi(3) / 32.0;
         let area = 0.25 * PI * self.diameter_m.powi(2);
-        let at = |place: usize| {
-            let (sin, cos) = (TAU * place as f64 / PLACES as f64).sin_cos();
+        let at = |k: usize| {
+            let (sin, cos) = (TAU * k as f64 / ANGLES as f64).sin_cos();
             let (outward, along) = (Vector::new(cos, sin, 0.0), Vector::new(-sin, cos, 0.0));
             let moment = section.moment - (outward * self.coil_radius_m).cross(&section.force);
             let across = section.force - along * section.force.dot(&along);
@@ -69,28 +69,28 @@ impl Wire {
             let bending = (moment.dot(&outward)).hypot(moment.z * curved_bending) / modulus;
             (bending + section.force.dot(&along).abs() / area).hypot(3_f64.sqrt() * shear)
         };
-        (0..PLACES).map(at).fold(0.0, f64::max)
+        (0..ANGLES).map(at).fold(0.0, f64::max)
     }
 
-    /// The stress at which the wire stays bent, Pa; `None` for a material known by its moduli alone.
+    /// Yield stress of the wire, Pa; `None` for a material specified by its moduli only.
     ///
-    /// Tensile strength `A / d^m` and the allowable torsion of it, 45 % for music wire and 35 % for stainless 302,
-    /// taken over the square root of 3 to bending (Shigley's Mechanical Engineering Design, 9th edition, tables 10-4
-    /// and 10-6).
+    /// The tensile strength is `A / d^m`. The allowable torsional stress is 45 % of it for music wire and 35 % for
+    /// stainless 302 (Shigley's Mechanical Engineering Design, 9th edition, tables 10-4 and 10-6). The von Mises
+    /// criterion gives the tensile yield stress: sqrt(3) times the torsional stress.
     pub fn yield_pa(&self) -> Option<f64> {
         let wire_mm = self.diameter_m * 1e3;
-        let (strength_mpa, exponent, share) = match self.material {
+        let (strength_mpa, exponent, torsion_ratio) = match self.material {
             Material::SpringSteel => (2211.0, 0.145, 0.45),
             Material::Stainless if wire_mm <= 2.5 => (1867.0, 0.146, 0.35),
             Material::Stainless if wire_mm <= 5.0 => (2065.0, 0.263, 0.35),
             Material::Stainless => (2911.0, 0.478, 0.35),
             Material::Moduli { .. } => return None,
         };
-        Some(3_f64.sqrt() * share * 1e6 * strength_mpa / f64::powf(wire_mm, exponent))
+        Some(3_f64.sqrt() * torsion_ratio * 1e6 * strength_mpa / f64::powf(wire_mm, exponent))
     }
 }
 
-/// Where a spring is fastened, and to what.
+/// Attachments of a spring, and the body that it carries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpringMounting {
     base_from_foot: Pose,
@@ -99,7 +99,7 @@ pub struct SpringMounting {
 }
 
 impl SpringMounting {
-    /// That of a head on one spring; `None` for any other.
+    /// The mounting of a head on a single spring; `None` for other linkages.
     pub fn of(spec: &HeadSpec, body: &Body) -> Option<Self> {
         let LinkageSpec::Spring { base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
         Some(Self { base_from_foot: base_from_spring.pose(), head_from_top: head_from_spring.pose(), body: *body })
@@ -111,8 +111,7 @@ impl SpringMounting {
         (top - self.base_from_foot.translation.vector).norm()
     }
 
-    /// What the spring carries at its foot and at its top: the head's weight less its inertia (d'Alembert), about each
-    /// end.
+    /// Loads on the foot and the top of the spring: weight and inertial force of the head (d'Alembert).
     pub fn ends(&self, state: &HeadState) -> [WireLoad; 2] {
         let centre =
             state.head.of_frame(&Pose::from_parts(self.body.centre_of_mass_in_head.into(), Default::default()));
@@ -131,7 +130,7 @@ impl SpringMounting {
         })
     }
 
-    /// Greatest equivalent stress in the wire at either end, Pa.
+    /// Maximum von Mises stress in the wire at the two ends, Pa.
     pub fn stress_pa(&self, wire: &Wire, state: &HeadState) -> f64 {
         self.ends(state).iter().map(|section| wire.equivalent_stress_pa(section)).fold(0.0, f64::max)
     }
@@ -165,8 +164,8 @@ mod tests {
     }
 
     #[test]
-    fn bending_the_spring_bends_and_twists_its_wire_in_turn() {
-        // Where the moment is along the radius, the wire is bent: 32 M / (pi d^3); where along the tangent, twisted.
+    fn bending_of_the_spring_alternates_between_bending_and_torsion_of_the_wire() {
+        // A radial moment bends the wire, 32 M / (pi d^3); a tangential moment twists it.
         let section = WireLoad { force: Vector::zeros(), moment: Vector::x() * 0.5 };
         let bent = 32.0 * 0.5 / (PI * 0.003_f64.powi(3));
         let stress = WIRE.equivalent_stress_pa(&section);
@@ -174,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn strength_falls_with_the_wire() {
+    fn a_thicker_wire_has_less_strength() {
         // Music wire of 1 mm: 2211 MPa, 45 % of it in torsion, sqrt(3) times that in bending.
         let thin = Wire { diameter_m: 1e-3, ..WIRE };
         assert_relative_eq!(thin.yield_pa().unwrap(), 3_f64.sqrt() * 0.45 * 2211e6, max_relative = 1e-12);

@@ -1,102 +1,106 @@
-//! What must hold between the fields of a sweep's spec.
+//! Consistency checks of a sweep's spec.
 
-use super::design::MOST_SOBOL_AXES;
+use super::design::MAX_SOBOL_AXES;
 use super::{AxisSpec, BaseSpec, Measure, Sampling, SweepSpec};
 use crate::spec::{Source, SpecError};
 
-/// Most runs of a sweep.
-pub(super) const MOST_POINTS: u64 = 10_000_000;
+/// Maximum number of runs of a sweep: limits the plan's memory and the table of runs.
+pub(super) const MAX_RUNS: u64 = 10_000_000;
 
-/// Checks what concerns several fields of a spec.
+/// Checks the fields of a spec against each other.
 pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
     let about = |key: &str, message: String| SpecError::about(source, key, message);
     let is_journey = matches!(spec.base, BaseSpec::Journey { .. });
     if spec.axes.is_empty() {
-        return Err(about("axes", "a sweep varies something: it needs at least one axis".to_owned()));
+        return Err(about("axes", "a sweep needs at least one axis".to_owned()));
     }
     if spec.measures.is_empty() {
-        return Err(about("measures", "at least one of `measures` is needed".to_owned()));
+        return Err(about("measures", "`measures` is empty: at least one is needed".to_owned()));
     }
     if is_journey && spec.seeds.is_empty() {
-        return Err(about("seeds", "at least one of `seeds` is needed".to_owned()));
+        return Err(about("seeds", "`seeds` is empty: at least one is needed".to_owned()));
     }
     if !is_journey && !spec.seeds.is_empty() {
-        return Err(about("seeds", "a closed form has no chance in it: leave `seeds` out".to_owned()));
+        return Err(about("seeds", "a closed form is deterministic: remove `seeds`".to_owned()));
     }
-    if let Some(twice) = again(&spec.seeds) {
-        return Err(about("seeds", format!("`seeds` has {twice} more than once")));
+    if let Some(twice) = duplicate(&spec.seeds) {
+        return Err(about("seeds", format!("`seeds` contains {twice} more than once")));
     }
     if let Some(seed) = spec.seeds.iter().find(|seed| i64::try_from(**seed).is_err()) {
-        return Err(about("seeds", format!("the seed {seed} does not fit into a table: {} at most", i64::MAX)));
+        return Err(about("seeds", format!("seed {seed} is too large for the table: at most {}", i64::MAX)));
     }
-    if let Some(twice) = again(&spec.measures) {
-        return Err(about("measures", format!("`measures` has {twice} more than once")));
+    if let Some(twice) = duplicate(&spec.measures) {
+        return Err(about("measures", format!("`measures` contains {twice} more than once")));
     }
-    if let Some(measure) = spec.measures.iter().find(|measure| !measure.is_of(&spec.base)) {
+    if let Some(measure) = spec.measures.iter().find(|measure| !measure.is_available_for(&spec.base)) {
         let has: Vec<&str> =
-            Measure::ALL.into_iter().filter(|measure| measure.is_of(&spec.base)).map(Measure::key).collect();
-        let message = format!("a run of this base does not tell {}; it tells {}", measure.key(), has.join(", "));
+            Measure::ALL.into_iter().filter(|measure| measure.is_available_for(&spec.base)).map(Measure::key).collect();
+        let message = format!("a run of this base does not measure {}; it measures {}", measure.key(), has.join(", "));
         return Err(about(measure.key(), message));
     }
     if let Some(goal) = spec.front.iter().find(|goal| !spec.measures.contains(&goal.measure)) {
-        return Err(about("front", format!("{} is not among the measures", goal.measure.key())));
+        return Err(about("front", format!("{} is not in `measures`: add it", goal.measure.key())));
     }
     if spec.front.len() == 1 {
-        return Err(about("front", "one goal has a best run, no front: give two or more".to_owned()));
+        return Err(about("front", "a Pareto front needs at least two goals".to_owned()));
     }
-    check_names(spec, source)?;
+    check_table_names(spec, source)?;
     let count = match spec.sampling {
         Sampling::Grid => return Ok(()),
-        Sampling::Sobol { .. } if spec.axes.len() > MOST_SOBOL_AXES => {
-            return Err(about("sobol", format!("{} axes; Sobol's sequence takes {MOST_SOBOL_AXES}", spec.axes.len())));
+        Sampling::Sobol { .. } if spec.axes.len() > MAX_SOBOL_AXES => {
+            return Err(about(
+                "sobol",
+                format!("{} axes: a Sobol design has at most {MAX_SOBOL_AXES}", spec.axes.len()),
+            ));
         }
         Sampling::LatinHypercube { count, .. } | Sampling::Sobol { count } => count,
     };
-    if !(1..=MOST_POINTS as usize).contains(&count) {
-        return Err(about("count", format!("{count} samples: from 1 to {MOST_POINTS}")));
+    if !(1..=MAX_RUNS as usize).contains(&count) {
+        return Err(about("count", format!("{count} samples: expected 1 to {MAX_RUNS}")));
     }
     Ok(())
 }
 
-/// Checks names: they are columns and cells of tables.
-fn check_names(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
+/// Checks that names are valid as columns and cells of tables.
+fn check_table_names(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
     let names: Vec<&str> = spec.axes.iter().map(AxisSpec::name).collect();
-    let taken: Vec<&str> = ["point", "seed", "error", "id"].into_iter().chain(Measure::ALL.map(Measure::key)).collect();
+    let reserved: Vec<&str> =
+        ["point", "seed", "error", "id"].into_iter().chain(Measure::ALL.map(Measure::key)).collect();
     for (k, axis) in spec.axes.iter().enumerate() {
         let about = |message: String| Err(SpecError::about(source, axis.anchor().trim_matches('"'), message));
         let name = axis.name();
-        if names[..k].contains(&name) || taken.contains(&name) {
-            return about(format!("the column \"{name}\" is there already: give this axis another `name`"));
+        if names[..k].contains(&name) || reserved.contains(&name) {
+            return about(format!("the column \"{name}\" exists already: give this axis another `name`"));
         }
-        if unfit(name) {
-            return about(format!("\"{name}\" {UNFIT}"));
+        if is_invalid_name(name) {
+            return about(format!("\"{name}\" {INVALID_NAME}"));
         }
         let AxisSpec::Levels { levels, .. } = axis else { continue };
         let words: Vec<&str> = levels.iter().map(|level| level.name.as_str()).collect();
-        if let Some(word) = words.iter().find(|word| unfit(word)) {
-            return about(format!("\"{word}\" {UNFIT}"));
+        if let Some(word) = words.iter().find(|word| is_invalid_name(word)) {
+            return about(format!("\"{word}\" {INVALID_NAME}"));
         }
-        if let Some(twice) = again(&words) {
-            return about(format!("axis \"{name}\" has the level {twice} more than once"));
+        if let Some(twice) = duplicate(&words) {
+            return about(format!("axis \"{name}\" contains the level {twice} more than once"));
         }
     }
     match &spec.by {
         Some(by) if !names.contains(&by.as_str()) => {
-            let message = format!("there is no axis \"{by}\"; there are {}", names.join(", "));
+            let message = format!("no axis is named \"{by}\"; the axes are {}", names.join(", "));
             Err(SpecError::about(source, "by", message))
         }
         _ => Ok(()),
     }
 }
 
-const UNFIT: &str = "cannot be a name in a table: leave out commas, quotes, bars and control characters";
+const INVALID_NAME: &str = "cannot be a name in a table: remove commas, quotes, bars and control characters";
 
-fn unfit(name: &str) -> bool {
+fn is_invalid_name(name: &str) -> bool {
     name.is_empty() || name.contains(|c: char| c.is_control() || [',', '"', '|'].contains(&c))
 }
 
-/// What a list has twice.
-fn again<T: PartialEq + std::fmt::Debug>(list: &[T]) -> Option<String> {
+/// The first element that occurs twice in a list.
+fn duplicate<T: PartialEq + std::fmt::Debug>(list: &[T]) -> Option<String> {
     let twice = list.iter().enumerate().find(|(k, x)| list[..*k].contains(x));
     twice.map(|(_, x)| format!("{x:?}"))
 }

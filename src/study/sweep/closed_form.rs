@@ -1,33 +1,36 @@
-//! Runs that are closed forms.
+//! Runs that are evaluated in closed form.
 
 use super::component::{Component, Slot};
-use super::part::Row;
+use super::part::RunOutcome;
 use super::{Measure, Plan};
 use crate::study::StudyError;
-use crate::study::spring::{DesignFigures, closed_form};
+use crate::study::spring::{DesignMetrics, closed_form};
 use std::time::Instant;
 
-/// What comes of run `index`; that its head falls is a row too.
-pub(super) fn row(plan: &Plan, told: &[Measure], index: u64) -> Row {
+/// Evaluates run `index`. A failure, such as a head without static equilibrium, is recorded as an error.
+pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutcome {
     let started = Instant::now();
-    let row = match figures(plan, index) {
-        Ok(of) => Row { figures: told.iter().map(|measure| figure(*measure, &of)).collect(), ..Row::default() },
-        Err(error) => Row::failed_by(told.len(), &error),
+    let outcome = match figures(plan, index) {
+        Ok(of) => RunOutcome {
+            figures: measures.iter().map(|measure| figure(*measure, &of)).collect(),
+            ..RunOutcome::default()
+        },
+        Err(error) => RunOutcome::from_error(measures.len(), &error),
     };
-    Row { wall_s: Some(started.elapsed().as_secs_f64()), ..row }
+    RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
 }
 
-fn figures(plan: &Plan, index: u64) -> Result<DesignFigures, StudyError> {
-    let changed = plan.changed(index)?;
-    let (head, run) = (plan.filled(&changed, Slot::Head)?, plan.filled(&changed, Slot::Run)?);
-    let (Component::Head(spec), Component::Nod(nod)) = (&head.component, &run.component) else {
-        let message = "a spec is not of its slot's kind".to_owned();
-        return Err(StudyError::Plan { what: "the plan", message });
+fn figures(plan: &Plan, index: u64) -> Result<DesignMetrics, StudyError> {
+    let changed = plan.changed_specs(index)?;
+    let (head, run) = (plan.component(&changed, Slot::Head)?, plan.component(&changed, Slot::Run)?);
+    let (Component::Head(spec), Component::Shake(settings)) = (&head.component, &run.component) else {
+        let message = "unexpected kind of spec in a slot".to_owned();
+        return Err(StudyError::Plan { what: "plan", message });
     };
-    closed_form(spec, &head.source(), &nod.shake)
+    closed_form(spec, &head.source(), &settings.shake)
 }
 
-fn figure(measure: Measure, of: &DesignFigures) -> Option<f64> {
+fn figure(measure: Measure, of: &DesignMetrics) -> Option<f64> {
     match measure {
         Measure::RockingHz => Some(of.rocking_hz),
         Measure::PeakGain => Some(of.peak_gain),

@@ -1,4 +1,4 @@
-//! The specs that a run is made of, each as data that can be kept, changed and told apart.
+//! The specs of a run as data that can be stored, modified and hashed.
 
 use crate::dynamics::{HeadSpec, LinkageSpec};
 use crate::estimation::EstimatorSpec;
@@ -13,11 +13,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// A part of a run.
+/// Role of a spec in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Slot {
-    /// What the sweep itself says: duration and route, or the hand's nod.
+    /// Settings of the sweep's own spec: duration and route, or the shake of the hand.
     Run,
     Scene,
     Head,
@@ -42,7 +42,7 @@ impl Slot {
         Self::Estimator,
     ];
 
-    /// Its first key in a path; settings of the run itself have none.
+    /// First key of a setting's path; paths to settings of the run itself have none.
     pub(super) fn key(self) -> &'static str {
         self.kind().map_or("run", |kind| match kind {
             Kind::Head => "head",
@@ -56,11 +56,11 @@ impl Slot {
         })
     }
 
-    pub(super) fn of_key(key: &str) -> Option<Self> {
+    pub(super) fn from_key(key: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|slot| *slot != Self::Run && slot.key() == key)
     }
 
-    /// The kind of spec that fills it.
+    /// Kind of the spec in this slot.
     pub(super) fn kind(self) -> Option<Kind> {
         match self {
             Self::Run => None,
@@ -76,28 +76,30 @@ impl Slot {
     }
 }
 
-/// What a journey's spec says of its runs beside names.
+/// Settings of a journey that are not names of specs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Walk {
+pub(super) struct JourneySettings {
     pub route: Option<String>,
     #[serde(with = "checked::Positive")]
     pub duration_s: f64,
 }
 
-/// What a closed form's spec says of its runs beside names.
+/// Settings of a closed form that are not names of specs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Nod {
+pub(super) struct ShakeSettings {
     pub shake: Shake,
 }
 
-/// What fills a slot, whole: with the specs that it includes or names.
+/// The spec of a slot, self-contained: included and referenced specs are resolved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Component {
-    Walk(Walk),
-    Nod(Nod),
+    #[serde(rename = "walk")]
+    Journey(JourneySettings),
+    #[serde(rename = "nod")]
+    Shake(ShakeSettings),
     Scene(Box<SceneSpec>),
     Head(Box<HeadSpec>),
     Motion(Box<MotionSpec>),
@@ -108,30 +110,30 @@ pub(super) enum Component {
     Estimator(Box<EstimatorSpec>),
 }
 
-/// A component with what it is called and where the files that it names are.
+/// A component with its name and the folder that its file paths are relative to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Kept {
+pub(super) struct NamedComponent {
     pub name: String,
     pub folder: Option<PathBuf>,
     pub component: Component,
 }
 
-impl Kept {
-    /// Finds the spec `name` for `slot`, and takes in what it refers to.
+impl NamedComponent {
+    /// Loads the spec `name` for `slot` and resolves its references.
     pub(super) fn load(slot: Slot, name: &str) -> Result<Self, StudyError> {
         let Some(kind) = slot.kind() else {
-            return Err(SpecError::plain(name, "is no spec").into());
+            return Err(SpecError::plain(name, "is not a spec").into());
         };
         let source = find(kind, name)?;
         let component = match slot {
-            Slot::Run => return Err(SpecError::plain(name, "is no spec").into()),
+            Slot::Run => return Err(SpecError::plain(name, "is not a spec").into()),
             Slot::Scene => {
                 let scene: SceneSpec = parse(&source)?;
                 let whole = scene.with_includes(&source).map_err(crate::simulation::SimulationError::from)?;
                 Component::Scene(Box::new(whole))
             }
-            Slot::Head => Component::Head(Box::new(described(parse(&source)?)?)),
+            Slot::Head => Component::Head(Box::new(with_spring_resolved(parse(&source)?)?)),
             Slot::Motion => Component::Motion(Box::new(parse(&source)?)),
             Slot::Lidar => Component::Lidar(Box::new(parse(&source)?)),
             Slot::Imu => Component::Imu(Box::new(parse(&source)?)),
@@ -143,26 +145,26 @@ impl Kept {
         Ok(Self { name: name.to_owned(), folder, component })
     }
 
-    /// What to call it in errors, and where its files are.
+    /// Source for error messages and relative file paths.
     pub(super) fn source(&self) -> Source {
         Source { name: self.name.clone(), folder: self.folder.clone(), text: String::new() }
     }
 
-    /// The same with other settings.
+    /// The component with its settings replaced by `value`.
     ///
     /// # Errors
-    /// A sentence, when these are no such settings.
-    pub(super) fn with(&self, value: Value) -> Result<Self, String> {
-        Ok(Self { component: self.component.with(value)?, ..self.clone() })
+    /// A message if `value` is not valid for this kind of spec.
+    pub(super) fn with_value(&self, value: Value) -> Result<Self, String> {
+        Ok(Self { component: self.component.with_value(value)?, ..self.clone() })
     }
 }
 
 impl Component {
-    /// As a tree of keys and values.
+    /// The spec as a JSON tree.
     pub(super) fn value(&self) -> Result<Value, serde_json::Error> {
         match self {
-            Self::Walk(spec) => serde_json::to_value(spec),
-            Self::Nod(spec) => serde_json::to_value(spec),
+            Self::Journey(spec) => serde_json::to_value(spec),
+            Self::Shake(spec) => serde_json::to_value(spec),
             Self::Scene(spec) => serde_json::to_value(spec),
             Self::Head(spec) => serde_json::to_value(spec),
             Self::Motion(spec) => serde_json::to_value(spec),
@@ -174,11 +176,11 @@ impl Component {
         }
     }
 
-    fn with(&self, value: Value) -> Result<Self, String> {
+    fn with_value(&self, value: Value) -> Result<Self, String> {
         use serde_json::from_value;
         let read = match self {
-            Self::Walk(_) => from_value(value).map(Self::Walk),
-            Self::Nod(_) => from_value(value).map(Self::Nod),
+            Self::Journey(_) => from_value(value).map(Self::Journey),
+            Self::Shake(_) => from_value(value).map(Self::Shake),
             Self::Scene(_) => from_value(value).map(Self::Scene),
             Self::Head(_) => from_value(value).map(Self::Head),
             Self::Motion(_) => from_value(value).map(Self::Motion),
@@ -196,10 +198,10 @@ impl Component {
     }
 }
 
-/// The head with its spring described where it was named, so that its settings are there to change.
-fn described(mut head: HeadSpec) -> Result<HeadSpec, SpecError> {
+/// Replaces a spring that is given by name by its description, so that its settings can be varied.
+fn with_spring_resolved(mut head: HeadSpec) -> Result<HeadSpec, SpecError> {
     if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
-        *spring = spring.described()?;
+        *spring = spring.resolved()?;
     }
     Ok(head)
 }

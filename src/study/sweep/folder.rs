@@ -1,16 +1,16 @@
-//! A sweep on disk.
+//! Files of a sweep on disk.
 //!
 //! ```text
-//! plan.ron         the spec, the specs that it names, whole, and the version of zsim
-//! points.parquet   the runs: number, what is varied, seed, identity, and which task does it
-//! parts/           what is done: a table a run, or some hundred closed forms, named by what it is
-//! tmp/             what is being written
+//! plan.ron         the sweep's spec, all specs that it names, and the version of zsim
+//! points.parquet   the runs: index, values of the axes, seed, hash, and task
+//! parts/           finished runs: one table per journey or per 250 closed forms, named by its hash
+//! tmp/             files being written
 //! ```
 
-use super::axis::Shelf;
-use super::component::{Kept, Slot};
-use super::identity::Identity;
-use super::table::{Column, Held, Table, TableWriter};
+use super::axis::SpecSet;
+use super::component::{NamedComponent, Slot};
+use super::identity::ContentHash;
+use super::table::{Column, ColumnType, Table, TableWriter};
 use super::{BaseSpec, Plan, SweepSpec};
 use crate::spec::{self, Source, SpecError, to_text};
 use crate::study::StudyError;
@@ -20,71 +20,73 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Closed forms in a part: what a kill loses at most on each thread.
-const BLOCK: u64 = 250;
+/// Closed forms per part: the work that a kill loses at most on each thread.
+const RUNS_PER_PART: u64 = 250;
 
-/// Rows in a stretch of a table.
-pub(super) const STRETCH: u64 = 16_384;
+/// Rows in a row group of a Parquet table; bounds the memory of a merge.
+pub(super) const ROWS_PER_GROUP: u64 = 16_384;
 
-/// A plan as it is written.
+/// Content of `plan.ron`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Frozen {
+struct PlanFile {
     version: String,
     name: String,
-    /// The identity of all runs in their order.
+    /// Hash of all runs in their order.
     identity: String,
     spec: SweepSpec,
-    base: BTreeMap<Slot, Kept>,
-    others: BTreeMap<String, Kept>,
+    base: BTreeMap<Slot, NamedComponent>,
+    others: BTreeMap<String, NamedComponent>,
 }
 
-/// What is written at once.
+/// Runs that are stored together in one part file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unit {
-    pub identity: Identity,
+    pub identity: ContentHash,
     pub first: u64,
     pub count: u64,
 }
 
-/// A sweep that was planned in a folder.
+/// A sweep planned in a folder.
 pub struct Sweep {
     pub(super) plan: Plan,
     pub(super) folder: PathBuf,
-    /// Of each run.
-    pub(super) identities: Vec<Identity>,
+    /// Hash of each run.
+    pub(super) identities: Vec<ContentHash>,
     pub(super) units: Vec<Unit>,
-    /// Numbers of units that are done together, in the order of the first.
+    /// Indices of the units of each task, ordered by the first unit.
     pub(super) tasks: Vec<Vec<u32>>,
 }
 
 impl Plan {
-    /// Leaves the plan in `folder`, which is made. One that holds the same is left as it is; with `anew` another plan's
-    /// is replaced, of which all runs that are in both stay done.
+    /// Writes the plan to `folder`, creating the folder if needed.
+    ///
+    /// An identical plan in the folder is kept. With `anew` a different plan is replaced; finished runs that both plans
+    /// contain stay finished.
     ///
     /// # Errors
-    /// When the folder holds another plan or files that are not a sweep's, or cannot be written, or runs are wrong in
-    /// their combination.
+    /// If the folder contains another plan or files not written by a sweep, if it cannot be written, or if a combination
+    /// of settings is invalid.
     pub fn write(&self, folder: &Path, anew: bool) -> Result<Sweep, StudyError> {
-        if !anew && !plan_of(folder).exists() && is_foreign(folder)? {
+        if !anew && !plan_path(folder).exists() && is_foreign(folder)? {
             return Err(StudyError::FolderMismatch { folder: folder.to_owned() });
         }
-        let temporary = temporary(folder);
-        for each in [&temporary, &parts(folder)] {
+        let temporary = temporary_folder(folder);
+        for each in [&temporary, &parts_folder(folder)] {
             std::fs::create_dir_all(each).map_err(StudyError::file(each))?;
         }
-        let frozen = |identity: Identity| Frozen {
+        let content = |identity: ContentHash| PlanFile {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             name: self.name().to_owned(),
             identity: identity.to_string(),
             spec: self.spec().clone(),
-            base: self.shelf().base.clone(),
-            others: self.shelf().others.clone(),
+            base: self.specs().base.clone(),
+            others: self.specs().others.clone(),
         };
-        let plan = plan_of(folder);
+        let plan = plan_path(folder);
         let written = temporary.join("points.parquet");
         let identity = self.write_points(&temporary, &written)?;
-        let text = to_text(&frozen(identity))? + "\n";
+        let text = to_text(&content(identity))? + "\n";
         if plan.exists() && std::fs::read_to_string(&plan).map_err(StudyError::file(&plan))? == text {
             std::fs::remove_file(&written).map_err(StudyError::file(&written))?;
             return Sweep::open(folder);
@@ -92,32 +94,32 @@ impl Plan {
         if plan.exists() && !anew {
             return Err(StudyError::FolderMismatch { folder: folder.to_owned() });
         }
-        // In this order: a plan is there when its points are.
+        // Write the plan last: its presence implies a complete table of runs.
         if plan.exists() {
             std::fs::remove_file(&plan).map_err(StudyError::file(&plan))?;
         }
-        std::fs::rename(&written, points_of(folder)).map_err(StudyError::file(&written))?;
+        std::fs::rename(&written, points_path(folder)).map_err(StudyError::file(&written))?;
         write_text(&temporary, &plan, &text)?;
         Sweep::open(folder)
     }
 
-    /// Writes the table of runs, and tells the identity of all.
-    fn write_points(&self, temporary: &Path, place: &Path) -> Result<Identity, StudyError> {
-        let mut columns = vec![("point".to_owned(), Held::Counts), ("task".to_owned(), Held::Counts)];
+    /// Writes the table of runs to `target` and returns the hash of all runs.
+    fn write_points(&self, temporary: &Path, target: &Path) -> Result<ContentHash, StudyError> {
+        let mut columns = vec![("point".to_owned(), ColumnType::Counts), ("task".to_owned(), ColumnType::Counts)];
         columns.extend(self.setting_columns());
-        columns.push(("id".to_owned(), Held::Words));
-        let mut table = TableWriter::create(temporary, place, &columns)?;
-        let mut tasks: BTreeMap<Identity, i64> = BTreeMap::new();
+        columns.push(("id".to_owned(), ColumnType::Text));
+        let mut table = TableWriter::create(temporary, target, &columns)?;
+        let mut tasks: BTreeMap<ContentHash, i64> = BTreeMap::new();
         let mut all = Vec::new();
-        for first in (0..self.points()).step_by(STRETCH as usize) {
-            let numbers: Vec<u64> = (first..(first + STRETCH).min(self.points())).collect();
-            let runs: Vec<(Identity, Identity)> = numbers
+        for first in (0..self.points()).step_by(ROWS_PER_GROUP as usize) {
+            let numbers: Vec<u64> = (first..(first + ROWS_PER_GROUP).min(self.points())).collect();
+            let runs: Vec<(ContentHash, ContentHash)> = numbers
                 .par_iter()
-                .map(|index| self.point(*index).map(|point| (point.identity, point.rays)))
+                .map(|index| self.resolve(*index).map(|run| (run.identity, run.rays)))
                 .collect::<Result<_, _>>()?;
-            let task = |(index, (_, rays)): (&u64, &(Identity, Identity))| {
+            let task = |(index, (_, rays)): (&u64, &(ContentHash, ContentHash))| {
                 Some(match self.spec().base {
-                    BaseSpec::Spring { .. } => (index / BLOCK) as i64,
+                    BaseSpec::Spring { .. } => (index / RUNS_PER_PART) as i64,
                     BaseSpec::Journey { .. } => {
                         let next = tasks.len() as i64;
                         *tasks.entry(*rays).or_insert(next)
@@ -125,33 +127,34 @@ impl Plan {
                 })
             };
             let tasks = numbers.iter().zip(&runs).map(task).collect();
-            let mut stretch =
+            let mut cells =
                 vec![Column::Counts(numbers.iter().map(|index| Some(*index as i64)).collect()), Column::Counts(tasks)];
-            stretch.extend(self.setting_stretch(&numbers));
-            stretch.push(Column::Words(runs.iter().map(|(identity, _)| Some(identity.to_string())).collect()));
-            table.write(&stretch)?;
+            cells.extend(self.setting_cells(&numbers));
+            cells.push(Column::Text(runs.iter().map(|(identity, _)| Some(identity.to_string())).collect()));
+            table.write(&cells)?;
             all.extend(runs.into_iter().map(|(identity, _)| identity));
         }
         table.finish()?;
-        Ok(Identity::of(all.iter().map(Identity::bytes)))
+        Ok(ContentHash::of(all.iter().map(ContentHash::bytes)))
     }
 
-    /// The columns of what is varied.
-    pub(super) fn setting_columns(&self) -> Vec<(String, Held)> {
-        let held = |is_number: bool| if is_number { Held::Numbers } else { Held::Words };
-        let mut columns: Vec<_> = self.axes().iter().map(|axis| (axis.name.clone(), held(axis.is_number()))).collect();
+    /// Names and types of the columns of axis values and seed.
+    pub(super) fn setting_columns(&self) -> Vec<(String, ColumnType)> {
+        let column_type = |is_number: bool| if is_number { ColumnType::Numbers } else { ColumnType::Text };
+        let mut columns: Vec<_> =
+            self.axes().iter().map(|axis| (axis.name.clone(), column_type(axis.is_number()))).collect();
         if !self.spec().seeds.is_empty() {
-            columns.push(("seed".to_owned(), Held::Counts));
+            columns.push(("seed".to_owned(), ColumnType::Counts));
         }
         columns
     }
 
-    /// A stretch of these columns.
-    pub(super) fn setting_stretch(&self, numbers: &[u64]) -> Vec<Column> {
+    /// Cells of these columns for the runs `numbers`.
+    pub(super) fn setting_cells(&self, numbers: &[u64]) -> Vec<Column> {
         let settings: Vec<_> = numbers.iter().map(|index| self.settings(*index)).collect();
         let column = |(k, axis): (usize, &super::axis::Axis)| match axis.is_number() {
             true => Column::Numbers(settings.iter().map(|row| row[k].number()).collect()),
-            false => Column::Words(settings.iter().map(|row| Some(row[k].to_string())).collect()),
+            false => Column::Text(settings.iter().map(|row| Some(row[k].to_string())).collect()),
         };
         let mut columns: Vec<Column> = self.axes().iter().enumerate().map(column).collect();
         if !self.spec().seeds.is_empty() {
@@ -163,39 +166,43 @@ impl Plan {
 }
 
 impl Sweep {
-    /// Opens the sweep that was planned in `folder`.
+    /// Opens the sweep planned in `folder`.
     ///
     /// # Errors
-    /// When there is none, it is damaged, or another version of zsim planned it.
+    /// If the folder contains no sweep, if the sweep is damaged, or if another version of zsim planned it.
     pub fn open(folder: &Path) -> Result<Self, StudyError> {
-        let path = plan_of(folder);
+        let path = plan_path(folder);
         if !path.is_file() {
-            let message = "holds no sweep: make one with `zsim sweep plan`".to_owned();
+            let message = "contains no sweep: create one with `zsim sweep plan`".to_owned();
             return Err(SpecError::plain(folder.display().to_string(), message).into());
         }
         let source = Source::read(&path)?;
-        let frozen: Frozen = spec::parse(&source)?;
+        let file: PlanFile = spec::parse(&source)?;
         let ours = env!("CARGO_PKG_VERSION");
-        if frozen.version != ours {
-            let message = format!("was planned by zsim {}, this is {ours}: its runs would be others", frozen.version);
+        if file.version != ours {
+            let message = format!(
+                "was planned by zsim {}, this is zsim {ours}, whose runs may differ: plan the sweep again",
+                file.version
+            );
             return Err(SpecError::plain(source.name, message).into());
         }
-        let mut shelf = Shelf { base: frozen.base, others: frozen.others };
-        let plan = Plan::with(&frozen.name, &frozen.spec, &mut shelf, &source)?;
-        let path = points_of(folder);
-        let damaged = || SpecError::plain(path.display().to_string(), "is not of this plan: plan the sweep again");
+        let mut specs = SpecSet { base: file.base, others: file.others };
+        let plan = Plan::with_specs(&file.name, &file.spec, &mut specs, &source)?;
+        let path = points_path(folder);
+        let damaged = || SpecError::plain(path.display().to_string(), "does not match the plan: plan the sweep again");
         let table = Table::open(&path)?.ok_or_else(damaged)?;
-        let words = table.column("id", Held::Words)?.words();
-        let identities: Option<Vec<Identity>> = words.iter().map(|word| Identity::parse(word.as_deref()?)).collect();
+        let hashes = table.column("id", ColumnType::Text)?.texts();
+        let identities: Option<Vec<ContentHash>> =
+            hashes.iter().map(|hash| ContentHash::parse(hash.as_deref()?)).collect();
         let identities = identities.filter(|all| all.len() as u64 == plan.points()).ok_or_else(damaged)?;
-        if Identity::of(identities.iter().map(Identity::bytes)).to_string() != frozen.identity {
+        if ContentHash::of(identities.iter().map(ContentHash::bytes)).to_string() != file.identity {
             return Err(damaged().into());
         }
         let units = units(&plan, &identities);
         let mut tasks: BTreeMap<i64, Vec<u32>> = BTreeMap::new();
-        let of_points = table.column("task", Held::Counts)?.counts();
+        let task_of_run = table.column("task", ColumnType::Counts)?.counts();
         for (k, unit) in units.iter().enumerate() {
-            let task = of_points.get(unit.first as usize).copied().flatten().ok_or_else(damaged)?;
+            let task = task_of_run.get(unit.first as usize).copied().flatten().ok_or_else(damaged)?;
             tasks.entry(task).or_default().push(k as u32);
         }
         let tasks = tasks.into_values().collect();
@@ -207,42 +214,43 @@ impl Sweep {
         &self.plan
     }
 
-    /// Runs that share physics and rays, or a block of closed forms: what one worker does.
+    /// Number of tasks. One worker processes a task: runs that share physics and rays, or a block of closed forms.
     pub fn tasks(&self) -> usize {
         self.tasks.len()
     }
 
-    /// Where a unit's part is when it is done.
-    pub(super) fn part(&self, unit: &Unit) -> PathBuf {
-        parts(&self.folder).join(format!("{}.parquet", unit.identity))
+    /// Path of a unit's part file.
+    pub(super) fn part_path(&self, unit: &Unit) -> PathBuf {
+        parts_folder(&self.folder).join(format!("{}.parquet", unit.identity))
     }
 
+    /// Folder of files being written.
     pub(super) fn temporary(&self) -> PathBuf {
-        temporary(&self.folder)
+        temporary_folder(&self.folder)
     }
 }
 
-fn units(plan: &Plan, identities: &[Identity]) -> Vec<Unit> {
+fn units(plan: &Plan, identities: &[ContentHash]) -> Vec<Unit> {
     let size = match plan.spec().base {
-        BaseSpec::Spring { .. } => BLOCK,
+        BaseSpec::Spring { .. } => RUNS_PER_PART,
         BaseSpec::Journey { .. } => 1,
     };
-    let unit = |(k, block): (usize, &[Identity])| Unit {
-        identity: Identity::of(block.iter().map(Identity::bytes)),
+    let unit = |(k, block): (usize, &[ContentHash])| Unit {
+        identity: ContentHash::of(block.iter().map(ContentHash::bytes)),
         first: k as u64 * size,
         count: block.len() as u64,
     };
     identities.chunks(size as usize).enumerate().map(unit).collect()
 }
 
-/// Whether a folder without a plan holds more than planning leaves behind when it is killed.
+/// Whether a folder without a plan contains files other than those of an interrupted planning.
 fn is_foreign(folder: &Path) -> Result<bool, StudyError> {
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(false),
         Err(error) => return Err(StudyError::file(folder)(error)),
     };
-    let ours = [temporary(folder), parts(folder), points_of(folder)];
+    let ours = [temporary_folder(folder), parts_folder(folder), points_path(folder)];
     for entry in entries {
         if !ours.contains(&entry.map_err(StudyError::file(folder))?.path()) {
             return Ok(true);
@@ -251,18 +259,18 @@ fn is_foreign(folder: &Path) -> Result<bool, StudyError> {
     Ok(false)
 }
 
-fn plan_of(folder: &Path) -> PathBuf {
+fn plan_path(folder: &Path) -> PathBuf {
     folder.join("plan.ron")
 }
 
-fn points_of(folder: &Path) -> PathBuf {
+fn points_path(folder: &Path) -> PathBuf {
     folder.join("points.parquet")
 }
 
-fn parts(folder: &Path) -> PathBuf {
+fn parts_folder(folder: &Path) -> PathBuf {
     folder.join("parts")
 }
 
-fn temporary(folder: &Path) -> PathBuf {
+fn temporary_folder(folder: &Path) -> PathBuf {
     folder.join("tmp")
 }

@@ -1,18 +1,18 @@
-//! What a run is, as a number: equal when all that matters is equal.
+//! Hashes that identify runs by everything that determines their results.
 
-use super::component::{Component, Kept, Slot};
+use super::component::{Component, NamedComponent, Slot};
 use crate::study::StudyError;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The first half of a SHA-256: no two of any number of runs that can be made share one.
+/// First 128 bits of a SHA-256: collisions are negligible for any feasible number of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Identity([u8; 16]);
+pub(super) struct ContentHash([u8; 16]);
 
-impl Identity {
-    /// Of some parts, each told from the next.
+impl ContentHash {
+    /// Hash of a sequence of byte strings; lengths are hashed too, so that boundaries matter.
     pub fn of<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> Self {
         let mut hash = Sha256::new();
         for part in parts {
@@ -28,74 +28,76 @@ impl Identity {
         &self.0
     }
 
-    /// Reads what is displayed.
+    /// Parses the 32 hexadecimal digits that `Display` writes.
     pub fn parse(text: &str) -> Option<Self> {
         u128::from_str_radix(text, 16).ok().filter(|_| text.len() == 32).map(|number| Self(number.to_be_bytes()))
     }
 }
 
-impl std::fmt::Display for Identity {
+impl std::fmt::Display for ContentHash {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{:032x}", u128::from_be_bytes(self.0))
     }
 }
 
-/// What a component is, and what it is apart from noise.
+/// Hashes of a component, with and without its sensor noise.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Identities {
-    pub whole: Identity,
-    /// Of what rays and physics depend on; equal for lidars that differ in their errors alone.
-    pub without_noise: Identity,
+pub(super) struct ComponentHashes {
+    /// Of the complete component.
+    pub full: ContentHash,
+    /// Of everything that affects rays and physics; equal for lidars that differ only in their error models.
+    pub without_noise: ContentHash,
 }
 
-impl Identities {
-    pub fn of(slot: Slot, kept: &Kept) -> Result<Self, StudyError> {
-        let mut tree = kept.component.value()?;
+impl ComponentHashes {
+    /// Hashes a component and the content of all files that it refers to.
+    pub fn of(slot: Slot, named: &NamedComponent) -> Result<Self, StudyError> {
+        let mut tree = named.component.value()?;
         let mut files = Vec::new();
-        if let Some(folder) = &kept.folder {
+        if let Some(folder) = &named.folder {
             let mut names = BTreeSet::new();
-            words(&tree, &mut names);
+            strings(&tree, &mut names);
             for name in names {
-                files.extend(content(&folder.join(&name))?.map(|content| (name, content)));
+                files.extend(file_hash(&folder.join(&name))?.map(|content| (name, content)));
             }
         }
-        let of = |tree: &Value| -> Result<Identity, StudyError> {
+        let of = |tree: &Value| -> Result<ContentHash, StudyError> {
             let text = serde_json::to_string(tree)?;
             let head = [slot.key().as_bytes(), text.as_bytes()];
             let files = files.iter().flat_map(|(name, content)| [name.as_bytes(), content.bytes()]);
-            Ok(Identity::of(head.into_iter().chain(files)))
+            Ok(ContentHash::of(head.into_iter().chain(files)))
         };
-        let whole = of(&tree)?;
-        let is_lidar = matches!(kept.component, Component::Lidar(_));
+        let full = of(&tree)?;
+        let is_lidar = matches!(named.component, Component::Lidar(_));
         let without_noise = match tree.as_object_mut().filter(|_| is_lidar) {
             Some(object) => {
                 object.remove("errors");
                 object.remove("noise");
                 of(&tree)?
             }
-            None => whole,
+            None => full,
         };
-        Ok(Self { whole, without_noise })
+        Ok(Self { full, without_noise })
     }
 }
 
-/// The words in a tree, which may name files.
-fn words(tree: &Value, into: &mut BTreeSet<String>) {
+/// Collects the strings in a tree: they may be names of files.
+fn strings(tree: &Value, into: &mut BTreeSet<String>) {
     match tree {
         Value::String(word) => drop(into.insert(word.clone())),
-        Value::Array(list) => list.iter().for_each(|value| words(value, into)),
-        Value::Object(object) => object.values().for_each(|value| words(value, into)),
+        Value::Array(list) => list.iter().for_each(|value| strings(value, into)),
+        Value::Object(object) => object.values().for_each(|value| strings(value, into)),
         _ => {}
     }
 }
 
-/// What is in a file, if it is one: a mesh that a scene names, a trajectory that is played.
-fn content(path: &Path) -> Result<Option<Identity>, StudyError> {
+/// Hash of a file's content, such as a mesh or a replayed trajectory; `None` if `path` is not a file.
+fn file_hash(path: &Path) -> Result<Option<ContentHash>, StudyError> {
     if !path.is_file() {
         return Ok(None);
     }
     let bytes = std::fs::read(path).map_err(StudyError::file(path))?;
-    Ok(Some(Identity::of([bytes.as_slice()])))
+    Ok(Some(ContentHash::of([bytes.as_slice()])))
 }
 
 #[cfg(test)]
@@ -103,38 +105,38 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_that_of_sha256() {
-        // FIPS 180-4's hash of eight zero bytes and nothing else is that of one empty part.
+    fn the_hash_is_the_first_half_of_sha256() {
+        // One empty part is hashed as its length: eight zero bytes.
         let mut hash = Sha256::new();
         hash.update([0_u8; 8]);
-        assert_eq!(Identity::of([b"".as_slice()]).bytes(), &hash.finalize()[..16]);
-        let (a, b) = (Identity::of([b"ab".as_slice(), b"c"]), Identity::of([b"a".as_slice(), b"bc"]));
+        assert_eq!(ContentHash::of([b"".as_slice()]).bytes(), &hash.finalize()[..16]);
+        let (a, b) = (ContentHash::of([b"ab".as_slice(), b"c"]), ContentHash::of([b"a".as_slice(), b"bc"]));
         assert_ne!(a, b);
-        assert_eq!(Identity::parse(&a.to_string()), Some(a));
-        assert_eq!(Identity::parse("12"), None);
+        assert_eq!(ContentHash::parse(&a.to_string()), Some(a));
+        assert_eq!(ContentHash::parse("12"), None);
     }
 
     #[test]
-    fn noise_is_no_matter_of_rays_and_a_file_is_one_of_its_spec() {
-        let lidar = Kept::load(Slot::Lidar, "utm30lx").unwrap();
+    fn lidar_noise_does_not_affect_the_ray_hash_and_referenced_files_affect_the_full_hash() {
+        let lidar = NamedComponent::load(Slot::Lidar, "utm30lx").unwrap();
         let mut noisy = lidar.clone();
         let Component::Lidar(spec) = &mut noisy.component else { panic!() };
         spec.errors.range.near_sigma_m *= 2.0;
-        let [first, second] = [&lidar, &noisy].map(|kept| Identities::of(Slot::Lidar, kept).unwrap());
-        assert_ne!(first.whole, second.whole);
+        let [first, second] = [&lidar, &noisy].map(|named| ComponentHashes::of(Slot::Lidar, named).unwrap());
+        assert_ne!(first.full, second.full);
         assert_eq!(first.without_noise, second.without_noise);
         let Component::Lidar(spec) = &mut noisy.component else { panic!() };
         spec.range_max_m = 20.0;
-        assert_ne!(Identities::of(Slot::Lidar, &noisy).unwrap().without_noise, first.without_noise);
+        assert_ne!(ComponentHashes::of(Slot::Lidar, &noisy).unwrap().without_noise, first.without_noise);
 
         let here = tempfile::tempdir().unwrap();
-        let place = here.path().join("walk.tum");
+        let trajectory = here.path().join("walk.tum");
         let motion = r#"Replay((poses: Tum("walk.tum"), from_route: false, still_s: 1.0, ease_s: 1.0))"#;
         std::fs::write(here.path().join("m.ron"), motion).unwrap();
         let identity = |text: &str| {
-            std::fs::write(&place, text).unwrap();
-            let kept = Kept::load(Slot::Motion, &here.path().join("m.ron").display().to_string()).unwrap();
-            Identities::of(Slot::Motion, &kept).unwrap().whole
+            std::fs::write(&trajectory, text).unwrap();
+            let named = NamedComponent::load(Slot::Motion, &here.path().join("m.ron").display().to_string()).unwrap();
+            ComponentHashes::of(Slot::Motion, &named).unwrap().full
         };
         assert_ne!(identity("a"), identity("b"));
     }

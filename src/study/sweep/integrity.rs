@@ -1,24 +1,24 @@
-//! What a sweep says of the statement of integrity: verdicts and bounds against the true errors.
+//! Evaluation of the integrity statements of a sweep: verdicts and error bounds against the true errors.
 
-use super::table::{Held, Table};
+use super::table::{ColumnType, Table};
 use super::{Measure, Plan, Sweep};
 use crate::report;
 use crate::spec::SpecError;
 use crate::study::StudyError;
 use crate::study::integrity::large_error_m;
 
-/// The axis of fault lists, and its level without faults.
-const FAULTS: (&str, &str) = ("faults", "none");
-/// Share of a run's poses that must lie within their bound.
-const COVERED: f64 = 0.99;
-/// An aligned error below this is small: such a run should not be called lost, m.
-const SMALL_M: f64 = 0.02;
-/// How many of the worst runs are listed.
-const WORST: usize = 10;
+/// Name of the axis of fault lists, and its level without faults.
+const FAULT_AXIS: (&str, &str) = ("faults", "none");
+/// Required fraction of a run's poses with an error within the bound, which is a 99 % bound.
+const REQUIRED_WITHIN_BOUND: f64 = 0.99;
+/// Aligned RMSE, m, below which a run should not be reported as lost: well below the 5 cm of a good run.
+const SMALL_ERROR_M: f64 = 0.02;
+/// Number of worst runs in the table.
+const MAX_LISTED_RUNS: usize = 10;
 
-/// A run, as far as its statement goes. Without an estimate its figures are NaN.
+/// Integrity measures of a run; NaN if the run has no estimate.
 #[derive(Debug, Clone, PartialEq)]
-struct Stated {
+struct RunIntegrity {
     number: u64,
     settings: Vec<String>,
     is_faulted: bool,
@@ -31,27 +31,27 @@ struct Stated {
     way_m: f64,
 }
 
-impl Stated {
+impl RunIntegrity {
     fn is_failed(&self) -> bool {
         self.status.is_nan()
     }
 
-    /// How much more it errs than a good result may.
-    fn excess(&self) -> f64 {
+    /// Aligned RMSE over the largest error of a good result.
+    fn error_ratio(&self) -> f64 {
         self.aligned_rmse_m / large_error_m(self.way_m)
     }
 }
 
-/// What the statements of a sweep's runs are worth.
+/// Integrity statements of all runs of a sweep.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Coverage {
+pub(super) struct IntegrityReport {
     axes: Vec<String>,
-    runs: Vec<Stated>,
+    runs: Vec<RunIntegrity>,
 }
 
 impl Sweep {
-    /// The statements of the merged table's runs; `None` where they were not measured.
-    pub(super) fn coverage(&self) -> Result<Option<Coverage>, StudyError> {
+    /// Integrity statements of the runs in the merged table; `None` if the sweep does not measure them.
+    pub(super) fn integrity_report(&self) -> Result<Option<IntegrityReport>, StudyError> {
         let measures = [
             Measure::Status,
             Measure::AlignedRmseM,
@@ -64,23 +64,23 @@ impl Sweep {
             return Ok(None);
         }
         let path = self.table();
-        let unmerged = || SpecError::plain(path.display().to_string(), "is not there: merge the sweep first");
+        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
         let table = Table::open(&path)?.ok_or_else(unmerged)?;
         let figures = |measure: Measure| {
-            let cells = table.column(measure.key(), Held::Numbers)?.numbers();
+            let cells = table.column(measure.key(), ColumnType::Numbers)?.numbers();
             Ok(cells.into_iter().map(|cell| cell.unwrap_or(f64::NAN)).collect::<Vec<f64>>())
         };
         let figures: Vec<Vec<f64>> = measures.into_iter().map(figures).collect::<Result<_, StudyError>>()?;
-        let numbers = table.column("point", Held::Counts)?.counts();
-        let axes = word_axes(&self.plan);
-        let words = |axis: &String| Ok(table.column(axis, Held::Words)?.words());
-        let words: Vec<Vec<Option<String>>> = axes.iter().map(words).collect::<Result<_, StudyError>>()?;
-        let faults = axes.iter().position(|axis| axis == FAULTS.0);
-        let stated = |(row, number): (usize, Option<i64>)| {
-            let settings: Vec<String> = words.iter().map(|column| column[row].clone().unwrap_or_default()).collect();
-            Stated {
+        let numbers = table.column("point", ColumnType::Counts)?.counts();
+        let axes = text_axes(&self.plan);
+        let cells = |axis: &String| Ok(table.column(axis, ColumnType::Text)?.texts());
+        let texts: Vec<Vec<Option<String>>> = axes.iter().map(cells).collect::<Result<_, StudyError>>()?;
+        let faults = axes.iter().position(|axis| axis == FAULT_AXIS.0);
+        let run = |(row, number): (usize, Option<i64>)| {
+            let settings: Vec<String> = texts.iter().map(|column| column[row].clone().unwrap_or_default()).collect();
+            RunIntegrity {
                 number: number.unwrap_or_default() as u64,
-                is_faulted: faults.is_some_and(|axis| settings[axis] != FAULTS.1),
+                is_faulted: faults.is_some_and(|axis| settings[axis] != FAULT_AXIS.1),
                 settings,
                 status: figures[0][row],
                 aligned_rmse_m: figures[1][row],
@@ -90,56 +90,64 @@ impl Sweep {
                 way_m: figures[5][row],
             }
         };
-        Ok(Some(Coverage { axes, runs: numbers.into_iter().enumerate().map(stated).collect() }))
+        Ok(Some(IntegrityReport { axes, runs: numbers.into_iter().enumerate().map(run).collect() }))
     }
 }
 
-fn word_axes(plan: &Plan) -> Vec<String> {
-    plan.setting_columns().into_iter().filter(|(_, held)| *held == Held::Words).map(|(name, _)| name).collect()
+/// Names of the axes whose values are text.
+fn text_axes(plan: &Plan) -> Vec<String> {
+    plan.setting_columns()
+        .into_iter()
+        .filter(|(_, column_type)| *column_type == ColumnType::Text)
+        .map(|(name, _)| name)
+        .collect()
 }
 
-impl Coverage {
-    /// Two tables: how the verdicts and bounds held, and the runs that were worst for their verdict.
+impl IntegrityReport {
+    /// Two tables (title, header, rows): reliability of verdicts and bounds, and the worst runs that are not lost.
     pub fn tables(&self) -> [(String, Vec<String>, Vec<Vec<String>>); 2] {
-        [self.held(), self.worst()]
+        [self.reliability(), self.worst_runs()]
     }
 
-    fn held(&self) -> (String, Vec<String>, Vec<Vec<String>>) {
-        let clean: Vec<&Stated> = self.runs.iter().filter(|run| !run.is_faulted).collect();
-        let faulted: Vec<&Stated> = self.runs.iter().filter(|run| run.is_faulted).collect();
-        let row =
-            |name: &str, figure: &dyn Fn(&[&Stated]) -> String| vec![name.to_owned(), figure(&clean), figure(&faulted)];
-        let with = |status: f64| move |runs: &[&Stated]| count(runs, |run| run.status == status);
+    /// Reliability of verdicts and bounds, without and with faults.
+    fn reliability(&self) -> (String, Vec<String>, Vec<Vec<String>>) {
+        let clean: Vec<&RunIntegrity> = self.runs.iter().filter(|run| !run.is_faulted).collect();
+        let faulted: Vec<&RunIntegrity> = self.runs.iter().filter(|run| run.is_faulted).collect();
+        let row = |name: &str, figure: &dyn Fn(&[&RunIntegrity]) -> String| {
+            vec![name.to_owned(), figure(&clean), figure(&faulted)]
+        };
+        let with = |status: f64| move |runs: &[&RunIntegrity]| count(runs, |run| run.status == status);
         let rows = vec![
             row("runs", &|runs| runs.len().to_string()),
             row("good", &with(0.0)),
             row("degraded", &with(1.0)),
             row("lost", &with(2.0)),
-            row("refused with an error", &|runs| count(runs, Stated::is_failed)),
-            row("good, but wrong by more than 5 cm and 1 % of the way", &|runs| {
-                count(runs, |run| run.status == 0.0 && run.excess() > 1.0)
+            row("failed with an error", &|runs| count(runs, RunIntegrity::is_failed)),
+            row("good, but error above 5 cm and 1 % of the path", &|runs| {
+                count(runs, |run| run.status == 0.0 && run.error_ratio() > 1.0)
             }),
-            row("at least 99 % of the poses within their bound (%)", &|runs| {
-                share(runs, |run| !run.is_failed(), |run| run.within_bound >= COVERED)
+            row("runs with at least 99 % of the poses within the bound (%)", &|runs| {
+                percentage(runs, |run| !run.is_failed(), |run| run.within_bound >= REQUIRED_WITHIN_BOUND)
             }),
             row("bound over error, good runs, median", &|runs| median_ratio(runs, 0.0)),
             row("bound over error, degraded runs, median", &|runs| median_ratio(runs, 1.0)),
-            row("lost, of those that err by less than 2 cm (%)", &|runs| {
-                share(runs, |run| run.aligned_rmse_m < SMALL_M, |run| run.status == 2.0)
+            row("lost, of runs with an error below 2 cm (%)", &|runs| {
+                percentage(runs, |run| run.aligned_rmse_m < SMALL_ERROR_M, |run| run.status == 2.0)
             }),
         ];
         let header = ["", "without faults", "with faults"].map(str::to_owned).to_vec();
-        ("Statement of integrity".to_owned(), header, rows)
+        ("Integrity: verdicts and bounds against true errors".to_owned(), header, rows)
     }
 
-    /// Runs that are not lost, by how little the bound covers and by how far they err.
-    fn worst(&self) -> (String, Vec<String>, Vec<Vec<String>>) {
-        let mut runs: Vec<&Stated> = self.runs.iter().filter(|run| run.status < 2.0).collect();
+    /// Runs that are not lost, ordered by the fraction within the bound, then by error.
+    fn worst_runs(&self) -> (String, Vec<String>, Vec<Vec<String>>) {
+        let mut runs: Vec<&RunIntegrity> = self.runs.iter().filter(|run| run.status < 2.0).collect();
         runs.sort_by(|a, b| {
-            let uncovered = a.within_bound.min(COVERED).total_cmp(&b.within_bound.min(COVERED));
-            uncovered.then(b.excess().total_cmp(&a.excess()))
+            let uncovered =
+                a.within_bound.min(REQUIRED_WITHIN_BOUND).total_cmp(&b.within_bound.min(REQUIRED_WITHIN_BOUND));
+            uncovered.then(b.error_ratio().total_cmp(&a.error_ratio()))
         });
-        let row = |run: &&Stated| {
+        let row = |run: &&RunIntegrity| {
             let mut cells = vec![run.number.to_string()];
             cells.extend(run.settings.iter().cloned());
             cells.push(if run.status == 0.0 { "good" } else { "degraded" }.to_owned());
@@ -151,11 +159,15 @@ impl Coverage {
         let mut header = vec!["run".to_owned()];
         header.extend(self.axes.iter().cloned());
         header.extend(["verdict", "error mm", "bound mm", "within %"].map(str::to_owned));
-        (format!("The {WORST} worst runs that are not lost"), header, runs.iter().take(WORST).map(row).collect())
+        (
+            format!("The {MAX_LISTED_RUNS} worst runs that are not lost"),
+            header,
+            runs.iter().take(MAX_LISTED_RUNS).map(row).collect(),
+        )
     }
 
-    /// As text for a terminal.
-    pub fn words(&self) -> String {
+    /// The tables for a terminal.
+    pub fn text(&self) -> String {
         let text = |(title, header, rows): (String, Vec<String>, Vec<Vec<String>>)| {
             let header: Vec<&str> = header.iter().map(String::as_str).collect();
             format!("{title}\n{}\n", report::table(&header, &rows, true))
@@ -163,7 +175,7 @@ impl Coverage {
         self.tables().map(text).concat()
     }
 
-    /// As Markdown.
+    /// The tables as Markdown.
     pub fn markdown(&self) -> String {
         let text = |(title, header, rows): (String, Vec<String>, Vec<Vec<String>>)| {
             let header: Vec<&str> = header.iter().map(String::as_str).collect();
@@ -173,18 +185,22 @@ impl Coverage {
     }
 }
 
-fn count(runs: &[&Stated], is_so: impl Fn(&Stated) -> bool) -> String {
-    runs.iter().filter(|run| is_so(run)).count().to_string()
+fn count(runs: &[&RunIntegrity], has: impl Fn(&RunIntegrity) -> bool) -> String {
+    runs.iter().filter(|run| has(run)).count().to_string()
 }
 
-/// Percentage of the runs that are `of` which are also `is_so`.
-fn share(runs: &[&Stated], of: impl Fn(&Stated) -> bool, is_so: impl Fn(&Stated) -> bool) -> String {
-    let all: Vec<&&Stated> = runs.iter().filter(|run| of(run)).collect();
-    let some = all.iter().filter(|run| is_so(run)).count();
+/// Percentage of the runs with `condition` that also have `property`.
+fn percentage(
+    runs: &[&RunIntegrity],
+    condition: impl Fn(&RunIntegrity) -> bool,
+    property: impl Fn(&RunIntegrity) -> bool,
+) -> String {
+    let all: Vec<&&RunIntegrity> = runs.iter().filter(|run| condition(run)).collect();
+    let some = all.iter().filter(|run| property(run)).count();
     if all.is_empty() { "-".to_owned() } else { format!("{:.1}", 1e2 * some as f64 / all.len() as f64) }
 }
 
-fn median_ratio(runs: &[&Stated], status: f64) -> String {
+fn median_ratio(runs: &[&RunIntegrity], status: f64) -> String {
     let of_status = runs.iter().filter(|run| run.status == status && run.bound_over_error.is_finite());
     let mut ratios: Vec<f64> = of_status.map(|run| run.bound_over_error).collect();
     ratios.sort_unstable_by(f64::total_cmp);
@@ -195,10 +211,10 @@ fn median_ratio(runs: &[&Stated], status: f64) -> String {
 mod tests {
     use super::*;
 
-    fn run(number: u64, faults: &str, status: f64, aligned_rmse_m: f64, within_bound: f64) -> Stated {
-        Stated {
+    fn run(number: u64, faults: &str, status: f64, aligned_rmse_m: f64, within_bound: f64) -> RunIntegrity {
+        RunIntegrity {
             number,
-            is_faulted: faults != FAULTS.1,
+            is_faulted: faults != FAULT_AXIS.1,
             settings: vec![faults.to_owned()],
             status,
             aligned_rmse_m,
@@ -210,8 +226,8 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_run_that_is_called_good_is_counted_and_listed_first() {
-        let coverage = Coverage {
+    fn a_run_with_a_large_error_and_the_verdict_good_is_counted_and_listed_first() {
+        let report = IntegrityReport {
             axes: vec!["faults".to_owned()],
             runs: vec![
                 run(0, "none", 0.0, 0.002, 1.0),
@@ -221,15 +237,15 @@ mod tests {
                 run(4, "gap", f64::NAN, f64::NAN, f64::NAN),
             ],
         };
-        let (_, _, rows) = coverage.held();
+        let (_, _, rows) = report.reliability();
         let figures =
             |name: &str| rows.iter().find(|row| row[0].starts_with(name)).map(|row| row[1..].to_vec()).unwrap();
         assert_eq!(figures("runs"), ["2", "3"]);
-        assert_eq!(figures("refused"), ["0", "1"]);
-        assert_eq!(figures("good, but wrong"), ["1", "0"]);
-        assert_eq!(figures("at least 99 %"), ["50.0", "100.0"]);
-        assert_eq!(figures("lost, of those"), ["0.0", "50.0"]);
-        let (_, _, worst) = coverage.worst();
+        assert_eq!(figures("failed"), ["0", "1"]);
+        assert_eq!(figures("good, but error"), ["1", "0"]);
+        assert_eq!(figures("runs with at least 99 %"), ["50.0", "100.0"]);
+        assert_eq!(figures("lost, of runs"), ["0.0", "50.0"]);
+        let (_, _, worst) = report.worst_runs();
         assert_eq!(worst.iter().map(|row| row[0].as_str()).collect::<Vec<_>>(), ["1", "3", "0"]);
     }
 }

@@ -1,10 +1,10 @@
-//! Runs that are simulated and estimated.
+//! Runs that are simulated, recorded and estimated.
 
 use super::Measure;
 use super::component::{Component, Slot};
-use super::measure::Told;
-use super::part::Row;
-use super::{LimitSpec, Plan, plan::Point};
+use super::measure::Origin;
+use super::part::RunOutcome;
+use super::{LimitSpec, Plan, plan::ResolvedRun};
 use crate::estimation::{EstimatorSpec, Status};
 use crate::recording::{Preference, Reader, Writer};
 use crate::report::IntegrityMetrics;
@@ -13,7 +13,7 @@ use crate::study::calibration::calibration;
 use crate::study::closed_loop::run_closed_loop;
 use crate::study::coverage::{Coverage, CoveragePlan, coverage};
 use crate::study::integrity::{Integrity, path_length_m};
-use crate::study::open_loop::{How, run_open_loop};
+use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
 use crate::study::{CalibrationSpec, StudyError, Watch, judge};
 use std::fs::File;
@@ -21,24 +21,25 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Recordings that are made at once.
-pub(super) const MOST_TAPES: usize = 16;
+/// Maximum number of recordings written at once; bounds memory and temporary disk space.
+pub(super) const MAX_RECORDINGS: usize = 16;
 
-/// A simulation and its recording, which has no name: it is gone with the process, however that ends.
-pub(super) struct Tape {
+/// A simulation and its recording in an unlinked temporary file, which the system removes when the process ends.
+pub(super) struct TemporaryRecording {
     simulation: Simulation,
-    /// One a thread.
+    /// One file handle per reader thread; empty without a recording.
     handles: Vec<File>,
 }
 
-/// Runs simulations that share physics and rays, for `readers` threads to read what they recorded. With `recorded`
-/// unset there is nothing to read.
-pub(super) fn tapes(
+/// Runs simulations that share physics and rays, and records them for `readers` threads.
+///
+/// Without `recorded` the simulations are not run, and the recordings are empty.
+pub(super) fn record_simulations(
     simulations: Vec<Simulation>,
     (recorded, readers): (bool, usize),
     limit: LimitSpec,
-) -> Result<Vec<Tape>, StudyError> {
-    let without = |simulation| Tape { simulation, handles: Vec::new() };
+) -> Result<Vec<TemporaryRecording>, StudyError> {
+    let without = |simulation| TemporaryRecording { simulation, handles: Vec::new() };
     if !recorded {
         return Ok(simulations.into_iter().map(without).collect());
     }
@@ -49,56 +50,60 @@ pub(super) fn tapes(
         let open = || file.reopen().map_err(StudyError::file(file.path()));
         handles.push((0..readers).map(|_| open()).collect::<Result<Vec<_>, _>>()?);
         writers.push(Writer::new(open()?, description(simulation, false)?)?);
-        // The name goes here; the handles keep what is behind it.
+        // The file is unlinked here; the open handles keep its content.
     }
-    within(limit, |stop| record_together(&simulations, writers, &Watch { stop, report: &mut |_| {} }))?;
-    Ok(simulations.into_iter().zip(handles).map(|(simulation, handles)| Tape { simulation, handles }).collect())
+    with_time_limit(limit, |stop| record_together(&simulations, writers, &Watch { stop, report: &mut |_| {} }))?;
+    Ok(simulations
+        .into_iter()
+        .zip(handles)
+        .map(|(simulation, handles)| TemporaryRecording { simulation, handles })
+        .collect())
 }
 
-impl Tape {
-    /// What comes of a run on this recording, read by thread `reader`.
-    pub fn row(&self, plan: &Plan, point: &Point, reader: usize) -> Row {
-        let told = plan.told();
+impl TemporaryRecording {
+    /// Evaluates a run on this recording, read by thread `reader`.
+    pub fn evaluate(&self, plan: &Plan, run: &ResolvedRun, reader: usize) -> RunOutcome {
+        let measures = plan.result_measures();
         let started = Instant::now();
-        let row = match self.figures(plan, point, &told, reader) {
-            Ok(figures) => Row { figures, ..Row::default() },
-            Err(error) => Row::failed_by(told.len(), &error),
+        let outcome = match self.figures(plan, run, &measures, reader) {
+            Ok(figures) => RunOutcome { figures, ..RunOutcome::default() },
+            Err(error) => RunOutcome::from_error(measures.len(), &error),
         };
-        Row { wall_s: Some(started.elapsed().as_secs_f64()), ..row }
+        RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
     }
 
     fn figures(
         &self,
         plan: &Plan,
-        point: &Point,
-        told: &[Measure],
+        run: &ResolvedRun,
+        measures: &[Measure],
         reader: usize,
     ) -> Result<Vec<Option<f64>>, StudyError> {
         let limit = plan.limit().ok_or_else(|| wrong_kind("limit"))?;
-        let is_of = |told_by: Told| told.iter().any(|measure| measure.told() == told_by);
-        let swing = match is_of(Told::Swing) || is_of(Told::SwingOrClosedForm) {
+        let needs = |origin: Origin| measures.iter().any(|measure| measure.origin() == origin);
+        let swing = match needs(Origin::Swing) || needs(Origin::SwingOrClosedForm) {
             true => Some(self.swing()?),
             false => None,
         };
-        let estimated = match self.handles.get(reader).filter(|_| is_of(Told::Estimate)) {
+        let estimated = match self.handles.get(reader).filter(|_| needs(Origin::Estimate)) {
             Some(handle) => {
-                let Component::Estimator(estimator) = &plan.filled(&point.changed, Slot::Estimator)?.component else {
+                let Component::Estimator(estimator) = &plan.component(&run.changed, Slot::Estimator)?.component else {
                     return Err(wrong_kind("estimator"));
                 };
                 let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
-                let closes_loops = told.contains(&Measure::ClosedPositionRmseM);
-                Some(within(limit, |stop| estimate(file, estimator, closes_loops, stop))?)
+                let closes_loops = measures.contains(&Measure::ClosedPositionRmseM);
+                Some(with_time_limit(limit, |stop| estimate(file, estimator, closes_loops, stop))?)
             }
             None => None,
         };
         let figure = |measure: &Measure| {
-            let by_swing = swing.as_ref().and_then(|seen| of_swing(*measure, seen));
+            let by_swing = swing.as_ref().and_then(|coverage| swing_figure(*measure, coverage));
             by_swing.or_else(|| estimated.as_ref().and_then(|estimated| estimated.figure(*measure)))
         };
-        Ok(told.iter().map(figure).collect())
+        Ok(measures.iter().map(figure).collect())
     }
 
-    /// What the lidar sees from 5 s on to the run's end, and what the gyroscope makes of it.
+    /// Coverage of the lidar and use of the gyroscope's range, from 5 s (after the rest at the start) to the run's end.
     fn swing(&self) -> Result<Coverage, StudyError> {
         let simulation = &self.simulation;
         let usual = CoveragePlan::default();
@@ -112,24 +117,24 @@ impl Tape {
 }
 
 fn wrong_kind(what: &str) -> StudyError {
-    StudyError::Plan { what: "the plan", message: format!("a journey has no {what}") }
+    StudyError::Plan { what: "the plan", message: format!("{what} is missing for a journey") }
 }
 
-fn of_swing(measure: Measure, seen: &Coverage) -> Option<f64> {
+fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {
     match measure {
-        Measure::FractionSeen => Some(seen.fraction_seen),
-        Measure::CoveredS => Some(seen.covered_s),
-        Measure::DensityPerSrS => Some(seen.density_per_sr_s.mean),
-        Measure::FieldOfViewDeg => Some(seen.field_of_view_deg),
-        Measure::RateDegPerS => Some(seen.gyro.most_deg_per_s),
-        Measure::RateP99DegPerS => Some(seen.gyro.p99_deg_per_s),
-        Measure::Saturated => Some(seen.gyro.saturated),
+        Measure::FractionSeen => Some(coverage.fraction_seen),
+        Measure::CoveredS => Some(coverage.covered_s),
+        Measure::DensityPerSrS => Some(coverage.density_per_sr_s.mean),
+        Measure::FieldOfViewDeg => Some(coverage.field_of_view_deg),
+        Measure::RateDegPerS => Some(coverage.gyro.most_deg_per_s),
+        Measure::RateP99DegPerS => Some(coverage.gyro.p99_deg_per_s),
+        Measure::Saturated => Some(coverage.gyro.saturated),
         _ => None,
     }
 }
 
-/// An estimate's figures.
-struct Estimated {
+/// Metrics of an estimate.
+struct EstimateMetrics {
     open_loop: crate::report::OpenLoopMetrics,
     clock: crate::report::ClockMetrics,
     closed_position_rmse_m: Option<f64>,
@@ -138,7 +143,7 @@ struct Estimated {
     way_m: f64,
 }
 
-impl Estimated {
+impl EstimateMetrics {
     fn figure(&self, measure: Measure) -> Option<f64> {
         let figure = match measure {
             Measure::PositionRmseM => self.open_loop.position_rmse_m,
@@ -160,20 +165,20 @@ impl Estimated {
     }
 }
 
-/// An estimate from a recording, on one thread.
+/// Estimates from a recording on one thread, and evaluates the result.
 fn estimate(
     recording: File,
     estimator: &EstimatorSpec,
     closes_loops: bool,
     stop: &AtomicBool,
-) -> Result<Estimated, StudyError> {
-    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    alone.install(|| {
+) -> Result<EstimateMetrics, StudyError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    pool.install(|| {
         let mut watch = Watch { stop, report: &mut |_| {} };
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&Preference::default())?;
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
-        let how = How { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
+        let how = OpenLoopOptions { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
         let known = judge::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
         let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);
@@ -181,14 +186,14 @@ fn estimate(
         let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
         let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
         let pairs = judge::pairs_of(&reader, map_from_head)?;
-        let of_closed = match closed {
+        let closed_errors = match closed {
             Some(_) => judge::compare_with_truth(&reader, (map_from_head, &[]), &mut watch)?,
             None => None,
         };
-        Ok(Estimated {
+        Ok(EstimateMetrics {
             open_loop,
             clock: judge::clock_metrics(&run, known.as_ref()),
-            closed_position_rmse_m: of_closed.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
+            closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
             status: integrity.status(),
             integrity: integrity.metrics(&run, Some(pairs)),
             way_m: path_length_m(map_from_head),
@@ -196,8 +201,11 @@ fn estimate(
     })
 }
 
-/// Does `work`, which is told to stop when it takes longer than it may.
-fn within<T>(limit: LimitSpec, work: impl FnOnce(&AtomicBool) -> Result<T, StudyError>) -> Result<T, StudyError> {
+/// Does `work`, and sets its stop flag when the time limit is exceeded.
+fn with_time_limit<T>(
+    limit: LimitSpec,
+    work: impl FnOnce(&AtomicBool) -> Result<T, StudyError>,
+) -> Result<T, StudyError> {
     let stop = AtomicBool::new(false);
     let (done, is_done) = channel::<()>();
     let time = Duration::from_secs_f64(limit.time_s.min(1e9));
@@ -223,7 +231,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_takes_longer_than_it_may_is_told_to_stop() {
+    fn work_is_stopped_at_the_time_limit() {
         let limit = LimitSpec { time_s: 0.05, memory_mib: 1 };
         let forever = |stop: &AtomicBool| {
             while !stop.load(Ordering::Relaxed) {
@@ -231,8 +239,8 @@ mod tests {
             }
             Err::<(), _>(StudyError::Stopped)
         };
-        let error = within(limit, forever).unwrap_err().to_string();
+        let error = with_time_limit(limit, forever).unwrap_err().to_string();
         assert!(error.contains("0.05 s"), "{error}");
-        assert_eq!(within(limit, |_| Ok(3)).unwrap(), 3);
+        assert_eq!(with_time_limit(limit, |_| Ok(3)).unwrap(), 3);
     }
 }

@@ -1,83 +1,83 @@
-//! What is told of a run.
+//! Measures: the figures that a sweep reports for each run.
 
 use super::BaseSpec;
 use serde::{Deserialize, Serialize};
 
-/// A figure of a run.
+/// A measure of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
-    /// Of the estimate: position error after rigid alignment, root mean square, m.
+    /// Position error of the open-loop estimate after rigid alignment, root mean square, m.
     PositionRmseM,
-    /// Of the estimate: angle of the rotation error after rigid alignment, root mean square, degrees.
+    /// Rotation error (angle) of the open-loop estimate after rigid alignment, root mean square, degrees.
     RotationRmseDeg,
-    /// Of the estimate: drift of the position, m/min.
+    /// Position drift of the open-loop estimate, m/min.
     DriftMPerMin,
-    /// Of the estimate: drift about the vertical, degrees/min.
+    /// Yaw drift of the open-loop estimate, degrees/min.
     YawDriftDegPerMin,
-    /// Of the estimate: error of the clock offset over the whole run, its beginning included, root mean square, s.
+    /// Error of the estimated clock offset over the complete run including its start, root mean square, s.
     ClockRmseS,
-    /// Of the closed loop: position error after rigid alignment, root mean square, m; loops are closed only where it is
-    /// asked for.
+    /// Position error after loop closure and rigid alignment, root mean square, m. Loops are closed only if this measure
+    /// is requested.
     ClosedPositionRmseM,
-    /// Verdict on the estimate: 0 good, 1 degraded, 2 lost.
+    /// Integrity verdict on the estimate: 0 good, 1 degraded, 2 lost.
     Status,
-    /// Of the result that counts, the closed loop's where it is asked for: position error after rigid alignment over
-    /// the first 20 s (half of a shorter run), root mean square, m.
+    /// Position error of the final trajectory (loop-closed if that is requested) after rigid alignment over the first
+    /// 20 s (half of a shorter run), root mean square, m.
     AlignedRmseM,
-    /// The same, the largest of the run, m.
+    /// Largest position error after the same alignment, m.
     LargestErrorM,
-    /// Median of the 99 % bound on that error, m.
+    /// Median of the 99 % bound on the aligned position error, m.
     #[serde(rename = "bound_m_99")]
     BoundM99,
-    /// Share of the poses whose error is within its bound.
+    /// Fraction of the poses whose position error is within the bound.
     WithinBound,
-    /// Median over the poses of bound over error.
+    /// Ratio of bound to position error, median over the poses.
     BoundOverError,
-    /// Length of the estimated path by positions a second apart, m.
+    /// Length of the estimated path, from positions one second apart, m.
     WayM,
-    /// Share of the sphere that the lidar saw at all.
+    /// Fraction of the sphere of directions that the lidar observed.
     FractionSeen,
-    /// Time until nine tenths of that had been seen, s.
+    /// Time until 90 % of that fraction was observed, s.
     CoveredS,
-    /// Beams per steradian and second, mean of all that was seen.
+    /// Beams per steradian and second, mean over the observed part of the sphere.
     DensityPerSrS,
-    /// Field of view: of a journey between the 2.5 % and 97.5 % quantiles of the forward beam's elevation, of a closed
-    /// form twice the amplitude of the head's pitch; degrees.
+    /// Vertical field of view, degrees. In a journey: from the 2.5 % to the 97.5 % quantile of the forward beam's
+    /// elevation. In closed form: twice the head's pitch amplitude.
     FieldOfViewDeg,
-    /// Greatest rate of rotation on an axis of the gyroscope, degrees/s.
+    /// Maximum angular rate on an axis of the gyroscope, degrees/s.
     RateDegPerS,
-    /// Rate not exceeded in 99 % of the time on the busiest axis, degrees/s.
+    /// 99 % quantile over time of the largest rate among the gyroscope's axes, degrees/s.
     RateP99DegPerS,
-    /// Share of the time in which some axis of the gyroscope was beyond its limit.
+    /// Fraction of the time in which at least one axis of the gyroscope is saturated.
     Saturated,
     /// Frequency of the slowest mode, Hz.
     RockingHz,
-    /// Greatest gain of the pitch rate.
+    /// Peak gain of the pitch rate, head over base.
     PeakGain,
-    /// How far the spring shortens under the head, mm.
+    /// Static compression of the spring under the head's weight, mm.
     SagMm,
-    /// Mass of the active wire, g.
+    /// Mass of the spring's active wire, g.
     SpringMassG,
-    /// Greatest stress in the wire over its yield.
+    /// Maximum stress in the wire over the yield strength.
     StressShare,
-    /// Time that the run took on its thread, s. It is no property of the run, and stays out of the table of results.
+    /// Computing time of the run on its thread, s. It is reported in `times.parquet`, not in the table of results.
     WallS,
 }
 
-/// What must be done to know a measure.
+/// The computation that yields a measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Told {
-    /// An estimate from a recording.
+pub(super) enum Origin {
+    /// Estimation from a recording.
     Estimate,
-    /// A swing of the head, without rays.
+    /// Simulation of the head's swing without ray casting.
     Swing,
-    /// A closed form.
+    /// The closed form of the linearised head.
     ClosedForm,
-    /// Either of a swing and a closed form.
+    /// Simulation of the swing in a journey, else the closed form.
     SwingOrClosedForm,
-    /// A clock on the wall.
-    Clock,
+    /// Measured computing time.
+    WallClock,
 }
 
 impl Measure {
@@ -111,8 +111,7 @@ impl Measure {
         Self::WallS,
     ];
 
-    /// Key in files, name in narrow tables, name on an axis of a plot with its unit there, that unit alone, and how
-    /// many of it make one of the key's.
+    /// Key in files, short name for tables, axis label, display unit, and factor from the key's unit to the display unit.
     fn names(self) -> (&'static str, &'static str, &'static str, &'static str, f64) {
         match self {
             Self::PositionRmseM => ("position_rmse_m", "position", "Position error (mm rms)", "mm", 1e3),
@@ -121,7 +120,7 @@ impl Measure {
             Self::YawDriftDegPerMin => {
                 ("yaw_drift_deg_per_min", "yaw drift", "Yaw drift (degrees/min)", "deg/min", 1.0)
             }
-            Self::ClockRmseS => ("clock_rmse_s", "clock", "Error of the clock offset (ms rms)", "ms", 1e3),
+            Self::ClockRmseS => ("clock_rmse_s", "clock", "Clock offset error (ms rms)", "ms", 1e3),
             Self::ClosedPositionRmseM => {
                 ("closed_position_rmse_m", "closed loop", "Position error, closed loop (mm rms)", "mm", 1e3)
             }
@@ -133,51 +132,51 @@ impl Measure {
             Self::BoundM99 => ("bound_m_99", "bound", "Bound on the position error, 99 % (mm)", "mm", 1e3),
             Self::WithinBound => ("within_bound", "within", "Poses within their bound (%)", "%", 1e2),
             Self::BoundOverError => ("bound_over_error", "bound/error", "Bound over error", "1", 1.0),
-            Self::WayM => ("way_m", "way", "Length of the path (m)", "m", 1.0),
-            Self::FractionSeen => ("fraction_seen", "seen", "Share of the sphere seen (%)", "%", 1e2),
-            Self::CoveredS => ("covered_s", "covered", "Time to nine tenths of it (s)", "s", 1.0),
+            Self::WayM => ("way_m", "path", "Length of the path (m)", "m", 1.0),
+            Self::FractionSeen => ("fraction_seen", "coverage", "Observed fraction of the sphere (%)", "%", 1e2),
+            Self::CoveredS => ("covered_s", "cover time", "Time to 90 % of the coverage (s)", "s", 1.0),
             Self::DensityPerSrS => ("density_per_sr_s", "density", "Beams per sr and s", "1/sr/s", 1.0),
             Self::FieldOfViewDeg => ("field_of_view_deg", "view", "Field of view (degrees)", "deg", 1.0),
-            Self::RateDegPerS => ("rate_deg_per_s", "rate", "Greatest rate (degrees/s)", "deg/s", 1.0),
+            Self::RateDegPerS => ("rate_deg_per_s", "rate", "Maximum rate (degrees/s)", "deg/s", 1.0),
             Self::RateP99DegPerS => {
-                ("rate_p99_deg_per_s", "rate 99 %", "Rate not exceeded in 99 % (degrees/s)", "deg/s", 1.0)
+                ("rate_p99_deg_per_s", "rate 99 %", "Rate, 99 % quantile (degrees/s)", "deg/s", 1.0)
             }
-            Self::Saturated => ("saturated", "saturated", "Gyroscope beyond its limit (% of the time)", "%", 1e2),
+            Self::Saturated => ("saturated", "saturated", "Gyroscope saturated (% of the time)", "%", 1e2),
             Self::RockingHz => ("rocking_hz", "rocking", "Rocking frequency (Hz)", "Hz", 1.0),
             Self::PeakGain => ("peak_gain", "gain", "Peak gain of the pitch rate", "1", 1.0),
             Self::SagMm => ("sag_mm", "sag", "Sag (mm)", "mm", 1.0),
             Self::SpringMassG => ("spring_mass_g", "mass", "Mass of the spring (g)", "g", 1.0),
             Self::StressShare => ("stress_share", "stress", "Stress over yield (%)", "%", 1e2),
-            Self::WallS => ("wall_s", "time", "Time taken (s)", "s", 1.0),
+            Self::WallS => ("wall_s", "time", "Computing time (s)", "s", 1.0),
         }
     }
 
-    /// Its name in files.
+    /// Key in files.
     pub fn key(self) -> &'static str {
         self.names().0
     }
 
-    /// Its name in narrow tables.
+    /// Short name for tables.
     pub(super) fn short(self) -> &'static str {
         self.names().1
     }
 
-    /// What it is called on an axis of a plot, in the unit that people read.
+    /// Label of a plot axis, with the display unit.
     pub(super) fn label(self) -> &'static str {
         self.names().2
     }
 
-    /// The unit in which people read it, and how many of it make one of the file's.
+    /// Display unit, and the factor from the unit in files to it.
     pub(super) fn unit(self) -> (&'static str, f64) {
         (self.names().3, self.names().4)
     }
 
-    /// What a figure that is not there counts as: an estimate that was lost is infinitely wrong.
-    pub(super) fn when_lost(self) -> f64 {
-        if self.told() == Told::Estimate { f64::INFINITY } else { f64::NAN }
+    /// Value of a missing figure: infinite for the error of a lost estimate, else NaN.
+    pub(super) fn missing_value(self) -> f64 {
+        if self.origin() == Origin::Estimate { f64::INFINITY } else { f64::NAN }
     }
 
-    pub(super) fn told(self) -> Told {
+    pub(super) fn origin(self) -> Origin {
         match self {
             Self::PositionRmseM
             | Self::RotationRmseDeg
@@ -191,22 +190,24 @@ impl Measure {
             | Self::BoundM99
             | Self::WithinBound
             | Self::BoundOverError
-            | Self::WayM => Told::Estimate,
+            | Self::WayM => Origin::Estimate,
             Self::FractionSeen | Self::CoveredS | Self::DensityPerSrS | Self::RateP99DegPerS | Self::Saturated => {
-                Told::Swing
+                Origin::Swing
             }
-            Self::FieldOfViewDeg | Self::RateDegPerS => Told::SwingOrClosedForm,
-            Self::RockingHz | Self::PeakGain | Self::SagMm | Self::SpringMassG | Self::StressShare => Told::ClosedForm,
-            Self::WallS => Told::Clock,
+            Self::FieldOfViewDeg | Self::RateDegPerS => Origin::SwingOrClosedForm,
+            Self::RockingHz | Self::PeakGain | Self::SagMm | Self::SpringMassG | Self::StressShare => {
+                Origin::ClosedForm
+            }
+            Self::WallS => Origin::WallClock,
         }
     }
 
-    /// Whether a run of this base tells it.
-    pub(super) fn is_of(self, base: &BaseSpec) -> bool {
-        match self.told() {
-            Told::Clock | Told::SwingOrClosedForm => true,
-            Told::ClosedForm => matches!(base, BaseSpec::Spring { .. }),
-            Told::Estimate | Told::Swing => matches!(base, BaseSpec::Journey { .. }),
+    /// Whether runs of this base have this measure.
+    pub(super) fn is_available_for(self, base: &BaseSpec) -> bool {
+        match self.origin() {
+            Origin::WallClock | Origin::SwingOrClosedForm => true,
+            Origin::ClosedForm => matches!(base, BaseSpec::Spring { .. }),
+            Origin::Estimate | Origin::Swing => matches!(base, BaseSpec::Journey { .. }),
         }
     }
 }

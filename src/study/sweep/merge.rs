@@ -1,8 +1,8 @@
-//! Parts become one table: the same bytes, whoever did them, when, and in which order.
+//! Merges part files into one table, with the same bytes for any order and division of the work.
 
-use super::folder::{STRETCH, Unit};
+use super::folder::{ROWS_PER_GROUP, Unit};
 use super::part::Part;
-use super::table::{Column, Held, TableWriter, quoted};
+use super::table::{Column, ColumnType, TableWriter, quoted};
 use super::{Measure, Share, Sweep};
 use crate::study::StudyError;
 use crate::study::atomic_file::AtomicFile;
@@ -10,110 +10,113 @@ use serde::Serialize;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-/// How far a sweep is.
+/// Progress of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Status {
-    /// Runs.
+pub struct SweepStatus {
+    /// Total number of runs.
     pub points: u64,
-    /// Those that are done.
+    /// Finished runs.
     pub done: u64,
-    /// Those of them that failed.
+    /// Finished runs that failed.
     pub failed: u64,
-    /// Those that are not done, or whose parts are damaged: `zsim sweep run` does them.
+    /// Runs that are not finished or whose parts are damaged; `zsim sweep run` runs them.
     pub missing: u64,
-    /// Those of the missing runs whose parts are damaged, or belong to other runs.
+    /// Missing runs whose parts are damaged or belong to other runs.
     pub damaged: u64,
-    /// Time that one thread takes for what is missing, if it goes on as it did so far, s.
+    /// Extrapolated computing time of the missing runs on one thread, s.
     pub thread_s_left: Option<f64>,
 }
 
 impl Sweep {
-    /// How far it is, or a share of it.
+    /// Progress of a share of the sweep.
     ///
     /// # Errors
-    /// When a part cannot be opened.
-    pub fn status(&self, share: Share) -> Result<Status, StudyError> {
-        let mut tally = Tally::default();
-        for unit in share.of(&self.tasks).flatten() {
+    /// If a part cannot be opened.
+    pub fn status(&self, share: Share) -> Result<SweepStatus, StudyError> {
+        let mut counter = ProgressCounter::default();
+        for unit in share.select(&self.tasks).flatten() {
             let unit = &self.units[*unit as usize];
-            tally.take(unit, &self.kept(unit)?);
+            counter.add(unit, &self.read_part(unit)?);
         }
-        Ok(tally.status())
+        Ok(counter.status())
     }
 
-    /// Makes `table.parquet`, `table.csv` and `times.parquet` of what is done, a row a run in the order of the plan.
-    /// The two tables depend on the plan and on which of its runs are done, and on nothing else; times are kept apart.
-    /// Memory holds a stretch of rows.
+    /// Writes `table.parquet`, `table.csv` and `times.parquet`: one row per finished run, in the order of the plan.
+    ///
+    /// The two tables depend only on the plan and on the set of finished runs; computing times are in a file of their own.
+    /// At most one row group is in memory.
     ///
     /// # Errors
-    /// When a part cannot be opened, or the tables cannot be written.
-    pub fn merge(&self) -> Result<Status, StudyError> {
+    /// If a part cannot be opened, or if the tables cannot be written.
+    pub fn merge(&self) -> Result<SweepStatus, StudyError> {
         let mut tables = Tables::create(self)?;
-        let mut tally = Tally::default();
-        let mut stretch = self.empty_stretch();
+        let mut counter = ProgressCounter::default();
+        let mut buffer = self.empty_buffer();
         for unit in &self.units {
-            let kept = self.kept(unit)?;
-            tally.take(unit, &kept);
-            let Part::Done(kept) = kept else { continue };
-            stretch.take(self, unit, kept);
-            if stretch.numbers.len() as u64 >= STRETCH {
-                tables.write(self, std::mem::replace(&mut stretch, self.empty_stretch()))?;
+            let part = self.read_part(unit)?;
+            counter.add(unit, &part);
+            let Part::Done(columns) = part else { continue };
+            buffer.append(self, unit, columns);
+            if buffer.numbers.len() as u64 >= ROWS_PER_GROUP {
+                tables.write(self, std::mem::replace(&mut buffer, self.empty_buffer()))?;
             }
         }
-        if !stretch.numbers.is_empty() {
-            tables.write(self, stretch)?;
+        if !buffer.numbers.is_empty() {
+            tables.write(self, buffer)?;
         }
         tables.finish()?;
-        Ok(tally.status())
+        Ok(counter.status())
     }
 
-    /// The table of results.
+    /// Path of the table of results.
     pub(super) fn table(&self) -> PathBuf {
         self.folder.join("table.parquet")
     }
 
-    /// The table of the times that runs took.
+    /// Path of the table of computing times.
     pub(super) fn times(&self) -> PathBuf {
         self.folder.join("times.parquet")
     }
 
-    fn table_columns(&self) -> Vec<(String, Held)> {
-        let mut columns = vec![("point".to_owned(), Held::Counts)];
+    fn table_columns(&self) -> Vec<(String, ColumnType)> {
+        let mut columns = vec![("point".to_owned(), ColumnType::Counts)];
         columns.extend(self.plan.setting_columns());
-        columns.extend(self.plan.told().into_iter().map(|measure| (measure.key().to_owned(), Held::Numbers)));
-        columns.extend([("error".to_owned(), Held::Words), ("id".to_owned(), Held::Words)]);
+        columns.extend(
+            self.plan.result_measures().into_iter().map(|measure| (measure.key().to_owned(), ColumnType::Numbers)),
+        );
+        columns.extend([("error".to_owned(), ColumnType::Text), ("id".to_owned(), ColumnType::Text)]);
         columns
     }
 
-    fn empty_stretch(&self) -> Stretch {
-        let figures = vec![Vec::new(); self.plan.told().len()];
-        Stretch { numbers: Vec::new(), figures, errors: Vec::new(), times: Vec::new() }
+    fn empty_buffer(&self) -> RowBuffer {
+        let figures = vec![Vec::new(); self.plan.result_measures().len()];
+        RowBuffer { numbers: Vec::new(), figures, errors: Vec::new(), times: Vec::new() }
     }
 }
 
-/// Rows that are gathered.
-struct Stretch {
+/// Rows of the next row group.
+struct RowBuffer {
     numbers: Vec<u64>,
     figures: Vec<Vec<Option<f64>>>,
     errors: Vec<Option<String>>,
     times: Vec<Option<f64>>,
 }
 
-impl Stretch {
-    fn take(&mut self, sweep: &Sweep, unit: &Unit, kept: Vec<Column>) {
+impl RowBuffer {
+    fn append(&mut self, sweep: &Sweep, unit: &Unit, columns: Vec<Column>) {
         self.numbers.extend(unit.first..unit.first + unit.count);
-        let told = sweep.plan.told().len();
-        for (k, column) in kept.into_iter().enumerate() {
+        let measures = sweep.plan.result_measures().len();
+        for (k, column) in columns.into_iter().enumerate() {
             match k {
-                k if k < told => self.figures[k].extend(column.numbers()),
-                k if k == told => self.errors.extend(column.words()),
+                k if k < measures => self.figures[k].extend(column.numbers()),
+                k if k == measures => self.errors.extend(column.texts()),
                 _ => self.times.extend(column.numbers()),
             }
         }
     }
 }
 
-/// The files that are being written.
+/// Writers of the three files.
 struct Tables {
     parquet: TableWriter,
     csv: BufWriter<AtomicFile>,
@@ -127,21 +130,22 @@ impl Tables {
         let mut csv = BufWriter::new(AtomicFile::new(&temporary, &sweep.folder.join("table.csv"))?);
         let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
         writeln!(csv, "{}", names.join(",")).map_err(StudyError::file(csv.get_ref().target()))?;
-        let of_times = [("point".to_owned(), Held::Counts), (Measure::WallS.key().to_owned(), Held::Numbers)];
-        let times = TableWriter::create(&temporary, &sweep.times(), &of_times)?;
+        let time_columns =
+            [("point".to_owned(), ColumnType::Counts), (Measure::WallS.key().to_owned(), ColumnType::Numbers)];
+        let times = TableWriter::create(&temporary, &sweep.times(), &time_columns)?;
         Ok(Self { parquet, csv, times })
     }
 
-    fn write(&mut self, sweep: &Sweep, stretch: Stretch) -> Result<(), StudyError> {
+    fn write(&mut self, sweep: &Sweep, buffer: RowBuffer) -> Result<(), StudyError> {
         let identity = |index: &u64| Some(sweep.identities[*index as usize].to_string());
-        let mut columns = vec![Column::Counts(stretch.numbers.iter().map(|index| Some(*index as i64)).collect())];
-        columns.extend(sweep.plan.setting_stretch(&stretch.numbers));
-        columns.extend(stretch.figures.into_iter().map(Column::Numbers));
-        columns.push(Column::Words(stretch.errors));
-        columns.push(Column::Words(stretch.numbers.iter().map(identity).collect()));
+        let mut columns = vec![Column::Counts(buffer.numbers.iter().map(|index| Some(*index as i64)).collect())];
+        columns.extend(sweep.plan.setting_cells(&buffer.numbers));
+        columns.extend(buffer.figures.into_iter().map(Column::Numbers));
+        columns.push(Column::Text(buffer.errors));
+        columns.push(Column::Text(buffer.numbers.iter().map(identity).collect()));
         self.parquet.write(&columns)?;
-        self.times.write(&[columns[0].clone(), Column::Numbers(stretch.times)])?;
-        for row in 0..stretch.numbers.len() {
+        self.times.write(&[columns[0].clone(), Column::Numbers(buffer.times)])?;
+        for row in 0..buffer.numbers.len() {
             let cells: Vec<String> = columns.iter().map(|column| column.cell(row)).collect();
             let line = writeln!(self.csv, "{}", cells.join(","));
             line.map_err(StudyError::file(self.csv.get_ref().target()))?;
@@ -152,15 +156,15 @@ impl Tables {
     fn finish(self) -> Result<(), StudyError> {
         self.parquet.finish()?;
         self.times.finish()?;
-        let place = self.csv.get_ref().target().to_owned();
+        let target = self.csv.get_ref().target().to_owned();
         let flushed = self.csv.into_inner().map_err(std::io::IntoInnerError::into_error);
-        flushed.map_err(StudyError::file(&place))?.finish()
+        flushed.map_err(StudyError::file(&target))?.finish()
     }
 }
 
-/// Counts runs.
+/// Counts finished, failed and missing runs.
 #[derive(Default)]
-struct Tally {
+struct ProgressCounter {
     done: u64,
     failed: u64,
     missing: u64,
@@ -168,33 +172,33 @@ struct Tally {
     wall_s: f64,
 }
 
-impl Tally {
-    fn take(&mut self, unit: &Unit, part: &Part) {
-        let Part::Done(kept) = part else {
+impl ProgressCounter {
+    fn add(&mut self, unit: &Unit, part: &Part) {
+        let Part::Done(columns) = part else {
             self.missing += unit.count;
             self.damaged += if *part == Part::Damaged { unit.count } else { 0 };
             return;
         };
         self.done += unit.count;
-        for column in kept {
-            if let Column::Words(errors) = column {
+        for column in columns {
+            if let Column::Text(errors) = column {
                 self.failed += errors.iter().flatten().count() as u64;
             }
         }
-        if let Some(Column::Numbers(times)) = kept.last() {
+        if let Some(Column::Numbers(times)) = columns.last() {
             self.wall_s += times.iter().flatten().sum::<f64>();
         }
     }
 
-    fn status(&self) -> Status {
-        let each_s = (self.done > 0).then(|| self.wall_s / self.done as f64);
-        Status {
+    fn status(&self) -> SweepStatus {
+        let mean_s = (self.done > 0).then(|| self.wall_s / self.done as f64);
+        SweepStatus {
             points: self.done + self.missing,
             done: self.done,
             failed: self.failed,
             missing: self.missing,
             damaged: self.damaged,
-            thread_s_left: each_s.map(|each_s| each_s * self.missing as f64),
+            thread_s_left: mean_s.map(|mean_s| mean_s * self.missing as f64),
         }
     }
 }

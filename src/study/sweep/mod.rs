@@ -1,13 +1,13 @@
-//! Sweeps and studies: a run, what is varied about it, and what is told of each.
+//! Parameter sweeps: a base run, the parameters to vary, and the measures of each run.
 //!
-//! A [`SweepSpec`] names a base run, axes and measures. A [`Plan`] is the spec with all that it names found and
-//! checked; left in a folder it is a [`Sweep`], whose runs any number of processes on any number of machines may do,
-//! stop, and go on with: each run is named by what it is (a hash of its specs, seed and the version of zsim), and what
-//! came of it is there whole or not at all. Merged, they are one table, the same bytes however they came about.
+//! A [`SweepSpec`] defines a base run, axes and measures. A [`Plan`] is the spec with all referenced specs loaded and
+//! checked; written to a folder it is a [`Sweep`]. Any number of processes on any number of machines can run a sweep, and
+//! stop and resume it: a run is identified by a hash of its specs, its seed and the version of zsim, and its result is
+//! written atomically. The merged table has the same bytes for any division of the work.
 //!
-//! Work is not repeated: runs that differ in the estimator alone share one recording, and recordings that differ in the
-//! IMU or the lidar's errors alone share physics and rays. A run that fails, takes too long or needs too much memory is
-//! a row with its error; journeys run in processes of their own, so that one that breaks breaks no other.
+//! Work is shared: runs that differ only in the estimator use one recording, and recordings that differ only in the IMU
+//! or in the lidar's errors use the same physics and rays. A run that fails or exceeds its time or memory limit is a row
+//! with its error. Journeys run in worker processes, so that a crash does not affect other runs.
 
 mod axis;
 mod check;
@@ -23,8 +23,9 @@ mod merge;
 mod output;
 mod paired;
 mod part;
-mod pictures;
 mod plan;
+mod plots;
+mod report;
 mod run;
 mod runs;
 mod settings;
@@ -32,16 +33,15 @@ mod spec;
 mod summary;
 mod table;
 mod task;
-mod tell;
 mod trend;
 mod worker;
 
 pub use folder::Sweep;
 pub use measure::Measure;
-pub use merge::Status;
+pub use merge::SweepStatus;
 pub use plan::Plan;
+pub use report::MergedReport;
 pub use run::{Runner, Share};
 pub use spec::{Aim, AxisSpec, BaseSpec, GoalSpec, LevelSpec, LimitSpec, Sampling, Setting, SweepSpec};
-pub use summary::{Against, Line, SIGNIFICANT, Summary, Trend};
-pub use task::{Word, confine};
-pub use tell::Merged;
+pub use summary::{LevelSummary, RatioToFirst, SIGNIFICANCE_LEVEL, Summary, Trend};
+pub use task::{WorkerMessage, limit_process};

@@ -1,17 +1,17 @@
-//! A summary as tables: terminal, Markdown, CSV.
+//! Tables of a summary for the terminal, Markdown and CSV.
 
 use super::axis::Axis;
-use super::design::Extent;
-use super::summary::{Line, SIGNIFICANT, Summary};
+use super::design::AxisSize;
+use super::summary::{LevelSummary, SIGNIFICANCE_LEVEL, Summary};
 use super::table::quoted;
 use super::{Measure, Plan};
 use crate::report;
 use std::fmt::Write;
 
-/// Most levels of an axis whose lines are shown to people; `summary.csv` has all.
-const SHOWN: usize = 60;
+/// Axes with more levels are omitted from text and Markdown for readability; `summary.csv` has all levels.
+const MAX_LEVELS_SHOWN: usize = 60;
 
-/// A line of numbers for each line of the summary.
+/// CSV with one row per [`LevelSummary`].
 pub(super) fn csv(summary: &Summary) -> String {
     let mut text = "axis,level,within,measure,runs,lost,median,quarter,three_quarters,greatest,ratio,least_ratio,\
                     greatest_ratio,p,corrected_p\n"
@@ -33,7 +33,7 @@ pub(super) fn csv(summary: &Summary) -> String {
     text
 }
 
-/// A line for each trend.
+/// CSV with one row per [`Trend`](super::Trend).
 pub(super) fn trends_csv(summary: &Summary) -> String {
     let mut text = "axis,measure,rank_correlation,p,corrected_p\n".to_owned();
     for trend in &summary.trends {
@@ -48,7 +48,7 @@ fn cell(number: f64) -> String {
 }
 
 /// Tables for the terminal: every axis over all runs.
-pub(super) fn words(summary: &Summary, plan: &Plan) -> String {
+pub(super) fn text(summary: &Summary, plan: &Plan) -> String {
     let tables = tables(summary, plan, false).into_iter().map(|(title, header, rows)| {
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         format!("{title}\n{}\n", report::table(&header, &rows, true))
@@ -56,10 +56,10 @@ pub(super) fn words(summary: &Summary, plan: &Plan) -> String {
     tables.collect::<String>() + &legend(summary) + "\n"
 }
 
-/// The same as Markdown, and separately at each level of the axis by which all is told.
-pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -> String {
+/// The tables as Markdown, and again at each level of the axis `by`.
+pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::SweepStatus) -> String {
     let mut text = format!(
-        "# {}\n\nMade by `zsim study {}`, version {}: {} runs, {} of them failed, {} missing.\n",
+        "# {}\n\nWritten by `zsim study {}`, version {}: {} runs, {} of them failed, {} missing.\n",
         plan.name(),
         plan.name(),
         env!("CARGO_PKG_VERSION"),
@@ -71,14 +71,16 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -
     if let Some(by) = &plan.spec().by {
         let mut levels: Vec<&String> = summary.lines.iter().filter_map(|line| line.within.as_ref()).collect();
         levels.dedup();
-        let mut told: Vec<&String> = Vec::new();
+        let mut distinct: Vec<&String> = Vec::new();
         levels.into_iter().for_each(|level| {
-            if !told.contains(&level) {
-                told.push(level);
+            if !distinct.contains(&level) {
+                distinct.push(level);
             }
         });
         for axis in summary.axes.iter().filter(|axis| *axis != by) {
-            all.extend(told.iter().map(|level| level_table(summary, axis, Some((by, level)), &summary.measures, true)));
+            all.extend(
+                distinct.iter().map(|level| level_table(summary, axis, Some((by, level)), &summary.measures, true)),
+            );
         }
     }
     for (title, header, rows) in all {
@@ -88,26 +90,29 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::Status) -
     format!("{text}\n{}\n", legend(summary))
 }
 
-/// So many measures, each with its ratio, stand side by side in a terminal.
-const ACROSS: usize = 3;
+/// Measures per table on the terminal, each with its ratio; more are too wide.
+const MEASURES_PER_TABLE: usize = 3;
 
-type TableOfWords = (String, Vec<String>, Vec<Vec<String>>);
+/// Title, header and rows of a table.
+type TextTable = (String, Vec<String>, Vec<Vec<String>>);
 
-fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TableOfWords> {
+fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TextTable> {
     if !summary.trends.is_empty() {
         return vec![trend_table(summary)];
     }
-    let is_shown = |axis: &&Axis| matches!(axis.extent(), Extent::Levels(1..=SHOWN) | Extent::Weighted(1..=SHOWN, _));
+    let is_shown = |axis: &&Axis| {
+        matches!(axis.size(), AxisSize::Levels(1..=MAX_LEVELS_SHOWN) | AxisSize::Weighted(1..=MAX_LEVELS_SHOWN, _))
+    };
     let axes = plan.axes().iter().filter(is_shown);
-    let across = if bands { summary.measures.len().max(1) } else { ACROSS };
-    let of_axis = |axis: &Axis| {
+    let across = if bands { summary.measures.len().max(1) } else { MEASURES_PER_TABLE };
+    let axis_tables = |axis: &Axis| {
         summary.measures.chunks(across).map(|some| level_table(summary, &axis.name, None, some, bands)).collect()
     };
-    axes.flat_map(|axis: &Axis| -> Vec<TableOfWords> { of_axis(axis) }).collect()
+    axes.flat_map(|axis: &Axis| -> Vec<TextTable> { axis_tables(axis) }).collect()
 }
 
-/// Axes by measures: rank correlations.
-fn trend_table(summary: &Summary) -> TableOfWords {
+/// Rank correlations, axes by measures.
+fn trend_table(summary: &Summary) -> TextTable {
     let mut header = vec!["axis".to_owned()];
     header.extend(summary.measures.iter().map(|measure| measure.short().to_owned()));
     let cell = |axis: &String, measure: &Measure| {
@@ -122,48 +127,48 @@ fn trend_table(summary: &Summary) -> TableOfWords {
     ("Rank correlation of each measure with each axis".to_owned(), header, summary.axes.iter().map(row).collect())
 }
 
-/// Levels by some of the measures: median, with `bands` the quartiles too, and the ratio to the first level.
+/// Levels of an axis by measures: median, with `bands` also quartiles, and the ratio to the first level.
 fn level_table(
     summary: &Summary,
     axis: &str,
     within: Option<(&str, &str)>,
     measures: &[Measure],
     bands: bool,
-) -> TableOfWords {
+) -> TextTable {
     let mut header = vec![axis.to_owned()];
     for measure in measures {
         header.extend([format!("{} {}", measure.short(), measure.unit().0), "ratio".to_owned()]);
     }
-    let level_of = within.map(|(_, level)| level);
+    let within_level = within.map(|(_, level)| level);
     let Some(first) = measures.first() else { return (String::new(), header, Vec::new()) };
-    let row = |line: &Line| {
+    let row = |line: &LevelSummary| {
         let mut cells = vec![line.level.clone()];
         for measure in measures {
-            match summary.line(axis, &line.level, level_of, *measure) {
+            match summary.line(axis, &line.level, within_level, *measure) {
                 Some(line) => cells.extend([figures(line, bands), ratio(line)]),
                 None => cells.extend([String::new(), String::new()]),
             }
         }
         cells
     };
-    let rows = summary.of_axis(axis, level_of, *first).map(row).collect();
+    let rows = summary.of_axis(axis, within_level, *first).map(row).collect();
     let place = within.map_or_else(|| "over all runs".to_owned(), |(by, level)| format!("{by} {level}"));
     (format!("By {axis}, {place}"), header, rows)
 }
 
-/// Median, with `bands` the quartiles too, in the unit that people read.
-fn figures(line: &Line, bands: bool) -> String {
+/// Median, with `bands` also quartiles, in display units.
+fn figures(line: &LevelSummary, bands: bool) -> String {
     let (_, per_unit) = line.measure.unit();
     let [median, low, high] = [line.median, line.quarter, line.three_quarters].map(|x| digits(x * per_unit));
     if low == high || !bands { median } else { format!("{median} ({low}..{high})") }
 }
 
-fn ratio(line: &Line) -> String {
+fn ratio(line: &LevelSummary) -> String {
     let Some(against) = line.against_first else { return String::new() };
     format!("{}{}", digits(against.ratio), if against.is_significant() { "*" } else { "" })
 }
 
-/// Three digits, and no more than a ratio or a millimetre needs.
+/// A number with about three significant digits.
 fn digits(x: f64) -> String {
     match x.abs() {
         size if size.is_nan() => "-".to_owned(),
@@ -178,12 +183,11 @@ fn digits(x: f64) -> String {
 fn legend(summary: &Summary) -> String {
     if !summary.trends.is_empty() {
         return format!(
-            "Spearman's rank correlation, from -1 (falls) to 1 (rises); * p < {SIGNIFICANT}, corrected for all axes by Holm's \
-             method."
+            "Spearman's rank correlation, from -1 (falling) to 1 (rising). * p < {SIGNIFICANCE_LEVEL}, Holm-corrected over all axes."
         );
     }
     format!(
-        "Medians, in study.md with quartiles. Ratios are medians over runs that are alike in all else, to the axis's first level. * p < \
-         {SIGNIFICANT} by Wilcoxon's signed-rank test of their logarithms, two-sided, corrected for all levels by Holm's method."
+        "Medians; quartiles are in study.md. Ratio: median over pairs of runs that differ only in this axis, to its first level. * p < \
+         {SIGNIFICANCE_LEVEL} in a two-sided Wilcoxon signed-rank test of the log ratios, Holm-corrected over all levels."
     )
 }

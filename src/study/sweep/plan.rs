@@ -1,10 +1,10 @@
-//! A sweep whose specs are found and checked: which runs there are, and what each of them is.
+//! A sweep with its specs loaded and checked: the list of runs and the specs of each.
 
-use super::axis::{Axis, Change, Level, Shelf, composed};
-use super::check::{MOST_POINTS, check};
-use super::component::{Component, Kept, Nod, Slot, Walk};
-use super::design::{Design, Extent};
-use super::identity::{Identities, Identity};
+use super::axis::{Axis, Change, Level, SpecSet, apply_changes};
+use super::check::{MAX_RUNS, check};
+use super::component::{Component, JourneySettings, NamedComponent, ShakeSettings, Slot};
+use super::design::{AxisSize, Design};
+use super::identity::{ComponentHashes, ContentHash};
 use super::{BaseSpec, LimitSpec, Measure, Setting, SweepSpec};
 use crate::random::Seed;
 use crate::simulation::{Scenario, Simulation, Sources, Specs};
@@ -12,76 +12,82 @@ use crate::spec::{Source, SpecError};
 use crate::study::StudyError;
 use std::collections::BTreeMap;
 
-/// A sweep, ready to be planned on disk.
+/// A sweep with resolved specs; [`Plan::write`] stores it in a folder.
 #[derive(Debug, Clone)]
 pub struct Plan {
     name: String,
     spec: SweepSpec,
-    shelf: Shelf,
-    identities: BTreeMap<Slot, Identities>,
+    specs: SpecSet,
+    identities: BTreeMap<Slot, ComponentHashes>,
     axes: Vec<Axis>,
     design: Design,
 }
 
-/// A run of a sweep.
+/// A run of a sweep with its specs and hashes.
 #[derive(Debug, Clone)]
-pub(super) struct Point {
-    /// What differs from the base.
-    pub changed: BTreeMap<Slot, Kept>,
-    pub identity: Identity,
-    /// Equal for runs that share their recording.
-    pub simulation: Identity,
-    /// Equal for runs that share physics and rays.
-    pub rays: Identity,
+pub(super) struct ResolvedRun {
+    /// Specs that differ from the base run.
+    pub changed: BTreeMap<Slot, NamedComponent>,
+    /// Hash of everything that determines the run's result.
+    pub identity: ContentHash,
+    /// Hash of the recording: equal for runs with the same recording.
+    pub simulation: ContentHash,
+    /// Hash of physics and rays: equal for runs with the same physics and rays.
+    pub rays: ContentHash,
 }
 
 impl Plan {
-    /// Finds and checks all that `spec`, read from `source`, names; `name` is what tables call it.
+    /// Loads and checks all specs that `spec`, read from `source`, refers to; `name` is the sweep's name in tables.
     ///
     /// # Errors
-    /// At the place in the spec that is wrong.
+    /// If a spec is missing or invalid, with the position in `source`.
     pub fn new(name: &str, spec: &SweepSpec, source: &Source) -> Result<Self, StudyError> {
-        let mut shelf = Shelf { base: base(&spec.base, name)?, ..Shelf::default() };
-        let plan = Self::with(name, spec, &mut shelf, source)?;
+        let mut specs = SpecSet { base: load_base(&spec.base, name)?, ..SpecSet::default() };
+        let plan = Self::with_specs(name, spec, &mut specs, source)?;
         if let BaseSpec::Journey { .. } = spec.base {
             plan.simulation(&BTreeMap::new(), plan.spec.seeds[0])?;
         }
         Ok(plan)
     }
 
-    /// The same with specs that were found before.
-    pub(super) fn with(name: &str, spec: &SweepSpec, shelf: &mut Shelf, source: &Source) -> Result<Self, StudyError> {
+    /// Builds the plan from specs that are loaded already.
+    pub(super) fn with_specs(
+        name: &str,
+        spec: &SweepSpec,
+        specs: &mut SpecSet,
+        source: &Source,
+    ) -> Result<Self, StudyError> {
         check(spec, source)?;
         if name.chars().any(char::is_control) {
             let message = format!("the sweep's name {name:?} has control characters: rename its file");
             return Err(SpecError::plain(&source.name, message).into());
         }
-        let axes = spec.axes.iter().map(|axis| Axis::new(axis, spec.sampling, shelf, source));
+        let axes = spec.axes.iter().map(|axis| Axis::new(axis, spec.sampling, specs, source));
         let axes: Vec<Axis> = axes.collect::<Result<_, _>>()?;
-        let extents: Vec<Extent> = axes.iter().map(Axis::extent).collect();
+        let sizes: Vec<AxisSize> = axes.iter().map(Axis::size).collect();
         let about = |message: String| SpecError::about(source, "sampling", message);
-        let design = Design::new(spec.sampling, extents).filter(|design| design.count() <= MOST_POINTS);
-        let design = design.ok_or_else(|| about(format!("more than {MOST_POINTS} runs")))?;
-        let of = |(slot, kept): (&Slot, &Kept)| Ok((*slot, Identities::of(*slot, kept)?));
-        let identities = shelf.base.iter().map(of).collect::<Result<_, StudyError>>()?;
-        let plan = Self { name: name.to_owned(), spec: spec.clone(), shelf: shelf.clone(), identities, axes, design };
-        if plan.points() > MOST_POINTS {
-            return Err(about(format!("{} runs with all seeds; {MOST_POINTS} at most", plan.points())).into());
+        let design = Design::new(spec.sampling, sizes).filter(|design| design.count() <= MAX_RUNS);
+        let design = design.ok_or_else(|| about(format!("more than {MAX_RUNS} runs: reduce levels or samples")))?;
+        let of = |(slot, component): (&Slot, &NamedComponent)| Ok((*slot, ComponentHashes::of(*slot, component)?));
+        let identities = specs.base.iter().map(of).collect::<Result<_, StudyError>>()?;
+        let plan = Self { name: name.to_owned(), spec: spec.clone(), specs: specs.clone(), identities, axes, design };
+        if plan.points() > MAX_RUNS {
+            return Err(about(format!("{} runs with all seeds: expected at most {MAX_RUNS}", plan.points())).into());
         }
         Ok(plan)
     }
 
-    /// What tables call it.
+    /// Name in tables.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The spec as it was written.
+    /// The spec of the sweep.
     pub fn spec(&self) -> &SweepSpec {
         &self.spec
     }
 
-    /// How many runs there are.
+    /// Number of runs.
     pub fn points(&self) -> u64 {
         self.design.count() * self.seeds() as u64
     }
@@ -90,20 +96,20 @@ impl Plan {
         self.spec.seeds.len().max(1)
     }
 
-    pub(super) fn shelf(&self) -> &Shelf {
-        &self.shelf
+    pub(super) fn specs(&self) -> &SpecSet {
+        &self.specs
     }
 
     pub(super) fn axes(&self) -> &[Axis] {
         &self.axes
     }
 
-    /// What is told of a run in the table of results.
-    pub(super) fn told(&self) -> Vec<Measure> {
+    /// The measures in the table of results: all but the computing time.
+    pub(super) fn result_measures(&self) -> Vec<Measure> {
         self.spec.measures.iter().copied().filter(|measure| *measure != Measure::WallS).collect()
     }
 
-    /// What a run may take, where that is limited.
+    /// Time and memory limits of a run; `None` for closed forms.
     pub(super) fn limit(&self) -> Option<LimitSpec> {
         match self.spec.base {
             BaseSpec::Spring { .. } => None,
@@ -111,12 +117,12 @@ impl Plan {
         }
     }
 
-    /// Where run `index` is on each axis, as a level's number where the axis has levels.
-    pub(super) fn places(&self, index: u64) -> Vec<super::design::Place> {
+    /// Position of run `index` on each axis.
+    pub(super) fn positions(&self, index: u64) -> Vec<super::design::AxisPosition> {
         self.design.sample(index / self.seeds() as u64)
     }
 
-    /// What run `index` has on each axis.
+    /// Value of each axis in run `index`.
     pub(super) fn settings(&self, index: u64) -> Vec<Setting> {
         self.levels(index).into_iter().map(|level| level.setting).collect()
     }
@@ -127,43 +133,43 @@ impl Plan {
     }
 
     fn levels(&self, index: u64) -> Vec<Level> {
-        self.axes.iter().zip(self.places(index)).map(|(axis, place)| axis.level(place)).collect()
+        self.axes.iter().zip(self.positions(index)).map(|(axis, position)| axis.level(position)).collect()
     }
 
-    /// What of the base is other in run `index`.
+    /// Specs of run `index` that differ from the base run.
     ///
     /// # Errors
-    /// When its settings do not go together.
-    pub(super) fn changed(&self, index: u64) -> Result<BTreeMap<Slot, Kept>, StudyError> {
+    /// If the combination of settings is invalid.
+    pub(super) fn changed_specs(&self, index: u64) -> Result<BTreeMap<Slot, NamedComponent>, StudyError> {
         let levels = self.levels(index);
         let changes: Vec<&Change> = levels.iter().flat_map(|level| &level.changes).collect();
-        composed(&self.shelf, &changes).map_err(|message| {
+        apply_changes(&self.specs, &changes).map_err(|message| {
             let named = self.axes.iter().zip(&levels).map(|(axis, level)| format!("{} {}", axis.name, level.setting));
             let named: Vec<String> = named.collect();
-            StudyError::Plan { what: "a run", message: format!("with {}: {message}", named.join(", ")) }
+            StudyError::Plan { what: "run", message: format!("{}: {message}", named.join(", ")) }
         })
     }
 
-    /// What run `index` is.
+    /// Resolves run `index`.
     ///
     /// # Errors
-    /// When its settings do not go together.
-    pub(super) fn point(&self, index: u64) -> Result<Point, StudyError> {
-        let changed = self.changed(index)?;
+    /// If the combination of settings is invalid.
+    pub(super) fn resolve(&self, index: u64) -> Result<ResolvedRun, StudyError> {
+        let changed = self.changed_specs(index)?;
         let mut identities = self.identities.clone();
-        for (slot, kept) in &changed {
-            identities.insert(*slot, Identities::of(*slot, kept)?);
+        for (slot, component) in &changed {
+            identities.insert(*slot, ComponentHashes::of(*slot, component)?);
         }
         let version = env!("CARGO_PKG_VERSION").as_bytes();
         let seed = self.seed(index).map(u64::to_le_bytes).unwrap_or_default();
-        let measures: Vec<&str> = self.told().into_iter().map(Measure::key).collect();
+        let measures: Vec<&str> = self.result_measures().into_iter().map(Measure::key).collect();
         let measures = measures.join(" ");
-        let of = |slots: &dyn Fn(Slot) -> bool, whole: bool, more: &[u8]| {
+        let of = |slots: &dyn Fn(Slot) -> bool, full: bool, more: &[u8]| {
             let chosen = identities.iter().filter(|(slot, _)| slots(**slot));
-            let parts = chosen.map(|(_, both)| if whole { both.whole.bytes() } else { both.without_noise.bytes() });
-            Identity::of([version, &seed, more].into_iter().chain(parts))
+            let parts = chosen.map(|(_, hashes)| if full { hashes.full.bytes() } else { hashes.without_noise.bytes() });
+            ContentHash::of([version, &seed, more].into_iter().chain(parts))
         };
-        Ok(Point {
+        Ok(ResolvedRun {
             identity: of(&|_| true, true, measures.as_bytes()),
             simulation: of(&|slot| slot != Slot::Estimator, true, b"simulation"),
             rays: of(&|slot| !matches!(slot, Slot::Estimator | Slot::Imu | Slot::Faults), false, b"rays"),
@@ -171,36 +177,44 @@ impl Plan {
         })
     }
 
-    /// What fills a slot of a run.
-    pub(super) fn filled<'a>(&'a self, changed: &'a BTreeMap<Slot, Kept>, slot: Slot) -> Result<&'a Kept, StudyError> {
-        let missing = || StudyError::Plan { what: "the plan", message: format!("this run has no {}", slot.key()) };
-        changed.get(&slot).or_else(|| self.shelf.base.get(&slot)).ok_or_else(missing)
+    /// The component in a slot of a run.
+    pub(super) fn component<'a>(
+        &'a self,
+        changed: &'a BTreeMap<Slot, NamedComponent>,
+        slot: Slot,
+    ) -> Result<&'a NamedComponent, StudyError> {
+        let missing = || StudyError::Plan { what: "plan", message: format!("this run has no {}", slot.key()) };
+        changed.get(&slot).or_else(|| self.specs.base.get(&slot)).ok_or_else(missing)
     }
 
-    /// The simulation of a run.
-    pub(super) fn simulation(&self, changed: &BTreeMap<Slot, Kept>, seed: u64) -> Result<Simulation, StudyError> {
-        let kept = |slot| self.filled(changed, slot);
+    /// Builds the simulation of a run.
+    pub(super) fn simulation(
+        &self,
+        changed: &BTreeMap<Slot, NamedComponent>,
+        seed: u64,
+    ) -> Result<Simulation, StudyError> {
+        let component = |slot| self.component(changed, slot);
         let slots = [Slot::Scene, Slot::Head, Slot::Motion, Slot::Lidar, Slot::Imu, Slot::Clock];
-        let [scene, head, motion, lidar, imu, clock] = slots.map(kept);
+        let [scene, head, motion, lidar, imu, clock] = slots.map(component);
         let (scene, head, motion, lidar, imu, clock) = (scene?, head?, motion?, lidar?, imu?, clock?);
-        let faults = kept(Slot::Faults).ok();
-        let faults_spec = faults.and_then(|kept| match &kept.component {
+        let faults = component(Slot::Faults).ok();
+        let faults_spec = faults.and_then(|component| match &component.component {
             Component::Faults(spec) => Some((**spec).clone()),
             _ => None,
         });
         let components = (
-            &kept(Slot::Run)?.component,
+            &component(Slot::Run)?.component,
             (&scene.component, &head.component, &motion.component),
             (&lidar.component, &imu.component, &clock.component),
         );
         let (
-            Component::Walk(Walk { route, duration_s }),
+            Component::Journey(JourneySettings { route, duration_s }),
             (Component::Scene(scene_spec), Component::Head(head_spec), Component::Motion(motion_spec)),
             (Component::Lidar(lidar_spec), Component::Imu(imu_spec), Component::Clock(clock_spec)),
         ) = components
         else {
-            let message = "a spec is not of its slot's kind".to_owned();
-            return Err(StudyError::Plan { what: "the plan", message });
+            let message = "unexpected kind of spec in a slot".to_owned();
+            return Err(StudyError::Plan { what: "plan", message });
         };
         let scenario = Scenario {
             scene: scene.name.clone(),
@@ -210,7 +224,7 @@ impl Plan {
             imu: imu.name.clone(),
             clock: clock.name.clone(),
             base_imu: None,
-            faults: faults.map(|kept| kept.name.clone()),
+            faults: faults.map(|component| component.name.clone()),
             route: route.clone(),
             duration_s: *duration_s,
             seed: Seed(seed),
@@ -233,18 +247,20 @@ impl Plan {
             imu: imu.source(),
             clock: clock.source(),
             base_imu: None,
-            faults: faults.map(Kept::source),
+            faults: faults.map(NamedComponent::source),
         };
         Ok(Simulation::build(&scenario, specs, &sources)?)
     }
 }
 
-/// The specs of a base. The run itself is called by the plan's name, not by its file's path: `./a.ron` is `a.ron`.
-fn base(spec: &BaseSpec, name: &str) -> Result<BTreeMap<Slot, Kept>, StudyError> {
+/// Loads the specs of a base run. The run has the plan's name, not its path, so that `./a.ron` and `a.ron` are equal.
+fn load_base(spec: &BaseSpec, name: &str) -> Result<BTreeMap<Slot, NamedComponent>, StudyError> {
     let (run, named) = match spec {
-        BaseSpec::Spring { head, shake } => (Component::Nod(Nod { shake: *shake }), vec![(Slot::Head, head)]),
+        BaseSpec::Spring { head, shake } => {
+            (Component::Shake(ShakeSettings { shake: *shake }), vec![(Slot::Head, head)])
+        }
         BaseSpec::Journey { scene, head, motion, lidar, imu, clock, faults, estimator, route, duration_s, .. } => {
-            let run = Component::Walk(Walk { route: route.clone(), duration_s: *duration_s });
+            let run = Component::Journey(JourneySettings { route: route.clone(), duration_s: *duration_s });
             let mut named = vec![
                 (Slot::Scene, scene),
                 (Slot::Head, head),
@@ -258,7 +274,7 @@ fn base(spec: &BaseSpec, name: &str) -> Result<BTreeMap<Slot, Kept>, StudyError>
             (run, named)
         }
     };
-    let run = Kept { name: name.to_owned(), folder: None, component: run };
-    let named = named.into_iter().map(|(slot, name)| Ok((slot, Kept::load(slot, name)?)));
+    let run = NamedComponent { name: name.to_owned(), folder: None, component: run };
+    let named = named.into_iter().map(|(slot, name)| Ok((slot, NamedComponent::load(slot, name)?)));
     std::iter::once(Ok((Slot::Run, run))).chain(named).collect()
 }

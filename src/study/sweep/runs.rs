@@ -1,70 +1,71 @@
-//! The runs of a merged table, and where they are on the axes.
+//! Runs of a merged table with their levels on the axes.
 
 use super::axis::Levels;
-use super::design::Place;
-use super::table::{Held, Table};
+use super::design::AxisPosition;
+use super::table::{ColumnType, Table};
 use super::{Plan, Sweep};
 use crate::spec::SpecError;
 use crate::study::StudyError;
 
-/// Parts into which a range is cut for its curve.
-const PARTS: usize = 12;
+/// Number of bins of a continuous axis in summaries and plots.
+const RANGE_BINS: usize = 12;
 
-/// The runs of the merged table.
+/// Runs of the merged table.
 pub(super) struct Runs {
-    /// Their numbers, rising.
+    /// Indices of the runs, ascending.
     pub numbers: Vec<u64>,
-    /// Where each is on the axes, as a level's number; of a range as the number of a part.
+    /// Level index of each run, per axis; the bin index on a continuous axis.
     pub levels: Vec<Vec<u32>>,
-    /// The settings themselves, of axes of numbers.
+    /// Value of each run, per axis; `None` for axes that are not numeric.
     pub settings: Vec<Option<Vec<f64>>>,
 }
 
 impl Runs {
-    pub fn of(sweep: &Sweep) -> Result<Self, StudyError> {
+    /// Reads the runs of a merged sweep.
+    pub fn read(sweep: &Sweep) -> Result<Self, StudyError> {
         let path = sweep.table();
-        let unmerged = || SpecError::plain(path.display().to_string(), "is not there: merge the sweep first");
+        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
         let table = Table::open(&path)?.ok_or_else(unmerged)?;
-        let numbers = table.column("point", Held::Counts)?.counts();
+        let numbers = table.column("point", ColumnType::Counts)?.counts();
         let numbers: Vec<u64> = numbers.into_iter().flatten().map(|number| number as u64).collect();
         let mut levels = vec![Vec::with_capacity(numbers.len()); sweep.plan.axes().len()];
         for number in &numbers {
-            for (levels, place) in levels.iter_mut().zip(sweep.plan.places(*number)) {
-                levels.push(match place {
-                    Place::Level(level) => level as u32,
-                    Place::Along(u) => ((u * PARTS as f64) as u32).min(PARTS as u32 - 1),
+            for (levels, position) in levels.iter_mut().zip(sweep.plan.positions(*number)) {
+                levels.push(match position {
+                    AxisPosition::Level(level) => level as u32,
+                    AxisPosition::Along(u) => ((u * RANGE_BINS as f64) as u32).min(RANGE_BINS as u32 - 1),
                 });
             }
         }
         let settings = sweep.plan.axes().iter().map(|axis| {
-            let cells = axis.is_number().then(|| table.column(&axis.name, Held::Numbers)).transpose()?;
+            let cells = axis.is_number().then(|| table.column(&axis.name, ColumnType::Numbers)).transpose()?;
             Ok(cells.map(|cells| cells.numbers().into_iter().map(|cell| cell.unwrap_or(f64::NAN)).collect()))
         });
         let settings = settings.collect::<Result<_, StudyError>>()?;
         Ok(Self { numbers, levels, settings })
     }
 
-    /// The row of run `number`, if it is there.
+    /// Row of run `number` in the table.
     pub fn row(&self, number: u64) -> Option<usize> {
         self.numbers.binary_search(&number).ok()
     }
 }
 
-/// How many levels an axis has, or parts.
-pub(super) fn levels_of(plan: &Plan, axis: usize) -> usize {
+/// Number of levels of an axis, or of bins of a continuous one.
+pub(super) fn level_count(plan: &Plan, axis: usize) -> usize {
     match &plan.axes()[axis].levels {
-        Levels::Some(levels) => levels.len(),
-        Levels::Range { .. } => PARTS,
+        Levels::Discrete(levels) => levels.len(),
+        Levels::Range { .. } => RANGE_BINS,
     }
 }
 
-/// What a level is called, and its number.
-pub(super) fn level_of(plan: &Plan, axis: usize, level: usize) -> (String, Option<f64>) {
+/// Label of a level or bin, and its numeric value.
+pub(super) fn level_label(plan: &Plan, axis: usize, level: usize) -> (String, Option<f64>) {
     let axis = &plan.axes()[axis];
-    let place = match &axis.levels {
-        Levels::Some(_) => Place::Level(level),
-        Levels::Range { .. } => Place::Along((level as f64 + 0.5) / PARTS as f64),
+    let position = match &axis.levels {
+        Levels::Discrete(_) => AxisPosition::Level(level),
+        Levels::Range { .. } => AxisPosition::Along((level as f64 + 0.5) / RANGE_BINS as f64),
     };
-    let setting = axis.level(place).setting;
+    let setting = axis.level(position).setting;
     (setting.to_string(), setting.number())
 }

@@ -1,30 +1,30 @@
-//! Settings in a tree of keys, by their path.
+//! Access to settings in a JSON tree by path.
 
 use serde_json::Value;
 
-/// Most settings that an error lists.
-const LISTED: usize = 12;
+/// Maximum number of settings in an error message.
+const MAX_LISTED: usize = 12;
 
-/// The one setting of `tree` that `keys` tell: they lead to it in order, and may leave out some on the way.
+/// Finds the setting of `tree` that `keys` identify: the path contains all keys in order and ends with the last one.
 ///
 /// # Errors
-/// A sentence, when there is none (with those that come near) or more than one.
+/// A message if no setting matches (with similar ones), or if several match.
 pub(super) fn find(tree: &Value, keys: &[&str]) -> Result<Vec<String>, String> {
     let mut all = Vec::new();
-    gather(tree, &mut Vec::new(), &mut all);
+    collect_paths(tree, &mut Vec::new(), &mut all);
     if let Some(exact) = all.iter().find(|path| path.as_slice() == keys) {
         return Ok(exact.clone());
     }
-    let told: Vec<&Vec<String>> = all.iter().filter(|path| leads_to(keys, path)).collect();
+    let matches: Vec<&Vec<String>> = all.iter().filter(|path| matches_keys(keys, path)).collect();
     let wanted = keys.join(".");
-    match told.as_slice() {
+    match matches.as_slice() {
         [one] => Ok((*one).clone()),
-        [] => Err(format!("there is no setting `{wanted}`; there are: {}", list(&near(&all, keys)))),
-        several => Err(format!("`{wanted}` may be any of {}: write more of the path", list(several))),
+        [] => Err(format!("no setting `{wanted}`; similar settings: {}", list(&similar(&all, keys)))),
+        several => Err(format!("`{wanted}` is ambiguous: {}: write more of the path", list(several))),
     }
 }
 
-/// Sets what is at `path`, which [`find`] gave, perhaps for another tree: `None` where this one has no such place.
+/// Sets the value at `path`, which [`find`] returned for this or another tree; `None` if this tree has no such path.
 #[must_use]
 pub(super) fn set(tree: &mut Value, path: &[String], value: Value) -> Option<()> {
     let mut at = tree;
@@ -39,11 +39,11 @@ pub(super) fn set(tree: &mut Value, path: &[String], value: Value) -> Option<()>
     Some(())
 }
 
-/// The paths of all settings that are no groups.
-fn gather(tree: &Value, above: &mut Vec<String>, into: &mut Vec<Vec<String>>) {
+/// Collects the paths of all leaves.
+fn collect_paths(tree: &Value, above: &mut Vec<String>, into: &mut Vec<Vec<String>>) {
     let mut below = |key: String, value: &Value| {
         above.push(key);
-        gather(value, above, into);
+        collect_paths(value, above, into);
         above.pop();
     };
     match tree {
@@ -53,8 +53,8 @@ fn gather(tree: &Value, above: &mut Vec<String>, into: &mut Vec<Vec<String>>) {
     }
 }
 
-/// Whether `keys` are in `path` in their order, the last at its end.
-fn leads_to(keys: &[&str], path: &[String]) -> bool {
+/// Whether `path` contains `keys` in order and ends with the last one.
+fn matches_keys(keys: &[&str], path: &[String]) -> bool {
     let mut wanted = keys.iter().peekable();
     for key in path {
         wanted.next_if(|next| **next == key);
@@ -62,11 +62,12 @@ fn leads_to(keys: &[&str], path: &[String]) -> bool {
     wanted.peek().is_none() && keys.last().copied() == path.last().map(String::as_str)
 }
 
-/// The settings whose last key is nearly that of `keys`, or else those that share the longest beginning.
-fn near<'a>(all: &'a [Vec<String>], keys: &[&str]) -> Vec<&'a Vec<String>> {
+/// Settings with a last key similar to that of `keys`, else those with the longest common prefix.
+fn similar<'a>(all: &'a [Vec<String>], keys: &[&str]) -> Vec<&'a Vec<String>> {
     let last = keys.last().copied().unwrap_or_default();
-    let alike = |path: &&Vec<String>| path.last().is_some_and(|key| key.contains(last) || last.contains(key.as_str()));
-    let same_end: Vec<_> = all.iter().filter(alike).collect();
+    let has_similar_end =
+        |path: &&Vec<String>| path.last().is_some_and(|key| key.contains(last) || last.contains(key.as_str()));
+    let same_end: Vec<_> = all.iter().filter(has_similar_end).collect();
     if !same_end.is_empty() {
         return same_end;
     }
@@ -76,8 +77,9 @@ fn near<'a>(all: &'a [Vec<String>], keys: &[&str]) -> Vec<&'a Vec<String>> {
 }
 
 fn list(paths: &[&Vec<String>]) -> String {
-    let more = if paths.len() > LISTED { format!(", and {} more", paths.len() - LISTED) } else { String::new() };
-    let words: Vec<String> = paths.iter().take(LISTED).map(|path| path.join(".")).collect();
+    let more =
+        if paths.len() > MAX_LISTED { format!(", and {} more", paths.len() - MAX_LISTED) } else { String::new() };
+    let words: Vec<String> = paths.iter().take(MAX_LISTED).map(|path| path.join(".")).collect();
     words.join(", ") + &more
 }
 
@@ -95,22 +97,22 @@ mod tests {
     }
 
     #[test]
-    fn a_setting_is_told_by_its_path_or_by_enough_of_it() {
-        let told = |path: &str| find(&tree(), &path.split('.').collect::<Vec<_>>()).map(|found| found.join("."));
-        let whole = "linkage.spring.spring.coil.wire_mm";
-        for path in [whole, "wire_mm", "linkage.wire_mm", "spring.coil.wire_mm"] {
-            assert_eq!(told(path).as_deref(), Ok(whole));
+    fn a_setting_is_found_by_its_path_or_an_unambiguous_part_of_it() {
+        let found = |path: &str| find(&tree(), &path.split('.').collect::<Vec<_>>()).map(|path| path.join("."));
+        let full = "linkage.spring.spring.coil.wire_mm";
+        for path in [full, "wire_mm", "linkage.wire_mm", "spring.coil.wire_mm"] {
+            assert_eq!(found(path).as_deref(), Ok(full));
         }
-        assert_eq!(told("parts.1.mass_kg").as_deref(), Ok("parts.1.block.mass_kg"));
-        assert_eq!(told("hold").as_deref(), Ok("hold"));
-        assert!(told("mass_kg").unwrap_err().contains("parts.0.block.mass_kg, parts.1.block.mass_kg: write more"));
-        assert!(told("linkage.spring.coil.wire").unwrap_err().contains(whole));
-        assert!(told("stop.wire_mm").unwrap_err().contains("no setting `stop.wire_mm`"));
-        assert!(told("linkage.spring").is_err(), "a group is no setting");
+        assert_eq!(found("parts.1.mass_kg").as_deref(), Ok("parts.1.block.mass_kg"));
+        assert_eq!(found("hold").as_deref(), Ok("hold"));
+        assert!(found("mass_kg").unwrap_err().contains("parts.0.block.mass_kg, parts.1.block.mass_kg: write more"));
+        assert!(found("linkage.spring.coil.wire").unwrap_err().contains(full));
+        assert!(found("stop.wire_mm").unwrap_err().contains("no setting `stop.wire_mm`"));
+        assert!(found("linkage.spring").is_err(), "a group is not a setting");
     }
 
     #[test]
-    fn setting_one_changes_no_other() {
+    fn setting_a_value_does_not_change_others() {
         let mut changed = tree();
         let path = ["parts", "1", "block", "mass_kg"].map(str::to_owned);
         assert!(set(&mut changed, &path, json!(0.3)).is_some());

@@ -1,4 +1,4 @@
-//! A sweep as it is written: `specs/studies/NAME.ron`.
+//! Spec of a sweep: `specs/studies/NAME.ron`.
 
 use super::Measure;
 use crate::spec::checked;
@@ -6,214 +6,214 @@ use crate::study::spring::Shake;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What is varied about a run, and what is told of each.
+/// A sweep: a base run, the parameters to vary, and the measures to report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepSpec {
-    /// The run that is varied.
+    /// The base run.
     pub base: BaseSpec,
-    /// What is varied. In a grid the first level of an axis is what its others are compared with.
+    /// Axes: the parameters to vary. In a grid the other levels of an axis are compared with its first level.
     pub axes: Vec<AxisSpec>,
-    /// Which combinations of the axes are run.
+    /// Selection of the combinations of axis values to run.
     pub sampling: Sampling,
-    /// Seeds: each combination is run with each. Closed forms have no chance in them, and none.
+    /// Random seeds; each combination is run with each seed. Must be empty for closed forms, which are deterministic.
     #[serde(default)]
     pub seeds: Vec<u64>,
-    /// What is told of a run, the most important first.
+    /// Measures to report for each run, the most important first.
     pub measures: Vec<Measure>,
-    /// The name of an axis for whose levels all is told separately too.
+    /// Name of an axis: the summary is repeated separately for each of its levels.
     #[serde(default)]
     pub by: Option<String>,
-    /// What is wanted, for the set that nothing beats; two goals or more.
+    /// Goals of the Pareto front, at least two; no front if empty.
     #[serde(default)]
     pub front: Vec<GoalSpec>,
 }
 
-/// A run, by names: each a path, or a name in the library.
+/// The base run. Each spec is a path or a name in the library.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum BaseSpec {
-    /// A head on its spring in a hand that nods, by closed form: no simulation, a fraction of a millisecond.
+    /// A head on its spring, shaken by a hand, in closed form without simulation; takes below 1 ms.
     Spring {
-        /// The head and its spring.
+        /// Head with its spring.
         head: String,
-        /// The hand's nod.
+        /// Shake of the hand.
         shake: Shake,
     },
-    /// Simulated, recorded, estimated in open loop, judged.
+    /// A journey: simulation, recording, open-loop estimation, evaluation.
     Journey {
-        /// The world.
+        /// Scene.
         scene: String,
-        /// The head and what carries it.
+        /// Head and its mount.
         head: String,
-        /// How the base moves.
+        /// Motion of the base.
         motion: String,
-        /// The lidar.
+        /// Lidar.
         lidar: String,
-        /// The inertial measurement unit.
+        /// Inertial measurement unit.
         imu: String,
-        /// The sensors' clocks.
+        /// Clocks of the sensors.
         clock: String,
-        /// Faults of the sensors and of their delivery; none unless told. An axis over faults needs them here:
-        /// `"none"` is a list without faults.
+        /// Faults of the sensors and of data delivery; none by default. An axis over faults requires this key; `"none"`
+        /// is a list without faults.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         faults: Option<String>,
-        /// The estimator's settings.
+        /// Settings of the estimator.
         estimator: String,
-        /// The scene's way to walk; its default one unless told.
+        /// Route in the scene; the scene's default route if omitted.
         #[serde(default)]
         route: Option<String>,
-        /// How long a run lasts, s.
+        /// Duration of a run, s.
         #[serde(with = "checked::Positive")]
         duration_s: f64,
-        /// What a run may take.
+        /// Limits of computing time and memory.
         limit: LimitSpec,
     },
 }
 
-/// What a run may take before it counts as failed.
+/// Limits of computing time and memory; a run that exceeds them counts as failed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LimitSpec {
-    /// Time for a simulation, and for each estimate from it, s.
+    /// Time limit of a simulation, and of each estimate from it, s.
     #[serde(with = "checked::Positive")]
     pub time_s: f64,
-    /// Memory of the process that does it, MiB; enforced on Linux.
+    /// Memory limit of the worker process, MiB; enforced only on Linux.
     pub memory_mib: u64,
 }
 
-/// What is varied.
+/// An axis: a parameter to vary.
 ///
-/// A path leads through a spec's keys as they are nested there: `head.linkage.spring.spring.coil.wire_diameter_mm`.
-/// Keys that are not needed to tell it may be left out: `head.wire_diameter_mm`. The name of a spec itself, `imu`,
-/// takes names of specs. A number in it counts from 0 in a list: `head.parts.0.mass_kg`.
+/// A path lists the nested keys of a setting: `head.linkage.spring.spring.coil.wire_diameter_mm`. Keys may be omitted if
+/// the path stays unambiguous: `head.wire_diameter_mm`. A number is an index into a list, from 0:
+/// `head.parts.0.mass_kg`. The path of a spec itself, such as `imu`, takes names of specs as values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum AxisSpec {
-    /// These values of one setting.
+    /// Listed values of one setting.
     Values {
-        /// The setting.
+        /// Path of the setting.
         path: String,
-        /// Its values.
+        /// Values of the setting.
         values: Vec<Setting>,
-        /// Share of the runs that have the first value, between 0 and 1, where runs are sampled; as many as the others
-        /// have by default.
+        /// Fraction of the runs with the first value, between 0 and 1; only for sampled designs. By default all values
+        /// have the same fraction.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         first_share: Option<f64>,
-        /// The column's name; the last key of the path unless told.
+        /// Name of the column; the last key of the path by default.
         #[serde(default)]
         name: Option<String>,
     },
-    /// Values of one setting evenly between two ends.
+    /// Linearly spaced values of one setting, or a continuous range if sampled.
     Linear {
-        /// The setting.
+        /// Path of the setting.
         path: String,
-        /// The first value.
+        /// First value.
         #[serde(with = "checked::Finite")]
         from: f64,
-        /// The last value.
+        /// Last value.
         #[serde(with = "checked::Finite")]
         to: f64,
-        /// How many, in a grid.
+        /// Number of values, at least 2; required in a grid, invalid otherwise.
         #[serde(default)]
         steps: Option<usize>,
-        /// The column's name; the last key of the path unless told.
+        /// Name of the column; the last key of the path by default.
         #[serde(default)]
         name: Option<String>,
     },
-    /// The same in even ratios.
+    /// Logarithmically spaced values of one setting, or a continuous logarithmic range if sampled.
     Log {
-        /// The setting.
+        /// Path of the setting.
         path: String,
-        /// The first value, above 0.
+        /// First value, above 0.
         #[serde(with = "checked::Positive")]
         from: f64,
-        /// The last value, above 0.
+        /// Last value, above 0.
         #[serde(with = "checked::Positive")]
         to: f64,
-        /// How many, in a grid.
+        /// Number of values, at least 2; required in a grid, invalid otherwise.
         #[serde(default)]
         steps: Option<usize>,
-        /// The column's name; the last key of the path unless told.
+        /// Name of the column; the last key of the path by default.
         #[serde(default)]
         name: Option<String>,
     },
-    /// Sets of settings, each with a name.
+    /// Named levels; each sets any number of settings.
     Levels {
-        /// The column's name.
+        /// Name of the column.
         name: String,
-        /// The sets.
+        /// The levels.
         levels: Vec<LevelSpec>,
     },
 }
 
-/// Settings with a name.
+/// A named level: settings and their values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LevelSpec {
-    /// What it is called in tables.
+    /// Name of the level in tables.
     pub name: String,
-    /// Settings by their path: `"estimator.solve.match_weight": 0.5`.
+    /// Values by path of the setting: `"estimator.solve.match_weight": 0.5`.
     #[serde(default)]
     pub set: BTreeMap<String, Setting>,
 }
 
-/// A setting's value.
+/// Value of a setting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum Setting {
-    /// On or off.
+    /// `true` or `false`.
     Switch(bool),
-    /// A whole number.
+    /// A non-negative integer.
     Count(u64),
-    /// Any number.
+    /// A real number.
     Number(f64),
-    /// A name, or a word that the setting knows.
-    Word(String),
+    /// A name of a spec, or of an option of the setting.
+    Text(String),
 }
 
-/// Which combinations of the axes are run.
+/// Selection of the combinations of axis values to run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Sampling {
-    /// All of them; the last axis changes fastest.
+    /// Full factorial: all combinations; the last axis varies fastest.
     Grid,
-    /// So many that each axis, cut into as many parts, has one in each (McKay, Beckman and Conover 1979).
+    /// Latin hypercube: one sample in each of `count` equal bins of each axis (McKay, Beckman and Conover 1979).
     LatinHypercube {
-        /// How many.
+        /// Number of samples.
         count: usize,
-        /// From which their chance follows.
+        /// Random seed of the samples.
         seed: u64,
     },
-    /// The first points of Sobol's sequence (directions of Joe and Kuo 2008); a power of two fills the space best.
+    /// First points of the Sobol sequence (directions of Joe and Kuo 2008); powers of two fill the space most evenly.
     Sobol {
-        /// How many.
+        /// Number of samples.
         count: usize,
     },
 }
 
-/// What is wanted of a measure.
+/// A goal: a measure to minimise or maximise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GoalSpec {
     /// The measure.
     pub measure: Measure,
-    /// Whether little of it is wanted, or much.
+    /// Whether to minimise or maximise it.
     pub aim: Aim,
 }
 
-/// How much of a measure is wanted.
+/// Direction of optimisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Aim {
-    /// As little as can be.
+    /// Minimise.
     Least,
-    /// As much as can be.
+    /// Maximise.
     Most,
 }
 
 impl AxisSpec {
-    /// The column's name.
+    /// Name of the column.
     pub fn name(&self) -> &str {
         let (path, name) = match self {
             Self::Levels { name, .. } => return name,
@@ -224,7 +224,7 @@ impl AxisSpec {
         name.as_deref().unwrap_or_else(|| path.rsplit('.').next().unwrap_or(path))
     }
 
-    /// Words of the spec's text that tell this axis from others.
+    /// Text of the spec that locates this axis in error messages.
     pub(super) fn anchor(&self) -> String {
         match self {
             Self::Levels { name, .. } => format!("\"{name}\""),
@@ -239,27 +239,28 @@ impl std::fmt::Display for Setting {
             Self::Switch(on) => write!(f, "{on}"),
             Self::Count(count) => write!(f, "{count}"),
             Self::Number(number) => write!(f, "{number}"),
-            Self::Word(word) => f.write_str(word),
+            Self::Text(word) => f.write_str(word),
         }
     }
 }
 
 impl Setting {
-    /// As a number, where it is one.
+    /// The value as a number; `None` for switches and text.
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Count(count) => Some(*count as f64),
             Self::Number(number) => Some(*number),
-            Self::Switch(_) | Self::Word(_) => None,
+            Self::Switch(_) | Self::Text(_) => None,
         }
     }
 
+    /// The value as JSON.
     pub(super) fn value(&self) -> serde_json::Value {
         match self {
             Self::Switch(on) => (*on).into(),
             Self::Count(count) => (*count).into(),
             Self::Number(number) => (*number).into(),
-            Self::Word(word) => word.as_str().into(),
+            Self::Text(word) => word.as_str().into(),
         }
     }
 }

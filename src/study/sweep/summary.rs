@@ -1,120 +1,121 @@
-//! What the runs of a sweep say together, axis by axis.
+//! Summary of a sweep: statistics of each measure per axis and level.
 
 use super::paired::{holm, signed_rank_p};
-use super::runs::{Runs, level_of, levels_of};
-use super::table::{Held, Table};
+use super::runs::{Runs, level_count, level_label};
+use super::table::{ColumnType, Table};
 use super::trend::rank_correlation;
 use super::{Measure, Plan, Sampling, Sweep};
 use crate::spec::SpecError;
 use crate::study::StudyError;
 use serde::Serialize;
 
-/// A level differs, or a trend is there, when what is seen would be rarer than this without it.
-pub const SIGNIFICANT: f64 = 0.05;
+/// Significance level of corrected p-values, for differences between levels and for trends.
+pub const SIGNIFICANCE_LEVEL: f64 = 0.05;
 
-/// What a measure says of a level of an axis, over all else or at one level of another axis.
+/// Statistics of a measure at one level of an axis, over all runs or within one level of the axis `by`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Line {
-    /// The axis.
+pub struct LevelSummary {
+    /// Name of the axis.
     pub axis: String,
-    /// The level; of a range the middle of a part of it.
+    /// Label of the level; of a continuous axis the centre of a bin.
     pub level: String,
-    /// The level as a number, where it is one.
+    /// The level as a number; `None` if it is not numeric.
     pub value: Option<f64>,
-    /// The level of the axis by which all is told separately; `None` for all.
+    /// Level of the axis `by` that the runs are restricted to; `None` for all runs.
     pub within: Option<String>,
     /// The measure.
     pub measure: Measure,
-    /// How many runs.
+    /// Number of runs.
     pub runs: usize,
-    /// How many of them have no such figure. Of an estimate that counts as infinite below; else they are left out.
+    /// Number of runs without a finite figure. The statistics below take a lost estimate as infinite and omit other
+    /// missing figures.
     pub lost: usize,
-    /// The median figure, in the measure's unit.
+    /// Median, in the unit of the measure's key.
     pub median: f64,
-    /// A quarter of the figures is less.
+    /// Lower quartile.
     pub quarter: f64,
-    /// A quarter of the figures is more.
+    /// Upper quartile.
     pub three_quarters: f64,
-    /// The greatest.
+    /// Maximum.
     pub greatest: f64,
-    /// Of a grid: against the axis's first level in runs that are alike in all else.
-    pub against_first: Option<Against>,
+    /// Comparison with the axis's first level, over pairs of runs that differ only in this axis; only in a grid.
+    pub against_first: Option<RatioToFirst>,
 }
 
-/// A level against the first of its axis, run by run.
+/// Paired comparison of a level with the first level of its axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Against {
-    /// Median of the runs' ratios.
+pub struct RatioToFirst {
+    /// Median ratio over the pairs.
     pub ratio: f64,
-    /// The least ratio.
+    /// Minimum ratio.
     pub least: f64,
-    /// The greatest ratio.
+    /// Maximum ratio.
     pub greatest: f64,
-    /// Level of the signed-rank test that the ratios' logarithms are about zero.
+    /// p-value of the Wilcoxon signed-rank test of the log ratios.
     pub p: f64,
-    /// The same, corrected for all levels of the axis by Holm's method.
+    /// p-value, Holm-corrected over all levels of the axis.
     pub corrected_p: f64,
 }
 
-/// How a measure follows a numeric axis that is sampled.
+/// Rank correlation of a measure with a sampled numeric axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trend {
-    /// The axis.
+    /// Name of the axis.
     pub axis: String,
     /// The measure.
     pub measure: Measure,
     /// Spearman's rank correlation.
     pub correlation: f64,
-    /// Its level.
+    /// p-value of the correlation.
     pub p: f64,
-    /// The same, corrected for all axes by Holm's method.
+    /// p-value, Holm-corrected over all axes.
     pub corrected_p: f64,
 }
 
-/// All that the runs of a sweep say together.
+/// Summary of all runs of a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Runs that are done.
+    /// Number of finished runs.
     pub runs: usize,
-    /// The axes.
+    /// Names of the axes.
     pub axes: Vec<String>,
     /// The measures, the most important first.
     pub measures: Vec<Measure>,
-    /// A line each of measure, axis, level of the axis by which all is told (all first), and level, in this order.
-    pub lines: Vec<Line>,
-    /// What sampled axes do.
+    /// Statistics, ordered by measure, axis, level of the axis `by` (all runs first), and level.
+    pub lines: Vec<LevelSummary>,
+    /// Trends along numeric axes; empty for a grid.
     pub trends: Vec<Trend>,
 }
 
-impl Against {
-    /// Whether the level differs from the first.
+impl RatioToFirst {
+    /// Whether the level differs significantly from the first.
     pub fn is_significant(&self) -> bool {
-        self.corrected_p < SIGNIFICANT
+        self.corrected_p < SIGNIFICANCE_LEVEL
     }
 }
 
 impl Trend {
-    /// Whether there is one.
+    /// Whether the trend is significant.
     pub fn is_significant(&self) -> bool {
-        self.corrected_p < SIGNIFICANT
+        self.corrected_p < SIGNIFICANCE_LEVEL
     }
 }
 
 impl Summary {
-    /// The line of a level, over all or at a level of the axis by which all is told.
-    pub fn line(&self, axis: &str, level: &str, within: Option<&str>, measure: Measure) -> Option<&Line> {
+    /// Statistics of a level, over all runs or within a level of the axis `by`.
+    pub fn line(&self, axis: &str, level: &str, within: Option<&str>, measure: Measure) -> Option<&LevelSummary> {
         self.lines.iter().find(|line| {
             line.axis == axis && line.level == level && line.within.as_deref() == within && line.measure == measure
         })
     }
 
-    /// The lines of an axis.
+    /// Statistics of all levels of an axis.
     pub fn of_axis<'a>(
         &'a self,
         axis: &'a str,
         within: Option<&'a str>,
         measure: Measure,
-    ) -> impl Iterator<Item = &'a Line> {
+    ) -> impl Iterator<Item = &'a LevelSummary> {
         self.lines
             .iter()
             .filter(move |line| line.axis == axis && line.within.as_deref() == within && line.measure == measure)
@@ -122,12 +123,12 @@ impl Summary {
 }
 
 impl Sweep {
-    /// Sums up the merged table.
+    /// Summarises the merged table.
     ///
     /// # Errors
-    /// When there is none, or it cannot be read.
+    /// If there is no merged table, or if it cannot be read.
     pub fn summary(&self) -> Result<Summary, StudyError> {
-        let runs = Runs::of(self)?;
+        let runs = Runs::read(self)?;
         let mut summary = Summary {
             runs: runs.numbers.len(),
             axes: self.plan.axes().iter().map(|axis| axis.name.clone()).collect(),
@@ -147,69 +148,70 @@ impl Sweep {
         Ok(summary)
     }
 
-    /// A measure of all rows of the merged table; what is not there is NaN, or infinite where an estimate was lost.
+    /// A measure of all rows of the merged table; missing figures are [`Measure::missing_value`].
     pub(super) fn figures(&self, measure: Measure) -> Result<Vec<f64>, StudyError> {
         let path = if measure == Measure::WallS { self.times() } else { self.table() };
-        let unmerged = || SpecError::plain(path.display().to_string(), "is not there: merge the sweep first");
+        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
         let table = Table::open(&path)?.ok_or_else(unmerged)?;
-        let cells = table.column(measure.key(), Held::Numbers)?.numbers();
-        Ok(cells.into_iter().map(|cell| cell.unwrap_or(measure.when_lost())).collect())
+        let cells = table.column(measure.key(), ColumnType::Numbers)?.numbers();
+        Ok(cells.into_iter().map(|cell| cell.unwrap_or(measure.missing_value())).collect())
     }
 }
 
-/// The lines of an axis, over all and at each level of the axis by which all is told.
-fn lines(plan: &Plan, runs: &Runs, figures: &[f64], measure: Measure, axis: usize) -> Vec<Line> {
+/// Statistics of an axis's levels, over all runs and within each level of the axis `by`.
+fn lines(plan: &Plan, runs: &Runs, figures: &[f64], measure: Measure, axis: usize) -> Vec<LevelSummary> {
     let by = plan.axes().iter().position(|other| Some(&other.name) == plan.spec().by.as_ref());
     let by = by.filter(|by| *by != axis);
-    let withins =
-        std::iter::once(None).chain(by.into_iter().flat_map(|by| (0..levels_of(plan, by)).map(move |k| Some((by, k)))));
-    let firsts = against_which(plan, runs, axis);
+    let withins = std::iter::once(None)
+        .chain(by.into_iter().flat_map(|by| (0..level_count(plan, by)).map(move |k| Some((by, k)))));
+    let firsts = first_level_rows(plan, runs, axis);
     let mut all = Vec::new();
     for within in withins {
         let is_in = |row: usize| within.is_none_or(|(by, level)| runs.levels[by][row] as usize == level);
-        let mut rows_by_level: Vec<Vec<usize>> = vec![Vec::new(); levels_of(plan, axis)];
+        let mut rows_by_level: Vec<Vec<usize>> = vec![Vec::new(); level_count(plan, axis)];
         for row in (0..runs.numbers.len()).filter(|row| is_in(*row)) {
             rows_by_level[runs.levels[axis][row] as usize].push(row);
         }
         let mut lines = Vec::new();
         for (level, rows) in rows_by_level.iter().enumerate() {
-            let (word, value) = level_of(plan, axis, level);
+            let (label, value) = level_label(plan, axis, level);
             let line = line(rows, figures, firsts.as_deref().filter(|_| level > 0));
-            let within = within.map(|(by, level)| level_of(plan, by, level).0);
+            let within = within.map(|(by, level)| level_label(plan, by, level).0);
             let axis = plan.axes()[axis].name.clone();
-            lines.push(Line { axis, level: word, value, within, measure, ..line });
+            lines.push(LevelSummary { axis, level: label, value, within, measure, ..line });
         }
-        let levels: Vec<f64> = lines.iter().filter_map(|line| line.against_first.map(|against| against.p)).collect();
+        let p_values: Vec<f64> = lines.iter().filter_map(|line| line.against_first.map(|against| against.p)).collect();
         let compared = lines.iter_mut().filter_map(|line| line.against_first.as_mut());
-        compared.zip(holm(&levels)).for_each(|(against, p)| against.corrected_p = p);
+        compared.zip(holm(&p_values)).for_each(|(against, p)| against.corrected_p = p);
         all.extend(lines);
     }
     all
 }
 
-/// Of each row of a grid the row that differs in `axis` alone, where it has its first level.
-fn against_which(plan: &Plan, runs: &Runs, axis: usize) -> Option<Vec<Option<usize>>> {
+/// For each row of a grid, the row with the first level of `axis` and all other settings equal; `None` without a grid.
+fn first_level_rows(plan: &Plan, runs: &Runs, axis: usize) -> Option<Vec<Option<usize>>> {
     if plan.spec().sampling != Sampling::Grid {
         return None;
     }
-    let later: usize = (axis + 1..plan.axes().len()).map(|axis| levels_of(plan, axis)).product();
+    let later: usize = (axis + 1..plan.axes().len()).map(|axis| level_count(plan, axis)).product();
     let stride = (later * plan.spec().seeds.len().max(1)) as u64;
     let first = |(row, number): (usize, &u64)| runs.row(number - u64::from(runs.levels[axis][row]) * stride);
     Some(runs.numbers.iter().enumerate().map(first).collect())
 }
 
-fn line(rows: &[usize], figures: &[f64], firsts: Option<&[Option<usize>]>) -> Line {
-    let told = sorted(rows.iter().map(|row| figures[*row]));
+/// Statistics of `rows`; the caller fills in the labels.
+fn line(rows: &[usize], figures: &[f64], firsts: Option<&[Option<usize>]>) -> LevelSummary {
+    let sorted_figures = sorted(rows.iter().map(|row| figures[*row]));
     let against_first = firsts.map(|firsts| {
         let ratio = |row: &usize| {
-            let (of, first) = (figures[*row], figures[firsts[*row]?]);
-            // Both lost, or both without error: alike.
-            Some(if of == first { 1.0 } else { of / first })
+            let (figure, first) = (figures[*row], figures[firsts[*row]?]);
+            // Two infinite or two zero figures are equal, though their ratio is NaN.
+            Some(if figure == first { 1.0 } else { figure / first })
         };
         let ratios = sorted(rows.iter().filter_map(ratio));
         let logarithms: Vec<f64> = ratios.iter().map(|ratio| ratio.ln()).collect();
         let p = signed_rank_p(&logarithms);
-        Against {
+        RatioToFirst {
             ratio: quantile(&ratios, 0.5),
             least: ratios.first().copied().unwrap_or(f64::NAN),
             greatest: ratios.last().copied().unwrap_or(f64::NAN),
@@ -217,23 +219,23 @@ fn line(rows: &[usize], figures: &[f64], firsts: Option<&[Option<usize>]>) -> Li
             corrected_p: p,
         }
     });
-    Line {
+    LevelSummary {
         axis: String::new(),
         level: String::new(),
         value: None,
         within: None,
         measure: Measure::WallS,
         runs: rows.len(),
-        lost: rows.len() - told.iter().filter(|figure| figure.is_finite()).count(),
-        median: quantile(&told, 0.5),
-        quarter: quantile(&told, 0.25),
-        three_quarters: quantile(&told, 0.75),
-        greatest: told.last().copied().unwrap_or(f64::NAN),
+        lost: rows.len() - sorted_figures.iter().filter(|figure| figure.is_finite()).count(),
+        median: quantile(&sorted_figures, 0.5),
+        quarter: quantile(&sorted_figures, 0.25),
+        three_quarters: quantile(&sorted_figures, 0.75),
+        greatest: sorted_figures.last().copied().unwrap_or(f64::NAN),
         against_first,
     }
 }
 
-/// How a measure follows each numeric axis.
+/// Rank correlations of a measure with each numeric axis.
 fn trends(plan: &Plan, runs: &Runs, figures: &[f64], measure: Measure) -> Vec<Trend> {
     let mut trends = Vec::new();
     for (axis, settings) in plan.axes().iter().zip(&runs.settings) {
@@ -254,13 +256,13 @@ fn sorted(numbers: impl Iterator<Item = f64>) -> Vec<f64> {
     sorted
 }
 
-/// A quantile of sorted numbers, between neighbours linearly; NaN of none.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
+/// Quantile of sorted numbers at `fraction`, linearly interpolated; NaN if there are none.
+pub(super) fn quantile(sorted: &[f64], fraction: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let place = share * last as f64;
-    let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
-    // Two infinite neighbours have no difference.
-    if below == above { below } else { below + (above - below) * place.fract() }
+    let position = fraction * last as f64;
+    let (below, above) = (sorted[position.floor() as usize], sorted[position.ceil() as usize]);
+    // The difference of two infinite neighbours is NaN.
+    if below == above { below } else { below + (above - below) * position.fract() }
 }
 
 #[cfg(test)]
@@ -268,7 +270,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_lie_between_neighbours() {
+    fn quantiles_are_interpolated_between_neighbours() {
         assert_eq!(quantile(&[1.0, 2.0, 4.0, f64::INFINITY], 0.5), 3.0);
         assert_eq!(quantile(&[1.0, f64::INFINITY, f64::INFINITY], 0.75), f64::INFINITY);
         assert_eq!(quantile(&[5.0], 0.25), 5.0);
@@ -276,8 +278,8 @@ mod tests {
     }
 
     #[test]
-    fn ratios_are_of_like_runs_and_lost_ones_are_the_worst() {
-        // Rows 0..6 are the first level, 6..12 a tenth better, 12..18 the same but for one that is lost.
+    fn ratios_are_of_paired_runs_and_lost_runs_are_infinite() {
+        // Rows 0..6 are the first level; 6..12 are 10 % smaller; 12..18 are equal except for one lost run.
         let base: Vec<f64> = (0..6).map(|k| if k < 3 { 0.01 } else { 0.1 } + 0.001 * f64::from(k)).collect();
         let mut figures = base.clone();
         figures.extend(base.iter().map(|x| 0.9 * x));
@@ -286,7 +288,7 @@ mod tests {
         let rows = |level: usize| (6 * level..6 * level + 6).collect::<Vec<_>>();
         let better = line(&rows(1), &figures, Some(&firsts)).against_first.unwrap();
         assert!((better.ratio - 0.9).abs() < 1e-12 && (better.greatest - 0.9).abs() < 1e-12, "{better:?}");
-        // All six signs alike: 2 / 2^6.
+        // All six signs equal: 2 / 2^6.
         assert!((better.p - 2.0 / 64.0).abs() < 1e-15);
         let lost = line(&rows(2), &figures, Some(&firsts));
         let against = lost.against_first.unwrap();

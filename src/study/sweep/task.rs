@@ -1,26 +1,26 @@
-//! A task of a sweep, done in a process of its own: what it takes is limited, and what it breaks is its own.
+//! Execution of a task in a worker process, which limits its resources and isolates its crashes.
 
-use super::identity::Identity;
-use super::journey::{MOST_TAPES, Tape, tapes};
-use super::measure::Told;
-use super::part::Row;
-use super::plan::Point;
+use super::identity::ContentHash;
+use super::journey::{MAX_RECORDINGS, TemporaryRecording, record_simulations};
+use super::measure::Origin;
+use super::part::RunOutcome;
+use super::plan::ResolvedRun;
 use super::{LimitSpec, Sweep};
 use crate::simulation::Simulation;
 use crate::study::StudyError;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What a worker tells the process that began it, a line each on stdout: `begin 7`, `done 7`.
+/// Message from a worker to its supervisor, one line on stdout: `begin 7`, `done 7`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Word {
-    /// This unit is begun.
+pub enum WorkerMessage {
+    /// The run of this unit has started.
     Begin(usize),
-    /// Its part is on disk.
+    /// The part file of this unit is written.
     Done(usize),
 }
 
-impl std::fmt::Display for Word {
+impl std::fmt::Display for WorkerMessage {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Begin(unit) => write!(f, "begin {unit}"),
@@ -29,11 +29,11 @@ impl std::fmt::Display for Word {
     }
 }
 
-impl Word {
+impl WorkerMessage {
     pub(super) fn parse(line: &str) -> Option<Self> {
-        let (word, unit) = line.split_once(' ')?;
+        let (event, unit) = line.split_once(' ')?;
         let unit = unit.parse().ok()?;
-        match word {
+        match event {
             "begin" => Some(Self::Begin(unit)),
             "done" => Some(Self::Done(unit)),
             _ => None,
@@ -41,20 +41,21 @@ impl Word {
     }
 }
 
-/// Runs that share a recording.
-struct Shared {
-    runs: Vec<(usize, Point)>,
+/// Runs with the same recording.
+struct SharedRecording {
+    runs: Vec<(usize, ResolvedRun)>,
 }
 
-/// Limits this process to what a task may take, and ends it with the one that began it; on Linux.
+/// Limits the memory of this process, and ends it when its parent ends; only on Linux.
 ///
 /// # Errors
-/// When the system refuses.
-pub fn confine(limit: Option<LimitSpec>) -> Result<(), StudyError> {
+/// If the operating system rejects a limit.
+pub fn limit_process(limit: Option<LimitSpec>) -> Result<(), StudyError> {
     #[cfg(target_os = "linux")]
     {
         use rustix::process::{Resource, Rlimit, Signal, set_parent_process_death_signal, setrlimit};
-        let refused = |error: rustix::io::Errno| StudyError::Worker { message: format!("no limits: {error}") };
+        let refused =
+            |error: rustix::io::Errno| StudyError::Worker { message: format!("cannot limit the process: {error}") };
         set_parent_process_death_signal(Some(Signal::KILL)).map_err(refused)?;
         if let Some(limit) = limit {
             let bytes = Some(limit.memory_mib.saturating_mul(1 << 20));
@@ -67,94 +68,104 @@ pub fn confine(limit: Option<LimitSpec>) -> Result<(), StudyError> {
 }
 
 impl Sweep {
-    /// What a run may take, where that is limited.
+    /// Time and memory limits of a run; `None` for closed forms.
     pub fn limit(&self) -> Option<LimitSpec> {
         self.plan.limit()
     }
 
-    /// Does what is missing of task `task`, here and now, with rayon's threads; `tell` hears of each run.
+    /// Runs the missing runs of task `task` in this process on rayon's threads; `report` receives a message per event.
     ///
     /// # Errors
-    /// When there is no such task, or a part cannot be written. That a run fails is a row of its part.
-    pub fn run_task(&self, task: usize, tell: &(dyn Fn(Word) + Sync)) -> Result<(), StudyError> {
-        let none = || StudyError::Plan {
-            what: "the task",
+    /// If there is no such task, or if a part cannot be written. A failed run is not an error here: its row in the
+    /// table contains the error.
+    pub fn run_task(&self, task: usize, report: &(dyn Fn(WorkerMessage) + Sync)) -> Result<(), StudyError> {
+        let unknown = || StudyError::Plan {
+            what: "task",
             message: format!("{task}: the plan has tasks 0 to {}", self.tasks.len().saturating_sub(1)),
         };
-        let units = self.tasks.get(task).ok_or_else(none)?;
+        let units = self.tasks.get(task).ok_or_else(unknown)?;
         let Some(limit) = self.plan.limit() else {
             return units.iter().try_for_each(|unit| self.run_block(*unit as usize));
         };
-        let mut shared: Vec<Shared> = Vec::new();
-        let mut places: BTreeMap<Identity, usize> = BTreeMap::new();
-        for unit in self.missing(task)? {
-            let point = self.plan.point(self.units[unit].first)?;
-            let place = *places.entry(point.simulation).or_insert(shared.len());
-            if place == shared.len() {
-                shared.push(Shared { runs: Vec::new() });
+        let mut shared: Vec<SharedRecording> = Vec::new();
+        let mut groups: BTreeMap<ContentHash, usize> = BTreeMap::new();
+        for unit in self.missing_units(task)? {
+            let run = self.plan.resolve(self.units[unit].first)?;
+            let group = *groups.entry(run.simulation).or_insert(shared.len());
+            if group == shared.len() {
+                shared.push(SharedRecording { runs: Vec::new() });
             }
-            shared[place].runs.push((unit, point));
+            shared[group].runs.push((unit, run));
         }
-        shared.chunks(MOST_TAPES).try_for_each(|some| self.run_shared(some, limit, tell))
+        shared.chunks(MAX_RECORDINGS).try_for_each(|some| self.run_shared(some, limit, report))
     }
 
-    /// A block of closed forms.
+    /// Runs a block of closed forms, unless it is finished.
     pub(super) fn run_block(&self, unit: usize) -> Result<(), StudyError> {
         let unit = &self.units[unit];
         if self.is_done(unit)? {
             return Ok(());
         }
-        let told = self.plan.told();
-        let row = |index| super::closed_form::row(&self.plan, &told, index);
-        let rows: Vec<Row> = (unit.first..unit.first + unit.count).map(row).collect();
-        self.keep(unit, &rows)
+        let measures = self.plan.result_measures();
+        let evaluate = |index| super::closed_form::evaluate(&self.plan, &measures, index);
+        let outcomes: Vec<RunOutcome> = (unit.first..unit.first + unit.count).map(evaluate).collect();
+        self.write_part(unit, &outcomes)
     }
 
-    fn run_shared(&self, shared: &[Shared], limit: LimitSpec, tell: &(dyn Fn(Word) + Sync)) -> Result<(), StudyError> {
+    /// Simulates and records each group of runs, then estimates.
+    fn run_shared(
+        &self,
+        shared: &[SharedRecording],
+        limit: LimitSpec,
+        report: &(dyn Fn(WorkerMessage) + Sync),
+    ) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
-        let told = self.plan.told();
-        let recorded = told.iter().any(|measure| measure.told() == Told::Estimate);
-        let mut built: Vec<Simulation> = Vec::new();
-        let mut standing: Vec<&Shared> = Vec::new();
+        let measures = self.plan.result_measures();
+        let recorded = measures.iter().any(|measure| measure.origin() == Origin::Estimate);
+        let mut simulations: Vec<Simulation> = Vec::new();
+        let mut groups: Vec<&SharedRecording> = Vec::new();
         for each in shared {
-            let Some((unit, point)) = each.runs.first() else { continue };
+            let Some((unit, run)) = each.runs.first() else { continue };
             let seed = self.plan.seed(self.units[*unit].first).unwrap_or_default();
-            match self.plan.simulation(&point.changed, seed) {
+            match self.plan.simulation(&run.changed, seed) {
                 Ok(simulation) => {
-                    built.push(simulation);
-                    standing.push(each);
+                    simulations.push(simulation);
+                    groups.push(each);
                 }
-                // A head that falls, a motion that does not fit the scene: the runs' own fault.
-                Err(error) => self.fail(each, &error, tell)?,
+                // For example a head without static equilibrium, or a motion that leaves the scene: these runs fail.
+                Err(error) => self.fail(each, &error, report)?,
             }
         }
-        let tapes = match tapes(built, (recorded, threads), limit) {
-            Ok(tapes) => tapes,
+        let recordings = match record_simulations(simulations, (recorded, threads), limit) {
+            Ok(recordings) => recordings,
             Err(error @ StudyError::File { .. }) => return Err(error),
-            Err(error) => return standing.into_iter().try_for_each(|each| self.fail(each, &error, tell)),
+            Err(error) => return groups.into_iter().try_for_each(|each| self.fail(each, &error, report)),
         };
-        let runs: Vec<(&Tape, &(usize, Point))> =
-            tapes.iter().zip(standing).flat_map(|(tape, each)| each.runs.iter().map(move |run| (tape, run))).collect();
-        self.run_on_tapes(&runs, threads, tell)
+        let runs: Vec<(&TemporaryRecording, &(usize, ResolvedRun))> = recordings
+            .iter()
+            .zip(groups)
+            .flat_map(|(recording, each)| each.runs.iter().map(move |run| (recording, run)))
+            .collect();
+        self.estimate_runs(&runs, threads, report)
     }
 
-    /// Estimates beside each other.
-    fn run_on_tapes(
+    /// Estimates the runs in parallel, each on one thread.
+    fn estimate_runs(
         &self,
-        runs: &[(&Tape, &(usize, Point))],
+        runs: &[(&TemporaryRecording, &(usize, ResolvedRun))],
         threads: usize,
-        tell: &(dyn Fn(Word) + Sync),
+        report: &(dyn Fn(WorkerMessage) + Sync),
     ) -> Result<(), StudyError> {
         let next = AtomicUsize::new(0);
         let read = |reader: usize| {
-            while let Some((tape, (unit, point))) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
+            while let Some((recording, (unit, run))) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
                 if self.is_done(&self.units[*unit])? {
-                    tell(Word::Done(*unit));
+                    report(WorkerMessage::Done(*unit));
                     continue;
                 }
-                tell(Word::Begin(*unit));
-                self.keep(&self.units[*unit], &[tape.row(&self.plan, point, reader)])?;
-                tell(Word::Done(*unit));
+                report(WorkerMessage::Begin(*unit));
+                self.write_part(&self.units[*unit], &[recording.evaluate(&self.plan, run, reader)])?;
+                report(WorkerMessage::Done(*unit));
             }
             Ok::<(), StudyError>(())
         };
@@ -169,11 +180,17 @@ impl Sweep {
         })
     }
 
-    fn fail(&self, shared: &Shared, error: &StudyError, tell: &(dyn Fn(Word) + Sync)) -> Result<(), StudyError> {
-        let row = Row::failed_by(self.plan.told().len(), error);
+    /// Records all runs of a group as failed.
+    fn fail(
+        &self,
+        shared: &SharedRecording,
+        error: &StudyError,
+        report: &(dyn Fn(WorkerMessage) + Sync),
+    ) -> Result<(), StudyError> {
+        let outcome = RunOutcome::from_error(self.plan.result_measures().len(), error);
         shared.runs.iter().try_for_each(|(unit, _)| {
-            self.keep(&self.units[*unit], std::slice::from_ref(&row))?;
-            tell(Word::Done(*unit));
+            self.write_part(&self.units[*unit], std::slice::from_ref(&outcome))?;
+            report(WorkerMessage::Done(*unit));
             Ok(())
         })
     }

@@ -1,16 +1,17 @@
-//! Whether a figure rises or falls with a setting: Spearman's rank correlation.
+//! Spearman's rank correlation of a figure with a setting.
 //!
 //! C. Spearman, The proof and measurement of association between two things, American Journal of Psychology 15(1),
 //! 1904.
 
-/// Fewest pairs of which the level is told.
-const FEWEST: usize = 10;
+/// Minimum number of pairs for which the normal approximation of the p-value is accurate.
+const MIN_PAIRS: usize = 10;
 
-/// The rank correlation of `pairs`, -1..1, and the probability that it were as far from 0 if there were none,
-/// two-sided: without correlation its variance is 1 / (n - 1), and of ten pairs or more it is nearly normal. `None` of
-/// fewer, or when one side does not vary.
+/// Rank correlation of `pairs`, from -1 to 1, and its two-sided p-value.
+///
+/// The p-value is that of a normal distribution with variance 1 / (n - 1), accurate from ten pairs on. `None` for
+/// fewer pairs, or if one of the two variables is constant.
 pub(super) fn rank_correlation(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
-    if pairs.len() < FEWEST {
+    if pairs.len() < MIN_PAIRS {
         return None;
     }
     let x = ranks(&pairs.iter().map(|pair| pair.0).collect::<Vec<_>>());
@@ -22,11 +23,11 @@ pub(super) fn rank_correlation(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
         return None;
     }
     let correlation = product(&x, &y) / scale;
-    let beyond = correlation.abs() * (pairs.len() as f64 - 1.0).sqrt();
-    Some((correlation, libm::erfc(beyond / std::f64::consts::SQRT_2)))
+    let z = correlation.abs() * (pairs.len() as f64 - 1.0).sqrt();
+    Some((correlation, libm::erfc(z / std::f64::consts::SQRT_2)))
 }
 
-/// Ranks from 1; equal numbers share their mean rank.
+/// Ranks from 1; ties get their mean rank.
 fn ranks(numbers: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..numbers.len()).collect();
     order.sort_by(|a, b| numbers[*a].total_cmp(&numbers[*b]));
@@ -46,7 +47,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn what_rises_is_one_and_what_falls_minus_one() {
+    fn the_correlation_is_one_for_rising_and_minus_one_for_falling_pairs() {
         let rising: Vec<(f64, f64)> = (0..20).map(|k| (f64::from(k), f64::from(k).exp())).collect();
         assert_relative_eq!(rank_correlation(&rising).unwrap().0, 1.0, epsilon = 1e-12);
         let falling: Vec<(f64, f64)> = rising.iter().map(|(x, y)| (*x, -y)).collect();
@@ -58,16 +59,16 @@ mod tests {
     }
 
     #[test]
-    fn without_ties_it_is_that_of_the_squared_differences() {
-        // 1 - 6 sum d^2 / (n (n^2 - 1)) for ranks that differ by d; here k and 7 k mod 11.
+    fn without_ties_the_correlation_follows_from_squared_rank_differences() {
+        // 1 - 6 sum d^2 / (n (n^2 - 1)) with rank differences d; the ranks are k and 7 k mod 11.
         let pairs: Vec<(f64, f64)> = (1..=10).map(|k| (f64::from(k), f64::from(7 * k % 11))).collect();
         let squares: f64 = pairs.iter().map(|(x, y)| (x - y).powi(2)).sum();
         assert_relative_eq!(rank_correlation(&pairs).unwrap().0, 1.0 - 6.0 * squares / 990.0, epsilon = 1e-12);
     }
 
     #[test]
-    fn chance_is_told_as_chance() {
-        // Of many draws without correlation 5 % are at the level of 0.05.
+    fn uncorrelated_pairs_are_significant_at_the_nominal_rate() {
+        // 5 % of uncorrelated samples have p < 0.05.
         use rand::RngExt;
         let mut stream = crate::random::Seed(1).stream("test");
         let mut draw = || -> Vec<(f64, f64)> { (0..30).map(|_| (stream.random(), stream.random())).collect() };

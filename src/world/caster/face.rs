@@ -1,22 +1,22 @@
-//! One flat face: where a ray crosses it, which of its points is nearest.
+//! A flat face: ray intersection and nearest point.
 
 use super::{Aabb, Vec3, single};
 use crate::geometry::Vector;
 use crate::world::MaterialId;
 use crate::world::shape::Triangle;
 
-/// How far outside its edges a face still counts, in fractions of its edges. Neighbours overlap by this much, so that
-/// no ray slips between them.
+/// Tolerance outside the edges of a face, as a fraction of the edges. Neighbouring faces overlap by this, so that no
+/// ray passes between them.
 const OVERLAP: f32 = 1e-6;
 
-/// Two triangles are one parallelogram when their fourth corner is this close to where it belongs, m.
+/// Two triangles form a parallelogram if the fourth corner deviates by less than this, m.
 const SAME_CORNER_M: f64 = 1e-9;
 
-/// A triangle, or the parallelogram that two triangles make up, as most faces of a scene do: half the faces to search.
+/// A triangle, or a parallelogram of two triangles. Most faces of a scene are parallelograms, which halves the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Face {
     pub corner: Vector,
-    /// The edges from the corner.
+    /// Edges from the corner.
     pub u: Vector,
     pub v: Vector,
     pub is_parallelogram: bool,
@@ -27,18 +27,18 @@ impl Face {
         Self { corner: *a, u: b - a, v: c - a, is_parallelogram: false }
     }
 
-    /// The parallelogram of two triangles `a b c` and `a c d`, if they make one up.
+    /// The parallelogram of the triangles `a b c` and `a c d`; `None` if they do not form one.
     fn parallelogram([a, b, c]: &Triangle, second: &Triangle) -> Option<Self> {
         let meets = *a == second[0] && *c == second[1] && (a + c - b - second[2]).amax() < SAME_CORNER_M;
         meets.then(|| Self { corner: *a, u: b - a, v: second[2] - a, is_parallelogram: true })
     }
 
-    /// The middle of its bounds, roughly: where it belongs in space.
+    /// Approximate centre, for sorting.
     pub fn middle(&self) -> Vector {
         self.corner + (self.u + self.v) / 2.0
     }
 
-    /// Its point nearest to `point`.
+    /// The point of the face nearest to `point`.
     pub fn nearest(&self, point: &Vector) -> Vector {
         let Self { corner, u, v, is_parallelogram } = *self;
         let (uu, uv, vv) = (u.dot(&u), u.dot(&v), v.dot(&v));
@@ -51,7 +51,7 @@ impl Face {
         }
         let far_edges = if is_parallelogram { [(corner + u, v), (corner + v, u)] } else { [(corner + u, v - u); 2] };
         let edges = [(corner, u), (corner, v), far_edges[0], far_edges[1]];
-        let [first, rest @ ..] = edges.map(|(start, edge)| on_edge(point, start, edge));
+        let [first, rest @ ..] = edges.map(|(start, edge)| nearest_on_edge(point, start, edge));
         let nearer = |best: Vector, next: Vector| {
             if (next - point).norm_squared() < (best - point).norm_squared() { next } else { best }
         };
@@ -60,12 +60,12 @@ impl Face {
 }
 
 /// The point of the segment from `start` along `edge` that is nearest to `point`.
-fn on_edge(point: &Vector, start: Vector, edge: Vector) -> Vector {
+fn nearest_on_edge(point: &Vector, start: Vector, edge: Vector) -> Vector {
     let length2 = edge.norm_squared();
     if length2 == 0.0 { start } else { start + edge * (edge.dot(&(point - start)) / length2).clamp(0.0, 1.0) }
 }
 
-/// The faces of triangles in the frame of `middle`, each with the index of its first triangle.
+/// The faces of triangles relative to `middle`, each with the index of the first triangle.
 pub(super) fn faces(triangles: &[Triangle], materials: &[MaterialId], middle: &Vector) -> Vec<(usize, Face)> {
     let local = |at: usize| triangles.get(at).map(|triangle| triangle.map(|corner| corner - middle));
     let (mut faces, mut at) = (Vec::with_capacity(triangles.len()), 0);
@@ -78,38 +78,38 @@ pub(super) fn faces(triangles: &[Triangle], materials: &[MaterialId], middle: &V
     faces
 }
 
-/// A face in single precision, as the search reads it.
+/// A face in single precision, for the search.
 pub(super) struct SingleFace {
     corner: Vec3,
     u: Vec3,
     v: Vec3,
-    /// Greatest sum of the fractions along `u` and `v`: 1 in a triangle, 2 in a parallelogram.
-    greatest_sum: f32,
+    /// Maximum sum of the fractions along `u` and `v`: 1 for a triangle, 2 for a parallelogram.
+    max_sum: f32,
 }
 
 impl SingleFace {
     pub fn new(face: &Face) -> Self {
         let corner = single(&face.corner);
         let edge = |edge: Vector| single(&(face.corner + edge)) - corner;
-        let greatest_sum = if face.is_parallelogram { 2.0 } else { 1.0 } + OVERLAP;
-        Self { corner, u: edge(face.u), v: edge(face.v), greatest_sum }
+        let max_sum = if face.is_parallelogram { 2.0 } else { 1.0 } + OVERLAP;
+        Self { corner, u: edge(face.u), v: edge(face.v), max_sum }
     }
 
     /// The same face in double precision.
-    pub fn widened(&self) -> Face {
+    pub fn to_double(&self) -> Face {
         let [corner, u, v] = [self.corner, self.u, self.v].map(|x| Vector::new(x.x.into(), x.y.into(), x.z.into()));
-        Face { corner, u, v, is_parallelogram: self.greatest_sum > 1.5 }
+        Face { corner, u, v, is_parallelogram: self.max_sum > 1.5 }
     }
 
-    /// The box around it, `margin` larger on each side.
+    /// Bounding box, enlarged by `margin` on each side.
     pub fn bounds(&self, margin: f32) -> Aabb {
         let (b, c) = (self.corner + self.u, self.corner + self.v);
-        let d = if self.greatest_sum > 1.5 { b + self.v } else { c };
+        let d = if self.max_sum > 1.5 { b + self.v } else { c };
         let margin = Vec3::splat(margin);
         Aabb::new(self.corner.min(b).min(c).min(d) - margin, self.corner.max(b).max(c).max(d) + margin)
     }
 
-    /// How far along the ray it is crossed, from either side (Moeller and Trumbore 1997).
+    /// Distance along the ray at which it hits the face from either side (Moeller and Trumbore 1997).
     #[inline]
     pub fn cross(&self, origin: &Vec3, direction: &Vec3) -> Option<f32> {
         let p = direction.cross(self.v);
@@ -124,13 +124,13 @@ impl SingleFace {
             && along_v >= -OVERLAP
             && along_u <= 1.0 + OVERLAP
             && along_v <= 1.0 + OVERLAP
-            && along_u + along_v <= self.greatest_sum;
-        // A ray in the face's plane divides by zero: what is not a number is not inside.
+            && along_u + along_v <= self.max_sum;
+        // A ray in the plane of the face divides by zero: the NaN fails the comparison.
         (is_inside && (0.0..f32::INFINITY).contains(&distance)).then_some(distance)
     }
 }
 
-/// A face's plane `normal . x = offset`, in double precision.
+/// Plane of a face, `normal . x = offset`, in double precision.
 pub(super) struct Plane {
     pub normal: Vector,
     offset: f64,
@@ -142,7 +142,7 @@ impl Plane {
         Self { normal, offset: normal.dot(&face.middle()) }
     }
 
-    /// How far along the ray the plane is crossed, or `None` for a ray in the plane.
+    /// Distance along the ray to the plane; `None` for a ray parallel to it.
     #[inline]
     pub fn distance(&self, origin: &Vector, direction: &Vector) -> Option<f64> {
         let approach = self.normal.dot(direction);
@@ -151,23 +151,23 @@ impl Plane {
     }
 
     /// The foot of the perpendicular from a point.
-    pub fn onto(&self, point: &Vector) -> Vector {
+    pub fn project(&self, point: &Vector) -> Vector {
         point - self.normal * (self.normal.dot(point) - self.offset)
     }
 }
 
-/// Puts faces in order along a space-filling curve, so that neighbours in space are neighbours in memory. Those at one
-/// place of the curve keep their order.
-pub(super) fn sort_in_space(faces: &mut [(usize, Face)]) {
+/// Sorts faces along a space-filling (Morton) curve, so that neighbours in space are neighbours in memory. Faces with
+/// the same key keep their order.
+pub(super) fn sort_along_curve(faces: &mut [(usize, Face)]) {
     let largest = faces.iter().map(|(_, face)| face.middle().amax()).fold(f64::MIN_POSITIVE, f64::max);
     faces.sort_by_cached_key(|(_, face)| {
         let cell = face.middle().map(|x| ((x / largest + 1.0) * 511.5) as u32);
-        spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
+        spread_bits(cell.x) | spread_bits(cell.y) << 1 | spread_bits(cell.z) << 2
     });
 }
 
-/// Puts two zero bits before each of the lowest ten bits.
-fn spread(bits: u32) -> u32 {
+/// Inserts two zero bits before each of the lowest ten bits.
+fn spread_bits(bits: u32) -> u32 {
     let x = (bits | bits << 16) & 0x0300_00ff;
     let x = (x | x << 8) & 0x0300_f00f;
     let x = (x | x << 4) & 0x030c_30c3;

@@ -1,10 +1,9 @@
-//! glTF 2.0, as `.gltf` with its buffers and as `.glb`: the triangles of the scene, each by the transforms of its
-//! nodes.
+//! glTF 2.0 (`.gltf` with buffers, or `.glb`): the triangles of the scene with the transforms of the nodes.
 
 mod accessor;
 mod document;
 
-use super::{MAX_BYTES, MeshError, Triangle, fans};
+use super::{MAX_BYTES, MeshError, Triangle, triangulate};
 use crate::geometry::Vector;
 use crate::world::build::MAX_TRIANGLES;
 use accessor::{Data, base64};
@@ -13,34 +12,34 @@ use std::path::{Component, Path};
 
 type Transform = nalgebra::Matrix4<f64>;
 
-/// Deepest nesting of nodes, and most visits of nodes: a node may be named by several others.
+/// Maximum nesting depth, and maximum number of node visits: several nodes may refer to the same child.
 const MAX_DEPTH: usize = 64;
 const MAX_VISITS: usize = 1_000_000;
 
-/// `mode` of a primitive: points and lines lie below it.
+/// `mode` of a primitive: smaller values are points and lines.
 const TRIANGLES: u32 = 4;
 const TRIANGLE_STRIP: u32 = 5;
 const TRIANGLE_FAN: u32 = 6;
 
-/// The triangles of a glTF file; `folder` is where its buffers lie.
+/// The triangles of a glTF file; `folder` contains the buffers.
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Triangle>, MeshError> {
     let (json, blob) = split(bytes)?;
     let document = Document::parse(json).map_err(malformed)?;
     let buffers = document.buffers.iter().map(|buffer| load(buffer, blob, folder)).collect::<Result<Vec<_>, _>>()?;
     let scene = document.scenes.get(document.scene).ok_or_else(|| malformed("it has no scene"))?;
     let roots = scene.nodes.clone();
-    let mut walk = Walk { data: &Data { document, buffers }, triangles: Vec::new(), visits: 0 };
+    let mut traversal = NodeTraversal { data: &Data { document, buffers }, triangles: Vec::new(), visits: 0 };
     for root in roots {
-        walk.visit(root, &Transform::identity(), 0)?;
+        traversal.visit(root, &Transform::identity(), 0)?;
     }
-    Ok(walk.triangles)
+    Ok(traversal.triangles)
 }
 
 fn malformed(problem: impl Into<String>) -> MeshError {
     MeshError::Malformed { format: "glTF", problem: problem.into() }
 }
 
-/// The JSON and the binary chunk of a `.glb`; all is JSON in a `.gltf`.
+/// The JSON and the binary chunk of a `.glb`; a `.gltf` is JSON only.
 fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));
@@ -51,11 +50,14 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
     };
     let length = word(8).unwrap_or_default();
     if length != bytes.len() {
-        return Err(MeshError::Lies { said: format!("{length} bytes"), found: format!("{} bytes", bytes.len()) });
+        return Err(MeshError::CountMismatch {
+            declared: format!("{length} bytes"),
+            found: format!("{} bytes", bytes.len()),
+        });
     }
     let chunk =
         |at: usize| Some((bytes.get(at + 4..at + 8)?, bytes.get(at + 8..at.checked_add(8)?.checked_add(word(at)?)?)?));
-    let (kind, json) = chunk(12).ok_or_else(|| malformed("its first chunk is cut short"))?;
+    let (kind, json) = chunk(12).ok_or_else(|| malformed("its first chunk is truncated"))?;
     if kind != b"JSON" {
         return Err(malformed("its first chunk is not JSON"));
     }
@@ -63,7 +65,7 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
     Ok((json, blob))
 }
 
-/// The bytes of a buffer: the binary chunk, a base64 URI, or a file in the mesh's folder or below.
+/// The bytes of a buffer: the binary chunk, a base64 URI, or a file in the mesh's folder or a subfolder.
 fn load(buffer: &Buffer, blob: Option<&[u8]>, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
     let data = match &buffer.uri {
         None => blob.ok_or_else(|| malformed("its binary chunk is missing"))?.to_vec(),
@@ -72,17 +74,17 @@ fn load(buffer: &Buffer, blob: Option<&[u8]>, folder: Option<&Path>) -> Result<V
                 let text = data.split_once(";base64,").map(|(_, text)| text);
                 text.and_then(base64).ok_or_else(|| malformed("a buffer's data URI is not base64"))?
             }
-            None => read_beside(uri, folder)?,
+            None => read_buffer_file(uri, folder)?,
         },
     };
     if data.len() < buffer.byte_length {
-        let said = format!("{} bytes in a buffer", buffer.byte_length);
-        return Err(MeshError::Lies { said, found: format!("{} bytes", data.len()) });
+        let declared = format!("{} bytes in a buffer", buffer.byte_length);
+        return Err(MeshError::CountMismatch { declared, found: format!("{} bytes", data.len()) });
     }
     Ok(data)
 }
 
-fn read_beside(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
+fn read_buffer_file(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
     let relative = uri.replace("%20", " ");
     let relative = Path::new(&relative);
     let stays = relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
@@ -98,25 +100,25 @@ fn read_beside(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
     std::fs::read(&path).map_err(named)
 }
 
-struct Walk<'a> {
+struct NodeTraversal<'a> {
     data: &'a Data,
     triangles: Vec<Triangle>,
     visits: usize,
 }
 
-impl Walk<'_> {
+impl NodeTraversal<'_> {
     fn visit(&mut self, index: usize, parent: &Transform, depth: usize) -> Result<(), MeshError> {
         self.visits += 1;
         if depth > MAX_DEPTH || self.visits > MAX_VISITS {
-            return Err(malformed(format!("its nodes nest deeper than {MAX_DEPTH}, or go round")));
+            return Err(malformed(format!("its nodes nest deeper than {MAX_DEPTH}, or form a cycle")));
         }
         let document = &self.data.document;
         let node = document.nodes.get(index);
-        let node = node.ok_or_else(|| malformed(format!("it names node {index}, which it has not")))?;
+        let node = node.ok_or_else(|| malformed(format!("it refers to node {index}, which does not exist")))?;
         let transform = parent * node.transform();
         if let Some(mesh) = node.mesh {
             let known = document.meshes.get(mesh);
-            let known = known.ok_or_else(|| malformed(format!("it names mesh {mesh}, which it has not")))?;
+            let known = known.ok_or_else(|| malformed(format!("it refers to mesh {mesh}, which does not exist")))?;
             for primitive in &known.primitives {
                 self.add(primitive, &transform)?;
             }
@@ -141,13 +143,13 @@ impl Walk<'_> {
             None => (0..vertices.len() as i64).collect(),
         };
         self.triangles.extend(match primitive.mode {
-            TRIANGLES => fans(&vertices, indices.chunks_exact(3).map(<[i64]>::to_vec))?,
-            TRIANGLE_STRIP => fans(&vertices, indices.windows(3).map(<[i64]>::to_vec))?,
-            TRIANGLE_FAN => fans(&vertices, std::iter::once(indices))?,
+            TRIANGLES => triangulate(&vertices, indices.chunks_exact(3).map(<[i64]>::to_vec))?,
+            TRIANGLE_STRIP => triangulate(&vertices, indices.windows(3).map(<[i64]>::to_vec))?,
+            TRIANGLE_FAN => triangulate(&vertices, std::iter::once(indices))?,
             mode => return Err(malformed(format!("a primitive has the unknown mode {mode}"))),
         });
         if self.triangles.len() > MAX_TRIANGLES {
-            return Err(malformed("its nodes repeat meshes to more triangles than a scene may have"));
+            return Err(malformed("its nodes repeat meshes to more triangles than a scene can have"));
         }
         Ok(())
     }

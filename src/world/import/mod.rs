@@ -1,5 +1,5 @@
-//! Meshes from files. A file is measured before it is parsed, and checked after: whatever it holds, the answer is
-//! triangles with an area, or a sentence.
+//! Meshes from files. The file size is checked before parsing and the triangles afterwards, so that any file gives
+//! either triangles with an area or an error message.
 
 mod gltf;
 mod obj;
@@ -10,23 +10,23 @@ use super::shape::{Triangle, UpAxis};
 use crate::geometry::Vector;
 use std::path::Path;
 
-/// Largest file of a mesh: twice the triangles that a scene may have, as binary STL.
+/// Maximum file size, bytes: twice the maximum number of triangles of a scene as binary STL.
 const MAX_BYTES: u64 = 1 << 30;
-/// Largest share of triangles without area that a mesh may have.
-const MAX_SHARE_WITHOUT_AREA: f64 = 0.1;
-/// A triangle is flat when its height is less than this part of its longest edge.
-const FLAT: f64 = 1e-6;
+/// Maximum fraction of triangles without area: a mesh with more is damaged.
+const MAX_FRACTION_WITHOUT_AREA: f64 = 0.1;
+/// A triangle counts as flat if its height is below this fraction of the longest edge.
+const FLAT_RATIO: f64 = 1e-6;
 
 /// The triangles of a mesh.
 #[derive(Debug)]
 pub(super) struct MeshTriangles {
-    /// Those that have an area.
+    /// Triangles with non-zero area.
     pub triangles: Vec<Triangle>,
-    /// How many were left out because they have none.
+    /// Number of removed triangles without area.
     pub without_area: usize,
 }
 
-/// Why a mesh cannot be used. The file's name stands before it.
+/// Why a mesh cannot be used. The name of the file precedes the message.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum MeshError {
     #[error("cannot be read: {0}")]
@@ -36,13 +36,13 @@ pub(super) enum MeshError {
     #[error("ends in neither .obj, .stl, .ply, .gltf nor .glb")]
     UnknownFormat,
     #[error(
-        "is a COLLADA file, which is not read: convert it to glTF with Blender (import the .dae, export as .glb) or with `assimp export model.dae model.glb`"
+        "is a COLLADA file, which is not supported: convert it to glTF with Blender (import the .dae, export as .glb) or with `assimp export model.dae model.glb`"
     )]
     Collada,
-    #[error("is no {format} mesh: {problem}")]
+    #[error("is not a valid {format} mesh: {problem}")]
     Malformed { format: &'static str, problem: String },
-    #[error("says it has {said}, but holds {found}")]
-    Lies { said: String, found: String },
+    #[error("declares {declared}, but contains {found}")]
+    CountMismatch { declared: String, found: String },
     #[error("face {face} names the vertex {index}; there are {vertices}")]
     NoSuchVertex { face: usize, index: i64, vertices: usize },
     #[error("has no triangles")]
@@ -50,13 +50,12 @@ pub(super) enum MeshError {
     #[error("triangle {0} has a corner that is not finite")]
     NotFinite(usize),
     #[error(
-        "{without} of its {all} triangles have no area (thinner than a millionth of their length); at most 10 % may: repair the mesh"
+        "{without} of its {all} triangles have no area (thinner than a millionth of their length); the maximum is 10 %: repair the mesh"
     )]
     WithoutArea { without: usize, all: usize },
 }
 
-/// Reads the mesh in a file; `scale` is metres per unit of it, `up` the axis that points up where that is not its
-/// format's own.
+/// Reads the mesh in a file. `scale` is metres per unit of the file; `up` overrides the up axis of the format.
 pub(super) fn read(path: &Path, scale: f64, up: Option<UpAxis>) -> Result<MeshTriangles, MeshError> {
     let meta = std::fs::metadata(path)?;
     if !meta.is_file() {
@@ -73,7 +72,7 @@ pub(super) fn read(path: &Path, scale: f64, up: Option<UpAxis>) -> Result<MeshTr
     check(triangles, scale)
 }
 
-/// How a file is read: the triangles as it has them, and the axis that points up unless the scene says otherwise.
+/// A file format: parser and default up axis.
 struct Format {
     parse: fn(Vec<u8>, &Path) -> Result<Vec<Triangle>, MeshError>,
     up: UpAxis,
@@ -85,14 +84,14 @@ fn format_of(path: &Path) -> Result<Format, MeshError> {
         "obj" => Ok(Format { parse: |bytes, _| obj::parse(&bytes), up: UpAxis::Z }),
         "stl" => Ok(Format { parse: |bytes, _| stl::parse(bytes), up: UpAxis::Z }),
         "ply" => Ok(Format { parse: |bytes, _| ply::parse(&bytes), up: UpAxis::Z }),
-        // The specification of glTF 2.0 has y up (section 3.4).
+        // y is up in glTF 2.0 (specification, section 3.4).
         "gltf" | "glb" => Ok(Format { parse: |bytes, path| gltf::parse(&bytes, path.parent()), up: UpAxis::Y }),
         "dae" => Err(MeshError::Collada),
         _ => Err(MeshError::UnknownFormat),
     }
 }
 
-/// Scales triangles, and removes those that have no area, unless they are too many.
+/// Scales triangles, and removes triangles without area unless there are too many.
 fn check(triangles: Vec<Triangle>, scale: f64) -> Result<MeshTriangles, MeshError> {
     if triangles.is_empty() {
         return Err(MeshError::Empty);
@@ -106,22 +105,22 @@ fn check(triangles: Vec<Triangle>, scale: f64) -> Result<MeshTriangles, MeshErro
         triangles.into_iter().map(|triangle| triangle.map(|corner| corner * scale)).collect();
     let with_area: Vec<Triangle> = triangles.into_iter().filter(|triangle| !is_flat(triangle)).collect();
     let without = all - with_area.len();
-    if without as f64 > MAX_SHARE_WITHOUT_AREA * all as f64 {
+    if without as f64 > MAX_FRACTION_WITHOUT_AREA * all as f64 {
         return Err(MeshError::WithoutArea { without, all });
     }
     Ok(MeshTriangles { triangles: with_area, without_area: without })
 }
 
-/// Whether a triangle is thinner than a millionth of its longest edge.
+/// Whether a triangle is thinner than a millionth of the longest edge.
 fn is_flat([a, b, c]: &Triangle) -> bool {
     let edges = [b - a, c - b, a - c];
     let longest = edges.iter().map(Vector::norm).fold(0.0, f64::max);
     let twice_area = edges[0].cross(&edges[1]).norm();
-    twice_area <= FLAT * longest * longest
+    twice_area <= FLAT_RATIO * longest * longest
 }
 
-/// The triangles of polygons, each as a fan around its first corner; indices count from 0.
-fn fans(vertices: &[Vector], polygons: impl Iterator<Item = Vec<i64>>) -> Result<Vec<Triangle>, MeshError> {
+/// Splits polygons into fans of triangles around their first corners; indices start at 0.
+fn triangulate(vertices: &[Vector], polygons: impl Iterator<Item = Vec<i64>>) -> Result<Vec<Triangle>, MeshError> {
     let mut triangles = Vec::new();
     for (face, polygon) in polygons.enumerate() {
         let corner = |index: i64| {

@@ -1,9 +1,9 @@
-//! Wavefront OBJ: its `v` and `f` statements; all else (normals, textures, groups, materials) says nothing of surfaces.
+//! Wavefront OBJ: `v` and `f` statements; others (normals, textures, groups, materials) are ignored.
 
-use super::{MeshError, Triangle, fans};
+use super::{MeshError, Triangle, triangulate};
 use crate::geometry::Vector;
 
-/// The triangles of an OBJ file; polygons are cut into fans.
+/// The triangles of an OBJ file; polygons are split into fans.
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
     let text = std::str::from_utf8(bytes).map_err(|error| malformed(error.to_string()))?;
     let (mut vertices, mut polygons) = (Vec::new(), Vec::new());
@@ -23,14 +23,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
             _ => {}
         }
     }
-    fans(&vertices, polygons.into_iter())
+    triangulate(&vertices, polygons.into_iter())
 }
 
 fn malformed(problem: String) -> MeshError {
     MeshError::Malformed { format: "OBJ", problem }
 }
 
-/// Each line without its comment and with the number it has in the file; a backslash at its end joins it to the next.
+/// Lines without comments, with their line numbers; a backslash at the end joins a line to the next.
 fn statements(text: &str) -> impl Iterator<Item = (usize, String)> {
     let mut lines = text.lines().zip(1..);
     std::iter::from_fn(move || {
@@ -45,13 +45,14 @@ fn statements(text: &str) -> impl Iterator<Item = (usize, String)> {
     })
 }
 
-/// The first three numbers; a weight or a colour may follow.
+/// The first three numbers; a weight or a colour can follow.
 fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Vector> {
     let mut number = || words.next()?.parse().ok();
     Some(Vector::new(number()?, number()?, number()?))
 }
 
-/// The vertex of a corner, from 0: a positive index counts from 1, a negative one back from the last vertex read.
+/// Vertex index of a corner, from 0. In the file a positive index starts at 1, a negative one counts back from the last
+/// vertex.
 fn corner(word: &str, vertices: usize) -> Option<i64> {
     let index: i64 = word.split('/').next()?.parse().ok()?;
     match index {

@@ -1,12 +1,12 @@
 //! PLY, ASCII and binary: the elements `vertex` (x, y, z) and `face` (`vertex_indices` or `vertex_index`).
 
-use super::{MeshError, Triangle, fans};
+use super::{MeshError, Triangle, triangulate};
 use crate::geometry::Vector;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
 use std::io::BufRead;
 
-/// The triangles of a PLY file; polygons are cut into fans.
+/// The triangles of a PLY file; polygons are split into fans.
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
     let mut reader = Reader::new(bytes);
     let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(malformed)?;
@@ -21,16 +21,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
     }
     let missing = |name: &str| MeshError::Malformed { format: "PLY", problem: format!("it has no element `{name}`") };
     let vertices: Vec<Vector> = vertices.ok_or_else(|| missing("vertex"))?.into_iter().map(|vertex| vertex.0).collect();
-    fans(&vertices, faces.ok_or_else(|| missing("face"))?.into_iter().map(|face| face.0))
+    triangulate(&vertices, faces.ok_or_else(|| missing("face"))?.into_iter().map(|face| face.0))
 }
 
-/// An element takes at least a byte: a larger count is a lie, and would be read for long.
+/// An element has at least one byte, so a larger count is wrong, and parsing it would take long.
 fn check_count(element: &ElementDef, bytes: usize) -> Result<(), MeshError> {
     if element.count <= bytes && !element.properties.is_empty() {
         return Ok(());
     }
-    let said = format!("{} of `{}` with {} properties", element.count, element.name, element.properties.len());
-    Err(MeshError::Lies { said, found: format!("{bytes} bytes") })
+    let declared = format!("{} of `{}` with {} properties", element.count, element.name, element.properties.len());
+    Err(MeshError::CountMismatch { declared, found: format!("{bytes} bytes") })
 }
 
 fn read<E: PropertyAccess, B: BufRead>(
@@ -43,7 +43,7 @@ fn read<E: PropertyAccess, B: BufRead>(
 
 #[expect(clippy::needless_pass_by_value, reason = "it is handed to map_err")]
 fn malformed(error: ParseError) -> MeshError {
-    // The parser's message quotes the line it stumbled over, which may be all of a binary file.
+    // The message of the parser quotes the failing line, which may be an entire binary file.
     let first = error.to_string().lines().next().unwrap_or_default().chars().take(200).collect();
     MeshError::Malformed { format: "PLY", problem: first }
 }
@@ -54,7 +54,7 @@ struct Skipped;
 
 impl PropertyAccess for Vertex {
     fn new() -> Self {
-        // What the file does not give stays NaN, which the check of the corners finds.
+        // A missing coordinate stays NaN, which the check of the corners detects.
         Self(Vector::repeat(f64::NAN))
     }
 

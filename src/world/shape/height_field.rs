@@ -1,27 +1,27 @@
-use super::{MAX_DIVISIONS, Triangle, within};
+use super::{MAX_DIVISIONS, Triangle, check_count};
 use crate::geometry::Vector;
 use crate::random::{Seed, Stream};
 use crate::spec::checked;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-/// The heights of a height field.
+/// Heights of a height field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum HeightsSpec {
-    /// Given, m: rows along x, from the lowest y to the highest; at least 2 x 2.
+    /// Given heights, m: rows along x, in order of y; at least 2 x 2.
     Grid(Vec<Vec<f64>>),
-    /// Rolling ground from a seed: smooth noise, three octaves, each of half the length and half the height of the one
-    /// before.
+    /// Random rolling terrain: smooth noise in three octaves, each with half the wavelength and half the height of the
+    /// previous one.
     Rolling {
-        /// The seed. It belongs to the scene: every run sees the same ground.
+        /// Random seed. It belongs to the scene, so all runs have the same terrain.
         seed: u64,
         /// Number of cells along x and y.
         cells: [usize; 2],
-        /// Greatest height of the first octave above and below zero, m.
+        /// Maximum height of the first octave above and below zero, m.
         #[serde(with = "checked::NonNegative")]
         amplitude_m: f64,
-        /// Length of the first octave, m.
+        /// Wavelength of the first octave, m.
         #[serde(with = "checked::Positive")]
         wavelength_m: f64,
     },
@@ -29,10 +29,10 @@ pub enum HeightsSpec {
 
 const OCTAVES: u32 = 3;
 
-/// Most cells of a field that is drawn from a seed.
+/// Maximum number of cells of a random field: bounds time and memory.
 const MAX_CELLS: usize = 4_000_000;
 
-/// Two triangles a cell, facing up.
+/// Two triangles per cell, facing up.
 pub(super) fn triangles(size_m: [f64; 2], heights: &HeightsSpec) -> Result<Vec<Triangle>, (&'static str, String)> {
     let rows = match heights {
         HeightsSpec::Grid(rows) => {
@@ -40,8 +40,8 @@ pub(super) fn triangles(size_m: [f64; 2], heights: &HeightsSpec) -> Result<Vec<T
             rows.clone()
         }
         HeightsSpec::Rolling { seed, cells: [columns, rows], amplitude_m, wavelength_m } => {
-            within("cells", *columns, 1)?;
-            within("cells", *rows, 1)?;
+            check_count("cells", *columns, 1)?;
+            check_count("cells", *rows, 1)?;
             if columns * rows > MAX_CELLS {
                 return Err(("cells", format!("{columns} x {rows} cells are more than {MAX_CELLS}")));
             }
@@ -67,8 +67,8 @@ fn check_grid(rows: &[Vec<f64>]) -> Result<(), (&'static str, String)> {
     if rows.len() < 2 || columns < 2 {
         return Err(("Grid", format!("the grid has {} rows of {columns}; it needs at least 2 x 2", rows.len())));
     }
-    within("Grid", rows.len(), 2)?;
-    within("Grid", columns, 2)?;
+    check_count("Grid", rows.len(), 2)?;
+    check_count("Grid", columns, 2)?;
     if let Some((index, row)) = rows.iter().enumerate().find(|(_, row)| row.len() != columns) {
         let message = format!("row {} of the grid has {} heights, the first has {columns}", index + 1, row.len());
         return Err(("Grid", message));
@@ -79,7 +79,7 @@ fn check_grid(rows: &[Vec<f64>]) -> Result<(), (&'static str, String)> {
     }
 }
 
-/// Value noise: heights drawn at the nodes of a lattice, joined by smoothstep.
+/// Value noise: random heights at the nodes of a lattice, interpolated by smoothstep.
 struct Noise {
     seed: Seed,
     amplitude: f64,
@@ -115,7 +115,7 @@ impl Lattice {
     fn draw(mut stream: Stream, size: [f64; 2], spacing: f64) -> Result<Self, (&'static str, String)> {
         let nodes = size.map(|extent| (extent / spacing).ceil() + 2.0);
         if nodes.iter().any(|n| *n > MAX_DIVISIONS as f64) {
-            let message = format!("`wavelength_m` is too short for ground of {} x {} m", size[0], size[1]);
+            let message = format!("`wavelength_m` is too short for terrain of {} x {} m", size[0], size[1]);
             return Err(("wavelength_m", message));
         }
         let [columns, rows] = nodes.map(|n| n as usize);
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ragged_or_tiny_grid_is_refused() {
+    fn a_ragged_or_tiny_grid_is_rejected() {
         for rows in [vec![], vec![vec![1.0, 2.0]], vec![vec![1.0, 2.0], vec![1.0]], vec![vec![1.0, f64::NAN]; 2]] {
             assert_eq!(triangles([1.0, 1.0], &HeightsSpec::Grid(rows)).unwrap_err().0, "Grid");
         }

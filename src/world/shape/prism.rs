@@ -1,9 +1,9 @@
-//! Boxes, cylinders, stairs: closed surfaces whose triangles face outwards.
+//! Boxes, cylinders and stairs: closed surfaces with outward faces.
 
 use super::{Triangle, parallelogram};
 use crate::geometry::Vector;
 
-/// The box from `corner` along `size`.
+/// The box with edges along the axes from `corner`, of size `size`.
 pub(super) fn cuboid(corner: Vector, size: Vector) -> Vec<Triangle> {
     let (x, y, z) = (Vector::x() * size.x, Vector::y() * size.y, Vector::z() * size.z);
     let faces = [
@@ -17,7 +17,7 @@ pub(super) fn cuboid(corner: Vector, size: Vector) -> Vec<Triangle> {
     faces.concat()
 }
 
-/// The prism about z over a regular polygon of `sides` corners at `radius`.
+/// The prism about z over a regular polygon with `sides` corners at `radius`.
 pub(super) fn cylinder(radius: f64, height: f64, sides: usize) -> Vec<Triangle> {
     let corner = |k: usize| {
         let angle = std::f64::consts::TAU * (k % sides) as f64 / sides as f64;
@@ -32,8 +32,8 @@ pub(super) fn cylinder(radius: f64, height: f64, sides: usize) -> Vec<Triangle> 
     (0..sides).flat_map(side).collect()
 }
 
-/// A flight of `steps` that climbs along x; `step` is tread, width, rise. Its underside is `slab` below the inner edges
-/// of the steps, along the slope, or at z = 0 for a slab of 0.
+/// A flight of `steps` that climbs along x; `step` is tread, width, rise. The soffit is `slab` below the inner edges of
+/// the steps, sloped; at z = 0 for a slab of 0.
 pub(super) fn stairs(steps: usize, step: Vector, slab: f64) -> Vec<Triangle> {
     let across = Vector::y() * step.y;
     let at = |k: usize, height: f64| Vector::new(k as f64 * step.x, -step.y / 2.0, height);

@@ -3,25 +3,25 @@ use crate::geometry::Vector;
 use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
-/// A doorway or a window in a wall: a rectangle that is cut out.
+/// A doorway or a window: a rectangular opening in a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OpeningSpec {
-    /// Where it begins along the wall, m.
+    /// Start along the wall, m.
     #[serde(with = "checked::NonNegative")]
     pub from_m: f64,
-    /// Where it ends along the wall, m.
+    /// End along the wall, m.
     #[serde(with = "checked::Positive")]
     pub to_m: f64,
-    /// Height of its lower edge, m: 0, and unless told, for a doorway.
+    /// Height of the sill, m. Default: 0, a doorway.
     #[serde(default, with = "checked::NonNegative")]
     pub sill_m: f64,
-    /// Height of its upper edge, m.
+    /// Height of the head, m.
     #[serde(with = "checked::Positive")]
     pub head_m: f64,
 }
 
-/// The outer faces of a wall of `size` (length, thickness, height), and the reveals of its openings.
+/// The outer faces of a wall of `size` (length, thickness, height), and the reveals of the openings.
 pub(super) fn triangles(size: Vector, openings: &[OpeningSpec]) -> Result<Vec<Triangle>, String> {
     check(size, openings)?;
     let mut faces = Faces { thickness: size.y, triangles: Vec::new() };
@@ -53,12 +53,12 @@ pub(super) fn triangles(size: Vector, openings: &[OpeningSpec]) -> Result<Vec<Tr
     Ok(faces.triangles)
 }
 
-/// Openings lie within the wall, each beyond the last.
+/// Checks that the openings are within the wall, in order, and do not overlap.
 fn check(size: Vector, openings: &[OpeningSpec]) -> Result<(), String> {
     let mut done = 0.0;
     for OpeningSpec { from_m, to_m, sill_m, head_m } in openings {
         if *from_m < done {
-            return Err(format!("the opening from {from_m} m begins before the one ahead of it ends, at {done} m"));
+            return Err(format!("the opening from {from_m} m begins before the previous one ends, at {done} m"));
         }
         if to_m <= from_m || head_m <= sill_m {
             return Err(format!("the opening from {from_m} to {to_m} m, {sill_m} to {head_m} m high, has no area"));
@@ -86,24 +86,24 @@ impl Faces {
         }
     }
 
-    /// The two sides of a piece of the wall.
+    /// The two sides of a part of the wall.
     fn panel(&mut self, [x0, x1]: [f64; 2], [z0, z1]: [f64; 2]) {
         let (along, up) = (Vector::x() * (x1 - x0), Vector::z() * (z1 - z0));
         self.push(Vector::new(x0, -self.thickness / 2.0, z0), along, up);
         self.push(Vector::new(x0, self.thickness / 2.0, z0), up, along);
     }
 
-    /// A face that looks up.
+    /// A face that points up.
     fn floor(&mut self, [x0, x1]: [f64; 2], z: f64) {
         self.push(Vector::new(x0, -self.thickness / 2.0, z), Vector::x() * (x1 - x0), Vector::y() * self.thickness);
     }
 
-    /// A face that looks down.
+    /// A face that points down.
     fn ceiling(&mut self, [x0, x1]: [f64; 2], z: f64) {
         self.push(Vector::new(x0, -self.thickness / 2.0, z), Vector::y() * self.thickness, Vector::x() * (x1 - x0));
     }
 
-    /// A face across the wall that looks along x, or against it.
+    /// A face across the wall that points along x, or against it.
     fn end(&mut self, x: f64, [z0, z1]: [f64; 2], along_x: bool) {
         let (across, up) = (Vector::y() * self.thickness, Vector::z() * (z1 - z0));
         let (u, v) = if along_x { (across, up) } else { (up, across) };

@@ -1,6 +1,6 @@
-//! What a point's fields are, and how its time is told.
+//! Fields of a point, and the encoding of the time field.
 
-use super::unit::Unit;
+use super::time_unit::TimeUnit;
 use crate::time::{NANOS_PER_SECOND, Span, Stamp};
 
 /// `PointField.UINT32`.
@@ -10,35 +10,35 @@ pub const FLOAT32: u8 = 7;
 /// `PointField.FLOAT64`.
 const FLOAT64: u8 = 8;
 
-/// Names under which makers keep a point's time, the first one that is there is taken.
+/// Names of the time field in drivers, in order of priority.
 const TIME_NAMES: [&str; 7] = ["t", "time", "timestamp", "offset_time", "time_stamp", "time_offset", "time_offset_ns"];
 
-/// Instants that are farther than this from their cloud's stamp are of another clock.
-const SAME_CLOCK_S: f64 = 1.0;
+/// Absolute times that differ by more than this from their cloud's stamp are on another clock, s.
+const MAX_CLOCK_DIFFERENCE_S: f64 = 1.0;
 
-/// A cloud of another clock's instants lasts at most this, s.
-const LONGEST_CLOUD_S: f64 = 1.5;
+/// Maximum duration of a cloud with times of another clock, s.
+const MAX_CLOUD_S: f64 = 1.5;
 
-/// And it lasts so many times less than that clock has run.
-const FAR_FROM_ZERO: f64 = 20.0;
+/// Minimum ratio of the time on another clock to the duration of the cloud.
+const MIN_UPTIME_RATIO: f64 = 20.0;
 
-/// Longest time from a cloud's stamp to a point of it: beyond, the time is not what its field's name says.
-const LONGEST_S: f64 = 60.0;
+/// Maximum time between a point and its cloud's stamp, s: larger values are not a point's time.
+const MAX_OFFSET_S: f64 = 60.0;
 
-/// How far from a cloud's stamp the nearest of its points may be told, when points lie close together.
-const SLACK_S: f64 = 1e-3;
+/// Tolerance between a cloud's stamp and the nearest point, s, for clouds of short duration.
+const TOLERANCE_S: f64 = 1e-3;
 
-/// Greatest relative time that is taken for seconds; a frame of a lidar is shorter.
-const MOST_SECONDS: f64 = 10.0;
+/// Maximum relative time that is interpreted as seconds; a lidar frame is shorter.
+const MAX_RELATIVE_S: f64 = 10.0;
 
-/// A number within each point.
+/// Numeric field of each point.
 #[derive(Debug, Clone, Copy)]
 pub struct Field<'a> {
-    /// Its name.
+    /// Field name.
     pub name: &'a str,
-    /// Where it begins, bytes into the point.
+    /// Offset in the point, bytes.
     pub offset: usize,
-    /// Its type, as `PointField` counts them.
+    /// Data type, in the codes of `PointField`.
     pub kind: u8,
 }
 
@@ -52,29 +52,29 @@ impl Field<'_> {
         }
     }
 
-    /// Whether it is of a known type and lies within a point of `step` bytes.
+    /// Whether the type is known and it fits into a point of `step` bytes.
     pub fn fits(&self, step: usize) -> bool {
         (1..=8).contains(&self.kind) && self.offset.checked_add(self.size()).is_some_and(|end| end <= step)
     }
 
-    /// Its value in a point, exact for every type but the largest doubles' use.
+    /// Value in a point, as a 64-bit float.
     pub fn number(&self, point: &[u8], big_endian: bool) -> f64 {
         let bytes = &point[self.offset..];
         match self.kind {
             1 => f64::from(bytes[0].cast_signed()),
             2 => f64::from(bytes[0]),
-            3 => f64::from(u16::from_le_bytes(ordered(bytes, big_endian)).cast_signed()),
-            4 => f64::from(u16::from_le_bytes(ordered(bytes, big_endian))),
-            5 => f64::from(u32::from_le_bytes(ordered(bytes, big_endian)).cast_signed()),
-            UINT32 => f64::from(u32::from_le_bytes(ordered(bytes, big_endian))),
-            FLOAT32 => f64::from(f32::from_le_bytes(ordered(bytes, big_endian))),
-            _ => f64::from_le_bytes(ordered(bytes, big_endian)),
+            3 => f64::from(u16::from_le_bytes(little_endian(bytes, big_endian)).cast_signed()),
+            4 => f64::from(u16::from_le_bytes(little_endian(bytes, big_endian))),
+            5 => f64::from(u32::from_le_bytes(little_endian(bytes, big_endian)).cast_signed()),
+            UINT32 => f64::from(u32::from_le_bytes(little_endian(bytes, big_endian))),
+            FLOAT32 => f64::from(f32::from_le_bytes(little_endian(bytes, big_endian))),
+            _ => f64::from_le_bytes(little_endian(bytes, big_endian)),
         }
     }
 }
 
-/// The first `N` bytes, least significant first. Fields are checked to fit before a point is read.
-fn ordered<const N: usize>(bytes: &[u8], big_endian: bool) -> [u8; N] {
+/// The first `N` bytes in little-endian order. The caller has checked that the field fits.
+fn little_endian<const N: usize>(bytes: &[u8], big_endian: bool) -> [u8; N] {
     let mut word = [0; N];
     word.copy_from_slice(&bytes[..N]);
     if big_endian {
@@ -83,84 +83,88 @@ fn ordered<const N: usize>(bytes: &[u8], big_endian: bool) -> [u8; N] {
     word
 }
 
-/// What a field's number means.
+/// Encoding of a time field.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Meaning {
+enum TimeEncoding {
     /// Time after the cloud's stamp.
-    AfterStamp(Unit),
-    /// An instant, counted in this many parts of a second.
-    Instant(f64),
-    /// An instant of another clock than the stamp's, after the cloud's first one.
-    OfOtherClock {
-        /// Counted in this many parts of a second.
-        parts: f64,
-        /// The first one.
+    AfterStamp(TimeUnit),
+    /// Absolute time, in this fraction of a second (1e9: nanoseconds).
+    Absolute(f64),
+    /// Absolute time of another clock than the stamp's; converted to the time after the cloud's first point.
+    OtherClock {
+        /// Units per second.
+        per_second: f64,
+        /// Earliest value in the cloud.
         first: f64,
     },
 }
 
-/// The field that tells a point's time, and how to read it.
+/// Time field of the points and the encoding.
 pub struct TimeField<'a> {
     field: Field<'a>,
-    meaning: Meaning,
+    encoding: TimeEncoding,
 }
 
 impl<'a> TimeField<'a> {
-    /// The time field among `fields`.
+    /// Finds the time field among `fields`.
     pub fn find(fields: &[Field<'a>]) -> Option<Self> {
         let field = TIME_NAMES.iter().find_map(|name| fields.iter().find(|field| field.name == *name))?;
-        Some(Self { field: *field, meaning: Meaning::AfterStamp(Unit::NANOSECOND) })
+        Some(Self { field: *field, encoding: TimeEncoding::AfterStamp(TimeUnit::NANOSECOND) })
     }
 
-    /// Learns from a cloud's numbers what they mean. Integers are nanoseconds after the stamp. Floats are instants
-    /// where they lie as near the stamp as they lie to each other (in seconds, microseconds or nanoseconds), and not as
-    /// near to zero; else seconds after the stamp while they are at most 10, as a frame is shorter; else instants where
-    /// they lie near the stamp at all; else instants of another clock where they lie far closer to each other than to
-    /// zero; else nanoseconds after it.
-    pub fn learn<'p>(&mut self, stamp: Stamp, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) {
+    /// Detects the encoding from the values of a cloud.
+    ///
+    /// Integers are nanoseconds after the stamp. For floats the first rule that applies is used: absolute times (s, us
+    /// or ns) if they are as near to the stamp as to each other, and not as near to zero; seconds after the stamp if
+    /// they are at most 10, since a frame is shorter; absolute times if they are within 1 s of the stamp; absolute
+    /// times of another clock if their spread is much smaller than their value; else nanoseconds after the stamp.
+    pub fn detect_encoding<'p>(&mut self, stamp: Stamp, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) {
         if self.field.kind < FLOAT32 {
             return;
         }
-        let (least, most) = self.range(points, big_endian);
+        let (min, max) = self.range(points, big_endian);
         let stamp_s = stamp.nanos() as f64 / NANOS_PER_SECOND as f64;
-        // Whether all lie within `reach_s` of `centre_s`, counted in `parts` of a second.
-        let within = |centre_s: f64, parts: f64, reach_s: f64| {
-            least / parts >= centre_s - reach_s && most / parts <= centre_s + reach_s
+        // Whether all values are within `reach_s` of `centre_s`, at `per_second` units per second.
+        let within = |centre_s: f64, per_second: f64, reach_s: f64| {
+            min / per_second >= centre_s - reach_s && max / per_second <= centre_s + reach_s
         };
-        let spread = |parts: f64| (most - least) / parts + SLACK_S;
-        let instant = |reach: &dyn Fn(f64) -> f64| {
-            [1.0, 1e6, 1e9].into_iter().find(|parts| within(stamp_s, *parts, reach(*parts))).map(Meaning::Instant)
+        let spread = |per_second: f64| (max - min) / per_second + TOLERANCE_S;
+        let absolute = |reach: &dyn Fn(f64) -> f64| {
+            [1.0, 1e6, 1e9]
+                .into_iter()
+                .find(|per_second| within(stamp_s, *per_second, reach(*per_second)))
+                .map(TimeEncoding::Absolute)
         };
-        let tight = if within(0.0, 1.0, spread(1.0)) { None } else { instant(&spread) };
-        let seconds = (least >= -MOST_SECONDS && most <= MOST_SECONDS).then_some(Meaning::AfterStamp(Unit::SECOND));
-        let loose = || instant(&|_| SAME_CLOCK_S);
-        let other_clock = || Self::of_other_clock(least, most);
+        let tight = if within(0.0, 1.0, spread(1.0)) { None } else { absolute(&spread) };
+        let seconds =
+            (min >= -MAX_RELATIVE_S && max <= MAX_RELATIVE_S).then_some(TimeEncoding::AfterStamp(TimeUnit::SECOND));
+        let loose = || absolute(&|_| MAX_CLOCK_DIFFERENCE_S);
+        let other_clock = || Self::detect_other_clock(min, max);
         let found = tight.or(seconds).or_else(loose).or_else(other_clock);
-        self.meaning = found.unwrap_or(Meaning::AfterStamp(Unit::NANOSECOND));
+        self.encoding = found.unwrap_or(TimeEncoding::AfterStamp(TimeUnit::NANOSECOND));
     }
 
-    fn of_other_clock(least: f64, most: f64) -> Option<Meaning> {
-        let is_cloud = |parts: &f64| (most - least) / parts <= LONGEST_CLOUD_S;
-        let parts = [1.0, 1e3, 1e6, 1e9].into_iter().find(is_cloud)?;
-        (least > FAR_FROM_ZERO * (most - least)).then_some(Meaning::OfOtherClock { parts, first: least })
+    fn detect_other_clock(min: f64, max: f64) -> Option<TimeEncoding> {
+        let is_cloud = |per_second: &f64| (max - min) / per_second <= MAX_CLOUD_S;
+        let per_second = [1.0, 1e3, 1e6, 1e9].into_iter().find(is_cloud)?;
+        (min > MIN_UPTIME_RATIO * (max - min)).then_some(TimeEncoding::OtherClock { per_second, first: min })
     }
 
-    /// Whether points tell instants of another clock than the stamp's.
-    pub fn is_of_other_clock(&self) -> bool {
-        matches!(self.meaning, Meaning::OfOtherClock { .. })
+    /// Whether the point times are absolute times of another clock than the stamp's.
+    pub fn is_other_clock(&self) -> bool {
+        matches!(self.encoding, TimeEncoding::OtherClock { .. })
     }
 
-    /// Takes a point's number for so much time after the stamp.
-    pub fn count_in(&mut self, unit: Unit) {
-        self.meaning = Meaning::AfterStamp(unit);
+    /// Interprets the values as times after the stamp in the given unit.
+    pub fn set_unit(&mut self, unit: TimeUnit) {
+        self.encoding = TimeEncoding::AfterStamp(unit);
     }
 
-    /// From the least of a cloud's numbers to the greatest, and the same in seconds; `None` where they are instants, or
-    /// there are none.
+    /// Spread of a cloud's values, and the same in seconds; `None` if they are absolute times, or there are none.
     pub fn spread<'p>(&self, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) -> Option<(f64, f64)> {
-        let Meaning::AfterStamp(unit) = self.meaning else { return None };
-        let (least, most) = self.range(points, big_endian);
-        Some((most - least, (most - least) / unit.in_a_second())).filter(|spread| spread.0.is_finite())
+        let TimeEncoding::AfterStamp(unit) = self.encoding else { return None };
+        let (min, max) = self.range(points, big_endian);
+        Some((max - min, (max - min) / unit.per_second())).filter(|spread| spread.0.is_finite())
     }
 
     fn range<'p>(&self, points: impl Iterator<Item = &'p [u8]>, big_endian: bool) -> (f64, f64) {
@@ -168,22 +172,22 @@ impl<'a> TimeField<'a> {
         numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
     }
 
-    /// A point's time after the stamp; `None` where it is not finite or too far from it.
+    /// Time of a point after the stamp; `None` if it is not finite or too far from the stamp.
     pub fn offset(&self, stamp: Stamp, point: &[u8], big_endian: bool) -> Option<Span> {
         let number = self.field.number(point, big_endian);
-        let offset = match self.meaning {
-            Meaning::AfterStamp(Unit::NANOSECOND) => Span::from_nanos(number.round() as i64),
-            Meaning::AfterStamp(unit) => Span::from_seconds(number / unit.in_a_second()),
-            // Whole and fractional seconds apart: their product in nanoseconds is beyond a double's 53 bits.
-            Meaning::Instant(parts) => {
-                let whole = (number / parts).floor();
-                let part = (number - whole * parts) / parts;
-                let instant =
+        let offset = match self.encoding {
+            TimeEncoding::AfterStamp(TimeUnit::NANOSECOND) => Span::from_nanos(number.round() as i64),
+            TimeEncoding::AfterStamp(unit) => Span::from_seconds(number / unit.per_second()),
+            // Whole and fractional seconds separately: nanoseconds since 1970 exceed the 53 bits of a double.
+            TimeEncoding::Absolute(per_second) => {
+                let whole = (number / per_second).floor();
+                let part = (number - whole * per_second) / per_second;
+                let absolute =
                     Stamp::from_nanos((whole as i64).saturating_mul(NANOS_PER_SECOND)) + Span::from_seconds(part);
-                instant - stamp
+                absolute - stamp
             }
-            Meaning::OfOtherClock { parts, first } => Span::from_seconds((number - first) / parts),
+            TimeEncoding::OtherClock { per_second, first } => Span::from_seconds((number - first) / per_second),
         };
-        (number.is_finite() && offset.seconds().abs() <= LONGEST_S).then_some(offset)
+        (number.is_finite() && offset.seconds().abs() <= MAX_OFFSET_S).then_some(offset)
     }
 }

@@ -1,19 +1,19 @@
-//! Springs that can be bought, as CSV: `name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material`.
+//! Catalogue of available springs, as CSV: `name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material`.
 
 use super::CoilDesign;
 use crate::elasticity::Material;
 use crate::spec::{Source, SpecError};
 use std::path::Path;
 
-/// The catalogue that is built in: `specs/springs/catalogue.csv`.
+/// The built-in catalogue: `specs/springs/catalogue.csv`.
 pub const STOCK: &str = include_str!("../../../../specs/springs/catalogue.csv");
 
 const HEADER: &str = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material";
 
-/// The springs of the catalogue `name`: a CSV file, or `"stock"`.
+/// Reads the catalogue `name`: a CSV file, or `"stock"` for the built-in one.
 ///
 /// # Errors
-/// When it cannot be read, or a line is no spring's; the error has the line.
+/// When the file cannot be read or a line is invalid; the error has the line number.
 pub fn catalogue(name: &str) -> Result<Vec<CoilDesign>, SpecError> {
     let source = match name {
         "stock" => Source::in_memory("specs/springs/catalogue.csv (built in)", STOCK),
@@ -23,19 +23,24 @@ pub fn catalogue(name: &str) -> Result<Vec<CoilDesign>, SpecError> {
     let mut lines = lines.map(|(index, line)| (index + 1, line.trim()));
     match lines.next() {
         Some((_, HEADER)) => {}
-        _ => return Err(SpecError::plain(&source.name, format!("a catalogue of springs begins with \"{HEADER}\""))),
+        _ => {
+            return Err(SpecError::plain(
+                &source.name,
+                format!("the first line of a spring catalogue must be \"{HEADER}\""),
+            ));
+        }
     }
-    lines.map(|(number, line)| spring(line).map_err(|what| fault(&source, number, &what))).collect()
+    lines.map(|(number, line)| spring(line).map_err(|problem| line_error(&source, number, &problem))).collect()
 }
 
-fn fault(source: &Source, line: usize, what: &str) -> SpecError {
-    SpecError::plain(&source.name, format!("line {line}: {what}"))
+fn line_error(source: &Source, line: usize, problem: &str) -> SpecError {
+    SpecError::plain(&source.name, format!("line {line}: {problem}"))
 }
 
 fn spring(line: &str) -> Result<CoilDesign, String> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
     let [name, coil, wire, coils, length, material] = fields[..] else {
-        return Err(format!("{} fields where a spring has 6", fields.len()));
+        return Err(format!("found {} fields, expected 6", fields.len()));
     };
     let number = |text: &str| match text.parse::<f64>() {
         Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
@@ -61,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_spring_in_stock_can_be_wound() {
+    fn every_spring_of_the_built_in_catalogue_is_valid() {
         let springs = catalogue("stock").unwrap();
         assert!(springs.len() > 100);
         for spring in springs {
@@ -70,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_line_is_named() {
+    fn the_error_of_an_invalid_line_has_its_number() {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), format!("{HEADER}\na,25,3,12,120,spring_steel\nb,25,-3,12,120,stainless\n"))
             .unwrap();

@@ -1,10 +1,10 @@
-//! The search for a spring.
+//! Multi-objective search for a spring.
 //!
-//! A design in the space (a coil's geometry within bounds, or the springs of a catalogue) is judged by its closed form
-//! in a fraction of a millisecond. A catalogue is tried through. A geometry is sampled evenly first; then CMA-ES
-//! (Hansen 2016, crate `cmaes`) descends on the goals weighed in several ways (Chebyshev's scalarisation, so that
-//! hollow fronts are found too), and whatever it meets is kept. What no other design beats in every goal is the Pareto
-//! set; some of it, spread evenly, is verified by a full simulation each.
+//! The design space is the geometry of a coil within bounds, or a catalogue of springs. A design is evaluated in closed
+//! form, in less than 1 ms. A catalogue is evaluated exhaustively. A geometry is sampled uniformly first; then several
+//! runs of CMA-ES (Hansen 2016, crate `cmaes`) minimise the goals with different weights. The scalarisation is that of
+//! Chebyshev, which also finds concave fronts. The Pareto set is taken from all evaluated designs; an evenly distributed
+//! selection of it is verified by full simulations.
 
 mod catalogue;
 mod output;
@@ -15,5 +15,5 @@ mod spec;
 pub use catalogue::{STOCK, catalogue};
 pub use output::{csv, pareto_figure};
 pub use pareto::{pareto_set, spread};
-pub use search::{Candidate, DesignStudy, Search, Verified};
-pub use spec::{Aim, CoilDesign, DesignSpec, FigureName, GoalSpec, LimitSpec, SpaceSpec};
+pub use search::{Candidate, DesignSearch, DesignStudy, VerifiedDesign};
+pub use spec::{Aim, CoilDesign, DesignMetric, DesignSpec, GoalSpec, LimitSpec, SpaceSpec};

@@ -1,26 +1,29 @@
-//! What nothing else beats.
+//! Pareto set, and an evenly distributed selection of it.
 
-/// The indices of the points that no other beats: none is at most as costly in every goal and less so in one. In the
-/// order of their first cost.
+/// Returns the indices of the Pareto-optimal points, in the order of the first cost.
+///
+/// Point a dominates point b if no cost of a is higher and at least one is lower. Of equal points, one is returned.
 pub fn pareto_set(costs: &[Vec<f64>]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
-    // After a sort by all costs in turn a point can only be beaten by those before it.
+    // In lexicographic order, a point can be dominated only by earlier points.
     order.sort_by(|a, b| {
         let pairs = costs[*a].iter().zip(&costs[*b]);
         pairs.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(a.cmp(b))
     });
     let mut front: Vec<usize> = Vec::new();
     for index in order {
-        let beats = |other: &usize| costs[*other].iter().zip(&costs[index]).all(|(theirs, mine)| theirs <= mine);
-        if !front.iter().any(beats) {
+        let dominates = |other: &usize| costs[*other].iter().zip(&costs[index]).all(|(a, b)| a <= b);
+        if !front.iter().any(dominates) {
             front.push(index);
         }
     }
     front
 }
 
-/// At most `count` of `points`, spread evenly: the best in each goal, then whatever is farthest from those chosen,
-/// costs being scaled to their ranges. Indices, in rising order.
+/// Selects at most `count` evenly distributed points; returns their indices in ascending order.
+///
+/// The selection starts with the best point of each goal, then adds the point most distant from the selected ones.
+/// Costs are scaled by their ranges.
 pub fn spread(points: &[Vec<f64>], count: usize) -> Vec<usize> {
     if points.len() <= count {
         return (0..points.len()).collect();
@@ -32,7 +35,7 @@ pub fn spread(points: &[Vec<f64>], count: usize) -> Vec<usize> {
         f64::max(high - low, f64::MIN_POSITIVE)
     };
     let ranges: Vec<f64> = (0..goals).map(range).collect();
-    let apart =
+    let distance2 =
         |a: usize, b: usize| -> f64 { (0..goals).map(|k| ((points[a][k] - points[b][k]) / ranges[k]).powi(2)).sum() };
     let mut chosen: Vec<usize> = Vec::new();
     for k in 0..goals {
@@ -40,12 +43,12 @@ pub fn spread(points: &[Vec<f64>], count: usize) -> Vec<usize> {
         chosen.extend(best.filter(|best| !chosen.contains(best) && chosen.len() < count));
     }
     let mut nearest: Vec<f64> =
-        (0..points.len()).map(|p| chosen.iter().map(|c| apart(p, *c)).fold(f64::INFINITY, f64::min)).collect();
+        (0..points.len()).map(|p| chosen.iter().map(|c| distance2(p, *c)).fold(f64::INFINITY, f64::min)).collect();
     while chosen.len() < count {
         let Some(next) = (0..points.len()).max_by(|a, b| nearest[*a].total_cmp(&nearest[*b])) else { break };
         chosen.push(next);
-        for (p, least) in nearest.iter_mut().enumerate() {
-            *least = least.min(apart(p, next));
+        for (p, distance) in nearest.iter_mut().enumerate() {
+            *distance = distance.min(distance2(p, next));
         }
     }
     chosen.sort_unstable();
@@ -57,14 +60,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn beaten_points_and_twins_are_left_out() {
+    fn dominated_and_duplicate_points_are_excluded() {
         let costs = [[1.0, 3.0], [2.0, 2.0], [2.0, 2.0], [3.0, 2.5], [3.0, 1.0], [0.5, 9.0]].map(|c| c.to_vec());
         assert_eq!(pareto_set(&costs), [5, 0, 1, 4]);
         assert!(pareto_set(&[]).is_empty());
     }
 
     #[test]
-    fn a_spread_keeps_the_ends_and_leaves_even_gaps() {
+    fn a_spread_has_both_ends_and_equal_gaps() {
         let line: Vec<Vec<f64>> = (0..=100).map(|k| vec![f64::from(k), 100.0 - f64::from(k)]).collect();
         assert_eq!(spread(&line, 5), [0, 25, 50, 75, 100]);
         assert_eq!(spread(&line[..3], 5), [0, 1, 2]);

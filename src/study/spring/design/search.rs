@@ -1,4 +1,4 @@
-//! Trying designs, keeping the best, verifying them.
+//! Search: evaluation of designs, Pareto set and verification.
 
 use super::{CoilDesign, DesignSpec, SpaceSpec, catalogue, pareto_set, spread};
 use crate::dynamics::{self, HeadSpec, LinkageSpec};
@@ -7,7 +7,7 @@ use crate::random::{Seed, Stream};
 use crate::sensors::Lidar;
 use crate::spec::{Kind, Source, SpecError, find, parse};
 use crate::study::coverage::CoveragePlan;
-use crate::study::spring::{DesignFigures, closed_form, simulated};
+use crate::study::spring::{DesignMetrics, closed_form, simulated};
 use crate::study::watch::PieceProgress;
 use crate::study::{OnProgress, StudyError};
 use cmaes::{CMAESOptions, DVector};
@@ -15,65 +15,65 @@ use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// A design within all limits.
+/// A feasible design.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
     /// The coil.
     pub coil: CoilDesign,
-    /// Its figures by the closed form.
-    pub figures: DesignFigures,
-    /// How far it is from each goal.
+    /// Metrics in closed form.
+    pub figures: DesignMetrics,
+    /// Cost for each goal; lower is better.
     pub costs: Vec<f64>,
 }
 
-/// A design of the Pareto set, and what its full simulation says.
+/// A design of the Pareto set with the result of a full simulation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Verified {
+pub struct VerifiedDesign {
     /// The design.
     #[serde(flatten)]
     pub candidate: Candidate,
-    /// Its figures by simulation.
-    pub simulated: Option<DesignFigures>,
-    /// Whether they are within all limits.
+    /// Metrics by simulation; `None` if it failed.
+    pub simulated: Option<DesignMetrics>,
+    /// Whether the simulated metrics are within all limits.
     pub holds: bool,
-    /// Share of the sphere that the lidar saw.
+    /// Fraction of the sphere that the lidar covered.
     pub fraction_seen: Option<f64>,
-    /// Share of the time in which the gyroscope was beyond its range.
+    /// Fraction of the time in which the gyroscope was saturated.
     pub saturated: Option<f64>,
-    /// Why the simulation failed, if it did.
+    /// The reason why the simulation failed.
     pub failed: Option<String>,
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignStudy {
     /// The spec as used.
     pub spec: DesignSpec,
-    /// Designs that were tried.
+    /// Number of evaluated designs.
     pub evaluated: usize,
-    /// Designs within all limits.
+    /// Number of feasible designs.
     pub feasible: usize,
-    /// Size of the Pareto set.
+    /// Number of designs in the Pareto set.
     pub pareto: usize,
-    /// Some of it, verified, in the order of the first goal.
-    pub candidates: Vec<Verified>,
-    /// The values of the first two goals' figures for every design within all limits, for a plot.
+    /// Verified designs of the Pareto set, in the order of the first goal.
+    pub candidates: Vec<VerifiedDesign>,
+    /// Metrics of the first two goals for each feasible design, for the plot.
     #[serde(skip)]
     pub cloud: Vec<(f64, f64)>,
 }
 
-/// What became of a design.
-enum Outcome {
+/// Evaluation of a design.
+enum Evaluation {
     /// Within all limits.
-    Fits(Box<Candidate>),
-    /// Beyond some, by this much in all.
-    Beyond(f64),
-    /// It cannot be wound, or its head falls.
-    Falls,
+    Feasible(Box<Candidate>),
+    /// Outside limits, with the sum of the relative violations.
+    Infeasible(f64),
+    /// The geometry is invalid, or the head has no stable rest pose.
+    Invalid,
 }
 
-/// A search about to begin.
-pub struct Search {
+/// A search for a spring.
+pub struct DesignSearch {
     spec: DesignSpec,
     head: HeadSpec,
     source: Source,
@@ -86,17 +86,17 @@ enum Space {
     Catalogue(Vec<CoilDesign>),
 }
 
-/// Ways in which the goals are weighed, and so descents.
-const DESCENTS: usize = 16;
+/// Number of runs of CMA-ES, each with different weights of the goals.
+const OPTIMISER_RUNS: usize = 16;
 
-/// Share of the evaluations that samples the space evenly first.
-const SAMPLED: f64 = 0.4;
+/// Fraction of the evaluations for the initial uniform sampling.
+const SAMPLED_FRACTION: f64 = 0.4;
 
-impl Search {
-    /// The search that `spec`, read from `source`, describes.
+impl DesignSearch {
+    /// Creates the search that `spec`, read from `source`, describes.
     ///
     /// # Errors
-    /// When a name in it leads nowhere, bounds are empty, or there is nothing to search for.
+    /// When a named spec does not exist, bounds are reversed, or there are no goals or evaluations.
     pub fn new(spec: &DesignSpec, source: &Source) -> Result<Self, StudyError> {
         let (head, head_source) = dynamics::load(&spec.head)?;
         if !matches!(head.linkage, LinkageSpec::Spring { .. }) {
@@ -106,17 +106,17 @@ impl Search {
         let lidar_source = find(Kind::Lidar, &spec.lidar)?;
         let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
         if spec.goals.is_empty() {
-            return Err(SpecError::about(source, "goals", "a search has at least one goal").into());
+            return Err(SpecError::about(source, "goals", "at least one goal is required").into());
         }
         if spec.evaluations == 0 || spec.candidates == 0 {
-            return Err(SpecError::about(source, "evaluations", "a search tries and tells at least one design").into());
+            return Err(SpecError::about(source, "evaluations", "evaluations and candidates must be at least 1").into());
         }
         let space = match &spec.space {
             SpaceSpec::Catalogue(name) => Space::Catalogue(catalogue(name)?),
             SpaceSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, material } => {
                 let bounds = [*coil_diameter_mm, *wire_diameter_mm, *active_coils, *free_length_mm];
                 if let Some([low, high]) = bounds.iter().find(|[low, high]| high < low) {
-                    let message = format!("bounds go from the smaller to the larger number, not from {low} to {high}");
+                    let message = format!("the lower bound {low} exceeds the upper bound {high}");
                     return Err(SpecError::about(source, "space", message).into());
                 }
                 Space::Coil { bounds, material: *material }
@@ -125,63 +125,68 @@ impl Search {
         Ok(Self { spec: spec.clone(), head, source: head_source, lidar, space })
     }
 
-    /// Tries the space, and returns every design within all limits, and how many were tried; `on_progress` is told
-    /// after each.
+    /// Explores the design space; returns the feasible designs and the number of evaluations.
+    ///
+    /// `on_progress` is called after each evaluation.
     pub fn explore(&self, on_progress: OnProgress<'_>) -> (Vec<Candidate>, usize) {
-        let whole = match &self.space {
+        let total = match &self.space {
             Space::Catalogue(springs) => springs.len(),
             Space::Coil { .. } => self.spec.evaluations,
         };
-        let pieces = PieceProgress::new(whole, on_progress);
-        let judge = |coil: &CoilDesign| {
-            let outcome = self.judge(coil);
+        let pieces = PieceProgress::new(total, on_progress);
+        let evaluate = |coil: &CoilDesign| {
+            let evaluation = self.evaluate(coil);
             pieces.finish_one();
-            outcome
+            evaluation
         };
         match &self.space {
-            Space::Catalogue(springs) => (fitting(springs.par_iter().map(judge).collect::<Vec<_>>()), springs.len()),
+            Space::Catalogue(springs) => {
+                (feasible(springs.par_iter().map(evaluate).collect::<Vec<_>>()), springs.len())
+            }
             Space::Coil { bounds, material } => {
-                let judge = |place: &[f64]| judge(&coil_at(place, bounds, *material));
+                let evaluate = |point: &[f64]| evaluate(&coil_at(point, bounds, *material));
                 let mut stream = Seed(self.spec.seed).stream("design/samples");
-                let samples = ((self.spec.evaluations as f64 * SAMPLED) as usize).max(1);
-                let places: Vec<[f64; 4]> =
+                let samples = ((self.spec.evaluations as f64 * SAMPLED_FRACTION) as usize).max(1);
+                let points: Vec<[f64; 4]> =
                     (0..samples).map(|_| std::array::from_fn(|_| stream.random::<f64>())).collect();
-                let outcomes: Vec<Outcome> = places.par_iter().map(|place| judge(place)).collect();
+                let sampled: Vec<Evaluation> = points.par_iter().map(|point| evaluate(point)).collect();
                 let mut evaluated = samples;
-                let scales = Scales::of(&outcomes, self.spec.goals.len());
-                let each = (self.spec.evaluations - samples) / DESCENTS;
-                let descents = (0..DESCENTS).into_par_iter().map(|k| {
+                let scales = Scales::of(&sampled, self.spec.goals.len());
+                let evaluations_per_run = (self.spec.evaluations - samples) / OPTIMISER_RUNS;
+                let runs = (0..OPTIMISER_RUNS).into_par_iter().map(|k| {
                     let weights =
                         weights(k, self.spec.goals.len(), &mut Seed(self.spec.seed).part("design/weights", k as u64));
-                    let value = |o: &Outcome| scales.value(o, &weights);
-                    let start = (0..samples).min_by(|a, b| value(&outcomes[*a]).total_cmp(&value(&outcomes[*b])));
-                    let start = start.map_or([0.5; 4], |k| places[k]);
+                    let cost = |evaluation: &Evaluation| scales.cost(evaluation, &weights);
+                    let start = (0..samples).min_by(|a, b| cost(&sampled[*a]).total_cmp(&cost(&sampled[*b])));
+                    let start = start.map_or([0.5; 4], |k| points[k]);
                     let seed = Seed(self.spec.seed).child(&format!("design/{k}")).0;
-                    descend(&start, (each, seed), &judge, &value)
+                    optimise(&start, (evaluations_per_run, seed), &evaluate, &cost)
                 });
-                let descended: Vec<Vec<Outcome>> = descents.collect();
-                evaluated += descended.iter().map(Vec::len).sum::<usize>();
-                (fitting(outcomes.into_iter().chain(descended.into_iter().flatten())), evaluated)
+                let optimised: Vec<Vec<Evaluation>> = runs.collect();
+                evaluated += optimised.iter().map(Vec::len).sum::<usize>();
+                (feasible(sampled.into_iter().chain(optimised.into_iter().flatten())), evaluated)
             }
         }
     }
 
-    fn judge(&self, coil: &CoilDesign) -> Outcome {
-        let Ok(figures) = closed_form(&self.with(coil), &self.source, &self.spec.shake) else { return Outcome::Falls };
-        let beyond = self.excess(&figures);
+    fn evaluate(&self, coil: &CoilDesign) -> Evaluation {
+        let Ok(figures) = closed_form(&self.with(coil), &self.source, &self.spec.shake) else {
+            return Evaluation::Invalid;
+        };
+        let excess = self.excess(&figures);
         let costs: Vec<f64> = self.spec.goals.iter().map(|goal| goal.cost(goal.figure.of(&figures))).collect();
-        if beyond > 0.0 || costs.iter().any(|cost| !cost.is_finite()) {
-            return Outcome::Beyond(beyond);
+        if excess > 0.0 || costs.iter().any(|cost| !cost.is_finite()) {
+            return Evaluation::Infeasible(excess);
         }
-        Outcome::Fits(Box::new(Candidate { coil: coil.clone(), figures, costs }))
+        Evaluation::Feasible(Box::new(Candidate { coil: coil.clone(), figures, costs }))
     }
 
-    /// By how much in all limits are exceeded.
-    fn excess(&self, figures: &DesignFigures) -> f64 {
-        self.spec.limits.iter().map(|limit| limit.excess(limit.figure.of(figures))).sum()
+    /// Sum of the relative violations of the limits.
+    fn excess(&self, metrics: &DesignMetrics) -> f64 {
+        self.spec.limits.iter().map(|limit| limit.excess(limit.figure.of(metrics))).sum()
     }
 
-    /// The head on another spring.
+    /// The head with its spring replaced.
     fn with(&self, coil: &CoilDesign) -> HeadSpec {
         let mut head = self.head.clone();
         if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
@@ -190,27 +195,28 @@ impl Search {
         head
     }
 
-    /// Explores, takes the Pareto set, and verifies as much of it as the spec says. `on_progress` is told as designs
-    /// are tried (the first half) and verified.
+    /// Explores the design space and verifies a selection of the Pareto set.
+    ///
+    /// The first half of the progress is the exploration, the second half the verification.
     ///
     /// # Errors
-    /// When the verification cannot be set up. A design whose simulation fails is a result.
+    /// When the verification cannot be set up. A failed simulation of a design is part of the result.
     pub fn run(&self, on_progress: OnProgress<'_>) -> Result<DesignStudy, StudyError> {
-        let (feasible, evaluated) = self.explore(&|share| on_progress(0.5 * share));
+        let (feasible, evaluated) = self.explore(&|fraction| on_progress(0.5 * fraction));
         let costs: Vec<Vec<f64>> = feasible.iter().map(|candidate| candidate.costs.clone()).collect();
         let front = pareto_set(&costs);
-        let of_front: Vec<Vec<f64>> = front.iter().map(|k| costs[*k].clone()).collect();
-        let chosen = spread(&of_front, self.spec.candidates);
-        let second_half = |share: f64| on_progress(0.5 + 0.5 * share);
+        let front_costs: Vec<Vec<f64>> = front.iter().map(|k| costs[*k].clone()).collect();
+        let chosen = spread(&front_costs, self.spec.candidates);
+        let second_half = |fraction: f64| on_progress(0.5 + 0.5 * fraction);
         let pieces = PieceProgress::new(chosen.len(), &second_half);
         let verified = chosen.par_iter().map(|k| {
             let verified = self.verify(&feasible[front[*k]]);
             pieces.finish_one();
             verified
         });
-        let figure = |k: usize| self.spec.goals.get(k).or(self.spec.goals.first()).map(|goal| goal.figure);
-        let cloud = figure(0)
-            .zip(figure(1))
+        let metric = |k: usize| self.spec.goals.get(k).or(self.spec.goals.first()).map(|goal| goal.figure);
+        let cloud = metric(0)
+            .zip(metric(1))
             .map_or(Vec::new(), |(x, y)| feasible.iter().map(|c| (x.of(&c.figures), y.of(&c.figures))).collect());
         Ok(DesignStudy {
             spec: self.spec.clone(),
@@ -222,10 +228,10 @@ impl Search {
         })
     }
 
-    fn verify(&self, candidate: &Candidate) -> Result<Verified, StudyError> {
+    fn verify(&self, candidate: &Candidate) -> Result<VerifiedDesign, StudyError> {
         let plan = CoveragePlan { from_s: 10.0, duration_s: 10.0, ..CoveragePlan::default() };
         let head = self.with(&candidate.coil);
-        let blank = Verified {
+        let unverified = VerifiedDesign {
             candidate: candidate.clone(),
             simulated: None,
             holds: false,
@@ -234,53 +240,53 @@ impl Search {
             failed: None,
         };
         match simulated(&head, &self.source, &self.spec.shake, &self.lidar, &plan) {
-            Ok((figures, seen)) => Ok(Verified {
-                simulated: Some(figures),
-                holds: self.excess(&figures) <= 0.0,
-                fraction_seen: Some(seen.fraction_seen),
-                saturated: Some(seen.gyro.saturated),
-                ..blank
+            Ok((metrics, coverage)) => Ok(VerifiedDesign {
+                simulated: Some(metrics),
+                holds: self.excess(&metrics) <= 0.0,
+                fraction_seen: Some(coverage.fraction_seen),
+                saturated: Some(coverage.gyro.saturated),
+                ..unverified
             }),
-            Err(StudyError::Dynamics(error)) => Ok(Verified { failed: Some(error.to_string()), ..blank }),
+            Err(StudyError::Dynamics(error)) => Ok(VerifiedDesign { failed: Some(error.to_string()), ..unverified }),
             Err(error) => Err(error),
         }
     }
 }
 
-/// One run of CMA-ES from `start`; everything it met.
-fn descend(
+/// Runs CMA-ES from `start` in the unit cube; returns all evaluations.
+fn optimise(
     start: &[f64; 4],
     (evaluations, seed): (usize, u64),
-    judge: &dyn Fn(&[f64]) -> Outcome,
-    value: &dyn Fn(&Outcome) -> f64,
-) -> Vec<Outcome> {
-    let mut met = Vec::with_capacity(evaluations);
+    evaluate: &dyn Fn(&[f64]) -> Evaluation,
+    cost: &dyn Fn(&Evaluation) -> f64,
+) -> Vec<Evaluation> {
+    let mut evaluated = Vec::with_capacity(evaluations);
     let population = 8;
     if evaluations < population {
-        return met;
+        return evaluated;
     }
-    let objective = |place: &DVector<f64>| {
-        let outside: f64 = place.iter().map(|x| (x - x.clamp(0.0, 1.0)).powi(2)).sum();
-        let inside: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
-        let outcome = judge(&inside);
-        let cost = value(&outcome) + outside;
-        met.push(outcome);
-        cost
+    let objective = |point: &DVector<f64>| {
+        let outside: f64 = point.iter().map(|x| (x - x.clamp(0.0, 1.0)).powi(2)).sum();
+        let inside: Vec<f64> = point.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+        let evaluation = evaluate(&inside);
+        let value = cost(&evaluation) + outside;
+        evaluated.push(evaluation);
+        value
     };
     let options = CMAESOptions::new(start.to_vec(), 0.15)
         .population_size(population)
         .max_function_evals(evaluations - population + 1)
         .seed(seed);
-    // The options are sound by construction: a positive step, a population of eight.
-    if let Ok(mut descent) = options.build(objective) {
-        descent.run();
+    // These options are always valid: positive step size, population of 8.
+    if let Ok(mut optimiser) = options.build(objective) {
+        optimiser.run();
     }
-    met
+    evaluated
 }
 
-/// The coil at a place of the unit cube.
-fn coil_at(place: &[f64], bounds: &[[f64; 2]; 4], material: Material) -> CoilDesign {
-    let between = |k: usize| bounds[k][0] + place[k] * (bounds[k][1] - bounds[k][0]);
+/// The coil at a point of the unit cube.
+fn coil_at(point: &[f64], bounds: &[[f64; 2]; 4], material: Material) -> CoilDesign {
+    let between = |k: usize| bounds[k][0] + point[k] * (bounds[k][1] - bounds[k][0]);
     CoilDesign {
         name: String::new(),
         coil_diameter_mm: between(0),
@@ -291,53 +297,56 @@ fn coil_at(place: &[f64], bounds: &[[f64; 2]; 4], material: Material) -> CoilDes
     }
 }
 
-fn fitting(outcomes: impl IntoIterator<Item = Outcome>) -> Vec<Candidate> {
-    let fits = |outcome| match outcome {
-        Outcome::Fits(candidate) => Some(*candidate),
+/// The feasible designs of the evaluations.
+fn feasible(evaluations: impl IntoIterator<Item = Evaluation>) -> Vec<Candidate> {
+    let candidate = |evaluation| match evaluation {
+        Evaluation::Feasible(candidate) => Some(*candidate),
         _ => None,
     };
-    outcomes.into_iter().filter_map(fits).collect()
+    evaluations.into_iter().filter_map(candidate).collect()
 }
 
-/// The range of each goal's cost over the even samples, to compare them by.
+/// Range of each cost over the uniform samples, for normalisation.
 struct Scales(Vec<(f64, f64)>);
 
 impl Scales {
-    fn of(outcomes: &[Outcome], goals: usize) -> Self {
+    fn of(evaluations: &[Evaluation], goals: usize) -> Self {
         let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); goals];
-        for outcome in outcomes {
-            if let Outcome::Fits(candidate) = outcome {
+        for evaluation in evaluations {
+            if let Evaluation::Feasible(candidate) = evaluation {
                 for (range, cost) in ranges.iter_mut().zip(&candidate.costs) {
                     *range = (range.0.min(*cost), range.1.max(*cost));
                 }
             }
         }
-        let sound = |(low, high): (f64, f64)| if low < high { (low, high) } else { (0.0, 1.0) };
-        Self(ranges.into_iter().map(sound).collect())
+        let nonempty = |(low, high): (f64, f64)| if low < high { (low, high) } else { (0.0, 1.0) };
+        Self(ranges.into_iter().map(nonempty).collect())
     }
 
-    /// Chebyshev's scalarisation, with a little of the sum so that nothing is given away; beyond the limits 10 and the
-    /// excess, and 100 for a design that falls.
-    fn value(&self, outcome: &Outcome, weights: &[f64]) -> f64 {
-        match outcome {
-            Outcome::Falls => 100.0,
-            Outcome::Beyond(excess) => 10.0 + excess.min(50.0),
-            Outcome::Fits(candidate) => {
+    /// Scalar cost of an evaluation: augmented Chebyshev scalarisation of the normalised costs.
+    ///
+    /// The maximum plus 0.05 times the sum excludes weakly Pareto-optimal points. Infeasible designs cost 10 plus the
+    /// violation, at most 60; invalid designs cost 100.
+    fn cost(&self, evaluation: &Evaluation, weights: &[f64]) -> f64 {
+        match evaluation {
+            Evaluation::Invalid => 100.0,
+            Evaluation::Infeasible(excess) => 10.0 + excess.min(50.0),
+            Evaluation::Feasible(candidate) => {
                 let scaled = candidate.costs.iter().zip(&self.0).zip(weights);
                 let terms = scaled.map(|((cost, (low, high)), weight)| weight * (cost - low) / (high - low));
-                let (most, sum) = terms.fold((f64::NEG_INFINITY, 0.0), |(most, sum), t| (f64::max(most, t), sum + t));
-                most + 0.05 * sum
+                let (max, sum) = terms.fold((f64::NEG_INFINITY, 0.0), |(max, sum), t| (f64::max(max, t), sum + t));
+                max + 0.05 * sum
             }
         }
     }
 }
 
-/// The weights of descent `index`: each goal nearly alone first, then at random, evenly over their simplex.
+/// Weights of optimiser run `index`: the first runs emphasise one goal each, the others are uniform on the simplex.
 fn weights(index: usize, goals: usize, stream: &mut Stream) -> Vec<f64> {
     if index < goals {
         return (0..goals).map(|k| if k == index { 1.0 } else { 0.05 }).collect();
     }
-    let shares: Vec<f64> = (0..goals).map(|_| -(1.0 - stream.random::<f64>()).ln()).collect();
-    let sum: f64 = shares.iter().sum();
-    shares.iter().map(|share| share / sum).collect()
+    let values: Vec<f64> = (0..goals).map(|_| -(1.0 - stream.random::<f64>()).ln()).collect();
+    let sum: f64 = values.iter().sum();
+    values.iter().map(|value| value / sum).collect()
 }

@@ -1,132 +1,132 @@
-//! What is wanted of a spring, as it is written: `specs/studies/NAME.ron`.
+//! Spec of a spring search: `specs/studies/NAME.ron`.
 
-use super::super::{DesignFigures, Shake};
+use super::super::{DesignMetrics, Shake};
 use crate::elasticity::{Material, SpringSpec};
 use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
-/// What is wanted of a spring, and where to look for it.
+/// A search for a spring: design space, goals and limits.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DesignSpec {
-    /// The head that it carries: a name or a file. The spring there is replaced; its mounting, damping and stops stay.
+    /// The head: a name or a file. The search replaces its spring; mounting, damping and stops remain.
     pub head: String,
-    /// The lidar on it: a name or a file.
+    /// The lidar on the head: a name or a file.
     pub lidar: String,
-    /// The hand under which field of view, rate and stress are judged.
+    /// Motion of the base for field of view, rate and stress.
     pub shake: Shake,
-    /// Where to look.
+    /// Design space.
     pub space: SpaceSpec,
-    /// What is wanted.
+    /// Goals; the search returns the Pareto set of them.
     pub goals: Vec<GoalSpec>,
-    /// What must hold. That the head stands goes without saying.
+    /// Limits of feasible designs; a design without a stable rest pose of the head is always infeasible.
     #[serde(default)]
     pub limits: Vec<LimitSpec>,
-    /// How many designs are tried; a catalogue is tried through in any case.
+    /// Number of designs to evaluate; a catalogue is always evaluated completely.
     pub evaluations: usize,
-    /// How many of the Pareto set are verified and told.
+    /// Number of designs of the Pareto set that are verified by simulation and reported.
     pub candidates: usize,
-    /// From which all chance is drawn.
+    /// Random seed.
     pub seed: u64,
 }
 
-/// Where to look for a spring.
+/// Design space of a spring search.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum SpaceSpec {
-    /// Any coil between bounds.
+    /// Coils with a geometry within bounds.
     Coil {
-        /// Mean diameter of the coil, from and to, mm.
+        /// Mean diameter of the coil, minimum and maximum, mm.
         #[serde(with = "checked::PositiveArray::<2>")]
         coil_diameter_mm: [f64; 2],
-        /// Diameter of the wire, from and to, mm.
+        /// Diameter of the wire, minimum and maximum, mm.
         #[serde(with = "checked::PositiveArray::<2>")]
         wire_diameter_mm: [f64; 2],
-        /// Coils that are free to move, from and to.
+        /// Number of active coils, minimum and maximum.
         #[serde(with = "checked::PositiveArray::<2>")]
         active_coils: [f64; 2],
-        /// Length without load, from and to, mm.
+        /// Free length, minimum and maximum, mm.
         #[serde(with = "checked::PositiveArray::<2>")]
         free_length_mm: [f64; 2],
-        /// What the wire is made of.
+        /// Material of the wire.
         material: Material,
     },
-    /// The springs of a catalogue: a CSV file, or `"stock"` for the one built in.
+    /// The springs of a catalogue: a CSV file, or `"stock"` for the built-in one.
     Catalogue(String),
 }
 
-/// A figure of a design.
+/// A metric of a design.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum FigureName {
+pub enum DesignMetric {
     /// Frequency of the slowest mode, Hz.
     RockingHz,
-    /// Greatest gain of the pitch rate.
+    /// Peak gain of the pitch rate.
     PeakGain,
     /// Field of view under the shake, degrees.
     FieldOfViewDeg,
-    /// Greatest rate of rotation under the shake, degrees/s.
+    /// Maximum angular velocity under the shake, degrees/s.
     RateDegPerS,
-    /// How far the spring shortens under the head, mm.
+    /// Static compression of the spring under the head, mm.
     SagMm,
     /// Mass of the active wire, g.
     SpringMassG,
-    /// Greatest stress in the wire under the shake, over its yield.
+    /// Maximum stress in the wire under the shake, divided by the yield stress.
     StressShare,
 }
 
-impl FigureName {
-    /// The figure's value; infinite where the design has none.
-    pub fn of(self, figures: &DesignFigures) -> f64 {
+impl DesignMetric {
+    /// The value of the metric; infinite if it is not known.
+    pub fn of(self, metrics: &DesignMetrics) -> f64 {
         match self {
-            FigureName::RockingHz => figures.rocking_hz,
-            FigureName::PeakGain => figures.peak_gain,
-            FigureName::FieldOfViewDeg => figures.field_of_view_deg,
-            FigureName::RateDegPerS => figures.rate_deg_per_s,
-            FigureName::SagMm => figures.sag_mm,
-            FigureName::SpringMassG => figures.spring_mass_g.unwrap_or(f64::INFINITY),
-            FigureName::StressShare => figures.stress_share.unwrap_or(f64::INFINITY),
+            DesignMetric::RockingHz => metrics.rocking_hz,
+            DesignMetric::PeakGain => metrics.peak_gain,
+            DesignMetric::FieldOfViewDeg => metrics.field_of_view_deg,
+            DesignMetric::RateDegPerS => metrics.rate_deg_per_s,
+            DesignMetric::SagMm => metrics.sag_mm,
+            DesignMetric::SpringMassG => metrics.spring_mass_g.unwrap_or(f64::INFINITY),
+            DesignMetric::StressShare => metrics.stress_share.unwrap_or(f64::INFINITY),
         }
     }
 
-    /// What it is called on an axis of a plot.
+    /// Axis label with unit.
     pub fn label(self) -> &'static str {
         match self {
-            FigureName::RockingHz => "Rocking frequency (Hz)",
-            FigureName::PeakGain => "Peak gain of the pitch rate",
-            FigureName::FieldOfViewDeg => "Field of view (degrees)",
-            FigureName::RateDegPerS => "Greatest rate (degrees/s)",
-            FigureName::SagMm => "Sag (mm)",
-            FigureName::SpringMassG => "Mass of the spring (g)",
-            FigureName::StressShare => "Stress over yield",
+            DesignMetric::RockingHz => "Rocking frequency (Hz)",
+            DesignMetric::PeakGain => "Peak gain of the pitch rate",
+            DesignMetric::FieldOfViewDeg => "Field of view (degrees)",
+            DesignMetric::RateDegPerS => "Maximum rate (degrees/s)",
+            DesignMetric::SagMm => "Sag (mm)",
+            DesignMetric::SpringMassG => "Spring mass (g)",
+            DesignMetric::StressShare => "Stress / yield stress",
         }
     }
 }
 
-/// What is wanted of a figure.
+/// Aim of a goal.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Aim {
-    /// This value.
+    /// Reach this value.
     Target(#[serde(with = "checked::Positive")] f64),
-    /// As little as can be.
+    /// Minimise the metric.
     Least,
-    /// As much as can be.
+    /// Maximise the metric.
     Most,
 }
 
-/// A goal.
+/// A goal of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct GoalSpec {
-    /// Of what.
-    pub figure: FigureName,
-    /// What is wanted of it.
+    /// The metric.
+    pub figure: DesignMetric,
+    /// Aim: a target value, minimum or maximum.
     pub aim: Aim,
 }
 
 impl GoalSpec {
-    /// How far a value is from the aim: less is better.
+    /// Cost of a value; lower is better. For a target, the relative deviation.
     pub fn cost(&self, value: f64) -> f64 {
         match self.aim {
             Aim::Target(target) => (value / target - 1.0).abs(),
@@ -136,22 +136,22 @@ impl GoalSpec {
     }
 }
 
-/// A limit.
+/// A limit of feasible designs.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct LimitSpec {
-    /// Of what.
-    pub figure: FigureName,
-    /// No less than this.
+    /// The metric.
+    pub figure: DesignMetric,
+    /// Minimum value.
     #[serde(default)]
     pub least: Option<f64>,
-    /// No more than this.
+    /// Maximum value.
     #[serde(default)]
     pub most: Option<f64>,
 }
 
 impl LimitSpec {
-    /// By what share of the limit a value is beyond it; 0 within.
+    /// Relative violation of the limit; 0 if the value is within.
     pub fn excess(&self, value: f64) -> f64 {
         let below = self.least.map_or(0.0, |least| (least - value) / least.abs().max(1e-9));
         let above = self.most.map_or(0.0, |most| (value - most) / most.abs().max(1e-9));
@@ -159,25 +159,25 @@ impl LimitSpec {
     }
 }
 
-/// A coil to try.
+/// A coil of the design space.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 pub struct CoilDesign {
-    /// Its name in the catalogue; empty for one that is in none.
+    /// Name in the catalogue; empty for a coil that is not from a catalogue.
     pub name: String,
     /// Mean diameter of the coil, mm.
     pub coil_diameter_mm: f64,
     /// Diameter of the wire, mm.
     pub wire_diameter_mm: f64,
-    /// Coils that are free to move.
+    /// Number of active coils.
     pub active_coils: f64,
-    /// Length without load, mm.
+    /// Free length, mm.
     pub free_length_mm: f64,
-    /// What the wire is made of.
+    /// Material of the wire.
     pub material: Material,
 }
 
 impl CoilDesign {
-    /// As a spring's spec.
+    /// The spec of the spring.
     pub fn spring(&self) -> SpringSpec {
         SpringSpec::Coil {
             coil_diameter_mm: self.coil_diameter_mm,

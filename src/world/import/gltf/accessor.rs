@@ -1,16 +1,16 @@
-//! The numbers in the buffers of a glTF file, with every index and every offset checked.
+//! Access to the buffers of a glTF file, with checks of every index and offset.
 
 use super::document::{Accessor, Document};
 use super::{MeshError, malformed};
 use crate::geometry::Vector;
 
-/// `componentType` of the specification.
+/// Values of `componentType` in the specification.
 const U8: u32 = 5121;
 const U16: u32 = 5123;
 const U32: u32 = 5125;
 const F32: u32 = 5126;
 
-/// A document with the bytes of its buffers.
+/// A document with the bytes of the buffers.
 pub(super) struct Data {
     pub document: Document,
     pub buffers: Vec<Vec<u8>>,
@@ -47,9 +47,10 @@ impl Data {
 
     fn accessor(&self, index: usize) -> Result<&Accessor, MeshError> {
         let accessor = self.document.accessors.get(index);
-        let accessor = accessor.ok_or_else(|| malformed(format!("it names accessor {index}, which it has not")))?;
+        let accessor =
+            accessor.ok_or_else(|| malformed(format!("it refers to accessor {index}, which does not exist")))?;
         if accessor.sparse.is_some() {
-            return Err(malformed("it has sparse accessors, which are not read: export it without"));
+            return Err(malformed("it has sparse accessors, which are not supported: export without them"));
         }
         Ok(accessor)
     }
@@ -73,12 +74,12 @@ impl Data {
             let bytes = bytes.get(accessor.byte_offset..accessor.byte_offset.checked_add(length)?)?;
             (stride >= size).then_some((stride, bytes))
         };
-        let (stride, bytes) = span().ok_or_else(|| malformed(format!("accessor {index} reaches beyond its buffer")))?;
+        let (stride, bytes) = span().ok_or_else(|| malformed(format!("accessor {index} extends beyond its buffer")))?;
         Ok((0..accessor.count).map(move |k| &bytes[k * stride..k * stride + size]))
     }
 }
 
-/// Decodes base64 (RFC 4648), padded or not.
+/// Decodes base64 (RFC 4648), with or without padding.
 pub(super) fn base64(text: &str) -> Option<Vec<u8>> {
     let digits = text.trim_end_matches('=').bytes().map(|byte| match byte {
         b'A'..=b'Z' => Some(byte - b'A'),

@@ -1,5 +1,4 @@
-//! The part of a glTF document that says where surfaces are (glTF 2.0 specification, section 5). Its indices are looked
-//! up where they are used, never trusted.
+//! The geometry part of a glTF document (glTF 2.0 specification, section 5). Indices are validated where they are used.
 
 use crate::geometry::Vector;
 use serde::Deserialize;
@@ -7,8 +6,8 @@ use std::collections::BTreeMap;
 
 type Transform = nalgebra::Matrix4<f64>;
 
-/// Compressed or encoded geometry comes as an extension; extensions of these kinds leave it alone.
-const HARMLESS: [&str; 4] = ["KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_"];
+/// Prefixes of extensions that do not change the geometry. Compressed or encoded geometry uses others.
+const IGNORED_EXTENSIONS: [&str; 4] = ["KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_"];
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -24,7 +23,7 @@ pub(super) struct Document {
     #[serde(default)]
     pub accessors: Vec<Accessor>,
     #[serde(default)]
-    pub buffer_views: Vec<View>,
+    pub buffer_views: Vec<BufferView>,
     #[serde(default)]
     pub buffers: Vec<Buffer>,
     #[serde(default)]
@@ -57,7 +56,7 @@ pub(super) struct Mesh {
 pub(super) struct Primitive {
     pub attributes: BTreeMap<String, usize>,
     pub indices: Option<usize>,
-    /// Triangles (4) unless told.
+    /// Default: 4, triangles.
     #[serde(default = "triangles")]
     pub mode: u32,
 }
@@ -77,7 +76,7 @@ pub(super) struct Accessor {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct View {
+pub(super) struct BufferView {
     pub buffer: usize,
     #[serde(default)]
     pub byte_offset: usize,
@@ -100,16 +99,16 @@ impl Document {
     /// Reads a document's JSON.
     pub fn parse(json: &[u8]) -> Result<Self, String> {
         let document: Self = serde_json::from_slice(json).map_err(|error| error.to_string())?;
-        let is_harmless = |name: &&String| HARMLESS.iter().any(|kind| name.starts_with(kind));
-        match document.extensions_required.iter().find(|name| !is_harmless(name)) {
-            Some(name) => Err(format!("it requires the extension {name}, which is not read: export it without")),
+        let is_ignored = |name: &&String| IGNORED_EXTENSIONS.iter().any(|kind| name.starts_with(kind));
+        match document.extensions_required.iter().find(|name| !is_ignored(name)) {
+            Some(name) => Err(format!("it requires the extension {name}, which is not supported: export without it")),
             None => Ok(document),
         }
     }
 }
 
 impl Node {
-    /// The transform from the node's frame to its parent's.
+    /// Transform from the frame of the node to the frame of the parent.
     pub fn transform(&self) -> Transform {
         if let Some(columns) = &self.matrix {
             return Transform::from_column_slice(columns);

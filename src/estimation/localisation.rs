@@ -1,0 +1,126 @@
+//! Localisation in a given map, and relocalisation after an IMU gap in the surfaces seen before it.
+
+use super::consider::Consider;
+use super::map::{Located, MAP_LIMITS, RelocalisationLimits, Relocaliser, map_covariance};
+use super::surfel::Patch;
+use super::views::Views;
+use super::window::Window;
+use super::{EstimationError, EstimatorSpec};
+use crate::geometry::{Pose, Rotation, Vector, roll_pitch_yaw};
+use crate::surfel_map::SurfelMap;
+use nalgebra::Matrix6;
+
+/// Localisation of the head in a given map.
+#[derive(Debug)]
+pub(super) struct MapLocalisation {
+    relocaliser: Relocaliser,
+    /// Covariance of the map error.
+    covariance: Matrix6<f64>,
+    /// Approximate pose `map_from_head` of a pending search.
+    about: Option<Pose>,
+    /// Result of the first successful search.
+    found: Option<Located>,
+}
+
+impl MapLocalisation {
+    /// Localisation in `map`, with a pending search near `map_from_head`.
+    pub(super) fn new(map: &SurfelMap, map_from_head: Pose, spec: &EstimatorSpec) -> Self {
+        let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
+        let relocaliser = Relocaliser::new(map, (&spec.matching, &spec.surfels), certainty);
+        Self { relocaliser, covariance: map_covariance(map), about: Some(map_from_head), found: None }
+    }
+
+    /// The patches of the map.
+    pub(super) fn patches(&self) -> &[Patch] {
+        self.relocaliser.patches()
+    }
+
+    /// Covariance of the map error: rotation (rad), then translation (m).
+    pub(super) fn covariance(&self) -> Matrix6<f64> {
+        self.covariance
+    }
+
+    /// Result of the first successful search.
+    pub(super) fn found(&self) -> Option<&Located> {
+        self.found.as_ref()
+    }
+
+    /// Requests another search, near `map_from_head`.
+    pub(super) fn restart_search(&mut self, map_from_head: Pose) {
+        self.about = Some(map_from_head);
+    }
+
+    /// Performs a pending search: localises the frame of `window` in the map by the patches of the window.
+    ///
+    /// `None` if no search is pending. The search is no longer pending afterwards, whether it succeeds or fails.
+    pub(super) fn find(&mut self, window: &Window, head_from_imu: &Pose) -> Option<Result<Located, EstimationError>> {
+        let about = self.about.take()?;
+        // Window and map frames are both level, so only the heading of the approximate pose is used.
+        let window_start = window.start_pose();
+        let here_from_head = window_start * head_from_imu.inverse();
+        let yaw = |rotation: &Rotation| roll_pitch_yaw(rotation).2;
+        let turn = yaw(&about.rotation) - yaw(&here_from_head.rotation);
+        let rotation = Rotation::from_axis_angle(&Vector::z_axis(), turn);
+        let shift = about.translation.vector - rotation * here_from_head.translation.vector;
+        let start = Pose::from_parts(shift.into(), rotation);
+        let (seen, from) = (window.patches(), window_start.translation.vector);
+        let mut located = self.relocaliser.find(&seen, (&from, &start), &MAP_LIMITS);
+        if let (None, Ok(found)) = (&self.found, &located)
+            && let Some(better) = self.relocaliser.find_better_elsewhere(&seen, &from, found)
+        {
+            located = Err(ambiguous(found, &better, &(better.map_from_query * here_from_head)));
+        }
+        if let (None, Ok(located)) = (&self.found, &located) {
+            self.found = Some(located.clone());
+        }
+        Some(located.map_err(EstimationError::NotInMap))
+    }
+}
+
+/// Error text for a position near the given start if another start gives a `better` one.
+fn ambiguous(found: &Located, better: &Located, map_from_head: &Pose) -> String {
+    let at = map_from_head.translation.vector;
+    format!(
+        "near the start {:.0} % of the observed surface matches the map, but {:.0} % at x,y,z,yaw = {:.1},{:.1},{:.1},{:.0}",
+        100.0 * found.inlier_ratio,
+        100.0 * better.inlier_ratio,
+        at.x,
+        at.y,
+        at.z,
+        roll_pitch_yaw(&map_from_head.rotation).2.to_degrees()
+    )
+}
+
+/// Relocalisation after an IMU gap in the surfaces seen before it.
+#[derive(Debug)]
+pub(super) struct GapRelocalisation {
+    views: Views,
+    consider: Consider,
+    /// Patches of the last window before the gap, in addition to the views.
+    last: Vec<Patch>,
+    /// Start of the gap, IMU time, s.
+    until_s: f64,
+}
+
+impl GapRelocalisation {
+    /// Prepares the search: the views with their covariance, the last patches, and the start of the gap.
+    pub(super) fn new((views, consider): (Views, Consider), last: Vec<Patch>, until_s: f64) -> Self {
+        Self { views, consider, last, until_s }
+    }
+
+    /// Localises the frame of `window`, which starts near the end of the trajectory before the gap.
+    ///
+    /// Returns the pose of that frame in the map, the views, and their joint covariance with the relocalised pose; or the
+    /// reason of the failure.
+    pub(super) fn find(mut self, window: &Window, spec: &EstimatorSpec) -> Result<(Pose, Views, Consider), String> {
+        self.last.extend(self.views.patches());
+        let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
+        let relocaliser = Relocaliser::in_patches(self.last, (&spec.matching, &spec.surfels), certainty);
+        let window_start = window.start_pose().translation.vector;
+        let search = RelocalisationLimits::after_gap(window.start_s() - self.until_s, spec.solve.match_sigma_m);
+        let found = relocaliser.find(&window.patches(), (&window_start, &Pose::identity()), &search)?;
+        let there = found.map_from_query.transform_point(&window_start.into()).coords;
+        self.consider.relocalise(there, &window.known_at_start().unwrap_or_default(), &found.covariance);
+        Ok((found.map_from_query, self.views, self.consider))
+    }
+}

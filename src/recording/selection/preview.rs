@@ -1,0 +1,96 @@
+//! First seconds of a recording, from which units, content and clocks are detected.
+
+use super::clocks::LogTimes;
+use super::content::quantile;
+use crate::measurement::ImuSample;
+use crate::recording::container::{ChannelId, RawMessage};
+use crate::recording::measurements::is_finite;
+use crate::recording::message::imu::{self, ForceUnit};
+use crate::recording::wire::Decoder;
+use crate::recording::{Reader, RecordingError};
+use crate::time::Stamp;
+use std::collections::BTreeMap;
+
+/// Length of the preview, s of log time: above the 10 s that prove the absence of gravity.
+const PREVIEW_S: f64 = 12.0;
+
+/// Maximum number of messages in the preview: bounds the memory.
+const MAX_MESSAGES: usize = 60_000;
+
+/// First messages of an IMU topic, with accelerations in the unit of the file.
+#[derive(Debug, Clone, Default)]
+pub struct ImuPreview {
+    /// Samples in order of their stamps.
+    pub samples: Vec<ImuSample>,
+    /// Log times of the samples.
+    pub log_times: LogTimes,
+}
+
+impl ImuPreview {
+    /// Median interval of the samples that satisfy `has`, s.
+    pub fn period_s(&self, has: impl Fn(&ImuSample) -> bool) -> f64 {
+        let stamps: Vec<_> = self.samples.iter().filter(|sample| has(sample)).map(|sample| sample.stamp).collect();
+        quantile(stamps.windows(2).map(|pair| pair[1].seconds_since(pair[0])).collect(), 0.5)
+    }
+}
+
+impl Reader {
+    /// Calls `take` with the messages of `ids` in the first seconds.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn for_first_messages(
+        &self,
+        ids: &[ChannelId],
+        mut take: impl FnMut(&RawMessage<'_>, Stamp),
+    ) -> Result<(), RecordingError> {
+        let (mut messages, mut first, mut count) = (self.messages_in_blocks_of(ids), None, 0);
+        while let Some(message) = messages.next()? {
+            let log = Stamp::from_nanos(i64::try_from(message.log_time_ns).unwrap_or(i64::MAX));
+            if count >= MAX_MESSAGES || log.seconds_since(*first.get_or_insert(log)) > PREVIEW_S {
+                break;
+            }
+            if ids.contains(&message.channel) {
+                count += 1;
+                take(&message, log);
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the first samples of several IMU topics.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn preview_imus<'t>(
+        &self,
+        topics: impl Iterator<Item = &'t str>,
+    ) -> Result<BTreeMap<String, ImuPreview>, RecordingError> {
+        let ids: BTreeMap<ChannelId, &str> =
+            topics.flat_map(|topic| self.ids_of(topic).into_iter().map(move |id| (id, topic))).collect();
+        let mut previews: BTreeMap<String, ImuPreview> = BTreeMap::new();
+        self.for_first_messages(&ids.keys().copied().collect::<Vec<_>>(), |message, log| {
+            let sample = imu::decode(message.data, ForceUnit::default()).ok().filter(is_finite);
+            if let (Some(sample), Some(topic)) = (sample, ids.get(&message.channel)) {
+                let preview = previews.entry((*topic).to_owned()).or_default();
+                preview.samples.push(sample);
+                preview.log_times.pairs.push((log, sample.stamp));
+            }
+        })?;
+        previews.values_mut().for_each(|preview| preview.samples.sort_by_key(|sample| sample.stamp));
+        Ok(previews)
+    }
+
+    /// Reads log times and header stamps of the first messages of a lidar.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn log_times(&self, topic: &str) -> Result<LogTimes, RecordingError> {
+        let mut log_times = LogTimes::default();
+        self.for_first_messages(&self.ids_of(topic), |message, log| {
+            let header = Decoder::new(message.data).and_then(|mut input| input.header());
+            log_times.pairs.extend(header.ok().map(|(stamp, _)| (log, stamp)));
+        })?;
+        Ok(log_times)
+    }
+}

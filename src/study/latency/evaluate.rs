@@ -1,0 +1,157 @@
+//! Estimation from the disturbed recording, and evaluation of the estimate.
+
+use super::bootstrap::Block;
+use super::reference::{Reference, SampledReturn};
+use super::stamp_errors::DisturbedStamps;
+use super::{ClockState, Disturbance};
+use crate::estimation::{ClockSpec, Estimator, EstimatorSpec, OpenLoop, smoothed_stamps};
+use crate::evaluation::{CloudErrors, Errors, Pairs};
+use crate::geometry::{Pose, SmoothCursor, Vector};
+use crate::measurement::Calibration;
+use crate::random::Seed;
+use crate::recording::{Reader, Selection};
+use crate::study::StudyError;
+use crate::time::Stamp;
+use crate::world::World;
+use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Maximum distance from a point to a surface, m: points farther away are outliers.
+const REACH_M: f64 = 1.0;
+
+/// Result of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RunResult {
+    /// Error sums per block of time.
+    pub blocks: Vec<Block>,
+    /// Estimated minus true clock offset at the end of the run, ms.
+    pub clock_error_ms: f64,
+    /// Coordinates of the returns in the section by the estimate (along it, up), m; NaN outside the estimated time.
+    #[serde(rename = "cut_m")]
+    pub section_m: Vec<(f32, f32)>,
+}
+
+/// The recording and the settings common to all runs.
+pub(super) struct RunContext<'a> {
+    pub reader: &'a Reader,
+    pub selection: &'a Selection,
+    pub calibration: &'a Calibration,
+    pub estimator: &'a EstimatorSpec,
+    pub world: &'a World,
+    pub reference: &'a Reference,
+    pub block_s: f64,
+    pub seed: Seed,
+}
+
+impl RunContext<'_> {
+    /// Estimates with a disturbance, and evaluates the estimate.
+    pub(super) fn run(
+        &self,
+        disturbance: Disturbance,
+        clock: ClockState,
+        stop: &AtomicBool,
+    ) -> Result<RunResult, StudyError> {
+        let timing = DisturbedStamps::new(disturbance, &self.reference.clock, &self.reference.scan_stamps, self.seed);
+        let estimator = self.settings(clock, disturbance.noise_ms * 1e-3);
+        let estimate = self.estimate(&estimator, &timing, stop)?;
+        // The cloud uses the scan times that the estimator assumed.
+        let scan_stamps = smoothed_stamps(timing.scan_stamps(), &estimator);
+        let pairs = Pairs::associate(&estimate.trajectory, &self.reference.truth)?;
+        let world_from_map = pairs.world_from_map()?;
+        let mut blocks = Vec::new();
+        let errors = Errors::after(&pairs, &world_from_map);
+        for (stamp, error) in errors.stamps.iter().zip(&errors.position_m) {
+            let block = self.block_at(&mut blocks, *stamp);
+            block.poses += 1.0;
+            block.position2_m2 += error.norm_squared();
+        }
+        self.evaluate_cloud(&estimate, (&world_from_map, &scan_stamps), &mut blocks);
+        let coordinates = |projected: Option<(Vector, Vector)>| {
+            let (along, up) =
+                projected.map_or((f64::NAN, f64::NAN), |(point, _)| self.reference.section.coordinates(&point));
+            (along as f32, up as f32)
+        };
+        let shown = self.project(&self.reference.shown, &estimate, &world_from_map, &scan_stamps);
+        let offset_s = estimate.clock_offsets.last().map_or(0.0, |(_, offset_s)| *offset_s);
+        Ok(RunResult {
+            blocks,
+            clock_error_ms: offset_s * 1e3 - disturbance.latency_ms,
+            section_m: shown.into_iter().map(coordinates).collect(),
+        })
+    }
+
+    /// Settings of the estimator for a clock state; to smooth stamps the estimator needs the true jitter.
+    fn settings(&self, clock: ClockState, noise_s: f64) -> EstimatorSpec {
+        let own = &self.estimator.clock;
+        let clock = match clock {
+            ClockState::On => ClockSpec { jitter_s: own.jitter_s.max(noise_s), ..own.clone() },
+            ClockState::Off => ClockSpec { estimated: false, start_s: 0.0, jitter_s: 0.0, ..own.clone() },
+        };
+        EstimatorSpec { clock, ..self.estimator.clone() }
+    }
+
+    /// Runs the estimator on the disturbed recording.
+    fn estimate(
+        &self,
+        spec: &EstimatorSpec,
+        timing: &DisturbedStamps<'_>,
+        stop: &AtomicBool,
+    ) -> Result<OpenLoop, StudyError> {
+        let mut estimator = Estimator::new(spec, self.calibration)?;
+        for measurement in timing.apply(self.reader.measurements(self.selection)) {
+            if stop.load(Ordering::Relaxed) {
+                return Err(StudyError::Stopped);
+            }
+            estimator.push(measurement?)?;
+        }
+        Ok(estimator.finish()?)
+    }
+
+    /// Adds the distances of the cloud to the true surfaces.
+    fn evaluate_cloud(
+        &self,
+        estimate: &OpenLoop,
+        (world_from_map, scan_stamps): (&Pose, &[Stamp]),
+        blocks: &mut Vec<Block>,
+    ) {
+        let returns = &self.reference.evaluated;
+        let projected = self.project(returns, estimate, world_from_map, scan_stamps);
+        for (hit, (point, origin)) in returns.iter().zip(projected).filter_map(|(hit, ends)| Some((hit, ends?))) {
+            let found = CloudErrors::to_surface(self.world, &[(point, Some(origin))], REACH_M);
+            if let Some(distance_m) = found.signed_m.first() {
+                let block = self.block_at(blocks, self.reference.scan_stamps[hit.scan]);
+                block.points += 1.0;
+                block.distance_m += distance_m;
+                block.distance2_m2 += distance_m * distance_m;
+            }
+        }
+    }
+
+    /// End and origin of beams in the world, by the estimate; `None` outside the estimated time.
+    fn project(
+        &self,
+        returns: &[SampledReturn],
+        estimate: &OpenLoop,
+        world_from_map: &Pose,
+        scan_stamps: &[Stamp],
+    ) -> Vec<Option<(Vector, Vector)>> {
+        let mut cursor = SmoothCursor::new(&estimate.trajectory);
+        let project = |hit: &SampledReturn| {
+            let map_from_head = cursor.at(scan_stamps[hit.scan] + hit.offset)?;
+            let world_from_laser = world_from_map * map_from_head * self.calibration.head_from_laser;
+            let end = world_from_laser.transform_point(&hit.point_in_laser.into()).coords;
+            Some((end, world_from_laser.translation.vector))
+        };
+        returns.iter().map(project).collect()
+    }
+
+    /// The block of time that contains `stamp`.
+    fn block_at<'b>(&self, blocks: &'b mut Vec<Block>, stamp: Stamp) -> &'b mut Block {
+        let (first, last) = self.reference.truth.span().unwrap_or_default();
+        let count = ((last.seconds_since(first) / self.block_s).round() as usize).max(1);
+        blocks.resize(count, Block::default());
+        let index = (stamp.seconds_since(first) / self.block_s).max(0.0) as usize;
+        &mut blocks[index.min(count - 1)]
+    }
+}

@@ -1,0 +1,186 @@
+//! Ground truth and a sample of the lidar's returns, which all runs are evaluated against.
+
+use super::cross_section::CrossSection;
+use crate::evaluation::Thinning;
+use crate::geometry::{Pose, Trajectory, Vector};
+use crate::measurement::{Calibration, LidarScan, Measurement};
+use crate::recording::{Reader, Selection};
+use crate::study::StudyError;
+use crate::study::cloud::Surroundings;
+use crate::study::true_clock::TrueClock;
+use crate::study::truth_cursor::TruthCursor;
+use crate::time::{Span, Stamp};
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Approximate number of returns for the cloud's errors: the computing time of an evaluation is proportional to it.
+const EVALUATED_RETURNS: usize = 60_000;
+/// Maximum number of returns in the section's plot: limits the size of the SVG.
+const SHOWN_RETURNS: usize = 6000;
+
+/// Size of the shown part of the section (along it, up), m.
+const SHOWN_M: (f64, f64) = (3.6, 2.8);
+/// Maximum distance of the shown part's edges from the section's centre (along it, up), m.
+const REACH_M: (f64, f64) = (5.0, 2.4);
+/// Side of the grid cells for the choice of the shown part, m.
+const CELL_M: f64 = 0.05;
+
+/// A return that truly is from a static surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SampledReturn {
+    /// Index of the scan, in order of arrival.
+    pub scan: usize,
+    /// Time of the beam after the scan's stamp.
+    pub offset: Span,
+    /// Measured point in the lidar's frame, m.
+    pub point_in_laser: Vector,
+}
+
+/// Ground truth and sampled returns of the recording.
+pub(super) struct Reference {
+    /// `world_from_head` in lidar time.
+    pub truth: Trajectory,
+    /// True offset of the clocks.
+    pub clock: TrueClock,
+    /// True stamps of the scans, in order of arrival.
+    pub scan_stamps: Vec<Stamp>,
+    /// Returns for the cloud's errors.
+    pub evaluated: Vec<SampledReturn>,
+    /// The section through the map.
+    pub section: CrossSection,
+    /// Shown range of the section (along it, up), m.
+    pub range_m: ((f64, f64), (f64, f64)),
+    /// Returns in the shown range.
+    pub shown: Vec<SampledReturn>,
+    /// True angular rate of the head in the section's plane for each shown return, degrees/s.
+    pub shown_rates_deg_per_s: Vec<f64>,
+}
+
+impl Reference {
+    /// Reads the recording. `returns` is the approximate number of returns, `shown_s` the time range of the section, s.
+    pub(super) fn read(
+        reader: &Reader,
+        (selection, calibration): (&Selection, &Calibration),
+        surroundings: Surroundings<'_>,
+        (returns, shown_s): (usize, f64),
+        stop: &AtomicBool,
+    ) -> Result<Self, StudyError> {
+        let truth = reader.truth_trajectory()?;
+        let Some(section) = CrossSection::through(&truth, shown_s) else {
+            let message = "the recording has no ground truth".to_owned();
+            return Err(StudyError::Plan { what: "latency", message });
+        };
+        let mut sampling = ReturnSampler {
+            truth: TruthCursor::new(reader.truth()),
+            surroundings,
+            head_from_laser: calibration.head_from_laser,
+            section,
+            thinning: Thinning::to(EVALUATED_RETURNS, returns),
+            index: 0,
+            scan_stamps: Vec::new(),
+            evaluated: Vec::new(),
+            shown: Vec::new(),
+        };
+        for measurement in reader.measurements(selection) {
+            if stop.load(Ordering::Relaxed) {
+                return Err(StudyError::Stopped);
+            }
+            if let Measurement::Lidar(scan) = measurement? {
+                sampling.add_scan(&scan)?;
+            }
+        }
+        let ReturnSampler { scan_stamps, evaluated, shown, .. } = sampling;
+        let coordinates: Vec<(f64, f64)> = shown.iter().map(|(_, coordinates)| *coordinates).collect();
+        let range_m = densest_range(&coordinates);
+        let ((left, right), (low, high)) = range_m;
+        let within = |(x, y): (f64, f64)| (left..=right).contains(&x) && (low..=high).contains(&y);
+        let shown: Vec<SampledReturn> =
+            shown.into_iter().filter(|(_, coordinates)| within(*coordinates)).map(|(hit, _)| hit).collect();
+        let thinning = Thinning::to(SHOWN_RETURNS, shown.len());
+        let thinned = shown.into_iter().enumerate().filter(|(index, _)| thinning.keeps(*index));
+        let shown: Vec<SampledReturn> = thinned.map(|(_, hit)| hit).collect();
+        let rate = |hit: &SampledReturn| section.rate_deg_per_s(&truth, scan_stamps[hit.scan] + hit.offset);
+        let shown_rates_deg_per_s = shown.iter().map(|hit| rate(hit).unwrap_or(f64::NAN)).collect();
+        let clock = TrueClock::read(reader, selection)?;
+        Ok(Self { truth, clock, scan_stamps, evaluated, section, range_m, shown, shown_rates_deg_per_s })
+    }
+}
+
+/// Samples returns scan by scan.
+struct ReturnSampler<'a> {
+    truth: TruthCursor<'a>,
+    surroundings: Surroundings<'a>,
+    head_from_laser: Pose,
+    section: CrossSection,
+    thinning: Thinning,
+    index: usize,
+    scan_stamps: Vec<Stamp>,
+    evaluated: Vec<SampledReturn>,
+    /// Returns in the section, with their coordinates there.
+    shown: Vec<(SampledReturn, (f64, f64))>,
+}
+
+impl ReturnSampler<'_> {
+    fn add_scan(&mut self, scan: &LidarScan) -> Result<(), StudyError> {
+        let number = self.scan_stamps.len();
+        self.scan_stamps.push(scan.stamp);
+        for hit in &scan.returns {
+            let stamp = scan.stamp + hit.offset;
+            let index = self.index;
+            self.index += 1;
+            let Some(state) = self.truth.at(stamp)? else { continue };
+            let sampled = SampledReturn { scan: number, offset: hit.offset, point_in_laser: hit.point_in_laser.cast() };
+            let world_from_laser = state.world_from_head * self.head_from_laser;
+            let end = world_from_laser.transform_point(&sampled.point_in_laser.into()).coords;
+            let (is_evaluated, is_shown) = (self.thinning.keeps(index), self.section.contains(&end, stamp));
+            if !(is_evaluated || is_shown) || !self.surroundings.hits_static_surface(&end, &state) {
+                continue;
+            }
+            if is_evaluated {
+                self.evaluated.push(sampled);
+            }
+            if is_shown {
+                self.shown.push((sampled, self.section.coordinates(&end)));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The range of size [`SHOWN_M`] in the section with the most occupied grid cells.
+///
+/// Counting cells rather than points keeps a dense nearby surface from dominating. Of several equal ranges, the leftmost
+/// and then the lowest is chosen.
+fn densest_range(coordinates: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
+    let cells: BTreeSet<(i64, i64)> =
+        coordinates.iter().map(|(x, y)| ((x / CELL_M).round() as i64, (y / CELL_M).round() as i64)).collect();
+    let size = ((SHOWN_M.0 / CELL_M) as i64, (SHOWN_M.1 / CELL_M) as i64);
+    let (reach, step) = (((REACH_M.0 / CELL_M) as i64, (REACH_M.1 / CELL_M) as i64), 4);
+    let mut best = (0, (-size.0 / 2, -size.1 / 2));
+    for left in (-reach.0..=reach.0 - size.0).step_by(step) {
+        for low in (-reach.1..=reach.1 - size.1).step_by(step) {
+            let within = |(x, y): &&(i64, i64)| (left..left + size.0).contains(x) && (low..low + size.1).contains(y);
+            let count = cells.iter().filter(within).count();
+            if count > best.0 {
+                best = (count, (left, low));
+            }
+        }
+    }
+    let (left, low) = (best.1.0 as f64 * CELL_M, best.1.1 as f64 * CELL_M);
+    ((left, left + SHOWN_M.0), (low, low + SHOWN_M.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_corner_of_two_walls_is_preferred_to_a_dense_floor() {
+        // 1000 points of floor within 0.2 m, and two walls of 1.5 m that meet at (2, 1).
+        let floor = (0..1000).map(|k| (-2.0 + 0.0002 * f64::from(k), -1.5));
+        let walls = (0..60).flat_map(|k| [(2.0, 1.0 - 0.025 * f64::from(k)), (2.0 - 0.025 * f64::from(k), 1.0)]);
+        let ((left, right), (low, high)) = densest_range(&floor.chain(walls).collect::<Vec<_>>());
+        assert!(left <= 0.6 && right >= 2.0 && low <= -0.4 && high >= 1.0, "{left} {right} {low} {high}");
+        assert!((right - left - SHOWN_M.0).abs() < 1e-12 && (high - low - SHOWN_M.1).abs() < 1e-12);
+    }
+}

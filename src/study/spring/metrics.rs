@@ -1,0 +1,224 @@
+//! Metrics of a spring design, from the linearised head or from a simulation.
+
+use super::{Shake, SpringMounting, Wire};
+use crate::dynamics::{FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState, LinkageSpec, Quantity};
+use crate::elasticity::{SpringDesign, split};
+use crate::geometry::{Kinematics, Pose, Rotation, Vector};
+use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
+use crate::random::Seed;
+use crate::sensors::Lidar;
+use crate::spec::Source;
+use crate::study::StudyError;
+use crate::study::coverage::{Coverage, CoveragePlan, coverage};
+use nalgebra::Complex;
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// Metrics of a head on a spring under a [`Shake`] of the base.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DesignMetrics {
+    /// Frequency of the slowest mode, Hz.
+    pub rocking_hz: f64,
+    /// Peak gain of the pitch rate.
+    pub peak_gain: f64,
+    /// Static compression of the spring under the head, mm.
+    pub sag_mm: f64,
+    /// Mass of the active wire, g; `None` if spring or material are specified by stiffness only.
+    pub spring_mass_g: Option<f64>,
+    /// Field of view, degrees: twice the pitch amplitude, or in a simulation the 95 % elevation range of the forward
+    /// beam.
+    pub field_of_view_deg: f64,
+    /// Maximum angular velocity, degrees/s.
+    pub rate_deg_per_s: f64,
+    /// Maximum stress in the wire divided by the yield stress; `None` if either is not known.
+    pub stress_share: Option<f64>,
+}
+
+/// Upper frequency of the search for the peak gain, Hz: above the modes of interest.
+const MAX_PEAK_HZ: f64 = 20.0;
+
+/// Computes the metrics of the linearised head: static pose, stiffness, modes and gains.
+///
+/// The response is linear for any amplitude. The computation takes less than 1 ms.
+///
+/// # Errors
+/// When the spec is invalid or the head has no stable rest pose; the error does not include the maximum mass.
+pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignMetrics, StudyError> {
+    let head = HeadModel::new_without_advice(spec, source)?;
+    let model = SpringModel::of(spec, &head)?;
+    let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
+    let foot = head.default_points().base_in_base;
+    let points = GainPoints { base_in_base: foot, head_in_head: head.body().centre_of_mass_in_head };
+    let response = head.frequency_response(&points);
+    let swing = LinearSwing { head: &head, response: &response, foot, omega: TAU * frequency_hz, shake };
+    let pitch = swing.amplitude()[4].norm();
+    let phases = (0..12).map(|k| f64::from(k) * TAU / 12.0);
+    let stress = phases.filter_map(|phase| model.stress_pa(&swing.state(phase))).reduce(f64::max);
+    Ok(model.metrics(
+        &head,
+        &SwingResult {
+            field_of_view_deg: 2.0 * pitch.to_degrees(),
+            rate_deg_per_s: (swing.omega * pitch).to_degrees(),
+            stress,
+        },
+    ))
+}
+
+/// Computes the metrics by a full simulation of the shake, with the coverage of `lidar`.
+///
+/// # Errors
+/// When the spec is invalid, the head has no stable rest pose, or the simulation fails.
+pub fn simulated(
+    spec: &HeadSpec,
+    source: &Source,
+    shake: &Shake,
+    lidar: &Lidar,
+    plan: &CoveragePlan,
+) -> Result<(DesignMetrics, Coverage), StudyError> {
+    let head = HeadModel::new(spec, source)?;
+    let model = SpringModel::of(spec, &head)?;
+    let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
+    let amplitude = Level::Degrees(shake.pitch_deg);
+    let signal = SignalSpec::SweptSine { from_hz: frequency_hz, to_hz: frequency_hz, amplitude };
+    let drives = vec![DriveSpec { axis: Axis::Pitch, signal }];
+    let shaker = MotionSpec::Shaker(ShakerSpec { height_m: 1.1, still_s: 0.5, onset_s: 2.0, drives });
+    let duration_s = plan.from_s + plan.duration_s;
+    let shake = shaker.build(&Source::in_memory("the shake of the base", ""), None, duration_s, Seed(1))?;
+    let base_from_shaken = Pose::from_parts(head.default_points().base_in_base.into(), Rotation::identity());
+    let motion = ShakeAboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
+    let (mut stress, mut step) = (None, 0_usize);
+    let coverage = coverage(&head, &motion, lidar, plan, |state| {
+        step += 1;
+        // A period has hundreds of steps, so every tenth is sufficient for the maximum.
+        if step.is_multiple_of(10) {
+            stress = [stress, model.stress_pa(state)].into_iter().flatten().reduce(f64::max);
+        }
+    })?;
+    let swing = SwingResult {
+        field_of_view_deg: coverage.field_of_view_deg,
+        rate_deg_per_s: coverage.gyro.most_deg_per_s,
+        stress,
+    };
+    Ok((model.metrics(&head, &swing), coverage))
+}
+
+/// Motion of a base that is shaken about the foot of the spring.
+struct ShakeAboutFoot<'a> {
+    shake: &'a dyn BaseMotion,
+    shaken_from_base: Pose,
+}
+
+impl BaseMotion for ShakeAboutFoot<'_> {
+    fn at(&self, t_s: f64) -> Kinematics {
+        self.shake.at(t_s).of_frame(&self.shaken_from_base)
+    }
+}
+
+/// Response to the shake, linear or simulated.
+struct SwingResult {
+    field_of_view_deg: f64,
+    rate_deg_per_s: f64,
+    /// Maximum stress, Pa.
+    stress: Option<f64>,
+}
+
+/// Properties of the spring of a head.
+pub(super) struct SpringModel {
+    pub wire: Option<Wire>,
+    pub mounting: Option<SpringMounting>,
+    /// Whether the spring carries the head without a cable; the stress then follows from the motion of the head.
+    pub has_no_cable: bool,
+    pub free_length_m: Option<f64>,
+    pub mass_kg: Option<f64>,
+}
+
+impl SpringModel {
+    pub fn of(spec: &HeadSpec, head: &HeadModel) -> Result<Self, StudyError> {
+        let mounting = SpringMounting::of(spec, head.body());
+        let LinkageSpec::Spring { spring, cable, .. } = &spec.linkage else {
+            return Ok(Self { mounting, ..Self::without_mounting() });
+        };
+        let coil = match spring.design().map_err(crate::dynamics::DynamicsError::from)? {
+            SpringDesign::Coil(coil) => Some(coil),
+            SpringDesign::Stiffness { .. } => None,
+        };
+        Ok(Self {
+            wire: Wire::of(spring)?,
+            mounting,
+            has_no_cable: cable.is_none(),
+            free_length_m: coil.map(|coil| coil.free_length_m()),
+            mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
+        })
+    }
+
+    /// A model without wire and mounting, for a head without a rest pose or a spring.
+    pub fn without_mounting() -> Self {
+        Self { wire: None, mounting: None, has_no_cable: false, free_length_m: None, mass_kg: None }
+    }
+
+    /// Maximum stress in the wire in a state, Pa; `None` unless a single spring without a cable carries the head.
+    pub fn stress_pa(&self, state: &HeadState) -> Option<f64> {
+        let (wire, mounting) = self.wire.zip(self.mounting).filter(|_| self.has_no_cable)?;
+        Some(mounting.stress_pa(&wire, state))
+    }
+
+    fn metrics(&self, head: &HeadModel, swing: &SwingResult) -> DesignMetrics {
+        let response = head.frequency_response(&head.default_points());
+        let peak = response.peak(Axis::Pitch, MAX_PEAK_HZ, Quantity::Kinematic);
+        let yield_pa = self.wire.and_then(|wire| wire.yield_pa());
+        DesignMetrics {
+            rocking_hz: head.linear_modes().first().map_or(f64::INFINITY, |mode| mode.frequency_hz),
+            peak_gain: peak.map_or(1.0, |peak| peak.gain),
+            sag_mm: self.sag_m(head) * 1e3,
+            spring_mass_g: self.mass_kg.map(|mass_kg| mass_kg * 1e3),
+            field_of_view_deg: swing.field_of_view_deg,
+            rate_deg_per_s: swing.rate_deg_per_s,
+            stress_share: swing.stress.zip(yield_pa).map(|(stress, yield_pa)| stress / yield_pa),
+        }
+    }
+
+    /// Compression at rest: free length minus distance from foot to top, m; 0 if the free length is not known.
+    pub fn sag_m(&self, head: &HeadModel) -> f64 {
+        let (Some(mounting), Some(free_length_m)) = (&self.mounting, self.free_length_m) else { return 0.0 };
+        free_length_m - mounting.length_m(head.rest_pose_base_from_head())
+    }
+}
+
+/// The linear response to a shake.
+struct LinearSwing<'a> {
+    head: &'a HeadModel,
+    response: &'a FrequencyResponse,
+    foot: Vector,
+    omega: f64,
+    shake: &'a Shake,
+}
+
+impl LinearSwing<'_> {
+    /// Complex amplitude of translation (m) and rotation (rad) of the centre of mass.
+    fn amplitude(&self) -> [Complex<f64>; 6] {
+        let base_rad = self.shake.pitch_deg.to_radians();
+        let per_base = self.response.displacement(Axis::Pitch, self.omega / TAU);
+        std::array::from_fn(|k| per_base[k] * base_rad)
+    }
+
+    /// State of base and head at `phase` of the shake, rad. Velocities are zero: their forces are of second order.
+    fn state(&self, phase: f64) -> HeadState {
+        let turning = Complex::from_polar(1.0, phase);
+        let now = crate::elasticity::Vector6::from(self.amplitude().map(|a| (a * turning).re));
+        let (shift, turn) = split(&now);
+        let rest = self.head.rest_pose_base_from_head();
+        let centre_in_head = self.head.body().centre_of_mass_in_head;
+        let rotation = Rotation::from_scaled_axis(turn) * rest.rotation;
+        let centre = rest * nalgebra::Point3::from(centre_in_head) + shift;
+        let arm = rotation * centre_in_head;
+        let angular_acceleration = turn * -(self.omega * self.omega);
+        let mut head = Kinematics::at_rest(Pose::from_parts((centre.coords - arm).into(), rotation));
+        head.angular_acceleration_in_world = angular_acceleration;
+        head.acceleration_in_world = shift * -(self.omega * self.omega) - angular_acceleration.cross(&arm);
+        let pitch = self.shake.pitch_deg.to_radians() * phase.cos();
+        let base_rotation = Rotation::from_scaled_axis(Vector::y() * pitch);
+        let origin = self.foot - base_rotation * self.foot;
+        let base = Kinematics::at_rest(Pose::from_parts(origin.into(), base_rotation));
+        HeadState { t_s: 0.0, head, base }
+    }
+}

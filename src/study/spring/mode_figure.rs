@@ -1,0 +1,144 @@
+//! Plot of the mode shapes.
+
+use super::outline::{Link, edges};
+use crate::dynamics::{HeadModel, HeadSpec, Mode, ModeKind};
+use crate::elasticity::split;
+use crate::geometry::{Pose, Rotation, Vector};
+use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
+
+/// Displayed amplitude: rotation in rad, or translation in units of 0.1 m.
+const DISPLAYED_AMPLITUDE: f64 = 0.3;
+
+/// A polyline in the view plane, mm; NaN interrupts it.
+pub(super) type Polyline = Vec<(f64, f64)>;
+
+/// Plots the mode shapes, slowest first, at the same scale.
+///
+/// Each chart is a side view in the plane of the mode; yaw is a top view. The rest pose is grey, the displaced pose is
+/// coloured. The figure is empty for a head without modes.
+pub fn mode_figure(spec: &HeadSpec, head: &HeadModel) -> Figure {
+    let drawings: Vec<ModeDrawing> =
+        head.linear_modes().iter().map(|mode| ModeDrawing::of(spec, head, *mode)).collect();
+    let extent = |drawing: &ModeDrawing| {
+        let points = [&drawing.rest, &drawing.moved, &drawing.base].into_iter().flatten();
+        points.filter(|(x, y)| x.is_finite() && y.is_finite()).fold([(0.0, 0.0); 2], |ends, (x, y)| {
+            let with = |(low, high): (f64, f64), value: f64| (f64::min(low, value), f64::max(high, value));
+            [with(ends[0], *x), with(ends[1], *y)]
+        })
+    };
+    let all = drawings.iter().map(extent).fold([(0.0, 0.0); 2], |all, [x, y]: [(f64, f64); 2]| {
+        [(f64::min(all[0].0, x.0), f64::max(all[0].1, x.1)), (f64::min(all[1].0, y.0), f64::max(all[1].1, y.1))]
+    });
+    // All charts have the size of the largest drawing plus a margin in mm; a top view is centred.
+    let (wide, high) = (all[0].1.max(-all[0].0) + 15.0, all[1].1 - all[1].0 + 30.0);
+    let panels = drawings.into_iter().map(|drawing| {
+        let y = if drawing.from_above { (-0.5 * high, 0.5 * high) } else { (all[1].0 - 15.0, all[1].1 + 15.0) };
+        let chart = Chart::new(&drawing.title, &drawing.labels.0, &drawing.labels.1).as_map().between((-wide, wide), y);
+        chart
+            .with(Series::line("", Colour::Backdrop, drawing.rest).marked(Mark::Line(1.2)))
+            .with(Series::line("", Colour::Estimate, drawing.moved).marked(Mark::Line(1.2)))
+            .with(Series::line("", Colour::Truth, drawing.base).marked(Mark::Line(3.0)))
+    });
+    Figure::of(panels.collect()).in_columns(3)
+}
+
+/// Name of a kind of mode in the title.
+fn kind_name(kind: ModeKind) -> &'static str {
+    match kind {
+        ModeKind::Rocking => "Rocking",
+        ModeKind::Sway => "Sway",
+        ModeKind::Bounce => "Bounce",
+        ModeKind::Yaw => "Yaw",
+    }
+}
+
+/// Drawing of a mode in the view plane.
+struct ModeDrawing {
+    title: String,
+    /// Labels of the x and y axes.
+    labels: (String, String),
+    from_above: bool,
+    rest: Polyline,
+    moved: Polyline,
+    /// Attachments of springs and cords to the base.
+    base: Polyline,
+}
+
+impl ModeDrawing {
+    fn of(spec: &HeadSpec, head: &HeadModel, mode: Mode) -> Self {
+        let rest = *head.rest_pose_base_from_head();
+        let (shift, turn) = split(&mode.shape);
+        let scale = DISPLAYED_AMPLITUDE / turn.norm().max(10.0 * shift.norm()).max(f64::MIN_POSITIVE);
+        let centre = (rest * nalgebra::Point3::from(head.body().centre_of_mass_in_head)).coords;
+        let rotation = Rotation::from_scaled_axis(turn * scale);
+        let moved = Pose::from_parts((centre + shift * scale - rotation * centre).into(), rotation);
+        let plane = ViewPlane::of(mode.kind, &shift, &turn);
+        let links = Link::all(&spec.linkage);
+        let outline = |head: &Pose| {
+            let mut line: Polyline = links.iter().flat_map(|link| link.outline(head, &plane)).collect();
+            for part in &spec.parts {
+                line.push((f64::NAN, f64::NAN));
+                line.extend(edges(part, &plane).map(|corner| plane.project(&(head * corner).coords)));
+            }
+            line
+        };
+        Self {
+            title: format!(
+                "{} {:.2} Hz, damping ratio {}",
+                kind_name(mode.kind),
+                mode.frequency_hz,
+                ratio(mode.damping_ratio)
+            ),
+            labels: plane.labels(),
+            from_above: plane.from_above,
+            rest: outline(&rest),
+            moved: outline(&(moved * rest)),
+            base: links.iter().flat_map(|link| link.foot_line(&plane)).collect(),
+        }
+    }
+}
+
+/// Formats a damping ratio with significant decimals.
+fn ratio(ratio: f64) -> String {
+    if ratio < 0.01 { format!("{ratio:.4}") } else { format!("{ratio:.3}") }
+}
+
+/// View plane of a drawing, in the base frame.
+pub(super) struct ViewPlane {
+    pub right: Vector,
+    pub up: Vector,
+    pub from_above: bool,
+}
+
+impl ViewPlane {
+    /// The plane of a mode: perpendicular to its rotation axis, or along its translation if it hardly rotates.
+    ///
+    /// Yaw is viewed from above.
+    fn of(kind: ModeKind, shift: &Vector, turn: &Vector) -> Self {
+        let from_above = kind == ModeKind::Yaw;
+        let level = if turn.xy().norm() > 10.0 * shift.xy().norm() {
+            Vector::new(turn.y, -turn.x, 0.0)
+        } else {
+            Vector::new(shift.x, shift.y, 0.0)
+        };
+        let is_bending = matches!(kind, ModeKind::Rocking | ModeKind::Sway) && level.norm() > 1e-9;
+        let right = if is_bending { level.normalize() } else { Vector::x() };
+        // Orient the plane along the closer positive axis.
+        let right = if right[right.iamax()] < 0.0 { -right } else { right };
+        Self { right, up: if from_above { Vector::y() } else { Vector::z() }, from_above }
+    }
+
+    /// Projects a point, m, to the plane, mm.
+    pub fn project(&self, point: &Vector) -> (f64, f64) {
+        (self.right.dot(point) * 1e3, self.up.dot(point) * 1e3)
+    }
+
+    fn labels(&self) -> (String, String) {
+        let across = match (self.right.x, self.right.y) {
+            (x, _) if x > 0.999 => "x (mm)".to_owned(),
+            (_, y) if y > 0.999 => "y (mm)".to_owned(),
+            (x, y) => format!("Along {:.0}\u{b0} from x (mm)", y.atan2(x).to_degrees()),
+        };
+        (across, if self.from_above { "y (mm)" } else { "z (mm)" }.to_owned())
+    }
+}

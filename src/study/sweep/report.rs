@@ -1,0 +1,48 @@
+//! Report of a merged sweep: summary tables and plots.
+
+use super::integrity::IntegrityReport;
+use super::output::{csv, markdown, text, trends_csv};
+use super::{Summary, Sweep, SweepStatus};
+use crate::study::StudyError;
+use crate::study::atomic_file::write_text;
+
+/// Report of a merged sweep.
+#[derive(Debug, Clone)]
+pub struct MergedReport {
+    /// Progress of the sweep.
+    pub status: SweepStatus,
+    /// Summary of the runs.
+    pub summary: Summary,
+    /// The summary as tables for the terminal.
+    pub text: String,
+}
+
+impl Sweep {
+    /// [Merges](Self::merge) the finished runs and reports them.
+    ///
+    /// Writes `summary.csv`, `trends.csv` (for sampled axes), `study.md`, and plots to `plots/`.
+    ///
+    /// # Errors
+    /// If no run is finished, or if a file cannot be read or written.
+    pub fn merge_and_report(&self) -> Result<MergedReport, StudyError> {
+        let status = self.merge()?;
+        if status.done == 0 {
+            let message = "no run is finished: run it with `zsim sweep run`".to_owned();
+            return Err(StudyError::Plan { what: "sweep", message });
+        }
+        let summary = self.summary()?;
+        let integrity = self.integrity_report()?;
+        let integrity_tables = integrity.as_ref().map_or_else(String::new, IntegrityReport::markdown);
+        let page = markdown(&summary, &self.plan, &status) + &integrity_tables;
+        let mut files = vec![("summary.csv", csv(&summary)), ("study.md", page)];
+        if !summary.trends.is_empty() {
+            files.push(("trends.csv", trends_csv(&summary)));
+        }
+        for (name, text) in files {
+            write_text(&self.temporary(), &self.folder.join(name), &text)?;
+        }
+        self.draw(&summary)?;
+        let text = text(&summary, &self.plan) + &integrity.map_or_else(String::new, |integrity| integrity.text());
+        Ok(MergedReport { status, summary, text })
+    }
+}
