@@ -34,6 +34,8 @@ pub(super) struct StampFilter {
     outliers: usize,
     started: bool,
     off: bool,
+    /// Whether the sensor has no period.
+    irregular: bool,
     /// Whether stamps are only delayed, so that the earliest ones are accurate.
     delayed: bool,
     /// Number of consecutive late stamps, and the smallest delay of them, s.
@@ -58,9 +60,15 @@ impl StampFilter {
             outliers: 0,
             started: false,
             off,
+            irregular: pattern == StampPattern::Irregular,
             delayed: pattern == StampPattern::Delayed,
             late: (0, f64::INFINITY),
         }
+    }
+
+    /// Whether the sensor has no period; `period_s` is then the median interval.
+    pub(super) fn is_irregular(&self) -> bool {
+        self.irregular
     }
 
     /// Estimated sampling period, s.

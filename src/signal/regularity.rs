@@ -5,6 +5,11 @@
 /// The sensor is aperiodic if the jitter exceeds the first fraction of the period, and the variance of `n` intervals
 /// exceeds the second fraction of `n` times the variance of one interval.
 const APERIODIC: (f64, f64) = (0.2, 0.4);
+/// The same for a sensor slower than 50 Hz. A second of its stamps is a small sample, and to call it aperiodic costs less:
+/// between its readings the motion is interpolated in any case.
+const APERIODIC_SLOW: (f64, f64) = (0.12, 0.2);
+/// Period of a slow sensor, s.
+const SLOW_S: f64 = 0.02;
 /// Skewness of the residuals above which stamps count as delayed; an exponential delay has 2.
 const DELAYED_SKEWNESS: f64 = 0.8;
 /// Minimum number of stamps for a meaningful skewness.
@@ -92,7 +97,8 @@ impl Regularity {
             }
             (a, b) => a.or(b)?,
         };
-        if line.jitter_s > APERIODIC.0 * line.period_s && has_independent_intervals(stamps_s) {
+        let (jitter, variance_ratio) = if median > SLOW_S { APERIODIC_SLOW } else { APERIODIC };
+        if line.jitter_s > jitter * line.period_s && has_independent_intervals(stamps_s, variance_ratio) {
             return Some(Self { period_s: median, jitter_s: 0.0, pattern: StampPattern::Irregular });
         }
         Some(line)
@@ -144,14 +150,14 @@ impl Regularity {
 /// Whether the intervals are independent, as those of a sensor without period.
 ///
 /// The variance of the duration of `n` independent intervals grows with `n`; jitter about a constant period does not.
-fn has_independent_intervals(stamps_s: &[f64]) -> bool {
+fn has_independent_intervals(stamps_s: &[f64], variance_ratio: f64) -> bool {
     let variance = |n: usize| {
         let times: Vec<f64> = stamps_s.windows(n + 1).map(|run| run[n] - run[0]).collect();
         let mean = times.iter().sum::<f64>() / times.len() as f64;
         times.iter().map(|time| (time - mean).powi(2)).sum::<f64>() / times.len() as f64
     };
     let many = (stamps_s.len() / 4).min(16);
-    many >= 4 && variance(many) > APERIODIC.1 * many as f64 * variance(1)
+    many >= 4 && variance(many) > variance_ratio * many as f64 * variance(1)
 }
 
 #[cfg(test)]
@@ -189,6 +195,21 @@ mod tests {
         assert_eq!(Regularity::of(&irregular).unwrap().pattern, StampPattern::Irregular);
         let noisy: Vec<f64> = stamps(150, 8e-3);
         assert_ne!(Regularity::of(&noisy).unwrap().pattern, StampPattern::Irregular);
+    }
+
+    #[test]
+    fn the_arrivals_of_a_micro_controller_have_no_period() {
+        // Arrival times of a real sensor, as samples of a 100 Hz IMU; any second and a half of them.
+        let text = include_str!("../../specs/faults/imu_arrivals_mcu.txt");
+        let arrivals = text.lines().filter(|line| !line.starts_with('#')).map(|line| line.parse::<f64>().unwrap());
+        let mut samples: Vec<f64> = arrivals.map(|arrival| (arrival / 0.01).ceil() * 0.01).collect();
+        samples.dedup();
+        for start in 0..50 {
+            let from = samples.partition_point(|t| *t < f64::from(start));
+            let to = samples.partition_point(|t| *t < f64::from(start) + 1.5);
+            let found = Regularity::of(&samples[from..to]);
+            assert_eq!(found.unwrap().pattern, StampPattern::Irregular, "{start}: {found:?}");
+        }
     }
 
     #[test]

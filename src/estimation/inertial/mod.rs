@@ -4,6 +4,7 @@
 
 mod clipping;
 mod reconstruction;
+mod resampling;
 mod screen;
 
 pub(super) use clipping::Clipped;
@@ -16,10 +17,14 @@ use super::strapdown::Interval;
 use crate::geometry::Vector;
 use crate::measurement::{ImuNoise, ImuSample};
 use reconstruction::{FIT_MEANS, bridge, reconstruct_clipped};
+use resampling::Resampler;
 use std::collections::VecDeque;
 
 /// Samples of a faster IMU are averaged to about this spacing, s.
 const SPACING_S: f64 = 0.01;
+/// Longest gap that is bridged in the data of an irregular sensor, s. Gaps are frequent there: to restart after each
+/// of them would leave no time to relocalise.
+const IRREGULAR_GAP_S: f64 = 0.3;
 /// Maximum time to wait for valid samples after a gap or a clipped reading, s; bounds the latency.
 const MAX_WAIT_S: f64 = 1.0;
 /// Extra standard deviation of the specific force where an outlier was discarded, m/s^2: it may have been a shock.
@@ -47,6 +52,8 @@ pub(super) struct InertialStream {
     spec: InertialSpec,
     /// Number of samples in a mean.
     per_group: usize,
+    /// Present for an irregular sensor.
+    resampler: Option<Resampler>,
     group: Vec<Mean>,
     /// The last two means. The later one becomes an interval when the next mean is known.
     before: Option<Mean>,
@@ -65,12 +72,14 @@ pub(super) struct InertialStream {
 
 impl InertialStream {
     pub(super) fn new(filter: StampFilter, noise: ImuNoise, spec: InertialSpec) -> Self {
-        let per_group = (SPACING_S / filter.period_s()).round().max(1.0) as usize;
+        let is_irregular = filter.is_irregular();
+        let per_group = if is_irregular { 1 } else { (SPACING_S / filter.period_s()).round().max(1.0) as usize };
         Self {
             filter,
             noise,
             spec,
             per_group,
+            resampler: is_irregular.then(Resampler::new),
             group: Vec::new(),
             before: None,
             current: None,
@@ -102,11 +111,17 @@ impl InertialStream {
         std::mem::take(&mut self.saturated)
     }
 
+    /// Longest gap that is bridged, s, where `regular_s` is that of a sensor with a period.
+    pub(super) fn max_gap_s(&self, regular_s: f64) -> f64 {
+        if self.resampler.is_some() { regular_s.max(IRREGULAR_GAP_S) } else { regular_s }
+    }
+
     /// Discards the samples so far; the next interval does not continue the last one.
     pub(super) fn restart(&mut self) {
         self.group.clear();
         self.last_valid.clear();
         self.waiting.clear();
+        self.resampler.iter_mut().for_each(Resampler::restart);
         (self.before, self.current, self.end_s) = (None, None, None);
     }
 
@@ -153,6 +168,9 @@ impl InertialStream {
         if !self.group.is_empty() {
             self.close_group(into);
         }
+        if let Some(resampler) = &mut self.resampler {
+            resampler.flush().into_iter().for_each(|mean| self.append(mean, into));
+        }
         self.release(into);
     }
 
@@ -169,7 +187,10 @@ impl InertialStream {
             bridged: false,
         };
         self.group.clear();
-        self.append(mean, into);
+        match &mut self.resampler {
+            Some(resampler) => resampler.push(mean).into_iter().for_each(|mean| self.append(mean, into)),
+            None => self.append(mean, into),
+        }
     }
 
     /// Appends a mean, or holds it back until a gap or clipped readings before it are reconstructed.
@@ -205,7 +226,10 @@ impl InertialStream {
 
     /// Spacing of the means, s.
     fn spacing_s(&self) -> f64 {
-        self.filter.period_s() * self.per_group as f64
+        match &self.resampler {
+            Some(_) => SPACING_S,
+            None => self.filter.period_s() * self.per_group as f64,
+        }
     }
 
     /// Emits the waiting means, with gaps bridged and clipped readings reconstructed.

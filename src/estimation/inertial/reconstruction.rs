@@ -59,7 +59,7 @@ impl LineFit {
 }
 
 /// Cubic Hermite interpolation between two values with slopes, at `u` in 0..1.
-fn hermite(from: (Vector, Vector), to: (Vector, Vector), length_s: f64, u: f64) -> Vector {
+pub(super) fn hermite(from: (Vector, Vector), to: (Vector, Vector), length_s: f64, u: f64) -> Vector {
     let (h01, h10, h11) = (u * u * (3.0 - 2.0 * u), u * (1.0 - u) * (1.0 - u), u * u * (u - 1.0));
     from.0.lerp(&to.0, h01) + (from.1 * h10 + to.1 * h11) * length_s
 }

@@ -121,6 +121,7 @@ impl SampleQueue {
     pub(super) fn advance(&mut self, end_s: f64, max_bridged_s: f64, last: bool) -> Coverage {
         let complete_s = if last { f64::INFINITY } else { self.newest_s() - COMPLETE_AFTER_S };
         let Some(stream) = &mut self.stream else { return Coverage::Waiting };
+        let max_bridged_s = stream.max_gap_s(max_bridged_s);
         while let Some((seconds, sample)) = self.waiting.front().copied() {
             if self.used_s > end_s + MARGIN_S && stream.end_s() > end_s + 0.5 * MARGIN_S {
                 return Coverage::Complete;
