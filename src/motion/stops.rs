@@ -14,7 +14,7 @@ pub enum StopsSpec {
     At(Vec<(f64, f64)>),
     /// At random times.
     Random {
-        /// Mean time from the end of a stop to the start of the next, s; drawn uniformly from 0.5 to 1.5 times this
+        /// Mean time from the end of a stop to the start of the next, s; uniformly distributed from 0.5 to 1.5 times this
         /// value.
         #[serde(with = "crate::spec::checked::Positive")]
         every_s: f64,

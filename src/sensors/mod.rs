@@ -2,7 +2,7 @@
 //!
 //! Each sensor has three parts. A *spec* is data ([`LidarSpec`], [`ImuSpec`], [`ClocksSpec`]), read from `specs/`. A
 //! *model* is built from the spec and is valid by construction ([`Lidar`], [`Imu`], [`Clocks`]). The *errors* are one
-//! realisation of the noise of the spec, drawn from a seed ([`LidarErrors`], [`ImuErrors`], [`Stamper`]). The exact
+//! realisation of the noise of the spec, sampled with a seed ([`LidarErrors`], [`ImuErrors`], [`Stamper`]). The exact
 //! geometry is computed first and the errors afterwards, so that runs that differ only in noise can use the same rays:
 //!
 //! - lidar: [`Lidar::sweep`] casts the rays of one scan, each from the pose at the firing time of its beam;

@@ -64,7 +64,7 @@ pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> R
     for measurement in reader.measurements(&selection) {
         match measurement? {
             Measurement::Imu(sample) => {
-                accumulator.information.add_imu_sample(clock.on_lidar_clock(sample.stamp), &sample)
+                accumulator.information.add_imu_sample(clock.on_lidar_clock(sample.stamp), &sample);
             }
             Measurement::Lidar(scan) => {
                 if watch.is_stopped() {

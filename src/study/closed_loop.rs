@@ -14,7 +14,7 @@ pub(super) struct ClosedLoopRun {
     pub lidar: LidarCorrection,
     /// The open-loop trajectory with the estimated lidar extrinsics, if these were estimated.
     pub open_loop_recalibrated: Option<Trajectory>,
-    /// Recognised places.
+    /// Loop closures.
     pub loops: LoopReport,
     /// The reason why the loop closure was not applied; `None` if it was.
     pub rejected_because: Option<&'static str>,

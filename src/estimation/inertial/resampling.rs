@@ -155,9 +155,9 @@ mod tests {
 
     /// Twenty seconds of readings, 25 to 65 ms apart (golden-ratio sequence), with one gap of 0.2 s.
     fn irregular_times() -> Vec<f64> {
-        let mut t_s = 0.0;
         let step = |k: i32| 0.025 + 0.04 * (0.618_033_988_75 * f64::from(k)).fract() + if k == 200 { 0.2 } else { 0.0 };
-        (0..440).map(|k| std::mem::replace(&mut t_s, t_s + step(k))).collect()
+        let sum_before = |t_s: &mut f64, k: i32| Some(std::mem::replace(t_s, *t_s + step(k)));
+        (0..440).scan(0.0, sum_before).collect()
     }
 
     #[test]

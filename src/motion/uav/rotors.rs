@@ -18,7 +18,7 @@ pub struct RotorSpec {
     /// Mean rotor speed, revolutions/s.
     #[serde(with = "Positive")]
     pub speed_hz: f64,
-    /// Maximum deviation of a rotor's speed from the mean, as a fraction of it; drawn uniformly.
+    /// Maximum deviation of a rotor's speed from the mean, as a fraction of it; uniformly distributed.
     #[serde(with = "crate::spec::checked::Fraction")]
     pub speed_spread: f64,
     /// Blades per rotor.

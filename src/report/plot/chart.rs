@@ -27,12 +27,12 @@ pub struct Series {
 }
 
 impl Series {
-    /// A series drawn as a line.
+    /// A series as a line.
     pub fn line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self { name: name.to_owned(), colour, mark: Mark::Line(1.5), points, band: Vec::new() }
     }
 
-    /// A series drawn as dots.
+    /// A series as dots.
     pub fn dots(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self { mark: Mark::Dots(1.5), ..Self::line(name, colour, points) }
     }

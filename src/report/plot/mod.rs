@@ -18,7 +18,7 @@ pub use chart::{Cell, Cells, Chart, Mark, Series, SignedDots};
 pub use figure::Figure;
 pub use palette::Colour;
 
-/// Error when a plot is drawn or saved.
+/// Error of plotting or saving a plot.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
     /// The drawing backend failed.

@@ -29,7 +29,7 @@ impl GaussMarkov {
     }
 }
 
-/// Errors of an IMU in one run, drawn from a seed: scale, misalignment, and biases that change over time.
+/// Errors of an IMU in one run, sampled with a seed: scale, misalignment, and biases that change over time.
 ///
 /// A sample over `dt` is `round(clamp((I + S + M) true + bias + white))`, with white noise of `density / sqrt(dt)`. The
 /// bias follows a random walk, `b' = b + walk sqrt(dt) w`, plus an optional Gauss-Markov process,

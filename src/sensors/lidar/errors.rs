@@ -11,7 +11,7 @@ const CERTAIN_ODDS: f64 = 1e6;
 /// Detection odds for which the power threshold is precomputed: most draws are below, so most beams need no `powf`.
 const FAST_PATH_ODDS: f64 = 100.0;
 
-/// Errors of a lidar in one run, drawn from a seed.
+/// Errors of a lidar in one run, sampled with a seed.
 #[derive(Debug, Clone)]
 pub struct LidarErrors {
     seed: Seed,

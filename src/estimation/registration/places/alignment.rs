@@ -1,4 +1,4 @@
-//! Point-to-plane registration of two places, and the agreement of their surfaces.
+//! Point-to-plane registration of two nodes, and the agreement of their surfaces.
 
 use crate::estimation::matching::{Forest, Matcher};
 use crate::estimation::surfel::Patch;
@@ -21,10 +21,10 @@ const GATE_EDGES: f64 = 0.25;
 const FACING_COSINE: f64 = 0.7;
 /// Minimum number of surfaces facing a direction for the evaluation.
 const MIN_FACING: usize = 8;
-/// Standard deviation of a match, m: drift within a place distorts the surfaces.
+/// Standard deviation of a match, m: drift within a node distorts the surfaces.
 const MATCH_SIGMA_M: f64 = 0.1;
 
-/// Relative pose of two levelled places: a point `x` of the first is at `Rz(yaw) x + shift` in the second.
+/// Relative pose of two levelled nodes: a point `x` of the first is at `Rz(yaw) x + shift` in the second.
 ///
 /// Both are relative to their head positions, in map axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,8 +51,8 @@ impl Alignment {
     }
 }
 
-/// Surfels of a place with a search index.
-pub(super) struct PlaceSurfels {
+/// Surfels of a node with a search index.
+pub(super) struct NodeSurfels {
     /// All surfels of the used resolutions.
     patches: Vec<Patch>,
     forest: Forest,
@@ -70,7 +70,7 @@ pub(super) struct Fit {
     pub(super) matches: usize,
 }
 
-impl PlaceSurfels {
+impl NodeSurfels {
     /// Builds the index from patches by resolution.
     pub(super) fn new(levels: Vec<Vec<Patch>>, matcher: &Matcher) -> Self {
         let subsample = |patches: &Vec<Patch>| {
@@ -95,7 +95,7 @@ impl PlaceSurfels {
 }
 
 /// Registers `from` to `to` from the coarsest resolution to the finest; `None` without matches.
-pub(super) fn align(from: &PlaceSurfels, to: &PlaceSurfels, start: &Alignment, matcher: &Matcher) -> Option<Fit> {
+pub(super) fn align(from: &NodeSurfels, to: &NodeSurfels, start: &Alignment, matcher: &Matcher) -> Option<Fit> {
     let mut fit = Fit { alignment: *start, information: Matrix4::zeros(), matches: 0 };
     for level in (0..from.queries.len()).rev() {
         let gate_m = GATE_EDGES * matcher.finest_voxel_m * f64::from(1_u32 << level);
@@ -112,7 +112,7 @@ pub(super) fn align(from: &PlaceSurfels, to: &PlaceSurfels, start: &Alignment, m
 /// One Gauss-Newton step of `e = n^T (Rz x + shift - mu)` over yaw and shift.
 fn step(
     fit: &mut Fit,
-    (from, to): (&PlaceSurfels, &PlaceSurfels),
+    (from, to): (&NodeSurfels, &NodeSurfels),
     level: usize,
     gate_m: f64,
     matcher: &Matcher,
@@ -143,8 +143,8 @@ fn step(
 /// The directions are the vertical and the horizontal principal axes of the normals. The minimum is used because in a corridor
 /// floor and walls match at any position along it. `None` if too few surfaces face one of the directions.
 pub(super) fn agreement(
-    from: &PlaceSurfels,
-    to: &PlaceSurfels,
+    from: &NodeSurfels,
+    to: &NodeSurfels,
     alignment: &Alignment,
     (matcher, gate_m): (&Matcher, f64),
 ) -> Option<f64> {

@@ -1,8 +1,8 @@
-//! Start alignments of two places by correlation over heading and horizontal translation.
+//! Start alignments of two nodes by correlation over heading and horizontal translation.
 //!
-//! After E. Olson, Real-time correlative scan matching (ICRA 2009): the vertical surfaces of one place are entered into a grid
+//! After E. Olson, Real-time correlative scan matching (ICRA 2009): the vertical surfaces of one node are entered into a grid
 //! with the octants of their normals. For every translation in range and every heading around the given one, the surfaces of
-//! the other place that fall into cells with the same octant are counted.
+//! the other node that fall into cells with the same octant are counted.
 
 use super::alignment::Alignment;
 use super::scan_context::is_wall;
@@ -13,7 +13,7 @@ use crate::geometry::{Rotation, Vector};
 const CELL_M: f64 = 0.5;
 /// Number of cells from the centre to the border: 20 m, as the Scan Context descriptor.
 const HALF: i32 = 40;
-/// Search range of the translation in cells to each side: 3 m, the maximum distance of two views of one place.
+/// Search range of the translation in cells to each side: 3 m, the maximum distance of two views of one node.
 const REACH: i32 = 6;
 /// Number of heading steps to each side: 9 degrees, more than one sector of the descriptor.
 const HEADING_STEPS: i32 = 3;

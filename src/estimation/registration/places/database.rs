@@ -1,4 +1,4 @@
-//! Divides the recording into places, submaps for place recognition.
+//! Divides the recording into nodes, submaps for place recognition.
 
 use super::PlacesSpec;
 use crate::estimation::registration::corrected_trajectory::CorrectedTrajectory;
@@ -14,7 +14,7 @@ const GROUND_QUANTILE: f64 = 0.02;
 
 /// A submap of a few seconds.
 #[derive(Debug, Clone)]
-pub(super) struct Place {
+pub(super) struct Node {
     /// Middle time, s.
     pub(super) tau_s: f64,
     /// Position of the head at that time in the map, m.
@@ -25,13 +25,13 @@ pub(super) struct Place {
     members: Range<usize>,
 }
 
-/// All places and their surfels.
+/// All nodes and their surfels.
 #[derive(Debug)]
 pub(super) struct PlaceDatabase<'a> {
     survey: &'a Survey,
     /// Indices of the sightings of the survey in time order.
     order: Vec<u32>,
-    pub(super) places: Vec<Place>,
+    pub(super) nodes: Vec<Node>,
 }
 
 impl<'a> PlaceDatabase<'a> {
@@ -42,7 +42,7 @@ impl<'a> PlaceDatabase<'a> {
         let mut order: Vec<u32> = (0..survey.len() as u32).filter(|k| (start_s..=end_s).contains(&tau_s(k))).collect();
         order.sort_by(|a, b| tau_s(a).total_cmp(&tau_s(b)));
         let times_s: Vec<f64> = order.iter().map(tau_s).collect();
-        let place = |members: Range<usize>| {
+        let node = |members: Range<usize>| {
             let tau_s = 0.5 * (times_s[members.start] + times_s[members.end - 1]);
             let head = corrected.pose_at(tau_s).translation.vector;
             let mut heights: Vec<f64> = order[members.clone()]
@@ -53,15 +53,15 @@ impl<'a> PlaceDatabase<'a> {
                 .collect();
             heights.sort_by(f64::total_cmp);
             let ground_m = heights.get((heights.len() as f64 * GROUND_QUANTILE) as usize).copied().unwrap_or(0.0);
-            Place { tau_s, head, ground_m, members }
+            Node { tau_s, head, ground_m, members }
         };
-        let places = divide(&times_s, spec.length_s).into_iter().map(place).collect();
-        Self { survey, order, places }
+        let nodes = divide(&times_s, spec.length_s).into_iter().map(node).collect();
+        Self { survey, order, nodes }
     }
 
-    /// Surfels of `level` of a place, relative to the head, in map axes.
-    pub(super) fn patches(&self, place: usize, level: usize) -> impl Iterator<Item = Patch> + '_ {
-        let Place { head, members, .. } = self.places[place].clone();
+    /// Surfels of `level` of a node, relative to the head, in map axes.
+    pub(super) fn patches(&self, node: usize, level: usize) -> impl Iterator<Item = Patch> + '_ {
+        let Node { head, members, .. } = self.nodes[node].clone();
         let patches = self.order[members].iter().map(|k| self.survey.sightings[*k as usize].patch);
         patches
             .filter(move |patch| patch.level == level)

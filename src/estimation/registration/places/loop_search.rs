@@ -1,13 +1,13 @@
-//! Search for loop closures between places.
+//! Search for loop closures between nodes.
 
-use super::alignment::{ALIGNED_LEVELS, Alignment, Fit, PlaceSurfels, agreement, align};
+use super::alignment::{ALIGNED_LEVELS, Alignment, Fit, NodeSurfels, agreement, align};
 use super::database::PlaceDatabase;
 use super::scan_context::{self, Context};
 use super::{LoopReport, MATCHING_REACH, PlacesSpec, RelativePose, correlation};
 use crate::estimation::matching::Matcher;
 use rayon::prelude::*;
 
-/// Maximum distance of two views of one place, m: up to it the descriptors stay similar.
+/// Maximum distance of two views of one node, m: up to it the descriptors stay similar.
 const MAX_VIEW_DISTANCE_M: f64 = 3.0;
 /// Number of start alignments per pair.
 const STARTS: usize = 3;
@@ -15,7 +15,7 @@ const STARTS: usize = 3;
 const SAME_ALIGNMENT: (f64, f64) = (0.5, 0.1);
 /// The best alignment is ambiguous if a different one has more than this fraction of the agreement.
 const MAX_SECOND_RATIO: f64 = 0.8;
-/// Minimum number of matches for a link between successive places.
+/// Minimum number of matches for a link between successive nodes.
 const MIN_LINK_MATCHES: usize = 30;
 
 /// Selects the loops to search for.
@@ -23,20 +23,20 @@ const MIN_LINK_MATCHES: usize = 30;
 pub(super) enum LoopFilter {
     /// All loops, including those that the trajectory already satisfies.
     All,
-    /// Only loops of places without any candidate that agrees at the current pose.
+    /// Only loops of nodes without any candidate that agrees at the current pose.
     OutOfReach,
 }
 
-/// A pair of similar places.
+/// A pair of similar nodes.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
-    /// Indices of the later and the earlier place.
-    places: (usize, usize),
+    /// Indices of the later and the earlier node.
+    nodes: (usize, usize),
     yaw: f64,
     distance: f64,
 }
 
-/// Result of the candidates of one place.
+/// Result of the candidates of one node.
 #[derive(Debug, Clone, Copy, Default)]
 struct Outcome {
     /// Number of candidates that were registered.
@@ -44,7 +44,7 @@ struct Outcome {
     found: Option<RelativePose>,
 }
 
-/// Searches the place database for loop closures.
+/// Searches the node database for loop closures.
 pub(super) struct LoopSearch<'a> {
     pub(super) database: PlaceDatabase<'a>,
     pub(super) matcher: &'a Matcher,
@@ -55,26 +55,25 @@ impl LoopSearch<'_> {
     /// Verified loops in time order, with statistics.
     pub(super) fn loops(&self, filter: LoopFilter) -> (Vec<RelativePose>, LoopReport) {
         let outcomes: Vec<Outcome> =
-            self.candidates().into_par_iter().map(|of_place| self.test_candidates(&of_place, filter)).collect();
+            self.candidates().into_par_iter().map(|of_node| self.test_candidates(&of_node, filter)).collect();
         let loops: Vec<RelativePose> = outcomes.iter().filter_map(|outcome| outcome.found).collect();
         let proposed = outcomes.iter().map(|outcome| outcome.registered).sum();
         let report = LoopReport { proposed, verified: loops.len(), closed: 0 };
         (loops, report)
     }
 
-    /// For each place the most similar earlier places, most similar first.
+    /// For each node the most similar earlier nodes, most similar first.
     fn candidates(&self) -> Vec<Vec<Candidate>> {
-        let places = &self.database.places;
-        let context = |place: usize| Context::from_patches(self.database.patches(place, 0), places[place].ground_m);
-        let contexts: Vec<Context> = (0..places.len()).into_par_iter().map(context).collect();
+        let nodes = &self.database.nodes;
+        let context = |node: usize| Context::from_patches(self.database.patches(node, 0), nodes[node].ground_m);
+        let contexts: Vec<Context> = (0..nodes.len()).into_par_iter().map(context).collect();
         // Neighbours in time are similar, too, and excluded below: request as many more.
         let in_time = 2 * (self.spec.min_apart_s / self.spec.length_s).ceil() as usize;
         let near = scan_context::nearest_by_key(&contexts, self.spec.candidates + in_time);
-        let of_place = |late: usize| {
+        let of_node = |late: usize| {
             let to_candidate = |early: &usize| {
                 let similarity = contexts[late].compare(&contexts[*early])?;
-                let candidate =
-                    Candidate { places: (late, *early), yaw: similarity.yaw, distance: similarity.distance };
+                let candidate = Candidate { nodes: (late, *early), yaw: similarity.yaw, distance: similarity.distance };
                 Some(candidate).filter(|candidate| self.is_possible(candidate))
             };
             let earlier = near[late].iter().filter(|early| **early < late);
@@ -83,13 +82,13 @@ impl LoopSearch<'_> {
             candidates.truncate(self.spec.tries);
             candidates
         };
-        (0..places.len()).into_par_iter().map(of_place).collect()
+        (0..nodes.len()).into_par_iter().map(of_node).collect()
     }
 
     /// Whether similarity, time difference and drift of a candidate are within the limits.
     fn is_possible(&self, candidate: &Candidate) -> bool {
-        let (late, early) = (&self.database.places[candidate.places.0], &self.database.places[candidate.places.1]);
-        let (max_drift_m, max_heading_error) = self.max_drift(candidate.places);
+        let (late, early) = (&self.database.nodes[candidate.nodes.0], &self.database.nodes[candidate.nodes.1]);
+        let (max_drift_m, max_heading_error) = self.max_drift(candidate.nodes);
         late.tau_s - early.tau_s >= self.spec.min_apart_s
             && candidate.distance < self.spec.max_distance
             && (late.head - early.head).norm() < MAX_VIEW_DISTANCE_M + max_drift_m
@@ -98,46 +97,46 @@ impl LoopSearch<'_> {
 
     /// Maximum drift of the open loop between two times, m and rad.
     fn max_drift(&self, (late, early): (usize, usize)) -> (f64, f64) {
-        let minutes = (self.database.places[late].tau_s - self.database.places[early].tau_s) / 60.0;
+        let minutes = (self.database.nodes[late].tau_s - self.database.nodes[early].tau_s) / 60.0;
         let spec = self.spec;
         let turn_deg = spec.max_turn_deg + spec.max_turn_deg_per_min * minutes;
         (spec.max_drift_m + spec.max_drift_m_per_min * minutes, turn_deg.to_radians())
     }
 
-    /// Registers the candidates of one place; returns the first verified loop.
+    /// Registers the candidates of one node; returns the first verified loop.
     ///
     /// With `OutOfReach` it returns no loop if any candidate already agrees at the current pose.
     fn test_candidates(&self, candidates: &[Candidate], filter: LoopFilter) -> Outcome {
         let mut outcome = Outcome::default();
         let Some(first) = candidates.first() else { return outcome };
-        let late = self.surfels(first.places.0);
-        for Candidate { places, yaw, .. } in candidates {
-            let early = self.surfels(places.1);
-            let now = self.current_alignment(*places);
+        let late = self.surfels(first.nodes.0);
+        for Candidate { nodes, yaw, .. } in candidates {
+            let early = self.surfels(nodes.1);
+            let now = self.current_alignment(*nodes);
             let agrees = self.agreement(&late, &early, &now).is_some_and(|ratio| ratio >= self.spec.min_agreement);
             if agrees && filter == LoopFilter::OutOfReach {
                 return Outcome { found: None, ..outcome };
             }
             outcome.registered += 1;
-            let Some(fit) = self.verify((&late, &early), *places, *yaw) else { continue };
+            let Some(fit) = self.verify((&late, &early), *nodes, *yaw) else { continue };
             let (shift_m, turn) = fit.alignment.difference(&now);
             if shift_m < MATCHING_REACH.0 && turn < MATCHING_REACH.1 && filter == LoopFilter::OutOfReach {
                 return Outcome { found: None, ..outcome };
             }
-            let (max_drift_m, max_heading_error) = self.max_drift(*places);
+            let (max_drift_m, max_heading_error) = self.max_drift(*nodes);
             if shift_m < max_drift_m && turn < max_heading_error {
-                outcome.found = outcome.found.or(Some(self.relative_pose(*places, &fit)));
+                outcome.found = outcome.found.or(Some(self.relative_pose(*nodes, &fit)));
             }
         }
         outcome
     }
 
-    /// Registers two places; `None` if the agreement is insufficient or ambiguous.
-    fn verify(&self, (late, early): (&PlaceSurfels, &PlaceSurfels), places: (usize, usize), yaw: f64) -> Option<Fit> {
-        let ground_m = |place: usize| self.database.places[place].ground_m;
-        let up_m = ground_m(places.1) - ground_m(places.0);
+    /// Registers two nodes; `None` if the agreement is insufficient or ambiguous.
+    fn verify(&self, (late, early): (&NodeSurfels, &NodeSurfels), nodes: (usize, usize), yaw: f64) -> Option<Fit> {
+        let ground_m = |node: usize| self.database.nodes[node].ground_m;
+        let up_m = ground_m(nodes.1) - ground_m(nodes.0);
         let mut starts = correlation::start_alignments(late.finest(), early.finest(), (yaw, up_m), STARTS);
-        starts.push(self.current_alignment(places));
+        starts.push(self.current_alignment(nodes));
         let register = |start: &Alignment| {
             let fit = align(late, early, start, self.matcher)?;
             Some((self.agreement(late, early, &fit.alignment)?, fit))
@@ -152,34 +151,34 @@ impl LoopSearch<'_> {
         (best >= self.spec.min_agreement && next < MAX_SECOND_RATIO * best).then_some(fit)
     }
 
-    /// Relative poses of successive places with enough common surfaces.
+    /// Relative poses of successive nodes with enough common surfaces.
     pub(super) fn links(&self) -> Vec<RelativePose> {
         let link = |early: usize| {
-            let places = (early + 1, early);
+            let nodes = (early + 1, early);
             let fit =
-                align(&self.surfels(places.0), &self.surfels(places.1), &self.current_alignment(places), self.matcher)?;
-            (fit.matches >= MIN_LINK_MATCHES).then(|| self.relative_pose(places, &fit))
+                align(&self.surfels(nodes.0), &self.surfels(nodes.1), &self.current_alignment(nodes), self.matcher)?;
+            (fit.matches >= MIN_LINK_MATCHES).then(|| self.relative_pose(nodes, &fit))
         };
-        (0..self.database.places.len().saturating_sub(1)).into_par_iter().filter_map(link).collect()
+        (0..self.database.nodes.len().saturating_sub(1)).into_par_iter().filter_map(link).collect()
     }
 
     fn relative_pose(&self, (late, early): (usize, usize), fit: &Fit) -> RelativePose {
-        let time_s = |place: usize| self.database.places[place].tau_s;
+        let time_s = |node: usize| self.database.nodes[node].tau_s;
         let times_s = (time_s(late), time_s(early));
         RelativePose { times_s, alignment: fit.alignment, information: fit.information }
     }
 
-    fn surfels(&self, place: usize) -> PlaceSurfels {
+    fn surfels(&self, node: usize) -> NodeSurfels {
         let levels = 0..ALIGNED_LEVELS.min(self.matcher.levels);
-        PlaceSurfels::new(levels.map(|level| self.database.patches(place, level).collect()).collect(), self.matcher)
+        NodeSurfels::new(levels.map(|level| self.database.patches(node, level).collect()).collect(), self.matcher)
     }
 
     fn current_alignment(&self, (late, early): (usize, usize)) -> Alignment {
-        let head = |place: usize| self.database.places[place].head;
+        let head = |node: usize| self.database.nodes[node].head;
         Alignment { yaw: 0.0, shift: head(late) - head(early) }
     }
 
-    fn agreement(&self, late: &PlaceSurfels, early: &PlaceSurfels, alignment: &Alignment) -> Option<f64> {
+    fn agreement(&self, late: &NodeSurfels, early: &NodeSurfels, alignment: &Alignment) -> Option<f64> {
         agreement(late, early, alignment, (self.matcher, self.spec.max_plane_distance_m))
     }
 }

@@ -1,15 +1,15 @@
 //! Loop closure: place recognition and pose graph optimisation for drift beyond the matching distance.
 //!
-//! 1. The recording is divided into *places*, submaps of a few seconds. Gravity levels them: the relative pose of two places
+//! 1. The recording is divided into *nodes* of a few seconds. Gravity levels their surfels: the relative pose of two nodes
 //!    is a heading and a translation.
-//! 2. *Candidates* are pairs of places, separated in time, with similar Scan Context descriptors (`scan_context`) and a
-//!    relative pose within the maximum drift of the open loop. A k-d tree returns a fixed number per place, so their number
+//! 2. *Candidates* are pairs of nodes, separated in time, with similar Scan Context descriptors (`scan_context`) and a
+//!    relative pose within the maximum drift of the open loop. A k-d tree returns a fixed number per node, so their number
 //!    grows linearly with the recording.
 //! 3. A pair that agrees at the open-loop pose needs no loop closure. This test is cheap, and all that runs without drift need.
 //! 4. Other pairs are registered plane to plane from several starts (`correlation`, `alignment`). A loop is *verified* if
-//!    enough surfaces agree in every direction and no different alignment is nearly as good; this rejects repetitive places.
-//! 5. A pose graph (`pose_graph`) connects the verified loops with the relative poses of successive places. Loops that
-//!    contradict these are removed as outliers. Drift also distorts the places, so the steps are repeated until convergence.
+//!    enough surfaces agree in every direction and no different alignment is nearly as good; this rejects repetitive surroundings.
+//! 5. A pose graph (`pose_graph`) connects the verified loops with the relative poses of successive nodes. Loops that
+//!    contradict these are removed as outliers. Drift also distorts the nodes, so the steps are repeated until convergence.
 //!    The remaining loops that exceed the matching distance are *closed*; if there are too few, the open loop is kept.
 
 mod alignment;
@@ -48,7 +48,7 @@ const MATCHING_REACH: (f64, f64) = (0.3, 0.03);
 /// Statistics of the loop closure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LoopReport {
-    /// Number of similar pairs of places that disagree at the open-loop pose.
+    /// Number of similar pairs of nodes that disagree at the open-loop pose.
     pub proposed: usize,
     /// Number of these that were verified by registration.
     pub verified: usize,
@@ -56,10 +56,10 @@ pub struct LoopReport {
     pub closed: usize,
 }
 
-/// Measured relative pose of two places: a constraint of the pose graph.
+/// Measured relative pose of two nodes: a constraint of the pose graph.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RelativePose {
-    /// Times of the later and the earlier place, s; the alignment is the pose of the later one in the earlier one.
+    /// Times of the later and the earlier node, s; the alignment is the pose of the later one in the earlier one.
     pub(super) times_s: (f64, f64),
     pub(super) alignment: Alignment,
     /// Information about `[yaw, shift]`, 1/rad^2 and 1/m^2.
@@ -75,7 +75,7 @@ pub(super) struct PreAligned {
 
 /// Detects loop closures and aligns the open-loop trajectory to them if it drifted beyond the matching distance.
 ///
-/// Drift within a place distorts it and makes the measured drift too small; the alignment is repeated until convergence.
+/// Drift within a node distorts it and makes the measured drift too small; the alignment is repeated until convergence.
 pub(super) fn close_loops(
     (map_from_head, survey): (&Trajectory, &Survey),
     corrected: &CorrectedTrajectory,
@@ -85,10 +85,10 @@ pub(super) fn close_loops(
     if !spec.places.recognised {
         return (LoopReport::default(), None);
     }
-    let places = &spec.places;
-    let search = LoopSearch { database: PlaceDatabase::new(survey, corrected, places), matcher, spec: places };
+    let nodes = &spec.places;
+    let search = LoopSearch { database: PlaceDatabase::new(survey, corrected, nodes), matcher, spec: nodes };
     let (loops, report) = search.loops(LoopFilter::OutOfReach);
-    if loops.len() < places.min_loops {
+    if loops.len() < nodes.min_loops {
         return (report, None);
     }
     let (mut trajectory, mut survey) = (map_from_head.clone(), survey.clone());
@@ -99,11 +99,11 @@ pub(super) fn close_loops(
             break;
         };
         let mut corrected = corrected.with_gravity_from(map_from_head, &trajectory);
-        let search = LoopSearch { database: PlaceDatabase::new(&survey, &corrected, places), matcher, spec: places };
+        let search = LoopSearch { database: PlaceDatabase::new(&survey, &corrected, nodes), matcher, spec: nodes };
         let ((loops, _), links) = (search.loops(LoopFilter::All), search.links());
         let level_sigma_rad = spec.level_sigma_deg.to_radians();
         let mut with_loops = corrected.clone();
-        // Distorted places can make correct loops inconsistent: then optimise this pass without loops.
+        // Distorted nodes can make correct loops inconsistent: then optimise this pass without loops.
         let closed = match optimise(&mut with_loops, (&loops, &links), level_sigma_rad) {
             Some(closed) => {
                 corrected = with_loops;
@@ -124,7 +124,7 @@ pub(super) fn close_loops(
             break;
         }
     }
-    if closures < places.min_loops {
+    if closures < nodes.min_loops {
         return (report, None);
     }
     (LoopReport { closed: closures, ..report }, Some(PreAligned { trajectory, survey }))

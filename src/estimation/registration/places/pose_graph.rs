@@ -8,7 +8,7 @@
 //! e_t = C_b^T (p_a - p_b) - shift        de_t = C_b^T (dt_a - dt_b + (p_a - p_b) x dr_b)
 //! ```
 //!
-//! Successive places are linked with the information of their registration, so the trajectory deforms where this is weak.
+//! Successive nodes are linked with the information of their registration, so the trajectory deforms where this is weak.
 //! Loops first have a large standard deviation and a Geman-McClure kernel whose scale decreases in each step (graduated
 //! non-convexity: Yang, Antonante, Tzoumas and Carlone, IEEE Robotics and Automation Letters 5(2), 2020). Loops that remain
 //! inconsistent are removed as outliers; the others are then applied with their full information.
@@ -27,18 +27,18 @@ const FIRST_SCALE_M: f64 = 10.0;
 const STEPS: (usize, usize) = (8, 4);
 /// Standard deviation of a loop in the robust steps, m and rad.
 const ROBUST_SIGMA: (f64, f64) = (0.5, 0.09);
-/// Fraction of the information of links between successive places that is used: their match errors are correlated.
+/// Fraction of the information of links between successive nodes that is used: their match errors are correlated.
 const LINK_INFORMATION: f64 = 0.1;
 /// A loop with a larger residual after the robust steps is an outlier, m.
 const OUTLIER_M: f64 = 1.0;
 /// Lever arm that converts a residual heading to a distance, m: typical distance of surfaces.
 const ARM_M: f64 = 4.0;
-/// Maximum residual of a link between successive places, m; if the loops cause more, they are rejected together.
+/// Maximum residual of a link between successive nodes, m; if the loops cause more, they are rejected together.
 const MAX_LINK_RESIDUAL_M: f64 = 0.25;
 /// Weak prior that determines unconstrained knots, 1/m^2 and 1/rad^2.
 const PRIOR_INFORMATION: f64 = 1e-3;
 
-/// Current pose of the head at the middle of a place.
+/// Current pose of the head at the middle of a node.
 #[derive(Debug, Clone)]
 struct PlacePose {
     basis: Basis,
@@ -56,7 +56,7 @@ struct Edge {
     information: Matrix4<f64>,
 }
 
-/// Optimises `corrected` with `loops` and `links` between successive places; returns the times of the inlier loops.
+/// Optimises `corrected` with `loops` and `links` between successive nodes; returns the times of the inlier loops.
 ///
 /// `None` if the loops contradict the links or the equations are singular; `corrected` is then invalid.
 pub(in crate::estimation::registration) fn optimise(
@@ -126,7 +126,7 @@ impl Edge {
         Vector::new(e[1], e[2], e[3]).norm().hypot(ARM_M * e[0])
     }
 
-    /// Derivatives of the deviation by the corrections `[dr, dt]` of the later and the earlier place.
+    /// Derivatives of the deviation by the corrections `[dr, dt]` of the later and the earlier node.
     fn derivatives(&self) -> (Matrix4x6<f64>, Matrix4x6<f64>) {
         let back = self.early.turn.inverse().to_rotation_matrix().into_inner();
         let mut by_late = Matrix4x6::zeros();
@@ -214,7 +214,7 @@ mod tests {
         }
     }
 
-    /// A straight trajectory of two minutes at 0.8 m/s, and the middle times of thirty places.
+    /// A straight trajectory of two minutes at 0.8 m/s, and the middle times of thirty nodes.
     fn straight() -> (CorrectedTrajectory, Vec<f64>) {
         let stamp = |t_s: f64| Stamp::from_nanos((t_s * 1e9) as i64);
         let pose = |t_s: f64| Pose::from_parts(Vector::new(0.8 * t_s, 0.0, 1.2).into(), Rotation::identity());
@@ -225,7 +225,7 @@ mod tests {
         (corrected, (0..30).map(|k| 2.0 + 4.0 * f64::from(k)).collect())
     }
 
-    /// Relative pose of two places that differ by `shift`, with sigmas of 1 cm and 0.1 degrees.
+    /// Relative pose of two nodes that differ by `shift`, with sigmas of 1 cm and 0.1 degrees.
     fn relative_pose(times_s: (f64, f64), shift: Vector) -> RelativePose {
         let information = Matrix4::from_diagonal(&Vector4::new(3e5, 1e4, 1e4, 1e4));
         RelativePose { times_s, alignment: Alignment { yaw: 0.0, shift }, information }
@@ -239,7 +239,7 @@ mod tests {
         corrected.pose_at(118.0).translation.vector
     }
 
-    /// Identical storeys: five successive places match the places of 24 s before at 3.2 m instead of 19.2 m.
+    /// Identical storeys: five successive nodes match the nodes of 24 s before at 3.2 m instead of 19.2 m.
     #[test]
     fn consistent_false_loops_are_rejected_by_the_links() {
         let (mut corrected, at_s) = straight();
@@ -251,7 +251,7 @@ mod tests {
         assert!((end_m(&corrected) - before).norm() < 0.05, "{}", end_m(&corrected));
     }
 
-    /// Two successive places have no link, and the open loop drifted by 80 cm there: consistent loops across the gap are
+    /// Two successive nodes have no link, and the open loop drifted by 80 cm there: consistent loops across the gap are
     /// inliers, and a contradicting one is an outlier.
     #[test]
     fn loops_across_a_missing_link_are_accepted() {

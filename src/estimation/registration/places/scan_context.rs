@@ -1,8 +1,8 @@
-//! Scan Context descriptor of a place (G. Kim and A. Kim, IROS 2018).
+//! Scan Context descriptor of a node (G. Kim and A. Kim, IROS 2018).
 //!
 //! The horizontal plane around the head is divided into rings and sectors; each cell stores the maximum height. A rotation of
 //! the head shifts the columns (sectors). The fraction of occupied cells of each ring is invariant to rotation; it is the key
-//! for the search of similar places in a k-d tree.
+//! for the search of similar nodes in a k-d tree.
 //!
 //! Only vertical surfaces are used, with heights above the ground, because ceilings look alike everywhere. The vertical axis
 //! is that of gravity, which the open loop observes without drift.

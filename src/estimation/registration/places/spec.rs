@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 pub struct PlacesSpec {
     /// Enables loop closure.
     pub recognised: bool,
-    /// Duration of a place (submap for recognition), s.
+    /// Duration of a pose-graph node, s: its surfels are compared with those of other nodes.
     #[serde(with = "crate::spec::checked::Positive")]
     pub length_s: f64,
-    /// Minimum time between two places of a loop closure, s.
+    /// Minimum time between two nodes of a loop closure, s.
     #[serde(with = "crate::spec::checked::Positive")]
     pub min_apart_s: f64,
-    /// Number of nearest neighbours by ring key that are compared by their full Scan Context descriptor, per place.
+    /// Number of nearest neighbours by ring key that are compared by their full Scan Context descriptor, per node.
     pub candidates: usize,
-    /// Number of most similar candidates that are registered, per place.
+    /// Number of most similar candidates that are registered, per node.
     pub tries: usize,
     /// Maximum Scan Context distance of a candidate, 0 (equal) to 1.
     #[serde(with = "crate::spec::checked::Fraction")]
@@ -31,7 +31,7 @@ pub struct PlacesSpec {
     /// Additional maximum drift of the heading per minute, degrees/min.
     #[serde(with = "crate::spec::checked::NonNegative")]
     pub max_turn_deg_per_min: f64,
-    /// Minimum fraction of the surfaces facing each direction that agree with the other place, 0..1.
+    /// Minimum fraction of the surfaces facing each direction that agree with the other node, 0..1.
     #[serde(with = "crate::spec::checked::Fraction")]
     pub min_agreement: f64,
     /// Maximum distance along the normal of surfaces that agree, m.
