@@ -142,12 +142,12 @@ fn out_of_range_numbers_are_refused_with_their_limit() {
         ("check many.ron", "from 0 to 4294967295, found 99999999999"),
         ("check imu.ron", "1 to 10000"),
         ("simulate --scene mocap_room --lidar lidar.ron", "0.1 to 1000"),
-        ("simulate --scene mocap_room --duration 1e8s", "604800 s (7 days) at most"),
-        ("coverage --duration 1e5s --motion stand", "3600 s at most"),
-        ("gains --step 1e-12", "from 0.00001 s to 0.1 s"),
-        ("gains --realisations 1000000000", "and 1000 at most"),
-        ("gains --realisations 1000 --period 100", "10000000 at most"),
-        ("gains --period 1e9", "10000 at most"),
+        ("simulate --scene mocap_room --duration 1e8s", "at most 604800 s (7 days)"),
+        ("coverage --duration 1e5s --motion stand", "at most 3600 s"),
+        ("gains --step 1e-12", "expected 0.00001 to 0.1 s"),
+        ("gains --realisations 1000000000", "at most 1000"),
+        ("gains --realisations 1000 --period 100", "more than 10000000"),
+        ("gains --period 1e9", "more than 10000:"),
         ("check office --threads 1000000", "from 1 to 1024"),
     ] {
         let (code, _, talk) = run(here.path(), arguments);

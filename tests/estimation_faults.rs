@@ -201,7 +201,7 @@ fn saturation_is_reported() {
 fn gaps_and_frozen_sensors_are_reported() {
     let micro_controller = "(sensor: imu, fault: thin(file: \"FAULTS/imu_arrivals_mcu.txt\", repeat_s: 57.2))";
     for (name, faults, stated, within) in [
-        ("irregular IMU", micro_controller, &["gap"][..], Some((0.01, 0.5))),
+        ("irregular IMU", micro_controller, &["gap"][..], Some((0.004, 2.0))),
         ("IMU ends", "(sensor: imu, fault: cut(end_s: 6))", &["not_covered"], Some((0.004, 0.4))),
         ("IMU begins late", "(sensor: imu, fault: cut(start_s: 6))", &["not_covered"], Some((0.004, 0.4))),
         ("lidar begins late", "(sensor: lidar, fault: cut(start_s: 5))", &["not_covered"], Some((0.01, 1.0))),

@@ -87,7 +87,7 @@ fn invalid_usage_exits_with_2_and_a_message() {
         (&["spring", "design", "nowhere"][..], "no such study"),
         (&["spring", "handheld", "--pitch", "0"][..], "--pitch 0"),
         (&["coverage", "--motion", "nowhere"][..], "no such motion"),
-        (&["coverage", "--duration", "0s"][..], "above zero"),
+        (&["coverage", "--duration", "0s"][..], "above 0 s"),
         (&["coverage", "--duration", "10ms"][..], "less than two scans"),
     ] {
         zsim(arguments).assert().code(2).stderr(predicate::str::contains(sentence));

@@ -35,7 +35,7 @@ fn a_recording_is_localised_in_the_map_of_another_and_maps_are_merged() {
     let count = |key: &str| cloud["filter"][key].as_u64().unwrap();
     let dropped = count("dropped_mixed") + count("dropped_isolated") + count("dropped_moving");
     assert_eq!(count("kept") + dropped, cloud["points"].as_u64().unwrap());
-    assert!(cloud["judged"].as_str().unwrap().contains("filtered or not"));
+    assert!(cloud["judged"].as_str().unwrap().contains("before filtering"));
     assert!(cloud["filter"]["standing_dropped_fraction"].as_f64().unwrap() < 0.02, "{cloud}");
 
     let merged: Value = serde_json::from_str(&done("map merge a/map.ply b/map.ply --out both.ply --json")).unwrap();

@@ -134,7 +134,7 @@ fn a_replay_of_invalid_poses_is_an_error() {
     let here = |rows: &[String]| format!("Here([{}])", rows.concat());
     assert!(said("Here([])").contains("no poses"));
     assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "0.0")])).contains("3 poses"));
-    assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "0.0"), row("0.5", "0.0")])).contains("not after"));
+    assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "0.0"), row("0.5", "0.0")])).contains("not later"));
     assert!(said(&here(&[row("0.0", "0.0"), row("NaN", "0.0"), row("2.0", "0.0")])).contains("not finite"));
     assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "NaN"), row("2.0", "0.0")])).contains("not finite"));
     assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "120.0"), row("2.0", "0.0")])).contains("120 degrees"));
@@ -145,7 +145,7 @@ fn a_replay_of_invalid_poses_is_an_error() {
 fn each_road_class_doubles_the_acceleration() {
     // Each class of ISO 8608 has four times the power of the previous one: twice the acceleration. The engine is off.
     let text = find(Kind::Motion, "vehicle").unwrap().text;
-    let engine = text.find("    // Three cylinders").unwrap();
+    let engine = text.find("    // Three-cylinder").unwrap();
     let quiet = format!("{}    engine: None,\n))", &text[..engine]);
     let bounce = |class: &str| {
         let motion = build("vehicle", quiet.replace("Class(D)", class), 60.0).unwrap();

@@ -180,9 +180,7 @@ mod tests {
         assert_eq!(message("1 0 0 nan 0 0 0 1\n"), "a.tum:1: `nan` is not a number");
         assert_eq!(message("x 0 0 0 0 0 0 1\n"), "a.tum:1: `x` is not a time in seconds");
         assert_eq!(message("1 0 0 0 0 0 0 2\n"), "a.tum:1: the quaternion's norm is 2.0000, not 1");
-        assert!(
-            message("2 0 0 0 0 0 0 1\n\n1 0 0 0 0 0 0 1\n").starts_with("a.tum:3: pose 1 is stamped 1000000000 ns")
-        );
+        assert!(message("2 0 0 0 0 0 0 1\n\n1 0 0 0 0 0 0 1\n").starts_with("a.tum:3: pose 1 has stamp 1000000000 ns"));
         assert!(message(&" ".repeat(5000)).starts_with("a.tum:1: this is not a line of text"));
     }
 }
