@@ -14,8 +14,8 @@ const MAX_SIGMA: (f64, f64) = (30.0, 60.0);
 
 /// Interpolates irregular readings by a cubic Hermite spline with slopes from finite differences.
 ///
-/// The error of the interpolation is measured by leaving out one reading at a time: it is proportional to the squared
-/// distance of the readings, whatever the spectrum of the motion.
+/// The error of the interpolation is measured by leaving out one reading at a time, and scaled with the squared gap. A
+/// smooth motion errs by a higher power of the gap; the square is on the safe side for gaps shorter than those measured.
 #[derive(Debug)]
 pub(super) struct Resampler {
     /// The last readings, at most five.
