@@ -3,7 +3,7 @@
 use super::calibration::calibration;
 use super::true_clock::TrueClock;
 use super::truth_cursor::{TrueState, TruthCursor};
-use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch};
+use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError};
 use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::{Calibration, LidarReturn, LidarScan, Measurement};
@@ -40,7 +40,11 @@ pub struct RecordingBound {
 ///
 /// # Errors
 /// When the recording cannot be read, has no sensors or no truth, or the computation is stopped.
-pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> Result<RecordingBound, StudyError> {
+pub fn information_bound(
+    reader: &Reader,
+    world: &World,
+    watch: &mut ProgressMonitor,
+) -> Result<RecordingBound, StudyError> {
     let selection = reader.select(&Preference::default())?;
     let found = calibration(reader, &selection, &CalibrationSpec::default(), None)?;
     let clock = TrueClock::read(reader, &selection)?;

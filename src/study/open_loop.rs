@@ -3,7 +3,7 @@
 use super::cadence::Cadence;
 use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
-use super::{MapOptions, Stage, StudyError, Watch};
+use super::{MapOptions, ProgressMonitor, Stage, StudyError};
 use crate::estimation::{
     EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, covariance_blocks,
     radius_99,
@@ -82,7 +82,7 @@ pub(super) fn run_open_loop(
     options: OpenLoopOptions,
     tum: Option<&Path>,
     expected_s: Option<f64>,
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
     let estimator = Estimator::new(options.estimator, options.calibration)?;
@@ -144,7 +144,7 @@ fn push_all(
     estimator: &mut Estimator,
     (counts, poses): (&mut MeasurementCounts, &mut PoseOutput),
     expected_s: Option<f64>,
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) -> Result<(), StudyError> {
     for (index, measurement) in measurements.enumerate() {
         let measurement = measurement?;

@@ -2,7 +2,7 @@
 
 use super::cloud_files::{CloudFiles, CloudOptions};
 use super::truth_cursor::{TrueState, TruthCursor};
-use super::{Stage, StudyError, Watch};
+use super::{ProgressMonitor, Stage, StudyError};
 use crate::estimation::{CloudFilter, Fate, ProjectedReturn, point_sigma_m};
 use crate::evaluation::{DeadReckoning, EvaluationError, RestDetection, Thinning};
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
@@ -91,7 +91,7 @@ pub(super) struct Registration<'a> {
 
 impl Registration<'_> {
     /// Projects all beams by the estimate and writes the cloud files and `result.mcap` to `folder`.
-    pub(super) fn run(&self, folder: &Path, watch: &mut Watch) -> Result<Registered, StudyError> {
+    pub(super) fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<Registered, StudyError> {
         let noise = self.calibration.lidar;
         let mut beams = BeamProjection {
             measurements: self.reader.measurements(self.selection),
@@ -165,7 +165,7 @@ struct BeamProjection<'a, 'w, 's> {
     fates: FateCounts,
     sample: Vec<SampledBeam>,
     failure: Option<StudyError>,
-    watch: &'w mut Watch<'s>,
+    watch: &'w mut ProgressMonitor<'s>,
 }
 
 impl Iterator for BeamProjection<'_, '_, '_> {

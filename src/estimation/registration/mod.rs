@@ -153,7 +153,7 @@ fn register_without_gaps(input: RegistrationInput, calibration: &Calibration, sp
 }
 
 /// A result with diagnostics, or the diagnostics and the reason of rejection.
-type Outcome<T> = Result<(T, RegistrationReport), Box<(RegistrationReport, &'static str)>>;
+type RegistrationResult<T> = Result<(T, RegistrationReport), Box<(RegistrationReport, &'static str)>>;
 
 /// The registration problem: open loop and settings.
 #[derive(Clone, Copy)]
@@ -171,7 +171,7 @@ struct Registered {
 
 impl Problem<'_> {
     /// Closes loops if necessary, then registers the trajectory and the lidar.
-    fn solve(&self, lidar_model: LidarModel) -> Outcome<Registered> {
+    fn solve(&self, lidar_model: LidarModel) -> RegistrationResult<Registered> {
         let empty = RegistrationReport::default();
         let RegistrationInput { map_from_head, covariances, survey, .. } = self.input;
         let corrected = CorrectedTrajectory::new(map_from_head, covariances, survey.origin, self.spec);
@@ -197,7 +197,7 @@ impl Problem<'_> {
         mut pre_aligned: PreAligned,
         mut lidar_model: LidarModel,
         mut report: RegistrationReport,
-    ) -> Outcome<Registered> {
+    ) -> RegistrationResult<Registered> {
         let RegistrationInput { map_from_head, covariances, .. } = self.input;
         for _ in 0..MAX_ROUNDS {
             let corrected =
@@ -246,7 +246,7 @@ impl<'a> Registration<'a> {
         (corrected, lidar_model): (CorrectedTrajectory, LidarModel),
         survey: &Survey,
         report: RegistrationReport,
-    ) -> Outcome<(CorrectedTrajectory, LidarModel)> {
+    ) -> RegistrationResult<(CorrectedTrajectory, LidarModel)> {
         let (spec, matcher) = (problem.spec, problem.matcher);
         let scene = Scene::new(survey, &corrected, &lidar_model, spec);
         let mut registration = Self { spec, matcher, corrected, lidar_model, scene, weakest: Vector::z(), report };

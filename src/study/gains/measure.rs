@@ -6,7 +6,7 @@ use crate::dynamics::{GainPoints, HeadModel, HeadSimulation, HeadState, Peak, Qu
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::motion::Axis;
 use crate::signal::{Segments, TransferPoint, transfer_function};
-use crate::study::watch::PieceProgress;
+use crate::study::progress::PieceProgress;
 use crate::study::{OnProgress, StudyError};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;

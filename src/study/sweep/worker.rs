@@ -4,7 +4,7 @@ use super::Sweep;
 use super::run::Runner;
 use super::task::WorkerMessage;
 use crate::study::StudyError;
-use crate::study::watch::PieceProgress;
+use crate::study::progress::PieceProgress;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
