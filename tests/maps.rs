@@ -11,7 +11,7 @@ use zsim::evaluation::{Errors, Pairs};
 use zsim::geometry::{Pose, PoseCovariance, Rotation, Surface, Trajectory, Vector};
 use zsim::measurement::{Calibration, Measurement};
 use zsim::random::Seed;
-use zsim::recording::{Preference, Reader, RunDescription, Writer};
+use zsim::recording::{Reader, RunDescription, TopicPreference, Writer};
 use zsim::simulation::{Scenario, Simulation};
 use zsim::surfel_map::SurfelMap;
 use zsim::time::{Span, Stamp};
@@ -42,7 +42,7 @@ impl Session {
         simulation.run(&mut writer, &mut |_| ()).unwrap();
         writer.finish().unwrap();
         let reader = Reader::open(&path).unwrap();
-        let selection = reader.select(&Preference::default()).unwrap();
+        let selection = reader.select(&TopicPreference::default()).unwrap();
         let truth = reader.truth_trajectory().unwrap();
         let begin = truth.span().unwrap().0 + Span::from_seconds(from_s);
         let all = reader.measurements(&selection).map(Result::unwrap);

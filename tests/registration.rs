@@ -9,7 +9,7 @@ use zsim::estimation::{ClosedLoop, Estimator, OpenLoop, RegistrationInput, load,
 use zsim::evaluation::{Errors, Pairs};
 use zsim::geometry::{Pose, Rotation, Trajectory, Vector};
 use zsim::measurement::Calibration;
-use zsim::recording::{Preference, Reader, RunDescription, Writer};
+use zsim::recording::{Reader, RunDescription, TopicPreference, Writer};
 use zsim::simulation::{Scenario, Simulation};
 use zsim::spec::{Kind, names};
 
@@ -74,7 +74,7 @@ fn through(scene: &str, duration_s: f64) -> (OpenLoop, Trajectory, Calibration) 
     simulation.run(&mut writer, &mut |_| ()).unwrap();
     writer.finish().unwrap();
     let reader = Reader::open(&path).unwrap();
-    let selection = reader.select(&Preference::default()).unwrap();
+    let selection = reader.select(&TopicPreference::default()).unwrap();
     let mut estimator = Estimator::new(&load("default").unwrap(), &simulation.calibration()).unwrap().surveying();
     reader.measurements(&selection).for_each(|measurement| estimator.push(measurement.unwrap()).unwrap());
     (estimator.finish().unwrap(), reader.truth_trajectory().unwrap(), simulation.calibration())

@@ -7,7 +7,7 @@ use super::{full_run, output};
 use clap::Args;
 use std::path::PathBuf;
 use zsim::geometry::Pose;
-use zsim::recording::{Preference, Reader};
+use zsim::recording::{Reader, TopicPreference};
 use zsim::study::{self, EstimateOptions, MapOptions, ProgressMonitor};
 
 /// Estimate trajectory and map from a recording of any program
@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         map: arguments.map.as_ref().map(within).transpose()?,
         calibration: calibration(arguments.calibration.as_deref())?,
         body_frame: arguments.body_frame.clone(),
-        topics: Preference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
+        topics: TopicPreference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
         ..arguments.estimator.options()?
     };
     // Open the recording first: a recording that is missing, or lacks a sensor, must not create a folder.

@@ -7,7 +7,7 @@ use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError};
 use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::{Calibration, LidarReturn, LidarScan, Measurement};
-use crate::recording::{Preference, Reader, Truth};
+use crate::recording::{Reader, TopicPreference, Truth};
 use crate::sensors::ImuSpec;
 use crate::time::{Span, Stamp};
 use crate::world::{Hit, Ray, World};
@@ -45,7 +45,7 @@ pub fn information_bound(
     world: &World,
     watch: &mut ProgressMonitor,
 ) -> Result<RecordingBound, StudyError> {
-    let selection = reader.select(&Preference::default())?;
+    let selection = reader.select(&TopicPreference::default())?;
     let found = calibration(reader, &selection, &CalibrationSpec::default(), None)?;
     let clock = TrueClock::read(reader, &selection)?;
     let mut span: Option<(Stamp, Stamp)> = None;

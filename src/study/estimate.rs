@@ -14,7 +14,7 @@ use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artef
 use crate::estimation::{EstimatorSpec, TimeSpent};
 use crate::geometry::Trajectory;
 use crate::measurement::LidarCorrection;
-use crate::recording::{FoundCalibration, Preference, Reader, Selection, write_tum};
+use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::{SimulationSummary, carrier_of};
 use crate::spec::Source;
@@ -34,7 +34,7 @@ pub struct EstimateOptions {
     /// The frame whose pose is estimated; `None` for `head` if the recording has it, else the IMU frame.
     pub body_frame: Option<String>,
     /// Topics to read; topics that are not named are selected automatically.
-    pub topics: Preference,
+    pub topics: TopicPreference,
     /// Whether to run the global registration with loop closure after the open loop.
     pub closed_loop: bool,
     /// Options of the cloud.
@@ -46,7 +46,7 @@ pub struct EstimateOptions {
 impl EstimateOptions {
     /// Options with these estimator settings, loop closure, and defaults.
     pub fn with(estimator: EstimatorSpec) -> Self {
-        let (calibration, topics) = (CalibrationSpec::default(), Preference::default());
+        let (calibration, topics) = (CalibrationSpec::default(), TopicPreference::default());
         let cloud = CloudOptions::default();
         Self { estimator, calibration, body_frame: None, topics, closed_loop: true, cloud, map: None }
     }

@@ -6,7 +6,7 @@ use super::reference::Reference;
 use super::{ClockState, Disturbance, LatencySpec};
 use crate::estimation::{self, EstimatorSpec};
 use crate::measurement::Calibration;
-use crate::recording::{Preference, Reader, Selection};
+use crate::recording::{Reader, Selection, TopicPreference};
 use crate::simulation::{Simulation, Specs};
 use crate::spec::Source;
 use crate::study::cloud::Surroundings;
@@ -175,7 +175,7 @@ impl LatencyStudy {
             std::fs::rename(&part, &path).map_err(StudyError::file(&path))?;
         }
         let reader = Reader::open(&path)?;
-        let selection = reader.select(&Preference::default())?;
+        let selection = reader.select(&TopicPreference::default())?;
         let calibration = simulation.calibration();
         let reference = self.reference(&simulation, &reader, (&selection, &calibration), stop)?;
         let context = RunContext {

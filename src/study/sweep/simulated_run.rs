@@ -6,7 +6,7 @@ use super::measure::Origin;
 use super::part::RunOutcome;
 use super::{LimitSpec, Plan, plan::ResolvedRun};
 use crate::estimation::{EstimatorSpec, Status};
-use crate::recording::{Preference, Reader, Writer};
+use crate::recording::{Reader, TopicPreference, Writer};
 use crate::report::IntegrityMetrics;
 use crate::simulation::Simulation;
 use crate::study::calibration::calibration;
@@ -178,7 +178,7 @@ fn estimate(
     pool.install(|| {
         let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
         let reader = Reader::new("the recording", recording)?;
-        let selection = reader.select(&Preference::default())?;
+        let selection = reader.select(&TopicPreference::default())?;
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
         let how = OpenLoopOptions { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
