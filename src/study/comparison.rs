@@ -197,7 +197,7 @@ pub(super) fn lidar_metrics(range_m: f64, extrinsics: &LidarCorrection, spec: &E
     LidarMetrics {
         range_correction_m: estimates_range.then_some(range_m),
         rotation_correction_deg: estimates_extrinsics
-            .then(|| (extrinsics.turn.scaled_axis() * 1_f64.to_degrees()).into()),
-        translation_correction_m: estimates_extrinsics.then(|| extrinsics.shift.into()),
+            .then(|| (extrinsics.rotation.scaled_axis() * 1_f64.to_degrees()).into()),
+        translation_correction_m: estimates_extrinsics.then(|| extrinsics.translation.into()),
     }
 }

@@ -159,8 +159,8 @@ mod tests {
     fn correction(scale: f64) -> LidarCorrection {
         LidarCorrection {
             range_m: 0.01 * scale,
-            turn: from_roll_pitch_yaw(0.02 * scale, -0.01 * scale, 0.03 * scale),
-            shift: Vector::new(0.005, -0.01, 0.02) * scale,
+            rotation: from_roll_pitch_yaw(0.02 * scale, -0.01 * scale, 0.03 * scale),
+            translation: Vector::new(0.005, -0.01, 0.02) * scale,
         }
     }
 

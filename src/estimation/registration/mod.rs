@@ -280,19 +280,19 @@ impl<'a> Registration<'a> {
                 let (x, step) = equations.solve().ok_or("the normal equations are singular")?;
                 let three = Vector::from_column_slice;
                 let knots = x.chunks_exact(6).map(|knot| (three(&knot[..3]), three(&knot[3..])));
-                let Displacement { shift, turn } = Displacement::max_of(knots);
-                if !(shift < MAX_CORRECTION.0 && turn < MAX_CORRECTION.1) {
+                let Displacement { translation_m, rotation_rad } = Displacement::max_of(knots);
+                if !(translation_m < MAX_CORRECTION.0 && rotation_rad < MAX_CORRECTION.1) {
                     return Err("the correction is implausibly large");
                 }
                 self.corrected.correct(&x);
                 self.lidar_model.correct(&step);
                 self.scene.correct(first_knot, &x, &step);
                 let by_lidar_m = step[0].abs();
-                neighbours.add_motion(shift + max_distance_m * turn + by_lidar_m);
+                neighbours.add_motion(translation_m + max_distance_m * rotation_rad + by_lidar_m);
                 self.report.iterations += 1;
                 self.describe(&statistics);
-                self.report.last_correction_m = shift;
-                if shift.max(by_lidar_m) < self.spec.settled_m * coarser {
+                self.report.last_correction_m = translation_m;
+                if translation_m.max(by_lidar_m) < self.spec.settled_m * coarser {
                     break;
                 }
             }

@@ -117,7 +117,7 @@ fn simulated(
         let (centre, normal) = wall(&origin, &direction);
         let reach = head.rotation.inverse() * (centre + normal * (1e-3 * normal_number()) - origin);
         let lidar = LidarCorrection { range_m, ..LidarCorrection::default() };
-        let arm = head.rotation * (LASER_IN_HEAD + lidar.calibrated(&reach));
+        let arm = head.rotation * (LASER_IN_HEAD + lidar.remove(&reach));
         let (turn, shift) = distortion(tau_s);
         let spread = (0.5 * f64::from(1_u32 << level)).powi(2) / 12.0;
         let along = Matrix::identity() - normal * normal.transpose();
@@ -240,8 +240,8 @@ fn open_loop_extrinsics_are_kept_and_the_head_is_recalibrated() {
     // The open loop used the calibration in the first half and the corrected extrinsics in the second; the surfels are
     // correct throughout.
     let found = LidarCorrection {
-        turn: Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.4) * 1_f64.to_radians()),
-        shift: Vector::new(0.006, -0.009, 0.004),
+        rotation: Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.4) * 1_f64.to_radians()),
+        translation: Vector::new(0.006, -0.009, 0.004),
         ..LidarCorrection::default()
     };
     let mut setup = distorted(distortion);
@@ -262,7 +262,11 @@ fn open_loop_extrinsics_are_kept_and_the_head_is_recalibrated() {
     let input = RegistrationInput { map_from_head: open, covariances, lidar: &found, survey };
     let closed = register(input, &calibration(), &spec);
     assert_eq!(closed.report.rejected_because, None);
-    assert!(closed.lidar.turn == found.turn && closed.lidar.shift == found.shift, "{:?}", closed.lidar);
+    assert!(
+        closed.lidar.rotation == found.rotation && closed.lidar.translation == found.translation,
+        "{:?}",
+        closed.lidar
+    );
     // The origins of the head frames differ, and so does the start of the map.
     let (_, but_for_a_shift) = rms_distance_m(&closed.trajectory, &setup.truth);
     assert!(but_for_a_shift < 0.003, "{but_for_a_shift}");

@@ -122,7 +122,7 @@ pub(in crate::estimation) fn add_scaled_row(
 #[cfg(test)]
 mod tests {
     use super::super::sums::{Coupling, SpanSums, SurfelSums};
-    use super::super::{BORDER, LIDAR_SHIFT, LIDAR_TURN, RANGE};
+    use super::super::{BORDER, LIDAR_ROTATION, LIDAR_TRANSLATION, RANGE};
     use super::*;
     use crate::estimation::nominal::Correction;
     use crate::estimation::normal_equations::NormalEquations;
@@ -165,9 +165,9 @@ mod tests {
         let origin = surfel.patch.centre - surfel.arm;
         let turned = Rotation::from_scaled_axis(correction.rotation) * surfel.arm;
         let border = x.rows(layout.border(), BORDER);
-        let lidar_turn = Rotation::from_scaled_axis(border.fixed_rows::<3>(LIDAR_TURN).into_owned());
+        let lidar_turn = Rotation::from_scaled_axis(border.fixed_rows::<3>(LIDAR_ROTATION).into_owned());
         let reach_in_imu = surfel.map_from_imu.transpose() * surfel.beam * surfel.range_m;
-        let moved_in_imu = lidar_turn * reach_in_imu - reach_in_imu + border.fixed_rows::<3>(LIDAR_SHIFT);
+        let moved_in_imu = lidar_turn * reach_in_imu - reach_in_imu + border.fixed_rows::<3>(LIDAR_TRANSLATION);
         let by_lidar = surfel.map_from_imu * moved_in_imu + surfel.beam * border[RANGE];
         origin + correction.translation + turned + surfel.velocity * later_s + by_lidar
     }

@@ -95,8 +95,8 @@ impl SurfelMaker {
         let mut start_s = f64::NEG_INFINITY;
         let mut end_s = f64::NEG_INFINITY;
         let mut ends: Option<(Motion, Motion)> = None;
-        let turn = self.lidar.turn.to_rotation_matrix();
-        let laser_in_imu = self.laser_in_imu + self.lidar.shift;
+        let lidar_rotation = self.lidar.rotation.to_rotation_matrix();
+        let laser_in_imu = self.laser_in_imu + self.lidar.translation;
         for beam in beams {
             if beam.tau_s >= end_s || ends.is_none() {
                 start_s = beam.tau_s;
@@ -108,7 +108,7 @@ impl SurfelMaker {
             let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
             let position = a.position.lerp(&b.position, x);
             let ray = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
-            let ray = turn * (ray * (1.0 + self.lidar.range_m / f64::from(beam.range_m)));
+            let ray = lidar_rotation * (ray * (1.0 + self.lidar.range_m / f64::from(beam.range_m)));
             with(beam, rotation * (laser_in_imu + ray) + position);
         }
     }
@@ -138,10 +138,10 @@ impl SurfelMaker {
         let motion = nominal.at(clock.imu_s(tau_s), &biases.gyro);
         let imu_from_map = motion.rotation.transpose();
         let centre_in_imu = imu_from_map * (moments.mean() + origin - motion.position);
-        let corrected = centre_in_imu - self.laser_in_imu - self.lidar.shift;
+        let corrected = centre_in_imu - self.laser_in_imu - self.lidar.translation;
         let range_m = corrected.norm();
-        let calibrated_from_map = self.lidar.turn.inverse().to_rotation_matrix() * imu_from_map;
-        let beam = self.lidar.turn.inverse() * corrected / range_m;
+        let calibrated_from_map = self.lidar.rotation.inverse().to_rotation_matrix() * imu_from_map;
+        let beam = self.lidar.rotation.inverse() * corrected / range_m;
         let rate = calibrated_from_map * motion.angular_velocity;
         let sweeps = self.scan_normal.is_none_or(|scan_normal| {
             rate.cross(&beam).dot(&scan_normal).abs() >= self.spec.min_sweep_deg_per_s.to_radians()

@@ -124,9 +124,9 @@ impl Surfel {
     pub(super) fn place(&self, by: &PlacementState<'_>) -> Placed {
         let u_s = by.clock.imu_s(self.tau_s);
         let motion = by.nominal.at(u_s, &by.biases.gyro);
-        let ray_in_imu = by.lidar.reach(&self.ray_in_imu);
-        let arm = motion.rotation * (by.laser_in_imu + by.lidar.shift + ray_in_imu);
-        let map_from_calibrated = motion.rotation * by.lidar.turn.to_rotation_matrix().matrix();
+        let ray_in_imu = by.lidar.apply(&self.ray_in_imu);
+        let arm = motion.rotation * (by.laser_in_imu + by.lidar.translation + ray_in_imu);
+        let map_from_calibrated = motion.rotation * by.lidar.rotation.to_rotation_matrix().matrix();
         let patch = Patch {
             centre: motion.position + arm,
             normal: map_from_calibrated * self.normal_in_imu,

@@ -63,9 +63,9 @@ impl Robust {
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Displacement {
     /// Translation, m.
-    pub shift: f64,
+    pub translation_m: f64,
     /// Rotation, rad.
-    pub turn: f64,
+    pub rotation_rad: f64,
 }
 
 impl Displacement {
@@ -73,15 +73,15 @@ impl Displacement {
     pub fn max_of(corrections: impl Iterator<Item = (Vector, Vector)>) -> Self {
         // A NaN must not count as small.
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        corrections.fold(Self { shift: 0.0, turn: 0.0 }, |most, (turn, shift)| Self {
-            shift: larger(most.shift, shift.norm()),
-            turn: larger(most.turn, turn.norm()),
+        corrections.fold(Self { translation_m: 0.0, rotation_rad: 0.0 }, |largest, (rotation, translation)| Self {
+            translation_m: larger(largest.translation_m, translation.norm()),
+            rotation_rad: larger(largest.rotation_rad, rotation.norm()),
         })
     }
 
     /// The larger of rotation (rad) and translation (m).
     pub fn max(self) -> f64 {
-        self.shift.max(self.turn)
+        self.translation_m.max(self.rotation_rad)
     }
 }
 

@@ -348,9 +348,9 @@ impl Window {
             return lidar;
         }
         let imu_from_gyro = Rotation::from_scaled_axis(self.scale_misalignment.accel_against_gyro() * 0.5);
-        let position = self.maker.laser_in_imu + lidar.shift;
-        let shift = lidar.shift + imu_from_gyro * position - position;
-        LidarCorrection { turn: imu_from_gyro * lidar.turn, shift, ..lidar }
+        let position = self.maker.laser_in_imu + lidar.translation;
+        let translation = lidar.translation + imu_from_gyro * position - position;
+        LidarCorrection { rotation: imu_from_gyro * lidar.rotation, translation, ..lidar }
     }
 
     /// The current states with which surfels are placed in the map.

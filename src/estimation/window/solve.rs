@@ -7,8 +7,8 @@ use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::residual::{
-    ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN, Layout,
-    RANGE,
+    ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION, LIDAR_TRANSLATION,
+    Layout, RANGE,
 };
 use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::strapdown::ImuScaleMisalignment;
@@ -83,14 +83,14 @@ impl Window {
                 break;
             };
             watch.lap_s(); // the solver records this time
-            if !(by.shift < MAX_CORRECTION.0 && by.turn < MAX_CORRECTION.1) {
+            if !(by.translation_m < MAX_CORRECTION.0 && by.rotation_rad < MAX_CORRECTION.1) {
                 solved.trouble = Some("the correction is too large");
                 break;
             }
             self.apply(&x, first, &layout, &mut total);
             self.speed_is_known |= !matches.all.is_empty();
             self.sees_rest |= !matches.all.is_empty();
-            neighbours.moved(by.shift + LEVER_ARM_M * by.turn);
+            neighbours.moved(by.translation_m + LEVER_ARM_M * by.rotation_rad);
             solved.spent.correction_s += watch.lap_s();
             solved.last_correction_m = by.max();
             linearised = Some(Linearised { layout, scene, matches, robust });
@@ -141,8 +141,8 @@ impl Window {
         self.nominal.correct_readings(&more);
         self.scale_misalignment.add(&more);
         self.maker.lidar.range_m += border[RANGE];
-        self.maker.lidar.turn = Rotation::from_scaled_axis(three(LIDAR_TURN)) * self.maker.lidar.turn;
-        self.maker.lidar.shift += three(LIDAR_SHIFT);
+        self.maker.lidar.rotation = Rotation::from_scaled_axis(three(LIDAR_ROTATION)) * self.maker.lidar.rotation;
+        self.maker.lidar.translation += three(LIDAR_TRANSLATION);
     }
 }
 

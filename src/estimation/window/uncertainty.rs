@@ -5,7 +5,7 @@ use super::correspondence::{Counterpart, Match, Matches};
 use super::equations::Robust;
 use crate::estimation::consider::{IMU_OFFSET, IMU_STATES, START_STATES, Sensitivity, StartMatrix};
 use crate::estimation::residual::prior::ByLidar;
-use crate::estimation::residual::{LIDAR_TURN, Layout, matched};
+use crate::estimation::residual::{LIDAR_ROTATION, Layout, matched};
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Placed;
 use crate::estimation::views::Views;
@@ -70,7 +70,7 @@ impl Window {
         if !self.spec.extrinsics.estimated {
             return None;
         }
-        let lidar = at.layout.border() + LIDAR_TURN;
+        let lidar = at.layout.border() + LIDAR_ROTATION;
         let covariances: [Vec<f64>; 6] = std::array::from_fn(|k| {
             let mut column = vec![0.0; at.layout.size()];
             column[lidar + k] = 1.0;
