@@ -74,6 +74,7 @@ mod map;
 mod matching;
 mod nominal;
 mod normal_equations;
+mod observed;
 mod output;
 mod registration;
 mod residual;
@@ -85,7 +86,6 @@ mod stamps;
 mod standstill;
 mod strapdown;
 mod surfel;
-mod survey;
 mod views;
 mod window;
 
@@ -96,6 +96,7 @@ pub use error::{Discarded, EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use integrity::{Cause, Evidence, Finding, Status, bound_factors, covariance_blocks, findings, radius_99};
 pub use map::{Located, locate_map, map_of, merge_maps};
+pub use observed::ObservedSurfels;
 pub use output::{EstimatedPose, GAUGED_S, OpenLoop, TURN_LEVER_M, WindowReport};
 pub use registration::{
     ClosedLoop, LoopReport, PlacesSpec, RegistrationInput, RegistrationReport, RegistrationSpec, register,
@@ -103,4 +104,3 @@ pub use registration::{
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
 pub use spent::TimeSpent;
 pub use stamps::smoothed_stamps;
-pub use survey::Survey;

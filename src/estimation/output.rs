@@ -1,6 +1,6 @@
 //! Output of the estimator.
 
-use super::{Located, Survey, TimeSpent, Warning, WarningKind};
+use super::{Located, ObservedSurfels, TimeSpent, Warning, WarningKind};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
@@ -110,5 +110,5 @@ pub struct OpenLoop {
     /// Events that degraded the estimate.
     pub warnings: Vec<Warning>,
     /// The observed surfaces, if requested.
-    pub survey: Survey,
+    pub observed: ObservedSurfels,
 }

@@ -174,8 +174,8 @@ struct Loops {
 /// The estimate for cloud, result and plots: the closed loop if it was computed, else the open loop.
 pub(super) struct BestEstimate<'a> {
     pub map_from_head: &'a Trajectory,
-    /// The open-loop trajectory that the survey refers to.
-    pub survey_trajectory: &'a Trajectory,
+    /// The open-loop trajectory in which the surfels were observed.
+    pub observed_trajectory: &'a Trajectory,
     /// Estimated correction of the lidar calibration.
     pub lidar: &'a LidarCorrection,
     /// Comparison with the truth, if it is known.
@@ -199,7 +199,7 @@ impl Loops {
         }
         let writes_map = prior_map.map_or(options.closed_loop, |map| map.extend);
         let open_loop =
-            OpenLoopOptions { estimator, calibration, surveying: closes_loops || writes_map, map: prior_map };
+            OpenLoopOptions { estimator, calibration, recording_surfels: closes_loops || writes_map, map: prior_map };
         let open = run_open_loop(reader, selection, open_loop, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
         open.events.notes.iter().for_each(|note| watch.note(&note.line()));
         let closed = match closes_loops {
@@ -214,7 +214,7 @@ impl Loops {
         let closed_comparison =
             closed.as_ref().map(|closed| compare(&closed.map_from_head, &[])).transpose()?.flatten();
         let loops = Self { open, comparison, closed, closed_comparison };
-        if writes_map && !loops.open.survey.is_empty() {
+        if writes_map && !loops.open.observed.is_empty() {
             write_map(&loops.open, &loops.best(), (estimator, prior_map), folder)?;
         }
         Ok(loops)
@@ -225,13 +225,13 @@ impl Loops {
         match &self.closed {
             Some(ClosedLoopRun { map_from_head, lidar, open_loop_recalibrated, .. }) => BestEstimate {
                 map_from_head,
-                survey_trajectory: open_loop_recalibrated.as_ref().unwrap_or(open),
+                observed_trajectory: open_loop_recalibrated.as_ref().unwrap_or(open),
                 lidar,
                 comparison: self.closed_comparison.as_ref(),
             },
             None => BestEstimate {
                 map_from_head: open,
-                survey_trajectory: open,
+                observed_trajectory: open,
                 lidar: &self.open.lidar,
                 comparison: self.comparison.as_ref(),
             },

@@ -66,11 +66,11 @@ pub(super) fn write_map(
     (estimator, within): (&EstimatorSpec, Option<&MapOptions>),
     folder: &Path,
 ) -> Result<(), StudyError> {
-    let trajectories = (best.survey_trajectory, best.map_from_head);
-    let surveyed = map_of(&run.survey, trajectories, &run.covariances, &estimator.registration)?;
+    let trajectories = (best.observed_trajectory, best.map_from_head);
+    let from_run = map_of(&run.observed, trajectories, &run.covariances, &estimator.registration)?;
     let map = match within {
-        Some(within) => merge_maps(&within.map, &surveyed, &Pose::identity())?,
-        None => surveyed,
+        Some(within) => merge_maps(&within.map, &from_run, &Pose::identity())?,
+        None => from_run,
     };
     write(&map, &folder.join("map.ply"))
 }

@@ -5,8 +5,8 @@ use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
 use super::{MapOptions, ProgressMonitor, Stage, StudyError};
 use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, covariance_blocks,
-    radius_99,
+    EstimatedPose, Estimator, EstimatorSpec, Located, ObservedSurfels, TimeSpent, Warning, WindowReport,
+    covariance_blocks, radius_99,
 };
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
@@ -53,9 +53,9 @@ pub(super) struct OpenLoopRun {
     pub returns: usize,
     /// Duration of the recording, s.
     pub acquisition_s: f64,
-    /// Observations for the closed loop and the map; empty without `surveying`.
-    pub survey: Survey,
-    /// Wall-clock time, including reading but not the survey, s.
+    /// Observations for the closed loop and the map; empty without `recording_surfels`.
+    pub observed: ObservedSurfels,
+    /// Wall-clock time, including reading but not building the observed surfels, s.
     pub wall_s: f64,
     /// Run time of each part of the estimator.
     pub spent: TimeSpent,
@@ -67,7 +67,7 @@ pub(super) struct OpenLoopOptions<'a> {
     pub estimator: &'a EstimatorSpec,
     pub calibration: &'a Calibration,
     /// Whether to keep the observations for the closed loop and the map.
-    pub surveying: bool,
+    pub recording_surfels: bool,
     /// The map in which to localise the head; `None` to start a new map.
     pub map: Option<&'a MapOptions>,
 }
@@ -86,7 +86,7 @@ pub(super) fn run_open_loop(
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
     let estimator = Estimator::new(options.estimator, options.calibration)?;
-    let estimator = if options.surveying { estimator.surveying() } else { estimator };
+    let estimator = if options.recording_surfels { estimator.recording_surfels() } else { estimator };
     let mut estimator = match options.map {
         Some(prior) => estimator.in_map(&prior.map, &prior.map_from_head),
         None => estimator,
@@ -133,8 +133,8 @@ pub(super) fn run_open_loop(
         warnings: result.warnings,
         returns: counts.returns,
         acquisition_s: counts.seconds(),
-        wall_s: started.elapsed().as_secs_f64() - result.survey.took_s(),
-        survey: result.survey,
+        wall_s: started.elapsed().as_secs_f64() - result.observed.elapsed_s(),
+        observed: result.observed,
     })
 }
 

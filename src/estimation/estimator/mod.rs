@@ -11,11 +11,11 @@ use crate::estimation::consider::{Consider, Sensitivity, StartMatrix};
 use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
 use crate::estimation::intake::{Intake, Segment};
 use crate::estimation::localisation::{GapRelocalisation, MapLocalisation};
+use crate::estimation::observed::ObservedSurfels;
 use crate::estimation::spent::Stopwatch;
 use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::strapdown::Interval;
 use crate::estimation::surfel::{Beam, Patch, SurfelMaker};
-use crate::estimation::survey::Survey;
 use crate::estimation::views::Views;
 use crate::estimation::window::{Linearised, Window};
 use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
@@ -55,7 +55,7 @@ pub struct Estimator {
     /// Pending relocalisation in the surfaces seen before an IMU gap.
     gap_relocalisation: Option<GapRelocalisation>,
     /// Observed surfaces, if the caller requests them.
-    survey: Option<Survey>,
+    observed: Option<ObservedSurfels>,
     consider: Consider,
     gauge: GaugeBuilder,
     /// Sensitivity of the end of the newest window to the errors at its start.
@@ -91,7 +91,7 @@ impl Estimator {
             views: Views::new(&spec.views, spec.fixed_views),
             map_localisation: None,
             gap_relocalisation: None,
-            survey: None,
+            observed: None,
             consider: Consider::new(Vector::zeros(), &StartMatrix::zeros()),
             gauge: GaugeBuilder::default(),
             at_end: None,
@@ -107,8 +107,8 @@ impl Estimator {
     }
 
     /// Also stores the observed surfaces for [`super::register`]; memory then grows with the recording.
-    pub fn surveying(self) -> Self {
-        Self { survey: Some(Survey::default()), ..self }
+    pub fn recording_surfels(self) -> Self {
+        Self { observed: Some(ObservedSurfels::default()), ..self }
     }
 
     /// Estimates the trajectory in the frame of `map`, with every window matched with the map.
@@ -156,15 +156,15 @@ impl Estimator {
         let (lidar, calibrated_lidar) = (window.lidar(), window.calibrated_lidar());
         self.propagate_to_end();
         self.output_poses(end_s);
-        self.survey_window(Window::survey_all, Window::end_s);
+        self.record_observed(Window::observed_in_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
         let gauged = self.gauge.finish(&mut self.consider, self.newest_pose);
-        let Self { poses, clock_offsets, windows, warnings, survey, map_localisation, .. } = self;
-        let survey = survey.unwrap_or_default();
+        let Self { poses, clock_offsets, windows, warnings, observed, map_localisation, .. } = self;
+        let observed = observed.unwrap_or_default();
         let located = map_localisation.and_then(|map_localisation| map_localisation.found().cloned());
         let learnt = OpenLoop { lidar, calibrated_lidar, located, ..OpenLoop::default() };
-        Ok(OpenLoop { trajectory, poses, gauged, clock_offsets, windows, warnings, survey, ..learnt })
+        Ok(OpenLoop { trajectory, poses, gauged, clock_offsets, windows, warnings, observed, ..learnt })
     }
 
     /// Adds a segment: handles a gap before it, starts the first window, and processes the segment.
@@ -212,9 +212,9 @@ impl Estimator {
         let Some(window) = &self.window else { return Ok(()) };
         let elapsed_s = started.elapsed().as_secs_f64();
         if window.is_full() {
-            self.survey_window(Window::survey_oldest, Window::oldest_end_s);
+            self.record_observed(Window::observed_in_oldest, Window::oldest_end_s);
         }
-        watch.lap_s(); // the survey has its own time
+        watch.lap_s(); // the observed surfels have their own time
         let final_until_s = self.finish_oldest_segment(linearised.as_ref());
         spent.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return Ok(()) };
@@ -306,7 +306,7 @@ impl Estimator {
         self.before_gap = window.state_before_gap();
         self.propagate_to_end();
         self.output_poses(end_s);
-        self.survey_window(Window::survey_all, Window::end_s);
+        self.record_observed(Window::observed_in_all, Window::end_s);
         let Some(window) = self.window.take() else { return };
         self.next_pose = None;
         // The pose relative to the old views is unknown after the gap; accidental matches with them would be wrong.
@@ -339,8 +339,8 @@ impl Estimator {
         });
         let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
         let adapted = self.intake.scan_geometry().adapt(&self.spec);
-        if let Some(survey) = &mut self.survey {
-            survey.ranges_are_held = self.intake.scan_geometry().is_one_way();
+        if let Some(observed) = &mut self.observed {
+            observed.range_bias_is_fixed = self.intake.scan_geometry().is_one_way();
         }
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
         let seen = self.lidar_standstill();
@@ -408,17 +408,17 @@ impl Estimator {
             lidar: LidarCorrection::default(),
         };
         let border = Border::new(initial_state.information, &self.calibration.imu, self.spec.clock.estimated);
-        let surveyor = SurfelMaker { spec: spec.registration.surfels(&spec.surfels), ..maker.clone() };
+        let observed_builder = SurfelMaker { spec: spec.registration.surfels(&spec.surfels), ..maker.clone() };
         let window = Window::new(spec, maker, initial_state, start_s, border);
-        if self.survey.is_some() { window.surveyed_by(surveyor) } else { window }
+        if self.observed.is_some() { window.with_observed_builder(observed_builder) } else { window }
     }
 
-    /// Adds the patches returned by `seen`, up to time `until`, to the survey, if there is one.
-    fn survey_window(&mut self, seen: fn(&Window) -> Vec<(f64, Patch)>, until: fn(&Window) -> f64) {
-        if let (Some(window), Some(survey)) = (&self.window, &mut self.survey) {
+    /// Adds the patches returned by `surfels`, up to time `until`, to the observed surfels, if they are recorded.
+    fn record_observed(&mut self, surfels: fn(&Window) -> Vec<(f64, Patch)>, until: fn(&Window) -> f64) {
+        if let (Some(window), Some(observed)) = (&self.window, &mut self.observed) {
             let mut watch = Stopwatch::start();
-            survey.extend(self.intake.origin(), seen(window).into_iter(), window.lidar(), until(window));
-            survey.took_s += watch.lap_s();
+            observed.extend(self.intake.origin(), surfels(window).into_iter(), window.lidar(), until(window));
+            observed.elapsed_s += watch.lap_s();
         }
     }
 

@@ -61,8 +61,8 @@ struct WindowSegment {
 pub(super) struct Window {
     spec: EstimatorSpec,
     maker: SurfelMaker,
-    /// Builds the surfels of the survey, if one is requested.
-    surveyor: Option<SurfelMaker>,
+    /// Builds the observed surfels, if they are requested.
+    observed_builder: Option<SurfelMaker>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
     pub(super) clock: Clock,
@@ -106,7 +106,7 @@ impl Window {
             spec: spec.clone(),
             matcher: Matcher::new(&spec.matching, &spec.surfels),
             maker,
-            surveyor: None,
+            observed_builder: None,
             nominal: Nominal::starting(start_u_s, initial_state.state),
             clock,
             biases: initial_state.biases,
@@ -210,9 +210,9 @@ impl Window {
         self.start.u_s
     }
 
-    /// The same window, which also builds survey surfels with `surveyor`.
-    pub(super) fn surveyed_by(self, surveyor: SurfelMaker) -> Self {
-        Self { surveyor: Some(surveyor), ..self }
+    /// The same window, which also builds the observed surfels with `builder`.
+    pub(super) fn with_observed_builder(self, builder: SurfelMaker) -> Self {
+        Self { observed_builder: Some(builder), ..self }
     }
 
     pub(super) fn matcher(&self) -> &Matcher {
@@ -259,7 +259,7 @@ impl Window {
         if let Some(newest) = self.segments.back_mut() {
             newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
             newest.cached = vec![CachedNeighbours::default(); newest.surfels.len()];
-            if self.surveyor.is_none() {
+            if self.observed_builder.is_none() {
                 newest.beams = Vec::new();
             }
         }
@@ -286,14 +286,14 @@ impl Window {
         Some(self.clock.imu_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
-    /// The survey patches of the oldest segment in the map frame, each with the measurement time, s.
-    pub(super) fn survey_oldest(&self) -> Vec<(f64, Patch)> {
-        self.segments.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
+    /// The observed surfels of the oldest segment in the map frame, each with the measurement time, s.
+    pub(super) fn observed_in_oldest(&self) -> Vec<(f64, Patch)> {
+        self.segments.front().map_or_else(Vec::new, |oldest| self.observed(oldest))
     }
 
-    /// The survey patches of all segments of the window, as [`Self::survey_oldest`].
-    pub(super) fn survey_all(&self) -> Vec<(f64, Patch)> {
-        self.segments.iter().flat_map(|segment| self.survey(segment)).collect()
+    /// The observed surfels of all segments of the window, as [`Self::observed_in_oldest`].
+    pub(super) fn observed_in_all(&self) -> Vec<(f64, Patch)> {
+        self.segments.iter().flat_map(|segment| self.observed(segment)).collect()
     }
 
     /// End of the oldest segment, lidar time, s.
@@ -306,12 +306,12 @@ impl Window {
         self.segments.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
     }
 
-    fn survey(&self, segment: &WindowSegment) -> Vec<(f64, Patch)> {
-        let Some(surveyor) = &self.surveyor else { return Vec::new() };
-        let surveyor = SurfelMaker { lidar: self.maker.lidar, ..surveyor.clone() };
-        let seen = surveyor.build(&segment.beams, &self.nominal, &self.clock, &self.biases);
+    fn observed(&self, segment: &WindowSegment) -> Vec<(f64, Patch)> {
+        let Some(builder) = &self.observed_builder else { return Vec::new() };
+        let builder = SurfelMaker { lidar: self.maker.lidar, ..builder.clone() };
+        let surfels = builder.build(&segment.beams, &self.nominal, &self.clock, &self.biases);
         let placing = self.placing();
-        seen.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
+        surfels.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
     }
 
     /// Removes the oldest segment, whose states become final; returns the patches of that segment in the map frame.

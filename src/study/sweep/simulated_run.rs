@@ -180,7 +180,8 @@ fn estimate(
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&TopicPreference::default())?;
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
-        let how = OpenLoopOptions { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
+        let how =
+            OpenLoopOptions { estimator, calibration: &found.calibration, recording_surfels: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
         let known = comparison::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
         let open_loop = comparison::open_loop_metrics(&run, known.as_ref(), None);
