@@ -3,9 +3,9 @@
 //! Segments that left the window become a view if they cover cells that the stored views do not. A window uses the few
 //! views that cover most of its cells. Of about equal ones it uses the oldest, which has drifted least.
 
-use super::matching::{Forest, Matcher};
+use super::matching::{Matcher, SearchTrees};
 use super::spec::ViewSpec;
-use super::surfel::{Patch, Placed};
+use super::surfel::{Patch, PlacedSurfel};
 use crate::geometry::Vector;
 
 /// Edge length of the cells with which the coverage of views is compared, m.
@@ -22,7 +22,7 @@ pub(super) const MAP: u64 = u64::MAX;
 #[derive(Debug)]
 pub(super) struct View {
     pub(super) patches: Vec<Patch>,
-    pub(super) forest: Forest,
+    pub(super) trees: SearchTrees,
     cells: Vec<u64>,
     /// View number, in order of storage.
     pub(super) number: u64,
@@ -57,8 +57,8 @@ impl Views {
 
     /// Adds a given map, with which every window is matched and which is never removed.
     pub(super) fn with_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
-        let (forest, cells) = (matcher.plant(patches), cells_of(patches.iter()));
-        self.kept.insert(0, View { patches: patches.to_vec(), forest, cells, number: MAP, pivot });
+        let (trees, cells) = (matcher.build_trees(patches), cells_of(patches.iter()));
+        self.kept.insert(0, View { patches: patches.to_vec(), trees, cells, number: MAP, pivot });
         self
     }
 
@@ -95,9 +95,9 @@ impl Views {
         }
         let removed =
             if self.kept.len() - self.maps() >= self.spec.max_kept { self.remove_most_redundant() } else { None };
-        let (forest, number) = (matcher.plant(&patches), self.next);
+        let (trees, number) = (matcher.build_trees(&patches), self.next);
         self.next += 1;
-        self.kept.push(View { patches, forest, cells, number, pivot });
+        self.kept.push(View { patches, trees, cells, number, pivot });
         ViewUpdate { added: Some(number), removed }
     }
 
@@ -117,7 +117,7 @@ impl Views {
     }
 
     /// Selects the views for a window with the surfels `placed`; returns indices for [`Views::view`].
-    pub(super) fn select(&self, placed: &[Placed]) -> Vec<usize> {
+    pub(super) fn select(&self, placed: &[PlacedSurfel]) -> Vec<usize> {
         let mut missing = cells_of(placed.iter().map(|surfel| &surfel.patch));
         let worthwhile = ((missing.len() as f64 * MIN_ADDED_FRACTION) as usize).max(1);
         let mut chosen: Vec<usize> = (0..self.maps()).collect();

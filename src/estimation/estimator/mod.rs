@@ -15,7 +15,7 @@ use crate::estimation::observed::ObservedSurfels;
 use crate::estimation::spent::Stopwatch;
 use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::strapdown::Interval;
-use crate::estimation::surfel::{Beam, Patch, SurfelMaker};
+use crate::estimation::surfel::{Patch, SurfelBuilder, TimedReturn};
 use crate::estimation::views::Views;
 use crate::estimation::window::{Linearised, Window};
 use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
@@ -191,7 +191,7 @@ impl Estimator {
     fn process(&mut self, segment: Segment) -> Result<(), EstimationError> {
         let Some(window) = &mut self.window else { return Ok(()) };
         let started = Instant::now();
-        let mut spent = window.extend(&segment.intervals, segment.beams, segment.end_s);
+        let mut spent = window.extend(&segment.intervals, segment.returns, segment.end_s);
         let (mut solved, mut linearised) = window.solve(&self.views);
         spent += solved.spent;
         let mut watch = Stopwatch::start();
@@ -370,14 +370,14 @@ impl Estimator {
 
     /// Whether the lidar shows motion or rest during the assumed initial rest.
     fn lidar_standstill(&self) -> Standstill {
-        let beams: Vec<Beam> = self.waiting.iter().flat_map(|segment| &segment.beams).copied().collect();
-        let (Some(first), Some(last)) = (beams.first(), beams.last()) else { return Standstill::Unknown };
+        let returns: Vec<TimedReturn> = self.waiting.iter().flat_map(|segment| &segment.returns).copied().collect();
+        let (Some(first), Some(last)) = (returns.first(), returns.last()) else { return Standstill::Unknown };
         let quarter_s = 0.25 * (last.tau_s.min(first.tau_s + self.spec.inertial.rest_s) - first.tau_s);
         let until_s = first.tau_s + 4.0 * quarter_s;
-        let early = beams.partition_point(|beam| beam.tau_s < first.tau_s + quarter_s);
-        let late = beams.partition_point(|beam| beam.tau_s < until_s - quarter_s);
-        let end = beams.partition_point(|beam| beam.tau_s <= until_s);
-        standstill(&beams[..early], &beams[late..end])
+        let early = returns.partition_point(|one| one.tau_s < first.tau_s + quarter_s);
+        let late = returns.partition_point(|one| one.tau_s < until_s - quarter_s);
+        let end = returns.partition_point(|one| one.tau_s <= until_s);
+        standstill(&returns[..early], &returns[late..end])
     }
 
     /// Multiplies the assumed IMU noise by factors, also for the queued segments.
@@ -400,7 +400,7 @@ impl Estimator {
     /// The window after the start or a restart.
     fn first_window(&self, spec: &EstimatorSpec, initial_state: &InitialState, start_s: f64) -> Window {
         let imu_from_laser = self.calibration.head_from_imu.inverse() * self.calibration.head_from_laser;
-        let maker = SurfelMaker {
+        let builder = SurfelBuilder {
             spec: spec.surfels.clone(),
             noise: self.calibration.lidar,
             scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
@@ -408,8 +408,8 @@ impl Estimator {
             lidar: LidarCorrection::default(),
         };
         let border = Border::new(initial_state.information, &self.calibration.imu, self.spec.clock.estimated);
-        let observed_builder = SurfelMaker { spec: spec.registration.surfels(&spec.surfels), ..maker.clone() };
-        let window = Window::new(spec, maker, initial_state, start_s, border);
+        let observed_builder = SurfelBuilder { spec: spec.registration.surfels(&spec.surfels), ..builder.clone() };
+        let window = Window::new(spec, builder, initial_state, start_s, border);
         if self.observed.is_some() { window.with_observed_builder(observed_builder) } else { window }
     }
 

@@ -6,7 +6,7 @@
 //! different pose is nearly as good.
 
 use super::limits::RelocalisationLimits;
-use crate::estimation::matching::{Forest, Matcher};
+use crate::estimation::matching::{Matcher, SearchTrees};
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
 use crate::estimation::surfel::Patch;
@@ -64,7 +64,7 @@ pub struct Located {
 pub(in crate::estimation) struct Relocaliser {
     matcher: Matcher,
     patches: Vec<Patch>,
-    forest: Forest,
+    trees: SearchTrees,
     inflation: f64,
     sigma_m: f64,
 }
@@ -107,12 +107,12 @@ impl Relocaliser {
         (matching, surfels): (&MatchingSpec, &SurfelSpec),
         (sigma_m, inflation): (f64, f64),
     ) -> Self {
-        let forest = Matcher::new(matching, surfels).plant(&patches);
+        let trees = Matcher::new(matching, surfels).build_trees(&patches);
         let wide = MatchingSpec {
             max_normal_angle_deg: NORMAL_GATE_DEG.max(matching.max_normal_angle_deg),
             ..matching.clone()
         };
-        Self { matcher: Matcher::new(&wide, surfels), patches, forest, inflation, sigma_m }
+        Self { matcher: Matcher::new(&wide, surfels), patches, trees, inflation, sigma_m }
     }
 
     /// The map's patches.
@@ -249,11 +249,11 @@ impl Relocaliser {
         let mut sums = MatchSums::default();
         for patch in query {
             let patch = patch.moved_by(pose);
-            let near = self.matcher.neighbours(&self.forest, &patch, 1);
+            let near = self.matcher.neighbours(&self.trees, &patch, 1);
             let Some(other) = near.first().map(|k| &self.patches[*k as usize]) else { continue };
             debug_assert_eq!(other.level, gate.level);
             sums.with_neighbour += 1;
-            if !self.matcher.agree(&patch, other, gate.gate_m) {
+            if !self.matcher.pass_gates(&patch, other, gate.gate_m) {
                 continue;
             }
             let plane = Plane::of(&patch, other, gate.sigma_m);

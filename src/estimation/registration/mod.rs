@@ -12,7 +12,8 @@
 //! + |bias / sigma|^2                                           prior of the range bias
 //! ```
 //!
-//! 1. The open loop records the *observed surfels*, which have several resolutions, built from all returns with the final trajectory.
+//! 1. The open loop records the *observed surfels*, built from all returns with the final trajectory,
+//!    in several resolutions.
 //! 2. If the open loop drifted by more than the matching distance, `places` detects loop closures and optimises a pose graph.
 //! 3. The surfels are divided into submaps, and pairs of submaps that observe the same cells are selected: `submaps`.
 //! 4. Starting with the coarsest resolution: find reciprocal nearest neighbours in six dimensions, match, solve, move

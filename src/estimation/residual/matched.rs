@@ -10,7 +10,7 @@
 
 use super::sums::{SPAN_UNKNOWNS, add_scaled, over_knots};
 use super::{CLOCK, Layout};
-use crate::estimation::surfel::{Patch, Placed};
+use crate::estimation::surfel::{Patch, PlacedSurfel};
 use crate::geometry::{Matrix, Vector};
 
 /// The common plane of two matched surfels.
@@ -76,7 +76,7 @@ pub(in crate::estimation) struct SurfelJacobian<const B: usize> {
 impl<const B: usize> SurfelJacobian<B> {
     /// The derivatives for `surfel`, with `normal` pointing towards it.
     #[inline(always)]
-    pub(in crate::estimation) fn of(surfel: &Placed, normal: &Vector, clock_reference_s: f64) -> Self {
+    pub(in crate::estimation) fn of(surfel: &PlacedSurfel, normal: &Vector, clock_reference_s: f64) -> Self {
         let turn = surfel.arm.cross(normal);
         let later = normal.dot(&surfel.velocity);
         let mut common = [0.0; B];
@@ -106,7 +106,7 @@ impl<const B: usize> SurfelJacobian<B> {
 pub(in crate::estimation) fn add_scaled_row(
     columns: &mut [Vec<f64>; 6],
     layout: &Layout,
-    (surfel, normal): (&Placed, &Vector),
+    (surfel, normal): (&PlacedSurfel, &Vector),
     scales: &[f64; 6],
     clock_reference_s: f64,
 ) {
@@ -134,7 +134,7 @@ mod tests {
     const AT_S: f64 = 0.5;
 
     /// A thin patch close to a common plane, measured at `tau_s`.
-    fn surfel(tau_s: f64, seed: f64) -> Placed {
+    fn surfel(tau_s: f64, seed: f64) -> PlacedSurfel {
         let turn = from_roll_pitch_yaw(0.02 * seed, 0.3, 0.4).to_rotation_matrix().into_inner();
         let covariance = turn * Matrix::from_diagonal(&Vector::new(0.02, 0.05, 1e-4)) * turn.transpose();
         let patch = Patch {
@@ -145,7 +145,7 @@ mod tests {
             roughness_variance: 0.0,
             level: 0,
         };
-        Placed {
+        PlacedSurfel {
             patch,
             tau_s,
             arm: Vector::new(1.5, 0.2 * seed, -0.4),
@@ -158,7 +158,7 @@ mod tests {
     }
 
     /// The centre after a step `x`, by the definition of the correction and of the clock.
-    fn moved(surfel: &Placed, layout: &Layout, x: &DVector<f64>) -> Vector {
+    fn moved(surfel: &PlacedSurfel, layout: &Layout, x: &DVector<f64>) -> Vector {
         let correction = Correction::of_spline(&surfel.basis, layout.first_knot, x.as_slice());
         let clock = layout.border() + CLOCK;
         let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - AT_S);
@@ -172,7 +172,7 @@ mod tests {
         origin + correction.translation + turned + surfel.velocity * later_s + by_lidar
     }
 
-    fn check(a: &Placed, b: Option<&Placed>) {
+    fn check(a: &PlacedSurfel, b: Option<&PlacedSurfel>) {
         let layout = Layout { first_knot: 0, knots: 12 };
         let other = b.map_or(surfel(0.0, 0.5).patch, |b| b.patch);
         let plane = Plane::of(&a.patch, &other, 0.01);

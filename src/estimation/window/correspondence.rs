@@ -3,7 +3,7 @@
 use super::{Window, WindowSegment};
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::surfel::{Patch, Placed, Surfel};
+use crate::estimation::surfel::{Patch, PlacedSurfel, Surfel};
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use rayon::prelude::*;
@@ -115,7 +115,7 @@ impl<K: Copy + Send + Sync> Runs<K> {
 }
 
 impl Matches {
-    fn of(all: Vec<Match>, scene: &[Placed]) -> Self {
+    fn of(all: Vec<Match>, scene: &[PlacedSurfel]) -> Self {
         let mut offsets = vec![0; scene.len() + 1];
         let sides = |one: &Match| [Some(one.a as usize), one.other()];
         for surfel in all.iter().flat_map(sides).flatten() {
@@ -159,14 +159,14 @@ impl Neighbours {
     }
 
     /// Whether the neighbours are still valid for `scene`.
-    pub fn are_valid_for(&self, scene: &[Placed]) -> bool {
+    pub fn are_valid_for(&self, scene: &[PlacedSurfel]) -> bool {
         self.scene_len == scene.len() && self.moved_m < MOVED_M
     }
 }
 
 impl Window {
     /// The window's surfels in the map frame, except surfels that a clock correction moved out of the window's knots.
-    pub(super) fn scene(&self) -> Vec<Placed> {
+    pub(super) fn scene(&self) -> Vec<PlacedSurfel> {
         let placing = self.placing();
         let surfel_indices = self.surfel_indices();
         surfel_indices
@@ -190,7 +190,7 @@ impl Window {
     /// The `neighbours` in `scene` that pass the match gates.
     pub(super) fn match_up(
         &self,
-        scene: &[Placed],
+        scene: &[PlacedSurfel],
         views: &Views,
         neighbours: &Neighbours,
         iteration: usize,
@@ -200,7 +200,7 @@ impl Window {
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, other: &Patch| {
             let patch = &scene[a as usize].patch;
-            self.matcher.agree(patch, other, gate_m).then(|| Plane::of(patch, other, sigma_m))
+            self.matcher.pass_gates(patch, other, gate_m).then(|| Plane::of(patch, other, sigma_m))
         };
         let live = |(a, b): &(u32, u32)| {
             let plane = plane(*a, &scene[*b as usize].patch)?;
@@ -221,7 +221,7 @@ impl Window {
     pub(super) fn remove_insignificant_tilt(
         &self,
         matches: &mut Matches,
-        scene: &[Placed],
+        scene: &[PlacedSurfel],
         views: &Views,
         direction: &Vector,
     ) {
@@ -239,9 +239,13 @@ impl Window {
     }
 
     /// Searches the neighbours in `scene` and in the `chosen` views.
-    pub(super) fn search_neighbours(&mut self, scene: &[Placed], (views, chosen): (&Views, &[usize])) -> Neighbours {
+    pub(super) fn search_neighbours(
+        &mut self,
+        scene: &[PlacedSurfel],
+        (views, chosen): (&Views, &[usize]),
+    ) -> Neighbours {
         let patches: Vec<Patch> = scene.iter().map(|surfel| surfel.patch).collect();
-        let pairs = self.matcher.among(scene, &self.matcher.plant(&patches));
+        let pairs = self.matcher.neighbour_pairs(scene, &self.matcher.build_trees(&patches));
         let surfel_indices = self.surfel_indices();
         let mut cached: Vec<CachedNeighbours> =
             surfel_indices.iter().map(|(k, index)| std::mem::take(&mut self.segments[*k].cached[*index])).collect();
@@ -273,7 +277,7 @@ impl CachedNeighbours {
         }
         for view in chosen.iter().map(|index| views.view(*index)) {
             if self.found.iter().all(|(number, _)| *number != view.number) {
-                self.found.push((view.number, matcher.neighbours(&view.forest, patch, count)));
+                self.found.push((view.number, matcher.neighbours(&view.trees, patch, count)));
             }
         }
     }

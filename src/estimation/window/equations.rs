@@ -12,7 +12,7 @@ use crate::estimation::residual::sums::{Coupling, SpanSums, SurfelSums};
 use crate::estimation::spec::SolveSpec;
 use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::spline::Basis;
-use crate::estimation::surfel::Placed;
+use crate::estimation::surfel::PlacedSurfel;
 use crate::geometry::Vector;
 use pulp::Arch;
 use rayon::prelude::*;
@@ -100,7 +100,7 @@ impl Window {
     pub(super) fn solve_linearised(
         &mut self,
         (first, total): (usize, &[f64]),
-        scene: &[Placed],
+        scene: &[PlacedSurfel],
         (matches, robust): (&Matches, &Robust),
         layout: &Layout,
         spent: &mut TimeSpent,
@@ -149,7 +149,7 @@ impl Window {
 
 /// The matches, with all that their normal equations need.
 struct WeightedMatches<'a> {
-    scene: &'a [Placed],
+    scene: &'a [PlacedSurfel],
     matches: &'a Matches,
     robust: &'a Robust,
     clock_reference_s: f64,

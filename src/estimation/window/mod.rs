@@ -21,7 +21,7 @@ use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, ImuScaleMisalignment, Interval};
-use super::surfel::{Beam, Patch, PlacementState, Surfel, SurfelMaker};
+use super::surfel::{Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
@@ -50,7 +50,7 @@ const RELOCALISED_SIGMA: [f64; 2] = [0.05, 0.2];
 #[derive(Debug)]
 struct WindowSegment {
     end_tau_s: f64,
-    beams: Vec<Beam>,
+    returns: Vec<TimedReturn>,
     surfels: Vec<Surfel>,
     /// Cached fixed-view neighbours of each surfel.
     cached: Vec<CachedNeighbours>,
@@ -60,9 +60,9 @@ struct WindowSegment {
 #[derive(Debug)]
 pub(super) struct Window {
     spec: EstimatorSpec,
-    maker: SurfelMaker,
+    builder: SurfelBuilder,
     /// Builds the observed surfels, if they are requested.
-    observed_builder: Option<SurfelMaker>,
+    observed_builder: Option<SurfelBuilder>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
     pub(super) clock: Clock,
@@ -96,7 +96,7 @@ impl Window {
     /// A window that starts with the first IMU interval, at `start_u_s`.
     pub(super) fn new(
         spec: &EstimatorSpec,
-        maker: SurfelMaker,
+        builder: SurfelBuilder,
         initial_state: &InitialState,
         start_u_s: f64,
         border: Border,
@@ -105,7 +105,7 @@ impl Window {
         Self {
             spec: spec.clone(),
             matcher: Matcher::new(&spec.matching, &spec.surfels),
-            maker,
+            builder,
             observed_builder: None,
             nominal: Nominal::starting(start_u_s, initial_state.state),
             clock,
@@ -130,7 +130,7 @@ impl Window {
     /// The states that initialise the estimate after an IMU gap.
     pub(super) fn state_before_gap(&self) -> Option<StateBeforeGap> {
         let state = *self.nominal.states().last()?;
-        let (scale_misalignment, lidar) = (self.scale_misalignment, self.maker.lidar);
+        let (scale_misalignment, lidar) = (self.scale_misalignment, self.builder.lidar);
         let until_s = self.nominal.end_s();
         let displacement = state.position - self.start_pose().translation.vector;
         let mean_velocity = displacement / (until_s - self.start.u_s).max(self.spec.step_s);
@@ -142,7 +142,7 @@ impl Window {
     pub(super) fn resume_from(&mut self, before_gap: &StateBeforeGap) {
         self.clock = before_gap.clock.after_gap((before_gap.until_s, self.start.u_s));
         self.scale_misalignment = before_gap.scale_misalignment;
-        self.maker.lidar = before_gap.lidar;
+        self.builder.lidar = before_gap.lidar;
     }
 
     /// Rotates the window by the smallest angle that aligns gravity with that before the gap.
@@ -211,7 +211,7 @@ impl Window {
     }
 
     /// The same window, which also builds the observed surfels with `builder`.
-    pub(super) fn with_observed_builder(self, builder: SurfelMaker) -> Self {
+    pub(super) fn with_observed_builder(self, builder: SurfelBuilder) -> Self {
         Self { observed_builder: Some(builder), ..self }
     }
 
@@ -219,8 +219,13 @@ impl Window {
         &self.matcher
     }
 
-    /// Appends a segment: integrates the intervals and builds surfels of the beams. Returns the run time.
-    pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) -> TimeSpent {
+    /// Appends a segment: integrates the intervals and builds surfels of the returns. Returns the run time.
+    pub(super) fn extend(
+        &mut self,
+        intervals: &[(f64, Interval)],
+        returns: Vec<TimedReturn>,
+        end_tau_s: f64,
+    ) -> TimeSpent {
         let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
             self.nominal.extend(interval.corrected_by(&self.scale_misalignment), &self.biases, &self.gravity);
@@ -242,9 +247,9 @@ impl Window {
         self.bridged_gap = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
             || self.nominal.end_s() < self.wide_gate_until_s;
         let integration_s = watch.lap_s();
-        let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
+        let surfels = self.builder.build(&returns, &self.nominal, &self.clock, &self.biases);
         let cached = vec![CachedNeighbours::default(); surfels.len()];
-        self.segments.push_back(WindowSegment { end_tau_s, beams, surfels, cached });
+        self.segments.push_back(WindowSegment { end_tau_s, returns, surfels, cached });
         let surfels_s = watch.lap_s();
         // Reference time of the clock: the middle of the window, where offset and rate are least correlated.
         let length_s = self.spec.step_s * self.segments.len() as f64;
@@ -257,10 +262,10 @@ impl Window {
     /// Rebuilds the surfels of the newest segment with the current trajectory.
     pub(super) fn rebuild_newest_surfels(&mut self) {
         if let Some(newest) = self.segments.back_mut() {
-            newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
+            newest.surfels = self.builder.build(&newest.returns, &self.nominal, &self.clock, &self.biases);
             newest.cached = vec![CachedNeighbours::default(); newest.surfels.len()];
             if self.observed_builder.is_none() {
-                newest.beams = Vec::new();
+                newest.returns = Vec::new();
             }
         }
     }
@@ -308,8 +313,8 @@ impl Window {
 
     fn observed(&self, segment: &WindowSegment) -> Vec<(f64, Patch)> {
         let Some(builder) = &self.observed_builder else { return Vec::new() };
-        let builder = SurfelMaker { lidar: self.maker.lidar, ..builder.clone() };
-        let surfels = builder.build(&segment.beams, &self.nominal, &self.clock, &self.biases);
+        let builder = SurfelBuilder { lidar: self.builder.lidar, ..builder.clone() };
+        let surfels = builder.build(&segment.returns, &self.nominal, &self.clock, &self.biases);
         let placing = self.placing();
         surfels.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
     }
@@ -335,7 +340,7 @@ impl Window {
 
     /// The estimated corrections of the lidar calibration.
     pub(super) fn lidar(&self) -> LidarCorrection {
-        self.maker.lidar
+        self.builder.lidar
     }
 
     /// The lidar correction in the axes of the IMU calibration.
@@ -343,12 +348,12 @@ impl Window {
     /// If the extrinsics are estimated, the axes are midway between the gyroscope axes, which the estimated attitude
     /// refers to, and the accelerometer axes; both are equally accurate.
     pub(super) fn calibrated_lidar(&self) -> LidarCorrection {
-        let lidar = self.maker.lidar;
+        let lidar = self.builder.lidar;
         if !self.spec.extrinsics.estimated {
             return lidar;
         }
         let imu_from_gyro = Rotation::from_scaled_axis(self.scale_misalignment.accel_against_gyro() * 0.5);
-        let position = self.maker.laser_in_imu + lidar.translation;
+        let position = self.builder.laser_in_imu + lidar.translation;
         let translation = lidar.translation + imu_from_gyro * position - position;
         LidarCorrection { rotation: imu_from_gyro * lidar.rotation, translation, ..lidar }
     }
@@ -359,8 +364,8 @@ impl Window {
             nominal: &self.nominal,
             clock: &self.clock,
             biases: &self.biases,
-            laser_in_imu: &self.maker.laser_in_imu,
-            lidar: &self.maker.lidar,
+            laser_in_imu: &self.builder.laser_in_imu,
+            lidar: &self.builder.lidar,
             knot_spacing_s: self.spec.knot_spacing_s,
         }
     }

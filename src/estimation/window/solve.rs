@@ -12,7 +12,7 @@ use crate::estimation::residual::{
 };
 use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::strapdown::ImuScaleMisalignment;
-use crate::estimation::surfel::Placed;
+use crate::estimation::surfel::PlacedSurfel;
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
 
@@ -52,7 +52,7 @@ impl Window {
         }
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
-        let lidar = self.maker.lidar;
+        let lidar = self.builder.lidar;
         let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.scale_misalignment);
         self.border.start_window();
         let mut total = vec![0.0; layout.border()];
@@ -100,7 +100,7 @@ impl Window {
         }
         if solved.trouble.is_some() {
             (self.nominal, self.clock, self.biases, self.gravity, self.scale_misalignment) = backup;
-            self.maker.lidar = lidar;
+            self.builder.lidar = lidar;
             self.border.reset_to_window_start();
             linearised = None;
         }
@@ -108,7 +108,7 @@ impl Window {
     }
 
     /// Removes matches and match components that are not significant; too few matches are removed entirely.
-    fn significant(&self, mut matches: Matches, solved: &Solved, scene: &[Placed], views: &Views) -> Matches {
+    fn significant(&self, mut matches: Matches, solved: &Solved, scene: &[PlacedSurfel], views: &Views) -> Matches {
         if matches.all.len() < self.spec.solve.min_matches {
             return Matches::default();
         }
@@ -140,9 +140,9 @@ impl Window {
         let more = ImuScaleMisalignment { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
         self.nominal.correct_readings(&more);
         self.scale_misalignment.add(&more);
-        self.maker.lidar.range_m += border[RANGE];
-        self.maker.lidar.rotation = Rotation::from_scaled_axis(three(LIDAR_ROTATION)) * self.maker.lidar.rotation;
-        self.maker.lidar.translation += three(LIDAR_TRANSLATION);
+        self.builder.lidar.range_m += border[RANGE];
+        self.builder.lidar.rotation = Rotation::from_scaled_axis(three(LIDAR_ROTATION)) * self.builder.lidar.rotation;
+        self.builder.lidar.translation += three(LIDAR_TRANSLATION);
     }
 }
 

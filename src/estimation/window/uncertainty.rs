@@ -7,7 +7,7 @@ use crate::estimation::consider::{IMU_OFFSET, IMU_STATES, START_STATES, Sensitiv
 use crate::estimation::residual::prior::ByLidar;
 use crate::estimation::residual::{LIDAR_ROTATION, Layout, matched};
 use crate::estimation::spline::Basis;
-use crate::estimation::surfel::Placed;
+use crate::estimation::surfel::PlacedSurfel;
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use nalgebra::{Matrix6, SMatrix};
@@ -16,7 +16,7 @@ use nalgebra::{Matrix6, SMatrix};
 #[derive(Debug)]
 pub(in crate::estimation) struct Linearised {
     pub(super) layout: Layout,
-    pub(super) scene: Vec<Placed>,
+    pub(super) scene: Vec<PlacedSurfel>,
     pub(super) matches: Matches,
     pub(super) robust: Robust,
 }
