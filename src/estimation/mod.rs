@@ -91,7 +91,7 @@ mod window;
 
 pub use base::{BaseEstimate, BaseFix, BaseImu, FixSigmas, smooth_base};
 use clock::Clock;
-pub use cloud::{CloudFilter, Fate, ProjectedReturn, point_sigma_m};
+pub use cloud::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
 pub use error::{Discarded, EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use integrity::{Cause, Evidence, Finding, Status, bound_factors, covariance_blocks, findings, radius_99};

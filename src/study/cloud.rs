@@ -1,8 +1,8 @@
 //! Metrics of the registered cloud against the true surfaces.
 
-use super::register::{FateCounts, ProjectedBeam, Registered, SampledBeam};
+use super::register::{ClassCounts, ProjectedBeam, Registered, SampledBeam};
 use super::truth_cursor::TrueState;
-use crate::estimation::Fate;
+use crate::estimation::ReturnClass;
 use crate::evaluation::{CloudErrors, CloudSummary};
 use crate::geometry::{Pose, Surface, Vector};
 use crate::report::{CloudMetrics, FilterMetrics};
@@ -70,10 +70,10 @@ pub(super) fn cloud_metrics(
     surroundings: Option<Surroundings>,
 ) -> CloudMetrics {
     let filter = match registered.filtered {
-        true => filter_metrics(&registered.fates),
+        true => filter_metrics(&registered.class_counts),
         false => FilterMetrics::default(),
     };
-    let counted = CloudMetrics { points: Some(registered.fates.all()), filter, ..CloudMetrics::default() };
+    let counted = CloudMetrics { points: Some(registered.class_counts.all()), filter, ..CloudMetrics::default() };
     let (Some(world_from_map), Some(surroundings)) = (world_from_map, surroundings) else {
         return counted;
     };
@@ -119,7 +119,7 @@ fn judged_filter<'a>(
         let all = registered.sample.iter().zip(targets);
         all.filter(move |(_, on)| **on == target).map(|(beam, _)| beam)
     };
-    let kept = |beam: &&SampledBeam| beam.fate == Fate::Kept;
+    let kept = |beam: &&SampledBeam| beam.class == ReturnClass::Static;
     let dropped = |target: Target| {
         let (all, remaining) = (of(target).count(), of(target).filter(kept).count());
         (all > 0).then(|| (all - remaining) as f64 / all as f64)
@@ -128,17 +128,17 @@ fn judged_filter<'a>(
         kept_sigma_m: errors(&mut of(Target::Static).filter(kept)).map(|cloud| cloud.sigma_m),
         standing_dropped_fraction: dropped(Target::Static),
         movers_dropped_fraction: dropped(Target::Mover),
-        ..filter_metrics(&registered.fates)
+        ..filter_metrics(&registered.class_counts)
     }
 }
 
 /// Counts of the filter: returns in the cloud, and removed returns by reason.
-fn filter_metrics(fates: &FateCounts) -> FilterMetrics {
+fn filter_metrics(classes: &ClassCounts) -> FilterMetrics {
     FilterMetrics {
-        kept: Some(fates.kept),
-        dropped_mixed: Some(fates.mixed),
-        dropped_isolated: Some(fates.isolated),
-        dropped_moving: Some(fates.moving),
+        kept: Some(classes.kept),
+        dropped_mixed: Some(classes.mixed),
+        dropped_isolated: Some(classes.isolated),
+        dropped_moving: Some(classes.moving),
         ..FilterMetrics::default()
     }
 }
@@ -210,10 +210,10 @@ mod tests {
         let judged = |end: &Vector| SampledBeam {
             in_map: beam(end + Vector::z() * 0.01),
             by_truth: Some((beam(*end), at(4.0))),
-            fate: if end.x == 6.0 { Fate::Kept } else { Fate::Moving },
+            class: if end.x == 6.0 { ReturnClass::Static } else { ReturnClass::Dynamic },
         };
         let registered = Registered {
-            fates: FateCounts { kept: 16, moving: 4, ..FateCounts::default() },
+            class_counts: ClassCounts { kept: 16, moving: 4, ..ClassCounts::default() },
             filtered: true,
             sample: ends.iter().map(judged).collect(),
             dead_reckoning: Err(EvaluationError::OnALine),
