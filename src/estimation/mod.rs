@@ -97,7 +97,7 @@ pub use estimator::{Estimator, estimate_all};
 pub use integrity::{Cause, Evidence, Finding, Status, bound_factors, covariance_blocks, findings, radius_99};
 pub use map::{Located, locate_map, map_of, merge_maps};
 pub use observed::ObservedSurfels;
-pub use output::{EstimatedPose, GAUGED_S, OpenLoop, TURN_LEVER_M, WindowReport};
+pub use output::{ALIGNMENT_S, EstimatedPose, OpenLoop, TURN_LEVER_M, WindowReport};
 pub use registration::{
     ClosedLoop, LoopReport, PlacesSpec, RegistrationInput, RegistrationReport, RegistrationSpec, register,
 };

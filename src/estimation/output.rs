@@ -6,7 +6,7 @@ use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
 
 /// Length of the initial part over which a trajectory is aligned with the truth when errors are reported, s.
-pub const GAUGED_S: f64 = 20.0;
+pub const ALIGNMENT_S: f64 = 20.0;
 
 /// Lever arm that converts a rotation error to a position error in the alignment, m.
 ///
@@ -22,7 +22,7 @@ pub struct EstimatedPose {
     pub map_from_head: Pose,
     /// Covariance relative to the map, which the first pose defines: position, then attitude; m^2, m rad, rad^2.
     pub covariance: PoseCovariance,
-    /// Covariance relative to the alignment over the first [`GAUGED_S`] seconds, or over the time so far during these.
+    /// Covariance relative to the alignment over the first [`ALIGNMENT_S`] seconds, or over the time so far during these.
     pub covariance_against_gauge: PoseCovariance,
     /// Velocity of the head origin, m/s.
     pub velocity_in_map_m_per_s: Vector,
@@ -74,7 +74,7 @@ pub struct WindowReport {
     /// Whether the lidar would show a motion of a resting head.
     pub sees_rest: bool,
     /// Problem of the solution, if any.
-    pub trouble: Option<WarningKind>,
+    pub problem: Option<WarningKind>,
     /// Run time, s. With its parts, the only value that differs between identical runs.
     pub elapsed_s: f64,
     /// Parts of the run time; their sum is slightly smaller.
@@ -88,12 +88,12 @@ pub struct OpenLoop {
     pub trajectory: Trajectory,
     /// The poses with velocity, biases and clock offset.
     pub poses: Vec<EstimatedPose>,
-    /// Covariances of some poses during twice [`GAUGED_S`] seconds from the start, relative to the alignment: m^2, m rad,
+    /// Covariances of some poses during twice [`ALIGNMENT_S`] seconds from the start, relative to the alignment: m^2, m rad,
     /// rad^2.
     ///
-    /// The alignment covers the first [`GAUGED_S`] seconds, or half of a shorter run. Empty if the estimate restarted in
+    /// The alignment covers the first [`ALIGNMENT_S`] seconds, or half of a shorter run. Empty if the estimate restarted in
     /// this time.
-    pub gauged: Vec<(Stamp, PoseCovariance)>,
+    pub aligned_covariances: Vec<(Stamp, PoseCovariance)>,
     /// The clock offset after each window, s, positive if IMU stamps are later; over lidar time.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// Estimated corrections of the lidar calibration at the end, consistent with the poses.

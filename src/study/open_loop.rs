@@ -32,7 +32,7 @@ pub(super) struct OpenLoopRun {
     /// 99 % radii of the position error relative to the alignment of the first seconds, at the same stamps, m.
     pub radii_m: Vec<f64>,
     /// Covariances of marked poses of the first seconds relative to the alignment over these.
-    pub gauged: Vec<(Stamp, PoseCovariance)>,
+    pub aligned_covariances: Vec<(Stamp, PoseCovariance)>,
     /// The estimated clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// Estimated correction of the lidar calibration that the poses are consistent with (gyroscope axes).
@@ -121,7 +121,7 @@ pub(super) fn run_open_loop(
         map_from_head,
         covariances,
         radii_m,
-        gauged: result.gauged,
+        aligned_covariances: result.aligned_covariances,
         spent: result.windows.iter().map(|window| window.spent).sum(),
         clock_offsets: result.clock_offsets.into_iter().map(|(at, offset_s)| (at, offset_s - shift_s)).collect(),
         lidar: result.lidar,

@@ -5,7 +5,7 @@ mod poses;
 mod reports;
 
 use self::gauge::GaugeBuilder;
-use self::reports::{is_dead_reckoning, report, trouble};
+use self::reports::{is_dead_reckoning, problem, report};
 use crate::estimation::border::Border;
 use crate::estimation::consider::{Consider, Sensitivity, StartMatrix};
 use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
@@ -70,7 +70,7 @@ pub struct Estimator {
     /// Total time of dead reckoning with the IMU, s.
     dead_reckoning_s: f64,
     /// The problem of the newest window, and whether it was reported.
-    trouble: Option<(WarningKind, bool)>,
+    problem: Option<(WarningKind, bool)>,
 }
 
 impl Estimator {
@@ -102,7 +102,7 @@ impl Estimator {
             windows: Vec::new(),
             warnings: Vec::new(),
             dead_reckoning_s: 0.0,
-            trouble: None,
+            problem: None,
         })
     }
 
@@ -159,12 +159,12 @@ impl Estimator {
         self.record_observed(Window::observed_in_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        let gauged = self.gauge.finish(&mut self.consider, self.newest_pose);
+        let aligned_covariances = self.gauge.finish(&mut self.consider, self.newest_pose);
         let Self { poses, clock_offsets, windows, warnings, observed, map_localisation, .. } = self;
         let observed = observed.unwrap_or_default();
         let located = map_localisation.and_then(|map_localisation| map_localisation.found().cloned());
         let learnt = OpenLoop { lidar, calibrated_lidar, located, ..OpenLoop::default() };
-        Ok(OpenLoop { trajectory, poses, gauged, clock_offsets, windows, warnings, observed, ..learnt })
+        Ok(OpenLoop { trajectory, poses, aligned_covariances, clock_offsets, windows, warnings, observed, ..learnt })
     }
 
     /// Adds a segment: handles a gap before it, starts the first window, and processes the segment.
@@ -222,11 +222,11 @@ impl Estimator {
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving =
             window.speed_m_per_s() > MOVING.0 || segment.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
-        let trouble = trouble(&solved, &self.spec, moving);
+        let problem = problem(&solved, &self.spec, moving);
         let at = (self.intake.stamp(segment.end_s), moving);
-        self.windows.push(report(&solved, at, window, trouble.clone(), took));
-        self.dead_reckoning_s += if trouble.as_ref().is_some_and(is_dead_reckoning) { self.spec.step_s } else { 0.0 };
-        self.warn_of_trouble(trouble, segment.end_s);
+        self.windows.push(report(&solved, at, window, problem.clone(), took));
+        self.dead_reckoning_s += if problem.as_ref().is_some_and(is_dead_reckoning) { self.spec.step_s } else { 0.0 };
+        self.warn_of_problem(problem, segment.end_s);
         if let Some(until_s) = final_until_s {
             self.output_poses(until_s);
             let Some(window) = &mut self.window else { return Ok(()) };

@@ -19,7 +19,7 @@ pub(super) fn report(
     solved: &Solved,
     (stamp, moving): (Stamp, bool),
     window: &Window,
-    trouble: Option<WarningKind>,
+    problem: Option<WarningKind>,
     (elapsed_s, spent): (f64, TimeSpent),
 ) -> WindowReport {
     WindowReport {
@@ -41,16 +41,16 @@ pub(super) fn report(
         moving,
         resting: window.is_resting(),
         sees_rest: window.sees_rest(),
-        trouble,
+        problem,
         elapsed_s,
         spent,
     }
 }
 
 /// The problem of a window, if any; `expected`: whether surfaces should have been matched.
-pub(super) fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
+pub(super) fn problem(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
     let matches = solved.matches + solved.view_matches;
-    if let Some(reason) = solved.trouble {
+    if let Some(reason) = solved.failure {
         Some(WarningKind::NotSolved { reason })
     } else if expected && matches < spec.solve.min_matches {
         Some(WarningKind::FewMatches { matches })
@@ -62,8 +62,8 @@ pub(super) fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> 
 }
 
 /// Whether a problem means that the window is dead reckoning with the IMU.
-pub(super) fn is_dead_reckoning(trouble: &WarningKind) -> bool {
-    match trouble {
+pub(super) fn is_dead_reckoning(problem: &WarningKind) -> bool {
+    match problem {
         WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
         WarningKind::WeakGeometry { conditioning, .. } => *conditioning <= 0.0,
         _ => false,
@@ -94,15 +94,15 @@ impl Estimator {
     /// Warns of a problem of two consecutive windows, or immediately of a rejected solution.
     ///
     /// The warning is repeated only after a window without a problem or with another one.
-    pub(super) fn warn_of_trouble(&mut self, trouble: Option<WarningKind>, end_s: f64) {
+    pub(super) fn warn_of_problem(&mut self, problem: Option<WarningKind>, end_s: f64) {
         let before =
-            self.trouble.take().filter(|(kind, _)| Some(discriminant(kind)) == trouble.as_ref().map(discriminant));
-        let Some(kind) = trouble else { return };
+            self.problem.take().filter(|(kind, _)| Some(discriminant(kind)) == problem.as_ref().map(discriminant));
+        let Some(kind) = problem else { return };
         let was_reported = before.as_ref().is_some_and(|(_, reported)| *reported);
         let report = !was_reported && (before.is_some() || matches!(kind, WarningKind::NotSolved { .. }));
         if report {
             self.warnings.push(Warning { stamp: self.intake.stamp(end_s), kind: kind.clone() });
         }
-        self.trouble = Some((kind, was_reported || report));
+        self.problem = Some((kind, was_reported || report));
     }
 }

@@ -154,7 +154,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// Whether a window is dead reckoning with the IMU although surfaces should have been matched.
 fn is_untracked(window: &WindowReport) -> bool {
-    matches!(window.trouble, Some(WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }))
+    matches!(window.problem, Some(WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }))
 }
 
 /// Findings from the window reports.
@@ -288,7 +288,7 @@ pub fn bound_factors(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
     let factor = |k: usize| {
         let contradiction = median(near(k).iter().map(|w| w.imu_contradiction).collect());
         let residual_m = median(near(k).iter().map(|w| w.residual_rms_m).collect());
-        let is_weak = |w: &WindowReport| matches!(w.trouble, Some(WarningKind::WeakGeometry { .. }));
+        let is_weak = |w: &WindowReport| matches!(w.problem, Some(WarningKind::WeakGeometry { .. }));
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_FACTOR } else { 1.0 };
         let scale = (windows[k].imu_matrix / NOMINAL.2).powi(2).min(MAX_SCALE_FACTOR);
@@ -352,7 +352,7 @@ mod tests {
             moving: true,
             resting: false,
             sees_rest: true,
-            trouble: None,
+            problem: None,
             elapsed_s: 0.0,
             spent: TimeSpent::default(),
         };

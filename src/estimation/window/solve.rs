@@ -39,7 +39,7 @@ pub(in crate::estimation) struct Solved {
     pub conditioning: f64,
     /// The least constrained direction, in the map frame.
     pub weakest: Vector,
-    pub trouble: Option<&'static str>,
+    pub failure: Option<&'static str>,
     pub spent: TimeSpent,
 }
 
@@ -47,8 +47,8 @@ impl Window {
     /// Solves the window; returns the last linearisation if the solution is accepted.
     pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
         if self.nominal.end_s() <= self.start.u_s {
-            let trouble = Some("the IMU samples do not reach the window");
-            return (Solved { trouble, ..Solved::default() }, None);
+            let failure = Some("the IMU samples do not reach the window");
+            return (Solved { failure, ..Solved::default() }, None);
         }
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
@@ -79,12 +79,12 @@ impl Window {
             let seen = (&matches, &robust);
             let spent = &mut solved.spent;
             let Some((x, by)) = self.solve_linearised((first, &total), &scene, seen, &layout, spent) else {
-                solved.trouble = Some("the normal equations are singular");
+                solved.failure = Some("the normal equations are singular");
                 break;
             };
             watch.lap_s(); // the solver records this time
             if !(by.translation_m < MAX_CORRECTION.0 && by.rotation_rad < MAX_CORRECTION.1) {
-                solved.trouble = Some("the correction is too large");
+                solved.failure = Some("the correction is too large");
                 break;
             }
             self.apply(&x, first, &layout, &mut total);
@@ -98,7 +98,7 @@ impl Window {
                 break;
             }
         }
-        if solved.trouble.is_some() {
+        if solved.failure.is_some() {
             (self.nominal, self.clock, self.biases, self.gravity, self.scale_misalignment) = backup;
             self.builder.lidar = lidar;
             self.border.reset_to_window_start();
