@@ -55,7 +55,7 @@ pub(super) fn print_partial_results(folder: &Path) {
 
 /// Time of each part of the estimator, s, and of the open loop in total.
 fn seconds_by_part(outcome: &EstimateResult) -> Value {
-    let parts = outcome.spent.parts().into_iter().map(|(name, seconds)| (format!("{name}_s"), json!(seconds)));
+    let parts = outcome.timing.parts().into_iter().map(|(name, seconds)| (format!("{name}_s"), json!(seconds)));
     let whole = ("open_loop_s".to_owned(), json!(outcome.metrics.open_loop.wall_s));
     Value::Object(parts.chain([whole]).collect())
 }
@@ -74,7 +74,7 @@ pub(super) fn print_outcome(
     let mut words = report::summary(&outcome.metrics);
     if let (true, Some(wall_s)) = (profile, outcome.metrics.open_loop.wall_s) {
         words += "\n";
-        words += &report::time_spent(&outcome.spent, wall_s);
+        words += &report::timing_table(&outcome.timing, wall_s);
     }
     output::print_result(global, &words, figures, Some(folder))?;
     let Metrics { losses, status, .. } = &outcome.metrics;

@@ -80,12 +80,12 @@ mod registration;
 mod residual;
 mod scan_geometry;
 mod spec;
-mod spent;
 mod spline;
 mod stamps;
 mod standstill;
 mod strapdown;
 mod surfel;
+mod timing;
 mod views;
 mod window;
 
@@ -102,5 +102,5 @@ pub use registration::{
     ClosedLoop, LoopReport, PlacesSpec, RegistrationInput, RegistrationReport, RegistrationSpec, register,
 };
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
-pub use spent::TimeSpent;
 pub use stamps::smoothed_stamps;
+pub use timing::Timing;

@@ -1,6 +1,6 @@
 //! Output of the estimator.
 
-use super::{Located, ObservedSurfels, TimeSpent, Warning, WarningKind};
+use super::{Located, ObservedSurfels, Timing, Warning, WarningKind};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
@@ -78,7 +78,7 @@ pub struct WindowReport {
     /// Run time, s. With its parts, the only value that differs between identical runs.
     pub elapsed_s: f64,
     /// Parts of the run time; their sum is slightly smaller.
-    pub spent: TimeSpent,
+    pub timing: Timing,
 }
 
 /// An open-loop estimate.

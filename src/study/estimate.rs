@@ -11,7 +11,7 @@ use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use super::register::{Registered, Registration};
 use super::result_files::{estimate_files, remove};
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
-use crate::estimation::{EstimatorSpec, TimeSpent};
+use crate::estimation::{EstimatorSpec, Timing};
 use crate::geometry::Trajectory;
 use crate::measurement::LidarCorrection;
 use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
@@ -58,7 +58,7 @@ pub struct EstimateResult {
     /// The metrics, as in `metrics.json`.
     pub metrics: Metrics,
     /// Run time of each part of the open-loop estimator.
-    pub spent: TimeSpent,
+    pub timing: Timing,
 }
 
 /// Estimates the trajectory from the recording at `path` and writes the results to `folder`.
@@ -160,7 +160,7 @@ pub(super) fn estimate_in(
     let open_errors = open_comparison.and_then(|comparison| Some(&comparison.errors.as_ref()?.decimated));
     let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
     artefacts::write(folder, &metrics, plots, origin.manifest)?;
-    Ok(EstimateResult { metrics, spent: loops.open.spent })
+    Ok(EstimateResult { metrics, timing: loops.open.timing })
 }
 
 /// Open loop and closed loop, each with its comparison with the truth.

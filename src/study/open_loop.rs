@@ -5,7 +5,7 @@ use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
 use super::{MapOptions, ProgressMonitor, Stage, StudyError};
 use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Located, ObservedSurfels, TimeSpent, Warning, WindowReport,
+    EstimatedPose, Estimator, EstimatorSpec, Located, ObservedSurfels, Timing, Warning, WindowReport,
     covariance_blocks, radius_99,
 };
 use crate::geometry::{PoseCovariance, Trajectory};
@@ -58,7 +58,7 @@ pub(super) struct OpenLoopRun {
     /// Wall-clock time, including reading but not building the observed surfels, s.
     pub wall_s: f64,
     /// Run time of each part of the estimator.
-    pub spent: TimeSpent,
+    pub timing: Timing,
 }
 
 /// Options of the open loop.
@@ -122,7 +122,7 @@ pub(super) fn run_open_loop(
         covariances,
         radii_m,
         aligned_covariances: result.aligned_covariances,
-        spent: result.windows.iter().map(|window| window.spent).sum(),
+        timing: result.windows.iter().map(|window| window.timing).sum(),
         clock_offsets: result.clock_offsets.into_iter().map(|(at, offset_s)| (at, offset_s - shift_s)).collect(),
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,

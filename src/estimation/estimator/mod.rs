@@ -12,10 +12,10 @@ use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGa
 use crate::estimation::intake::{Intake, Segment};
 use crate::estimation::localisation::{GapRelocalisation, MapLocalisation};
 use crate::estimation::observed::ObservedSurfels;
-use crate::estimation::spent::Stopwatch;
 use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::strapdown::Interval;
 use crate::estimation::surfel::{Patch, SurfelBuilder, TimedReturn};
+use crate::estimation::timing::Stopwatch;
 use crate::estimation::views::Views;
 use crate::estimation::window::{Linearised, Window};
 use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
@@ -191,12 +191,12 @@ impl Estimator {
     fn process(&mut self, segment: Segment) -> Result<(), EstimationError> {
         let Some(window) = &mut self.window else { return Ok(()) };
         let started = Instant::now();
-        let mut spent = window.extend(&segment.intervals, segment.returns, segment.end_s);
+        let mut timing = window.extend(&segment.intervals, segment.returns, segment.end_s);
         let (mut solved, mut linearised) = window.solve(&self.views);
-        spent += solved.spent;
+        timing += solved.timing;
         let mut watch = Stopwatch::start();
         window.rebuild_newest_surfels();
-        spent.surfels_s += watch.lap_s();
+        timing.surfels_s += watch.lap_s();
         if window.is_full()
             && let Some(before_gap) = self.before_gap.take()
         {
@@ -206,7 +206,7 @@ impl Estimator {
             // Solve again, with matches with the map or the old views.
             let Some(window) = &mut self.window else { return Ok(()) };
             (solved, linearised) = window.solve(&self.views);
-            spent += solved.spent;
+            timing += solved.timing;
             watch.lap_s();
         }
         let Some(window) = &self.window else { return Ok(()) };
@@ -216,9 +216,9 @@ impl Estimator {
         }
         watch.lap_s(); // the observed surfels have their own time
         let final_until_s = self.finish_oldest_segment(linearised.as_ref());
-        spent.views_s += watch.lap_s();
+        timing.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return Ok(()) };
-        let took = (elapsed_s + spent.views_s, spent);
+        let took = (elapsed_s + timing.views_s, timing);
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
         let moving =
             window.speed_m_per_s() > MOVING.0 || segment.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);

@@ -2,7 +2,7 @@
 
 use super::Estimator;
 use crate::estimation::window::{Solved, Window};
-use crate::estimation::{EstimatorSpec, TimeSpent, Warning, WarningKind, WindowReport};
+use crate::estimation::{EstimatorSpec, Timing, Warning, WarningKind, WindowReport};
 use crate::time::Stamp;
 use std::mem::discriminant;
 
@@ -20,7 +20,7 @@ pub(super) fn report(
     (stamp, moving): (Stamp, bool),
     window: &Window,
     problem: Option<WarningKind>,
-    (elapsed_s, spent): (f64, TimeSpent),
+    (elapsed_s, timing): (f64, Timing),
 ) -> WindowReport {
     WindowReport {
         stamp,
@@ -43,7 +43,7 @@ pub(super) fn report(
         sees_rest: window.sees_rest(),
         problem,
         elapsed_s,
-        spent,
+        timing,
     }
 }
 

@@ -329,7 +329,7 @@ fn ill_conditioned(windows: &[WindowReport], of: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::TimeSpent;
+    use crate::estimation::Timing;
 
     /// Windows of a sound run, two per second.
     fn sound(count: usize) -> Vec<WindowReport> {
@@ -354,7 +354,7 @@ mod tests {
             sees_rest: true,
             problem: None,
             elapsed_s: 0.0,
-            spent: TimeSpent::default(),
+            timing: Timing::default(),
         };
         (0..count).map(report).collect()
     }

@@ -10,9 +10,9 @@ use crate::estimation::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Pl
 use crate::estimation::residual::prior;
 use crate::estimation::residual::sums::{Coupling, SpanSums, SurfelSums};
 use crate::estimation::spec::SolveSpec;
-use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::PlacedSurfel;
+use crate::estimation::timing::{Stopwatch, Timing};
 use crate::geometry::Vector;
 use pulp::Arch;
 use rayon::prelude::*;
@@ -96,20 +96,20 @@ impl Window {
         Layout { first_knot, knots: (last_knot - first_knot + 1) as usize }
     }
 
-    /// Solves the linearised window and returns the solution with the displacement; adds the run time to `spent`.
+    /// Solves the linearised window and returns the solution with the displacement; adds the run time to `timing`.
     pub(super) fn solve_linearised(
         &mut self,
         (first, total): (usize, &[f64]),
         scene: &[PlacedSurfel],
         (matches, robust): (&Matches, &Robust),
         layout: &Layout,
-        spent: &mut TimeSpent,
+        timing: &mut Timing,
     ) -> Option<(Vec<f64>, Displacement)> {
         let mut watch = Stopwatch::start();
         self.assemble_inertial(first, layout, total);
         let weighted = WeightedMatches { scene, matches, robust, clock_reference_s: self.clock.at_s };
         weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
-        spent.equations_s += watch.lap_s();
+        timing.equations_s += watch.lap_s();
         let Workspace { equations, factor, bases } = &mut self.workspace;
         equations.factor(factor).ok()?;
         let x = equations.solve(factor);
@@ -117,7 +117,7 @@ impl Window {
             let correction = Correction::of_spline(basis, layout.first_knot, &x);
             (correction.rotation, correction.translation)
         }));
-        spent.solve_s += watch.lap_s();
+        timing.solve_s += watch.lap_s();
         Some((x, moved))
     }
 

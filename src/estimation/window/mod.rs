@@ -19,9 +19,9 @@ use super::residual::contradiction::contradiction;
 use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
-use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, ImuScaleMisalignment, Interval};
 use super::surfel::{Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
+use super::timing::{Stopwatch, Timing};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
@@ -225,7 +225,7 @@ impl Window {
         intervals: &[(f64, Interval)],
         returns: Vec<TimedReturn>,
         end_tau_s: f64,
-    ) -> TimeSpent {
+    ) -> Timing {
         let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
             self.nominal.extend(interval.corrected_by(&self.scale_misalignment), &self.biases, &self.gravity);
@@ -256,7 +256,7 @@ impl Window {
         let middle_s = end_tau_s - 0.5 * length_s;
         self.border.shift_clock_reference(middle_s - self.clock.at_s);
         self.clock = self.clock.with_reference_at(middle_s);
-        TimeSpent { integration_s, surfels_s, ..TimeSpent::default() }
+        Timing { integration_s, surfels_s, ..Timing::default() }
     }
 
     /// Rebuilds the surfels of the newest segment with the current trajectory.

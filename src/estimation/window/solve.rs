@@ -10,9 +10,9 @@ use crate::estimation::residual::{
     ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION, LIDAR_TRANSLATION,
     Layout, RANGE,
 };
-use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::strapdown::ImuScaleMisalignment;
 use crate::estimation::surfel::PlacedSurfel;
+use crate::estimation::timing::{Stopwatch, Timing};
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
 
@@ -40,7 +40,7 @@ pub(in crate::estimation) struct Solved {
     /// The least constrained direction, in the map frame.
     pub weakest: Vector,
     pub failure: Option<&'static str>,
-    pub spent: TimeSpent,
+    pub timing: Timing,
 }
 
 impl Window {
@@ -63,22 +63,22 @@ impl Window {
         let mut watch = Stopwatch::start();
         for iteration in 0..self.spec.solve.max_iterations {
             let scene = self.scene();
-            solved.spent.placing_s += watch.lap_s();
+            solved.timing.placing_s += watch.lap_s();
             let chosen = chosen.get_or_insert_with(|| views.select(&scene));
-            solved.spent.views_s += watch.lap_s();
+            solved.timing.views_s += watch.lap_s();
             if !neighbours.are_valid_for(&scene) {
                 neighbours = self.search_neighbours(&scene, (views, chosen));
             }
-            solved.spent.neighbours_s += watch.lap_s();
+            solved.timing.neighbours_s += watch.lap_s();
             let matches = self.match_up(&scene, views, &neighbours, iteration);
             let robust = Robust::of(&self.spec.solve, iteration);
             solved.record(&matches, &robust);
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
             let matches = self.significant(matches, &solved, &scene, views);
-            solved.spent.matches_s += watch.lap_s();
+            solved.timing.matches_s += watch.lap_s();
             let seen = (&matches, &robust);
-            let spent = &mut solved.spent;
-            let Some((x, by)) = self.solve_linearised((first, &total), &scene, seen, &layout, spent) else {
+            let timing = &mut solved.timing;
+            let Some((x, by)) = self.solve_linearised((first, &total), &scene, seen, &layout, timing) else {
                 solved.failure = Some("the normal equations are singular");
                 break;
             };
@@ -91,7 +91,7 @@ impl Window {
             self.speed_is_known |= !matches.all.is_empty();
             self.sees_rest |= !matches.all.is_empty();
             neighbours.moved(by.translation_m + LEVER_ARM_M * by.rotation_rad);
-            solved.spent.correction_s += watch.lap_s();
+            solved.timing.correction_s += watch.lap_s();
             solved.last_correction_m = by.max();
             linearised = Some(Linearised { layout, scene, matches, robust });
             if solved.last_correction_m < self.spec.solve.settled_m {
