@@ -19,7 +19,7 @@ const MAX_ITERATIONS: usize = 20;
 impl HeadModel {
     /// The poses of the base if the linkage were rigid at the equilibrium: the paper's figures 11 to 13.
     pub fn base_from_rigid_link(&self, world_from_head: &Trajectory) -> Vec<(Stamp, Pose)> {
-        let head_from_base = self.rest_pose_base_from_head().inverse();
+        let head_from_base = self.base_from_head_at_rest().inverse();
         world_from_head.iter().map(|(stamp, head)| (stamp, head * head_from_base)).collect()
     }
 

@@ -93,12 +93,12 @@ pub enum ElasticityError {
         segments: usize,
     },
     /// The number of segments is out of range.
-    #[error("a spring has 1 to {most} segments, not {segments}")]
+    #[error("a spring has 1 to {max} segments, not {segments}")]
     Segments {
         /// Requested number of segments.
         segments: usize,
         /// Maximum number of segments.
-        most: usize,
+        max: usize,
     },
     /// The equilibrium of the inner nodes did not converge.
     #[error("the equilibrium of the spring's {segments} segments did not converge: residual {residual_n:.1e} N")]

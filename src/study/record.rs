@@ -62,7 +62,7 @@ pub(super) fn description(simulation: &Simulation, truth_tf: bool) -> Result<Run
         base_imu: simulation.base_imu().map(|imu| BaseImuDescription {
             noise: imu.noise(),
             rate_hz: 1.0 / imu.period_s(),
-            head_from_base: simulation.head().rest_pose_base_from_head().inverse(),
+            head_from_base: simulation.head().base_from_head_at_rest().inverse(),
         }),
         manifest: Manifest::of(simulation).to_ron()?,
         truth_tf,
