@@ -96,7 +96,7 @@ fn make_run() -> Run {
 
 fn record<W: Write + Send + 'static>(made: &Run, file: W) {
     let mut writer = Writer::new(file, run()).unwrap();
-    let clock = ClockTruth { lidar_ahead: Span::ZERO, imu_ahead: Span::ZERO };
+    let clock = ClockTruth { lidar_offset: Span::ZERO, imu_offset: Span::ZERO };
     for (k, (now, sample)) in made.truth.iter().enumerate() {
         writer.truth(*now, sample).unwrap();
         if k % 10 == 0 {

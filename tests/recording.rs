@@ -67,13 +67,13 @@ fn ground_truth_is_read_separately_from_measurements() {
         let angle = k as f64 * 0.01;
         Pose::from_parts([angle, 2.0, 0.5].into(), from_roll_pitch_yaw(angle, -angle, 3.0 * angle))
     };
-    let clock = ClockTruth { lidar_ahead: Span::from_nanos(-5), imu_ahead: Span::from_nanos(3_000_001) };
+    let clock = ClockTruth { lidar_offset: Span::from_nanos(-5), imu_offset: Span::from_nanos(3_000_001) };
     let (file, bytes) = recordings::shared_file();
     let mut writer = Writer::new(file, run()).unwrap();
     for k in 0..50 {
         let now = Stamp::from_nanos(k * 1_000_000);
         let sample = TruthSample {
-            lidar_stamp: now + clock.lidar_ahead,
+            lidar_stamp: now + clock.lidar_offset,
             head: Kinematics::at_rest(head(k)),
             base: Kinematics::at_rest(Pose::identity()),
         };

@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     /// Period of the multisine, s: the reciprocal of the line spacing [default: two lines in the narrowest peak]
     #[arg(long, value_name = "S")]
     period: Option<f64>,
-    /// AccelerationKind compared along x, y and z
+    /// Quantity compared along x, y and z
     #[arg(long, value_enum, default_value_t = Along::Acceleration)]
     along: Along,
     /// Damping ratio of all modes, instead of that of the head

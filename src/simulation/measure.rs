@@ -118,7 +118,7 @@ impl<'a> Sensors<'a> {
     fn clock(&self, t_s: f64) -> (Stamp, ClockTruth) {
         let (lidar, imu) = (&self.rig.clocks.lidar, &self.rig.clocks.imu);
         let delay = Span::from_seconds(self.rig.imu.delay_s());
-        let truth = ClockTruth { lidar_ahead: lidar.ahead(t_s), imu_ahead: imu.ahead(t_s) + delay };
+        let truth = ClockTruth { lidar_offset: lidar.offset_at(t_s), imu_offset: imu.offset_at(t_s) + delay };
         (self.rig.true_stamp(t_s), truth)
     }
 }

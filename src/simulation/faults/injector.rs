@@ -115,7 +115,7 @@ impl<S: Sink + TruthSink + ?Sized> TruthSink for Injector<'_, S> {
         if let Some(attitude) = &mut self.attitude {
             attitude.update(now, &sample.head.world_from_body);
         }
-        let lidar_stamp = sample.lidar_stamp + self.clock.lidar_ahead(now - EPOCH);
+        let lidar_stamp = sample.lidar_stamp + self.clock.lidar_offset(now - EPOCH);
         self.send(now, Event::Truth(TruthSample { lidar_stamp, ..*sample }));
         self.deliver(Some(now))
     }
