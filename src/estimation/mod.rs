@@ -95,7 +95,7 @@ pub use cloud::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
 pub use error::{Discarded, EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use integrity::{Cause, Evidence, Finding, Status, bound_factors, covariance_blocks, findings, radius_99};
-pub use map::{Located, locate_map, map_of, merge_maps};
+pub use map::{LocalisedPose, locate_map, map_of, merge_maps};
 pub use observed::ObservedSurfels;
 pub use output::{ALIGNMENT_S, EstimatedPose, OpenLoop, TURN_LEVER_M, WindowReport};
 pub use registration::{

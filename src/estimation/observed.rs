@@ -16,7 +16,7 @@ pub struct ObservedSurfels {
     /// The observed patches.
     pub(super) surfels: Vec<ObservedSurfel>,
     /// The lidar corrections with which the patches were built, in order of time.
-    pub(super) lidars: Vec<KnownLidar>,
+    pub(super) lidars: Vec<LidarCorrectionPeriod>,
     /// Whether the range bias is unobservable and fixed, because the lidar looks in one direction only.
     pub(super) range_bias_is_fixed: bool,
     /// Run time of building the surfels, s.
@@ -25,7 +25,7 @@ pub struct ObservedSurfels {
 
 /// The lidar correction during a part of the trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct KnownLidar {
+pub(super) struct LidarCorrectionPeriod {
     pub(super) lidar: LidarCorrection,
     /// End of the part of the trajectory that became final with it, lidar time, s from the origin of the times.
     pub(super) until_s: f64,
@@ -89,7 +89,7 @@ impl ObservedSurfels {
         self.origin = origin;
         match self.lidars.last_mut().filter(|last| last.lidar == lidar) {
             Some(last) => last.until_s = until_s,
-            None => self.lidars.push(KnownLidar { lidar, until_s }),
+            None => self.lidars.push(LidarCorrectionPeriod { lidar, until_s }),
         }
         let lidar = (self.lidars.len() - 1) as u32;
         self.surfels.extend(patches.map(|(tau_s, patch)| ObservedSurfel { tau_s, patch, lidar }));

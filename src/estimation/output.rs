@@ -1,6 +1,6 @@
 //! Output of the estimator.
 
-use super::{Located, ObservedSurfels, Timing, Warning, WarningKind};
+use super::{LocalisedPose, ObservedSurfels, Timing, Warning, WarningKind};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
@@ -104,7 +104,7 @@ pub struct OpenLoop {
     /// those of gyroscope and accelerometer.
     pub calibrated_lidar: LidarCorrection,
     /// Result of the first localisation in the given map, if any.
-    pub located: Option<Located>,
+    pub located: Option<LocalisedPose>,
     /// One report per window.
     pub windows: Vec<WindowReport>,
     /// Events that degraded the estimate.

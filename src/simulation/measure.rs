@@ -84,7 +84,7 @@ impl<'a> Sensors<'a> {
     }
 
     /// Computes all events except scans that are complete by `until_s`, and counts them in `summary`.
-    fn measure_but_scans(
+    fn measure_except_scans(
         &mut self,
         head: &Track,
         base: &Track,
@@ -135,7 +135,7 @@ pub(super) fn measure(
     let base = Track::new(first, STEP_S, bases)?;
     let each = sensors.iter_mut().zip(summaries.iter_mut());
     let mut events: Vec<Events> =
-        each.map(|(sensors, summary)| sensors.measure_but_scans(&head, &base, until_s, summary)).collect();
+        each.map(|(sensors, summary)| sensors.measure_except_scans(&head, &base, until_s, summary)).collect();
     let scans = scans(sensors, (&head, &base), until_s, summaries);
     for ((events, scans), summary) in events.iter_mut().zip(scans).zip(summaries) {
         summary.scans += scans.len() as u64;

@@ -5,7 +5,7 @@ use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
 use super::{MapOptions, ProgressMonitor, Stage, StudyError};
 use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Located, ObservedSurfels, Timing, Warning, WindowReport,
+    EstimatedPose, Estimator, EstimatorSpec, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
     covariance_blocks, radius_99,
 };
 use crate::geometry::{PoseCovariance, Trajectory};
@@ -162,7 +162,7 @@ fn push_all(
 }
 
 /// Message on the localisation in the map.
-fn located_message(located: &Located) -> String {
+fn located_message(located: &LocalisedPose) -> String {
     format!(
         "localised in the map: {:.0} % of the surfels of the first window match, residual {:.1} mm RMS",
         100.0 * located.inlier_ratio,

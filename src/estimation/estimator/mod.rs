@@ -7,7 +7,7 @@ mod reports;
 use self::gauge::GaugeBuilder;
 use self::reports::{is_dead_reckoning, problem, report};
 use crate::estimation::border::Border;
-use crate::estimation::consider::{Consider, Sensitivity, StartMatrix};
+use crate::estimation::consider::{ConsiderCovariance, Sensitivity, StartMatrix};
 use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
 use crate::estimation::intake::{Intake, Segment};
 use crate::estimation::localisation::{GapRelocalisation, MapLocalisation};
@@ -56,7 +56,7 @@ pub struct Estimator {
     gap_relocalisation: Option<GapRelocalisation>,
     /// Observed surfaces, if the caller requests them.
     observed: Option<ObservedSurfels>,
-    consider: Consider,
+    consider: ConsiderCovariance,
     gauge: GaugeBuilder,
     /// Sensitivity of the end of the newest window to the errors at its start.
     at_end: Option<Sensitivity>,
@@ -92,7 +92,7 @@ impl Estimator {
             map_localisation: None,
             gap_relocalisation: None,
             observed: None,
-            consider: Consider::new(Vector::zeros(), &StartMatrix::zeros()),
+            consider: ConsiderCovariance::new(Vector::zeros(), &StartMatrix::zeros()),
             gauge: GaugeBuilder::default(),
             at_end: None,
             next_pose: None,
@@ -255,7 +255,7 @@ impl Estimator {
         let views = Views::new(&self.spec.views, self.spec.fixed_views);
         self.views = views.with_map(map_localisation.patches(), window.matcher(), place);
         let known = window.known_at_start().unwrap_or_default();
-        self.consider = Consider::localised(place, &known, (found.covariance, map_localisation.covariance()));
+        self.consider = ConsiderCovariance::localised(place, &known, (found.covariance, map_localisation.covariance()));
         Ok(true)
     }
 
@@ -270,8 +270,8 @@ impl Estimator {
                 return false;
             }
         };
-        let away_m = (consider.pivot() - self.consider.pivot()).norm();
-        self.warnings.push(Warning { stamp, kind: WarningKind::Relocalised { away_m } });
+        let distance_m = (consider.pivot() - self.consider.pivot()).norm();
+        self.warnings.push(Warning { stamp, kind: WarningKind::Relocalised { distance_m } });
         window.move_by(&map_from_here);
         (self.views, self.consider) = (views, consider);
         true
@@ -364,7 +364,11 @@ impl Estimator {
             window.resume_from(before_gap);
         }
         let (pivot, known) = (self.consider.pivot(), window.known_at_start().unwrap_or_default());
-        self.consider = if continues { Consider::after_gap(pivot, &known) } else { Consider::new(pivot, &known) };
+        self.consider = if continues {
+            ConsiderCovariance::after_gap(pivot, &known)
+        } else {
+            ConsiderCovariance::new(pivot, &known)
+        };
         self.window = Some(window);
     }
 

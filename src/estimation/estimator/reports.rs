@@ -1,7 +1,7 @@
 //! Reports on solved windows, and the warnings derived from them.
 
 use super::Estimator;
-use crate::estimation::window::{Solved, Window};
+use crate::estimation::window::{Window, WindowSolution};
 use crate::estimation::{EstimatorSpec, Timing, Warning, WarningKind, WindowReport};
 use crate::time::Stamp;
 use std::mem::discriminant;
@@ -16,7 +16,7 @@ const CONTRADICTED: f64 = 0.6;
 
 /// The report on the solution of a window.
 pub(super) fn report(
-    solved: &Solved,
+    solved: &WindowSolution,
     (stamp, moving): (Stamp, bool),
     window: &Window,
     problem: Option<WarningKind>,
@@ -48,7 +48,7 @@ pub(super) fn report(
 }
 
 /// The problem of a window, if any; `expected`: whether surfaces should have been matched.
-pub(super) fn problem(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
+pub(super) fn problem(solved: &WindowSolution, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
     let matches = solved.matches + solved.view_matches;
     if let Some(reason) = solved.failure {
         Some(WarningKind::NotSolved { reason })

@@ -6,7 +6,7 @@
 //! Candidate poses come from correlative matching (Olson, ICRA 2009), here in 3-D and with the normals of all surfaces.
 
 use super::limits::MAP_LIMITS;
-use super::relocaliser::{Located, Relocaliser, is_different_pose, offset_pose};
+use super::relocaliser::{LocalisedPose, Relocaliser, is_different_pose, offset_pose};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Pose, Vector};
 use rayon::prelude::*;
@@ -135,8 +135,8 @@ impl Relocaliser {
         &self,
         query: &[Patch],
         from: &Vector,
-        found: &Located,
-    ) -> Option<Located> {
+        found: &LocalisedPose,
+    ) -> Option<LocalisedPose> {
         let here = found.map_from_query;
         let patches_by_level = self.patches_by_level(query);
         let candidates_here = candidates(self.patches(), &patches_by_level[0], from, &here);

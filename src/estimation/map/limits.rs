@@ -1,6 +1,6 @@
 //! Search region and acceptance thresholds of the relocalisation.
 
-use super::relocaliser::{Located, offset_pose, pose_distance};
+use super::relocaliser::{LocalisedPose, offset_pose, pose_distance};
 use crate::geometry::{Pose, Vector};
 
 /// Spacing of the start poses, m and rad: within half of it the coarsest surfels converge.
@@ -81,7 +81,7 @@ impl RelocalisationLimits {
     }
 
     /// Whether a pose meets the acceptance thresholds.
-    pub(super) fn accepts(&self, found: &Located) -> bool {
+    pub(super) fn accepts(&self, found: &LocalisedPose) -> bool {
         found.inlier_ratio >= self.min_inlier_ratio
             && found.agreement >= self.min_agreement
             && found.residual_rms_m <= self.max_residual_m

@@ -6,7 +6,7 @@ mod limits;
 mod relocaliser;
 
 pub(super) use limits::{MAP_LIMITS, RelocalisationLimits};
-pub use relocaliser::Located;
+pub use relocaliser::LocalisedPose;
 pub(super) use relocaliser::Relocaliser;
 
 use super::observed::{ObservedSurfel, ObservedSurfels};
@@ -57,7 +57,7 @@ pub fn locate_map(
     other: &SurfelMap,
     start: &Pose,
     spec: &EstimatorSpec,
-) -> Result<Located, EstimationError> {
+) -> Result<LocalisedPose, EstimationError> {
     let surfels = spec.registration.surfels(&spec.surfels);
     let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
     let relocaliser = Relocaliser::new(map, (&spec.matching, &surfels), certainty);

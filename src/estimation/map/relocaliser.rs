@@ -46,7 +46,7 @@ const DIFFERENT: (f64, f64, f64) = (0.3, 0.1, 0.85);
 
 /// Pose of a query found in a map.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Located {
+pub struct LocalisedPose {
     /// Pose of the query frame in the map.
     pub map_from_query: Pose,
     /// Fraction of the finest query surfels that match the map.
@@ -129,7 +129,7 @@ impl Relocaliser {
         query: &[Patch],
         (from, map_from_query): (&Vector, &Pose),
         limits: &RelocalisationLimits,
-    ) -> Result<Located, String> {
+    ) -> Result<LocalisedPose, String> {
         let patches_by_level = self.patches_by_level(query);
         let finest = patches_by_level.first().map_or(0, Vec::len);
         if finest < MIN_PATCHES {
@@ -137,9 +137,10 @@ impl Relocaliser {
         }
         let poses = self.refine_all(&patches_by_level, limits.starts(map_from_query, from), from);
         let evaluated = self.evaluate_all(&patches_by_level[0], from, &poses, limits.gate_m);
-        let score =
-            |found: &Located| found.inlier_ratio.powi(3) * limits.prior(&found.map_from_query, map_from_query, from);
-        let mut found: Vec<(f64, Located)> = evaluated.map(|found| (score(&found), found)).collect();
+        let score = |found: &LocalisedPose| {
+            found.inlier_ratio.powi(3) * limits.prior(&found.map_from_query, map_from_query, from)
+        };
+        let mut found: Vec<(f64, LocalisedPose)> = evaluated.map(|found| (score(&found), found)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some((score, best)) = found.iter().find(|(score, found)| *score > 0.0 && limits.accepts(found)) else {
             let best =
@@ -152,7 +153,7 @@ impl Relocaliser {
             ));
         };
         let as_good = found.iter().filter(|(other, found)| *other > DIFFERENT.2 * score && limits.accepts(found));
-        let others: Vec<&Located> =
+        let others: Vec<&LocalisedPose> =
             as_good.map(|(_, other)| other).filter(|other| is_different_pose(best, other, from)).collect();
         match others.first() {
             Some(other) if !limits.nearest => {
@@ -192,7 +193,7 @@ impl Relocaliser {
         from: &'a Vector,
         poses: &'a [(Pose, Pose)],
         gate_m: Option<f64>,
-    ) -> impl Iterator<Item = Located> + 'a {
+    ) -> impl Iterator<Item = LocalisedPose> + 'a {
         let gate_m = gate_m.unwrap_or(self.matcher.finest_voxel_m * GATES.1);
         poses.iter().filter_map(move |(_, pose)| self.evaluate(finest, from, pose, gate_m))
     }
@@ -227,7 +228,7 @@ impl Relocaliser {
     }
 
     /// Evaluates a pose with the finest patches; `None` if they leave too many directions unobservable.
-    fn evaluate(&self, query: &[Patch], from: &Vector, pose: &Pose, gate_m: f64) -> Option<Located> {
+    fn evaluate(&self, query: &[Patch], from: &Vector, pose: &Pose, gate_m: f64) -> Option<LocalisedPose> {
         let pivot = pose.transform_point(&(*from).into()).coords;
         let sums = self.sum_matches(query, pose, &pivot, &Gate { level: 0, gate_m, sigma_m: self.sigma_m });
         let unobservable = sums.unobservable();
@@ -241,7 +242,7 @@ impl Relocaliser {
         let residual_rms_m = (sums.squares / sums.matched.max(1) as f64).sqrt();
         let inlier_ratio = sums.matched as f64 / query.len() as f64;
         let agreement = sums.matched as f64 / sums.with_neighbour.max(1) as f64;
-        Some(Located { map_from_query: *pose, inlier_ratio, agreement, residual_rms_m, covariance })
+        Some(LocalisedPose { map_from_query: *pose, inlier_ratio, agreement, residual_rms_m, covariance })
     }
 
     /// Matches the query at `pose` with the map; unknowns are a rotation about `pivot` and a translation.
@@ -326,13 +327,13 @@ impl MatchSums {
     }
 }
 
-impl Located {
+impl LocalisedPose {
     /// Adds to the covariance the spread of equally good poses.
-    fn with_alternatives(&self, others: &[&Located], from: &Vector) -> Self {
+    fn with_alternatives(&self, others: &[&LocalisedPose], from: &Vector) -> Self {
         let mut covariance = self.covariance;
         for other in others {
             let turn = (other.map_from_query.rotation * self.map_from_query.rotation.inverse()).scaled_axis();
-            let place = |located: &Located| located.map_from_query.transform_point(&(*from).into()).coords;
+            let place = |located: &LocalisedPose| located.map_from_query.transform_point(&(*from).into()).coords;
             let shift = place(other) - place(self);
             let by = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
             covariance += by * by.transpose() / (others.len() + 1) as f64;
@@ -342,7 +343,7 @@ impl Located {
 }
 
 /// Whether two poses differ by more than `DIFFERENT`.
-pub(super) fn is_different_pose(a: &Located, b: &Located, from: &Vector) -> bool {
+pub(super) fn is_different_pose(a: &LocalisedPose, b: &LocalisedPose, from: &Vector) -> bool {
     let (distance_m, angle) = pose_distance(&a.map_from_query, &b.map_from_query, from);
     distance_m > DIFFERENT.0 || angle > DIFFERENT.1
 }

@@ -4,7 +4,7 @@ use super::lidar_model::Shared;
 use super::matches::BinPairSums;
 use super::*;
 use crate::estimation::load;
-use crate::estimation::observed::{KnownLidar, ObservedSurfel};
+use crate::estimation::observed::{LidarCorrectionPeriod, ObservedSurfel};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Matrix, Pose, Rotation, from_roll_pitch_yaw};
 use crate::measurement::{ImuNoise, LidarNoise};
@@ -139,7 +139,7 @@ fn simulated(
     let trajectory = |pose: &dyn Fn(f64) -> Pose| Trajectory::from_poses(times().map(|t| (stamp(t), pose(t)))).unwrap();
     let observed = ObservedSurfels {
         surfels,
-        lidars: vec![KnownLidar { lidar: LidarCorrection::default(), until_s: duration_s }],
+        lidars: vec![LidarCorrectionPeriod { lidar: LidarCorrection::default(), until_s: duration_s }],
         ..ObservedSurfels::default()
     };
     Setup { open: trajectory(&estimated), covariances, observed, truth: trajectory(&truth) }
@@ -253,8 +253,8 @@ fn open_loop_extrinsics_are_kept_and_the_head_is_recalibrated() {
     setup.truth =
         Trajectory::from_poses(setup.truth.iter().map(|(stamp, pose)| (stamp, pose * head_from_head))).unwrap();
     setup.observed.lidars = vec![
-        KnownLidar { lidar: LidarCorrection::default(), until_s: 20.0 },
-        KnownLidar { lidar: found, until_s: DURATION_S },
+        LidarCorrectionPeriod { lidar: LidarCorrection::default(), until_s: 20.0 },
+        LidarCorrectionPeriod { lidar: found, until_s: DURATION_S },
     ];
     for surfel in &mut setup.observed.surfels {
         surfel.lidar = u32::from(surfel.tau_s > 20.0);

@@ -63,9 +63,9 @@ pub(super) enum Counterpart {
 pub(super) struct Matches {
     pub all: Vec<Match>,
     /// The matched surfels of the scene, by the span between knots in which they were measured.
-    pub spans: Runs<i64>,
+    pub spans: Grouped<i64>,
     /// The matches of two live surfels, by the spans of the earlier and the later one.
-    pub couplings: Runs<(i64, i64)>,
+    pub couplings: Grouped<(i64, i64)>,
     /// Indices of the matches of each surfel of the scene, one surfel after the other.
     of_surfels: Vec<u32>,
     /// Offset of each surfel's first match in `of_surfels`, then the offset of the end.
@@ -74,7 +74,7 @@ pub(super) struct Matches {
 
 /// Indices in runs of one key each, in the order of keys.
 #[derive(Debug)]
-pub(super) struct Runs<K> {
+pub(super) struct Grouped<K> {
     members: Vec<(K, u32)>,
     ends: Vec<usize>,
 }
@@ -86,7 +86,7 @@ impl Match {
     }
 }
 
-impl<K: Ord> Runs<K> {
+impl<K: Ord> Grouped<K> {
     fn of(mut members: Vec<(K, u32)>) -> Self {
         members.sort_unstable();
         let ends = members.chunk_by(|a, b| a.0 == b.0).scan(0, |end, run| {
@@ -97,13 +97,13 @@ impl<K: Ord> Runs<K> {
     }
 }
 
-impl<K> Default for Runs<K> {
+impl<K> Default for Grouped<K> {
     fn default() -> Self {
         Self { members: Vec::new(), ends: Vec::new() }
     }
 }
 
-impl<K: Copy + Send + Sync> Runs<K> {
+impl<K: Copy + Send + Sync> Grouped<K> {
     /// The key and the indices of each run.
     pub fn par_iter(&self) -> impl IndexedParallelIterator<Item = (K, impl Iterator<Item = usize>)> {
         (0..self.ends.len()).into_par_iter().map(|k| {
@@ -134,12 +134,12 @@ impl Matches {
         }
         let span = |surfel: usize| scene[surfel].basis.first;
         let matched = (0..scene.len()).filter(|surfel| offsets[*surfel] < offsets[surfel + 1]);
-        let spans = Runs::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
+        let spans = Grouped::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
         let coupled = all.iter().enumerate().filter_map(|(index, one)| {
             let (a, b) = (span(one.a as usize), span(one.other()?));
             Some(((a.min(b), a.max(b)), index as u32))
         });
-        Self { spans, couplings: Runs::of(coupled.collect()), all, of_surfels, offsets }
+        Self { spans, couplings: Grouped::of(coupled.collect()), all, of_surfels, offsets }
     }
 
     /// The matches of a surfel of the scene: indices into `all`.

@@ -7,7 +7,7 @@ mod solve;
 mod uncertainty;
 
 pub(super) use equations::Displacement;
-pub(super) use solve::{MIN_SIGNIFICANT_TILT, Solved};
+pub(super) use solve::{MIN_SIGNIFICANT_TILT, WindowSolution};
 pub(super) use uncertainty::Linearised;
 
 use super::border::Border;
@@ -147,8 +147,9 @@ impl Window {
 
     /// Rotates the window by the smallest angle that aligns gravity with that before the gap.
     pub(super) fn align_gravity_with(&mut self, before_gap: &StateBeforeGap) {
-        let turn = Rotation::rotation_between(&self.gravity, &before_gap.gravity).unwrap_or_else(Rotation::identity);
-        self.nominal.turn(&turn, &before_gap.state.position);
+        let rotation =
+            Rotation::rotation_between(&self.gravity, &before_gap.gravity).unwrap_or_else(Rotation::identity);
+        self.nominal.rotate(&rotation, &before_gap.state.position);
         self.gravity = before_gap.gravity;
     }
 

@@ -28,7 +28,7 @@ const UNCONSTRAINED: f64 = 0.01;
 
 /// Statistics of a window's solution.
 #[derive(Debug, Clone, Default)]
-pub(in crate::estimation) struct Solved {
+pub(in crate::estimation) struct WindowSolution {
     pub surfels: usize,
     pub matches: usize,
     pub view_matches: usize,
@@ -45,10 +45,10 @@ pub(in crate::estimation) struct Solved {
 
 impl Window {
     /// Solves the window; returns the last linearisation if the solution is accepted.
-    pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
+    pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (WindowSolution, Option<Linearised>) {
         if self.nominal.end_s() <= self.start.u_s {
             let failure = Some("the IMU samples do not reach the window");
-            return (Solved { failure, ..Solved::default() }, None);
+            return (WindowSolution { failure, ..WindowSolution::default() }, None);
         }
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
@@ -56,7 +56,7 @@ impl Window {
         let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.scale_misalignment);
         self.border.start_window();
         let mut total = vec![0.0; layout.border()];
-        let mut solved = Solved::default();
+        let mut solved = WindowSolution::default();
         let mut neighbours = Neighbours::default();
         let mut chosen = None;
         let mut linearised = None;
@@ -108,7 +108,13 @@ impl Window {
     }
 
     /// Removes matches and match components that are not significant; too few matches are removed entirely.
-    fn significant(&self, mut matches: Matches, solved: &Solved, scene: &[PlacedSurfel], views: &Views) -> Matches {
+    fn significant(
+        &self,
+        mut matches: Matches,
+        solved: &WindowSolution,
+        scene: &[PlacedSurfel],
+        views: &Views,
+    ) -> Matches {
         if matches.all.len() < self.spec.solve.min_matches {
             return Matches::default();
         }
@@ -146,7 +152,7 @@ impl Window {
     }
 }
 
-impl Solved {
+impl WindowSolution {
     /// Records number, residual and conditioning of a set of matches.
     fn record(&mut self, matches: &Matches, robust: &Robust) {
         self.matches = matches.all.iter().filter(|one| matches!(one.with, Counterpart::Live(_))).count();

@@ -41,7 +41,7 @@ impl Window {
         let mut start = StartMatrix::zeros();
         start.fixed_columns_mut::<12>(0).copy_from(&of_start);
         start.fixed_columns_mut::<IMU_STATES>(IMU_OFFSET).copy_from(&of_imu);
-        // The remainder of the covariance after subtraction of the start's part, which `Consider` propagates.
+        // The remainder of the covariance after subtraction of the start's part, which `ConsiderCovariance` propagates.
         let all = StartMatrix::from_fn(|r, c| by(r, &inherited[c]));
         let own = all - start * self.known_at_start()? * start.transpose();
         let by_views = self.columns_of_views(at, views);
