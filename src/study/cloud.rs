@@ -1,6 +1,6 @@
 //! Metrics of the registered cloud against the true surfaces.
 
-use super::register::{ClassCounts, ProjectedBeam, Registered, SampledBeam};
+use super::register::{ClassCounts, ProjectedBeam, RegisteredCloud, SampledBeam};
 use super::truth_cursor::TrueState;
 use crate::estimation::ReturnClass;
 use crate::evaluation::{CloudErrors, CloudSummary};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const MAX_DISTANCE_M: f64 = 1.0;
 
 /// The returns that the distance metrics include.
-const JUDGED_RETURNS: &str = "all returns from static surfaces, before filtering";
+const EVALUATED_RETURNS: &str = "all returns from static surfaces, before filtering";
 
 /// The surroundings of a lidar: scene and carrier.
 #[derive(Clone, Copy)]
@@ -65,7 +65,7 @@ impl Surroundings<'_> {
 /// The distances to the true surfaces include all sampled beams on static surfaces, before filtering. They need the
 /// scene and the alignment. The other beams of the sample, on the carrier and on moving objects, are counted.
 pub(super) fn cloud_metrics(
-    registered: &Registered,
+    registered: &RegisteredCloud,
     world_from_map: Option<&Pose>,
     surroundings: Option<Surroundings>,
 ) -> CloudMetrics {
@@ -90,13 +90,13 @@ pub(super) fn cloud_metrics(
     let by_truth = static_beams().filter_map(|(beam, _)| beam.by_truth.map(|(by, _)| in_world(&by, &Pose::identity())));
     let by_truth = errors(by_truth.collect());
     let filter = match registered.filtered {
-        true => judged_filter(registered, &targets, |kept| {
+        true => evaluated_filter(registered, &targets, |kept| {
             errors(kept.map(|k| in_world(&k.in_map, world_from_map)).collect())
         }),
         false => FilterMetrics::default(),
     };
     CloudMetrics {
-        judged: estimated.map(|_| JUDGED_RETURNS.to_owned()),
+        judged: estimated.map(|_| EVALUATED_RETURNS.to_owned()),
         bias_m: estimated.map(|cloud| cloud.bias_m),
         sigma_m: estimated.map(|cloud| cloud.sigma_m),
         p95_m: estimated.map(|cloud| cloud.p95_m),
@@ -110,8 +110,8 @@ pub(super) fn cloud_metrics(
 }
 
 /// Metrics of the filter for returns from static surfaces and from moving objects.
-fn judged_filter<'a>(
-    registered: &'a Registered,
+fn evaluated_filter<'a>(
+    registered: &'a RegisteredCloud,
     targets: &'a [Target],
     errors: impl Fn(&mut dyn Iterator<Item = &'a SampledBeam>) -> Option<CloudSummary>,
 ) -> FilterMetrics {
@@ -212,7 +212,7 @@ mod tests {
             by_truth: Some((beam(*end), at(4.0))),
             class: if end.x == 6.0 { ReturnClass::Static } else { ReturnClass::Dynamic },
         };
-        let registered = Registered {
+        let registered = RegisteredCloud {
             class_counts: ClassCounts { kept: 16, moving: 4, ..ClassCounts::default() },
             filtered: true,
             sample: ends.iter().map(judged).collect(),
@@ -226,14 +226,14 @@ mod tests {
         assert_relative_eq!(metrics.sigma_by_truth_m.unwrap(), 0.03, epsilon = 1e-6);
         // Without a carrier all beams count as static; the beams on the operator then dominate the standard deviation.
         let empty = Surroundings { carrier: &[], ..surroundings };
-        let judged_all = cloud_metrics(&registered, Some(&Pose::identity()), Some(empty));
-        assert!(judged_all.sigma_m.unwrap() > 0.2, "{judged_all:?}");
+        let all_evaluated = cloud_metrics(&registered, Some(&Pose::identity()), Some(empty));
+        assert!(all_evaluated.sigma_m.unwrap() > 0.2, "{all_evaluated:?}");
         // Filtered returns are counted, and are in the distance metrics.
         assert_eq!((metrics.filter.kept, metrics.filter.dropped_moving), (Some(16), Some(4)));
         assert_eq!(metrics.filter.standing_dropped_fraction, Some(0.0));
         assert_eq!(metrics.filter.movers_dropped_fraction, Some(1.0));
-        assert_relative_eq!(judged_all.filter.kept_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
-        let unfiltered = cloud_metrics(&Registered { filtered: false, ..registered }, None, None);
+        assert_relative_eq!(all_evaluated.filter.kept_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
+        let unfiltered = cloud_metrics(&RegisteredCloud { filtered: false, ..registered }, None, None);
         assert_eq!((unfiltered.points, unfiltered.filter), (Some(20), FilterMetrics::default()));
     }
 }

@@ -8,7 +8,7 @@ use super::cloud_files::CloudOptions;
 use super::integrity::{Integrity, write_windows};
 use super::map::{MapOptions, write_map};
 use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
-use super::register::{Registered, Registration};
+use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
@@ -264,7 +264,7 @@ fn close_loops(
 fn metrics(
     origin: &Origin,
     run: &OpenLoopRun,
-    registered: &Registered,
+    registered: &RegisteredCloud,
     comparison: Option<&comparison::Comparison>,
 ) -> Metrics {
     let Manifest { scenario, specs, .. } = origin.manifest;

@@ -60,7 +60,7 @@ impl ClassCounts {
 }
 
 /// Result of the registration, from a second pass over the recording.
-pub(super) struct Registered {
+pub(super) struct RegisteredCloud {
     /// Number of returns by decision of the filter.
     pub class_counts: ClassCounts,
     /// Whether the cloud was filtered.
@@ -91,7 +91,7 @@ pub(super) struct Registration<'a> {
 
 impl Registration<'_> {
     /// Projects all beams by the estimate and writes the cloud files and `result.mcap` to `folder`.
-    pub(super) fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<Registered, StudyError> {
+    pub(super) fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<RegisteredCloud, StudyError> {
         let noise = self.calibration.lidar;
         let mut beams = BeamProjection {
             measurements: self.reader.measurements(self.selection),
@@ -106,8 +106,8 @@ impl Registration<'_> {
             covariances: self.covariances,
             filter: (!self.options.keep_outliers).then(|| CloudFilter::new(noise)),
             files: CloudFiles::create(folder, self.options.format)?,
-            sampled: Thinning::to(MAX_SAMPLED_BEAMS, self.returns),
-            displayed: Thinning::to(MAX_VIEWER_POINTS, self.returns),
+            sampled: Thinning::to_at_most(MAX_SAMPLED_BEAMS, self.returns),
+            displayed: Thinning::to_at_most(MAX_VIEWER_POINTS, self.returns),
             dead_reckoning: DeadReckoning::new(&self.calibration.head_from_imu, RestDetection::default()),
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
@@ -125,7 +125,7 @@ impl Registration<'_> {
         beams.files.finish()?;
         let filtered = !self.options.keep_outliers;
         let dead_reckoning = beams.dead_reckoning.finish();
-        Ok(Registered { class_counts: beams.class_counts, filtered, sample: beams.sample, dead_reckoning })
+        Ok(RegisteredCloud { class_counts: beams.class_counts, filtered, sample: beams.sample, dead_reckoning })
     }
 }
 

@@ -75,7 +75,7 @@ impl Reference {
             surroundings,
             head_from_laser: calibration.head_from_laser,
             section,
-            thinning: Thinning::to(EVALUATED_RETURNS, returns),
+            thinning: Thinning::to_at_most(EVALUATED_RETURNS, returns),
             index: 0,
             scan_stamps: Vec::new(),
             evaluated: Vec::new(),
@@ -96,7 +96,7 @@ impl Reference {
         let within = |(x, y): (f64, f64)| (left..=right).contains(&x) && (low..=high).contains(&y);
         let shown: Vec<SampledReturn> =
             shown.into_iter().filter(|(_, coordinates)| within(*coordinates)).map(|(hit, _)| hit).collect();
-        let thinning = Thinning::to(SHOWN_RETURNS, shown.len());
+        let thinning = Thinning::to_at_most(SHOWN_RETURNS, shown.len());
         let thinned = shown.into_iter().enumerate().filter(|(index, _)| thinning.keeps(*index));
         let shown: Vec<SampledReturn> = thinned.map(|(_, hit)| hit).collect();
         let rate = |hit: &SampledReturn| section.rate_deg_per_s(&truth, scan_stamps[hit.scan] + hit.offset);

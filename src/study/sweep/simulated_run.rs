@@ -142,7 +142,7 @@ struct EstimateMetrics {
     closed_position_rmse_m: Option<f64>,
     status: Status,
     integrity: IntegrityMetrics,
-    way_m: f64,
+    path_length_m: f64,
 }
 
 impl EstimateMetrics {
@@ -160,7 +160,7 @@ impl EstimateMetrics {
             Measure::BoundM99 => self.integrity.bound_m_99,
             Measure::WithinBound => self.integrity.within_bound,
             Measure::BoundOverError => self.integrity.bound_over_error,
-            Measure::WayM => Some(self.way_m),
+            Measure::WayM => Some(self.path_length_m),
             _ => None,
         };
         figure.filter(|figure| figure.is_finite())
@@ -199,7 +199,7 @@ fn estimate(
             closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
             status: integrity.status(),
             integrity: integrity.metrics(&run, Some(pairs)),
-            way_m: path_length_m(map_from_head),
+            path_length_m: path_length_m(map_from_head),
         })
     })
 }
