@@ -98,11 +98,11 @@ impl Nominal {
     }
 
     /// Rotates the trajectory about `pivot`.
-    pub(super) fn turn(&mut self, turn: &Rotation, pivot: &Vector) {
+    pub(super) fn rotate(&mut self, rotation: &Rotation, pivot: &Vector) {
         for state in &mut self.states {
-            state.rotation = turn * state.rotation;
-            state.position = pivot + turn * (state.position - pivot);
-            state.velocity = turn * state.velocity;
+            state.rotation = rotation * state.rotation;
+            state.position = pivot + rotation * (state.position - pivot);
+            state.velocity = rotation * state.velocity;
         }
     }
 
