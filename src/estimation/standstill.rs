@@ -12,15 +12,15 @@ use std::collections::BTreeMap;
 /// Cell size in azimuth and elevation, rad.
 const CELL_RAD: f64 = 0.05;
 /// Two ranges in a cell are different if they differ by more than this, m, plus this fraction.
-const DIFFER: (f64, f64) = (0.1, 0.03);
+const RANGE_TOLERANCE: (f64, f64) = (0.1, 0.03);
 /// The head moves if more than this fraction of the cells have different ranges, out of at least this number.
-const MOVED: (f64, usize) = (0.12, 20);
+const MOTION_THRESHOLD: (f64, usize) = (0.12, 20);
 /// The head moves if its translation exceeds this, m.
 const SHIFTED_M: f64 = 0.03;
 /// Cauchy threshold of the residuals in successive solutions, m. Outliers are edges and moving objects.
-const OUTLIERS_M: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.03, 0.03];
+const CAUCHY_SCALES_M: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.03, 0.03];
 /// A cell is used if its points are within this fraction of their extent from a line.
-const STRAIGHT: f64 = 0.1;
+const LINE_TOLERANCE: f64 = 0.1;
 /// A cell is used if the cosine of the incidence angle exceeds this.
 const MIN_COSINE: f64 = 0.1;
 /// The translation is observable along eigenvectors of the mean `n n^T` with an eigenvalue above this.
@@ -59,7 +59,7 @@ impl Cell {
         let longest = scatter.eigenvalues.imax();
         let across = scatter.eigenvalues.iter().enumerate().filter(|(k, _)| *k != longest);
         let across = across.map(|(_, square)| *square).fold(0.0, f64::max);
-        if across > STRAIGHT.powi(2) * scatter.eigenvalues[longest] {
+        if across > LINE_TOLERANCE.powi(2) * scatter.eigenvalues[longest] {
             return None;
         }
         let tangent: Vector = scatter.eigenvectors.column(longest).into();
@@ -74,9 +74,9 @@ pub(super) fn standstill(early: &[TimedReturn], late: &[TimedReturn]) -> Standst
     let (early, late) = (by_direction(early), by_direction(late));
     let both: Vec<(&Cell, f64)> =
         early.iter().filter_map(|(key, cell)| Some((cell, late.get(key)?.mean_range_m()))).collect();
-    let is_different = |a: f64, b: f64| (a - b).abs() > DIFFER.0 + DIFFER.1 * a.min(b);
+    let is_different = |a: f64, b: f64| (a - b).abs() > RANGE_TOLERANCE.0 + RANGE_TOLERANCE.1 * a.min(b);
     let differ = both.iter().filter(|(a, b)| is_different(a.mean_range_m(), *b)).count();
-    if both.len() >= MOVED.1 && differ as f64 > MOVED.0 * both.len() as f64 {
+    if both.len() >= MOTION_THRESHOLD.1 && differ as f64 > MOTION_THRESHOLD.0 * both.len() as f64 {
         return Standstill::Moves;
     }
     let facing = both.iter().filter_map(|(cell, late_m)| {
@@ -104,7 +104,7 @@ fn by_direction(returns: &[TimedReturn]) -> BTreeMap<(i32, i32), Cell> {
 
 /// Estimates the translation from normals and the displacement along each of them, m.
 fn from_displacements(facing: &[(Vector, f64)]) -> Standstill {
-    if facing.len() < MOVED.1 {
+    if facing.len() < MOTION_THRESHOLD.1 {
         return Standstill::Unknown;
     }
     let mean = facing.iter().map(|(normal, _)| normal * normal.transpose()).sum::<Matrix3<f64>>() / facing.len() as f64;
@@ -116,7 +116,7 @@ fn from_displacements(facing: &[(Vector, f64)]) -> Standstill {
     // The translation along the other directions stays zero.
     let within = observable.iter().map(|along| along * along.transpose()).sum::<Matrix3<f64>>();
     let mut shift = Vector::zeros();
-    for outlier_m in OUTLIERS_M {
+    for outlier_m in CAUCHY_SCALES_M {
         let (mut information, mut right) = (Matrix3::identity() - within, Vector::zeros());
         for (normal, displacement_m) in facing {
             let weight = 1.0 / (1.0 + ((displacement_m - normal.dot(&shift)) / outlier_m).powi(2));

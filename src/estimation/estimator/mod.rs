@@ -26,7 +26,7 @@ use crate::time::Stamp;
 use std::time::Instant;
 
 /// Speed (m/s) or rotation rate (rad/s) above which too few matches are a problem. Below both the IMU is sufficient.
-const MOVING: (f64, f64) = (0.3, 0.5);
+const FAST_MOTION: (f64, f64) = (0.3, 0.5);
 
 /// While relocalisation after a gap is pending, gaps of up to this multiple of `max_gap_s` are bridged.
 const BRIDGING_FACTOR_WHILE_LOST: f64 = 3.0;
@@ -220,8 +220,8 @@ impl Estimator {
         let Some(window) = &mut self.window else { return Ok(()) };
         let took = (elapsed_s + timing.views_s, timing);
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
-        let moving =
-            window.speed_m_per_s() > MOVING.0 || segment.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
+        let moving = window.speed_m_per_s() > FAST_MOTION.0
+            || segment.intervals.iter().any(|(_, i)| i.gyro.norm() > FAST_MOTION.1);
         let problem = problem(&solved, &self.spec, moving);
         let at = (self.intake.stamp(segment.end_s), moving);
         self.windows.push(report(&solved, at, window, problem.clone(), took));

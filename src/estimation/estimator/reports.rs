@@ -7,12 +7,12 @@ use crate::time::Stamp;
 use std::mem::discriminant;
 
 /// Tracking counts as lost after more dead reckoning than this, s, and than this fraction of the run.
-const LOST: (f64, f64) = (5.0, 0.2);
+const TRACKING_LOST: (f64, f64) = (5.0, 0.2);
 
 /// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise.
 ///
 /// Noise causes less: the trajectory follows the IMU, and `noise_inflation` enlarges the assumed noise by half.
-const CONTRADICTED: f64 = 0.6;
+const CONTRADICTION_THRESHOLD: f64 = 0.6;
 
 /// The report on the solution of a window.
 pub(super) fn report(
@@ -74,7 +74,9 @@ impl Estimator {
     /// Warns if tracking was lost for a large part of the run.
     pub(super) fn warn_of_loss(&mut self) {
         let (seconds, of_seconds) = (self.dead_reckoning_s, self.windows.len() as f64 * self.spec.step_s);
-        if let Some(first) = self.windows.first().filter(|_| seconds > LOST.0 && seconds > LOST.1 * of_seconds) {
+        if let Some(first) =
+            self.windows.first().filter(|_| seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds)
+        {
             self.warnings.push(Warning { stamp: first.stamp, kind: WarningKind::Lost { seconds, of_seconds } });
         }
     }
@@ -82,9 +84,9 @@ impl Estimator {
     /// Warns if IMU and lidar contradict each other by more than noise explains.
     pub(super) fn warn_of_contradiction(&mut self) {
         let all = self.windows.iter().map(|window| window.imu_contradiction);
-        let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTED).collect();
+        let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTION_THRESHOLD).collect();
         let [seconds, of_seconds] = [times.len(), self.windows.len()].map(|count| count as f64 * self.spec.step_s);
-        if seconds > LOST.0 && seconds > LOST.1 * of_seconds {
+        if seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds {
             times.sort_unstable_by(f64::total_cmp);
             let kind = WarningKind::Contradicted { times: times[times.len() / 2], seconds, of_seconds };
             self.warnings.extend(self.windows.first().map(|first| Warning { stamp: first.stamp, kind }));

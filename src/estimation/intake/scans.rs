@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 /// A scan that repeats the previous one for this many times is frozen: noise changes some range of a working lidar.
 const FROZEN_REPEATS: usize = 2;
 /// A scan of at least this many returns whose ranges agree to within this, m, is no valid measurement.
-const CONSTANT: (usize, f32) = (20, 1e-4);
+const CONSTANT_RANGES: (usize, f32) = (20, 1e-4);
 
 /// Whether a scan repeats the previous ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -176,6 +176,6 @@ fn fingerprint(scan: &LidarScan) -> u64 {
 /// Whether all returns have the same range.
 fn is_constant(scan: &LidarScan) -> bool {
     let Some(first) = scan.returns.first().map(|hit| hit.point_in_laser.norm()) else { return false };
-    scan.returns.len() >= CONSTANT.0
-        && scan.returns.iter().all(|hit| (hit.point_in_laser.norm() - first).abs() <= CONSTANT.1)
+    scan.returns.len() >= CONSTANT_RANGES.0
+        && scan.returns.iter().all(|hit| (hit.point_in_laser.norm() - first).abs() <= CONSTANT_RANGES.1)
 }

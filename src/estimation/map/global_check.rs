@@ -36,7 +36,7 @@ const SUPPRESSION: (i32, i32) = (2, 2);
 const HORIZONTAL_NORMAL_Z: f64 = 0.8;
 /// An accepted pose is rejected if another has more than this multiple of its inlier ratio. In 144 starts in office, mocap
 /// room, courtyard and stairwell the best false pose has at most 0.88 times the inlier ratio of the correct one.
-const BETTER_RATIO: f64 = 1.05;
+const MAX_OTHER_INLIER_RATIO: f64 = 1.05;
 
 /// Candidate pose on the search grid: heading steps and cells relative to the accepted pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -149,7 +149,8 @@ impl Relocaliser {
         let accepted =
             self.evaluate_all(&patches_by_level[0], from, &poses, None).filter(|located| MAP_LIMITS.accepts(located));
         let best = accepted.max_by(|a, b| a.inlier_ratio.total_cmp(&b.inlier_ratio))?;
-        (best.inlier_ratio > BETTER_RATIO * found.inlier_ratio && is_different_pose(&best, found, from)).then_some(best)
+        (best.inlier_ratio > MAX_OTHER_INLIER_RATIO * found.inlier_ratio && is_different_pose(&best, found, from))
+            .then_some(best)
     }
 }
 

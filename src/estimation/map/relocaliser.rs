@@ -26,7 +26,7 @@ const MAX_PATCHES: usize = 2000;
 /// Iterations per resolution.
 const ITERATIONS: usize = 8;
 /// Match gate along the normal in the first and the last iteration, as a fraction of the voxel edge.
-const GATES: (f64, f64) = (0.5, 0.1);
+const MATCH_GATE_EDGES: (f64, f64) = (0.5, 0.1);
 /// Minimum gate on the angle between normals, degrees: start poses are up to half a heading step off.
 const NORMAL_GATE_DEG: f64 = 30.0;
 /// Standard deviation of roll and pitch between the two level frames, degrees.
@@ -39,10 +39,10 @@ const FIXED_INFORMATION: f64 = 1e12;
 /// Minimum number of finest query patches for a relocalisation.
 const MIN_PATCHES: usize = 50;
 /// Poses that converged to within this distance, m and rad, are duplicates.
-const DUPLICATE: f64 = 0.01;
+const DUPLICATE_POSE_TOLERANCE: f64 = 0.01;
 /// Two poses are different above this distance, m, or angle, rad; a different pose competes with the best one if it has
 /// at least this fraction of the score of the best.
-const DIFFERENT: (f64, f64, f64) = (0.3, 0.1, 0.85);
+const COMPETING_POSE: (f64, f64, f64) = (0.3, 0.1, 0.85);
 
 /// Pose of a query found in a map.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,7 +152,7 @@ impl Relocaliser {
                  (residual {residual_mm:.0} mm)"
             ));
         };
-        let as_good = found.iter().filter(|(other, found)| *other > DIFFERENT.2 * score && limits.accepts(found));
+        let as_good = found.iter().filter(|(other, found)| *other > COMPETING_POSE.2 * score && limits.accepts(found));
         let others: Vec<&LocalisedPose> =
             as_good.map(|(_, other)| other).filter(|other| is_different_pose(best, other, from)).collect();
         match others.first() {
@@ -194,7 +194,7 @@ impl Relocaliser {
         poses: &'a [(Pose, Pose)],
         gate_m: Option<f64>,
     ) -> impl Iterator<Item = LocalisedPose> + 'a {
-        let gate_m = gate_m.unwrap_or(self.matcher.finest_voxel_m * GATES.1);
+        let gate_m = gate_m.unwrap_or(self.matcher.finest_voxel_m * MATCH_GATE_EDGES.1);
         poses.iter().filter_map(move |(_, pose)| self.evaluate(finest, from, pose, gate_m))
     }
 
@@ -206,7 +206,7 @@ impl Relocaliser {
         let edge_m = self.matcher.finest_voxel_m * f64::from(1_u32 << level);
         for iteration in 0..ITERATIONS {
             let late = iteration as f64 / (ITERATIONS - 1) as f64;
-            let gate_m = edge_m * GATES.0 * (GATES.1 / GATES.0).powf(late);
+            let gate_m = edge_m * MATCH_GATE_EDGES.0 * (MATCH_GATE_EDGES.1 / MATCH_GATE_EDGES.0).powf(late);
             let gate = Gate { level, gate_m, sigma_m: gate_m / 3.0 };
             let pivot = pose.transform_point(&(*from).into()).coords;
             let mut sums = self.sum_matches(query, &pose, &pivot, &gate);
@@ -283,7 +283,7 @@ fn remove_duplicates(poses: &mut Vec<(Pose, Pose)>, from: &Vector) {
     for (start, pose) in poses.drain(..) {
         let is_other = |(_, other): &(Pose, Pose)| {
             let (distance_m, angle) = pose_distance(&pose, other, from);
-            distance_m > DUPLICATE || angle > DUPLICATE
+            distance_m > DUPLICATE_POSE_TOLERANCE || angle > DUPLICATE_POSE_TOLERANCE
         };
         if distinct.iter().all(is_other) {
             distinct.push((start, pose));
@@ -342,10 +342,10 @@ impl LocalisedPose {
     }
 }
 
-/// Whether two poses differ by more than `DIFFERENT`.
+/// Whether two poses differ by more than `COMPETING_POSE`.
 pub(super) fn is_different_pose(a: &LocalisedPose, b: &LocalisedPose, from: &Vector) -> bool {
     let (distance_m, angle) = pose_distance(&a.map_from_query, &b.map_from_query, from);
-    distance_m > DIFFERENT.0 || angle > DIFFERENT.1
+    distance_m > COMPETING_POSE.0 || angle > COMPETING_POSE.1
 }
 
 /// Distance of the viewpoint between two poses, m, and their angle, rad.

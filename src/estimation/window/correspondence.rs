@@ -9,11 +9,11 @@ use crate::geometry::Vector;
 use rayon::prelude::*;
 
 /// The neighbour search is repeated when a surfel may have moved by this, m; smaller motion hardly changes the result.
-const MOVED_M: f64 = 0.02;
+const SEARCH_MOTION_M: f64 = 0.02;
 /// Widening of the match gate in a first window that starts in motion, and after a bridged gap.
 const WIDE_GATE: f64 = 3.0;
 /// A tilt of a normal is significant above this multiple of the standard deviation.
-const SIGNIFICANT: f64 = 4.0;
+const SIGNIFICANT_SIGMAS: f64 = 4.0;
 
 /// Candidate pairs of surfels, before the distance gate.
 #[derive(Default)]
@@ -160,7 +160,7 @@ impl Neighbours {
 
     /// Whether the neighbours are still valid for `scene`.
     pub fn are_valid_for(&self, scene: &[PlacedSurfel]) -> bool {
-        self.scene_len == scene.len() && self.moved_m < MOVED_M
+        self.scene_len == scene.len() && self.moved_m < SEARCH_MOTION_M
     }
 }
 
@@ -232,7 +232,7 @@ impl Window {
             };
             let variance =
                 scene[*a as usize].patch.normal_tilt_variance(direction) + other.normal_tilt_variance(direction);
-            if plane.normal.dot(direction).abs() < SIGNIFICANT * variance.sqrt() {
+            if plane.normal.dot(direction).abs() < SIGNIFICANT_SIGMAS * variance.sqrt() {
                 plane.remove_component(direction);
             }
         }
@@ -270,7 +270,7 @@ impl CachedNeighbours {
     /// Updates the neighbours of `patch` in the `chosen` views; views searched from about this position stay cached.
     fn update(&mut self, patch: &Patch, (views, chosen): (&Views, &[usize]), matcher: &Matcher, count: usize) {
         let is_chosen = |number: u64| chosen.iter().any(|index| views.view(*index).number == number);
-        let moved = (patch.centre - self.centre).norm() > MOVED_M;
+        let moved = (patch.centre - self.centre).norm() > SEARCH_MOTION_M;
         self.found.retain(|(number, _)| !moved && is_chosen(*number));
         if self.found.is_empty() {
             self.centre = patch.centre;

@@ -32,9 +32,9 @@ use std::collections::VecDeque;
 /// The head may move for this time before the IMU shows it, s.
 const REST_MARGIN_S: f64 = 0.3;
 /// The window grows to at most this multiple of the nominal length while the segments contain few surfaces.
-const MAX_LENGTH: f64 = 3.0;
+const MAX_LENGTH_RATIO: f64 = 3.0;
 /// A segment counts as swept if it has this fraction of the largest number of surfels in a segment.
-const SWEPT: f64 = 0.25;
+const MIN_SWEPT_RATIO: f64 = 0.25;
 
 /// If the initial velocity has at least this standard deviation, the head may move at constant velocity, m/s.
 const MOVING_SIGMA_M_PER_S: f64 = 5.0;
@@ -277,12 +277,12 @@ impl Window {
     /// A head at rest measures only lines and needs the older patches.
     pub(super) fn is_full(&self) -> bool {
         let richest = self.segments.iter().map(|segment| segment.surfels.len()).max().unwrap_or(0);
-        let enough = (richest as f64 * SWEPT) as usize;
+        let enough = (richest as f64 * MIN_SWEPT_RATIO) as usize;
         let is_swept = |segment: &WindowSegment| segment.surfels.len() >= enough;
         let swept = self.segments.iter().filter(|segment| is_swept(segment)).count();
         let windows = |segments: usize| segments as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
         let all = windows(self.segments.len());
-        windows(swept) > 1.0 || all > MAX_LENGTH || (all > 1.0 && !self.segments.front().is_some_and(is_swept))
+        windows(swept) > 1.0 || all > MAX_LENGTH_RATIO || (all > 1.0 && !self.segments.front().is_some_and(is_swept))
     }
 
     /// Start of the window after removal of the oldest segment, IMU time, s.

@@ -62,7 +62,7 @@ pub(super) trait Stage {
 }
 
 /// Time without messages after which a stage emits held messages: the message that they wait for may never come.
-const SILENCE: Span = Span::from_nanos(5_000_000_000);
+const FLUSH_TIMEOUT: Span = Span::from_nanos(5_000_000_000);
 
 /// All fault stages of a sensor.
 pub(super) struct Pipeline {
@@ -97,11 +97,11 @@ impl Pipeline {
         feed(&mut self.stages, message, out);
     }
 
-    /// Emits the held messages of stages that have had no message for [`SILENCE`].
+    /// Emits the held messages of stages that have had no message for [`FLUSH_TIMEOUT`].
     pub fn flush_silent(&mut self, now: Stamp, out: &mut Vec<Message>) {
         let mut stages = self.stages.as_mut_slice();
         while let Some((first, rest)) = stages.split_first_mut() {
-            if first.stage.held().is_some() && now - first.last > SILENCE {
+            if first.stage.held().is_some() && now - first.last > FLUSH_TIMEOUT {
                 flush(first, rest, out);
             }
             stages = rest;

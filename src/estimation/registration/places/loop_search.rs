@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// Maximum distance of two views of one node, m: up to it the descriptors stay similar.
 const MAX_VIEW_DISTANCE_M: f64 = 3.0;
 /// Number of start alignments per pair.
-const STARTS: usize = 3;
+const START_ALIGNMENTS: usize = 3;
 /// Alignments that differ by less than this, m and rad, are equal.
 const SAME_ALIGNMENT: (f64, f64) = (0.5, 0.1);
 /// The best alignment is ambiguous if a different one has more than this fraction of the agreement.
@@ -135,7 +135,7 @@ impl LoopSearch<'_> {
     fn verify(&self, (late, early): (&NodeSurfels, &NodeSurfels), nodes: (usize, usize), yaw: f64) -> Option<Fit> {
         let ground_m = |node: usize| self.database.nodes[node].ground_m;
         let up_m = ground_m(nodes.1) - ground_m(nodes.0);
-        let mut starts = correlation::start_alignments(late.finest(), early.finest(), (yaw, up_m), STARTS);
+        let mut starts = correlation::start_alignments(late.finest(), early.finest(), (yaw, up_m), START_ALIGNMENTS);
         starts.push(self.current_alignment(nodes));
         let register = |start: &Alignment| {
             let fit = align(late, early, start, self.matcher)?;
