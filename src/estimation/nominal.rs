@@ -80,9 +80,9 @@ impl Nominal {
     pub(super) fn correct(&mut self, first: usize, curve: impl Fn(usize) -> Correction) {
         for (index, state) in self.states.iter_mut().enumerate().skip(first) {
             let correction = curve(index);
-            state.rotation = Rotation::from_scaled_axis(correction.rotation) * state.rotation;
+            state.rotation = Rotation::from_scaled_axis(correction.rotation) * state.rotation; // eq. (2)
             state.rotation.renormalize_fast();
-            state.position += correction.translation;
+            state.position += correction.translation; // eq. (2)
             state.velocity += correction.velocity;
         }
     }

@@ -98,7 +98,7 @@ mod tests {
             interval.gyro += noise(interval.gyro_sigma);
             interval.accel += noise(interval.accel_sigma);
         }
-        // The median of chi-squared with three degrees of freedom is 2.366. Counterpart 200 spans the sample median has an
+        // The median of chi-squared with three degrees of freedom is 2.366. With 200 spans the sample median has an
         // error of 6 %; the larger of two medians is above it.
         let expected = (2.366_f64 / 3.0).sqrt();
         assert!((multiples(&intervals) / expected - 1.0).abs() < 0.15, "{}", multiples(&intervals));

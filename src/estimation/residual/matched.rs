@@ -19,7 +19,7 @@ pub(in crate::estimation) struct Plane {
     /// Unit normal of the surface.
     pub(in crate::estimation) normal: Vector,
     /// From the second centre to the first, m.
-    apart: Vector,
+    offset: Vector,
     /// Distance along the normal, m.
     pub(in crate::estimation) distance_m: f64,
     /// Variance of that distance, m^2.
@@ -36,11 +36,11 @@ impl Plane {
         let normal = adjugate(&both) * start;
         let normal = normal.try_normalize(0.0).or_else(|| start.try_normalize(0.0)).unwrap_or(b.normal);
         let lambda = normal.dot(&(both * normal));
-        let apart = a.centre - b.centre;
-        let distance_m = normal.dot(&apart);
+        let offset = a.centre - b.centre;
+        let distance_m = normal.dot(&offset);
         Self {
             normal,
-            apart,
+            offset,
             distance_m,
             variance: sigma_m * sigma_m + lambda.max(0.0) + a.roughness_variance + b.roughness_variance,
         }
@@ -48,9 +48,9 @@ impl Plane {
 
     /// Removes the component of the normal along `direction`, a unit vector.
     pub(in crate::estimation) fn remove_component(&mut self, direction: &Vector) {
-        let left = self.normal - direction * self.normal.dot(direction);
-        self.normal = left.try_normalize(1e-3).unwrap_or(self.normal);
-        self.distance_m = self.normal.dot(&self.apart);
+        let remainder = self.normal - direction * self.normal.dot(direction);
+        self.normal = remainder.try_normalize(1e-3).unwrap_or(self.normal);
+        self.distance_m = self.normal.dot(&self.offset);
     }
 }
 
@@ -77,7 +77,7 @@ impl<const B: usize> SurfelJacobian<B> {
     /// The derivatives for `surfel`, with `normal` pointing towards it.
     #[inline(always)]
     pub(in crate::estimation) fn of(surfel: &PlacedSurfel, normal: &Vector, clock_reference_s: f64) -> Self {
-        let turn = surfel.arm.cross(normal);
+        let rotation = surfel.arm.cross(normal);
         let later = normal.dot(&surfel.velocity);
         let mut common = [0.0; B];
         common[..COMMON_WITHOUT_EXTRINSICS].copy_from_slice(&[
@@ -86,12 +86,12 @@ impl<const B: usize> SurfelJacobian<B> {
             normal.dot(&surfel.beam),
         ]);
         if B == COMMON {
-            let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.ray().cross(normal));
-            let lidar_shift = surfel.map_from_imu.tr_mul(normal);
-            common[COMMON_WITHOUT_EXTRINSICS..COMMON_WITHOUT_EXTRINSICS + 3].copy_from_slice(lidar_turn.as_slice());
-            common[COMMON_WITHOUT_EXTRINSICS + 3..].copy_from_slice(lidar_shift.as_slice());
+            let lidar_rotation = surfel.map_from_imu.tr_mul(&surfel.ray().cross(normal));
+            let lidar_translation = surfel.map_from_imu.tr_mul(normal);
+            common[COMMON_WITHOUT_EXTRINSICS..COMMON_WITHOUT_EXTRINSICS + 3].copy_from_slice(lidar_rotation.as_slice());
+            common[COMMON_WITHOUT_EXTRINSICS + 3..].copy_from_slice(lidar_translation.as_slice());
         }
-        Self { own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], common }
+        Self { own: [rotation.x, rotation.y, rotation.z, normal.x, normal.y, normal.z], common }
     }
 
     /// Adds the other surfel's derivatives by the common unknowns.

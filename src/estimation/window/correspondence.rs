@@ -20,7 +20,7 @@ const SIGNIFICANT_SIGMAS: f64 = 4.0;
 pub(super) struct Neighbours {
     /// Within the window: indices into the scene.
     pairs: Vec<(u32, u32)>,
-    /// Counterpart views: a surfel of the scene, a view, a patch of the view.
+    /// With views: a surfel of the scene, a view, a patch of the view.
     fixed: Vec<(u32, u32, u32)>,
     /// Number of surfels in the scene at the time of the search.
     scene_len: usize,

@@ -65,7 +65,7 @@ impl Window {
 
     /// Regression of the corrections at `u_s` (IMU time) and of their derivatives on the lidar extrinsics.
     ///
-    /// Counterpart all other unknowns solved: `P_xl P_ll^-1` of the covariances `P`. None if the extrinsics are not estimated.
+    /// With all other unknowns solved: `P_xl P_ll^-1` of the covariances `P`. None if the extrinsics are not estimated.
     pub(super) fn regression_on_lidar(&self, u_s: f64, at: &Linearised) -> Option<ByLidar> {
         if !self.spec.extrinsics.estimated {
             return None;
