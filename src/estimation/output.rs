@@ -22,7 +22,7 @@ pub struct EstimatedPose {
     pub map_from_head: Pose,
     /// Covariance relative to the map, which the first pose defines: position, then attitude; m^2, m rad, rad^2.
     pub covariance: PoseCovariance,
-    /// Covariance relative to the alignment over the first [`ALIGNMENT_S`] seconds, or over the time so far during these.
+    /// Covariance relative to the alignment over the first [`ALIGNMENT_S`] seconds, or over the time up to the pose.
     pub covariance_against_gauge: PoseCovariance,
     /// Velocity of the head origin, m/s.
     pub velocity_in_map_m_per_s: Vector,
@@ -88,11 +88,11 @@ pub struct OpenLoop {
     pub trajectory: Trajectory,
     /// The poses with velocity, biases and clock offset.
     pub poses: Vec<EstimatedPose>,
-    /// Covariances of some poses during twice [`ALIGNMENT_S`] seconds from the start, relative to the alignment: m^2, m rad,
-    /// rad^2.
+    /// Covariances of some poses during twice [`ALIGNMENT_S`] seconds from the start, relative to the alignment: m^2,
+    /// m rad, rad^2.
     ///
-    /// The alignment covers the first [`ALIGNMENT_S`] seconds, or half of a shorter run. Empty if the estimate restarted in
-    /// this time.
+    /// The alignment covers the first [`ALIGNMENT_S`] seconds, or half of a shorter run. Empty if the estimate
+    /// restarted in this time.
     pub aligned_covariances: Vec<(Stamp, PoseCovariance)>,
     /// The clock offset after each window, s, positive if IMU stamps are later; over lidar time.
     pub clock_offsets: Vec<(Stamp, f64)>,

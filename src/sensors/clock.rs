@@ -125,8 +125,8 @@ impl Clock {
     /// The first reading of the crystal from `stamp` on that is half-way between two ticks of the resolution.
     ///
     /// A sensor that starts at such a reading, with a period of whole ticks, loses exactly half a tick by rounding: the
-    /// mean that [`Clock::offset_at`] assumes. A sensor that starts on a tick would lose nothing, and that mean would not
-    /// apply.
+    /// mean that [`Clock::offset_at`] assumes. A sensor that starts on a tick would lose nothing, and that mean would
+    /// not apply.
     pub fn half_tick_from(&self, stamp: Stamp) -> Stamp {
         let half = self.half_tick();
         let tick = (stamp - half).floor_to(self.resolution);

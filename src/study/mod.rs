@@ -1,7 +1,7 @@
 //! Experiments: simulation, estimation, evaluation and reports combined.
 //!
-//! [`simulate_and_estimate`] is the full run: it simulates, records, estimates from the recording, evaluates against the truth and
-//! writes the report. [`estimate_recording`] does the same from an existing recording.
+//! [`simulate_and_estimate`] is the full run: it simulates, records, estimates from the recording, evaluates against
+//! the truth and writes the report. [`estimate_recording`] does the same from an existing recording.
 //!
 //! Studies of a head without an estimator: the [`gains`] of its modes, the stress and motion of its [`spring`] and the
 //! [`coverage`] of its lidar. [`latency`] measures the effect of timing errors. A [`sweep`] varies parameters of these

@@ -2,7 +2,7 @@
 //!
 //! | class | meaning | criterion |
 //! |---|---|---|
-//! | [`ReturnClass::MixedPixel`] | mixed pixel: one return of two surfaces, measured in between | neighbours in the scan, see `mixed` |
+//! | [`ReturnClass::MixedPixel`] | mixed pixel: a return of two surfaces, between them | neighbours in the scan: `mixed` |
 //! | [`ReturnClass::Dynamic`] | point of a dynamic object | other beams passed through the cell, see `dynamic` |
 //! | [`ReturnClass::Isolated`] | isolated point | few points around it, see `density` |
 //!

@@ -32,7 +32,7 @@ pub(super) struct Mark {
 }
 
 impl ConsiderCovariance {
-    /// The same as [`ConsiderCovariance::covariance_at`] relative to the gauge; relative to the map if there is no gauge.
+    /// [`ConsiderCovariance::covariance_at`] relative to the gauge; relative to the map if there is no gauge.
     pub(in crate::estimation) fn covariance_against_gauge(&self, point: &Vector) -> Matrix6<f64> {
         let with_start = |at: usize| self.views[at].with_start.fixed_columns::<6>(0).into_owned();
         let by = pose_error_matrix(&(point - self.pivot));
