@@ -69,12 +69,12 @@ pub enum ElasticityError {
     },
     /// The stiffness matrix is not positive definite.
     #[error(
-        "the stiffness is not positive definite: scaled to a unit diagonal, the smallest eigenvalue is {least:.2e}, so some \
+        "the stiffness is not positive definite: scaled to a unit diagonal, the smallest eigenvalue is {smallest:.2e}, so some \
          displacement meets no resistance"
     )]
     NotPositiveDefinite {
         /// Smallest eigenvalue of the scaled matrix; -1 if a diagonal entry is not positive.
-        least: f64,
+        smallest: f64,
     },
     /// The axial load buckles the column.
     #[error(

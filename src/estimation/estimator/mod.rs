@@ -251,11 +251,12 @@ impl Estimator {
             None => return Ok(false),
         };
         window.move_by(&found.map_from_query);
-        let place = window.start_pose().translation.vector;
+        let position = window.start_pose().translation.vector;
         let views = Views::new(&self.spec.views, self.spec.fixed_views);
-        self.views = views.with_map(map_localisation.patches(), window.matcher(), place);
+        self.views = views.with_map(map_localisation.patches(), window.matcher(), position);
         let known = window.known_at_start().unwrap_or_default();
-        self.consider = ConsiderCovariance::localised(place, &known, (found.covariance, map_localisation.covariance()));
+        self.consider =
+            ConsiderCovariance::localised(position, &known, (found.covariance, map_localisation.covariance()));
         Ok(true)
     }
 
@@ -343,8 +344,8 @@ impl Estimator {
             observed.range_bias_is_fixed = self.intake.scan_geometry().is_one_way();
         }
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let seen = self.lidar_standstill();
-        let may_rest = seen != Standstill::Moves;
+        let standstill = self.lidar_standstill();
+        let may_rest = standstill != Standstill::Moves;
         let initial_state = initial::estimate((&intervals[..resting], may_rest), head_from_imu, noise, &adapted);
         let start_s = *start_s;
         self.raise_noise(initial_state.noise_factors, start_s);
@@ -357,7 +358,7 @@ impl Estimator {
             self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
         }
         let mut window = self.first_window(&adapted, &initial_state, start_s);
-        if seen == Standstill::Unknown {
+        if standstill == Standstill::Unknown {
             window = window.with_unobservable_rest();
         }
         if let Some(before_gap) = &self.before_gap {

@@ -136,11 +136,11 @@ fn over_intervals(
         let (from, to) = (interval[0].stamp, interval[length - 1].stamp);
         found = Some(match found {
             // A loss lasts from the first lost interval.
-            Some((worst, most, starts, ends)) if worst >= status => {
+            Some((worst, magnitude, starts, ends)) if worst >= status => {
                 let ends = if worst > status { ends } else { to };
-                (worst, most.max(value), starts, ends)
+                (worst, magnitude.max(value), starts, ends)
             }
-            Some((_, most, ..)) => (status, most.max(value), from, to),
+            Some((_, magnitude, ..)) => (status, magnitude.max(value), from, to),
             None => (status, value, from, to),
         });
     }
@@ -282,12 +282,12 @@ fn coverage_finding(evidence: &Evidence) -> Option<Finding> {
 /// surfaces fit badly, or the IMU scale is far from the prior, the covariance is too small by a similar factor. An error
 /// persists in the map, so the factors never decrease.
 pub fn bound_factors(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
-    let mut most = 1.0_f64;
+    let mut largest = 1.0_f64;
     let of = CONVERGENCE_WINDOWS.min(windows.len());
-    let near = |k: usize| &windows[k.saturating_sub(2)..(k + 3).min(windows.len())];
+    let neighbourhood = |k: usize| &windows[k.saturating_sub(2)..(k + 3).min(windows.len())];
     let factor = |k: usize| {
-        let contradiction = median(near(k).iter().map(|w| w.imu_contradiction).collect());
-        let residual_m = median(near(k).iter().map(|w| w.residual_rms_m).collect());
+        let contradiction = median(neighbourhood(k).iter().map(|w| w.imu_contradiction).collect());
+        let residual_m = median(neighbourhood(k).iter().map(|w| w.residual_rms_m).collect());
         let is_weak = |w: &WindowReport| matches!(w.problem, Some(WarningKind::WeakGeometry { .. }));
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_FACTOR } else { 1.0 };
@@ -304,8 +304,8 @@ pub fn bound_factors(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
             .clamp(1.0, MAX_FACTOR)
     };
     let enlarge = |k: usize| {
-        most = most.max(factor(k));
-        (windows[k].stamp, most)
+        largest = largest.max(factor(k));
+        (windows[k].stamp, largest)
     };
     (0..windows.len()).map(enlarge).collect()
 }

@@ -67,7 +67,7 @@ impl NormalGrid {
             let offset = patch.centre - centre;
             patch.level == 0 && offset.xy().norm() < GRID_REACH_M.0 && offset.z.abs() < GRID_REACH_M.1
         };
-        let near: Vec<([i32; 3], u16)> = patches
+        let occupied: Vec<([i32; 3], u16)> = patches
             .iter()
             .filter(is_near)
             .map(|patch| {
@@ -75,14 +75,14 @@ impl NormalGrid {
                 (cell(&patch.centre), nearest | next)
             })
             .collect();
-        let end = |axis: usize, pick: fn(i32, i32) -> i32| near.iter().map(|(cell, _)| cell[axis]).reduce(pick);
+        let end = |axis: usize, pick: fn(i32, i32) -> i32| occupied.iter().map(|(cell, _)| cell[axis]).reduce(pick);
         let (mut first, mut size) = ([0; 3], [0; 3]);
         for axis in 0..3 {
             first[axis] = end(axis, i32::min)? - 1;
             size[axis] = end(axis, i32::max)? + 2 - first[axis];
         }
         let mut grid = Self { first, size, cells: vec![0; size.iter().map(|n| *n as usize).product()] };
-        for (at, bits) in near {
+        for (at, bits) in occupied {
             for k in 0..27 {
                 let neighbour = [at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1];
                 if let Some(index) = grid.index(neighbour) {
@@ -160,7 +160,7 @@ fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose) -> Vec
     let Some(grid) = NormalGrid::around(&centre, map) else { return Vec::new() };
     let correlated: Vec<&Patch> = query.iter().step_by(query.len().div_ceil(MAX_CORRELATED).max(1)).collect();
     let (horizontal, up) = ((SEARCH_REACH_M.0 / CELL_M) as i32, (SEARCH_REACH_M.1 / CELL_M) as i32);
-    let steps = |most: i32, step: i32| (-most / step..=most / step).map(move |k| k * step);
+    let steps = |reach: i32, step: i32| (-reach / step..=reach / step).map(move |k| k * step);
     let level = || steps(horizontal, STEPS.0).flat_map(move |x| steps(horizontal, STEPS.0).map(move |y| (x, y)));
     let at = cell(&centre);
     let cells: Vec<[i32; 3]> = steps(up, STEPS.1)
@@ -183,8 +183,8 @@ fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose) -> Vec
 
 /// The `count` candidates with the most hits, after non-maximum suppression.
 fn suppress_non_maxima(mut all: Vec<(usize, GridPose)>, count: usize) -> Vec<(usize, GridPose)> {
-    let most = all.iter().map(|(hits, _)| *hits).max().unwrap_or(0);
-    all.retain(|(hits, _)| 2 * hits > most);
+    let max_hits = all.iter().map(|(hits, _)| *hits).max().unwrap_or(0);
+    all.retain(|(hits, _)| 2 * hits > max_hits);
     all.sort_unstable_by_key(|(hits, shift)| (Reverse(*hits), *shift));
     let mut chosen: Vec<(usize, GridPose)> = Vec::new();
     for one in all {

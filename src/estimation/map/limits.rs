@@ -64,8 +64,8 @@ impl RelocalisationLimits {
     /// Start poses on a grid around the expected pose, each as a pair (start, current pose).
     pub(super) fn starts(&self, map_from_query: &Pose, viewpoint: &Vector) -> Vec<(Pose, Pose)> {
         let steps = |reach: f64, spacing: f64| {
-            let most = (reach / spacing).floor() as i32;
-            (-most..=most).map(move |k| f64::from(k) * spacing)
+            let steps = (reach / spacing).floor() as i32;
+            (-steps..=steps).map(move |k| f64::from(k) * spacing)
         };
         let reach_m = self.reach.0.min(MAX_START_OFFSET_M);
         let mut starts = Vec::new();

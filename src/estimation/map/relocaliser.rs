@@ -333,8 +333,8 @@ impl LocalisedPose {
         let mut covariance = self.covariance;
         for other in others {
             let turn = (other.map_from_query.rotation * self.map_from_query.rotation.inverse()).scaled_axis();
-            let place = |located: &LocalisedPose| located.map_from_query.transform_point(&(*from).into()).coords;
-            let shift = place(other) - place(self);
+            let position = |located: &LocalisedPose| located.map_from_query.transform_point(&(*from).into()).coords;
+            let shift = position(other) - position(self);
             let by = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
             covariance += by * by.transpose() / (others.len() + 1) as f64;
         }
@@ -350,6 +350,6 @@ pub(super) fn is_different_pose(a: &LocalisedPose, b: &LocalisedPose, from: &Vec
 
 /// Distance of the viewpoint between two poses, m, and their angle, rad.
 pub(super) fn pose_distance(a: &Pose, b: &Pose, from: &Vector) -> (f64, f64) {
-    let place = |pose: &Pose| pose.transform_point(&(*from).into()).coords;
-    ((place(a) - place(b)).norm(), a.rotation.angle_to(&b.rotation))
+    let position = |pose: &Pose| pose.transform_point(&(*from).into()).coords;
+    ((position(a) - position(b)).norm(), a.rotation.angle_to(&b.rotation))
 }

@@ -76,9 +76,9 @@ impl Window {
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
             let matches = self.significant(matches, &solved, &scene, views);
             solved.timing.matches_s += watch.lap_s();
-            let seen = (&matches, &robust);
+            let weighted = (&matches, &robust);
             let timing = &mut solved.timing;
-            let Some((x, by)) = self.solve_linearised((first, &total), &scene, seen, &layout, timing) else {
+            let Some((x, by)) = self.solve_linearised((first, &total), &scene, weighted, &layout, timing) else {
                 solved.failure = Some("the normal equations are singular");
                 break;
             };
