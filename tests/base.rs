@@ -12,7 +12,7 @@ use zsim::estimation::{BaseEstimate, BaseFix, BaseImu, EstimationError, FixSigma
 use zsim::geometry::{Kinematics, Pose, Rotation, Trajectory, Vector, from_roll_pitch_yaw};
 use zsim::measurement::ImuSample;
 use zsim::random::Seed;
-use zsim::recording::{Preference, Reader};
+use zsim::recording::{Reader, TopicPreference};
 use zsim::sensors::mean_motion;
 use zsim::time::{Span, Stamp};
 
@@ -178,7 +178,7 @@ fn an_imu_on_the_base_improves_a_simulated_handle_trajectory() {
     assert!(here.path().join("base/base_imu.tum").exists());
 
     // The estimator still uses the IMU of the head.
-    let selection = Reader::open(&here.path().join("a.mcap")).unwrap().select(&Preference::default()).unwrap();
+    let selection = Reader::open(&here.path().join("a.mcap")).unwrap().select(&TopicPreference::default()).unwrap();
     assert_eq!(selection.imu_topic, "/imu/data_raw");
     for (topic, words) in
         [("/nope", "/base/imu (sensor_msgs/msg/Imu)"), ("/imu/data_raw", "does not match the rotation")]

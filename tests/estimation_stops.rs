@@ -47,7 +47,7 @@ fn a_multi_plane_lidar_is_tracked_without_swing() {
     assert!(score.rmse_m < 0.02, "{score:?}");
     assert!(result.windows.iter().skip(4).all(|window| window.matches > 200), "{:?}", result.windows.last());
     for window in &result.windows {
-        let parts: f64 = window.spent.parts().iter().map(|(_, seconds)| seconds).sum();
+        let parts: f64 = window.timing.parts().iter().map(|(_, seconds)| seconds).sum();
         assert!(parts > 0.0 && parts <= window.elapsed_s, "{window:?}");
     }
 }
@@ -82,10 +82,10 @@ fn lidar_extrinsics_are_estimated_from_an_incorrect_calibration() {
     };
     let found = estimate(true).lidar;
     println!("{found:?}");
-    let turned_back = found.turn * Rotation::from_scaled_axis(turn);
+    let turned_back = found.rotation * Rotation::from_scaled_axis(turn);
     assert!(turned_back.angle().to_degrees() < 0.1, "{turned_back}");
-    assert!((found.shift + shift).norm() < 0.003, "{found:?}");
+    assert!((found.translation + shift).norm() < 0.003, "{found:?}");
     // Without refinement the calibrated extrinsics do not change.
     let unrefined = estimate(false).lidar;
-    assert!(unrefined.turn.angle() < 1e-6 && unrefined.shift.norm() < 1e-6, "{unrefined:?}");
+    assert!(unrefined.rotation.angle() < 1e-6 && unrefined.translation.norm() < 1e-6, "{unrefined:?}");
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
-use zsim::dynamics::{DampingSpec, HeadModel, LinkageSpec, Quantity, load};
+use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, LinkageSpec, load};
 use zsim::motion::Axis;
 use zsim::spec::{Source, parse};
 use zsim::study::gains::{GainCurve, GainPlan, GainPoint, csv, gain_curve, gain_curves, swing_study};
@@ -62,7 +62,7 @@ fn halving_the_time_step_changes_the_peak_by_less_than_1_percent() {
 #[test]
 fn specific_force_agrees_with_the_closed_form() {
     let head = handheld(0.06);
-    let plan = GainPlan { quantity: Quantity::SpecificForce, up_to_hz: 5.0, ..plan() };
+    let plan = GainPlan { acceleration: AccelerationKind::SpecificForce, up_to_hz: 5.0, ..plan() };
     for axis in [Axis::X, Axis::Y] {
         let curve = gain_curve(&head, axis, &plan, &|_| ()).unwrap();
         let (deviation, point) = worst(&curve);

@@ -11,7 +11,7 @@ use zsim::evaluation::{Errors, Pairs};
 use zsim::geometry::{Pose, PoseCovariance, Rotation, Surface, Trajectory, Vector};
 use zsim::measurement::{Calibration, Measurement};
 use zsim::random::Seed;
-use zsim::recording::{Preference, Reader, RunDescription, Writer};
+use zsim::recording::{Reader, RunDescription, TopicPreference, Writer};
 use zsim::simulation::{Scenario, Simulation};
 use zsim::surfel_map::SurfelMap;
 use zsim::time::{Span, Stamp};
@@ -42,7 +42,7 @@ impl Session {
         simulation.run(&mut writer, &mut |_| ()).unwrap();
         writer.finish().unwrap();
         let reader = Reader::open(&path).unwrap();
-        let selection = reader.select(&Preference::default()).unwrap();
+        let selection = reader.select(&TopicPreference::default()).unwrap();
         let truth = reader.truth_trajectory().unwrap();
         let begin = truth.span().unwrap().0 + Span::from_seconds(from_s);
         let all = reader.measurements(&selection).map(Result::unwrap);
@@ -50,7 +50,7 @@ impl Session {
     }
 
     fn estimate(&self, within: Option<(&SurfelMap, &Pose)>) -> Result<OpenLoop, EstimationError> {
-        let mut estimator = Estimator::new(&spec(), &self.calibration)?.surveying();
+        let mut estimator = Estimator::new(&spec(), &self.calibration)?.recording_surfels();
         if let Some((map, start)) = within {
             estimator = estimator.in_map(map, start);
         }
@@ -102,11 +102,11 @@ impl Mapped {
     fn by(session: Session) -> Self {
         let run = session.estimate(None).unwrap();
         let covariances = covariances(&run.poses);
-        let OpenLoop { trajectory, lidar, survey, .. } = &run;
-        let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, survey };
+        let OpenLoop { trajectory, lidar, observed, .. } = &run;
+        let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, observed };
         let closed = register(travelled, &session.calibration, &spec());
         let both = (&run.trajectory, &closed.trajectory);
-        let map = map_of(&run.survey, both, &covariances, &spec().registration).unwrap();
+        let map = map_of(&run.observed, both, &covariances, &spec().registration).unwrap();
         let pairs = Pairs::associate(&closed.trajectory, &session.truth).unwrap();
         let world_from_map = pairs.world_from_map().unwrap();
         let rmse_m = Errors::after(&pairs, &world_from_map).position_rmse_m();
@@ -225,7 +225,7 @@ fn extended_and_merged_maps_are_as_accurate_as_their_parts() {
     let start = second.session.start_in(&first.world_from_map);
     let run = second.session.estimate(Some((&first.map, &start))).unwrap();
     let of_run = (&run.trajectory, &run.trajectory);
-    let seen = map_of(&run.survey, of_run, &covariances(&run.poses), &spec().registration).unwrap();
+    let seen = map_of(&run.observed, of_run, &covariances(&run.poses), &spec().registration).unwrap();
     let longer = merge_maps(&first.map, &seen, &Pose::identity()).unwrap();
     let longer_off = of(&longer, &first.world_from_map);
     println!("extended {longer_off} m");

@@ -9,7 +9,7 @@ use recordings::{calibration, imu_sample, in_order, planar_scan, record, run};
 use std::io::Cursor;
 use zsim::geometry::{Kinematics, Pose, from_roll_pitch_yaw};
 use zsim::measurement::{LidarScan, Measurement, PlanarScan, Sink};
-use zsim::recording::{Preference, Reader, Truth, Writer};
+use zsim::recording::{Reader, TopicPreference, Truth, Writer};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
@@ -17,7 +17,7 @@ use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 fn measurements_are_read_back_bit_for_bit() {
     let (bytes, written) = record(run(), 100);
     let reader = Reader::new("memory", Cursor::new(bytes)).unwrap();
-    let selection = reader.select(&Preference::default()).unwrap();
+    let selection = reader.select(&TopicPreference::default()).unwrap();
     assert_eq!((selection.lidar_topic.as_str(), selection.imu_topic.as_str()), ("/scan", "/imu/data_raw"));
     assert!(selection.notes.is_empty(), "{:?}", selection.notes);
     let mut measurements = reader.measurements(&selection);
@@ -30,7 +30,7 @@ fn measurements_are_read_back_bit_for_bit() {
 fn points_are_read_back_bit_for_bit() {
     let (bytes, written) = record(run(), 100);
     let reader = Reader::new("memory", Cursor::new(bytes)).unwrap();
-    let preference = Preference { lidar_topic: Some("/points".to_owned()), imu_topic: None };
+    let preference = TopicPreference { lidar_topic: Some("/points".to_owned()), imu_topic: None };
     let selection = reader.select(&preference).unwrap();
     let scans = |all: Vec<Measurement>| -> Vec<_> {
         all.into_iter().filter_map(|m| if let Measurement::Lidar(scan) = m { Some(scan) } else { None }).collect()
@@ -46,7 +46,7 @@ fn points_are_read_back_bit_for_bit() {
 fn extrinsics_and_manifest_are_read_back() {
     let (bytes, _) = record(run(), 10);
     let reader = Reader::new("memory", Cursor::new(bytes)).unwrap();
-    let selection = reader.select(&Preference::default()).unwrap();
+    let selection = reader.select(&TopicPreference::default()).unwrap();
     let mut defaults = calibration();
     defaults.head_from_imu = Pose::identity();
     defaults.head_from_laser = Pose::identity();
@@ -67,13 +67,13 @@ fn ground_truth_is_read_separately_from_measurements() {
         let angle = k as f64 * 0.01;
         Pose::from_parts([angle, 2.0, 0.5].into(), from_roll_pitch_yaw(angle, -angle, 3.0 * angle))
     };
-    let clock = ClockTruth { lidar_ahead: Span::from_nanos(-5), imu_ahead: Span::from_nanos(3_000_001) };
+    let clock = ClockTruth { lidar_offset: Span::from_nanos(-5), imu_offset: Span::from_nanos(3_000_001) };
     let (file, bytes) = recordings::shared_file();
     let mut writer = Writer::new(file, run()).unwrap();
     for k in 0..50 {
         let now = Stamp::from_nanos(k * 1_000_000);
         let sample = TruthSample {
-            lidar_stamp: now + clock.lidar_ahead,
+            lidar_stamp: now + clock.lidar_offset,
             head: Kinematics::at_rest(head(k)),
             base: Kinematics::at_rest(Pose::identity()),
         };
@@ -137,7 +137,7 @@ proptest! {
         }
         writer.finish().unwrap();
         let reader = Reader::new("memory", Cursor::new(bytes.take())).unwrap();
-        let selection = reader.select(&Preference::default()).unwrap();
+        let selection = reader.select(&TopicPreference::default()).unwrap();
         let read: Vec<_> = reader.measurements(&selection).map(|m| m.unwrap()).collect();
         let mut read: Vec<_> =
             read.into_iter().filter_map(|m| if let Measurement::Lidar(scan) = m { Some(scan) } else { None }).collect();

@@ -9,7 +9,7 @@ use recordings::{in_order, record, run};
 use std::io::Cursor;
 use std::sync::LazyLock;
 use zsim::measurement::Measurement;
-use zsim::recording::{Loss, Preference, Reader, RecordingError};
+use zsim::recording::{Loss, Reader, RecordingError, TopicPreference};
 use zsim::time::Span;
 
 /// Three seconds: more than three chunks.
@@ -18,7 +18,7 @@ static RECORDING: LazyLock<(Vec<u8>, Vec<Measurement>)> = LazyLock::new(|| recor
 /// All readable measurements, and the reported loss.
 fn read(bytes: Vec<u8>) -> Result<(Vec<Measurement>, Loss), RecordingError> {
     let reader = Reader::new("memory", Cursor::new(bytes))?;
-    let selection = reader.select(&Preference::default())?;
+    let selection = reader.select(&TopicPreference::default())?;
     let mut measurements = reader.measurements(&selection);
     let read = measurements.by_ref().collect::<Result<Vec<_>, _>>()?;
     Ok((read, measurements.loss().clone()))

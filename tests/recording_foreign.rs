@@ -11,7 +11,7 @@ use foreign::{
 use std::io::Cursor;
 use zsim::geometry::Pose;
 use zsim::measurement::Measurement;
-use zsim::recording::{Preference, Reader};
+use zsim::recording::{Reader, TopicPreference};
 
 #[test]
 fn compression_and_chunks_make_no_difference() {
@@ -135,10 +135,10 @@ fn a_lidar_with_beam_times_is_preferred_and_other_sensors_are_listed() {
             "Of several IMU topics, /imu/data_raw is used, not /a/imu/data, /b/imu/data."
         ]
     );
-    let asked = Preference { lidar_topic: Some("/untimed".into()), imu_topic: Some("/b/imu/data".into()) };
+    let asked = TopicPreference { lidar_topic: Some("/untimed".into()), imu_topic: Some("/b/imu/data".into()) };
     let selection = reader.select(&asked).unwrap();
     assert_eq!((&*selection.lidar_topic, &*selection.imu_frame), ("/untimed", "b"));
-    let wrong = Preference { lidar_topic: Some("/velodyne".into()), imu_topic: None };
+    let wrong = TopicPreference { lidar_topic: Some("/velodyne".into()), imu_topic: None };
     let error = reader.select(&wrong).unwrap_err().to_string();
     assert!(
         error.starts_with("foreign: topic /velodyne is missing or not of type sensor_msgs/msg/LaserScan or"),
@@ -150,7 +150,7 @@ fn a_lidar_with_beam_times_is_preferred_and_other_sensors_are_listed() {
 fn a_recording_without_an_imu_is_refused_with_its_topics() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/scan", SCAN, 0, &scan(0, 0.001, 0.1));
-    let error = foreign.reader().select(&Preference::default()).unwrap_err().to_string();
+    let error = foreign.reader().select(&TopicPreference::default()).unwrap_err().to_string();
     let expected = "foreign: no IMU in the recording (sensor_msgs/msg/Imu); it has /scan (sensor_msgs/msg/LaserScan)";
     assert_eq!(error, expected);
 }
@@ -225,7 +225,7 @@ fn a_lidar_connected_to_the_imu_is_preferred() {
     let reader = foreign.reader();
     let selection = select(&reader);
     assert_eq!(selection.lidar_topic, "/scan");
-    let lost = Preference { lidar_topic: Some("/front/points".into()), imu_topic: None };
+    let lost = TopicPreference { lidar_topic: Some("/front/points".into()), imu_topic: None };
     let error = reader.calibration(&reader.select(&lost).unwrap(), &recordings::calibration(), None).unwrap_err();
     assert!(error.to_string().contains("--lidar-topic"), "{error}");
 }

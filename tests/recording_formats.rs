@@ -9,7 +9,7 @@ use foreign::{Foreign, IMU, POINTS, SCAN, TF, UINT32, cdr, cloud, imu, scan, sel
 use std::io::Cursor;
 use zsim::geometry::Pose;
 use zsim::measurement::{Calibration, ImuNoise, LidarNoise, Measurement};
-use zsim::recording::{Preference, Reader};
+use zsim::recording::{Reader, TopicPreference};
 use zsim::time::Span;
 
 /// Start time, ns: ROS 1 times are unsigned 32-bit seconds since 1970.
@@ -107,7 +107,7 @@ fn without_polar_form(mut measurement: Measurement) -> Measurement {
 fn content(reader: &Reader) -> (Vec<Measurement>, f64) {
     let mut all = Vec::new();
     for topic in ["/scan", "/points"] {
-        let preference = Preference { lidar_topic: Some(topic.into()), imu_topic: None };
+        let preference = TopicPreference { lidar_topic: Some(topic.into()), imu_topic: None };
         let selection = reader.select(&preference).unwrap();
         let mut measurements = reader.measurements(&selection);
         all.extend(measurements.by_ref().map(|m| without_polar_form(m.unwrap())));

@@ -7,7 +7,7 @@ mod recordings;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use zsim::measurement::Sink;
-use zsim::recording::{Preference, Reader, Writer};
+use zsim::recording::{Reader, TopicPreference, Writer};
 use zsim::time::Stamp;
 
 /// Environment variable with the file that the child process records to.
@@ -44,7 +44,7 @@ fn a_killed_process_loses_only_its_last_chunk() {
     child.wait().unwrap();
 
     let reader = Reader::open(&path).unwrap();
-    let selection = reader.select(&Preference::default()).unwrap();
+    let selection = reader.select(&TopicPreference::default()).unwrap();
     let mut measurements = reader.measurements(&selection);
     let count = measurements.by_ref().filter(Result::is_ok).count();
     let loss = measurements.loss();

@@ -9,7 +9,7 @@ use zsim::estimation::{ClosedLoop, Estimator, OpenLoop, RegistrationInput, load,
 use zsim::evaluation::{Errors, Pairs};
 use zsim::geometry::{Pose, Rotation, Trajectory, Vector};
 use zsim::measurement::Calibration;
-use zsim::recording::{Preference, Reader, RunDescription, Writer};
+use zsim::recording::{Reader, RunDescription, TopicPreference, Writer};
 use zsim::simulation::{Scenario, Simulation};
 use zsim::spec::{Kind, names};
 
@@ -23,16 +23,16 @@ fn runs() -> [Run; 3] {
     ]
 }
 
-fn surveyed(run: &Run) -> OpenLoop {
-    let mut estimator = Estimator::new(&load("default").unwrap(), &calibration()).unwrap().surveying();
+fn open_loop_of(run: &Run) -> OpenLoop {
+    let mut estimator = Estimator::new(&load("default").unwrap(), &calibration()).unwrap().recording_surfels();
     run.measurements().into_iter().for_each(|measurement| estimator.push(measurement).unwrap());
     estimator.finish().unwrap()
 }
 
 fn registered(open: &OpenLoop, calibration: &Calibration) -> ClosedLoop {
     let covariances: Vec<_> = open.poses.iter().map(|pose| (pose.stamp, pose.covariance)).collect();
-    let OpenLoop { trajectory, lidar, survey, .. } = open;
-    let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, survey };
+    let OpenLoop { trajectory, lidar, observed, .. } = open;
+    let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, observed };
     register(travelled, calibration, &load("default").unwrap())
 }
 
@@ -45,7 +45,7 @@ fn closed(open: &OpenLoop) -> OpenLoop {
 #[test]
 fn loop_closure_increases_the_error_by_at_most_5_percent() {
     for (index, run) in runs().iter().enumerate() {
-        let open = surveyed(run);
+        let open = open_loop_of(run);
         let (before, after) = (Score::of(&open, run).rmse_m, Score::of(&closed(&open), run).rmse_m);
         assert!(after < 1.05 * before, "run {index}: {before} m before, {after} m after");
     }
@@ -56,9 +56,9 @@ fn the_open_loop_does_not_depend_on_the_storage_of_surfels() {
     let run = Run::new(Room::furnished(), Walk { start_s: 1.5, ..Walk::new((1.8, 1.2), 12.0) }, 24, 7.0);
     let mut plain = Estimator::new(&load("default").unwrap(), &calibration()).unwrap();
     run.measurements().into_iter().for_each(|measurement| plain.push(measurement).unwrap());
-    let (plain, with_survey) = (plain.finish().unwrap(), surveyed(&run));
-    assert!(plain.poses == with_survey.poses);
-    assert!(plain.survey.is_empty() && with_survey.survey.len() > 1000, "{}", with_survey.survey.len());
+    let (plain, with_surfels) = (plain.finish().unwrap(), open_loop_of(&run));
+    assert!(plain.poses == with_surfels.poses);
+    assert!(plain.observed.is_empty() && with_surfels.observed.len() > 1000, "{}", with_surfels.observed.len());
 }
 
 /// The open loop of a short run through a shipped scene, the true trajectory, and the head's calibration.
@@ -74,8 +74,9 @@ fn through(scene: &str, duration_s: f64) -> (OpenLoop, Trajectory, Calibration) 
     simulation.run(&mut writer, &mut |_| ()).unwrap();
     writer.finish().unwrap();
     let reader = Reader::open(&path).unwrap();
-    let selection = reader.select(&Preference::default()).unwrap();
-    let mut estimator = Estimator::new(&load("default").unwrap(), &simulation.calibration()).unwrap().surveying();
+    let selection = reader.select(&TopicPreference::default()).unwrap();
+    let mut estimator =
+        Estimator::new(&load("default").unwrap(), &simulation.calibration()).unwrap().recording_surfels();
     reader.measurements(&selection).for_each(|measurement| estimator.push(measurement.unwrap()).unwrap());
     (estimator.finish().unwrap(), reader.truth_trajectory().unwrap(), simulation.calibration())
 }
@@ -114,10 +115,10 @@ fn with_drift(trajectory: &Trajectory) -> Trajectory {
 fn a_drift_of_5_m_and_10_degrees_is_corrected() {
     let walk = Walk { start_s: 1.5, ..Walk::new((1.8, 1.2), 12.0) };
     let run = Run::new(Room::furnished(), walk, 25, 60.0);
-    let open = surveyed(&run);
+    let open = open_loop_of(&run);
     let trajectory = with_drift(&open.trajectory);
-    let survey = open.survey.along(&open.trajectory, &trajectory);
-    let with_drift = OpenLoop { trajectory, survey, ..open.clone() };
+    let observed = open.observed.along(&open.trajectory, &trajectory);
+    let with_drift = OpenLoop { trajectory, observed, ..open.clone() };
     let recovered = registered(&with_drift, &calibration());
     let score =
         |trajectory: &Trajectory| Score::of(&OpenLoop { trajectory: trajectory.clone(), ..open.clone() }, &run).rmse_m;

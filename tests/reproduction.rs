@@ -5,7 +5,7 @@
 use assert_cmd::Command;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use zsim::dynamics::{DampingSpec, HeadModel, Quantity, load};
+use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
 use zsim::motion::Axis;
 use zsim::study::gains::with_damping;
 use zsim::study::reproduction::{Experiment, Extent, PeaksSpec, fit_damping};
@@ -17,7 +17,7 @@ fn peaks(damping: DampingSpec, up_to_hz: f64) -> PeaksSpec {
     let (spec, source) = load("handheld").unwrap();
     let head = HeadModel::new(&with_damping(&spec, damping), &source).unwrap();
     let response = head.frequency_response(&head.default_points());
-    let peak = |axis| response.peak(axis, up_to_hz, Quantity::Kinematic).map(|peak| peak.gain);
+    let peak = |axis| response.peak(axis, up_to_hz, AccelerationKind::Kinematic).map(|peak| peak.gain);
     PeaksSpec {
         x_rot: peak(Axis::Roll),
         y_rot: peak(Axis::Pitch),

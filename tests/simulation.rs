@@ -226,11 +226,11 @@ fn stamps_agree_with_the_ground_truth_of_the_clocks() {
     // IMU time after the middle of its interval, which is the stamp.
     let scans = recorded.scans.iter().map(|(arrival, scan)| {
         let fired_s = arrival.seconds_since(EPOCH) - 0.01875 / (1.0 - 30e-6);
-        scan.stamp.seconds_since(EPOCH) - fired_s - ahead_at(fired_s, |clock| clock.lidar_ahead)
+        scan.stamp.seconds_since(EPOCH) - fired_s - ahead_at(fired_s, |clock| clock.lidar_offset)
     });
     let samples = recorded.samples.iter().map(|(arrival, sample)| {
         let middle_s = arrival.seconds_since(EPOCH) - 0.005 / (1.0 + 100e-6);
-        sample.stamp.seconds_since(EPOCH) - middle_s - ahead_at(middle_s, |clock| clock.imu_ahead)
+        sample.stamp.seconds_since(EPOCH) - middle_s - ahead_at(middle_s, |clock| clock.imu_offset)
     });
     // Standard deviation: jitter and rounding, uniform over a tick (tick / sqrt(12)), in quadrature.
     for (errors, sigma) in [

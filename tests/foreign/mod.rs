@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use zsim::measurement::{LidarScan, Measurement};
-use zsim::recording::{Preference, Reader, Selection};
+use zsim::recording::{Reader, Selection, TopicPreference};
 
 #[derive(Serialize, Clone)]
 pub struct Header {
@@ -174,7 +174,7 @@ pub const SCAN: &str = "sensor_msgs/msg/LaserScan";
 pub const TF: &str = "tf2_msgs/msg/TFMessage";
 
 pub fn select(reader: &Reader) -> Selection {
-    reader.select(&Preference::default()).unwrap()
+    reader.select(&TopicPreference::default()).unwrap()
 }
 
 pub fn scans(reader: &Reader) -> Vec<LidarScan> {

@@ -3,7 +3,7 @@
 use super::foreign::{self, Foreign, IMU, SCAN, select};
 use super::{MS, START_NS, moving, room};
 use zsim::measurement::{ImuSample, Measurement};
-use zsim::recording::{Preference, Reader};
+use zsim::recording::{Reader, TopicPreference};
 
 /// Samples of a selection, and its notes.
 fn samples(reader: &Reader) -> (Vec<ImuSample>, Vec<String>) {
@@ -59,7 +59,7 @@ fn split_imu_messages_are_paired_or_refused() {
             assert!((force - truth).norm() < 0.08, "{force} {truth}");
         }
     }
-    let error = |topics| record(topics).select(&Preference::default()).unwrap_err().to_string();
+    let error = |topics| record(topics).select(&TopicPreference::default()).unwrap_err().to_string();
     let lacks = error([Some("/imu/gyro"), None, None]);
     assert!(lacks.contains("IMU topic /imu/gyro has zeros for acceleration, and no other topic has it"), "{lacks}");
     let lacks = error([None, Some("/imu/acc"), None]);
@@ -82,7 +82,7 @@ fn accelerations_without_gravity_are_refused_and_units_of_gravity_are_not() {
         foreign.reader()
     };
     let linear = record(12, &|[x, y, z]| [x, y, z - 9.8]);
-    let error = linear.select(&Preference::default()).unwrap_err().to_string();
+    let error = linear.select(&TopicPreference::default()).unwrap_err().to_string();
     assert!(error.contains("IMU topic /phone/imu has accelerations without gravity (median 1."), "{error}");
     assert!(error.contains("TYPE_ACCELEROMETER"), "{error}");
     let (in_g, notes) = samples(&record(12, &|force| force.map(|c| c / 9.806_65)));

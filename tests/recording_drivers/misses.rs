@@ -2,7 +2,7 @@
 
 use super::foreign::{FLOAT32, Foreign, IMU, LaserScan, POINTS, SCAN, UINT32, header, imu, scan, scans, select};
 use super::{Fields, MS, START_NS, point_cloud, room, wall_m};
-use zsim::recording::{Preference, Reader};
+use zsim::recording::{Reader, TopicPreference};
 
 const XYZ: Fields<'static> = &[("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32), ("t", 12, UINT32)];
 
@@ -84,7 +84,7 @@ fn a_lidar_that_cannot_be_decoded_is_an_error_with_the_reason() {
         let mut foreign = Foreign::new(mcap::WriteOptions::new());
         let scan = LaserScan { angles, time_increment: times[0], scan_time: times[1], ..room(0, [0.1, 30.0], 0.0) };
         foreign.message("/imu", IMU, 0, &imu(0, "imu")).message("/sc\u{1b}[31man", SCAN, 0, &scan);
-        foreign.reader().select(&Preference::default()).unwrap_err().to_string()
+        foreign.reader().select(&TopicPreference::default()).unwrap_err().to_string()
     };
     let unusable = "foreign: no lidar topic can be used: topic /sc\\u{1b}[31man: ";
     let kind = " in its first sensor_msgs/msg/LaserScan message";
@@ -94,7 +94,7 @@ fn a_lidar_that_cannot_be_decoded_is_an_error_with_the_reason() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     let cloud = point_cloud(0, &[("range", 0, FLOAT32)], 4, &[vec![0; 4]]);
     foreign.message("/imu", IMU, 0, &imu(0, "imu")).message("/points", POINTS, 0, &cloud);
-    let error = foreign.reader().select(&Preference::default()).unwrap_err().to_string();
+    let error = foreign.reader().select(&TopicPreference::default()).unwrap_err().to_string();
     assert!(error.contains("topic /points: a cloud has no fields x, y and z"), "{error}");
 }
 

@@ -1,6 +1,6 @@
 //! Search region and acceptance thresholds of the relocalisation.
 
-use super::relocaliser::{Located, offset_pose, pose_distance};
+use super::relocaliser::{LocalisedPose, offset_pose, pose_distance};
 use crate::geometry::{Pose, Vector};
 
 /// Spacing of the start poses, m and rad: within half of it the coarsest surfels converge.
@@ -72,8 +72,8 @@ impl RelocalisationLimits {
     /// Start poses on a grid around the expected pose, each as a pair (start, current pose).
     pub(super) fn starts(&self, map_from_query: &Pose, viewpoint: &Vector) -> Vec<(Pose, Pose)> {
         let steps = |reach: f64, spacing: f64| {
-            let most = (reach / spacing).floor() as i32;
-            (-most..=most).map(move |k| f64::from(k) * spacing)
+            let steps = (reach / spacing).floor() as i32;
+            (-steps..=steps).map(move |k| f64::from(k) * spacing)
         };
         let reach_m = self.reach.0.min(MAX_START_OFFSET_M);
         let level =
@@ -89,7 +89,7 @@ impl RelocalisationLimits {
     }
 
     /// Whether a pose meets the acceptance thresholds.
-    pub(super) fn accepts(&self, found: &Located) -> bool {
+    pub(super) fn accepts(&self, found: &LocalisedPose) -> bool {
         found.inlier_ratio >= self.min_inlier_ratio
             && found.agreement >= self.min_agreement
             && found.residual_rms_m <= self.max_residual_m

@@ -4,7 +4,7 @@ use super::artefacts::{decimated, decimated_errors};
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use super::true_clock::true_offset;
-use super::{StudyError, Watch};
+use super::{ProgressMonitor, StudyError};
 use crate::estimation::EstimatorSpec;
 use crate::evaluation::{
     Consistency, Drift, Errors, EvaluationError, Pairs, RelativeError, clock_error, consistency, drift, relative_error,
@@ -53,7 +53,7 @@ impl AlignedErrors {
 pub(super) fn compare_with_truth(
     reader: &Reader,
     (map_from_head, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) -> Result<Option<Comparison>, StudyError> {
     let mut clock_offsets = Vec::new();
     let heads = reader.truth().filter_map(|record| match record {
@@ -93,7 +93,7 @@ pub(super) fn pairs_of(reader: &Reader, map_from_head: &Trajectory) -> Result<Pa
 }
 
 /// Returns the value, or reports the error as a note.
-fn or_note<T>(result: Result<T, EvaluationError>, watch: &mut Watch) -> Option<T> {
+fn or_note<T>(result: Result<T, EvaluationError>, watch: &mut ProgressMonitor) -> Option<T> {
     result.inspect_err(|error| watch.note(&error.to_string())).ok()
 }
 
@@ -168,7 +168,7 @@ pub(super) struct ImuOnlyDrift(f64);
 pub(super) fn imu_only(
     reader: &Reader,
     dead_reckoning: Result<&Trajectory, &EvaluationError>,
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) -> Result<Option<ImuOnlyDrift>, StudyError> {
     let dead_reckoning = dead_reckoning.map_err(Clone::clone);
     let Some(map_from_head) = or_note(dead_reckoning, watch) else { return Ok(None) };
@@ -197,7 +197,7 @@ pub(super) fn lidar_metrics(range_m: f64, extrinsics: &LidarCorrection, spec: &E
     LidarMetrics {
         range_correction_m: estimates_range.then_some(range_m),
         rotation_correction_deg: estimates_extrinsics
-            .then(|| (extrinsics.turn.scaled_axis() * 1_f64.to_degrees()).into()),
-        translation_correction_m: estimates_extrinsics.then(|| extrinsics.shift.into()),
+            .then(|| (extrinsics.rotation.scaled_axis() * 1_f64.to_degrees()).into()),
+        translation_correction_m: estimates_extrinsics.then(|| extrinsics.translation.into()),
     }
 }

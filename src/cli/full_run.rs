@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim::report::{self, Metrics};
 use zsim::simulation::Simulation;
-use zsim::study::{self, Outcome, Watch};
+use zsim::study::{self, EstimateResult, ProgressMonitor};
 
 #[derive(Args)]
 pub(super) struct Arguments {
@@ -32,12 +32,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let mut bars = Bars::new(global);
     recording_size::check(&simulation, &wanted, |note| bars.note(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
-    let written: Vec<PathBuf> = study::journey_files().iter().map(|name| folder.join(name)).collect();
+    let written: Vec<PathBuf> = study::full_run_files().iter().map(|name| folder.join(name)).collect();
     output::check_not_inputs(&arguments.scenario.inputs(scene), &written)?;
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));
-    let mut watch = Watch { stop: stop_flag(), report: &mut |event| bars.update(event) };
-    let outcome = study::journey(&simulation, &options, &folder, &mut watch);
+    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
+    let outcome = study::simulate_and_estimate(&simulation, &options, &folder, &mut watch);
     bars.finish();
     let outcome = outcome.inspect_err(|_| print_partial_results(&folder))?;
     print_outcome(global, &outcome, arguments.estimator.profile, &folder)
@@ -54,8 +54,8 @@ pub(super) fn print_partial_results(folder: &Path) {
 }
 
 /// Time of each part of the estimator, s, and of the open loop in total.
-fn seconds_by_part(outcome: &Outcome) -> Value {
-    let parts = outcome.spent.parts().into_iter().map(|(name, seconds)| (format!("{name}_s"), json!(seconds)));
+fn seconds_by_part(outcome: &EstimateResult) -> Value {
+    let parts = outcome.timing.parts().into_iter().map(|(name, seconds)| (format!("{name}_s"), json!(seconds)));
     let whole = ("open_loop_s".to_owned(), json!(outcome.metrics.open_loop.wall_s));
     Value::Object(parts.chain([whole]).collect())
 }
@@ -63,7 +63,7 @@ fn seconds_by_part(outcome: &Outcome) -> Value {
 /// Prints the results of an estimate, its times with `profile`, and its losses.
 pub(super) fn print_outcome(
     global: &Global,
-    outcome: &Outcome,
+    outcome: &EstimateResult,
     profile: bool,
     folder: &Path,
 ) -> anyhow::Result<Completion> {
@@ -74,7 +74,7 @@ pub(super) fn print_outcome(
     let mut words = report::summary(&outcome.metrics);
     if let (true, Some(wall_s)) = (profile, outcome.metrics.open_loop.wall_s) {
         words += "\n";
-        words += &report::time_spent(&outcome.spent, wall_s);
+        words += &report::timing_table(&outcome.timing, wall_s);
     }
     output::print_result(global, &words, figures, Some(folder))?;
     let Metrics { losses, status, .. } = &outcome.metrics;

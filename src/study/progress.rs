@@ -36,14 +36,14 @@ pub enum StudyEvent<'a> {
 }
 
 /// Progress callback and stop flag of an experiment.
-pub struct Watch<'a> {
+pub struct ProgressMonitor<'a> {
     /// The caller sets this flag to stop the experiment; open files are completed first.
     pub stop: &'a AtomicBool,
     /// Called with each event.
     pub report: &'a mut dyn FnMut(StudyEvent),
 }
 
-impl Watch<'_> {
+impl ProgressMonitor<'_> {
     pub(super) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }

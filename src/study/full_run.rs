@@ -2,8 +2,8 @@
 
 use super::cloud::Surroundings;
 use super::estimate::{Origin, estimate_in};
-use super::result_files::{journey_files, remove};
-use super::{EstimateOptions, Manifest, Outcome, StudyError, Watch, record};
+use super::result_files::{full_run_files, remove};
+use super::{EstimateOptions, EstimateResult, Manifest, ProgressMonitor, StudyError, record};
 use crate::recording::Reader;
 use crate::simulation::Simulation;
 use std::path::Path;
@@ -16,13 +16,13 @@ use std::path::Path;
 ///
 /// # Errors
 /// When a stage fails or the run is stopped; the files of the completed stages are in the folder.
-pub fn journey(
+pub fn simulate_and_estimate(
     simulation: &Simulation,
     options: &EstimateOptions,
     folder: &Path,
-    watch: &mut Watch,
-) -> Result<Outcome, StudyError> {
-    remove(folder, &journey_files())?;
+    watch: &mut ProgressMonitor,
+) -> Result<EstimateResult, StudyError> {
+    remove(folder, &full_run_files())?;
     let manifest = Manifest::of(simulation).with_estimator(&options.estimator);
     manifest.write(&folder.join("manifest.ron"))?;
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 /// Run time of the parts of the estimator, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct TimeSpent {
+pub struct Timing {
     /// IMU integration.
     pub integration_s: f64,
     /// Surfel extraction: projection, voxels, shapes.
@@ -27,7 +27,7 @@ pub struct TimeSpent {
     pub views_s: f64,
 }
 
-impl TimeSpent {
+impl Timing {
     /// Name and run time of each part, in order of execution.
     pub fn parts(&self) -> [(&'static str, f64); 9] {
         [
@@ -44,7 +44,7 @@ impl TimeSpent {
     }
 }
 
-impl AddAssign for TimeSpent {
+impl AddAssign for Timing {
     fn add_assign(&mut self, other: Self) {
         self.integration_s += other.integration_s;
         self.surfels_s += other.surfels_s;
@@ -58,7 +58,7 @@ impl AddAssign for TimeSpent {
     }
 }
 
-impl Sum for TimeSpent {
+impl Sum for Timing {
     fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
         all.fold(Self::default(), |mut sum, one| {
             sum += one;

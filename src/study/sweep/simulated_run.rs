@@ -6,7 +6,7 @@ use super::measure::Origin;
 use super::part::RunOutcome;
 use super::{LimitSpec, Plan, plan::ResolvedRun};
 use crate::estimation::{EstimatorSpec, Status};
-use crate::recording::{Preference, Reader, Writer};
+use crate::recording::{Reader, TopicPreference, Writer};
 use crate::report::IntegrityMetrics;
 use crate::simulation::Simulation;
 use crate::study::calibration::calibration;
@@ -15,7 +15,7 @@ use crate::study::coverage::{Coverage, CoveragePlan, coverage};
 use crate::study::integrity::{Integrity, path_length_m};
 use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
-use crate::study::{CalibrationSpec, StudyError, Watch, judge};
+use crate::study::{CalibrationSpec, ProgressMonitor, StudyError, comparison};
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -52,7 +52,9 @@ pub(super) fn record_simulations(
         writers.push(Writer::new(open()?, description(simulation, false)?)?);
         // The file is unlinked here; the open handles keep its content.
     }
-    with_time_limit(limit, |stop| record_together(&simulations, writers, &Watch { stop, report: &mut |_| {} }))?;
+    with_time_limit(limit, |stop| {
+        record_together(&simulations, writers, &ProgressMonitor { stop, report: &mut |_| {} })
+    })?;
     Ok(simulations
         .into_iter()
         .zip(handles)
@@ -140,7 +142,7 @@ struct EstimateMetrics {
     closed_position_rmse_m: Option<f64>,
     status: Status,
     integrity: IntegrityMetrics,
-    way_m: f64,
+    path_length_m: f64,
 }
 
 impl EstimateMetrics {
@@ -158,7 +160,7 @@ impl EstimateMetrics {
             Measure::BoundM99 => self.integrity.bound_m_99,
             Measure::WithinBound => self.integrity.within_bound,
             Measure::BoundOverError => self.integrity.bound_over_error,
-            Measure::WayM => Some(self.way_m),
+            Measure::WayM => Some(self.path_length_m),
             _ => None,
         };
         figure.filter(|figure| figure.is_finite())
@@ -174,29 +176,30 @@ fn estimate(
 ) -> Result<EstimateMetrics, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     pool.install(|| {
-        let mut watch = Watch { stop, report: &mut |_| {} };
+        let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
         let reader = Reader::new("the recording", recording)?;
-        let selection = reader.select(&Preference::default())?;
+        let selection = reader.select(&TopicPreference::default())?;
         let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
-        let how = OpenLoopOptions { estimator, calibration: &found.calibration, surveying: closes_loops, map: None };
+        let how =
+            OpenLoopOptions { estimator, calibration: &found.calibration, recording_surfels: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
-        let known = judge::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
-        let open_loop = judge::open_loop_metrics(&run, known.as_ref(), None);
+        let known = comparison::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
+        let open_loop = comparison::open_loop_metrics(&run, known.as_ref(), None);
         let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator));
         let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
         let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
-        let pairs = judge::pairs_of(&reader, map_from_head)?;
+        let pairs = comparison::pairs_of(&reader, map_from_head)?;
         let closed_errors = match closed {
-            Some(_) => judge::compare_with_truth(&reader, (map_from_head, &[]), &mut watch)?,
+            Some(_) => comparison::compare_with_truth(&reader, (map_from_head, &[]), &mut watch)?,
             None => None,
         };
         Ok(EstimateMetrics {
             open_loop,
-            clock: judge::clock_metrics(&run, known.as_ref()),
+            clock: comparison::clock_metrics(&run, known.as_ref()),
             closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
             status: integrity.status(),
             integrity: integrity.metrics(&run, Some(pairs)),
-            way_m: path_length_m(map_from_head),
+            path_length_m: path_length_m(map_from_head),
         })
     })
 }
