@@ -1,6 +1,6 @@
 //! A small recording for the tests of writing and reading.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
