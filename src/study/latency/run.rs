@@ -7,7 +7,7 @@ use super::{ClockState, Disturbance, LatencySpec};
 use crate::estimation::{self, EstimatorSpec};
 use crate::measurement::Calibration;
 use crate::recording::{Preference, Reader, Selection};
-use crate::simulation::{Simulation, Specs};
+use crate::simulation::{Run, Simulation};
 use crate::spec::Source;
 use crate::study::cloud::Surroundings;
 use crate::study::reproduction::part_store::PartStore;
@@ -24,7 +24,7 @@ const RECORDING: &str = "recording.mcap";
 #[derive(Debug, Clone)]
 pub struct LatencyStudy {
     spec: LatencySpec,
-    specs: Specs,
+    run: Run,
     estimator: EstimatorSpec,
 }
 
@@ -128,8 +128,8 @@ impl LatencyStudy {
         spec.check(source)?;
         let estimator = estimation::load(&spec.estimator)?;
         estimator.check()?;
-        let (specs, _) = Specs::load(&spec.scenario)?;
-        Ok(Self { spec: spec.clone(), specs, estimator })
+        let run = Run::load(&spec.scenario)?;
+        Ok(Self { spec: spec.clone(), run, estimator })
     }
 
     /// The spec of the study.
@@ -139,7 +139,7 @@ impl LatencyStudy {
 
     /// Everything that determines the result; a folder with other inputs is not resumed.
     pub(in crate::study) fn inputs(&self) -> impl Serialize + use<> {
-        (env!("CARGO_PKG_VERSION"), self.spec.clone(), self.specs.clone(), self.estimator.clone())
+        (env!("CARGO_PKG_VERSION"), self.spec.clone(), self.run.clone(), self.estimator.clone())
     }
 
     /// Runs the study in `folder`, resuming an interrupted one; `on_progress` receives the finished fraction.

@@ -1,7 +1,7 @@
 //! Runs that are evaluated in closed form.
 
-use super::component::{Component, Slot};
 use super::part::RunOutcome;
+use super::tree::ClosedForm;
 use super::{Measure, Plan};
 use crate::study::StudyError;
 use crate::study::spring::{DesignMetrics, closed_form};
@@ -21,13 +21,9 @@ pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutc
 }
 
 fn figures(plan: &Plan, index: u64) -> Result<DesignMetrics, StudyError> {
-    let changed = plan.changed_specs(index)?;
-    let (head, run) = (plan.component(&changed, Slot::Head)?, plan.component(&changed, Slot::Run)?);
-    let (Component::Head(spec), Component::Shake(settings)) = (&head.component, &run.component) else {
-        let message = "unexpected kind of spec in a slot".to_owned();
-        return Err(StudyError::Plan { what: "plan", message });
-    };
-    closed_form(spec, &head.source(), &settings.shake)
+    let inputs = plan.inputs(index)?.closed_form();
+    let ClosedForm { shake, head } = inputs.map_err(|message| StudyError::Plan { what: "run", message })?;
+    closed_form(&head.spec, &head.source(), &shake)
 }
 
 fn figure(measure: Measure, of: &DesignMetrics) -> Option<f64> {

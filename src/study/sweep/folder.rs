@@ -8,15 +8,16 @@
 //! ```
 
 use super::axis::SpecSet;
-use super::component::{NamedComponent, Slot};
 use super::identity::ContentHash;
 use super::table::{Column, ColumnType, Table, TableWriter};
+use super::tree::Tree;
 use super::{BaseSpec, Plan, SweepSpec};
 use crate::spec::{self, Source, SpecError, to_text};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -35,8 +36,8 @@ struct PlanFile {
     /// Hash of all runs in their order.
     identity: String,
     spec: SweepSpec,
-    base: BTreeMap<Slot, NamedComponent>,
-    others: BTreeMap<String, NamedComponent>,
+    base: Tree,
+    named: BTreeMap<String, Value>,
 }
 
 /// Runs that are stored together in one part file.
@@ -81,7 +82,7 @@ impl Plan {
             identity: identity.to_string(),
             spec: self.spec().clone(),
             base: self.specs().base.clone(),
-            others: self.specs().others.clone(),
+            named: self.specs().named.clone(),
         };
         let plan = plan_path(folder);
         let written = temporary.join("points.parquet");
@@ -113,14 +114,12 @@ impl Plan {
         let mut all = Vec::new();
         for first in (0..self.points()).step_by(ROWS_PER_GROUP as usize) {
             let numbers: Vec<u64> = (first..(first + ROWS_PER_GROUP).min(self.points())).collect();
-            let runs: Vec<(ContentHash, ContentHash)> = numbers
-                .par_iter()
-                .map(|index| self.resolve(*index).map(|run| (run.identity, run.rays)))
-                .collect::<Result<_, _>>()?;
-            let task = |(index, (_, rays)): (&u64, &(ContentHash, ContentHash))| {
-                Some(match self.spec().base {
-                    BaseSpec::Spring { .. } => (index / RUNS_PER_PART) as i64,
-                    BaseSpec::Journey { .. } => {
+            let runs: Vec<(ContentHash, Option<ContentHash>)> =
+                numbers.par_iter().map(|index| self.hashes_of(*index)).collect::<Result<_, _>>()?;
+            let task = |(index, (_, rays)): (&u64, &(ContentHash, Option<ContentHash>))| {
+                Some(match rays {
+                    None => (index / RUNS_PER_PART) as i64,
+                    Some(rays) => {
                         let next = tasks.len() as i64;
                         *tasks.entry(*rays).or_insert(next)
                     }
@@ -136,6 +135,16 @@ impl Plan {
         }
         table.finish()?;
         Ok(ContentHash::of(all.iter().map(ContentHash::bytes)))
+    }
+
+    /// Hash of run `index`, and of its physics and rays, if any.
+    fn hashes_of(&self, index: u64) -> Result<(ContentHash, Option<ContentHash>), StudyError> {
+        let inputs = self.inputs(index)?;
+        let rays = match self.spec().base {
+            BaseSpec::Spring { .. } => None,
+            BaseSpec::Journey { .. } => Some(self.journey(index, &inputs)?.rays),
+        };
+        Ok((self.identity(index, &inputs)?, rays))
     }
 
     /// Names and types of the columns of axis values and seed.
@@ -186,7 +195,7 @@ impl Sweep {
             );
             return Err(SpecError::plain(source.name, message).into());
         }
-        let mut specs = SpecSet { base: file.base, others: file.others };
+        let mut specs = SpecSet { base: file.base, named: file.named };
         let plan = Plan::with_specs(&file.name, &file.spec, &mut specs, &source)?;
         let path = points_path(folder);
         let damaged = || SpecError::plain(path.display().to_string(), "does not match the plan: plan the sweep again");

@@ -1,10 +1,10 @@
 //! Runs that are simulated, recorded and estimated.
 
 use super::Measure;
-use super::component::{Component, Slot};
 use super::measure::Origin;
 use super::part::RunOutcome;
-use super::{LimitSpec, Plan, plan::ResolvedRun};
+use super::tree::Journey;
+use super::{LimitSpec, Plan};
 use crate::estimation::{EstimatorSpec, Status};
 use crate::recording::{Preference, Reader, Writer};
 use crate::report::IntegrityMetrics;
@@ -62,10 +62,10 @@ pub(super) fn record_simulations(
 
 impl TemporaryRecording {
     /// Evaluates a run on this recording, read by thread `reader`.
-    pub fn evaluate(&self, plan: &Plan, run: &ResolvedRun, reader: usize) -> RunOutcome {
+    pub fn evaluate(&self, (plan, limit): (&Plan, LimitSpec), run: &Journey, reader: usize) -> RunOutcome {
         let measures = plan.result_measures();
         let started = Instant::now();
-        let outcome = match self.figures(plan, run, &measures, reader) {
+        let outcome = match self.figures((limit, &measures), run, reader) {
             Ok(figures) => RunOutcome { figures, ..RunOutcome::default() },
             Err(error) => RunOutcome::from_error(measures.len(), &error),
         };
@@ -74,12 +74,10 @@ impl TemporaryRecording {
 
     fn figures(
         &self,
-        plan: &Plan,
-        run: &ResolvedRun,
-        measures: &[Measure],
+        (limit, measures): (LimitSpec, &[Measure]),
+        run: &Journey,
         reader: usize,
     ) -> Result<Vec<Option<f64>>, StudyError> {
-        let limit = plan.limit().ok_or_else(|| wrong_kind("limit"))?;
         let needs = |origin: Origin| measures.iter().any(|measure| measure.origin() == origin);
         let swing = match needs(Origin::Swing) || needs(Origin::SwingOrClosedForm) {
             true => Some(self.swing()?),
@@ -87,12 +85,9 @@ impl TemporaryRecording {
         };
         let estimated = match self.handles.get(reader).filter(|_| needs(Origin::Estimate)) {
             Some(handle) => {
-                let Component::Estimator(estimator) = &plan.component(&run.changed, Slot::Estimator)?.component else {
-                    return Err(wrong_kind("estimator"));
-                };
                 let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
                 let closes_loops = measures.contains(&Measure::ClosedPositionRmseM);
-                Some(with_time_limit(limit, |stop| estimate(file, estimator, closes_loops, stop))?)
+                Some(with_time_limit(limit, |stop| estimate(file, &run.estimator.spec, closes_loops, stop))?)
             }
             None => None,
         };
@@ -108,16 +103,12 @@ impl TemporaryRecording {
         let simulation = &self.simulation;
         let usual = CoveragePlan::default();
         let plan = CoveragePlan {
-            duration_s: simulation.scenario().duration_s - usual.from_s,
+            duration_s: simulation.inputs().duration_s - usual.from_s,
             rate_limit_deg_per_s: simulation.imu().spec().gyro.limit_deg_per_s,
             ..usual
         };
         coverage(simulation.head(), simulation.motion(), simulation.lidar(), &plan, |_| ())
     }
-}
-
-fn wrong_kind(what: &str) -> StudyError {
-    StudyError::Plan { what: "the plan", message: format!("{what} is missing for a journey") }
 }
 
 fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {

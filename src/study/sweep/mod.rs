@@ -12,7 +12,6 @@
 mod axis;
 mod check;
 mod closed_form;
-mod component;
 mod design;
 mod folder;
 mod identity;
@@ -33,6 +32,7 @@ mod spec;
 mod summary;
 mod table;
 mod task;
+mod tree;
 mod trend;
 mod worker;
 

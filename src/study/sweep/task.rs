@@ -4,7 +4,7 @@ use super::identity::ContentHash;
 use super::journey::{MAX_RECORDINGS, TemporaryRecording, record_simulations};
 use super::measure::Origin;
 use super::part::RunOutcome;
-use super::plan::ResolvedRun;
+use super::plan::PlannedJourney;
 use super::{LimitSpec, Sweep};
 use crate::simulation::Simulation;
 use crate::study::StudyError;
@@ -43,7 +43,7 @@ impl WorkerMessage {
 
 /// Runs with the same recording.
 struct SharedRecording {
-    runs: Vec<(usize, ResolvedRun)>,
+    runs: Vec<(usize, PlannedJourney)>,
 }
 
 /// Limits the memory of this process, and ends it when its parent ends; only on Linux.
@@ -90,8 +90,9 @@ impl Sweep {
         let mut shared: Vec<SharedRecording> = Vec::new();
         let mut groups: BTreeMap<ContentHash, usize> = BTreeMap::new();
         for unit in self.missing_units(task)? {
-            let run = self.plan.resolve(self.units[unit].first)?;
-            let group = *groups.entry(run.simulation).or_insert(shared.len());
+            let index = self.units[unit].first;
+            let run = self.plan.journey(index, &self.plan.inputs(index)?)?;
+            let group = *groups.entry(run.recording).or_insert(shared.len());
             if group == shared.len() {
                 shared.push(SharedRecording { runs: Vec::new() });
             }
@@ -125,9 +126,8 @@ impl Sweep {
         let mut simulations: Vec<Simulation> = Vec::new();
         let mut groups: Vec<&SharedRecording> = Vec::new();
         for each in shared {
-            let Some((unit, run)) = each.runs.first() else { continue };
-            let seed = self.plan.seed(self.units[*unit].first).unwrap_or_default();
-            match self.plan.simulation(&run.changed, seed) {
+            let Some((_, run)) = each.runs.first() else { continue };
+            match Simulation::build(run.inputs.simulation.clone()).map_err(StudyError::from) {
                 Ok(simulation) => {
                     simulations.push(simulation);
                     groups.push(each);
@@ -141,19 +141,19 @@ impl Sweep {
             Err(error @ StudyError::File { .. }) => return Err(error),
             Err(error) => return groups.into_iter().try_for_each(|each| self.fail(each, &error, report)),
         };
-        let runs: Vec<(&TemporaryRecording, &(usize, ResolvedRun))> = recordings
+        let runs: Vec<(&TemporaryRecording, &(usize, PlannedJourney))> = recordings
             .iter()
             .zip(groups)
             .flat_map(|(recording, each)| each.runs.iter().map(move |run| (recording, run)))
             .collect();
-        self.estimate_runs(&runs, threads, report)
+        self.estimate_runs(&runs, (limit, threads), report)
     }
 
     /// Estimates the runs in parallel, each on one thread.
     fn estimate_runs(
         &self,
-        runs: &[(&TemporaryRecording, &(usize, ResolvedRun))],
-        threads: usize,
+        runs: &[(&TemporaryRecording, &(usize, PlannedJourney))],
+        (limit, threads): (LimitSpec, usize),
         report: &(dyn Fn(WorkerMessage) + Sync),
     ) -> Result<(), StudyError> {
         let next = AtomicUsize::new(0);
@@ -164,7 +164,8 @@ impl Sweep {
                     continue;
                 }
                 report(WorkerMessage::Begin(*unit));
-                self.write_part(&self.units[*unit], &[recording.evaluate(&self.plan, run, reader)])?;
+                let outcome = recording.evaluate((&self.plan, limit), &run.inputs, reader);
+                self.write_part(&self.units[*unit], &[outcome])?;
                 report(WorkerMessage::Done(*unit));
             }
             Ok::<(), StudyError>(())
