@@ -64,6 +64,11 @@ impl<T: NamedSpec> Named<T> {
 }
 
 impl<T> Named<T> {
+    /// A spec that is not from a file.
+    pub fn in_memory(name: impl Into<String>, spec: T) -> Self {
+        Self { name: name.into(), folder: None, spec, source: None }
+    }
+
     /// Source for error messages and relative paths.
     pub fn source(&self) -> Source {
         let stored = || Source { name: self.name.clone(), folder: self.folder.clone(), text: String::new() };

@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// First 128 bits of a SHA-256: collisions are negligible for any feasible number of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct ContentHash([u8; 16]);
+pub(in crate::study) struct ContentHash([u8; 16]);
 
 impl ContentHash {
     /// Hash of a sequence of byte strings; lengths are hashed too, so that boundaries matter.
@@ -52,6 +52,12 @@ pub(super) struct InputHash {
 /// Key of the settings without a name.
 const UNNAMED: &str = "run";
 
+/// Key of the timing errors, which do not affect the recording.
+const TIMING: &str = "timing";
+
+/// Keys of the inputs that do not affect the recording.
+pub(super) const AFTER_RECORDING: [&str; 2] = [TIMING, "estimator"];
+
 /// Hashes of the inputs of a run by key, in the order of its tree; settings without a name come first.
 pub(super) type InputHashes = Vec<(String, InputHash)>;
 
@@ -63,8 +69,11 @@ pub(super) fn input_hashes(tree: &Tree, known: Option<(&Tree, &InputHashes)>) ->
             is_known.and_then(|(_, hashes)| hashes.iter().find(|(other, _)| other == key).map(|(_, hash)| *hash));
         Ok((key.to_owned(), hash.map_or_else(|| named_hash(key, &tree.0[key]), Ok)?))
     };
-    let unnamed = (UNNAMED.to_owned(), input_hash(UNNAMED, &tree.unnamed(), None)?);
-    std::iter::once(Ok(unnamed)).chain(tree.named_keys().map(of)).collect()
+    let mut settings = tree.unnamed();
+    settings.retain(|key, _| key != TIMING);
+    let unnamed = (UNNAMED.to_owned(), input_hash(UNNAMED, &Value::Object(settings), None)?);
+    let timing = tree.0.get(TIMING).map(|timing| Ok((TIMING.to_owned(), input_hash(TIMING, timing, None)?)));
+    std::iter::once(Ok(unnamed)).chain(timing).chain(tree.named_keys().map(of)).collect()
 }
 
 fn named_hash(key: &str, named: &Value) -> Result<InputHash, StudyError> {

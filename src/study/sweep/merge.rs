@@ -55,7 +55,7 @@ impl Sweep {
         for unit in &self.units {
             let part = self.read_part(unit)?;
             counter.add(unit, &part);
-            let Part::Done(columns) = part else { continue };
+            let Part::Done { columns, .. } = part else { continue };
             buffer.append(self, unit, columns);
             if buffer.numbers.len() as u64 >= ROWS_PER_GROUP {
                 tables.write(self, std::mem::replace(&mut buffer, self.empty_buffer()))?;
@@ -174,7 +174,7 @@ struct ProgressCounter {
 
 impl ProgressCounter {
     fn add(&mut self, unit: &Unit, part: &Part) {
-        let Part::Done(columns) = part else {
+        let Part::Done { columns, .. } = part else {
             self.missing += unit.count;
             self.damaged += if *part == Part::Damaged { unit.count } else { 0 };
             return;

@@ -3,12 +3,14 @@
 use super::axis::{Axis, Level, SpecSet};
 use super::check::{MAX_RUNS, check};
 use super::design::{AxisSize, Design};
-use super::identity::{ContentHash, InputHashes, input_hashes};
-use super::tree::{Journey, Tree};
+use super::identity::{AFTER_RECORDING, ContentHash, InputHashes, input_hashes};
+use super::tree::{GainRun, Journey, Tree};
 use super::{BaseSpec, LimitSpec, Measure, Setting, SweepSpec};
-use crate::simulation::Simulation;
+use crate::dynamics::HeadSpec;
+use crate::simulation::{Named, Simulation};
 use crate::spec::{Source, SpecError};
 use crate::study::StudyError;
+use crate::study::gains::GainsSpec;
 
 /// A sweep with resolved specs; [`Plan::write`] stores it in a folder.
 #[derive(Debug, Clone)]
@@ -45,6 +47,23 @@ impl Plan {
             Simulation::build(journey.map_err(|message| StudyError::Plan { what: "base", message })?.simulation)?;
         }
         Ok(plan)
+    }
+
+    /// The plan of gains of `heads`, which axes refer to by name; the first is that of the base run.
+    ///
+    /// # Errors
+    /// If the spec is invalid.
+    pub(in crate::study) fn of_gains(
+        name: &str,
+        spec: &SweepSpec,
+        gains: GainsSpec,
+        heads: Vec<Named<HeadSpec>>,
+    ) -> Result<Self, StudyError> {
+        let named = heads.iter().map(|head| Ok((format!("head/{}", head.name), serde_json::to_value(head)?)));
+        let named = named.collect::<Result<_, StudyError>>()?;
+        let base =
+            heads.into_iter().next().map_or_else(|| Ok(Tree::default()), |head| Tree::of(&GainRun { gains, head }))?;
+        Self::with_specs(name, spec, &mut SpecSet { base, named }, &Source::in_memory(name, ""))
     }
 
     /// Builds the plan from specs that are loaded already.
@@ -108,7 +127,7 @@ impl Plan {
     /// Time and memory limits of a run; `None` for closed forms.
     pub(super) fn limit(&self) -> Option<LimitSpec> {
         match self.spec.base {
-            BaseSpec::Spring { .. } => None,
+            BaseSpec::Spring { .. } | BaseSpec::Gains { .. } => None,
             BaseSpec::Journey { limit, .. } => Some(limit),
         }
     }
@@ -164,7 +183,10 @@ impl Plan {
         let hashes = self.hashes(inputs)?;
         let rays = serde_json::to_string(&journey.simulation.ray_inputs()?)?;
         let files = hashes.iter().map(|(_, hash)| hash.files.bytes());
-        let recorded = hashes.iter().filter(|(key, _)| key != "estimator").map(|(_, hash)| hash.full.bytes());
+        let recorded = hashes
+            .iter()
+            .filter(|(key, _)| !AFTER_RECORDING.contains(&key.as_str()))
+            .map(|(_, hash)| hash.full.bytes());
         Ok(PlannedJourney {
             inputs: journey,
             recording: self.hash(index, b"simulation", recorded),

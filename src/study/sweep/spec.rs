@@ -1,7 +1,10 @@
 //! Spec of a sweep: `specs/studies/NAME.ron`.
 
 use super::Measure;
+use crate::simulation::Scenario;
 use crate::spec::checked;
+use crate::study::gains::GainsSpec;
+use crate::study::latency::TimingSpec;
 use crate::study::spring::Shake;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -27,6 +30,9 @@ pub struct SweepSpec {
     /// Goals of the Pareto front, at least two; no front if empty.
     #[serde(default)]
     pub front: Vec<GoalSpec>,
+    /// Limits of the runs in the Pareto front.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<MeasureLimitSpec>,
 }
 
 /// The base run. Each spec is a path or a name in the library.
@@ -39,6 +45,13 @@ pub enum BaseSpec {
         head: String,
         /// Shake of the hand.
         shake: Shake,
+    },
+    /// The gains of a head, by a simulation on a base that is shaken along or about one axis.
+    Gains {
+        /// Head with its linkage.
+        head: String,
+        /// Axis and settings of the measurement.
+        gains: GainsSpec,
     },
     /// A journey: simulation, recording, open-loop estimation, evaluation.
     Journey {
@@ -58,8 +71,15 @@ pub enum BaseSpec {
         /// is a list without faults.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         faults: Option<String>,
+        /// A second IMU on the base; none by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        base_imu: Option<String>,
         /// Settings of the estimator.
         estimator: String,
+        /// Timing errors that replace the true offset of the clocks, and the evaluation of the map with them; none by
+        /// default. An axis over timing requires this key.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        timing: Option<TimingSpec>,
         /// Route in the scene; the scene's default route if omitted.
         #[serde(default)]
         route: Option<String>,
@@ -192,24 +212,95 @@ pub enum Sampling {
     },
 }
 
-/// A goal: a measure to minimise or maximise.
+/// A goal for a measure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GoalSpec {
     /// The measure.
+    #[serde(alias = "figure")]
     pub measure: Measure,
-    /// Whether to minimise or maximise it.
+    /// Aim: a target value, minimum or maximum.
     pub aim: Aim,
 }
 
-/// Direction of optimisation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+/// Aim of a goal.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Aim {
+    /// Reach this value.
+    Target(#[serde(with = "checked::Positive")] f64),
     /// Minimise.
     Least,
     /// Maximise.
     Most,
+}
+
+impl GoalSpec {
+    /// Cost of a value; lower is better. For a target, the relative deviation.
+    pub fn cost(&self, value: f64) -> f64 {
+        match self.aim {
+            Aim::Target(target) => (value / target - 1.0).abs(),
+            Aim::Least => value,
+            Aim::Most => -value,
+        }
+    }
+}
+
+/// A limit of a measure: designs and runs outside it are not in the Pareto front.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeasureLimitSpec {
+    /// The measure.
+    #[serde(alias = "figure")]
+    pub measure: Measure,
+    /// Minimum value.
+    #[serde(default)]
+    pub least: Option<f64>,
+    /// Maximum value.
+    #[serde(default)]
+    pub most: Option<f64>,
+}
+
+impl MeasureLimitSpec {
+    /// Relative violation of the limit; 0 if the value is within.
+    pub fn excess(&self, value: f64) -> f64 {
+        let below = self.least.map_or(0.0, |least| (least - value) / least.abs().max(1e-9));
+        let above = self.most.map_or(0.0, |most| (value - most) / most.abs().max(1e-9));
+        below.max(above).max(0.0)
+    }
+}
+
+impl BaseSpec {
+    /// Runs per part file: of fast runs, the work that a kill loses at most on each thread.
+    pub(super) fn runs_per_part(&self) -> u64 {
+        if matches!(self, Self::Spring { .. }) { 250 } else { 1 }
+    }
+
+    /// Replaces the scenario and the estimator of a journey; other runs have none.
+    pub fn set_scenario(&mut self, new: Scenario, new_estimator: &str) {
+        let Self::Journey {
+            scene,
+            head,
+            motion,
+            lidar,
+            imu,
+            clock,
+            faults,
+            base_imu,
+            estimator,
+            route,
+            duration_s,
+            timing: _,
+            limit: _,
+        } = self
+        else {
+            return;
+        };
+        (*scene, *head, *motion, *lidar) = (new.scene, new.head, new.motion, new.lidar);
+        (*imu, *clock, *faults, *base_imu) = (new.imu, new.clock, new.faults, new.base_imu);
+        (*route, *duration_s) = (new.route, new.duration_s);
+        new_estimator.clone_into(estimator);
+    }
 }
 
 impl AxisSpec {

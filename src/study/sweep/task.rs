@@ -101,14 +101,14 @@ impl Sweep {
         shared.chunks(MAX_RECORDINGS).try_for_each(|some| self.run_shared(some, limit, report))
     }
 
-    /// Runs a block of closed forms, unless it is finished.
+    /// Runs a block of runs in this process, unless it is finished.
     pub(super) fn run_block(&self, unit: usize) -> Result<(), StudyError> {
         let unit = &self.units[unit];
         if self.is_done(unit)? {
             return Ok(());
         }
         let measures = self.plan.result_measures();
-        let evaluate = |index| super::closed_form::evaluate(&self.plan, &measures, index);
+        let evaluate = |index| super::in_process::evaluate(&self.plan, &measures, index);
         let outcomes: Vec<RunOutcome> = (unit.first..unit.first + unit.count).map(evaluate).collect();
         self.write_part(unit, &outcomes)
     }
@@ -122,7 +122,7 @@ impl Sweep {
     ) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
         let measures = self.plan.result_measures();
-        let recorded = measures.iter().any(|measure| measure.origin() == Origin::Estimate);
+        let recorded = measures.iter().any(|measure| matches!(measure.origin(), Origin::Estimate | Origin::Map));
         let mut simulations: Vec<Simulation> = Vec::new();
         let mut groups: Vec<&SharedRecording> = Vec::new();
         for each in shared {

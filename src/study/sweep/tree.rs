@@ -9,24 +9,35 @@ use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
 use crate::simulation::{FaultsSpec, Named, NamedSpec, Run, Scenario};
 use crate::spec::{Kind, SpecError};
 use crate::study::StudyError;
+use crate::study::gains::GainsSpec;
+use crate::study::latency::TimingSpec;
 use crate::study::spring::Shake;
 use crate::world::SceneSpec;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-/// Inputs of a journey: the simulation, and the estimator.
+/// Inputs of a journey: the simulation, the estimator, and timing errors between them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Journey {
+pub(in crate::study) struct Journey {
     #[serde(flatten)]
     pub simulation: Run,
     pub estimator: Named<EstimatorSpec>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timing: Option<TimingSpec>,
 }
 
 /// Inputs of a closed form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct ClosedForm {
     pub shake: Shake,
+    pub head: Named<HeadSpec>,
+}
+
+/// Inputs of a gain measurement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct GainRun {
+    pub gains: GainsSpec,
     pub head: Named<HeadSpec>,
 }
 
@@ -52,12 +63,23 @@ const SEED: &str = "seed";
 impl Tree {
     /// Loads the specs of a base run.
     pub fn load(base: &BaseSpec) -> Result<Self, StudyError> {
-        let inputs = match base {
-            BaseSpec::Spring { head, shake } => {
-                serde_json::to_value(ClosedForm { shake: *shake, head: Named::load(head)? })?
-            }
+        match base {
+            BaseSpec::Spring { head, shake } => Self::of(&ClosedForm { shake: *shake, head: Named::load(head)? }),
+            BaseSpec::Gains { head, gains } => Self::of(&GainRun { gains: *gains, head: Named::load(head)? }),
             BaseSpec::Journey {
-                scene, head, motion, lidar, imu, clock, faults, estimator, route, duration_s, ..
+                scene,
+                head,
+                motion,
+                lidar,
+                imu,
+                clock,
+                faults,
+                base_imu,
+                estimator,
+                timing,
+                route,
+                duration_s,
+                limit: _,
             } => {
                 let scenario = Scenario {
                     scene: scene.clone(),
@@ -66,16 +88,21 @@ impl Tree {
                     lidar: lidar.clone(),
                     imu: imu.clone(),
                     clock: clock.clone(),
-                    base_imu: None,
+                    base_imu: base_imu.clone(),
                     faults: faults.clone(),
                     route: route.clone(),
                     duration_s: *duration_s,
                     seed: Seed(0),
                 };
-                serde_json::to_value(Journey { simulation: Run::load(&scenario)?, estimator: Named::load(estimator)? })?
+                let simulation = Run::load(&scenario)?;
+                Self::of(&Journey { simulation, estimator: Named::load(estimator)?, timing: *timing })
             }
-        };
-        let Value::Object(mut inputs) = inputs else { return Ok(Self::default()) };
+        }
+    }
+
+    /// The tree of the inputs of a run.
+    pub fn of<T: Serialize>(inputs: &T) -> Result<Self, StudyError> {
+        let Value::Object(mut inputs) = serde_json::to_value(inputs)? else { return Ok(Self::default()) };
         inputs.retain(|key, _| key != SEED);
         Ok(Self(inputs))
     }
@@ -91,7 +118,7 @@ impl Tree {
     }
 
     /// The settings without a name: duration and route, or the shake of the hand.
-    pub fn unnamed(&self) -> Value {
+    pub fn unnamed(&self) -> Map<String, Value> {
         self.0.iter().filter(|(key, _)| !self.is_named(key)).map(|(key, value)| (key.clone(), value.clone())).collect()
     }
 
@@ -103,7 +130,7 @@ impl Tree {
         let keys: Vec<&str> = path.split('.').collect();
         if !self.is_named(keys[0]) {
             let named: Vec<&str> = self.named_keys().collect();
-            return settings::find(&self.unnamed(), &keys)
+            return settings::find(&Value::Object(self.unnamed()), &keys)
                 .map_err(|error| format!("{error}, and the settings of {}", named.join(", ")));
         }
         if keys.len() == 1 {
@@ -141,6 +168,7 @@ impl Tree {
         inputs.insert(SEED.to_owned(), seed.into());
         let journey: Journey = read(inputs)?;
         journey.estimator.spec.check().map_err(|error| error.to_string())?;
+        journey.timing.map_or(Ok(()), |timing| timing.check(journey.simulation.duration_s))?;
         Ok(journey)
     }
 
@@ -152,6 +180,14 @@ impl Tree {
         read(self.0.clone())
     }
 
+    /// The inputs of a gain measurement.
+    ///
+    /// # Errors
+    /// A message if a value is invalid.
+    pub fn gain_run(&self) -> Result<GainRun, String> {
+        read(self.0.clone())
+    }
+
     /// Checks that the values are valid for a base run.
     ///
     /// # Errors
@@ -159,6 +195,7 @@ impl Tree {
     pub fn check(&self, base: &BaseSpec) -> Result<(), String> {
         match base {
             BaseSpec::Spring { .. } => self.closed_form().map(drop),
+            BaseSpec::Gains { .. } => self.gain_run().map(drop),
             BaseSpec::Journey { .. } => self.journey(0).map(drop),
         }
     }
@@ -181,7 +218,7 @@ pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
         "head" => load::<HeadSpec>(name),
         "motion" => load::<MotionSpec>(name),
         "lidar" => load::<LidarSpec>(name),
-        "imu" => load::<ImuSpec>(name),
+        "imu" | "base_imu" => load::<ImuSpec>(name),
         "clock" => load::<ClocksSpec>(name),
         "faults" => load::<FaultsSpec>(name),
         "estimator" => load::<EstimatorSpec>(name),
