@@ -101,20 +101,18 @@ impl Sweep {
     /// If the file exists and cannot be opened. A damaged file is not an error: its runs are repeated.
     pub(super) fn read_part(&self, unit: &Unit) -> Result<Part, StudyError> {
         match self.read_content(unit) {
-            Ok(Some((columns, details))) => Ok(Part::Done { columns, details }),
-            Ok(None) => Ok(Part::Missing),
             Err(StudyError::Table { .. }) => Ok(Part::Damaged),
-            Err(error) => Err(error),
+            read => read,
         }
     }
 
-    /// Columns of a unit's part file (measures, errors, computing times) and details. `None` without a file.
+    /// Content of a unit's part file.
     ///
     /// # Errors
     /// [`StudyError::Table`] if the file is truncated, modified, or of another unit.
-    fn read_content(&self, unit: &Unit) -> Result<Option<(Vec<Column>, Option<String>)>, StudyError> {
+    fn read_content(&self, unit: &Unit) -> Result<Part, StudyError> {
         let path = self.part_path(unit);
-        let Some(table) = Table::open(&path)? else { return Ok(None) };
+        let Some(table) = Table::open(&path)? else { return Ok(Part::Missing) };
         let damaged = |what: &str| StudyError::table(&path)(ParquetError::General(what.to_owned()));
         if table.metadata(UNIT) != Some(&unit.identity.to_string()) {
             return Err(damaged("belongs to other runs of a sweep"));
@@ -125,16 +123,16 @@ impl Sweep {
         let columns = self.part_columns();
         let columns: Vec<(&str, ColumnType)> =
             columns.iter().map(|(name, column_type)| (name.as_str(), *column_type)).collect();
-        let cells = table.read(0, &columns)?;
+        let columns = table.read(0, &columns)?;
         let rows = unit.count as usize;
-        if cells.iter().any(|column| column.len() != rows) {
+        if columns.iter().any(|column| column.len() != rows) {
             return Err(damaged("has columns of different lengths"));
         }
         let details = table.metadata(DETAILS);
-        if table.metadata(CHECKSUM) != Some(&checksum(&cells, rows, details).to_string()) {
+        if table.metadata(CHECKSUM) != Some(&checksum(&columns, rows, details).to_string()) {
             return Err(damaged("checksum mismatch"));
         }
-        Ok(Some((cells, details.map(str::to_owned))))
+        Ok(Part::Done { details: details.map(str::to_owned), columns })
     }
 
     /// Details of all runs in the order of the plan; `None` if a run failed, is missing, or has no details.
