@@ -127,16 +127,17 @@ fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
 }
 
 /// The kinds of studies.
+#[expect(clippy::large_enum_variant, reason = "there is one a file")]
 enum Study {
     Design(DesignSpec),
-    Sweep(Box<SweepSpec>),
+    Sweep(SweepSpec),
 }
 
 /// Parses a study of either type; if neither fits, returns the error with the larger line number.
 fn study(source: &Source) -> Result<Study, SpecError> {
     match (parse(source), parse(source)) {
         (Ok(design), _) => Ok(Study::Design(design)),
-        (_, Ok(sweep)) => Ok(Study::Sweep(Box::new(sweep))),
+        (_, Ok(sweep)) => Ok(Study::Sweep(sweep)),
         (Err(design), Err(sweep)) => {
             let is_sweep = sweep.line_and_column() > design.line_and_column();
             Err(if is_sweep { sweep } else { design })

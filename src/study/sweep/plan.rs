@@ -78,6 +78,7 @@ impl Plan {
             let message = format!("the sweep's name {name:?} has control characters: rename its file");
             return Err(SpecError::plain(&source.name, message).into());
         }
+        specs.base.check(&spec.base).map_err(|message| SpecError::about(source, "base", message))?;
         let axes = spec.axes.iter().map(|axis| Axis::new(axis, (&spec.base, spec.sampling), specs, source));
         let axes: Vec<Axis> = axes.collect::<Result<_, _>>()?;
         let sizes: Vec<AxisSize> = axes.iter().map(Axis::size).collect();
