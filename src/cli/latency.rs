@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use zsim::random::Seed;
 use zsim::spec::{Kind, find, parse};
 use zsim::study::latency::text_table;
-use zsim::study::sweep::{Plan, Share, SweepSpec};
+use zsim::study::sweep::{Plan, Shard, SweepSpec};
 
 /// The study with the latencies and noises.
 const STUDY: &str = "timing";
@@ -47,7 +47,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let plan = Plan::new(STUDY, &spec, &source)?;
     let folder = output::folder_to_resume(&arguments.out)?;
     let planned = plan.write(&folder, arguments.force)?;
-    sweep::run_sweep(&planned, Share::WHOLE, global).inspect_err(|_| super::journey::print_partial_results(&folder))?;
+    sweep::run_sweep(&planned, Shard::WHOLE, global)
+        .inspect_err(|_| super::full_run::print_partial_results(&folder))?;
     let merged = planned.merge_and_report()?;
     let failed =
         || anyhow!("{} runs failed: {} has their errors", merged.status.failed, folder.join("table.csv").display());

@@ -21,5 +21,5 @@ pub use metrics::{
     SimulationMetrics,
 };
 pub use page::{Section, page};
-pub use profile::time_spent;
+pub use profile::timing_table;
 pub use table::{markdown, summary, table};

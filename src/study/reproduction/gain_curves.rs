@@ -11,7 +11,7 @@ use crate::spec::{self, Source};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
 use crate::study::gains::{AXES, GainCurve, GainPlan, GainsSpec, csv, with_damping};
-use crate::study::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Share, SweepSpec};
+use crate::study::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub(super) fn run(
     let damped: Vec<HeadSpec> =
         heads.iter().zip(&fitted).map(|(head, fit)| with_damping(head, fit.damping_ratio)).collect();
     let sweep = plan(spec, &damped, extent)?.write(folder, anew)?;
-    sweep.run(Share::WHOLE, runner)?;
+    sweep.run(Shard::WHOLE, runner)?;
     sweep.merge()?;
     let curves: Vec<GainCurve> = sweep.details()?.ok_or_else(|| sweep.failed())?;
     let responses: Vec<HeadResponse<'_>> = spec

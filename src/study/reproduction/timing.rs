@@ -3,7 +3,7 @@
 use super::{ComparedNumber, ExperimentResult};
 use crate::study::StudyError;
 use crate::study::latency::{ClockState, Disturbance, LatencyResult, conclusions, curve_figure, map_figure};
-use crate::study::sweep::{Plan, Runner, Share};
+use crate::study::sweep::{Plan, Runner, Shard};
 use std::path::Path;
 
 /// Runs the study, draws figures, and compares with the paper.
@@ -14,7 +14,7 @@ pub(super) fn run(
     runner: &Runner,
 ) -> Result<ExperimentResult, StudyError> {
     let sweep = plan.write(folder, anew)?;
-    sweep.run(Share::WHOLE, runner)?;
+    sweep.run(Shard::WHOLE, runner)?;
     let study = sweep.merge_and_report()?.latency.ok_or_else(|| sweep.failed())?;
     for (name, figure) in [
         ("maps", map_figure(&study, ClockState::Off)),

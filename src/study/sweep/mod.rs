@@ -17,7 +17,6 @@ mod folder;
 mod identity;
 mod in_process;
 mod integrity;
-mod journey;
 mod measure;
 mod merge;
 mod output;
@@ -30,6 +29,7 @@ mod report;
 mod run;
 mod runs;
 mod settings;
+mod simulated_run;
 mod spec;
 mod summary;
 mod table;
@@ -48,7 +48,7 @@ pub use merge::SweepStatus;
 pub use pareto::{pareto_set, spread};
 pub use plan::Plan;
 pub use report::MergedReport;
-pub use run::{Runner, Share};
+pub use run::{Runner, Shard};
 pub use spec::{
     Aim, AxisSpec, BaseSpec, GoalSpec, LevelSpec, LimitSpec, MeasureLimitSpec, Sampling, Setting, SweepSpec,
 };
