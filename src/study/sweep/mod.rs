@@ -14,6 +14,7 @@ mod bootstrap;
 mod check;
 mod design;
 mod folder;
+mod goal;
 mod identity;
 mod in_process;
 mod integrity;
@@ -42,6 +43,7 @@ mod worker;
 pub use bootstrap::{Block, ConfidenceInterval};
 pub(super) use bootstrap::{Resampling, pooled};
 pub use folder::Sweep;
+pub use goal::{Aim, GoalSpec, MeasureLimitSpec};
 pub(super) use identity::ContentHash;
 pub use measure::Measure;
 pub use merge::SweepStatus;
@@ -49,9 +51,7 @@ pub use pareto::{pareto_set, spread};
 pub use plan::Plan;
 pub use report::MergedReport;
 pub use run::{Runner, Shard};
-pub use spec::{
-    Aim, AxisSpec, BaseSpec, GoalSpec, LevelSpec, LimitSpec, MeasureLimitSpec, Sampling, Setting, SweepSpec,
-};
+pub use spec::{AxisSpec, BaseSpec, LevelSpec, LimitSpec, Sampling, Setting, SweepSpec};
 pub use summary::{LevelSummary, RatioToFirst, SIGNIFICANCE_LEVEL, Summary, Trend};
 pub use task::{WorkerMessage, limit_process};
 pub(super) use tree::Journey;
