@@ -54,11 +54,11 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
     if let Some(scene) = &arguments.scene {
         return Ok(World::load(scene)?);
     }
-    let Some(specs) = Manifest::in_recording(reader).and_then(|manifest| manifest.specs) else {
+    let Some(run) = Manifest::in_recording(reader).and_then(|manifest| manifest.run) else {
         let message = format!("{} has no scene: pass one with --scene", reader.name());
         return Err(Usage(message).into());
     };
-    Ok(World::build(&specs.scene, &Source::in_memory("the recording's scene", ""))?)
+    Ok(World::build(&run.scene.spec, &Source::in_memory("the recording's scene", ""))?)
 }
 
 fn write_results(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
