@@ -4,14 +4,13 @@ use super::arguments::Global;
 use super::bars::{Bars, stop_flag};
 use super::failure::Usage;
 use super::{Completion, output};
-use anyhow::Context;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim::recording::Reader;
 use zsim::report;
 use zsim::spec::Source;
-use zsim::study::{Manifest, ProgressMonitor, RecordingBound, information_bound};
+use zsim::study::{Manifest, ProgressMonitor, RecordingBound, information_bound, replace_text};
 use zsim::world::World;
 
 /// Compute the Cramer-Rao bound of a recording: the accuracy that no estimator can exceed
@@ -63,8 +62,7 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
 
 fn write_results(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
-    let path = folder.join("bound.csv");
-    std::fs::write(&path, csv(bounded)).with_context(|| format!("{} cannot be written", path.display()))?;
+    replace_text(&folder.join("bound.csv"), &csv(bounded))?;
     report::bound_over_time(&bounded.bound).save(&folder, "bound")?;
     Ok(folder)
 }

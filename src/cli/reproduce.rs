@@ -9,6 +9,7 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim::report;
+use zsim::study::replace_text;
 use zsim::study::reproduction::{Experiment, ExperimentResult, Extent, TABLE_HEADING, paper_table};
 use zsim::study::sweep::Runner;
 
@@ -104,6 +105,5 @@ fn table(
     }
     let path = folder.with_extension("md");
     std::fs::create_dir_all(&arguments.out).with_context(|| format!("cannot create {}", arguments.out.display()))?;
-    std::fs::write(&path, paper_table(&findings, extent, &options))
-        .with_context(|| format!("{} cannot be written", path.display()))
+    Ok(replace_text(&path, &paper_table(&findings, extent, &options))?)
 }

@@ -1,6 +1,7 @@
 //! Manifest of a run: version and inputs.
 
 use super::StudyError;
+use super::atomic_file::replace_text;
 use crate::estimation::EstimatorSpec;
 use crate::recording::Reader;
 use crate::simulation::{Run, Simulation};
@@ -54,6 +55,6 @@ impl Manifest {
     }
 
     pub(super) fn write(&self, path: &Path) -> Result<(), StudyError> {
-        std::fs::write(path, self.to_ron()?).map_err(StudyError::file(path))
+        replace_text(path, &self.to_ron()?)
     }
 }
