@@ -117,7 +117,7 @@ mod tests {
         };
         assert_eq!(count(86_400.0), count(10.0));
         assert!(count(86_400.0) < 3000, "{}", count(86_400.0));
-        // A short gap is searched at the expected height only: 3 x 3 positions, 5 headings at 1 s.
+        // A short gap is searched at the expected height only: 3 x 3 positions, 11 headings at 1 s.
         assert!(count(1.0) < 150, "{}", count(1.0));
     }
 }
