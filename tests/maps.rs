@@ -104,7 +104,7 @@ impl Mapped {
         let covariances = covariances(&run.poses);
         let OpenLoop { trajectory, lidar, survey, .. } = &run;
         let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, survey };
-        let closed = register(travelled, &session.calibration, &spec());
+        let closed = register(travelled, &session.calibration, &spec()).unwrap();
         let both = (&run.trajectory, &closed.trajectory);
         let map = map_of(&run.survey, both, &covariances, &spec().registration).unwrap();
         let pairs = Pairs::associate(&closed.trajectory, &session.truth).unwrap();

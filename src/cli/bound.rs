@@ -54,7 +54,7 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
     if let Some(scene) = &arguments.scene {
         return Ok(World::load(scene)?);
     }
-    let Some(specs) = Manifest::in_recording(reader).and_then(|manifest| manifest.specs) else {
+    let Some(specs) = Manifest::in_recording(reader)?.and_then(|manifest| manifest.specs) else {
         let message = format!("{} has no scene: pass one with --scene", reader.name());
         return Err(Usage(message).into());
     };

@@ -9,6 +9,7 @@ use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::{Calibration, LidarReturn, LidarScan, Measurement};
 use crate::recording::{Preference, Reader, Truth};
 use crate::sensors::ImuSpec;
+use crate::simulation::Specs;
 use crate::time::{Span, Stamp};
 use crate::world::{Hit, Ray, World};
 use rayon::prelude::*;
@@ -42,7 +43,9 @@ pub struct RecordingBound {
 /// When the recording cannot be read, has no sensors or no truth, or the computation is stopped.
 pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> Result<RecordingBound, StudyError> {
     let selection = reader.select(&Preference::default())?;
-    let found = calibration(reader, &selection, &CalibrationSpec::default(), None)?;
+    let manifest = Manifest::in_recording(reader)?;
+    let specs = manifest.as_ref().and_then(|manifest| manifest.specs.as_ref());
+    let (found, _) = calibration((reader, &selection), &CalibrationSpec::default(), specs, None)?;
     let clock = TrueClock::read(reader, &selection)?;
     let mut span: Option<(Stamp, Stamp)> = None;
     let heads = reader.truth().filter_map(|record| match record {
@@ -53,7 +56,7 @@ pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> R
         Ok(Truth::Base(..) | Truth::Clock(..)) => None,
         Err(error) => Some(Err(error)),
     });
-    let information = FisherInformation::new(model(reader, &found.calibration), heads)?;
+    let information = FisherInformation::new(model(specs, &found.calibration), heads)?;
     let Some((first, last)) = span else {
         let message = "the recording has no true trajectory, which the bound requires".to_owned();
         return Err(StudyError::Plan { what: "information bound", message });
@@ -81,10 +84,9 @@ pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> R
 }
 
 /// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
-fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
-    let specs = Manifest::in_recording(reader).and_then(|manifest| manifest.specs);
+fn model(specs: Option<&Specs>, calibration: &Calibration) -> BoundModel {
     let matrix = |errors: fn(&ImuSpec) -> (f64, f64)| {
-        let (scale_percent, misalignment_deg) = specs.as_ref().map_or((0.0, 0.0), |specs| errors(&specs.imu));
+        let (scale_percent, misalignment_deg) = specs.map_or((0.0, 0.0), |specs| errors(&specs.imu));
         (scale_percent * 1e-2, misalignment_deg.to_radians())
     };
     BoundModel {
@@ -92,7 +94,7 @@ fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
         imu: calibration.imu,
         gyro_matrix: matrix(|imu| (imu.gyro.scale_percent, imu.gyro.misalignment_deg)),
         accel_matrix: matrix(|imu| (imu.accel.scale_percent, imu.accel.misalignment_deg)),
-        range_offset_m: specs.as_ref().map_or(0.0, |specs| specs.lidar.errors.range.bias_sigma_m),
+        range_offset_m: specs.map_or(0.0, |specs| specs.lidar.errors.range.bias_sigma_m),
         clock_offset_s: CLOCK_PRIOR.0,
         clock_rate: CLOCK_PRIOR.1,
     }

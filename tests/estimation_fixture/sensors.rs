@@ -3,7 +3,7 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 use zsim::geometry::{Pose, Rotation, Vector, from_roll_pitch_yaw};
 use zsim::measurement::{
-    Calibration, ImuNoise, ImuSample, LidarNoise, LidarReturn, LidarScan, Measurement, PlanarScan,
+    Calibration, ImuAveraging, ImuNoise, ImuSample, LidarNoise, LidarReturn, LidarScan, Measurement, PlanarScan,
 };
 use zsim::random::{Seed, Stream};
 use zsim::time::{Span, Stamp};
@@ -26,6 +26,7 @@ pub fn calibration() -> Calibration {
             gyro_limit_rad_per_s: 600_f64.to_radians(),
             accel_limit_m_per_s2: 5.0 * 9.81,
         },
+        imu_averaging: ImuAveraging::BodyMean,
         lidar: LidarNoise { near_sigma_m: 0.010, near_m: 10.0, far_sigma_m: 0.030, far_m: 30.0 },
     }
 }
