@@ -22,6 +22,6 @@ pub use metrics::{
     SimulationMetrics,
 };
 pub use page::{Section, page};
-pub use profile::time_spent;
+pub use profile::timing_table;
 pub use sensors::{NoiseMetrics, SensorMetrics};
 pub use table::{markdown, summary, table};
