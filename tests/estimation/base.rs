@@ -5,10 +5,10 @@ use rand_distr::{Distribution, StandardNormal};
 use serde_json::Value;
 use zsim::estimation::{BaseEstimate, BaseFix, BaseImu, EstimationError, FixSigmas, load, smooth_base};
 use zsim::geometry::{Kinematics, Pose, Rotation, Trajectory, Vector, from_roll_pitch_yaw};
-use zsim::measurement::ImuSample;
+use zsim::measurement::{ImuAveraging, ImuSample};
 use zsim::random::Seed;
 use zsim::recording::{Reader, TopicPreference};
-use zsim::sensors::mean_motion;
+use zsim::sensors::coning_corrected;
 use zsim::time::{Span, Stamp};
 
 /// Pose of the IMU in the base, and its biases: rad/s and m/s^2.
@@ -49,7 +49,7 @@ fn samples() -> Vec<ImuSample> {
     let moved = |t: f64| walk(t).of_frame(&base_from_imu());
     let sample = |k: i32| {
         let middle_s = (f64::from(k) + 0.5) * 0.01;
-        let ideal = mean_motion(&moved(middle_s - 0.005), &moved(middle_s + 0.005), 0.01);
+        let ideal = coning_corrected(&moved(middle_s - 0.005), &moved(middle_s + 0.005), 0.01);
         ImuSample {
             stamp: at(middle_s * (1.0 + OFFSET.1) + OFFSET.0),
             angular_velocity_rad_per_s: ideal.angular_velocity_rad_per_s + GYRO_BIAS,
@@ -76,7 +76,7 @@ fn fixes(position_m: f64, rotation_rad: f64) -> Vec<BaseFix> {
 
 fn imu() -> BaseImu {
     let noise = crate::recordings::calibration().imu;
-    BaseImu { base_from_imu: base_from_imu(), noise, clock_offset_s: None }
+    BaseImu { base_from_imu: base_from_imu(), noise, averaging: ImuAveraging::ConingCorrected, clock_offset_s: None }
 }
 
 fn smoothed(fixes: &[BaseFix], samples: &[ImuSample]) -> Result<BaseEstimate, EstimationError> {
