@@ -214,6 +214,7 @@ mod tests {
         };
         let registered = Registered {
             fates: FateCounts { kept: 16, moving: 4, ..FateCounts::default() },
+            page_points: Vec::new(),
             filtered: true,
             sample: ends.iter().map(judged).collect(),
             dead_reckoning: Err(EvaluationError::OnALine),

@@ -8,6 +8,7 @@ use super::cloud_files::CloudOptions;
 use super::integrity::{Integrity, write_windows};
 use super::map::{MapOptions, write_map};
 use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
+use super::page::RunResults;
 use super::register::{Registered, Registration};
 use super::result_files::{estimate_files, remove};
 use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
@@ -141,11 +142,10 @@ pub(super) fn estimate_in(
     let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(options.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
-    let integrity_metrics =
-        integrity.metrics(run, comparison.map(|_| judge::pairs_of(reader, best.map_from_head)).transpose()?);
+    let pairs = comparison.map(|_| judge::pairs_of(reader, best.map_from_head)).transpose()?;
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
-        integrity: integrity_metrics,
+        integrity: integrity.metrics(run, pairs.as_ref()),
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),
         open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, comparison, imu_only_drift) },
@@ -159,7 +159,18 @@ pub(super) fn estimate_in(
     let open_comparison = comparison.filter(|_| loops.closed.is_some());
     let open_errors = open_comparison.and_then(|comparison| Some(&comparison.errors.as_ref()?.decimated));
     let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
-    artefacts::write(folder, &metrics, plots, origin.manifest)?;
+    let results = RunResults {
+        reader,
+        origin,
+        open: run,
+        best: &best,
+        open_errors,
+        bound: bound.as_ref(),
+        integrity: &integrity,
+        pairs: pairs.as_ref(),
+        points: &registered.page_points,
+    };
+    artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?)?)?;
     Ok(Outcome { metrics, spent: loops.open.spent })
 }
 
