@@ -2,11 +2,12 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench fails by panicking")]
 
-#[path = "../tests/estimation_fixture/mod.rs"]
-mod estimation_fixture;
+#[allow(dead_code, unused_imports, reason = "the bench uses a part of it")]
+#[path = "../tests/estimation/fixture/mod.rs"]
+mod fixture;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use estimation_fixture::{Room, Run, Walk, calibration};
+use fixture::{Room, Run, Walk, calibration};
 use zsim::estimation::{estimate_all, load};
 
 const SECONDS: f64 = 10.0;

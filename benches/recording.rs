@@ -9,7 +9,7 @@ use std::io::{Cursor, Write};
 use zsim::geometry::{Kinematics, Pose, Vector, from_roll_pitch_yaw};
 use zsim::measurement::{Calibration, ImuNoise, ImuSample, LidarNoise, LidarReturn, LidarScan, PlanarScan, Sink};
 use zsim::random::{Seed, Stream};
-use zsim::recording::{Preference, Reader, RunDescription, Truth, TumWriter, Writer};
+use zsim::recording::{Reader, RunDescription, TopicPreference, Truth, TumWriter, Writer};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
@@ -96,7 +96,7 @@ fn make_run() -> Run {
 
 fn record<W: Write + Send + 'static>(made: &Run, file: W) {
     let mut writer = Writer::new(file, run()).unwrap();
-    let clock = ClockTruth { lidar_ahead: Span::ZERO, imu_ahead: Span::ZERO };
+    let clock = ClockTruth { lidar_offset: Span::ZERO, imu_offset: Span::ZERO };
     for (k, (now, sample)) in made.truth.iter().enumerate() {
         writer.truth(*now, sample).unwrap();
         if k % 10 == 0 {
@@ -124,7 +124,7 @@ fn benches(criterion: &mut Criterion) {
         criterion.bench_function(&format!("read the measurements of 10 s by {topic}"), |b| {
             b.iter(|| {
                 let reader = Reader::new("memory", Cursor::new(bytes.clone())).unwrap();
-                let preference = Preference { lidar_topic: Some(topic.to_owned()), imu_topic: None };
+                let preference = TopicPreference { lidar_topic: Some(topic.to_owned()), imu_topic: None };
                 let selection = reader.select(&preference).unwrap();
                 reader.measurements(&selection).count()
             });

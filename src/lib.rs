@@ -14,7 +14,7 @@
 //! ```
 //! use zsim::estimation::{self, Estimator};
 //! use zsim::evaluation::{Errors, Pairs};
-//! use zsim::recording::{Preference, Reader, RunDescription, Writer};
+//! use zsim::recording::{TopicPreference, Reader, RunDescription, Writer};
 //! use zsim::simulation::{Scenario, Simulation};
 //!
 //! // A walk through a furnished hall, with specs from the library.
@@ -37,7 +37,7 @@
 //!
 //! // Estimate from the measurements only.
 //! let reader = Reader::open(&path)?;
-//! let selection = reader.select(&Preference::default())?;
+//! let selection = reader.select(&TopicPreference::default())?;
 //! let found = reader.calibration(&selection, &simulation.calibration(), None)?;
 //! let mut estimator = Estimator::new(&estimation::load("default")?, &found.calibration)?;
 //! for measurement in reader.measurements(&selection) {

@@ -23,15 +23,15 @@ pub struct TruthSample {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockTruth {
     /// Lidar clock minus true time.
-    pub lidar_ahead: Span,
+    pub lidar_offset: Span,
     /// IMU stamps minus true time.
-    pub imu_ahead: Span,
+    pub imu_offset: Span,
 }
 
 impl ClockTruth {
     /// IMU stamp minus lidar stamp of one event: the time offset that an estimator determines.
     pub fn imu_after_lidar(&self) -> Span {
-        self.imu_ahead - self.lidar_ahead
+        self.imu_offset - self.lidar_offset
     }
 }
 

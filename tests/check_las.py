@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """check_las.py FILE.las EXPECTED.txt: compares a LAS cloud, as laspy reads it, with its expected points.
 
-EXPECTED.txt has one point per line: x y z intensity time error. Prints one line, `ok ...`, or `skipped: ...` if laspy is not
-installed; exits with 1 on a difference.
+EXPECTED.txt has one point per line: x y z intensity time error. Prints one line, `ok ...`; exits with 1 on a
+difference, and with 77 if laspy is not installed.
 """
 import sys
 
@@ -10,8 +10,8 @@ try:
     import laspy
     import numpy as np
 except ImportError as missing:
-    print(f"skipped: {missing}")
-    sys.exit(0)
+    print(missing, file=sys.stderr)
+    sys.exit(77)
 
 cloud = laspy.read(sys.argv[1])
 expected = np.loadtxt(sys.argv[2], ndmin=2)

@@ -2,8 +2,8 @@
 """check_mcap.py FILE.mcap: checks a recording with independent readers.
 
 Reads every message twice: with `mcap` and `mcap-ros2-support` by the definitions in the file, and with `rosbags` by its
-own definitions. Both must agree, and the values must be those of a recording of zsim. Prints one line, `ok ...`, or
-`skipped: ...` if a module is not installed; exits with 1 on a difference.
+own definitions. Both must agree, and the values must be those of a recording of zsim. Prints one line, `ok ...`;
+exits with 1 on a difference, and with 77 if a module is not installed.
 """
 import sys
 
@@ -13,8 +13,8 @@ try:
     from mcap_ros2.decoder import DecoderFactory
     from rosbags.typesys import Stores, get_typestore
 except ImportError as missing:
-    print(f"skipped: {missing}")
-    sys.exit(0)
+    print(missing, file=sys.stderr)
+    sys.exit(77)
 
 TYPES = {
     "/scan": "sensor_msgs/msg/LaserScan",

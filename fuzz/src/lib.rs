@@ -3,7 +3,7 @@
 use std::io::{Read, Seek};
 use zsim::geometry::Pose;
 use zsim::measurement::{Calibration, ImuNoise, LidarNoise};
-use zsim::recording::{Preference, Reader};
+use zsim::recording::{TopicPreference, Reader};
 use zsim::time::Span;
 
 /// Reads all contents of a recording: info, truth, and the measurements for each lidar topic.
@@ -13,7 +13,7 @@ pub fn read_all(file: impl Read + Seek + Send + 'static) {
     reader.truth().for_each(drop);
     let preferences = [None, Some("/points"), Some("/echoes"), Some("/livox")].map(|topic| topic.map(str::to_owned));
     for lidar_topic in preferences {
-        let Ok(selection) = reader.select(&Preference { lidar_topic, imu_topic: None }) else { continue };
+        let Ok(selection) = reader.select(&TopicPreference { lidar_topic, imu_topic: None }) else { continue };
         let _ = reader.calibration(&selection, &calibration(), None);
         reader.measurements(&selection).for_each(drop);
     }

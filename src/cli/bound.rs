@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use zsim::recording::Reader;
 use zsim::report;
 use zsim::spec::Source;
-use zsim::study::{Manifest, RecordingBound, Watch, information_bound};
+use zsim::study::{Manifest, ProgressMonitor, RecordingBound, information_bound};
 use zsim::world::World;
 
 /// Compute the Cramer-Rao bound of a recording: the accuracy that no estimator can exceed
@@ -41,7 +41,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let reader = Reader::open(&arguments.recording)?;
     let world = world(arguments, &reader)?;
     let mut bars = Bars::new(global);
-    let mut watch = Watch { stop: stop_flag(), report: &mut |event| bars.update(event) };
+    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let bounded = information_bound(&reader, &world, &mut watch);
     bars.finish();
     let bounded = bounded?;

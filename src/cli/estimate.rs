@@ -3,12 +3,12 @@
 use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, calibration, start};
 use super::bars::{Bars, stop_flag};
-use super::{journey, output};
+use super::{full_run, output};
 use clap::Args;
 use std::path::PathBuf;
 use zsim::geometry::Pose;
-use zsim::recording::{Preference, Reader};
-use zsim::study::{self, EstimateOptions, MapOptions, Watch};
+use zsim::recording::{Reader, TopicPreference};
+use zsim::study::{self, EstimateOptions, MapOptions, ProgressMonitor};
 
 /// Estimate trajectory and map from a recording of any program
 ///
@@ -62,22 +62,22 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         map: arguments.map.as_ref().map(within).transpose()?,
         calibration: calibration(arguments.calibration.as_deref())?,
         body_frame: arguments.body_frame.clone(),
-        topics: Preference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
+        topics: TopicPreference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
         ..arguments.estimator.options()?
     };
     // Open the recording first: a recording that is missing, or lacks a sensor, must not create a folder.
     Reader::open(&arguments.recording)?.select(&options.topics)?;
     let stem = arguments.recording.file_stem().unwrap_or_default().to_string_lossy();
-    let wanted = arguments.out.out.clone().unwrap_or_else(|| journey::default_folder(&stem));
+    let wanted = arguments.out.out.clone().unwrap_or_else(|| full_run::default_folder(&stem));
     let folder = output::folder(&wanted, arguments.out.force)?;
     let inputs = [Some(&arguments.recording), arguments.map.as_ref(), arguments.calibration.as_ref()];
     let written: Vec<PathBuf> = study::estimate_files().iter().map(|name| folder.join(name)).collect();
     output::check_not_inputs(&inputs.into_iter().flatten().cloned().collect::<Vec<_>>(), &written)?;
 
     let mut bars = Bars::new(global);
-    let mut watch = Watch { stop: stop_flag(), report: &mut |event| bars.update(event) };
+    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let outcome = study::estimate_recording(&arguments.recording, &folder, &options, &mut watch);
     bars.finish();
-    let outcome = outcome.inspect_err(|_| journey::print_partial_results(&folder))?;
-    journey::print_outcome(global, &outcome, arguments.estimator.profile, &folder)
+    let outcome = outcome.inspect_err(|_| full_run::print_partial_results(&folder))?;
+    full_run::print_outcome(global, &outcome, arguments.estimator.profile, &folder)
 }

@@ -109,8 +109,8 @@ fn evaluate_cloud(
     metrics: &mut Map<String, Value>,
 ) -> anyhow::Result<()> {
     let reader = PlyReader::open(path)?;
-    let total = reader.left() as usize;
-    let thinning = Thinning::to(MAX_EVALUATED_POINTS, total);
+    let total = reader.remaining() as usize;
+    let thinning = Thinning::to_at_most(MAX_EVALUATED_POINTS, total);
     let world_from_map = estimated.map_or_else(Pose::identity, |(_, world_from_map)| *world_from_map);
     let in_world = |at: &Vector| world_from_map.rotation * at + world_from_map.translation.vector;
     let mut cursor = estimated.map(|(trajectory, _)| SmoothCursor::new(trajectory));

@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim::dynamics::{DampingSpec, HeadModel, Quantity, load};
+use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
 use zsim::motion::Axis;
 use zsim::random::Seed;
 use zsim::report;
@@ -113,9 +113,9 @@ fn plan(arguments: &Arguments) -> anyhow::Result<GainPlan> {
         }
     }
     Ok(GainPlan {
-        quantity: match arguments.along {
-            Along::Acceleration => Quantity::Kinematic,
-            Along::SpecificForce => Quantity::SpecificForce,
+        acceleration: match arguments.along {
+            Along::Acceleration => AccelerationKind::Kinematic,
+            Along::SpecificForce => AccelerationKind::SpecificForce,
         },
         up_to_hz: arguments.up_to,
         period_s: arguments.period,

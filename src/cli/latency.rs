@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let bar = WorkBar::new(global, "estimating");
     let ran = latency.run(&folder, arguments.force, stop_flag(), &|fraction| bar.set_fraction(fraction));
     drop(bar);
-    let study = ran.inspect_err(|_| super::journey::print_partial_results(&folder))?;
+    let study = ran.inspect_err(|_| super::full_run::print_partial_results(&folder))?;
     write_results(&study, &folder)?;
     output::print_result(global, &text_table(&study), serde_json::to_value(&study)?, Some(&folder))?;
     Ok(Completion::Done)

@@ -14,9 +14,9 @@ mod coverage_text;
 mod estimate;
 mod evaluate;
 mod failure;
+mod full_run;
 mod gains;
 mod info;
-mod journey;
 mod latency;
 mod map;
 mod output;
@@ -53,7 +53,7 @@ use std::process::ExitCode;
 )]
 struct Cli {
     #[command(flatten)]
-    journey: journey::Arguments,
+    full_run: full_run::Arguments,
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
@@ -104,8 +104,8 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
-    let Some(command) = &cli.command else { return journey::run(&cli.journey, global) };
-    if cli.journey.scene.is_some() {
+    let Some(command) = &cli.command else { return full_run::run(&cli.full_run, global) };
+    if cli.full_run.scene.is_some() {
         let message = "--scene before a command has no effect: put it after the command, or omit the command";
         Cli::command().error(ErrorKind::ArgumentConflict, message).exit();
     }

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
     use zsim::simulation::Scenario;
-    use zsim::study::{Watch, record};
+    use zsim::study::{ProgressMonitor, record};
 
     #[test]
     fn the_size_is_about_that_of_a_recording() {
@@ -70,7 +70,7 @@ mod tests {
             let scenario = Scenario { lidar: lidar.to_owned(), duration_s: 2.0, ..Scenario::in_scene("office") };
             let simulation = Simulation::prepare(&scenario).unwrap();
             let files = [here.path().join("a.mcap"), here.path().join("a.tum")];
-            let mut watch = Watch { stop: &AtomicBool::new(false), report: &mut |_| {} };
+            let mut watch = ProgressMonitor { stop: &AtomicBool::new(false), report: &mut |_| {} };
             record(&simulation, &files[0], &files[1], false, &mut watch).unwrap();
             let bytes: u64 = files.iter().map(|file| file.metadata().unwrap().len()).sum();
             let ratio = expected_bytes(&simulation) / bytes as f64;

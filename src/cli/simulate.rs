@@ -10,7 +10,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use zsim::report;
 use zsim::simulation::{Simulation, SimulationSummary};
-use zsim::study::{self, Watch};
+use zsim::study::{self, ProgressMonitor};
 
 /// Simulate and record: an MCAP file with the truth inside, and the true trajectory next to it as a TUM file
 #[derive(Args)]
@@ -42,10 +42,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let files = RecordingFiles::reserve(&wanted, arguments.force, &inputs)?;
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));
-    let mut watch = Watch { stop: stop_flag(), report: &mut |event| bars.update(event) };
+    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let recorded = study::record(&simulation, files.recording(), files.truth(), arguments.truth_tf, &mut watch);
     bars.finish();
-    let summary = recorded.inspect_err(|_| super::journey::print_partial_results(files.recording()))?;
+    let summary = recorded.inspect_err(|_| super::full_run::print_partial_results(files.recording()))?;
     let (recording, truth) = files.finish()?;
 
     let mut figures = serde_json::to_value(summary)?;

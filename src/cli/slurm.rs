@@ -9,7 +9,7 @@ use serde_json::json;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use zsim::study::sweep::{Share, Sweep};
+use zsim::study::sweep::{Shard, Sweep};
 
 /// Default number of runs per array element; a scheduler needs about 1 s for each element.
 const RUNS_PER_ELEMENT: u64 = 20;
@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let folder = folder.with_context(|| format!("{} cannot be found", arguments.folder.display()))?;
     let log = log_option(&folder)?;
     let sweep = Sweep::open(&folder)?;
-    let status = sweep.status(Share::WHOLE)?;
+    let status = sweep.status(Shard::WHOLE)?;
     if status.missing == 0 {
         output::print_result(global, "all runs are complete", json!({ "job": null, "elements": 0 }), Some(&folder))?;
         return Ok(Completion::Done);

@@ -4,7 +4,7 @@ use super::arguments::Global;
 use super::{Completion, sweep};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use zsim::study::sweep::Share;
+use zsim::study::sweep::Shard;
 
 /// Vary the parameters of a run and report their effects: `zsim sweep` plan, run and merge in one
 ///
@@ -28,6 +28,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let plan = sweep::plan_of(&arguments.file)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(plan.name()));
     let planned = plan.write(&folder, arguments.force)?;
-    sweep::run_sweep(&planned, Share::WHOLE, global).inspect_err(|_| super::journey::print_partial_results(&folder))?;
+    sweep::run_sweep(&planned, Shard::WHOLE, global)
+        .inspect_err(|_| super::full_run::print_partial_results(&folder))?;
     sweep::merge(&planned, &folder, global)
 }

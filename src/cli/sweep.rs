@@ -11,7 +11,7 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use zsim::spec::{Kind, find, parse};
-use zsim::study::sweep::{Plan, Runner, Share, Sweep, SweepStatus, limit_process};
+use zsim::study::sweep::{Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///
@@ -93,9 +93,9 @@ struct TaskArguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     match &arguments.command {
         Command::Plan(plan) => plan_in(plan, global),
-        Command::Run(run) => run_share(run, global),
+        Command::Run(run) => run_shard(run, global),
         Command::Status(folder) => {
-            print_status(global, &Sweep::open(&folder.folder)?.status(Share::WHOLE)?, &folder.folder)
+            print_status(global, &Sweep::open(&folder.folder)?.status(Shard::WHOLE)?, &folder.folder)
         }
         Command::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
         Command::Submit(submit) => slurm::run(submit, global),
@@ -119,36 +119,36 @@ fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Complet
     Ok(Completion::Done)
 }
 
-fn run_share(arguments: &RunArguments, global: &Global) -> anyhow::Result<Completion> {
+fn run_shard(arguments: &RunArguments, global: &Global) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
-    let share = share(arguments)?;
-    run_sweep(&sweep, share, global)?;
-    print_status(global, &sweep.status(share)?, &arguments.folder)
+    let shard = shard(arguments)?;
+    run_sweep(&sweep, shard, global)?;
+    print_status(global, &sweep.status(shard)?, &arguments.folder)
 }
 
 /// Runs the missing runs of a part, with a progress bar.
-pub(super) fn run_sweep(sweep: &Sweep, share: Share, global: &Global) -> anyhow::Result<()> {
+pub(super) fn run_sweep(sweep: &Sweep, shard: Shard, global: &Global) -> anyhow::Result<()> {
     let program = std::env::current_exe().context("this program's own path is not known")?;
     let bar = WorkBar::new(global, "sweeping");
     let on_progress = |fraction: f64| bar.set_fraction(fraction);
-    sweep.run(share, &Runner { program: &program, stop: stop_flag(), on_progress: &on_progress })?;
+    sweep.run(shard, &Runner { program: &program, stop: stop_flag(), on_progress: &on_progress })?;
     Ok(())
 }
 
 /// The part given on the command line or by the scheduler.
-fn share(arguments: &RunArguments) -> anyhow::Result<Share> {
+fn shard(arguments: &RunArguments) -> anyhow::Result<Shard> {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<usize>().ok());
     let slurm = number("SLURM_ARRAY_TASK_ID");
     let given = arguments.index.or(slurm).or_else(|| number("JOB_COMPLETION_INDEX"));
     match (given, arguments.count) {
-        (None, None) => Ok(Share::WHOLE),
-        (Some(index), Some(count)) => Ok(Share { index, count }),
+        (None, None) => Ok(Shard::WHOLE),
+        (Some(index), Some(count)) => Ok(Shard { index, count }),
         (Some(index), None) if arguments.index.is_none() && slurm.is_some() => {
             let (first, step) = (number("SLURM_ARRAY_TASK_MIN"), number("SLURM_ARRAY_TASK_STEP"));
             let index = index.saturating_sub(first.unwrap_or(0)) / step.unwrap_or(1).max(1);
             let count = number("SLURM_ARRAY_TASK_COUNT");
             let count = count.ok_or_else(|| Usage("SLURM_ARRAY_TASK_COUNT is not set: pass --count".to_owned()))?;
-            Ok(Share { index, count })
+            Ok(Shard { index, count })
         }
         (Some(index), None) => Err(Usage(format!("--index {index} needs --count")).into()),
         (None, Some(count)) => Err(Usage(format!("--count {count} needs --index")).into()),

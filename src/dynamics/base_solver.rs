@@ -19,7 +19,7 @@ const MAX_ITERATIONS: usize = 20;
 impl HeadModel {
     /// The poses of the base if the linkage were rigid at the equilibrium: the paper's figures 11 to 13.
     pub fn base_from_rigid_link(&self, world_from_head: &Trajectory) -> Vec<(Stamp, Pose)> {
-        let head_from_base = self.rest_pose_base_from_head().inverse();
+        let head_from_base = self.base_from_head_at_rest().inverse();
         world_from_head.iter().map(|(stamp, head)| (stamp, head * head_from_base)).collect()
     }
 
@@ -104,10 +104,10 @@ impl<'a> BaseSolver<'a> {
     fn solve_next(&mut self, motion: &HeadMotion, step_s: f64) -> Option<Pose> {
         let before = self.before.take();
         // First guess: the spring keeps the previous deformation. Second guess: the head is in equilibrium.
-        let kept = before.map(|[head, base]| motion.pose * (head.inverse() * base));
+        let previous = before.map(|[head, base]| motion.pose * (head.inverse() * base));
         let rest = motion.pose * self.compliant.rest.inverse();
         let base_before = before.map(|[_, base]| base);
-        let starts = kept.into_iter().chain([rest]);
+        let starts = previous.into_iter().chain([rest]);
         let base = starts.into_iter().find_map(|start| self.solve(motion, start, base_before.as_ref(), step_s))?;
         self.before = Some([motion.pose, base]);
         Some(base)
@@ -166,9 +166,9 @@ impl<'a> BaseSolver<'a> {
         for axis in 0..6 {
             let mut step = Vector6::zeros();
             step[axis] = DIFFERENCE;
-            let ahead = self.residual_wrench(motion, &displaced(base, &step), before, step_s)?;
-            let behind = self.residual_wrench(motion, &displaced(base, &-step), before, step_s)?;
-            slope.set_column(axis, &((ahead - behind) / (2.0 * DIFFERENCE)));
+            let plus = self.residual_wrench(motion, &displaced(base, &step), before, step_s)?;
+            let minus = self.residual_wrench(motion, &displaced(base, &-step), before, step_s)?;
+            slope.set_column(axis, &((plus - minus) / (2.0 * DIFFERENCE)));
         }
         Ok(slope)
     }

@@ -9,7 +9,7 @@ use nalgebra::Point3;
 /// Stretch range over which a cord changes from slack to taut, as a fraction of the length.
 ///
 /// It smooths the stiffness, as in a real rope whose fibres become taut one after the other.
-const TRANSITION: f64 = 1e-4;
+const TAUT_TRANSITION: f64 = 1e-4;
 
 /// A massless cord between a point of the base and a point of the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +56,7 @@ impl Cord {
     /// Zero where the cord is slack and equal to `distance - length` above the transition range. In the range it is a
     /// parabola that joins both with continuous slope.
     fn stretch(&self, distance_m: f64) -> (f64, f64, f64) {
-        let (transition, stretch) = (TRANSITION * self.length_m, distance_m - self.length_m);
+        let (transition, stretch) = (TAUT_TRANSITION * self.length_m, distance_m - self.length_m);
         let into = stretch + 0.5 * transition;
         if into <= 0.0 {
             (0.0, 0.0, 0.0)

@@ -72,7 +72,7 @@ impl Engine {
 /// Predicts the pose after one step with `twist`.
 ///
 /// Rapier rotates by `2 atan(|w| h / 2)` instead of `|w| h`.
-pub(super) fn ahead(body: &Body, pose: &Pose, twist: &Vector6, step_s: f64) -> Pose {
+pub(super) fn predicted_pose(body: &Body, pose: &Pose, twist: &Vector6, step_s: f64) -> Pose {
     let (shift, turn) = split(&(twist * step_s));
     let angle = turn.norm();
     let turned = if angle > 0.0 { turn * (2.0 * (0.5 * angle).atan() / angle) } else { turn };

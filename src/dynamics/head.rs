@@ -62,7 +62,7 @@ impl HeadModel {
         let linkage = Linkage::new(&spec.linkage, &body, source, explain)?;
         let (head_from_laser, head_from_imu) = (spec.head_from_laser.pose(), spec.head_from_imu.pose());
         let model = Self { body, linkage, head_from_laser, head_from_imu };
-        let base_from_laser = model.rest_pose_base_from_head() * head_from_laser;
+        let base_from_laser = model.base_from_head_at_rest() * head_from_laser;
         carrier::check(spec, &base_from_laser.translation.vector, source)?;
         Ok(model)
     }
@@ -85,7 +85,7 @@ impl HeadModel {
     /// Pose of the head in the base in static equilibrium, with the base upright.
     ///
     /// For an actuated mount, the pose before the motor starts.
-    pub fn rest_pose_base_from_head(&self) -> &Pose {
+    pub fn base_from_head_at_rest(&self) -> &Pose {
         match &self.linkage {
             Linkage::Rigid { base_from_head } => base_from_head,
             Linkage::Actuated(actuated) => &actuated.start,

@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::elements::UniversalJointSpec;
-use super::engine::ahead;
+use super::engine::predicted_pose;
 use super::forces::{EndFrames, Forces, MotionState};
 use crate::elasticity::{Vector6, stack};
 use crate::geometry::{Pose, Rotation, Vector};
@@ -123,7 +123,7 @@ impl UniversalJoint {
         let tolerance = 1e-14 * (1.0 + next_base.translation.vector.norm());
         let mut constrained = *change;
         for _ in 0..MAX_ITERATIONS {
-            let next = ahead(now.body, now.world_from_head, &(now.twist + constrained), step_s);
+            let next = predicted_pose(now.body, now.world_from_head, &(now.twist + constrained), step_s);
             let violation = self.constraint_violation(next_base, &next);
             if violation.amax() <= tolerance {
                 return Some(constrained);

@@ -41,6 +41,6 @@ pub use elements::{
 pub use error::DynamicsError;
 pub use head::HeadModel;
 pub use modes::{LinearModel, Mode, ModeKind};
-pub use response::{FrequencyResponse, GainPoints, Peak, Quantity};
+pub use response::{AccelerationKind, FrequencyResponse, GainPoints, Peak};
 pub use simulation::{HeadSimulation, HeadState};
 pub use spec::{DampingSpec, EndStopSpec, HeadSpec, HoldSpec, InertiaSpec, LinkageSpec, PartSpec, PlacementSpec, load};

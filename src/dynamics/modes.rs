@@ -150,12 +150,12 @@ fn bounce_and_yaw_modes(
         let moved = (rate * unclassified[mode].shape)[coordinate];
         in_coordinates[(coordinate, coordinate)] * moved * moved / unclassified[mode].square
     };
-    let most = |coordinate: usize, but: Option<usize>| {
+    let largest_in = |coordinate: usize, but: Option<usize>| {
         let others = (0..unclassified.len()).filter(|k| Some(*k) != but);
         others.max_by(|a, b| share(*a, coordinate).total_cmp(&share(*b, coordinate)))
     };
-    let bounce = most(2, None);
-    Some((bounce, most(5, bounce)))
+    let bounce = largest_in(2, None);
+    Some((bounce, largest_in(5, bounce)))
 }
 
 /// The matrix `M Phi diag(x) Phi^T M` with mode shapes Phi and one number x for each mode.

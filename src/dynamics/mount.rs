@@ -67,7 +67,7 @@ struct SpringParameters<'a> {
 const MAX_ITERATIONS: usize = 20;
 
 /// Length at which a displacement of a suspended head counts as a rotation by 1 rad, m.
-const SCALE_M: f64 = 0.1;
+const ROTATION_LENGTH_M: f64 = 0.1;
 
 impl<'a> Mount<'a> {
     /// Creates the mount that a linkage spec describes.
@@ -202,7 +202,7 @@ impl CompliantMount<'_> {
         let tolerance_n = 1e-6 * self.body.mass_kg * gravity_in_base.norm();
         for _ in 0..MAX_ITERATIONS {
             let mut law = self.law(&loads_n)?;
-            let scale_m = if self.is_one_spring() { law.springs[0].spring.length_m() } else { SCALE_M };
+            let scale_m = if self.is_one_spring() { law.springs[0].spring.length_m() } else { ROTATION_LENGTH_M };
             let statics = Statics { law: &law, body: self.body, gravity_in_base, weight, scale_m };
             let start = match &self.start {
                 None => self.on_straight_spring(&law),

@@ -8,9 +8,9 @@ use crate::motion::Axis;
 use nalgebra::{Complex, Matrix6x1};
 use std::f64::consts::TAU;
 
-/// The quantity whose gain is taken along x, y and z; about the axes it is always the angular rate.
+/// The acceleration whose gain is taken along x, y and z; about the axes it is always the angular rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Quantity {
+pub enum AccelerationKind {
     /// Kinematic acceleration, without gravity.
     #[default]
     Kinematic,
@@ -50,7 +50,7 @@ impl HeadModel {
 
     /// The response of the linearised head to small motions of the base.
     pub fn frequency_response(&self, points: &GainPoints) -> FrequencyResponse {
-        let rest = self.rest_pose_base_from_head();
+        let rest = self.base_from_head_at_rest();
         let at_base = lever_matrix(&-points.base_in_base);
         let Some(linear) = self.linear() else {
             let point = rest * nalgebra::Point3::from(points.head_in_head);
@@ -180,12 +180,12 @@ impl FrequencyResponse {
     }
 
     /// The head's rate or acceleration over the base's, both along or about `axis`, at `freq_hz`.
-    pub fn along(&self, axis: Axis, freq_hz: f64, quantity: Quantity) -> Complex<f64> {
+    pub fn transfer(&self, axis: Axis, freq_hz: f64, acceleration: AccelerationKind) -> Complex<f64> {
         let row = index(axis);
-        let gravity_term = match (quantity, axis) {
+        let gravity_term = match (acceleration, axis) {
             // (phi x g) is -g phi_y along x and g phi_x along y; dividing by -w^2 converts it to displacement.
-            (Quantity::SpecificForce, Axis::X) => Some((4, STANDARD_GRAVITY_M_PER_S2)),
-            (Quantity::SpecificForce, Axis::Y) => Some((3, -STANDARD_GRAVITY_M_PER_S2)),
+            (AccelerationKind::SpecificForce, Axis::X) => Some((4, STANDARD_GRAVITY_M_PER_S2)),
+            (AccelerationKind::SpecificForce, Axis::Y) => Some((3, -STANDARD_GRAVITY_M_PER_S2)),
             _ => None,
         };
         let freq_hz = if gravity_term.is_some() { freq_hz.max(MIN_FREQUENCY_HZ) } else { freq_hz };
@@ -202,15 +202,15 @@ impl FrequencyResponse {
             .fold(start, |sum, (term, amplitude)| sum + amplitude * measured(&|k| term.shape[k]))
     }
 
-    /// The gain: the modulus of [`FrequencyResponse::along`].
-    pub fn gain(&self, axis: Axis, freq_hz: f64, quantity: Quantity) -> f64 {
-        self.along(axis, freq_hz, quantity).norm()
+    /// The gain: the modulus of [`FrequencyResponse::transfer`].
+    pub fn gain(&self, axis: Axis, freq_hz: f64, acceleration: AccelerationKind) -> f64 {
+        self.transfer(axis, freq_hz, acceleration).norm()
     }
 
     /// The local maxima of a gain curve between 0 and `up_to_hz`, lowest frequency first.
-    pub fn peaks(&self, axis: Axis, up_to_hz: f64, quantity: Quantity) -> Vec<Peak> {
+    pub fn peaks(&self, axis: Axis, up_to_hz: f64, acceleration: AccelerationKind) -> Vec<Peak> {
         let grid = self.grid(axis, up_to_hz);
-        let gain = |freq_hz: f64| self.gain(axis, freq_hz, quantity);
+        let gain = |freq_hz: f64| self.gain(axis, freq_hz, acceleration);
         let gains: Vec<f64> = grid.iter().map(|f| gain(*f)).collect();
         let is_top = |k: &usize| gains[*k] > gains[k - 1] && gains[*k] >= gains[k + 1];
         (1..grid.len().saturating_sub(1))
@@ -223,8 +223,8 @@ impl FrequencyResponse {
     }
 
     /// The largest of the [`FrequencyResponse::peaks`].
-    pub fn peak(&self, axis: Axis, up_to_hz: f64, quantity: Quantity) -> Option<Peak> {
-        self.peaks(axis, up_to_hz, quantity).into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
+    pub fn peak(&self, axis: Axis, up_to_hz: f64, acceleration: AccelerationKind) -> Option<Peak> {
+        self.peaks(axis, up_to_hz, acceleration).into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
     /// Frequencies from 0 to `up_to_hz`, refined around the modes that `axis` excites.
@@ -315,10 +315,14 @@ mod tests {
             let head = reference_head(coils, length_mm);
             let response = head.frequency_response(&head.default_points());
             for axis in [Axis::Roll, Axis::Pitch] {
-                assert_relative_eq!(response.gain(axis, 0.0, Quantity::Kinematic), expected, max_relative = 0.02);
+                assert_relative_eq!(
+                    response.gain(axis, 0.0, AccelerationKind::Kinematic),
+                    expected,
+                    max_relative = 0.02
+                );
             }
             for axis in [Axis::X, Axis::Y, Axis::Z, Axis::Yaw] {
-                assert_relative_eq!(response.gain(axis, 0.0, Quantity::Kinematic), 1.0, epsilon = 1e-4);
+                assert_relative_eq!(response.gain(axis, 0.0, AccelerationKind::Kinematic), 1.0, epsilon = 1e-4);
             }
         }
     }
@@ -334,10 +338,10 @@ mod tests {
             for r in [0.1, 0.9, 1.0, 1.1, 3.0_f64] {
                 let c = (2.0 * zeta * r).powi(2);
                 let exact = ((1.0 + c) / ((1.0 - r * r).powi(2) + c)).sqrt();
-                let gain = response.gain(axis, r * mode.frequency_hz, Quantity::Kinematic);
+                let gain = response.gain(axis, r * mode.frequency_hz, AccelerationKind::Kinematic);
                 assert_relative_eq!(gain, exact, max_relative = 1e-4);
             }
-            let peak = response.peak(axis, 60.0, Quantity::Kinematic).unwrap();
+            let peak = response.peak(axis, 60.0, AccelerationKind::Kinematic).unwrap();
             assert_relative_eq!(peak.freq_hz, mode.frequency_hz, max_relative = 1e-3);
             assert_relative_eq!(peak.gain, 1.0 / (2.0 * zeta), max_relative = 2e-3);
         }
@@ -379,8 +383,8 @@ mod tests {
         let (spec, source) = load("rigid").unwrap();
         let head = HeadModel::new(&spec, &source).unwrap();
         let response = head.frequency_response(&head.default_points());
-        assert!(Axis::ALL.iter().all(|axis| response.gain(*axis, 5.0, Quantity::Kinematic) == 1.0));
-        assert!(response.peaks(Axis::X, 10.0, Quantity::Kinematic).is_empty());
+        assert!(Axis::ALL.iter().all(|axis| response.gain(*axis, 5.0, AccelerationKind::Kinematic) == 1.0));
+        assert!(response.peaks(Axis::X, 10.0, AccelerationKind::Kinematic).is_empty());
     }
 
     #[test]
@@ -392,10 +396,10 @@ mod tests {
         let column = response.displacement(Axis::X, freq_hz);
         let exact = column[0] + column[4] * (g / (TAU * freq_hz).powi(2));
         assert_relative_eq!(
-            (response.along(Axis::X, freq_hz, Quantity::SpecificForce) - exact).norm(),
+            (response.transfer(Axis::X, freq_hz, AccelerationKind::SpecificForce) - exact).norm(),
             0.0,
             epsilon = 1e-12
         );
-        assert!(response.gain(Axis::Y, 0.0, Quantity::SpecificForce).is_finite());
+        assert!(response.gain(Axis::Y, 0.0, AccelerationKind::SpecificForce).is_finite());
     }
 }

@@ -264,9 +264,9 @@ fn negative_derivative(
 ) -> Result<Matrix6, ElasticityError> {
     let mut slope = Matrix6::zeros();
     for k in 0..6 {
-        let ahead = wrench(&Vector6::ith(k, DIFFERENCE))?;
-        let behind = wrench(&Vector6::ith(k, -DIFFERENCE))?;
-        slope.set_column(k, &((behind - ahead) / (2.0 * DIFFERENCE)));
+        let plus = wrench(&Vector6::ith(k, DIFFERENCE))?;
+        let minus = wrench(&Vector6::ith(k, -DIFFERENCE))?;
+        slope.set_column(k, &((minus - plus) / (2.0 * DIFFERENCE)));
     }
     Ok(slope)
 }

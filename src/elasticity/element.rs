@@ -90,8 +90,8 @@ impl Element {
 
 /// Returns an error unless a stiffness is positive definite.
 pub(super) fn check_positive_definite(k: &Matrix6) -> Result<(), ElasticityError> {
-    let least = conditioning(k);
-    if least.is_nan() || least <= 1e-12 { Err(ElasticityError::NotPositiveDefinite { least }) } else { Ok(()) }
+    let smallest = conditioning(k);
+    if smallest.is_nan() || smallest <= 1e-12 { Err(ElasticityError::NotPositiveDefinite { smallest }) } else { Ok(()) }
 }
 
 fn check_symmetric(k: &Matrix6) -> Result<(), ElasticityError> {

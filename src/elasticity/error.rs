@@ -69,12 +69,12 @@ pub enum ElasticityError {
     },
     /// The stiffness matrix is not positive definite.
     #[error(
-        "the stiffness is not positive definite: scaled to a unit diagonal, the smallest eigenvalue is {least:.2e}, so some \
+        "the stiffness is not positive definite: scaled to a unit diagonal, the smallest eigenvalue is {smallest:.2e}, so some \
          displacement meets no resistance"
     )]
     NotPositiveDefinite {
         /// Smallest eigenvalue of the scaled matrix; -1 if a diagonal entry is not positive.
-        least: f64,
+        smallest: f64,
     },
     /// The axial load buckles the column.
     #[error(
@@ -93,12 +93,12 @@ pub enum ElasticityError {
         segments: usize,
     },
     /// The number of segments is out of range.
-    #[error("a spring has 1 to {most} segments, not {segments}")]
+    #[error("a spring has 1 to {max} segments, not {segments}")]
     Segments {
         /// Requested number of segments.
         segments: usize,
         /// Maximum number of segments.
-        most: usize,
+        max: usize,
     },
     /// The equilibrium of the inner nodes did not converge.
     #[error("the equilibrium of the spring's {segments} segments did not converge: residual {residual_n:.1e} N")]

@@ -34,7 +34,7 @@ impl Spring {
     /// When the load buckles the column, or `segments` is not 1 to [`MAX_SEGMENTS`].
     pub fn of_column(column: &Column, segments: usize) -> Result<Self, ElasticityError> {
         if !(1..=MAX_SEGMENTS).contains(&segments) {
-            return Err(ElasticityError::Segments { segments, most: MAX_SEGMENTS });
+            return Err(ElasticityError::Segments { segments, max: MAX_SEGMENTS });
         }
         // The full column must not buckle either, even if each segment is short enough.
         super::loaded_stiffness(column)?;

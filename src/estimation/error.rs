@@ -137,7 +137,7 @@ pub enum WarningKind {
     /// Relocalisation after the gap succeeded.
     Relocalised {
         /// Distance from the position before the gap, m.
-        away_m: f64,
+        distance_m: f64,
     },
     /// Relocalisation after the gap failed: the motion during the gap is missing from the trajectory.
     NotRelocalised {
@@ -205,7 +205,7 @@ impl WarningKind {
         match self {
             Self::ImuGap { seconds } | Self::LidarGap { seconds } | Self::Restarted { seconds } => Some(*seconds),
             Self::Lost { seconds, .. } => Some(*seconds),
-            Self::Relocalised { away_m } => Some(*away_m),
+            Self::Relocalised { distance_m } => Some(*distance_m),
             Self::NoisyImu { gyro, accel } => Some(gyro.max(*accel)),
             Self::Discarded { count, .. } => Some(*count as f64),
             Self::Saturated { samples } => Some(*samples as f64),
@@ -271,8 +271,8 @@ impl fmt::Display for WarningKind {
             Self::Restarted { seconds } => {
                 write!(f, "no IMU sample for {seconds:.3} s, too long to bridge; re-initialised after the gap")
             }
-            Self::Relocalised { away_m } => {
-                write!(f, "relocalised after the IMU gap, {away_m:.2} m from the position before it")
+            Self::Relocalised { distance_m } => {
+                write!(f, "relocalised after the IMU gap, {distance_m:.2} m from the position before it")
             }
             Self::NotRelocalised { why } => write!(
                 f,

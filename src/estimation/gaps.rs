@@ -3,7 +3,7 @@
 //! If a clock is set by a day in the middle of a recording, there is a gap of a day. Quantities at regular times (knots,
 //! nodes) would fill it. They are placed on a time axis on which no gap exceeds [`MAX_GAP_S`].
 
-use super::survey::{KnownLidar, Sighting, Survey};
+use super::observed::{LidarCorrectionPeriod, ObservedSurfel, ObservedSurfels};
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::time::{Span, Stamp};
 
@@ -50,16 +50,16 @@ impl Gaps {
         all.iter().map(|(stamp, covariance)| (self.shortened(*stamp), *covariance)).collect()
     }
 
-    /// Converts a survey to the shortened time.
-    pub(super) fn shorten_survey(&self, survey: &Survey) -> Survey {
-        let origin = survey.origin;
+    /// Converts observed surfels to the shortened time.
+    pub(super) fn shorten_observed(&self, observed: &ObservedSurfels) -> ObservedSurfels {
+        let origin = observed.origin;
         let seconds = |tau_s: f64| self.shortened(origin + Span::from_seconds(tau_s)).seconds_since(origin);
-        let sighting = |one: &Sighting| Sighting { tau_s: seconds(one.tau_s), ..*one };
-        let known = |one: &KnownLidar| KnownLidar { until_s: seconds(one.until_s), ..*one };
-        Survey {
-            sightings: survey.sightings.iter().map(sighting).collect(),
-            lidars: survey.lidars.iter().map(known).collect(),
-            ..*survey
+        let surfel = |one: &ObservedSurfel| ObservedSurfel { tau_s: seconds(one.tau_s), ..*one };
+        let known = |one: &LidarCorrectionPeriod| LidarCorrectionPeriod { until_s: seconds(one.until_s), ..*one };
+        ObservedSurfels {
+            surfels: observed.surfels.iter().map(surfel).collect(),
+            lidars: observed.lidars.iter().map(known).collect(),
+            ..*observed
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::clock::Clock;
 use super::residual::{
-    ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN,
-    RANGE,
+    ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION,
+    LIDAR_TRANSLATION, RANGE,
 };
 use super::spec::EstimatorSpec;
 use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
@@ -221,8 +221,8 @@ fn information(
     // An unknown with a sigma of zero is fixed.
     sigmas[RANGE] = surfels.range_offset_sigma_m.max(1e-9);
     let (turn, shift) = extrinsics.sigmas();
-    sigmas[LIDAR_TURN..LIDAR_TURN + 3].fill(turn.max(1e-9));
-    sigmas[LIDAR_SHIFT..LIDAR_SHIFT + 3].fill(shift.max(1e-9));
+    sigmas[LIDAR_ROTATION..LIDAR_ROTATION + 3].fill(turn.max(1e-9));
+    sigmas[LIDAR_TRANSLATION..LIDAR_TRANSLATION + 3].fill(shift.max(1e-9));
     sigmas[GYRO_MATRIX..GYRO_MATRIX + 9].fill(inertial.gyro_matrix_sigma.max(1e-9));
     sigmas[ACCEL_MATRIX..ACCEL_MATRIX + 9].fill(inertial.accel_matrix_sigma.max(1e-9));
     let mut information = SMatrix::from_diagonal(&SVector::from(sigmas.map(|sigma| sigma.powi(-2))));

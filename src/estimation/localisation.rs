@@ -1,7 +1,7 @@
 //! Localisation in a given map, and relocalisation after an IMU gap in the surfaces seen before it.
 
-use super::consider::Consider;
-use super::map::{Located, MAP_LIMITS, RelocalisationLimits, Relocaliser, map_covariance};
+use super::consider::ConsiderCovariance;
+use super::map::{LocalisedPose, MAP_LIMITS, RelocalisationLimits, Relocaliser, map_covariance};
 use super::surfel::Patch;
 use super::views::Views;
 use super::window::Window;
@@ -19,7 +19,7 @@ pub(super) struct MapLocalisation {
     /// Approximate pose `map_from_head` of a pending search.
     about: Option<Pose>,
     /// Result of the first successful search.
-    found: Option<Located>,
+    found: Option<LocalisedPose>,
 }
 
 impl MapLocalisation {
@@ -41,7 +41,7 @@ impl MapLocalisation {
     }
 
     /// Result of the first successful search.
-    pub(super) fn found(&self) -> Option<&Located> {
+    pub(super) fn found(&self) -> Option<&LocalisedPose> {
         self.found.as_ref()
     }
 
@@ -53,7 +53,11 @@ impl MapLocalisation {
     /// Performs a pending search: localises the frame of `window` in the map by the patches of the window.
     ///
     /// `None` if no search is pending. The search is no longer pending afterwards, whether it succeeds or fails.
-    pub(super) fn find(&mut self, window: &Window, head_from_imu: &Pose) -> Option<Result<Located, EstimationError>> {
+    pub(super) fn find(
+        &mut self,
+        window: &Window,
+        head_from_imu: &Pose,
+    ) -> Option<Result<LocalisedPose, EstimationError>> {
         let about = self.about.take()?;
         // Window and map frames are both level, so only the heading of the approximate pose is used.
         let window_start = window.start_pose();
@@ -78,7 +82,7 @@ impl MapLocalisation {
 }
 
 /// Error text for a position near the given start if another start gives a `better` one.
-fn ambiguous(found: &Located, better: &Located, map_from_head: &Pose) -> String {
+fn ambiguous(found: &LocalisedPose, better: &LocalisedPose, map_from_head: &Pose) -> String {
     let at = map_from_head.translation.vector;
     format!(
         "near the start {:.0} % of the observed surface matches the map, but {:.0} % at x,y,z,yaw = {:.1},{:.1},{:.1},{:.0}",
@@ -95,7 +99,7 @@ fn ambiguous(found: &Located, better: &Located, map_from_head: &Pose) -> String 
 #[derive(Debug)]
 pub(super) struct GapRelocalisation {
     views: Views,
-    consider: Consider,
+    consider: ConsiderCovariance,
     /// Patches of the last window before the gap, in addition to the views.
     last: Vec<Patch>,
     /// Start of the gap, IMU time, s.
@@ -104,7 +108,7 @@ pub(super) struct GapRelocalisation {
 
 impl GapRelocalisation {
     /// Prepares the search: the views with their covariance, the last patches, and the start of the gap.
-    pub(super) fn new((views, consider): (Views, Consider), last: Vec<Patch>, until_s: f64) -> Self {
+    pub(super) fn new((views, consider): (Views, ConsiderCovariance), last: Vec<Patch>, until_s: f64) -> Self {
         Self { views, consider, last, until_s }
     }
 
@@ -112,7 +116,11 @@ impl GapRelocalisation {
     ///
     /// Returns the pose of that frame in the map, the views, and their joint covariance with the relocalised pose; or the
     /// reason of the failure.
-    pub(super) fn find(mut self, window: &Window, spec: &EstimatorSpec) -> Result<(Pose, Views, Consider), String> {
+    pub(super) fn find(
+        mut self,
+        window: &Window,
+        spec: &EstimatorSpec,
+    ) -> Result<(Pose, Views, ConsiderCovariance), String> {
         self.last.extend(self.views.patches());
         let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
         let relocaliser = Relocaliser::in_patches(self.last, (&spec.matching, &spec.surfels), certainty);

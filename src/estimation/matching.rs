@@ -1,7 +1,7 @@
 //! Surfel matching: nearest neighbours in position and normal, with gates on normals, distance and time.
 
 use super::spec::{MatchingSpec, SurfelSpec};
-use super::surfel::{Patch, Placed};
+use super::surfel::{Patch, PlacedSurfel};
 use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 use rayon::prelude::*;
 
@@ -28,7 +28,7 @@ pub(super) struct Matcher {
 }
 
 /// A k-d tree of patches for each resolution.
-pub(super) struct Forest {
+pub(super) struct SearchTrees {
     levels: Vec<Level>,
 }
 
@@ -52,12 +52,12 @@ impl Level {
         let Some(tree) = &self.tree else { return Vec::new() };
         let max_radius = max_distance as f32;
         let parameters = Parameters { epsilon: 0.0, max_radius, allow_self_match: false, sort_results: true };
-        let near = tree.knn_advanced(count as u32, feature, CandidateContainer::Linear, &parameters, None);
-        near.iter().map(|neighbour| self.members[neighbour.index as usize]).collect()
+        let found = tree.knn_advanced(count as u32, feature, CandidateContainer::Linear, &parameters, None);
+        found.iter().map(|neighbour| self.members[neighbour.index as usize]).collect()
     }
 }
 
-impl std::fmt::Debug for Forest {
+impl std::fmt::Debug for SearchTrees {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_list().entries(self.levels.iter().map(|level| level.members.len())).finish()
     }
@@ -70,36 +70,36 @@ impl Matcher {
 
     fn feature(&self, patch: &Patch) -> Feature {
         let per_edge = 1.0 / (self.finest_voxel_m * f64::from(1_u32 << patch.level));
-        let [x, y, z] = <[f64; 3]>::from(patch.centre * per_edge).map(number);
-        let [a, b, c] = <[f64; 3]>::from(patch.normal * self.spec.normal_scale).map(number);
+        let [x, y, z] = <[f64; 3]>::from(patch.centre * per_edge).map(not_nan);
+        let [a, b, c] = <[f64; 3]>::from(patch.normal * self.spec.normal_scale).map(not_nan);
         Feature([x, y, z, a, b, c])
     }
 
     /// Builds a tree for each resolution.
-    pub(super) fn plant(&self, patches: &[Patch]) -> Forest {
-        let plant = |level| Level::of(level, patches, |patch| self.feature(patch));
-        Forest { levels: (0..self.levels).map(plant).collect() }
+    pub(super) fn build_trees(&self, patches: &[Patch]) -> SearchTrees {
+        let build = |level| Level::of(level, patches, |patch| self.feature(patch));
+        SearchTrees { levels: (0..self.levels).map(build).collect() }
     }
 
     /// The `count` patches nearest to `patch` in six dimensions, nearest first.
-    pub(super) fn neighbours(&self, forest: &Forest, patch: &Patch, count: usize) -> Vec<u32> {
-        let level = forest.levels.get(patch.level);
+    pub(super) fn neighbours(&self, trees: &SearchTrees, patch: &Patch, count: usize) -> Vec<u32> {
+        let level = trees.levels.get(patch.level);
         level.map_or_else(Vec::new, |level| level.nearest(&self.feature(patch), count, self.spec.max_distance))
     }
 
-    /// Pairs of neighbouring patches in `placed`, with the trees in `forest`: ordered indices `(i, j)`, `i < j`.
-    pub(super) fn among(&self, placed: &[Placed], forest: &Forest) -> Vec<(u32, u32)> {
-        let near: Vec<Vec<u32>> = placed
+    /// Pairs of neighbouring patches in `placed`, found in `trees`: ordered indices `(i, j)`, `i < j`.
+    pub(super) fn neighbour_pairs(&self, placed: &[PlacedSurfel], trees: &SearchTrees) -> Vec<(u32, u32)> {
+        let neighbours: Vec<Vec<u32>> = placed
             .par_iter()
             .with_min_len(256)
-            .map(|surfel| self.neighbours(forest, &surfel.patch, self.spec.neighbours))
+            .map(|surfel| self.neighbours(trees, &surfel.patch, self.spec.neighbours))
             .collect();
         let mut pairs = Vec::new();
         for (i, surfel) in placed.iter().enumerate() {
-            for j in near[i].iter().map(|j| *j as usize) {
-                let mutual = near[j].contains(&(i as u32));
+            for j in neighbours[i].iter().map(|j| *j as usize) {
+                let mutual = neighbours[j].contains(&(i as u32));
                 let first_of_both = i < j || !mutual;
-                if first_of_both && (mutual || !self.spec.reciprocal) && self.apart(surfel, &placed[j]) {
+                if first_of_both && (mutual || !self.spec.reciprocal) && self.separated_in_time(surfel, &placed[j]) {
                     pairs.push((i.min(j) as u32, i.max(j) as u32));
                 }
             }
@@ -108,19 +108,19 @@ impl Matcher {
     }
 
     /// Whether the times of two surfels differ by at least the minimum.
-    pub(super) fn apart(&self, a: &Placed, b: &Placed) -> bool {
+    pub(super) fn separated_in_time(&self, a: &PlacedSurfel, b: &PlacedSurfel) -> bool {
         (a.tau_s - b.tau_s).abs() >= self.spec.min_time_difference_s
     }
 
     /// Whether two patches pass the gates on the angle between normals and on the distance along them.
-    pub(super) fn agree(&self, a: &Patch, b: &Patch, gate_m: f64) -> bool {
-        let apart = a.centre - b.centre;
+    pub(super) fn pass_gates(&self, a: &Patch, b: &Patch, gate_m: f64) -> bool {
+        let difference = a.centre - b.centre;
         a.normal.dot(&b.normal) > self.spec.max_normal_angle_deg.to_radians().cos()
-            && apart.dot(&a.normal).abs().max(apart.dot(&b.normal).abs()) < 3.0 * gate_m
-            && apart.dot(&(a.normal + b.normal)).abs() < 2.0 * gate_m
+            && difference.dot(&a.normal).abs().max(difference.dot(&b.normal).abs()) < 3.0 * gate_m
+            && difference.dot(&(a.normal + b.normal)).abs() < 2.0 * gate_m
     }
 }
 
-fn number(x: f64) -> NotNan<f32> {
+fn not_nan(x: f64) -> NotNan<f32> {
     NotNan::new(x as f32).unwrap_or_default()
 }

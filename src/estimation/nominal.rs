@@ -80,9 +80,9 @@ impl Nominal {
     pub(super) fn correct(&mut self, first: usize, curve: impl Fn(usize) -> Correction) {
         for (index, state) in self.states.iter_mut().enumerate().skip(first) {
             let correction = curve(index);
-            state.rotation = Rotation::from_scaled_axis(correction.rotation) * state.rotation;
+            state.rotation = Rotation::from_scaled_axis(correction.rotation) * state.rotation; // eq. (2)
             state.rotation.renormalize_fast();
-            state.position += correction.translation;
+            state.position += correction.translation; // eq. (2)
             state.velocity += correction.velocity;
         }
     }
@@ -98,11 +98,11 @@ impl Nominal {
     }
 
     /// Rotates the trajectory about `pivot`.
-    pub(super) fn turn(&mut self, turn: &Rotation, pivot: &Vector) {
+    pub(super) fn rotate(&mut self, rotation: &Rotation, pivot: &Vector) {
         for state in &mut self.states {
-            state.rotation = turn * state.rotation;
-            state.position = pivot + turn * (state.position - pivot);
-            state.velocity = turn * state.velocity;
+            state.rotation = rotation * state.rotation;
+            state.position = pivot + rotation * (state.position - pivot);
+            state.velocity = rotation * state.velocity;
         }
     }
 

@@ -1,12 +1,12 @@
 //! Output of the estimator.
 
-use super::{Located, Survey, TimeSpent, Warning, WarningKind};
+use super::{LocalisedPose, ObservedSurfels, Timing, Warning, WarningKind};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use crate::measurement::LidarCorrection;
 use crate::time::Stamp;
 
 /// Length of the initial part over which a trajectory is aligned with the truth when errors are reported, s.
-pub const GAUGED_S: f64 = 20.0;
+pub const ALIGNMENT_S: f64 = 20.0;
 
 /// Lever arm that converts a rotation error to a position error in the alignment, m.
 ///
@@ -22,7 +22,7 @@ pub struct EstimatedPose {
     pub map_from_head: Pose,
     /// Covariance relative to the map, which the first pose defines: position, then attitude; m^2, m rad, rad^2.
     pub covariance: PoseCovariance,
-    /// Covariance relative to the alignment over the first [`GAUGED_S`] seconds, or over the time so far during these.
+    /// Covariance relative to the alignment over the first [`ALIGNMENT_S`] seconds, or over the time up to the pose.
     pub covariance_against_gauge: PoseCovariance,
     /// Velocity of the head origin, m/s.
     pub velocity_in_map_m_per_s: Vector,
@@ -74,11 +74,11 @@ pub struct WindowReport {
     /// Whether the lidar would show a motion of a resting head.
     pub sees_rest: bool,
     /// Problem of the solution, if any.
-    pub trouble: Option<WarningKind>,
+    pub problem: Option<WarningKind>,
     /// Run time, s. With its parts, the only value that differs between identical runs.
     pub elapsed_s: f64,
     /// Parts of the run time; their sum is slightly smaller.
-    pub spent: TimeSpent,
+    pub timing: Timing,
 }
 
 /// An open-loop estimate.
@@ -88,12 +88,12 @@ pub struct OpenLoop {
     pub trajectory: Trajectory,
     /// The poses with velocity, biases and clock offset.
     pub poses: Vec<EstimatedPose>,
-    /// Covariances of some poses during twice [`GAUGED_S`] seconds from the start, relative to the alignment: m^2, m rad,
-    /// rad^2.
+    /// Covariances of some poses during twice [`ALIGNMENT_S`] seconds from the start, relative to the alignment: m^2,
+    /// m rad, rad^2.
     ///
-    /// The alignment covers the first [`GAUGED_S`] seconds, or half of a shorter run. Empty if the estimate restarted in
-    /// this time.
-    pub gauged: Vec<(Stamp, PoseCovariance)>,
+    /// The alignment covers the first [`ALIGNMENT_S`] seconds, or half of a shorter run. Empty if the estimate
+    /// restarted in this time.
+    pub aligned_covariances: Vec<(Stamp, PoseCovariance)>,
     /// The clock offset after each window, s, positive if IMU stamps are later; over lidar time.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// Estimated corrections of the lidar calibration at the end, consistent with the poses.
@@ -104,11 +104,11 @@ pub struct OpenLoop {
     /// those of gyroscope and accelerometer.
     pub calibrated_lidar: LidarCorrection,
     /// Result of the first localisation in the given map, if any.
-    pub located: Option<Located>,
+    pub located: Option<LocalisedPose>,
     /// One report per window.
     pub windows: Vec<WindowReport>,
     /// Events that degraded the estimate.
     pub warnings: Vec<Warning>,
     /// The observed surfaces, if requested.
-    pub survey: Survey,
+    pub observed: ObservedSurfels,
 }

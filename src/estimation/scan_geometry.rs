@@ -16,7 +16,7 @@ const PERIODS: (f64, f64) = (1.2, 2.5);
 const OUT_OF_PLANE: f32 = 0.01;
 /// Length of the mean beam direction above which a lidar looks in one direction only: 0.91 for a cone with a half angle
 /// of 35 degrees, 0.64 for half a plane.
-const ONE_WAY: f64 = 0.8;
+const ONE_DIRECTION_THRESHOLD: f64 = 0.8;
 
 /// Scanning geometry, measured from the first scans.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -47,7 +47,7 @@ impl ScanGeometry {
 
     /// Whether the lidar looks in one direction only; a range bias is then equivalent to a translation.
     pub(super) fn is_one_way(self) -> bool {
-        self.one_sidedness > ONE_WAY
+        self.one_sidedness > ONE_DIRECTION_THRESHOLD
     }
 
     /// Adapts the settings: fewer points per surfel for a sparse lidar, longer surfels for a slow one.

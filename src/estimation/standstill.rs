@@ -4,7 +4,7 @@
 //! Least squares over many directions gives the translation, in the directions that the surfaces constrain: along two
 //! parallel walls it is unknown.
 
-use super::surfel::Beam;
+use super::surfel::TimedReturn;
 use crate::geometry::Vector;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::BTreeMap;
@@ -12,15 +12,15 @@ use std::collections::BTreeMap;
 /// Cell size in azimuth and elevation, rad.
 const CELL_RAD: f64 = 0.05;
 /// Two ranges in a cell are different if they differ by more than this, m, plus this fraction.
-const DIFFER: (f64, f64) = (0.1, 0.03);
+const RANGE_TOLERANCE: (f64, f64) = (0.1, 0.03);
 /// The head moves if more than this fraction of the cells have different ranges, out of at least this number.
-const MOVED: (f64, usize) = (0.12, 20);
+const MOTION_THRESHOLD: (f64, usize) = (0.12, 20);
 /// The head moves if its translation exceeds this, m.
 const SHIFTED_M: f64 = 0.03;
 /// Cauchy threshold of the residuals in successive solutions, m. Outliers are edges and moving objects.
-const OUTLIERS_M: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.03, 0.03];
+const CAUCHY_SCALES_M: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.03, 0.03];
 /// A cell is used if its points are within this fraction of their extent from a line.
-const STRAIGHT: f64 = 0.1;
+const LINE_TOLERANCE: f64 = 0.1;
 /// A cell is used if the cosine of the incidence angle exceeds this.
 const MIN_COSINE: f64 = 0.1;
 /// The translation is observable along eigenvectors of the mean `n n^T` with an eigenvalue above this.
@@ -59,7 +59,7 @@ impl Cell {
         let longest = scatter.eigenvalues.imax();
         let across = scatter.eigenvalues.iter().enumerate().filter(|(k, _)| *k != longest);
         let across = across.map(|(_, square)| *square).fold(0.0, f64::max);
-        if across > STRAIGHT.powi(2) * scatter.eigenvalues[longest] {
+        if across > LINE_TOLERANCE.powi(2) * scatter.eigenvalues[longest] {
             return None;
         }
         let tangent: Vector = scatter.eigenvectors.column(longest).into();
@@ -69,14 +69,14 @@ impl Cell {
     }
 }
 
-/// Compares `early` and `late` beams of the assumed initial rest.
-pub(super) fn standstill(early: &[Beam], late: &[Beam]) -> Standstill {
+/// Compares `early` and `late` returns of the assumed initial rest.
+pub(super) fn standstill(early: &[TimedReturn], late: &[TimedReturn]) -> Standstill {
     let (early, late) = (by_direction(early), by_direction(late));
     let both: Vec<(&Cell, f64)> =
         early.iter().filter_map(|(key, cell)| Some((cell, late.get(key)?.mean_range_m()))).collect();
-    let is_different = |a: f64, b: f64| (a - b).abs() > DIFFER.0 + DIFFER.1 * a.min(b);
+    let is_different = |a: f64, b: f64| (a - b).abs() > RANGE_TOLERANCE.0 + RANGE_TOLERANCE.1 * a.min(b);
     let differ = both.iter().filter(|(a, b)| is_different(a.mean_range_m(), *b)).count();
-    if both.len() >= MOVED.1 && differ as f64 > MOVED.0 * both.len() as f64 {
+    if both.len() >= MOTION_THRESHOLD.1 && differ as f64 > MOTION_THRESHOLD.0 * both.len() as f64 {
         return Standstill::Moves;
     }
     let facing = both.iter().filter_map(|(cell, late_m)| {
@@ -86,10 +86,10 @@ pub(super) fn standstill(early: &[Beam], late: &[Beam]) -> Standstill {
     from_displacements(&facing.collect::<Vec<_>>())
 }
 
-/// Sorts beams into cells of direction.
-fn by_direction(beams: &[Beam]) -> BTreeMap<(i32, i32), Cell> {
+/// Sorts returns into cells of direction.
+fn by_direction(returns: &[TimedReturn]) -> BTreeMap<(i32, i32), Cell> {
     let mut cells: BTreeMap<(i32, i32), Cell> = BTreeMap::new();
-    for beam in beams {
+    for beam in returns {
         let point = beam.point_in_imu.cast::<f64>();
         let (azimuth, elevation) = (point.y.atan2(point.x), (point.z / point.norm()).asin());
         let cell = cells.entry(((azimuth / CELL_RAD).floor() as i32, (elevation / CELL_RAD).floor() as i32));
@@ -104,7 +104,7 @@ fn by_direction(beams: &[Beam]) -> BTreeMap<(i32, i32), Cell> {
 
 /// Estimates the translation from normals and the displacement along each of them, m.
 fn from_displacements(facing: &[(Vector, f64)]) -> Standstill {
-    if facing.len() < MOVED.1 {
+    if facing.len() < MOTION_THRESHOLD.1 {
         return Standstill::Unknown;
     }
     let mean = facing.iter().map(|(normal, _)| normal * normal.transpose()).sum::<Matrix3<f64>>() / facing.len() as f64;
@@ -116,7 +116,7 @@ fn from_displacements(facing: &[(Vector, f64)]) -> Standstill {
     // The translation along the other directions stays zero.
     let within = observable.iter().map(|along| along * along.transpose()).sum::<Matrix3<f64>>();
     let mut shift = Vector::zeros();
-    for outlier_m in OUTLIERS_M {
+    for outlier_m in CAUCHY_SCALES_M {
         let (mut information, mut right) = (Matrix3::identity() - within, Vector::zeros());
         for (normal, displacement_m) in facing {
             let weight = 1.0 / (1.0 + ((displacement_m - normal.dot(&shift)) / outlier_m).powi(2));
@@ -139,7 +139,7 @@ mod tests {
 
     /// Beams in a hall 6 m wide with ends at 12 and 8 m, or in a corridor without ends, after a motion of `moved_m` along
     /// it. The range noise is a fixed pattern; the maximum range is 30 m.
-    fn beams(moved_m: f64, has_ends: bool) -> Vec<Beam> {
+    fn returns(moved_m: f64, has_ends: bool) -> Vec<TimedReturn> {
         let beam = |k: i32| {
             let azimuth = f64::from(k) * 0.004_363;
             let (sin, cos) = azimuth.sin_cos();
@@ -147,14 +147,14 @@ mod tests {
             let along = if has_ends { along } else { f64::INFINITY };
             let range = along.min(3.0 / sin.abs()) + 0.01 * (f64::from(k) * 7.3).sin();
             let point = nalgebra::Vector3::new(range * cos, range * sin, 0.0).cast();
-            Beam { tau_s: 0.0, point_in_imu: point, range_m: range as f32 }
+            TimedReturn { tau_s: 0.0, point_in_imu: point, range_m: range as f32 }
         };
         (0..1440).map(beam).filter(|beam| beam.range_m < 30.0).collect()
     }
 
     #[test]
     fn constant_velocity_is_detected_as_motion() {
-        let seen = |moved_m: f64| standstill(&beams(0.0, true), &beams(moved_m, true));
+        let seen = |moved_m: f64| standstill(&returns(0.0, true), &returns(moved_m, true));
         assert_eq!(seen(0.0), Standstill::Rests);
         assert_eq!(seen(0.01), Standstill::Rests);
         for moved_m in [0.06, 0.3, 1.0, 4.0] {
@@ -165,16 +165,16 @@ mod tests {
 
     #[test]
     fn rest_is_unknown_in_a_corridor_without_ends() {
-        assert_eq!(standstill(&beams(0.0, false), &beams(5.0, false)), Standstill::Unknown);
-        assert_eq!(standstill(&beams(0.0, true), &[]), Standstill::Unknown);
+        assert_eq!(standstill(&returns(0.0, false), &returns(5.0, false)), Standstill::Unknown);
+        assert_eq!(standstill(&returns(0.0, true), &[]), Standstill::Unknown);
     }
 
     #[test]
     fn a_passing_person_is_not_a_motion_of_the_head() {
-        let mut late = beams(0.0, true);
+        let mut late = returns(0.0, true);
         for beam in &mut late[100..200] {
             beam.range_m *= 0.8;
         }
-        assert_eq!(standstill(&beams(0.0, true), &late), Standstill::Rests);
+        assert_eq!(standstill(&returns(0.0, true), &late), Standstill::Rests);
     }
 }

@@ -3,9 +3,9 @@
 //! Segments that left the window become a view if they cover cells that the stored views do not. A window uses the few
 //! views that cover most of its cells. Of about equal ones it uses the oldest, which has drifted least.
 
-use super::matching::{Forest, Matcher};
+use super::matching::{Matcher, SearchTrees};
 use super::spec::ViewSpec;
-use super::surfel::{Patch, Placed};
+use super::surfel::{Patch, PlacedSurfel};
 use crate::geometry::Vector;
 
 /// Edge length of the cells with which the coverage of views is compared, m.
@@ -22,7 +22,7 @@ pub(super) const MAP: u64 = u64::MAX;
 #[derive(Debug)]
 pub(super) struct View {
     pub(super) patches: Vec<Patch>,
-    pub(super) forest: Forest,
+    pub(super) trees: SearchTrees,
     cells: Vec<u64>,
     /// View number, in order of storage.
     pub(super) number: u64,
@@ -44,7 +44,7 @@ pub(super) struct ViewUpdate {
 pub(super) struct Views {
     spec: ViewSpec,
     max_active: usize,
-    kept: Vec<View>,
+    stored: Vec<View>,
     gathering: Vec<Patch>,
     gathered_s: f64,
     next: u64,
@@ -52,19 +52,19 @@ pub(super) struct Views {
 
 impl Views {
     pub(super) fn new(spec: &ViewSpec, max_active: usize) -> Self {
-        Self { spec: spec.clone(), max_active, kept: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
+        Self { spec: spec.clone(), max_active, stored: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
     }
 
     /// Adds a given map, with which every window is matched and which is never removed.
     pub(super) fn with_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
-        let (forest, cells) = (matcher.plant(patches), cells_of(patches.iter()));
-        self.kept.insert(0, View { patches: patches.to_vec(), forest, cells, number: MAP, pivot });
+        let (trees, cells) = (matcher.build_trees(patches), cells_of(patches.iter()));
+        self.stored.insert(0, View { patches: patches.to_vec(), trees, cells, number: MAP, pivot });
         self
     }
 
     /// Number of maps among the views, 0 or 1; the map is the first view.
     fn maps(&self) -> usize {
-        usize::from(self.kept.first().is_some_and(|view| view.number == MAP))
+        usize::from(self.stored.first().is_some_and(|view| view.number == MAP))
     }
 
     /// Adds the patches of a segment of `seconds` that left the window; `pivot` is the IMU position at the end of it, m.
@@ -86,7 +86,7 @@ impl Views {
         let patches = std::mem::take(&mut self.gathering);
         let cells = cells_of(patches.iter());
         let mut seen = cells.clone();
-        for view in &self.kept {
+        for view in &self.stored {
             remove(&mut seen, &view.cells);
         }
         let covered = 1.0 - seen.len() as f64 / cells.len().max(1) as f64;
@@ -94,44 +94,44 @@ impl Views {
             return ViewUpdate::default();
         }
         let removed =
-            if self.kept.len() - self.maps() >= self.spec.max_kept { self.remove_most_redundant() } else { None };
-        let (forest, number) = (matcher.plant(&patches), self.next);
+            if self.stored.len() - self.maps() >= self.spec.max_kept { self.remove_most_redundant() } else { None };
+        let (trees, number) = (matcher.build_trees(&patches), self.next);
         self.next += 1;
-        self.kept.push(View { patches, forest, cells, number, pivot });
+        self.stored.push(View { patches, trees, cells, number, pivot });
         ViewUpdate { added: Some(number), removed }
     }
 
     /// Removes the view with the fewest cells that no other view covers; returns its number.
     fn remove_most_redundant(&mut self) -> Option<u64> {
         let own = |index: usize| {
-            let mut cells = self.kept[index].cells.clone();
-            for (other, view) in self.kept.iter().enumerate() {
+            let mut cells = self.stored[index].cells.clone();
+            for (other, view) in self.stored.iter().enumerate() {
                 if other != index {
                     remove(&mut cells, &view.cells);
                 }
             }
             cells.len()
         };
-        let least = (self.maps()..self.kept.len()).min_by_key(|index| own(*index))?;
-        Some(self.kept.remove(least).number)
+        let most_redundant = (self.maps()..self.stored.len()).min_by_key(|index| own(*index))?;
+        Some(self.stored.remove(most_redundant).number)
     }
 
     /// Selects the views for a window with the surfels `placed`; returns indices for [`Views::view`].
-    pub(super) fn select(&self, placed: &[Placed]) -> Vec<usize> {
+    pub(super) fn select(&self, placed: &[PlacedSurfel]) -> Vec<usize> {
         let mut missing = cells_of(placed.iter().map(|surfel| &surfel.patch));
         let worthwhile = ((missing.len() as f64 * MIN_ADDED_FRACTION) as usize).max(1);
         let mut chosen: Vec<usize> = (0..self.maps()).collect();
-        chosen.iter().for_each(|map| remove(&mut missing, &self.kept[*map].cells));
-        let most = self.maps() + self.max_active.min(self.kept.len() - self.maps());
-        while chosen.len() < most {
-            let adds: Vec<usize> = self.kept.iter().map(|view| common(&missing, &view.cells)).collect();
+        chosen.iter().for_each(|map| remove(&mut missing, &self.stored[*map].cells));
+        let max_views = self.maps() + self.max_active.min(self.stored.len() - self.maps());
+        while chosen.len() < max_views {
+            let adds: Vec<usize> = self.stored.iter().map(|view| common(&missing, &view.cells)).collect();
             let best = adds.iter().copied().max().unwrap_or(0);
             if best < worthwhile {
                 break;
             }
             let enough = (best as f64 * OLDER_VIEW_RATIO) as usize;
             let Some(oldest) = adds.iter().position(|count| *count >= enough.max(worthwhile)) else { break };
-            remove(&mut missing, &self.kept[oldest].cells);
+            remove(&mut missing, &self.stored[oldest].cells);
             chosen.push(oldest);
         }
         chosen
@@ -139,11 +139,11 @@ impl Views {
 
     /// The patches of all views.
     pub(super) fn patches(&self) -> impl Iterator<Item = &Patch> {
-        self.kept.iter().flat_map(|view| &view.patches)
+        self.stored.iter().flat_map(|view| &view.patches)
     }
 
     pub(super) fn view(&self, index: usize) -> &View {
-        &self.kept[index]
+        &self.stored[index]
     }
 }
 

@@ -1,25 +1,25 @@
 use crate::geometry::{Surface, Vector};
 use rayon::prelude::*;
 
-/// Which points of a cloud are judged: a bounded number, spread evenly over it, always the same ones.
+/// Which points of a cloud are evaluated: a bounded number, spread evenly over it, always the same ones.
 ///
 /// Point `k` is selected when the Weyl sequence `k / phi mod 1` is below the wanted fraction: evenly distributed, and
 /// out of step with any period of the scanner.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thinning {
-    share: f64,
+    fraction: f64,
 }
 
 impl Thinning {
     /// About `limit` of `total` points; all of them where there are no more.
-    pub fn to(limit: usize, total: usize) -> Self {
-        Self { share: if total <= limit { 1.0 } else { limit as f64 / total as f64 } }
+    pub fn to_at_most(limit: usize, total: usize) -> Self {
+        Self { fraction: if total <= limit { 1.0 } else { limit as f64 / total as f64 } }
     }
 
-    /// Whether point `index` is judged.
+    /// Whether point `index` is evaluated.
     pub fn keeps(&self, index: usize) -> bool {
         const INVERSE_GOLDEN_RATIO: f64 = 0.618_033_988_749_894_8;
-        (index as f64 * INVERSE_GOLDEN_RATIO).fract() < self.share
+        (index as f64 * INVERSE_GOLDEN_RATIO).fract() < self.fraction
     }
 }
 
@@ -124,11 +124,11 @@ mod tests {
     fn thinning_keeps_about_the_limit_and_every_phase_of_a_scan() {
         // 1081 beams a scan, 2000 scans: of 100 000 selected points, each beam's index occurs about 92 times.
         let total = 1081 * 2000;
-        let thinning = Thinning::to(100_000, total);
+        let thinning = Thinning::to_at_most(100_000, total);
         let mut per_beam = vec![0_usize; 1081];
         (0..total).filter(|index| thinning.keeps(*index)).for_each(|index| per_beam[index % 1081] += 1);
         assert!(per_beam.iter().sum::<usize>().abs_diff(100_000) < 10);
         assert!(per_beam.iter().all(|count| (80..=105).contains(count)), "{per_beam:?}");
-        assert!((0..50).all(|index| Thinning::to(50, 50).keeps(index)));
+        assert!((0..50).all(|index| Thinning::to_at_most(50, 50).keeps(index)));
     }
 }

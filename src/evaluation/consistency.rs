@@ -26,18 +26,18 @@ pub struct Consistency {
 pub fn consistency(pairs: &Pairs, covariances: &[(Stamp, PoseCovariance)]) -> Option<Consistency> {
     let map_from_world = pairs.estimate().first()? * pairs.truth().first()?.inverse();
     let mut next = *pairs.stamps().first()?;
-    let mut told: Vec<[f64; 2]> = Vec::new();
+    let mut samples: Vec<[f64; 2]> = Vec::new();
     let mut rest = covariances.iter().peekable();
     for ((stamp, estimate), truth) in pairs.stamps().iter().zip(pairs.estimate()).zip(pairs.truth()) {
         while rest.next_if(|(at, _)| at < stamp).is_some() {}
         let Some((_, covariance)) = rest.peek().filter(|(at, _)| at == stamp && *stamp >= next) else { continue };
         if let Some(nees) = nees(estimate, &(map_from_world * truth), covariance) {
-            told.push(nees);
+            samples.push(nees);
             next = *stamp + SAMPLE_PERIOD;
         }
     }
-    let mean = |of: usize| told.iter().map(|nees| nees[of]).sum::<f64>() / told.len() as f64;
-    Some(Consistency { end: *told.last()?, position_nees: mean(0), attitude_nees: mean(1) })
+    let mean = |of: usize| samples.iter().map(|nees| nees[of]).sum::<f64>() / samples.len() as f64;
+    Some(Consistency { end: *samples.last()?, position_nees: mean(0), attitude_nees: mean(1) })
 }
 
 /// Normalised errors squared of position and attitude; `None` if a covariance is not positive definite.

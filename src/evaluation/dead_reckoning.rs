@@ -15,7 +15,7 @@ pub struct RestDetection {
     /// Maximum deviation of the specific force from the running mean, m/s^2.
     pub accel_m_per_s2: f64,
     /// Minimum duration of the rest, s.
-    pub least_s: f64,
+    pub min_s: f64,
     /// Delay with which a motion is detected, s: the last part of the rest of this length is not averaged.
     pub onset_s: f64,
 }
@@ -23,7 +23,7 @@ pub struct RestDetection {
 impl Default for RestDetection {
     /// Ten standard deviations of the noise of a 3DM-GX2 at 100 Hz; 0.5 s for both times.
     fn default() -> Self {
-        Self { gyro_rad_per_s: 0.06, accel_m_per_s2: 0.3, least_s: 0.5, onset_s: 0.5 }
+        Self { gyro_rad_per_s: 0.06, accel_m_per_s2: 0.3, min_s: 0.5, onset_s: 0.5 }
     }
 }
 
@@ -40,7 +40,7 @@ pub struct DeadReckoning {
     start: RestMean,
     still: bool,
     /// The last samples of the rest, which can include the onset of motion.
-    held: VecDeque<ImuSample>,
+    queue: VecDeque<ImuSample>,
     latest: Option<Stamp>,
     previous: Option<ImuSample>,
     map_from_imu: Rotation,
@@ -81,7 +81,7 @@ impl DeadReckoning {
             imu_from_head: head_from_imu.inverse(),
             start: RestMean::default(),
             still: true,
-            held: VecDeque::new(),
+            queue: VecDeque::new(),
             latest: None,
             previous: None,
             map_from_imu: Rotation::identity(),
@@ -103,8 +103,8 @@ impl DeadReckoning {
             self.delay(sample);
         } else {
             self.still = false;
-            for held in std::mem::take(&mut self.held) {
-                self.step(&held);
+            for sample in std::mem::take(&mut self.queue) {
+                self.step(&sample);
             }
             self.step(sample);
         }
@@ -112,9 +112,9 @@ impl DeadReckoning {
 
     /// Delays a sample, so that the onset of motion is not averaged.
     fn delay(&mut self, sample: &ImuSample) {
-        self.held.push_back(*sample);
-        while self.held.front().is_some_and(|held| sample.stamp.seconds_since(held.stamp) >= self.rest.onset_s) {
-            let Some(settled) = self.held.pop_front() else { return };
+        self.queue.push_back(*sample);
+        while self.queue.front().is_some_and(|first| sample.stamp.seconds_since(first.stamp) >= self.rest.onset_s) {
+            let Some(settled) = self.queue.pop_front() else { return };
             self.start.take(&settled);
             self.map_from_imu = level(&self.start.accel);
             self.output_pose(&settled);
@@ -122,7 +122,7 @@ impl DeadReckoning {
     }
 
     fn is_at_rest(&self, sample: &ImuSample) -> bool {
-        let Some(reference) = self.held.front() else { return true };
+        let Some(reference) = self.queue.front() else { return true };
         let (gyro, accel) = match self.start.count {
             0.0 => (reference.angular_velocity_rad_per_s, reference.specific_force_m_per_s2),
             _ => (self.start.gyro, self.start.accel),
@@ -161,7 +161,7 @@ impl DeadReckoning {
     /// # Errors
     /// When the rest at the start was too short.
     pub fn finish(self) -> Result<Trajectory, EvaluationError> {
-        let (needed_s, found_s) = (self.rest.least_s, self.start.seconds());
+        let (needed_s, found_s) = (self.rest.min_s, self.start.seconds());
         let weightless = self.start.accel.norm() < STANDARD_GRAVITY_M_PER_S2 / 2.0;
         if found_s < needed_s || weightless {
             return Err(EvaluationError::NoRest { needed_s, found_s: if weightless { 0.0 } else { found_s } });

@@ -1,5 +1,5 @@
 use super::{Errors, EvaluationError, Pairs};
-use crate::estimation::GAUGED_S;
+use crate::estimation::ALIGNMENT_S;
 
 /// Duration of the interval at the end over which the error is averaged, s.
 pub const TAIL_S: f64 = 5.0;
@@ -21,7 +21,7 @@ pub struct Drift {
     pub end_error_m: f64,
 }
 
-/// Drift of an estimate that is aligned over the first [`GAUGED_S`] seconds only.
+/// Drift of an estimate that is aligned over the first [`ALIGNMENT_S`] seconds only.
 ///
 /// The estimate is aligned with the truth over the first 20 s, all six degrees of freedom: by positions, and by
 /// attitudes where positions do not determine the rotation (twenty seconds of a straight path). The drift is the mean
@@ -32,11 +32,11 @@ pub struct Drift {
 /// # Errors
 /// When the two intervals overlap, or the first has too little motion for an alignment.
 pub fn drift(pairs: &Pairs) -> Result<Drift, EvaluationError> {
-    let (needed_s, found_s) = (GAUGED_S + TAIL_S, pairs.duration_s());
+    let (needed_s, found_s) = (ALIGNMENT_S + TAIL_S, pairs.duration_s());
     if found_s < needed_s {
         return Err(EvaluationError::TooShort { measure: "drift", needed_s, found_s });
     }
-    let (start, tail) = (pairs.first_seconds(GAUGED_S), pairs.last_seconds(TAIL_S));
+    let (start, tail) = (pairs.first_seconds(ALIGNMENT_S), pairs.last_seconds(TAIL_S));
     let world_from_map = super::align_poses(start.truth(), start.estimate(), TURN_LEVER_M)?;
     let (at_start, at_end) = (Errors::after(&start, &world_from_map), Errors::after(&tail, &world_from_map));
     let origin = pairs.stamps()[0];

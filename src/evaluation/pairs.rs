@@ -17,8 +17,8 @@ impl Pairs {
     /// # Errors
     /// When no pose does.
     pub fn associate(estimate: &Trajectory, truth: &Trajectory) -> Result<Self, EvaluationError> {
-        let told = truth.iter().map(|(stamp, pose)| Ok::<_, Infallible>((stamp, *pose)));
-        let Ok(pairs) = Self::gather(estimate, told);
+        let poses = truth.iter().map(|(stamp, pose)| Ok::<_, Infallible>((stamp, *pose)));
+        let Ok(pairs) = Self::gather(estimate, poses);
         if pairs.is_empty() {
             return Err(EvaluationError::NothingInCommon { estimate: span_of(estimate), truth: span_of(truth) });
         }
@@ -34,13 +34,13 @@ impl Pairs {
         estimate: &Trajectory,
         truth: impl IntoIterator<Item = Result<(Stamp, Pose), E>>,
     ) -> Result<Self, E> {
-        let most = estimate.len();
-        let (estimated, truths) = (Vec::with_capacity(most), Vec::with_capacity(most));
-        let mut pairs = Self { stamps: Vec::with_capacity(most), estimate: estimated, truth: truths };
+        let capacity = estimate.len();
+        let (estimated, truths) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+        let mut pairs = Self { stamps: Vec::with_capacity(capacity), estimate: estimated, truth: truths };
         let mut waiting = estimate.iter().peekable();
         let mut before: Option<(Stamp, Pose)> = None;
-        for told in truth {
-            let now = told?;
+        for pose in truth {
+            let now = pose?;
             // Poses before the first true pose have no partner.
             while let Some((stamp, pose)) = waiting.next_if(|(stamp, _)| *stamp <= now.0) {
                 let around = before.into_iter().filter(|before| before.0 < now.0).chain([now]);

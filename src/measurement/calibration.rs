@@ -20,28 +20,28 @@ pub struct LidarCorrection {
     /// Added to every range, m.
     pub range_m: f64,
     /// Rotation of the lidar about the lidar origin.
-    pub turn: Rotation,
+    pub rotation: Rotation,
     /// Translation of the lidar, m.
-    pub shift: Vector,
+    pub translation: Vector,
 }
 
 impl Default for LidarCorrection {
     fn default() -> Self {
-        Self { range_m: 0.0, turn: Rotation::identity(), shift: Vector::zeros() }
+        Self { range_m: 0.0, rotation: Rotation::identity(), translation: Vector::zeros() }
     }
 }
 
 impl LidarCorrection {
     /// Corrects a vector from the lidar to a point, m, given as the calibration yields it (`reach`).
-    pub fn reach(&self, reach: &Vector) -> Vector {
-        self.turn * (reach * (1.0 + self.range_m / reach.norm()))
+    pub fn apply(&self, reach: &Vector) -> Vector {
+        self.rotation * (reach * (1.0 + self.range_m / reach.norm()))
     }
 
-    /// Inverse of [`Self::reach`].
+    /// Inverse of [`Self::apply`].
     ///
     /// The vector, m, that the calibration yields for a point at `reach` from the lidar.
-    pub fn calibrated(&self, reach: &Vector) -> Vector {
-        self.turn.inverse() * (reach * (1.0 - self.range_m / reach.norm()))
+    pub fn remove(&self, reach: &Vector) -> Vector {
+        self.rotation.inverse() * (reach * (1.0 - self.range_m / reach.norm()))
     }
 }
 
@@ -49,8 +49,8 @@ impl Calibration {
     /// Pose of the lidar in the head, with the correction applied.
     pub fn head_from_corrected_laser(&self, correction: &LidarCorrection) -> Pose {
         let mut imu_from_laser = self.head_from_imu.inverse() * self.head_from_laser;
-        imu_from_laser.rotation = correction.turn * imu_from_laser.rotation;
-        imu_from_laser.translation.vector += correction.shift;
+        imu_from_laser.rotation = correction.rotation * imu_from_laser.rotation;
+        imu_from_laser.translation.vector += correction.translation;
         self.head_from_imu * imu_from_laser
     }
 }

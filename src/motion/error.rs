@@ -57,12 +57,12 @@ pub enum MotionError {
     },
     /// The motion would need too many path segments.
     #[error(
-        "{duration_s} s of this motion need more than {most} path segments; shorten the run, lower the speed, or lengthen the route"
+        "{duration_s} s of this motion need more than {max} path segments; shorten the run, lower the speed, or lengthen the route"
     )]
     TooLong {
         /// Requested duration, s.
         duration_s: f64,
         /// Maximum number of path segments.
-        most: usize,
+        max: usize,
     },
 }

@@ -80,7 +80,7 @@ impl WalkSpec {
                 break;
             }
             if walker.path.knots() > MAX_KNOTS {
-                return Err(MotionError::TooLong { duration_s: until_s, most: MAX_KNOTS });
+                return Err(MotionError::TooLong { duration_s: until_s, max: MAX_KNOTS });
             }
         }
         let speed_fraction = walker.path.speed_fraction(self.speed_m_per_s);

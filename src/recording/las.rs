@@ -10,7 +10,7 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::sync::{Arc, OnceLock};
 
 /// Resolution of the coordinates, m.
-const SCALE_M: f64 = 1e-4;
+const RESOLUTION_M: f64 = 1e-4;
 /// Maximum coordinate at this resolution, m: below 2^31 times the resolution.
 const MAX_COORDINATE_M: f64 = 214_000.0;
 /// User id of records defined by the LAS specification.
@@ -93,7 +93,7 @@ impl<W: Write + Seek + Send + Sync + 'static> LasWriter<W> {
 fn header() -> las::Result<las::Header> {
     let mut builder = Builder::from((1, 4));
     builder.point_format = Format { extra_bytes: 4, ..Format::new(6)? };
-    let axis = || Transform { scale: SCALE_M, offset: 0.0 };
+    let axis = || Transform { scale: RESOLUTION_M, offset: 0.0 };
     builder.transforms = Vector { x: axis(), y: axis(), z: axis() };
     builder.generating_software = concat!("zsim ", env!("CARGO_PKG_VERSION")).to_owned();
     builder.system_identifier = "OTHER".to_owned();

@@ -62,7 +62,7 @@ pub use measurements::Measurements;
 pub use ply::{PlyReader, PlyWriter};
 pub use reader::Reader;
 pub use result::write_result;
-pub use selection::{Preference, Selection};
+pub use selection::{Selection, TopicPreference};
 pub use truth::{Truth, TruthReader};
 pub use tum::{TumWriter, parse_tum, read_tum, write_tum};
 pub use writer::{BaseImuDescription, RunDescription, Writer};

@@ -17,7 +17,7 @@ pub(super) use imu_choice::ImuLayout;
 
 /// Topics that the caller requests; topics not given are detected.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Preference {
+pub struct TopicPreference {
     /// Lidar topic.
     pub lidar_topic: Option<String>,
     /// IMU topic.
@@ -95,9 +95,9 @@ impl Reader {
     ///
     /// # Errors
     /// When no lidar or no IMU can be decoded, a requested topic is missing, or the IMU lacks rates or accelerations.
-    pub fn select(&self, preference: &Preference) -> Result<Selection, RecordingError> {
-        let lidars = self.candidates(&LIDAR_TYPES, preference.lidar_topic.as_deref(), candidates::probe_lidar)?;
-        let requested = preference.imu_topic.as_deref();
+    pub fn select(&self, topics: &TopicPreference) -> Result<Selection, RecordingError> {
+        let lidars = self.candidates(&LIDAR_TYPES, topics.lidar_topic.as_deref(), candidates::probe_lidar)?;
+        let requested = topics.imu_topic.as_deref();
         let imus = self.candidates(&[MessageType::Imu], requested, probe_imu)?;
         let others = match requested {
             Some(_) => self.candidates(&[MessageType::Imu], None, probe_imu)?.found,

@@ -106,8 +106,10 @@ fn pair(lidar: &mut Option<clock::ClockReading<'static>>, message: &RawMessage<'
             Some(None)
         }
         ("imu", Some(before)) if before.now == reading.now => {
-            let clock =
-                ClockTruth { lidar_ahead: before.clock_time - before.now, imu_ahead: reading.clock_time - reading.now };
+            let clock = ClockTruth {
+                lidar_offset: before.clock_time - before.now,
+                imu_offset: reading.clock_time - reading.now,
+            };
             Some(Some(Truth::Clock(reading.now, clock)))
         }
         _ => None,

@@ -166,9 +166,9 @@ impl Writer {
 
     fn write_clock(&mut self, now: Stamp, clock: &ClockTruth) -> Result<(), RecordingError> {
         self.start(now)?;
-        let readings = [(topics::LASER, "lidar", clock.lidar_ahead), (topics::IMU, "imu", clock.imu_ahead)];
-        for (frame, source, ahead) in readings {
-            let reading = ClockReading { now, clock_time: now + ahead, source };
+        let readings = [(topics::LASER, "lidar", clock.lidar_offset), (topics::IMU, "imu", clock.imu_offset)];
+        for (frame, source, offset) in readings {
+            let reading = ClockReading { now, clock_time: now + offset, source };
             self.mcap.message(Topic::TruthClock, now, |out| clock::encode(out, frame, &reading))?;
         }
         Ok(())

@@ -21,5 +21,5 @@ pub use metrics::{
     ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, LoopMetrics, Metrics, OpenLoopMetrics,
     SimulationMetrics,
 };
-pub use profile::time_spent;
+pub use profile::timing_table;
 pub use table::{markdown, summary, table};

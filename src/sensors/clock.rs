@@ -125,8 +125,8 @@ impl Clock {
     /// The first reading of the crystal from `stamp` on that is half-way between two ticks of the resolution.
     ///
     /// A sensor that starts at such a reading, with a period of whole ticks, loses exactly half a tick by rounding: the
-    /// mean that [`Clock::ahead`] assumes. A sensor that starts on a tick would lose nothing, and that mean would not
-    /// apply.
+    /// mean that [`Clock::offset_at`] assumes. A sensor that starts on a tick would lose nothing, and that mean would
+    /// not apply.
     pub fn half_tick_from(&self, stamp: Stamp) -> Stamp {
         let half = self.half_tick();
         let tick = (stamp - half).floor_to(self.resolution);
@@ -138,7 +138,7 @@ impl Clock {
     }
 
     /// Mean difference of stamps from true time at `t_s`, rounding included; positive is ahead.
-    pub fn ahead(&self, t_s: f64) -> Span {
+    pub fn offset_at(&self, t_s: f64) -> Span {
         Span::from_seconds(self.offset_s + (self.pace - 1.0) * t_s) - self.half_tick()
     }
 
@@ -173,8 +173,8 @@ mod tests {
     #[test]
     fn a_clock_that_gains_a_millisecond_a_minute_is_16_67_ppm_fast() {
         let clock = clock(3.0, 1e6 * 1e-3 / 60.0, 0.0);
-        assert_eq!(clock.ahead(0.0).nanos(), 3_000_000);
-        assert_eq!(clock.ahead(120.0).nanos(), 5_000_000);
+        assert_eq!(clock.offset_at(0.0).nanos(), 3_000_000);
+        assert_eq!(clock.offset_at(120.0).nanos(), 5_000_000);
         assert_eq!(clock.stamp_of(60.0).nanos(), 1_060_004_000_000);
         assert!((clock.true_s(clock.stamp_of(47.123)) - 47.123).abs() < 1e-9);
     }
@@ -187,7 +187,7 @@ mod tests {
             (clock.crystal(t).floor_to(clock.resolution()) - clock.crystal(t)).seconds()
         });
         let mean = errors.sum::<f64>() / 1000.0;
-        assert!((mean - clock.ahead(0.0).seconds()).abs() < 1e-6, "{mean}");
+        assert!((mean - clock.offset_at(0.0).seconds()).abs() < 1e-6, "{mean}");
     }
 
     #[test]
@@ -215,7 +215,7 @@ mod tests {
             let source = find(Kind::Clock, &name).unwrap();
             let clocks = Clocks::new(&parse(&source).unwrap(), &source, Stamp::default()).unwrap();
             assert_eq!(
-                clocks.lidar.ahead(0.0).nanos(),
+                clocks.lidar.offset_at(0.0).nanos(),
                 -clocks.lidar.resolution().nanos() / 2,
                 "offset of the reference clock: {name}"
             );

@@ -4,23 +4,23 @@
 ///
 /// The sensor is aperiodic if the jitter exceeds the first fraction of the period, and the variance of `n` intervals
 /// exceeds the second fraction of `n` times the variance of one interval.
-const APERIODIC: (f64, f64) = (0.2, 0.4);
+const APERIODIC_THRESHOLDS: (f64, f64) = (0.2, 0.4);
 /// The same for a sensor slower than 50 Hz. A second of its stamps is a small sample, and to call it aperiodic costs less:
 /// between its readings the motion is interpolated in any case.
-const APERIODIC_SLOW: (f64, f64) = (0.12, 0.2);
+const SLOW_APERIODIC_THRESHOLDS: (f64, f64) = (0.12, 0.2);
 /// Period of a slow sensor, s.
-const SLOW_S: f64 = 0.02;
+const SLOW_PERIOD_S: f64 = 0.02;
 /// Skewness of the residuals above which stamps count as delayed; an exponential delay has 2.
 const DELAYED_SKEWNESS: f64 = 0.8;
 /// Minimum number of stamps for a meaningful skewness.
-const DELAYED_FROM: usize = 30;
+const MIN_SKEWNESS_STAMPS: usize = 30;
 /// Samples count as lost if the fit with losses has a relative jitter below this fraction of that without.
-const LOSSES_FIT: f64 = 0.25;
+const LOST_SAMPLES_JITTER_RATIO: f64 = 0.25;
 /// Iterations of the lower-envelope fit, and the weight of a late stamp in it.
 const ENVELOPE_ITERATIONS: usize = 30;
 const LATE_WEIGHT: f64 = 1e-3;
 /// Stamps are in bursts if the median interval is below this fraction of the mean.
-const BURST: f64 = 0.3;
+const BURST_INTERVAL_RATIO: f64 = 0.3;
 
 /// Period, jitter and pattern of a sensor's first stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ impl Regularity {
         let without_losses = Self::about_line(stamps_s.iter().copied().zip(0..).map(|(s, k)| (f64::from(k), s)));
         intervals.sort_by(f64::total_cmp);
         let typical = intervals.get(intervals.len() / 2).copied().unwrap_or_default();
-        let comes_in_bursts = typical < BURST * intervals.iter().sum::<f64>() / intervals.len() as f64;
+        let comes_in_bursts = typical < BURST_INTERVAL_RATIO * intervals.iter().sum::<f64>() / intervals.len() as f64;
         intervals.retain(|dt| *dt > 0.0);
         if intervals.len() < 2 {
             return None;
@@ -92,12 +92,13 @@ impl Regularity {
         let line = match (by_intervals, without_losses) {
             // A long delay looks like a loss, and with large jitter a short interval looks like the period.
             (Some(a), Some(b)) => {
-                let fits = a.jitter_s / a.period_s < LOSSES_FIT * b.jitter_s / b.period_s;
+                let fits = a.jitter_s / a.period_s < LOST_SAMPLES_JITTER_RATIO * b.jitter_s / b.period_s;
                 if fits { a } else { b }
             }
             (a, b) => a.or(b)?,
         };
-        let (jitter, variance_ratio) = if median > SLOW_S { APERIODIC_SLOW } else { APERIODIC };
+        let (jitter, variance_ratio) =
+            if median > SLOW_PERIOD_S { SLOW_APERIODIC_THRESHOLDS } else { APERIODIC_THRESHOLDS };
         if line.jitter_s > jitter * line.period_s && has_independent_intervals(stamps_s, variance_ratio) {
             return Some(Self { period_s: median, jitter_s: 0.0, pattern: StampPattern::Irregular });
         }
@@ -114,7 +115,7 @@ impl Regularity {
         let period_s = sum(&|x, y| x * y) / sum(&|x, _| x * x);
         let jitter_s = (sum(&|x, y| (y - period_s * x).powi(2)) / n).sqrt();
         let skewness = sum(&|x, y| (y - period_s * x).powi(3)) / n / jitter_s.powi(3);
-        let delayed = points.len() >= DELAYED_FROM && skewness > DELAYED_SKEWNESS && jitter_s > 1e-4;
+        let delayed = points.len() >= MIN_SKEWNESS_STAMPS && skewness > DELAYED_SKEWNESS && jitter_s > 1e-4;
         let period_s = if delayed { Self::lower_envelope(&points, period_s) } else { period_s };
         let is_line = points.len() > 2 && period_s > 0.0 && jitter_s.is_finite();
         let pattern = if delayed { StampPattern::Delayed } else { StampPattern::Regular };

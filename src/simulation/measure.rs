@@ -84,7 +84,7 @@ impl<'a> Sensors<'a> {
     }
 
     /// Computes all events except scans that are complete by `until_s`, and counts them in `summary`.
-    fn measure_but_scans(
+    fn measure_except_scans(
         &mut self,
         head: &Track,
         base: &Track,
@@ -118,7 +118,7 @@ impl<'a> Sensors<'a> {
     fn clock(&self, t_s: f64) -> (Stamp, ClockTruth) {
         let (lidar, imu) = (&self.rig.clocks.lidar, &self.rig.clocks.imu);
         let delay = Span::from_seconds(self.rig.imu.delay_s());
-        let truth = ClockTruth { lidar_ahead: lidar.ahead(t_s), imu_ahead: imu.ahead(t_s) + delay };
+        let truth = ClockTruth { lidar_offset: lidar.offset_at(t_s), imu_offset: imu.offset_at(t_s) + delay };
         (self.rig.true_stamp(t_s), truth)
     }
 }
@@ -135,7 +135,7 @@ pub(super) fn measure(
     let base = Track::new(first, STEP_S, bases)?;
     let each = sensors.iter_mut().zip(summaries.iter_mut());
     let mut events: Vec<Events> =
-        each.map(|(sensors, summary)| sensors.measure_but_scans(&head, &base, until_s, summary)).collect();
+        each.map(|(sensors, summary)| sensors.measure_except_scans(&head, &base, until_s, summary)).collect();
     let scans = scans(sensors, (&head, &base), until_s, summaries);
     for ((events, scans), summary) in events.iter_mut().zip(scans).zip(summaries) {
         summary.scans += scans.len() as u64;

@@ -2,11 +2,10 @@
 
 use super::StudyError;
 use super::atomic_file::write_text;
-use super::estimate::BestEstimate;
-use super::open_loop::OpenLoopRun;
+use super::page::RunResults;
 use super::register::SampledBeam;
 use super::result_files::METRICS;
-use crate::evaluation::{Errors, InformationBound};
+use crate::evaluation::Errors;
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report;
 use crate::report::page::RunPage;
@@ -28,13 +27,9 @@ pub(super) struct Plot {
     figure: Figure,
 }
 
-/// The plots of an estimate; `open_errors` are the errors of the open loop if a closed loop was computed.
-pub(super) fn plots(
-    run: &OpenLoopRun,
-    best: &BestEstimate,
-    (open_errors, bound): (Option<&Errors>, Option<&InformationBound>),
-    sample: &[SampledBeam],
-) -> Vec<Plot> {
+/// The plots of an estimate.
+pub(super) fn plots(results: &RunResults, sample: &[SampledBeam]) -> Vec<Plot> {
+    let RunResults { open: run, best, open_errors, bound, .. } = *results;
     let comparison = best.comparison;
     let world_from_map = comparison.and_then(|found| found.world_from_map).unwrap_or_else(Pose::identity);
     let estimate = decimated(best.map_from_head.iter().map(|(stamp, pose)| (stamp, world_from_map * pose)));

@@ -3,11 +3,11 @@
 use super::calibration::calibration;
 use super::true_clock::TrueClock;
 use super::truth_cursor::{TrueState, TruthCursor};
-use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch};
+use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError};
 use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::{Calibration, LidarReturn, LidarScan, Measurement};
-use crate::recording::{Preference, Reader, Truth};
+use crate::recording::{Reader, TopicPreference, Truth};
 use crate::sensors::ImuSpec;
 use crate::time::{Span, Stamp};
 use crate::world::{Hit, Ray, World};
@@ -23,7 +23,7 @@ const MOVER_DISTANCE_M: f64 = 0.05;
 /// Maximum number of glass panes on the path of a beam.
 const MAX_PANES: usize = 8;
 /// Time between the true poses of a scan: the period of the recorded truth.
-const STEP: Span = Span::from_nanos(1_000_000);
+const TRUTH_STEP: Span = Span::from_nanos(1_000_000);
 
 /// The information bound of a recording, with the number of beams that it uses.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,8 +40,12 @@ pub struct RecordingBound {
 ///
 /// # Errors
 /// When the recording cannot be read, has no sensors or no truth, or the computation is stopped.
-pub fn information_bound(reader: &Reader, world: &World, watch: &mut Watch) -> Result<RecordingBound, StudyError> {
-    let selection = reader.select(&Preference::default())?;
+pub fn information_bound(
+    reader: &Reader,
+    world: &World,
+    watch: &mut ProgressMonitor,
+) -> Result<RecordingBound, StudyError> {
+    let selection = reader.select(&TopicPreference::default())?;
     let found = calibration(reader, &selection, &CalibrationSpec::default(), None)?;
     let clock = TrueClock::read(reader, &selection)?;
     let mut span: Option<(Stamp, Stamp)> = None;
@@ -110,11 +114,11 @@ struct BoundAccumulator<'a> {
 
 impl BoundAccumulator<'_> {
     fn take(&mut self, scan: &LidarScan) -> Result<(), StudyError> {
-        let mut scan_motion = ScanMotion { first: scan.stamp - STEP, states: Vec::new() };
+        let mut scan_motion = ScanMotion { first: scan.stamp - TRUTH_STEP, states: Vec::new() };
         let sweep = scan.returns.iter().map(|hit| hit.offset).max().unwrap_or(Span::ZERO);
-        let steps = (sweep.nanos() / STEP.nanos()).max(0) + 3;
+        let steps = (sweep.nanos() / TRUTH_STEP.nanos()).max(0) + 3;
         for step in 0..=steps {
-            let stamp = scan_motion.first + Span::from_nanos(step * STEP.nanos());
+            let stamp = scan_motion.first + Span::from_nanos(step * TRUTH_STEP.nanos());
             scan_motion.states.push(self.truth.at(stamp)?);
         }
         let beams: Vec<Option<BeamObservation>> =
@@ -177,7 +181,7 @@ impl BoundAccumulator<'_> {
 /// True poses of the head during a scan.
 struct ScanMotion {
     first: Stamp,
-    /// One state for each [`STEP`].
+    /// One state for each [`TRUTH_STEP`].
     states: Vec<Option<TrueState>>,
 }
 
@@ -192,18 +196,18 @@ struct HeadMotion {
 impl ScanMotion {
     fn at(&self, stamp: Stamp) -> Option<HeadMotion> {
         let since = (stamp - self.first).nanos();
-        let index = usize::try_from(since / STEP.nanos()).ok()?;
+        let index = usize::try_from(since / TRUTH_STEP.nanos()).ok()?;
         let (before, after) = ((*self.states.get(index)?)?, (*self.states.get(index + 1)?)?);
-        let u = (since % STEP.nanos()) as f64 / STEP.nanos() as f64;
+        let u = (since % TRUTH_STEP.nanos()) as f64 / TRUTH_STEP.nanos() as f64;
         let (a, b) = (before.world_from_head, after.world_from_head);
         let shift = b.translation.vector - a.translation.vector;
         let turn = (b.rotation * a.rotation.inverse()).scaled_axis();
         let rotation = Rotation::from_scaled_axis(turn * u) * a.rotation;
         Some(HeadMotion {
             world_from_head: Pose::from_parts((a.translation.vector + shift * u).into(), rotation),
-            velocity_in_world: shift / STEP.seconds(),
-            angular_velocity_in_world: turn / STEP.seconds(),
-            t_s: before.t_s + u * STEP.seconds(),
+            velocity_in_world: shift / TRUTH_STEP.seconds(),
+            angular_velocity_in_world: turn / TRUTH_STEP.seconds(),
+            t_s: before.t_s + u * TRUTH_STEP.seconds(),
         })
     }
 }

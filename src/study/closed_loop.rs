@@ -20,19 +20,19 @@ pub(super) struct ClosedLoopRun {
     pub rejected_because: Option<&'static str>,
     /// Messages to the user.
     pub notes: Vec<String>,
-    /// Wall-clock time, including that of the survey, s.
+    /// Wall-clock time, including that of building the observed surfels, s.
     pub wall_s: f64,
 }
 
-/// Runs the global registration over the survey of `run`.
+/// Runs the global registration over the surfels observed in `run`.
 pub(super) fn run_closed_loop(
     run: &OpenLoopRun,
     calibration: &Calibration,
     estimator: &EstimatorSpec,
 ) -> ClosedLoopRun {
     let started = Instant::now();
-    let OpenLoopRun { map_from_head, covariances, lidar, survey, .. } = run;
-    let closed = register(RegistrationInput { map_from_head, covariances, lidar, survey }, calibration, estimator);
+    let OpenLoopRun { map_from_head, covariances, lidar, observed, .. } = run;
+    let closed = register(RegistrationInput { map_from_head, covariances, lidar, observed }, calibration, estimator);
     let (loops, rejected_because) = (closed.report.loops, closed.report.rejected_because);
     let rejected =
         rejected_because.map(|why| format!("loop closure not applied ({why}); the result is the open-loop trajectory"));
@@ -46,6 +46,6 @@ pub(super) fn run_closed_loop(
         loops,
         rejected_because,
         notes: closed_loops.into_iter().chain(rejected).collect(),
-        wall_s: started.elapsed().as_secs_f64() + run.survey.took_s(),
+        wall_s: started.elapsed().as_secs_f64() + run.observed.elapsed_s(),
     }
 }

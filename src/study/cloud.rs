@@ -1,8 +1,8 @@
 //! Metrics of the registered cloud against the true surfaces.
 
-use super::register::{FateCounts, ProjectedBeam, Registered, SampledBeam};
+use super::register::{ClassCounts, ProjectedBeam, RegisteredCloud, SampledBeam};
 use super::truth_cursor::TrueState;
-use crate::estimation::Fate;
+use crate::estimation::ReturnClass;
 use crate::evaluation::{CloudErrors, CloudSummary};
 use crate::geometry::{Pose, Surface, Vector};
 use crate::report::{CloudMetrics, FilterMetrics};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const MAX_DISTANCE_M: f64 = 1.0;
 
 /// The returns that the distance metrics include.
-const JUDGED_RETURNS: &str = "all returns from static surfaces, before filtering";
+const EVALUATED_RETURNS: &str = "all returns from static surfaces, before filtering";
 
 /// The surroundings of a lidar: scene and carrier.
 #[derive(Clone, Copy)]
@@ -65,15 +65,15 @@ impl Surroundings<'_> {
 /// The distances to the true surfaces include all sampled beams on static surfaces, before filtering. They need the
 /// scene and the alignment. The other beams of the sample, on the carrier and on moving objects, are counted.
 pub(super) fn cloud_metrics(
-    registered: &Registered,
+    registered: &RegisteredCloud,
     world_from_map: Option<&Pose>,
     surroundings: Option<Surroundings>,
 ) -> CloudMetrics {
     let filter = match registered.filtered {
-        true => filter_metrics(&registered.fates),
+        true => filter_metrics(&registered.class_counts),
         false => FilterMetrics::default(),
     };
-    let counted = CloudMetrics { points: Some(registered.fates.all()), filter, ..CloudMetrics::default() };
+    let counted = CloudMetrics { points: Some(registered.class_counts.all()), filter, ..CloudMetrics::default() };
     let (Some(world_from_map), Some(surroundings)) = (world_from_map, surroundings) else {
         return counted;
     };
@@ -90,13 +90,13 @@ pub(super) fn cloud_metrics(
     let by_truth = static_beams().filter_map(|(beam, _)| beam.by_truth.map(|(by, _)| in_world(&by, &Pose::identity())));
     let by_truth = errors(by_truth.collect());
     let filter = match registered.filtered {
-        true => judged_filter(registered, &targets, |kept| {
+        true => evaluated_filter(registered, &targets, |kept| {
             errors(kept.map(|k| in_world(&k.in_map, world_from_map)).collect())
         }),
         false => FilterMetrics::default(),
     };
     CloudMetrics {
-        judged: estimated.map(|_| JUDGED_RETURNS.to_owned()),
+        judged: estimated.map(|_| EVALUATED_RETURNS.to_owned()),
         bias_m: estimated.map(|cloud| cloud.bias_m),
         sigma_m: estimated.map(|cloud| cloud.sigma_m),
         p95_m: estimated.map(|cloud| cloud.p95_m),
@@ -110,8 +110,8 @@ pub(super) fn cloud_metrics(
 }
 
 /// Metrics of the filter for returns from static surfaces and from moving objects.
-fn judged_filter<'a>(
-    registered: &'a Registered,
+fn evaluated_filter<'a>(
+    registered: &'a RegisteredCloud,
     targets: &'a [Target],
     errors: impl Fn(&mut dyn Iterator<Item = &'a SampledBeam>) -> Option<CloudSummary>,
 ) -> FilterMetrics {
@@ -119,7 +119,7 @@ fn judged_filter<'a>(
         let all = registered.sample.iter().zip(targets);
         all.filter(move |(_, on)| **on == target).map(|(beam, _)| beam)
     };
-    let kept = |beam: &&SampledBeam| beam.fate == Fate::Kept;
+    let kept = |beam: &&SampledBeam| beam.class == ReturnClass::Static;
     let dropped = |target: Target| {
         let (all, remaining) = (of(target).count(), of(target).filter(kept).count());
         (all > 0).then(|| (all - remaining) as f64 / all as f64)
@@ -128,17 +128,17 @@ fn judged_filter<'a>(
         kept_sigma_m: errors(&mut of(Target::Static).filter(kept)).map(|cloud| cloud.sigma_m),
         standing_dropped_fraction: dropped(Target::Static),
         movers_dropped_fraction: dropped(Target::Mover),
-        ..filter_metrics(&registered.fates)
+        ..filter_metrics(&registered.class_counts)
     }
 }
 
 /// Counts of the filter: returns in the cloud, and removed returns by reason.
-fn filter_metrics(fates: &FateCounts) -> FilterMetrics {
+fn filter_metrics(classes: &ClassCounts) -> FilterMetrics {
     FilterMetrics {
-        kept: Some(fates.kept),
-        dropped_mixed: Some(fates.mixed),
-        dropped_isolated: Some(fates.isolated),
-        dropped_moving: Some(fates.moving),
+        kept: Some(classes.kept),
+        dropped_mixed: Some(classes.mixed),
+        dropped_isolated: Some(classes.isolated),
+        dropped_moving: Some(classes.moving),
         ..FilterMetrics::default()
     }
 }
@@ -210,10 +210,10 @@ mod tests {
         let judged = |end: &Vector| SampledBeam {
             in_map: beam(end + Vector::z() * 0.01),
             by_truth: Some((beam(*end), at(4.0))),
-            fate: if end.x == 6.0 { Fate::Kept } else { Fate::Moving },
+            class: if end.x == 6.0 { ReturnClass::Static } else { ReturnClass::Dynamic },
         };
-        let registered = Registered {
-            fates: FateCounts { kept: 16, moving: 4, ..FateCounts::default() },
+        let registered = RegisteredCloud {
+            class_counts: ClassCounts { kept: 16, moving: 4, ..ClassCounts::default() },
             page_points: Vec::new(),
             filtered: true,
             sample: ends.iter().map(judged).collect(),
@@ -227,14 +227,14 @@ mod tests {
         assert_relative_eq!(metrics.sigma_by_truth_m.unwrap(), 0.03, epsilon = 1e-6);
         // Without a carrier all beams count as static; the beams on the operator then dominate the standard deviation.
         let empty = Surroundings { carrier: &[], ..surroundings };
-        let judged_all = cloud_metrics(&registered, Some(&Pose::identity()), Some(empty));
-        assert!(judged_all.sigma_m.unwrap() > 0.2, "{judged_all:?}");
+        let all_evaluated = cloud_metrics(&registered, Some(&Pose::identity()), Some(empty));
+        assert!(all_evaluated.sigma_m.unwrap() > 0.2, "{all_evaluated:?}");
         // Filtered returns are counted, and are in the distance metrics.
         assert_eq!((metrics.filter.kept, metrics.filter.dropped_moving), (Some(16), Some(4)));
         assert_eq!(metrics.filter.standing_dropped_fraction, Some(0.0));
         assert_eq!(metrics.filter.movers_dropped_fraction, Some(1.0));
-        assert_relative_eq!(judged_all.filter.kept_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
-        let unfiltered = cloud_metrics(&Registered { filtered: false, ..registered }, None, None);
+        assert_relative_eq!(all_evaluated.filter.kept_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
+        let unfiltered = cloud_metrics(&RegisteredCloud { filtered: false, ..registered }, None, None);
         assert_eq!((unfiltered.points, unfiltered.filter), (Some(20), FilterMetrics::default()));
     }
 }

@@ -9,13 +9,14 @@ use super::integrity::{Integrity, write_windows};
 use super::map::{MapOptions, write_map};
 use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use super::page::RunResults;
-use super::register::{Registered, Registration};
+use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
-use super::{CalibrationSpec, Manifest, Stage, StudyError, Watch, artefacts, judge, memory};
-use crate::estimation::{EstimatorSpec, TimeSpent};
+use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
+use crate::estimation::{EstimatorSpec, Timing};
+use crate::evaluation::Errors;
 use crate::geometry::Trajectory;
 use crate::measurement::LidarCorrection;
-use crate::recording::{FoundCalibration, Preference, Reader, Selection, write_tum};
+use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::{SimulationSummary, carrier_of};
 use crate::spec::Source;
@@ -35,7 +36,7 @@ pub struct EstimateOptions {
     /// The frame whose pose is estimated; `None` for `head` if the recording has it, else the IMU frame.
     pub body_frame: Option<String>,
     /// Topics to read; topics that are not named are selected automatically.
-    pub topics: Preference,
+    pub topics: TopicPreference,
     /// Whether to run the global registration with loop closure after the open loop.
     pub closed_loop: bool,
     /// Options of the cloud.
@@ -47,7 +48,7 @@ pub struct EstimateOptions {
 impl EstimateOptions {
     /// Options with these estimator settings, loop closure, and defaults.
     pub fn with(estimator: EstimatorSpec) -> Self {
-        let (calibration, topics) = (CalibrationSpec::default(), Preference::default());
+        let (calibration, topics) = (CalibrationSpec::default(), TopicPreference::default());
         let cloud = CloudOptions::default();
         Self { estimator, calibration, body_frame: None, topics, closed_loop: true, cloud, map: None }
     }
@@ -55,11 +56,11 @@ impl EstimateOptions {
 
 /// Result of an estimate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub struct EstimateResult {
     /// The metrics, as in `metrics.json`.
     pub metrics: Metrics,
     /// Run time of each part of the open-loop estimator.
-    pub spent: TimeSpent,
+    pub timing: Timing,
 }
 
 /// Estimates the trajectory from the recording at `path` and writes the results to `folder`.
@@ -78,8 +79,8 @@ pub fn estimate_recording(
     path: &Path,
     folder: &Path,
     options: &EstimateOptions,
-    watch: &mut Watch,
-) -> Result<Outcome, StudyError> {
+    watch: &mut ProgressMonitor,
+) -> Result<EstimateResult, StudyError> {
     let reader = Reader::open(path)?;
     remove(folder, &estimate_files())?;
     let manifest = Manifest::in_recording(&reader).unwrap_or_else(Manifest::without_simulation);
@@ -106,8 +107,8 @@ pub(super) fn estimate_in(
     folder: &Path,
     options: &EstimateOptions,
     origin: &Origin,
-    watch: &mut Watch,
-) -> Result<Outcome, StudyError> {
+    watch: &mut ProgressMonitor,
+) -> Result<EstimateResult, StudyError> {
     origin.manifest.write(&folder.join("manifest.ron"))?;
     let selection = reader.select(&options.topics)?;
     let found = calibration(reader, &selection, &options.calibration, options.body_frame.as_deref())?;
@@ -132,7 +133,7 @@ pub(super) fn estimate_in(
 
     watch.progress(Stage::Reporting, 0.0, None);
     let imu_only_drift = match comparison {
-        Some(_) => judge::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
+        Some(_) => comparison::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
         None => None,
     };
     let bound = match (comparison, origin.surroundings) {
@@ -142,55 +143,53 @@ pub(super) fn estimate_in(
     let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(options.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
-    let pairs = comparison.map(|_| judge::pairs_of(reader, best.map_from_head)).transpose()?;
+    let pairs = comparison.map(|_| comparison::pairs_of(reader, best.map_from_head)).transpose()?;
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
         integrity: integrity.metrics(run, pairs.as_ref()),
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),
-        open_loop: OpenLoopMetrics { fixed_views, ..judge::open_loop_metrics(run, comparison, imu_only_drift) },
+        open_loop: OpenLoopMetrics { fixed_views, ..comparison::open_loop_metrics(run, comparison, imu_only_drift) },
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
-        clock: judge::clock_metrics(run, comparison),
-        lidar: judge::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &options.estimator),
+        clock: comparison::clock_metrics(run, comparison),
+        lidar: comparison::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &options.estimator),
         ..metrics(origin, run, &registered, best.comparison)
     };
     integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
-    let open_comparison = comparison.filter(|_| loops.closed.is_some());
-    let open_errors = open_comparison.and_then(|comparison| Some(&comparison.errors.as_ref()?.decimated));
-    let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
     let results = RunResults {
         reader,
         origin,
         open: run,
         best: &best,
-        open_errors,
+        open_errors: loops.open_errors(),
         bound: bound.as_ref(),
         integrity: &integrity,
         pairs: pairs.as_ref(),
         points: &registered.page_points,
     };
+    let plots = artefacts::plots(&results, &registered.sample);
     artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?)?)?;
-    Ok(Outcome { metrics, spent: loops.open.spent })
+    Ok(EstimateResult { metrics, timing: loops.open.timing })
 }
 
 /// Open loop and closed loop, each with its comparison with the truth.
 struct Loops {
     open: OpenLoopRun,
-    comparison: Option<judge::Comparison>,
+    comparison: Option<comparison::Comparison>,
     closed: Option<ClosedLoopRun>,
-    closed_comparison: Option<judge::Comparison>,
+    closed_comparison: Option<comparison::Comparison>,
 }
 
 /// The estimate for cloud, result and plots: the closed loop if it was computed, else the open loop.
 pub(super) struct BestEstimate<'a> {
     pub map_from_head: &'a Trajectory,
-    /// The open-loop trajectory that the survey refers to.
-    pub survey_trajectory: &'a Trajectory,
+    /// The open-loop trajectory in which the surfels were observed.
+    pub observed_trajectory: &'a Trajectory,
     /// Estimated correction of the lidar calibration.
     pub lidar: &'a LidarCorrection,
     /// Comparison with the truth, if it is known.
-    pub comparison: Option<&'a judge::Comparison>,
+    pub comparison: Option<&'a comparison::Comparison>,
 }
 
 impl Loops {
@@ -200,7 +199,7 @@ impl Loops {
         folder: &Path,
         options: &EstimateOptions,
         expected_s: Option<f64>,
-        watch: &mut Watch,
+        watch: &mut ProgressMonitor,
     ) -> Result<Self, StudyError> {
         let (estimator, calibration) = (&options.estimator, &found.calibration);
         let prior_map = options.map.as_ref();
@@ -210,7 +209,7 @@ impl Loops {
         }
         let writes_map = prior_map.map_or(options.closed_loop, |map| map.extend);
         let open_loop =
-            OpenLoopOptions { estimator, calibration, surveying: closes_loops || writes_map, map: prior_map };
+            OpenLoopOptions { estimator, calibration, recording_surfels: closes_loops || writes_map, map: prior_map };
         let open = run_open_loop(reader, selection, open_loop, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
         open.events.notes.iter().for_each(|note| watch.note(&note.line()));
         let closed = match closes_loops {
@@ -218,14 +217,14 @@ impl Loops {
             false => None,
         };
         let mut compare = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
-            true => judge::compare_with_truth(reader, (map_from_head, covariances), watch),
+            true => comparison::compare_with_truth(reader, (map_from_head, covariances), watch),
             false => Ok(None),
         };
         let comparison = compare(&open.map_from_head, &open.covariances[..])?;
         let closed_comparison =
             closed.as_ref().map(|closed| compare(&closed.map_from_head, &[])).transpose()?.flatten();
         let loops = Self { open, comparison, closed, closed_comparison };
-        if writes_map && !loops.open.survey.is_empty() {
+        if writes_map && !loops.open.observed.is_empty() {
             write_map(&loops.open, &loops.best(), (estimator, prior_map), folder)?;
         }
         Ok(loops)
@@ -236,22 +235,29 @@ impl Loops {
         match &self.closed {
             Some(ClosedLoopRun { map_from_head, lidar, open_loop_recalibrated, .. }) => BestEstimate {
                 map_from_head,
-                survey_trajectory: open_loop_recalibrated.as_ref().unwrap_or(open),
+                observed_trajectory: open_loop_recalibrated.as_ref().unwrap_or(open),
                 lidar,
                 comparison: self.closed_comparison.as_ref(),
             },
             None => BestEstimate {
                 map_from_head: open,
-                survey_trajectory: open,
+                observed_trajectory: open,
                 lidar: &self.open.lidar,
                 comparison: self.comparison.as_ref(),
             },
         }
     }
 
+    /// Errors of the open loop if a closed loop was computed.
+    fn open_errors(&self) -> Option<&Errors> {
+        self.closed.as_ref()?;
+        Some(&self.comparison.as_ref()?.errors.as_ref()?.decimated)
+    }
+
     fn closed_metrics(&self) -> ClosedLoopMetrics {
         let (comparison, acquisition_s) = (self.closed_comparison.as_ref(), self.open.acquisition_s);
-        let metrics = self.closed.as_ref().map(|closed| judge::closed_loop_metrics(closed, comparison, acquisition_s));
+        let metrics =
+            self.closed.as_ref().map(|closed| comparison::closed_loop_metrics(closed, comparison, acquisition_s));
         metrics.unwrap_or_default()
     }
 }
@@ -261,7 +267,7 @@ fn close_loops(
     run: &OpenLoopRun,
     folder: &Path,
     options: OpenLoopOptions,
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) -> Result<ClosedLoopRun, StudyError> {
     watch.progress(Stage::ClosingLoops, 0.0, None);
     let closed = run_closed_loop(run, options.calibration, options.estimator);
@@ -274,8 +280,8 @@ fn close_loops(
 fn metrics(
     origin: &Origin,
     run: &OpenLoopRun,
-    registered: &Registered,
-    comparison: Option<&judge::Comparison>,
+    registered: &RegisteredCloud,
+    comparison: Option<&comparison::Comparison>,
 ) -> Metrics {
     let Manifest { scenario, specs, .. } = origin.manifest;
     let world_from_map = comparison.and_then(|comparison| comparison.world_from_map);
@@ -284,7 +290,7 @@ fn metrics(
         scene: specs.as_ref().map(|specs| specs.scene.name.clone()),
         seed: scenario.as_ref().map(|scenario| scenario.seed.0),
         duration_s: origin.simulation.map_or(run.acquisition_s, |summary| summary.duration_s),
-        simulation: origin.simulation.map(judge::simulation_metrics).unwrap_or_default(),
+        simulation: origin.simulation.map(comparison::simulation_metrics).unwrap_or_default(),
         cloud: cloud_metrics(registered, world_from_map.as_ref(), origin.surroundings),
         peak_rss_mib: memory::peak_rss_mib(),
         ..Metrics::default()
@@ -292,7 +298,7 @@ fn metrics(
 }
 
 /// Builds the world of a recording's manifest; `None` if there is none or a mesh file is missing.
-fn world_of(manifest: &Manifest, watch: &mut Watch) -> Option<World> {
+fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
     let scene = &manifest.specs.as_ref()?.scene;
     let built = World::build(scene, &Source::in_memory("the recording's scene", ""));
     built.inspect_err(|error| watch.note(&format!("no evaluation of the cloud: {error}"))).ok()
@@ -303,7 +309,7 @@ fn report_notes(
     selection: &Selection,
     found: &FoundCalibration,
     (options, origin): (&EstimateOptions, &Origin),
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) {
     selection.notes.iter().for_each(|note| watch.note(note));
     let given = options.calibration.head_from_laser.is_some() && options.calibration.head_from_imu.is_some();

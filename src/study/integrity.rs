@@ -5,8 +5,8 @@ use super::atomic_file::AtomicFile;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{
-    Cause, Evidence, Finding, GAUGED_S, Status, TURN_LEVER_M, WindowReport, bound_factors, covariance_blocks, findings,
-    radius_99,
+    ALIGNMENT_S, Cause, Evidence, Finding, Status, TURN_LEVER_M, WindowReport, bound_factors, covariance_blocks,
+    findings, radius_99,
 };
 use crate::evaluation::{Errors, Pairs, align_poses};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
@@ -71,14 +71,14 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
 /// Ratio of the error after alignment to the predicted error, for the length of a trajectory.
 fn aligned_error_ratio(trajectory: &Trajectory) -> f64 {
     let aligned_s = trajectory.stamps().first().zip(aligned_until(trajectory)).map(|(from, until)| until - *from);
-    let shorter = GAUGED_S / aligned_s.map_or(GAUGED_S, Span::seconds).max(0.1);
+    let shorter = ALIGNMENT_S / aligned_s.map_or(ALIGNMENT_S, Span::seconds).max(0.1);
     (ALIGNED_ERROR_RATIO * shorter.sqrt()).min(1.0)
 }
 
 /// End of the interval of alignment with the truth: the first 20 s, or half of a run shorter than 40 s.
 fn aligned_until(trajectory: &Trajectory) -> Option<Stamp> {
     let (first, last) = (trajectory.stamps().first()?, trajectory.stamps().last()?);
-    Some(*first + Span::from_seconds(GAUGED_S.min(0.5 * last.seconds_since(*first))))
+    Some(*first + Span::from_seconds(ALIGNMENT_S.min(0.5 * last.seconds_since(*first))))
 }
 
 /// Computes the 99 % radii of the position error from the covariances, m.
@@ -88,15 +88,15 @@ fn aligned_until(trajectory: &Trajectory) -> Option<Stamp> {
 fn radii(run: &OpenLoopRun) -> Vec<f64> {
     let mut radii_m = run.radii_m.clone();
     let Some(((first, _), (last, _))) = run.covariances.first().zip(run.covariances.last()) else { return radii_m };
-    let is_short = last.seconds_since(*first) < 2.0 * GAUGED_S;
+    let is_short = last.seconds_since(*first) < 2.0 * ALIGNMENT_S;
     let marked_m: Vec<f64> =
-        run.gauged.iter().map(|(_, covariance)| radius_99(&covariance_blocks(covariance).0)).collect();
-    let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| is_short || stamp.seconds_since(*first) < GAUGED_S;
+        run.aligned_covariances.iter().map(|(_, covariance)| radius_99(&covariance_blocks(covariance).0)).collect();
+    let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| is_short || stamp.seconds_since(*first) < ALIGNMENT_S;
     let aligned = run.covariances.partition_point(is_aligned);
     let end_m = aligned.checked_sub(1).filter(|_| !is_short).map_or(0.0, |last| radii_m[last]);
     let largest_m = radii_m[..aligned].iter().copied().fold(0.0, f64::max);
     for (radius_m, (stamp, _)) in radii_m[..aligned].iter_mut().zip(&run.covariances) {
-        let after = run.gauged.partition_point(|(at, _)| at <= stamp);
+        let after = run.aligned_covariances.partition_point(|(at, _)| at <= stamp);
         let before_m = after.checked_sub(1).map(|before| marked_m[before]);
         let adjacent_m = marked_m.get(after).copied().unwrap_or(end_m).max(before_m.unwrap_or(0.0));
         *radius_m = if marked_m.is_empty() { largest_m } else { adjacent_m };
@@ -149,7 +149,7 @@ impl Integrity {
 
     /// The true errors after alignment over the first 20 s, or half of a run shorter than 40 s, which the bounds refer to.
     pub fn aligned_errors(pairs: &Pairs) -> Option<Errors> {
-        let aligned = pairs.first_seconds(GAUGED_S.min(0.5 * pairs.duration_s()));
+        let aligned = pairs.first_seconds(ALIGNMENT_S.min(0.5 * pairs.duration_s()));
         let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
         Some(Errors::after(pairs, &world_from_map))
     }
@@ -293,9 +293,9 @@ pub(super) fn write_windows(folder: &Path, windows: &[WindowReport]) -> Result<(
     let header = "stamp_s,surfels,matches,view_matches,views,residual_rms_m,iterations,last_correction_m,conditioning,imu_contradiction,\
                   clock_offset_s,clock_rate,range_correction_m,imu_matrix,moving,trouble";
     let rows = windows.iter().map(|w| {
-        let trouble = w.trouble.as_ref().map_or("", |kind| kind.name());
+        let problem = w.problem.as_ref().map_or("", |kind| kind.name());
         format!(
-            "{},{},{},{},{},{:.6},{},{:.6},{:.3e},{:.4},{:.9},{:.3e},{:.6},{:.3e},{},{trouble}",
+            "{},{},{},{},{},{:.6},{},{:.6},{:.3e},{:.4},{:.9},{:.3e},{:.6},{:.3e},{},{problem}",
             seconds(w.stamp),
             w.surfels,
             w.matches,

@@ -4,7 +4,7 @@ use super::StudyError;
 use super::atomic_file::AtomicFile;
 use super::estimate::BestEstimate;
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{EstimatorSpec, Located, locate_map, map_of, merge_maps};
+use crate::estimation::{EstimatorSpec, LocalisedPose, locate_map, map_of, merge_maps};
 use crate::geometry::Pose;
 use crate::recording::{read_surfel_map, write_surfel_map};
 use crate::surfel_map::SurfelMap;
@@ -37,7 +37,7 @@ pub struct MergedMap {
     /// Number of surfels of the first map, the second map and the merged map.
     pub surfels: [usize; 3],
     /// Pose of the second map in the first.
-    pub located: Located,
+    pub located: LocalisedPose,
 }
 
 /// Merges the maps `first` and `second` in the frame of the first, and writes the result to `out`.
@@ -66,11 +66,11 @@ pub(super) fn write_map(
     (estimator, within): (&EstimatorSpec, Option<&MapOptions>),
     folder: &Path,
 ) -> Result<(), StudyError> {
-    let trajectories = (best.survey_trajectory, best.map_from_head);
-    let surveyed = map_of(&run.survey, trajectories, &run.covariances, &estimator.registration)?;
+    let trajectories = (best.observed_trajectory, best.map_from_head);
+    let from_run = map_of(&run.observed, trajectories, &run.covariances, &estimator.registration)?;
     let map = match within {
-        Some(within) => merge_maps(&within.map, &surveyed, &Pose::identity())?,
-        None => surveyed,
+        Some(within) => merge_maps(&within.map, &from_run, &Pose::identity())?,
+        None => from_run,
     };
     write(&map, &folder.join("map.ply"))
 }

@@ -3,10 +3,10 @@
 use super::cadence::Cadence;
 use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
-use super::{MapOptions, Stage, StudyError, Watch};
+use super::{MapOptions, ProgressMonitor, Stage, StudyError};
 use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Located, Survey, TimeSpent, Warning, WindowReport, covariance_blocks,
-    radius_99,
+    EstimatedPose, Estimator, EstimatorSpec, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
+    covariance_blocks, radius_99,
 };
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
@@ -32,7 +32,7 @@ pub(super) struct OpenLoopRun {
     /// 99 % radii of the position error relative to the alignment of the first seconds, at the same stamps, m.
     pub radii_m: Vec<f64>,
     /// Covariances of marked poses of the first seconds relative to the alignment over these.
-    pub gauged: Vec<(Stamp, PoseCovariance)>,
+    pub aligned_covariances: Vec<(Stamp, PoseCovariance)>,
     /// The estimated clock offset over lidar time, s.
     pub clock_offsets: Vec<(Stamp, f64)>,
     /// Estimated correction of the lidar calibration that the poses are consistent with (gyroscope axes).
@@ -53,12 +53,12 @@ pub(super) struct OpenLoopRun {
     pub returns: usize,
     /// Duration of the recording, s.
     pub acquisition_s: f64,
-    /// Observations for the closed loop and the map; empty without `surveying`.
-    pub survey: Survey,
-    /// Wall-clock time, including reading but not the survey, s.
+    /// Observations for the closed loop and the map; empty without `recording_surfels`.
+    pub observed: ObservedSurfels,
+    /// Wall-clock time, including reading but not building the observed surfels, s.
     pub wall_s: f64,
     /// Run time of each part of the estimator.
-    pub spent: TimeSpent,
+    pub timing: Timing,
 }
 
 /// Options of the open loop.
@@ -67,7 +67,7 @@ pub(super) struct OpenLoopOptions<'a> {
     pub estimator: &'a EstimatorSpec,
     pub calibration: &'a Calibration,
     /// Whether to keep the observations for the closed loop and the map.
-    pub surveying: bool,
+    pub recording_surfels: bool,
     /// The map in which to localise the head; `None` to start a new map.
     pub map: Option<&'a MapOptions>,
 }
@@ -82,11 +82,11 @@ pub(super) fn run_open_loop(
     options: OpenLoopOptions,
     tum: Option<&Path>,
     expected_s: Option<f64>,
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) -> Result<OpenLoopRun, StudyError> {
     let started = Instant::now();
     let estimator = Estimator::new(options.estimator, options.calibration)?;
-    let estimator = if options.surveying { estimator.surveying() } else { estimator };
+    let estimator = if options.recording_surfels { estimator.recording_surfels() } else { estimator };
     let mut estimator = match options.map {
         Some(prior) => estimator.in_map(&prior.map, &prior.map_from_head),
         None => estimator,
@@ -121,8 +121,8 @@ pub(super) fn run_open_loop(
         map_from_head,
         covariances,
         radii_m,
-        gauged: result.gauged,
-        spent: result.windows.iter().map(|window| window.spent).sum(),
+        aligned_covariances: result.aligned_covariances,
+        timing: result.windows.iter().map(|window| window.timing).sum(),
         clock_offsets: result.clock_offsets.into_iter().map(|(at, offset_s)| (at, offset_s - shift_s)).collect(),
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,
@@ -133,8 +133,8 @@ pub(super) fn run_open_loop(
         warnings: result.warnings,
         returns: counts.returns,
         acquisition_s: counts.seconds(),
-        wall_s: started.elapsed().as_secs_f64() - result.survey.took_s(),
-        survey: result.survey,
+        wall_s: started.elapsed().as_secs_f64() - result.observed.elapsed_s(),
+        observed: result.observed,
     })
 }
 
@@ -144,7 +144,7 @@ fn push_all(
     estimator: &mut Estimator,
     (counts, poses): (&mut MeasurementCounts, &mut PoseOutput),
     expected_s: Option<f64>,
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) -> Result<(), StudyError> {
     for (index, measurement) in measurements.enumerate() {
         let measurement = measurement?;
@@ -162,7 +162,7 @@ fn push_all(
 }
 
 /// Message on the localisation in the map.
-fn located_message(located: &Located) -> String {
+fn located_message(located: &LocalisedPose) -> String {
     format!(
         "localised in the map: {:.0} % of the surfels of the first window match, residual {:.1} mm RMS",
         100.0 * located.inlier_ratio,

@@ -1,6 +1,6 @@
 //! Writes the measurements and the truth of a simulation to files.
 
-use super::{Manifest, Stage, StudyError, Watch};
+use super::{Manifest, ProgressMonitor, Stage, StudyError};
 use crate::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use crate::recording::{BaseImuDescription, RunDescription, TumWriter, Writer};
 use crate::simulation::{Simulation, SimulationSummary};
@@ -23,7 +23,7 @@ pub fn record(
     recording: &Path,
     truth: &Path,
     truth_tf: bool,
-    watch: &mut Watch,
+    watch: &mut ProgressMonitor,
 ) -> Result<SimulationSummary, StudyError> {
     let recording = Writer::create(recording, description(simulation, truth_tf)?)?;
     let mut files = FileSink { recording, truth: Some(TumWriter::create(truth)?), stop: watch.stop };
@@ -41,7 +41,7 @@ pub fn record(
 pub(super) fn record_together(
     simulations: &[Simulation],
     recordings: Vec<Writer>,
-    watch: &Watch,
+    watch: &ProgressMonitor,
 ) -> Result<(), StudyError> {
     let files = |recording| FileSink { recording, truth: None, stop: watch.stop };
     let mut all: Vec<FileSink> = recordings.into_iter().map(files).collect();
@@ -62,7 +62,7 @@ pub(super) fn description(simulation: &Simulation, truth_tf: bool) -> Result<Run
         base_imu: simulation.base_imu().map(|imu| BaseImuDescription {
             noise: imu.noise(),
             rate_hz: 1.0 / imu.period_s(),
-            head_from_base: simulation.head().rest_pose_base_from_head().inverse(),
+            head_from_base: simulation.head().base_from_head_at_rest().inverse(),
         }),
         manifest: Manifest::of(simulation).to_ron()?,
         truth_tf,

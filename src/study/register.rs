@@ -2,8 +2,8 @@
 
 use super::cloud_files::{CloudFiles, CloudOptions};
 use super::truth_cursor::{TrueState, TruthCursor};
-use super::{Stage, StudyError, Watch};
-use crate::estimation::{CloudFilter, Fate, ProjectedReturn, point_sigma_m};
+use super::{ProgressMonitor, Stage, StudyError};
+use crate::estimation::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
 use crate::evaluation::{DeadReckoning, EvaluationError, RestDetection, Thinning};
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
@@ -32,38 +32,38 @@ pub(super) struct SampledBeam {
     /// Projected by the true pose, in the world frame, with the true state at that time; `None` without truth.
     pub by_truth: Option<(ProjectedBeam, TrueState)>,
     /// Decision of the outlier filter.
-    pub fate: Fate,
+    pub class: ReturnClass,
 }
 
 /// Number of returns by decision of the outlier filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct FateCounts {
+pub(super) struct ClassCounts {
     pub kept: u64,
     pub mixed: u64,
     pub isolated: u64,
     pub moving: u64,
 }
 
-impl FateCounts {
+impl ClassCounts {
     /// Total number of returns.
     pub(super) fn all(&self) -> u64 {
         self.kept + self.mixed + self.isolated + self.moving
     }
 
-    fn count(&mut self, fate: Fate) {
-        *match fate {
-            Fate::Kept => &mut self.kept,
-            Fate::Mixed => &mut self.mixed,
-            Fate::Isolated => &mut self.isolated,
-            Fate::Moving => &mut self.moving,
+    fn count(&mut self, class: ReturnClass) {
+        *match class {
+            ReturnClass::Static => &mut self.kept,
+            ReturnClass::MixedPixel => &mut self.mixed,
+            ReturnClass::Isolated => &mut self.isolated,
+            ReturnClass::Dynamic => &mut self.moving,
         } += 1;
     }
 }
 
 /// Result of the registration, from a second pass over the recording.
-pub(super) struct Registered {
+pub(super) struct RegisteredCloud {
     /// Number of returns by decision of the filter.
-    pub fates: FateCounts,
+    pub class_counts: ClassCounts,
     /// Whether the cloud was filtered.
     pub filtered: bool,
     /// A sample of the beams, before filtering.
@@ -94,7 +94,7 @@ pub(super) struct Registration<'a> {
 
 impl Registration<'_> {
     /// Projects all beams by the estimate and writes the cloud files and `result.mcap` to `folder`.
-    pub(super) fn run(&self, folder: &Path, watch: &mut Watch) -> Result<Registered, StudyError> {
+    pub(super) fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<RegisteredCloud, StudyError> {
         let noise = self.calibration.lidar;
         let mut beams = BeamProjection {
             measurements: self.reader.measurements(self.selection),
@@ -109,14 +109,14 @@ impl Registration<'_> {
             covariances: self.covariances,
             filter: (!self.options.keep_outliers).then(|| CloudFilter::new(noise)),
             files: CloudFiles::create(folder, self.options.format)?,
-            sampled: Thinning::to(MAX_SAMPLED_BEAMS, self.returns),
-            displayed: Thinning::to(MAX_VIEWER_POINTS, self.returns),
-            on_page: Thinning::to(MAX_PAGE_POINTS, self.returns),
+            sampled: Thinning::to_at_most(MAX_SAMPLED_BEAMS, self.returns),
+            displayed: Thinning::to_at_most(MAX_VIEWER_POINTS, self.returns),
+            on_page: Thinning::to_at_most(MAX_PAGE_POINTS, self.returns),
             dead_reckoning: DeadReckoning::new(&self.calibration.head_from_imu, RestDetection::default()),
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
             projected: 0,
-            fates: FateCounts::default(),
+            class_counts: ClassCounts::default(),
             sample: Vec::new(),
             page_points: Vec::new(),
             failure: None,
@@ -130,8 +130,8 @@ impl Registration<'_> {
         beams.files.finish()?;
         let filtered = !self.options.keep_outliers;
         let dead_reckoning = beams.dead_reckoning.finish();
-        let BeamProjection { fates, sample, page_points, .. } = beams;
-        Ok(Registered { fates, filtered, sample, page_points, dead_reckoning })
+        let BeamProjection { class_counts, sample, page_points, .. } = beams;
+        Ok(RegisteredCloud { class_counts, filtered, sample, page_points, dead_reckoning })
     }
 }
 
@@ -171,11 +171,11 @@ struct BeamProjection<'a, 'w, 's> {
     span: Option<(Stamp, Stamp)>,
     /// Number of projected returns.
     projected: usize,
-    fates: FateCounts,
+    class_counts: ClassCounts,
     sample: Vec<SampledBeam>,
     page_points: Vec<CloudPoint>,
     failure: Option<StudyError>,
-    watch: &'w mut Watch<'s>,
+    watch: &'w mut ProgressMonitor<'s>,
 }
 
 impl Iterator for BeamProjection<'_, '_, '_> {
@@ -233,7 +233,7 @@ impl BeamProjection<'_, '_, '_> {
         }
         let decided = match &mut self.filter {
             Some(filter) => filter.push(pending),
-            None => pending.into_iter().map(|(_, pending)| (pending, Fate::Kept)).collect(),
+            None => pending.into_iter().map(|(_, pending)| (pending, ReturnClass::Static)).collect(),
         };
         self.settle(decided)
     }
@@ -274,12 +274,12 @@ impl BeamProjection<'_, '_, '_> {
     }
 
     /// Counts the decisions, writes the accepted points and returns those for viewers.
-    fn settle(&mut self, decided: Vec<(Pending, Fate)>) -> Result<Vec<CloudPoint>, RecordingError> {
+    fn settle(&mut self, decided: Vec<(Pending, ReturnClass)>) -> Result<Vec<CloudPoint>, RecordingError> {
         let mut displayed = Vec::new();
-        for (pending, fate) in decided {
-            self.fates.count(fate);
-            self.sample.extend(pending.sampled.map(|pair| SampledBeam { in_map: pair.0, by_truth: pair.1, fate }));
-            if fate == Fate::Kept {
+        for (pending, class) in decided {
+            self.class_counts.count(class);
+            self.sample.extend(pending.sampled.map(|pair| SampledBeam { in_map: pair.0, by_truth: pair.1, class }));
+            if class == ReturnClass::Static {
                 self.files.point(&pending.point)?;
                 self.page_points.extend(pending.on_page.then_some(pending.point));
                 displayed.extend(pending.displayed.then_some(pending.point));

@@ -31,7 +31,7 @@ pub fn estimate_files() -> Vec<String> {
 }
 
 /// The files that a simulation with its estimate may write to its folder, `metrics.json` first.
-pub fn journey_files() -> Vec<String> {
+pub fn full_run_files() -> Vec<String> {
     let recording = ["recording.mcap", "truth.tum"].map(str::to_owned);
     estimate_files().into_iter().chain(recording).collect()
 }

@@ -6,7 +6,7 @@ use crate::truth::ClockTruth;
 
 /// The true clock offset, s, with its lidar time: IMU stamp minus lidar stamp of the same true time `now`.
 pub(super) fn true_offset(now: Stamp, clock: &ClockTruth) -> (Stamp, f64) {
-    (now + clock.lidar_ahead, clock.imu_after_lidar().seconds())
+    (now + clock.lidar_offset, clock.imu_after_lidar().seconds())
 }
 
 /// The true clock offset over lidar time, s: IMU stamp minus lidar stamp of the same time.

@@ -28,7 +28,7 @@ pub(super) struct TruthCursor<'r> {
     heads: PoseBuffer,
     bases: PoseBuffer,
     /// Offset of the lidar clock at the last clock message; it changes by microseconds between messages.
-    lidar_ahead: Span,
+    lidar_offset: Span,
 }
 
 /// Poses of the last second.
@@ -37,7 +37,7 @@ struct PoseBuffer(VecDeque<(Stamp, Pose)>);
 
 impl<'r> TruthCursor<'r> {
     pub(super) fn new(truths: TruthReader<'r>) -> Self {
-        Self { truths, heads: PoseBuffer::default(), bases: PoseBuffer::default(), lidar_ahead: Span::ZERO }
+        Self { truths, heads: PoseBuffer::default(), bases: PoseBuffer::default(), lidar_offset: Span::ZERO }
     }
 
     /// The true state at `stamp` on the lidar clock; `None` if the truth does not cover it.
@@ -47,13 +47,13 @@ impl<'r> TruthCursor<'r> {
             match self.truths.next().transpose()? {
                 Some(Truth::Head(at, pose)) => self.heads.0.push_back((at, pose)),
                 Some(Truth::Base(at, pose)) => self.bases.0.push_back((at, pose)),
-                Some(Truth::Clock(_, clock)) => self.lidar_ahead = clock.lidar_ahead,
+                Some(Truth::Clock(_, clock)) => self.lidar_offset = clock.lidar_offset,
                 None => break,
             }
         }
         self.heads.remove_before(stamp - BUFFER);
         self.bases.remove_before(stamp - BUFFER);
-        let t_s = (stamp - self.lidar_ahead).seconds_since(EPOCH);
+        let t_s = (stamp - self.lidar_offset).seconds_since(EPOCH);
         let state = |world_from_head| TrueState { world_from_head, world_from_base: self.bases.at(stamp), t_s };
         Ok(self.heads.at(stamp).map(state))
     }

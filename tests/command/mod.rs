@@ -1,7 +1,5 @@
 //! Runs the zsim command.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use std::path::Path;
 

@@ -74,7 +74,7 @@ fn an_actuated_head_starts_at_rest_with_continuous_acceleration() {
         let model = built(&text(turn)).unwrap();
         let path = states(&model, &FixedBase(Pose::identity()), 1e-3, 3.0);
         for state in &path[..=500] {
-            assert_eq!(state.head, Kinematics::at_rest(*model.rest_pose_base_from_head()), "{turn}");
+            assert_eq!(state.head, Kinematics::at_rest(*model.base_from_head_at_rest()), "{turn}");
         }
         // The largest third derivative, at the start: 60 / 0.8^2 times the rate of 8.2 rad/s; smaller for the nod.
         let most = 60.0 / 0.64 * 1.3 * TAU * 1e-3;
@@ -96,14 +96,14 @@ fn the_rotation_is_as_specified_and_points_on_the_axis_do_not_move() {
     for t_ms in [1_300_usize, 1_777, 2_950] {
         let turned = TAU * 1.3 * (0.4 + t_ms as f64 * 1e-3 - 1.3);
         let axis = nalgebra::Unit::new_normalize(Vector::new(1.0, 2.0, -0.5));
-        let expected = model.rest_pose_base_from_head().rotation * Rotation::from_axis_angle(&axis, turned);
+        let expected = model.base_from_head_at_rest().rotation * Rotation::from_axis_angle(&axis, turned);
         assert!(path[t_ms].head.world_from_body.rotation.angle_to(&expected) < 1e-9, "{t_ms} ms");
     }
     // A nod of 50 degrees at 0.9 Hz, at its amplitude at three quarters of its second period.
     let model = built(&text("nod(amplitude_deg: 50.0, frequency_hz: 0.9)")).unwrap();
     let path = states(&model, &FixedBase(Pose::identity()), 1e-3, 3.0);
     let angle = |state: &HeadState| {
-        model.rest_pose_base_from_head().rotation.angle_to(&state.head.world_from_body.rotation).to_degrees()
+        model.base_from_head_at_rest().rotation.angle_to(&state.head.world_from_body.rotation).to_degrees()
     };
     let most = path.iter().map(angle).fold(0.0, f64::max);
     assert!((most - 50.0).abs() < 1e-3, "{most}");

@@ -115,7 +115,7 @@ fn a_float_heaves_and_rolls_as_a_ship() {
     let area = PI * radius * radius;
     let model = model([0.0, 0.0, 0.05], &(floating([0.0, 0.0, 0.0, added]) + &moored()));
     let draft = M / (1000.0 * area);
-    let rest = model.rest_pose_base_from_head().translation.z;
+    let rest = model.base_from_head_at_rest().translation.z;
     // The soft cords pull horizontally.
     assert_relative_eq!(rest + bottom, -draft, max_relative = 0.01);
     let mooring = {
@@ -181,7 +181,7 @@ fn a_float_follows_its_vessel() {
     let model = model([0.0, 0.0, 0.05], &(floating([0.0; 4]) + &moored()));
     let response = model.frequency_response(&model.default_points());
     for freq_hz in [0.5, 2.0, 5.0, 9.0] {
-        let gain = response.gain(zsim::motion::Axis::Z, freq_hz, zsim::dynamics::Quantity::Kinematic);
+        let gain = response.gain(zsim::motion::Axis::Z, freq_hz, zsim::dynamics::AccelerationKind::Kinematic);
         assert_relative_eq!(gain, 1.0, max_relative = 1e-4);
     }
 }
@@ -208,10 +208,14 @@ fn a_universal_joint_has_two_rocking_modes_with_the_stiffness_of_spring_less_gra
     // Tilted slowly, the base lifts the head by k / (k - m g h); shifted and turned about the vertical, it takes it
     // along.
     let response = model.frequency_response(&model.default_points());
-    let gain = |axis| response.gain(axis, 1e-6, zsim::dynamics::Quantity::Kinematic);
+    let gain = |axis| response.gain(axis, 1e-6, zsim::dynamics::AccelerationKind::Kinematic);
     assert_relative_eq!(gain(zsim::motion::Axis::Pitch), k / (k - M * G * h), max_relative = 1e-6);
     for axis in [zsim::motion::Axis::Z, zsim::motion::Axis::Yaw] {
-        assert_relative_eq!(response.gain(axis, 3.0, zsim::dynamics::Quantity::Kinematic), 1.0, max_relative = 1e-9);
+        assert_relative_eq!(
+            response.gain(axis, 3.0, zsim::dynamics::AccelerationKind::Kinematic),
+            1.0,
+            max_relative = 1e-9
+        );
     }
 }
 

@@ -228,7 +228,7 @@ pub fn states(model: &HeadModel, motion: &dyn BaseMotion, step_s: f64, seconds: 
 /// Displacement of the head's centre of mass and its rotation from rest, in the base's axes.
 pub fn displacement(model: &HeadModel, state: &HeadState) -> Vector6 {
     let base_from_head = state.base.world_from_body.inv_mul(&state.head.world_from_body);
-    let rest = model.rest_pose_base_from_head();
+    let rest = model.base_from_head_at_rest();
     let centre = nalgebra::Point3::from(model.body().centre_of_mass_in_head);
     let turn = (base_from_head.rotation * rest.rotation.inverse()).scaled_axis();
     stack(&(base_from_head * centre - rest * centre), &turn)

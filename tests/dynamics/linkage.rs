@@ -9,10 +9,10 @@ fn a_rigid_head_moves_with_its_base() {
     assert!(model.linear_modes().is_empty());
     let base = Nodding { amount_rad: 0.1 };
     for state in states(&model, &base, 1e-3, 1.0) {
-        assert_eq!(state.head, base.at(state.t_s).of_frame(model.rest_pose_base_from_head()));
+        assert_eq!(state.head, base.at(state.t_s).of_frame(model.base_from_head_at_rest()));
     }
     // The rest position of the sprung head, to 1 mm.
-    let apart = shipped("handheld").rest_pose_base_from_head().inv_mul(model.rest_pose_base_from_head());
+    let apart = shipped("handheld").base_from_head_at_rest().inv_mul(model.base_from_head_at_rest());
     assert!(apart.translation.vector.norm() < 1e-3 && apart.rotation.angle() < 1e-3);
 }
 

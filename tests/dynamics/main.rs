@@ -1,9 +1,10 @@
-//! The simulated head compared with its linear model, closed forms and conservation laws.
+//! The simulated head and its spring compared with linear models, closed forms and conservation laws.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod actuated;
 mod base;
 mod decay;
+mod elasticity;
 mod elements;
 mod energy;
 mod heads;

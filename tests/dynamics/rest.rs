@@ -33,10 +33,10 @@ fn the_static_deflection_is_weight_over_axial_stiffness() {
     // G d^4 / (8 D^3 n) = 79.3e9 0.003^4 / (8 0.025^3 12) = 4282.2 N/m under 0.40 kg: 0.916 mm.
     let model = ReferenceHead::default().model();
     let sag = 0.40 * G / 4282.2;
-    let rest = model.rest_pose_base_from_head();
+    let rest = model.base_from_head_at_rest();
     assert_relative_eq!(rest.translation.vector, Vector::new(0.0, 0.0, 0.12 - sag), epsilon = 1e-8);
     let hanging = ReferenceHead { hanging: true, ..ReferenceHead::default() }.model();
-    assert_relative_eq!(hanging.rest_pose_base_from_head().translation.z, -(0.12 + sag), epsilon = 1e-8);
+    assert_relative_eq!(hanging.base_from_head_at_rest().translation.z, -(0.12 + sag), epsilon = 1e-8);
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn a_head_on_a_base_at_constant_velocity_stays_at_rest() {
     let model = shipped("handheld");
     for state in states(&model, &ConstantVelocity, 1e-3, 2.0) {
         let relative = state.base.world_from_body.inv_mul(&state.head.world_from_body);
-        let moved = relative.inv_mul(model.rest_pose_base_from_head());
+        let moved = relative.inv_mul(model.base_from_head_at_rest());
         assert!(moved.translation.vector.norm() < 1e-10 && moved.rotation.angle() < 1e-9, "{} s: {moved}", state.t_s);
         assert_relative_eq!(state.head.velocity_in_world, Vector::new(1.4, -0.3, 0.1), epsilon = 1e-9);
         assert_relative_eq!(state.head.acceleration_in_world, Vector::zeros(), epsilon = 1e-6);
@@ -128,7 +128,7 @@ fn every_shipped_head_is_valid_and_stays_at_rest() {
             _ => 10.0,
         };
         let path = states(&model, &FixedBase(Pose::identity()), 1e-3, rests_s);
-        let moved = path[path.len() - 1].head.world_from_body.inv_mul(model.rest_pose_base_from_head());
+        let moved = path[path.len() - 1].head.world_from_body.inv_mul(model.base_from_head_at_rest());
         assert!(moved.translation.vector.norm() < 1e-9, "{name} moves by {moved}");
     }
     for name in names(Kind::Spring) {

@@ -57,7 +57,7 @@ fn flexible_and_actuated_heads_move_in_a_hand_and_rigid_ones_do_not() {
         for state in HeadSimulation::new(&model, motion.as_ref(), 1e-3).unwrap().take(10_000) {
             let state = state.unwrap_or_else(|error| panic!("{name}: {error}"));
             let seen = state.base.world_from_body.inv_mul(&state.head.world_from_body);
-            lean = lean.max(seen.rotation.angle_to(&model.rest_pose_base_from_head().rotation).to_degrees());
+            lean = lean.max(seen.rotation.angle_to(&model.base_from_head_at_rest().rotation).to_degrees());
         }
         let expected = match load(&name).unwrap().0.linkage {
             LinkageSpec::Rigid { .. } => 0.0..1e-4,

@@ -1,6 +1,6 @@
 //! A small recording for the tests of writing and reading.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
@@ -123,7 +123,7 @@ pub fn truth_sample(now: Stamp, clock: &ClockTruth) -> TruthSample {
     let head = Pose::from_parts([t.cos(), t.sin(), 1.4].into(), nod);
     let base = Pose::from_parts([t.cos(), t.sin(), 1.1].into(), from_roll_pitch_yaw(0.0, 0.0, t));
     TruthSample {
-        lidar_stamp: now + clock.lidar_ahead,
+        lidar_stamp: now + clock.lidar_offset,
         head: Kinematics::at_rest(head),
         base: Kinematics::at_rest(base),
     }
@@ -134,15 +134,15 @@ pub fn record_all(run: RunDescription, samples: i64) -> Vec<u8> {
     let (file, bytes) = shared_file();
     let has_base_imu = run.base_imu.is_some();
     let mut writer = Writer::new(file, run).unwrap();
-    let clock = ClockTruth { lidar_ahead: Span::ZERO, imu_ahead: Span::from_nanos(3_000_000) };
+    let clock = ClockTruth { lidar_offset: Span::ZERO, imu_offset: Span::from_nanos(3_000_000) };
     for k in 0..samples * 10 {
         let now = Stamp::from_nanos(k * 1_000_000);
         writer.truth(now, &truth_sample(now, &clock)).unwrap();
         if k % 10 == 0 {
             writer.clock(now, &clock).unwrap();
-            writer.imu(now, &imu_sample(now + clock.imu_ahead)).unwrap();
+            writer.imu(now, &imu_sample(now + clock.imu_offset)).unwrap();
             if has_base_imu {
-                writer.base_imu(now, &imu_sample(now + clock.imu_ahead)).unwrap();
+                writer.base_imu(now, &imu_sample(now + clock.imu_offset)).unwrap();
             }
         }
         if k % 25 == 0 {

@@ -7,16 +7,16 @@ set -euo pipefail
 verb=$1 at=$2
 port=${SLURM_TEST_PORT:-16900}
 
-skip() { echo "skipped: $*" >&2; exit 77; }
+cannot_run() { echo "$*" >&2; exit 77; }
 
 up() {
-  [ "$(id -u)" = 0 ] || skip "a local Slurm cluster needs root"
+  [ "$(id -u)" = 0 ] || cannot_run "a local Slurm cluster needs root"
   for program in munged slurmctld slurmd sbatch squeue; do
-    command -v "$program" >/dev/null || skip "$program is not installed (Debian: slurm-wlm and munge)"
+    command -v "$program" >/dev/null || cannot_run "$program is not installed (Debian: slurm-wlm and munge)"
   done
   local host memory
   host=$(hostname -s)
-  getent hosts "$host" >/dev/null || skip "the host's name $host is not resolvable"
+  getent hosts "$host" >/dev/null || cannot_run "the host's name $host is not resolvable"
   memory=$(($(awk '/MemTotal/ { print $2 }' /proc/meminfo) / 1024 * 9 / 20))
   # munged requires private folders below folders that others cannot write.
   mkdir -p "$at"/{munge,state,log,spool.n0,spool.n1}

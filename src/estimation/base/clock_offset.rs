@@ -14,7 +14,7 @@ const ROTATION_S: f64 = 0.05;
 /// Length of the start of the recording that is used, s.
 const START_LENGTH_S: f64 = 60.0;
 /// The used part is extended until the accumulated rotation reaches this, rad.
-const ENOUGH_ROTATION_RAD: f64 = 5.0;
+const MIN_TOTAL_ROTATION_RAD: f64 = 5.0;
 /// Minimum accumulated rotation that determines the offset, rad.
 const MIN_ROTATION_RAD: f64 = 0.5;
 /// Maximum standard deviation of the attitude of the fixes that are used, rad.
@@ -60,7 +60,7 @@ fn rotations(fixes: &Fixes, gyro: &IntegratedRate) -> Vec<(f64, Vector)> {
     let (from_s, to_s) = (from_s.max(gyro.start_s() + MAX_OFFSET_S), to_s.min(gyro.end_s() - MAX_OFFSET_S));
     let (mut rotations, mut total_rad) = (Vec::new(), 0.0);
     let mut tau_s = from_s;
-    while tau_s + ROTATION_S < to_s && (tau_s < from_s + START_LENGTH_S || total_rad < ENOUGH_ROTATION_RAD) {
+    while tau_s + ROTATION_S < to_s && (tau_s < from_s + START_LENGTH_S || total_rad < MIN_TOTAL_ROTATION_RAD) {
         let accurate = |tau_s: f64| fixes.at(tau_s).filter(|(_, sigmas)| sigmas.rotation_rad <= MAX_SIGMA_RAD);
         if let (Some((start, _)), Some((end, _))) = (accurate(tau_s), accurate(tau_s + ROTATION_S)) {
             let rotation = (start.rotation.inverse() * end.rotation).scaled_axis();

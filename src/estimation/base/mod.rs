@@ -161,8 +161,8 @@ fn intervals(
     for (k, (raw_s, sample)) in stamped.iter().enumerate() {
         match screen.screen((*raw_s, sample), stamped[k + 1..].iter()) {
             Screened::Measured(clipped) => stream.push(*raw_s, (sample, clipped), &mut placed),
-            Screened::Outlier => stream.note_discarded_outlier(),
-            Screened::Frozen => {}
+            Screened::Outlier { may_be_shock: true } => stream.note_possible_shock(),
+            Screened::Outlier { may_be_shock: false } | Screened::Frozen => {}
         }
     }
     stream.flush(&mut placed);

@@ -114,8 +114,8 @@ impl Traversal {
         let step_m = [0, 1, 2].map(|axis| EDGE_M * range_m / ray[axis].abs());
         let next_m = [0, 1, 2].map(|axis| {
             let at = hit.origin_in_map[axis] / EDGE_M;
-            let ahead = if ray[axis] > 0.0 { 1.0 - (at - at.floor()) } else { at - at.floor() };
-            if ray[axis] == 0.0 { f64::INFINITY } else { ahead * step_m[axis] }
+            let to_boundary = if ray[axis] > 0.0 { 1.0 - (at - at.floor()) } else { at - at.floor() };
+            if ray[axis] == 0.0 { f64::INFINITY } else { to_boundary * step_m[axis] }
         });
         let side = [0, 1, 2].map(|axis| if ray[axis] > 0.0 { 1 } else { -1 });
         let cell = Some(coordinates(&hit.origin_in_map, 0));

@@ -43,11 +43,11 @@ pub(super) fn find_mixed(hits: &[ProjectedReturn], noise: &LidarNoise) -> Vec<bo
 
 fn is_mixed(beams: &[PolarReturn], k: usize) -> bool {
     let beam = &beams[k];
-    let near = |other: Option<usize>| {
+    let neighbour = |other: Option<usize>| {
         let other = beams.get(other?)?;
         ((other.angle - beam.angle).abs() < MAX_NEIGHBOUR_RAD).then_some(other)
     };
-    let (Some(before), Some(after)) = (near(k.checked_sub(1)), near(k.checked_add(1))) else { return false };
+    let (Some(before), Some(after)) = (neighbour(k.checked_sub(1)), neighbour(k.checked_add(1))) else { return false };
     let normalised_difference = |other: &PolarReturn| {
         let sigma_m = beam.sigma_m.hypot(other.sigma_m);
         (beam.range_m - other.range_m) / sigma_m
@@ -55,7 +55,7 @@ fn is_mixed(beams: &[PolarReturn], k: usize) -> bool {
     let (from_before, from_after) = (normalised_difference(before), normalised_difference(after));
     let is_between = from_before * from_after < 0.0 && from_before.abs().min(from_after.abs()) > GAP_SIGMAS;
     let predicted = |one: &PolarReturn, two: Option<&PolarReturn>| two.is_some_and(|two| is_on_line(beam, one, two));
-    is_between && !predicted(before, near(k.checked_sub(2))) && !predicted(after, near(k.checked_add(2)))
+    is_between && !predicted(before, neighbour(k.checked_sub(2))) && !predicted(after, neighbour(k.checked_add(2)))
 }
 
 /// Whether a return is on the line through two others, the nearer neighbour first.
@@ -64,11 +64,11 @@ fn is_on_line(beam: &PolarReturn, one: &PolarReturn, two: &PolarReturn) -> bool 
     if step == 0.0 {
         return false;
     }
-    let ahead = (beam.angle - one.angle) / step;
+    let steps = (beam.angle - one.angle) / step;
     let inverse = |beam: &PolarReturn| (1.0 / beam.range_m, beam.sigma_m / (beam.range_m * beam.range_m));
     let ((d0, s0), (d1, s1), (d2, s2)) = (inverse(beam), inverse(one), inverse(two));
-    let predicted = d1 + (d1 - d2) * ahead;
-    let variance = s0 * s0 + (s1 * (1.0 + ahead)).powi(2) + (s2 * ahead).powi(2);
+    let predicted = d1 + (d1 - d2) * steps;
+    let variance = s0 * s0 + (s1 * (1.0 + steps)).powi(2) + (s2 * steps).powi(2);
     (d0 - predicted).abs() <= LINE_SIGMAS * variance.sqrt()
 }
 

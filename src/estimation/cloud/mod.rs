@@ -2,9 +2,9 @@
 //!
 //! | class | meaning | criterion |
 //! |---|---|---|
-//! | [`Fate::Mixed`] | mixed pixel: one return of two surfaces, measured in between | neighbours in the scan, see `mixed` |
-//! | [`Fate::Moving`] | point of a dynamic object | other beams passed through the cell, see `dynamic` |
-//! | [`Fate::Isolated`] | isolated point | few points around it, see `density` |
+//! | [`ReturnClass::MixedPixel`] | mixed pixel: a return of two surfaces, between them | neighbours in the scan: `mixed` |
+//! | [`ReturnClass::Dynamic`] | point of a dynamic object | other beams passed through the cell, see `dynamic` |
+//! | [`ReturnClass::Isolated`] | isolated point | few points around it, see `density` |
 //!
 //! Time is divided into blocks of 1 s. A point is classified with the blocks up to 5 s before and after: the head swings
 //! about once a second and observes the same spot several times within that period. Memory is bounded by eleven blocks.
@@ -51,15 +51,15 @@ impl ProjectedReturn {
 
 /// Class of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fate {
-    /// On a static surface; stays in the cloud.
-    Kept,
+pub enum ReturnClass {
+    /// On a static surface; the only class that stays in the cloud.
+    Static,
     /// Mixed pixel: a return of two surfaces, on neither of them.
-    Mixed,
+    MixedPixel,
     /// Too few other points around it.
     Isolated,
     /// On a dynamic object.
-    Moving,
+    Dynamic,
 }
 
 /// Classifies returns in a stream; each return has a payload `T`.
@@ -99,7 +99,7 @@ impl<T: Send + Sync> CloudFilter<T> {
     /// Adds the returns of a scan, in order of emission; returns the newly classified ones in input order.
     ///
     /// A block is classified about 6 s after its last return.
-    pub fn push(&mut self, scan: Vec<(ProjectedReturn, T)>) -> Vec<(T, Fate)> {
+    pub fn push(&mut self, scan: Vec<(ProjectedReturn, T)>) -> Vec<(T, ReturnClass)> {
         let Some((first, _)) = scan.first() else { return Vec::new() };
         let stamp = first.stamp;
         let mut classified = Vec::new();
@@ -121,7 +121,7 @@ impl<T: Send + Sync> CloudFilter<T> {
     }
 
     /// Classifies the remaining returns.
-    pub fn finish(mut self) -> Vec<(T, Fate)> {
+    pub fn finish(mut self) -> Vec<(T, ReturnClass)> {
         self.close_block();
         let mut classified = Vec::new();
         while self.classified < self.complete.len() {
@@ -139,27 +139,27 @@ impl<T: Send + Sync> CloudFilter<T> {
     }
 
     /// Classifies the oldest pending block; drops the block that is no longer needed.
-    fn classify_next(&mut self) -> Vec<(T, Fate)> {
+    fn classify_next(&mut self) -> Vec<(T, ReturnClass)> {
         let until = (self.classified + CONTEXT_BLOCKS + 1).min(self.complete.len());
         let around = || self.complete.range(..until);
         let density = Density::from_blocks(around().map(|block| &block.counts));
         let free_spaces: Vec<&FreeSpace> = around().map(|block| &block.free_space).collect();
         let block = &self.complete[self.classified];
         let dynamic = DynamicCells::find(&block.counts, &free_spaces);
-        let fate = |one: &PendingReturn<T>| match one {
-            PendingReturn { mixed: true, .. } => Fate::Mixed,
-            PendingReturn { hit, .. } if !density.is_sufficient_at(hit) => Fate::Isolated,
-            PendingReturn { hit, .. } if dynamic.contains(&hit.point_in_map) => Fate::Moving,
-            _ => Fate::Kept,
+        let class = |one: &PendingReturn<T>| match one {
+            PendingReturn { mixed: true, .. } => ReturnClass::MixedPixel,
+            PendingReturn { hit, .. } if !density.is_sufficient_at(hit) => ReturnClass::Isolated,
+            PendingReturn { hit, .. } if dynamic.contains(&hit.point_in_map) => ReturnClass::Dynamic,
+            _ => ReturnClass::Static,
         };
-        let fates: Vec<Fate> = block.returns.par_iter().with_min_len(512).map(fate).collect();
+        let classes: Vec<ReturnClass> = block.returns.par_iter().with_min_len(512).map(class).collect();
         let returns = std::mem::take(&mut self.complete[self.classified].returns);
         self.classified += 1;
         if self.classified > CONTEXT_BLOCKS {
             self.complete.pop_front();
             self.classified -= 1;
         }
-        returns.into_iter().map(|one| one.payload).zip(fates).collect()
+        returns.into_iter().map(|one| one.payload).zip(classes).collect()
     }
 }
 
@@ -195,8 +195,8 @@ mod tests {
         classified.extend(filter.finish());
         let order: Vec<(i64, usize)> = classified.iter().map(|(payload, _)| *payload).collect();
         assert!(order.is_sorted() && order.len() == 80_000);
-        let dropped: Vec<_> = classified.iter().filter(|(_, fate)| *fate != Fate::Kept).collect();
-        assert_eq!(dropped, [&((7500, 50), Fate::Isolated)]);
+        let dropped: Vec<_> = classified.iter().filter(|(_, class)| *class != ReturnClass::Static).collect();
+        assert_eq!(dropped, [&((7500, 50), ReturnClass::Isolated)]);
     }
 
     #[test]
@@ -215,7 +215,11 @@ mod tests {
         let _ = filter.push(edge.into_iter().map(nearer).collect());
         let classified = filter.finish();
         assert_eq!(
-            classified.iter().filter(|(_, fate)| *fate == Fate::Mixed).map(|(k, _)| *k).collect::<Vec<_>>(),
+            classified
+                .iter()
+                .filter(|(_, class)| *class == ReturnClass::MixedPixel)
+                .map(|(k, _)| *k)
+                .collect::<Vec<_>>(),
             [50]
         );
     }

@@ -1,6 +1,6 @@
 //! Covariance of the pose error after alignment of the trajectory with the truth over the first seconds.
 
-use super::{Consider, START_STATES, View, pose_error_matrix};
+use super::{ConsiderCovariance, START_STATES, View, pose_error_matrix};
 use crate::estimation::output::TURN_LEVER_M;
 use crate::geometry::Vector;
 use crate::time::Stamp;
@@ -31,8 +31,8 @@ pub(super) struct Mark {
     stamp: Stamp,
 }
 
-impl Consider {
-    /// The same as [`Consider::covariance_at`] relative to the gauge; relative to the map if there is no gauge.
+impl ConsiderCovariance {
+    /// [`ConsiderCovariance::covariance_at`] relative to the gauge; relative to the map if there is no gauge.
     pub(in crate::estimation) fn covariance_against_gauge(&self, point: &Vector) -> Matrix6<f64> {
         let with_start = |at: usize| self.views[at].with_start.fixed_columns::<6>(0).into_owned();
         let by = pose_error_matrix(&(point - self.pivot));
@@ -149,7 +149,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     /// Covariance relative to a gauge built from the window starts marked until then.
-    fn rebuilt(consider: &Consider, until_ns: i64, point: &Vector) -> Matrix6<f64> {
+    fn rebuilt(consider: &ConsiderCovariance, until_ns: i64, point: &Vector) -> Matrix6<f64> {
         let mut of_marks = consider.clone();
         of_marks.rebuild_gauge(Stamp::from_nanos(until_ns));
         of_marks.covariance_against_gauge(point)
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn an_error_relative_to_the_gauge_is_the_residual_of_the_alignment() {
         let root = wave::<START_STATES>(31);
-        let mut consider = Consider::new(Vector::new(0.3, -0.2, 0.1), &(root * root.transpose()));
+        let mut consider = ConsiderCovariance::new(Vector::new(0.3, -0.2, 0.1), &(root * root.transpose()));
         let sources = START_STATES * 7;
         let mut start = DMatrix::<f64>::zeros(START_STATES, sources);
         start.view_mut((0, 0), (START_STATES, START_STATES)).copy_from(&root);

@@ -50,7 +50,7 @@ pub(super) struct Sensitivity {
 
 /// Consider covariance: the joint covariance of the window start and of the stored views.
 #[derive(Debug, Clone)]
-pub(super) struct Consider {
+pub(super) struct ConsiderCovariance {
     pivot: Vector,
     start: StartMatrix,
     views: Vec<View>,
@@ -68,7 +68,7 @@ struct View {
     with_views: Vec<Matrix6<f64>>,
 }
 
-impl Consider {
+impl ConsiderCovariance {
     /// For a map with the origin at `pivot`: the pose error there is zero by definition. `known` is the covariance of the
     /// start states.
     pub(super) fn new(pivot: Vector, known: &StartMatrix) -> Self {
@@ -99,7 +99,7 @@ impl Consider {
     /// Updates after relocalisation at `pivot` in the surfaces seen before a gap.
     ///
     /// These surfaces have the covariance from before the gap, to which `found`, that of the relocalisation, is added;
-    /// `known` as for [`Consider::new`].
+    /// `known` as for [`ConsiderCovariance::new`].
     pub(super) fn relocalise(&mut self, pivot: Vector, known: &StartMatrix, found: &Matrix6<f64>) {
         self.move_rigidly(pivot, with_pose_covariance(known, found));
     }
@@ -227,7 +227,7 @@ mod tests {
     fn the_joint_covariance_is_that_of_explicitly_propagated_errors() {
         // The initial covariance, and the contribution of eight windows.
         let root = wave::<START_STATES>(31);
-        let mut consider = Consider::new(Vector::zeros(), &(root * root.transpose()));
+        let mut consider = ConsiderCovariance::new(Vector::zeros(), &(root * root.transpose()));
         let sources = START_STATES * 9;
         let mut start = DMatrix::<f64>::zeros(START_STATES, sources);
         start.view_mut((0, START_STATES * 8), (START_STATES, START_STATES)).copy_from(&root);
@@ -273,7 +273,7 @@ mod tests {
         };
         let noise = pose_block(&sensitivity(1, &[]).noise);
         let after = |step: &Sensitivity| {
-            let mut consider = Consider::localised(Vector::zeros(), &StartMatrix::zeros(), (found, of_map));
+            let mut consider = ConsiderCovariance::localised(Vector::zeros(), &StartMatrix::zeros(), (found, of_map));
             consider.advance(step);
             pose_block(&consider.start)
         };
@@ -287,14 +287,14 @@ mod tests {
     fn relocalisation_adds_its_covariance_to_that_of_the_old_surfaces() {
         let root = wave::<START_STATES>(3);
         let before = root * root.transpose();
-        let mut consider = Consider::new(Vector::zeros(), &before);
+        let mut consider = ConsiderCovariance::new(Vector::zeros(), &before);
         consider.add_view(0);
         let there = Vector::new(1.0, -2.0, 0.5);
         let (known, found) = (StartMatrix::identity() * 0.7, Matrix6::identity() * 0.2);
         consider.relocalise(there, &known, &found);
         // The error of the old start at that position, and the relocalisation error.
-        let old = Consider::new(Vector::zeros(), &before);
-        let own = Consider::new(there, &with_pose_covariance(&known, &found));
+        let old = ConsiderCovariance::new(Vector::zeros(), &before);
+        let own = ConsiderCovariance::new(there, &with_pose_covariance(&known, &found));
         let expected = old.covariance_at(&there) + own.covariance_at(&there);
         assert_relative_eq!(consider.covariance_at(&there), expected, epsilon = 1e-12);
         // Velocity and biases are independent of the pose, as at any start.
@@ -309,7 +309,7 @@ mod tests {
         // A rotation of variance s^2 about z only, observed 3 m along x: 9 s^2 along y, correlated with the rotation.
         let mut noise = StartMatrix::zeros();
         noise[(2, 2)] = 1e-6;
-        let mut consider = Consider::new(Vector::zeros(), &StartMatrix::zeros());
+        let mut consider = ConsiderCovariance::new(Vector::zeros(), &StartMatrix::zeros());
         let by = Sensitivity { pivot: Vector::zeros(), start: StartMatrix::identity(), views: Vec::new(), noise };
         consider.advance(&by);
         let there = consider.covariance_at(&Vector::new(3.0, 0.0, 0.0));

@@ -1,7 +1,7 @@
 //! Builds the gauge: the window starts over which the trajectory is aligned when errors are reported.
 
-use crate::estimation::GAUGED_S;
-use crate::estimation::consider::Consider;
+use crate::estimation::ALIGNMENT_S;
+use crate::estimation::consider::ConsiderCovariance;
 use crate::geometry::PoseCovariance;
 use crate::time::{Span, Stamp};
 
@@ -16,17 +16,17 @@ pub(super) struct GaugeBuilder {
     /// Time of the last marked window start, IMU time, s.
     marked_s: Option<f64>,
     /// Covariances of the marked window starts relative to the alignment.
-    gauged: Vec<(Stamp, PoseCovariance)>,
+    aligned_covariances: Vec<(Stamp, PoseCovariance)>,
 }
 
 impl GaugeBuilder {
     /// Adds the window start at `until_s` (IMU time), `stamp` (lidar time), to the alignment over the first seconds.
     ///
     /// Window starts are marked for twice that time, because a run that ends earlier is aligned over its first half.
-    pub(super) fn advance(&mut self, consider: &mut Consider, until_s: f64, stamp: Stamp) {
-        let end_s = *self.until_s.get_or_insert(until_s + GAUGED_S);
-        if until_s >= end_s + GAUGED_S {
-            self.gauged.append(&mut consider.take_marks());
+    pub(super) fn advance(&mut self, consider: &mut ConsiderCovariance, until_s: f64, stamp: Stamp) {
+        let end_s = *self.until_s.get_or_insert(until_s + ALIGNMENT_S);
+        if until_s >= end_s + ALIGNMENT_S {
+            self.aligned_covariances.append(&mut consider.take_marks());
             return;
         }
         if until_s < end_s {
@@ -42,12 +42,16 @@ impl GaugeBuilder {
     ///
     /// If the gauge is not complete, the marked window starts of the first half form the alignment. Returns the
     /// covariances of the marked window starts relative to it.
-    pub(super) fn finish(&mut self, consider: &mut Consider, last: Option<Stamp>) -> Vec<(Stamp, PoseCovariance)> {
+    pub(super) fn finish(
+        &mut self,
+        consider: &mut ConsiderCovariance,
+        last: Option<Stamp>,
+    ) -> Vec<(Stamp, PoseCovariance)> {
         if let (Some(first), Some(last)) = (consider.first_mark(), last) {
-            let half_s = (0.5 * last.seconds_since(first)).min(GAUGED_S);
+            let half_s = (0.5 * last.seconds_since(first)).min(ALIGNMENT_S);
             consider.rebuild_gauge(first + Span::from_seconds(half_s));
-            self.gauged.append(&mut consider.take_marks());
+            self.aligned_covariances.append(&mut consider.take_marks());
         }
-        std::mem::take(&mut self.gauged)
+        std::mem::take(&mut self.aligned_covariances)
     }
 }

@@ -5,17 +5,17 @@ mod poses;
 mod reports;
 
 use self::gauge::GaugeBuilder;
-use self::reports::{is_dead_reckoning, report, trouble};
+use self::reports::{is_dead_reckoning, problem, report};
 use crate::estimation::border::Border;
-use crate::estimation::consider::{Consider, Sensitivity, StartMatrix};
+use crate::estimation::consider::{ConsiderCovariance, Sensitivity, StartMatrix};
 use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
 use crate::estimation::intake::{Intake, Segment};
 use crate::estimation::localisation::{GapRelocalisation, MapLocalisation};
-use crate::estimation::spent::Stopwatch;
+use crate::estimation::observed::ObservedSurfels;
 use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::strapdown::Interval;
-use crate::estimation::surfel::{Beam, Patch, SurfelMaker};
-use crate::estimation::survey::Survey;
+use crate::estimation::surfel::{Patch, SurfelBuilder, TimedReturn};
+use crate::estimation::timing::Stopwatch;
 use crate::estimation::views::Views;
 use crate::estimation::window::{Linearised, Window};
 use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WarningKind, WindowReport};
@@ -26,7 +26,7 @@ use crate::time::Stamp;
 use std::time::Instant;
 
 /// Speed (m/s) or rotation rate (rad/s) above which too few matches are a problem. Below both the IMU is sufficient.
-const MOVING: (f64, f64) = (0.3, 0.5);
+const FAST_MOTION: (f64, f64) = (0.3, 0.5);
 
 /// While relocalisation after a gap is pending, gaps of up to this multiple of `max_gap_s` are bridged.
 const BRIDGING_FACTOR_WHILE_LOST: f64 = 3.0;
@@ -55,8 +55,8 @@ pub struct Estimator {
     /// Pending relocalisation in the surfaces seen before an IMU gap.
     gap_relocalisation: Option<GapRelocalisation>,
     /// Observed surfaces, if the caller requests them.
-    survey: Option<Survey>,
-    consider: Consider,
+    observed: Option<ObservedSurfels>,
+    consider: ConsiderCovariance,
     gauge: GaugeBuilder,
     /// Sensitivity of the end of the newest window to the errors at its start.
     at_end: Option<Sensitivity>,
@@ -70,7 +70,7 @@ pub struct Estimator {
     /// Total time of dead reckoning with the IMU, s.
     dead_reckoning_s: f64,
     /// The problem of the newest window, and whether it was reported.
-    trouble: Option<(WarningKind, bool)>,
+    problem: Option<(WarningKind, bool)>,
 }
 
 impl Estimator {
@@ -91,8 +91,8 @@ impl Estimator {
             views: Views::new(&spec.views, spec.fixed_views),
             map_localisation: None,
             gap_relocalisation: None,
-            survey: None,
-            consider: Consider::new(Vector::zeros(), &StartMatrix::zeros()),
+            observed: None,
+            consider: ConsiderCovariance::new(Vector::zeros(), &StartMatrix::zeros()),
             gauge: GaugeBuilder::default(),
             at_end: None,
             next_pose: None,
@@ -102,13 +102,13 @@ impl Estimator {
             windows: Vec::new(),
             warnings: Vec::new(),
             dead_reckoning_s: 0.0,
-            trouble: None,
+            problem: None,
         })
     }
 
     /// Also stores the observed surfaces for [`super::register`]; memory then grows with the recording.
-    pub fn surveying(self) -> Self {
-        Self { survey: Some(Survey::default()), ..self }
+    pub fn recording_surfels(self) -> Self {
+        Self { observed: Some(ObservedSurfels::default()), ..self }
     }
 
     /// Estimates the trajectory in the frame of `map`, with every window matched with the map.
@@ -156,15 +156,15 @@ impl Estimator {
         let (lidar, calibrated_lidar) = (window.lidar(), window.calibrated_lidar());
         self.propagate_to_end();
         self.output_poses(end_s);
-        self.survey_window(Window::survey_all, Window::end_s);
+        self.record_observed(Window::observed_in_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
         let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
-        let gauged = self.gauge.finish(&mut self.consider, self.newest_pose);
-        let Self { poses, clock_offsets, windows, warnings, survey, map_localisation, .. } = self;
-        let survey = survey.unwrap_or_default();
+        let aligned_covariances = self.gauge.finish(&mut self.consider, self.newest_pose);
+        let Self { poses, clock_offsets, windows, warnings, observed, map_localisation, .. } = self;
+        let observed = observed.unwrap_or_default();
         let located = map_localisation.and_then(|map_localisation| map_localisation.found().cloned());
         let learnt = OpenLoop { lidar, calibrated_lidar, located, ..OpenLoop::default() };
-        Ok(OpenLoop { trajectory, poses, gauged, clock_offsets, windows, warnings, survey, ..learnt })
+        Ok(OpenLoop { trajectory, poses, aligned_covariances, clock_offsets, windows, warnings, observed, ..learnt })
     }
 
     /// Adds a segment: handles a gap before it, starts the first window, and processes the segment.
@@ -191,12 +191,12 @@ impl Estimator {
     fn process(&mut self, segment: Segment) -> Result<(), EstimationError> {
         let Some(window) = &mut self.window else { return Ok(()) };
         let started = Instant::now();
-        let mut spent = window.extend(&segment.intervals, segment.beams, segment.end_s);
+        let mut timing = window.extend(&segment.intervals, segment.returns, segment.end_s);
         let (mut solved, mut linearised) = window.solve(&self.views);
-        spent += solved.spent;
+        timing += solved.timing;
         let mut watch = Stopwatch::start();
         window.rebuild_newest_surfels();
-        spent.surfels_s += watch.lap_s();
+        timing.surfels_s += watch.lap_s();
         if window.is_full()
             && let Some(before_gap) = self.before_gap.take()
         {
@@ -206,27 +206,27 @@ impl Estimator {
             // Solve again, with matches with the map or the old views.
             let Some(window) = &mut self.window else { return Ok(()) };
             (solved, linearised) = window.solve(&self.views);
-            spent += solved.spent;
+            timing += solved.timing;
             watch.lap_s();
         }
         let Some(window) = &self.window else { return Ok(()) };
         let elapsed_s = started.elapsed().as_secs_f64();
         if window.is_full() {
-            self.survey_window(Window::survey_oldest, Window::oldest_end_s);
+            self.record_observed(Window::observed_in_oldest, Window::oldest_end_s);
         }
-        watch.lap_s(); // the survey has its own time
+        watch.lap_s(); // the observed surfels have their own time
         let final_until_s = self.finish_oldest_segment(linearised.as_ref());
-        spent.views_s += watch.lap_s();
+        timing.views_s += watch.lap_s();
         let Some(window) = &mut self.window else { return Ok(()) };
-        let took = (elapsed_s + spent.views_s, spent);
+        let took = (elapsed_s + timing.views_s, timing);
         self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
-        let moving =
-            window.speed_m_per_s() > MOVING.0 || segment.intervals.iter().any(|(_, i)| i.gyro.norm() > MOVING.1);
-        let trouble = trouble(&solved, &self.spec, moving);
+        let moving = window.speed_m_per_s() > FAST_MOTION.0
+            || segment.intervals.iter().any(|(_, i)| i.gyro.norm() > FAST_MOTION.1);
+        let problem = problem(&solved, &self.spec, moving);
         let at = (self.intake.stamp(segment.end_s), moving);
-        self.windows.push(report(&solved, at, window, trouble.clone(), took));
-        self.dead_reckoning_s += if trouble.as_ref().is_some_and(is_dead_reckoning) { self.spec.step_s } else { 0.0 };
-        self.warn_of_trouble(trouble, segment.end_s);
+        self.windows.push(report(&solved, at, window, problem.clone(), took));
+        self.dead_reckoning_s += if problem.as_ref().is_some_and(is_dead_reckoning) { self.spec.step_s } else { 0.0 };
+        self.warn_of_problem(problem, segment.end_s);
         if let Some(until_s) = final_until_s {
             self.output_poses(until_s);
             let Some(window) = &mut self.window else { return Ok(()) };
@@ -251,11 +251,12 @@ impl Estimator {
             None => return Ok(false),
         };
         window.move_by(&found.map_from_query);
-        let place = window.start_pose().translation.vector;
+        let position = window.start_pose().translation.vector;
         let views = Views::new(&self.spec.views, self.spec.fixed_views);
-        self.views = views.with_map(map_localisation.patches(), window.matcher(), place);
+        self.views = views.with_map(map_localisation.patches(), window.matcher(), position);
         let known = window.known_at_start().unwrap_or_default();
-        self.consider = Consider::localised(place, &known, (found.covariance, map_localisation.covariance()));
+        self.consider =
+            ConsiderCovariance::localised(position, &known, (found.covariance, map_localisation.covariance()));
         Ok(true)
     }
 
@@ -270,8 +271,8 @@ impl Estimator {
                 return false;
             }
         };
-        let away_m = (consider.pivot() - self.consider.pivot()).norm();
-        self.warnings.push(Warning { stamp, kind: WarningKind::Relocalised { away_m } });
+        let distance_m = (consider.pivot() - self.consider.pivot()).norm();
+        self.warnings.push(Warning { stamp, kind: WarningKind::Relocalised { distance_m } });
         window.move_by(&map_from_here);
         (self.views, self.consider) = (views, consider);
         true
@@ -306,7 +307,7 @@ impl Estimator {
         self.before_gap = window.state_before_gap();
         self.propagate_to_end();
         self.output_poses(end_s);
-        self.survey_window(Window::survey_all, Window::end_s);
+        self.record_observed(Window::observed_in_all, Window::end_s);
         let Some(window) = self.window.take() else { return };
         self.next_pose = None;
         // The pose relative to the old views is unknown after the gap; accidental matches with them would be wrong.
@@ -339,12 +340,12 @@ impl Estimator {
         });
         let resting = until.take_while(|t| *t <= self.spec.inertial.rest_s).count().max(1);
         let adapted = self.intake.scan_geometry().adapt(&self.spec);
-        if let Some(survey) = &mut self.survey {
-            survey.ranges_are_held = self.intake.scan_geometry().is_one_way();
+        if let Some(observed) = &mut self.observed {
+            observed.range_bias_is_fixed = self.intake.scan_geometry().is_one_way();
         }
         let (head_from_imu, noise) = (&self.calibration.head_from_imu, &self.calibration.imu);
-        let seen = self.lidar_standstill();
-        let may_rest = seen != Standstill::Moves;
+        let standstill = self.lidar_standstill();
+        let may_rest = standstill != Standstill::Moves;
         let initial_state = initial::estimate((&intervals[..resting], may_rest), head_from_imu, noise, &adapted);
         let start_s = *start_s;
         self.raise_noise(initial_state.noise_factors, start_s);
@@ -357,27 +358,31 @@ impl Estimator {
             self.warnings.push(Warning { stamp, kind: WarningKind::StartedInMotion });
         }
         let mut window = self.first_window(&adapted, &initial_state, start_s);
-        if seen == Standstill::Unknown {
+        if standstill == Standstill::Unknown {
             window = window.with_unobservable_rest();
         }
         if let Some(before_gap) = &self.before_gap {
             window.resume_from(before_gap);
         }
         let (pivot, known) = (self.consider.pivot(), window.known_at_start().unwrap_or_default());
-        self.consider = if continues { Consider::after_gap(pivot, &known) } else { Consider::new(pivot, &known) };
+        self.consider = if continues {
+            ConsiderCovariance::after_gap(pivot, &known)
+        } else {
+            ConsiderCovariance::new(pivot, &known)
+        };
         self.window = Some(window);
     }
 
     /// Whether the lidar shows motion or rest during the assumed initial rest.
     fn lidar_standstill(&self) -> Standstill {
-        let beams: Vec<Beam> = self.waiting.iter().flat_map(|segment| &segment.beams).copied().collect();
-        let (Some(first), Some(last)) = (beams.first(), beams.last()) else { return Standstill::Unknown };
+        let returns: Vec<TimedReturn> = self.waiting.iter().flat_map(|segment| &segment.returns).copied().collect();
+        let (Some(first), Some(last)) = (returns.first(), returns.last()) else { return Standstill::Unknown };
         let quarter_s = 0.25 * (last.tau_s.min(first.tau_s + self.spec.inertial.rest_s) - first.tau_s);
         let until_s = first.tau_s + 4.0 * quarter_s;
-        let early = beams.partition_point(|beam| beam.tau_s < first.tau_s + quarter_s);
-        let late = beams.partition_point(|beam| beam.tau_s < until_s - quarter_s);
-        let end = beams.partition_point(|beam| beam.tau_s <= until_s);
-        standstill(&beams[..early], &beams[late..end])
+        let early = returns.partition_point(|one| one.tau_s < first.tau_s + quarter_s);
+        let late = returns.partition_point(|one| one.tau_s < until_s - quarter_s);
+        let end = returns.partition_point(|one| one.tau_s <= until_s);
+        standstill(&returns[..early], &returns[late..end])
     }
 
     /// Multiplies the assumed IMU noise by factors, also for the queued segments.
@@ -400,7 +405,7 @@ impl Estimator {
     /// The window after the start or a restart.
     fn first_window(&self, spec: &EstimatorSpec, initial_state: &InitialState, start_s: f64) -> Window {
         let imu_from_laser = self.calibration.head_from_imu.inverse() * self.calibration.head_from_laser;
-        let maker = SurfelMaker {
+        let builder = SurfelBuilder {
             spec: spec.surfels.clone(),
             noise: self.calibration.lidar,
             scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
@@ -408,17 +413,17 @@ impl Estimator {
             lidar: LidarCorrection::default(),
         };
         let border = Border::new(initial_state.information, &self.calibration.imu, self.spec.clock.estimated);
-        let surveyor = SurfelMaker { spec: spec.registration.surfels(&spec.surfels), ..maker.clone() };
-        let window = Window::new(spec, maker, initial_state, start_s, border);
-        if self.survey.is_some() { window.surveyed_by(surveyor) } else { window }
+        let observed_builder = SurfelBuilder { spec: spec.registration.surfels(&spec.surfels), ..builder.clone() };
+        let window = Window::new(spec, builder, initial_state, start_s, border);
+        if self.observed.is_some() { window.with_observed_builder(observed_builder) } else { window }
     }
 
-    /// Adds the patches returned by `seen`, up to time `until`, to the survey, if there is one.
-    fn survey_window(&mut self, seen: fn(&Window) -> Vec<(f64, Patch)>, until: fn(&Window) -> f64) {
-        if let (Some(window), Some(survey)) = (&self.window, &mut self.survey) {
+    /// Adds the patches returned by `surfels`, up to time `until`, to the observed surfels, if they are recorded.
+    fn record_observed(&mut self, surfels: fn(&Window) -> Vec<(f64, Patch)>, until: fn(&Window) -> f64) {
+        if let (Some(window), Some(observed)) = (&self.window, &mut self.observed) {
             let mut watch = Stopwatch::start();
-            survey.extend(self.intake.origin(), seen(window).into_iter(), window.lidar(), until(window));
-            survey.took_s += watch.lap_s();
+            observed.extend(self.intake.origin(), surfels(window).into_iter(), window.lidar(), until(window));
+            observed.elapsed_s += watch.lap_s();
         }
     }
 

@@ -1,26 +1,26 @@
 //! Reports on solved windows, and the warnings derived from them.
 
 use super::Estimator;
-use crate::estimation::window::{Solved, Window};
-use crate::estimation::{EstimatorSpec, TimeSpent, Warning, WarningKind, WindowReport};
+use crate::estimation::window::{Window, WindowSolution};
+use crate::estimation::{EstimatorSpec, Timing, Warning, WarningKind, WindowReport};
 use crate::time::Stamp;
 use std::mem::discriminant;
 
 /// Tracking counts as lost after more dead reckoning than this, s, and than this fraction of the run.
-const LOST: (f64, f64) = (5.0, 0.2);
+const TRACKING_LOST: (f64, f64) = (5.0, 0.2);
 
 /// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise.
 ///
 /// Noise causes less: the trajectory follows the IMU, and `noise_inflation` enlarges the assumed noise by half.
-const CONTRADICTED: f64 = 0.6;
+const CONTRADICTION_THRESHOLD: f64 = 0.6;
 
 /// The report on the solution of a window.
 pub(super) fn report(
-    solved: &Solved,
+    solved: &WindowSolution,
     (stamp, moving): (Stamp, bool),
     window: &Window,
-    trouble: Option<WarningKind>,
-    (elapsed_s, spent): (f64, TimeSpent),
+    problem: Option<WarningKind>,
+    (elapsed_s, timing): (f64, Timing),
 ) -> WindowReport {
     WindowReport {
         stamp,
@@ -41,16 +41,16 @@ pub(super) fn report(
         moving,
         resting: window.is_resting(),
         sees_rest: window.sees_rest(),
-        trouble,
+        problem,
         elapsed_s,
-        spent,
+        timing,
     }
 }
 
 /// The problem of a window, if any; `expected`: whether surfaces should have been matched.
-pub(super) fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
+pub(super) fn problem(solved: &WindowSolution, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
     let matches = solved.matches + solved.view_matches;
-    if let Some(reason) = solved.trouble {
+    if let Some(reason) = solved.failure {
         Some(WarningKind::NotSolved { reason })
     } else if expected && matches < spec.solve.min_matches {
         Some(WarningKind::FewMatches { matches })
@@ -62,8 +62,8 @@ pub(super) fn trouble(solved: &Solved, spec: &EstimatorSpec, expected: bool) -> 
 }
 
 /// Whether a problem means that the window is dead reckoning with the IMU.
-pub(super) fn is_dead_reckoning(trouble: &WarningKind) -> bool {
-    match trouble {
+pub(super) fn is_dead_reckoning(problem: &WarningKind) -> bool {
+    match problem {
         WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
         WarningKind::WeakGeometry { conditioning, .. } => *conditioning <= 0.0,
         _ => false,
@@ -74,7 +74,9 @@ impl Estimator {
     /// Warns if tracking was lost for a large part of the run.
     pub(super) fn warn_of_loss(&mut self) {
         let (seconds, of_seconds) = (self.dead_reckoning_s, self.windows.len() as f64 * self.spec.step_s);
-        if let Some(first) = self.windows.first().filter(|_| seconds > LOST.0 && seconds > LOST.1 * of_seconds) {
+        if let Some(first) =
+            self.windows.first().filter(|_| seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds)
+        {
             self.warnings.push(Warning { stamp: first.stamp, kind: WarningKind::Lost { seconds, of_seconds } });
         }
     }
@@ -82,9 +84,9 @@ impl Estimator {
     /// Warns if IMU and lidar contradict each other by more than noise explains.
     pub(super) fn warn_of_contradiction(&mut self) {
         let all = self.windows.iter().map(|window| window.imu_contradiction);
-        let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTED).collect();
+        let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTION_THRESHOLD).collect();
         let [seconds, of_seconds] = [times.len(), self.windows.len()].map(|count| count as f64 * self.spec.step_s);
-        if seconds > LOST.0 && seconds > LOST.1 * of_seconds {
+        if seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds {
             times.sort_unstable_by(f64::total_cmp);
             let kind = WarningKind::Contradicted { times: times[times.len() / 2], seconds, of_seconds };
             self.warnings.extend(self.windows.first().map(|first| Warning { stamp: first.stamp, kind }));
@@ -94,15 +96,15 @@ impl Estimator {
     /// Warns of a problem of two consecutive windows, or immediately of a rejected solution.
     ///
     /// The warning is repeated only after a window without a problem or with another one.
-    pub(super) fn warn_of_trouble(&mut self, trouble: Option<WarningKind>, end_s: f64) {
+    pub(super) fn warn_of_problem(&mut self, problem: Option<WarningKind>, end_s: f64) {
         let before =
-            self.trouble.take().filter(|(kind, _)| Some(discriminant(kind)) == trouble.as_ref().map(discriminant));
-        let Some(kind) = trouble else { return };
+            self.problem.take().filter(|(kind, _)| Some(discriminant(kind)) == problem.as_ref().map(discriminant));
+        let Some(kind) = problem else { return };
         let was_reported = before.as_ref().is_some_and(|(_, reported)| *reported);
         let report = !was_reported && (before.is_some() || matches!(kind, WarningKind::NotSolved { .. }));
         if report {
             self.warnings.push(Warning { stamp: self.intake.stamp(end_s), kind: kind.clone() });
         }
-        self.trouble = Some((kind, was_reported || report));
+        self.problem = Some((kind, was_reported || report));
     }
 }

@@ -97,6 +97,11 @@ impl RangeLimits {
         Self { gyro: [AxisExtreme::default(); 3], accel: [AxisExtreme::default(); 3], data_sheet }
     }
 
+    /// Whether the sensor can have read this specific force, m/s^2, by its data sheet.
+    pub(super) fn is_in_accel_range(&self, specific_force: &Vector) -> bool {
+        specific_force.iter().all(|x| x.abs() <= (1.0 + AT_LIMIT) * self.data_sheet.1)
+    }
+
     /// The axes on which `sample`, followed by `ahead`, is clipped.
     pub(super) fn clipped<'a>(&mut self, sample: &ImuSample, ahead: impl Iterator<Item = &'a ImuSample>) -> Clipped {
         let readings = ahead.map(|next| (next.angular_velocity_rad_per_s, next.specific_force_m_per_s2));

@@ -3,6 +3,7 @@
 //! Stamps are smoothed, samples of a fast IMU are averaged, gaps are bridged, and clipped readings are reconstructed.
 
 mod clipping;
+mod interpolation;
 mod reconstruction;
 mod resampling;
 mod screen;
@@ -16,6 +17,7 @@ use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use crate::geometry::Vector;
 use crate::measurement::{ImuNoise, ImuSample};
+use interpolation::InterpolationError;
 use reconstruction::{FIT_MEANS, bridge, reconstruct_clipped};
 use resampling::Resampler;
 use std::collections::VecDeque;
@@ -27,8 +29,8 @@ const SPACING_S: f64 = 0.01;
 const IRREGULAR_GAP_S: f64 = 0.3;
 /// Maximum time to wait for valid samples after a gap or a clipped reading, s; bounds the latency.
 const MAX_WAIT_S: f64 = 1.0;
-/// Extra standard deviation of the specific force where an outlier was discarded, m/s^2: it may have been a shock.
-const OUTLIER_ACCEL: f64 = 10.0;
+/// Extra standard deviation of the specific force where a possible shock was discarded, m/s^2.
+const SHOCK_ACCEL: f64 = 10.0;
 
 /// The mean of one or more consecutive samples, at the middle of the time that they cover.
 #[derive(Debug, Clone, Copy)]
@@ -58,14 +60,16 @@ pub(super) struct InertialStream {
     /// The last two means. The later one becomes an interval when the next mean is known.
     before: Option<Mean>,
     current: Option<Mean>,
+    /// Error of the interpolation of a missing mean.
+    bridging_error: InterpolationError,
     /// The last means; a line through them predicts the motion into a gap or clipping.
     last_valid: VecDeque<Mean>,
     /// Means from the first gap or clipped reading on, until enough valid ones follow.
     waiting: Vec<Mean>,
     /// End of the last interval, IMU time, s.
     end_s: Option<f64>,
-    /// Whether an outlier was discarded since the last mean.
-    outlier_discarded: bool,
+    /// Whether a sample was discarded since the last mean that may have measured a shock.
+    possible_shock: bool,
     /// Number of clipped samples since the last query.
     saturated: usize,
 }
@@ -83,10 +87,11 @@ impl InertialStream {
             group: Vec::new(),
             before: None,
             current: None,
+            bridging_error: InterpolationError::new(),
             last_valid: VecDeque::new(),
             waiting: Vec::new(),
             end_s: None,
-            outlier_discarded: false,
+            possible_shock: false,
             saturated: 0,
         }
     }
@@ -125,9 +130,9 @@ impl InertialStream {
         (self.before, self.current, self.end_s) = (None, None, None);
     }
 
-    /// Records that a sample was discarded as an outlier.
-    pub(super) fn note_discarded_outlier(&mut self) {
-        self.outlier_discarded = true;
+    /// Records that a sample was discarded that may have measured a shock.
+    pub(super) fn note_possible_shock(&mut self) {
+        self.possible_shock = true;
     }
 
     /// Adds a sample stamped `raw_s`; appends the intervals that it completes to `into`, each with its start time.
@@ -182,7 +187,7 @@ impl InertialStream {
             gyro: sum(|m| m.gyro),
             accel: sum(|m| m.accel),
             extra_gyro_sigma: 0.0,
-            extra_accel_sigma: if std::mem::take(&mut self.outlier_discarded) { OUTLIER_ACCEL } else { 0.0 },
+            extra_accel_sigma: if std::mem::take(&mut self.possible_shock) { SHOCK_ACCEL } else { 0.0 },
             clipped: self.group.iter().fold(Clipped::NONE, |all, m| all.or(m.clipped)),
             bridged: false,
         };
@@ -248,7 +253,9 @@ impl InertialStream {
                 let leaving: Vec<Mean> = last_valid.iter().chain(&means[..k]).copied().collect();
                 let leaving = &leaving[self.gapless_from(&leaving)..];
                 let arriving = &means[k..k + self.gapless_count(&means[k..])];
-                bridge(leaving, arriving, steps).into_iter().for_each(|mean| self.emit(mean, into));
+                bridge(leaving, arriving, steps, &self.bridging_error)
+                    .into_iter()
+                    .for_each(|mean| self.emit(mean, into));
             }
             self.emit(means[k], into);
         }
@@ -285,6 +292,7 @@ impl InertialStream {
     /// Converts the current mean to an interval; `next` determines the end and the slopes.
     fn emit(&mut self, next: Mean, into: &mut Vec<(f64, Interval)>) {
         let Some(now) = self.current.replace(next) else { return };
+        self.measure_bridging_error(&now, &next);
         self.last_valid.push_back(now);
         if self.last_valid.len() >= FIT_MEANS {
             self.last_valid.pop_front();
@@ -298,6 +306,17 @@ impl InertialStream {
             start,
             self.interval(&now, end - start, (next.gyro - before.gyro, next.accel - before.accel), across),
         ));
+    }
+
+    /// Measures the interpolation error on five measured means at regular intervals.
+    fn measure_bridging_error(&mut self, now: &Mean, next: &Mean) {
+        let Some(from) = self.last_valid.len().checked_sub(3) else { return };
+        let [a, b, c] = [0, 1, 2].map(|k| self.last_valid[from + k]);
+        let five = [a, b, c, *now, *next];
+        let spans_s = next.centre_s - a.centre_s;
+        if five.iter().all(|mean| !mean.bridged) && spans_s < 4.5 * self.spacing_s() {
+            self.bridging_error.measure(&five);
+        }
     }
 
     fn interval(&self, now: &Mean, h: f64, differences: (Vector, Vector), across_s: f64) -> Interval {

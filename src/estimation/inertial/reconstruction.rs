@@ -2,6 +2,7 @@
 
 use super::Mean;
 use super::clipping::Clipped;
+use super::interpolation::{InterpolationError, hermite, slope};
 use crate::geometry::{Rotation, Vector};
 
 /// Number of means on each side of a gap to which a line is fitted.
@@ -13,7 +14,7 @@ pub(super) const FIT_MEANS: usize = 5;
 const BRIDGED_SIGMA_PER_S2: (f64, f64) = (120.0, 300.0);
 /// Upper limit of the standard deviation of a bridged mean, rad/s and m/s^2.
 const MAX_BRIDGED_SIGMA: (f64, f64) = (2.0, 5.0);
-/// Shorter gaps are bridged by straight lines, s: the fitted slopes are less accurate than the chord.
+/// Shorter gaps are bridged by a cubic through two readings on each side, s: fitted lines are less accurate.
 const SHORT_GAP_S: f64 = 0.045;
 /// Standard deviation of a reconstructed angular velocity: fraction of the excess over the limit, plus fraction of the
 /// limit.
@@ -58,45 +59,61 @@ impl LineFit {
     }
 }
 
-/// Cubic Hermite interpolation between two values with slopes, at `u` in 0..1.
-pub(super) fn hermite(from: (Vector, Vector), to: (Vector, Vector), length_s: f64, u: f64) -> Vector {
-    let (h01, h10, h11) = (u * u * (3.0 - 2.0 * u), u * (1.0 - u) * (1.0 - u), u * u * (u - 1.0));
-    from.0.lerp(&to.0, h01) + (from.1 * h10 + to.1 * h11) * length_s
+/// Angular velocity and specific force at both ends of a gap, each with its slope.
+type Ends = (((Vector, Vector), (Vector, Vector)), ((Vector, Vector), (Vector, Vector)));
+
+/// The readings at both ends, with the slopes of parabolas through their neighbours.
+fn cubic_ends(before: &[Mean], after: &[Mean]) -> Ends {
+    let (last, first) = (&before[before.len() - 1], &after[0]);
+    let earlier = before.len().checked_sub(2).map(|k| &before[k]);
+    let (leaves, arrives) = (slope(earlier, last, Some(first)), slope(Some(last), first, after.get(1)));
+    (((last.gyro, leaves.0), (first.gyro, arrives.0)), ((last.accel, leaves.1), (first.accel, arrives.1)))
+}
+
+/// Lines fitted to the readings on both sides, at the ends.
+fn fitted_ends(before: &[Mean], after: &[Mean]) -> Ends {
+    let (last_s, first_s) = (before[before.len() - 1].centre_s, after[0].centre_s);
+    let (leaving, arriving) = (LineFit::through(before), LineFit::through(after));
+    ((leaving.gyro_at(last_s), arriving.gyro_at(first_s)), (leaving.accel_at(last_s), arriving.accel_at(first_s)))
 }
 
 /// The `steps - 1` means that bridge the gap between the last of `before` and the first of `after`.
 ///
-/// The angular velocity is a cubic that continues the slopes on both sides of the gap. The specific force is linear in
-/// a frame that does not rotate.
-pub(super) fn bridge(before: &[Mean], after: &[Mean], steps: usize) -> Vec<Mean> {
+/// Short gaps are bridged by a cubic with the slopes at both ends; `error` is the measured error of that interpolation.
+/// In longer ones the angular velocity is a cubic with fitted slopes, and the specific force is linear in a frame that
+/// does not rotate.
+pub(super) fn bridge(before: &[Mean], after: &[Mean], steps: usize, error: &InterpolationError) -> Vec<Mean> {
     let (Some(last), Some(first)) = (before.last(), after.first()) else { return Vec::new() };
     let gap_s = first.centre_s - last.centre_s;
-    let (leaves, arrives) = if gap_s < SHORT_GAP_S {
-        let chord = (first.gyro - last.gyro) / gap_s;
-        ((last.gyro, chord), (first.gyro, chord))
-    } else {
-        (LineFit::through(before).gyro_at(last.centre_s), LineFit::through(after).gyro_at(first.centre_s))
-    };
+    let is_short = gap_s < SHORT_GAP_S;
+    let ends = if is_short { cubic_ends(before, after) } else { fitted_ends(before, after) };
+    let ((leaves, arrives), (force_leaves, force_arrives)) = ends;
     let mut turned = vec![Rotation::identity()];
     for step in 0..steps {
         let rate = hermite(leaves, arrives, gap_s, (step as f64 + 0.5) / steps as f64);
         turned.push(turned[step] * Rotation::from_scaled_axis(rate * (gap_s / steps as f64)));
     }
-    let (force_leaves, force_arrives) = if gap_s < SHORT_GAP_S {
-        (last.accel, first.accel)
-    } else {
-        (LineFit::through(before).accel_at(last.centre_s).0, LineFit::through(after).accel_at(first.centre_s).0)
+    // The cubic of the force is that in the frame of the head, for the short gaps in which it hardly rotates.
+    let force_at = |step: usize, u: f64| {
+        if is_short {
+            return hermite(force_leaves, force_arrives, gap_s, u);
+        }
+        turned[step].inverse() * force_leaves.0.lerp(&(turned[steps] * force_arrives.0), u)
     };
-    let force_arrives = turned[steps] * force_arrives;
-    let gap2 = gap_s * gap_s;
-    let extra_gyro_sigma = (BRIDGED_SIGMA_PER_S2.0 * gap2).min(MAX_BRIDGED_SIGMA.0);
-    let extra_accel_sigma = (BRIDGED_SIGMA_PER_S2.1 * gap2).min(MAX_BRIDGED_SIGMA.1);
+    let (gyro_sigma, accel_sigma) = error.sigmas(gap_s, steps as f64);
+    let (curvature_gyro, curvature_accel) = if is_short {
+        (0.0, 0.0)
+    } else {
+        (BRIDGED_SIGMA_PER_S2.0 * gap_s * gap_s, BRIDGED_SIGMA_PER_S2.1 * gap_s * gap_s)
+    };
+    let extra_gyro_sigma = gyro_sigma.max(curvature_gyro).min(MAX_BRIDGED_SIGMA.0);
+    let extra_accel_sigma = accel_sigma.max(curvature_accel).min(MAX_BRIDGED_SIGMA.1);
     let means = (1..steps).map(|step| {
         let u = step as f64 / steps as f64;
         Mean {
             centre_s: last.centre_s + u * gap_s,
             gyro: hermite(leaves, arrives, gap_s, u),
-            accel: turned[step].inverse() * force_leaves.lerp(&force_arrives, u),
+            accel: force_at(step, u),
             extra_gyro_sigma,
             extra_accel_sigma,
             clipped: Clipped::NONE,

@@ -1,33 +1,24 @@
 //! Resampling of a sensor without a period: a cubic through its readings, on a grid of about 10 ms.
 
+use super::interpolation::{InterpolationError, between, slope};
 use super::{Mean, SPACING_S};
-use crate::geometry::Vector;
 use std::collections::VecDeque;
 
-/// Initial interpolation error as a multiple of the squared gap, rad/s and m/s^2 per s^2: a head that rocks by 5 rad/s
-/// at 1.2 Hz.
-const INITIAL_ERROR_PER_S2: (f64, f64) = (20.0, 100.0);
-/// Weight of a new measurement of the interpolation error: the error is a mean over about 30 samples.
-const NEW_ERROR_WEIGHT: f64 = 1.0 / 30.0;
 /// Largest standard deviation of an interpolated reading, rad/s and m/s^2.
 const MAX_SIGMA: (f64, f64) = (30.0, 60.0);
 
 /// Interpolates irregular readings by a cubic Hermite spline with slopes from finite differences.
 ///
-/// The error of the interpolation is measured by leaving out one reading at a time, and scaled with the squared gap. A
-/// smooth motion errs by a higher power of the gap; the square is on the safe side for gaps shorter than those measured.
 #[derive(Debug)]
 pub(super) struct Resampler {
     /// The last readings, at most five.
     readings: VecDeque<Mean>,
-    /// Mean squared error of the interpolation over the squared gap, (rad/s/s^2)^2 and (m/s^2/s^2)^2.
-    error2: (f64, f64),
+    error: InterpolationError,
 }
 
 impl Resampler {
     pub(super) fn new() -> Self {
-        let (gyro, accel) = INITIAL_ERROR_PER_S2;
-        Self { readings: VecDeque::new(), error2: (gyro * gyro, accel * accel) }
+        Self { readings: VecDeque::new(), error: InterpolationError::new() }
     }
 
     /// Forgets the readings: the next one does not continue them.
@@ -44,7 +35,9 @@ impl Resampler {
         if self.readings.len() > 5 {
             self.readings.pop_front();
         }
-        self.measure_error();
+        if let [a, b, c, d, e] = *self.readings.make_contiguous() {
+            self.error.measure(&[a, b, c, d, e]);
+        }
         match self.readings.len() {
             1 => Vec::new(),
             2 => vec![self.readings[0]],
@@ -70,14 +63,12 @@ impl Resampler {
         let slopes = (slope(before, &from, Some(&to)), slope(Some(&from), &to, self.readings.get(k + 2)));
         let gap_s = to.centre_s - from.centre_s;
         let steps = (gap_s / SPACING_S).round().max(1.0);
-        // The errors within a gap have one sign: together they count as one.
-        let sigma = |error2: f64, most: f64| (error2 * steps).sqrt().min(most / (gap_s * gap_s)) * gap_s * gap_s;
-        let sigmas = (sigma(self.error2.0, MAX_SIGMA.0), sigma(self.error2.1, MAX_SIGMA.1));
+        let sigmas = self.error.sigmas(gap_s, steps);
+        let (extra_gyro_sigma, extra_accel_sigma) = (sigmas.0.min(MAX_SIGMA.0), sigmas.1.min(MAX_SIGMA.1));
         let inner = (1..steps as usize).map(|step| {
             let u = step as f64 / steps;
             let near = if u < 0.5 { &from } else { &to };
-            let (gyro, accel) = hermite((&from, &to), &slopes, u);
-            let (extra_gyro_sigma, extra_accel_sigma) = sigmas;
+            let (gyro, accel) = between((&from, &to), &slopes, u);
             let bridged = gap_s > 4.5 * SPACING_S;
             Mean {
                 centre_s: from.centre_s + u * gap_s,
@@ -91,55 +82,13 @@ impl Resampler {
         });
         inner.chain([to]).collect()
     }
-
-    /// Compares the reading in the middle of the last five with the interpolation between its neighbours.
-    fn measure_error(&mut self) {
-        let [first, from, middle, to, last] = match *self.readings.make_contiguous() {
-            [a, b, c, d, e] => [a, b, c, d, e],
-            _ => return,
-        };
-        let is_clipped = [first, from, middle, to, last].iter().any(|mean| mean.clipped.any());
-        let gap_s = to.centre_s - from.centre_s;
-        if is_clipped || gap_s <= 0.0 {
-            return;
-        }
-        let slopes = (slope(Some(&first), &from, Some(&to)), slope(Some(&from), &to, Some(&last)));
-        let (gyro, accel) = hermite((&from, &to), &slopes, (middle.centre_s - from.centre_s) / gap_s);
-        let take = |mean: &mut f64, error: &Vector| {
-            *mean += NEW_ERROR_WEIGHT * (error.norm_squared() / 3.0 / gap_s.powi(4) - *mean);
-        };
-        take(&mut self.error2.0, &(gyro - middle.gyro));
-        take(&mut self.error2.1, &(accel - middle.accel));
-    }
-}
-
-/// Slopes of angular velocity and specific force at `at`: the parabola through it and its neighbours.
-fn slope(before: Option<&Mean>, at: &Mean, after: Option<&Mean>) -> (Vector, Vector) {
-    let chord = |a: &Mean, b: &Mean| {
-        let h = b.centre_s - a.centre_s;
-        ((b.gyro - a.gyro) / h, (b.accel - a.accel) / h, h)
-    };
-    match (before.map(|before| chord(before, at)), after.map(|after| chord(at, after))) {
-        (Some((g0, a0, h0)), Some((g1, a1, h1))) => {
-            let share = h1 / (h0 + h1);
-            (g0 * share + g1 * (1.0 - share), a0 * share + a1 * (1.0 - share))
-        }
-        (Some((gyro, accel, _)), None) | (None, Some((gyro, accel, _))) => (gyro, accel),
-        (None, None) => (Vector::zeros(), Vector::zeros()),
-    }
-}
-
-/// Angular velocity and specific force `u` of the way between two readings with their slopes, `u` from 0 to 1.
-fn hermite((from, to): (&Mean, &Mean), slopes: &((Vector, Vector), (Vector, Vector)), u: f64) -> (Vector, Vector) {
-    let gap_s = to.centre_s - from.centre_s;
-    let between = |from, to| super::reconstruction::hermite(from, to, gap_s, u);
-    (between((from.gyro, slopes.0.0), (to.gyro, slopes.1.0)), between((from.accel, slopes.0.1), (to.accel, slopes.1.1)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::estimation::inertial::Clipped;
+    use crate::geometry::Vector;
 
     /// Rate and force of a head that rocks at 1.2 Hz, with a second component at 3.1 Hz.
     fn signal(t_s: f64) -> (Vector, Vector) {

@@ -23,7 +23,11 @@ pub(in crate::estimation) enum Screened {
     /// A measurement, with the clipped axes.
     Measured(Clipped),
     /// Far from both neighbours, implausibly large, or not finite.
-    Outlier,
+    Outlier {
+        /// Whether a mechanical shock can have caused the reading: a specific force within the sensor's range.
+        /// Otherwise it is a corrupt message, and the motion between the neighbours was smooth.
+        may_be_shock: bool,
+    },
     /// A repetition of the previous reading.
     Frozen,
 }
@@ -63,14 +67,14 @@ impl Screen {
     ) -> Screened {
         let ahead = ahead.take_while(|(s, _)| *s <= seconds + LOOKAHEAD_S);
         if is_implausible(sample) {
-            return Screened::Outlier;
+            return Screened::Outlier { may_be_shock: false };
         }
         if self.is_frozen((seconds, sample), ahead.clone()) {
             return Screened::Frozen;
         }
         let usable = ahead.map(|(_, next)| next).filter(|next| !is_implausible(next));
-        if self.is_outlier(sample, usable.clone()) {
-            return Screened::Outlier;
+        if let Some(outlier) = self.outlier(sample, usable.clone()) {
+            return outlier;
         }
         let clipped = self.limits.clipped(sample, usable);
         self.before = [Some(*sample), self.before[0]];
@@ -96,32 +100,48 @@ impl Screen {
         lasts_s >= FROZEN.0 && (repeated.1 >= FROZEN.1 || seconds - since_s >= FROZEN.0)
     }
 
-    /// Whether a sample differs from the previous measurement and from the median of the next three by much more than
-    /// these differ from each other.
-    fn is_outlier<'a>(&self, sample: &ImuSample, ahead: impl Iterator<Item = &'a ImuSample>) -> bool {
+    /// The verdict on a sample that differs from the previous measurement and from the median of the next three by much
+    /// more than these differ from each other.
+    fn outlier<'a>(&self, sample: &ImuSample, ahead: impl Iterator<Item = &'a ImuSample>) -> Option<Screened> {
         let next: Vec<&ImuSample> = ahead.take(3).collect();
-        let Some(before) = &self.before[0] else { return is_first_outlier(sample, &next) };
-        let exceeds = |of: fn(&ImuSample) -> Vector, (floor, factor): (f64, f64)| {
-            let (x, last) = (of(sample), of(before));
-            let Some(median) = median(&next, of) else { return false };
-            let mut usual = (median - last).norm();
-            if let Some(earlier) = &self.before[1] {
-                usual = usual.max((of(earlier) - last).norm());
-            }
-            (x - last).norm().min((x - median).norm()) > floor + factor * usual
+        let exceeds = |of: fn(&ImuSample) -> Vector, gate: (f64, f64)| match &self.before[0] {
+            Some(before) => self.exceeds_neighbours(of, gate, (sample, before), &next),
+            None => exceeds_successors(of, gate, sample, &next),
         };
-        exceeds(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO) || exceeds(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL)
+        let force = exceeds(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL);
+        let rate = exceeds(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO);
+        // A shock changes the velocity within a sample, not the rotational velocity and back.
+        let may_be_shock = !rate && self.limits.is_in_accel_range(&sample.specific_force_m_per_s2);
+        (force || rate).then_some(Screened::Outlier { may_be_shock })
+    }
+
+    fn exceeds_neighbours(
+        &self,
+        of: fn(&ImuSample) -> Vector,
+        (floor, factor): (f64, f64),
+        (sample, before): (&ImuSample, &ImuSample),
+        next: &[&ImuSample],
+    ) -> bool {
+        let (x, last) = (of(sample), of(before));
+        let Some(median) = median(next, of) else { return false };
+        let mut usual = (median - last).norm();
+        if let Some(earlier) = &self.before[1] {
+            usual = usual.max((of(earlier) - last).norm());
+        }
+        (x - last).norm().min((x - median).norm()) > floor + factor * usual
     }
 }
 
-/// Whether the first sample is an outlier: only later neighbours exist, and they must agree with each other.
-fn is_first_outlier(sample: &ImuSample, next: &[&ImuSample]) -> bool {
-    let exceeds = |of: fn(&ImuSample) -> Vector, (floor, factor): (f64, f64)| {
-        let Some(median) = median(next, of).filter(|_| next.len() == 3) else { return false };
-        let usual = next.iter().map(|other| (of(other) - median).norm()).fold(0.0, f64::max);
-        (of(sample) - median).norm() > floor + factor * usual
-    };
-    exceeds(|s| s.angular_velocity_rad_per_s, OUTLIER_GYRO) || exceeds(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL)
+/// The same for the first sample: only later neighbours exist, and they must agree with each other.
+fn exceeds_successors(
+    of: fn(&ImuSample) -> Vector,
+    (floor, factor): (f64, f64),
+    sample: &ImuSample,
+    next: &[&ImuSample],
+) -> bool {
+    let Some(median) = median(next, of).filter(|_| next.len() == 3) else { return false };
+    let usual = next.iter().map(|other| (of(other) - median).norm()).fold(0.0, f64::max);
+    (of(sample) - median).norm() > floor + factor * usual
 }
 
 /// The median of each axis.
@@ -176,6 +196,10 @@ mod tests {
         (0..samples.len()).map(|k| screen.screen((samples[k].0, &samples[k].1), samples[k + 1..].iter())).collect()
     }
 
+    fn is_outlier(one: &Screened) -> bool {
+        matches!(one, Screened::Outlier { .. })
+    }
+
     fn indices(screened: &[Screened], of: impl Fn(&Screened) -> bool) -> Vec<usize> {
         screened.iter().enumerate().filter(|(_, one)| of(one)).map(|(k, _)| k).collect()
     }
@@ -193,7 +217,7 @@ mod tests {
                 let mut samples = samples();
                 samples[at].1.angular_velocity_rad_per_s.y += gyro;
                 samples[at].1.specific_force_m_per_s2.x += accel;
-                let outliers = indices(&screened(&samples), |one| *one == Screened::Outlier);
+                let outliers = indices(&screened(&samples), is_outlier);
                 // The last sample has no successor: only an implausible value is detected.
                 let expected = if at == 999 && gyro == 10.0 { vec![] } else { vec![at] };
                 assert_eq!(outliers, expected, "{at}: {gyro}, {accel}");
@@ -207,7 +231,7 @@ mod tests {
         for (k, push) in [(500, 20.0), (501, 60.0), (502, 55.0), (503, 25.0)] {
             samples[k].1.specific_force_m_per_s2.z += push;
         }
-        assert!(indices(&screened(&samples), |one| *one == Screened::Outlier).is_empty());
+        assert!(indices(&screened(&samples), is_outlier).is_empty());
     }
 
     #[test]

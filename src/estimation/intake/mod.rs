@@ -11,7 +11,7 @@ use super::scan_geometry::ScanGeometry;
 use super::spec::EstimatorSpec;
 use super::stamps::StampFilter;
 use super::strapdown::Interval;
-use super::surfel::Beam;
+use super::surfel::TimedReturn;
 use super::{Discarded, EstimationError, Warning, WarningKind};
 use crate::measurement::{Calibration, Measurement};
 use crate::signal::Regularity;
@@ -41,7 +41,7 @@ pub(super) struct Segment {
     /// IMU intervals, which continue those of the previous segment, each with the start in IMU time, s.
     pub(super) intervals: Vec<(f64, Interval)>,
     /// Beams of the segment in order of time.
-    pub(super) beams: Vec<Beam>,
+    pub(super) returns: Vec<TimedReturn>,
     /// Whether an IMU gap too long to bridge, or a long lidar gap, precedes the segment.
     pub(super) after_gap: bool,
 }
@@ -151,9 +151,9 @@ impl Intake {
         }
         loop {
             let segment = self.cut(last)?;
-            let lidar_is_missing = segment.beams.is_empty() && segment.end_s - self.scans.used_s() > MAX_LIDAR_GAP_S;
+            let lidar_is_missing = segment.returns.is_empty() && segment.end_s - self.scans.used_s() > MAX_LIDAR_GAP_S;
             self.without_lidar |= lidar_is_missing;
-            if self.without_lidar && segment.beams.is_empty() {
+            if self.without_lidar && segment.returns.is_empty() {
                 continue;
             }
             if !segment.intervals.is_empty() {
@@ -184,9 +184,9 @@ impl Intake {
             end_s = end_s.min(self.samples.end_s() - 0.5 * MARGIN_S).max(start_s);
         }
         let intervals = self.samples.take_intervals();
-        let beams = self.scans.take_until(end_s, is_turning(&intervals));
+        let returns = self.scans.take_until(end_s, is_turning(&intervals));
         let after_gap = std::mem::take(&mut self.after_gap);
-        let segment = Segment { start_s, end_s, intervals, beams, after_gap };
+        let segment = Segment { start_s, end_s, intervals, returns, after_gap };
         self.report(&segment);
         self.next_start_s = end_s;
         if let Coverage::Gap(from_s, until_s) = coverage {
@@ -237,7 +237,7 @@ impl Intake {
             self.report_clipping(segment.end_s);
         }
         let seconds = segment.end_s - self.scans.used_s();
-        if segment.beams.is_empty() && seconds > LIDAR_GAP_S {
+        if segment.returns.is_empty() && seconds > LIDAR_GAP_S {
             let stamp = self.stamp(segment.start_s);
             self.warnings.push(Warning { stamp, kind: WarningKind::LidarGap { seconds } });
         }

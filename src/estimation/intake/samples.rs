@@ -148,9 +148,11 @@ impl SampleQueue {
                     self.used_s = seconds;
                     stream.push(seconds, (&sample, clipped), &mut self.intervals);
                 }
-                Screened::Outlier => {
+                Screened::Outlier { may_be_shock } => {
                     self.discarded.outliers += 1;
-                    stream.note_discarded_outlier();
+                    if may_be_shock {
+                        stream.note_possible_shock();
+                    }
                 }
                 Screened::Frozen => self.discarded.frozen += 1,
             }

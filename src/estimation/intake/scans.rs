@@ -1,10 +1,10 @@
-//! Lidar input: queues scans, discards frozen ones, and converts them to beams with smoothed times.
+//! Lidar input: queues scans, discards frozen ones, and converts them to returns with smoothed times.
 
 use crate::estimation::EstimationError;
 use crate::estimation::scan_geometry::{ScanGeometry, is_in_plane};
 use crate::estimation::spec::EstimatorSpec;
 use crate::estimation::stamps::StampFilter;
-use crate::estimation::surfel::Beam;
+use crate::estimation::surfel::TimedReturn;
 use crate::geometry::Pose;
 use crate::measurement::{Calibration, LidarScan};
 use crate::signal::Regularity;
@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 /// A scan that repeats the previous one for this many times is frozen: noise changes some range of a working lidar.
 const FROZEN_REPEATS: usize = 2;
 /// A scan of at least this many returns whose ranges agree to within this, m, is no valid measurement.
-const CONSTANT: (usize, f32) = (20, 1e-4);
+const CONSTANT_RANGES: (usize, f32) = (20, 1e-4);
 
 /// Whether a scan repeats the previous ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +23,7 @@ enum Content {
     Repeated,
 }
 
-/// Queue of scans, and the beams made of them.
+/// Queue of scans, and the returns made of them.
 #[derive(Debug)]
 pub(super) struct ScanQueue {
     spec: EstimatorSpec,
@@ -41,8 +41,8 @@ pub(super) struct ScanQueue {
     /// Whether all points so far lie in the x-y plane of the lidar.
     planar: bool,
     filter: Option<StampFilter>,
-    /// Beams with smoothed times that belong to later segments.
-    beams: VecDeque<Beam>,
+    /// Returns with smoothed times that belong to later segments.
+    returns: VecDeque<TimedReturn>,
 }
 
 impl ScanQueue {
@@ -59,7 +59,7 @@ impl ScanQueue {
             scan_geometry: ScanGeometry::default(),
             planar: true,
             filter: None,
-            beams: VecDeque::new(),
+            returns: VecDeque::new(),
         }
     }
 
@@ -127,11 +127,11 @@ impl ScanQueue {
         Some(())
     }
 
-    /// Removes and returns the beams before `end_s`, lidar time; discards repeated scans if the head moves.
-    pub(super) fn take_until(&mut self, end_s: f64, moving: bool) -> Vec<Beam> {
+    /// Removes and returns the returns before `end_s`, lidar time; discards repeated scans if the head moves.
+    pub(super) fn take_until(&mut self, end_s: f64, moving: bool) -> Vec<TimedReturn> {
         self.convert_until(end_s, moving);
-        let before = self.beams.iter().take_while(|beam| beam.tau_s < end_s).count();
-        self.beams.drain(..before).collect()
+        let before = self.returns.iter().take_while(|one| one.tau_s < end_s).count();
+        self.returns.drain(..before).collect()
     }
 
     fn convert_until(&mut self, end_s: f64, moving: bool) {
@@ -152,18 +152,18 @@ impl ScanQueue {
                 if (least..=most).contains(&range) {
                     let in_imu = self.imu_from_laser.rotation * point + self.imu_from_laser.translation.vector;
                     let tau_s = start_s + hit.offset.seconds();
-                    self.beams.push_back(Beam { tau_s, point_in_imu: in_imu.cast(), range_m: range as f32 });
+                    self.returns.push_back(TimedReturn { tau_s, point_in_imu: in_imu.cast(), range_m: range as f32 });
                 }
             }
         }
     }
 
-    /// Removes scans and beams before `seconds`.
+    /// Removes scans and returns before `seconds`.
     pub(super) fn forget_before(&mut self, seconds: f64) {
         let early = self.waiting.iter().take_while(|(s, ..)| *s < seconds).count();
         self.waiting.drain(..early);
-        let early = self.beams.iter().take_while(|beam| beam.tau_s < seconds).count();
-        self.beams.drain(..early);
+        let early = self.returns.iter().take_while(|one| one.tau_s < seconds).count();
+        self.returns.drain(..early);
     }
 }
 
@@ -176,6 +176,6 @@ fn fingerprint(scan: &LidarScan) -> u64 {
 /// Whether all returns have the same range.
 fn is_constant(scan: &LidarScan) -> bool {
     let Some(first) = scan.returns.first().map(|hit| hit.point_in_laser.norm()) else { return false };
-    scan.returns.len() >= CONSTANT.0
-        && scan.returns.iter().all(|hit| (hit.point_in_laser.norm() - first).abs() <= CONSTANT.1)
+    scan.returns.len() >= CONSTANT_RANGES.0
+        && scan.returns.iter().all(|hit| (hit.point_in_laser.norm() - first).abs() <= CONSTANT_RANGES.1)
 }

@@ -11,12 +11,12 @@ const LOST_CLIPPED_FRACTION: f64 = 0.02;
 const INTERVAL_S: f64 = 5.0;
 /// Contradiction between IMU and lidar, as a multiple of the IMU noise, above which a result is degraded or lost. 0.12
 /// to 0.35 in 24 sound runs of all scenes, at most 0.61 in a window.
-const CONTRADICTION: (f64, f64) = (0.6, 3.0);
+const CONTRADICTION_LIMITS: (f64, f64) = (0.6, 3.0);
 /// Residual of matched surfaces above which a result is degraded or lost, m. 2 to 4.5 mm in sound runs, up to 6 mm in
 /// a window.
 const RESIDUAL_M: (f64, f64) = (0.010, 0.018);
 /// Fraction of an interval with too few matches or unsolved windows, above which a result is degraded or lost.
-const NOT_TRACKED: (f64, f64) = (0.35, 0.6);
+const UNTRACKED_FRACTIONS: (f64, f64) = (0.35, 0.6);
 /// Fraction of a run without any match, and not at rest, above which the result is lost.
 const MAX_UNMATCHED_FRACTION: f64 = 0.5;
 /// Longer IMU gaps degrade a result, s.
@@ -24,11 +24,11 @@ const GAP_S: f64 = 0.2;
 /// Longer lidar gaps degrade a result, s.
 const LIDAR_GAP_S: f64 = 1.0;
 /// Fraction of clipped samples above which a result is degraded.
-const CLIPPED: f64 = 0.005;
+const CLIPPED_FRACTION: f64 = 0.005;
 /// Fraction of the recording without an estimate above which a result is degraded.
-const NOT_COVERED: f64 = 0.05;
+const MISSING_FRACTION: f64 = 0.05;
 /// More repeated IMU samples or lidar scans than this are a frozen sensor.
-const FROZEN: (usize, usize) = (30, 10);
+const MAX_REPEATED: (usize, usize) = (30, 10);
 /// Correction of all ranges above which a result is degraded or lost, m.
 const RANGE_CORRECTION_M: (f64, f64) = (0.06, 0.1);
 /// Entry of the IMU scale and misalignment above which a result is degraded or lost.
@@ -39,7 +39,7 @@ const CLOCK_RATE: f64 = 5e-4;
 const SPEED_M_PER_S: f64 = 60.0;
 
 /// Contradiction, residual (m) and IMU scale up to which the bound is not enlarged.
-const NOMINAL: (f64, f64, f64) = (0.4, 0.006, 0.004);
+const NOMINAL_EVIDENCE: (f64, f64, f64) = (0.4, 0.006, 0.004);
 /// Convergence is evaluated over this number of windows, 20 s at the default step.
 const CONVERGENCE_WINDOWS: usize = 40;
 /// Root mean square of the last corrections of converged windows, m or rad.
@@ -136,11 +136,11 @@ fn over_intervals(
         let (from, to) = (interval[0].stamp, interval[length - 1].stamp);
         found = Some(match found {
             // A loss lasts from the first lost interval.
-            Some((worst, most, starts, ends)) if worst >= status => {
+            Some((worst, magnitude, starts, ends)) if worst >= status => {
                 let ends = if worst > status { ends } else { to };
-                (worst, most.max(value), starts, ends)
+                (worst, magnitude.max(value), starts, ends)
             }
-            Some((_, most, ..)) => (status, most.max(value), from, to),
+            Some((_, magnitude, ..)) => (status, magnitude.max(value), from, to),
             None => (status, value, from, to),
         });
     }
@@ -154,7 +154,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// Whether a window is dead reckoning with the IMU although surfaces should have been matched.
 fn is_untracked(window: &WindowReport) -> bool {
-    matches!(window.trouble, Some(WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }))
+    matches!(window.problem, Some(WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }))
 }
 
 /// Findings from the window reports.
@@ -168,9 +168,9 @@ fn window_findings(windows: &[WindowReport]) -> Vec<Finding> {
     let mut add = |found: Option<(Status, f64, Stamp, Stamp)>, cause: &dyn Fn(f64, Stamp, Stamp) -> Cause| {
         all.extend(found.map(|(status, value, from, to)| Finding { status, cause: cause(value, from, to), from, to }));
     };
-    add(over_intervals(windows, contradiction, CONTRADICTION), &|times, _, _| Cause::Contradiction { times });
+    add(over_intervals(windows, contradiction, CONTRADICTION_LIMITS), &|times, _, _| Cause::Contradiction { times });
     add(over_intervals(windows, residual, RESIDUAL_M), &|residual_m, _, _| Cause::PoorFit { residual_m });
-    add(over_intervals(windows, untracked, NOT_TRACKED), &|_, from, to| Cause::FewMatches {
+    add(over_intervals(windows, untracked, UNTRACKED_FRACTIONS), &|_, from, to| Cause::FewMatches {
         seconds: to.seconds_since(from),
     });
     add(over_intervals(windows, fastest, (SPEED_M_PER_S, SPEED_M_PER_S)), &|speed_m_per_s, _, _| Cause::Speed {
@@ -222,14 +222,14 @@ fn warning_finding(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
         }
         WarningKind::Lost { seconds, .. } => (Status::Lost, Cause::FewMatches { seconds: *seconds }, end),
         WarningKind::NotRelocalised { .. } | WarningKind::LostInMap => (Status::Lost, Cause::NotRelocalised, end),
-        WarningKind::Saturated { samples } if *samples as f64 > CLIPPED * evidence.samples as f64 => {
+        WarningKind::Saturated { samples } if *samples as f64 > CLIPPED_FRACTION * evidence.samples as f64 => {
             let fraction = *samples as f64 / evidence.samples.max(1) as f64;
             (Status::Degraded, Cause::Clipped { fraction }, end)
         }
-        WarningKind::Discarded { what: Discarded::RepeatedSamples, count } if *count > FROZEN.0 => {
+        WarningKind::Discarded { what: Discarded::RepeatedSamples, count } if *count > MAX_REPEATED.0 => {
             (Status::Degraded, Cause::Frozen { sensor: "IMU", count: *count }, end)
         }
-        WarningKind::Discarded { what: Discarded::RepeatedScans, count } if *count > FROZEN.1 => {
+        WarningKind::Discarded { what: Discarded::RepeatedScans, count } if *count > MAX_REPEATED.1 => {
             (Status::Degraded, Cause::Frozen { sensor: "lidar", count: *count }, end)
         }
         _ => return None,
@@ -268,7 +268,7 @@ fn coverage_finding(evidence: &Evidence) -> Option<Finding> {
     let (from, to) = if before_s > after_s { (from, starts) } else { (ends, to) };
     let recorded_s = evidence.recorded.1.seconds_since(evidence.recorded.0);
     let cause = Cause::NotCovered { seconds };
-    (seconds > NOT_COVERED * recorded_s && seconds > 0.5).then_some(Finding {
+    (seconds > MISSING_FRACTION * recorded_s && seconds > 0.5).then_some(Finding {
         status: Status::Degraded,
         cause,
         from,
@@ -282,30 +282,30 @@ fn coverage_finding(evidence: &Evidence) -> Option<Finding> {
 /// surfaces fit badly, or the IMU scale is far from the prior, the covariance is too small by a similar factor. An error
 /// persists in the map, so the factors never decrease.
 pub fn bound_factors(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
-    let mut most = 1.0_f64;
+    let mut largest = 1.0_f64;
     let of = CONVERGENCE_WINDOWS.min(windows.len());
-    let near = |k: usize| &windows[k.saturating_sub(2)..(k + 3).min(windows.len())];
+    let neighbourhood = |k: usize| &windows[k.saturating_sub(2)..(k + 3).min(windows.len())];
     let factor = |k: usize| {
-        let contradiction = median(near(k).iter().map(|w| w.imu_contradiction).collect());
-        let residual_m = median(near(k).iter().map(|w| w.residual_rms_m).collect());
-        let is_weak = |w: &WindowReport| matches!(w.trouble, Some(WarningKind::WeakGeometry { .. }));
+        let contradiction = median(neighbourhood(k).iter().map(|w| w.imu_contradiction).collect());
+        let residual_m = median(neighbourhood(k).iter().map(|w| w.residual_rms_m).collect());
+        let is_weak = |w: &WindowReport| matches!(w.problem, Some(WarningKind::WeakGeometry { .. }));
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_FACTOR } else { 1.0 };
-        let scale = (windows[k].imu_matrix / NOMINAL.2).powi(2).min(MAX_SCALE_FACTOR);
+        let scale = (windows[k].imu_matrix / NOMINAL_EVIDENCE.2).powi(2).min(MAX_SCALE_FACTOR);
         let late = &windows[(k + 1).saturating_sub(of)..=k];
         let not_converged = not_converged(late, of).max(ill_conditioned(late, of));
         // A contradiction that noise does not explain causes an error that grows faster than linearly.
-        (contradiction / NOMINAL.0)
+        (contradiction / NOMINAL_EVIDENCE.0)
             .powi(2)
-            .max(residual_m / NOMINAL.1)
+            .max(residual_m / NOMINAL_EVIDENCE.1)
             .max(scale)
             .max(weak)
             .max(not_converged)
             .clamp(1.0, MAX_FACTOR)
     };
     let enlarge = |k: usize| {
-        most = most.max(factor(k));
-        (windows[k].stamp, most)
+        largest = largest.max(factor(k));
+        (windows[k].stamp, largest)
     };
     (0..windows.len()).map(enlarge).collect()
 }
@@ -329,7 +329,7 @@ fn ill_conditioned(windows: &[WindowReport], of: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::TimeSpent;
+    use crate::estimation::Timing;
 
     /// Windows of a sound run, two per second.
     fn sound(count: usize) -> Vec<WindowReport> {
@@ -352,9 +352,9 @@ mod tests {
             moving: true,
             resting: false,
             sees_rest: true,
-            trouble: None,
+            problem: None,
             elapsed_s: 0.0,
-            spent: TimeSpent::default(),
+            timing: Timing::default(),
         };
         (0..count).map(report).collect()
     }

@@ -6,7 +6,7 @@
 //! Candidate poses come from correlative matching (Olson, ICRA 2009), here in 3-D and with the normals of all surfaces.
 
 use super::limits::MAP_LIMITS;
-use super::relocaliser::{Located, Relocaliser, is_different_pose, offset_pose};
+use super::relocaliser::{LocalisedPose, Relocaliser, is_different_pose, offset_pose};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Pose, Vector};
 use rayon::prelude::*;
@@ -36,7 +36,7 @@ const SUPPRESSION: (i32, i32) = (2, 2);
 const HORIZONTAL_NORMAL_Z: f64 = 0.8;
 /// An accepted pose is rejected if another has more than this multiple of its inlier ratio. In 144 starts in office, mocap
 /// room, courtyard and stairwell the best false pose has at most 0.88 times the inlier ratio of the correct one.
-const BETTER_RATIO: f64 = 1.05;
+const MAX_OTHER_INLIER_RATIO: f64 = 1.05;
 
 /// Candidate pose on the search grid: heading steps and cells relative to the accepted pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -67,7 +67,7 @@ impl NormalGrid {
             let offset = patch.centre - centre;
             patch.level == 0 && offset.xy().norm() < GRID_REACH_M.0 && offset.z.abs() < GRID_REACH_M.1
         };
-        let near: Vec<([i32; 3], u16)> = patches
+        let occupied: Vec<([i32; 3], u16)> = patches
             .iter()
             .filter(is_near)
             .map(|patch| {
@@ -75,14 +75,14 @@ impl NormalGrid {
                 (cell(&patch.centre), nearest | next)
             })
             .collect();
-        let end = |axis: usize, pick: fn(i32, i32) -> i32| near.iter().map(|(cell, _)| cell[axis]).reduce(pick);
+        let end = |axis: usize, pick: fn(i32, i32) -> i32| occupied.iter().map(|(cell, _)| cell[axis]).reduce(pick);
         let (mut first, mut size) = ([0; 3], [0; 3]);
         for axis in 0..3 {
             first[axis] = end(axis, i32::min)? - 1;
             size[axis] = end(axis, i32::max)? + 2 - first[axis];
         }
         let mut grid = Self { first, size, cells: vec![0; size.iter().map(|n| *n as usize).product()] };
-        for (at, bits) in near {
+        for (at, bits) in occupied {
             for k in 0..27 {
                 let neighbour = [at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1];
                 if let Some(index) = grid.index(neighbour) {
@@ -135,8 +135,8 @@ impl Relocaliser {
         &self,
         query: &[Patch],
         from: &Vector,
-        found: &Located,
-    ) -> Option<Located> {
+        found: &LocalisedPose,
+    ) -> Option<LocalisedPose> {
         let here = found.map_from_query;
         let patches_by_level = self.patches_by_level(query);
         let candidates_here = candidates(self.patches(), &patches_by_level[0], from, &here);
@@ -149,7 +149,8 @@ impl Relocaliser {
         let accepted =
             self.evaluate_all(&patches_by_level[0], from, &poses, None).filter(|located| MAP_LIMITS.accepts(located));
         let best = accepted.max_by(|a, b| a.inlier_ratio.total_cmp(&b.inlier_ratio))?;
-        (best.inlier_ratio > BETTER_RATIO * found.inlier_ratio && is_different_pose(&best, found, from)).then_some(best)
+        (best.inlier_ratio > MAX_OTHER_INLIER_RATIO * found.inlier_ratio && is_different_pose(&best, found, from))
+            .then_some(best)
     }
 }
 
@@ -159,7 +160,7 @@ fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose) -> Vec
     let Some(grid) = NormalGrid::around(&centre, map) else { return Vec::new() };
     let correlated: Vec<&Patch> = query.iter().step_by(query.len().div_ceil(MAX_CORRELATED).max(1)).collect();
     let (horizontal, up) = ((SEARCH_REACH_M.0 / CELL_M) as i32, (SEARCH_REACH_M.1 / CELL_M) as i32);
-    let steps = |most: i32, step: i32| (-most / step..=most / step).map(move |k| k * step);
+    let steps = |reach: i32, step: i32| (-reach / step..=reach / step).map(move |k| k * step);
     let level = || steps(horizontal, STEPS.0).flat_map(move |x| steps(horizontal, STEPS.0).map(move |y| (x, y)));
     let at = cell(&centre);
     let cells: Vec<[i32; 3]> = steps(up, STEPS.1)
@@ -182,8 +183,8 @@ fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose) -> Vec
 
 /// The `count` candidates with the most hits, after non-maximum suppression.
 fn suppress_non_maxima(mut all: Vec<(usize, GridPose)>, count: usize) -> Vec<(usize, GridPose)> {
-    let most = all.iter().map(|(hits, _)| *hits).max().unwrap_or(0);
-    all.retain(|(hits, _)| 2 * hits > most);
+    let max_hits = all.iter().map(|(hits, _)| *hits).max().unwrap_or(0);
+    all.retain(|(hits, _)| 2 * hits > max_hits);
     all.sort_unstable_by_key(|(hits, shift)| (Reverse(*hits), *shift));
     let mut chosen: Vec<(usize, GridPose)> = Vec::new();
     for one in all {

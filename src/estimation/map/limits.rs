@@ -1,6 +1,6 @@
 //! Search region and acceptance thresholds of the relocalisation.
 
-use super::relocaliser::{Located, offset_pose, pose_distance};
+use super::relocaliser::{LocalisedPose, offset_pose, pose_distance};
 use crate::geometry::{Pose, Vector};
 
 /// Spacing of the start poses, m and rad: within half of it the coarsest surfels converge.
@@ -11,6 +11,10 @@ const GAP_RADIUS: (f64, f64, f64) = (0.3, 1.0, 2.5);
 const MAX_START_OFFSET_M: f64 = 1.4;
 /// After a gap longer than this, s, the search region is large, and a pose must agree better with the map.
 const LONG_GAP_S: f64 = 1.5;
+/// Vertical spacing of the start poses, m: stairs repeat every 0.3 m, and the coarsest surfels converge over more.
+const START_SPACING_UP_M: f64 = 0.5;
+/// Climbing speed of a person on stairs, m/s: vertical search after a gap.
+const CLIMB_M_PER_S: f64 = 0.5;
 /// Search range of the heading after a gap, degrees: initial value, growth per second of the gap, upper limit.
 const GAP_HEADING_DEG: (f64, f64, f64) = (15.0, 60.0, 90.0);
 
@@ -19,6 +23,8 @@ const GAP_HEADING_DEG: (f64, f64, f64) = (15.0, 60.0, 90.0);
 pub(in crate::estimation) struct RelocalisationLimits {
     /// Horizontal distance, m, and heading, rad, from the expected pose.
     reach: (f64, f64),
+    /// Vertical distance of the start poses from the expected pose, m.
+    reach_up_m: f64,
     /// Maximum distance of matched patches along their normals, m; `None` for a fixed fraction of the voxel edge.
     pub(super) gate_m: Option<f64>,
     /// Minimum fraction of the finest patches that match the map.
@@ -37,6 +43,7 @@ const MAX_RESIDUAL_M: f64 = 0.01;
 /// Limits in a complete map: the starts cover the convergence range of the coarsest surfels, 1 m and 20 degrees.
 pub(in crate::estimation) const MAP_LIMITS: RelocalisationLimits = RelocalisationLimits {
     reach: START_SPACING,
+    reach_up_m: 0.0,
     gate_m: None,
     min_inlier_ratio: 0.4,
     min_agreement: 0.0,
@@ -53,6 +60,7 @@ impl RelocalisationLimits {
         let reach_deg = (GAP_HEADING_DEG.0 + GAP_HEADING_DEG.1 * seconds).min(GAP_HEADING_DEG.2);
         Self {
             reach: (reach_m, reach_deg.to_radians()),
+            reach_up_m: if seconds > LONG_GAP_S { CLIMB_M_PER_S * seconds } else { 0.0 },
             gate_m: Some(1.5 * sigma_m),
             min_inlier_ratio: 0.1,
             min_agreement: if seconds > LONG_GAP_S { 0.85 } else { 0.6 },
@@ -64,24 +72,24 @@ impl RelocalisationLimits {
     /// Start poses on a grid around the expected pose, each as a pair (start, current pose).
     pub(super) fn starts(&self, map_from_query: &Pose, viewpoint: &Vector) -> Vec<(Pose, Pose)> {
         let steps = |reach: f64, spacing: f64| {
-            let most = (reach / spacing).floor() as i32;
-            (-most..=most).map(move |k| f64::from(k) * spacing)
+            let steps = (reach / spacing).floor() as i32;
+            (-steps..=steps).map(move |k| f64::from(k) * spacing)
         };
         let reach_m = self.reach.0.min(MAX_START_OFFSET_M);
+        let level =
+            || steps(reach_m, START_SPACING.0).flat_map(|x| steps(reach_m, START_SPACING.0).map(move |y| (x, y)));
         let mut starts = Vec::new();
         for yaw in steps(self.reach.1, START_SPACING.1) {
-            for (x, y) in
-                steps(reach_m, START_SPACING.0).flat_map(|x| steps(reach_m, START_SPACING.0).map(move |y| (x, y)))
-            {
-                let start = offset_pose(map_from_query, viewpoint, yaw, Vector::new(x, y, 0.0));
-                starts.push((start, start));
+            for z in steps(self.reach_up_m, START_SPACING_UP_M) {
+                let poses = level().map(|(x, y)| offset_pose(map_from_query, viewpoint, yaw, Vector::new(x, y, z)));
+                starts.extend(poses.map(|start| (start, start)));
             }
         }
         starts
     }
 
     /// Whether a pose meets the acceptance thresholds.
-    pub(super) fn accepts(&self, found: &Located) -> bool {
+    pub(super) fn accepts(&self, found: &LocalisedPose) -> bool {
         found.inlier_ratio >= self.min_inlier_ratio
             && found.agreement >= self.min_agreement
             && found.residual_rms_m <= self.max_residual_m

@@ -6,43 +6,43 @@ mod limits;
 mod relocaliser;
 
 pub(super) use limits::{MAP_LIMITS, RelocalisationLimits};
-pub use relocaliser::Located;
+pub use relocaliser::LocalisedPose;
 pub(super) use relocaliser::Relocaliser;
 
+use super::observed::{ObservedSurfel, ObservedSurfels};
 use super::surfel::Patch;
-use super::survey::{Sighting, Survey};
 use super::{EstimationError, EstimatorSpec, RegistrationSpec};
 use crate::geometry::{Matrix, Pose, PoseCovariance, Trajectory, Vector, skew};
 use crate::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
 use crate::time::{Span, Stamp};
 use nalgebra::Matrix6;
 
-/// Builds a map from the `survey` of an odometry run.
+/// Builds a map from the surfels `observed` in an odometry run.
 ///
 /// Each patch is moved from the odometry pose (`open_loop`) to the final pose (`best`) at the same time, both `map_from_head`;
 /// patches of the same surface are then fused. `covariances` are pose covariances at some of the stamps.
 ///
 /// # Errors
-/// When the survey yields no surfels.
+/// When no surfels were observed.
 pub fn map_of(
-    survey: &Survey,
+    observed: &ObservedSurfels,
     (open_loop, best): (&Trajectory, &Trajectory),
     covariances: &[(Stamp, PoseCovariance)],
     spec: &RegistrationSpec,
 ) -> Result<SurfelMap, EstimationError> {
-    let mut sightings: Vec<_> = survey.sightings.iter().collect();
-    sightings.sort_by(|a, b| a.tau_s.total_cmp(&b.tau_s));
-    let moved = |sighting: &&Sighting| {
-        let stamp = survey.origin + Span::from_seconds(sighting.tau_s);
+    let mut surfels: Vec<_> = observed.surfels.iter().collect();
+    surfels.sort_by(|a, b| a.tau_s.total_cmp(&b.tau_s));
+    let moved = |surfel: &&ObservedSurfel| {
+        let stamp = observed.origin + Span::from_seconds(surfel.tau_s);
         let (before, after) = (open_loop.at(stamp)?, best.at(stamp)?);
-        let patch = sighting.patch.moved_by(&(after * before.inverse()));
+        let patch = surfel.patch.moved_by(&(after * before.inverse()));
         let arm = patch.centre - after.translation.vector;
         let index = covariances.partition_point(|(at, _)| *at <= stamp).saturating_sub(1);
         let of_pose = covariances.get(index).map_or(0.0, |(_, c)| variance_along(&patch.normal, c, &arm));
         let thin = patch.normal.dot(&(patch.covariance * patch.normal)).max(0.0);
         Some(patch.to_map_surfel((of_pose + thin / patch.points).sqrt()))
     };
-    let surfels: Vec<MapSurfel> = sightings.iter().filter_map(moved).collect();
+    let surfels: Vec<MapSurfel> = surfels.iter().filter_map(moved).collect();
     map_from(spec.finest_voxel_m, spec.levels, surfels)
 }
 
@@ -57,7 +57,7 @@ pub fn locate_map(
     other: &SurfelMap,
     start: &Pose,
     spec: &EstimatorSpec,
-) -> Result<Located, EstimationError> {
+) -> Result<LocalisedPose, EstimationError> {
     let surfels = spec.registration.surfels(&spec.surfels);
     let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
     let relocaliser = Relocaliser::new(map, (&spec.matching, &surfels), certainty);

@@ -6,7 +6,7 @@
 //! different pose is nearly as good.
 
 use super::limits::RelocalisationLimits;
-use crate::estimation::matching::{Forest, Matcher};
+use crate::estimation::matching::{Matcher, SearchTrees};
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::spec::{MatchingSpec, SurfelSpec};
 use crate::estimation::surfel::Patch;
@@ -26,7 +26,7 @@ const MAX_PATCHES: usize = 2000;
 /// Iterations per resolution.
 const ITERATIONS: usize = 8;
 /// Match gate along the normal in the first and the last iteration, as a fraction of the voxel edge.
-const GATES: (f64, f64) = (0.5, 0.1);
+const MATCH_GATE_EDGES: (f64, f64) = (0.5, 0.1);
 /// Minimum gate on the angle between normals, degrees: start poses are up to half a heading step off.
 const NORMAL_GATE_DEG: f64 = 30.0;
 /// Standard deviation of roll and pitch between the two level frames, degrees.
@@ -39,14 +39,14 @@ const FIXED_INFORMATION: f64 = 1e12;
 /// Minimum number of finest query patches for a relocalisation.
 const MIN_PATCHES: usize = 50;
 /// Poses that converged to within this distance, m and rad, are duplicates.
-const DUPLICATE: f64 = 0.01;
+const DUPLICATE_POSE_TOLERANCE: f64 = 0.01;
 /// Two poses are different above this distance, m, or angle, rad; a different pose competes with the best one if it has
 /// at least this fraction of the score of the best.
-const DIFFERENT: (f64, f64, f64) = (0.3, 0.1, 0.85);
+const COMPETING_POSE: (f64, f64, f64) = (0.3, 0.1, 0.85);
 
 /// Pose of a query found in a map.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Located {
+pub struct LocalisedPose {
     /// Pose of the query frame in the map.
     pub map_from_query: Pose,
     /// Fraction of the finest query surfels that match the map.
@@ -64,7 +64,7 @@ pub struct Located {
 pub(in crate::estimation) struct Relocaliser {
     matcher: Matcher,
     patches: Vec<Patch>,
-    forest: Forest,
+    trees: SearchTrees,
     inflation: f64,
     sigma_m: f64,
 }
@@ -107,12 +107,12 @@ impl Relocaliser {
         (matching, surfels): (&MatchingSpec, &SurfelSpec),
         (sigma_m, inflation): (f64, f64),
     ) -> Self {
-        let forest = Matcher::new(matching, surfels).plant(&patches);
+        let trees = Matcher::new(matching, surfels).build_trees(&patches);
         let wide = MatchingSpec {
             max_normal_angle_deg: NORMAL_GATE_DEG.max(matching.max_normal_angle_deg),
             ..matching.clone()
         };
-        Self { matcher: Matcher::new(&wide, surfels), patches, forest, inflation, sigma_m }
+        Self { matcher: Matcher::new(&wide, surfels), patches, trees, inflation, sigma_m }
     }
 
     /// The map's patches.
@@ -129,7 +129,7 @@ impl Relocaliser {
         query: &[Patch],
         (from, map_from_query): (&Vector, &Pose),
         limits: &RelocalisationLimits,
-    ) -> Result<Located, String> {
+    ) -> Result<LocalisedPose, String> {
         let patches_by_level = self.patches_by_level(query);
         let finest = patches_by_level.first().map_or(0, Vec::len);
         if finest < MIN_PATCHES {
@@ -137,9 +137,10 @@ impl Relocaliser {
         }
         let poses = self.refine_all(&patches_by_level, limits.starts(map_from_query, from), from);
         let evaluated = self.evaluate_all(&patches_by_level[0], from, &poses, limits.gate_m);
-        let score =
-            |found: &Located| found.inlier_ratio.powi(3) * limits.prior(&found.map_from_query, map_from_query, from);
-        let mut found: Vec<(f64, Located)> = evaluated.map(|found| (score(&found), found)).collect();
+        let score = |found: &LocalisedPose| {
+            found.inlier_ratio.powi(3) * limits.prior(&found.map_from_query, map_from_query, from)
+        };
+        let mut found: Vec<(f64, LocalisedPose)> = evaluated.map(|found| (score(&found), found)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some((score, best)) = found.iter().find(|(score, found)| *score > 0.0 && limits.accepts(found)) else {
             let best =
@@ -151,8 +152,8 @@ impl Relocaliser {
                  (residual {residual_mm:.0} mm)"
             ));
         };
-        let as_good = found.iter().filter(|(other, found)| *other > DIFFERENT.2 * score && limits.accepts(found));
-        let others: Vec<&Located> =
+        let as_good = found.iter().filter(|(other, found)| *other > COMPETING_POSE.2 * score && limits.accepts(found));
+        let others: Vec<&LocalisedPose> =
             as_good.map(|(_, other)| other).filter(|other| is_different_pose(best, other, from)).collect();
         match others.first() {
             Some(other) if !limits.nearest => {
@@ -192,8 +193,8 @@ impl Relocaliser {
         from: &'a Vector,
         poses: &'a [(Pose, Pose)],
         gate_m: Option<f64>,
-    ) -> impl Iterator<Item = Located> + 'a {
-        let gate_m = gate_m.unwrap_or(self.matcher.finest_voxel_m * GATES.1);
+    ) -> impl Iterator<Item = LocalisedPose> + 'a {
+        let gate_m = gate_m.unwrap_or(self.matcher.finest_voxel_m * MATCH_GATE_EDGES.1);
         poses.iter().filter_map(move |(_, pose)| self.evaluate(finest, from, pose, gate_m))
     }
 
@@ -205,7 +206,7 @@ impl Relocaliser {
         let edge_m = self.matcher.finest_voxel_m * f64::from(1_u32 << level);
         for iteration in 0..ITERATIONS {
             let late = iteration as f64 / (ITERATIONS - 1) as f64;
-            let gate_m = edge_m * GATES.0 * (GATES.1 / GATES.0).powf(late);
+            let gate_m = edge_m * MATCH_GATE_EDGES.0 * (MATCH_GATE_EDGES.1 / MATCH_GATE_EDGES.0).powf(late);
             let gate = Gate { level, gate_m, sigma_m: gate_m / 3.0 };
             let pivot = pose.transform_point(&(*from).into()).coords;
             let mut sums = self.sum_matches(query, &pose, &pivot, &gate);
@@ -227,7 +228,7 @@ impl Relocaliser {
     }
 
     /// Evaluates a pose with the finest patches; `None` if they leave too many directions unobservable.
-    fn evaluate(&self, query: &[Patch], from: &Vector, pose: &Pose, gate_m: f64) -> Option<Located> {
+    fn evaluate(&self, query: &[Patch], from: &Vector, pose: &Pose, gate_m: f64) -> Option<LocalisedPose> {
         let pivot = pose.transform_point(&(*from).into()).coords;
         let sums = self.sum_matches(query, pose, &pivot, &Gate { level: 0, gate_m, sigma_m: self.sigma_m });
         let unobservable = sums.unobservable();
@@ -241,7 +242,7 @@ impl Relocaliser {
         let residual_rms_m = (sums.squares / sums.matched.max(1) as f64).sqrt();
         let inlier_ratio = sums.matched as f64 / query.len() as f64;
         let agreement = sums.matched as f64 / sums.with_neighbour.max(1) as f64;
-        Some(Located { map_from_query: *pose, inlier_ratio, agreement, residual_rms_m, covariance })
+        Some(LocalisedPose { map_from_query: *pose, inlier_ratio, agreement, residual_rms_m, covariance })
     }
 
     /// Matches the query at `pose` with the map; unknowns are a rotation about `pivot` and a translation.
@@ -249,11 +250,11 @@ impl Relocaliser {
         let mut sums = MatchSums::default();
         for patch in query {
             let patch = patch.moved_by(pose);
-            let near = self.matcher.neighbours(&self.forest, &patch, 1);
+            let near = self.matcher.neighbours(&self.trees, &patch, 1);
             let Some(other) = near.first().map(|k| &self.patches[*k as usize]) else { continue };
             debug_assert_eq!(other.level, gate.level);
             sums.with_neighbour += 1;
-            if !self.matcher.agree(&patch, other, gate.gate_m) {
+            if !self.matcher.pass_gates(&patch, other, gate.gate_m) {
                 continue;
             }
             let plane = Plane::of(&patch, other, gate.sigma_m);
@@ -282,7 +283,7 @@ fn remove_duplicates(poses: &mut Vec<(Pose, Pose)>, from: &Vector) {
     for (start, pose) in poses.drain(..) {
         let is_other = |(_, other): &(Pose, Pose)| {
             let (distance_m, angle) = pose_distance(&pose, other, from);
-            distance_m > DUPLICATE || angle > DUPLICATE
+            distance_m > DUPLICATE_POSE_TOLERANCE || angle > DUPLICATE_POSE_TOLERANCE
         };
         if distinct.iter().all(is_other) {
             distinct.push((start, pose));
@@ -326,14 +327,14 @@ impl MatchSums {
     }
 }
 
-impl Located {
+impl LocalisedPose {
     /// Adds to the covariance the spread of equally good poses.
-    fn with_alternatives(&self, others: &[&Located], from: &Vector) -> Self {
+    fn with_alternatives(&self, others: &[&LocalisedPose], from: &Vector) -> Self {
         let mut covariance = self.covariance;
         for other in others {
             let turn = (other.map_from_query.rotation * self.map_from_query.rotation.inverse()).scaled_axis();
-            let place = |located: &Located| located.map_from_query.transform_point(&(*from).into()).coords;
-            let shift = place(other) - place(self);
+            let position = |located: &LocalisedPose| located.map_from_query.transform_point(&(*from).into()).coords;
+            let shift = position(other) - position(self);
             let by = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
             covariance += by * by.transpose() / (others.len() + 1) as f64;
         }
@@ -341,14 +342,14 @@ impl Located {
     }
 }
 
-/// Whether two poses differ by more than `DIFFERENT`.
-pub(super) fn is_different_pose(a: &Located, b: &Located, from: &Vector) -> bool {
+/// Whether two poses differ by more than `COMPETING_POSE`.
+pub(super) fn is_different_pose(a: &LocalisedPose, b: &LocalisedPose, from: &Vector) -> bool {
     let (distance_m, angle) = pose_distance(&a.map_from_query, &b.map_from_query, from);
-    distance_m > DIFFERENT.0 || angle > DIFFERENT.1
+    distance_m > COMPETING_POSE.0 || angle > COMPETING_POSE.1
 }
 
 /// Distance of the viewpoint between two poses, m, and their angle, rad.
 pub(super) fn pose_distance(a: &Pose, b: &Pose, from: &Vector) -> (f64, f64) {
-    let place = |pose: &Pose| pose.transform_point(&(*from).into()).coords;
-    ((place(a) - place(b)).norm(), a.rotation.angle_to(&b.rotation))
+    let position = |pose: &Pose| pose.transform_point(&(*from).into()).coords;
+    ((position(a) - position(b)).norm(), a.rotation.angle_to(&b.rotation))
 }

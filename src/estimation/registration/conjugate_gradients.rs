@@ -16,7 +16,7 @@ pub(super) trait PreconditionedSystem {
 /// Convergence: the preconditioned norm of the residual has decreased by this factor.
 const TOLERANCE: f64 = 1e-8;
 /// A larger residual, up to this factor, is accepted if rounding errors prevent convergence.
-const ACCEPTABLE: f64 = 1e-4;
+const ACCEPTED_TOLERANCE: f64 = 1e-4;
 /// Maximum number of iterations, one matrix product each; some dozens are usual.
 const MAX_ITERATIONS: usize = 1000;
 
@@ -46,7 +46,7 @@ pub(super) fn solve(system: &impl PreconditionedSystem, b: &[f64]) -> Option<Vec
         let ratio = residual / before;
         direction.iter_mut().zip(&z).for_each(|(along, z)| *along = z + ratio * *along);
     }
-    (residual <= ACCEPTABLE * ACCEPTABLE * first).then_some(x)
+    (residual <= ACCEPTED_TOLERANCE * ACCEPTED_TOLERANCE * first).then_some(x)
 }
 
 fn add_scaled(into: &mut [f64], from: &[f64], scale: f64) {

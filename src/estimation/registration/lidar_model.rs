@@ -8,8 +8,8 @@
 
 use super::equations::SharedTerm;
 use crate::estimation::EstimatorSpec;
+use crate::estimation::observed::ObservedSurfels;
 use crate::estimation::surfel::Patch;
-use crate::estimation::survey::Survey;
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
 use nalgebra::SVector;
@@ -40,10 +40,10 @@ impl LidarModel {
     /// Starts with the estimate of the open loop; the range bias is fixed if it is unobservable.
     pub(super) fn new(
         calibration: &Calibration,
-        (lidar, ranges_are_held): (&LidarCorrection, bool),
+        (lidar, range_bias_is_fixed): (&LidarCorrection, bool),
         spec: &EstimatorSpec,
     ) -> Self {
-        let range_sigma_m = if ranges_are_held { 0.0 } else { spec.surfels.range_offset_sigma_m };
+        let range_sigma_m = if range_bias_is_fixed { 0.0 } else { spec.surfels.range_offset_sigma_m };
         Self {
             head_from_laser: calibration.head_from_corrected_laser(lidar),
             lidar: *lidar,
@@ -106,12 +106,12 @@ pub(super) fn rotate_patch(patch: &mut Patch, turn: &Rotation) {
 /// The surfels, and therefore the poses of the lidar, stay unchanged; the poses of the head follow from these.
 pub(super) fn recalibrated(
     map_from_head: &Trajectory,
-    survey: &Survey,
+    observed: &ObservedSurfels,
     (calibration, lidar): (&Calibration, &LidarCorrection),
 ) -> Trajectory {
     let laser_from_head = calibration.head_from_corrected_laser(lidar).inverse();
     let recalibrate = |(stamp, pose): (_, &Pose)| {
-        let then = survey.lidar_at(stamp);
+        let then = observed.lidar_at(stamp);
         let head_from_head =
             then.map_or_else(Pose::identity, |then| calibration.head_from_corrected_laser(then) * laser_from_head);
         (stamp, pose * head_from_head)
@@ -159,8 +159,8 @@ mod tests {
     fn correction(scale: f64) -> LidarCorrection {
         LidarCorrection {
             range_m: 0.01 * scale,
-            turn: from_roll_pitch_yaw(0.02 * scale, -0.01 * scale, 0.03 * scale),
-            shift: Vector::new(0.005, -0.01, 0.02) * scale,
+            rotation: from_roll_pitch_yaw(0.02 * scale, -0.01 * scale, 0.03 * scale),
+            translation: Vector::new(0.005, -0.01, 0.02) * scale,
         }
     }
 
@@ -202,17 +202,17 @@ mod tests {
     #[test]
     fn recalibration_keeps_the_poses_of_the_lidar() {
         let stamp = |k: i64| Stamp::from_nanos(k * 500_000_000);
-        let mut survey = Survey::default();
+        let mut observed = ObservedSurfels::default();
         let (early, late) = (correction(-0.5), correction(1.0));
-        survey.extend(Stamp::from_nanos(0), std::iter::empty(), early, 0.75);
-        survey.extend(Stamp::from_nanos(0), std::iter::empty(), late, 2.0);
+        observed.extend(Stamp::from_nanos(0), std::iter::empty(), early, 0.75);
+        observed.extend(Stamp::from_nanos(0), std::iter::empty(), late, 2.0);
         let poses = (0..5).map(|k| {
             let along = Pose::from_parts(Vector::new(k as f64, 0.5, 1.0).into(), Rotation::identity());
             (stamp(k), along * map_from_head())
         });
         let open = Trajectory::from_poses(poses).unwrap();
         let calibration = calibration();
-        let anew = recalibrated(&open, &survey, (&calibration, &late));
+        let anew = recalibrated(&open, &observed, (&calibration, &late));
         for ((at, before), after) in open.iter().zip(anew.poses()) {
             let known_then = if at <= stamp(0) + Span::from_seconds(0.75) { early } else { late };
             let was = before * calibration.head_from_corrected_laser(&known_then);

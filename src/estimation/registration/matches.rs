@@ -114,7 +114,7 @@ impl Matches<'_> {
         let mut sum = BinPairSums::default();
         for (i, j) in pairs.iter().map(|(i, j)| (*i as usize, *j as usize)) {
             let (a, b) = (&self.scene.patches[i], &self.scene.patches[j]);
-            if !self.matcher.agree(a, b, self.gate_m) {
+            if !self.matcher.pass_gates(a, b, self.gate_m) {
                 continue;
             }
             let plane = Plane::of(a, b, self.spec.match_sigma_m);

@@ -12,7 +12,8 @@
 //! + |bias / sigma|^2                                           prior of the range bias
 //! ```
 //!
-//! 1. The open loop's *survey* provides surfels of several resolutions, built from all returns with the final trajectory.
+//! 1. The open loop records the *observed surfels*, built from all returns with the final trajectory,
+//!    in several resolutions.
 //! 2. If the open loop drifted by more than the matching distance, `places` detects loop closures and optimises a pose graph.
 //! 3. The surfels are divided into submaps, and pairs of submaps that observe the same cells are selected: `submaps`.
 //! 4. Starting with the coarsest resolution: find reciprocal nearest neighbours in six dimensions, match, solve, move
@@ -39,7 +40,7 @@ pub use spec::RegistrationSpec;
 use super::EstimatorSpec;
 use super::gaps::{Gaps, restored};
 use super::matching::Matcher;
-use super::survey::Survey;
+use super::observed::ObservedSurfels;
 use super::window::Displacement;
 use crate::geometry::{PoseCovariance, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
@@ -111,7 +112,7 @@ pub struct RegistrationInput<'a> {
     /// Estimated correction of the lidar calibration.
     pub lidar: &'a LidarCorrection,
     /// Surfels observed along the trajectory.
-    pub survey: &'a Survey,
+    pub observed: &'a ObservedSurfels,
 }
 
 /// Registers all surfels of an open loop, observed with the sensors of `calibration`.
@@ -123,8 +124,8 @@ pub fn register(input: RegistrationInput, calibration: &Calibration, spec: &Esti
     let Some(gaps) = Gaps::between(stamps) else { return register_without_gaps(input, calibration, spec) };
     let map_from_head = &gaps.shorten(input.map_from_head);
     let covariances = &gaps.shorten_covariances(input.covariances);
-    let survey = &gaps.shorten_survey(input.survey);
-    let shortened = RegistrationInput { map_from_head, covariances, survey, lidar: input.lidar };
+    let observed = &gaps.shorten_observed(input.observed);
+    let shortened = RegistrationInput { map_from_head, covariances, observed, lidar: input.lidar };
     let closed = register_without_gaps(shortened, calibration, spec);
     let trajectory = restored(&closed.trajectory, stamps);
     let open_loop_recalibrated = closed.open_loop_recalibrated.map(|trajectory| restored(&trajectory, stamps));
@@ -134,13 +135,13 @@ pub fn register(input: RegistrationInput, calibration: &Calibration, spec: &Esti
 fn register_without_gaps(input: RegistrationInput, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
     let registration = &spec.registration;
     let matcher = Matcher::new(&registration.matching(&spec.matching), &registration.surfels(&spec.surfels));
-    let RegistrationInput { map_from_head, lidar, survey, .. } = input;
+    let RegistrationInput { map_from_head, lidar, observed, .. } = input;
     let recalibrated =
-        spec.extrinsics.estimated.then(|| lidar_model::recalibrated(map_from_head, survey, (calibration, lidar)));
+        spec.extrinsics.estimated.then(|| lidar_model::recalibrated(map_from_head, observed, (calibration, lidar)));
     let map_from_head = recalibrated.as_ref().unwrap_or(map_from_head);
     let problem =
         Problem { input: RegistrationInput { map_from_head, ..input }, spec: registration, matcher: &matcher };
-    match problem.solve(LidarModel::new(calibration, (lidar, survey.ranges_are_held), spec)) {
+    match problem.solve(LidarModel::new(calibration, (lidar, observed.range_bias_is_fixed), spec)) {
         Ok((Registered { trajectory, lidar_model }, report)) => {
             let report = RegistrationReport { moved: moved(map_from_head, &trajectory), ..report };
             ClosedLoop { trajectory, lidar: lidar_model.lidar, open_loop_recalibrated: recalibrated, report }
@@ -153,7 +154,7 @@ fn register_without_gaps(input: RegistrationInput, calibration: &Calibration, sp
 }
 
 /// A result with diagnostics, or the diagnostics and the reason of rejection.
-type Outcome<T> = Result<(T, RegistrationReport), Box<(RegistrationReport, &'static str)>>;
+type RegistrationResult<T> = Result<(T, RegistrationReport), Box<(RegistrationReport, &'static str)>>;
 
 /// The registration problem: open loop and settings.
 #[derive(Clone, Copy)]
@@ -171,17 +172,17 @@ struct Registered {
 
 impl Problem<'_> {
     /// Closes loops if necessary, then registers the trajectory and the lidar.
-    fn solve(&self, lidar_model: LidarModel) -> Outcome<Registered> {
+    fn solve(&self, lidar_model: LidarModel) -> RegistrationResult<Registered> {
         let empty = RegistrationReport::default();
-        let RegistrationInput { map_from_head, covariances, survey, .. } = self.input;
-        let corrected = CorrectedTrajectory::new(map_from_head, covariances, survey.origin, self.spec);
+        let RegistrationInput { map_from_head, covariances, observed, .. } = self.input;
+        let corrected = CorrectedTrajectory::new(map_from_head, covariances, observed.origin, self.spec);
         let corrected = corrected.ok_or_else(|| Box::new((empty, "no trajectory")))?;
-        let (loops, pre_aligned) = places::close_loops((map_from_head, survey), &corrected, self.matcher, self.spec);
+        let (loops, pre_aligned) = places::close_loops((map_from_head, observed), &corrected, self.matcher, self.spec);
         let report = RegistrationReport { loops, ..empty };
         if let Some(pre_aligned) = pre_aligned {
             return self.register_pre_aligned(pre_aligned, lidar_model, report);
         }
-        let ((corrected, lidar_model), report) = Registration::run(self, (corrected, lidar_model), survey, report)?;
+        let ((corrected, lidar_model), report) = Registration::run(self, (corrected, lidar_model), observed, report)?;
         if report.conditioning < self.spec.weak_conditioning && report.revisited < self.spec.min_seen_again {
             return Err(Box::new((report, "too few revisited surfaces constrain the weakest direction")));
         }
@@ -197,20 +198,20 @@ impl Problem<'_> {
         mut pre_aligned: PreAligned,
         mut lidar_model: LidarModel,
         mut report: RegistrationReport,
-    ) -> Outcome<Registered> {
+    ) -> RegistrationResult<Registered> {
         let RegistrationInput { map_from_head, covariances, .. } = self.input;
         for _ in 0..MAX_ROUNDS {
             let corrected =
-                CorrectedTrajectory::new(&pre_aligned.trajectory, covariances, pre_aligned.survey.origin, self.spec);
+                CorrectedTrajectory::new(&pre_aligned.trajectory, covariances, pre_aligned.observed.origin, self.spec);
             let corrected = corrected.ok_or_else(|| Box::new((report, "no trajectory")))?;
             let corrected = corrected.with_gravity_from(map_from_head, &pre_aligned.trajectory);
-            let registered = Registration::run(self, (corrected, lidar_model), &pre_aligned.survey, report)?;
+            let registered = Registration::run(self, (corrected, lidar_model), &pre_aligned.observed, report)?;
             let ((corrected, found), updated_report) = registered;
             (lidar_model, report) = (found, updated_report);
             let next = corrected.into_trajectory(map_from_head.stamps());
             let (shift_m, _) = moved(&pre_aligned.trajectory, &next);
-            let survey = pre_aligned.survey.along(&pre_aligned.trajectory, &next);
-            pre_aligned = PreAligned { trajectory: next, survey };
+            let observed = pre_aligned.observed.along(&pre_aligned.trajectory, &next);
+            pre_aligned = PreAligned { trajectory: next, observed };
             if shift_m < ROUNDS_CONVERGED_M {
                 break;
             }
@@ -240,15 +241,15 @@ struct Registration<'a> {
 }
 
 impl<'a> Registration<'a> {
-    /// Registers `survey`, observed along `corrected` by the lidar of `lidar_model`; returns the corrected two.
+    /// Registers the surfels `observed` along `corrected` by the lidar of `lidar_model`; returns the corrected two.
     fn run(
         problem: &Problem<'a>,
         (corrected, lidar_model): (CorrectedTrajectory, LidarModel),
-        survey: &Survey,
+        observed: &ObservedSurfels,
         report: RegistrationReport,
-    ) -> Outcome<(CorrectedTrajectory, LidarModel)> {
+    ) -> RegistrationResult<(CorrectedTrajectory, LidarModel)> {
         let (spec, matcher) = (problem.spec, problem.matcher);
-        let scene = Scene::new(survey, &corrected, &lidar_model, spec);
+        let scene = Scene::new(observed, &corrected, &lidar_model, spec);
         let mut registration = Self { spec, matcher, corrected, lidar_model, scene, weakest: Vector::z(), report };
         match registration.refine() {
             Ok(()) => Ok(((registration.corrected, registration.lidar_model), registration.report)),
@@ -280,19 +281,19 @@ impl<'a> Registration<'a> {
                 let (x, step) = equations.solve().ok_or("the normal equations are singular")?;
                 let three = Vector::from_column_slice;
                 let knots = x.chunks_exact(6).map(|knot| (three(&knot[..3]), three(&knot[3..])));
-                let Displacement { shift, turn } = Displacement::max_of(knots);
-                if !(shift < MAX_CORRECTION.0 && turn < MAX_CORRECTION.1) {
+                let Displacement { translation_m, rotation_rad } = Displacement::max_of(knots);
+                if !(translation_m < MAX_CORRECTION.0 && rotation_rad < MAX_CORRECTION.1) {
                     return Err("the correction is implausibly large");
                 }
                 self.corrected.correct(&x);
                 self.lidar_model.correct(&step);
                 self.scene.correct(first_knot, &x, &step);
                 let by_lidar_m = step[0].abs();
-                neighbours.add_motion(shift + max_distance_m * turn + by_lidar_m);
+                neighbours.add_motion(translation_m + max_distance_m * rotation_rad + by_lidar_m);
                 self.report.iterations += 1;
                 self.describe(&statistics);
-                self.report.last_correction_m = shift;
-                if shift.max(by_lidar_m) < self.spec.settled_m * coarser {
+                self.report.last_correction_m = translation_m;
+                if translation_m.max(by_lidar_m) < self.spec.settled_m * coarser {
                     break;
                 }
             }

@@ -1,7 +1,7 @@
 //! Candidate matches: reciprocal nearest neighbours between two submaps, for each resolution.
 
 use super::scene::Scene;
-use crate::estimation::matching::{Forest, Matcher};
+use crate::estimation::matching::{Matcher, SearchTrees};
 use crate::estimation::surfel::Patch;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -41,7 +41,7 @@ pub(super) struct ActiveNeighbours {
 struct SubmapIndex {
     members: Vec<u32>,
     patches: Vec<Patch>,
-    forest: Forest,
+    trees: SearchTrees,
 }
 
 impl Neighbours {
@@ -102,16 +102,16 @@ fn search_level(level: usize, scene: &Scene, matcher: &Matcher, count: usize) ->
     let index = |submap: &Range<usize>| {
         let members: Vec<u32> = submap.clone().filter(|k| scene.patches[*k].level == level).map(|k| k as u32).collect();
         let patches: Vec<Patch> = members.iter().map(|k| scene.patches[*k as usize]).collect();
-        let forest = matcher.plant(&patches);
-        SubmapIndex { members, patches, forest }
+        let trees = matcher.build_trees(&patches);
+        SubmapIndex { members, patches, trees }
     };
     let indices: Vec<SubmapIndex> = scene.submaps.par_iter().map(index).collect();
     let between = |(a, b): &(usize, usize)| {
         let (a, b) = (&indices[*a], &indices[*b]);
-        let back: Vec<Vec<u32>> = b.patches.iter().map(|patch| matcher.neighbours(&a.forest, patch, count)).collect();
+        let back: Vec<Vec<u32>> = b.patches.iter().map(|patch| matcher.neighbours(&a.trees, patch, count)).collect();
         let mut found = Vec::new();
         for (i, patch) in a.patches.iter().enumerate() {
-            for j in matcher.neighbours(&b.forest, patch, count) {
+            for j in matcher.neighbours(&b.trees, patch, count) {
                 let pair = (a.members[i], b.members[j as usize]);
                 let time_difference_s = scene.time_difference_s((pair.0 as usize, pair.1 as usize));
                 if back[j as usize].contains(&(i as u32)) && time_difference_s >= matcher.spec.min_time_difference_s {

@@ -4,9 +4,9 @@ use super::corrected_trajectory::CorrectedTrajectory;
 use super::lidar_model::{LidarModel, LidarRay, Shared, rotate_patch};
 use super::{RegistrationSpec, submaps};
 use crate::estimation::nominal::Correction;
+use crate::estimation::observed::ObservedSurfels;
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::Patch;
-use crate::estimation::survey::Survey;
 use crate::geometry::{Rotation, Vector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -31,25 +31,25 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Builds the scene from the surfels of `survey` within the time of `corrected`, observed by the lidar of `lidar_model`.
+    /// Builds the scene from the surfels `observed` within the time of `corrected` by the lidar of `lidar_model`.
     pub(super) fn new(
-        survey: &Survey,
+        observed: &ObservedSurfels,
         corrected: &CorrectedTrajectory,
         lidar_model: &LidarModel,
         spec: &RegistrationSpec,
     ) -> Self {
         let (start_s, end_s) = corrected.span_s();
-        let within = |k: &usize| (start_s..=end_s).contains(&survey.sightings[*k].tau_s);
-        let mut order: Vec<usize> = (0..survey.len()).filter(within).collect();
-        order.sort_by(|a, b| survey.sightings[*a].tau_s.total_cmp(&survey.sightings[*b].tau_s));
-        let sightings = || order.iter().map(|k| &survey.sightings[*k]);
-        let times_s: Vec<f64> = sightings().map(|sighting| sighting.tau_s).collect();
-        let mut patches: Vec<Patch> = sightings().map(|sighting| sighting.patch).collect();
+        let within = |k: &usize| (start_s..=end_s).contains(&observed.surfels[*k].tau_s);
+        let mut order: Vec<usize> = (0..observed.len()).filter(within).collect();
+        order.sort_by(|a, b| observed.surfels[*a].tau_s.total_cmp(&observed.surfels[*b].tau_s));
+        let surfels = || order.iter().map(|k| &observed.surfels[*k]);
+        let times_s: Vec<f64> = surfels().map(|surfel| surfel.tau_s).collect();
+        let mut patches: Vec<Patch> = surfels().map(|surfel| surfel.patch).collect();
         let mut rays = Vec::with_capacity(patches.len());
         let mut arms = Vec::with_capacity(patches.len());
-        for (sighting, patch) in sightings().zip(&mut patches) {
-            let map_from_head = corrected.pose_at(sighting.tau_s);
-            rays.push(lidar_model.ray_to(&map_from_head, patch, &survey.lidars[sighting.lidar as usize].lidar));
+        for (surfel, patch) in surfels().zip(&mut patches) {
+            let map_from_head = corrected.pose_at(surfel.tau_s);
+            rays.push(lidar_model.ray_to(&map_from_head, patch, &observed.lidars[surfel.lidar as usize].lidar));
             arms.push(patch.centre - map_from_head.translation.vector);
         }
         let length_s = 0.5 * spec.knot_spacing_s;

@@ -4,8 +4,8 @@ use super::lidar_model::Shared;
 use super::matches::BinPairSums;
 use super::*;
 use crate::estimation::load;
+use crate::estimation::observed::{LidarCorrectionPeriod, ObservedSurfel};
 use crate::estimation::surfel::Patch;
-use crate::estimation::survey::{KnownLidar, Sighting};
 use crate::geometry::{Matrix, Pose, Rotation, from_roll_pitch_yaw};
 use crate::measurement::{ImuNoise, LidarNoise};
 use rand::{RngExt, SeedableRng};
@@ -62,11 +62,11 @@ fn calibration() -> Calibration {
     }
 }
 
-/// Result of an open loop (trajectory, covariances, survey), and the true trajectory.
+/// Result of an open loop (trajectory, covariances, observed surfels), and the true trajectory.
 struct Setup {
     open: Trajectory,
     covariances: Vec<(Stamp, PoseCovariance)>,
-    survey: Survey,
+    observed: ObservedSurfels,
     truth: Trajectory,
 }
 
@@ -77,8 +77,9 @@ impl Setup {
     }
 
     fn registered_by(&self, spec: &EstimatorSpec) -> ClosedLoop {
-        let Self { open, covariances, survey, .. } = self;
-        let input = RegistrationInput { map_from_head: open, covariances, lidar: &LidarCorrection::default(), survey };
+        let Self { open, covariances, observed, .. } = self;
+        let input =
+            RegistrationInput { map_from_head: open, covariances, lidar: &LidarCorrection::default(), observed };
         register(input, &calibration(), spec)
     }
 }
@@ -107,7 +108,7 @@ fn simulated(
         Pose::from_parts((pose.translation.vector + shift).into(), turn * pose.rotation)
     };
     let times = || (0..(duration_s * 100.0) as usize).map(|k| k as f64 * 0.01);
-    let sighting = |k: usize| {
+    let surfel = |k: usize| {
         let tau_s = k as f64 / per_s;
         let mut normal_number = || random.sample::<f64, _>(StandardNormal);
         let direction = Vector::new(normal_number(), normal_number(), normal_number());
@@ -117,7 +118,7 @@ fn simulated(
         let (centre, normal) = wall(&origin, &direction);
         let reach = head.rotation.inverse() * (centre + normal * (1e-3 * normal_number()) - origin);
         let lidar = LidarCorrection { range_m, ..LidarCorrection::default() };
-        let arm = head.rotation * (LASER_IN_HEAD + lidar.calibrated(&reach));
+        let arm = head.rotation * (LASER_IN_HEAD + lidar.remove(&reach));
         let (turn, shift) = distortion(tau_s);
         let spread = (0.5 * f64::from(1_u32 << level)).powi(2) / 12.0;
         let along = Matrix::identity() - normal * normal.transpose();
@@ -131,17 +132,17 @@ fn simulated(
             roughness_variance: 0.0,
             level,
         };
-        Sighting { tau_s, patch, lidar: 0 }
+        ObservedSurfel { tau_s, patch, lidar: 0 }
     };
-    let sightings = (0..((duration_s - 0.05) * per_s) as usize).map(sighting).collect();
+    let surfels = (0..((duration_s - 0.05) * per_s) as usize).map(surfel).collect();
     let covariances = times().step_by(10).map(|t| (stamp(t), PoseCovariance::identity() * (1e-5 * t))).collect();
     let trajectory = |pose: &dyn Fn(f64) -> Pose| Trajectory::from_poses(times().map(|t| (stamp(t), pose(t)))).unwrap();
-    let survey = Survey {
-        sightings,
-        lidars: vec![KnownLidar { lidar: LidarCorrection::default(), until_s: duration_s }],
-        ..Survey::default()
+    let observed = ObservedSurfels {
+        surfels,
+        lidars: vec![LidarCorrectionPeriod { lidar: LidarCorrection::default(), until_s: duration_s }],
+        ..ObservedSurfels::default()
     };
-    Setup { open: trajectory(&estimated), covariances, survey, truth: trajectory(&truth) }
+    Setup { open: trajectory(&estimated), covariances, observed, truth: trajectory(&truth) }
 }
 
 /// Root mean square distance of the positions of two trajectories, m: total, and after removal of the mean difference.
@@ -172,7 +173,7 @@ fn distorted_trajectory_is_corrected() {
 /// Registers the same trajectory with floor and ceiling observed only `when` requested.
 fn registered_with_floor(when: impl Fn(f64) -> bool) -> ClosedLoop {
     let mut setup = distorted(distortion);
-    setup.survey.sightings.retain(|sighting| sighting.patch.normal.z.abs() < 0.5 || when(sighting.tau_s));
+    setup.observed.surfels.retain(|surfel| surfel.patch.normal.z.abs() < 0.5 || when(surfel.tau_s));
     setup.registered()
 }
 
@@ -240,8 +241,8 @@ fn open_loop_extrinsics_are_kept_and_the_head_is_recalibrated() {
     // The open loop used the calibration in the first half and the corrected extrinsics in the second; the surfels are
     // correct throughout.
     let found = LidarCorrection {
-        turn: Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.4) * 1_f64.to_radians()),
-        shift: Vector::new(0.006, -0.009, 0.004),
+        rotation: Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.4) * 1_f64.to_radians()),
+        translation: Vector::new(0.006, -0.009, 0.004),
         ..LidarCorrection::default()
     };
     let mut setup = distorted(distortion);
@@ -251,18 +252,22 @@ fn open_loop_extrinsics_are_kept_and_the_head_is_recalibrated() {
     setup.open = Trajectory::from_poses(setup.open.iter().map(to_head)).unwrap();
     setup.truth =
         Trajectory::from_poses(setup.truth.iter().map(|(stamp, pose)| (stamp, pose * head_from_head))).unwrap();
-    setup.survey.lidars = vec![
-        KnownLidar { lidar: LidarCorrection::default(), until_s: 20.0 },
-        KnownLidar { lidar: found, until_s: DURATION_S },
+    setup.observed.lidars = vec![
+        LidarCorrectionPeriod { lidar: LidarCorrection::default(), until_s: 20.0 },
+        LidarCorrectionPeriod { lidar: found, until_s: DURATION_S },
     ];
-    for sighting in &mut setup.survey.sightings {
-        sighting.lidar = u32::from(sighting.tau_s > 20.0);
+    for surfel in &mut setup.observed.surfels {
+        surfel.lidar = u32::from(surfel.tau_s > 20.0);
     }
-    let Setup { open, covariances, survey, .. } = &setup;
-    let input = RegistrationInput { map_from_head: open, covariances, lidar: &found, survey };
+    let Setup { open, covariances, observed, .. } = &setup;
+    let input = RegistrationInput { map_from_head: open, covariances, lidar: &found, observed };
     let closed = register(input, &calibration(), &spec);
     assert_eq!(closed.report.rejected_because, None);
-    assert!(closed.lidar.turn == found.turn && closed.lidar.shift == found.shift, "{:?}", closed.lidar);
+    assert!(
+        closed.lidar.rotation == found.rotation && closed.lidar.translation == found.translation,
+        "{:?}",
+        closed.lidar
+    );
     // The origins of the head frames differ, and so does the start of the map.
     let (_, but_for_a_shift) = rms_distance_m(&closed.trajectory, &setup.truth);
     assert!(but_for_a_shift < 0.003, "{but_for_a_shift}");
@@ -282,23 +287,23 @@ fn result_is_bit_identical_with_one_and_two_threads() {
 fn registration_is_invariant_to_the_map_frame() {
     let setup = distorted(distortion);
     let there = Pose::from_parts(Vector::new(30.0, -7.0, 2.0).into(), from_roll_pitch_yaw(0.0, 0.0, 1.0));
-    let moved = |sighting: &Sighting| {
-        let (turn, patch) = (there.rotation.to_rotation_matrix().into_inner(), sighting.patch);
+    let moved = |surfel: &ObservedSurfel| {
+        let (turn, patch) = (there.rotation.to_rotation_matrix().into_inner(), surfel.patch);
         let covariance = turn * patch.covariance * turn.transpose();
         let centre = turn * patch.centre + there.translation.vector;
-        Sighting { patch: Patch { centre, normal: turn * patch.normal, covariance, ..patch }, ..*sighting }
+        ObservedSurfel { patch: Patch { centre, normal: turn * patch.normal, covariance, ..patch }, ..*surfel }
     };
     let here = setup.registered().trajectory.transformed(&there);
-    let sightings = setup.survey.sightings.iter().map(moved).collect();
-    let survey = Survey { sightings, ..setup.survey.clone() };
-    let there = Setup { open: setup.open.transformed(&there), survey, ..setup }.registered().trajectory;
+    let surfels = setup.observed.surfels.iter().map(moved).collect();
+    let observed = ObservedSurfels { surfels, ..setup.observed.clone() };
+    let there = Setup { open: setup.open.transformed(&there), observed, ..setup }.registered().trajectory;
     // The cells for the selection of submap pairs differ, so other pairs may be matched.
     assert!(rms_distance_m(&here, &there).0 < 0.0005, "{:?}", rms_distance_m(&here, &there));
 }
 
 #[test]
-fn empty_survey_keeps_the_open_loop() {
-    let setup = Setup { survey: Survey::default(), ..distorted(distortion) };
+fn no_observed_surfels_keep_the_open_loop() {
+    let setup = Setup { observed: ObservedSurfels::default(), ..distorted(distortion) };
     let closed = setup.registered();
     assert_eq!(closed.trajectory, setup.open);
     assert!(closed.report.rejected_because.is_some());
@@ -310,20 +315,20 @@ fn empty_survey_keeps_the_open_loop() {
 #[test]
 fn derivatives_of_a_match_match_finite_differences() {
     let spec = load("default").unwrap();
-    let Setup { open, covariances, survey, .. } = distorted(|_| (Rotation::identity(), Vector::zeros()));
+    let Setup { open, covariances, observed, .. } = distorted(|_| (Rotation::identity(), Vector::zeros()));
     let length_s = 0.5 * spec.registration.knot_spacing_s;
     // At the middles of two time bins.
     let times_s = [4.5 * length_s, 60.5 * length_s];
-    let wall = survey.sightings.iter().find(|sighting| sighting.patch.normal.x > 0.5).unwrap();
-    let sighting = |k: usize| {
+    let wall = observed.surfels.iter().find(|surfel| surfel.patch.normal.x > 0.5).unwrap();
+    let surfel = |k: usize| {
         let centre = Vector::new(-4.9 + 0.004 * k as f64, 0.4 + 0.1 * k as f64, 1.4);
-        Sighting { tau_s: times_s[k], patch: Patch { centre, ..wall.patch }, lidar: 0 }
+        ObservedSurfel { tau_s: times_s[k], patch: Patch { centre, ..wall.patch }, lidar: 0 }
     };
-    let survey = Survey { sightings: vec![sighting(0), sighting(1)], ..survey };
-    let corrected = CorrectedTrajectory::new(&open, &covariances, survey.origin, &spec.registration).unwrap();
+    let observed = ObservedSurfels { surfels: vec![surfel(0), surfel(1)], ..observed };
+    let corrected = CorrectedTrajectory::new(&open, &covariances, observed.origin, &spec.registration).unwrap();
     let matcher = Matcher::new(&spec.registration.matching(&spec.matching), &spec.registration.surfels(&spec.surfels));
     let lidar_model = LidarModel::new(&calibration(), (&LidarCorrection::default(), false), &spec);
-    let scene = Scene::new(&survey, &corrected, &lidar_model, &spec.registration);
+    let scene = Scene::new(&observed, &corrected, &lidar_model, &spec.registration);
     let (first_knot, knots) = corrected.knots();
     let sum = |scene: &Scene| {
         let mut neighbours = Neighbours::new(spec.registration.levels);
@@ -343,7 +348,7 @@ fn derivatives_of_a_match_match_finite_differences() {
             let mut x = vec![0.0; 6 * knots];
             let segment = (scene.bin_bases[scene.bins[0] as usize].first - first_knot) as usize;
             (segment..segment + 4).for_each(|knot| x[6 * knot + axis] = by);
-            let mut scene = Scene::new(&survey, &corrected, &lidar_model, &spec.registration);
+            let mut scene = Scene::new(&observed, &corrected, &lidar_model, &spec.registration);
             scene.correct(first_knot, &x, &Shared::zeros());
             -sum(&scene).statistics.rms_m()
         };

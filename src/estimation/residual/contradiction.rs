@@ -5,7 +5,7 @@ use crate::estimation::strapdown::{Biases, Interval, State};
 use crate::geometry::Vector;
 
 /// Rotations and velocities are summed over this interval, s, which averages the noise of single samples.
-const SUMMED_S: f64 = 0.2;
+const SUM_INTERVAL_S: f64 = 0.2;
 
 /// Residuals of rotation (rad) and velocity (m/s) summed over a time span, and the variance of each on an axis.
 #[derive(Default)]
@@ -43,7 +43,7 @@ pub(in crate::estimation) fn contradiction(
     let (mut sum, mut times) = (SummedResidual::default(), [Vec::new(), Vec::new()]);
     for (ends, interval) in states.windows(2).zip(intervals) {
         sum.add(&Inertial::between((&ends[0], &ends[1]), interval, biases, gravity), interval);
-        if sum.duration_s >= SUMMED_S {
+        if sum.duration_s >= SUM_INTERVAL_S {
             let multiples = std::mem::take(&mut sum).multiples();
             times.iter_mut().zip(multiples).for_each(|(all, one)| all.push(one));
         }
@@ -98,7 +98,7 @@ mod tests {
             interval.gyro += noise(interval.gyro_sigma);
             interval.accel += noise(interval.accel_sigma);
         }
-        // The median of chi-squared with three degrees of freedom is 2.366. Counterpart 200 spans the sample median has an
+        // The median of chi-squared with three degrees of freedom is 2.366. With 200 spans the sample median has an
         // error of 6 %; the larger of two medians is above it.
         let expected = (2.366_f64 / 3.0).sqrt();
         assert!((multiples(&intervals) / expected - 1.0).abs() < 0.15, "{}", multiples(&intervals));

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Both compare means over the interval, so the rate belongs to the middle and no second difference of positions is
-//! needed: `v` is the integrated velocity, corrected by the exact derivative of the spline. Counterpart `R' = exp(dr) R`, `t'
+//! needed: `v` is the integrated velocity, corrected by the exact derivative of the spline. With `R' = exp(dr) R`, `t'
 //! = t + dt`, in the map's axes:
 //!
 //! ```text
@@ -80,7 +80,7 @@ impl Inertial {
 ///
 /// If the head rocks, a change of the accelerometer bias becomes a changing acceleration in the map. The second
 /// derivative of the correction is linear between knots, so it follows this acceleration on average over a knot spacing
-/// but not from sample to sample. Counterpart full weight on single samples, the difference would count as information and
+/// but not from sample to sample. With full weight on single samples, the difference would count as information and
 /// freeze the bias at any value. Therefore velocities have full weight when summed from the middle of one knot span to
 /// the next, and single samples have less ([`SINGLE_SAMPLE_FACTOR`]). Where sigmas change, for example at a dropout, a new sum
 /// starts, so that the accurate samples retain their weight.
@@ -118,7 +118,7 @@ pub(in crate::estimation) fn add_inertial(
 ///
 /// After such a run velocity or attitude are uncertain by more than [`STEP`], so the correction needs a step. The
 /// correction is smooth over some knot spacings and spreads the step to both sides of the run, where it contradicts
-/// valid samples. Counterpart their nominal sigmas these samples would move the biases instead.
+/// valid samples. With their nominal sigmas these samples would move the biases instead.
 fn near_steps(intervals: &[Interval]) -> Vec<bool> {
     let mut near = vec![false; intervals.len()];
     let (mut step2, mut since_s) = ((0.0, 0.0), f64::INFINITY);

@@ -10,7 +10,7 @@
 
 use super::sums::{SPAN_UNKNOWNS, add_scaled, over_knots};
 use super::{CLOCK, Layout};
-use crate::estimation::surfel::{Patch, Placed};
+use crate::estimation::surfel::{Patch, PlacedSurfel};
 use crate::geometry::{Matrix, Vector};
 
 /// The common plane of two matched surfels.
@@ -19,7 +19,7 @@ pub(in crate::estimation) struct Plane {
     /// Unit normal of the surface.
     pub(in crate::estimation) normal: Vector,
     /// From the second centre to the first, m.
-    apart: Vector,
+    offset: Vector,
     /// Distance along the normal, m.
     pub(in crate::estimation) distance_m: f64,
     /// Variance of that distance, m^2.
@@ -36,11 +36,11 @@ impl Plane {
         let normal = adjugate(&both) * start;
         let normal = normal.try_normalize(0.0).or_else(|| start.try_normalize(0.0)).unwrap_or(b.normal);
         let lambda = normal.dot(&(both * normal));
-        let apart = a.centre - b.centre;
-        let distance_m = normal.dot(&apart);
+        let offset = a.centre - b.centre;
+        let distance_m = normal.dot(&offset);
         Self {
             normal,
-            apart,
+            offset,
             distance_m,
             variance: sigma_m * sigma_m + lambda.max(0.0) + a.roughness_variance + b.roughness_variance,
         }
@@ -48,9 +48,9 @@ impl Plane {
 
     /// Removes the component of the normal along `direction`, a unit vector.
     pub(in crate::estimation) fn remove_component(&mut self, direction: &Vector) {
-        let left = self.normal - direction * self.normal.dot(direction);
-        self.normal = left.try_normalize(1e-3).unwrap_or(self.normal);
-        self.distance_m = self.normal.dot(&self.apart);
+        let remainder = self.normal - direction * self.normal.dot(direction);
+        self.normal = remainder.try_normalize(1e-3).unwrap_or(self.normal);
+        self.distance_m = self.normal.dot(&self.offset);
     }
 }
 
@@ -76,8 +76,8 @@ pub(in crate::estimation) struct SurfelJacobian<const B: usize> {
 impl<const B: usize> SurfelJacobian<B> {
     /// The derivatives for `surfel`, with `normal` pointing towards it.
     #[inline(always)]
-    pub(in crate::estimation) fn of(surfel: &Placed, normal: &Vector, clock_reference_s: f64) -> Self {
-        let turn = surfel.arm.cross(normal);
+    pub(in crate::estimation) fn of(surfel: &PlacedSurfel, normal: &Vector, clock_reference_s: f64) -> Self {
+        let rotation = surfel.arm.cross(normal);
         let later = normal.dot(&surfel.velocity);
         let mut common = [0.0; B];
         common[..COMMON_WITHOUT_EXTRINSICS].copy_from_slice(&[
@@ -86,12 +86,12 @@ impl<const B: usize> SurfelJacobian<B> {
             normal.dot(&surfel.beam),
         ]);
         if B == COMMON {
-            let lidar_turn = surfel.map_from_imu.tr_mul(&surfel.ray().cross(normal));
-            let lidar_shift = surfel.map_from_imu.tr_mul(normal);
-            common[COMMON_WITHOUT_EXTRINSICS..COMMON_WITHOUT_EXTRINSICS + 3].copy_from_slice(lidar_turn.as_slice());
-            common[COMMON_WITHOUT_EXTRINSICS + 3..].copy_from_slice(lidar_shift.as_slice());
+            let lidar_rotation = surfel.map_from_imu.tr_mul(&surfel.ray().cross(normal));
+            let lidar_translation = surfel.map_from_imu.tr_mul(normal);
+            common[COMMON_WITHOUT_EXTRINSICS..COMMON_WITHOUT_EXTRINSICS + 3].copy_from_slice(lidar_rotation.as_slice());
+            common[COMMON_WITHOUT_EXTRINSICS + 3..].copy_from_slice(lidar_translation.as_slice());
         }
-        Self { own: [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], common }
+        Self { own: [rotation.x, rotation.y, rotation.z, normal.x, normal.y, normal.z], common }
     }
 
     /// Adds the other surfel's derivatives by the common unknowns.
@@ -106,7 +106,7 @@ impl<const B: usize> SurfelJacobian<B> {
 pub(in crate::estimation) fn add_scaled_row(
     columns: &mut [Vec<f64>; 6],
     layout: &Layout,
-    (surfel, normal): (&Placed, &Vector),
+    (surfel, normal): (&PlacedSurfel, &Vector),
     scales: &[f64; 6],
     clock_reference_s: f64,
 ) {
@@ -122,7 +122,7 @@ pub(in crate::estimation) fn add_scaled_row(
 #[cfg(test)]
 mod tests {
     use super::super::sums::{Coupling, SpanSums, SurfelSums};
-    use super::super::{BORDER, LIDAR_SHIFT, LIDAR_TURN, RANGE};
+    use super::super::{BORDER, LIDAR_ROTATION, LIDAR_TRANSLATION, RANGE};
     use super::*;
     use crate::estimation::nominal::Correction;
     use crate::estimation::normal_equations::NormalEquations;
@@ -134,7 +134,7 @@ mod tests {
     const AT_S: f64 = 0.5;
 
     /// A thin patch close to a common plane, measured at `tau_s`.
-    fn surfel(tau_s: f64, seed: f64) -> Placed {
+    fn surfel(tau_s: f64, seed: f64) -> PlacedSurfel {
         let turn = from_roll_pitch_yaw(0.02 * seed, 0.3, 0.4).to_rotation_matrix().into_inner();
         let covariance = turn * Matrix::from_diagonal(&Vector::new(0.02, 0.05, 1e-4)) * turn.transpose();
         let patch = Patch {
@@ -145,7 +145,7 @@ mod tests {
             roughness_variance: 0.0,
             level: 0,
         };
-        Placed {
+        PlacedSurfel {
             patch,
             tau_s,
             arm: Vector::new(1.5, 0.2 * seed, -0.4),
@@ -158,21 +158,21 @@ mod tests {
     }
 
     /// The centre after a step `x`, by the definition of the correction and of the clock.
-    fn moved(surfel: &Placed, layout: &Layout, x: &DVector<f64>) -> Vector {
+    fn moved(surfel: &PlacedSurfel, layout: &Layout, x: &DVector<f64>) -> Vector {
         let correction = Correction::of_spline(&surfel.basis, layout.first_knot, x.as_slice());
         let clock = layout.border() + CLOCK;
         let later_s = x[clock] + x[clock + 1] * (surfel.tau_s - AT_S);
         let origin = surfel.patch.centre - surfel.arm;
         let turned = Rotation::from_scaled_axis(correction.rotation) * surfel.arm;
         let border = x.rows(layout.border(), BORDER);
-        let lidar_turn = Rotation::from_scaled_axis(border.fixed_rows::<3>(LIDAR_TURN).into_owned());
+        let lidar_turn = Rotation::from_scaled_axis(border.fixed_rows::<3>(LIDAR_ROTATION).into_owned());
         let reach_in_imu = surfel.map_from_imu.transpose() * surfel.beam * surfel.range_m;
-        let moved_in_imu = lidar_turn * reach_in_imu - reach_in_imu + border.fixed_rows::<3>(LIDAR_SHIFT);
+        let moved_in_imu = lidar_turn * reach_in_imu - reach_in_imu + border.fixed_rows::<3>(LIDAR_TRANSLATION);
         let by_lidar = surfel.map_from_imu * moved_in_imu + surfel.beam * border[RANGE];
         origin + correction.translation + turned + surfel.velocity * later_s + by_lidar
     }
 
-    fn check(a: &Placed, b: Option<&Placed>) {
+    fn check(a: &PlacedSurfel, b: Option<&PlacedSurfel>) {
         let layout = Layout { first_knot: 0, knots: 12 };
         let other = b.map_or(surfel(0.0, 0.5).patch, |b| b.patch);
         let plane = Plane::of(&a.patch, &other, 0.01);

@@ -20,8 +20,8 @@ pub(super) const GRAVITY: usize = 6;
 pub(super) const CLOCK: usize = 8;
 pub(super) const CLOCK_RATE: usize = 9;
 pub(super) const RANGE: usize = 10;
-pub(super) const LIDAR_TURN: usize = 11;
-pub(super) const LIDAR_SHIFT: usize = 14;
+pub(super) const LIDAR_ROTATION: usize = 11;
+pub(super) const LIDAR_TRANSLATION: usize = 14;
 pub(super) const GYRO_MATRIX: usize = 17;
 pub(super) const ACCEL_MATRIX: usize = 26;
 

@@ -1,6 +1,6 @@
 //! Priors of the window: the start state and the border.
 
-use super::{BORDER, LIDAR_TURN, Layout};
+use super::{BORDER, LIDAR_ROTATION, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::geometry::Vector;
@@ -56,7 +56,7 @@ impl Start {
                 let weight = self.sigmas[order][axis / 3].powi(-2);
                 let column = |a: usize| first + 6 * a + axis;
                 let by_lidar = self.by_lidar.map(|by_lidar| -by_lidar[order].row(axis));
-                let target = by_lidar.map_or(0.0, |by_lidar| (by_lidar * moved.fixed_rows::<6>(LIDAR_TURN))[0]);
+                let target = by_lidar.map_or(0.0, |by_lidar| (by_lidar * moved.fixed_rows::<6>(LIDAR_ROTATION))[0]);
                 let residual = (0..4).map(|a| by[a] * total[column(a)]).sum::<f64>() + target;
                 for a in 0..4 {
                     equations.add_right(column(a), -weight * by[a] * residual);
@@ -65,11 +65,15 @@ impl Start {
                     }
                 }
                 for (k, by_unknown) in by_lidar.iter().flat_map(|by| by.iter().enumerate()) {
-                    let row = layout.border() + LIDAR_TURN + k;
+                    let row = layout.border() + LIDAR_ROTATION + k;
                     equations.add_right(row, -weight * by_unknown * residual);
                     (0..4).for_each(|a| equations.add_entry(row, column(a), weight * by_unknown * by[a]));
                     for (other, by_other) in by_lidar.iter().flat_map(|by| by.iter().enumerate()).take(k + 1) {
-                        equations.add_entry(row, layout.border() + LIDAR_TURN + other, weight * by_unknown * by_other);
+                        equations.add_entry(
+                            row,
+                            layout.border() + LIDAR_ROTATION + other,
+                            weight * by_unknown * by_other,
+                        );
                     }
                 }
             }
@@ -95,7 +99,7 @@ impl Start {
                     right[first + 6 * a + axis] += weight * by[a] * target[axis];
                 }
                 for (k, by_lidar) in (0..6).filter_map(|k| Some((k, self.by_lidar?[order][(axis, k)]))) {
-                    right[layout.border() + LIDAR_TURN + k] -= weight * by_lidar * target[axis];
+                    right[layout.border() + LIDAR_ROTATION + k] -= weight * by_lidar * target[axis];
                 }
             }
         }
@@ -185,7 +189,7 @@ mod tests {
         let whitened = |x: &DVector<f64>| {
             let mut all = Vec::new();
             for (order, by) in [basis.value, basis.rate, basis.acceleration].iter().enumerate() {
-                let lidar = moved.fixed_rows::<6>(LIDAR_TURN) + x.rows(layout.border() + LIDAR_TURN, 6);
+                let lidar = moved.fixed_rows::<6>(LIDAR_ROTATION) + x.rows(layout.border() + LIDAR_ROTATION, 6);
                 let target = by_lidar[order] * lidar;
                 for axis in 0..6 {
                     let knot = |a: usize| layout.knot(basis.first) + 6 * a + axis;

@@ -34,8 +34,8 @@ impl ResidualRow {
 
     /// The derivative by an unknown of the border: bias, tilt, scale or misalignment.
     pub(super) fn border(&mut self, unknown: usize) -> &mut f64 {
-        let place = if unknown < CLOCK { unknown } else { CLOCK + unknown - GYRO_MATRIX };
-        &mut self.by[KNOT_UNKNOWNS + place]
+        let index = if unknown < CLOCK { unknown } else { CLOCK + unknown - GYRO_MATRIX };
+        &mut self.by[KNOT_UNKNOWNS + index]
     }
 }
 
@@ -102,6 +102,6 @@ impl ResidualSums {
 }
 
 fn border_index(unknown: usize, layout: &Layout) -> usize {
-    let place = unknown - KNOT_UNKNOWNS;
-    layout.border() + if place < CLOCK { place } else { GYRO_MATRIX + place - CLOCK }
+    let index = unknown - KNOT_UNKNOWNS;
+    layout.border() + if index < CLOCK { index } else { GYRO_MATRIX + index - CLOCK }
 }

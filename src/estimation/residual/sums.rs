@@ -7,7 +7,7 @@ use super::matched::SurfelJacobian;
 use super::{CLOCK, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
-use crate::estimation::surfel::Placed;
+use crate::estimation::surfel::PlacedSurfel;
 
 /// Unknowns of the four knots about a span.
 pub(super) const SPAN_UNKNOWNS: usize = 24;
@@ -130,8 +130,8 @@ impl Coupling {
     #[inline(always)]
     pub(in crate::estimation) fn add<const B: usize>(
         &mut self,
-        (early, early_side): (&Placed, &SurfelJacobian<B>),
-        (late, late_side): (&Placed, &SurfelJacobian<B>),
+        (early, early_side): (&PlacedSurfel, &SurfelJacobian<B>),
+        (late, late_side): (&PlacedSurfel, &SurfelJacobian<B>),
         weight: f64,
     ) {
         let row = over_knots(&early_side.own, &early.basis);

@@ -2,7 +2,7 @@
 
 use super::flatness::{self, SurfelThickness};
 use super::moments::Moments;
-use super::{Beam, Surfel};
+use super::{Surfel, TimedReturn};
 use crate::estimation::Clock;
 use crate::estimation::nominal::{Motion, Nominal};
 use crate::estimation::spec::SurfelSpec;
@@ -20,7 +20,7 @@ const MAX_WALL_NORMAL_Z: f64 = 0.7;
 
 /// Builds surfels from lidar returns.
 #[derive(Debug, Clone)]
-pub(in super::super) struct SurfelMaker {
+pub(in super::super) struct SurfelBuilder {
     pub(in super::super) spec: SurfelSpec,
     pub(in super::super) noise: LidarNoise,
     /// Unit normal of the scan plane in the IMU frame; `None` for a lidar without a single scan plane.
@@ -40,21 +40,21 @@ struct Fragment {
     moments: Moments,
 }
 
-impl SurfelMaker {
+impl SurfelBuilder {
     /// Builds the surfels of one time segment, in order of resolution, grid, cell and time.
     pub(in super::super) fn build(
         &self,
-        beams: &[Beam],
+        returns: &[TimedReturn],
         nominal: &Nominal,
         clock: &Clock,
         biases: &Biases,
     ) -> Vec<Surfel> {
-        let Some(first) = beams.first() else { return Vec::new() };
+        let Some(first) = returns.first() else { return Vec::new() };
         let origin = nominal.at(clock.imu_s(first.tau_s), &biases.gyro).position;
         let edge = self.spec.finest_voxel_m;
         let mut regular = Fragments::new(origin, edge, 0.0);
         let mut offset = Fragments::new(origin, edge, 0.5 * edge);
-        self.project(beams, nominal, (clock, biases), |beam, point| {
+        self.project(returns, nominal, (clock, biases), |beam, point| {
             let range = f64::from(beam.range_m);
             let noise2 = self.noise.sigma_m(range).powi(2);
             regular.add(&point, beam.tau_s, noise2);
@@ -84,10 +84,10 @@ impl SurfelMaker {
     /// Calls `with` for each return and the point in the map, m.
     fn project(
         &self,
-        beams: &[Beam],
+        returns: &[TimedReturn],
         nominal: &Nominal,
         state: (&Clock, &Biases),
-        mut with: impl FnMut(&Beam, Vector),
+        mut with: impl FnMut(&TimedReturn, Vector),
     ) {
         let (clock, biases) = state;
         let mut cursor = 0;
@@ -95,9 +95,9 @@ impl SurfelMaker {
         let mut start_s = f64::NEG_INFINITY;
         let mut end_s = f64::NEG_INFINITY;
         let mut ends: Option<(Motion, Motion)> = None;
-        let turn = self.lidar.turn.to_rotation_matrix();
-        let laser_in_imu = self.laser_in_imu + self.lidar.shift;
-        for beam in beams {
+        let lidar_rotation = self.lidar.rotation.to_rotation_matrix();
+        let laser_in_imu = self.laser_in_imu + self.lidar.translation;
+        for beam in returns {
             if beam.tau_s >= end_s || ends.is_none() {
                 start_s = beam.tau_s;
                 end_s = start_s + POSE_SPACING_S;
@@ -108,7 +108,7 @@ impl SurfelMaker {
             let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
             let position = a.position.lerp(&b.position, x);
             let ray = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
-            let ray = turn * (ray * (1.0 + self.lidar.range_m / f64::from(beam.range_m)));
+            let ray = lidar_rotation * (ray * (1.0 + self.lidar.range_m / f64::from(beam.range_m)));
             with(beam, rotation * (laser_in_imu + ray) + position);
         }
     }
@@ -138,10 +138,10 @@ impl SurfelMaker {
         let motion = nominal.at(clock.imu_s(tau_s), &biases.gyro);
         let imu_from_map = motion.rotation.transpose();
         let centre_in_imu = imu_from_map * (moments.mean() + origin - motion.position);
-        let corrected = centre_in_imu - self.laser_in_imu - self.lidar.shift;
+        let corrected = centre_in_imu - self.laser_in_imu - self.lidar.translation;
         let range_m = corrected.norm();
-        let calibrated_from_map = self.lidar.turn.inverse().to_rotation_matrix() * imu_from_map;
-        let beam = self.lidar.turn.inverse() * corrected / range_m;
+        let calibrated_from_map = self.lidar.rotation.inverse().to_rotation_matrix() * imu_from_map;
+        let beam = self.lidar.rotation.inverse() * corrected / range_m;
         let rate = calibrated_from_map * motion.angular_velocity;
         let sweeps = self.scan_normal.is_none_or(|scan_normal| {
             rate.cross(&beam).dot(&scan_normal).abs() >= self.spec.min_sweep_deg_per_s.to_radians()
@@ -250,7 +250,7 @@ mod tests {
     use crate::geometry::Rotation;
 
     /// Planar scans of a vertical corner with walls 2.1 m away, by a lidar that nods towards it at `rate`, rad/s.
-    fn scans_of_a_corner(rate: f64, scans: usize) -> (Nominal, Vec<Beam>) {
+    fn scans_of_a_corner(rate: f64, scans: usize) -> (Nominal, Vec<TimedReturn>) {
         let nodding = Vector::new(-1.0, 1.0, 0.0).normalize() * rate;
         let none = Vector::zeros();
         let start = State { rotation: Rotation::identity(), position: none, velocity: none };
@@ -272,15 +272,15 @@ mod tests {
             let beam = Vector::new(angle.cos(), angle.sin(), 0.0);
             let direction = Rotation::from_scaled_axis(nodding * tau_s) * beam;
             let range = 2.1 / direction.x.max(direction.y);
-            Beam { tau_s, point_in_imu: (beam * range).cast(), range_m: range as f32 }
+            TimedReturn { tau_s, point_in_imu: (beam * range).cast(), range_m: range as f32 }
         };
         (nominal, (0..scans * 181).map(beam).collect())
     }
 
     /// Absolute vertical components of the surfels' normals.
-    fn normal_heights((nominal, beams): (Nominal, Vec<Beam>), max_incidence_deg: f64) -> Vec<f64> {
+    fn normal_heights((nominal, returns): (Nominal, Vec<TimedReturn>), max_incidence_deg: f64) -> Vec<f64> {
         let shipped = spec::load("default").unwrap().surfels;
-        let maker = SurfelMaker {
+        let builder = SurfelBuilder {
             spec: SurfelSpec { max_incidence_deg, ..shipped },
             noise: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
             scan_normal: Some(Vector::z()),
@@ -289,7 +289,7 @@ mod tests {
         };
         let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0 };
         let still = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
-        maker.build(&beams, &nominal, &clock, &still).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
+        builder.build(&returns, &nominal, &clock, &still).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
     }
 
     #[test]

@@ -8,7 +8,7 @@ mod build;
 mod flatness;
 mod moments;
 
-pub(super) use build::SurfelMaker;
+pub(super) use build::SurfelBuilder;
 
 use super::Clock;
 use super::nominal::Nominal;
@@ -19,7 +19,7 @@ use crate::measurement::LidarCorrection;
 
 /// A lidar return in the IMU frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Beam {
+pub(super) struct TimedReturn {
     /// Time of emission, lidar time, s.
     pub(super) tau_s: f64,
     /// Measured point in the IMU frame, m.
@@ -68,7 +68,7 @@ pub(super) struct Patch {
 
 /// A surfel placed in the map by the trajectory, with derivatives by the window's unknowns.
 #[derive(Debug, Clone)]
-pub(super) struct Placed {
+pub(super) struct PlacedSurfel {
     /// The surfel in the map.
     pub(super) patch: Patch,
     /// Mean time of the points, lidar time, s.
@@ -99,7 +99,7 @@ impl Patch {
     }
 }
 
-impl Placed {
+impl PlacedSurfel {
     /// Vector from the lidar to the centre, in map axes, m.
     pub(super) fn ray(&self) -> Vector {
         self.beam * self.range_m
@@ -121,12 +121,12 @@ pub(super) struct PlacementState<'a> {
 
 impl Surfel {
     /// Places the surfel in the map.
-    pub(super) fn place(&self, by: &PlacementState<'_>) -> Placed {
+    pub(super) fn place(&self, by: &PlacementState<'_>) -> PlacedSurfel {
         let u_s = by.clock.imu_s(self.tau_s);
         let motion = by.nominal.at(u_s, &by.biases.gyro);
-        let ray_in_imu = by.lidar.reach(&self.ray_in_imu);
-        let arm = motion.rotation * (by.laser_in_imu + by.lidar.shift + ray_in_imu);
-        let map_from_calibrated = motion.rotation * by.lidar.turn.to_rotation_matrix().matrix();
+        let ray_in_imu = by.lidar.apply(&self.ray_in_imu);
+        let arm = motion.rotation * (by.laser_in_imu + by.lidar.translation + ray_in_imu);
+        let map_from_calibrated = motion.rotation * by.lidar.rotation.to_rotation_matrix().matrix();
         let patch = Patch {
             centre: motion.position + arm,
             normal: map_from_calibrated * self.normal_in_imu,
@@ -136,7 +136,7 @@ impl Surfel {
             points: self.points,
         };
         let range_m = ray_in_imu.norm();
-        Placed {
+        PlacedSurfel {
             patch,
             tau_s: self.tau_s,
             arm,

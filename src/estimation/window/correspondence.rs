@@ -3,24 +3,24 @@
 use super::{Window, WindowSegment};
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::surfel::{Patch, Placed, Surfel};
+use crate::estimation::surfel::{Patch, PlacedSurfel, Surfel};
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use rayon::prelude::*;
 
 /// The neighbour search is repeated when a surfel may have moved by this, m; smaller motion hardly changes the result.
-const MOVED_M: f64 = 0.02;
+const SEARCH_MOTION_M: f64 = 0.02;
 /// Widening of the match gate in a first window that starts in motion, and after a bridged gap.
 const WIDE_GATE: f64 = 3.0;
 /// A tilt of a normal is significant above this multiple of the standard deviation.
-const SIGNIFICANT: f64 = 4.0;
+const SIGNIFICANT_SIGMAS: f64 = 4.0;
 
 /// Candidate pairs of surfels, before the distance gate.
 #[derive(Default)]
 pub(super) struct Neighbours {
     /// Within the window: indices into the scene.
     pairs: Vec<(u32, u32)>,
-    /// Counterpart views: a surfel of the scene, a view, a patch of the view.
+    /// With views: a surfel of the scene, a view, a patch of the view.
     fixed: Vec<(u32, u32, u32)>,
     /// Number of surfels in the scene at the time of the search.
     scene_len: usize,
@@ -63,9 +63,9 @@ pub(super) enum Counterpart {
 pub(super) struct Matches {
     pub all: Vec<Match>,
     /// The matched surfels of the scene, by the span between knots in which they were measured.
-    pub spans: Runs<i64>,
+    pub spans: Grouped<i64>,
     /// The matches of two live surfels, by the spans of the earlier and the later one.
-    pub couplings: Runs<(i64, i64)>,
+    pub couplings: Grouped<(i64, i64)>,
     /// Indices of the matches of each surfel of the scene, one surfel after the other.
     of_surfels: Vec<u32>,
     /// Offset of each surfel's first match in `of_surfels`, then the offset of the end.
@@ -74,7 +74,7 @@ pub(super) struct Matches {
 
 /// Indices in runs of one key each, in the order of keys.
 #[derive(Debug)]
-pub(super) struct Runs<K> {
+pub(super) struct Grouped<K> {
     members: Vec<(K, u32)>,
     ends: Vec<usize>,
 }
@@ -86,7 +86,7 @@ impl Match {
     }
 }
 
-impl<K: Ord> Runs<K> {
+impl<K: Ord> Grouped<K> {
     fn of(mut members: Vec<(K, u32)>) -> Self {
         members.sort_unstable();
         let ends = members.chunk_by(|a, b| a.0 == b.0).scan(0, |end, run| {
@@ -97,13 +97,13 @@ impl<K: Ord> Runs<K> {
     }
 }
 
-impl<K> Default for Runs<K> {
+impl<K> Default for Grouped<K> {
     fn default() -> Self {
         Self { members: Vec::new(), ends: Vec::new() }
     }
 }
 
-impl<K: Copy + Send + Sync> Runs<K> {
+impl<K: Copy + Send + Sync> Grouped<K> {
     /// The key and the indices of each run.
     pub fn par_iter(&self) -> impl IndexedParallelIterator<Item = (K, impl Iterator<Item = usize>)> {
         (0..self.ends.len()).into_par_iter().map(|k| {
@@ -115,7 +115,7 @@ impl<K: Copy + Send + Sync> Runs<K> {
 }
 
 impl Matches {
-    fn of(all: Vec<Match>, scene: &[Placed]) -> Self {
+    fn of(all: Vec<Match>, scene: &[PlacedSurfel]) -> Self {
         let mut offsets = vec![0; scene.len() + 1];
         let sides = |one: &Match| [Some(one.a as usize), one.other()];
         for surfel in all.iter().flat_map(sides).flatten() {
@@ -134,12 +134,12 @@ impl Matches {
         }
         let span = |surfel: usize| scene[surfel].basis.first;
         let matched = (0..scene.len()).filter(|surfel| offsets[*surfel] < offsets[surfel + 1]);
-        let spans = Runs::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
+        let spans = Grouped::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
         let coupled = all.iter().enumerate().filter_map(|(index, one)| {
             let (a, b) = (span(one.a as usize), span(one.other()?));
             Some(((a.min(b), a.max(b)), index as u32))
         });
-        Self { spans, couplings: Runs::of(coupled.collect()), all, of_surfels, offsets }
+        Self { spans, couplings: Grouped::of(coupled.collect()), all, of_surfels, offsets }
     }
 
     /// The matches of a surfel of the scene: indices into `all`.
@@ -159,14 +159,14 @@ impl Neighbours {
     }
 
     /// Whether the neighbours are still valid for `scene`.
-    pub fn are_valid_for(&self, scene: &[Placed]) -> bool {
-        self.scene_len == scene.len() && self.moved_m < MOVED_M
+    pub fn are_valid_for(&self, scene: &[PlacedSurfel]) -> bool {
+        self.scene_len == scene.len() && self.moved_m < SEARCH_MOTION_M
     }
 }
 
 impl Window {
     /// The window's surfels in the map frame, except surfels that a clock correction moved out of the window's knots.
-    pub(super) fn scene(&self) -> Vec<Placed> {
+    pub(super) fn scene(&self) -> Vec<PlacedSurfel> {
         let placing = self.placing();
         let surfel_indices = self.surfel_indices();
         surfel_indices
@@ -190,7 +190,7 @@ impl Window {
     /// The `neighbours` in `scene` that pass the match gates.
     pub(super) fn match_up(
         &self,
-        scene: &[Placed],
+        scene: &[PlacedSurfel],
         views: &Views,
         neighbours: &Neighbours,
         iteration: usize,
@@ -200,7 +200,7 @@ impl Window {
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, other: &Patch| {
             let patch = &scene[a as usize].patch;
-            self.matcher.agree(patch, other, gate_m).then(|| Plane::of(patch, other, sigma_m))
+            self.matcher.pass_gates(patch, other, gate_m).then(|| Plane::of(patch, other, sigma_m))
         };
         let live = |(a, b): &(u32, u32)| {
             let plane = plane(*a, &scene[*b as usize].patch)?;
@@ -221,7 +221,7 @@ impl Window {
     pub(super) fn remove_insignificant_tilt(
         &self,
         matches: &mut Matches,
-        scene: &[Placed],
+        scene: &[PlacedSurfel],
         views: &Views,
         direction: &Vector,
     ) {
@@ -232,16 +232,20 @@ impl Window {
             };
             let variance =
                 scene[*a as usize].patch.normal_tilt_variance(direction) + other.normal_tilt_variance(direction);
-            if plane.normal.dot(direction).abs() < SIGNIFICANT * variance.sqrt() {
+            if plane.normal.dot(direction).abs() < SIGNIFICANT_SIGMAS * variance.sqrt() {
                 plane.remove_component(direction);
             }
         }
     }
 
     /// Searches the neighbours in `scene` and in the `chosen` views.
-    pub(super) fn search_neighbours(&mut self, scene: &[Placed], (views, chosen): (&Views, &[usize])) -> Neighbours {
+    pub(super) fn search_neighbours(
+        &mut self,
+        scene: &[PlacedSurfel],
+        (views, chosen): (&Views, &[usize]),
+    ) -> Neighbours {
         let patches: Vec<Patch> = scene.iter().map(|surfel| surfel.patch).collect();
-        let pairs = self.matcher.among(scene, &self.matcher.plant(&patches));
+        let pairs = self.matcher.neighbour_pairs(scene, &self.matcher.build_trees(&patches));
         let surfel_indices = self.surfel_indices();
         let mut cached: Vec<CachedNeighbours> =
             surfel_indices.iter().map(|(k, index)| std::mem::take(&mut self.segments[*k].cached[*index])).collect();
@@ -266,14 +270,14 @@ impl CachedNeighbours {
     /// Updates the neighbours of `patch` in the `chosen` views; views searched from about this position stay cached.
     fn update(&mut self, patch: &Patch, (views, chosen): (&Views, &[usize]), matcher: &Matcher, count: usize) {
         let is_chosen = |number: u64| chosen.iter().any(|index| views.view(*index).number == number);
-        let moved = (patch.centre - self.centre).norm() > MOVED_M;
+        let moved = (patch.centre - self.centre).norm() > SEARCH_MOTION_M;
         self.found.retain(|(number, _)| !moved && is_chosen(*number));
         if self.found.is_empty() {
             self.centre = patch.centre;
         }
         for view in chosen.iter().map(|index| views.view(*index)) {
             if self.found.iter().all(|(number, _)| *number != view.number) {
-                self.found.push((view.number, matcher.neighbours(&view.forest, patch, count)));
+                self.found.push((view.number, matcher.neighbours(&view.trees, patch, count)));
             }
         }
     }

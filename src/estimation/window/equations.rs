@@ -10,9 +10,9 @@ use crate::estimation::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Pl
 use crate::estimation::residual::prior;
 use crate::estimation::residual::sums::{Coupling, SpanSums, SurfelSums};
 use crate::estimation::spec::SolveSpec;
-use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::spline::Basis;
-use crate::estimation::surfel::Placed;
+use crate::estimation::surfel::PlacedSurfel;
+use crate::estimation::timing::{Stopwatch, Timing};
 use crate::geometry::Vector;
 use pulp::Arch;
 use rayon::prelude::*;
@@ -63,9 +63,9 @@ impl Robust {
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Displacement {
     /// Translation, m.
-    pub shift: f64,
+    pub translation_m: f64,
     /// Rotation, rad.
-    pub turn: f64,
+    pub rotation_rad: f64,
 }
 
 impl Displacement {
@@ -73,15 +73,15 @@ impl Displacement {
     pub fn max_of(corrections: impl Iterator<Item = (Vector, Vector)>) -> Self {
         // A NaN must not count as small.
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        corrections.fold(Self { shift: 0.0, turn: 0.0 }, |most, (turn, shift)| Self {
-            shift: larger(most.shift, shift.norm()),
-            turn: larger(most.turn, turn.norm()),
+        corrections.fold(Self { translation_m: 0.0, rotation_rad: 0.0 }, |largest, (rotation, translation)| Self {
+            translation_m: larger(largest.translation_m, translation.norm()),
+            rotation_rad: larger(largest.rotation_rad, rotation.norm()),
         })
     }
 
     /// The larger of rotation (rad) and translation (m).
     pub fn max(self) -> f64 {
-        self.shift.max(self.turn)
+        self.translation_m.max(self.rotation_rad)
     }
 }
 
@@ -96,20 +96,20 @@ impl Window {
         Layout { first_knot, knots: (last_knot - first_knot + 1) as usize }
     }
 
-    /// Solves the linearised window and returns the solution with the displacement; adds the run time to `spent`.
+    /// Solves the linearised window and returns the solution with the displacement; adds the run time to `timing`.
     pub(super) fn solve_linearised(
         &mut self,
         (first, total): (usize, &[f64]),
-        scene: &[Placed],
+        scene: &[PlacedSurfel],
         (matches, robust): (&Matches, &Robust),
         layout: &Layout,
-        spent: &mut TimeSpent,
+        timing: &mut Timing,
     ) -> Option<(Vec<f64>, Displacement)> {
         let mut watch = Stopwatch::start();
         self.assemble_inertial(first, layout, total);
         let weighted = WeightedMatches { scene, matches, robust, clock_reference_s: self.clock.at_s };
         weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
-        spent.equations_s += watch.lap_s();
+        timing.equations_s += watch.lap_s();
         let Workspace { equations, factor, bases } = &mut self.workspace;
         equations.factor(factor).ok()?;
         let x = equations.solve(factor);
@@ -117,7 +117,7 @@ impl Window {
             let correction = Correction::of_spline(basis, layout.first_knot, &x);
             (correction.rotation, correction.translation)
         }));
-        spent.solve_s += watch.lap_s();
+        timing.solve_s += watch.lap_s();
         Some((x, moved))
     }
 
@@ -149,7 +149,7 @@ impl Window {
 
 /// The matches, with all that their normal equations need.
 struct WeightedMatches<'a> {
-    scene: &'a [Placed],
+    scene: &'a [PlacedSurfel],
     matches: &'a Matches,
     robust: &'a Robust,
     clock_reference_s: f64,

@@ -7,7 +7,7 @@ mod solve;
 mod uncertainty;
 
 pub(super) use equations::Displacement;
-pub(super) use solve::{MIN_SIGNIFICANT_TILT, Solved};
+pub(super) use solve::{MIN_SIGNIFICANT_TILT, WindowSolution};
 pub(super) use uncertainty::Linearised;
 
 use super::border::Border;
@@ -19,9 +19,9 @@ use super::residual::contradiction::contradiction;
 use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
-use super::spent::{Stopwatch, TimeSpent};
 use super::strapdown::{Biases, ImuScaleMisalignment, Interval};
-use super::surfel::{Beam, Patch, PlacementState, Surfel, SurfelMaker};
+use super::surfel::{Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
+use super::timing::{Stopwatch, Timing};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
@@ -32,9 +32,9 @@ use std::collections::VecDeque;
 /// The head may move for this time before the IMU shows it, s.
 const REST_MARGIN_S: f64 = 0.3;
 /// The window grows to at most this multiple of the nominal length while the segments contain few surfaces.
-const MAX_LENGTH: f64 = 3.0;
+const MAX_LENGTH_RATIO: f64 = 3.0;
 /// A segment counts as swept if it has this fraction of the largest number of surfels in a segment.
-const SWEPT: f64 = 0.25;
+const MIN_SWEPT_RATIO: f64 = 0.25;
 
 /// If the initial velocity has at least this standard deviation, the head may move at constant velocity, m/s.
 const MOVING_SIGMA_M_PER_S: f64 = 5.0;
@@ -50,7 +50,7 @@ const RELOCALISED_SIGMA: [f64; 2] = [0.05, 0.2];
 #[derive(Debug)]
 struct WindowSegment {
     end_tau_s: f64,
-    beams: Vec<Beam>,
+    returns: Vec<TimedReturn>,
     surfels: Vec<Surfel>,
     /// Cached fixed-view neighbours of each surfel.
     cached: Vec<CachedNeighbours>,
@@ -60,9 +60,9 @@ struct WindowSegment {
 #[derive(Debug)]
 pub(super) struct Window {
     spec: EstimatorSpec,
-    maker: SurfelMaker,
-    /// Builds the surfels of the survey, if one is requested.
-    surveyor: Option<SurfelMaker>,
+    builder: SurfelBuilder,
+    /// Builds the observed surfels, if they are requested.
+    observed_builder: Option<SurfelBuilder>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
     pub(super) clock: Clock,
@@ -96,7 +96,7 @@ impl Window {
     /// A window that starts with the first IMU interval, at `start_u_s`.
     pub(super) fn new(
         spec: &EstimatorSpec,
-        maker: SurfelMaker,
+        builder: SurfelBuilder,
         initial_state: &InitialState,
         start_u_s: f64,
         border: Border,
@@ -105,8 +105,8 @@ impl Window {
         Self {
             spec: spec.clone(),
             matcher: Matcher::new(&spec.matching, &spec.surfels),
-            maker,
-            surveyor: None,
+            builder,
+            observed_builder: None,
             nominal: Nominal::starting(start_u_s, initial_state.state),
             clock,
             biases: initial_state.biases,
@@ -130,7 +130,7 @@ impl Window {
     /// The states that initialise the estimate after an IMU gap.
     pub(super) fn state_before_gap(&self) -> Option<StateBeforeGap> {
         let state = *self.nominal.states().last()?;
-        let (scale_misalignment, lidar) = (self.scale_misalignment, self.maker.lidar);
+        let (scale_misalignment, lidar) = (self.scale_misalignment, self.builder.lidar);
         let until_s = self.nominal.end_s();
         let displacement = state.position - self.start_pose().translation.vector;
         let mean_velocity = displacement / (until_s - self.start.u_s).max(self.spec.step_s);
@@ -142,13 +142,14 @@ impl Window {
     pub(super) fn resume_from(&mut self, before_gap: &StateBeforeGap) {
         self.clock = before_gap.clock.after_gap((before_gap.until_s, self.start.u_s));
         self.scale_misalignment = before_gap.scale_misalignment;
-        self.maker.lidar = before_gap.lidar;
+        self.builder.lidar = before_gap.lidar;
     }
 
     /// Rotates the window by the smallest angle that aligns gravity with that before the gap.
     pub(super) fn align_gravity_with(&mut self, before_gap: &StateBeforeGap) {
-        let turn = Rotation::rotation_between(&self.gravity, &before_gap.gravity).unwrap_or_else(Rotation::identity);
-        self.nominal.turn(&turn, &before_gap.state.position);
+        let rotation =
+            Rotation::rotation_between(&self.gravity, &before_gap.gravity).unwrap_or_else(Rotation::identity);
+        self.nominal.rotate(&rotation, &before_gap.state.position);
         self.gravity = before_gap.gravity;
     }
 
@@ -210,17 +211,22 @@ impl Window {
         self.start.u_s
     }
 
-    /// The same window, which also builds survey surfels with `surveyor`.
-    pub(super) fn surveyed_by(self, surveyor: SurfelMaker) -> Self {
-        Self { surveyor: Some(surveyor), ..self }
+    /// The same window, which also builds the observed surfels with `builder`.
+    pub(super) fn with_observed_builder(self, builder: SurfelBuilder) -> Self {
+        Self { observed_builder: Some(builder), ..self }
     }
 
     pub(super) fn matcher(&self) -> &Matcher {
         &self.matcher
     }
 
-    /// Appends a segment: integrates the intervals and builds surfels of the beams. Returns the run time.
-    pub(super) fn extend(&mut self, intervals: &[(f64, Interval)], beams: Vec<Beam>, end_tau_s: f64) -> TimeSpent {
+    /// Appends a segment: integrates the intervals and builds surfels of the returns. Returns the run time.
+    pub(super) fn extend(
+        &mut self,
+        intervals: &[(f64, Interval)],
+        returns: Vec<TimedReturn>,
+        end_tau_s: f64,
+    ) -> Timing {
         let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
             self.nominal.extend(interval.corrected_by(&self.scale_misalignment), &self.biases, &self.gravity);
@@ -242,25 +248,25 @@ impl Window {
         self.bridged_gap = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
             || self.nominal.end_s() < self.wide_gate_until_s;
         let integration_s = watch.lap_s();
-        let surfels = self.maker.build(&beams, &self.nominal, &self.clock, &self.biases);
+        let surfels = self.builder.build(&returns, &self.nominal, &self.clock, &self.biases);
         let cached = vec![CachedNeighbours::default(); surfels.len()];
-        self.segments.push_back(WindowSegment { end_tau_s, beams, surfels, cached });
+        self.segments.push_back(WindowSegment { end_tau_s, returns, surfels, cached });
         let surfels_s = watch.lap_s();
         // Reference time of the clock: the middle of the window, where offset and rate are least correlated.
         let length_s = self.spec.step_s * self.segments.len() as f64;
         let middle_s = end_tau_s - 0.5 * length_s;
         self.border.shift_clock_reference(middle_s - self.clock.at_s);
         self.clock = self.clock.with_reference_at(middle_s);
-        TimeSpent { integration_s, surfels_s, ..TimeSpent::default() }
+        Timing { integration_s, surfels_s, ..Timing::default() }
     }
 
     /// Rebuilds the surfels of the newest segment with the current trajectory.
     pub(super) fn rebuild_newest_surfels(&mut self) {
         if let Some(newest) = self.segments.back_mut() {
-            newest.surfels = self.maker.build(&newest.beams, &self.nominal, &self.clock, &self.biases);
+            newest.surfels = self.builder.build(&newest.returns, &self.nominal, &self.clock, &self.biases);
             newest.cached = vec![CachedNeighbours::default(); newest.surfels.len()];
-            if self.surveyor.is_none() {
-                newest.beams = Vec::new();
+            if self.observed_builder.is_none() {
+                newest.returns = Vec::new();
             }
         }
     }
@@ -271,12 +277,12 @@ impl Window {
     /// A head at rest measures only lines and needs the older patches.
     pub(super) fn is_full(&self) -> bool {
         let richest = self.segments.iter().map(|segment| segment.surfels.len()).max().unwrap_or(0);
-        let enough = (richest as f64 * SWEPT) as usize;
+        let enough = (richest as f64 * MIN_SWEPT_RATIO) as usize;
         let is_swept = |segment: &WindowSegment| segment.surfels.len() >= enough;
         let swept = self.segments.iter().filter(|segment| is_swept(segment)).count();
         let windows = |segments: usize| segments as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
         let all = windows(self.segments.len());
-        windows(swept) > 1.0 || all > MAX_LENGTH || (all > 1.0 && !self.segments.front().is_some_and(is_swept))
+        windows(swept) > 1.0 || all > MAX_LENGTH_RATIO || (all > 1.0 && !self.segments.front().is_some_and(is_swept))
     }
 
     /// Start of the window after removal of the oldest segment, IMU time, s.
@@ -286,14 +292,14 @@ impl Window {
         Some(self.clock.imu_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
-    /// The survey patches of the oldest segment in the map frame, each with the measurement time, s.
-    pub(super) fn survey_oldest(&self) -> Vec<(f64, Patch)> {
-        self.segments.front().map_or_else(Vec::new, |oldest| self.survey(oldest))
+    /// The observed surfels of the oldest segment in the map frame, each with the measurement time, s.
+    pub(super) fn observed_in_oldest(&self) -> Vec<(f64, Patch)> {
+        self.segments.front().map_or_else(Vec::new, |oldest| self.observed(oldest))
     }
 
-    /// The survey patches of all segments of the window, as [`Self::survey_oldest`].
-    pub(super) fn survey_all(&self) -> Vec<(f64, Patch)> {
-        self.segments.iter().flat_map(|segment| self.survey(segment)).collect()
+    /// The observed surfels of all segments of the window, as [`Self::observed_in_oldest`].
+    pub(super) fn observed_in_all(&self) -> Vec<(f64, Patch)> {
+        self.segments.iter().flat_map(|segment| self.observed(segment)).collect()
     }
 
     /// End of the oldest segment, lidar time, s.
@@ -306,12 +312,12 @@ impl Window {
         self.segments.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
     }
 
-    fn survey(&self, segment: &WindowSegment) -> Vec<(f64, Patch)> {
-        let Some(surveyor) = &self.surveyor else { return Vec::new() };
-        let surveyor = SurfelMaker { lidar: self.maker.lidar, ..surveyor.clone() };
-        let seen = surveyor.build(&segment.beams, &self.nominal, &self.clock, &self.biases);
+    fn observed(&self, segment: &WindowSegment) -> Vec<(f64, Patch)> {
+        let Some(builder) = &self.observed_builder else { return Vec::new() };
+        let builder = SurfelBuilder { lidar: self.builder.lidar, ..builder.clone() };
+        let surfels = builder.build(&segment.returns, &self.nominal, &self.clock, &self.biases);
         let placing = self.placing();
-        seen.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
+        surfels.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
     }
 
     /// Removes the oldest segment, whose states become final; returns the patches of that segment in the map frame.
@@ -335,7 +341,7 @@ impl Window {
 
     /// The estimated corrections of the lidar calibration.
     pub(super) fn lidar(&self) -> LidarCorrection {
-        self.maker.lidar
+        self.builder.lidar
     }
 
     /// The lidar correction in the axes of the IMU calibration.
@@ -343,14 +349,14 @@ impl Window {
     /// If the extrinsics are estimated, the axes are midway between the gyroscope axes, which the estimated attitude
     /// refers to, and the accelerometer axes; both are equally accurate.
     pub(super) fn calibrated_lidar(&self) -> LidarCorrection {
-        let lidar = self.maker.lidar;
+        let lidar = self.builder.lidar;
         if !self.spec.extrinsics.estimated {
             return lidar;
         }
         let imu_from_gyro = Rotation::from_scaled_axis(self.scale_misalignment.accel_against_gyro() * 0.5);
-        let position = self.maker.laser_in_imu + lidar.shift;
-        let shift = lidar.shift + imu_from_gyro * position - position;
-        LidarCorrection { turn: imu_from_gyro * lidar.turn, shift, ..lidar }
+        let position = self.builder.laser_in_imu + lidar.translation;
+        let translation = lidar.translation + imu_from_gyro * position - position;
+        LidarCorrection { rotation: imu_from_gyro * lidar.rotation, translation, ..lidar }
     }
 
     /// The current states with which surfels are placed in the map.
@@ -359,8 +365,8 @@ impl Window {
             nominal: &self.nominal,
             clock: &self.clock,
             biases: &self.biases,
-            laser_in_imu: &self.maker.laser_in_imu,
-            lidar: &self.maker.lidar,
+            laser_in_imu: &self.builder.laser_in_imu,
+            lidar: &self.builder.lidar,
             knot_spacing_s: self.spec.knot_spacing_s,
         }
     }

@@ -7,12 +7,12 @@ use super::uncertainty::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::matched::Plane;
 use crate::estimation::residual::{
-    ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_SHIFT, LIDAR_TURN, Layout,
-    RANGE,
+    ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION, LIDAR_TRANSLATION,
+    Layout, RANGE,
 };
-use crate::estimation::spent::{Stopwatch, TimeSpent};
 use crate::estimation::strapdown::ImuScaleMisalignment;
-use crate::estimation::surfel::Placed;
+use crate::estimation::surfel::PlacedSurfel;
+use crate::estimation::timing::{Stopwatch, Timing};
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Rotation, Vector};
 
@@ -28,7 +28,7 @@ const UNCONSTRAINED: f64 = 0.01;
 
 /// Statistics of a window's solution.
 #[derive(Debug, Clone, Default)]
-pub(in crate::estimation) struct Solved {
+pub(in crate::estimation) struct WindowSolution {
     pub surfels: usize,
     pub matches: usize,
     pub view_matches: usize,
@@ -39,68 +39,68 @@ pub(in crate::estimation) struct Solved {
     pub conditioning: f64,
     /// The least constrained direction, in the map frame.
     pub weakest: Vector,
-    pub trouble: Option<&'static str>,
-    pub spent: TimeSpent,
+    pub failure: Option<&'static str>,
+    pub timing: Timing,
 }
 
 impl Window {
     /// Solves the window; returns the last linearisation if the solution is accepted.
-    pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (Solved, Option<Linearised>) {
+    pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (WindowSolution, Option<Linearised>) {
         if self.nominal.end_s() <= self.start.u_s {
-            let trouble = Some("the IMU samples do not reach the window");
-            return (Solved { trouble, ..Solved::default() }, None);
+            let failure = Some("the IMU samples do not reach the window");
+            return (WindowSolution { failure, ..WindowSolution::default() }, None);
         }
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
-        let lidar = self.maker.lidar;
+        let lidar = self.builder.lidar;
         let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.scale_misalignment);
         self.border.start_window();
         let mut total = vec![0.0; layout.border()];
-        let mut solved = Solved::default();
+        let mut solved = WindowSolution::default();
         let mut neighbours = Neighbours::default();
         let mut chosen = None;
         let mut linearised = None;
         let mut watch = Stopwatch::start();
         for iteration in 0..self.spec.solve.max_iterations {
             let scene = self.scene();
-            solved.spent.placing_s += watch.lap_s();
+            solved.timing.placing_s += watch.lap_s();
             let chosen = chosen.get_or_insert_with(|| views.select(&scene));
-            solved.spent.views_s += watch.lap_s();
+            solved.timing.views_s += watch.lap_s();
             if !neighbours.are_valid_for(&scene) {
                 neighbours = self.search_neighbours(&scene, (views, chosen));
             }
-            solved.spent.neighbours_s += watch.lap_s();
+            solved.timing.neighbours_s += watch.lap_s();
             let matches = self.match_up(&scene, views, &neighbours, iteration);
             let robust = Robust::of(&self.spec.solve, iteration);
             solved.record(&matches, &robust);
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
             let matches = self.significant(matches, &solved, &scene, views);
-            solved.spent.matches_s += watch.lap_s();
-            let seen = (&matches, &robust);
-            let spent = &mut solved.spent;
-            let Some((x, by)) = self.solve_linearised((first, &total), &scene, seen, &layout, spent) else {
-                solved.trouble = Some("the normal equations are singular");
+            solved.timing.matches_s += watch.lap_s();
+            let weighted = (&matches, &robust);
+            let timing = &mut solved.timing;
+            let Some((x, by)) = self.solve_linearised((first, &total), &scene, weighted, &layout, timing) else {
+                solved.failure = Some("the normal equations are singular");
                 break;
             };
             watch.lap_s(); // the solver records this time
-            if !(by.shift < MAX_CORRECTION.0 && by.turn < MAX_CORRECTION.1) {
-                solved.trouble = Some("the correction is too large");
+            if !(by.translation_m < MAX_CORRECTION.0 && by.rotation_rad < MAX_CORRECTION.1) {
+                solved.failure = Some("the correction is too large");
                 break;
             }
             self.apply(&x, first, &layout, &mut total);
             self.speed_is_known |= !matches.all.is_empty();
             self.sees_rest |= !matches.all.is_empty();
-            neighbours.moved(by.shift + LEVER_ARM_M * by.turn);
-            solved.spent.correction_s += watch.lap_s();
+            neighbours.moved(by.translation_m + LEVER_ARM_M * by.rotation_rad);
+            solved.timing.correction_s += watch.lap_s();
             solved.last_correction_m = by.max();
             linearised = Some(Linearised { layout, scene, matches, robust });
             if solved.last_correction_m < self.spec.solve.settled_m {
                 break;
             }
         }
-        if solved.trouble.is_some() {
+        if solved.failure.is_some() {
             (self.nominal, self.clock, self.biases, self.gravity, self.scale_misalignment) = backup;
-            self.maker.lidar = lidar;
+            self.builder.lidar = lidar;
             self.border.reset_to_window_start();
             linearised = None;
         }
@@ -108,7 +108,13 @@ impl Window {
     }
 
     /// Removes matches and match components that are not significant; too few matches are removed entirely.
-    fn significant(&self, mut matches: Matches, solved: &Solved, scene: &[Placed], views: &Views) -> Matches {
+    fn significant(
+        &self,
+        mut matches: Matches,
+        solved: &WindowSolution,
+        scene: &[PlacedSurfel],
+        views: &Views,
+    ) -> Matches {
         if matches.all.len() < self.spec.solve.min_matches {
             return Matches::default();
         }
@@ -140,13 +146,13 @@ impl Window {
         let more = ImuScaleMisalignment { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
         self.nominal.correct_readings(&more);
         self.scale_misalignment.add(&more);
-        self.maker.lidar.range_m += border[RANGE];
-        self.maker.lidar.turn = Rotation::from_scaled_axis(three(LIDAR_TURN)) * self.maker.lidar.turn;
-        self.maker.lidar.shift += three(LIDAR_SHIFT);
+        self.builder.lidar.range_m += border[RANGE];
+        self.builder.lidar.rotation = Rotation::from_scaled_axis(three(LIDAR_ROTATION)) * self.builder.lidar.rotation;
+        self.builder.lidar.translation += three(LIDAR_TRANSLATION);
     }
 }
 
-impl Solved {
+impl WindowSolution {
     /// Records number, residual and conditioning of a set of matches.
     fn record(&mut self, matches: &Matches, robust: &Robust) {
         self.matches = matches.all.iter().filter(|one| matches!(one.with, Counterpart::Live(_))).count();

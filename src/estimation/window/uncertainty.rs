@@ -5,9 +5,9 @@ use super::correspondence::{Counterpart, Match, Matches};
 use super::equations::Robust;
 use crate::estimation::consider::{IMU_OFFSET, IMU_STATES, START_STATES, Sensitivity, StartMatrix};
 use crate::estimation::residual::prior::ByLidar;
-use crate::estimation::residual::{LIDAR_TURN, Layout, matched};
+use crate::estimation::residual::{LIDAR_ROTATION, Layout, matched};
 use crate::estimation::spline::Basis;
-use crate::estimation::surfel::Placed;
+use crate::estimation::surfel::PlacedSurfel;
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use nalgebra::{Matrix6, SMatrix};
@@ -16,7 +16,7 @@ use nalgebra::{Matrix6, SMatrix};
 #[derive(Debug)]
 pub(in crate::estimation) struct Linearised {
     pub(super) layout: Layout,
-    pub(super) scene: Vec<Placed>,
+    pub(super) scene: Vec<PlacedSurfel>,
     pub(super) matches: Matches,
     pub(super) robust: Robust,
 }
@@ -41,7 +41,7 @@ impl Window {
         let mut start = StartMatrix::zeros();
         start.fixed_columns_mut::<12>(0).copy_from(&of_start);
         start.fixed_columns_mut::<IMU_STATES>(IMU_OFFSET).copy_from(&of_imu);
-        // The remainder of the covariance after subtraction of the start's part, which `Consider` propagates.
+        // The remainder of the covariance after subtraction of the start's part, which `ConsiderCovariance` propagates.
         let all = StartMatrix::from_fn(|r, c| by(r, &inherited[c]));
         let own = all - start * self.known_at_start()? * start.transpose();
         let by_views = self.columns_of_views(at, views);
@@ -65,12 +65,12 @@ impl Window {
 
     /// Regression of the corrections at `u_s` (IMU time) and of their derivatives on the lidar extrinsics.
     ///
-    /// Counterpart all other unknowns solved: `P_xl P_ll^-1` of the covariances `P`. None if the extrinsics are not estimated.
+    /// With all other unknowns solved: `P_xl P_ll^-1` of the covariances `P`. None if the extrinsics are not estimated.
     pub(super) fn regression_on_lidar(&self, u_s: f64, at: &Linearised) -> Option<ByLidar> {
         if !self.spec.extrinsics.estimated {
             return None;
         }
-        let lidar = at.layout.border() + LIDAR_TURN;
+        let lidar = at.layout.border() + LIDAR_ROTATION;
         let covariances: [Vec<f64>; 6] = std::array::from_fn(|k| {
             let mut column = vec![0.0; at.layout.size()];
             column[lidar + k] = 1.0;

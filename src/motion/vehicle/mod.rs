@@ -81,7 +81,7 @@ impl Vehicle {
         let road = SineSum::new(spec.suspension.response(&tracks, speed_m_per_s));
         let engine = spec.engine.as_ref().map(|engine| {
             let mut running = SmoothSteps::from_level(0.0);
-            running.push(spec.still_s + STARTING_S / 2.0, STARTING_S / 2.0, 1.0);
+            running.push(spec.still_s + ENGINE_START_S / 2.0, ENGINE_START_S / 2.0, 1.0);
             (Engine::new(engine, &mut seed.stream("motion/vehicle/engine")), running)
         });
         let [x, y, z] = spec.base_m;
@@ -100,7 +100,7 @@ impl Vehicle {
 }
 
 /// Time in which the engine reaches full speed, s.
-const STARTING_S: f64 = 1.0;
+const ENGINE_START_S: f64 = 1.0;
 
 impl BaseMotion for Vehicle {
     fn at(&self, t_s: f64) -> Kinematics {

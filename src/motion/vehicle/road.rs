@@ -140,13 +140,14 @@ mod tests {
         let (tracks, segments) = heights(RoadClass::A);
         let points = transfer_function(&tracks[0], &tracks[1], 20.0, segments).unwrap();
         for (low, high) in [(0.03, 0.05), (0.1, 0.16), (0.2, 0.3), (0.5, 1.0)] {
-            let near: Vec<_> = points.iter().filter(|point| (low..high).contains(&point.freq_hz)).collect();
-            let power: f64 = near.iter().map(|point| point.input_density).sum();
-            let told: f64 = near.iter().map(|point| point.response.re * point.input_density).sum::<f64>() / power;
+            let in_band: Vec<_> = points.iter().filter(|point| (low..high).contains(&point.freq_hz)).collect();
+            let power: f64 = in_band.iter().map(|point| point.input_density).sum();
+            let estimated: f64 =
+                in_band.iter().map(|point| point.response.re * point.input_density).sum::<f64>() / power;
             let expected: f64 =
-                near.iter().map(|point| coherence(TAU * point.freq_hz * 1.5) * point.input_density).sum::<f64>()
+                in_band.iter().map(|point| coherence(TAU * point.freq_hz * 1.5) * point.input_density).sum::<f64>()
                     / power;
-            assert_relative_eq!(told, expected, epsilon = 0.05);
+            assert_relative_eq!(estimated, expected, epsilon = 0.05);
         }
     }
 }

@@ -12,7 +12,7 @@ pub struct PlyReader<R: Read> {
     format: PlyFormat,
     columns: Columns,
     properties: Vec<Property>,
-    left: u64,
+    remaining: u64,
     line: usize,
     row: Vec<f64>,
 }
@@ -70,15 +70,15 @@ impl<R: Read> PlyReader<R> {
             format: header.format,
             columns,
             properties: header.properties,
-            left: header.count,
+            remaining: header.count,
             line: header.lines,
             row: Vec::new(),
         })
     }
 
     /// Number of points not yet read, according to the header.
-    pub fn left(&self) -> u64 {
-        self.left
+    pub fn remaining(&self) -> u64 {
+        self.remaining
     }
 
     fn next_point(&mut self) -> Result<CloudPoint, String> {
@@ -106,7 +106,7 @@ impl<R: Read> PlyReader<R> {
         for property in &self.properties {
             let mut word = [0; 8];
             let bytes = &mut word[..property.scalar.size()];
-            self.input.read_exact(bytes).map_err(|_| format!("the file ends {} points early", self.left))?;
+            self.input.read_exact(bytes).map_err(|_| format!("the file ends {} points early", self.remaining))?;
             if big_endian {
                 bytes.reverse();
             }
@@ -120,7 +120,7 @@ impl<R: Read> PlyReader<R> {
         let mut text = Vec::new();
         let read = (&mut self.input).take(header::MAX_LINE_BYTES).read_until(b'\n', &mut text);
         if read.map_err(|error| error.to_string())? == 0 {
-            return Err(format!("the file ends {} points early", self.left));
+            return Err(format!("the file ends {} points early", self.remaining));
         }
         let text = std::str::from_utf8(&text).map_err(|_| "this is not text".to_owned())?;
         for word in text.split_whitespace() {
@@ -141,12 +141,12 @@ impl<R: Read> Iterator for PlyReader<R> {
     type Item = Result<CloudPoint, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.left == 0 {
+        if self.remaining == 0 {
             return None;
         }
         self.line += 1;
         let point = self.next_point();
-        self.left = if point.is_ok() { self.left - 1 } else { 0 };
+        self.remaining = if point.is_ok() { self.remaining - 1 } else { 0 };
         let (name, line) = (&self.name, self.line);
         Some(point.map_err(|problem| RecordingError::Line { name: name.clone(), line, problem }))
     }

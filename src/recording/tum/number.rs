@@ -7,7 +7,7 @@ use std::io::Write;
 const DECIMALS: usize = 9;
 
 /// Upper limit of the fast path: 1e9 times the value is below 2^53, so it is an exact integer in a double.
-const EXACT_BELOW: f64 = 1e6;
+const FAST_PATH_LIMIT: f64 = 1e6;
 
 /// Appends seconds with nine decimals, i.e. exact to the nanosecond.
 pub fn write_stamp(out: &mut Vec<u8>, stamp: Stamp) {
@@ -16,7 +16,7 @@ pub fn write_stamp(out: &mut Vec<u8>, stamp: Stamp) {
 
 /// Appends `value` with nine decimals.
 pub fn write(out: &mut Vec<u8>, value: f64) {
-    if value.abs() < EXACT_BELOW {
+    if value.abs() < FAST_PATH_LIMIT {
         write_billionths(out, (value * 1e9).round() as i64);
     } else {
         // Writing to memory does not fail.

@@ -10,7 +10,7 @@ use plotters::prelude::DrawingBackend;
 
 /// Font sizes, points.
 pub(super) const TEXT: f64 = 12.0;
-pub(super) const SMALL: f64 = 11.0;
+pub(super) const SMALL_TEXT: f64 = 11.0;
 /// Margins around the axes, points: above for one line of title and legend, below and left for tick labels and axis label.
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;
@@ -113,7 +113,7 @@ fn frame_of(chart: &Chart, corner: CanvasPoint, size: (f64, f64), left: f64) -> 
 
 /// The left margin, wide enough for custom tick labels, points.
 fn left_margin<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &Chart) -> Result<f64, PlotError> {
-    chart.y_ticks.iter().try_fold(LEFT, |margin, (_, label)| Ok(margin.max(canvas.width_of(label, SMALL)? + 16.0)))
+    chart.y_ticks.iter().try_fold(LEFT, |margin, (_, label)| Ok(margin.max(canvas.width_of(label, SMALL_TEXT)? + 16.0)))
 }
 
 /// The custom ticks within the range of an axis, or about `wanted` round numbers if there are none.
@@ -129,13 +129,13 @@ fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -
         let (x, _) = frame.at((value, frame.y.low));
         canvas.line(&[(x, frame.top), (x, frame.bottom())], GRID, 0.8)?;
         canvas.line(&[(x, frame.bottom()), (x, frame.bottom() + 4.0)], INK, 0.8)?;
-        canvas.text(&label, (x, frame.bottom() + 7.0), Anchor::Below, SMALL)?;
+        canvas.text(&label, (x, frame.bottom() + 7.0), Anchor::Below, SMALL_TEXT)?;
     }
     for (value, label) in ticks(&frame.y, &chart.y_ticks, frame.height / TICK_Y) {
         let (_, y) = frame.at((frame.x.low, value));
         canvas.line(&[(frame.left, y), (frame.right(), y)], GRID, 0.8)?;
         canvas.line(&[(frame.left - 4.0, y), (frame.left, y)], INK, 0.8)?;
-        canvas.text(&label, (frame.left - 8.0, y), Anchor::Right, SMALL)?;
+        canvas.text(&label, (frame.left - 8.0, y), Anchor::Right, SMALL_TEXT)?;
     }
     let axes = [(frame.left, frame.top), (frame.left, frame.bottom()), (frame.right(), frame.bottom())];
     canvas.line(&axes, INK, 0.8)?;

@@ -1,7 +1,7 @@
 //! Header of a chart: title and legend above the axes.
 
 use super::canvas::{Anchor, Canvas, CanvasPoint};
-use super::frame::{SMALL, TEXT};
+use super::frame::{SMALL_TEXT, TEXT};
 use super::palette::{INK, Rgb, shade, signed_shade};
 use super::{Chart, Mark, PlotError, Series, axis, stroke};
 use plotters::prelude::DrawingBackend;
@@ -42,7 +42,7 @@ impl<'a> Header<'a> {
     pub fn of<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &'a Chart, width: f64) -> Result<Self, PlotError> {
         let mut entries = Vec::new();
         for series in chart.series.iter().filter(|series| !series.name.is_empty()) {
-            let wide = SAMPLE_LENGTH + NAME_GAP + canvas.width_of(&series.name, SMALL)?;
+            let wide = SAMPLE_LENGTH + NAME_GAP + canvas.width_of(&series.name, SMALL_TEXT)?;
             entries.push(Entry { content: EntryContent::Series(series), width: wide });
         }
         if let Some(cells) = &chart.cells {
@@ -104,7 +104,7 @@ fn colour_bar<'a, DB: DrawingBackend>(
     shade: fn(f64) -> Rgb,
 ) -> Result<Entry<'a>, PlotError> {
     let (min, max) = (axis::short(min), format!("{} {unit}", axis::short(max)));
-    let labels = canvas.width_of(&min, SMALL)? + canvas.width_of(&max, SMALL)?;
+    let labels = canvas.width_of(&min, SMALL_TEXT)? + canvas.width_of(&max, SMALL_TEXT)?;
     Ok(Entry { content: EntryContent::ColourBar { min, max, shade }, width: labels + COLOUR_BAR + 2.0 * NAME_GAP })
 }
 
@@ -118,11 +118,11 @@ impl Entry<'_> {
                     Mark::Dashes(width) => stroke::dashes(canvas, &sample, series, width.max(1.5))?,
                     Mark::Dots(_) => canvas.dot((x + SAMPLE_LENGTH / 2.0, y), series.colour.rgb(), 6.0)?,
                 }
-                canvas.text(&series.name, (x + SAMPLE_LENGTH + NAME_GAP, y), Anchor::Left, SMALL)
+                canvas.text(&series.name, (x + SAMPLE_LENGTH + NAME_GAP, y), Anchor::Left, SMALL_TEXT)
             }
             EntryContent::ColourBar { min, max, shade } => {
-                canvas.text(min, (x, y), Anchor::Left, SMALL)?;
-                let start = x + canvas.width_of(min, SMALL)? + NAME_GAP;
+                canvas.text(min, (x, y), Anchor::Left, SMALL_TEXT)?;
+                let start = x + canvas.width_of(min, SMALL_TEXT)? + NAME_GAP;
                 let steps = COLOUR_BAR as u32;
                 for k in 0..steps {
                     let at = start + f64::from(k);
@@ -132,7 +132,7 @@ impl Entry<'_> {
                 let end = start + COLOUR_BAR;
                 let outline = [(start, y - 5.0), (end, y - 5.0), (end, y + 5.0), (start, y + 5.0), (start, y - 5.0)];
                 canvas.line(&outline, INK, 0.5)?;
-                canvas.text(max, (end + NAME_GAP, y), Anchor::Left, SMALL)
+                canvas.text(max, (end + NAME_GAP, y), Anchor::Left, SMALL_TEXT)
             }
         }
     }

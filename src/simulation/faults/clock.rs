@@ -31,20 +31,20 @@ impl ClockFaults {
     }
 
     /// Offset of the lidar clock at `since_start`.
-    pub fn lidar_ahead(&self, since_start: Span) -> Span {
-        ahead(&self.lidar, since_start)
+    pub fn lidar_offset(&self, since_start: Span) -> Span {
+        offset_after(&self.lidar, since_start)
     }
 
     /// Clock offsets with the faults, given the offsets without.
     pub fn apply(&self, since_start: Span, clock: &ClockTruth) -> ClockTruth {
         ClockTruth {
-            lidar_ahead: clock.lidar_ahead + ahead(&self.lidar, since_start),
-            imu_ahead: clock.imu_ahead + ahead(&self.imu, since_start),
+            lidar_offset: clock.lidar_offset + offset_after(&self.lidar, since_start),
+            imu_offset: clock.imu_offset + offset_after(&self.imu, since_start),
         }
     }
 }
 
-fn ahead(changes: &[(Span, Span)], since_start: Span) -> Span {
+fn offset_after(changes: &[(Span, Span)], since_start: Span) -> Span {
     let until_now = changes.iter().filter(|(from, _)| *from <= since_start);
     until_now.fold(Span::ZERO, |sum, (_, by)| sum + *by)
 }

@@ -76,7 +76,7 @@ impl<'s, S: Sink + TruthSink + ?Sized> Injector<'s, S> {
 
     /// Delivers events that arrive up to `now` (`None`: all), except those that a held message may precede.
     fn deliver(&mut self, now: Option<Stamp>) -> Result<(), SinkError> {
-        let held = self.imu.held().into_iter().chain(self.lidar.held()).min();
+        let held = self.imu.earliest_held().into_iter().chain(self.lidar.earliest_held()).min();
         let until = now.into_iter().chain(held).min();
         while let Some(first) = self.queue.first_entry() {
             let (arrival, _) = *first.key();
@@ -115,7 +115,7 @@ impl<S: Sink + TruthSink + ?Sized> TruthSink for Injector<'_, S> {
         if let Some(attitude) = &mut self.attitude {
             attitude.update(now, &sample.head.world_from_body);
         }
-        let lidar_stamp = sample.lidar_stamp + self.clock.lidar_ahead(now - EPOCH);
+        let lidar_stamp = sample.lidar_stamp + self.clock.lidar_offset(now - EPOCH);
         self.send(now, Event::Truth(TruthSample { lidar_stamp, ..*sample }));
         self.deliver(Some(now))
     }

@@ -120,7 +120,7 @@ impl Stage for Thin {
         }
     }
 
-    fn held(&self) -> Option<Stamp> {
+    fn earliest_held(&self) -> Option<Stamp> {
         self.pending.as_ref().map(|message| message.arrival)
     }
 }

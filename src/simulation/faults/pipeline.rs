@@ -56,13 +56,13 @@ pub(super) trait Stage {
     fn finish(&mut self, _out: &mut Vec<Message>) {}
 
     /// Earliest arrival of a held message.
-    fn held(&self) -> Option<Stamp> {
+    fn earliest_held(&self) -> Option<Stamp> {
         None
     }
 }
 
 /// Time without messages after which a stage emits held messages: the message that they wait for may never come.
-const SILENCE: Span = Span::from_nanos(5_000_000_000);
+const FLUSH_TIMEOUT: Span = Span::from_nanos(5_000_000_000);
 
 /// All fault stages of a sensor.
 pub(super) struct Pipeline {
@@ -97,11 +97,11 @@ impl Pipeline {
         feed(&mut self.stages, message, out);
     }
 
-    /// Emits the held messages of stages that have had no message for [`SILENCE`].
+    /// Emits the held messages of stages that have had no message for [`FLUSH_TIMEOUT`].
     pub fn flush_silent(&mut self, now: Stamp, out: &mut Vec<Message>) {
         let mut stages = self.stages.as_mut_slice();
         while let Some((first, rest)) = stages.split_first_mut() {
-            if first.stage.held().is_some() && now - first.last > SILENCE {
+            if first.stage.earliest_held().is_some() && now - first.last > FLUSH_TIMEOUT {
                 flush(first, rest, out);
             }
             stages = rest;
@@ -118,8 +118,8 @@ impl Pipeline {
     }
 
     /// Earliest arrival of a held message.
-    pub fn held(&self) -> Option<Stamp> {
-        self.stages.iter().filter_map(|placed| placed.stage.held()).min()
+    pub fn earliest_held(&self) -> Option<Stamp> {
+        self.stages.iter().filter_map(|placed| placed.stage.earliest_held()).min()
     }
 }
 
@@ -172,9 +172,9 @@ mod tests {
             (0..11).for_each(|k| pipeline.take(message(10 * k), &mut out));
             let before = out.len();
             pipeline.flush_silent(at(5), &mut out);
-            assert!(out.len() == before && pipeline.held().is_some(), "{waiting}");
+            assert!(out.len() == before && pipeline.earliest_held().is_some(), "{waiting}");
             pipeline.flush_silent(at(6), &mut out);
-            assert!(out.len() <= 11 && pipeline.held().is_none(), "{waiting}");
+            assert!(out.len() <= 11 && pipeline.earliest_held().is_none(), "{waiting}");
         }
     }
 

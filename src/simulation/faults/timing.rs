@@ -14,7 +14,7 @@ pub(super) fn stage(kind: &FaultKind, stream: &Stream, interval: &Interval) -> O
     Some(match kind {
         FaultKind::Delay { mean_s } => Box::new(Delay { mean_s: *mean_s, stream, last: None }),
         FaultKind::Burst { size, spacing_us } => {
-            Box::new(Burst { size: *size, spacing: Span::from_seconds(1e-6 * spacing_us), held: Vec::new() })
+            Box::new(Burst { size: *size, spacing: Span::from_seconds(1e-6 * spacing_us), waiting: Vec::new() })
         }
         FaultKind::ClockOffset { offset_s } => {
             Box::new(ClockChange { from: Span::from_nanos(i64::MIN), by: Span::from_seconds(*offset_s) })
@@ -23,7 +23,7 @@ pub(super) fn stage(kind: &FaultKind, stream: &Stream, interval: &Interval) -> O
             Box::new(ClockChange { from: interval.from(), by: Span::from_seconds(*jump_s) })
         }
         FaultKind::Duplicate { share } => Box::new(Duplicate { probability: *share, stream }),
-        FaultKind::Reorder { share } => Box::new(Reorder { probability: *share, stream, held: None }),
+        FaultKind::Reorder { share } => Box::new(Reorder { probability: *share, stream, waiting: None }),
         _ => return None,
     })
 }
@@ -65,20 +65,20 @@ impl Stage for Delay {
 struct Burst {
     size: usize,
     spacing: Span,
-    held: Vec<Message>,
+    waiting: Vec<Message>,
 }
 
 impl Stage for Burst {
     fn take(&mut self, message: Message, out: &mut Vec<Message>) {
-        self.held.push(message);
-        if self.held.len() >= self.size {
+        self.waiting.push(message);
+        if self.waiting.len() >= self.size {
             self.finish(out);
         }
     }
 
     fn finish(&mut self, out: &mut Vec<Message>) {
-        let Some((mut stamp, arrival)) = self.held.last().map(|last| (last.stamp(), last.arrival)) else { return };
-        for mut message in self.held.drain(..) {
+        let Some((mut stamp, arrival)) = self.waiting.last().map(|last| (last.stamp(), last.arrival)) else { return };
+        for mut message in self.waiting.drain(..) {
             message.set_stamp(stamp);
             message.arrival = arrival;
             stamp += self.spacing;
@@ -86,8 +86,8 @@ impl Stage for Burst {
         }
     }
 
-    fn held(&self) -> Option<Stamp> {
-        self.held.first().map(|message| message.arrival)
+    fn earliest_held(&self) -> Option<Stamp> {
+        self.waiting.first().map(|message| message.arrival)
     }
 }
 
@@ -125,26 +125,26 @@ impl Stage for Duplicate {
 struct Reorder {
     probability: f64,
     stream: Stream,
-    held: Option<Message>,
+    waiting: Option<Message>,
 }
 
 impl Stage for Reorder {
     fn take(&mut self, message: Message, out: &mut Vec<Message>) {
-        if let Some(mut before) = self.held.take() {
+        if let Some(mut before) = self.waiting.take() {
             before.arrival = message.arrival;
             out.extend([message, before]);
         } else if self.stream.random::<f64>() < self.probability {
-            self.held = Some(message);
+            self.waiting = Some(message);
         } else {
             out.push(message);
         }
     }
 
     fn finish(&mut self, out: &mut Vec<Message>) {
-        out.extend(self.held.take());
+        out.extend(self.waiting.take());
     }
 
-    fn held(&self) -> Option<Stamp> {
-        self.held.as_ref().map(|message| message.arrival)
+    fn earliest_held(&self) -> Option<Stamp> {
+        self.waiting.as_ref().map(|message| message.arrival)
     }
 }

@@ -2,11 +2,11 @@
 
 use super::drive::{Schedule, ShakenBase};
 use super::{AXES, GainCurve, GainPlan, GainPoint};
-use crate::dynamics::{GainPoints, HeadModel, HeadSimulation, HeadState, Peak, Quantity};
+use crate::dynamics::{AccelerationKind, GainPoints, HeadModel, HeadSimulation, HeadState, Peak};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::motion::Axis;
 use crate::signal::{Segments, TransferPoint, transfer_function};
-use crate::study::watch::PieceProgress;
+use crate::study::progress::PieceProgress;
 use crate::study::{OnProgress, StudyError};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -104,7 +104,7 @@ fn record(
 ) -> Result<Record, StudyError> {
     let points = plan.points.unwrap_or_else(|| head.default_points());
     let base = ShakenBase::new(axis, index, plan, schedule, &points.base_in_base)?;
-    let probe = MotionProbe::new(head, axis, &points, plan.quantity);
+    let probe = MotionProbe::new(head, axis, &points, plan.acceleration);
     let mut record = Record::default();
     for (step, state) in HeadSimulation::new(head, &base, plan.step_s)?.enumerate().take(schedule.steps()) {
         let state = state?;
@@ -119,22 +119,22 @@ fn record(
 struct MotionProbe {
     axis: usize,
     is_rotation: bool,
-    quantity: Quantity,
+    acceleration: AccelerationKind,
     base_from_point: Pose,
     head_from_point: Pose,
     rest: Rotation,
 }
 
 impl MotionProbe {
-    fn new(head: &HeadModel, axis: Axis, points: &GainPoints, quantity: Quantity) -> Self {
+    fn new(head: &HeadModel, axis: Axis, points: &GainPoints, acceleration: AccelerationKind) -> Self {
         let at = |point: &Vector| Pose::from_parts((*point).into(), Rotation::identity());
         Self {
             axis: axis as usize % 3,
             is_rotation: axis.is_rotation(),
-            quantity,
+            acceleration,
             base_from_point: at(&points.base_in_base),
             head_from_point: at(&points.head_in_head),
-            rest: head.rest_pose_base_from_head().rotation,
+            rest: head.base_from_head_at_rest().rotation,
         }
     }
 
@@ -143,10 +143,10 @@ impl MotionProbe {
     /// The head's rates and forces are rotated into axes that coincide with the base's at rest.
     fn sample(&self, state: &HeadState, record: &mut Record) {
         let (base, head) = (state.base.of_frame(&self.base_from_point), state.head.of_frame(&self.head_from_point));
-        let (base_value, head_value) = match (self.is_rotation, self.quantity) {
+        let (base_value, head_value) = match (self.is_rotation, self.acceleration) {
             (true, _) => (base.angular_velocity_in_body(), self.rest * head.angular_velocity_in_body()),
-            (false, Quantity::Kinematic) => (base.acceleration_in_world, head.acceleration_in_world),
-            (false, Quantity::SpecificForce) => {
+            (false, AccelerationKind::Kinematic) => (base.acceleration_in_world, head.acceleration_in_world),
+            (false, AccelerationKind::SpecificForce) => {
                 (base.specific_force_in_body(), self.rest * head.specific_force_in_body())
             }
         };
@@ -178,7 +178,7 @@ fn curve(
         gain: p.gain(),
         coherence: p.coherence,
         gain_sigma: p.gain_sigma,
-        gain_model: response.gain(axis, p.freq_hz, plan.quantity),
+        gain_model: response.gain(axis, p.freq_hz, plan.acceleration),
     };
     // Skip the constant; the excited lines end at the highest frequency.
     let lines = measured.iter().skip(1).take_while(|p| p.freq_hz <= plan.up_to_hz * (1.0 + 1e-9));
@@ -188,7 +188,7 @@ fn curve(
     Ok(GainCurve {
         axis,
         peak: highest_peak(&points),
-        peak_model: response.peak(axis, plan.up_to_hz, plan.quantity),
+        peak_model: response.peak(axis, plan.up_to_hz, plan.acceleration),
         points,
         swing_rms_deg: mean_squared_angle.sqrt().to_degrees(),
         swing_most_deg: records.iter().map(|r| r.max_angle).fold(0.0, f64::max).to_degrees(),

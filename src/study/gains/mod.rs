@@ -18,7 +18,7 @@ pub use measure::{gain_curve, gain_curves};
 pub use swing::{SwingPoint, SwingStudy, swing_study};
 pub use table::{csv, swing_csv};
 
-use crate::dynamics::{DampingSpec, GainPoints, HeadSpec, Peak, Quantity};
+use crate::dynamics::{AccelerationKind, DampingSpec, GainPoints, HeadSpec, Peak};
 use crate::motion::Axis;
 use crate::random::Seed;
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq)]
 pub struct GainPlan {
     /// Quantity compared along x, y and z: acceleration or specific force.
-    pub quantity: Quantity,
+    pub acceleration: AccelerationKind,
     /// Points of base and head whose motion is compared; `None` for the spring's foot and the IMU.
     pub points: Option<GainPoints>,
     /// Highest frequency, Hz.
@@ -52,7 +52,7 @@ impl Default for GainPlan {
     /// Up to 10 Hz, an amplitude small enough for the head to be linear, four realisations, steps of 1 ms.
     fn default() -> Self {
         Self {
-            quantity: Quantity::Kinematic,
+            acceleration: AccelerationKind::Kinematic,
             points: None,
             up_to_hz: 10.0,
             period_s: None,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Number of bootstrap resamples: the ends of a 95 % interval then rest on 50 resamples each.
 const RESAMPLES: usize = 2000;
 /// Confidence level of the intervals.
-const LEVEL: f64 = 0.95;
+const CONFIDENCE_LEVEL: f64 = 0.95;
 
 /// Error sums over one block of time; sums of several blocks are added.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -128,7 +128,11 @@ fn percentile_interval(value: f64, mut resampled: Vec<f64>) -> ConfidenceInterva
     resampled.sort_by(f64::total_cmp);
     let rank = |fraction: f64| ((fraction * resampled.len() as f64) as usize).min(resampled.len().saturating_sub(1));
     let quantile = |fraction: f64| resampled.get(rank(fraction)).copied().unwrap_or(f64::NAN);
-    ConfidenceInterval { value, low: quantile(0.5 - 0.5 * LEVEL), high: quantile(0.5 + 0.5 * LEVEL) }
+    ConfidenceInterval {
+        value,
+        low: quantile(0.5 - 0.5 * CONFIDENCE_LEVEL),
+        high: quantile(0.5 + 0.5 * CONFIDENCE_LEVEL),
+    }
 }
 
 /// Variance of `values`, bounded below to keep weights finite.

@@ -19,7 +19,7 @@ const EVALUATED_RETURNS: usize = 60_000;
 const SHOWN_RETURNS: usize = 6000;
 
 /// Size of the shown part of the section (along it, up), m.
-const SHOWN_M: (f64, f64) = (3.6, 2.8);
+const SECTION_SIZE_M: (f64, f64) = (3.6, 2.8);
 /// Maximum distance of the shown part's edges from the section's centre (along it, up), m.
 const REACH_M: (f64, f64) = (5.0, 2.4);
 /// Side of the grid cells for the choice of the shown part, m.
@@ -75,7 +75,7 @@ impl Reference {
             surroundings,
             head_from_laser: calibration.head_from_laser,
             section,
-            thinning: Thinning::to(EVALUATED_RETURNS, returns),
+            thinning: Thinning::to_at_most(EVALUATED_RETURNS, returns),
             index: 0,
             scan_stamps: Vec::new(),
             evaluated: Vec::new(),
@@ -96,7 +96,7 @@ impl Reference {
         let within = |(x, y): (f64, f64)| (left..=right).contains(&x) && (low..=high).contains(&y);
         let shown: Vec<SampledReturn> =
             shown.into_iter().filter(|(_, coordinates)| within(*coordinates)).map(|(hit, _)| hit).collect();
-        let thinning = Thinning::to(SHOWN_RETURNS, shown.len());
+        let thinning = Thinning::to_at_most(SHOWN_RETURNS, shown.len());
         let thinned = shown.into_iter().enumerate().filter(|(index, _)| thinning.keeps(*index));
         let shown: Vec<SampledReturn> = thinned.map(|(_, hit)| hit).collect();
         let rate = |hit: &SampledReturn| section.rate_deg_per_s(&truth, scan_stamps[hit.scan] + hit.offset);
@@ -147,14 +147,14 @@ impl ReturnSampler<'_> {
     }
 }
 
-/// The range of size [`SHOWN_M`] in the section with the most occupied grid cells.
+/// The range of size [`SECTION_SIZE_M`] in the section with the most occupied grid cells.
 ///
 /// Counting cells rather than points keeps a dense nearby surface from dominating. Of several equal ranges, the leftmost
 /// and then the lowest is chosen.
 fn densest_range(coordinates: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
     let cells: BTreeSet<(i64, i64)> =
         coordinates.iter().map(|(x, y)| ((x / CELL_M).round() as i64, (y / CELL_M).round() as i64)).collect();
-    let size = ((SHOWN_M.0 / CELL_M) as i64, (SHOWN_M.1 / CELL_M) as i64);
+    let size = ((SECTION_SIZE_M.0 / CELL_M) as i64, (SECTION_SIZE_M.1 / CELL_M) as i64);
     let (reach, step) = (((REACH_M.0 / CELL_M) as i64, (REACH_M.1 / CELL_M) as i64), 4);
     let mut best = (0, (-size.0 / 2, -size.1 / 2));
     for left in (-reach.0..=reach.0 - size.0).step_by(step) {
@@ -167,7 +167,7 @@ fn densest_range(coordinates: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
         }
     }
     let (left, low) = (best.1.0 as f64 * CELL_M, best.1.1 as f64 * CELL_M);
-    ((left, left + SHOWN_M.0), (low, low + SHOWN_M.1))
+    ((left, left + SECTION_SIZE_M.0), (low, low + SECTION_SIZE_M.1))
 }
 
 #[cfg(test)]
@@ -181,6 +181,6 @@ mod tests {
         let walls = (0..60).flat_map(|k| [(2.0, 1.0 - 0.025 * f64::from(k)), (2.0 - 0.025 * f64::from(k), 1.0)]);
         let ((left, right), (low, high)) = densest_range(&floor.chain(walls).collect::<Vec<_>>());
         assert!(left <= 0.6 && right >= 2.0 && low <= -0.4 && high >= 1.0, "{left} {right} {low} {high}");
-        assert!((right - left - SHOWN_M.0).abs() < 1e-12 && (high - low - SHOWN_M.1).abs() < 1e-12);
+        assert!((right - left - SECTION_SIZE_M.0).abs() < 1e-12 && (high - low - SECTION_SIZE_M.1).abs() < 1e-12);
     }
 }

@@ -6,13 +6,13 @@ use super::reference::Reference;
 use super::{ClockState, Disturbance, LatencySpec};
 use crate::estimation::{self, EstimatorSpec};
 use crate::measurement::Calibration;
-use crate::recording::{Preference, Reader, Selection};
+use crate::recording::{Reader, Selection, TopicPreference};
 use crate::simulation::{Simulation, Specs};
 use crate::spec::Source;
 use crate::study::cloud::Surroundings;
+use crate::study::progress::PieceProgress;
 use crate::study::reproduction::part_store::PartStore;
-use crate::study::watch::PieceProgress;
-use crate::study::{OnProgress, StudyError, Watch, record};
+use crate::study::{OnProgress, ProgressMonitor, StudyError, record};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -170,12 +170,12 @@ impl LatencyStudy {
         let path = store.folder().join(RECORDING);
         if !path.is_file() {
             let part = store.folder().join("recording.part");
-            let mut watch = Watch { stop, report: &mut |_| {} };
+            let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
             record(&simulation, &part, &store.folder().join("truth.tum"), false, &mut watch)?;
             std::fs::rename(&part, &path).map_err(StudyError::file(&path))?;
         }
         let reader = Reader::open(&path)?;
-        let selection = reader.select(&Preference::default())?;
+        let selection = reader.select(&TopicPreference::default())?;
         let calibration = simulation.calibration();
         let reference = self.reference(&simulation, &reader, (&selection, &calibration), stop)?;
         let context = RunContext {

@@ -40,7 +40,7 @@ impl RunResults<'_> {
         Ok(RunPage {
             metrics,
             manifest,
-            parts_s: self.open.spent.parts().to_vec(),
+            parts_s: self.open.timing.parts().to_vec(),
             view: self.view()?,
             charts: charts::all(self),
             timeline: timeline::rows(self.open, &metrics.integrity.causes),

@@ -8,10 +8,10 @@ use crate::study::open_loop::OpenLoopRun;
 use crate::time::Stamp;
 use std::collections::BTreeMap;
 
-/// Windows of the same trouble within this time are one event, s.
+/// Windows with the same problem within this time are one event, s.
 const MERGED_WITHIN_S: f64 = 0.5;
 
-/// Causes of the status, warnings of the estimator and windows in trouble, one row for each kind; most severe first.
+/// Causes of the status, warnings of the estimator and windows with a problem, one row for each kind; most severe first.
 pub(super) fn rows(run: &OpenLoopRun, causes: &[CauseMetrics]) -> Vec<TimelineRow> {
     let start = run.recorded.0;
     let mut rows: BTreeMap<(Level, String), Vec<Interval>> = BTreeMap::new();
@@ -24,7 +24,7 @@ pub(super) fn rows(run: &OpenLoopRun, causes: &[CauseMetrics]) -> Vec<TimelineRo
         add(&mut rows, kind, interval(*stamp, kind, start));
     }
     for window in &run.windows {
-        let Some(kind) = &window.trouble else { continue };
+        let Some(kind) = &window.problem else { continue };
         add(&mut rows, kind, interval(window.stamp, kind, start));
     }
     let row = |((level, name), events)| TimelineRow { name, level, events: merged(events) };

@@ -1,7 +1,7 @@
 //! Fit of a head's damping ratios to the peak gains in the paper.
 
 use super::PeaksSpec;
-use crate::dynamics::{DampingSpec, HeadModel, HeadSpec, Peak, Quantity};
+use crate::dynamics::{AccelerationKind, DampingSpec, HeadModel, HeadSpec, Peak};
 use crate::motion::Axis;
 use crate::random::Seed;
 use crate::spec::Source;
@@ -60,7 +60,7 @@ impl DampingFit {
     /// Peaks of `head` in comparison with the paper's.
     fn new(head: &HeadModel, damping_ratio: DampingSpec, paper: &PeaksSpec, up_to_hz: f64) -> Self {
         let response = head.frequency_response(&head.default_points());
-        let peak = |axis| response.peak(axis, up_to_hz, Quantity::Kinematic);
+        let peak = |axis| response.peak(axis, up_to_hz, AccelerationKind::Kinematic);
         let peaks = AXES.map(|axis| FittedPeak { axis, paper: paper.peak(axis), peak: peak(axis) });
         Self { damping_ratio, peaks: peaks.to_vec() }
     }

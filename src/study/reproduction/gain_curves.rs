@@ -9,7 +9,7 @@ use crate::dynamics::{DampingSpec, HeadModel, HeadSpec, Peak};
 use crate::motion::Axis;
 use crate::spec::{self, Source};
 use crate::study::gains::{AXES, GainCurve, GainPlan, axis_name, csv, gain_curve, with_damping};
-use crate::study::watch::PieceProgress;
+use crate::study::progress::PieceProgress;
 use crate::study::{OnProgress, StudyError};
 use rayon::prelude::*;
 

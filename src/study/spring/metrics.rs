@@ -1,7 +1,7 @@
 //! Metrics of a spring design, from the linearised head or from a simulation.
 
 use super::{Shake, SpringMounting, Wire};
-use crate::dynamics::{FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState, LinkageSpec, Quantity};
+use crate::dynamics::{AccelerationKind, FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState, LinkageSpec};
 use crate::elasticity::{SpringDesign, split};
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
 use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
@@ -164,7 +164,7 @@ impl SpringModel {
 
     fn metrics(&self, head: &HeadModel, swing: &SwingResult) -> DesignMetrics {
         let response = head.frequency_response(&head.default_points());
-        let peak = response.peak(Axis::Pitch, MAX_PEAK_HZ, Quantity::Kinematic);
+        let peak = response.peak(Axis::Pitch, MAX_PEAK_HZ, AccelerationKind::Kinematic);
         let yield_pa = self.wire.and_then(|wire| wire.yield_pa());
         DesignMetrics {
             rocking_hz: head.linear_modes().first().map_or(f64::INFINITY, |mode| mode.frequency_hz),
@@ -180,7 +180,7 @@ impl SpringModel {
     /// Compression at rest: free length minus distance from foot to top, m; 0 if the free length is not known.
     pub fn sag_m(&self, head: &HeadModel) -> f64 {
         let (Some(mounting), Some(free_length_m)) = (&self.mounting, self.free_length_m) else { return 0.0 };
-        free_length_m - mounting.length_m(head.rest_pose_base_from_head())
+        free_length_m - mounting.length_m(head.base_from_head_at_rest())
     }
 }
 
@@ -206,7 +206,7 @@ impl LinearSwing<'_> {
         let turning = Complex::from_polar(1.0, phase);
         let now = crate::elasticity::Vector6::from(self.amplitude().map(|a| (a * turning).re));
         let (shift, turn) = split(&now);
-        let rest = self.head.rest_pose_base_from_head();
+        let rest = self.head.base_from_head_at_rest();
         let centre_in_head = self.head.body().centre_of_mass_in_head;
         let rotation = Rotation::from_scaled_axis(turn) * rest.rotation;
         let centre = rest * nalgebra::Point3::from(centre_in_head) + shift;

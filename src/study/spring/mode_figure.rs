@@ -66,7 +66,7 @@ struct ModeDrawing {
 
 impl ModeDrawing {
     fn of(spec: &HeadSpec, head: &HeadModel, mode: Mode) -> Self {
-        let rest = *head.rest_pose_base_from_head();
+        let rest = *head.base_from_head_at_rest();
         let (shift, turn) = split(&mode.shape);
         let scale = DISPLAYED_AMPLITUDE / turn.norm().max(10.0 * shift.norm()).max(f64::MIN_POSITIVE);
         let centre = (rest * nalgebra::Point3::from(head.body().centre_of_mass_in_head)).coords;

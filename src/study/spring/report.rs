@@ -3,7 +3,7 @@
 use super::metrics::SpringModel;
 use super::{DesignMetrics, Shake, closed_form, simulated};
 use crate::dynamics::{
-    ElementLoad, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, Quantity, max_head_mass_kg,
+    AccelerationKind, ElementLoad, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, max_head_mass_kg,
 };
 use crate::elasticity::{Coil, Matrix6, SpringDesign, buckling_load_n, loaded_stiffness};
 use crate::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2, roll_pitch_yaw};
@@ -138,13 +138,13 @@ pub fn spring_report(
     let model = SpringModel::of(spec, &head)?;
     let at_rest = HeadState {
         t_s: 0.0,
-        head: Kinematics::at_rest(*head.rest_pose_base_from_head()),
+        head: Kinematics::at_rest(*head.base_from_head_at_rest()),
         base: Kinematics::at_rest(Pose::identity()),
     };
     let stress_pa = model.stress_pa(&at_rest);
     let coil = coil_of(spec)?.map(|coil| coil_report(&coil, &model, mass_kg, stress_pa));
     let response = head.frequency_response(&head.default_points());
-    let peak = |axis| (axis_name(axis), response.peak(axis, 20.0, Quantity::Kinematic));
+    let peak = |axis| (axis_name(axis), response.peak(axis, 20.0, AccelerationKind::Kinematic));
     Ok(SpringReport {
         head_mass_kg: mass_kg,
         stands: true,
@@ -245,7 +245,7 @@ fn coil_report(coil: &Coil, model: &SpringModel, head_mass_kg: f64, stress_pa: O
 }
 
 fn rest_report(head: &HeadModel, sag_m: Option<f64>) -> RestReport {
-    let rest = head.rest_pose_base_from_head();
+    let rest = head.base_from_head_at_rest();
     let (roll, pitch, yaw) = roll_pitch_yaw(&rest.rotation);
     RestReport {
         position_m: rest.translation.vector.into(),

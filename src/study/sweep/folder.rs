@@ -3,7 +3,7 @@
 //! ```text
 //! plan.ron         the sweep's spec, all specs that it names, and the version of zsim
 //! points.parquet   the runs: index, values of the axes, seed, hash, and task
-//! parts/           finished runs: one table per journey or per 250 closed forms, named by its hash
+//! parts/           finished runs: one table per simulated run or per 250 closed forms, named by its hash
 //! tmp/             files being written
 //! ```
 

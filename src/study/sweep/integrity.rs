@@ -28,7 +28,7 @@ struct RunIntegrity {
     within_bound: f64,
     bound_over_error: f64,
     bound_m_99: f64,
-    way_m: f64,
+    path_length_m: f64,
 }
 
 impl RunIntegrity {
@@ -38,7 +38,7 @@ impl RunIntegrity {
 
     /// Aligned RMSE over the largest error of a good result.
     fn error_ratio(&self) -> f64 {
-        self.aligned_rmse_m / large_error_m(self.way_m)
+        self.aligned_rmse_m / large_error_m(self.path_length_m)
     }
 }
 
@@ -87,7 +87,7 @@ impl Sweep {
                 within_bound: figures[2][row],
                 bound_over_error: figures[3][row],
                 bound_m_99: figures[4][row],
-                way_m: figures[5][row],
+                path_length_m: figures[5][row],
             }
         };
         Ok(Some(IntegrityReport { axes, runs: numbers.into_iter().enumerate().map(run).collect() }))
@@ -221,7 +221,7 @@ mod tests {
             within_bound,
             bound_over_error: 4.0,
             bound_m_99: 0.01,
-            way_m: 20.0,
+            path_length_m: 20.0,
         }
     }
 

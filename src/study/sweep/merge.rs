@@ -3,7 +3,7 @@
 use super::folder::{ROWS_PER_GROUP, Unit};
 use super::part::Part;
 use super::table::{Column, ColumnType, TableWriter, quoted};
-use super::{Measure, Share, Sweep};
+use super::{Measure, Shard, Sweep};
 use crate::study::StudyError;
 use crate::study::atomic_file::AtomicFile;
 use serde::Serialize;
@@ -28,13 +28,13 @@ pub struct SweepStatus {
 }
 
 impl Sweep {
-    /// Progress of a share of the sweep.
+    /// Progress of a shard of the sweep.
     ///
     /// # Errors
     /// If a part cannot be opened.
-    pub fn status(&self, share: Share) -> Result<SweepStatus, StudyError> {
+    pub fn status(&self, shard: Shard) -> Result<SweepStatus, StudyError> {
         let mut counter = ProgressCounter::default();
-        for unit in share.select(&self.tasks).flatten() {
+        for unit in shard.select(&self.tasks).flatten() {
             let unit = &self.units[*unit as usize];
             counter.add(unit, &self.read_part(unit)?);
         }

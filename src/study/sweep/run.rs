@@ -1,24 +1,24 @@
-//! Runs the missing runs of a sweep, or of a share of it.
+//! Runs the missing runs of a sweep, or of a shard of it.
 
 use super::part::RunOutcome;
 use super::worker::{Worker, WorkerExit};
 use super::{BaseSpec, Sweep};
 use crate::study::StudyError;
-use crate::study::watch::{OnProgress, PieceProgress};
+use crate::study::progress::{OnProgress, PieceProgress};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Share of a sweep for one of several processes: number `index`, from 0, of `count` equal shares.
+/// Shard of a sweep for one of several processes: number `index`, from 0, of `count` equal shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Share {
-    /// Index of this share, from 0.
+pub struct Shard {
+    /// Index of this shard, from 0.
     pub index: usize,
-    /// Number of shares.
+    /// Number of shards.
     pub count: usize,
 }
 
-impl Share {
+impl Shard {
     /// The complete sweep.
     pub const WHOLE: Self = Self { index: 0, count: 1 };
 
@@ -26,7 +26,7 @@ impl Share {
         task % self.count == self.index
     }
 
-    /// The tasks in this share.
+    /// The tasks in this shard.
     pub(super) fn select<T>(self, tasks: &[T]) -> impl Iterator<Item = &T> {
         tasks.iter().enumerate().filter(move |(task, _)| self.contains(*task)).map(|(_, task)| task)
     }
@@ -44,20 +44,20 @@ pub struct Runner<'a> {
 }
 
 impl Sweep {
-    /// Runs the missing runs of `share` on as many threads as rayon has.
+    /// Runs the missing runs of `shard` on as many threads as rayon has.
     ///
     /// Finished runs survive any interruption. Several processes may run the same sweep at once.
     ///
     /// # Errors
     /// If a part cannot be written, a worker cannot be started, or the sweep is stopped. A failed run is not an error
     /// here: its row in the table contains the error.
-    pub fn run(&self, share: Share, runner: &Runner) -> Result<(), StudyError> {
-        if share.index >= share.count {
-            let message = format!("{} of {}: shares are counted from 0", share.index, share.count);
+    pub fn run(&self, shard: Shard, runner: &Runner) -> Result<(), StudyError> {
+        if shard.index >= shard.count {
+            let message = format!("{} of {}: shares are counted from 0", shard.index, shard.count);
             return Err(StudyError::Plan { what: "share", message });
         }
         let mut tasks = Vec::new();
-        for task in (0..self.tasks.len()).filter(|task| share.contains(*task)) {
+        for task in (0..self.tasks.len()).filter(|task| shard.contains(*task)) {
             if !self.missing_units(task)?.is_empty() {
                 tasks.push(task);
             }

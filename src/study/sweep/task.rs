@@ -1,10 +1,10 @@
 //! Execution of a task in a worker process, which limits its resources and isolates its crashes.
 
 use super::identity::ContentHash;
-use super::journey::{MAX_RECORDINGS, TemporaryRecording, record_simulations};
 use super::measure::Origin;
 use super::part::RunOutcome;
 use super::plan::ResolvedRun;
+use super::simulated_run::{MAX_RECORDINGS, TemporaryRecording, record_simulations};
 use super::{LimitSpec, Sweep};
 use crate::simulation::Simulation;
 use crate::study::StudyError;

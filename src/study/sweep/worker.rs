@@ -4,7 +4,7 @@ use super::Sweep;
 use super::run::Runner;
 use super::task::WorkerMessage;
 use crate::study::StudyError;
-use crate::study::watch::PieceProgress;
+use crate::study::progress::PieceProgress;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Grace period over the time limit: fraction of the limit, and seconds. A worker stops an overlong run itself; one that
 /// does not is killed after the grace period.
-const GRACE: (f64, f64) = (0.5, 10.0);
+const GRACE_PERIOD: (f64, f64) = (0.5, 10.0);
 /// Maximum length of a worker's stderr that is read for the error message, bytes.
 const MAX_STDERR_BYTES: u64 = 4096;
 
@@ -87,7 +87,7 @@ impl Worker<'_> {
     /// Receives messages until the process closes its stdout; returns whether it was killed for exceeding the time limit.
     fn supervise(&self, child: &mut Child, messages: &Receiver<WorkerMessage>, started: &mut BTreeSet<usize>) -> bool {
         let limit_s = self.sweep.plan.limit().map_or(f64::INFINITY, |limit| limit.time_s);
-        let timeout_s = limit_s * (1.0 + GRACE.0) + GRACE.1;
+        let timeout_s = limit_s * (1.0 + GRACE_PERIOD.0) + GRACE_PERIOD.1;
         let mut since = Instant::now();
         let mut too_long = false;
         loop {

@@ -1,6 +1,6 @@
 //! Point-to-plane registration of two nodes, and the agreement of their surfaces.
 
-use crate::estimation::matching::{Forest, Matcher};
+use crate::estimation::matching::{Matcher, SearchTrees};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Matrix, Rotation, Vector};
 use nalgebra::{Matrix4, Vector4};
@@ -55,7 +55,7 @@ impl Alignment {
 pub(super) struct NodeSurfels {
     /// All surfels of the used resolutions.
     patches: Vec<Patch>,
-    forest: Forest,
+    trees: SearchTrees,
     /// Subsampled query surfels of each resolution.
     queries: Vec<Vec<Patch>>,
 }
@@ -78,8 +78,8 @@ impl NodeSurfels {
         };
         let queries = levels.iter().map(subsample).collect();
         let patches: Vec<Patch> = levels.into_iter().flatten().collect();
-        let forest = matcher.plant(&patches);
-        Self { patches, forest, queries }
+        let trees = matcher.build_trees(&patches);
+        Self { patches, trees, queries }
     }
 
     /// Query surfels of the finest resolution.
@@ -89,8 +89,8 @@ impl NodeSurfels {
 
     /// The patch nearest to `patch`, if the two pass the match gates.
     fn counterpart(&self, patch: &Patch, matcher: &Matcher, gate_m: f64) -> Option<&Patch> {
-        let nearest = *matcher.neighbours(&self.forest, patch, 1).first()?;
-        Some(&self.patches[nearest as usize]).filter(|other| matcher.agree(patch, other, gate_m))
+        let nearest = *matcher.neighbours(&self.trees, patch, 1).first()?;
+        Some(&self.patches[nearest as usize]).filter(|other| matcher.pass_gates(patch, other, gate_m))
     }
 }
 

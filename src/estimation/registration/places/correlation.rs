@@ -12,9 +12,9 @@ use crate::geometry::{Rotation, Vector};
 /// Edge of the grid cells, m.
 const CELL_M: f64 = 0.5;
 /// Number of cells from the centre to the border: 20 m, as the Scan Context descriptor.
-const HALF: i32 = 40;
+const HALF_GRID_CELLS: i32 = 40;
 /// Search range of the translation in cells to each side: 3 m, the maximum distance of two views of one node.
-const REACH: i32 = 6;
+const SEARCH_CELLS: i32 = 6;
 /// Number of heading steps to each side: 9 degrees, more than one sector of the descriptor.
 const HEADING_STEPS: i32 = 3;
 /// Heading step, rad.
@@ -39,7 +39,7 @@ pub(super) fn start_alignments(from: &[Patch], to: &[Patch], (yaw, up_m): (f64, 
                 (x, y, 1 << octants(&(rotation * wall.normal)).0)
             })
             .collect();
-        for (x, y) in (-REACH..=REACH).flat_map(|x| (-REACH..=REACH).map(move |y| (x, y))) {
+        for (x, y) in (-SEARCH_CELLS..=SEARCH_CELLS).flat_map(|x| (-SEARCH_CELLS..=SEARCH_CELLS).map(move |y| (x, y))) {
             let hits = cells.iter().filter(|(u, v, octant)| grid.at(u + x, v + y) & octant != 0).count();
             found.push((hits as u32, [step, x, y]));
         }
@@ -66,7 +66,7 @@ struct Grid(Vec<u8>);
 
 impl Grid {
     fn of(patches: &[Patch]) -> Self {
-        let mut grid = Self(vec![0; (4 * HALF * HALF) as usize]);
+        let mut grid = Self(vec![0; (4 * HALF_GRID_CELLS * HALF_GRID_CELLS) as usize]);
         for patch in patches.iter().filter(|patch| is_wall(patch)) {
             let (x, y) = cell(&patch.centre);
             let (nearest, next) = octants(&patch.normal);
@@ -85,8 +85,8 @@ impl Grid {
 }
 
 fn index(x: i32, y: i32) -> Option<usize> {
-    let inside = (-HALF..HALF).contains(&x) && (-HALF..HALF).contains(&y);
-    inside.then(|| ((x + HALF) * 2 * HALF + y + HALF) as usize)
+    let inside = (-HALF_GRID_CELLS..HALF_GRID_CELLS).contains(&x) && (-HALF_GRID_CELLS..HALF_GRID_CELLS).contains(&y);
+    inside.then(|| ((x + HALF_GRID_CELLS) * 2 * HALF_GRID_CELLS + y + HALF_GRID_CELLS) as usize)
 }
 
 fn cell(point: &Vector) -> (i32, i32) {

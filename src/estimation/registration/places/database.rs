@@ -1,10 +1,10 @@
 //! Divides the recording into nodes, submaps for place recognition.
 
 use super::PlacesSpec;
+use crate::estimation::observed::ObservedSurfels;
 use crate::estimation::registration::corrected_trajectory::CorrectedTrajectory;
 use crate::estimation::registration::submaps::divide;
 use crate::estimation::surfel::Patch;
-use crate::estimation::survey::Survey;
 use crate::geometry::Vector;
 use std::ops::Range;
 
@@ -28,18 +28,19 @@ pub(super) struct Node {
 /// All nodes and their surfels.
 #[derive(Debug)]
 pub(super) struct PlaceDatabase<'a> {
-    survey: &'a Survey,
-    /// Indices of the sightings of the survey in time order.
+    observed: &'a ObservedSurfels,
+    /// Indices of the observed surfels in time order.
     order: Vec<u32>,
     pub(super) nodes: Vec<Node>,
 }
 
 impl<'a> PlaceDatabase<'a> {
-    /// Divides the part of `survey` within the time of `corrected`.
-    pub(super) fn new(survey: &'a Survey, corrected: &CorrectedTrajectory, spec: &PlacesSpec) -> Self {
+    /// Divides the surfels of `observed` within the time of `corrected`.
+    pub(super) fn new(observed: &'a ObservedSurfels, corrected: &CorrectedTrajectory, spec: &PlacesSpec) -> Self {
         let (start_s, end_s) = corrected.span_s();
-        let tau_s = |k: &u32| survey.sightings[*k as usize].tau_s;
-        let mut order: Vec<u32> = (0..survey.len() as u32).filter(|k| (start_s..=end_s).contains(&tau_s(k))).collect();
+        let tau_s = |k: &u32| observed.surfels[*k as usize].tau_s;
+        let mut order: Vec<u32> =
+            (0..observed.len() as u32).filter(|k| (start_s..=end_s).contains(&tau_s(k))).collect();
         order.sort_by(|a, b| tau_s(a).total_cmp(&tau_s(b)));
         let times_s: Vec<f64> = order.iter().map(tau_s).collect();
         let node = |members: Range<usize>| {
@@ -47,7 +48,7 @@ impl<'a> PlaceDatabase<'a> {
             let head = corrected.pose_at(tau_s).translation.vector;
             let mut heights: Vec<f64> = order[members.clone()]
                 .iter()
-                .map(|k| &survey.sightings[*k as usize].patch)
+                .map(|k| &observed.surfels[*k as usize].patch)
                 .filter(|patch| patch.level == 0)
                 .map(|patch| patch.centre.z - head.z)
                 .collect();
@@ -56,13 +57,13 @@ impl<'a> PlaceDatabase<'a> {
             Node { tau_s, head, ground_m, members }
         };
         let nodes = divide(&times_s, spec.length_s).into_iter().map(node).collect();
-        Self { survey, order, nodes }
+        Self { observed, order, nodes }
     }
 
     /// Surfels of `level` of a node, relative to the head, in map axes.
     pub(super) fn patches(&self, node: usize, level: usize) -> impl Iterator<Item = Patch> + '_ {
         let Node { head, members, .. } = self.nodes[node].clone();
-        let patches = self.order[members].iter().map(|k| self.survey.sightings[*k as usize].patch);
+        let patches = self.order[members].iter().map(|k| self.observed.surfels[*k as usize].patch);
         patches
             .filter(move |patch| patch.level == level)
             .map(move |patch| Patch { centre: patch.centre - head, ..patch })

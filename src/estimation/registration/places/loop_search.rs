@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// Maximum distance of two views of one node, m: up to it the descriptors stay similar.
 const MAX_VIEW_DISTANCE_M: f64 = 3.0;
 /// Number of start alignments per pair.
-const STARTS: usize = 3;
+const START_ALIGNMENTS: usize = 3;
 /// Alignments that differ by less than this, m and rad, are equal.
 const SAME_ALIGNMENT: (f64, f64) = (0.5, 0.1);
 /// The best alignment is ambiguous if a different one has more than this fraction of the agreement.
@@ -38,7 +38,7 @@ struct Candidate {
 
 /// Result of the candidates of one node.
 #[derive(Debug, Clone, Copy, Default)]
-struct Outcome {
+struct NodeSearch {
     /// Number of candidates that were registered.
     registered: usize,
     found: Option<RelativePose>,
@@ -54,7 +54,7 @@ pub(super) struct LoopSearch<'a> {
 impl LoopSearch<'_> {
     /// Verified loops in time order, with statistics.
     pub(super) fn loops(&self, filter: LoopFilter) -> (Vec<RelativePose>, LoopReport) {
-        let outcomes: Vec<Outcome> =
+        let outcomes: Vec<NodeSearch> =
             self.candidates().into_par_iter().map(|of_node| self.test_candidates(&of_node, filter)).collect();
         let loops: Vec<RelativePose> = outcomes.iter().filter_map(|outcome| outcome.found).collect();
         let proposed = outcomes.iter().map(|outcome| outcome.registered).sum();
@@ -106,8 +106,8 @@ impl LoopSearch<'_> {
     /// Registers the candidates of one node; returns the first verified loop.
     ///
     /// With `OutOfReach` it returns no loop if any candidate already agrees at the current pose.
-    fn test_candidates(&self, candidates: &[Candidate], filter: LoopFilter) -> Outcome {
-        let mut outcome = Outcome::default();
+    fn test_candidates(&self, candidates: &[Candidate], filter: LoopFilter) -> NodeSearch {
+        let mut outcome = NodeSearch::default();
         let Some(first) = candidates.first() else { return outcome };
         let late = self.surfels(first.nodes.0);
         for Candidate { nodes, yaw, .. } in candidates {
@@ -115,13 +115,13 @@ impl LoopSearch<'_> {
             let now = self.current_alignment(*nodes);
             let agrees = self.agreement(&late, &early, &now).is_some_and(|ratio| ratio >= self.spec.min_agreement);
             if agrees && filter == LoopFilter::OutOfReach {
-                return Outcome { found: None, ..outcome };
+                return NodeSearch { found: None, ..outcome };
             }
             outcome.registered += 1;
             let Some(fit) = self.verify((&late, &early), *nodes, *yaw) else { continue };
             let (shift_m, turn) = fit.alignment.difference(&now);
             if shift_m < MATCHING_REACH.0 && turn < MATCHING_REACH.1 && filter == LoopFilter::OutOfReach {
-                return Outcome { found: None, ..outcome };
+                return NodeSearch { found: None, ..outcome };
             }
             let (max_drift_m, max_heading_error) = self.max_drift(*nodes);
             if shift_m < max_drift_m && turn < max_heading_error {
@@ -135,7 +135,7 @@ impl LoopSearch<'_> {
     fn verify(&self, (late, early): (&NodeSurfels, &NodeSurfels), nodes: (usize, usize), yaw: f64) -> Option<Fit> {
         let ground_m = |node: usize| self.database.nodes[node].ground_m;
         let up_m = ground_m(nodes.1) - ground_m(nodes.0);
-        let mut starts = correlation::start_alignments(late.finest(), early.finest(), (yaw, up_m), STARTS);
+        let mut starts = correlation::start_alignments(late.finest(), early.finest(), (yaw, up_m), START_ALIGNMENTS);
         starts.push(self.current_alignment(nodes));
         let register = |start: &Alignment| {
             let fit = align(late, early, start, self.matcher)?;

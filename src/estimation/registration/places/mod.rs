@@ -25,7 +25,7 @@ pub use spec::PlacesSpec;
 use super::corrected_trajectory::CorrectedTrajectory;
 use super::{RegistrationSpec, moved};
 use crate::estimation::matching::Matcher;
-use crate::estimation::survey::Survey;
+use crate::estimation::observed::ObservedSurfels;
 use crate::geometry::Trajectory;
 use crate::time::{Span, Stamp};
 use alignment::Alignment;
@@ -69,15 +69,15 @@ pub(super) struct RelativePose {
 /// A trajectory aligned to loop closures, within the convergence range of the matching.
 pub(super) struct PreAligned {
     pub(super) trajectory: Trajectory,
-    /// The survey, moved with the trajectory.
-    pub(super) survey: Survey,
+    /// The observed surfels, moved with the trajectory.
+    pub(super) observed: ObservedSurfels,
 }
 
 /// Detects loop closures and aligns the open-loop trajectory to them if it drifted beyond the matching distance.
 ///
 /// Drift within a node distorts it and makes the measured drift too small; the alignment is repeated until convergence.
 pub(super) fn close_loops(
-    (map_from_head, survey): (&Trajectory, &Survey),
+    (map_from_head, observed): (&Trajectory, &ObservedSurfels),
     corrected: &CorrectedTrajectory,
     matcher: &Matcher,
     spec: &RegistrationSpec,
@@ -86,20 +86,20 @@ pub(super) fn close_loops(
         return (LoopReport::default(), None);
     }
     let nodes = &spec.places;
-    let search = LoopSearch { database: PlaceDatabase::new(survey, corrected, nodes), matcher, spec: nodes };
+    let search = LoopSearch { database: PlaceDatabase::new(observed, corrected, nodes), matcher, spec: nodes };
     let (loops, report) = search.loops(LoopFilter::OutOfReach);
     if loops.len() < nodes.min_loops {
         return (report, None);
     }
-    let (mut trajectory, mut survey) = (map_from_head.clone(), survey.clone());
+    let (mut trajectory, mut observed) = (map_from_head.clone(), observed.clone());
     let mut closures = 0;
     for _ in 0..MAX_PASSES {
-        let Some(corrected) = CorrectedTrajectory::new(&trajectory, &[], survey.origin, &with_pose_graph_drift(spec))
+        let Some(corrected) = CorrectedTrajectory::new(&trajectory, &[], observed.origin, &with_pose_graph_drift(spec))
         else {
             break;
         };
         let mut corrected = corrected.with_gravity_from(map_from_head, &trajectory);
-        let search = LoopSearch { database: PlaceDatabase::new(&survey, &corrected, nodes), matcher, spec: nodes };
+        let search = LoopSearch { database: PlaceDatabase::new(&observed, &corrected, nodes), matcher, spec: nodes };
         let ((loops, _), links) = (search.loops(LoopFilter::All), search.links());
         let level_sigma_rad = spec.level_sigma_deg.to_radians();
         let mut with_loops = corrected.clone();
@@ -116,9 +116,9 @@ pub(super) fn close_loops(
         };
         let next = corrected.into_trajectory(map_from_head.stamps());
         let (shift_m, _) = moved(&trajectory, &next);
-        (trajectory, survey) = (next.clone(), survey.along(&trajectory, &next));
+        (trajectory, observed) = (next.clone(), observed.along(&trajectory, &next));
         let was_out_of_reach =
-            |times_s: &&(f64, f64)| is_out_of_reach(map_from_head, &trajectory, survey.origin, **times_s);
+            |times_s: &&(f64, f64)| is_out_of_reach(map_from_head, &trajectory, observed.origin, **times_s);
         closures = closed.iter().filter(was_out_of_reach).count();
         if shift_m < CONVERGED_M {
             break;
@@ -127,7 +127,7 @@ pub(super) fn close_loops(
     if closures < nodes.min_loops {
         return (report, None);
     }
-    (LoopReport { closed: closures, ..report }, Some(PreAligned { trajectory, survey }))
+    (LoopReport { closed: closures, ..report }, Some(PreAligned { trajectory, observed }))
 }
 
 /// Whether the relative pose between two times, s from `origin`, differs by more than the matching distance.

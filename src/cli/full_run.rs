@@ -1,0 +1,84 @@
+//! `zsim --scene`: the full run, from simulation to report.
+
+use super::Completion;
+use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
+use super::bars::{Bars, stop_flag};
+use super::{output, recording_size};
+use clap::Args;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use zsim::report::{self, Metrics};
+use zsim::simulation::Simulation;
+use zsim::study::{self, EstimateResult, ProgressMonitor};
+
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// The world, a name under scenes/ or a file
+    #[arg(long, value_name = "NAME|FILE", required = true)]
+    pub scene: Option<String>,
+    #[command(flatten)]
+    scenario: ScenarioArguments,
+    #[command(flatten)]
+    estimator: EstimatorArguments,
+    #[command(flatten)]
+    out: OutArguments,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
+    let scene = arguments.scene.as_deref().unwrap_or_default();
+    let options = arguments.estimator.options()?;
+    let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
+    let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
+    let mut bars = Bars::new(global);
+    recording_size::check(&simulation, &wanted, |note| bars.note(note))?;
+    let folder = output::folder(&wanted, arguments.out.force)?;
+    let written: Vec<PathBuf> = study::full_run_files().iter().map(|name| folder.join(name)).collect();
+    output::check_not_inputs(&arguments.scenario.inputs(scene), &written)?;
+
+    simulation.world().notes().iter().for_each(|note| bars.note(note));
+    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
+    let outcome = study::simulate_and_estimate(&simulation, &options, &folder, &mut watch);
+    bars.finish();
+    let outcome = outcome.inspect_err(|_| print_partial_results(&folder))?;
+    print_outcome(global, &outcome, arguments.estimator.profile, &folder)
+}
+
+/// Default folder for results.
+pub(super) fn default_folder(name: &str) -> PathBuf {
+    Path::new("results").join(name)
+}
+
+/// Prints the folder that has the parts completed before a failure.
+pub(super) fn print_partial_results(folder: &Path) {
+    eprintln!("completed parts are in {}", output::printable(&folder.display().to_string()));
+}
+
+/// Time of each part of the estimator, s, and of the open loop in total.
+fn seconds_by_part(outcome: &EstimateResult) -> Value {
+    let parts = outcome.timing.parts().into_iter().map(|(name, seconds)| (format!("{name}_s"), json!(seconds)));
+    let whole = ("open_loop_s".to_owned(), json!(outcome.metrics.open_loop.wall_s));
+    Value::Object(parts.chain([whole]).collect())
+}
+
+/// Prints the results of an estimate, its times with `profile`, and its losses.
+pub(super) fn print_outcome(
+    global: &Global,
+    outcome: &EstimateResult,
+    profile: bool,
+    folder: &Path,
+) -> anyhow::Result<Completion> {
+    let mut figures = serde_json::to_value(&outcome.metrics)?;
+    if let (true, Value::Object(object)) = (profile, &mut figures) {
+        object.insert("profile".to_owned(), seconds_by_part(outcome));
+    }
+    let mut words = report::summary(&outcome.metrics);
+    if let (true, Some(wall_s)) = (profile, outcome.metrics.open_loop.wall_s) {
+        words += "\n";
+        words += &report::timing_table(&outcome.timing, wall_s);
+    }
+    output::print_result(global, &words, figures, Some(folder))?;
+    let Metrics { losses, status, .. } = &outcome.metrics;
+    losses.iter().for_each(|loss| eprintln!("loss: {}", output::printable(&loss.line())));
+    let is_good = status.as_deref().is_none_or(|status| status == "good");
+    Ok(if losses.is_empty() && is_good { Completion::Done } else { Completion::WithLoss })
+}

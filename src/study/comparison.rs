@@ -1,0 +1,203 @@
+//! Comparison of an estimate with the truth in the recording.
+
+use super::artefacts::{decimated, decimated_errors};
+use super::closed_loop::ClosedLoopRun;
+use super::open_loop::OpenLoopRun;
+use super::true_clock::true_offset;
+use super::{ProgressMonitor, StudyError};
+use crate::estimation::EstimatorSpec;
+use crate::evaluation::{
+    Consistency, Drift, Errors, EvaluationError, Pairs, RelativeError, clock_error, consistency, drift, relative_error,
+};
+use crate::geometry::{Pose, PoseCovariance, Trajectory};
+use crate::measurement::LidarCorrection;
+use crate::recording::{Reader, RecordingError, Truth};
+use crate::report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, OpenLoopMetrics, SimulationMetrics};
+use crate::simulation::SimulationSummary;
+use crate::time::{Span, Stamp};
+
+/// Comparison of an estimate with the truth.
+pub(super) struct Comparison {
+    /// The true trajectory, `world_from_head`, decimated for plots.
+    pub truth: Trajectory,
+    /// The true clock offset over lidar time, s.
+    pub clock_offsets: Vec<(Stamp, f64)>,
+    /// Rigid alignment of the estimate by all positions; `None` if they do not determine it.
+    pub world_from_map: Option<Pose>,
+    /// Errors after this alignment.
+    pub errors: Option<AlignedErrors>,
+    drift: Option<Drift>,
+    consistency: Option<Consistency>,
+    per_minute: Option<RelativeError>,
+}
+
+/// Errors after alignment.
+pub(super) struct AlignedErrors {
+    pub position_rmse_m: f64,
+    rotation_rmse_rad: f64,
+    /// Errors over time, decimated for plots.
+    pub decimated: Errors,
+}
+
+impl AlignedErrors {
+    fn after(pairs: &Pairs, world_from_map: &Pose) -> Self {
+        let errors = Errors::after(pairs, world_from_map);
+        let (position_rmse_m, rotation_rmse_rad) = (errors.position_rmse_m(), errors.rotation_rmse_rad());
+        Self { position_rmse_m, rotation_rmse_rad, decimated: decimated_errors(&errors) }
+    }
+}
+
+/// Compares an estimate and its covariances with the truth at the stamps of the estimate.
+///
+/// Returns `None` if the recording has no truth. Poses and errors are decimated, so that memory stays small in long runs.
+pub(super) fn compare_with_truth(
+    reader: &Reader,
+    (map_from_head, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),
+    watch: &mut ProgressMonitor,
+) -> Result<Option<Comparison>, StudyError> {
+    let mut clock_offsets = Vec::new();
+    let heads = reader.truth().filter_map(|record| match record {
+        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
+        Ok(Truth::Clock(now, clock)) => {
+            clock_offsets.push(true_offset(now, &clock));
+            None
+        }
+        Ok(Truth::Base(..)) => None,
+        Err(error) => Some(Err::<(Stamp, Pose), RecordingError>(error)),
+    });
+    let pairs = Pairs::gather(map_from_head, heads)?;
+    if pairs.is_empty() {
+        return Ok(None);
+    }
+    let world_from_map = or_note(pairs.world_from_map(), watch);
+    let errors = world_from_map.map(|world_from_map| AlignedErrors::after(&pairs, &world_from_map));
+    Ok(Some(Comparison {
+        truth: decimated(pairs.stamps().iter().copied().zip(pairs.truth().iter().copied())),
+        clock_offsets,
+        world_from_map,
+        errors,
+        drift: drift(&pairs).ok(),
+        consistency: consistency(&pairs, covariances),
+        per_minute: relative_error(&pairs, Span::from_seconds(60.0)).ok(),
+    }))
+}
+
+/// Pairs the poses of `map_from_head` with the true poses at the same stamps.
+pub(super) fn pairs_of(reader: &Reader, map_from_head: &Trajectory) -> Result<Pairs, StudyError> {
+    let heads = reader.truth().filter_map(|record| match record {
+        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
+        Ok(_) => None,
+        Err(error) => Some(Err::<(Stamp, Pose), RecordingError>(error)),
+    });
+    Ok(Pairs::gather(map_from_head, heads)?)
+}
+
+/// Returns the value, or reports the error as a note.
+fn or_note<T>(result: Result<T, EvaluationError>, watch: &mut ProgressMonitor) -> Option<T> {
+    result.inspect_err(|error| watch.note(&error.to_string())).ok()
+}
+
+/// Metrics of the simulation.
+pub(super) fn simulation_metrics(summary: &SimulationSummary) -> SimulationMetrics {
+    SimulationMetrics {
+        wall_s: Some(summary.wall_s),
+        beams: Some(summary.beams),
+        returns: Some(summary.returns),
+        rays: Some(summary.rays),
+        physics_wall_s: Some(summary.physics_wall_s),
+        rays_wall_s: Some(summary.rays_wall_s),
+    }
+}
+
+/// Metrics of the open loop.
+pub(super) fn open_loop_metrics(
+    run: &OpenLoopRun,
+    comparison: Option<&Comparison>,
+    dead_reckoning: Option<ImuOnlyDrift>,
+) -> OpenLoopMetrics {
+    let drift = comparison.and_then(|found| found.drift);
+    let errors = comparison.and_then(|found| found.errors.as_ref());
+    let consistency = comparison.and_then(|found| found.consistency);
+    let relative = comparison.and_then(|found| found.per_minute);
+    OpenLoopMetrics {
+        wall_s: Some(run.wall_s),
+        fraction_of_acquisition: Some(run.wall_s / run.acquisition_s).filter(|fraction| fraction.is_finite()),
+        fixed_views: None,
+        position_rmse_m: errors.map(|errors| errors.position_rmse_m),
+        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
+        drift_m_per_min: drift.map(|drift| drift.position_m_per_min),
+        yaw_drift_deg_per_min: drift.map(|drift| drift.yaw_rad_per_min.to_degrees()),
+        end_error_m: drift.map(|drift| drift.end_error_m),
+        relative_error_per_minute_m: relative.map(|error| error.position_rmse_m),
+        imu_only_drift_m_per_min: dead_reckoning.map(|drift| drift.0),
+        position_nees: consistency.map(|found| found.position_nees),
+        attitude_nees: consistency.map(|found| found.attitude_nees),
+    }
+}
+
+/// Metrics of the closed loop.
+pub(super) fn closed_loop_metrics(
+    run: &ClosedLoopRun,
+    comparison: Option<&Comparison>,
+    acquisition_s: f64,
+) -> ClosedLoopMetrics {
+    let errors = comparison.and_then(|found| found.errors.as_ref());
+    ClosedLoopMetrics {
+        wall_s: Some(run.wall_s),
+        fraction_of_acquisition: Some(run.wall_s / acquisition_s).filter(|fraction| fraction.is_finite()),
+        position_rmse_m: errors.map(|errors| errors.position_rmse_m),
+        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
+        bound_rmse_m: None,
+        loops: LoopMetrics {
+            proposed: Some(run.loops.proposed as u64),
+            verified: Some(run.loops.verified as u64),
+            closed: Some(run.loops.closed as u64),
+        },
+        left: run.rejected_because.map(str::to_owned),
+    }
+}
+
+/// Position drift of IMU dead reckoning, m/min.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ImuOnlyDrift(f64);
+
+/// Computes the drift of IMU dead reckoning; `None` without truth or if the drift is not defined.
+///
+/// The trajectory is on the IMU clock, which differs from the lidar clock by milliseconds; the effect is negligible
+/// relative to the drift.
+pub(super) fn imu_only(
+    reader: &Reader,
+    dead_reckoning: Result<&Trajectory, &EvaluationError>,
+    watch: &mut ProgressMonitor,
+) -> Result<Option<ImuOnlyDrift>, StudyError> {
+    let dead_reckoning = dead_reckoning.map_err(Clone::clone);
+    let Some(map_from_head) = or_note(dead_reckoning, watch) else { return Ok(None) };
+    let heads = reader.truth().filter_map(|record| match record {
+        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
+        Ok(Truth::Base(..) | Truth::Clock(..)) => None,
+        Err(error) => Some(Err(error)),
+    });
+    let pairs = Pairs::gather(map_from_head, heads)?;
+    Ok(drift(&pairs).ok().map(|drift| ImuOnlyDrift(drift.position_m_per_min)))
+}
+
+/// Metrics of the clock offset.
+pub(super) fn clock_metrics(run: &OpenLoopRun, comparison: Option<&Comparison>) -> ClockMetrics {
+    let error = comparison.and_then(|found| clock_error(&run.clock_offsets, &found.clock_offsets));
+    ClockMetrics {
+        offset_end_s: run.clock_offsets.last().map(|(_, offset_s)| *offset_s),
+        offset_rmse_s: error.map(|error| error.offset_rmse_s),
+        offset_end_error_s: error.map(|error| error.offset_end_error_s),
+    }
+}
+
+/// Metrics of the estimated lidar corrections; `None` for each that was not estimated.
+pub(super) fn lidar_metrics(range_m: f64, extrinsics: &LidarCorrection, spec: &EstimatorSpec) -> LidarMetrics {
+    let (estimates_extrinsics, estimates_range) = (spec.extrinsics.estimated, spec.surfels.range_offset_sigma_m > 0.0);
+    LidarMetrics {
+        range_correction_m: estimates_range.then_some(range_m),
+        rotation_correction_deg: estimates_extrinsics
+            .then(|| (extrinsics.rotation.scaled_axis() * 1_f64.to_degrees()).into()),
+        translation_correction_m: estimates_extrinsics.then(|| extrinsics.translation.into()),
+    }
+}

@@ -1,0 +1,81 @@
+//! Progress reports and cancellation of experiments.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Stage of an experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Physics, ray casting and recording.
+    Simulating,
+    /// Open-loop estimation.
+    Estimating,
+    /// Global registration with loop closure.
+    ClosingLoops,
+    /// Registration of the cloud.
+    Registering,
+    /// Computation of the information bound.
+    Bounding,
+    /// Evaluation, plots and report.
+    Reporting,
+}
+
+/// Progress or note of a running experiment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StudyEvent<'a> {
+    /// Progress of a stage.
+    Progress {
+        /// The stage.
+        stage: Stage,
+        /// Completed fraction, 0 to 1; `None` if the duration of the data is not known.
+        fraction: Option<f64>,
+        /// Processed data, s.
+        done_s: f64,
+    },
+    /// A message for the user.
+    Note(&'a str),
+}
+
+/// Progress callback and stop flag of an experiment.
+pub struct ProgressMonitor<'a> {
+    /// The caller sets this flag to stop the experiment; open files are completed first.
+    pub stop: &'a AtomicBool,
+    /// Called with each event.
+    pub report: &'a mut dyn FnMut(StudyEvent),
+}
+
+impl ProgressMonitor<'_> {
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn progress(&mut self, stage: Stage, done_s: f64, total_s: Option<f64>) {
+        let fraction = total_s.filter(|total_s| *total_s > 0.0).map(|total_s| (done_s / total_s).clamp(0.0, 1.0));
+        (self.report)(StudyEvent::Progress { stage, fraction, done_s });
+    }
+
+    pub(super) fn note(&mut self, text: &str) {
+        (self.report)(StudyEvent::Note(text));
+    }
+}
+
+/// Progress callback with the completed fraction, 0 to 1; it is called from worker threads.
+pub type OnProgress<'a> = &'a (dyn Fn(f64) + Sync);
+
+/// Progress of work in equal pieces that threads complete in any order.
+pub(super) struct PieceProgress<'a> {
+    total: usize,
+    done: AtomicUsize,
+    on_progress: OnProgress<'a>,
+}
+
+impl<'a> PieceProgress<'a> {
+    pub(super) fn new(total: usize, on_progress: OnProgress<'a>) -> Self {
+        Self { total, done: AtomicUsize::new(0), on_progress }
+    }
+
+    /// Counts one completed piece and reports the progress.
+    pub(super) fn finish_one(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        (self.on_progress)(done as f64 / self.total.max(1) as f64);
+    }
+}

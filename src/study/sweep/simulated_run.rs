@@ -1,0 +1,249 @@
+//! Runs that are simulated, recorded and estimated.
+
+use super::Measure;
+use super::component::{Component, Slot};
+use super::measure::Origin;
+use super::part::RunOutcome;
+use super::{LimitSpec, Plan, plan::ResolvedRun};
+use crate::estimation::{EstimatorSpec, Status};
+use crate::recording::{Reader, TopicPreference, Writer};
+use crate::report::IntegrityMetrics;
+use crate::simulation::Simulation;
+use crate::study::calibration::calibration;
+use crate::study::closed_loop::run_closed_loop;
+use crate::study::coverage::{Coverage, CoveragePlan, coverage};
+use crate::study::integrity::{Integrity, path_length_m};
+use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
+use crate::study::record::{description, record_together};
+use crate::study::{CalibrationSpec, ProgressMonitor, StudyError, comparison};
+use std::fs::File;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Maximum number of recordings written at once; bounds memory and temporary disk space.
+pub(super) const MAX_RECORDINGS: usize = 16;
+
+/// A simulation and its recording in an unlinked temporary file, which the system removes when the process ends.
+pub(super) struct TemporaryRecording {
+    simulation: Simulation,
+    /// One file handle per reader thread; empty without a recording.
+    handles: Vec<File>,
+}
+
+/// Runs simulations that share physics and rays, and records them for `readers` threads.
+///
+/// Without `recorded` the simulations are not run, and the recordings are empty.
+pub(super) fn record_simulations(
+    simulations: Vec<Simulation>,
+    (recorded, readers): (bool, usize),
+    limit: LimitSpec,
+) -> Result<Vec<TemporaryRecording>, StudyError> {
+    let without = |simulation| TemporaryRecording { simulation, handles: Vec::new() };
+    if !recorded {
+        return Ok(simulations.into_iter().map(without).collect());
+    }
+    let mut writers = Vec::new();
+    let mut handles = Vec::new();
+    for simulation in &simulations {
+        let file = tempfile::NamedTempFile::new().map_err(StudyError::file(&std::env::temp_dir()))?;
+        let open = || file.reopen().map_err(StudyError::file(file.path()));
+        handles.push((0..readers).map(|_| open()).collect::<Result<Vec<_>, _>>()?);
+        writers.push(Writer::new(open()?, description(simulation, false)?)?);
+        // The file is unlinked here; the open handles keep its content.
+    }
+    with_time_limit(limit, |stop| {
+        record_together(&simulations, writers, &ProgressMonitor { stop, report: &mut |_| {} })
+    })?;
+    Ok(simulations
+        .into_iter()
+        .zip(handles)
+        .map(|(simulation, handles)| TemporaryRecording { simulation, handles })
+        .collect())
+}
+
+impl TemporaryRecording {
+    /// Evaluates a run on this recording, read by thread `reader`.
+    pub fn evaluate(&self, plan: &Plan, run: &ResolvedRun, reader: usize) -> RunOutcome {
+        let measures = plan.result_measures();
+        let started = Instant::now();
+        let outcome = match self.figures(plan, run, &measures, reader) {
+            Ok(figures) => RunOutcome { figures, ..RunOutcome::default() },
+            Err(error) => RunOutcome::from_error(measures.len(), &error),
+        };
+        RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
+    }
+
+    fn figures(
+        &self,
+        plan: &Plan,
+        run: &ResolvedRun,
+        measures: &[Measure],
+        reader: usize,
+    ) -> Result<Vec<Option<f64>>, StudyError> {
+        let limit = plan.limit().ok_or_else(|| wrong_kind("limit"))?;
+        let needs = |origin: Origin| measures.iter().any(|measure| measure.origin() == origin);
+        let swing = match needs(Origin::Swing) || needs(Origin::SwingOrClosedForm) {
+            true => Some(self.swing()?),
+            false => None,
+        };
+        let estimated = match self.handles.get(reader).filter(|_| needs(Origin::Estimate)) {
+            Some(handle) => {
+                let Component::Estimator(estimator) = &plan.component(&run.changed, Slot::Estimator)?.component else {
+                    return Err(wrong_kind("estimator"));
+                };
+                let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
+                let closes_loops = measures.contains(&Measure::ClosedPositionRmseM);
+                Some(with_time_limit(limit, |stop| estimate(file, estimator, closes_loops, stop))?)
+            }
+            None => None,
+        };
+        let figure = |measure: &Measure| {
+            let by_swing = swing.as_ref().and_then(|coverage| swing_figure(*measure, coverage));
+            by_swing.or_else(|| estimated.as_ref().and_then(|estimated| estimated.figure(*measure)))
+        };
+        Ok(measures.iter().map(figure).collect())
+    }
+
+    /// Coverage of the lidar and use of the gyroscope's range, from 5 s (after the rest at the start) to the run's end.
+    fn swing(&self) -> Result<Coverage, StudyError> {
+        let simulation = &self.simulation;
+        let usual = CoveragePlan::default();
+        let plan = CoveragePlan {
+            duration_s: simulation.scenario().duration_s - usual.from_s,
+            rate_limit_deg_per_s: simulation.imu().spec().gyro.limit_deg_per_s,
+            ..usual
+        };
+        coverage(simulation.head(), simulation.motion(), simulation.lidar(), &plan, |_| ())
+    }
+}
+
+fn wrong_kind(what: &str) -> StudyError {
+    StudyError::Plan { what: "the plan", message: format!("{what} is missing for a journey") }
+}
+
+fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {
+    match measure {
+        Measure::FractionSeen => Some(coverage.fraction_seen),
+        Measure::CoveredS => Some(coverage.covered_s),
+        Measure::DensityPerSrS => Some(coverage.density_per_sr_s.mean),
+        Measure::FieldOfViewDeg => Some(coverage.field_of_view_deg),
+        Measure::RateDegPerS => Some(coverage.gyro.most_deg_per_s),
+        Measure::RateP99DegPerS => Some(coverage.gyro.p99_deg_per_s),
+        Measure::Saturated => Some(coverage.gyro.saturated),
+        _ => None,
+    }
+}
+
+/// Metrics of an estimate.
+struct EstimateMetrics {
+    open_loop: crate::report::OpenLoopMetrics,
+    clock: crate::report::ClockMetrics,
+    closed_position_rmse_m: Option<f64>,
+    status: Status,
+    integrity: IntegrityMetrics,
+    path_length_m: f64,
+}
+
+impl EstimateMetrics {
+    fn figure(&self, measure: Measure) -> Option<f64> {
+        let figure = match measure {
+            Measure::PositionRmseM => self.open_loop.position_rmse_m,
+            Measure::RotationRmseDeg => self.open_loop.rotation_rmse_deg,
+            Measure::DriftMPerMin => self.open_loop.drift_m_per_min,
+            Measure::YawDriftDegPerMin => self.open_loop.yaw_drift_deg_per_min,
+            Measure::ClockRmseS => self.clock.offset_rmse_s,
+            Measure::ClosedPositionRmseM => self.closed_position_rmse_m,
+            Measure::Status => Some(f64::from(self.status as u8)),
+            Measure::AlignedRmseM => self.integrity.aligned_rmse_m,
+            Measure::LargestErrorM => self.integrity.largest_error_m,
+            Measure::BoundM99 => self.integrity.bound_m_99,
+            Measure::WithinBound => self.integrity.within_bound,
+            Measure::BoundOverError => self.integrity.bound_over_error,
+            Measure::WayM => Some(self.path_length_m),
+            _ => None,
+        };
+        figure.filter(|figure| figure.is_finite())
+    }
+}
+
+/// Estimates from a recording on one thread, and evaluates the result.
+fn estimate(
+    recording: File,
+    estimator: &EstimatorSpec,
+    closes_loops: bool,
+    stop: &AtomicBool,
+) -> Result<EstimateMetrics, StudyError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    pool.install(|| {
+        let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
+        let reader = Reader::new("the recording", recording)?;
+        let selection = reader.select(&TopicPreference::default())?;
+        let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
+        let how =
+            OpenLoopOptions { estimator, calibration: &found.calibration, recording_surfels: closes_loops, map: None };
+        let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
+        let known = comparison::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
+        let open_loop = comparison::open_loop_metrics(&run, known.as_ref(), None);
+        let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator));
+        let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
+        let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
+        let pairs = comparison::pairs_of(&reader, map_from_head)?;
+        let closed_errors = match closed {
+            Some(_) => comparison::compare_with_truth(&reader, (map_from_head, &[]), &mut watch)?,
+            None => None,
+        };
+        Ok(EstimateMetrics {
+            open_loop,
+            clock: comparison::clock_metrics(&run, known.as_ref()),
+            closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
+            status: integrity.status(),
+            integrity: integrity.metrics(&run, Some(&pairs)),
+            path_length_m: path_length_m(map_from_head),
+        })
+    })
+}
+
+/// Does `work`, and sets its stop flag when the time limit is exceeded.
+fn with_time_limit<T>(
+    limit: LimitSpec,
+    work: impl FnOnce(&AtomicBool) -> Result<T, StudyError>,
+) -> Result<T, StudyError> {
+    let stop = AtomicBool::new(false);
+    let (done, is_done) = channel::<()>();
+    let time = Duration::from_secs_f64(limit.time_s.min(1e9));
+    let result = std::thread::scope(|scope| {
+        let stop = &stop;
+        scope.spawn(move || {
+            if is_done.recv_timeout(time) == Err(RecvTimeoutError::Timeout) {
+                stop.store(true, Ordering::Relaxed);
+            }
+        });
+        let result = work(stop);
+        drop(done);
+        result
+    });
+    match result {
+        Err(_) if stop.load(Ordering::Relaxed) => Err(StudyError::TooLong { time_s: limit.time_s }),
+        result => result,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_stopped_at_the_time_limit() {
+        let limit = LimitSpec { time_s: 0.05, memory_mib: 1 };
+        let forever = |stop: &AtomicBool| {
+            while !stop.load(Ordering::Relaxed) {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            Err::<(), _>(StudyError::Stopped)
+        };
+        let error = with_time_limit(limit, forever).unwrap_err().to_string();
+        assert!(error.contains("0.05 s"), "{error}");
+        assert_eq!(with_time_limit(limit, |_| Ok(3)).unwrap(), 3);
+    }
+}

@@ -1,0 +1,207 @@
+//! The commands with hostile input: protected files, out-of-range numbers, control characters in names, and signals.
+
+use crate::command::run;
+use std::path::Path;
+
+const SHORT: &str = "simulate --scene mocap_room --duration 1s --quiet";
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap()
+}
+
+#[test]
+fn simulate_does_not_replace_files_of_other_origin() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("run.tum"), "foreign").unwrap();
+    let (code, out, _) = run(here.path(), &format!("{SHORT} --out run.mcap"));
+    assert_eq!((code, out.lines().last()), (0, Some("run-2.mcap")));
+    assert_eq!(read(here.path(), "run.tum"), b"foreign");
+    let (code, _, talk) = run(here.path(), &format!("{SHORT} --out y.tum"));
+    assert!(code == 2 && talk.contains("another ending"), "{talk}");
+    assert!(!here.path().join("y.tum").exists());
+}
+
+#[test]
+fn reproduce_does_not_replace_a_table_of_other_origin() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("paper-quick.md"), "# My paper").unwrap();
+    let (code, _, talk) = run(here.path(), "reproduce fig3 --quick --out .");
+    assert!(code == 2 && talk.contains("not written by zsim reproduce"), "{talk}");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn force_does_not_replace_inputs_or_files_of_a_failed_run() {
+    let here = tempfile::tempdir().unwrap();
+    let motion = r#"Replay((poses: Tum("in.tum"), from_route: false, still_s: 1.0, ease_s: 1.0))"#;
+    std::fs::write(here.path().join("replay.ron"), motion).unwrap();
+    let (code, _, talk) = run(here.path(), &format!("{SHORT} --out in.mcap"));
+    assert_eq!(code, 0, "{talk}");
+    let before = ["in.tum", "in.mcap"].map(|name| read(here.path(), name));
+    let (code, _, talk) = run(here.path(), &format!("{SHORT} --motion replay.ron --out in.mcap --force"));
+    assert!(code == 2 && talk.contains("would be replaced by the result"), "{talk}");
+    assert!(before == ["in.tum", "in.mcap"].map(|name| read(here.path(), name)));
+    let (code, out, talk) = run(here.path(), &format!("{SHORT} --seed 2 --out in.mcap --force"));
+    assert_eq!((code, out.lines().last()), (0, Some("in.mcap")), "{talk}");
+    assert!(before[1] != read(here.path(), "in.mcap"), "another seed gives another recording");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "no temporary file remains");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_replaced_folder_has_metrics_only_when_it_is_complete() {
+    use std::process::{Command, Stdio};
+    let here = tempfile::tempdir().unwrap();
+    let has = |name: &str| here.path().join("run").join(name).exists();
+    let journey = "--scene mocap_room --quiet --out run --force";
+    let (code, _, talk) = run(here.path(), &format!("{journey} --duration 8s"));
+    assert!(code == 0 && has("metrics.json") && has("plots/loops.svg") && has("map.ply"), "{talk}");
+    std::fs::write(here.path().join("run/notes.txt"), "mine").unwrap();
+    std::fs::write(here.path().join("run/.partial-x"), "half of a cloud").unwrap();
+
+    let mut child = Command::new(env!("CARGO_BIN_EXE_zsim"))
+        .args(journey.split(' ').chain(["--duration", "20min"]))
+        .current_dir(here.path())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    // A recording longer than the old one shows that the old one has been replaced.
+    while here.path().join("run/recording.mcap").metadata().map_or(0, |file| file.len()) < 10_000_000 {
+        assert!(child.try_wait().unwrap().is_none(), "the process ended before the signal");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let old_files = ["metrics.json", "report.html", "open_loop.tum", "cloud.ply", "plots/loops.svg", ".partial-x"];
+    assert_eq!(old_files.map(has), [false; 6], "the incomplete folder has files of the old run");
+
+    // Without loop closure, no closed-loop file of the first run remains.
+    let (code, _, talk) = run(here.path(), &format!("{journey} --duration 8s --open-loop"));
+    assert!(code == 0 && has("metrics.json") && has("open_loop.tum"), "{talk}");
+    assert_eq!(["closed_loop.tum", "plots/loops.svg", "map.ply"].map(has), [false; 3]);
+    assert_eq!(read(here.path(), "run/notes.txt"), b"mine", "files of other origin remain");
+}
+
+#[test]
+fn force_does_not_replace_the_map_used_for_localisation() {
+    let here = tempfile::tempdir().unwrap();
+    let (code, _, talk) = run(here.path(), "--scene mocap_room --duration 8s --quiet --out run");
+    assert_eq!(code, 0, "{talk}");
+    let map = read(here.path(), "run/map.ply");
+    let in_place = "estimate run/recording.mcap --map run/map.ply --extend-map --quiet --out run --force";
+    let (code, _, talk) = run(here.path(), in_place);
+    assert!(
+        code == 2 && talk.contains("map.ply is an input of this command and would be replaced by the result"),
+        "{talk}"
+    );
+    assert!(map == read(here.path(), "run/map.ply"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_closes_the_files_and_determines_the_exit_code() {
+    use std::process::{Command, Stdio};
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let here = tempfile::tempdir().unwrap();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_zsim"))
+            .args("simulate --scene mocap_room --duration 20min --quiet --out long.mcap".split(' '))
+            .current_dir(here.path())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // The signal handlers are installed before the first chunk is written.
+        while here.path().join("long.mcap").metadata().map_or(0, |file| file.len()) < 100_000 {
+            assert!(child.try_wait().unwrap().is_none(), "the process ended before the signal");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        assert!(Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(code));
+        let (code, _, talk) = run(here.path(), "info long.mcap");
+        assert_eq!(code, 0, "the recording is complete: {talk}");
+    }
+}
+
+#[test]
+fn out_of_range_numbers_are_refused_with_their_limit() {
+    let here = tempfile::tempdir().unwrap();
+    let write = |name: &str, kind: &str, from: &str, to: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs").join(kind);
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(text.contains(from), "{from}");
+        std::fs::write(here.path().join(name), text.replacen(from, to, 1)).unwrap();
+    };
+    write("lidar.ron", "lidars/utm30lx.ron", "rate_hz: 40", "rate_hz: 1e6");
+    write("many.ron", "lidars/utm30lx.ron", "beams: 1081", "beams: 99999999999");
+    write("imu.ron", "imus/3dm_gx2.ron", "rate_hz: 100", "rate_hz: 1e18");
+    for (arguments, words) in [
+        ("check lidar.ron", "0.1 to 1000"),
+        ("check many.ron", "from 0 to 4294967295, found 99999999999"),
+        ("check imu.ron", "1 to 10000"),
+        ("simulate --scene mocap_room --lidar lidar.ron", "0.1 to 1000"),
+        ("simulate --scene mocap_room --duration 1e8s", "at most 604800 s (7 days)"),
+        ("coverage --duration 1e5s --motion stand", "at most 3600 s"),
+        ("gains --step 1e-12", "expected 0.00001 to 0.1 s"),
+        ("gains --realisations 1000000000", "at most 1000"),
+        ("gains --realisations 1000 --period 100", "more than 10000000"),
+        ("gains --period 1e9", "more than 10000:"),
+        ("check office --threads 1000000", "from 1 to 1024"),
+    ] {
+        let (code, _, talk) = run(here.path(), arguments);
+        assert!(code == 2 && talk.contains(words), "`{arguments}`: {code} {talk}");
+    }
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "no file remains");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_larger_than_the_disk_is_not_started() {
+    // 2^20 beams at 28 Hz are 3e7 beams/s of 16 bytes each: 280 TB in 7 days.
+    let here = tempfile::tempdir().unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/lidars/mid360.ron");
+    let text = std::fs::read_to_string(path).unwrap();
+    let text = text.replace("rate_hz: 10,", "rate_hz: 28,").replace("beams: 20000,", "beams: 1048576,");
+    std::fs::write(here.path().join("dense.ron"), text).unwrap();
+    let dense = "simulate --scene mocap_room --motion stand --lidar dense.ron --duration 168h --out a.mcap";
+    let (code, _, talk) = run(here.path(), dense);
+    assert!(code == 1 && talk.contains("GB free"), "{talk}");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn empty_and_out_of_range_trajectories_are_errors() {
+    let here = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(here.path().join(name), text).unwrap();
+    let poses = "1 0 0 0 0 0 0 1\n2 0 1 0 0 0 0 1\n3 1 0 0 0 0 0 1\n";
+    write("empty.tum", "");
+    write("poses.tum", poses);
+    write("marked.tum", &format!("\u{feff}{poses}"));
+    write("far.tum", &poses.replacen("2 0 1", "2 0 1e200", 1));
+    for (arguments, words) in [
+        ("base empty.tum", "empty.tum: a trajectory of 0 poses; 3 are needed"),
+        (
+            "evaluate --estimate far.tum --truth poses.tum",
+            "far.tum: the pose at t = 2.000000000 s has a coordinate of 1e200 m",
+        ),
+        ("evaluate --estimate poses.tum --truth far.tum", "far.tum: "),
+    ] {
+        let (code, _, talk) = run(here.path(), arguments);
+        assert!(code == 1 && talk.contains(words), "`{arguments}`: {code} {talk}");
+    }
+    let (code, out, talk) = run(here.path(), "evaluate --estimate marked.tum --truth poses.tum");
+    assert!(code == 0 && out.contains("position_rmse_m"), "with a byte order mark: {talk}");
+}
+
+#[test]
+fn control_characters_do_not_reach_the_terminal() {
+    let here = tempfile::tempdir().unwrap();
+    let name = "\u{1b}]0;title\u{7}.ron";
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/imus/3dm_gx2.ron"), here.path().join(name))
+        .unwrap();
+    for (arguments, code) in [(format!("check {name}"), 0), (format!("check missing{name}"), 2)] {
+        let (ended, out, talk) = run(here.path(), &arguments);
+        assert_eq!(ended, code, "{talk}");
+        assert!(!(out + &talk).contains(['\u{1b}', '\u{7}']));
+    }
+    let (_, out, _) = run(here.path(), &format!("check {name}"));
+    assert!(out.starts_with("\\u{1b}]0;title\\u{7}.ron: "), "{out}");
+}

@@ -1,0 +1,12 @@
+//! The commands: output, files and errors.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+#[path = "../command/mod.rs"]
+mod command;
+mod commands;
+mod gains;
+mod hostile;
+mod maps;
+mod specs;
+mod summary;

@@ -1,0 +1,15 @@
+//! The estimator: accuracy on closed-form walks, full runs with faults, maps, and the base trajectory.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod accuracy;
+mod base;
+#[path = "../command/mod.rs"]
+mod command;
+mod faults;
+mod fixture;
+mod maps;
+#[path = "../recordings/mod.rs"]
+mod recordings;
+mod registration;
+mod stops;

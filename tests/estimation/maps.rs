@@ -1,0 +1,231 @@
+//! Persistent maps over two sessions in one building: localisation, extension and merging.
+
+use std::sync::LazyLock;
+use zsim::estimation::{
+    EstimatedPose, EstimationError, Estimator, EstimatorSpec, OpenLoop, RegistrationInput, WarningKind,
+};
+use zsim::estimation::{load, locate_map, map_of, merge_maps, register};
+use zsim::evaluation::{Errors, Pairs};
+use zsim::geometry::{Pose, PoseCovariance, Rotation, Surface, Trajectory, Vector};
+use zsim::measurement::{Calibration, Measurement};
+use zsim::random::Seed;
+use zsim::recording::{Reader, RunDescription, TopicPreference, Writer};
+use zsim::simulation::{Scenario, Simulation};
+use zsim::surfel_map::SurfelMap;
+use zsim::time::{Span, Stamp};
+use zsim::world::World;
+
+/// A recording of the office between two times of a walk.
+struct Session {
+    measurements: Vec<Measurement>,
+    calibration: Calibration,
+    truth: Trajectory,
+}
+
+impl Session {
+    fn record(seed: u64, (from_s, to_s): (f64, f64)) -> Self {
+        let scenario = Scenario { duration_s: to_s, seed: Seed(seed), ..Scenario::in_scene("office") };
+        let simulation = Simulation::prepare(&scenario).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session.mcap");
+        let calibration = simulation.calibration();
+        let run = RunDescription {
+            calibration: calibration.clone(),
+            imu_rate_hz: 100.0,
+            base_imu: None,
+            manifest: String::new(),
+            truth_tf: false,
+        };
+        let mut writer = Writer::create(&path, run).unwrap();
+        simulation.run(&mut writer, &mut |_| ()).unwrap();
+        writer.finish().unwrap();
+        let reader = Reader::open(&path).unwrap();
+        let selection = reader.select(&TopicPreference::default()).unwrap();
+        let truth = reader.truth_trajectory().unwrap();
+        let begin = truth.span().unwrap().0 + Span::from_seconds(from_s);
+        let all = reader.measurements(&selection).map(Result::unwrap);
+        Self { measurements: all.filter(|m| stamp(m) >= begin).collect(), calibration, truth }
+    }
+
+    fn estimate(&self, within: Option<(&SurfelMap, &Pose)>) -> Result<OpenLoop, EstimationError> {
+        let mut estimator = Estimator::new(&spec(), &self.calibration)?.recording_surfels();
+        if let Some((map, start)) = within {
+            estimator = estimator.in_map(map, start);
+        }
+        for measurement in &self.measurements {
+            estimator.push(measurement.clone())?;
+        }
+        estimator.finish()
+    }
+
+    /// The error of a trajectory in a map of known pose in the world, without alignment.
+    fn error_in(&self, map_from_head: &Trajectory, world_from_map: &Pose) -> Errors {
+        Errors::after(&Pairs::associate(map_from_head, &self.truth).unwrap(), world_from_map)
+    }
+
+    /// True initial pose of the head in that map.
+    fn start_in(&self, world_from_map: &Pose) -> Pose {
+        let first = self.measurements.iter().find_map(|m| match m {
+            Measurement::Imu(sample) => Some(sample.stamp),
+            Measurement::Lidar(_) => None,
+        });
+        world_from_map.inverse() * self.truth.at(first.unwrap() + Span::from_seconds(0.1)).unwrap()
+    }
+}
+
+fn stamp(measurement: &Measurement) -> Stamp {
+    match measurement {
+        Measurement::Imu(sample) => sample.stamp,
+        Measurement::Lidar(scan) => scan.stamp,
+    }
+}
+
+fn spec() -> EstimatorSpec {
+    load("default").unwrap()
+}
+
+fn covariances(poses: &[EstimatedPose]) -> Vec<(Stamp, PoseCovariance)> {
+    poses.iter().map(|pose| (pose.stamp, pose.covariance)).collect()
+}
+
+/// A mapped session: the map, its true pose, and the RMSE of its trajectory, m.
+struct Mapped {
+    session: Session,
+    map: SurfelMap,
+    world_from_map: Pose,
+    rmse_m: f64,
+}
+
+impl Mapped {
+    fn by(session: Session) -> Self {
+        let run = session.estimate(None).unwrap();
+        let covariances = covariances(&run.poses);
+        let OpenLoop { trajectory, lidar, observed, .. } = &run;
+        let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, observed };
+        let closed = register(travelled, &session.calibration, &spec());
+        let both = (&run.trajectory, &closed.trajectory);
+        let map = map_of(&run.observed, both, &covariances, &spec().registration).unwrap();
+        let pairs = Pairs::associate(&closed.trajectory, &session.truth).unwrap();
+        let world_from_map = pairs.world_from_map().unwrap();
+        let rmse_m = Errors::after(&pairs, &world_from_map).position_rmse_m();
+        Self { session, map, world_from_map, rmse_m }
+    }
+
+    /// True pose of `other`'s map in this one.
+    fn pose_of(&self, other: &Self) -> Pose {
+        self.world_from_map.inverse() * other.world_from_map
+    }
+}
+
+/// The first session starts at the start of the route, the second in motion further along it, with other noise.
+static FIRST: LazyLock<Mapped> = LazyLock::new(|| Mapped::by(Session::record(101, (0.0, 45.0))));
+static SECOND: LazyLock<Mapped> = LazyLock::new(|| Mapped::by(Session::record(202, (18.0, 42.0))));
+
+fn displaced(pose: &Pose, by: Vector, yaw_deg: f64) -> Pose {
+    let turn = Rotation::from_axis_angle(&Vector::z_axis(), yaw_deg.to_radians());
+    Pose::from_parts((pose.translation.vector + by).into(), turn * pose.rotation)
+}
+
+/// RMS distance of the finest surfels from the true surfaces along their normals, m.
+///
+/// Weighted by points, without the worst 5 %, which are at edges.
+fn surface_rmse_m(map: &SurfelMap, world_from_map: &Pose, world: &World) -> f64 {
+    let mut off: Vec<(f64, f64)> = Vec::new();
+    for surfel in map.surfels().iter().filter(|surfel| surfel.level == 0) {
+        let centre = world_from_map.transform_point(&surfel.centre_in_map.into()).coords;
+        let normal = world_from_map.rotation * surfel.normal_in_map;
+        let Some(near) = world.nearest(&centre, 0.5) else { continue };
+        off.push(((centre - near.point_in_world).dot(&normal).abs(), surfel.points));
+    }
+    off.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f64 = off.iter().map(|(_, points)| points).sum();
+    let (mut points, mut squares) = (0.0, 0.0);
+    for (off_m, of) in &off {
+        if points > 0.95 * all {
+            break;
+        }
+        points += of;
+        squares += of * off_m * off_m;
+    }
+    (squares / points).sqrt()
+}
+
+#[test]
+fn a_second_session_is_localised_to_the_accuracy_of_the_map_without_drift() {
+    let (first, second) = (&*FIRST, &SECOND.session);
+    let start = displaced(&second.start_in(&first.world_from_map), Vector::new(0.5, -0.4, 0.1), 15.0);
+    let run = second.estimate(Some((&first.map, &start))).unwrap();
+    let errors = second.error_in(&run.trajectory, &first.world_from_map);
+    let rmse_m = errors.position_rmse_m();
+    println!("mapped to {:.2} mm, localised to {:.2} mm", 1e3 * first.rmse_m, 1e3 * rmse_m);
+    assert!(rmse_m < 1.5 * first.rmse_m + 0.003, "{rmse_m} m in a map of {} m", first.rmse_m);
+    // From the first pose on: there is no pose before the head is localised.
+    let (begun, ended) = (run.trajectory.span().unwrap(), second.truth.span().unwrap().1);
+    assert!((begun.1 - ended).seconds().abs() < 0.5);
+    let part = |from: f64, to: f64| {
+        let (begin, whole_s) = (begun.0, begun.1.seconds_since(begun.0));
+        let at = |share: f64| begin + Span::from_seconds(whole_s * share);
+        let poses = run.trajectory.iter().filter(|(stamp, _)| (at(from)..at(to)).contains(stamp));
+        let part = Trajectory::from_poses(poses.map(|(stamp, pose)| (stamp, *pose))).unwrap();
+        second.error_in(&part, &first.world_from_map).position_rmse_m()
+    };
+    let (early, late) = (part(0.0, 0.3), part(0.7, 1.0));
+    assert!(late < 1.5 * early + 0.003, "{early} m early, {late} m late");
+}
+
+#[test]
+fn after_a_gap_the_head_is_relocalised_in_the_map() {
+    let (first, second) = (&*FIRST, &SECOND.session);
+    let begin = second.measurements.iter().map(stamp).min().unwrap();
+    let silence = begin + Span::from_seconds(10.0)..begin + Span::from_seconds(11.0);
+    let kept = second.measurements.iter().filter(|m| !silence.contains(&stamp(m))).cloned().collect();
+    let gapped = Session { measurements: kept, calibration: second.calibration.clone(), truth: second.truth.clone() };
+    let start = second.start_in(&first.world_from_map);
+    let run = gapped.estimate(Some((&first.map, &start))).unwrap();
+    assert!(run.warnings.iter().any(|w| matches!(w.kind, WarningKind::Restarted { .. })), "{:?}", run.warnings);
+    assert!(!run.warnings.iter().any(|w| w.kind == WarningKind::LostInMap), "{:?}", run.warnings);
+    let behind = run.trajectory.iter().filter(|(stamp, _)| *stamp > silence.end + Span::from_seconds(1.0));
+    let behind = Trajectory::from_poses(behind.map(|(stamp, pose)| (stamp, *pose))).unwrap();
+    let rmse_m = second.error_in(&behind, &first.world_from_map).position_rmse_m();
+    println!("after a gap {:.2} mm", 1e3 * rmse_m);
+    assert!(rmse_m < 0.01, "{rmse_m} m");
+}
+
+#[test]
+fn an_incorrect_start_is_an_error_without_a_trajectory() {
+    let (first, second) = (&*FIRST, &SECOND.session);
+    let start = displaced(&second.start_in(&first.world_from_map), Vector::new(9.0, 7.0, 0.0), 90.0);
+    match second.estimate(Some((&first.map, &start))) {
+        Err(error @ EstimationError::NotInMap(_)) => assert!(error.to_string().contains("--start"), "{error}"),
+        Ok(_) => panic!("localised 11 m away"),
+        Err(other) => panic!("{other}"),
+    }
+}
+
+#[test]
+fn extended_and_merged_maps_are_as_accurate_as_their_parts() {
+    let (first, second) = (&*FIRST, &*SECOND);
+    let world = World::load("office").unwrap();
+    let of = |map: &SurfelMap, at: &Pose| surface_rmse_m(map, at, &world);
+    let parts = [of(&first.map, &first.world_from_map), of(&second.map, &second.world_from_map)];
+    // Merged, from an approximate pose.
+    let truly = first.pose_of(second);
+    let found =
+        locate_map(&first.map, &second.map, &displaced(&truly, Vector::new(-0.5, 0.5, 0.0), -12.0), &spec()).unwrap();
+    let apart = truly.inverse() * found.map_from_query;
+    let merged = merge_maps(&first.map, &second.map, &found.map_from_query).unwrap();
+    let both = of(&merged, &first.world_from_map);
+    println!("parts {parts:?} m, merged {both} m, pose error {:.4} m", apart.translation.vector.norm());
+    assert!(apart.translation.vector.norm() < 0.02 && apart.rotation.angle() < 0.003, "{apart}");
+    assert!(both < 1.1 * parts[0].max(parts[1]), "{parts:?} and {both}");
+    assert!(merged.surfels().len() < first.map.surfels().len() + second.map.surfels().len());
+    // Extended: the second session adds surfels to the map of the first.
+    let start = second.session.start_in(&first.world_from_map);
+    let run = second.session.estimate(Some((&first.map, &start))).unwrap();
+    let of_run = (&run.trajectory, &run.trajectory);
+    let seen = map_of(&run.observed, of_run, &covariances(&run.poses), &spec().registration).unwrap();
+    let longer = merge_maps(&first.map, &seen, &Pose::identity()).unwrap();
+    let longer_off = of(&longer, &first.world_from_map);
+    println!("extended {longer_off} m");
+    assert!(longer_off < 1.1 * parts[0].max(parts[1]), "{parts:?} and {longer_off}");
+}

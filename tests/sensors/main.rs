@@ -1,0 +1,7 @@
+//! Sensors compared with closed forms and with their specs.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod imu;
+mod lidar;
+mod specs;

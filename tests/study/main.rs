@@ -1,0 +1,15 @@
+//! Studies: coverage, gains, latency, spring design, sweeps, and the paper's experiments.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+#[path = "../command/mod.rs"]
+mod command;
+mod coverage;
+mod gains;
+mod latency;
+mod reproduction;
+#[path = "../skip/mod.rs"]
+mod skip;
+mod slurm;
+mod spring_design;
+mod sweep;

@@ -1,0 +1,374 @@
+//! Sweeps: reproducible tables with any processes, threads and stops, and failures as rows.
+
+use crate::command::run;
+use assert_cmd::Command;
+use rand::RngExt;
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command as Process, Stdio};
+use std::time::Duration;
+use zsim::random::Seed;
+
+const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
+
+fn run_ok(folder: &Path, arguments: &str) -> String {
+    let (code, out, talk) = run(folder, arguments);
+    assert_eq!(code, 0, "`{arguments}`: {talk}");
+    out
+}
+
+/// The bytes of both result tables.
+fn tables(folder: &Path) -> [Vec<u8>; 2] {
+    ["table.parquet", "table.csv"].map(|name| std::fs::read(folder.join(name)).unwrap())
+}
+
+/// The cells of a column.
+fn column(folder: &Path, name: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(folder.join("table.csv")).unwrap();
+    let mut lines = text.lines();
+    let place = lines.next().unwrap().split(',').position(|cell| cell == name).unwrap();
+    lines.map(|line| line.split(',').nth(place).unwrap().to_owned()).collect()
+}
+
+fn numbers(folder: &Path, name: &str) -> Vec<f64> {
+    column(folder, name).iter().map(|cell| cell.parse().unwrap()).collect()
+}
+
+/// Number of finished tasks of the sweep.
+fn parts(folder: &Path) -> usize {
+    std::fs::read_dir(folder.join("swept/parts")).map_or(0, Iterator::count)
+}
+
+/// Starts `run` in a process and kills it some time after `enough` tasks are done. Returns whether it had ended
+/// before.
+fn run_and_kill(folder: &Path, enough: usize, after: Duration) -> bool {
+    let mut child = Process::new(ZSIM)
+        .args(["sweep", "run", "--quiet", "--threads", "2", "swept"])
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    while parts(folder) < enough && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    std::thread::sleep(after);
+    let ended = child.try_wait().unwrap().is_some();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    ended
+}
+
+const SPRINGS: &str = r#"(
+    base: spring(head: "handheld", shake: (pitch_deg: 2.0)),
+    axes: [
+        linear(path: "head.coil_diameter_mm", from: 18.0, to: 34.0),
+        log(path: "head.wire_diameter_mm", from: 1.6, to: 4.0),
+        values(path: "head.material", values: ["spring_steel", "stainless"]),
+    ],
+    sampling: sobol(count: 4096),
+    measures: [rocking_hz, spring_mass_g, field_of_view_deg],
+    front: [(measure: spring_mass_g, aim: least), (measure: field_of_view_deg, aim: most)],
+)"#;
+
+#[test]
+fn a_sweep_is_the_same_in_one_call_in_parts_and_after_kills() {
+    let here = tempfile::tempdir().unwrap();
+    let at = |name: &str| here.path().join(name);
+    std::fs::write(at("springs.ron"), SPRINGS).unwrap();
+    run_ok(here.path(), "sweep plan springs.ron -o whole");
+    run_ok(here.path(), "sweep run whole --threads 1");
+    run_ok(here.path(), "sweep merge whole");
+
+    run_ok(here.path(), "sweep plan springs.ron -o shares");
+    for index in [2, 0, 1] {
+        run_ok(here.path(), &format!("sweep run shares --threads 2 --index {index} --count 3"));
+    }
+    let (code, _, talk) = run(here.path(), "sweep run shares --index 3 --count 3");
+    assert!(code == 2 && talk.contains("counted from 0"), "{talk}");
+    run_ok(here.path(), "sweep merge shares");
+    assert!(tables(&at("whole")) == tables(&at("shares")));
+
+    run_ok(here.path(), "sweep plan springs.ron -o swept");
+    let mut stream = Seed(7).stream("kills");
+    let mut kills = 0;
+    // The kill depends on the number of finished tasks, not only on time: a fast machine could finish the sweep first.
+    while kills < 10 && !run_and_kill(here.path(), kills, Duration::from_millis(stream.random_range(0..20))) {
+        kills += 1;
+    }
+    assert!(kills > 2, "the sweep ended before the kill");
+    let (code, out, _) = run(here.path(), "sweep merge swept --json");
+    let left = serde_json::from_str::<Value>(&out).map_or(1, |told| told["status"]["missing"].as_u64().unwrap());
+    assert!(code == 3 && left > 0 || code == 0 && left == 0 || code == 2, "{code} {left}");
+    run_ok(here.path(), "sweep run swept");
+    run_ok(here.path(), "sweep merge swept");
+    assert!(tables(&at("whole")) == tables(&at("swept")));
+
+    // Spring mass: m = rho pi^2 D d^2 n / 4.
+    let [coil, wire, mass] =
+        ["coil_diameter_mm", "wire_diameter_mm", "spring_mass_g"].map(|name| column(&at("whole"), name));
+    let material = column(&at("whole"), "material");
+    let mut stable = 0;
+    for row in (0..4096).filter(|row| !mass[*row].is_empty()) {
+        let [coil, wire, mass] = [&coil, &wire, &mass].map(|cells| cells[row].parse::<f64>().unwrap());
+        let density = if material[row] == "stainless" { 7900.0 } else { 7850.0 };
+        let law = density * std::f64::consts::PI.powi(2) / 4.0 * coil * wire * wire * 12.0 * 1e-6;
+        assert!((mass / law - 1.0).abs() < 0.02, "{mass} g, {law} g");
+        stable += 1;
+    }
+    assert!(stable > 1000, "{stable} stable heads");
+    let failed = column(&at("whole"), "error").iter().filter(|error| !error.is_empty()).count();
+    assert_eq!(stable + failed, 4096, "an unstable head is a row with its error");
+    for name in ["study.md", "trends.csv", "front.csv", "plots/front.png", "plots/effects_rocking_hz.svg"] {
+        assert!(at("whole").join(name).metadata().unwrap().len() > 100, "{name}");
+    }
+}
+
+#[test]
+fn a_plan_is_continued_and_replaced_only_with_force() {
+    let here = tempfile::tempdir().unwrap();
+    let few = SPRINGS.replace("4096", "256");
+    std::fs::write(here.path().join("a.ron"), &few).unwrap();
+    std::fs::write(here.path().join("b.ron"), few.replace("to: 34.0", "to: 33.0")).unwrap();
+    run_ok(here.path(), "sweep plan a.ron -o swept");
+    run_ok(here.path(), "sweep run swept");
+    run_ok(here.path(), "sweep plan a.ron -o swept");
+    let out = run_ok(here.path(), "sweep status swept --json");
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 256);
+    let (code, _, talk) = run(here.path(), "sweep plan b.ron -o swept");
+    assert!(code == 2 && talk.contains("another experiment"), "{talk}");
+    run_ok(here.path(), "sweep plan b.ron -o swept --force");
+    let out = run_ok(here.path(), "sweep status swept --json");
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 0);
+    // Back to the first plan: its finished runs are found by their content.
+    run_ok(here.path(), "sweep plan a.ron -o swept --force");
+    let out = run_ok(here.path(), "sweep status swept --json");
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 256);
+    let (code, _, talk) = run(here.path(), "sweep run nowhere");
+    assert!(code == 2 && talk.contains("contains no sweep"), "{talk}");
+}
+
+#[test]
+fn a_study_continues_for_the_same_spec_and_keeps_files_of_other_origin() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("a.ron"), SPRINGS.replace("4096", "256")).unwrap();
+    run_ok(here.path(), "study a.ron -o swept");
+    run_ok(here.path(), "study ./a.ron -o swept");
+    let foreign = here.path().join("thesis");
+    std::fs::create_dir(&foreign).unwrap();
+    std::fs::write(foreign.join("table.csv"), "years of work").unwrap();
+    for command in ["study a.ron -o thesis", "sweep plan a.ron -o thesis"] {
+        let (code, _, talk) = run(here.path(), command);
+        assert!(code == 2 && talk.contains("another experiment"), "{talk}");
+    }
+    assert_eq!(std::fs::read_to_string(foreign.join("table.csv")).unwrap(), "years of work");
+    assert_eq!(std::fs::read_dir(&foreign).unwrap().count(), 1, "no file is added");
+}
+
+#[test]
+fn damaged_and_swapped_parts_are_computed_again() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("a.ron"), SPRINGS.replace("4096", "1000")).unwrap();
+    run_ok(here.path(), "study a.ron -o swept");
+    let whole = tables(&here.path().join("swept"));
+    let parts: Vec<_> =
+        std::fs::read_dir(here.path().join("swept/parts")).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(parts.len(), 4, "parts have 250 runs each");
+    let damage: [(&dyn Fn(), u64); 4] = [
+        (&|| std::fs::write(&parts[0], &std::fs::read(&parts[0]).unwrap()[..1000]).unwrap(), 250),
+        (&|| std::fs::write(&parts[1], "").unwrap(), 250),
+        (
+            &|| {
+                let [a, b] = [&parts[0], &parts[1]].map(|path| std::fs::read(path).unwrap());
+                std::fs::write(&parts[0], b).unwrap();
+                std::fs::write(&parts[1], a).unwrap();
+            },
+            500,
+        ),
+        (
+            // Flips a bit of a number in the middle of the file.
+            &|| {
+                let mut bytes = std::fs::read(&parts[2]).unwrap();
+                let middle = bytes.len() / 3;
+                bytes[middle] ^= 1;
+                std::fs::write(&parts[2], bytes).unwrap();
+            },
+            250,
+        ),
+    ];
+    for (harm, damaged) in damage {
+        harm();
+        let status = run_ok(here.path(), "sweep status swept --json");
+        let status: Value = serde_json::from_str(&status).unwrap();
+        assert_eq!((status["missing"].as_u64(), status["damaged"].as_u64()), (Some(damaged), Some(damaged)));
+        let (code, _, talk) = run(here.path(), "sweep merge swept");
+        assert_eq!(code, 3, "a merge without the damaged parts must report loss: {talk}");
+        run_ok(here.path(), "sweep run swept");
+        run_ok(here.path(), "sweep merge swept");
+        assert!(tables(&here.path().join("swept")) == whole);
+    }
+}
+
+#[test]
+fn names_in_a_plan_cannot_inject_into_a_slurm_script() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("a.ron"), SPRINGS.replace("4096", "256")).unwrap();
+    run_ok(here.path(), "sweep plan a.ron -o swept");
+    let plan = here.path().join("swept/plan.ron");
+    let text = std::fs::read_to_string(&plan).unwrap();
+    let named = |name: &str| {
+        assert!(text.contains("name: \"a\""));
+        std::fs::write(&plan, text.replacen("name: \"a\"", &format!("name: \"{name}\""), 1)).unwrap();
+        run(here.path(), "sweep submit swept --slurm --dry-run")
+    };
+    let (code, _, talk) = named("a --uid=0; $(touch b)");
+    assert_eq!(code, 0, "{talk}");
+    let script = std::fs::read_to_string(here.path().join("swept/slurm/array.sh")).unwrap();
+    assert!(script.contains("#SBATCH --job-name=zsim-a_--uid_0____touch_b_\n"), "{script}");
+    let (code, _, talk) = named("a\\ntouch b\\u{1b}[2J");
+    assert!(code == 2 && talk.contains("control characters") && !talk.contains('\u{1b}'), "{talk}");
+}
+
+const WALKS: &str = r#"(
+    base: journey(
+        scene: "mocap_room", head: "handheld", motion: "hand", lidar: "utm30lx", imu: "3dm_gx2", clock: "drifting",
+        estimator: "default", duration_s: 7.0, limit: (time_s: 300.0, memory_mib: 2048),
+    ),
+    axes: [
+        values(path: "imu", values: ["3dm_gx2", "tactical"]),
+        levels(name: "variant", levels: [
+            (name: "base"),
+            (name: "the same"),
+            (name: "no offset grids", set: { "estimator.offset_grids": false }),
+        ]),
+    ],
+    sampling: grid,
+    seeds: [3],
+    measures: [position_rmse_m, drift_m_per_min, fraction_seen, wall_s],
+)"#;
+
+#[test]
+fn full_runs_share_work_and_give_the_results_of_single_runs() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("walks.ron"), WALKS).unwrap();
+    let out = run_ok(here.path(), "sweep plan walks.ron -o swept --json");
+    let planned: Value = serde_json::from_str(&out).unwrap();
+    // Six runs, two of which equal another, with one simulated motion.
+    assert_eq!((planned["points"].as_u64(), planned["tasks"].as_u64()), (Some(6), Some(1)));
+    let mut kills = 0;
+    while kills < 3 && !run_and_kill(here.path(), kills, Duration::from_millis(500)) {
+        kills += 1;
+    }
+    run_ok(here.path(), "sweep run swept --threads 2");
+    run_ok(here.path(), "sweep merge swept");
+    assert_eq!(std::fs::read_dir(here.path().join("swept/parts")).unwrap().count(), 4);
+    run_ok(here.path(), "study walks.ron -o again --threads 1");
+    assert!(tables(&here.path().join("swept")) == tables(&here.path().join("again")));
+
+    let errors = numbers(&here.path().join("swept"), "position_rmse_m");
+    assert_eq!(errors[0], errors[1]);
+    assert!(errors[0] != errors[2] && errors[0] != errors[3], "{errors:?}");
+    // Runs of 7 s are too short for a drift.
+    assert!(column(&here.path().join("swept"), "drift_m_per_min").iter().all(String::is_empty));
+    for (row, imu) in [(0, "3dm_gx2"), (3, "tactical")] {
+        let alone = format!("--scene mocap_room --duration 7s --seed 3 --imu {imu} --out {imu} --json");
+        let told: Value = serde_json::from_str(&run_ok(here.path(), &alone)).unwrap();
+        // A decimal number may differ in its last digit.
+        let one = told["open_loop"]["position_rmse_m"].as_f64().unwrap();
+        assert!((one - errors[row]).abs() < 1e-12, "{one} and {}", errors[row]);
+    }
+}
+
+#[test]
+fn runs_over_an_axis_of_faults_share_rays() {
+    let here = tempfile::tempdir().unwrap();
+    let (head, rest) = WALKS.split_once("axes: [").unwrap();
+    let (_, tail) = rest.split_once("sampling:").unwrap();
+    let axis = r#"values(path: "faults", values: ["none", "imu_dropout_50pct"])"#;
+    let spec = format!("{head}axes: [{axis}], sampling:{tail}");
+    let spec = spec.replace(r#"clock: "drifting","#, r#"clock: "drifting", faults: "none","#);
+    std::fs::write(here.path().join("faults.ron"), spec).unwrap();
+    let planned: Value = serde_json::from_str(&run_ok(here.path(), "sweep plan faults.ron -o swept --json")).unwrap();
+    assert_eq!((planned["points"].as_u64(), planned["tasks"].as_u64()), (Some(2), Some(1)));
+    run_ok(here.path(), "sweep run swept --threads 2");
+    run_ok(here.path(), "sweep merge swept");
+    let errors = numbers(&here.path().join("swept"), "position_rmse_m");
+    assert_ne!(errors[0], errors[1]);
+    for (error, faults) in errors.iter().zip(["", " --faults imu_dropout_50pct"]) {
+        let alone = format!("--scene mocap_room --duration 7s --seed 3 --out alone --force --json{faults}");
+        let (_, out, talk) = run(here.path(), &alone);
+        let figures: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{talk}"));
+        // A decimal number may differ in its last digit.
+        let one = figures["open_loop"]["position_rmse_m"].as_f64().unwrap();
+        assert!((one - error).abs() < 1e-12, "{one} and {error}");
+    }
+}
+
+#[test]
+fn a_failed_run_is_a_row_and_the_others_continue() {
+    let here = tempfile::tempdir().unwrap();
+    let spec = WALKS
+        .replace(
+            r#"values(path: "imu", values: ["3dm_gx2", "tactical"])"#,
+            r#"values(path: "head.parts.0.mass_kg", values: [0.21, 2.0])"#,
+        )
+        .replace(r#"(name: "the same"),"#, "");
+    std::fs::write(here.path().join("falls.ron"), &spec).unwrap();
+    run_ok(here.path(), "study falls.ron -o falls --threads 2");
+    let errors = column(&here.path().join("falls"), "error");
+    assert!(errors[0].is_empty() && errors[1].is_empty(), "{errors:?}");
+    assert!(errors[2].contains("cannot stand on the spring") && errors[3] == errors[2], "{errors:?}");
+
+    std::fs::write(here.path().join("late.ron"), spec.replace("time_s: 300.0", "time_s: 0.01")).unwrap();
+    run_ok(here.path(), "study late.ron -o late");
+    assert!(column(&here.path().join("late"), "error")[0].contains("took longer than 0.01 s"));
+
+    if cfg!(target_os = "linux") {
+        std::fs::write(here.path().join("large.ron"), spec.replace("memory_mib: 2048", "memory_mib: 12")).unwrap();
+        run_ok(here.path(), "study large.ron -o large");
+        let table = std::fs::read_to_string(here.path().join("large/table.csv")).unwrap();
+        assert!(table.lines().nth(1).is_some_and(|first| first.contains("memory")), "{table}");
+    }
+}
+
+#[test]
+fn invalid_sweeps_are_errors_with_the_line() {
+    let here = tempfile::tempdir().unwrap();
+    let wrong = |spec: &str, old: &str, new: &str, words: &[&str]| {
+        assert!(spec.contains(old), "{old}");
+        let text = spec.replacen(old, new, 1);
+        std::fs::write(here.path().join("bad.ron"), &text).unwrap();
+        let (code, _, talk) = run(here.path(), "sweep plan bad.ron -o bad");
+        assert_eq!(code, 2, "{new}: {talk}");
+        words.iter().for_each(|word| assert!(talk.contains(word), "{new}: {talk}"));
+        let (checked, _, _) = run(here.path(), "check bad.ron");
+        assert_eq!(checked, 2, "{new}");
+        assert!(!here.path().join("bad").exists());
+    };
+    wrong(SPRINGS, "head.coil_diameter_mm", "head.coil_diameter", &["bad.ron:4:", "coil_diameter_mm", "axis"]);
+    wrong(SPRINGS, "head.coil_diameter_mm", "head.mass_kg", &["is ambiguous", "parts.0.block.mass_kg"]);
+    wrong(SPRINGS, "head.coil_diameter_mm", "lidar.rate_hz", &["bad.ron:4:", "no setting"]);
+    wrong(SPRINGS, "from: 18.0", "from: -1.0", &["bad.ron:4:", "above 0"]);
+    wrong(SPRINGS, "from: 1.6", "from: 0.0", &["bad.ron:5:"]);
+    wrong(SPRINGS, "\"stainless\"", "\"wood\"", &["bad.ron:6:", "wood"]);
+    wrong(SPRINGS, "sobol(count: 4096)", "grid", &["steps"]);
+    wrong(SPRINGS, "count: 4096", "count: 0", &["count"]);
+    wrong(SPRINGS, "[rocking_hz", "[position_rmse_m", &["does not measure position_rmse_m"]);
+    wrong(SPRINGS, "[rocking_hz", "[rocking_hz, rocking_hz", &["more than once"]);
+    wrong(WALKS, "seeds: [3]", "seeds: []", &["at least one"]);
+    wrong(WALKS, "seeds: [3]", "seeds: [3, 3]", &["more than once"]);
+    wrong(WALKS, "\"tactical\"", "\"nosuch\"", &["no such IMU"]);
+    wrong(WALKS, "(name: \"the same\")", "(name: \"base\")", &["more than once"]);
+    wrong(WALKS, "(name: \"the same\")", "(name: \"a, b\")", &["commas"]);
+    wrong(WALKS, "estimator.offset_grids", "estimator.offset_grid", &["bad.ron:11:", "offset_grid"]);
+    wrong(WALKS, "\"mocap_room\"", "\"nowhere\"", &["no such scene"]);
+    wrong(WALKS, "memory_mib: 2048", "memory_mib: 2048, cores: 2", &["cores"]);
+}
+
+#[test]
+fn every_shipped_study_is_valid() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let files = std::fs::read_dir(root.join("specs/studies")).unwrap();
+    let files: Vec<_> = files.map(|entry| entry.unwrap().path()).collect();
+    let output = Command::new(ZSIM).current_dir(root).arg("check").args(&files).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}

@@ -1,0 +1,10 @@
+//! Worlds: scenes, meshes, movers, ray casts, and invalid files.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod casts;
+mod includes;
+mod meshes;
+mod scenes;
+mod specs;
+mod traffic;
