@@ -147,9 +147,14 @@ impl Integrity {
         &self.bounds
     }
 
-    /// The true errors after alignment over the first 20 s, or half of a run shorter than 40 s, which the bounds refer to.
+    /// Duration of the alignment that the bounds refer to: the first 20 s, or half of a run shorter than 40 s.
+    pub fn aligned_seconds(pairs: &Pairs) -> f64 {
+        ALIGNMENT_S.min(0.5 * pairs.duration_s())
+    }
+
+    /// The true errors after this alignment.
     pub fn aligned_errors(pairs: &Pairs) -> Option<Errors> {
-        let aligned = pairs.first_seconds(ALIGNMENT_S.min(0.5 * pairs.duration_s()));
+        let aligned = pairs.first_seconds(Self::aligned_seconds(pairs));
         let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
         Some(Errors::after(pairs, &world_from_map))
     }

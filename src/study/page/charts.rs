@@ -57,11 +57,21 @@ fn error_and_bound(results: &RunResults) -> Chart {
         let at = |k: usize| value_at(errors, bounds[k].stamp).map_or(f64::NAN, |k| errors.position_m[k].norm() * per_m);
         curves.push(curve("error", CurveStyle::Estimate, kept.map(at).collect()));
     }
-    let title = match errors {
-        Some(_) => "Position error, aligned over the first 20 s, and its 99 % bound",
-        None => "99 % bound on the position error",
+    chart(&bound_title(results), format!("Error ({unit})"), t_s, curves)
+}
+
+/// Title of the chart of the bound: the interval of the alignment, and from when there is no bound.
+fn bound_title(results: &RunResults) -> String {
+    let title = match results.pairs {
+        Some(pairs) => {
+            let aligned_s = Integrity::aligned_seconds(pairs);
+            format!("Position error, aligned over the first {aligned_s:.0} s, and its 99 % bound")
+        }
+        None => "99 % bound on the position error".to_owned(),
     };
-    chart(title, format!("Error ({unit})"), t_s, curves)
+    let unbounded = results.integrity.bounds().iter().find(|bound| !bound.bound_m_99.is_finite());
+    let from = unbounded.map(|bound| format!("; no bound from {:.1} s", results.seconds(bound.stamp)));
+    title + &from.unwrap_or_default()
 }
 
 /// Index of the error at `stamp`; `None` if there is none within 50 ms.

@@ -76,7 +76,7 @@ const options = (chart, width, onValues) => ({
   scales: { x: { time: false }, y: chart.log ? { distr: 3 } : {} },
   series: [{}, ...chart.curves.map(series)],
   bands: bands(chart.curves),
-  axes: [{ ...axis("Time (s)"), space: 60 }, { ...axis(chart.label), size: 62, ...(chart.log && { values: powers }) }],
+  axes: [{ ...axis("Time (s)"), space: 60, size: 34 }, { ...axis(chart.label), size: 62, ...(chart.log && { values: powers }) }],
   hooks: { draw: [nowLine], setCursor: [(plot) => onValues(plot.cursor.idx)] },
 });
 

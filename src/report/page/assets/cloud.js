@@ -72,7 +72,7 @@ class Cloud {
   // Colours the points by a channel.
   colour(key) {
     const channel = channels[key];
-    const colours = channel.scale ? table(SCALES[channel.scale]) : materialTable();
+    const colours = channel.scale ? table(SCALES[channel.scale]) : materialTable(channel.order);
     this.uniforms.colours.value?.dispose();
     this.uniforms.colours.value = texture(colours);
     this.points.geometry.setAttribute("code", new vendor.BufferAttribute(channel.codes, 1, true));

@@ -4,7 +4,9 @@ const SCALES = {
   sequential: ["#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725"],
   signed: ["#2166ac", "#4393c3", "#92c5de", "#c9ccd1", "#f4a582", "#d6604d", "#b2182b"],
 };
-const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#b8a800", "#8c6bb1", "#737373"];
+const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#b8a800", "#7a4fb5", "#737373"].concat(
+  ["#7f3b08", "#7fc97f", "#1b3a6b", "#f4a6a0", "#4d6b1e", "#a8d0d8", "#8b1a5c"],
+);
 const UNKNOWN_COLOUR = "#8a8f96";
 
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
@@ -22,12 +24,18 @@ const table = (stops) => {
   return colours;
 };
 
-const materialTable = () => {
-  const colours = new Uint8Array(4 * 256);
-  for (let code = 0; code < 256; code++) {
-    const hex = code === 255 ? UNKNOWN_COLOUR : PALETTE[code % PALETTE.length];
-    colours.set([...rgb(hex), 255], 4 * code);
-  }
+// Codes of the materials that occur, the most frequent first; the first ones have colours of their own.
+const materialsByCount = (codes) => {
+  const counts = new Uint32Array(256);
+  codes.forEach((code) => counts[code]++);
+  const occur = data.materials.map((_, code) => code).filter((code) => counts[code] > 0);
+  return occur.sort((a, b) => counts[b] - counts[a] || a - b);
+};
+const materialColour = (rank) => PALETTE[rank % PALETTE.length];
+
+const materialTable = (order) => {
+  const colours = table([UNKNOWN_COLOUR, UNKNOWN_COLOUR]);
+  order.forEach((code, rank) => colours.set(rgb(materialColour(rank)), 4 * code));
   return colours;
 };
 
@@ -50,7 +58,9 @@ const channels = (() => {
   add("turn_rate", "rotational velocity", "\u00b0/s", "sequential");
   add("intensity", "intensity", "", "sequential");
   const material = bytes(cloud.material);
-  if (material.some((code) => code !== 255)) known.material = { name: "surface material", codes: material };
+  if (material.some((code) => code !== 255)) {
+    known.material = { name: "surface material", codes: material, order: materialsByCount(material) };
+  }
   known.height.codes = heightCodes(known.height);
   return known;
 })();
@@ -82,17 +92,14 @@ const showLegend = (channel) => {
   add(legend, "span", channel.name);
   if (!channel.scale) {
     const keys = add(legend, "div", "");
-    const codes = new Set(channel.codes);
-    data.materials.forEach((name, code) => {
-      if (!codes.has(code)) return;
+    channel.order.forEach((code, rank) => {
       const key = add(keys, "span", "", "key");
-      add(key, "i", "").style.background = PALETTE[code % PALETTE.length];
-      add(key, "span", name);
+      add(key, "i", "").style.background = materialColour(rank);
+      add(key, "span", data.materials[code]);
     });
     return;
   }
   add(legend, "span", "", "bar").style.background = `linear-gradient(to right, ${SCALES[channel.scale].join(",")})`;
   const ends = add(legend, "div", "", "ends");
-  add(ends, "span", inWords(channel.lower, channel.unit));
-  add(ends, "span", inWords(channel.upper, channel.unit));
+  rangeInWords(channel.lower, channel.upper, channel.unit).forEach((end) => add(ends, "span", end));
 };

@@ -76,9 +76,11 @@ const onTheme = [];
 const themeColour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => onTheme.forEach((update) => update()));
 
-// Three significant digits and the unit, with an SI prefix for lengths below a metre.
 const threeDigits = (x) => (Math.abs(x) >= 1000 ? x.toFixed(0) : Number(x.toPrecision(3)).toString());
-const inWords = (x, unit) => {
-  if (unit === "m" && Math.abs(x) < 0.5) return threeDigits(x * 1e3) + " mm";
-  return threeDigits(x) + (unit ? " " + unit : "");
+// The ends of a range in one unit: mm for short lengths.
+const rangeInWords = (low, high, unit) => {
+  const isShort = unit === "m" && Math.max(Math.abs(low), Math.abs(high)) < 0.5;
+  const step = (high - low) * (isShort ? 1e3 : 1) / 100;
+  const digits = Math.min(Math.max(-Math.floor(Math.log10(step)), 0), 6);
+  return [low, high].map((x) => `${(isShort ? x * 1e3 : x).toFixed(digits).replace(/^-(?=[0.]*$)/, "")} ${isShort ? "mm" : unit}`.trim());
 };

@@ -145,7 +145,7 @@ class Head {
     const assumed = [{ centre: [0, 0, -0.02], size: [0.06, 0.06, 0.09] }];
     const parts = data.parts.length ? data.parts : assumed;
     parts.forEach(({ centre, size }, k) => {
-      const part = box(size, k % 2 ? this.materials.second : this.materials.head);
+      const part = box(size, k > 0 ? this.materials.second : this.materials.head);
       part.position.set(...centre);
       this.head.add(part);
     });

@@ -18,7 +18,7 @@ const surfaceMesh = () => {
   const geometry = new vendor.BufferGeometry();
   geometry.setAttribute("position", new vendor.BufferAttribute(corners, 3));
   geometry.setAttribute("color", new vendor.BufferAttribute(shades, 3));
-  const options = { vertexColors: true, transparent: true, opacity: 0.14, depthWrite: false, side: vendor.DoubleSide };
+  const options = { vertexColors: true, transparent: true, opacity: 0.1, depthWrite: false, side: vendor.DoubleSide };
   const mesh = new vendor.Mesh(geometry, new vendor.MeshBasicMaterial(options));
   mesh.visible = false;
   return mesh;
@@ -83,7 +83,7 @@ class View {
     const { centre, radius } = this.extent;
     const direction = { oblique: [-0.5, -0.75, 0.75], top: [0, -1e-3, 1], side: [0, -1, 0.02] }[from];
     const portrait = Math.max(1, 0.9 / this.camera.aspect);
-    const away = (radius / Math.sin((this.camera.fov * Math.PI) / 360)) * 0.78 * portrait;
+    const away = (radius / Math.sin((this.camera.fov * Math.PI) / 360)) * 0.84 * portrait;
     this.camera.position.set(...direction).normalize().multiplyScalar(away).add(centre);
     this.camera.near = Math.max(away / 1000, 0.02);
     this.camera.far = away * 20;
