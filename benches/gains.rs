@@ -36,7 +36,7 @@ fn studies(c: &mut Criterion) {
         b.iter(|| {
             let (found, _) = search.explore(&|_| ());
             let costs: Vec<Vec<f64>> = found.iter().map(|c| c.costs.clone()).collect();
-            zsim::study::spring::design::pareto_set(&costs)
+            zsim::study::sweep::pareto_set(&costs)
         });
     });
     let (spec, source) = load("handheld").unwrap();

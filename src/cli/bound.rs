@@ -4,14 +4,13 @@ use super::arguments::Global;
 use super::bars::{Bars, stop_flag};
 use super::failure::Usage;
 use super::{Completion, output};
-use anyhow::Context;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim::recording::Reader;
 use zsim::report;
 use zsim::spec::Source;
-use zsim::study::{Manifest, ProgressMonitor, RecordingBound, information_bound};
+use zsim::study::{Manifest, ProgressMonitor, RecordingBound, information_bound, replace_text};
 use zsim::world::World;
 
 /// Compute the Cramer-Rao bound of a recording: the accuracy that no estimator can exceed
@@ -54,17 +53,16 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
     if let Some(scene) = &arguments.scene {
         return Ok(World::load(scene)?);
     }
-    let Some(specs) = Manifest::in_recording(reader).and_then(|manifest| manifest.specs) else {
+    let Some(run) = Manifest::in_recording(reader).and_then(|manifest| manifest.run) else {
         let message = format!("{} has no scene: pass one with --scene", reader.name());
         return Err(Usage(message).into());
     };
-    Ok(World::build(&specs.scene, &Source::in_memory("the recording's scene", ""))?)
+    Ok(World::build(&run.scene.spec, &Source::in_memory("the recording's scene", ""))?)
 }
 
 fn write_results(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
-    let path = folder.join("bound.csv");
-    std::fs::write(&path, csv(bounded)).with_context(|| format!("{} cannot be written", path.display()))?;
+    replace_text(&folder.join("bound.csv"), &csv(bounded))?;
     report::bound_over_time(&bounded.bound).save(&folder, "bound")?;
     Ok(folder)
 }

@@ -3,7 +3,6 @@
 use super::arguments::{Global, OutArguments, any_route};
 use super::bars::WorkBar;
 use super::{Completion, coverage_text, output, quantity};
-use anyhow::Context;
 use clap::Args;
 use std::path::Path;
 use zsim::dynamics::{self, HeadModel};
@@ -13,6 +12,7 @@ use zsim::report;
 use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, find, parse};
 use zsim::study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
+use zsim::study::replace_text;
 
 /// Compute the coverage of the sphere by a lidar on a moving head: fraction, density and time, and the required gyroscope
 /// range
@@ -76,8 +76,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 fn write_results(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
     for (name, text) in [("coverage.csv", over_time_csv(seen)), ("density.csv", density_csv(seen))] {
-        let path = folder.join(name);
-        std::fs::write(&path, text).with_context(|| format!("{} cannot be written", path.display()))?;
+        replace_text(&folder.join(name), &text)?;
     }
     coverage_figure(seen).save(&folder, "coverage")?;
     Ok(folder)

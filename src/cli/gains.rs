@@ -16,6 +16,7 @@ use zsim::study::gains::{
     AXES, GainCurve, GainPlan, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure, swing_csv,
     swing_figure, swing_study, with_damping,
 };
+use zsim::study::replace_text;
 
 /// Measure a head's gain curves: head motion over base motion by frequency, from simulation and in closed form
 ///
@@ -75,13 +76,13 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let wanted =
         arguments.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/gains-{}", name(arguments))));
     let folder = output::folder(&wanted, arguments.out.force)?;
-    write(&folder.join("gains.csv"), &csv(&curves))?;
+    replace_text(&folder.join("gains.csv"), &csv(&curves))?;
     let plots = folder.join("plots");
     std::fs::create_dir_all(&plots).with_context(|| format!("cannot create {}", plots.display()))?;
     gain_figure(&curves).save(&plots, "gains")?;
     coherence_figure(&curves).save(&plots, "coherence")?;
     if let Some(swings) = &swings {
-        write(&folder.join("swing.csv"), &swing_csv(swings))?;
+        replace_text(&folder.join("swing.csv"), &swing_csv(swings))?;
         swing_figure(swings).save(&plots, "swing")?;
     }
     let swings = swings.unwrap_or_default();
@@ -140,10 +141,6 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
         Ok(swing_study(head, *axis, degrees, &plan, &on_progress)?)
     };
     axes.iter().enumerate().map(study).collect()
-}
-
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
 }
 
 fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {

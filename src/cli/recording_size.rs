@@ -26,7 +26,7 @@ pub(super) fn check(simulation: &Simulation, wanted: &Path, note: impl Fn(&str))
     if bytes < LARGE_BYTES {
         return Ok(());
     }
-    let duration_s = simulation.scenario().duration_s;
+    let duration_s = simulation.inputs().duration_s;
     let size = format!("the recording of {duration_s} s will take about {:.1} GB", bytes / 1e9);
     let folder = wanted.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
     if let Some(free) = free_bytes(folder) {
@@ -48,7 +48,7 @@ fn expected_bytes(simulation: &Simulation) -> f64 {
         + of_imu(simulation.imu())
         + simulation.base_imu().map_or(0.0, of_imu)
         + TRUTH_BYTES / STEP_S;
-    per_s * simulation.scenario().duration_s
+    per_s * simulation.inputs().duration_s
 }
 
 fn lidar_bytes_per_s(lidar: &Lidar) -> f64 {

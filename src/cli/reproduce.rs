@@ -1,7 +1,7 @@
 //! `zsim reproduce`: the paper's experiments.
 
 use super::arguments::Global;
-use super::bars::WorkBar;
+use super::bars::{WorkBar, stop_flag};
 use super::failure::Usage;
 use super::{Completion, output};
 use anyhow::Context;
@@ -9,7 +9,9 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim::report;
+use zsim::study::replace_text;
 use zsim::study::reproduction::{Experiment, ExperimentResult, Extent, TABLE_HEADING, paper_table};
+use zsim::study::sweep::Runner;
 
 /// Repeat the paper's experiments: compare the published results with zsim's
 ///
@@ -41,13 +43,15 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let folder = arguments.out.join(stem);
     check_table(&folder.with_extension("md"), arguments.force)?;
     let folder = output::folder_to_resume(&folder)?;
+    let program = std::env::current_exe().context("this program's own path is not known")?;
     let mut found = Vec::new();
     table(arguments, extent, &folder, &found)?;
     for experiment in &wanted {
         let bar = WorkBar::new(global, "reproducing");
         bar.set_task(experiment.name.clone());
-        let finding = experiment
-            .run(&folder.join(&experiment.name), extent, arguments.force, &|fraction| bar.set_fraction(fraction))?;
+        let on_progress = |fraction: f64| bar.set_fraction(fraction);
+        let runner = Runner { program: &program, stop: stop_flag(), on_progress: &on_progress };
+        let finding = experiment.run(&folder.join(&experiment.name), extent, arguments.force, &runner)?;
         found.push((experiment.given.clone(), finding));
         table(arguments, extent, &folder, &found)?;
     }
@@ -101,6 +105,5 @@ fn table(
     }
     let path = folder.with_extension("md");
     std::fs::create_dir_all(&arguments.out).with_context(|| format!("cannot create {}", arguments.out.display()))?;
-    std::fs::write(&path, paper_table(&findings, extent, &options))
-        .with_context(|| format!("{} cannot be written", path.display()))
+    Ok(replace_text(&path, &paper_table(&findings, extent, &options))?)
 }

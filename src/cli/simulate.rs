@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let mut figures = serde_json::to_value(summary)?;
     if let Some(object) = figures.as_object_mut() {
         object.insert("scene".to_owned(), json!(simulation.world().name()));
-        object.insert("seed".to_owned(), json!(simulation.scenario().seed));
+        object.insert("seed".to_owned(), json!(simulation.inputs().seed));
         object.insert("truth".to_owned(), json!(truth.display().to_string()));
     }
     output::print_result(global, &text(&summary), figures, Some(&recording))?;

@@ -9,6 +9,7 @@ use serde_json::json;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use zsim::study::replace_text;
 use zsim::study::sweep::{Shard, Sweep};
 
 /// Default number of runs per array element; a scheduler needs about 1 s for each element.
@@ -62,8 +63,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     std::fs::create_dir_all(&logs).with_context(|| format!("cannot create {}", logs.display()))?;
     let script = logs.join("array.sh");
     let threads = global.threads.map_or(1, std::num::NonZeroUsize::get);
-    std::fs::write(&script, text((&sweep, &log), &folder, elements, threads)?)
-        .with_context(|| format!("{} cannot be written", script.display()))?;
+    replace_text(&script, &text((&sweep, &log), &folder, elements, threads)?)?;
     if arguments.dry_run {
         output::print_result(global, "", json!({ "job": null, "elements": elements }), Some(&script))?;
         return Ok(Completion::Done);

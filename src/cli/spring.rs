@@ -3,7 +3,6 @@
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
 use super::{Completion, output, spring_text};
-use anyhow::Context;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use zsim::dynamics::{self, HeadModel, HeadSpec, LinkageSpec};
@@ -11,6 +10,7 @@ use zsim::elasticity::SpringSpec;
 use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::coverage::{CoveragePlan, coverage_figure};
+use zsim::study::replace_text;
 use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure};
 use zsim::study::spring::{Shake, mode_figure, spring_report};
 
@@ -100,7 +100,7 @@ fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::R
                 coverage_figure(seen).save(&folder, "coverage")?;
             }
             let text = serde_json::to_string_pretty(&report)? + "\n";
-            write(&folder.join("spring.json"), &text)?;
+            replace_text(&folder.join("spring.json"), &text)?;
             Some(folder)
         }
     };
@@ -140,13 +140,9 @@ fn search(design: &Design, global: &Global) -> anyhow::Result<Completion> {
     let stem = Path::new(&design.file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{stem}")));
     let folder = output::folder(&wanted, design.out.force)?;
-    write(&folder.join("pareto.csv"), &csv(&study))?;
-    write(&folder.join("design.ron"), &source.text)?;
+    replace_text(&folder.join("pareto.csv"), &csv(&study))?;
+    replace_text(&folder.join("design.ron"), &source.text)?;
     pareto_figure(&study).save(&folder, "pareto")?;
     output::print_result(global, &spring_text::design(&study), serde_json::to_value(&study)?, Some(&folder))?;
     Ok(if study.candidates.is_empty() { Completion::WithLoss } else { Completion::Done })
-}
-
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
 }

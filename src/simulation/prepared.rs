@@ -1,19 +1,18 @@
 use super::faults::Injector;
 use super::run::simulate_together;
-use super::{EPOCH, Faults, Rig, STEP_S, Scenario, SimulationError, SimulationSummary, Sources, Specs, simulate};
+use super::{EPOCH, Faults, Rig, Run, STEP_S, Scenario, SimulationError, SimulationSummary, simulate};
 use crate::dynamics::{CarrierSpec, HeadModel, HeadSimulation, HeadSpec};
 use crate::geometry::{Route, Vector};
 use crate::measurement::{Calibration, Sink};
 use crate::motion::BaseMotion;
 use crate::sensors::{Clocks, Cylinder, Imu, Lidar};
-use crate::spec::{Source, SpecError};
+use crate::spec::SpecError;
 use crate::truth::TruthSink;
 use crate::world::World;
 
-/// A scenario with all models built, ready to run.
+/// A run with all models built.
 pub struct Simulation {
-    scenario: Scenario,
-    specs: Specs,
+    run: Run,
     world: World,
     head: HeadModel,
     carrier: Vec<Cylinder>,
@@ -31,38 +30,30 @@ impl Simulation {
     /// # Errors
     /// If a spec is missing, invalid, or inconsistent with another one.
     pub fn prepare(scenario: &Scenario) -> Result<Self, SimulationError> {
-        let (specs, sources) = Specs::load(scenario)?;
-        Self::build(scenario, specs, &sources)
+        Self::build(Run::load(scenario)?)
     }
 
-    /// Builds the models of `specs`, which can differ from those that `scenario` names: a sweep modifies them.
+    /// Builds the models of a run.
     ///
     /// # Errors
     /// If the specs are invalid or inconsistent with each other.
-    pub fn build(scenario: &Scenario, specs: Specs, sources: &Sources) -> Result<Self, SimulationError> {
-        let world = World::build(&specs.scene, &sources.scene)?;
-        let head = HeadModel::new(&specs.head, &sources.head)?;
-        let carrier = carrier_of(&specs.head);
-        let route = route(scenario, &world)?;
-        let motion = specs.motion.build(&sources.motion, route, scenario.duration_s, scenario.seed)?;
-        let lidar = Lidar::new(&specs.lidar, &sources.lidar)?;
-        let imu = Imu::new(&specs.imu, &sources.imu)?;
-        let base_imu = specs.base_imu.as_ref().zip(sources.base_imu.as_ref());
-        let base_imu = base_imu.map(|(spec, source)| Imu::new(spec, source)).transpose()?;
-        let clocks = Clocks::new(&specs.clock, &sources.clock, EPOCH)?;
-        let faults = faults(&specs, sources, &lidar)?;
-        let scenario = scenario.clone();
-        Ok(Self { scenario, specs, world, head, carrier, motion, lidar, imu, base_imu, clocks, faults })
+    pub fn build(run: Run) -> Result<Self, SimulationError> {
+        let world = World::build(&run.scene.spec, &run.scene.source())?;
+        let head = HeadModel::new(&run.head.spec, &run.head.source())?;
+        let carrier = carrier_of(&run.head.spec);
+        let route = route(&run, &world)?;
+        let motion = run.motion.spec.build(&run.motion.source(), route, run.duration_s, run.seed)?;
+        let lidar = Lidar::new(&run.lidar.spec, &run.lidar.source())?;
+        let imu = Imu::new(&run.imu.spec, &run.imu.source())?;
+        let base_imu = run.base_imu.as_ref().map(|imu| Imu::new(&imu.spec, &imu.source())).transpose()?;
+        let clocks = Clocks::new(&run.clock.spec, &run.clock.source(), EPOCH)?;
+        let faults = faults(&run, &lidar)?;
+        Ok(Self { run, world, head, carrier, motion, lidar, imu, base_imu, clocks, faults })
     }
 
-    /// The scenario.
-    pub fn scenario(&self) -> &Scenario {
-        &self.scenario
-    }
-
-    /// The specs as used.
-    pub fn specs(&self) -> &Specs {
-        &self.specs
+    /// The inputs of the simulation.
+    pub fn inputs(&self) -> &Run {
+        &self.run
     }
 
     /// The world.
@@ -160,17 +151,7 @@ impl Simulation {
 
     /// Whether `other` has the same physics and rays: it may differ in the IMUs, the lidar errors and the faults only.
     pub fn shares_rays_with(&self, other: &Self) -> bool {
-        let without_noise = |simulation: &Self| {
-            let mut specs = simulation.specs.clone();
-            (specs.imu, specs.lidar.errors) = (self.specs.imu.clone(), self.specs.lidar.errors.clone());
-            specs.lidar.noise = self.specs.lidar.noise;
-            (specs.base_imu, specs.faults) = (self.specs.base_imu.clone(), self.specs.faults.clone());
-            specs
-        };
-        let walk = |simulation: &Self| {
-            (simulation.scenario.route.clone(), simulation.scenario.duration_s, simulation.scenario.seed)
-        };
-        walk(self) == walk(other) && self.specs == without_noise(other)
+        matches!((self.run.ray_inputs(), other.run.ray_inputs()), (Ok(ours), Ok(theirs)) if ours == theirs)
     }
 
     fn rig(&self) -> Rig<'_> {
@@ -183,19 +164,17 @@ impl Simulation {
             clocks: self.clocks,
             head_from_laser: *self.head.head_from_laser(),
             head_from_imu: *self.head.head_from_imu(),
-            duration_s: self.scenario.duration_s,
-            seed: self.scenario.seed,
+            duration_s: self.run.duration_s,
+            seed: self.run.seed,
         }
     }
 }
 
 /// The faults of a run, if any.
-fn faults(specs: &Specs, sources: &Sources, lidar: &Lidar) -> Result<Option<Faults>, SpecError> {
-    let Some(spec) = &specs.faults else { return Ok(None) };
-    let unnamed = Source::in_memory("faults", "");
-    let source = sources.faults.as_ref().unwrap_or(&unnamed);
-    let faults = Faults::new(spec, source)?;
-    faults.check_with(lidar, source)?;
+fn faults(run: &Run, lidar: &Lidar) -> Result<Option<Faults>, SpecError> {
+    let Some(named) = &run.faults else { return Ok(None) };
+    let faults = Faults::new(&named.spec, &named.source())?;
+    faults.check_with(lidar, &named.source())?;
     Ok(Some(faults))
 }
 
@@ -211,11 +190,11 @@ pub fn carrier_of(head: &HeadSpec) -> Vec<Cylinder> {
 }
 
 /// The named route, or the default route of the scene, if any.
-fn route<'w>(scenario: &Scenario, world: &'w World) -> Result<Option<&'w Route>, SpecError> {
-    let Some(name) = &scenario.route else { return Ok(world.default_route()) };
+fn route<'w>(run: &Run, world: &'w World) -> Result<Option<&'w Route>, SpecError> {
+    let Some(name) = &run.route else { return Ok(world.default_route()) };
     world.routes().get(name).map(Some).ok_or_else(|| {
         let names: Vec<&str> = world.routes().keys().map(String::as_str).collect();
         let help = if names.is_empty() { "it has none".to_owned() } else { format!("it has: {}", names.join(", ")) };
-        SpecError::plain(&scenario.scene, format!("the scene has no route `{name}`")).with_help(help)
+        SpecError::plain(&run.scene.name, format!("the scene has no route `{name}`")).with_help(help)
     })
 }

@@ -1,11 +1,12 @@
-use super::{FaultsSpec, SimulationError};
+use super::{FaultsSpec, Named, SimulationError};
 use crate::dynamics::HeadSpec;
 use crate::motion::MotionSpec;
 use crate::random::Seed;
 use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use crate::spec::{Kind, Source, checked, find, parse};
+use crate::spec::checked;
 use crate::world::SceneSpec;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// What to simulate: specs by name. A name is a path, or a name in the library.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -57,85 +58,79 @@ impl Scenario {
     }
 }
 
-/// All specs of a run as used. Together with the scenario they reproduce the run on any machine.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Specs {
+/// All inputs of a simulation, self-contained: they reproduce it on any machine.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Run {
     /// The scene, with included scenes merged.
-    pub scene: SceneSpec,
+    pub scene: Named<SceneSpec>,
     /// The head and the linkage.
-    pub head: HeadSpec,
+    pub head: Named<HeadSpec>,
     /// The motion of the base.
-    pub motion: MotionSpec,
+    pub motion: Named<MotionSpec>,
     /// The lidar.
-    pub lidar: LidarSpec,
+    pub lidar: Named<LidarSpec>,
     /// The inertial measurement unit.
-    pub imu: ImuSpec,
+    pub imu: Named<ImuSpec>,
     /// The clocks of the sensors.
-    pub clock: ClocksSpec,
+    pub clock: Named<ClocksSpec>,
     /// The IMU of the base, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub base_imu: Option<ImuSpec>,
+    pub base_imu: Option<Named<ImuSpec>>,
     /// The faults, with the content of referenced files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub faults: Option<FaultsSpec>,
+    pub faults: Option<Named<FaultsSpec>>,
+    /// Route of the scene; `None` for the default route.
+    pub route: Option<String>,
+    /// Duration, s.
+    #[serde(with = "checked::Positive")]
+    pub duration_s: f64,
+    /// Random seed. The same seed and specs give the same bytes.
+    pub seed: Seed,
 }
 
-/// Source texts of the specs of a run, for errors and for the folder of meshes.
-#[derive(Debug, Clone)]
-pub struct Sources {
-    /// Source of the scene.
-    pub scene: Source,
-    /// Source of the head.
-    pub head: Source,
-    /// Source of the motion.
-    pub motion: Source,
-    /// Source of the lidar.
-    pub lidar: Source,
-    /// Source of the IMU.
-    pub imu: Source,
-    /// Source of the clocks.
-    pub clock: Source,
-    /// Source of the base IMU, if any.
-    pub base_imu: Option<Source>,
-    /// Source of the faults, if any.
-    pub faults: Option<Source>,
-}
-
-impl Specs {
+impl Run {
     /// Finds and parses the specs that `scenario` names.
     ///
     /// # Errors
     /// If a spec is missing or invalid.
-    pub fn load(scenario: &Scenario) -> Result<(Self, Sources), SimulationError> {
-        let sources = Sources {
-            scene: find(Kind::Scene, &scenario.scene)?,
-            head: find(Kind::Head, &scenario.head)?,
-            motion: find(Kind::Motion, &scenario.motion)?,
-            lidar: find(Kind::Lidar, &scenario.lidar)?,
-            imu: find(Kind::Imu, &scenario.imu)?,
-            clock: find(Kind::Clock, &scenario.clock)?,
-            base_imu: scenario.base_imu.as_deref().map(|name| find(Kind::Imu, name)).transpose()?,
-            faults: scenario.faults.as_deref().map(|name| find(Kind::Faults, name)).transpose()?,
-        };
-        let specs = Self::parse(&sources)?;
-        Ok((specs, sources))
+    pub fn load(scenario: &Scenario) -> Result<Self, SimulationError> {
+        Ok(Self {
+            scene: Named::load(&scenario.scene)?,
+            head: Named::load(&scenario.head)?,
+            motion: Named::load(&scenario.motion)?,
+            lidar: Named::load(&scenario.lidar)?,
+            imu: Named::load(&scenario.imu)?,
+            clock: Named::load(&scenario.clock)?,
+            base_imu: scenario.base_imu.as_deref().map(Named::load).transpose()?,
+            faults: scenario.faults.as_deref().map(Named::load).transpose()?,
+            route: scenario.route.clone(),
+            duration_s: scenario.duration_s,
+            seed: scenario.seed,
+        })
     }
 
-    fn parse(sources: &Sources) -> Result<Self, SimulationError> {
-        Ok(Self {
-            scene: parse::<SceneSpec>(&sources.scene)?.with_includes(&sources.scene)?,
-            head: parse(&sources.head)?,
-            motion: parse(&sources.motion)?,
-            lidar: parse(&sources.lidar)?,
-            imu: parse(&sources.imu)?,
-            clock: parse(&sources.clock)?,
-            base_imu: sources.base_imu.as_ref().map(parse).transpose()?,
-            faults: sources
-                .faults
-                .as_ref()
-                .map(|source| parse::<FaultsSpec>(source)?.with_files(source))
-                .transpose()?,
-        })
+    /// Everything that determines physics and rays: all inputs but the IMUs, the lidar's errors and the faults.
+    ///
+    /// Runs with equal values share one simulation of physics and rays.
+    ///
+    /// # Errors
+    /// If a number is not finite.
+    pub fn ray_inputs(&self) -> Result<Value, serde_json::Error> {
+        let mut lidar = serde_json::to_value(&self.lidar.spec)?;
+        if let Some(lidar) = lidar.as_object_mut() {
+            lidar.retain(|key, _| !["errors", "noise"].contains(&key.as_str()));
+        }
+        let specs = (&self.scene.spec, &self.head.spec, &self.motion.spec, &self.clock.spec);
+        serde_json::to_value((specs, lidar, &self.route, self.duration_s, self.seed))
+    }
+
+    /// The run without the folders of its specs, which differ between machines.
+    #[must_use]
+    pub fn without_folders(mut self) -> Self {
+        (self.scene.folder, self.head.folder, self.motion.folder) = (None, None, None);
+        (self.lidar.folder, self.imu.folder, self.clock.folder) = (None, None, None);
+        self.base_imu.iter_mut().for_each(|imu| imu.folder = None);
+        self.faults.iter_mut().for_each(|faults| faults.folder = None);
+        self
     }
 }

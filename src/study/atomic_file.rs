@@ -55,7 +55,16 @@ impl Write for AtomicFile {
     }
 }
 
-/// Writes a text file atomically.
+/// Writes a text file atomically, with the temporary file beside it.
+///
+/// # Errors
+/// When the folder or the file cannot be written.
+pub fn replace_text(target: &Path, text: &str) -> Result<(), StudyError> {
+    let folder = target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    write_text(folder, target, text)
+}
+
+/// Writes a text file atomically, with the temporary file in `folder`.
 pub(super) fn write_text(folder: &Path, target: &Path, text: &str) -> Result<(), StudyError> {
     let mut partial = AtomicFile::new(folder, target)?;
     partial.write_all(text.as_bytes()).map_err(StudyError::file(target))?;

@@ -86,9 +86,9 @@ pub fn information_bound(
 
 /// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
 fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
-    let specs = Manifest::in_recording(reader).and_then(|manifest| manifest.specs);
+    let run = Manifest::in_recording(reader).and_then(|manifest| manifest.run);
     let matrix = |errors: fn(&ImuSpec) -> (f64, f64)| {
-        let (scale_percent, misalignment_deg) = specs.as_ref().map_or((0.0, 0.0), |specs| errors(&specs.imu));
+        let (scale_percent, misalignment_deg) = run.as_ref().map_or((0.0, 0.0), |run| errors(&run.imu.spec));
         (scale_percent * 1e-2, misalignment_deg.to_radians())
     };
     BoundModel {
@@ -96,7 +96,7 @@ fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
         imu: calibration.imu,
         gyro_matrix: matrix(|imu| (imu.gyro.scale_percent, imu.gyro.misalignment_deg)),
         accel_matrix: matrix(|imu| (imu.accel.scale_percent, imu.accel.misalignment_deg)),
-        range_offset_m: specs.as_ref().map_or(0.0, |specs| specs.lidar.errors.range.bias_sigma_m),
+        range_offset_m: run.as_ref().map_or(0.0, |run| run.lidar.spec.errors.range.bias_sigma_m),
         clock_offset_s: CLOCK_PRIOR.0,
         clock_rate: CLOCK_PRIOR.1,
     }

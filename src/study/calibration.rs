@@ -55,16 +55,16 @@ pub(super) fn calibration(
 
 /// Noise of the base IMU: from the manifest of a simulated recording, else that of a typical IMU.
 pub(super) fn base_imu_noise(reader: &Reader) -> Result<ImuNoise, SpecError> {
-    let specs = Manifest::in_recording(reader).and_then(|manifest| manifest.specs);
-    let Some(spec) = specs.and_then(|specs| specs.base_imu) else { return typical_imu_noise() };
-    Ok(Imu::new(&spec, &Source::in_memory("the recording's manifest", ""))?.noise())
+    let run = Manifest::in_recording(reader).and_then(|manifest| manifest.run);
+    let Some(imu) = run.and_then(|run| run.base_imu) else { return typical_imu_noise() };
+    Ok(Imu::new(&imu.spec, &Source::in_memory("the recording's manifest", ""))?.noise())
 }
 
 /// Sensor noise: from the manifest of a simulated recording, else that of a typical IMU and of the paper's lidar.
 fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
-    if let Some(specs) = Manifest::in_recording(reader).and_then(|manifest| manifest.specs) {
+    if let Some(run) = Manifest::in_recording(reader).and_then(|manifest| manifest.run) {
         let source = Source::in_memory("the recording's manifest", "");
-        return Ok((Imu::new(&specs.imu, &source)?.noise(), Lidar::new(&specs.lidar, &source)?.noise()));
+        return Ok((Imu::new(&run.imu.spec, &source)?.noise(), Lidar::new(&run.lidar.spec, &source)?.noise()));
     }
     let lidar = find(Kind::Lidar, "utm30lx")?;
     let lidar_spec: LidarSpec = parse(&lidar)?;

@@ -85,7 +85,7 @@ pub fn estimate_recording(
     remove(folder, &estimate_files())?;
     let manifest = Manifest::in_recording(&reader).unwrap_or_else(Manifest::without_simulation);
     let world = world_of(&manifest, watch);
-    let carrier = manifest.specs.as_ref().map(|specs| carrier_of(&specs.head)).unwrap_or_default();
+    let carrier = manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
     let origin = Origin { manifest: &manifest.with_estimator(&options.estimator), surroundings, simulation: None };
     estimate_in(&reader, folder, options, &origin, watch)
@@ -283,12 +283,12 @@ fn metrics(
     registered: &RegisteredCloud,
     comparison: Option<&comparison::Comparison>,
 ) -> Metrics {
-    let Manifest { scenario, specs, .. } = origin.manifest;
+    let inputs = origin.manifest.run.as_ref();
     let world_from_map = comparison.and_then(|comparison| comparison.world_from_map);
     Metrics {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        scene: specs.as_ref().map(|specs| specs.scene.name.clone()),
-        seed: scenario.as_ref().map(|scenario| scenario.seed.0),
+        scene: inputs.map(|inputs| inputs.scene.spec.name.clone()),
+        seed: inputs.map(|inputs| inputs.seed.0),
         duration_s: origin.simulation.map_or(run.acquisition_s, |summary| summary.duration_s),
         simulation: origin.simulation.map(comparison::simulation_metrics).unwrap_or_default(),
         cloud: cloud_metrics(registered, world_from_map.as_ref(), origin.surroundings),
@@ -299,7 +299,7 @@ fn metrics(
 
 /// Builds the world of a recording's manifest; `None` if there is none or a mesh file is missing.
 fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
-    let scene = &manifest.specs.as_ref()?.scene;
+    let scene = &manifest.run.as_ref()?.scene.spec;
     let built = World::build(scene, &Source::in_memory("the recording's scene", ""));
     built.inspect_err(|error| watch.note(&format!("no evaluation of the cloud: {error}"))).ok()
 }
@@ -319,7 +319,7 @@ fn report_notes(
              extrinsics with --calibration",
         );
     }
-    if origin.manifest.specs.is_none() && options.calibration.imu.is_none() {
+    if origin.manifest.run.is_none() && options.calibration.imu.is_none() {
         watch.note(
             "the IMU noise is not known: assuming a typical IMU (specs/imus/unknown.ron); pass the values of the data sheet \
              with --calibration",

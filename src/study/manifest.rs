@@ -1,9 +1,10 @@
-//! Manifest of a run: version, scenario and specs.
+//! Manifest of a run: version and inputs.
 
 use super::StudyError;
+use super::atomic_file::replace_text;
 use crate::estimation::EstimatorSpec;
 use crate::recording::Reader;
-use crate::simulation::{Scenario, Simulation, Specs};
+use crate::simulation::{Run, Simulation};
 use crate::spec::{self, Source, SpecError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -14,12 +15,9 @@ use std::path::Path;
 pub struct Manifest {
     /// Version of zsim.
     pub version: String,
-    /// Scenario with the random seed; `None` if the recording was not made by zsim.
+    /// Inputs of the simulation; `None` if the recording was not made by zsim.
     #[serde(default)]
-    pub scenario: Option<Scenario>,
-    /// All specs of the simulation; `None` if the recording was not made by zsim.
-    #[serde(default)]
-    pub specs: Option<Specs>,
+    pub run: Option<Run>,
     /// Settings of the estimator; `None` in the manifest of a recording, which does not depend on them.
     #[serde(default)]
     pub estimator: Option<EstimatorSpec>,
@@ -28,16 +26,12 @@ pub struct Manifest {
 impl Manifest {
     /// The manifest of a simulation.
     pub fn of(simulation: &Simulation) -> Self {
-        Self {
-            scenario: Some(simulation.scenario().clone()),
-            specs: Some(simulation.specs().clone()),
-            ..Self::without_simulation()
-        }
+        Self { run: Some(simulation.inputs().clone().without_folders()), ..Self::without_simulation() }
     }
 
     /// The manifest of a run without a simulation.
     pub fn without_simulation() -> Self {
-        Self { version: env!("CARGO_PKG_VERSION").to_owned(), scenario: None, specs: None, estimator: None }
+        Self { version: env!("CARGO_PKG_VERSION").to_owned(), run: None, estimator: None }
     }
 
     /// The manifest in a recording; `None` if there is none, or if it has the format of another version of zsim.
@@ -61,6 +55,6 @@ impl Manifest {
     }
 
     pub(super) fn write(&self, path: &Path) -> Result<(), StudyError> {
-        std::fs::write(path, self.to_ron()?).map_err(StudyError::file(path))
+        replace_text(path, &self.to_ron()?)
     }
 }

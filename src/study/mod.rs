@@ -43,6 +43,7 @@ pub mod sweep;
 mod true_clock;
 mod truth_cursor;
 
+pub use atomic_file::replace_text;
 pub use base::{base_by_imu, base_by_law};
 pub use bound::{RecordingBound, information_bound};
 pub use calibration::CalibrationSpec;

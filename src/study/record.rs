@@ -27,7 +27,7 @@ pub fn record(
 ) -> Result<SimulationSummary, StudyError> {
     let recording = Writer::create(recording, description(simulation, truth_tf)?)?;
     let mut files = FileSink { recording, truth: Some(TumWriter::create(truth)?), stop: watch.stop };
-    let duration_s = simulation.scenario().duration_s;
+    let duration_s = simulation.inputs().duration_s;
     let mut progress = |fraction: f64| watch.progress(Stage::Simulating, fraction * duration_s, Some(duration_s));
     let ran = simulation.run(&mut files, &mut progress);
     files.finish()?;

@@ -62,6 +62,8 @@ async function slide(page, id, fraction) {
 }
 
 async function use(page) {
+  // Only the drawing counts, not the focus ring, the legend and the label on it.
+  await page.addStyleTag({ content: "#scene{outline:none!important}.legend,.tag{visibility:hidden}" });
   const stage = await page.locator("#scene").boundingBox();
   const [x, y] = [stage.x + stage.width / 2, stage.y + stage.height / 2];
   await changes(page, "dragging", async () => {

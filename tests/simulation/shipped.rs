@@ -6,7 +6,7 @@ use zsim::geometry::{Pose, Rotation, Surface, Trajectory, Vector, gravity_in_wor
 use zsim::measurement::{ImuSample, LidarScan, Measurement, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::sensors::Cylinder;
-use zsim::simulation::{Scenario, Simulation, SimulationError, Specs};
+use zsim::simulation::{Run, Scenario, Simulation, SimulationError};
 use zsim::time::Stamp;
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
@@ -245,9 +245,9 @@ fn the_gyroscope_rarely_saturates() {
 #[test]
 fn the_used_specs_survive_writing_and_reading() {
     let simulation = Simulation::prepare(&exact_office(1.0)).unwrap();
-    let text = zsim::spec::to_text(simulation.specs()).unwrap();
-    let read: Specs = zsim::spec::parse(&zsim::spec::Source::in_memory("manifest", text)).unwrap();
-    assert_eq!(&read, simulation.specs());
+    let text = zsim::spec::to_text(simulation.inputs()).unwrap();
+    let read: Run = zsim::spec::parse(&zsim::spec::Source::in_memory("manifest", text)).unwrap();
+    assert_eq!(&read, simulation.inputs());
 }
 
 #[test]

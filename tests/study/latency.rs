@@ -4,40 +4,36 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use zsim::spec::{Kind, Source, find, parse};
 use zsim::study::StudyError;
-use zsim::study::latency::{
-    ClockState, Disturbance, LatencyResult, LatencySpec, LatencyStudy, csv, curve_figure, map_figure, text_table,
-};
+use zsim::study::latency::{ClockState, Disturbance, LatencyResult, csv, curve_figure, map_figure, text_table};
 use zsim::study::reproduction::ExperimentSpec;
+use zsim::study::sweep::{AxisSpec, BaseSpec, Plan, Runner, Shard, SweepSpec};
 
-fn shipped() -> (LatencySpec, Source) {
-    let source = find(Kind::Experiment, "fig4").unwrap();
-    let ExperimentSpec::Latency(spec) = parse(&source).unwrap() else { panic!("figure 4 is of latency") };
-    (*spec, source)
-}
+const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
 
 /// 14 s of the mocap room: no latency, 5 ms in both directions, and 5 ms of timing noise.
-fn small() -> LatencySpec {
-    let (spec, _) = shipped();
-    let mut small = LatencySpec {
-        latencies_ms: vec![-5.0, 0.0, 5.0],
-        noises_ms: vec![0.0, 5.0],
-        shown_latencies_ms: vec![-5.0, 0.0],
-        shown_noises_ms: vec![0.0, 5.0],
-        block_s: 2.0,
-        ..spec
+fn small() -> Plan {
+    let source = find(Kind::Study, "timing").unwrap();
+    let mut small: SweepSpec = parse(&source).unwrap();
+    let BaseSpec::Journey { scene, duration_s, timing: Some(timing), .. } = &mut small.base else {
+        panic!("the study has timing errors")
     };
-    small.scenario.scene = "mocap_room".to_owned();
-    small.scenario.duration_s = 14.0;
-    small
+    (*scene, *duration_s, timing.block_s) = ("mocap_room".to_owned(), 14.0, 2.0);
+    let AxisSpec::Levels { levels, .. } = &mut small.axes[0] else { panic!("the timings are levels") };
+    levels.retain(|level| ["-5 ms", "0 ms", "5 ms", "noise 5 ms"].contains(&level.name.as_str()));
+    Plan::new("timing", &small, &source).unwrap()
 }
 
 /// Runs the study, and stops it when the fraction `stop_at` is done.
 fn run(folder: &Path, threads: usize, stop_at: f64) -> Result<LatencyResult, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let stop = AtomicBool::new(false);
-    let hear = |share: f64| stop.store(share >= stop_at, Ordering::Relaxed);
-    let latency = LatencyStudy::new(&small(), &shipped().1).unwrap();
-    pool.install(|| latency.run(folder, false, &stop, &hear))
+    let on_progress = |fraction: f64| stop.store(fraction >= stop_at, Ordering::Relaxed);
+    let runner = Runner { program: Path::new(ZSIM), stop: &stop, on_progress: &on_progress };
+    pool.install(|| {
+        let sweep = small().write(folder, false)?;
+        sweep.run(Shard::WHOLE, &runner)?;
+        Ok(sweep.merge_and_report()?.latency.unwrap())
+    })
 }
 
 #[test]
@@ -90,22 +86,22 @@ fn the_folder_of_another_study_is_not_changed() {
 }
 
 #[test]
-fn an_invalid_study_is_an_error_with_the_line() {
-    let (_, source) = shipped();
+fn an_invalid_study_is_refused() {
+    let study = find(Kind::Study, "timing").unwrap();
     for (old, new, sentence) in [
-        ("latencies_ms: [-5.0, -2.0, -1.0, -0.5, 0.0,", "latencies_ms: [-5.0,", "needs a 0"),
-        ("latencies_ms: [-5.0, -2.0, -1.0, -0.5, 0.0,", "latencies_ms: [0.0,", "on each side of 0"),
-        ("latencies_ms: [-5.0, -2.0,", "latencies_ms: [-5.0, -5.0,", "more than once"),
-        ("noises_ms: [0.0, 1.0,", "noises_ms: [0.0, -1.0,", "expected 0 to 20"),
-        ("shown_noises_ms: [0.0,", "shown_noises_ms: [0.0, 3.0,", "but not studied"),
-        ("shown_noises_ms: [0.0, 1.0,", "shown_noises_ms: [0.0,", "expected equal numbers"),
+        ("\"timing.latency_ms\": -5.0", "\"timing.latency_ms\": -25.0", "expected -20 to 20"),
+        ("\"timing.noise_ms\": 1.0", "\"timing.noise_ms\": -1.0", "expected 0 to 20"),
         ("block_s: 5.0", "block_s: 70.0", "do not fit"),
         ("scene: \"office\"", "scene: \"nowhere\"", "no such scene"),
+        ("[cloud_sigma_m,", "[drift_m_per_min,", "does not measure drift_m_per_min"),
     ] {
-        assert!(source.text.contains(old), "{old}");
-        let source = Source { text: source.text.replacen(old, new, 1), ..source.clone() };
-        let ExperimentSpec::Latency(spec) = parse(&source).unwrap() else { panic!("figure 4 is of latency") };
-        let error = LatencyStudy::new(&spec, &source).map(|_| ()).unwrap_err().to_string();
+        assert!(study.text.contains(old), "{old}");
+        let source = Source { text: study.text.replacen(old, new, 1), ..study.clone() };
+        let error = Plan::new("timing", &parse(&source).unwrap(), &source).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(sentence), "{error}");
     }
+    let figure = find(Kind::Experiment, "fig4").unwrap();
+    let source = Source { text: figure.text.replace("\"timing\"", "\"imu_quality\""), ..figure };
+    let error = parse::<ExperimentSpec>(&source).unwrap().check(&source).unwrap_err().to_string();
+    assert!(error.contains("has no `timing`"), "{error}");
 }

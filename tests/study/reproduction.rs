@@ -3,10 +3,16 @@
 use assert_cmd::Command;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::SystemTime;
 use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
 use zsim::motion::Axis;
+use zsim::study::StudyError;
 use zsim::study::gains::with_damping;
 use zsim::study::reproduction::{Experiment, Extent, PeaksSpec, fit_damping};
+use zsim::study::sweep::Runner;
+
+const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
 
 const RATIOS: (f64, f64) = (0.0005, 0.3);
 
@@ -78,13 +84,16 @@ fn small(folder: &Path) -> PathBuf {
     path
 }
 
-/// Content of all files below a folder.
+/// Content of all files below a folder, except those with computing times.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(next) = folders.pop() {
         for entry in std::fs::read_dir(next).unwrap() {
             let path = entry.unwrap().path();
+            if path.ends_with("parts") || path.ends_with("times.parquet") {
+                continue;
+            }
             if path.is_dir() {
                 folders.push(path);
             } else {
@@ -101,31 +110,41 @@ fn a_stopped_experiment_resumes_with_the_same_result() {
     let experiment = Experiment::load(small(here.path()).to_str().unwrap()).unwrap();
     let whole = here.path().join("whole");
     let pool = |threads: usize| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let run = |folder: &Path| experiment.run(folder, Extent::Quick, false, &|_| ()).unwrap();
-    let finding = pool(1).install(|| run(&whole));
+    let run = |folder: &Path, extent: Extent, stop_at: f64| {
+        let stop = AtomicBool::new(false);
+        let on_progress = |fraction: f64| stop.store(fraction >= stop_at, Ordering::Relaxed);
+        experiment.run(
+            folder,
+            extent,
+            false,
+            &Runner { program: Path::new(ZSIM), stop: &stop, on_progress: &on_progress },
+        )
+    };
+    let result = pool(1).install(|| run(&whole, Extent::Quick, 2.0)).unwrap();
     // Six axes, and the misfit over all axes.
-    assert_eq!(finding.rows.len(), 7);
+    assert_eq!(result.rows.len(), 7);
     let at_end = files(&whole);
     for name in ["gains.svg", "gains.png", "coherence.svg", "coherence.png", "a/gains.csv", "a/head.ron"] {
         assert!(at_end.contains_key(Path::new(name)), "{name} of {:?}", at_end.keys());
     }
 
-    // Stopped half-way: the fit and two axes are complete, a third has started, there are no plots.
     let stopped = here.path().join("stopped");
-    std::fs::create_dir_all(stopped.join("parts")).unwrap();
-    for name in ["made_from.ron", "parts/a-fit.ron", "parts/a-x_rot.ron", "parts/a-y.ron"] {
-        std::fs::copy(whole.join(name), stopped.join(name)).unwrap();
-    }
-    std::fs::write(stopped.join("parts/.partial-a-z"), "(axis: Z, poi").unwrap();
-    let kept = std::fs::metadata(stopped.join("parts/a-y.ron")).unwrap().modified().unwrap();
+    assert!(matches!(pool(1).install(|| run(&stopped, Extent::Quick, 0.3)), Err(StudyError::Stopped)));
+    let modified = || -> BTreeMap<PathBuf, SystemTime> {
+        let parts = std::fs::read_dir(stopped.join("parts")).unwrap().map(|entry| entry.unwrap());
+        parts.map(|part| (part.path(), part.metadata().unwrap().modified().unwrap())).collect()
+    };
+    let kept = modified();
+    assert!((1..6).contains(&kept.len()), "{kept:?}");
     assert!(experiment.finished(&stopped, Extent::Quick).unwrap().is_none());
-    assert_eq!(pool(2).install(|| run(&stopped)), finding);
-    assert_eq!(std::fs::metadata(stopped.join("parts/a-y.ron")).unwrap().modified().unwrap(), kept);
+    assert_eq!(pool(2).install(|| run(&stopped, Extent::Quick, 2.0)).unwrap(), result);
+    let after = modified();
+    assert!(kept.iter().all(|(part, time)| after.get(part) == Some(time)), "finished parts are used again");
     assert!(files(&stopped) == at_end, "the result differs from that without a stop");
-    assert_eq!(experiment.finished(&stopped, Extent::Quick).unwrap(), Some(finding));
+    assert_eq!(experiment.finished(&stopped, Extent::Quick).unwrap(), Some(result));
     assert!(experiment.finished(&stopped, Extent::Whole).unwrap().is_none());
 
-    let error = experiment.run(&whole, Extent::Whole, false, &|_| ()).unwrap_err();
+    let error = run(&whole, Extent::Whole, 2.0).unwrap_err();
     assert!(error.to_string().contains("another experiment"), "{error}");
 }
 

@@ -1,7 +1,8 @@
 //! Spring design by search.
 
 use zsim::spec::{Kind, Source, find, parse};
-use zsim::study::spring::design::{DesignSearch, DesignSpec, DesignStudy, csv, pareto_figure, pareto_set};
+use zsim::study::spring::design::{DesignSearch, DesignSpec, DesignStudy, csv, pareto_figure};
+use zsim::study::sweep::pareto_set;
 
 fn load(name: &str) -> (DesignSpec, Source) {
     let source = find(Kind::Study, name).unwrap();

@@ -199,13 +199,12 @@ fn a_box_is_the_same_box_from_every_format() {
         let (lower, upper) = world.bounds();
         assert_relative_eq!(lower, Vector::new(0.0, 1.0, 0.0), epsilon = 1e-12);
         assert_relative_eq!(upper, Vector::new(2.0, 5.0, 6.0), epsilon = 1e-12);
-        for (axis, distance) in [(0, 10.0), (1, 11.0), (2, 10.0)] {
+        for axis in 0..3 {
             let direction_in_world = Vector::ith(axis, 1.0);
             let ray =
                 Ray { origin_in_world: Vector::new(1.2, 3.3, 2.9) - direction_in_world * 20.0, direction_in_world };
             let face = [0.0, 1.0, 0.0][axis];
             let expected = face - ray.origin_in_world[axis];
-            assert!((expected - distance).abs() < 10.0);
             assert_relative_eq!(world.cast(&ray, 30.0, 0.0).unwrap().distance_m, expected, epsilon = 1e-9);
         }
     }

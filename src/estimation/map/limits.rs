@@ -60,7 +60,7 @@ impl RelocalisationLimits {
         let reach_deg = (GAP_HEADING_DEG.0 + GAP_HEADING_DEG.1 * seconds).min(GAP_HEADING_DEG.2);
         Self {
             reach: (reach_m, reach_deg.to_radians()),
-            reach_up_m: if seconds > LONG_GAP_S { CLIMB_M_PER_S * seconds } else { 0.0 },
+            reach_up_m: if seconds > LONG_GAP_S { (CLIMB_M_PER_S * seconds).min(MAX_START_OFFSET_M) } else { 0.0 },
             gate_m: Some(1.5 * sigma_m),
             min_inlier_ratio: 0.1,
             min_agreement: if seconds > LONG_GAP_S { 0.85 } else { 0.6 },
@@ -103,5 +103,21 @@ impl RelocalisationLimits {
         let (distance_m, angle) = pose_distance(found, expected, viewpoint);
         let sigmas = 2.0 * (distance_m / self.reach.0).max(angle / self.reach.1);
         if sigmas > 3.0 { 0.0 } else { (-0.5 * sigmas * sigmas).exp() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_start_poses_after_a_gap_of_a_day_are_a_few_thousand_at_most() {
+        let count = |seconds: f64| {
+            RelocalisationLimits::after_gap(seconds, 0.01).starts(&Pose::identity(), &Vector::zeros()).len()
+        };
+        assert_eq!(count(86_400.0), count(10.0));
+        assert!(count(86_400.0) < 3000, "{}", count(86_400.0));
+        // A short gap is searched at the expected height only: 3 x 3 positions, 11 headings at 1 s.
+        assert!(count(1.0) < 150, "{}", count(1.0));
     }
 }

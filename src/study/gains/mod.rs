@@ -21,6 +21,7 @@ pub use table::{csv, swing_csv};
 use crate::dynamics::{AccelerationKind, DampingSpec, GainPoints, HeadSpec, Peak};
 use crate::motion::Axis;
 use crate::random::Seed;
+use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
 /// Settings of a gain measurement.
@@ -62,6 +63,37 @@ impl Default for GainPlan {
             longest_settling_s: 200.0,
             step_s: 1e-3,
             seed: Seed(1),
+        }
+    }
+}
+
+/// A gain measurement along or about one axis, with the default amplitudes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GainsSpec {
+    /// Axis: of angular rate for a rotation, of acceleration for a translation.
+    pub axis: Axis,
+    /// Highest frequency, Hz.
+    #[serde(with = "checked::Positive")]
+    pub up_to_hz: f64,
+    /// Number of averaged realisations, at least 2.
+    pub realisations: usize,
+    /// Period of the multisine, s; by default at least two spectral lines are in the narrowest resonance.
+    pub period_s: Option<f64>,
+    /// Maximum settling time, s. A transient that lasts longer lowers the coherence.
+    #[serde(with = "checked::Positive")]
+    pub longest_settling_s: f64,
+}
+
+impl GainsSpec {
+    /// Settings of the measurement.
+    pub fn plan(&self) -> GainPlan {
+        GainPlan {
+            up_to_hz: self.up_to_hz,
+            realisations: self.realisations,
+            period_s: self.period_s,
+            longest_settling_s: self.longest_settling_s,
+            ..GainPlan::default()
         }
     }
 }

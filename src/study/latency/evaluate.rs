@@ -1,59 +1,64 @@
-//! Estimation from the disturbed recording, and evaluation of the estimate.
+//! Estimation from a recording with timing errors, and evaluation of the estimate.
 
-use super::bootstrap::Block;
 use super::reference::{Reference, SampledReturn};
 use super::stamp_errors::DisturbedStamps;
-use super::{ClockState, Disturbance};
+use super::{ClockState, TimingSpec};
 use crate::estimation::{ClockSpec, Estimator, EstimatorSpec, OpenLoop, smoothed_stamps};
 use crate::evaluation::{CloudErrors, Errors, Pairs};
 use crate::geometry::{Pose, SmoothCursor, Vector};
 use crate::measurement::Calibration;
-use crate::random::Seed;
 use crate::recording::{Reader, Selection};
+use crate::simulation::Simulation;
 use crate::study::StudyError;
+use crate::study::sweep::Block;
 use crate::time::Stamp;
-use crate::world::World;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Maximum distance from a point to a surface, m: points farther away are outliers.
 const REACH_M: f64 = 1.0;
 
-/// Result of a run.
+/// Errors of a run and its map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct RunResult {
+pub struct MapErrors {
     /// Error sums per block of time.
     pub blocks: Vec<Block>,
     /// Estimated minus true clock offset at the end of the run, ms.
     pub clock_error_ms: f64,
-    /// Coordinates of the returns in the section by the estimate (along it, up), m; NaN outside the estimated time.
-    #[serde(rename = "cut_m")]
-    pub section_m: Vec<(f32, f32)>,
+    /// Vertical section through the map, if it is shown.
+    pub section: Option<Section>,
 }
 
-/// The recording and the settings common to all runs.
-pub(super) struct RunContext<'a> {
+/// Points in a vertical section through a map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Section {
+    /// Shown range (along the section, up), m.
+    pub range_m: ((f64, f64), (f64, f64)),
+    /// Coordinates by the estimate (along the section, up), m; NaN outside the estimated time.
+    pub points_m: Vec<(f32, f32)>,
+    /// True angular rate of the head in the section's plane for each point, degrees/s.
+    pub rates_deg_per_s: Vec<f64>,
+}
+
+/// A recording that is estimated with a timing error.
+pub(in crate::study) struct TimingRun<'a> {
     pub reader: &'a Reader,
     pub selection: &'a Selection,
     pub calibration: &'a Calibration,
-    pub estimator: &'a EstimatorSpec,
-    pub world: &'a World,
+    pub simulation: &'a Simulation,
     pub reference: &'a Reference,
-    pub block_s: f64,
-    pub seed: Seed,
+    pub timing: &'a TimingSpec,
 }
 
-impl RunContext<'_> {
-    /// Estimates with a disturbance, and evaluates the estimate.
-    pub(super) fn run(
-        &self,
-        disturbance: Disturbance,
-        clock: ClockState,
-        stop: &AtomicBool,
-    ) -> Result<RunResult, StudyError> {
-        let timing = DisturbedStamps::new(disturbance, &self.reference.clock, &self.reference.scan_stamps, self.seed);
-        let estimator = self.settings(clock, disturbance.noise_ms * 1e-3);
+impl TimingRun<'_> {
+    /// Estimates, and evaluates the estimate.
+    pub fn evaluate(&self, estimator: &EstimatorSpec, stop: &AtomicBool) -> Result<MapErrors, StudyError> {
+        let disturbance = self.timing.disturbance();
+        let seed = self.simulation.inputs().seed;
+        let timing = DisturbedStamps::new(disturbance, &self.reference.clock, &self.reference.scan_stamps, seed);
+        let estimator = with_known_jitter(estimator, disturbance.noise_ms * 1e-3);
         let estimate = self.estimate(&estimator, &timing, stop)?;
         // The cloud uses the scan times that the estimator assumed.
         let scan_stamps = smoothed_stamps(timing.scan_stamps(), &estimator);
@@ -67,28 +72,26 @@ impl RunContext<'_> {
             block.position2_m2 += error.norm_squared();
         }
         self.evaluate_cloud(&estimate, (&world_from_map, &scan_stamps), &mut blocks);
+        let offset_s = estimate.clock_offsets.last().map_or(0.0, |(_, offset_s)| *offset_s);
+        Ok(MapErrors {
+            blocks,
+            clock_error_ms: offset_s * 1e3 - disturbance.latency_ms,
+            section: self.timing.shown.then(|| self.section(&estimate, &world_from_map, &scan_stamps)),
+        })
+    }
+
+    fn section(&self, estimate: &OpenLoop, world_from_map: &Pose, scan_stamps: &[Stamp]) -> Section {
         let coordinates = |projected: Option<(Vector, Vector)>| {
             let (along, up) =
                 projected.map_or((f64::NAN, f64::NAN), |(point, _)| self.reference.section.coordinates(&point));
             (along as f32, up as f32)
         };
-        let shown = self.project(&self.reference.shown, &estimate, &world_from_map, &scan_stamps);
-        let offset_s = estimate.clock_offsets.last().map_or(0.0, |(_, offset_s)| *offset_s);
-        Ok(RunResult {
-            blocks,
-            clock_error_ms: offset_s * 1e3 - disturbance.latency_ms,
-            section_m: shown.into_iter().map(coordinates).collect(),
-        })
-    }
-
-    /// Settings of the estimator for a clock state; to smooth stamps the estimator needs the true jitter.
-    fn settings(&self, clock: ClockState, noise_s: f64) -> EstimatorSpec {
-        let own = &self.estimator.clock;
-        let clock = match clock {
-            ClockState::On => ClockSpec { jitter_s: own.jitter_s.max(noise_s), ..own.clone() },
-            ClockState::Off => ClockSpec { estimated: false, start_s: 0.0, jitter_s: 0.0, ..own.clone() },
-        };
-        EstimatorSpec { clock, ..self.estimator.clone() }
+        let shown = self.project(&self.reference.shown, estimate, world_from_map, scan_stamps);
+        Section {
+            range_m: self.reference.range_m,
+            points_m: shown.into_iter().map(coordinates).collect(),
+            rates_deg_per_s: self.reference.shown_rates_deg_per_s.clone(),
+        }
     }
 
     /// Runs the estimator on the disturbed recording.
@@ -118,7 +121,7 @@ impl RunContext<'_> {
         let returns = &self.reference.evaluated;
         let projected = self.project(returns, estimate, world_from_map, scan_stamps);
         for (hit, (point, origin)) in returns.iter().zip(projected).filter_map(|(hit, ends)| Some((hit, ends?))) {
-            let found = CloudErrors::to_surface(self.world, &[(point, Some(origin))], REACH_M);
+            let found = CloudErrors::to_surface(self.simulation.world(), &[(point, Some(origin))], REACH_M);
             if let Some(distance_m) = found.signed_m.first() {
                 let block = self.block_at(blocks, self.reference.scan_stamps[hit.scan]);
                 block.points += 1.0;
@@ -149,9 +152,23 @@ impl RunContext<'_> {
     /// The block of time that contains `stamp`.
     fn block_at<'b>(&self, blocks: &'b mut Vec<Block>, stamp: Stamp) -> &'b mut Block {
         let (first, last) = self.reference.truth.span().unwrap_or_default();
-        let count = ((last.seconds_since(first) / self.block_s).round() as usize).max(1);
+        let count = ((last.seconds_since(first) / self.timing.block_s).round() as usize).max(1);
         blocks.resize(count, Block::default());
-        let index = (stamp.seconds_since(first) / self.block_s).max(0.0) as usize;
+        let index = (stamp.seconds_since(first) / self.timing.block_s).max(0.0) as usize;
         &mut blocks[index.min(count - 1)]
+    }
+}
+
+/// The estimator that knows the jitter of the stamps, if it smooths stamps.
+fn with_known_jitter(estimator: &EstimatorSpec, noise_s: f64) -> EstimatorSpec {
+    let own = &estimator.clock;
+    let jitter_s = if own.jitter_s > 0.0 { own.jitter_s.max(noise_s) } else { 0.0 };
+    EstimatorSpec { clock: ClockSpec { jitter_s, ..own.clone() }, ..estimator.clone() }
+}
+
+impl ClockState {
+    /// Whether an estimator estimates clock errors.
+    pub(in crate::study) fn of(estimator: &EstimatorSpec) -> Self {
+        if estimator.clock.estimated { Self::On } else { Self::Off }
     }
 }

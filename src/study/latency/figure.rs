@@ -1,7 +1,8 @@
 //! Figures: sections through the map as in the paper's figure 4, and error curves.
 
-use super::{ClockState, ConfidenceInterval, Disturbance, LatencyResult, LatencyRun};
+use super::{ClockState, Disturbance, LatencyResult, LatencyRun};
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series, SignedDots};
+use crate::study::sweep::ConfidenceInterval;
 
 /// Angular rate at the ends of the colour scale, degrees/s; larger rates saturate the colour.
 const FULL_COLOUR_DEG_PER_S: f64 = 150.0;
@@ -15,14 +16,14 @@ type ErrorMeasure = fn(&LatencyRun) -> ConfidenceInterval;
 ///
 /// Colour is the head's angular rate at the time of a point.
 pub fn map_figure(study: &LatencyResult, clock: ClockState) -> Figure {
-    let [latencies, noises] = &study.shown;
+    let [latencies, noises] = study.shown();
     let columns = latencies.len();
     let mut letters = 'a'..;
     let mut charts = Vec::new();
-    for row in [latencies, noises] {
+    for (row, is_noise) in [(latencies, false), (noises, true)] {
         for disturbance in row {
-            let title = format!("({}) {}", letters.next().unwrap_or(' '), label(*disturbance, row == noises));
-            charts.push(panel(study, (*disturbance, clock), &title, charts.is_empty()));
+            let title = format!("({}) {}", letters.next().unwrap_or(' '), label(disturbance, is_noise));
+            charts.push(panel(study, (disturbance, clock), &title, charts.is_empty()));
         }
     }
     let mut figure = Figure::of(charts).in_columns(columns);
@@ -39,12 +40,12 @@ fn label(disturbance: Disturbance, is_noise: bool) -> String {
 }
 
 fn panel(study: &LatencyResult, (disturbance, clock): (Disturbance, ClockState), title: &str, is_first: bool) -> Chart {
-    let points = study.run(disturbance, clock).map(|run| run.section_m.as_slice()).unwrap_or_default();
-    let dots = points.iter().zip(&study.section_rates_deg_per_s);
-    let unit = if is_first { "\u{b0}/s" } else { "" };
-    let (along, up) = study.section_range_m;
-    Chart::new(title, "Along the section (m)", "Up (m)").as_map().between(along, up).with_signed_dots(SignedDots {
-        unit: unit.to_owned(),
+    let chart = Chart::new(title, "Along the section (m)", "Up (m)").as_map();
+    let Some(section) = study.run(disturbance, clock).and_then(|run| run.section.as_ref()) else { return chart };
+    let dots = section.points_m.iter().zip(&section.rates_deg_per_s);
+    let (along, up) = section.range_m;
+    chart.between(along, up).with_signed_dots(SignedDots {
+        unit: if is_first { "\u{b0}/s" } else { "" }.to_owned(),
         limit: FULL_COLOUR_DEG_PER_S,
         size: 1.6,
         dots: dots.map(|((x, y), rate)| (f64::from(*x), f64::from(*y), *rate)).collect(),

@@ -1,7 +1,7 @@
 //! Effect of timing errors between lidar and IMU on a map (the paper's figure 4), with and without clock estimation.
 //!
-//! One simulated recording is estimated repeatedly with a [`Disturbance`]: a constant latency of the IMU's stamps, or
-//! noise on the stamps of the lidar's scans. The errors are added between recording and estimator, after the true offset
+//! The study is a [sweep](super::sweep) over the timing of one simulated recording, `specs/studies/timing.ron`. Each run has
+//! a [`Disturbance`]: a constant latency of the IMU's stamps, or noise on the stamps of the lidar's scans. The errors are added between recording and estimator, after the true offset
 //! of the clocks, which the simulation knows, is removed. Each disturbance is estimated in both [`ClockState`]s: off
 //! (offset fixed at zero, stamps not smoothed, as in the paper) and on (offset and rate estimated, stamps smoothed).
 //!
@@ -9,22 +9,23 @@
 //! bootstrap yields 95 % confidence intervals. The minimum of a parabola fitted to the squared error over the latency is
 //! the best latency, which should be zero.
 
-mod bootstrap;
 mod cross_section;
 mod evaluate;
 mod figure;
 mod output;
 mod reference;
-mod run;
+mod result;
 mod spec;
 mod stamp_errors;
 
-pub use bootstrap::{Block, ConfidenceInterval};
+pub(in crate::study) use evaluate::TimingRun;
+pub use evaluate::{MapErrors, Section};
 pub use figure::{curve_figure, map_figure};
 pub(super) use output::conclusions;
 pub use output::{csv, text_table};
-pub use run::{LatencyResult, LatencyRun, LatencyStudy, Minimum, Recovery};
-pub use spec::LatencySpec;
+pub(in crate::study) use reference::Reference;
+pub use result::{LatencyResult, LatencyRun, Minimum, Recovery};
+pub use spec::TimingSpec;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,8 @@
 //! Tables of a latency study.
 
-use super::{ClockState, ConfidenceInterval, Disturbance, LatencyResult, LatencyRun};
+use super::{ClockState, Disturbance, LatencyResult, LatencyRun};
 use crate::report;
+use crate::study::sweep::ConfidenceInterval;
 use std::fmt::Write;
 
 /// CSV with one row per run: `latency_ms,noise_ms,clock_state` and the measures with their confidence limits.

@@ -5,6 +5,7 @@ use crate::evaluation::Thinning;
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarScan, Measurement};
 use crate::recording::{Reader, Selection};
+use crate::simulation::Simulation;
 use crate::study::StudyError;
 use crate::study::cloud::Surroundings;
 use crate::study::true_clock::TrueClock;
@@ -37,32 +38,32 @@ pub(super) struct SampledReturn {
 }
 
 /// Ground truth and sampled returns of the recording.
-pub(super) struct Reference {
+pub(in crate::study) struct Reference {
     /// `world_from_head` in lidar time.
-    pub truth: Trajectory,
+    pub(super) truth: Trajectory,
     /// True offset of the clocks.
-    pub clock: TrueClock,
+    pub(super) clock: TrueClock,
     /// True stamps of the scans, in order of arrival.
-    pub scan_stamps: Vec<Stamp>,
+    pub(super) scan_stamps: Vec<Stamp>,
     /// Returns for the cloud's errors.
-    pub evaluated: Vec<SampledReturn>,
+    pub(super) evaluated: Vec<SampledReturn>,
     /// The section through the map.
-    pub section: CrossSection,
+    pub(super) section: CrossSection,
     /// Shown range of the section (along it, up), m.
-    pub range_m: ((f64, f64), (f64, f64)),
+    pub(super) range_m: ((f64, f64), (f64, f64)),
     /// Returns in the shown range.
-    pub shown: Vec<SampledReturn>,
+    pub(super) shown: Vec<SampledReturn>,
     /// True angular rate of the head in the section's plane for each shown return, degrees/s.
-    pub shown_rates_deg_per_s: Vec<f64>,
+    pub(super) shown_rates_deg_per_s: Vec<f64>,
 }
 
 impl Reference {
-    /// Reads the recording. `returns` is the approximate number of returns, `shown_s` the time range of the section, s.
-    pub(super) fn read(
+    /// Reads the recording of `simulation`; the section has the returns of the middle `shown_s`.
+    pub(in crate::study) fn read(
         reader: &Reader,
         (selection, calibration): (&Selection, &Calibration),
-        surroundings: Surroundings<'_>,
-        (returns, shown_s): (usize, f64),
+        simulation: &Simulation,
+        shown_s: f64,
         stop: &AtomicBool,
     ) -> Result<Self, StudyError> {
         let truth = reader.truth_trajectory()?;
@@ -70,6 +71,10 @@ impl Reference {
             let message = "the recording has no ground truth".to_owned();
             return Err(StudyError::Plan { what: "latency", message });
         };
+        let surroundings = Surroundings { world: simulation.world(), carrier: simulation.carrier() };
+        let lidar = simulation.lidar();
+        let scans = simulation.inputs().duration_s / lidar.period_s();
+        let returns = (scans * lidar.beams().len() as f64) as usize;
         let mut sampling = ReturnSampler {
             truth: TruthCursor::new(reader.truth()),
             surroundings,

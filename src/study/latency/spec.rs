@@ -1,111 +1,51 @@
-//! Spec of a latency study.
+//! Timing errors of a run, and settings of the evaluation of its map.
 
-use super::{ClockState, Disturbance};
-use crate::simulation::Scenario;
-use crate::spec::{Source, SpecError, checked};
+use super::Disturbance;
+use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
 /// Maximum magnitude of latency and noise, ms: the search range of the clock estimation.
 const MAX_TIMING_ERROR_MS: f64 = 20.0;
 
-/// A study of latency and timing noise: one recording, estimated with each timing error.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+/// Timing errors between lidar and IMU, which replace the true offset of the clocks before the estimation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct LatencySpec {
-    /// Number of the figure in the paper.
-    pub figure: String,
-    /// Scenario of the recording, which is simulated once.
-    pub scenario: Scenario,
-    /// Settings of the estimator: a name under `specs/estimators/`, or a file.
-    pub estimator: String,
-    /// Constant latencies of the IMU's stamps relative to the lidar's, ms, from -20 to 20; must contain 0 and values of both
-    /// signs.
-    pub latencies_ms: Vec<f64>,
-    /// Standard deviations of the noise on the stamps of the lidar's scans, ms, from 0 to 20; must contain 0 and a positive
-    /// value.
-    pub noises_ms: Vec<f64>,
-    /// Latencies with a map in the figure, ms; a subset of `latencies_ms`.
-    pub shown_latencies_ms: Vec<f64>,
-    /// Noises with a map in the figure, ms; a subset of `noises_ms`, as many as latencies.
-    pub shown_noises_ms: Vec<f64>,
-    /// Time range of the returns in the maps, centred in the run, s.
-    #[serde(with = "checked::Positive")]
-    pub shown_s: f64,
-    /// Length of the blocks of the bootstrap for confidence intervals, s; at most half the scenario's duration.
+pub struct TimingSpec {
+    /// Delay of the IMU's stamps relative to the lidar's for the same time, ms, from -20 to 20.
+    pub latency_ms: f64,
+    /// Standard deviation of the white noise on the stamps of the lidar's scans, ms, from 0 to 20. An estimator that
+    /// smooths stamps is given this jitter.
+    pub noise_ms: f64,
+    /// Length of the blocks of the bootstrap for confidence intervals, s; at most half the run's duration.
     #[serde(with = "checked::Positive")]
     pub block_s: f64,
+    /// Time range of the returns in a map, centred in the run, s.
+    #[serde(with = "checked::Positive")]
+    pub shown_s: f64,
+    /// Whether the run has a map in the figure.
+    pub shown: bool,
 }
 
-impl LatencySpec {
-    /// Checks the numbers against each other.
+impl TimingSpec {
+    /// The timing error.
+    pub fn disturbance(&self) -> Disturbance {
+        Disturbance { latency_ms: self.latency_ms, noise_ms: self.noise_ms }
+    }
+
+    /// Checks the numbers for a run of `duration_s`.
     ///
     /// # Errors
-    /// At the first inconsistent key.
-    pub fn check(&self, source: &Source) -> Result<(), SpecError> {
-        let invalid = |key: &str, message: String| Err(SpecError::about(source, key, message));
-        let lists = [("latencies_ms", &self.latencies_ms, -MAX_TIMING_ERROR_MS), ("noises_ms", &self.noises_ms, 0.0)];
-        for (key, list, least) in lists {
-            if let Some(outside) = list.iter().find(|ms| !(least..=MAX_TIMING_ERROR_MS).contains(*ms)) {
-                return invalid(key, format!("{outside} ms: expected {least} to {MAX_TIMING_ERROR_MS}"));
-            }
-            if !list.contains(&0.0) {
-                return invalid(key, format!("`{key}` needs a 0 as reference"));
-            }
-            if let Some((_, twice)) = list.iter().enumerate().find(|(k, ms)| list[..*k].contains(ms)) {
-                return invalid(key, format!("`{key}` contains {twice} more than once"));
-            }
-            if !list.iter().any(|ms| *ms > 0.0) || (least < 0.0 && !list.iter().any(|ms| *ms < 0.0)) {
-                return invalid(key, format!("`{key}` needs a value on each side of 0 that its range permits"));
+    /// A message if a number is out of range.
+    pub fn check(&self, duration_s: f64) -> Result<(), String> {
+        let most = MAX_TIMING_ERROR_MS;
+        for (key, ms, least) in [("latency_ms", self.latency_ms, -most), ("noise_ms", self.noise_ms, 0.0)] {
+            if !(least..=most).contains(&ms) {
+                return Err(format!("`{key}` {ms} ms: expected {least} to {most}"));
             }
         }
-        let shown = [
-            ("shown_latencies_ms", &self.shown_latencies_ms, &self.latencies_ms),
-            ("shown_noises_ms", &self.shown_noises_ms, &self.noises_ms),
-        ];
-        for (key, list, studied) in shown {
-            if let Some(missing) = list.iter().find(|ms| !studied.contains(ms)) {
-                return invalid(
-                    key,
-                    format!("{missing} ms is shown, but not studied: add it to the list of studied values"),
-                );
-            }
-        }
-        if self.shown_noises_ms.len() != self.shown_latencies_ms.len() {
-            let counts = (self.shown_noises_ms.len(), self.shown_latencies_ms.len());
-            let message = format!("{} noises and {} latencies are shown: expected equal numbers", counts.0, counts.1);
-            return invalid("shown_noises_ms", message);
-        }
-        if self.scenario.duration_s < 2.0 * self.block_s {
-            let message = format!("two blocks of {} s do not fit into {} s", self.block_s, self.scenario.duration_s);
-            return invalid("block_s", message);
+        if duration_s < 2.0 * self.block_s {
+            return Err(format!("two blocks of {} s do not fit into {duration_s} s", self.block_s));
         }
         Ok(())
-    }
-
-    /// A reduced study for smoke tests, which takes seconds; its figures are not results.
-    #[must_use]
-    pub fn shortened(&self) -> Self {
-        let most = |list: &[f64]| list.iter().copied().fold(0.0, f64::max);
-        let least = self.latencies_ms.iter().copied().fold(0.0, f64::min);
-        let latencies_ms = vec![least, 0.0, most(&self.latencies_ms)];
-        let noises_ms = vec![0.0, 0.5 * most(&self.noises_ms), most(&self.noises_ms)];
-        Self {
-            scenario: Scenario { duration_s: self.scenario.duration_s.min(10.0), ..self.scenario.clone() },
-            shown_latencies_ms: latencies_ms.clone(),
-            shown_noises_ms: noises_ms.clone(),
-            latencies_ms,
-            noises_ms,
-            block_s: self.block_s.min(1.0),
-            ..self.clone()
-        }
-    }
-
-    /// All runs: each disturbance with the clock state off and on.
-    pub(super) fn runs(&self) -> Vec<(Disturbance, ClockState)> {
-        let latencies = self.latencies_ms.iter().map(|ms| Disturbance { latency_ms: *ms, noise_ms: 0.0 });
-        let noises = self.noises_ms.iter().filter(|ms| **ms > 0.0);
-        let noises = noises.map(|ms| Disturbance { latency_ms: 0.0, noise_ms: *ms });
-        let both = |disturbance| [ClockState::Off, ClockState::On].map(|clock| (disturbance, clock));
-        latencies.chain(noises).flat_map(both).collect()
     }
 }

@@ -54,7 +54,7 @@ impl RunResults<'_> {
         };
         let world = self.world();
         let (surfaces, surfaces_are_partial) = world.map(surfaces).unwrap_or_default();
-        let head = self.origin.manifest.specs.as_ref().map(|specs| &specs.head);
+        let head = self.origin.manifest.run.as_ref().map(|run| &run.head.spec);
         Ok(View {
             points: cloud::points(self),
             materials: world.map_or(&[][..], World::materials).iter().map(|material| material.name.clone()).collect(),

@@ -1,17 +1,19 @@
 //! Figure 3 of the paper: gain curves of several heads.
 
-use super::part_store::PartStore;
 use super::{
     ComparedNumber, DampingFit, DesignedSpec, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping,
     gain_plots,
 };
-use crate::dynamics::{DampingSpec, HeadModel, HeadSpec, Peak};
+use crate::dynamics::{DampingSpec, HeadSpec, Peak};
 use crate::motion::Axis;
+use crate::simulation::Named;
 use crate::spec::{self, Source};
-use crate::study::gains::{AXES, GainCurve, GainPlan, axis_name, csv, gain_curve, with_damping};
-use crate::study::progress::PieceProgress;
-use crate::study::{OnProgress, StudyError};
+use crate::study::StudyError;
+use crate::study::atomic_file::write_text;
+use crate::study::gains::{AXES, GainCurve, GainPlan, GainsSpec, csv, with_damping};
+use crate::study::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec};
 use rayon::prelude::*;
+use std::path::Path;
 
 /// A head with fitted damping and its gain curves.
 pub(super) struct HeadResponse<'a> {
@@ -25,57 +27,68 @@ pub(super) fn run(
     spec: &GainCurvesSpec,
     heads: &[HeadSpec],
     extent: Extent,
-    store: &PartStore,
-    on_progress: OnProgress<'_>,
+    (folder, anew): (&Path, bool),
+    runner: &Runner,
 ) -> Result<ExperimentResult, StudyError> {
-    let plan = plan(spec, extent);
-    let designs: Vec<(&DesignedSpec, &HeadSpec)> = spec.designs.iter().zip(heads).collect();
-    let fitted = designs.par_iter().map(|(design, head)| {
+    let fitted = spec.designs.par_iter().zip(heads).map(|(design, head)| {
         let source = Source::in_memory(design.head.clone(), "");
-        store.part(&format!("{}-fit", design.letter), || {
-            fit_damping(head, &source, &design.peaks, spec.ratios, spec.up_to_hz)
-        })
+        fit_damping(head, &source, &design.peaks, spec.ratios, spec.up_to_hz)
     });
     let fitted: Vec<DampingFit> = fitted.collect::<Result<_, StudyError>>()?;
-    let tasks: Vec<(usize, Axis)> = (0..designs.len()).flat_map(|k| AXES.map(|axis| (k, axis))).collect();
-    let pieces = PieceProgress::new(tasks.len() * plan.realisations, on_progress);
-    let curves = tasks.par_iter().map(|(k, axis)| {
-        let (design, head) = designs[*k];
-        let name = format!("{}-{}", design.letter, axis_name(*axis));
-        if store.has(&name) {
-            (0..plan.realisations).for_each(|_| pieces.finish_one());
-        }
-        store.part(&name, || {
-            let head = with_damping(head, fitted[*k].damping_ratio);
-            let head = HeadModel::new(&head, &Source::in_memory(design.head.clone(), ""))?;
-            gain_curve(&head, *axis, &plan, &|_| pieces.finish_one())
-        })
-    });
-    let curves: Vec<GainCurve> = curves.collect::<Result<_, StudyError>>()?;
-    let responses: Vec<HeadResponse<'_>> = designs
+    let damped: Vec<HeadSpec> =
+        heads.iter().zip(&fitted).map(|(head, fit)| with_damping(head, fit.damping_ratio)).collect();
+    let sweep = plan(spec, &damped, extent)?.write(folder, anew)?;
+    sweep.run(Shard::WHOLE, runner)?;
+    sweep.merge()?;
+    let curves: Vec<GainCurve> = sweep.details()?.ok_or_else(|| sweep.failed())?;
+    let responses: Vec<HeadResponse<'_>> = spec
+        .designs
         .iter()
         .zip(fitted)
         .zip(curves.chunks(AXES.len()))
-        .map(|(((design, _), fit), curves)| HeadResponse { design, fit, curves: curves.to_vec() })
+        .map(|((design, fit), curves)| HeadResponse { design, fit, curves: curves.to_vec() })
         .collect();
-    for (response, head) in responses.iter().zip(heads) {
-        let letter = &response.design.letter;
-        store.write(&format!("{letter}/gains.csv"), &csv(&response.curves))?;
-        let head = with_damping(head, response.fit.damping_ratio);
-        store.write(&format!("{letter}/head.ron"), &(spec::to_text(&head)? + "\n"))?;
+    for (response, head) in responses.iter().zip(&damped) {
+        let folder = folder.join(&response.design.letter);
+        std::fs::create_dir_all(&folder).map_err(StudyError::file(&folder))?;
+        write_text(&folder, &folder.join("gains.csv"), &csv(&response.curves))?;
+        write_text(&folder, &folder.join("head.ron"), &(spec::to_text(head)? + "\n"))?;
     }
-    gain_plots::gains(&responses, spec.shown_to_hz).save(store.folder(), "gains")?;
-    gain_plots::coherence(&responses, spec.shown_to_hz).save(store.folder(), "coherence")?;
+    gain_plots::gains(&responses, spec.shown_to_hz).save(folder, "gains")?;
+    gain_plots::coherence(&responses, spec.shown_to_hz).save(folder, "coherence")?;
     Ok(compare(spec, &responses))
 }
 
-/// Settings of the measurement.
-fn plan(spec: &GainCurvesSpec, extent: Extent) -> GainPlan {
-    let full = GainPlan { up_to_hz: spec.up_to_hz, ..GainPlan::default() };
-    match extent {
-        Extent::Whole => full,
-        Extent::Quick => GainPlan { realisations: 2, period_s: Some(5.0), longest_settling_s: 2.0, ..full },
-    }
+/// The sweep over the heads and the axes.
+fn plan(spec: &GainCurvesSpec, damped: &[HeadSpec], extent: Extent) -> Result<Plan, StudyError> {
+    let full = GainPlan::default();
+    let (realisations, period_s, longest_settling_s) = match extent {
+        Extent::Whole => (full.realisations, full.period_s, full.longest_settling_s),
+        Extent::Quick => (2, Some(5.0), 2.0),
+    };
+    let gains = GainsSpec { axis: AXES[0], up_to_hz: spec.up_to_hz, realisations, period_s, longest_settling_s };
+    let heads = spec.designs.iter().zip(damped);
+    let heads: Vec<Named<HeadSpec>> =
+        heads.map(|(design, head)| Named::in_memory(design.letter.clone(), head.clone())).collect();
+    let axis = |path: &str, values: Vec<Setting>| AxisSpec::Values {
+        path: path.to_owned(),
+        values,
+        first_share: None,
+        name: None,
+    };
+    let letters = heads.iter().map(|head| Setting::Text(head.name.clone())).collect();
+    let axes = AXES.iter().map(|axis| Setting::Text(format!("{axis:?}"))).collect();
+    let sweep = SweepSpec {
+        base: BaseSpec::Gains { head: spec.designs[0].letter.clone(), gains },
+        axes: vec![axis("head", letters), axis("gains.axis", axes)],
+        sampling: Sampling::Grid,
+        seeds: Vec::new(),
+        measures: vec![Measure::PeakGain],
+        by: None,
+        front: Vec::new(),
+        limits: Vec::new(),
+    };
+    Plan::of_gains(&format!("figure {}", spec.figure), &sweep, gains, heads)
 }
 
 /// Compares the peaks with the paper's.

@@ -1,26 +1,24 @@
 //! Reproduction of the paper's experiments, and comparison with its results.
 //!
-//! An experiment is a spec ([`ExperimentSpec`], the files of `specs/experiments/`). [`Experiment::run`] writes figures and
-//! finished parts to a folder, so that an interrupted experiment can be resumed. [`paper_table`] combines all finished
+//! An experiment is a spec ([`ExperimentSpec`], the files of `specs/experiments/`). Its runs are a [sweep](super::sweep), so
+//! that an interrupted experiment can be resumed; [`Experiment::run`] also draws the figures. [`paper_table`] combines all finished
 //! experiments in one table.
 
 mod damping;
 mod gain_curves;
 mod gain_plots;
-pub(super) mod part_store;
 mod result;
 mod spec;
 mod timing;
 
 pub use damping::{DampingFit, FittedPeak, fit_damping};
 pub use result::{ComparedNumber, ExperimentResult, TABLE_HEADING, paper_table};
-pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec};
+pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, TimingMapsSpec};
 
-use super::latency::LatencyStudy;
-use super::{OnProgress, StudyError};
-use crate::dynamics::HeadSpec;
-use crate::spec::{Kind, Source, find, names, parse};
-use part_store::PartStore;
+use super::StudyError;
+use super::atomic_file::write_text;
+use super::sweep::{ContentHash, Plan, Runner};
+use crate::spec::{Kind, Source, find, names, parse, to_text};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -34,8 +32,17 @@ pub enum Extent {
     Quick,
 }
 
-/// Name of the part with the result, which is written last.
-const RESULT_PART: &str = "finding";
+/// File with the result, which is written last.
+const RESULT_FILE: &str = "finding.ron";
+
+/// Content of the file with the result.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredResult {
+    /// Hash of everything that determines the result.
+    inputs: String,
+    result: ExperimentResult,
+}
 
 /// An experiment with its spec.
 #[derive(Debug, Clone)]
@@ -66,30 +73,34 @@ impl Experiment {
         names(Kind::Experiment)
     }
 
-    /// Runs the experiment in `folder`, resuming an interrupted one; `on_progress` receives the finished fraction.
+    /// Runs the experiment in `folder`, resuming an interrupted one.
     ///
     /// The result does not depend on the number of threads, nor on interruptions.
     ///
     /// # Errors
     /// If the folder contains another experiment (or this one by another spec or version) and `anew` does not permit
-    /// replacing it, if a simulation fails, or if a file cannot be written.
+    /// replacing it, if a run fails, or if a file cannot be written.
     pub fn run(
         &self,
         folder: &Path,
         extent: Extent,
         anew: bool,
-        on_progress: OnProgress<'_>,
+        runner: &Runner,
     ) -> Result<ExperimentResult, StudyError> {
-        match self.work(extent)? {
-            Work::GainCurves(spec, heads) => {
-                let store = PartStore::open(folder, &inputs(extent, spec, &heads), anew)?;
-                store.part(RESULT_PART, || gain_curves::run(spec, &heads, extent, &store, on_progress))
-            }
-            Work::Latency(latency) => {
-                let store = PartStore::open(folder, &latency.inputs(), anew)?;
-                store.part(RESULT_PART, || timing::run(&latency, &store, on_progress))
-            }
+        if let Some(result) = self.finished(folder, extent)?.filter(|_| !anew) {
+            return Ok(result);
         }
+        let result = match &self.spec {
+            ExperimentSpec::GainCurves(spec) => {
+                gain_curves::run(spec, &spec.heads(&self.source)?, extent, (folder, anew), runner)?
+            }
+            ExperimentSpec::Latency(spec) => {
+                timing::run(&spec.figure, &self.timing_plan(spec, extent)?, (folder, anew), runner)?
+            }
+        };
+        let stored = StoredResult { inputs: self.inputs(extent)?, result };
+        write_text(folder, &folder.join(RESULT_FILE), &(to_text(&stored)? + "\n"))?;
+        Ok(stored.result)
     }
 
     /// Reads the result of an earlier run from `folder`; `None` if the experiment is not finished there.
@@ -97,34 +108,25 @@ impl Experiment {
     /// # Errors
     /// If a spec is missing, or if the folder cannot be read.
     pub fn finished(&self, folder: &Path, extent: Extent) -> Result<Option<ExperimentResult>, StudyError> {
-        let store = match self.work(extent)? {
-            Work::GainCurves(spec, heads) => PartStore::existing(folder, &inputs(extent, spec, &heads))?,
-            Work::Latency(latency) => PartStore::existing(folder, &latency.inputs())?,
+        let path = folder.join(RESULT_FILE);
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let stored: StoredResult = parse(&Source::read(&path)?)?;
+        Ok((stored.inputs == self.inputs(extent)?).then_some(stored.result))
+    }
+
+    fn timing_plan(&self, spec: &TimingMapsSpec, extent: Extent) -> Result<Plan, StudyError> {
+        let (study, source) = spec.study(extent, &self.source)?;
+        Plan::new(&self.name, &study, &source)
+    }
+
+    /// Hash of everything that determines the result.
+    fn inputs(&self, extent: Extent) -> Result<String, StudyError> {
+        let text = match &self.spec {
+            ExperimentSpec::GainCurves(spec) => to_text(&(extent, &self.spec, spec.heads(&self.source)?))?,
+            ExperimentSpec::Latency(spec) => to_text(&(extent, &self.spec, self.timing_plan(spec, extent)?.text()?))?,
         };
-        store.filter(|store| store.has(RESULT_PART)).map(|store| store.get(RESULT_PART)).transpose()
+        Ok(ContentHash::of([env!("CARGO_PKG_VERSION"), &text].map(str::as_bytes)).to_string())
     }
-
-    /// Loads the specs that the experiment refers to.
-    fn work(&self, extent: Extent) -> Result<Work<'_>, StudyError> {
-        Ok(match (&self.spec, extent) {
-            (ExperimentSpec::GainCurves(spec), _) => Work::GainCurves(spec, spec.heads(&self.source)?),
-            (ExperimentSpec::Latency(spec), Extent::Whole) => {
-                Work::Latency(Box::new(LatencyStudy::new(spec, &self.source)?))
-            }
-            (ExperimentSpec::Latency(spec), Extent::Quick) => {
-                Work::Latency(Box::new(LatencyStudy::new(&spec.shortened(), &self.source)?))
-            }
-        })
-    }
-}
-
-/// An experiment with all specs that it refers to.
-enum Work<'a> {
-    GainCurves(&'a GainCurvesSpec, Vec<HeadSpec>),
-    Latency(Box<LatencyStudy>),
-}
-
-/// Everything that determines the result of a gain curve experiment.
-fn inputs(extent: Extent, spec: &GainCurvesSpec, heads: &[HeadSpec]) -> impl Serialize {
-    (env!("CARGO_PKG_VERSION"), extent, ExperimentSpec::GainCurves(spec.clone()), heads.to_vec())
 }

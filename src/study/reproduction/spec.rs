@@ -1,10 +1,11 @@
 //! Spec of an experiment: `specs/experiments/NAME.ron`.
 
+use super::Extent;
 use crate::dynamics::{self, HeadSpec};
 use crate::motion::Axis;
-use crate::spec::{Source, SpecError, checked};
+use crate::spec::{Kind, Source, SpecError, checked, find, parse};
 use crate::study::gains::AXES;
-use crate::study::latency::LatencySpec;
+use crate::study::sweep::{BaseSpec, SweepSpec};
 use serde::{Deserialize, Serialize};
 
 /// An experiment of the paper.
@@ -14,7 +15,7 @@ pub enum ExperimentSpec {
     /// Gain curves of several heads with damping fitted to the paper's peaks.
     GainCurves(GainCurvesSpec),
     /// Maps of one recording with timing errors.
-    Latency(Box<LatencySpec>),
+    Latency(TimingMapsSpec),
 }
 
 /// Gain curves of several heads.
@@ -33,6 +34,18 @@ pub struct GainCurvesSpec {
     pub ratios: (f64, f64),
     /// Heads of the figure.
     pub designs: Vec<DesignedSpec>,
+}
+
+/// Maps of a study of timing errors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TimingMapsSpec {
+    /// Number of the figure in the paper.
+    pub figure: String,
+    /// The study: a name under `specs/studies/`, or a file.
+    pub study: String,
+    /// A short study for smoke tests.
+    pub quick_study: String,
 }
 
 /// A head in a figure.
@@ -89,7 +102,28 @@ impl ExperimentSpec {
     pub fn check(&self, source: &Source) -> Result<(), SpecError> {
         match self {
             ExperimentSpec::GainCurves(spec) => spec.heads(source).map(drop),
-            ExperimentSpec::Latency(spec) => spec.check(source),
+            ExperimentSpec::Latency(spec) => {
+                [Extent::Whole, Extent::Quick].into_iter().try_for_each(|extent| spec.study(extent, source).map(drop))
+            }
+        }
+    }
+}
+
+impl TimingMapsSpec {
+    /// The study of an extent, and its source.
+    ///
+    /// # Errors
+    /// As [`ExperimentSpec::check`].
+    pub(super) fn study(&self, extent: Extent, source: &Source) -> Result<(SweepSpec, Source), SpecError> {
+        let (key, name) = match extent {
+            Extent::Whole => ("study", &self.study),
+            Extent::Quick => ("quick_study", &self.quick_study),
+        };
+        let of_study = find(Kind::Study, name)?;
+        let spec: SweepSpec = parse(&of_study)?;
+        match spec.base {
+            BaseSpec::Journey { timing: Some(_), .. } => Ok((spec, of_study)),
+            _ => Err(SpecError::about(source, key, format!("the study \"{name}\" has no `timing`"))),
         }
     }
 }

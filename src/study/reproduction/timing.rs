@@ -1,30 +1,29 @@
 //! Figure 4 of the paper: latency and timing noise.
 
-use super::part_store::PartStore;
 use super::{ComparedNumber, ExperimentResult};
-use crate::study::latency::{
-    ClockState, Disturbance, LatencyResult, LatencyStudy, conclusions, csv, curve_figure, map_figure,
-};
-use crate::study::{OnProgress, StudyError};
-use std::sync::atomic::AtomicBool;
+use crate::study::StudyError;
+use crate::study::latency::{ClockState, Disturbance, LatencyResult, conclusions, curve_figure, map_figure};
+use crate::study::sweep::{Plan, Runner, Shard};
+use std::path::Path;
 
 /// Runs the study, draws figures, and compares with the paper.
 pub(super) fn run(
-    latency: &LatencyStudy,
-    store: &PartStore,
-    on_progress: OnProgress<'_>,
+    figure: &str,
+    plan: &Plan,
+    (folder, anew): (&Path, bool),
+    runner: &Runner,
 ) -> Result<ExperimentResult, StudyError> {
-    let study = latency.run_in(store, &AtomicBool::new(false), on_progress)?;
-    store.write("latency.csv", &csv(&study))?;
-    store.write("latency.json", &(serde_json::to_string_pretty(&study)? + "\n"))?;
+    let sweep = plan.write(folder, anew)?;
+    sweep.run(Shard::WHOLE, runner)?;
+    let study = sweep.merge_and_report()?.latency.ok_or_else(|| sweep.failed())?;
     for (name, figure) in [
         ("maps", map_figure(&study, ClockState::Off)),
         ("maps_clock_on", map_figure(&study, ClockState::On)),
         ("curves", curve_figure(&study)),
     ] {
-        figure.save(store.folder(), name)?;
+        figure.save(folder, name)?;
     }
-    Ok(compare(&latency.spec().figure, &study))
+    Ok(compare(figure, &study))
 }
 
 /// Compares the maps with the paper's.
@@ -40,15 +39,15 @@ fn compare(figure: &str, study: &LatencyResult) -> ExperimentResult {
         }
     };
     let misaligned = |disturbed: bool| if disturbed { "visible misalignment" } else { "sharp" };
-    let [latencies, noises] = &study.shown;
+    let [latencies, noises] = study.shown();
     let mut rows = Vec::new();
     for shown in latencies {
         let what = format!("cloud sigma at {} ms of latency, clock state off and on", shown.latency_ms);
-        rows.push(row(*shown, (what, misaligned(shown.latency_ms != 0.0))));
+        rows.push(row(shown, (what, misaligned(shown.latency_ms != 0.0))));
     }
-    for shown in noises.iter().filter(|shown| shown.noise_ms > 0.0) {
+    for shown in noises.into_iter().filter(|shown| shown.noise_ms > 0.0) {
         let what = format!("cloud sigma at {} ms of timing noise, clock state off and on", shown.noise_ms);
-        rows.push(row(*shown, (what, "-")));
+        rows.push(row(shown, (what, "-")));
     }
     let mut notes = vec![
         "The paper shows maps without numbers; zsim reports the standard deviation of the cloud about the true surfaces. The \

@@ -10,6 +10,7 @@ use crate::sensors::Lidar;
 use crate::spec::Source;
 use crate::study::StudyError;
 use crate::study::coverage::{Coverage, CoveragePlan, coverage};
+use crate::study::sweep::Measure;
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -32,6 +33,27 @@ pub struct DesignMetrics {
     pub rate_deg_per_s: f64,
     /// Maximum stress in the wire divided by the yield stress; `None` if either is not known.
     pub stress_share: Option<f64>,
+}
+
+impl DesignMetrics {
+    /// A measure; `None` if it is not known, or has no closed form.
+    pub fn figure(&self, measure: Measure) -> Option<f64> {
+        match measure {
+            Measure::RockingHz => Some(self.rocking_hz),
+            Measure::PeakGain => Some(self.peak_gain),
+            Measure::SagMm => Some(self.sag_mm),
+            Measure::SpringMassG => self.spring_mass_g,
+            Measure::FieldOfViewDeg => Some(self.field_of_view_deg),
+            Measure::RateDegPerS => Some(self.rate_deg_per_s),
+            Measure::StressShare => self.stress_share,
+            _ => None,
+        }
+    }
+
+    /// The figure for goals and limits: infinite if it is not known.
+    pub(super) fn cost_figure(&self, measure: Measure) -> f64 {
+        self.figure(measure).unwrap_or(f64::INFINITY)
+    }
 }
 
 /// Upper frequency of the search for the peak gain, Hz: above the modes of interest.

@@ -1,9 +1,9 @@
 //! Axes of a sweep, resolved to settings of its specs.
 
-use super::component::{NamedComponent, Slot};
 use super::design::AxisSize;
 use super::spec::LevelSpec;
-use super::{AxisSpec, Sampling, Setting, settings};
+use super::tree::{Assignment, Tree, load_named};
+use super::{AxisSpec, BaseSpec, Sampling, Setting};
 use crate::spec::{Source, SpecError};
 use crate::study::StudyError;
 use serde_json::Value;
@@ -25,60 +25,53 @@ pub(super) enum Levels {
     /// A list of levels.
     Discrete(Vec<Level>),
     /// A continuous range of one numeric setting.
-    Range { setting: SettingPath, from: f64, to: f64, logarithmic: bool },
+    Range { path: Vec<String>, from: f64, to: f64, logarithmic: bool },
 }
 
-/// One level of an axis: its label and the changes to the specs.
+/// One level of an axis: its label and the inputs that it sets.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
     pub setting: Setting,
-    pub changes: Vec<Change>,
+    pub assignments: Vec<Assignment>,
 }
 
-/// Location of a setting: the spec's slot and the keys within the spec.
-#[derive(Debug, Clone)]
-pub(super) struct SettingPath {
-    pub slot: Slot,
-    pub path: Vec<String>,
-}
-
-/// A change to the specs of the base run.
-#[derive(Debug, Clone)]
-pub(super) enum Change {
-    /// Replace the spec of a slot by the named one.
-    ReplaceSpec(Slot, String),
-    /// Set one setting to a value.
-    SetValue(SettingPath, Value),
-}
-
-/// All specs of a sweep: of the base run, and of axes that refer to specs by name.
+/// The inputs of a sweep's base run, and the specs that axes refer to by name.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SpecSet {
-    pub base: BTreeMap<Slot, NamedComponent>,
-    pub others: BTreeMap<String, NamedComponent>,
+    pub base: Tree,
+    /// By key and name.
+    pub named: BTreeMap<String, Value>,
 }
 
 impl SpecSet {
-    /// Loads the spec `name` for `slot` unless it is loaded already.
-    fn load(&mut self, slot: Slot, name: &str) -> Result<(), StudyError> {
-        if let Entry::Vacant(free) = self.others.entry(Self::key(slot, name)) {
-            free.insert(NamedComponent::load(slot, name)?);
+    /// The spec `name` for the key `key`, loaded once.
+    fn load(&mut self, key: &str, name: &str) -> Result<Value, StudyError> {
+        Ok(match self.named.entry(format!("{key}/{name}")) {
+            Entry::Occupied(loaded) => loaded.get().clone(),
+            Entry::Vacant(free) => free.insert(load_named(key, name)?).clone(),
+        })
+    }
+
+    /// Sets `path` to `setting`.
+    fn assignment(&mut self, path: &str, setting: &Setting) -> Result<Assignment, String> {
+        if let Setting::Text(name) = setting
+            && self.base.is_named(path)
+        {
+            let value = self.load(path, name).map_err(|error| error.to_string())?;
+            return Ok(Assignment { path: vec![path.to_owned()], value });
         }
-        Ok(())
-    }
-
-    fn key(slot: Slot, name: &str) -> String {
-        format!("{}/{name}", slot.key())
-    }
-
-    pub fn named(&self, slot: Slot, name: &str) -> Option<&NamedComponent> {
-        self.others.get(&Self::key(slot, name))
+        Ok(Assignment { path: self.base.locate(path)?, value: setting.value() })
     }
 }
 
 impl Axis {
     /// Locates the settings of `spec`; loads the specs that it names into `specs`.
-    pub fn new(spec: &AxisSpec, sampling: Sampling, specs: &mut SpecSet, source: &Source) -> Result<Self, StudyError> {
+    pub fn new(
+        spec: &AxisSpec,
+        (base, sampling): (&BaseSpec, Sampling),
+        specs: &mut SpecSet,
+        source: &Source,
+    ) -> Result<Self, StudyError> {
         let about = |words: &str, message: String| -> StudyError {
             let message = format!("axis \"{}\": {message}", spec.name());
             SpecError::about_after(source, &spec.anchor(), words, message).into()
@@ -89,8 +82,8 @@ impl Axis {
                     return Err(about("values", "needs at least one value".to_owned()));
                 }
                 let level = |setting: &Setting| {
-                    let changes = vec![change(path, setting, specs).map_err(|error| about(path, error))?];
-                    Ok(Level { setting: setting.clone(), changes })
+                    let assignment = specs.assignment(path, setting).map_err(|error| about(path, error))?;
+                    Ok(Level { setting: setting.clone(), assignments: vec![assignment] })
                 };
                 Levels::Discrete(values.iter().map(level).collect::<Result<_, StudyError>>()?)
             }
@@ -104,19 +97,18 @@ impl Axis {
                         let (anchor, words) = (format!("\"{}\"", level.name), format!("\"{path}\""));
                         SpecError::about_after(source, &anchor, &words, message).into()
                     };
-                    let changes = level
-                        .set
-                        .iter()
-                        .map(|(path, setting)| change(path, setting, specs).map_err(|error| about(path, error)));
-                    let changes = changes.collect::<Result<_, StudyError>>()?;
-                    Ok(Level { setting: Setting::Text(level.name.clone()), changes })
+                    let set = level.set.iter();
+                    let assignments =
+                        set.map(|(path, setting)| specs.assignment(path, setting).map_err(|error| about(path, error)));
+                    let assignments = assignments.collect::<Result<_, _>>()?;
+                    Ok(Level { setting: Setting::Text(level.name.clone()), assignments })
                 };
                 Levels::Discrete(levels.iter().map(level).collect::<Result<_, StudyError>>()?)
             }
             AxisSpec::Linear { path, from, to, steps, .. } | AxisSpec::Log { path, from, to, steps, .. } => {
-                let setting = locate(path, specs).map_err(|error| about(path, error))?;
+                let located = specs.base.locate(path).map_err(|error| about(path, error))?;
                 let logarithmic = matches!(spec, AxisSpec::Log { .. });
-                let range = Levels::Range { setting, from: *from, to: *to, logarithmic };
+                let range = Levels::Range { path: located, from: *from, to: *to, logarithmic };
                 match (sampling, steps) {
                     (Sampling::Grid, Some(steps)) if *steps >= 2 => range.stepped(*steps),
                     (Sampling::Grid, _) => {
@@ -129,7 +121,7 @@ impl Axis {
         };
         let first_share = first_share(spec, sampling).map_err(|error| about("first_share", error))?;
         let axis = Self { name: spec.name().to_owned(), levels, first_share };
-        axis.check(specs).map_err(|(value, error)| about(&value, error))?;
+        axis.check(base, &specs.base).map_err(|(value, error)| about(&value, error))?;
         Ok(axis)
     }
 
@@ -168,7 +160,7 @@ impl Axis {
     ///
     /// # Errors
     /// The offending value as written in the spec, and a message.
-    fn check(&self, specs: &SpecSet) -> Result<(), (String, String)> {
+    fn check(&self, base: &BaseSpec, inputs: &Tree) -> Result<(), (String, String)> {
         let ends;
         let levels = match &self.levels {
             Levels::Discrete(levels) => levels,
@@ -182,7 +174,8 @@ impl Axis {
                 Setting::Text(word) => format!("\"{word}\""),
                 other => other.to_string(),
             };
-            apply_changes(specs, &level.changes.iter().collect::<Vec<_>>()).map_err(|error| (word, error))?;
+            let changed = inputs.with(&level.assignments);
+            changed.and_then(|changed| changed.check(base)).map_err(|error| (word, error))?;
         }
         Ok(())
     }
@@ -191,8 +184,8 @@ impl Axis {
 impl Levels {
     /// The level at `u` from 0 to 1 of a range.
     fn at(&self, u: f64) -> Level {
-        let Self::Range { setting, from, to, logarithmic } = self else {
-            return Level { setting: Setting::Number(u), changes: Vec::new() };
+        let Self::Range { path, from, to, logarithmic } = self else {
+            return Level { setting: Setting::Number(u), assignments: Vec::new() };
         };
         // Exact at both ends, without rounding.
         let value = match u {
@@ -201,7 +194,8 @@ impl Levels {
             _ if *logarithmic => from * (to / from).powf(u),
             _ => from + (to - from) * u,
         };
-        Level { setting: Setting::Number(value), changes: vec![Change::SetValue(setting.clone(), value.into())] }
+        let assignment = Assignment { path: path.clone(), value: value.into() };
+        Level { setting: Setting::Number(value), assignments: vec![assignment] }
     }
 
     /// A range as `steps` evenly spaced levels.
@@ -223,67 +217,4 @@ fn first_share(spec: &AxisSpec, sampling: Sampling) -> Result<Option<f64>, Strin
         ));
     }
     Ok(Some(*share))
-}
-
-/// The change that sets `path` to `setting`.
-fn change(path: &str, setting: &Setting, specs: &mut SpecSet) -> Result<Change, String> {
-    if let (Some(slot), Setting::Text(name)) = (Slot::from_key(path), setting)
-        && specs.base.contains_key(&slot)
-    {
-        specs.load(slot, name).map_err(|error| error.to_string())?;
-        return Ok(Change::ReplaceSpec(slot, name.clone()));
-    }
-    Ok(Change::SetValue(locate(path, specs)?, setting.value()))
-}
-
-/// Locates the setting `path` in the base run's specs.
-fn locate(path: &str, specs: &SpecSet) -> Result<SettingPath, String> {
-    let mut keys: Vec<&str> = path.split('.').collect();
-    let slot = Slot::from_key(keys[0]).filter(|slot| specs.base.contains_key(slot));
-    if slot.is_some() {
-        keys.remove(0);
-    }
-    let slot = slot.unwrap_or(Slot::Run);
-    let Some(spec) = specs.base.get(&slot) else { return Err(format!("no setting `{path}`")) };
-    if keys.is_empty() {
-        return Err(format!(
-            "`{path}` is a spec, not a setting: give names of specs as values, or extend the path to a setting"
-        ));
-    }
-    let tree = spec.component.value().map_err(|error| error.to_string())?;
-    let found = settings::find(&tree, &keys).map_err(|error| {
-        let slots: Vec<&str> = specs.base.keys().filter(|slot| **slot != Slot::Run).map(|slot| slot.key()).collect();
-        if slot == Slot::Run { format!("{error}, and the settings of {}", slots.join(", ")) } else { error }
-    })?;
-    Ok(SettingPath { slot, path: found })
-}
-
-/// Applies `changes` to the base run: replaces specs first, then sets values in them. Returns only the changed slots.
-pub(super) fn apply_changes(specs: &SpecSet, changes: &[&Change]) -> Result<BTreeMap<Slot, NamedComponent>, String> {
-    let mut changed: BTreeMap<Slot, NamedComponent> = BTreeMap::new();
-    for change in changes {
-        if let Change::ReplaceSpec(slot, name) = change {
-            let spec = specs.named(*slot, name).ok_or_else(|| format!("the plan does not contain \"{name}\""))?;
-            changed.insert(*slot, spec.clone());
-        }
-    }
-    let mut trees: BTreeMap<Slot, Value> = BTreeMap::new();
-    for change in changes {
-        let Change::SetValue(SettingPath { slot, path }, value) = change else { continue };
-        let spec = changed.get(slot).or_else(|| specs.base.get(slot));
-        let spec = spec.ok_or_else(|| format!("this run has no {}", slot.key()))?;
-        if !trees.contains_key(slot) {
-            trees.insert(*slot, spec.component.value().map_err(|error| error.to_string())?);
-        }
-        let Some(tree) = trees.get_mut(slot) else { continue };
-        let missing = || format!("\"{}\" has no setting `{}`", spec.name, path.join("."));
-        settings::set(tree, path, value.clone()).ok_or_else(missing)?;
-    }
-    for (slot, tree) in trees {
-        if let Some(spec) = changed.get(&slot).or_else(|| specs.base.get(&slot)) {
-            let replaced = spec.with_value(tree)?;
-            changed.insert(slot, replaced);
-        }
-    }
-    Ok(changed)
 }

@@ -21,7 +21,7 @@ pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> 
         return Err(about("seeds", "`seeds` is empty: at least one is needed".to_owned()));
     }
     if !is_journey && !spec.seeds.is_empty() {
-        return Err(about("seeds", "a closed form is deterministic: remove `seeds`".to_owned()));
+        return Err(about("seeds", "only journeys have seeds: remove `seeds`".to_owned()));
     }
     if let Some(twice) = duplicate(&spec.seeds) {
         return Err(about("seeds", format!("`seeds` contains {twice} more than once")));
@@ -40,6 +40,9 @@ pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> 
     }
     if let Some(goal) = spec.front.iter().find(|goal| !spec.measures.contains(&goal.measure)) {
         return Err(about("front", format!("{} is not in `measures`: add it", goal.measure.key())));
+    }
+    if let Some(limit) = spec.limits.iter().find(|limit| !spec.measures.contains(&limit.measure)) {
+        return Err(about("limits", format!("{} is not in `measures`: add it", limit.measure.key())));
     }
     if spec.front.len() == 1 {
         return Err(about("front", "a Pareto front needs at least two goals".to_owned()));

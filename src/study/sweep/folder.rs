@@ -8,20 +8,18 @@
 //! ```
 
 use super::axis::SpecSet;
-use super::component::{NamedComponent, Slot};
 use super::identity::ContentHash;
 use super::table::{Column, ColumnType, Table, TableWriter};
+use super::tree::Tree;
 use super::{BaseSpec, Plan, SweepSpec};
 use crate::spec::{self, Source, SpecError, to_text};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// Closed forms per part: the work that a kill loses at most on each thread.
-const RUNS_PER_PART: u64 = 250;
 
 /// Rows in a row group of a Parquet table; bounds the memory of a merge.
 pub(super) const ROWS_PER_GROUP: u64 = 16_384;
@@ -35,8 +33,8 @@ struct PlanFile {
     /// Hash of all runs in their order.
     identity: String,
     spec: SweepSpec,
-    base: BTreeMap<Slot, NamedComponent>,
-    others: BTreeMap<String, NamedComponent>,
+    base: Tree,
+    named: BTreeMap<String, Value>,
 }
 
 /// Runs that are stored together in one part file.
@@ -75,18 +73,10 @@ impl Plan {
         for each in [&temporary, &parts_folder(folder)] {
             std::fs::create_dir_all(each).map_err(StudyError::file(each))?;
         }
-        let content = |identity: ContentHash| PlanFile {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            name: self.name().to_owned(),
-            identity: identity.to_string(),
-            spec: self.spec().clone(),
-            base: self.specs().base.clone(),
-            others: self.specs().others.clone(),
-        };
         let plan = plan_path(folder);
         let written = temporary.join("points.parquet");
         let identity = self.write_points(&temporary, &written)?;
-        let text = to_text(&content(identity))? + "\n";
+        let text = self.text_with(&identity.to_string())?;
         if plan.exists() && std::fs::read_to_string(&plan).map_err(StudyError::file(&plan))? == text {
             std::fs::remove_file(&written).map_err(StudyError::file(&written))?;
             return Sweep::open(folder);
@@ -103,6 +93,24 @@ impl Plan {
         Sweep::open(folder)
     }
 
+    /// The sweep's spec, all specs that it names, and the version of zsim.
+    pub(in crate::study) fn text(&self) -> Result<String, SpecError> {
+        self.text_with("")
+    }
+
+    /// Content of `plan.ron`; `identity` is the hash of all runs.
+    fn text_with(&self, identity: &str) -> Result<String, SpecError> {
+        let content = PlanFile {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            name: self.name().to_owned(),
+            identity: identity.to_owned(),
+            spec: self.spec().clone(),
+            base: self.specs().base.clone(),
+            named: self.specs().named.clone(),
+        };
+        Ok(to_text(&content)? + "\n")
+    }
+
     /// Writes the table of runs to `target` and returns the hash of all runs.
     fn write_points(&self, temporary: &Path, target: &Path) -> Result<ContentHash, StudyError> {
         let mut columns = vec![("point".to_owned(), ColumnType::Counts), ("task".to_owned(), ColumnType::Counts)];
@@ -113,14 +121,12 @@ impl Plan {
         let mut all = Vec::new();
         for first in (0..self.points()).step_by(ROWS_PER_GROUP as usize) {
             let numbers: Vec<u64> = (first..(first + ROWS_PER_GROUP).min(self.points())).collect();
-            let runs: Vec<(ContentHash, ContentHash)> = numbers
-                .par_iter()
-                .map(|index| self.resolve(*index).map(|run| (run.identity, run.rays)))
-                .collect::<Result<_, _>>()?;
-            let task = |(index, (_, rays)): (&u64, &(ContentHash, ContentHash))| {
-                Some(match self.spec().base {
-                    BaseSpec::Spring { .. } => (index / RUNS_PER_PART) as i64,
-                    BaseSpec::Journey { .. } => {
+            let runs: Vec<(ContentHash, Option<ContentHash>)> =
+                numbers.par_iter().map(|index| self.hashes_of(*index)).collect::<Result<_, _>>()?;
+            let task = |(index, (_, rays)): (&u64, &(ContentHash, Option<ContentHash>))| {
+                Some(match rays {
+                    None => (index / self.spec().base.runs_per_part()) as i64,
+                    Some(rays) => {
                         let next = tasks.len() as i64;
                         *tasks.entry(*rays).or_insert(next)
                     }
@@ -136,6 +142,16 @@ impl Plan {
         }
         table.finish()?;
         Ok(ContentHash::of(all.iter().map(ContentHash::bytes)))
+    }
+
+    /// Hash of run `index`, and of its physics and rays, if any.
+    fn hashes_of(&self, index: u64) -> Result<(ContentHash, Option<ContentHash>), StudyError> {
+        let inputs = self.inputs(index)?;
+        let rays = match self.spec().base {
+            BaseSpec::Journey { .. } => Some(self.journey(index, &inputs)?.rays),
+            BaseSpec::Spring { .. } | BaseSpec::Gains { .. } => None,
+        };
+        Ok((self.identity(index, &inputs)?, rays))
     }
 
     /// Names and types of the columns of axis values and seed.
@@ -186,7 +202,7 @@ impl Sweep {
             );
             return Err(SpecError::plain(source.name, message).into());
         }
-        let mut specs = SpecSet { base: file.base, others: file.others };
+        let mut specs = SpecSet { base: file.base, named: file.named };
         let plan = Plan::with_specs(&file.name, &file.spec, &mut specs, &source)?;
         let path = points_path(folder);
         let damaged = || SpecError::plain(path.display().to_string(), "does not match the plan: plan the sweep again");
@@ -231,10 +247,7 @@ impl Sweep {
 }
 
 fn units(plan: &Plan, identities: &[ContentHash]) -> Vec<Unit> {
-    let size = match plan.spec().base {
-        BaseSpec::Spring { .. } => RUNS_PER_PART,
-        BaseSpec::Journey { .. } => 1,
-    };
+    let size = plan.spec().base.runs_per_part();
     let unit = |(k, block): (usize, &[ContentHash])| Unit {
         identity: ContentHash::of(block.iter().map(ContentHash::bytes)),
         first: k as u64 * size,

@@ -1,6 +1,6 @@
 //! Hashes that identify runs by everything that determines their results.
 
-use super::component::{Component, NamedComponent, Slot};
+use super::tree::Tree;
 use crate::study::StudyError;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// First 128 bits of a SHA-256: collisions are negligible for any feasible number of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct ContentHash([u8; 16]);
+pub(in crate::study) struct ContentHash([u8; 16]);
 
 impl ContentHash {
     /// Hash of a sequence of byte strings; lengths are hashed too, so that boundaries matter.
@@ -40,45 +40,61 @@ impl std::fmt::Display for ContentHash {
     }
 }
 
-/// Hashes of a component, with and without its sensor noise.
+/// Hash of an input of a run, and of the files that it refers to.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ComponentHashes {
-    /// Of the complete component.
+pub(super) struct InputHash {
+    /// Of the input and of its files.
     pub full: ContentHash,
-    /// Of everything that affects rays and physics; equal for lidars that differ only in their error models.
-    pub without_noise: ContentHash,
+    /// Of the content of its files.
+    pub files: ContentHash,
 }
 
-impl ComponentHashes {
-    /// Hashes a component and the content of all files that it refers to.
-    pub fn of(slot: Slot, named: &NamedComponent) -> Result<Self, StudyError> {
-        let mut tree = named.component.value()?;
-        let mut files = Vec::new();
-        if let Some(folder) = &named.folder {
-            let mut names = BTreeSet::new();
-            strings(&tree, &mut names);
-            for name in names {
-                files.extend(file_hash(&folder.join(&name))?.map(|content| (name, content)));
-            }
+/// Key of the settings without a name.
+const UNNAMED: &str = "run";
+
+/// Key of the timing errors, which do not affect the recording.
+const TIMING: &str = "timing";
+
+/// Keys of the inputs that do not affect the recording.
+pub(super) const AFTER_RECORDING: [&str; 2] = [TIMING, "estimator"];
+
+/// Hashes of the inputs of a run by key, in the order of its tree; settings without a name come first.
+pub(super) type InputHashes = Vec<(String, InputHash)>;
+
+/// Hashes the inputs of a run; `known` is a tree with its hashes, which are used for equal inputs.
+pub(super) fn input_hashes(tree: &Tree, known: Option<(&Tree, &InputHashes)>) -> Result<InputHashes, StudyError> {
+    let of = |key: &str| {
+        let is_known = known.filter(|(known, _)| known.0.get(key) == tree.0.get(key));
+        let hash =
+            is_known.and_then(|(_, hashes)| hashes.iter().find(|(other, _)| other == key).map(|(_, hash)| *hash));
+        Ok((key.to_owned(), hash.map_or_else(|| named_hash(key, &tree.0[key]), Ok)?))
+    };
+    let mut settings = tree.unnamed();
+    settings.retain(|key, _| key != TIMING);
+    let unnamed = (UNNAMED.to_owned(), input_hash(UNNAMED, &Value::Object(settings), None)?);
+    let timing = tree.0.get(TIMING).map(|timing| Ok((TIMING.to_owned(), input_hash(TIMING, timing, None)?)));
+    std::iter::once(Ok(unnamed)).chain(timing).chain(tree.named_keys().map(of)).collect()
+}
+
+fn named_hash(key: &str, named: &Value) -> Result<InputHash, StudyError> {
+    input_hash(key, &named["spec"], named["folder"].as_str().map(Path::new))
+}
+
+fn input_hash(key: &str, input: &Value, folder: Option<&Path>) -> Result<InputHash, StudyError> {
+    let mut files = Vec::new();
+    if let Some(folder) = folder {
+        let mut names = BTreeSet::new();
+        strings(input, &mut names);
+        for name in names {
+            files.extend(file_hash(&folder.join(&name))?.map(|content| (name, content)));
         }
-        let of = |tree: &Value| -> Result<ContentHash, StudyError> {
-            let text = serde_json::to_string(tree)?;
-            let head = [slot.key().as_bytes(), text.as_bytes()];
-            let files = files.iter().flat_map(|(name, content)| [name.as_bytes(), content.bytes()]);
-            Ok(ContentHash::of(head.into_iter().chain(files)))
-        };
-        let full = of(&tree)?;
-        let is_lidar = matches!(named.component, Component::Lidar(_));
-        let without_noise = match tree.as_object_mut().filter(|_| is_lidar) {
-            Some(object) => {
-                object.remove("errors");
-                object.remove("noise");
-                of(&tree)?
-            }
-            None => full,
-        };
-        Ok(Self { full, without_noise })
     }
+    let text = serde_json::to_string(input)?;
+    let files = files.iter().flat_map(|(name, content)| [name.as_bytes(), content.bytes()]);
+    Ok(InputHash {
+        full: ContentHash::of([key.as_bytes(), text.as_bytes()].into_iter().chain(files.clone())),
+        files: ContentHash::of(files),
+    })
 }
 
 /// Collects the strings in a tree: they may be names of files.
@@ -102,6 +118,7 @@ fn file_hash(path: &Path) -> Result<Option<ContentHash>, StudyError> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tree::load_named;
     use super::*;
 
     #[test]
@@ -117,27 +134,17 @@ mod tests {
     }
 
     #[test]
-    fn lidar_noise_does_not_affect_the_ray_hash_and_referenced_files_affect_the_full_hash() {
-        let lidar = NamedComponent::load(Slot::Lidar, "utm30lx").unwrap();
-        let mut noisy = lidar.clone();
-        let Component::Lidar(spec) = &mut noisy.component else { panic!() };
-        spec.errors.range.near_sigma_m *= 2.0;
-        let [first, second] = [&lidar, &noisy].map(|named| ComponentHashes::of(Slot::Lidar, named).unwrap());
-        assert_ne!(first.full, second.full);
-        assert_eq!(first.without_noise, second.without_noise);
-        let Component::Lidar(spec) = &mut noisy.component else { panic!() };
-        spec.range_max_m = 20.0;
-        assert_ne!(ComponentHashes::of(Slot::Lidar, &noisy).unwrap().without_noise, first.without_noise);
-
+    fn a_change_of_a_referenced_file_changes_the_hash() {
         let here = tempfile::tempdir().unwrap();
         let trajectory = here.path().join("walk.tum");
         let motion = r#"Replay((poses: Tum("walk.tum"), from_route: false, still_s: 1.0, ease_s: 1.0))"#;
         std::fs::write(here.path().join("m.ron"), motion).unwrap();
         let identity = |text: &str| {
             std::fs::write(&trajectory, text).unwrap();
-            let named = NamedComponent::load(Slot::Motion, &here.path().join("m.ron").display().to_string()).unwrap();
-            ComponentHashes::of(Slot::Motion, &named).unwrap().full
+            let named = load_named("motion", &here.path().join("m.ron").display().to_string()).unwrap();
+            named_hash("motion", &named).unwrap()
         };
-        assert_ne!(identity("a"), identity("b"));
+        let [first, second] = ["a", "b"].map(identity);
+        assert!(first.full != second.full && first.files != second.files);
     }
 }

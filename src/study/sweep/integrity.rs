@@ -1,9 +1,8 @@
 //! Evaluation of the integrity statements of a sweep: verdicts and error bounds against the true errors.
 
-use super::table::{ColumnType, Table};
+use super::table::ColumnType;
 use super::{Measure, Plan, Sweep};
 use crate::report;
-use crate::spec::SpecError;
 use crate::study::StudyError;
 use crate::study::integrity::large_error_m;
 
@@ -63,9 +62,7 @@ impl Sweep {
         if !measures.iter().all(|measure| self.plan.spec().measures.contains(measure)) {
             return Ok(None);
         }
-        let path = self.table();
-        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
-        let table = Table::open(&path)?.ok_or_else(unmerged)?;
+        let table = self.open_merged(&self.table())?;
         let figures = |measure: Measure| {
             let cells = table.column(measure.key(), ColumnType::Numbers)?.numbers();
             Ok(cells.into_iter().map(|cell| cell.unwrap_or(f64::NAN)).collect::<Vec<f64>>())

@@ -36,6 +36,12 @@ pub enum Measure {
     BoundOverError,
     /// Length of the estimated path, from positions one second apart, m.
     WayM,
+    /// Standard deviation of the map's points about the true surfaces, with timing errors, m.
+    CloudSigmaM,
+    /// Mean signed distance of the map's points to the true surfaces, with timing errors, m.
+    CloudBiasM,
+    /// Error of the estimated clock offset at the end of a run with timing errors, s.
+    ClockErrorS,
     /// Fraction of the sphere of directions that the lidar observed.
     FractionSeen,
     /// Time until 90 % of that fraction was observed, s.
@@ -53,7 +59,7 @@ pub enum Measure {
     Saturated,
     /// Frequency of the slowest mode, Hz.
     RockingHz,
-    /// Peak gain of the pitch rate, head over base.
+    /// Peak gain, head over base: of the pitch rate in closed form, along or about the axis of a gain measurement.
     PeakGain,
     /// Static compression of the spring under the head's weight, mm.
     SagMm,
@@ -70,6 +76,8 @@ pub enum Measure {
 pub(super) enum Origin {
     /// Estimation from a recording.
     Estimate,
+    /// Estimation from a recording, only with timing errors.
+    Map,
     /// Simulation of the head's swing without ray casting.
     Swing,
     /// The closed form of the linearised head.
@@ -82,7 +90,7 @@ pub(super) enum Origin {
 
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 29] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
@@ -96,6 +104,9 @@ impl Measure {
         Self::WithinBound,
         Self::BoundOverError,
         Self::WayM,
+        Self::CloudSigmaM,
+        Self::CloudBiasM,
+        Self::ClockErrorS,
         Self::FractionSeen,
         Self::CoveredS,
         Self::DensityPerSrS,
@@ -133,6 +144,9 @@ impl Measure {
             Self::WithinBound => ("within_bound", "within", "Poses within their bound (%)", "%", 1e2),
             Self::BoundOverError => ("bound_over_error", "bound/error", "Bound over error", "1", 1.0),
             Self::WayM => ("way_m", "path", "Length of the path (m)", "m", 1.0),
+            Self::CloudSigmaM => ("cloud_sigma_m", "cloud", "Cloud, sigma (mm)", "mm", 1e3),
+            Self::CloudBiasM => ("cloud_bias_m", "cloud bias", "Cloud, bias (mm)", "mm", 1e3),
+            Self::ClockErrorS => ("clock_error_s", "clock error", "Clock offset error at the end (ms)", "ms", 1e3),
             Self::FractionSeen => ("fraction_seen", "coverage", "Observed fraction of the sphere (%)", "%", 1e2),
             Self::CoveredS => ("covered_s", "cover time", "Time to 90 % of the coverage (s)", "s", 1.0),
             Self::DensityPerSrS => ("density_per_sr_s", "density", "Beams per sr and s", "1/sr/s", 1.0),
@@ -162,18 +176,18 @@ impl Measure {
     }
 
     /// Label of a plot axis, with the display unit.
-    pub(super) fn label(self) -> &'static str {
+    pub(in crate::study) fn label(self) -> &'static str {
         self.names().2
     }
 
     /// Display unit, and the factor from the unit in files to it.
-    pub(super) fn unit(self) -> (&'static str, f64) {
+    pub(in crate::study) fn unit(self) -> (&'static str, f64) {
         (self.names().3, self.names().4)
     }
 
     /// Value of a missing figure: infinite for the error of a lost estimate, else NaN.
     pub(super) fn missing_value(self) -> f64 {
-        if self.origin() == Origin::Estimate { f64::INFINITY } else { f64::NAN }
+        if matches!(self.origin(), Origin::Estimate | Origin::Map) { f64::INFINITY } else { f64::NAN }
     }
 
     pub(super) fn origin(self) -> Origin {
@@ -191,6 +205,7 @@ impl Measure {
             | Self::WithinBound
             | Self::BoundOverError
             | Self::WayM => Origin::Estimate,
+            Self::CloudSigmaM | Self::CloudBiasM | Self::ClockErrorS => Origin::Map,
             Self::FractionSeen | Self::CoveredS | Self::DensityPerSrS | Self::RateP99DegPerS | Self::Saturated => {
                 Origin::Swing
             }
@@ -202,11 +217,21 @@ impl Measure {
         }
     }
 
+    /// Whether a head on its spring has this measure in closed form.
+    pub(in crate::study) fn has_closed_form(self) -> bool {
+        matches!(self.origin(), Origin::ClosedForm | Origin::SwingOrClosedForm)
+    }
+
     /// Whether runs of this base have this measure.
     pub(super) fn is_available_for(self, base: &BaseSpec) -> bool {
+        if matches!(base, BaseSpec::Gains { .. }) {
+            return matches!(self, Self::PeakGain | Self::WallS);
+        }
         match self.origin() {
             Origin::WallClock | Origin::SwingOrClosedForm => true,
             Origin::ClosedForm => matches!(base, BaseSpec::Spring { .. }),
+            Origin::Estimate if self != Self::PositionRmseM => matches!(base, BaseSpec::Journey { timing: None, .. }),
+            Origin::Map => matches!(base, BaseSpec::Journey { timing: Some(_), .. }),
             Origin::Estimate | Origin::Swing => matches!(base, BaseSpec::Journey { .. }),
         }
     }

@@ -2,13 +2,14 @@
 
 use super::folder::{ROWS_PER_GROUP, Unit};
 use super::part::Part;
-use super::table::{Column, ColumnType, TableWriter, quoted};
+use super::table::{Column, ColumnType, Table, TableWriter, quoted};
 use super::{Measure, Shard, Sweep};
+use crate::spec::SpecError;
 use crate::study::StudyError;
 use crate::study::atomic_file::AtomicFile;
 use serde::Serialize;
 use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Progress of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -55,7 +56,7 @@ impl Sweep {
         for unit in &self.units {
             let part = self.read_part(unit)?;
             counter.add(unit, &part);
-            let Part::Done(columns) = part else { continue };
+            let Part::Done { columns, .. } = part else { continue };
             buffer.append(self, unit, columns);
             if buffer.numbers.len() as u64 >= ROWS_PER_GROUP {
                 tables.write(self, std::mem::replace(&mut buffer, self.empty_buffer()))?;
@@ -71,6 +72,15 @@ impl Sweep {
     /// Path of the table of results.
     pub(super) fn table(&self) -> PathBuf {
         self.folder.join("table.parquet")
+    }
+
+    /// Opens a merged table.
+    ///
+    /// # Errors
+    /// If it does not exist, or if it is damaged.
+    pub(super) fn open_merged(&self, path: &Path) -> Result<Table, StudyError> {
+        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
+        Ok(Table::open(path)?.ok_or_else(unmerged)?)
     }
 
     /// Path of the table of computing times.
@@ -174,7 +184,7 @@ struct ProgressCounter {
 
 impl ProgressCounter {
     fn add(&mut self, unit: &Unit, part: &Part) {
-        let Part::Done(columns) = part else {
+        let Part::Done { columns, .. } = part else {
             self.missing += unit.count;
             self.damaged += if *part == Part::Damaged { unit.count } else { 0 };
             return;

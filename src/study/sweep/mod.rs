@@ -10,17 +10,19 @@
 //! with its error. Journeys run in worker processes, so that a crash does not affect other runs.
 
 mod axis;
+mod bootstrap;
 mod check;
-mod closed_form;
-mod component;
 mod design;
 mod folder;
+mod goal;
 mod identity;
+mod in_process;
 mod integrity;
 mod measure;
 mod merge;
 mod output;
 mod paired;
+mod pareto;
 mod part;
 mod plan;
 mod plots;
@@ -33,15 +35,23 @@ mod spec;
 mod summary;
 mod table;
 mod task;
+mod timing;
+mod tree;
 mod trend;
 mod worker;
 
+pub use bootstrap::{Block, ConfidenceInterval};
+pub(super) use bootstrap::{Resampling, pooled};
 pub use folder::Sweep;
+pub use goal::{Aim, GoalSpec, MeasureLimitSpec};
+pub(super) use identity::ContentHash;
 pub use measure::Measure;
 pub use merge::SweepStatus;
+pub use pareto::{pareto_set, spread};
 pub use plan::Plan;
 pub use report::MergedReport;
 pub use run::{Runner, Shard};
-pub use spec::{Aim, AxisSpec, BaseSpec, GoalSpec, LevelSpec, LimitSpec, Sampling, Setting, SweepSpec};
+pub use spec::{AxisSpec, BaseSpec, LevelSpec, LimitSpec, Sampling, Setting, SweepSpec};
 pub use summary::{LevelSummary, RatioToFirst, SIGNIFICANCE_LEVEL, Summary, Trend};
 pub use task::{WorkerMessage, limit_process};
+pub(super) use tree::Journey;

@@ -4,19 +4,27 @@ use super::folder::Unit;
 use super::identity::ContentHash;
 use super::table::{Column, ColumnType, Table, TableWriter};
 use super::{Measure, Sweep};
+use crate::spec::{self, Source};
 use crate::study::StudyError;
 use parquet::errors::ParquetError;
+use serde::de::DeserializeOwned;
 use std::error::Error;
 
-/// Metadata keys of a part file: hash of its unit, and checksum of its cells.
+/// Metadata keys of a part file: hash of its unit, checksum of its content, and details of its run.
 const UNIT: &str = "zsim.unit";
 const CHECKSUM: &str = "zsim.checksum";
+const DETAILS: &str = "zsim.details";
 
 /// State of a unit's part file.
 #[derive(Debug, PartialEq)]
 pub(super) enum Part {
-    /// Complete, with its columns: one per measure, errors, computing times.
-    Done(Vec<Column>),
+    /// Complete.
+    Done {
+        /// One column per measure, errors, computing times.
+        columns: Vec<Column>,
+        /// Details of the run as RON, if it has any.
+        details: Option<String>,
+    },
     /// Truncated, modified, or of another unit.
     Damaged,
     /// No file.
@@ -32,6 +40,8 @@ pub(super) struct RunOutcome {
     pub error: Option<String>,
     /// Computing time, s.
     pub wall_s: Option<f64>,
+    /// What the table does not contain, as RON: the errors over time and the map of a run with timing errors.
+    pub details: Option<String>,
 }
 
 impl RunOutcome {
@@ -53,7 +63,7 @@ impl RunOutcome {
     pub fn failed(measures: usize, error: &str) -> Self {
         // A cell has one line; errors of specs have several, which show the position.
         let line = error.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ");
-        Self { figures: vec![None; measures], error: Some(line), wall_s: None }
+        Self { figures: vec![None; measures], error: Some(line), ..Self::default() }
     }
 }
 
@@ -77,7 +87,11 @@ impl Sweep {
         columns.push(Column::Numbers(rows.iter().map(|row| row.wall_s).collect()));
         table.write(&columns)?;
         table.set_metadata(UNIT, unit.identity.to_string());
-        table.set_metadata(CHECKSUM, checksum(&columns, rows.len()).to_string());
+        let details = rows.iter().find_map(|row| row.details.as_deref());
+        table.set_metadata(CHECKSUM, checksum(&columns, rows.len(), details).to_string());
+        if let Some(details) = details {
+            table.set_metadata(DETAILS, details.to_owned());
+        }
         table.finish()
     }
 
@@ -86,21 +100,19 @@ impl Sweep {
     /// # Errors
     /// If the file exists and cannot be opened. A damaged file is not an error: its runs are repeated.
     pub(super) fn read_part(&self, unit: &Unit) -> Result<Part, StudyError> {
-        match self.read_columns(unit) {
-            Ok(Some(columns)) => Ok(Part::Done(columns)),
-            Ok(None) => Ok(Part::Missing),
+        match self.read_content(unit) {
             Err(StudyError::Table { .. }) => Ok(Part::Damaged),
-            Err(error) => Err(error),
+            read => read,
         }
     }
 
-    /// Columns of a unit's part file: measures, errors, computing times. `None` without a file.
+    /// Content of a unit's part file.
     ///
     /// # Errors
     /// [`StudyError::Table`] if the file is truncated, modified, or of another unit.
-    fn read_columns(&self, unit: &Unit) -> Result<Option<Vec<Column>>, StudyError> {
+    fn read_content(&self, unit: &Unit) -> Result<Part, StudyError> {
         let path = self.part_path(unit);
-        let Some(table) = Table::open(&path)? else { return Ok(None) };
+        let Some(table) = Table::open(&path)? else { return Ok(Part::Missing) };
         let damaged = |what: &str| StudyError::table(&path)(ParquetError::General(what.to_owned()));
         if table.metadata(UNIT) != Some(&unit.identity.to_string()) {
             return Err(damaged("belongs to other runs of a sweep"));
@@ -111,15 +123,35 @@ impl Sweep {
         let columns = self.part_columns();
         let columns: Vec<(&str, ColumnType)> =
             columns.iter().map(|(name, column_type)| (name.as_str(), *column_type)).collect();
-        let cells = table.read(0, &columns)?;
+        let columns = table.read(0, &columns)?;
         let rows = unit.count as usize;
-        if cells.iter().any(|column| column.len() != rows) {
+        if columns.iter().any(|column| column.len() != rows) {
             return Err(damaged("has columns of different lengths"));
         }
-        if table.metadata(CHECKSUM) != Some(&checksum(&cells, rows).to_string()) {
+        let details = table.metadata(DETAILS);
+        if table.metadata(CHECKSUM) != Some(&checksum(&columns, rows, details).to_string()) {
             return Err(damaged("checksum mismatch"));
         }
-        Ok(Some(cells))
+        Ok(Part::Done { details: details.map(str::to_owned), columns })
+    }
+
+    /// Details of all runs in the order of the plan; `None` if a run failed, is missing, or has no details.
+    ///
+    /// # Errors
+    /// If a part cannot be opened.
+    pub(in crate::study) fn details<T: DeserializeOwned>(&self) -> Result<Option<Vec<T>>, StudyError> {
+        let mut all = Vec::new();
+        for unit in &self.units {
+            let Part::Done { details: Some(details), .. } = self.read_part(unit)? else { return Ok(None) };
+            all.push(spec::parse(&Source::in_memory("the details of a run", details))?);
+        }
+        Ok(Some(all))
+    }
+
+    /// The error of a study that needs all runs.
+    pub(in crate::study) fn failed(&self) -> StudyError {
+        let message = format!("a run failed: see {}", self.folder.join("table.csv").display());
+        StudyError::Plan { what: "study", message }
     }
 
     /// Whether a unit's part file exists and is undamaged.
@@ -127,12 +159,12 @@ impl Sweep {
     /// # Errors
     /// As [`read_part`](Self::read_part).
     pub(super) fn is_done(&self, unit: &Unit) -> Result<bool, StudyError> {
-        Ok(matches!(self.read_part(unit)?, Part::Done(_)))
+        Ok(matches!(self.read_part(unit)?, Part::Done { .. }))
     }
 }
 
-/// Hash of all cells as CSV text.
-fn checksum(columns: &[Column], rows: usize) -> ContentHash {
+/// Hash of all cells as CSV text, and of the details.
+fn checksum(columns: &[Column], rows: usize, details: Option<&str>) -> ContentHash {
     let cells: Vec<String> = columns.iter().flat_map(|column| (0..rows).map(move |row| column.cell(row))).collect();
-    ContentHash::of(cells.iter().map(String::as_bytes))
+    ContentHash::of(cells.iter().map(String::as_bytes).chain(details.map(str::as_bytes)))
 }

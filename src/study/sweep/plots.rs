@@ -1,12 +1,12 @@
 //! Plots of a sweep: effect of each axis, maps over two axes, ratios, Pareto front.
 
+use super::pareto::pareto_set;
 use super::runs::{Runs, level_count, level_label};
 use super::summary::{LevelSummary, Summary, quantile};
-use super::{Aim, Measure, Plan, Sweep};
+use super::{Measure, Plan, Sweep};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Mark, Series};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
-use crate::study::spring::design::pareto_set;
 use std::path::Path;
 
 /// Height of a level's row in a ratio plot, points: fits a line of text.
@@ -61,11 +61,14 @@ impl Sweep {
         let goals = &self.plan.spec().front;
         let [first, second, ..] = goals.as_slice() else { return Ok(()) };
         let columns: Vec<Vec<f64>> = goals.iter().map(|goal| self.figures(goal.measure)).collect::<Result<_, _>>()?;
-        let is_complete = |row: &usize| columns.iter().all(|column| column[*row].is_finite());
-        let rows: Vec<usize> = (0..runs.numbers.len()).filter(is_complete).collect();
-        let sign = |aim: Aim| if aim == Aim::Least { 1.0 } else { -1.0 };
-        let costs =
-            |row: &usize| goals.iter().zip(&columns).map(|(goal, column)| sign(goal.aim) * column[*row]).collect();
+        let limits = &self.plan.spec().limits;
+        let limited: Vec<Vec<f64>> =
+            limits.iter().map(|limit| self.figures(limit.measure)).collect::<Result<_, _>>()?;
+        let is_complete = |row: &usize| columns.iter().chain(&limited).all(|column| column[*row].is_finite());
+        let is_within =
+            |row: &usize| limits.iter().zip(&limited).all(|(limit, column)| limit.excess(column[*row]) <= 0.0);
+        let rows: Vec<usize> = (0..runs.numbers.len()).filter(|row| is_complete(row) && is_within(row)).collect();
+        let costs = |row: &usize| goals.iter().zip(&columns).map(|(goal, column)| goal.cost(column[*row])).collect();
         let costs: Vec<Vec<f64>> = rows.iter().map(costs).collect();
         let front: Vec<usize> = pareto_set(&costs).into_iter().map(|k| rows[k]).collect();
         let at = |row: &usize| {

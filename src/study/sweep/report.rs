@@ -5,6 +5,7 @@ use super::output::{csv, markdown, text, trends_csv};
 use super::{Summary, Sweep, SweepStatus};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
+use crate::study::latency::LatencyResult;
 
 /// Report of a merged sweep.
 #[derive(Debug, Clone)]
@@ -15,12 +16,15 @@ pub struct MergedReport {
     pub summary: Summary,
     /// The summary as tables for the terminal.
     pub text: String,
+    /// The latency study; `None` if the runs have no timing errors, or if a run failed or is missing.
+    pub latency: Option<LatencyResult>,
 }
 
 impl Sweep {
     /// [Merges](Self::merge) the finished runs and reports them.
     ///
-    /// Writes `summary.csv`, `trends.csv` (for sampled axes), `study.md`, and plots to `plots/`.
+    /// Writes `summary.csv`, `trends.csv` (for sampled axes), `study.md`, `latency.csv` and `metrics.json` (with timing
+    /// errors), and plots to `plots/`.
     ///
     /// # Errors
     /// If no run is finished, or if a file cannot be read or written.
@@ -42,7 +46,9 @@ impl Sweep {
             write_text(&self.temporary(), &self.folder.join(name), &text)?;
         }
         self.draw(&summary)?;
+        let latency = self.latency_result()?;
+        latency.as_ref().map_or(Ok(()), |study| self.write_latency(study))?;
         let text = text(&summary, &self.plan) + &integrity.map_or_else(String::new, |integrity| integrity.text());
-        Ok(MergedReport { status, summary, text })
+        Ok(MergedReport { status, summary, text, latency })
     }
 }

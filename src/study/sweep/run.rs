@@ -63,12 +63,12 @@ impl Sweep {
             }
         }
         match self.plan.spec().base {
-            BaseSpec::Spring { .. } => self.run_in_process(&tasks, runner),
+            BaseSpec::Spring { .. } | BaseSpec::Gains { .. } => self.run_in_process(&tasks, runner),
             BaseSpec::Journey { .. } => self.run_in_workers(&tasks, runner),
         }
     }
 
-    /// Runs blocks of closed forms in this process.
+    /// Runs closed forms and gains in this process.
     fn run_in_process(&self, tasks: &[usize], runner: &Runner) -> Result<(), StudyError> {
         let pieces = PieceProgress::new(tasks.len(), runner.on_progress);
         tasks.par_iter().try_for_each(|task| {

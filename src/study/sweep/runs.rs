@@ -2,9 +2,8 @@
 
 use super::axis::Levels;
 use super::design::AxisPosition;
-use super::table::{ColumnType, Table};
+use super::table::ColumnType;
 use super::{Plan, Sweep};
-use crate::spec::SpecError;
 use crate::study::StudyError;
 
 /// Number of bins of a continuous axis in summaries and plots.
@@ -23,9 +22,7 @@ pub(super) struct Runs {
 impl Runs {
     /// Reads the runs of a merged sweep.
     pub fn read(sweep: &Sweep) -> Result<Self, StudyError> {
-        let path = sweep.table();
-        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
-        let table = Table::open(&path)?.ok_or_else(unmerged)?;
+        let table = sweep.open_merged(&sweep.table())?;
         let numbers = table.column("point", ColumnType::Counts)?.counts();
         let numbers: Vec<u64> = numbers.into_iter().flatten().map(|number| number as u64).collect();
         let mut levels = vec![Vec::with_capacity(numbers.len()); sweep.plan.axes().len()];

@@ -1,24 +1,28 @@
 //! Runs that are simulated, recorded and estimated.
 
 use super::Measure;
-use super::component::{Component, Slot};
 use super::measure::Origin;
 use super::part::RunOutcome;
-use super::{LimitSpec, Plan, plan::ResolvedRun};
+use super::tree::Journey;
+use super::{LimitSpec, Plan, timing};
 use crate::estimation::{EstimatorSpec, Status};
-use crate::recording::{Reader, TopicPreference, Writer};
+use crate::measurement::Calibration;
+use crate::recording::{Reader, Selection, TopicPreference, Writer};
 use crate::report::IntegrityMetrics;
 use crate::simulation::Simulation;
+use crate::spec;
 use crate::study::calibration::calibration;
 use crate::study::closed_loop::run_closed_loop;
 use crate::study::coverage::{Coverage, CoveragePlan, coverage};
 use crate::study::integrity::{Integrity, path_length_m};
+use crate::study::latency::{MapErrors, Reference, TimingRun, TimingSpec};
 use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
 use crate::study::{CalibrationSpec, ProgressMonitor, StudyError, comparison};
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Maximum number of recordings written at once; bounds memory and temporary disk space.
@@ -29,6 +33,8 @@ pub(super) struct TemporaryRecording {
     simulation: Simulation,
     /// One file handle per reader thread; empty without a recording.
     handles: Vec<File>,
+    /// Ground truth for runs with timing errors, read by the first of them, and the time range of their maps, s.
+    reference: Mutex<Option<(f64, Arc<Reference>)>>,
 }
 
 /// Runs simulations that share physics and rays, and records them for `readers` threads.
@@ -39,9 +45,9 @@ pub(super) fn record_simulations(
     (recorded, readers): (bool, usize),
     limit: LimitSpec,
 ) -> Result<Vec<TemporaryRecording>, StudyError> {
-    let without = |simulation| TemporaryRecording { simulation, handles: Vec::new() };
+    let of = |(simulation, handles)| TemporaryRecording { simulation, handles, reference: Mutex::default() };
     if !recorded {
-        return Ok(simulations.into_iter().map(without).collect());
+        return Ok(simulations.into_iter().map(|simulation| of((simulation, Vec::new()))).collect());
     }
     let mut writers = Vec::new();
     let mut handles = Vec::new();
@@ -55,20 +61,16 @@ pub(super) fn record_simulations(
     with_time_limit(limit, |stop| {
         record_together(&simulations, writers, &ProgressMonitor { stop, report: &mut |_| {} })
     })?;
-    Ok(simulations
-        .into_iter()
-        .zip(handles)
-        .map(|(simulation, handles)| TemporaryRecording { simulation, handles })
-        .collect())
+    Ok(simulations.into_iter().zip(handles).map(of).collect())
 }
 
 impl TemporaryRecording {
     /// Evaluates a run on this recording, read by thread `reader`.
-    pub fn evaluate(&self, plan: &Plan, run: &ResolvedRun, reader: usize) -> RunOutcome {
+    pub fn evaluate(&self, (plan, limit): (&Plan, LimitSpec), run: &Journey, reader: usize) -> RunOutcome {
         let measures = plan.result_measures();
         let started = Instant::now();
-        let outcome = match self.figures(plan, run, &measures, reader) {
-            Ok(figures) => RunOutcome { figures, ..RunOutcome::default() },
+        let outcome = match self.figures((limit, &measures), run, reader) {
+            Ok((figures, details)) => RunOutcome { figures, details, ..RunOutcome::default() },
             Err(error) => RunOutcome::from_error(measures.len(), &error),
         };
         RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
@@ -76,33 +78,78 @@ impl TemporaryRecording {
 
     fn figures(
         &self,
-        plan: &Plan,
-        run: &ResolvedRun,
-        measures: &[Measure],
+        (limit, measures): (LimitSpec, &[Measure]),
+        run: &Journey,
         reader: usize,
-    ) -> Result<Vec<Option<f64>>, StudyError> {
-        let limit = plan.limit().ok_or_else(|| wrong_kind("limit"))?;
+    ) -> Result<(Vec<Option<f64>>, Option<String>), StudyError> {
         let needs = |origin: Origin| measures.iter().any(|measure| measure.origin() == origin);
         let swing = match needs(Origin::Swing) || needs(Origin::SwingOrClosedForm) {
             true => Some(self.swing()?),
             false => None,
         };
-        let estimated = match self.handles.get(reader).filter(|_| needs(Origin::Estimate)) {
-            Some(handle) => {
-                let Component::Estimator(estimator) = &plan.component(&run.changed, Slot::Estimator)?.component else {
-                    return Err(wrong_kind("estimator"));
-                };
-                let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
-                let closes_loops = measures.contains(&Measure::ClosedPositionRmseM);
-                Some(with_time_limit(limit, |stop| estimate(file, estimator, closes_loops, stop))?)
+        let (mut estimated, mut map_errors) = (None, None);
+        if let Some(handle) = self.handles.get(reader).filter(|_| needs(Origin::Estimate) || needs(Origin::Map)) {
+            let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
+            let closes_loops = measures.contains(&Measure::ClosedPositionRmseM);
+            match &run.timing {
+                None => {
+                    let work = |stop: &AtomicBool| estimate(file, &run.estimator.spec, closes_loops, stop);
+                    estimated = Some(with_time_limit(limit, work)?);
+                }
+                Some(timing) => {
+                    let work = |stop: &AtomicBool| self.map_errors(file, timing, &run.estimator.spec, stop);
+                    map_errors = Some(with_time_limit(limit, work)?);
+                }
             }
-            None => None,
-        };
+        }
         let figure = |measure: &Measure| {
             let by_swing = swing.as_ref().and_then(|coverage| swing_figure(*measure, coverage));
-            by_swing.or_else(|| estimated.as_ref().and_then(|estimated| estimated.figure(*measure)))
+            let by_map = || map_errors.as_ref().and_then(|errors| timing::figure(errors, *measure));
+            by_swing.or_else(by_map).or_else(|| estimated.as_ref().and_then(|estimated| estimated.figure(*measure)))
         };
-        Ok(measures.iter().map(figure).collect())
+        let details = map_errors.as_ref().map(spec::to_text).transpose()?;
+        Ok((measures.iter().map(figure).collect(), details))
+    }
+
+    /// Estimates with timing errors on one thread, and evaluates the result.
+    fn map_errors(
+        &self,
+        recording: File,
+        timing: &TimingSpec,
+        estimator: &EstimatorSpec,
+        stop: &AtomicBool,
+    ) -> Result<MapErrors, StudyError> {
+        let reader = Reader::new("the recording", recording)?;
+        let selection = reader.select(&TopicPreference::default())?;
+        let calibration = self.simulation.calibration();
+        let reference = self.reference(&reader, (&selection, &calibration), timing.shown_s, stop)?;
+        let run = TimingRun {
+            reader: &reader,
+            selection: &selection,
+            calibration: &calibration,
+            simulation: &self.simulation,
+            reference: &reference,
+            timing,
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        pool.install(|| run.evaluate(estimator, stop))
+    }
+
+    /// Ground truth for maps of `shown_s`; read once, while other threads wait for it.
+    fn reference(
+        &self,
+        reader: &Reader,
+        inputs: (&Selection, &Calibration),
+        shown_s: f64,
+        stop: &AtomicBool,
+    ) -> Result<Arc<Reference>, StudyError> {
+        let mut stored = self.reference.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, reference)) = stored.as_ref().filter(|(stored_s, _)| *stored_s == shown_s) {
+            return Ok(reference.clone());
+        }
+        let reference = Arc::new(Reference::read(reader, inputs, &self.simulation, shown_s, stop)?);
+        *stored = Some((shown_s, reference.clone()));
+        Ok(reference)
     }
 
     /// Coverage of the lidar and use of the gyroscope's range, from 5 s (after the rest at the start) to the run's end.
@@ -110,16 +157,12 @@ impl TemporaryRecording {
         let simulation = &self.simulation;
         let usual = CoveragePlan::default();
         let plan = CoveragePlan {
-            duration_s: simulation.scenario().duration_s - usual.from_s,
+            duration_s: simulation.inputs().duration_s - usual.from_s,
             rate_limit_deg_per_s: simulation.imu().spec().gyro.limit_deg_per_s,
             ..usual
         };
         coverage(simulation.head(), simulation.motion(), simulation.lidar(), &plan, |_| ())
     }
-}
-
-fn wrong_kind(what: &str) -> StudyError {
-    StudyError::Plan { what: "the plan", message: format!("{what} is missing for a journey") }
 }
 
 fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {

@@ -2,10 +2,9 @@
 
 use super::paired::{holm, signed_rank_p};
 use super::runs::{Runs, level_count, level_label};
-use super::table::{ColumnType, Table};
+use super::table::ColumnType;
 use super::trend::rank_correlation;
 use super::{Measure, Plan, Sampling, Sweep};
-use crate::spec::SpecError;
 use crate::study::StudyError;
 use serde::Serialize;
 
@@ -151,8 +150,7 @@ impl Sweep {
     /// A measure of all rows of the merged table; missing figures are [`Measure::missing_value`].
     pub(super) fn figures(&self, measure: Measure) -> Result<Vec<f64>, StudyError> {
         let path = if measure == Measure::WallS { self.times() } else { self.table() };
-        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
-        let table = Table::open(&path)?.ok_or_else(unmerged)?;
+        let table = self.open_merged(&path)?;
         let cells = table.column(measure.key(), ColumnType::Numbers)?.numbers();
         Ok(cells.into_iter().map(|cell| cell.unwrap_or(measure.missing_value())).collect())
     }

@@ -3,7 +3,7 @@
 use super::identity::ContentHash;
 use super::measure::Origin;
 use super::part::RunOutcome;
-use super::plan::ResolvedRun;
+use super::plan::PlannedJourney;
 use super::simulated_run::{MAX_RECORDINGS, TemporaryRecording, record_simulations};
 use super::{LimitSpec, Sweep};
 use crate::simulation::Simulation;
@@ -43,7 +43,7 @@ impl WorkerMessage {
 
 /// Runs with the same recording.
 struct SharedRecording {
-    runs: Vec<(usize, ResolvedRun)>,
+    runs: Vec<(usize, PlannedJourney)>,
 }
 
 /// Limits the memory of this process, and ends it when its parent ends; only on Linux.
@@ -90,8 +90,9 @@ impl Sweep {
         let mut shared: Vec<SharedRecording> = Vec::new();
         let mut groups: BTreeMap<ContentHash, usize> = BTreeMap::new();
         for unit in self.missing_units(task)? {
-            let run = self.plan.resolve(self.units[unit].first)?;
-            let group = *groups.entry(run.simulation).or_insert(shared.len());
+            let index = self.units[unit].first;
+            let run = self.plan.journey(index, &self.plan.inputs(index)?)?;
+            let group = *groups.entry(run.recording).or_insert(shared.len());
             if group == shared.len() {
                 shared.push(SharedRecording { runs: Vec::new() });
             }
@@ -100,14 +101,14 @@ impl Sweep {
         shared.chunks(MAX_RECORDINGS).try_for_each(|some| self.run_shared(some, limit, report))
     }
 
-    /// Runs a block of closed forms, unless it is finished.
+    /// Runs a block of runs in this process, unless it is finished.
     pub(super) fn run_block(&self, unit: usize) -> Result<(), StudyError> {
         let unit = &self.units[unit];
         if self.is_done(unit)? {
             return Ok(());
         }
         let measures = self.plan.result_measures();
-        let evaluate = |index| super::closed_form::evaluate(&self.plan, &measures, index);
+        let evaluate = |index| super::in_process::evaluate(&self.plan, &measures, index);
         let outcomes: Vec<RunOutcome> = (unit.first..unit.first + unit.count).map(evaluate).collect();
         self.write_part(unit, &outcomes)
     }
@@ -121,13 +122,12 @@ impl Sweep {
     ) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
         let measures = self.plan.result_measures();
-        let recorded = measures.iter().any(|measure| measure.origin() == Origin::Estimate);
+        let recorded = measures.iter().any(|measure| matches!(measure.origin(), Origin::Estimate | Origin::Map));
         let mut simulations: Vec<Simulation> = Vec::new();
         let mut groups: Vec<&SharedRecording> = Vec::new();
         for each in shared {
-            let Some((unit, run)) = each.runs.first() else { continue };
-            let seed = self.plan.seed(self.units[*unit].first).unwrap_or_default();
-            match self.plan.simulation(&run.changed, seed) {
+            let Some((_, run)) = each.runs.first() else { continue };
+            match Simulation::build(run.inputs.simulation.clone()).map_err(StudyError::from) {
                 Ok(simulation) => {
                     simulations.push(simulation);
                     groups.push(each);
@@ -141,19 +141,19 @@ impl Sweep {
             Err(error @ StudyError::File { .. }) => return Err(error),
             Err(error) => return groups.into_iter().try_for_each(|each| self.fail(each, &error, report)),
         };
-        let runs: Vec<(&TemporaryRecording, &(usize, ResolvedRun))> = recordings
+        let runs: Vec<(&TemporaryRecording, &(usize, PlannedJourney))> = recordings
             .iter()
             .zip(groups)
             .flat_map(|(recording, each)| each.runs.iter().map(move |run| (recording, run)))
             .collect();
-        self.estimate_runs(&runs, threads, report)
+        self.estimate_runs(&runs, (limit, threads), report)
     }
 
     /// Estimates the runs in parallel, each on one thread.
     fn estimate_runs(
         &self,
-        runs: &[(&TemporaryRecording, &(usize, ResolvedRun))],
-        threads: usize,
+        runs: &[(&TemporaryRecording, &(usize, PlannedJourney))],
+        (limit, threads): (LimitSpec, usize),
         report: &(dyn Fn(WorkerMessage) + Sync),
     ) -> Result<(), StudyError> {
         let next = AtomicUsize::new(0);
@@ -164,7 +164,8 @@ impl Sweep {
                     continue;
                 }
                 report(WorkerMessage::Begin(*unit));
-                self.write_part(&self.units[*unit], &[recording.evaluate(&self.plan, run, reader)])?;
+                let outcome = recording.evaluate((&self.plan, limit), &run.inputs, reader);
+                self.write_part(&self.units[*unit], &[outcome])?;
                 report(WorkerMessage::Done(*unit));
             }
             Ok::<(), StudyError>(())

@@ -7,8 +7,8 @@ mod values;
 use crate::memory_sink::MemorySink;
 use std::sync::OnceLock;
 use zsim::random::Seed;
-use zsim::simulation::{EPOCH, FaultsSpec, Scenario, Simulation, Specs};
-use zsim::spec::{Source, SpecError, parse};
+use zsim::simulation::{EPOCH, Named, Run, Scenario, Simulation, SimulationError};
+use zsim::spec::Source;
 use zsim::time::Stamp;
 
 const DURATION_S: f64 = 8.0;
@@ -24,14 +24,10 @@ fn faults(list: &str) -> Source {
 
 /// The simulation of `scenario` with faults.
 fn simulation(scenario: &Scenario, list: Option<&str>) -> Result<Simulation, String> {
-    let (mut specs, mut sources) = Specs::load(scenario).unwrap();
-    let wrong = |error: SpecError| error.to_string();
-    if let Some(list) = list {
-        let source = faults(list);
-        specs.faults = Some(parse::<FaultsSpec>(&source).and_then(|spec| spec.with_files(&source)).map_err(wrong)?);
-        sources.faults = Some(source);
-    }
-    Simulation::build(scenario, specs, &sources).map_err(|error| error.to_string())
+    let mut run = Run::load(scenario).unwrap();
+    let wrong = |error: SimulationError| error.to_string();
+    run.faults = list.map(|list| Named::parse(faults(list))).transpose().map_err(wrong)?;
+    Simulation::build(run).map_err(wrong)
 }
 
 fn run(scenario: &Scenario, list: Option<&str>) -> MemorySink {

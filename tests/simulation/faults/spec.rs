@@ -1,7 +1,7 @@
 //! Specs of faults: shipped lists, errors, files of arrival times.
 
 use super::{MemorySink, simulation, usual};
-use zsim::simulation::{FaultsSpec, Scenario, Simulation, Specs};
+use zsim::simulation::{FaultsSpec, Run, Scenario, Simulation};
 use zsim::spec::{Kind, Source, names, parse};
 
 #[test]
@@ -11,9 +11,9 @@ fn every_shipped_list_of_faults_builds_and_runs() {
         let simulation = Simulation::prepare(&scenario).unwrap_or_else(|error| panic!("{name}: {error}"));
         simulation.run(&mut MemorySink::default(), &mut |_| ()).unwrap();
         // A manifest has the complete specs, including referenced files: it must reproduce the run.
-        let text = zsim::spec::to_text(simulation.specs()).unwrap();
-        let read: Specs = parse(&Source::in_memory("manifest", text)).unwrap();
-        assert_eq!(&read, simulation.specs(), "{name}");
+        let text = zsim::spec::to_text(simulation.inputs()).unwrap();
+        let read: Run = parse(&Source::in_memory("manifest", text)).unwrap();
+        assert_eq!(&read, simulation.inputs(), "{name}");
     }
 }
 

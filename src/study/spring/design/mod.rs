@@ -8,12 +8,10 @@
 
 mod catalogue;
 mod output;
-mod pareto;
 mod search;
 mod spec;
 
 pub use catalogue::{STOCK, catalogue};
 pub use output::{csv, pareto_figure};
-pub use pareto::{pareto_set, spread};
 pub use search::{Candidate, DesignSearch, DesignStudy, VerifiedDesign};
-pub use spec::{Aim, CoilDesign, DesignMetric, DesignSpec, GoalSpec, LimitSpec, SpaceSpec};
+pub use spec::{CoilDesign, DesignSpec, SpaceSpec};

@@ -1,6 +1,6 @@
 //! Search: evaluation of designs, Pareto set and verification.
 
-use super::{CoilDesign, DesignSpec, SpaceSpec, catalogue, pareto_set, spread};
+use super::{CoilDesign, DesignSpec, SpaceSpec, catalogue};
 use crate::dynamics::{self, HeadSpec, LinkageSpec};
 use crate::elasticity::Material;
 use crate::random::{Seed, Stream};
@@ -9,6 +9,7 @@ use crate::spec::{Kind, Source, SpecError, find, parse};
 use crate::study::coverage::CoveragePlan;
 use crate::study::progress::PieceProgress;
 use crate::study::spring::{DesignMetrics, closed_form, simulated};
+use crate::study::sweep::{pareto_set, spread};
 use crate::study::{OnProgress, StudyError};
 use cmaes::{CMAESOptions, DVector};
 use rand::RngExt;
@@ -108,6 +109,11 @@ impl DesignSearch {
         if spec.goals.is_empty() {
             return Err(SpecError::about(source, "goals", "at least one goal is required").into());
         }
+        let measures = spec.goals.iter().map(|goal| goal.measure).chain(spec.limits.iter().map(|limit| limit.measure));
+        if let Some(measure) = measures.into_iter().find(|measure| !measure.has_closed_form()) {
+            let message = format!("{} has no closed form", measure.key());
+            return Err(SpecError::about(source, measure.key(), message).into());
+        }
         if spec.evaluations == 0 || spec.candidates == 0 {
             return Err(SpecError::about(source, "evaluations", "evaluations and candidates must be at least 1").into());
         }
@@ -174,7 +180,7 @@ impl DesignSearch {
             return Evaluation::Invalid;
         };
         let excess = self.excess(&figures);
-        let costs: Vec<f64> = self.spec.goals.iter().map(|goal| goal.cost(goal.figure.of(&figures))).collect();
+        let costs: Vec<f64> = self.spec.goals.iter().map(|goal| goal.cost(figures.cost_figure(goal.measure))).collect();
         if excess > 0.0 || costs.iter().any(|cost| !cost.is_finite()) {
             return Evaluation::Infeasible(excess);
         }
@@ -183,7 +189,7 @@ impl DesignSearch {
 
     /// Sum of the relative violations of the limits.
     fn excess(&self, metrics: &DesignMetrics) -> f64 {
-        self.spec.limits.iter().map(|limit| limit.excess(limit.figure.of(metrics))).sum()
+        self.spec.limits.iter().map(|limit| limit.excess(metrics.cost_figure(limit.measure))).sum()
     }
 
     /// The head with its spring replaced.
@@ -214,10 +220,10 @@ impl DesignSearch {
             pieces.finish_one();
             verified
         });
-        let metric = |k: usize| self.spec.goals.get(k).or(self.spec.goals.first()).map(|goal| goal.figure);
-        let cloud = metric(0)
-            .zip(metric(1))
-            .map_or(Vec::new(), |(x, y)| feasible.iter().map(|c| (x.of(&c.figures), y.of(&c.figures))).collect());
+        let metric = |k: usize| self.spec.goals.get(k).or(self.spec.goals.first()).map(|goal| goal.measure);
+        let cloud = metric(0).zip(metric(1)).map_or(Vec::new(), |(x, y)| {
+            feasible.iter().map(|c| (c.figures.cost_figure(x), c.figures.cost_figure(y))).collect()
+        });
         Ok(DesignStudy {
             spec: self.spec.clone(),
             evaluated,

@@ -53,7 +53,7 @@ impl Block {
 }
 
 /// Sum of all blocks.
-pub(super) fn pooled(blocks: &[Block]) -> Block {
+pub(in crate::study) fn pooled(blocks: &[Block]) -> Block {
     blocks.iter().fold(Block::default(), |mut sum, block| {
         sum.add(block, 1.0);
         sum
@@ -76,13 +76,13 @@ pub struct ConfidenceInterval {
 ///
 /// All runs use the same resamples, so that errors common to two runs cancel in their difference.
 #[derive(Debug)]
-pub(super) struct Resampling {
+pub(in crate::study) struct Resampling {
     /// Multiplicity of each block, per resample.
     counts: Vec<Vec<f64>>,
 }
 
 impl Resampling {
-    pub(super) fn new(blocks: usize, seed: Seed) -> Self {
+    pub(in crate::study) fn new(blocks: usize, seed: Seed) -> Self {
         let mut stream = seed.stream("latency/bootstrap");
         let mut draw = || {
             let mut counts = vec![0.0; blocks];
@@ -102,7 +102,7 @@ impl Resampling {
     }
 
     /// A measure of all blocks with its confidence interval.
-    pub(super) fn interval(&self, blocks: &[Block], measure: fn(&Block) -> f64) -> ConfidenceInterval {
+    pub(in crate::study) fn interval(&self, blocks: &[Block], measure: fn(&Block) -> f64) -> ConfidenceInterval {
         percentile_interval(measure(&pooled(blocks)), self.resampled(blocks, measure).collect())
     }
 
@@ -110,7 +110,11 @@ impl Resampling {
     ///
     /// Fits the parabola `a + b x + c x^2` to `curve` (abscissa, blocks); each point has the reciprocal of its bootstrap
     /// variance as weight. `None` if the parabola has no minimum.
-    pub(super) fn minimum(&self, curve: &[(f64, &[Block])], variance: fn(&Block) -> f64) -> Option<ConfidenceInterval> {
+    pub(in crate::study) fn minimum(
+        &self,
+        curve: &[(f64, &[Block])],
+        variance: fn(&Block) -> f64,
+    ) -> Option<ConfidenceInterval> {
         let resampled: Vec<Vec<f64>> =
             curve.iter().map(|(_, blocks)| self.resampled(blocks, variance).collect()).collect();
         let weights: Vec<f64> = resampled.iter().map(|values| 1.0 / variance_of(values)).collect();

@@ -1,0 +1,121 @@
+use super::{FaultsSpec, SimulationError};
+use crate::dynamics::{HeadSpec, LinkageSpec};
+use crate::motion::MotionSpec;
+use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
+use crate::spec::{Kind, Source, find, parse};
+use crate::world::SceneSpec;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// A spec that a run refers to by name.
+pub trait NamedSpec: DeserializeOwned {
+    /// Kind of the spec; it determines the folder in the library.
+    const KIND: Kind;
+
+    /// The spec with the content of the files that it includes.
+    ///
+    /// # Errors
+    /// If a file is missing or invalid.
+    fn resolved(self, _source: &Source) -> Result<Self, SimulationError> {
+        Ok(self)
+    }
+}
+
+/// A self-contained spec, with its name and the folder that its file paths are relative to.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Named<T> {
+    /// Name as given: a path, or a name in the library.
+    pub name: String,
+    /// Folder of meshes and recorded motions; `None` for a built-in spec.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub folder: Option<PathBuf>,
+    /// The spec.
+    pub spec: T,
+    /// Text of the spec, for positions in errors; `None` if the spec was modified or stored.
+    #[serde(skip)]
+    source: Option<Source>,
+}
+
+impl<T: PartialEq> PartialEq for Named<T> {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.name, &self.folder, &self.spec) == (&other.name, &other.folder, &other.spec)
+    }
+}
+
+impl<T: NamedSpec> Named<T> {
+    /// Finds and parses the spec `name`.
+    ///
+    /// # Errors
+    /// If the spec, or a file that it includes, is missing or invalid.
+    pub fn load(name: &str) -> Result<Self, SimulationError> {
+        Ok(Self { name: name.to_owned(), ..Self::parse(find(T::KIND, name)?)? })
+    }
+
+    /// Parses `source`; the name is that of the source.
+    ///
+    /// # Errors
+    /// As [`Named::load`].
+    pub fn parse(source: Source) -> Result<Self, SimulationError> {
+        let spec = parse::<T>(&source)?.resolved(&source)?;
+        let folder = source.folder.as_ref().map(|folder| folder.canonicalize().unwrap_or_else(|_| folder.clone()));
+        Ok(Self { name: source.name.clone(), folder, spec, source: Some(source) })
+    }
+}
+
+impl<T> Named<T> {
+    /// A spec that is not from a file.
+    pub fn in_memory(name: impl Into<String>, spec: T) -> Self {
+        Self { name: name.into(), folder: None, spec, source: None }
+    }
+
+    /// Source for error messages and relative paths.
+    pub fn source(&self) -> Source {
+        let stored = || Source { name: self.name.clone(), folder: self.folder.clone(), text: String::new() };
+        self.source.clone().unwrap_or_else(stored)
+    }
+}
+
+impl NamedSpec for SceneSpec {
+    const KIND: Kind = Kind::Scene;
+
+    fn resolved(self, source: &Source) -> Result<Self, SimulationError> {
+        Ok(self.with_includes(source)?)
+    }
+}
+
+impl NamedSpec for HeadSpec {
+    const KIND: Kind = Kind::Head;
+
+    /// A spring that is given by name is replaced by its description, so that its settings can be varied.
+    fn resolved(mut self, _source: &Source) -> Result<Self, SimulationError> {
+        if let LinkageSpec::Spring { spring, .. } = &mut self.linkage {
+            *spring = spring.resolved()?;
+        }
+        Ok(self)
+    }
+}
+
+impl NamedSpec for MotionSpec {
+    const KIND: Kind = Kind::Motion;
+}
+
+impl NamedSpec for LidarSpec {
+    const KIND: Kind = Kind::Lidar;
+}
+
+impl NamedSpec for ImuSpec {
+    const KIND: Kind = Kind::Imu;
+}
+
+impl NamedSpec for ClocksSpec {
+    const KIND: Kind = Kind::Clock;
+}
+
+impl NamedSpec for FaultsSpec {
+    const KIND: Kind = Kind::Faults;
+
+    fn resolved(self, source: &Source) -> Result<Self, SimulationError> {
+        Ok(self.with_files(source)?)
+    }
+}

@@ -1,0 +1,40 @@
+//! Runs that are evaluated in this process: closed forms, and gains of a head.
+
+use super::part::RunOutcome;
+use super::tree::{ClosedForm, GainRun};
+use super::{BaseSpec, Measure, Plan};
+use crate::dynamics::HeadModel;
+use crate::spec;
+use crate::study::StudyError;
+use crate::study::gains::gain_curve;
+use crate::study::spring::closed_form;
+use std::time::Instant;
+
+/// Evaluates run `index`. A failure, such as a head without static equilibrium, is recorded as an error.
+pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutcome {
+    let started = Instant::now();
+    let evaluated = match plan.spec().base {
+        BaseSpec::Gains { .. } => gains(plan, measures, index),
+        _ => metrics(plan, measures, index),
+    };
+    let outcome = evaluated.unwrap_or_else(|error| RunOutcome::from_error(measures.len(), &error));
+    RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
+}
+
+fn metrics(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, StudyError> {
+    let inputs = plan.inputs(index)?.closed_form();
+    let ClosedForm { shake, head } = inputs.map_err(|message| StudyError::Plan { what: "run", message })?;
+    let of = closed_form(&head.spec, &head.source(), &shake)?;
+    Ok(RunOutcome { figures: measures.iter().map(|measure| of.figure(*measure)).collect(), ..RunOutcome::default() })
+}
+
+/// Measures a gain curve, which is the detail of the run.
+fn gains(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, StudyError> {
+    let inputs = plan.inputs(index)?.gain_run();
+    let GainRun { gains, head } = inputs.map_err(|message| StudyError::Plan { what: "run", message })?;
+    let head = HeadModel::new(&head.spec, &head.source())?;
+    let curve = gain_curve(&head, gains.axis, &gains.plan(), &|_| ())?;
+    let figure = |measure: &Measure| curve.peak.filter(|_| *measure == Measure::PeakGain).map(|peak| peak.gain);
+    let figures = measures.iter().map(figure).collect();
+    Ok(RunOutcome { figures, details: Some(spec::to_text(&curve)?), ..RunOutcome::default() })
+}
