@@ -272,8 +272,8 @@ fn a_gyroscope_saturates_at_its_limit() {
         angular_velocity_rad_per_s: Vector::new(20.0, -20.0, 1.0),
         specific_force_m_per_s2: Vector::new(0.0, 60.0, -60.0),
     };
-    let said = errors.measure(&fast);
-    let (rate, force) = (said.angular_velocity_rad_per_s, said.specific_force_m_per_s2);
+    let reading = errors.measure(&fast);
+    let (rate, force) = (reading.angular_velocity_rad_per_s, reading.specific_force_m_per_s2);
     assert_relative_eq!(rate.xy(), nalgebra::Vector2::new(1.0, -1.0) * 600_f64.to_radians(), epsilon = 1e-12);
     assert!((rate.z - 1.0).abs() < 0.1);
     assert_relative_eq!(force.yz(), nalgebra::Vector2::new(1.0, -1.0) * 5.0 * G, epsilon = 1e-12);
@@ -301,13 +301,13 @@ fn scale_misalignment_and_turn_on_bias_have_the_specified_spread_over_runs() {
     let mut squares = Vector::zeros();
     for seed in 0..runs {
         let mut errors = ImuErrors::new(&imu, Seed(seed));
-        let mut said = |rate: Vector| {
+        let mut reading = |rate: Vector| {
             errors
                 .measure(&InertialReading { angular_velocity_rad_per_s: rate, ..at_rest() })
                 .angular_velocity_rad_per_s
         };
-        let bias = said(Vector::zeros());
-        let turned = said(Vector::x()) - bias;
+        let bias = reading(Vector::zeros());
+        let turned = reading(Vector::x()) - bias;
         squares += Vector::new(turned.x - 1.0, turned.y, bias.z).map(|x| x * x);
     }
     // Standard error of a sigma from n runs: 1 / sqrt(2 n) = 1.1 %.
