@@ -7,7 +7,9 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::io::{Cursor, Write};
 use zsim::geometry::{Kinematics, Pose, Vector, from_roll_pitch_yaw};
-use zsim::measurement::{Calibration, ImuNoise, ImuSample, LidarNoise, LidarReturn, LidarScan, PlanarScan, Sink};
+use zsim::measurement::{
+    Calibration, ImuAveraging, ImuNoise, ImuSample, LidarNoise, LidarReturn, LidarScan, PlanarScan, Sink,
+};
 use zsim::random::{Seed, Stream};
 use zsim::recording::{Reader, RunDescription, TopicPreference, Truth, TumWriter, Writer};
 use zsim::time::{Span, Stamp};
@@ -28,7 +30,8 @@ fn run() -> RunDescription {
     };
     let lidar = LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 };
     let (head_from_laser, head_from_imu) = (Pose::identity(), Pose::identity());
-    let calibration = Calibration { head_from_laser, head_from_imu, imu, lidar };
+    let calibration =
+        Calibration { head_from_laser, head_from_imu, imu, imu_averaging: ImuAveraging::ConingCorrected, lidar };
     RunDescription { calibration, imu_rate_hz: 100.0, base_imu: None, manifest: String::new(), truth_tf: false }
 }
 

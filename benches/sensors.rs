@@ -10,7 +10,7 @@ use zsim::geometry::{STANDARD_GRAVITY_M_PER_S2, Vector};
 use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::recording::{RunDescription, Writer};
-use zsim::sensors::{ImuErrors, LidarErrors, MeanMotion, ScanTiming, Track};
+use zsim::sensors::{ImuErrors, InertialReading, LidarErrors, ScanTiming, Track};
 use zsim::simulation::{EPOCH, STEP_S, Scenario, Simulation};
 use zsim::time::Stamp;
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
@@ -40,7 +40,7 @@ fn scan(criterion: &mut Criterion) {
 
 fn imu(criterion: &mut Criterion) {
     let mut errors = ImuErrors::new(office().imu(), Seed(1));
-    let ideal = MeanMotion {
+    let ideal = InertialReading {
         angular_velocity_rad_per_s: Vector::zeros(),
         specific_force_m_per_s2: Vector::z() * STANDARD_GRAVITY_M_PER_S2,
     };

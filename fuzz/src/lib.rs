@@ -2,7 +2,7 @@
 
 use std::io::{Read, Seek};
 use zsim::geometry::Pose;
-use zsim::measurement::{Calibration, ImuNoise, LidarNoise};
+use zsim::measurement::{Calibration, ImuAveraging, ImuNoise, LidarNoise};
 use zsim::recording::{TopicPreference, Reader};
 use zsim::time::Span;
 
@@ -33,6 +33,7 @@ fn calibration() -> Calibration {
             gyro_limit_rad_per_s: 1.0,
             accel_limit_m_per_s2: 1.0,
         },
+        imu_averaging: ImuAveraging::ConingCorrected,
         lidar: LidarNoise { near_sigma_m: 0.0, near_m: 1.0, far_sigma_m: 0.0, far_m: 2.0 },
     }
 }

@@ -53,7 +53,7 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
     if let Some(scene) = &arguments.scene {
         return Ok(World::load(scene)?);
     }
-    let Some(run) = Manifest::in_recording(reader).and_then(|manifest| manifest.run) else {
+    let Some(run) = Manifest::in_recording(reader)?.and_then(|manifest| manifest.run) else {
         let message = format!("{} has no scene: pass one with --scene", reader.name());
         return Err(Usage(message).into());
     };

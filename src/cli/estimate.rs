@@ -31,6 +31,10 @@ pub(super) struct Arguments {
     /// 180))); docs/guide/recordings.md has all keys, noise among them. Or a YAML file of Kalibr or allan_variance_ros
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+    /// Ignore the sensor models (noise, IMU averaging) in the manifest of a simulated recording, and assume those of unknown
+    /// sensors; the evaluation against the truth still uses the manifest
+    #[arg(long)]
+    ignore_manifest: bool,
     /// The frame whose pose is written [default: head where /tf_static has it, else the IMU's]
     #[arg(long, value_name = "NAME")]
     body_frame: Option<String>,
@@ -61,6 +65,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let options = EstimateOptions {
         map: arguments.map.as_ref().map(within).transpose()?,
         calibration: calibration(arguments.calibration.as_deref())?,
+        ignore_manifest: arguments.ignore_manifest,
         body_frame: arguments.body_frame.clone(),
         topics: TopicPreference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
         ..arguments.estimator.options()?

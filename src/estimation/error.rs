@@ -1,4 +1,4 @@
-use crate::geometry::Vector;
+use crate::geometry::{TrajectoryError, Vector};
 use crate::time::Stamp;
 use std::fmt;
 
@@ -28,6 +28,9 @@ pub enum EstimationError {
          `--start x,y,z,yaw` (m, degrees)"
     )]
     NotInMap(String),
+    /// Estimated poses that are not finite or not in order of time.
+    #[error("the estimated trajectory is invalid: {0}")]
+    Trajectory(#[from] TrajectoryError),
     /// A measurement with NaN or infinite values.
     #[error("the {sensor} measurement stamped {stamp_ns} ns is not finite")]
     NotFinite {

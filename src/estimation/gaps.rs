@@ -4,7 +4,7 @@
 //! nodes) would fill it. They are placed on a time axis on which no gap exceeds [`MAX_GAP_S`].
 
 use super::observed::{LidarCorrectionPeriod, ObservedSurfel, ObservedSurfels};
-use crate::geometry::{PoseCovariance, Trajectory};
+use crate::geometry::{PoseCovariance, Trajectory, TrajectoryError};
 use crate::time::{Span, Stamp};
 
 /// Longer gaps are shortened to this, s; it is longer than any interaction across a gap.
@@ -40,9 +40,9 @@ impl Gaps {
     }
 
     /// Converts a trajectory to the shortened time.
-    pub(super) fn shorten(&self, trajectory: &Trajectory) -> Trajectory {
+    pub(super) fn shorten(&self, trajectory: &Trajectory) -> Result<Trajectory, TrajectoryError> {
         let stamped = trajectory.iter().map(|(stamp, pose)| (self.shortened(stamp), *pose));
-        Trajectory::from_poses(stamped).unwrap_or_default()
+        Trajectory::from_poses(stamped)
     }
 
     /// Converts covariances to the shortened time.
@@ -65,9 +65,9 @@ impl Gaps {
 }
 
 /// The poses of `shortened` at the original stamps.
-pub(super) fn restored(shortened: &Trajectory, stamps: &[Stamp]) -> Trajectory {
+pub(super) fn restored(shortened: &Trajectory, stamps: &[Stamp]) -> Result<Trajectory, TrajectoryError> {
     let stamped = stamps.iter().copied().zip(shortened.poses().iter().copied());
-    Trajectory::from_poses(stamped).unwrap_or_default()
+    Trajectory::from_poses(stamped)
 }
 
 #[cfg(test)]
@@ -85,10 +85,10 @@ mod tests {
         let poses = (0..6).map(|k| Pose::translation(f64::from(k), 0.0, 0.0));
         let trajectory = Trajectory::from_poses(stamps.iter().copied().zip(poses)).unwrap();
         let gaps = Gaps::between(&stamps).unwrap();
-        let short = gaps.shorten(&trajectory);
+        let short = gaps.shorten(&trajectory).unwrap();
         let expected: Vec<Stamp> = [0.0, 1.0, 11.0, 12.0, 22.0, 23.0].map(at).to_vec();
         assert_eq!(short.stamps(), expected);
-        assert_eq!(restored(&short, &stamps), trajectory);
+        assert_eq!(restored(&short, &stamps).unwrap(), trajectory);
         // Times around the gap remain in order.
         let times = [0.5, 1.0, 1.2, 40_000.0, 86_400.8, 86_401.0, 86_401.3].map(|s| gaps.shortened(at(s)));
         assert!(times.windows(2).all(|pair| pair[0] <= pair[1]), "{times:?}");

@@ -7,7 +7,7 @@
 //!
 //! 1. [`Estimator::push`] sorts measurements, smooths the stamps of both sensors, and cuts time into segments of
 //!    `step_s`.
-//! 2. A new segment is integrated from the IMU, with coning and sculling corrections because samples are averages. Its
+//! 2. A new segment is integrated from the IMU, with coning and sculling corrections unless the IMU applies them. Its
 //!    beams are projected with the trajectory into voxels of several sizes on two grids. The points of a voxel from one
 //!    sweep form a *surfel*.
 //! 3. The surfels of the window are transformed into the map frame. They are matched with each other by position and
@@ -62,6 +62,7 @@ mod border;
 mod clock;
 mod cloud;
 mod consider;
+mod dead_reckoning;
 mod error;
 mod estimator;
 mod gaps;
@@ -92,6 +93,7 @@ mod window;
 pub use base::{BaseEstimate, BaseFix, BaseImu, FixSigmas, smooth_base};
 use clock::Clock;
 pub use cloud::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
+pub use dead_reckoning::integrate_imu;
 pub use error::{Discarded, EstimationError, Warning, WarningKind};
 pub use estimator::{Estimator, estimate_all};
 pub use integrity::{Cause, Evidence, Finding, Status, bound_factors, covariance_blocks, findings, radius_99};

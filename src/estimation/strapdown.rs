@@ -1,31 +1,36 @@
-//! Strapdown integration of IMU samples that are averages over intervals.
+//! Strapdown integration of IMU readings over intervals.
 //!
-//! A sample is the mean of angular velocity and specific force over an interval of length `h`; the slopes are from the
-//! neighbouring samples. About the middle of the interval, w(s) = w0 + w1 s and f(s) = f0 + f1 s. To third order in `h`
-//! (Magnus expansion; Savage, Strapdown Inertial Navigation Integration, 1998):
+//! Let `w` and `f` be the means of angular velocity and specific force over an interval of length `h`, in the axes of the
+//! body; the slopes are from the neighbouring readings. About the middle of the interval, w(s) = w + w1 s and f(s) = f +
+//! f1 s. To third order in `h`, with `R_mid` half-way along the rotation `phi` (Magnus expansion; Savage, Strapdown
+//! Inertial Navigation Integration, 1998):
 //!
 //! ```text
-//! turn       phi = w h + h^3/12 w0 x w1                                            (coning)
-//! velocity   R_mid (f h + h^3/12 w0 x f1 + h^3/24 (w1 x f0 + w0 x (w0 x f0)))      (sculling, rotation)
+//! turn       phi = w h + h^3/12 w x w1                                                   (coning)
+//! velocity   R_mid (f h + h^3/12 (w x f1 - w1 x f) + h^3/24 w x (w x f)) + g h           (sculling, rotation)
 //! ```
 //!
-//! At 400 degrees/s and 100 Hz the last term is 2 mm/s^2; without it, the error would look like a bias.
+//! At 400 degrees/s and 100 Hz the last term is 2 mm/s^2; without it, the error would look like a bias. An IMU that
+//! compensates for coning and sculling delivers these sums divided by `h`: the terms must not be added again.
 
 use crate::geometry::{Matrix, Rotation, Vector};
 
-/// IMU readings over an interval, in the IMU frame.
+/// IMU readings over an interval, in the IMU frame; see the module for their relation to the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Interval {
     /// Length, s.
     pub(super) h: f64,
-    /// Mean angular velocity, rad/s.
+    /// Angular velocity, rad/s.
     pub(super) gyro: Vector,
     /// Slope of the angular velocity, rad/s^2.
     pub(super) gyro_slope: Vector,
-    /// Mean specific force, m/s^2.
+    /// Specific force, m/s^2.
     pub(super) accel: Vector,
     /// Slope of the specific force, m/s^3.
     pub(super) accel_slope: Vector,
+    /// Fraction of the coning, sculling and rotation terms that the readings do not include: 1 for means in body axes, 0 if
+    /// the IMU compensates for them.
+    pub(super) uncompensated: f64,
     /// Standard deviation of `gyro` on each axis, rad/s.
     pub(super) gyro_sigma: f64,
     /// Standard deviation of `accel` on each axis, m/s^2.
@@ -90,20 +95,15 @@ impl Interval {
     /// Rotation vector from the start to the end of the interval, in the body frame, rad.
     pub(super) fn turn(&self, biases: &Biases) -> Vector {
         let rate = self.gyro - biases.gyro;
-        rate * self.h + rate.cross(&self.gyro_slope) * (self.h.powi(3) / 12.0)
+        rate * self.h + rate.cross(&self.gyro_slope) * (self.uncompensated * self.h.powi(3) / 12.0)
     }
 
-    /// Rotation vector from the start to the middle of the interval, rad.
-    pub(super) fn turn_to_middle(&self, biases: &Biases) -> Vector {
-        (self.gyro - biases.gyro) * (0.5 * self.h) - self.gyro_slope * (self.h * self.h / 8.0)
-    }
-
-    /// Bias-corrected mean specific force in the body frame at the middle of the interval, m/s^2.
+    /// Bias-corrected mean specific force in the axes of the body half-way along [`Self::turn`], m/s^2.
     pub(super) fn force_in_middle(&self, biases: &Biases) -> Vector {
         let (rate, force) = (self.gyro - biases.gyro, self.accel - biases.accel);
-        let turning = rate.cross(&self.accel_slope) / 12.0
-            + (self.gyro_slope.cross(&force) + rate.cross(&rate.cross(&force))) / 24.0;
-        force + turning * (self.h * self.h)
+        let sculling = (rate.cross(&self.accel_slope) - self.gyro_slope.cross(&force)) / 12.0;
+        let rotation = rate.cross(&rate.cross(&force)) / 24.0;
+        force + (sculling + rotation) * (self.uncompensated * self.h * self.h)
     }
 }
 
@@ -122,14 +122,15 @@ impl State {
     /// The state after an interval; `gravity` is in the map frame, m/s^2.
     pub(super) fn after(&self, interval: &Interval, biases: &Biases, gravity: &Vector) -> State {
         let h = interval.h;
-        let middle = self.rotation * Rotation::from_scaled_axis(interval.turn_to_middle(biases));
+        let turn = interval.turn(biases);
+        let middle = self.rotation * Rotation::from_scaled_axis(turn * 0.5);
         let force = interval.force_in_middle(biases);
         let acceleration = middle * force + gravity;
         let jerk = middle * (interval.accel_slope + (interval.gyro - biases.gyro).cross(&force));
         let velocity = self.velocity + acceleration * h;
         // Trapezoidal rule for the velocity, with the correction for a linear acceleration.
         let position = self.position + (self.velocity + velocity) * (0.5 * h) - jerk * (h.powi(3) / 12.0);
-        let mut rotation = self.rotation * Rotation::from_scaled_axis(interval.turn(biases));
+        let mut rotation = self.rotation * Rotation::from_scaled_axis(turn);
         rotation.renormalize_fast();
         State { rotation, position, velocity }
     }
@@ -173,7 +174,8 @@ mod tests {
             let ((gyro, accel), before, after) = (mean(centre), mean(centre - h), mean(centre + h));
             let gyro_slope = (after.0 - before.0) / (2.0 * h);
             let accel_slope = (after.1 - before.1) / (2.0 * h);
-            Interval { h, gyro, gyro_slope, accel, accel_slope, gyro_sigma: 1.0, accel_sigma: 1.0, bridged: false }
+            let (uncompensated, gyro_sigma, accel_sigma, bridged) = (1.0, 1.0, 1.0, false);
+            Interval { h, gyro, gyro_slope, accel, accel_slope, uncompensated, gyro_sigma, accel_sigma, bridged }
         };
         (0..count).map(interval).collect()
     }

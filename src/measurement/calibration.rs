@@ -1,3 +1,4 @@
+use super::ImuAveraging;
 use crate::geometry::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +11,8 @@ pub struct Calibration {
     pub head_from_imu: Pose,
     /// The IMU's noise.
     pub imu: ImuNoise,
+    /// How the IMU derives its samples from the motion.
+    pub imu_averaging: ImuAveraging,
     /// The lidar's noise.
     pub lidar: LidarNoise,
 }

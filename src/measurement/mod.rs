@@ -7,7 +7,7 @@ mod imu;
 mod lidar;
 
 pub use calibration::{Calibration, ImuNoise, LidarCorrection, LidarNoise};
-pub use imu::ImuSample;
+pub use imu::{ImuAveraging, ImuSample};
 pub use lidar::{LidarReturn, LidarScan, PlanarScan};
 
 use crate::time::Stamp;

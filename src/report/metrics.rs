@@ -1,6 +1,6 @@
 //! Metrics of a run: the contents of `metrics.json`.
 
-use super::{EventMetrics, IntegrityMetrics};
+use super::{EventMetrics, IntegrityMetrics, SensorMetrics};
 use serde::{Deserialize, Serialize};
 
 /// Metrics of a run.
@@ -30,6 +30,8 @@ pub struct Metrics {
     pub clock: ClockMetrics,
     /// Estimated corrections of the lidar calibration.
     pub lidar: LidarMetrics,
+    /// Sensor models that the estimator used, and their sources.
+    pub sensors: SensorMetrics,
     /// The registered cloud.
     pub cloud: CloudMetrics,
     /// Error bounds and causes of the status.
@@ -251,6 +253,10 @@ mod tests {
         "range_correction_m",
         "rotation_correction_deg",
         "translation_correction_m",
+        "sensors",
+        "imu_averaging",
+        "imu_averaging_source",
+        "noise",
         "cloud",
         "points",
         "judged",

@@ -10,6 +10,7 @@ pub mod plot;
 mod profile;
 mod quantity;
 mod rows;
+mod sensors;
 mod table;
 
 pub use figures::{
@@ -22,4 +23,5 @@ pub use metrics::{
     SimulationMetrics,
 };
 pub use profile::timing_table;
+pub use sensors::{NoiseMetrics, SensorMetrics};
 pub use table::{markdown, summary, table};

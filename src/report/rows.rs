@@ -2,6 +2,7 @@
 
 use super::Metrics;
 use super::quantity::{count, digits, length, percent, time};
+use super::sensors::sources;
 
 /// A metric: name and formatted value.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,6 +33,7 @@ pub(super) fn groups(metrics: &Metrics) -> Vec<Group> {
         closed_loop(metrics),
         clock(metrics),
         lidar(metrics),
+        sensors(metrics),
         cloud(metrics),
         memory(metrics),
     ];
@@ -111,6 +113,17 @@ fn lidar(metrics: &Metrics) -> Group {
     rows.add("rotation correction (x, y, z)", m.rotation_correction_deg, |deg| each(deg, degrees));
     rows.add("translation correction (x, y, z)", m.translation_correction_m, |by_m| each(by_m, length));
     rows.titled("lidar")
+}
+
+fn sensors(metrics: &Metrics) -> Group {
+    let m = &metrics.sensors;
+    let mut rows = RowBuilder(Vec::new());
+    let averaging = m.imu_averaging.as_deref().zip(m.imu_averaging_source.as_deref());
+    rows.add("IMU averaging", averaging, |(kind, source)| format!("{kind}, {source}"));
+    for (name, sensor) in [("IMU noise", "imu."), ("range noise", "lidar.")] {
+        rows.0.extend(sources(&m.noise, sensor).map(|value| MetricRow { name, value }));
+    }
+    rows.titled("sensors")
 }
 
 fn cloud(metrics: &Metrics) -> Group {

@@ -4,9 +4,11 @@ use super::motion::{MotionChunk, STEP_S};
 use super::schedule::{ImuInterval, ImuSchedule, Schedule};
 use super::{Rig, SimulationSummary};
 use crate::geometry::{Pose, Vector};
-use crate::measurement::{ImuNoise, ImuSample, LidarScan};
+use crate::measurement::{ImuAveraging, ImuNoise, ImuSample, LidarScan};
 use crate::random::Seed;
-use crate::sensors::{Clock, Imu, ImuErrors, LidarErrors, ScanTiming, Scenery, SceneryWithCarrier, Track, mean_motion};
+use crate::sensors::{
+    Clock, Imu, ImuErrors, LidarErrors, ScanTiming, Scenery, SceneryWithCarrier, Track, ideal_reading,
+};
 use crate::time::{Span, Stamp};
 use crate::truth::{ClockTruth, TruthSample};
 use rayon::prelude::*;
@@ -37,13 +39,15 @@ struct SimulatedImu {
     samples: ImuSchedule,
     errors: ImuErrors,
     noise: ImuNoise,
+    averaging: ImuAveraging,
     body_from_imu: Pose,
 }
 
 impl SimulatedImu {
     fn new(imu: &Imu, body_from_imu: Pose, schedule: &Schedule, clock: Clock, seed: Seed) -> Self {
         let samples = schedule.samples(imu, clock, seed);
-        Self { samples, errors: ImuErrors::new(imu, seed), noise: imu.noise(), body_from_imu }
+        let (errors, noise, averaging) = (ImuErrors::new(imu, seed), imu.noise(), imu.averaging());
+        Self { samples, errors, noise, averaging, body_from_imu }
     }
 
     /// The samples that are complete by `until_s`, each with the completion time, s.
@@ -53,7 +57,7 @@ impl SimulatedImu {
 
     fn sample(&mut self, body: &Track, interval: &ImuInterval) -> ImuSample {
         let at = |t_s: f64| body.kinematics(t_s).of_frame(&self.body_from_imu);
-        let ideal = mean_motion(&at(interval.from_s), &at(interval.to_s), interval.to_s - interval.from_s);
+        let ideal = ideal_reading(self.averaging, at, (interval.from_s, interval.to_s));
         let measured = self.errors.measure(&ideal);
         ImuSample {
             stamp: interval.stamp,

@@ -41,6 +41,7 @@ impl Rig<'_> {
             head_from_laser: self.head_from_laser,
             head_from_imu: self.head_from_imu,
             imu: self.imu.noise(),
+            imu_averaging: self.imu.averaging(),
             lidar: self.lidar.noise(),
         }
     }

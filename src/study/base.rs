@@ -1,7 +1,7 @@
 //! Trajectory of the base from a base-mounted IMU and the head's trajectory.
 
 use super::StudyError;
-use super::calibration::base_imu_noise;
+use super::calibration::base_imu;
 use crate::dynamics::{DynamicsError, HeadModel};
 use crate::estimation::{BaseEstimate, BaseFix, BaseImu, EstimationError, EstimatorSpec, FixSigmas, load, smooth_base};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
@@ -20,7 +20,7 @@ const MAX_PASSES: usize = 8;
 /// Estimates the base trajectory from the base IMU in `record` and the head trajectory `world_from_head`.
 ///
 /// The head trajectory gives fixes of the base: by the spring law, or by the rigid link if the law gives no pose. The
-/// IMU noise is that in the manifest of `reader`, else that of a typical IMU. The IMU pose in the base is that in
+/// IMU model is that in the manifest of `reader`, else that of a typical IMU. The IMU pose in the base is that in
 /// `record`, else the identity.
 ///
 /// The spring bends under gravity, so a map that is not level gives an incorrect base attitude: by half of the map's
@@ -37,11 +37,9 @@ pub fn base_by_imu(
     clock_offset_s: Option<f64>,
 ) -> Result<BaseEstimate, StudyError> {
     check_gaps(&record.samples)?;
-    let imu = BaseImu {
-        base_from_imu: record.base_from_imu.unwrap_or_else(Pose::identity),
-        noise: base_imu_noise(reader)?,
-        clock_offset_s,
-    };
+    let (noise, averaging) = base_imu(reader)?;
+    let base_from_imu = record.base_from_imu.unwrap_or_else(Pose::identity);
+    let imu = BaseImu { base_from_imu, noise, averaging, clock_offset_s };
     let spec = load("default")?;
     let mut level_from_world = Rotation::identity();
     let mut estimate = smooth_in_level_world(head, world_from_head, &record.samples, &imu, &spec)?;

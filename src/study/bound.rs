@@ -9,6 +9,7 @@ use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::{Calibration, LidarReturn, LidarScan, Measurement};
 use crate::recording::{Reader, TopicPreference, Truth};
 use crate::sensors::ImuSpec;
+use crate::simulation::Run;
 use crate::time::{Span, Stamp};
 use crate::world::{Hit, Ray, World};
 use rayon::prelude::*;
@@ -46,7 +47,9 @@ pub fn information_bound(
     watch: &mut ProgressMonitor,
 ) -> Result<RecordingBound, StudyError> {
     let selection = reader.select(&TopicPreference::default())?;
-    let found = calibration(reader, &selection, &CalibrationSpec::default(), None)?;
+    let manifest = Manifest::in_recording(reader)?;
+    let run = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
+    let (found, _) = calibration((reader, &selection), &CalibrationSpec::default(), run, None)?;
     let clock = TrueClock::read(reader, &selection)?;
     let mut span: Option<(Stamp, Stamp)> = None;
     let heads = reader.truth().filter_map(|record| match record {
@@ -57,7 +60,7 @@ pub fn information_bound(
         Ok(Truth::Base(..) | Truth::Clock(..)) => None,
         Err(error) => Some(Err(error)),
     });
-    let information = FisherInformation::new(model(reader, &found.calibration), heads)?;
+    let information = FisherInformation::new(model(run, &found.calibration), heads)?;
     let Some((first, last)) = span else {
         let message = "the recording has no true trajectory, which the bound requires".to_owned();
         return Err(StudyError::Plan { what: "information bound", message });
@@ -85,10 +88,9 @@ pub fn information_bound(
 }
 
 /// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
-fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
-    let run = Manifest::in_recording(reader).and_then(|manifest| manifest.run);
+fn model(run: Option<&Run>, calibration: &Calibration) -> BoundModel {
     let matrix = |errors: fn(&ImuSpec) -> (f64, f64)| {
-        let (scale_percent, misalignment_deg) = run.as_ref().map_or((0.0, 0.0), |run| errors(&run.imu.spec));
+        let (scale_percent, misalignment_deg) = run.map_or((0.0, 0.0), |run| errors(&run.imu.spec));
         (scale_percent * 1e-2, misalignment_deg.to_radians())
     };
     BoundModel {
@@ -96,7 +98,7 @@ fn model(reader: &Reader, calibration: &Calibration) -> BoundModel {
         imu: calibration.imu,
         gyro_matrix: matrix(|imu| (imu.gyro.scale_percent, imu.gyro.misalignment_deg)),
         accel_matrix: matrix(|imu| (imu.accel.scale_percent, imu.accel.misalignment_deg)),
-        range_offset_m: run.as_ref().map_or(0.0, |run| run.lidar.spec.errors.range.bias_sigma_m),
+        range_offset_m: run.map_or(0.0, |run| run.lidar.spec.errors.range.bias_sigma_m),
         clock_offset_s: CLOCK_PRIOR.0,
         clock_rate: CLOCK_PRIOR.1,
     }

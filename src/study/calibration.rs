@@ -1,12 +1,14 @@
-//! Extrinsics and noise of the sensors of a recording.
+//! Extrinsics and sensor models of a recording.
 
+use super::sensor_models::{GivenModels, ImuNoiseSpec, LidarNoiseSpec, SensorModels, unknown_imu};
 use super::{Manifest, StudyError};
 use crate::dynamics::PlacementSpec;
 use crate::geometry::Pose;
-use crate::measurement::{Calibration, ImuNoise, LidarNoise};
+use crate::measurement::{Calibration, ImuAveraging, ImuNoise};
 use crate::recording::{FoundCalibration, Reader, Selection};
-use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
-use crate::spec::{Kind, Source, SpecError, find, parse};
+use crate::sensors::Imu;
+use crate::simulation::Run;
+use crate::spec::{Source, SpecError};
 use serde::{Deserialize, Serialize};
 
 /// Sensor calibration given by the user.
@@ -21,59 +23,51 @@ pub struct CalibrationSpec {
     /// Pose of the IMU in the head.
     pub head_from_imu: Option<PlacementSpec>,
     /// The IMU's noise.
-    pub imu: Option<ImuNoise>,
+    pub imu: Option<ImuNoiseSpec>,
+    /// How the IMU derives its samples from the motion.
+    pub imu_averaging: Option<ImuAveraging>,
     /// The lidar's noise.
-    pub lidar: Option<LidarNoise>,
+    pub lidar: Option<LidarNoiseSpec>,
 }
 
 /// The calibration for an estimate: from the user, else from the recording, else the defaults.
+///
+/// Noise and averaging of the recording are those of the simulated sensors of `run`.
 pub(super) fn calibration(
-    reader: &Reader,
-    selection: &Selection,
+    (reader, selection): (&Reader, &Selection),
     given: &CalibrationSpec,
+    run: Option<&Run>,
     body_frame: Option<&str>,
-) -> Result<FoundCalibration, StudyError> {
+) -> Result<(FoundCalibration, SensorModels), StudyError> {
     let pose_of = |placement: Option<PlacementSpec>| placement.map(|placement| placement.pose());
     let (head_from_laser, head_from_imu) = (pose_of(given.head_from_laser), pose_of(given.head_from_imu));
-    let (imu, lidar) = noise(reader)?;
+    let known =
+        GivenModels { imu: given.imu.as_ref(), imu_averaging: given.imu_averaging, lidar: given.lidar.as_ref() };
+    let models = SensorModels::new(known, run.map(|run| (&run.imu.spec, &run.lidar.spec)))?;
     let defaults = Calibration {
         head_from_laser: head_from_laser.unwrap_or_else(Pose::identity),
         head_from_imu: head_from_imu.unwrap_or_else(Pose::identity),
-        imu: given.imu.unwrap_or(imu),
-        lidar: given.lidar.unwrap_or(lidar),
+        imu: models.imu,
+        imu_averaging: models.imu_averaging,
+        lidar: models.lidar,
     };
     if head_from_laser.is_some() && head_from_imu.is_some() {
         let body_frame = body_frame.unwrap_or("head").to_owned();
-        return Ok(FoundCalibration { calibration: defaults, body_frame, from_recording: false });
+        return Ok((FoundCalibration { calibration: defaults, body_frame, from_recording: false }, models));
     }
     let mut found = reader.calibration(selection, &defaults, body_frame)?;
     let calibration = &mut found.calibration;
     calibration.head_from_laser = head_from_laser.unwrap_or(calibration.head_from_laser);
     calibration.head_from_imu = head_from_imu.unwrap_or(calibration.head_from_imu);
-    Ok(found)
+    Ok((found, models))
 }
 
-/// Noise of the base IMU: from the manifest of a simulated recording, else that of a typical IMU.
-pub(super) fn base_imu_noise(reader: &Reader) -> Result<ImuNoise, SpecError> {
-    let run = Manifest::in_recording(reader).and_then(|manifest| manifest.run);
-    let Some(imu) = run.and_then(|run| run.base_imu) else { return typical_imu_noise() };
-    Ok(Imu::new(&imu.spec, &Source::in_memory("the recording's manifest", ""))?.noise())
-}
-
-/// Sensor noise: from the manifest of a simulated recording, else that of a typical IMU and of the paper's lidar.
-fn noise(reader: &Reader) -> Result<(ImuNoise, LidarNoise), SpecError> {
-    if let Some(run) = Manifest::in_recording(reader).and_then(|manifest| manifest.run) {
-        let source = Source::in_memory("the recording's manifest", "");
-        return Ok((Imu::new(&run.imu.spec, &source)?.noise(), Lidar::new(&run.lidar.spec, &source)?.noise()));
-    }
-    let lidar = find(Kind::Lidar, "utm30lx")?;
-    let lidar_spec: LidarSpec = parse(&lidar)?;
-    Ok((typical_imu_noise()?, Lidar::new(&lidar_spec, &lidar)?.noise()))
-}
-
-/// Noise of an IMU without a known specification.
-pub(super) fn typical_imu_noise() -> Result<ImuNoise, SpecError> {
-    let imu = find(Kind::Imu, "unknown")?;
-    let spec: ImuSpec = parse(&imu)?;
-    Ok(Imu::new(&spec, &imu)?.noise())
+/// Noise and averaging of the base IMU: from the manifest of a simulated recording, else those of a typical IMU.
+pub(super) fn base_imu(reader: &Reader) -> Result<(ImuNoise, ImuAveraging), SpecError> {
+    let run = Manifest::in_recording(reader)?.and_then(|manifest| manifest.run);
+    let imu = match run.and_then(|run| run.base_imu) {
+        Some(imu) => Imu::new(&imu.spec, &Source::in_memory("the recording's manifest", ""))?,
+        None => unknown_imu()?,
+    };
+    Ok((imu.noise(), imu.averaging()))
 }

@@ -1,7 +1,7 @@
 //! The closed loop: global registration of the open-loop estimate.
 
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{EstimatorSpec, LoopReport, RegistrationInput, register};
+use crate::estimation::{EstimationError, EstimatorSpec, LoopReport, RegistrationInput, register};
 use crate::geometry::Trajectory;
 use crate::measurement::{Calibration, LidarCorrection};
 use std::time::Instant;
@@ -29,17 +29,17 @@ pub(super) fn run_closed_loop(
     run: &OpenLoopRun,
     calibration: &Calibration,
     estimator: &EstimatorSpec,
-) -> ClosedLoopRun {
+) -> Result<ClosedLoopRun, EstimationError> {
     let started = Instant::now();
     let OpenLoopRun { map_from_head, covariances, lidar, observed, .. } = run;
-    let closed = register(RegistrationInput { map_from_head, covariances, lidar, observed }, calibration, estimator);
+    let closed = register(RegistrationInput { map_from_head, covariances, lidar, observed }, calibration, estimator)?;
     let (loops, rejected_because) = (closed.report.loops, closed.report.rejected_because);
     let rejected =
         rejected_because.map(|why| format!("loop closure not applied ({why}); the result is the open-loop trajectory"));
     let closed_loops = (loops.closed > 0).then(|| {
         format!("the open loop drifted beyond the matching distance; {} loop closures corrected it", loops.closed)
     });
-    ClosedLoopRun {
+    Ok(ClosedLoopRun {
         map_from_head: closed.trajectory,
         lidar: closed.lidar,
         open_loop_recalibrated: closed.open_loop_recalibrated,
@@ -47,5 +47,5 @@ pub(super) fn run_closed_loop(
         rejected_because,
         notes: closed_loops.into_iter().chain(rejected).collect(),
         wall_s: started.elapsed().as_secs_f64() + run.observed.elapsed_s(),
-    }
+    })
 }

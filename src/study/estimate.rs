@@ -11,6 +11,7 @@ use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use super::page::RunResults;
 use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
+use super::sensor_models::SensorModels;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
 use crate::evaluation::Errors;
@@ -33,6 +34,8 @@ pub struct EstimateOptions {
     pub estimator: EstimatorSpec,
     /// Calibration given by the user; it takes precedence over the recording.
     pub calibration: CalibrationSpec,
+    /// Whether to ignore the sensor models in the recording's manifest, as for a recording of unknown sensors.
+    pub ignore_manifest: bool,
     /// The frame whose pose is estimated; `None` for `head` if the recording has it, else the IMU frame.
     pub body_frame: Option<String>,
     /// Topics to read; topics that are not named are selected automatically.
@@ -50,7 +53,8 @@ impl EstimateOptions {
     pub fn with(estimator: EstimatorSpec) -> Self {
         let (calibration, topics) = (CalibrationSpec::default(), TopicPreference::default());
         let cloud = CloudOptions::default();
-        Self { estimator, calibration, body_frame: None, topics, closed_loop: true, cloud, map: None }
+        let (ignore_manifest, body_frame, closed_loop, map) = (false, None, true, None);
+        Self { estimator, calibration, ignore_manifest, body_frame, topics, closed_loop, cloud, map }
     }
 }
 
@@ -83,7 +87,7 @@ pub fn estimate_recording(
 ) -> Result<EstimateResult, StudyError> {
     let reader = Reader::open(path)?;
     remove(folder, &estimate_files())?;
-    let manifest = Manifest::in_recording(&reader).unwrap_or_else(Manifest::without_simulation);
+    let manifest = manifest_of(&reader, watch);
     let world = world_of(&manifest, watch);
     let carrier = manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
@@ -111,8 +115,10 @@ pub(super) fn estimate_in(
 ) -> Result<EstimateResult, StudyError> {
     origin.manifest.write(&folder.join("manifest.ron"))?;
     let selection = reader.select(&options.topics)?;
-    let found = calibration(reader, &selection, &options.calibration, options.body_frame.as_deref())?;
-    report_notes(&selection, &found, (options, origin), watch);
+    let simulated = origin.manifest.run.as_ref().filter(|_| !options.ignore_manifest);
+    let (found, models) =
+        calibration((reader, &selection), &options.calibration, simulated, options.body_frame.as_deref())?;
+    report_notes(&selection, (&found, &models), options, watch);
 
     let expected_s = origin.simulation.map(|summary| summary.duration_s);
     let loops = Loops::run((reader, &selection, &found), folder, options, expected_s, watch)?;
@@ -147,6 +153,7 @@ pub(super) fn estimate_in(
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
         integrity: integrity.metrics(run, pairs.as_ref()),
+        sensors: models.metrics(),
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),
         open_loop: OpenLoopMetrics { fixed_views, ..comparison::open_loop_metrics(run, comparison, imu_only_drift) },
@@ -270,7 +277,7 @@ fn close_loops(
     watch: &mut ProgressMonitor,
 ) -> Result<ClosedLoopRun, StudyError> {
     watch.progress(Stage::ClosingLoops, 0.0, None);
-    let closed = run_closed_loop(run, options.calibration, options.estimator);
+    let closed = run_closed_loop(run, options.calibration, options.estimator)?;
     closed.notes.iter().for_each(|note| watch.note(note));
     write_tum(&folder.join("closed_loop.tum"), &closed.map_from_head)?;
     if watch.is_stopped() { Err(StudyError::Stopped) } else { Ok(closed) }
@@ -297,6 +304,17 @@ fn metrics(
     }
 }
 
+/// The manifest of a recording; without simulation, and with a note, if it cannot be parsed.
+fn manifest_of(reader: &Reader, watch: &mut ProgressMonitor) -> Manifest {
+    let read = Manifest::in_recording(reader).inspect_err(|error| {
+        watch.note(&format!(
+            "the manifest in the recording cannot be read ({error}): sensor models are assumed and the cloud is not evaluated; \
+             another version of zsim may have written it"
+        ));
+    });
+    read.ok().flatten().unwrap_or_else(Manifest::without_simulation)
+}
+
 /// Builds the world of a recording's manifest; `None` if there is none or a mesh file is missing.
 fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
     let scene = &manifest.run.as_ref()?.scene.spec;
@@ -307,8 +325,8 @@ fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
 /// Reports notes on the selection and on missing calibration data.
 fn report_notes(
     selection: &Selection,
-    found: &FoundCalibration,
-    (options, origin): (&EstimateOptions, &Origin),
+    (found, models): (&FoundCalibration, &SensorModels),
+    options: &EstimateOptions,
     watch: &mut ProgressMonitor,
 ) {
     selection.notes.iter().for_each(|note| watch.note(note));
@@ -319,10 +337,7 @@ fn report_notes(
              extrinsics with --calibration",
         );
     }
-    if origin.manifest.run.is_none() && options.calibration.imu.is_none() {
-        watch.note(
-            "the IMU noise is not known: assuming a typical IMU (specs/imus/unknown.ron); pass the values of the data sheet \
-             with --calibration",
-        );
+    if let Some(note) = models.note() {
+        watch.note(&note);
     }
 }

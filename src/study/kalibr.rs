@@ -1,10 +1,10 @@
 //! Reads calibrations in the YAML formats of Kalibr and allan_variance_ros: IMU noise and lidar-IMU extrinsics.
 
 use super::StudyError;
-use super::calibration::{CalibrationSpec, typical_imu_noise};
+use super::calibration::CalibrationSpec;
+use super::sensor_models::ImuNoiseSpec;
 use crate::dynamics::PlacementSpec;
 use crate::geometry::{Pose, Rotation};
-use crate::measurement::ImuNoise;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -103,7 +103,7 @@ impl CalibrationSpec {
             return Err(invalid("the file has neither IMU noise (gyroscope_noise_density, ...) nor a transform (T_imu_lidar, T_lidar_imu or T_cam_imu)".to_owned()));
         }
         let head_from_imu = transform.map(|_| placement(&Pose::identity()));
-        Ok(Self { head_from_laser: transform.as_ref().map(placement), head_from_imu, imu, lidar: None })
+        Ok(Self { head_from_laser: transform.as_ref().map(placement), head_from_imu, imu, ..Self::default() })
     }
 }
 
@@ -144,8 +144,8 @@ impl File {
         }
     }
 
-    /// The IMU noise, if the file has it; noise parameters that the formats do not have are those of a typical IMU.
-    fn noise(&self, name: &str) -> Result<Option<ImuNoise>, StudyError> {
+    /// The IMU noise, if the file has it; it has neither turn-on biases nor limits.
+    fn noise(&self, name: &str) -> Result<Option<ImuNoiseSpec>, StudyError> {
         let invalid = |problem: String| StudyError::Calibration { name: name.to_owned(), problem };
         let nested = self.imu0.as_ref();
         let given = [
@@ -181,12 +181,12 @@ impl File {
         }
         match values {
             [None, None, None, None, _] => Ok(None),
-            [Some(gyro), Some(accel), Some(gyro_walk), Some(accel_walk), _] => Ok(Some(ImuNoise {
-                gyro_density_rad_per_s_per_sqrt_hz: gyro,
-                accel_density_m_per_s2_per_sqrt_hz: accel,
-                gyro_bias_walk_rad_per_s_per_sqrt_s: gyro_walk,
-                accel_bias_walk_m_per_s2_per_sqrt_s: accel_walk,
-                ..typical_imu_noise()?
+            [Some(gyro), Some(accel), Some(gyro_walk), Some(accel_walk), _] => Ok(Some(ImuNoiseSpec {
+                gyro_density_rad_per_s_per_sqrt_hz: Some(gyro),
+                accel_density_m_per_s2_per_sqrt_hz: Some(accel),
+                gyro_bias_walk_rad_per_s_per_sqrt_s: Some(gyro_walk),
+                accel_bias_walk_m_per_s2_per_sqrt_s: Some(accel_walk),
+                ..ImuNoiseSpec::default()
             })),
             _ => {
                 let missing = given.iter().zip(values).filter(|(_, value)| value.is_none()).map(|((key, ..), _)| *key);
@@ -235,10 +235,10 @@ mod tests {
         let nested = read(&nested.replace("-05  model", "-05\n  model")).unwrap();
         assert_eq!(flat, nested);
         let imu = flat.imu.unwrap();
-        assert_eq!(imu.gyro_density_rad_per_s_per_sqrt_hz, 1.87e-4);
-        assert_eq!(imu.accel_density_m_per_s2_per_sqrt_hz, 1.86e-3);
-        assert_eq!(imu.gyro_bias_walk_rad_per_s_per_sqrt_s, 2.66e-5);
-        assert_eq!(imu.accel_bias_walk_m_per_s2_per_sqrt_s, 4.33e-4);
+        assert_eq!(imu.gyro_density_rad_per_s_per_sqrt_hz, Some(1.87e-4));
+        assert_eq!(imu.accel_density_m_per_s2_per_sqrt_hz, Some(1.86e-3));
+        assert_eq!(imu.gyro_bias_walk_rad_per_s_per_sqrt_s, Some(2.66e-5));
+        assert_eq!(imu.accel_bias_walk_m_per_s2_per_sqrt_s, Some(4.33e-4));
         assert!(flat.head_from_laser.is_none() && flat.head_from_imu.is_none());
     }
 

@@ -34,9 +34,12 @@ impl Manifest {
         Self { version: env!("CARGO_PKG_VERSION").to_owned(), run: None, estimator: None }
     }
 
-    /// The manifest in a recording; `None` if there is none, or if it has the format of another version of zsim.
-    pub fn in_recording(reader: &Reader) -> Option<Self> {
-        spec::parse(&Source::in_memory("the recording's manifest", reader.manifest()?)).ok()
+    /// The manifest in a recording; `None` if there is none.
+    ///
+    /// # Errors
+    /// When it cannot be parsed, for example because another version of zsim wrote it.
+    pub fn in_recording(reader: &Reader) -> Result<Option<Self>, SpecError> {
+        reader.manifest().map(|text| spec::parse(&Source::in_memory("the recording's manifest", text))).transpose()
     }
 
     /// Adds the settings of the estimator.

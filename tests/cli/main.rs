@@ -8,5 +8,6 @@ mod commands;
 mod gains;
 mod hostile;
 mod maps;
+mod sensor_models;
 mod specs;
 mod summary;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod accuracy;
+mod averaging;
 mod base;
 #[path = "../command/mod.rs"]
 mod command;

@@ -102,7 +102,7 @@ impl Mapped {
         let covariances = covariances(&run.poses);
         let OpenLoop { trajectory, lidar, observed, .. } = &run;
         let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, observed };
-        let closed = register(travelled, &session.calibration, &spec());
+        let closed = register(travelled, &session.calibration, &spec()).unwrap();
         let both = (&run.trajectory, &closed.trajectory);
         let map = map_of(&run.observed, both, &covariances, &spec().registration).unwrap();
         let pairs = Pairs::associate(&closed.trajectory, &session.truth).unwrap();

@@ -29,7 +29,7 @@ fn registered(open: &OpenLoop, calibration: &Calibration) -> ClosedLoop {
     let covariances: Vec<_> = open.poses.iter().map(|pose| (pose.stamp, pose.covariance)).collect();
     let OpenLoop { trajectory, lidar, observed, .. } = open;
     let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, observed };
-    register(travelled, calibration, &load("default").unwrap())
+    register(travelled, calibration, &load("default").unwrap()).unwrap()
 }
 
 fn closed(open: &OpenLoop) -> OpenLoop {

@@ -4,7 +4,7 @@ use crate::foreign::bag::{Logged, Ros1, bag, database};
 use crate::foreign::{Foreign, IMU, POINTS, SCAN, TF, UINT32, cdr, cloud, imu, scan, select, transform};
 use std::io::Cursor;
 use zsim::geometry::Pose;
-use zsim::measurement::{Calibration, ImuNoise, LidarNoise, Measurement};
+use zsim::measurement::{Calibration, ImuAveraging, ImuNoise, LidarNoise, Measurement};
 use zsim::recording::{Reader, TopicPreference};
 use zsim::time::Span;
 
@@ -87,6 +87,7 @@ fn calibration() -> Calibration {
             gyro_limit_rad_per_s: 10.0,
             accel_limit_m_per_s2: 100.0,
         },
+        imu_averaging: ImuAveraging::ConingCorrected,
         lidar: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
     }
 }

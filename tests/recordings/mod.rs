@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
 use zsim::geometry::{Kinematics, Pose, Vector, from_roll_pitch_yaw};
 use zsim::measurement::{
-    Calibration, ImuNoise, ImuSample, LidarNoise, LidarReturn, LidarScan, Measurement, PlanarScan, Sink,
+    Calibration, ImuAveraging, ImuNoise, ImuSample, LidarNoise, LidarReturn, LidarScan, Measurement, PlanarScan, Sink,
 };
 use zsim::recording::{RunDescription, Writer};
 use zsim::time::{Span, Stamp};
@@ -52,6 +52,7 @@ pub fn calibration() -> Calibration {
             gyro_limit_rad_per_s: 10.0,
             accel_limit_m_per_s2: 49.0,
         },
+        imu_averaging: ImuAveraging::ConingCorrected,
         lidar: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
     }
 }

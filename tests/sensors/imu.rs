@@ -6,7 +6,7 @@ use zsim::geometry::{
     Kinematics, Pose, Rotation, STANDARD_GRAVITY_M_PER_S2 as G, Vector, from_roll_pitch_yaw, gravity_in_world,
 };
 use zsim::random::Seed;
-use zsim::sensors::{GaussMarkovSpec, Imu, ImuErrors, ImuSpec, MeanMotion, mean_motion};
+use zsim::sensors::{GaussMarkovSpec, Imu, ImuErrors, ImuSpec, InertialReading, coning_corrected};
 use zsim::signal::allan_deviation;
 use zsim::spec::{self, Kind, Source};
 
@@ -18,8 +18,8 @@ fn imu(spec: &ImuSpec) -> Imu {
     Imu::new(spec, &Source::in_memory("test.ron", "")).unwrap()
 }
 
-fn at_rest() -> MeanMotion {
-    MeanMotion { angular_velocity_rad_per_s: Vector::zeros(), specific_force_m_per_s2: Vector::z() * G }
+fn at_rest() -> InertialReading {
+    InertialReading { angular_velocity_rad_per_s: Vector::zeros(), specific_force_m_per_s2: Vector::z() * G }
 }
 
 #[test]
@@ -74,7 +74,7 @@ fn an_ideal_imu_at_1_khz_integrates_to_the_motion() {
     let mut position = start.world_from_body.translation.vector;
     for k in 0..10_000 {
         let t = f64::from(k) * dt;
-        let sample = errors.measure(&mean_motion(&tumbling(t), &tumbling(t + dt), dt));
+        let sample = errors.measure(&coning_corrected(&tumbling(t), &tumbling(t + dt), dt));
         // Textbook strapdown integration, as a user of /imu/data_raw would write it.
         let turn = sample.angular_velocity_rad_per_s * dt;
         let middle = rotation * Rotation::from_scaled_axis(turn * 0.5);
@@ -98,7 +98,7 @@ fn on_a_rate_table_the_lever_arm_adds_centripetal_acceleration() {
         let spinning = Kinematics { angular_velocity_in_world: Vector::z() * rate, ..Kinematics::at_rest(pose) };
         spinning.of_frame(&Pose::translation(arm, 0.0, 0.0))
     };
-    let sample = mean_motion(&table(0.3), &table(0.3 + period), period);
+    let sample = coning_corrected(&table(0.3), &table(0.3 + period), period);
     let half = 0.5 * rate * period;
     let expected = Vector::new(-rate * rate * arm * half.sin() / half, 0.0, G);
     assert_relative_eq!(sample.specific_force_m_per_s2, expected, epsilon = 1e-10);
@@ -132,7 +132,7 @@ fn an_accelerometer_on_a_pendulum_measures_only_the_rod_tension() {
             rate += half / 6.0 * (l1 + 2.0 * l2 + 2.0 * l3 + l4);
         }
         if k % 1000 == 0 {
-            let sample = mean_motion(&state(before.0, before.1), &state(a, rate), h);
+            let sample = coning_corrected(&state(before.0, before.1), &state(a, rate), h);
             let middle = 0.5 * (a + before.0);
             let pull = G * middle.cos() + 2.0 * G * (middle.cos() - a0.cos());
             assert_relative_eq!(sample.specific_force_m_per_s2, Vector::new(0.0, 0.0, pull), epsilon = 1e-6);
@@ -268,12 +268,12 @@ fn a_gauss_markov_bias_has_its_standard_deviation_and_correlation_time() {
 fn a_gyroscope_saturates_at_its_limit() {
     let spec = spec_of("3dm_gx2");
     let mut errors = ImuErrors::new(&imu(&spec), Seed(1));
-    let fast = MeanMotion {
+    let fast = InertialReading {
         angular_velocity_rad_per_s: Vector::new(20.0, -20.0, 1.0),
         specific_force_m_per_s2: Vector::new(0.0, 60.0, -60.0),
     };
-    let said = errors.measure(&fast);
-    let (rate, force) = (said.angular_velocity_rad_per_s, said.specific_force_m_per_s2);
+    let reading = errors.measure(&fast);
+    let (rate, force) = (reading.angular_velocity_rad_per_s, reading.specific_force_m_per_s2);
     assert_relative_eq!(rate.xy(), nalgebra::Vector2::new(1.0, -1.0) * 600_f64.to_radians(), epsilon = 1e-12);
     assert!((rate.z - 1.0).abs() < 0.1);
     assert_relative_eq!(force.yz(), nalgebra::Vector2::new(1.0, -1.0) * 5.0 * G, epsilon = 1e-12);
@@ -284,7 +284,7 @@ fn readings_are_rounded_to_the_resolution() {
     let mut spec = spec_of("ideal_1khz");
     spec.gyro.resolution_deg_per_s = 0.5;
     let mut errors = ImuErrors::new(&imu(&spec), Seed(1));
-    let turning = MeanMotion { angular_velocity_rad_per_s: Vector::repeat(0.7_f64.to_radians()), ..at_rest() };
+    let turning = InertialReading { angular_velocity_rad_per_s: Vector::repeat(0.7_f64.to_radians()), ..at_rest() };
     assert_relative_eq!(
         errors.measure(&turning).angular_velocity_rad_per_s,
         Vector::repeat(0.5_f64.to_radians()),
@@ -301,11 +301,13 @@ fn scale_misalignment_and_turn_on_bias_have_the_specified_spread_over_runs() {
     let mut squares = Vector::zeros();
     for seed in 0..runs {
         let mut errors = ImuErrors::new(&imu, Seed(seed));
-        let mut said = |rate: Vector| {
-            errors.measure(&MeanMotion { angular_velocity_rad_per_s: rate, ..at_rest() }).angular_velocity_rad_per_s
+        let mut reading = |rate: Vector| {
+            errors
+                .measure(&InertialReading { angular_velocity_rad_per_s: rate, ..at_rest() })
+                .angular_velocity_rad_per_s
         };
-        let bias = said(Vector::zeros());
-        let turned = said(Vector::x()) - bias;
+        let bias = reading(Vector::zeros());
+        let turned = reading(Vector::x()) - bias;
         squares += Vector::new(turned.x - 1.0, turned.y, bias.z).map(|x| x * x);
     }
     // Standard error of a sigma from n runs: 1 / sqrt(2 n) = 1.1 %.

@@ -156,7 +156,7 @@ impl Filter {
     /// Propagates the filter by one interval; returns the transition matrix of the errors.
     pub(super) fn predict(&mut self, interval: &Interval) -> ErrorMatrix {
         let (h, biases) = (interval.h, self.estimate.biases);
-        let middle = self.estimate.state.rotation * Rotation::from_scaled_axis(interval.turn_to_middle(&biases));
+        let middle = self.estimate.state.rotation * Rotation::from_scaled_axis(interval.turn(&biases) * 0.5);
         let axes = middle.to_rotation_matrix().into_inner();
         let mut transition = ErrorMatrix::identity();
         transition.fixed_view_mut::<3, 3>(ATTITUDE, GYRO_BIAS).copy_from(&(axes * -h));

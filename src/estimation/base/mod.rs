@@ -25,7 +25,7 @@ use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use super::{EstimationError, EstimatorSpec};
 use crate::geometry::{Pose, Trajectory, Vector};
-use crate::measurement::{ImuNoise, ImuSample};
+use crate::measurement::{ImuAveraging, ImuNoise, ImuSample};
 use crate::signal::Regularity;
 use crate::time::{Span, Stamp};
 use fixes::Fixes;
@@ -89,6 +89,8 @@ pub struct BaseImu {
     pub base_from_imu: Pose,
     /// Noise parameters.
     pub noise: ImuNoise,
+    /// How it derives its samples from the motion.
+    pub averaging: ImuAveraging,
     /// Clock offset, IMU stamp minus fix stamp of the same event, to 1 or 2 ms, s; `None` to search within 1 s.
     pub clock_offset_s: Option<f64>,
 }
@@ -107,7 +109,7 @@ pub fn smooth_base(
     spec: &EstimatorSpec,
 ) -> Result<BaseEstimate, EstimationError> {
     let origin = check(fixes, samples)?;
-    let (start_s, intervals) = intervals(samples, origin, &imu.noise, spec)?;
+    let (start_s, intervals) = intervals(samples, origin, (&imu.noise, imu.averaging), spec)?;
     let fixes = Fixes::new(fixes, origin, &imu.base_from_imu)?;
     let offset_s = imu.clock_offset_s.map_or_else(|| clock_offset::find(&fixes, start_s, &intervals), Ok)?;
     smoother::smooth(&fixes, start_s, &intervals, offset_s, imu, spec)
@@ -140,10 +142,10 @@ fn check(fixes: &[BaseFix], samples: &[ImuSample]) -> Result<Stamp, EstimationEr
 }
 
 /// Contiguous IMU intervals and the start of the first one, s after `origin`; gaps are bridged.
-fn intervals(
+pub(super) fn intervals(
     samples: &[ImuSample],
     origin: Stamp,
-    noise: &ImuNoise,
+    (noise, averaging): (&ImuNoise, ImuAveraging),
     spec: &EstimatorSpec,
 ) -> Result<(f64, Vec<Interval>), EstimationError> {
     let seconds: Vec<f64> = samples.iter().map(|sample| sample.stamp.seconds_since(origin)).collect();
@@ -154,7 +156,7 @@ fn intervals(
         ))
     })?;
     let filter = StampFilter::new(regularity, spec.clock.jitter_s);
-    let mut stream = InertialStream::new(filter, *noise, spec.inertial.clone());
+    let mut stream = InertialStream::new(filter, (*noise, averaging), spec.inertial.clone());
     let stamped: Vec<(f64, ImuSample)> = seconds.into_iter().zip(samples.iter().copied()).collect();
     let mut screen = Screen::new(noise);
     let mut placed = Vec::new();

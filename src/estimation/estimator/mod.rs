@@ -139,7 +139,7 @@ impl Estimator {
     /// Processes the remaining data; the result has the poses not yet returned, and the reports of all windows.
     ///
     /// # Errors
-    /// If IMU or lidar data are missing or too short to start, or localisation in the given map fails.
+    /// If IMU or lidar data are missing or too short to start, localisation in the given map fails, or a pose is not finite.
     pub fn finish(mut self) -> Result<OpenLoop, EstimationError> {
         while let Some(segment) = self.intake.next_segment(true) {
             self.advance(segment)?;
@@ -158,7 +158,7 @@ impl Estimator {
         self.output_poses(end_s);
         self.record_observed(Window::observed_in_all, Window::end_s);
         let stamped = self.poses.iter().map(|pose| (pose.stamp, pose.map_from_head));
-        let trajectory = Trajectory::from_poses(stamped).unwrap_or_default();
+        let trajectory = Trajectory::from_poses(stamped)?;
         let aligned_covariances = self.gauge.finish(&mut self.consider, self.newest_pose);
         let Self { poses, clock_offsets, windows, warnings, observed, map_localisation, .. } = self;
         let observed = observed.unwrap_or_default();

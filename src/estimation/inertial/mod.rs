@@ -2,6 +2,7 @@
 //!
 //! Stamps are smoothed, samples of a fast IMU are averaged, gaps are bridged, and clipped readings are reconstructed.
 
+mod averaging;
 mod clipping;
 mod interpolation;
 mod reconstruction;
@@ -16,7 +17,8 @@ use super::spec::InertialSpec;
 use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use crate::geometry::Vector;
-use crate::measurement::{ImuNoise, ImuSample};
+use crate::measurement::{ImuAveraging, ImuNoise, ImuSample};
+use averaging::{Compensation, Neighbours};
 use interpolation::InterpolationError;
 use reconstruction::{FIT_MEANS, bridge, reconstruct_clipped};
 use resampling::Resampler;
@@ -54,15 +56,15 @@ pub(super) struct InertialStream {
     spec: InertialSpec,
     /// Number of samples in a mean.
     per_group: usize,
+    compensation: Compensation,
     /// Present for an irregular sensor.
     resampler: Option<Resampler>,
     group: Vec<Mean>,
-    /// The last two means. The later one becomes an interval when the next mean is known.
-    before: Option<Mean>,
+    /// The last mean, which becomes an interval when the next mean is known.
     current: Option<Mean>,
     /// Error of the interpolation of a missing mean.
     bridging_error: InterpolationError,
-    /// The last means; a line through them predicts the motion into a gap or clipping.
+    /// The means before the current one; a line through them predicts the motion into a gap or clipping.
     last_valid: VecDeque<Mean>,
     /// Means from the first gap or clipped reading on, until enough valid ones follow.
     waiting: Vec<Mean>,
@@ -75,7 +77,7 @@ pub(super) struct InertialStream {
 }
 
 impl InertialStream {
-    pub(super) fn new(filter: StampFilter, noise: ImuNoise, spec: InertialSpec) -> Self {
+    pub(super) fn new(filter: StampFilter, (noise, averaging): (ImuNoise, ImuAveraging), spec: InertialSpec) -> Self {
         let is_irregular = filter.is_irregular();
         let per_group = if is_irregular { 1 } else { (SPACING_S / filter.period_s()).round().max(1.0) as usize };
         Self {
@@ -83,9 +85,9 @@ impl InertialStream {
             noise,
             spec,
             per_group,
+            compensation: Compensation::of(averaging, per_group, is_irregular),
             resampler: is_irregular.then(Resampler::new),
             group: Vec::new(),
-            before: None,
             current: None,
             bridging_error: InterpolationError::new(),
             last_valid: VecDeque::new(),
@@ -127,7 +129,7 @@ impl InertialStream {
         self.last_valid.clear();
         self.waiting.clear();
         self.resampler.iter_mut().for_each(Resampler::restart);
-        (self.before, self.current, self.end_s) = (None, None, None);
+        (self.current, self.end_s) = (None, None);
     }
 
     /// Records that a sample was discarded that may have measured a shock.
@@ -297,15 +299,12 @@ impl InertialStream {
         if self.last_valid.len() >= FIT_MEANS {
             self.last_valid.pop_front();
         }
-        let before = self.before.replace(now).unwrap_or(now);
         let end = 0.5 * (now.centre_s + next.centre_s);
         let start = self.end_s.unwrap_or(2.0 * now.centre_s - end);
         self.end_s = Some(end);
-        let across = next.centre_s - before.centre_s;
-        into.push((
-            start,
-            self.interval(&now, end - start, (next.gyro - before.gyro, next.accel - before.accel), across),
-        ));
+        let back = |steps: usize| self.last_valid.len().checked_sub(1 + steps).map(|k| self.last_valid[k]);
+        let readings = Neighbours { earlier: back(2), before: back(1), now, next };
+        into.push((start, self.interval(&readings, end - start)));
     }
 
     /// Measures the interpolation error on five measured means at regular intervals.
@@ -319,7 +318,7 @@ impl InertialStream {
         }
     }
 
-    fn interval(&self, now: &Mean, h: f64, differences: (Vector, Vector), across_s: f64) -> Interval {
+    fn interval(&self, readings: &Neighbours, h: f64) -> Interval {
         let spec = &self.spec;
         let sigma = |density: f64, scale: f64, reading: f64, extra: f64| {
             let noise = spec.noise_inflation * density / h.sqrt();
@@ -327,12 +326,16 @@ impl InertialStream {
         };
         let gyro_density = self.noise.gyro_density_rad_per_s_per_sqrt_hz;
         let accel_density = self.noise.accel_density_m_per_s2_per_sqrt_hz;
+        let now = &readings.now;
+        let (gyro, gyro_slope) = self.compensation.mean_and_slope(readings, |mean| mean.gyro);
+        let (accel, accel_slope) = self.compensation.mean_and_slope(readings, |mean| mean.accel);
         Interval {
             h,
-            gyro: now.gyro,
-            gyro_slope: differences.0 / across_s,
-            accel: now.accel,
-            accel_slope: differences.1 / across_s,
+            gyro,
+            gyro_slope,
+            accel,
+            accel_slope,
+            uncompensated: self.compensation.uncompensated,
             gyro_sigma: sigma(gyro_density, spec.gyro_scale_error, now.gyro.norm(), now.extra_gyro_sigma),
             accel_sigma: sigma(accel_density, spec.accel_scale_error, now.accel.norm(), now.extra_accel_sigma),
             bridged: now.bridged,

@@ -223,7 +223,8 @@ impl Intake {
         self.scans.start(first_scan, enough_s)?;
         // The IMU must cover the first beam for any clock offset.
         self.next_start_s = start_s + MARGIN_S;
-        let stream = InertialStream::new(imu, self.calibration.imu, self.spec.inertial.clone());
+        let model = (self.calibration.imu, self.calibration.imu_averaging);
+        let stream = InertialStream::new(imu, model, self.spec.inertial.clone());
         self.samples.start(stream, start_s - MARGIN_S);
         Some(())
     }

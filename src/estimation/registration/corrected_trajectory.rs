@@ -17,7 +17,7 @@ use super::RegistrationSpec;
 use super::equations::{Equations, PairTerm, UnaryTerm};
 use crate::estimation::nominal::Correction;
 use crate::estimation::spline::Basis;
-use crate::geometry::{Pose, PoseCovariance, Rotation, Trajectory, Vector, skew};
+use crate::geometry::{Pose, PoseCovariance, Rotation, Trajectory, TrajectoryError, Vector, skew};
 use crate::time::{Span, Stamp};
 use nalgebra::{Matrix6, Vector6};
 
@@ -176,8 +176,8 @@ impl CorrectedTrajectory {
     }
 
     /// The corrected trajectory at the stamps of the open loop.
-    pub(super) fn into_trajectory(self, stamps: &[Stamp]) -> Trajectory {
-        Trajectory::from_poses(stamps.iter().copied().zip(self.poses)).unwrap_or_default()
+    pub(super) fn into_trajectory(self, stamps: &[Stamp]) -> Result<Trajectory, TrajectoryError> {
+        Trajectory::from_poses(stamps.iter().copied().zip(self.poses))
     }
 }
 

@@ -10,7 +10,7 @@ use super::equations::SharedTerm;
 use crate::estimation::EstimatorSpec;
 use crate::estimation::observed::ObservedSurfels;
 use crate::estimation::surfel::Patch;
-use crate::geometry::{Pose, Rotation, Trajectory, Vector};
+use crate::geometry::{Pose, Rotation, Trajectory, TrajectoryError, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
 use nalgebra::SVector;
 
@@ -108,7 +108,7 @@ pub(super) fn recalibrated(
     map_from_head: &Trajectory,
     observed: &ObservedSurfels,
     (calibration, lidar): (&Calibration, &LidarCorrection),
-) -> Trajectory {
+) -> Result<Trajectory, TrajectoryError> {
     let laser_from_head = calibration.head_from_corrected_laser(lidar).inverse();
     let recalibrate = |(stamp, pose): (_, &Pose)| {
         let then = observed.lidar_at(stamp);
@@ -116,7 +116,7 @@ pub(super) fn recalibrated(
             then.map_or_else(Pose::identity, |then| calibration.head_from_corrected_laser(then) * laser_from_head);
         (stamp, pose * head_from_head)
     };
-    Trajectory::from_poses(map_from_head.iter().map(recalibrate)).unwrap_or_default()
+    Trajectory::from_poses(map_from_head.iter().map(recalibrate))
 }
 
 #[cfg(test)]
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::estimation::load;
     use crate::geometry::{Matrix, from_roll_pitch_yaw};
-    use crate::measurement::{ImuNoise, LidarNoise};
+    use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
     use crate::time::{Span, Stamp};
     use approx::assert_relative_eq;
 
@@ -142,6 +142,7 @@ mod tests {
                 gyro_limit_rad_per_s: 1.0,
                 accel_limit_m_per_s2: 1.0,
             },
+            imu_averaging: ImuAveraging::ConingCorrected,
             lidar: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
         }
     }
@@ -212,7 +213,7 @@ mod tests {
         });
         let open = Trajectory::from_poses(poses).unwrap();
         let calibration = calibration();
-        let anew = recalibrated(&open, &observed, (&calibration, &late));
+        let anew = recalibrated(&open, &observed, (&calibration, &late)).unwrap();
         for ((at, before), after) in open.iter().zip(anew.poses()) {
             let known_then = if at <= stamp(0) + Span::from_seconds(0.75) { early } else { late };
             let was = before * calibration.head_from_corrected_laser(&known_then);

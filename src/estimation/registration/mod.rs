@@ -37,11 +37,11 @@ mod tests;
 pub use places::{LoopReport, PlacesSpec};
 pub use spec::RegistrationSpec;
 
-use super::EstimatorSpec;
 use super::gaps::{Gaps, restored};
 use super::matching::Matcher;
 use super::observed::ObservedSurfels;
 use super::window::Displacement;
+use super::{EstimationError, EstimatorSpec};
 use crate::geometry::{PoseCovariance, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
 use crate::time::Stamp;
@@ -119,29 +119,41 @@ pub struct RegistrationInput<'a> {
 ///
 /// The result does not depend on the number of threads. Long gaps in time are shortened first, so that memory grows with the
 /// data and not with the time span.
-pub fn register(input: RegistrationInput, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
+///
+/// # Errors
+/// When a pose of the open loop is not finite.
+pub fn register(
+    input: RegistrationInput,
+    calibration: &Calibration,
+    spec: &EstimatorSpec,
+) -> Result<ClosedLoop, EstimationError> {
     let stamps = input.map_from_head.stamps();
     let Some(gaps) = Gaps::between(stamps) else { return register_without_gaps(input, calibration, spec) };
-    let map_from_head = &gaps.shorten(input.map_from_head);
+    let map_from_head = &gaps.shorten(input.map_from_head)?;
     let covariances = &gaps.shorten_covariances(input.covariances);
     let observed = &gaps.shorten_observed(input.observed);
     let shortened = RegistrationInput { map_from_head, covariances, observed, lidar: input.lidar };
-    let closed = register_without_gaps(shortened, calibration, spec);
-    let trajectory = restored(&closed.trajectory, stamps);
-    let open_loop_recalibrated = closed.open_loop_recalibrated.map(|trajectory| restored(&trajectory, stamps));
-    ClosedLoop { trajectory, open_loop_recalibrated, ..closed }
+    let closed = register_without_gaps(shortened, calibration, spec)?;
+    let trajectory = restored(&closed.trajectory, stamps)?;
+    let open_loop_recalibrated =
+        closed.open_loop_recalibrated.map(|trajectory| restored(&trajectory, stamps)).transpose()?;
+    Ok(ClosedLoop { trajectory, open_loop_recalibrated, ..closed })
 }
 
-fn register_without_gaps(input: RegistrationInput, calibration: &Calibration, spec: &EstimatorSpec) -> ClosedLoop {
+fn register_without_gaps(
+    input: RegistrationInput,
+    calibration: &Calibration,
+    spec: &EstimatorSpec,
+) -> Result<ClosedLoop, EstimationError> {
     let registration = &spec.registration;
     let matcher = Matcher::new(&registration.matching(&spec.matching), &registration.surfels(&spec.surfels));
     let RegistrationInput { map_from_head, lidar, observed, .. } = input;
-    let recalibrated =
-        spec.extrinsics.estimated.then(|| lidar_model::recalibrated(map_from_head, observed, (calibration, lidar)));
+    let recalibrate = || lidar_model::recalibrated(map_from_head, observed, (calibration, lidar));
+    let recalibrated = spec.extrinsics.estimated.then(recalibrate).transpose()?;
     let map_from_head = recalibrated.as_ref().unwrap_or(map_from_head);
     let problem =
         Problem { input: RegistrationInput { map_from_head, ..input }, spec: registration, matcher: &matcher };
-    match problem.solve(LidarModel::new(calibration, (lidar, observed.range_bias_is_fixed), spec)) {
+    let closed = match problem.solve(LidarModel::new(calibration, (lidar, observed.range_bias_is_fixed), spec)) {
         Ok((Registered { trajectory, lidar_model }, report)) => {
             let report = RegistrationReport { moved: moved(map_from_head, &trajectory), ..report };
             ClosedLoop { trajectory, lidar: lidar_model.lidar, open_loop_recalibrated: recalibrated, report }
@@ -150,7 +162,8 @@ fn register_without_gaps(input: RegistrationInput, calibration: &Calibration, sp
             let report = RegistrationReport { rejected_because: Some(rejection.1), ..rejection.0 };
             ClosedLoop { trajectory: input.map_from_head.clone(), lidar: *lidar, report, ..ClosedLoop::default() }
         }
-    }
+    };
+    Ok(closed)
 }
 
 /// A result with diagnostics, or the diagnostics and the reason of rejection.
@@ -186,7 +199,8 @@ impl Problem<'_> {
         if report.conditioning < self.spec.weak_conditioning && report.revisited < self.spec.min_seen_again {
             return Err(Box::new((report, "too few revisited surfaces constrain the weakest direction")));
         }
-        Ok((Registered { trajectory: corrected.into_trajectory(map_from_head.stamps()), lidar_model }, report))
+        let trajectory = trajectory_of(corrected, map_from_head.stamps(), report)?;
+        Ok((Registered { trajectory, lidar_model }, report))
     }
 
     /// Registers a trajectory that was pre-aligned to loop closures.
@@ -208,7 +222,7 @@ impl Problem<'_> {
             let registered = Registration::run(self, (corrected, lidar_model), &pre_aligned.observed, report)?;
             let ((corrected, found), updated_report) = registered;
             (lidar_model, report) = (found, updated_report);
-            let next = corrected.into_trajectory(map_from_head.stamps());
+            let next = trajectory_of(corrected, map_from_head.stamps(), report)?;
             let (shift_m, _) = moved(&pre_aligned.trajectory, &next);
             let observed = pre_aligned.observed.along(&pre_aligned.trajectory, &next);
             pre_aligned = PreAligned { trajectory: next, observed };
@@ -218,6 +232,15 @@ impl Problem<'_> {
         }
         Ok((Registered { trajectory: pre_aligned.trajectory, lidar_model }, report))
     }
+}
+
+/// The trajectory of `corrected`, or the rejection of the registration if a pose is not finite.
+fn trajectory_of(
+    corrected: CorrectedTrajectory,
+    stamps: &[Stamp],
+    report: RegistrationReport,
+) -> Result<Trajectory, Box<(RegistrationReport, &'static str)>> {
+    corrected.into_trajectory(stamps).map_err(|_| Box::new((report, "the registered poses are not finite")))
 }
 
 /// Largest difference of two trajectories at the same stamps, m and rad.

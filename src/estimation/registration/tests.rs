@@ -7,7 +7,7 @@ use crate::estimation::load;
 use crate::estimation::observed::{LidarCorrectionPeriod, ObservedSurfel};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Matrix, Pose, Rotation, from_roll_pitch_yaw};
-use crate::measurement::{ImuNoise, LidarNoise};
+use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -58,6 +58,7 @@ fn calibration() -> Calibration {
             gyro_limit_rad_per_s: 10.0,
             accel_limit_m_per_s2: 50.0,
         },
+        imu_averaging: ImuAveraging::ConingCorrected,
         lidar: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
     }
 }
@@ -80,7 +81,7 @@ impl Setup {
         let Self { open, covariances, observed, .. } = self;
         let input =
             RegistrationInput { map_from_head: open, covariances, lidar: &LidarCorrection::default(), observed };
-        register(input, &calibration(), spec)
+        register(input, &calibration(), spec).unwrap()
     }
 }
 
@@ -261,7 +262,7 @@ fn open_loop_extrinsics_are_kept_and_the_head_is_recalibrated() {
     }
     let Setup { open, covariances, observed, .. } = &setup;
     let input = RegistrationInput { map_from_head: open, covariances, lidar: &found, observed };
-    let closed = register(input, &calibration(), &spec);
+    let closed = register(input, &calibration(), &spec).unwrap();
     assert_eq!(closed.report.rejected_because, None);
     assert!(
         closed.lidar.rotation == found.rotation && closed.lidar.translation == found.translation,

@@ -76,6 +76,7 @@ mod tests {
                 gyro_slope: Vector::zeros(),
                 accel: Vector::new(2.0 * sin, -cos, 9.8 + sin),
                 accel_slope: Vector::zeros(),
+                uncompensated: 1.0,
                 gyro_sigma: 0.006,
                 accel_sigma: 0.02,
                 bridged: false,

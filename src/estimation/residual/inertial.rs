@@ -62,8 +62,7 @@ impl Inertial {
     pub fn between((a, b): (&State, &State), interval: &Interval, biases: &Biases, gravity: &Vector) -> Self {
         let turn = a.rotation.inverse() * b.rotation;
         let measured = Rotation::from_scaled_axis(interval.turn(biases));
-        let bend = interval.gyro_slope * (interval.h * interval.h / 8.0);
-        let middle = a.rotation * Rotation::from_scaled_axis(turn.scaled_axis() * 0.5 - bend);
+        let middle = a.rotation * Rotation::from_scaled_axis(turn.scaled_axis() * 0.5);
         let map_from_middle = middle.to_rotation_matrix().into_inner();
         let acceleration = (b.velocity - a.velocity) / interval.h - gravity;
         Self {
@@ -374,6 +373,7 @@ mod tests {
                 gyro_slope: Vector::new(0.0, -0.7 * w * w * phase.sin(), 0.0),
                 accel: Vector::new(2.0, -1.0 + phase.sin(), 9.0),
                 accel_slope: Vector::new(0.0, w * phase.cos(), 0.0),
+                uncompensated: 1.0,
                 gyro_sigma: 0.006,
                 accel_sigma: 0.01,
                 bridged: false,

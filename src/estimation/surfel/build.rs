@@ -261,6 +261,7 @@ mod tests {
             gyro_slope: none,
             accel: none,
             accel_slope: none,
+            uncompensated: 1.0,
             gyro_sigma: 1e-3,
             accel_sigma: 1e-2,
             bridged: false,

@@ -75,6 +75,7 @@ mod tests {
             gyro_slope: Vector::zeros(),
             accel: Vector::new(0.0, 0.0, 9.81),
             accel_slope: Vector::zeros(),
+            uncompensated: 1.0,
             gyro_sigma: 0.005,
             accel_sigma: 0.02,
             bridged: false,

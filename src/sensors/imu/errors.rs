@@ -1,4 +1,4 @@
-use super::{GaussMarkovSpec, Imu, MeanMotion};
+use super::{GaussMarkovSpec, Imu, InertialReading};
 use crate::geometry::{Matrix, Vector};
 use crate::random::{Seed, Stream};
 use rand_distr::{Distribution, StandardNormal};
@@ -52,8 +52,8 @@ impl ImuErrors {
     }
 
     /// The next sample, given the ideal one.
-    pub fn measure(&mut self, ideal: &MeanMotion) -> MeanMotion {
-        MeanMotion {
+    pub fn measure(&mut self, ideal: &InertialReading) -> InertialReading {
+        InertialReading {
             angular_velocity_rad_per_s: self.gyro.measure(&ideal.angular_velocity_rad_per_s),
             specific_force_m_per_s2: self.accel.measure(&ideal.specific_force_m_per_s2),
         }

@@ -1,15 +1,15 @@
 //! Inertial measurement units: the ideal sample, and the errors.
 
 mod errors;
-mod mean;
+mod ideal;
 mod spec;
 
 pub use errors::ImuErrors;
-pub use mean::{MeanMotion, mean_motion};
+pub use ideal::{InertialReading, coning_corrected, ideal_reading};
 pub use spec::{AccelSpec, GaussMarkovSpec, GyroSpec, ImuSpec};
 
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
-use crate::measurement::ImuNoise;
+use crate::measurement::{ImuAveraging, ImuNoise};
 use crate::spec::{Source, SpecError};
 use errors::TriadModel;
 
@@ -36,7 +36,7 @@ impl Imu {
         &self.spec
     }
 
-    /// Sample period, over which a sample is averaged, s.
+    /// Sample period, s.
     pub fn period_s(&self) -> f64 {
         1.0 / self.spec.rate_hz
     }
@@ -44,6 +44,11 @@ impl Imu {
     /// Delay of the stamp after the middle of the sample's interval, s on the IMU clock.
     pub fn delay_s(&self) -> f64 {
         self.spec.stamp_delay_ms * 1e-3
+    }
+
+    /// How a sample is derived from the motion during its interval.
+    pub fn averaging(&self) -> ImuAveraging {
+        self.spec.averaging
     }
 
     /// Noise model for an estimator.

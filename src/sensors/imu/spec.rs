@@ -1,6 +1,7 @@
 use super::MILLI_G;
 use super::errors::{GaussMarkov, TriadModel};
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
+use crate::measurement::ImuAveraging;
 use crate::spec::{Source, SpecError, checked};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
@@ -12,13 +13,16 @@ const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImuSpec {
-    /// Samples per second, Hz. A sample is the average over the period before it.
+    /// Samples per second, Hz. A sample describes the motion during the period before it.
     #[serde(with = "checked::Positive")]
     pub rate_hz: f64,
     /// Delay of the stamp after the middle of that period, ms. Half a period puts the stamp at the end of the period; a
     /// driver that corrects for it has a smaller value, a filter or a buffer a larger one. The clock offset adds to it.
     #[serde(with = "checked::Finite")]
     pub stamp_delay_ms: f64,
+    /// How a sample is derived from the motion during its period.
+    #[serde(default)]
+    pub averaging: ImuAveraging,
     /// The gyroscope.
     pub gyro: GyroSpec,
     /// The accelerometer.

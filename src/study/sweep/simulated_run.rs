@@ -18,7 +18,7 @@ use crate::study::integrity::{Integrity, path_length_m};
 use crate::study::latency::{MapErrors, Reference, TimingRun, TimingSpec};
 use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
-use crate::study::{CalibrationSpec, ProgressMonitor, StudyError, comparison};
+use crate::study::{CalibrationSpec, Manifest, ProgressMonitor, StudyError, comparison};
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -222,13 +222,15 @@ fn estimate(
         let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&TopicPreference::default())?;
-        let found = calibration(&reader, &selection, &CalibrationSpec::default(), None)?;
+        let manifest = Manifest::in_recording(&reader)?;
+        let simulated = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
+        let (found, _) = calibration((&reader, &selection), &CalibrationSpec::default(), simulated, None)?;
         let how =
             OpenLoopOptions { estimator, calibration: &found.calibration, recording_surfels: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
         let known = comparison::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
         let open_loop = comparison::open_loop_metrics(&run, known.as_ref(), None);
-        let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator));
+        let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator)).transpose()?;
         let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
         let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
         let pairs = comparison::pairs_of(&reader, map_from_head)?;

@@ -114,7 +114,7 @@ pub(super) fn close_loops(
                 None => return (report, None),
             },
         };
-        let next = corrected.into_trajectory(map_from_head.stamps());
+        let Ok(next) = corrected.into_trajectory(map_from_head.stamps()) else { return (report, None) };
         let (shift_m, _) = moved(&trajectory, &next);
         (trajectory, observed) = (next.clone(), observed.along(&trajectory, &next));
         let was_out_of_reach =

@@ -1,0 +1,75 @@
+use crate::geometry::{Kinematics, Rotation, Vector, gravity_in_world};
+use crate::measurement::ImuAveraging;
+
+/// Subintervals of an interval over which the body-axis mean is computed.
+const SUBINTERVALS: u32 = 10;
+
+/// Angular velocity and specific force in the IMU frame: the content of an IMU sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InertialReading {
+    /// Angular velocity, rad/s.
+    pub angular_velocity_rad_per_s: Vector,
+    /// Specific force, gravity included, m/s^2.
+    pub specific_force_m_per_s2: Vector,
+}
+
+/// The reading of an ideal IMU over the interval from `from_s` to `to_s`; `motion` is that of the IMU frame, by time.
+pub fn ideal_reading(
+    averaging: ImuAveraging,
+    motion: impl Fn(f64) -> Kinematics,
+    (from_s, to_s): (f64, f64),
+) -> InertialReading {
+    match averaging {
+        ImuAveraging::None => {
+            let middle = motion(0.5 * (from_s + to_s));
+            InertialReading {
+                angular_velocity_rad_per_s: middle.angular_velocity_in_body(),
+                specific_force_m_per_s2: middle.specific_force_in_body(),
+            }
+        }
+        ImuAveraging::BodyMean => body_mean(motion, (from_s, to_s)),
+        ImuAveraging::ConingCorrected => coning_corrected(&motion(from_s), &motion(to_s), to_s - from_s),
+    }
+}
+
+/// The compensated reading over the interval from `start` to `end`, of length `dt_s`.
+///
+/// It is the change of attitude and velocity over the interval, divided by the length, as a strapdown unit reports it
+/// that integrates at a high rate inside (coning and sculling included).
+///
+/// The angular velocity is `log(R_start^T R_end) / dt`. The specific force is `R_mid^T ((v_end - v_start) / dt - g)`,
+/// with `R_mid` half-way along that rotation. Integration by `exp(angular_velocity dt)` and `R_mid specific_force + g`
+/// therefore reproduces attitude and velocity exactly, for any motion within the interval.
+pub fn coning_corrected(start: &Kinematics, end: &Kinematics, dt_s: f64) -> InertialReading {
+    let from = start.world_from_body.rotation;
+    let turn = (from.inverse() * end.world_from_body.rotation).scaled_axis();
+    let middle = from * Rotation::from_scaled_axis(turn * 0.5);
+    let acceleration = (end.velocity_in_world - start.velocity_in_world) / dt_s;
+    InertialReading {
+        angular_velocity_rad_per_s: turn / dt_s,
+        specific_force_m_per_s2: middle.inverse() * (acceleration - gravity_in_world()),
+    }
+}
+
+/// The means of angular velocity and specific force over an interval, in the axes of the body.
+///
+/// A compensated reading differs from the mean by coning and sculling terms proportional to the squared length of the
+/// interval. The average of compensated readings over `n` subintervals has `1 / n^2` of them, which the extrapolation
+/// (Richardson) removes.
+fn body_mean(motion: impl Fn(f64) -> Kinematics, (from_s, to_s): (f64, f64)) -> InertialReading {
+    let n = f64::from(SUBINTERVALS);
+    let dt_s = (to_s - from_s) / n;
+    let nodes: Vec<Kinematics> = (0..=SUBINTERVALS).map(|k| motion(from_s + f64::from(k) * dt_s)).collect();
+    let whole = coning_corrected(&nodes[0], &nodes[nodes.len() - 1], to_s - from_s);
+    let (mut rate, mut force) = (Vector::zeros(), Vector::zeros());
+    for pair in nodes.windows(2) {
+        let part = coning_corrected(&pair[0], &pair[1], dt_s);
+        rate += part.angular_velocity_rad_per_s / n;
+        force += part.specific_force_m_per_s2 / n;
+    }
+    let extrapolated = |average: Vector, whole: Vector| average + (average - whole) / (n * n - 1.0);
+    InertialReading {
+        angular_velocity_rad_per_s: extrapolated(rate, whole.angular_velocity_rad_per_s),
+        specific_force_m_per_s2: extrapolated(force, whole.specific_force_m_per_s2),
+    }
+}

@@ -1,0 +1,199 @@
+//! Sensor models for an estimate: noise and averaging, each value with its source.
+
+use super::StudyError;
+use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
+use crate::report::{NoiseMetrics, SensorMetrics};
+use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
+use crate::spec::{Kind, Source, SpecError, find, parse};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Where the value of a sensor model comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ValueSource {
+    /// The calibration file of the user.
+    Calibration,
+    /// The manifest of the simulation in the recording.
+    Manifest,
+    /// The default for unknown sensors.
+    Assumed,
+}
+
+impl fmt::Display for ValueSource {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Calibration => "from --calibration",
+            Self::Manifest => "from the recording's manifest",
+            Self::Assumed => "assumed",
+        })
+    }
+}
+
+/// Noise of an IMU as far as it is known; see [`ImuNoise`] for the quantities.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImuNoiseSpec {
+    /// White noise density of the gyroscope, rad/s/sqrt(Hz).
+    pub gyro_density_rad_per_s_per_sqrt_hz: Option<f64>,
+    /// White noise density of the accelerometer, m/s^2/sqrt(Hz).
+    pub accel_density_m_per_s2_per_sqrt_hz: Option<f64>,
+    /// Random walk of the gyroscope bias, rad/s/sqrt(s).
+    pub gyro_bias_walk_rad_per_s_per_sqrt_s: Option<f64>,
+    /// Random walk of the accelerometer bias, m/s^2/sqrt(s).
+    pub accel_bias_walk_m_per_s2_per_sqrt_s: Option<f64>,
+    /// Standard deviation of the gyroscope bias at power-on, rad/s.
+    pub gyro_turn_on_bias_rad_per_s: Option<f64>,
+    /// Standard deviation of the accelerometer bias at power-on, m/s^2.
+    pub accel_turn_on_bias_m_per_s2: Option<f64>,
+    /// Measuring range of the gyroscope per axis, rad/s.
+    pub gyro_limit_rad_per_s: Option<f64>,
+    /// Measuring range of the accelerometer per axis, m/s^2.
+    pub accel_limit_m_per_s2: Option<f64>,
+}
+
+/// Range noise of a lidar as far as it is known; see [`LidarNoise`] for the quantities.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LidarNoiseSpec {
+    /// Standard deviation of ranges up to `near_m`, m.
+    pub near_sigma_m: Option<f64>,
+    /// Range up to which `near_sigma_m` applies, m.
+    pub near_m: Option<f64>,
+    /// Standard deviation at `far_m`, m.
+    pub far_sigma_m: Option<f64>,
+    /// Range at which `far_sigma_m` applies, m.
+    pub far_m: Option<f64>,
+}
+
+/// Models of IMU and lidar, and the source of each value.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct SensorModels {
+    pub imu: ImuNoise,
+    pub imu_averaging: ImuAveraging,
+    pub lidar: LidarNoise,
+    averaging_source: ValueSource,
+    /// Key, value and source of each noise parameter.
+    noise: Vec<(String, f64, ValueSource)>,
+}
+
+/// Values that a calibration file contains.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GivenModels<'a> {
+    pub imu: Option<&'a ImuNoiseSpec>,
+    pub imu_averaging: Option<ImuAveraging>,
+    pub lidar: Option<&'a LidarNoiseSpec>,
+}
+
+impl SensorModels {
+    /// Given values, completed by those of `simulated` sensors, else by those of unknown sensors.
+    pub fn new(given: GivenModels, simulated: Option<(&ImuSpec, &LidarSpec)>) -> Result<Self, StudyError> {
+        let (imu, lidar, source) = match simulated {
+            Some((imu, lidar)) => {
+                let source = Source::in_memory("the recording's manifest", "");
+                (Imu::new(imu, &source)?, Lidar::new(lidar, &source)?, ValueSource::Manifest)
+            }
+            None => (unknown_imu()?, unknown_lidar()?, ValueSource::Assumed),
+        };
+        let mut values = Values { source, noise: Vec::new() };
+        Ok(Self {
+            imu: values.imu(given.imu.copied().unwrap_or_default(), &imu.noise()),
+            lidar: values.lidar(given.lidar.copied().unwrap_or_default(), &lidar.noise()),
+            imu_averaging: given.imu_averaging.unwrap_or(imu.averaging()),
+            averaging_source: given.imu_averaging.map_or(source, |_| ValueSource::Calibration),
+            noise: values.noise,
+        })
+    }
+
+    /// The values and sources for `metrics.json`.
+    pub fn metrics(&self) -> SensorMetrics {
+        let noise = self.noise.iter().map(|(key, value, source)| NoiseMetrics {
+            key: key.clone(),
+            value: *value,
+            source: source.to_string(),
+        });
+        let averaging = match self.imu_averaging {
+            ImuAveraging::None => "none",
+            ImuAveraging::BodyMean => "body_mean",
+            ImuAveraging::ConingCorrected => "coning_corrected",
+        };
+        SensorMetrics {
+            imu_averaging: Some(averaging.to_owned()),
+            imu_averaging_source: Some(self.averaging_source.to_string()),
+            noise: noise.collect(),
+        }
+    }
+
+    /// A note on the values that had to be assumed, if any.
+    pub fn note(&self) -> Option<String> {
+        let assumed = |sensor: &str| {
+            self.noise.iter().any(|(key, _, source)| key.starts_with(sensor) && *source == ValueSource::Assumed)
+        };
+        let unknown: Vec<&str> = [
+            ("imu.", "IMU noise of a typical IMU (specs/imus/unknown.ron)"),
+            ("lidar.", "range noise of a UTM-30LX (10 mm)"),
+        ]
+        .into_iter()
+        .filter(|(sensor, _)| assumed(sensor))
+        .map(|(_, what)| what)
+        .collect();
+        let values = unknown.join(" and ");
+        (!unknown.is_empty())
+            .then(|| format!("assumed: {values}; pass the values of the data sheet with --calibration"))
+    }
+}
+
+/// Collects the values with their sources.
+struct Values {
+    /// Source of the values that are not given.
+    source: ValueSource,
+    noise: Vec<(String, f64, ValueSource)>,
+}
+
+impl Values {
+    fn value(&mut self, key: &str, given: Option<f64>, otherwise: f64) -> f64 {
+        let (value, source) = given.map_or((otherwise, self.source), |value| (value, ValueSource::Calibration));
+        self.noise.push((key.to_owned(), value, source));
+        value
+    }
+
+    fn imu(&mut self, given: ImuNoiseSpec, otherwise: &ImuNoise) -> ImuNoise {
+        macro_rules! value {
+            ($key:ident) => {
+                self.value(concat!("imu.", stringify!($key)), given.$key, otherwise.$key)
+            };
+        }
+        ImuNoise {
+            gyro_density_rad_per_s_per_sqrt_hz: value!(gyro_density_rad_per_s_per_sqrt_hz),
+            accel_density_m_per_s2_per_sqrt_hz: value!(accel_density_m_per_s2_per_sqrt_hz),
+            gyro_bias_walk_rad_per_s_per_sqrt_s: value!(gyro_bias_walk_rad_per_s_per_sqrt_s),
+            accel_bias_walk_m_per_s2_per_sqrt_s: value!(accel_bias_walk_m_per_s2_per_sqrt_s),
+            gyro_turn_on_bias_rad_per_s: value!(gyro_turn_on_bias_rad_per_s),
+            accel_turn_on_bias_m_per_s2: value!(accel_turn_on_bias_m_per_s2),
+            gyro_limit_rad_per_s: value!(gyro_limit_rad_per_s),
+            accel_limit_m_per_s2: value!(accel_limit_m_per_s2),
+        }
+    }
+
+    fn lidar(&mut self, given: LidarNoiseSpec, otherwise: &LidarNoise) -> LidarNoise {
+        LidarNoise {
+            near_sigma_m: self.value("lidar.near_sigma_m", given.near_sigma_m, otherwise.near_sigma_m),
+            near_m: self.value("lidar.near_m", given.near_m, otherwise.near_m),
+            far_sigma_m: self.value("lidar.far_sigma_m", given.far_sigma_m, otherwise.far_sigma_m),
+            far_m: self.value("lidar.far_m", given.far_m, otherwise.far_m),
+        }
+    }
+}
+
+/// An IMU without a known specification.
+pub(super) fn unknown_imu() -> Result<Imu, SpecError> {
+    let source = find(Kind::Imu, "unknown")?;
+    let spec: ImuSpec = parse(&source)?;
+    Imu::new(&spec, &source)
+}
+
+/// The lidar of the paper, for a lidar without a known specification.
+fn unknown_lidar() -> Result<Lidar, SpecError> {
+    let source = find(Kind::Lidar, "utm30lx")?;
+    let spec: LidarSpec = parse(&source)?;
+    Lidar::new(&spec, &source)
+}
