@@ -14,7 +14,7 @@ use super::result_files::{estimate_files, remove};
 use super::sensor_models::SensorModels;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
-use crate::evaluation::Errors;
+use crate::evaluation::{Errors, InformationBound};
 use crate::geometry::Trajectory;
 use crate::measurement::LidarCorrection;
 use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
@@ -142,10 +142,7 @@ pub(super) fn estimate_in(
         Some(_) => comparison::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
         None => None,
     };
-    let bound = match (comparison, origin.surroundings) {
-        (Some(_), Some(Surroundings { world, .. })) => Some(information_bound(reader, world, watch)?.bound),
-        _ => None,
-    };
+    let bound = comparison.map(|_| bound_of(reader, origin, watch)).transpose()?.flatten();
     let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(options.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
@@ -302,6 +299,16 @@ fn metrics(
         peak_rss_mib: memory::peak_rss_mib(),
         ..Metrics::default()
     }
+}
+
+/// The information bound of the recording, if its scene is known.
+fn bound_of(
+    reader: &Reader,
+    origin: &Origin,
+    watch: &mut ProgressMonitor,
+) -> Result<Option<InformationBound>, StudyError> {
+    let Some(Surroundings { world, .. }) = origin.surroundings else { return Ok(None) };
+    Ok(Some(information_bound(reader, world, watch)?.bound))
 }
 
 /// The manifest of a recording; without simulation, and with a note, if it cannot be parsed.

@@ -5,8 +5,9 @@ use std::f64::consts::PI;
 use zsim::geometry::{
     Kinematics, Pose, Rotation, STANDARD_GRAVITY_M_PER_S2 as G, Vector, from_roll_pitch_yaw, gravity_in_world,
 };
+use zsim::measurement::ImuAveraging;
 use zsim::random::Seed;
-use zsim::sensors::{GaussMarkovSpec, Imu, ImuErrors, ImuSpec, InertialReading, coning_corrected};
+use zsim::sensors::{GaussMarkovSpec, Imu, ImuErrors, ImuSpec, InertialReading, coning_corrected, ideal_reading};
 use zsim::signal::allan_deviation;
 use zsim::spec::{self, Kind, Source};
 
@@ -86,6 +87,33 @@ fn an_ideal_imu_at_1_khz_integrates_to_the_motion() {
     let end = tumbling(10.0).world_from_body;
     assert!((position - end.translation.vector).norm() < 1e-4, "{}", position - end.translation.vector);
     assert!(rotation.angle_to(&end.rotation).to_degrees() < 1e-6);
+}
+
+#[test]
+fn an_instantaneous_reading_is_the_motion_in_the_middle_and_a_body_mean_its_average() {
+    let (from_s, to_s) = (0.3, 0.31);
+    let point = |t_s: f64| {
+        let at = tumbling(t_s);
+        (at.angular_velocity_in_body(), at.specific_force_in_body())
+    };
+    let instant = ideal_reading(ImuAveraging::None, tumbling, (from_s, to_s));
+    let (rate, force) = point(0.305);
+    assert_relative_eq!(instant.angular_velocity_rad_per_s, rate, epsilon = 1e-8);
+    assert_relative_eq!(instant.specific_force_m_per_s2, force, epsilon = 1e-8);
+
+    // The midpoint rule with 1000 points errs by (h / 1000)^2 / 24 times the second derivative: 1e-9.
+    let (mut rate, mut force) = (Vector::zeros(), Vector::zeros());
+    for k in 0..1000 {
+        let (w, f) = point(from_s + (to_s - from_s) * (f64::from(k) + 0.5) / 1000.0);
+        (rate, force) = (rate + w / 1000.0, force + f / 1000.0);
+    }
+    let mean = ideal_reading(ImuAveraging::BodyMean, tumbling, (from_s, to_s));
+    assert_relative_eq!(mean.angular_velocity_rad_per_s, rate, epsilon = 1e-7);
+    assert_relative_eq!(mean.specific_force_m_per_s2, force, epsilon = 1e-7);
+    // The kinds differ by much more than that.
+    let corrected = ideal_reading(ImuAveraging::ConingCorrected, tumbling, (from_s, to_s));
+    assert!((corrected.specific_force_m_per_s2 - force).norm() > 1e-4);
+    assert!((instant.specific_force_m_per_s2 - force).norm() > 1e-4);
 }
 
 #[test]
