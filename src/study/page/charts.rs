@@ -69,9 +69,14 @@ fn bound_title(results: &RunResults) -> String {
         }
         None => "99 % bound on the position error".to_owned(),
     };
-    let unbounded = results.integrity.bounds().iter().find(|bound| !bound.bound_m_99.is_finite());
-    let from = unbounded.map(|bound| format!("; no bound from {:.1} s", results.seconds(bound.stamp)));
-    title + &from.unwrap_or_default()
+    match results.integrity.bounds().iter().position(|bound| !bound.bound_m_99.is_finite()) {
+        None => title,
+        Some(0) => title + " (unbounded)",
+        Some(first) => {
+            let from_s = results.seconds(results.integrity.bounds()[first].stamp);
+            format!("{title} (unbounded from {from_s:.1} s)")
+        }
+    }
 }
 
 /// Index of the error at `stamp`; `None` if there is none within 50 ms.

@@ -49,6 +49,7 @@ class View {
     this.controls = new vendor.OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.draw());
     this.follow = false;
+    byId("closeup-label").textContent = data.links.length ? "Head and spring" : "Head and base";
     this.resize();
     this.whole("oblique");
     this.paint();
