@@ -47,7 +47,8 @@ const BELOW_CLI: &[&str] = &[
 const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
 
 /// Crates that are restricted to some modules, and these modules.
-const RESTRICTED_CRATES: [(&str, &[&str]); 17] = [
+const RESTRICTED_CRATES: [(&str, &[&str]); 18] = [
+    ("base64", &["report"]),
     ("parry3d", &["world"]),
     ("rapier3d_f64", &["dynamics"]),
     ("mcap", &["recording"]),

@@ -42,7 +42,7 @@ pub(super) struct ScenarioArguments {
     /// The head and its spring, a name under specs/heads/ or a file [default: handheld]
     #[arg(long, value_name = "NAME|FILE")]
     head: Option<String>,
-    /// How the base moves, under specs/motions/ [default: hand]
+    /// Motion of the base, under specs/motions/ [default: hand]
     #[arg(long, value_name = "NAME|FILE")]
     motion: Option<String>,
     /// The lidar, under specs/lidars/ [default: utm30lx]
@@ -54,7 +54,7 @@ pub(super) struct ScenarioArguments {
     /// A second IMU, under specs/imus/, on the base (the handle, the vehicle): for `zsim base` [default: none]
     #[arg(long, value_name = "NAME|FILE")]
     base_imu: Option<String>,
-    /// The clocks, under specs/clocks/ [default: drifting]
+    /// Sensor clocks (offset, drift, jitter, resolution), under specs/clocks/ [default: drifting]
     #[arg(long, value_name = "NAME|FILE")]
     clock: Option<String>,
     /// Faults of the sensors and of their delivery, under specs/faults/ [default: none]
@@ -63,10 +63,10 @@ pub(super) struct ScenarioArguments {
     /// The route through the scene [default: the scene's own]
     #[arg(long, value_name = "NAME")]
     route: Option<String>,
-    /// How long: 120s, 2min, 90 [default: 120s]
+    /// Duration: 120s, 2min, 90 [default: 120s]
     #[arg(long, value_name = "TIME", value_parser = quantity::seconds)]
     duration: Option<f64>,
-    /// The seed from which all chance follows [default: 1]
+    /// Random seed [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 }

@@ -51,7 +51,8 @@ pub(super) struct Arguments {
     /// Random seed of the phases
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Also measure resonance and gain at these swing amplitudes of the head, degrees RMS, about and along x and y
+    /// Also measure resonance and gain at these rotation amplitudes of the head, degrees RMS; the base is
+    /// excited about x and y, and along x and y
     #[arg(long, value_name = "DEG,...", value_delimiter = ',', num_args = 0.., default_missing_value = "0.2,2,5,10,15,20")]
     swing: Option<Vec<f64>>,
 }

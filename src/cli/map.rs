@@ -35,10 +35,10 @@ struct MergeArguments {
     /// The map that defines the frame
     #[arg(value_name = "A.ply")]
     first: PathBuf,
-    /// The map that is put into it
+    /// The map that is aligned with the first and added to it
     #[arg(value_name = "B.ply")]
     second: PathBuf,
-    /// Where the second map's origin is in the first: metres, and degrees about the vertical
+    /// Approximate pose of the second map's origin in the first map: metres, and degrees about the vertical
     #[arg(long, value_name = "X,Y,Z,YAW", value_parser = start, default_value = "0,0,0,0", allow_hyphen_values = true)]
     start: Pose,
     /// The estimator's settings, a name under specs/estimators/ or a file

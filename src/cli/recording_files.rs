@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 /// A recording and the true trajectory next to it, as files that only this process has created.
 ///
-/// Files that exist are replaced only by [`finish`](Self::finish): until then the new ones have names of their own, so
-/// so that a run that fails destroys no file.
+/// Files that exist are replaced only by [`finish`](Self::finish): until then the new files have temporary names, so
+/// that a failed run destroys no file.
 pub(super) struct RecordingFiles {
     recording: PathBuf,
     truth: PathBuf,
@@ -47,6 +47,9 @@ impl RecordingFiles {
         Self::first_free(&wanted.with_extension(format!("partial{ending}")), Some(wanted))
     }
 
+    /// Creates both files under the first name, `wanted` or `wanted` with a number, that neither of them has taken.
+    ///
+    /// [`finish`](Self::finish) then moves them to `replaces`, if given.
     fn first_free(wanted: &Path, replaces: Option<&Path>) -> anyhow::Result<Self> {
         for recording in candidates(wanted) {
             let truth = truth_of(&recording);
@@ -71,7 +74,7 @@ impl RecordingFiles {
         &self.truth
     }
 
-    /// Moves complete files to the names that were wanted; these names.
+    /// Moves the complete files to the names that they replace; returns the final names.
     ///
     /// # Errors
     /// When they cannot be moved.
@@ -99,7 +102,7 @@ impl Drop for RecordingFiles {
     }
 }
 
-/// Creates an empty file; `false` where something of this name exists, if only a link that leads nowhere.
+/// Creates an empty file; `false` if the name exists, even as a dangling link.
 fn is_created(path: &Path) -> anyhow::Result<bool> {
     match OpenOptions::new().write(true).create_new(true).open(path) {
         Ok(_) => Ok(true),

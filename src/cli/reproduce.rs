@@ -26,7 +26,7 @@ pub(super) struct Arguments {
     /// Folder for all results
     #[arg(long, short, value_name = "DIR", default_value = "results")]
     out: PathBuf,
-    /// Run a small variant of each in seconds, in DIR/paper-quick/, as a smoke test; its figures are no results
+    /// Smoke test: run a small variant of each experiment, in seconds, in DIR/paper-quick/; do not use its results
     #[arg(long)]
     quick: bool,
     /// Start anew even if a folder has work by another spec or version

@@ -27,13 +27,13 @@ const SUPERVISOR_MEMORY_MIB: u64 = 256;
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim sweep submit results/springs --slurm --elements 16")]
 pub(super) struct Arguments {
-    /// The folder of the plan
+    /// Folder of the sweep, created by `zsim sweep plan`
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// As a Slurm job array
+    /// Submit to Slurm (the only supported scheduler)
     #[arg(long, required = true)]
     slurm: bool,
-    /// How many elements the array has [default: one for 20 runs, 1000 at most]
+    /// Number of array elements [default: one for 20 runs, 1000 at most]
     #[arg(long, value_name = "M")]
     elements: Option<u64>,
     /// Options for sbatch, such as "--partition=long --time=2:00:00"

@@ -63,8 +63,8 @@ fn rounded(x: f64) -> String {
 fn coil(coil: &CoilReport) -> Vec<Vec<String>> {
     let or_dash = |x: Option<f64>, unit: &str| x.map_or("-".to_owned(), |x| format!("{x:.1} {unit}"));
     let buckles = match (coil.buckling_load_n, coil.buckling_margin) {
-        (Some(load_n), Some(margin)) => format!("{load_n:.1} N with guided top, {margin:.1} x the weight"),
-        _ => "none with guided top".to_owned(),
+        (Some(load_n), Some(margin)) => format!("{load_n:.1} N, {margin:.1} x the weight (top cannot tilt)"),
+        _ => "does not buckle (top cannot tilt)".to_owned(),
     };
     let stress = match (coil.stress_at_rest_mpa, coil.yield_mpa) {
         (Some(stress), Some(yields)) => format!("{stress:.0} MPa (yield {yields:.0} MPa)"),

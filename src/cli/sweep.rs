@@ -38,14 +38,14 @@ enum Command {
     Task(TaskArguments),
 }
 
-/// Find and check all that a spec names, and leave the plan in a folder
+/// Check a sweep and all specs that it names; write the plan to a folder
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim sweep plan spring_sweep -o results/springs")]
 struct PlanArguments {
     /// The sweep, a name under specs/studies/ or a file
     #[arg(value_name = "SPEC")]
     spec: String,
-    /// The folder; a sweep in it is continued [default: results/<name>]
+    /// Folder for the plan and the results; a sweep in it is continued [default: results/<name>]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace another plan in the folder; runs that are in both stay done
@@ -61,13 +61,13 @@ struct PlanArguments {
     after_help = "Examples:\n  zsim sweep run results/springs --threads 8\n  zsim sweep run results/springs --index 3 --count 16"
 )]
 struct RunArguments {
-    /// The folder of the plan
+    /// Folder of the sweep, created by `zsim sweep plan`
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Which of the shares, from 0
+    /// Part of the runs that this process does, from 0
     #[arg(long, value_name = "I")]
     index: Option<usize>,
-    /// How many shares there are
+    /// Number of parts that the runs are divided into
     #[arg(long, value_name = "M")]
     count: Option<usize>,
 }
@@ -76,12 +76,12 @@ struct RunArguments {
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim sweep status results/springs --json\n  zsim sweep merge results/springs")]
 struct FolderArguments {
-    /// The folder of the plan
+    /// Folder of the sweep, created by `zsim sweep plan`
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
 
-/// Do one task, confined, telling of each run on stdout: how `run` works through journeys
+/// Do one task in a confined process and report each run on stdout; `run` starts it for journeys
 #[derive(Args)]
 struct TaskArguments {
     #[arg(value_name = "DIR")]

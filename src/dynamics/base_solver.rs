@@ -65,11 +65,11 @@ struct HeadMotion {
     /// Velocity of the centre of mass and angular velocity, in the world.
     twist: Vector6,
     /// Time derivative of the twist.
-    rate: Vector6,
+    twist_rate: Vector6,
 }
 
 impl HeadMotion {
-    /// Computes the motion from three successive poses by finite differences of second order.
+    /// Computes the motion at the middle of three successive poses by finite differences of second order.
     fn from_poses([before, now, after]: [&Pose; 3], [first_s, second_s]: [f64; 2], body: &Body) -> Self {
         let centre = |pose: &Pose| (pose * nalgebra::Point3::from(body.centre_of_mass_in_head)).coords;
         let twist = |from: &Pose, to: &Pose, step_s: f64| {
@@ -81,7 +81,7 @@ impl HeadMotion {
         Self {
             pose: *now,
             twist: (earlier * second_s + later * first_s) / whole_s,
-            rate: (later - earlier) * (2.0 / whole_s),
+            twist_rate: (later - earlier) * (2.0 / whole_s),
         }
     }
 }
@@ -151,7 +151,10 @@ impl<'a> BaseSolver<'a> {
         let (_, turning) = split(&motion.twist);
         let gyroscopic = turning.cross(&(mass.fixed_view::<3, 3>(3, 3) * turning));
         let weight = stack(&(gravity_in_world * self.body.mass_kg), &-gyroscopic);
-        Ok((mass + inertia) * motion.rate - wrench - weight - self.compliant.law.quadratic_forces(&now, &motion.twist))
+        Ok((mass + inertia) * motion.twist_rate
+            - wrench
+            - weight
+            - self.compliant.law.quadratic_forces(&now, &motion.twist))
     }
 
     /// The derivative of the residual by a displacement of the base, by central differences.

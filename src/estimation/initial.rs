@@ -153,8 +153,8 @@ pub(super) fn estimate(
     let mean = |of: fn(&Interval) -> Vector| intervals.iter().map(|i| of(i) * i.h).sum::<Vector>() / duration;
     let (gyro, force) = (mean(|i| i.gyro), mean(|i| i.accel));
     let rest = RestReadings { gyro, force };
-    let seen = NoiseFactors::estimated_from(intervals);
-    let imu_rests = intervals.iter().all(|interval| rest.agrees_with(&seen.scale(*interval)))
+    let measured_factors = NoiseFactors::estimated_from(intervals);
+    let imu_rests = intervals.iter().all(|interval| rest.agrees_with(&measured_factors.scale(*interval)))
         && gyro.norm() < 5.0 * noise.gyro_turn_on_bias_rad_per_s.max(1e-3);
     let at_rest = may_rest && imu_rests;
     let upward = if at_rest { force } else { mean_force_at_start(intervals) };
@@ -167,7 +167,7 @@ pub(super) fn estimate(
     // At rest, the specific force in excess of gravity is bias; the horizontal bias is not separable from the tilt.
     let excess = force.norm() - gravity_in_world().norm();
     let accel_bias = if at_rest { force.normalize() * excess } else { Vector::zeros() };
-    let noise_factors = if at_rest { seen } else { NoiseFactors::ONE };
+    let noise_factors = if at_rest { measured_factors } else { NoiseFactors::ONE };
     let gyro_sigma = if at_rest {
         3.0 * noise_factors.gyro * noise.gyro_density_rad_per_s_per_sqrt_hz / duration.sqrt()
     } else {

@@ -56,12 +56,12 @@ impl McapWriter {
     pub fn new<W: Write + Send + 'static>(file: W, metadata: BTreeMap<String, String>) -> Result<Self, RecordingError> {
         let writer = start_file(file, metadata)?;
         let (full, to_write) = sync_channel(BATCHES - 2);
-        let (written, empty) = sync_channel(BATCHES);
+        let (emptied, empty) = sync_channel(BATCHES);
         for _ in 1..BATCHES {
             // The channel has capacity for all of them.
-            let _ = written.send(Batch::default());
+            let _ = emptied.send(Batch::default());
         }
-        let thread = std::thread::spawn(move || write_batches(writer, &to_write, &written));
+        let thread = std::thread::spawn(move || write_batches(writer, &to_write, &emptied));
         Ok(Self { filling: Batch::default(), full: Some(full), empty, thread: Some(thread) })
     }
 
@@ -153,11 +153,11 @@ fn start_file<W: Write>(file: W, metadata: BTreeMap<String, String>) -> Result<L
     Ok(writer)
 }
 
-/// Writes all batches, then the summary.
+/// Writes all `full` batches, then the summary. Returns each batch to `empty` for reuse.
 fn write_batches<W: Write>(
     mut writer: LibraryWriter<W>,
     full: &Receiver<Batch>,
-    written: &SyncSender<Batch>,
+    empty: &SyncSender<Batch>,
 ) -> Result<(), RecordingError> {
     let mut channels = Channels::default();
     for mut batch in full {
@@ -169,7 +169,7 @@ fn write_batches<W: Write>(
         batch.bytes.clear();
         batch.messages.clear();
         // The receiver is gone when the recording is being finished.
-        let _ = written.send(batch);
+        let _ = empty.send(batch);
     }
     writer.finish()?;
     Ok(())

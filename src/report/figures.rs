@@ -129,7 +129,7 @@ fn seconds_of(stamps: &[Stamp]) -> Vec<f64> {
 }
 
 /// The unit for an axis with lengths up to `max_m`, and its number of units per metre.
-fn length_unit(max_m: f64) -> (&'static str, f64) {
+pub fn length_unit(max_m: f64) -> (&'static str, f64) {
     match max_m {
         m if m < 0.02 => ("mm", 1e3),
         m if m < 2.0 => ("cm", 1e2),

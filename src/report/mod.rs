@@ -5,7 +5,7 @@
 mod figures;
 mod integrity;
 mod metrics;
-mod page;
+pub mod page;
 pub mod plot;
 mod profile;
 mod quantity;
@@ -14,14 +14,14 @@ mod sensors;
 mod table;
 
 pub use figures::{
-    bound_over_time, clock_offset, errors_over_time, head_pitch, open_and_closed_loop_errors, trajectory_top_view,
+    bound_over_time, clock_offset, errors_over_time, head_pitch, length_unit, open_and_closed_loop_errors,
+    trajectory_top_view,
 };
 pub use integrity::{CauseMetrics, EventMetrics, IntegrityMetrics};
 pub use metrics::{
     ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, LoopMetrics, Metrics, OpenLoopMetrics,
     SimulationMetrics,
 };
-pub use page::{Section, page};
 pub use profile::timing_table;
 pub use sensors::{NoiseMetrics, SensorMetrics};
 pub use table::{markdown, summary, table};

@@ -1,15 +1,15 @@
-//! The plots and the HTML page of a run.
+//! The plots of a run, and the files of the report.
 
+use super::StudyError;
 use super::atomic_file::write_text;
-use super::estimate::BestEstimate;
-use super::open_loop::OpenLoopRun;
+use super::page::RunResults;
 use super::register::SampledBeam;
 use super::result_files::METRICS;
-use super::{Manifest, StudyError};
-use crate::evaluation::{Errors, InformationBound};
+use crate::evaluation::Errors;
 use crate::geometry::{Pose, Trajectory, Vector};
+use crate::report;
+use crate::report::page::RunPage;
 use crate::report::plot::Figure;
-use crate::report::{self, Metrics, Section};
 use crate::time::Stamp;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -21,39 +21,32 @@ const MAX_PLOT_POINTS: usize = 50_000;
 /// Half the height of the slice of the cloud, about the head's mean height, that gives the outline, m.
 const SLICE_HALF_HEIGHT_M: f64 = 0.4;
 
-/// A plot with a file name and a heading.
+/// A plot with its file name.
 pub(super) struct Plot {
     name: &'static str,
-    section: Section,
+    figure: Figure,
 }
 
-/// The plots of an estimate; `open_errors` are the errors of the open loop if a closed loop was computed.
-pub(super) fn plots(
-    run: &OpenLoopRun,
-    best: &BestEstimate,
-    (open_errors, bound): (Option<&Errors>, Option<&InformationBound>),
-    sample: &[SampledBeam],
-) -> Vec<Plot> {
+/// The plots of an estimate.
+pub(super) fn plots(results: &RunResults, sample: &[SampledBeam]) -> Vec<Plot> {
+    let RunResults { open: run, best, open_errors, bound, .. } = *results;
     let comparison = best.comparison;
     let world_from_map = comparison.and_then(|found| found.world_from_map).unwrap_or_else(Pose::identity);
     let estimate = decimated(best.map_from_head.iter().map(|(stamp, pose)| (stamp, world_from_map * pose)));
     let no_truth = Trajectory::new();
     let truth = comparison.map_or(&no_truth, |found| &found.truth);
     let outline = outline(sample, &world_from_map, &estimate);
-    let plot = |name, title: &str, figure: Figure| Plot { name, section: Section { title: title.to_owned(), figure } };
+    let plot = |name, figure: Figure| Plot { name, figure };
 
-    let mut plots = vec![plot("trajectory", "Trajectory", report::trajectory_top_view(truth, &estimate, &outline))];
+    let mut plots = vec![plot("trajectory", report::trajectory_top_view(truth, &estimate, &outline))];
     if let Some(errors) = comparison.and_then(|found| found.errors.as_ref()).map(|errors| &errors.decimated) {
-        plots.push(plot("errors", "Errors over time", report::errors_over_time(errors)));
-        if let Some(open) = open_errors {
-            let figure = report::open_and_closed_loop_errors(open, errors);
-            plots.push(plot("loops", "Position error: open loop and closed loop", figure));
-        }
+        plots.push(plot("errors", report::errors_over_time(errors)));
+        plots.extend(open_errors.map(|open| plot("loops", report::open_and_closed_loop_errors(open, errors))));
     }
-    plots.extend(bound.map(|bound| plot("bound", "Information bound", report::bound_over_time(bound))));
-    plots.push(plot("pitch", "Pitch of the head", report::head_pitch(truth, &estimate)));
+    plots.extend(bound.map(|bound| plot("bound", report::bound_over_time(bound))));
+    plots.push(plot("pitch", report::head_pitch(truth, &estimate)));
     let true_offsets = comparison.map_or(&[][..], |found| &found.clock_offsets);
-    plots.push(plot("clock", "IMU clock offset", report::clock_offset(true_offsets, &run.clock_offsets)));
+    plots.push(plot("clock", report::clock_offset(true_offsets, &run.clock_offsets)));
     plots
 }
 
@@ -87,14 +80,12 @@ fn outline(sample: &[SampledBeam], world_from_map: &Pose, estimate: &Trajectory)
 }
 
 /// Writes the plots and the page, then `metrics.json`, which marks the folder as complete.
-pub(super) fn write(folder: &Path, metrics: &Metrics, plots: Vec<Plot>, manifest: &Manifest) -> Result<(), StudyError> {
+pub(super) fn write(folder: &Path, plots: &[Plot], page: &RunPage) -> Result<(), StudyError> {
     let pictures = folder.join("plots");
     std::fs::create_dir_all(&pictures).map_err(StudyError::file(&pictures))?;
-    for plot in &plots {
-        plot.section.figure.save(&pictures, plot.name)?;
+    for plot in plots {
+        plot.figure.save(&pictures, plot.name)?;
     }
-    let sections: Vec<Section> = plots.into_iter().map(|plot| plot.section).collect();
-    let page = report::page(metrics, &sections, &manifest.to_ron()?)?;
-    write_text(folder, &folder.join("report.html"), &page)?;
-    write_text(folder, &folder.join(METRICS), &metrics.to_json()?)
+    write_text(folder, &folder.join("report.html"), &page.html()?)?;
+    write_text(folder, &folder.join(METRICS), &page.metrics.to_json()?)
 }

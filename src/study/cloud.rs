@@ -214,6 +214,7 @@ mod tests {
         };
         let registered = RegisteredCloud {
             class_counts: ClassCounts { kept: 16, moving: 4, ..ClassCounts::default() },
+            page_points: Vec::new(),
             filtered: true,
             sample: ends.iter().map(judged).collect(),
             dead_reckoning: Err(EvaluationError::OnALine),

@@ -8,11 +8,13 @@ use super::cloud_files::CloudOptions;
 use super::integrity::{Integrity, write_windows};
 use super::map::{MapOptions, write_map};
 use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
+use super::page::RunResults;
 use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
 use super::sensor_models::SensorModels;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
+use crate::evaluation::{Errors, InformationBound};
 use crate::geometry::Trajectory;
 use crate::measurement::LidarCorrection;
 use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
@@ -140,18 +142,14 @@ pub(super) fn estimate_in(
         Some(_) => comparison::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
         None => None,
     };
-    let bound = match (comparison, origin.surroundings) {
-        (Some(_), Some(Surroundings { world, .. })) => Some(information_bound(reader, world, watch)?.bound),
-        _ => None,
-    };
+    let bound = comparison.map(|_| bound_of(reader, origin, watch)).transpose()?.flatten();
     let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(options.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
-    let integrity_metrics =
-        integrity.metrics(run, comparison.map(|_| comparison::pairs_of(reader, best.map_from_head)).transpose()?);
+    let pairs = comparison.map(|_| comparison::pairs_of(reader, best.map_from_head)).transpose()?;
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
-        integrity: integrity_metrics,
+        integrity: integrity.metrics(run, pairs.as_ref()),
         sensors: models.metrics(),
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),
@@ -163,10 +161,19 @@ pub(super) fn estimate_in(
     };
     integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
-    let open_comparison = comparison.filter(|_| loops.closed.is_some());
-    let open_errors = open_comparison.and_then(|comparison| Some(&comparison.errors.as_ref()?.decimated));
-    let plots = artefacts::plots(run, &best, (open_errors, bound.as_ref()), &registered.sample);
-    artefacts::write(folder, &metrics, plots, origin.manifest)?;
+    let results = RunResults {
+        reader,
+        origin,
+        open: run,
+        best: &best,
+        open_errors: loops.open_errors(),
+        bound: bound.as_ref(),
+        integrity: &integrity,
+        pairs: pairs.as_ref(),
+        points: &registered.page_points,
+    };
+    let plots = artefacts::plots(&results, &registered.sample);
+    artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?)?)?;
     Ok(EstimateResult { metrics, timing: loops.open.timing })
 }
 
@@ -245,6 +252,12 @@ impl Loops {
         }
     }
 
+    /// Errors of the open loop if a closed loop was computed.
+    fn open_errors(&self) -> Option<&Errors> {
+        self.closed.as_ref()?;
+        Some(&self.comparison.as_ref()?.errors.as_ref()?.decimated)
+    }
+
     fn closed_metrics(&self) -> ClosedLoopMetrics {
         let (comparison, acquisition_s) = (self.closed_comparison.as_ref(), self.open.acquisition_s);
         let metrics =
@@ -286,6 +299,16 @@ fn metrics(
         peak_rss_mib: memory::peak_rss_mib(),
         ..Metrics::default()
     }
+}
+
+/// The information bound of the recording, if its scene is known.
+fn bound_of(
+    reader: &Reader,
+    origin: &Origin,
+    watch: &mut ProgressMonitor,
+) -> Result<Option<InformationBound>, StudyError> {
+    let Some(Surroundings { world, .. }) = origin.surroundings else { return Ok(None) };
+    Ok(Some(information_bound(reader, world, watch)?.bound))
 }
 
 /// The manifest of a recording; without simulation, and with a note, if it cannot be parsed.

@@ -51,7 +51,7 @@ fn add(events: &mut Vec<EventMetrics>, at_s: f64, kind: &WarningKind) {
 }
 
 /// Whether a warning is a loss: measurements are missing or unused, or there is no estimate for some time.
-fn is_loss(kind: &WarningKind) -> bool {
+pub(super) fn is_loss(kind: &WarningKind) -> bool {
     match kind {
         WarningKind::ImuGap { .. }
         | WarningKind::LidarGap { .. }

@@ -33,7 +33,7 @@ const LOST_FACTOR: f64 = 20.0;
 
 /// Error bound and standard deviations of a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct PoseBound {
+pub(super) struct PoseBound {
     pub stamp: Stamp,
     /// 99 % bound on the position error, m.
     pub bound_m_99: f64,
@@ -142,8 +142,25 @@ impl Integrity {
         self.findings.iter().map(|finding| finding.status).max().unwrap_or_default()
     }
 
+    /// Bounds and standard deviations of the poses, in order of time.
+    pub fn bounds(&self) -> &[PoseBound] {
+        &self.bounds
+    }
+
+    /// Duration of the alignment that the bounds refer to: the first 20 s, or half of a run shorter than 40 s.
+    pub fn aligned_seconds(pairs: &Pairs) -> f64 {
+        ALIGNMENT_S.min(0.5 * pairs.duration_s())
+    }
+
+    /// The true errors after this alignment.
+    pub fn aligned_errors(pairs: &Pairs) -> Option<Errors> {
+        let aligned = pairs.first_seconds(Self::aligned_seconds(pairs));
+        let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
+        Some(Errors::after(pairs, &world_from_map))
+    }
+
     /// The metrics for `metrics.json`; `pairs` are the estimated and true poses, if the truth is known.
-    pub fn metrics(&self, run: &OpenLoopRun, pairs: Option<Pairs>) -> IntegrityMetrics {
+    pub fn metrics(&self, run: &OpenLoopRun, pairs: Option<&Pairs>) -> IntegrityMetrics {
         let since = |stamp: Stamp| stamp.seconds_since(run.recorded.0);
         let cause = |finding: &Finding| CauseMetrics {
             status: finding.status.name().to_owned(),
@@ -155,7 +172,7 @@ impl Integrity {
         let finite = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
         let all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
         let largest = all.iter().copied().filter(|bound| bound.is_finite()).fold(0.0, f64::max);
-        let check = pairs.and_then(|pairs| self.check_bounds(&pairs));
+        let check = pairs.and_then(|pairs| self.check_bounds(pairs));
         IntegrityMetrics {
             bound_m_99: median(all).and_then(finite),
             largest_bound_m: Some(largest).filter(|bound| *bound > 0.0),
@@ -168,11 +185,9 @@ impl Integrity {
         }
     }
 
-    /// Compares the bounds with the true errors after alignment over the first 20 s, or half of a run shorter than 40 s.
+    /// Compares the bounds with the true errors.
     fn check_bounds(&self, pairs: &Pairs) -> Option<BoundCheck> {
-        let aligned = pairs.first_seconds(ALIGNMENT_S.min(0.5 * pairs.duration_s()));
-        let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
-        let errors = Errors::after(pairs, &world_from_map);
+        let errors = Self::aligned_errors(pairs)?;
         let mut bounds = self.bounds.iter();
         let mut current = bounds.next()?;
         let mut ratios = Vec::with_capacity(errors.stamps.len());

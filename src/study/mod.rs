@@ -31,6 +31,7 @@ mod manifest;
 mod map;
 mod memory;
 mod open_loop;
+mod page;
 mod progress;
 mod read_ahead;
 mod record;

@@ -8,6 +8,7 @@ use crate::evaluation::{DeadReckoning, EvaluationError, RestDetection, Thinning}
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
 use crate::recording::{CloudPoint, Measurements, Reader, RecordingError, Selection, write_result};
+use crate::report::page::MAX_PAGE_POINTS;
 use crate::time::Stamp;
 use std::path::Path;
 
@@ -67,6 +68,8 @@ pub(super) struct RegisteredCloud {
     pub filtered: bool,
     /// A sample of the beams, before filtering.
     pub sample: Vec<SampledBeam>,
+    /// Points for the page, after filtering.
+    pub page_points: Vec<CloudPoint>,
     /// Trajectory by IMU dead reckoning.
     pub dead_reckoning: Result<Trajectory, EvaluationError>,
 }
@@ -108,12 +111,14 @@ impl Registration<'_> {
             files: CloudFiles::create(folder, self.options.format)?,
             sampled: Thinning::to_at_most(MAX_SAMPLED_BEAMS, self.returns),
             displayed: Thinning::to_at_most(MAX_VIEWER_POINTS, self.returns),
+            on_page: Thinning::to_at_most(MAX_PAGE_POINTS, self.returns),
             dead_reckoning: DeadReckoning::new(&self.calibration.head_from_imu, RestDetection::default()),
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
             projected: 0,
             class_counts: ClassCounts::default(),
             sample: Vec::new(),
+            page_points: Vec::new(),
             failure: None,
             watch,
         };
@@ -125,7 +130,8 @@ impl Registration<'_> {
         beams.files.finish()?;
         let filtered = !self.options.keep_outliers;
         let dead_reckoning = beams.dead_reckoning.finish();
-        Ok(RegisteredCloud { class_counts: beams.class_counts, filtered, sample: beams.sample, dead_reckoning })
+        let BeamProjection { class_counts, sample, page_points, .. } = beams;
+        Ok(RegisteredCloud { class_counts, filtered, sample, page_points, dead_reckoning })
     }
 }
 
@@ -137,6 +143,8 @@ struct Pending {
     point: CloudPoint,
     /// Whether it is a point for viewers.
     displayed: bool,
+    /// Whether it is a point for the page.
+    on_page: bool,
     /// The projected beam if it is in the sample; boxed, because most returns are not.
     sampled: Option<Box<ProjectedPair>>,
 }
@@ -157,6 +165,7 @@ struct BeamProjection<'a, 'w, 's> {
     files: CloudFiles,
     sampled: Thinning,
     displayed: Thinning,
+    on_page: Thinning,
     dead_reckoning: DeadReckoning,
     ready: std::vec::IntoIter<CloudPoint>,
     span: Option<(Stamp, Stamp)>,
@@ -164,6 +173,7 @@ struct BeamProjection<'a, 'w, 's> {
     projected: usize,
     class_counts: ClassCounts,
     sample: Vec<SampledBeam>,
+    page_points: Vec<CloudPoint>,
     failure: Option<StudyError>,
     watch: &'w mut ProgressMonitor<'s>,
 }
@@ -249,7 +259,8 @@ impl BeamProjection<'_, '_, '_> {
             sampled = Some(Box::new((in_map, by_truth)));
         }
         let hit = ProjectedReturn { stamp, point_in_map: in_map.point, origin_in_map: in_map.origin };
-        Ok((hit, Pending { point, displayed: self.displayed.keeps(index), sampled }))
+        let (displayed, on_page) = (self.displayed.keeps(index), self.on_page.keeps(index));
+        Ok((hit, Pending { point, displayed, on_page, sampled }))
     }
 
     /// The last covariance at or before `stamp`, or the first one if there is none.
@@ -270,6 +281,7 @@ impl BeamProjection<'_, '_, '_> {
             self.sample.extend(pending.sampled.map(|pair| SampledBeam { in_map: pair.0, by_truth: pair.1, class }));
             if class == ReturnClass::Static {
                 self.files.point(&pending.point)?;
+                self.page_points.extend(pending.on_page.then_some(pending.point));
                 displayed.extend(pending.displayed.then_some(pending.point));
             }
         }

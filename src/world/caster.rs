@@ -90,8 +90,18 @@ impl Caster {
         (distance <= reach).then(|| Crossing { distance, normal, material: self.materials[at as usize] })
     }
 
-    /// The point of the triangles that is nearest to `point`, within `reach`.
-    pub fn nearest(&self, point: &Vector, reach: f64) -> Option<SurfacePoint> {
+    /// The corners of all triangles, in single precision, with their materials.
+    pub fn triangles(&self) -> impl Iterator<Item = (Triangle, MaterialId)> + '_ {
+        self.faces.iter().zip(&self.materials).flat_map(|(face, material)| {
+            let face = face.to_double();
+            let count = if face.is_parallelogram { 2 } else { 1 };
+            let in_world = |triangle: Triangle| (triangle.map(|corner| corner + self.middle), *material);
+            face.triangles().into_iter().take(count).map(in_world)
+        })
+    }
+
+    /// The point of the triangles that is nearest to `point`, within `reach`, and its material.
+    pub fn nearest(&self, point: &Vector, reach: f64) -> Option<(SurfacePoint, MaterialId)> {
         let local = point - self.middle;
         let probe = single(&local);
         // The search is in single precision; the margin includes a surface exactly at `reach`.
@@ -106,7 +116,8 @@ impl Caster {
         let plane = &self.planes[at as usize];
         let nearest = plane.project(&nearest(at));
         let is_within = (nearest - local).norm() <= reach;
-        is_within.then(|| SurfacePoint { point_in_world: nearest + self.middle, normal_in_world: plane.normal })
+        let surface = SurfacePoint { point_in_world: nearest + self.middle, normal_in_world: plane.normal };
+        is_within.then_some((surface, self.materials[at as usize]))
     }
 }
 

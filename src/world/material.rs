@@ -2,6 +2,13 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MaterialId(pub(super) u16);
 
+impl MaterialId {
+    /// Position of the material in the list of the world's materials.
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+}
+
 /// Optical properties of a surface at the laser wavelength.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {

@@ -80,9 +80,24 @@ impl World {
         distances.min_by(f64::total_cmp)
     }
 
+    /// The static surface point nearest to `point_in_world` within `reach_m` (m), and its material.
+    pub fn nearest_material(&self, point_in_world: &Vector, reach_m: f64) -> Option<(SurfacePoint, MaterialId)> {
+        self.static_surfaces.nearest(point_in_world, reach_m)
+    }
+
+    /// The static triangles: corners in the world, accurate to single precision, and material.
+    pub fn triangles(&self) -> impl Iterator<Item = ([Vector; 3], MaterialId)> + '_ {
+        self.static_surfaces.triangles()
+    }
+
     /// A material of this world.
     pub fn material(&self, id: MaterialId) -> &Material {
-        &self.materials[usize::from(id.0)]
+        &self.materials[id.index()]
+    }
+
+    /// The materials, in the order of [`MaterialId::index`].
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
     }
 
     /// The routes, by name.
@@ -113,6 +128,6 @@ impl World {
 
 impl Surface for World {
     fn nearest(&self, point_in_world: &Vector, reach_m: f64) -> Option<SurfacePoint> {
-        self.static_surfaces.nearest(point_in_world, reach_m)
+        self.nearest_material(point_in_world, reach_m).map(|(point, _)| point)
     }
 }

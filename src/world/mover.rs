@@ -42,7 +42,7 @@ impl Mover {
             return None;
         }
         let in_body = world_from_body.inverse_transform_point(&(*point).into()).coords;
-        Some((self.surfaces.nearest(&in_body, reach)?.point_in_world - in_body).norm())
+        Some((self.surfaces.nearest(&in_body, reach)?.0.point_in_world - in_body).norm())
     }
 }
 

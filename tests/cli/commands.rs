@@ -35,8 +35,8 @@ fn reproducible(mut figures: Value) -> Value {
 fn a_full_run_writes_all_files_independent_of_the_number_of_threads() {
     let here = tempfile::tempdir().unwrap();
     let journey = "--scene mocap_room --duration 8s --seed 3 --out run --json";
-    let (code, one, talk) = run(here.path(), &format!("{journey} --threads 1"));
-    assert_eq!(code, 0, "{talk}");
+    let (code, one, stderr) = run(here.path(), &format!("{journey} --threads 1"));
+    assert_eq!(code, 0, "{stderr}");
     let (code, two, _) = run(here.path(), &format!("{journey} --threads 2"));
     assert_eq!(code, 0);
     let [one, two]: [Value; 2] = [one, two].map(|text| serde_json::from_str(&text).unwrap());
@@ -93,15 +93,15 @@ fn info_and_estimate_read_a_recording_and_report_loss_when_it_is_truncated() {
 
     let bytes = std::fs::read(here.path().join("a.mcap")).unwrap();
     std::fs::write(here.path().join("cut.mcap"), &bytes[..bytes.len() * 2 / 3]).unwrap();
-    let (code, _, talk) = run(here.path(), "info cut.mcap --json");
-    assert_eq!(code, 3, "{talk}");
-    let (code, out, talk) = run(here.path(), "estimate cut.mcap --fixed-views 0 --open-loop --quiet");
-    assert_eq!((code, out.lines().last()), (3, Some("results/cut")), "{talk}");
-    assert!(talk.contains("The file is truncated"), "{talk}");
+    let (code, _, stderr) = run(here.path(), "info cut.mcap --json");
+    assert_eq!(code, 3, "{stderr}");
+    let (code, out, stderr) = run(here.path(), "estimate cut.mcap --fixed-views 0 --open-loop --quiet");
+    assert_eq!((code, out.lines().last()), (3, Some("results/cut")), "{stderr}");
+    assert!(stderr.contains("The file is truncated"), "{stderr}");
     let judged = "evaluate --estimate results/cut/open_loop.tum --truth a.tum --cloud results/cut/cloud.ply --scene \
                   mocap_room --json";
-    let (code, out, talk) = run(here.path(), judged);
-    assert_eq!(code, 0, "{talk}");
+    let (code, out, stderr) = run(here.path(), judged);
+    assert_eq!(code, 0, "{stderr}");
     let figures: Value = serde_json::from_str(&out).unwrap();
     let metrics = std::fs::read_to_string(here.path().join("results/cut/metrics.json")).unwrap();
     let metrics: Value = serde_json::from_str(&metrics).unwrap();
@@ -142,10 +142,10 @@ fn invalid_usage_and_invalid_specs_exit_with_2() {
         ("check bad.ron", "^"),
         ("fly", "unrecognized"),
     ] {
-        let (code, _, talk) = run(here.path(), arguments);
-        assert_eq!(code, 2, "`{arguments}`: {talk}");
-        assert!(talk.contains(words), "`{arguments}` prints: {talk}");
-        assert!(!talk.contains("panicked"));
+        let (code, _, stderr) = run(here.path(), arguments);
+        assert_eq!(code, 2, "`{arguments}`: {stderr}");
+        assert!(stderr.contains(words), "`{arguments}` prints: {stderr}");
+        assert!(!stderr.contains("panicked"));
     }
     assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1, "no file remains");
 }
@@ -160,9 +160,9 @@ fn failures_at_run_time_exit_with_1_and_one_line() {
         ("estimate text.mcap", "not an MCAP file"),
         ("evaluate --estimate text.mcap --truth text.mcap", "text.mcap:1: "),
     ] {
-        let (code, _, talk) = run(here.path(), arguments);
-        assert_eq!(code, 1, "`{arguments}`: {talk}");
-        assert!(talk.contains(words) && talk.lines().count() == 1, "`{arguments}` prints: {talk}");
+        let (code, _, stderr) = run(here.path(), arguments);
+        assert_eq!(code, 1, "`{arguments}`: {stderr}");
+        assert!(stderr.contains(words) && stderr.lines().count() == 1, "`{arguments}` prints: {stderr}");
     }
 }
 
@@ -198,8 +198,8 @@ fn the_kind_of_a_spec_is_determined_from_its_text() {
 fn help_and_completions_go_to_stdout() {
     let here = tempfile::tempdir().unwrap();
     for verb in ["", "simulate", "estimate", "evaluate", "check", "info", "completions"] {
-        let (code, out, talk) = run(here.path(), &format!("{verb} --help"));
-        assert_eq!((code, talk.as_str()), (0, ""));
+        let (code, out, stderr) = run(here.path(), &format!("{verb} --help"));
+        assert_eq!((code, stderr.as_str()), (0, ""));
         assert!(out.trim_end().lines().last().unwrap().trim().starts_with("zsim"), "{out}");
     }
     for shell in ["bash", "zsh", "fish"] {

@@ -100,8 +100,8 @@ fn the_shipped_studies_and_springs_are_valid() {
 #[test]
 fn gains_and_spring_refuse_a_mount_without_a_spring() {
     for arguments in [["gains", "--head", "spinning"], ["gains", "--head", "trawling"]] {
-        let told = predicate::str::contains("there is no spring, hence nothing to characterise");
-        zsim(&arguments).assert().code(2).stderr(told);
+        let message = predicate::str::contains("there is no spring, hence nothing to characterise");
+        zsim(&arguments).assert().code(2).stderr(message);
     }
     zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns the head"));
     zsim(&["check", "spinning", "nodding", "trawling"]).assert().success();

@@ -16,8 +16,8 @@ fn simulate_does_not_replace_files_of_other_origin() {
     let (code, out, _) = run(here.path(), &format!("{SHORT} --out run.mcap"));
     assert_eq!((code, out.lines().last()), (0, Some("run-2.mcap")));
     assert_eq!(read(here.path(), "run.tum"), b"foreign");
-    let (code, _, talk) = run(here.path(), &format!("{SHORT} --out y.tum"));
-    assert!(code == 2 && talk.contains("another ending"), "{talk}");
+    let (code, _, stderr) = run(here.path(), &format!("{SHORT} --out y.tum"));
+    assert!(code == 2 && stderr.contains("another ending"), "{stderr}");
     assert!(!here.path().join("y.tum").exists());
 }
 
@@ -25,8 +25,8 @@ fn simulate_does_not_replace_files_of_other_origin() {
 fn reproduce_does_not_replace_a_table_of_other_origin() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("paper-quick.md"), "# My paper").unwrap();
-    let (code, _, talk) = run(here.path(), "reproduce fig3 --quick --out .");
-    assert!(code == 2 && talk.contains("not written by zsim reproduce"), "{talk}");
+    let (code, _, stderr) = run(here.path(), "reproduce fig3 --quick --out .");
+    assert!(code == 2 && stderr.contains("not written by zsim reproduce"), "{stderr}");
     assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1);
 }
 
@@ -35,14 +35,14 @@ fn force_does_not_replace_inputs_or_files_of_a_failed_run() {
     let here = tempfile::tempdir().unwrap();
     let motion = r#"Replay((poses: Tum("in.tum"), from_route: false, still_s: 1.0, ease_s: 1.0))"#;
     std::fs::write(here.path().join("replay.ron"), motion).unwrap();
-    let (code, _, talk) = run(here.path(), &format!("{SHORT} --out in.mcap"));
-    assert_eq!(code, 0, "{talk}");
+    let (code, _, stderr) = run(here.path(), &format!("{SHORT} --out in.mcap"));
+    assert_eq!(code, 0, "{stderr}");
     let before = ["in.tum", "in.mcap"].map(|name| read(here.path(), name));
-    let (code, _, talk) = run(here.path(), &format!("{SHORT} --motion replay.ron --out in.mcap --force"));
-    assert!(code == 2 && talk.contains("would be replaced by the result"), "{talk}");
+    let (code, _, stderr) = run(here.path(), &format!("{SHORT} --motion replay.ron --out in.mcap --force"));
+    assert!(code == 2 && stderr.contains("would be replaced by the result"), "{stderr}");
     assert!(before == ["in.tum", "in.mcap"].map(|name| read(here.path(), name)));
-    let (code, out, talk) = run(here.path(), &format!("{SHORT} --seed 2 --out in.mcap --force"));
-    assert_eq!((code, out.lines().last()), (0, Some("in.mcap")), "{talk}");
+    let (code, out, stderr) = run(here.path(), &format!("{SHORT} --seed 2 --out in.mcap --force"));
+    assert_eq!((code, out.lines().last()), (0, Some("in.mcap")), "{stderr}");
     assert!(before[1] != read(here.path(), "in.mcap"), "another seed gives another recording");
     assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "no temporary file remains");
 }
@@ -54,8 +54,8 @@ fn a_replaced_folder_has_metrics_only_when_it_is_complete() {
     let here = tempfile::tempdir().unwrap();
     let has = |name: &str| here.path().join("run").join(name).exists();
     let journey = "--scene mocap_room --quiet --out run --force";
-    let (code, _, talk) = run(here.path(), &format!("{journey} --duration 8s"));
-    assert!(code == 0 && has("metrics.json") && has("plots/loops.svg") && has("map.ply"), "{talk}");
+    let (code, _, stderr) = run(here.path(), &format!("{journey} --duration 8s"));
+    assert!(code == 0 && has("metrics.json") && has("plots/loops.svg") && has("map.ply"), "{stderr}");
     std::fs::write(here.path().join("run/notes.txt"), "mine").unwrap();
     std::fs::write(here.path().join("run/.partial-x"), "half of a cloud").unwrap();
 
@@ -76,8 +76,8 @@ fn a_replaced_folder_has_metrics_only_when_it_is_complete() {
     assert_eq!(old_files.map(has), [false; 6], "the incomplete folder has files of the old run");
 
     // Without loop closure, no closed-loop file of the first run remains.
-    let (code, _, talk) = run(here.path(), &format!("{journey} --duration 8s --open-loop"));
-    assert!(code == 0 && has("metrics.json") && has("open_loop.tum"), "{talk}");
+    let (code, _, stderr) = run(here.path(), &format!("{journey} --duration 8s --open-loop"));
+    assert!(code == 0 && has("metrics.json") && has("open_loop.tum"), "{stderr}");
     assert_eq!(["closed_loop.tum", "plots/loops.svg", "map.ply"].map(has), [false; 3]);
     assert_eq!(read(here.path(), "run/notes.txt"), b"mine", "files of other origin remain");
 }
@@ -85,14 +85,14 @@ fn a_replaced_folder_has_metrics_only_when_it_is_complete() {
 #[test]
 fn force_does_not_replace_the_map_used_for_localisation() {
     let here = tempfile::tempdir().unwrap();
-    let (code, _, talk) = run(here.path(), "--scene mocap_room --duration 8s --quiet --out run");
-    assert_eq!(code, 0, "{talk}");
+    let (code, _, stderr) = run(here.path(), "--scene mocap_room --duration 8s --quiet --out run");
+    assert_eq!(code, 0, "{stderr}");
     let map = read(here.path(), "run/map.ply");
     let in_place = "estimate run/recording.mcap --map run/map.ply --extend-map --quiet --out run --force";
-    let (code, _, talk) = run(here.path(), in_place);
+    let (code, _, stderr) = run(here.path(), in_place);
     assert!(
-        code == 2 && talk.contains("map.ply is an input of this command and would be replaced by the result"),
-        "{talk}"
+        code == 2 && stderr.contains("map.ply is an input of this command and would be replaced by the result"),
+        "{stderr}"
     );
     assert!(map == read(here.path(), "run/map.ply"));
 }
@@ -116,8 +116,8 @@ fn a_signal_closes_the_files_and_determines_the_exit_code() {
         }
         assert!(Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap().success());
         assert_eq!(child.wait().unwrap().code(), Some(code));
-        let (code, _, talk) = run(here.path(), "info long.mcap");
-        assert_eq!(code, 0, "the recording is complete: {talk}");
+        let (code, _, stderr) = run(here.path(), "info long.mcap");
+        assert_eq!(code, 0, "the recording is complete: {stderr}");
     }
 }
 
@@ -146,8 +146,8 @@ fn out_of_range_numbers_are_refused_with_their_limit() {
         ("gains --period 1e9", "more than 10000:"),
         ("check office --threads 1000000", "from 1 to 1024"),
     ] {
-        let (code, _, talk) = run(here.path(), arguments);
-        assert!(code == 2 && talk.contains(words), "`{arguments}`: {code} {talk}");
+        let (code, _, stderr) = run(here.path(), arguments);
+        assert!(code == 2 && stderr.contains(words), "`{arguments}`: {code} {stderr}");
     }
     assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "no file remains");
 }
@@ -162,8 +162,8 @@ fn a_recording_larger_than_the_disk_is_not_started() {
     let text = text.replace("rate_hz: 10,", "rate_hz: 28,").replace("beams: 20000,", "beams: 1048576,");
     std::fs::write(here.path().join("dense.ron"), text).unwrap();
     let dense = "simulate --scene mocap_room --motion stand --lidar dense.ron --duration 168h --out a.mcap";
-    let (code, _, talk) = run(here.path(), dense);
-    assert!(code == 1 && talk.contains("GB free"), "{talk}");
+    let (code, _, stderr) = run(here.path(), dense);
+    assert!(code == 1 && stderr.contains("GB free"), "{stderr}");
     assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1);
 }
 
@@ -184,11 +184,11 @@ fn empty_and_out_of_range_trajectories_are_errors() {
         ),
         ("evaluate --estimate poses.tum --truth far.tum", "far.tum: "),
     ] {
-        let (code, _, talk) = run(here.path(), arguments);
-        assert!(code == 1 && talk.contains(words), "`{arguments}`: {code} {talk}");
+        let (code, _, stderr) = run(here.path(), arguments);
+        assert!(code == 1 && stderr.contains(words), "`{arguments}`: {code} {stderr}");
     }
-    let (code, out, talk) = run(here.path(), "evaluate --estimate marked.tum --truth poses.tum");
-    assert!(code == 0 && out.contains("position_rmse_m"), "with a byte order mark: {talk}");
+    let (code, out, stderr) = run(here.path(), "evaluate --estimate marked.tum --truth poses.tum");
+    assert!(code == 0 && out.contains("position_rmse_m"), "with a byte order mark: {stderr}");
 }
 
 #[test]
@@ -198,9 +198,9 @@ fn control_characters_do_not_reach_the_terminal() {
     std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/imus/3dm_gx2.ron"), here.path().join(name))
         .unwrap();
     for (arguments, code) in [(format!("check {name}"), 0), (format!("check missing{name}"), 2)] {
-        let (ended, out, talk) = run(here.path(), &arguments);
-        assert_eq!(ended, code, "{talk}");
-        assert!(!(out + &talk).contains(['\u{1b}', '\u{7}']));
+        let (ended, out, stderr) = run(here.path(), &arguments);
+        assert_eq!(ended, code, "{stderr}");
+        assert!(!(out + &stderr).contains(['\u{1b}', '\u{7}']));
     }
     let (_, out, _) = run(here.path(), &format!("check {name}"));
     assert!(out.starts_with("\\u{1b}]0;title\\u{7}.ron: "), "{out}");

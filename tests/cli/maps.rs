@@ -7,8 +7,8 @@ use serde_json::Value;
 fn a_recording_is_localised_in_the_map_of_another_and_maps_are_merged() {
     let here = tempfile::tempdir().unwrap();
     let done = |arguments: &str| {
-        let (code, out, talk) = run(here.path(), arguments);
-        assert_eq!(code, 0, "{arguments}: {talk}");
+        let (code, out, stderr) = run(here.path(), arguments);
+        assert_eq!(code, 0, "{arguments}: {stderr}");
         out
     };
     let has = |file: &str| here.path().join(file).exists();
@@ -19,15 +19,15 @@ fn a_recording_is_localised_in_the_map_of_another_and_maps_are_merged() {
     }
     // Localised at rest with a level scan, the head's height in the map is uncertain until it swings.
     let localise = "estimate b.mcap --map a/map.ply --start 0.3,0.2,0,5 --extend-map --cloud-format las --out c --json";
-    let (code, told, talk) = run(here.path(), localise);
-    assert_eq!(code, 3, "{talk}");
+    let (code, metrics, stderr) = run(here.path(), localise);
+    assert_eq!(code, 3, "{stderr}");
     assert!(has("c/map.ply") && has("c/cloud.las") && !has("c/cloud.ply") && !has("c/closed_loop.tum"));
-    let told: Value = serde_json::from_str(&told).unwrap();
-    let causes = told["integrity"]["causes"].as_array().unwrap();
-    assert!(causes.len() == 1 && causes[0]["kind"] == "uncertain" && told["status"] == "degraded", "{causes:?}");
-    assert_eq!(told["integrity"]["within_bound"].as_f64(), Some(1.0));
-    assert!(told["open_loop"]["position_rmse_m"].as_f64().unwrap() < 0.01, "{told}");
-    let cloud = &told["cloud"];
+    let metrics: Value = serde_json::from_str(&metrics).unwrap();
+    let causes = metrics["integrity"]["causes"].as_array().unwrap();
+    assert!(causes.len() == 1 && causes[0]["kind"] == "uncertain" && metrics["status"] == "degraded", "{causes:?}");
+    assert_eq!(metrics["integrity"]["within_bound"].as_f64(), Some(1.0));
+    assert!(metrics["open_loop"]["position_rmse_m"].as_f64().unwrap() < 0.01, "{metrics}");
+    let cloud = &metrics["cloud"];
     let count = |key: &str| cloud["filter"][key].as_u64().unwrap();
     let dropped = count("dropped_mixed") + count("dropped_isolated") + count("dropped_moving");
     assert_eq!(count("kept") + dropped, cloud["points"].as_u64().unwrap());
@@ -44,15 +44,15 @@ fn a_recording_is_localised_in_the_map_of_another_and_maps_are_merged() {
 fn people_are_removed_from_a_cloud_and_static_surfaces_are_not() {
     let here = tempfile::tempdir().unwrap();
     let done = |arguments: &str| {
-        let (code, out, talk) = run(here.path(), arguments);
-        assert_eq!(code, 0, "{arguments}: {talk}");
+        let (code, out, stderr) = run(here.path(), arguments);
+        assert_eq!(code, 0, "{arguments}: {stderr}");
         out
     };
     done("simulate --scene office_people --duration 20s --seed 9 --out people.mcap");
-    let told: Value = serde_json::from_str(&done("estimate people.mcap --open-loop --out a --json")).unwrap();
-    let dropped = |of: &str| told["cloud"]["filter"][of].as_f64().unwrap();
-    assert!(dropped("movers_dropped_fraction") > 0.6, "{told}");
-    assert!(dropped("standing_dropped_fraction") < 0.01, "{told}");
+    let metrics: Value = serde_json::from_str(&done("estimate people.mcap --open-loop --out a --json")).unwrap();
+    let dropped = |of: &str| metrics["cloud"]["filter"][of].as_f64().unwrap();
+    assert!(dropped("movers_dropped_fraction") > 0.6, "{metrics}");
+    assert!(dropped("standing_dropped_fraction") < 0.01, "{metrics}");
 }
 
 #[test]
@@ -60,15 +60,15 @@ fn invalid_maps_and_starts_are_errors_and_create_no_folder() {
     let here = tempfile::tempdir().unwrap();
     std::fs::write(here.path().join("broken.ply"), "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n").unwrap();
     std::fs::write(here.path().join("a.mcap"), "").unwrap();
-    let (code, _, talk) = run(here.path(), "estimate a.mcap --map broken.ply --out out");
+    let (code, _, stderr) = run(here.path(), "estimate a.mcap --map broken.ply --out out");
     assert!(
-        code == 1 && talk.contains("broken.ply:4: this is a PLY file, but not a surfel map of zsim"),
-        "{code} {talk}"
+        code == 1 && stderr.contains("broken.ply:4: this is a PLY file, but not a surfel map of zsim"),
+        "{code} {stderr}"
     );
-    let (code, _, talk) = run(here.path(), "map merge broken.ply absent.ply --out both.ply");
-    assert!(code == 1 && talk.contains("broken.ply:4"), "{code} {talk}");
-    let (code, _, talk) = run(here.path(), "estimate a.mcap --map broken.ply --start 1,2");
-    assert!(code == 2 && talk.contains("four numbers x,y,z,yaw are needed; here are 2"), "{code} {talk}");
+    let (code, _, stderr) = run(here.path(), "map merge broken.ply absent.ply --out both.ply");
+    assert!(code == 1 && stderr.contains("broken.ply:4"), "{code} {stderr}");
+    let (code, _, stderr) = run(here.path(), "estimate a.mcap --map broken.ply --start 1,2");
+    assert!(code == 2 && stderr.contains("four numbers x,y,z,yaw are needed; here are 2"), "{code} {stderr}");
     let (code, _, _) = run(here.path(), "estimate a.mcap --extend-map");
     assert_eq!(code, 2, "without a map there is nothing to extend");
     assert!(!here.path().join("out").exists() && !here.path().join("both.ply").exists());

@@ -180,10 +180,10 @@ fn rigid_mounts_have_no_gains_and_no_spring() {
         let head: HeadModel = shipped(name);
         assert!(head.linear_modes().is_empty() && head.linear().is_none());
         let error = gain_curves(&head, &GainPlan::default(), &|_| ()).unwrap_err();
-        let told = error.to_string();
+        let message = error.to_string();
         assert!(
-            error.is_invalid_input() && told.contains(because) && told.contains("nothing to characterise"),
-            "{told}"
+            error.is_invalid_input() && message.contains(because) && message.contains("nothing to characterise"),
+            "{message}"
         );
     }
 }

@@ -65,12 +65,12 @@ fn a_pose_without_a_base_solution_affects_only_its_neighbours() {
         let shift = if k == 500 { Vector::x() * 2.0 } else { Vector::zeros() };
         (stamp, Pose::from_parts((pose.translation.vector + shift).into(), pose.rotation))
     });
-    let told = model.base_from_force_law(&Trajectory::from_poses(thrown).unwrap()).unwrap();
-    assert!((whole.len() - 10..whole.len()).contains(&told.len()), "{} of {}", told.len(), whole.len());
+    let estimated = model.base_from_force_law(&Trajectory::from_poses(thrown).unwrap()).unwrap();
+    assert!((whole.len() - 10..whole.len()).contains(&estimated.len()), "{} of {}", estimated.len(), whole.len());
     let far = |stamp: Stamp| stamp.seconds_since(Stamp::default()) > 5.1 || stamp.seconds_since(Stamp::default()) < 4.9;
     let whole = Trajectory::from_poses(whole).unwrap();
-    let told: Vec<_> = told.into_iter().filter(|(stamp, _)| far(*stamp)).collect();
-    let (shift, turn) = largest_difference(&told, &whole);
+    let estimated: Vec<_> = estimated.into_iter().filter(|(stamp, _)| far(*stamp)).collect();
+    let (shift, turn) = largest_difference(&estimated, &whole);
     assert!(shift < 1e-3 && turn < 0.1, "{shift} m, {turn} degrees");
 }
 

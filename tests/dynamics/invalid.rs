@@ -141,7 +141,7 @@ fn an_invalid_carrier_is_an_error_with_its_line() {
     };
     // The head is on a spring of 120 mm, with its laser 100 mm higher.
     let around = "name: \"post\", foot_in_base_m: (0.0, 0.0, 0.2), radius_m: 0.05, height_m: 0.1, reflectance: 0.5";
-    let told = |from: &str, to: &str| {
+    let error_of = |from: &str, to: &str| {
         assert!(around.contains(from), "{from}");
         with(&around.replacen(from, to, 1)).unwrap_err().to_string()
     };
@@ -156,7 +156,7 @@ fn an_invalid_carrier_is_an_error_with_its_line() {
         ("foot_in_base_m: (0.0,", "foot_in_base_m: (NaN,", "NaN"),
         ("radius_m: 0.05", "radios_m: 0.05", "radios_m"),
     ] {
-        let error = told(from, to);
+        let error = error_of(from, to);
         assert!(error.starts_with("head.ron:22:") && error.contains(part), "{to}: {error}");
     }
 }

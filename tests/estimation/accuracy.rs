@@ -203,8 +203,8 @@ fn short_gaps_of_the_imu_are_bridged() {
     for (seed, gap_s) in [(15, 0.06), (16, 0.1)] {
         let silent = |t_s: f64| [5.2, 8.3, 10.9].iter().any(|from_s| (*from_s..from_s + gap_s).contains(&t_s));
         let (result, score) = lossy(seed, |m| matches!(m, Measurement::Imu(_)) && silent(seconds(m)));
-        let said = warned(&result, |kind| matches!(kind, WarningKind::ImuGap { .. }));
-        assert_eq!(said, 3, "{:?}", result.warnings);
+        let count = warned(&result, |kind| matches!(kind, WarningKind::ImuGap { .. }));
+        assert_eq!(count, 3, "{:?}", result.warnings);
         assert!(score.rmse_m < 0.02, "{gap_s} s: {score:?}");
     }
 }
@@ -214,8 +214,8 @@ fn after_longer_gaps_of_the_imu_the_head_is_relocalised() {
     for (seed, gap_s) in [(15, 0.15), (16, 0.3), (17, 1.0)] {
         let is_silent = |m: &Measurement| (6.2..6.2 + gap_s).contains(&seconds(m));
         let (result, score) = lossy(seed, |m| matches!(m, Measurement::Imu(_)) && is_silent(m));
-        let said = warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. }));
-        assert_eq!(said, 1, "{gap_s} s: {:?}", result.warnings);
+        let count = warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. }));
+        assert_eq!(count, 1, "{gap_s} s: {:?}", result.warnings);
         assert!(score.worst_m < 0.05, "{gap_s} s: {score:?}");
     }
 }
@@ -310,9 +310,9 @@ fn bias_and_noise_above_specification_are_estimated_at_rest() {
             sample.angular_velocity_rad_per_s += Vector::new(0.03, -0.03, 0.03) + noise;
         }
     }
-    let mut told = calibration();
-    told.imu.gyro_turn_on_bias_rad_per_s = 0.02;
-    let result = estimate_all(&spec(), &told, measurements.into_iter()).unwrap();
+    let mut raised = calibration();
+    raised.imu.gyro_turn_on_bias_rad_per_s = 0.02;
+    let result = estimate_all(&spec(), &raised, measurements.into_iter()).unwrap();
     let noisy = |kind: &WarningKind| matches!(kind, WarningKind::NoisyImu { gyro, .. } if (2.0..6.0).contains(gyro));
     assert!(result.warnings.iter().any(|w| noisy(&w.kind)), "{:?}", result.warnings);
     assert!(!result.warnings.iter().any(|w| w.kind == WarningKind::StartedInMotion), "{:?}", result.warnings);

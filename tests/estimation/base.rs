@@ -155,15 +155,15 @@ fn input_that_cannot_be_smoothed_is_an_error_with_the_reason() {
 fn an_imu_on_the_base_improves_a_simulated_handle_trajectory() {
     let here = tempfile::tempdir().unwrap();
     let simulate = "simulate --scene mocap_room --duration 14s --seed 5 --lidar lms291 --base-imu 3dm_gx2 --out a.mcap";
-    let (code, _, talk) = run(here.path(), simulate);
-    assert_eq!(code, 0, "{talk}");
+    let (code, _, stderr) = run(here.path(), simulate);
+    assert_eq!(code, 0, "{stderr}");
     // Subsampled to the rate of an estimate; the ground truth has 1000 poses/s.
     let truth = std::fs::read_to_string(here.path().join("a.tum")).unwrap();
     let head: Vec<_> = truth.lines().filter(|line| !line.starts_with('#')).step_by(10).collect();
     std::fs::write(here.path().join("head.tum"), head.join("\n") + "\n").unwrap();
     let base = "base head.tum --truth a.mcap --base-imu a.mcap --json --out base";
-    let (code, out, talk) = run(here.path(), base);
-    assert_eq!(code, 0, "{talk}");
+    let (code, out, stderr) = run(here.path(), base);
+    assert_eq!(code, 0, "{stderr}");
     let figures: Value = serde_json::from_str(&out).unwrap();
     let figure = |way: &str, key: &str| figures[way][key].as_f64().unwrap();
     assert!(figure("imu", "rotation_rmse_deg") < 0.05 * figure("rigid_link", "rotation_rmse_deg"), "{out}");
@@ -178,7 +178,7 @@ fn an_imu_on_the_base_improves_a_simulated_handle_trajectory() {
     for (topic, words) in
         [("/nope", "/base/imu (sensor_msgs/msg/Imu)"), ("/imu/data_raw", "does not match the rotation")]
     {
-        let (code, _, talk) = run(here.path(), &format!("{base} --base-imu-topic {topic}"));
-        assert!(code == 1 && talk.contains(words) && !talk.contains("panicked"), "{topic}: {talk}");
+        let (code, _, stderr) = run(here.path(), &format!("{base} --base-imu-topic {topic}"));
+        assert!(code == 1 && stderr.contains(words) && !stderr.contains("panicked"), "{topic}: {stderr}");
     }
 }

@@ -66,8 +66,8 @@ fn full_run(case: &Case) -> (i32, String, String, Option<String>) {
         "--scene {scene} --lidar {lidar} --motion {motion} --duration {duration_s}s --seed 3 --faults faults.ron \
          --open-loop --threads 1 --quiet --json --out run"
     );
-    let (code, figures, talk) = run(here.path(), &command);
-    (code, figures, talk, std::fs::read_to_string(here.path().join("run/open_loop.tum")).ok())
+    let (code, figures, stderr) = run(here.path(), &command);
+    (code, figures, stderr, std::fs::read_to_string(here.path().join("run/open_loop.tum")).ok())
 }
 
 /// Keys of all causes, losses and notes that a result states.
@@ -88,10 +88,10 @@ fn errors(metrics: &Value) -> (f64, f64) {
 
 fn check(case: &Case) {
     let name = case.name;
-    let (code, figures, talk, poses) = full_run(case);
-    assert_eq!(code, case.code, "{name}: {talk}");
+    let (code, figures, stderr, poses) = full_run(case);
+    assert_eq!(code, case.code, "{name}: {stderr}");
     if code == 1 {
-        assert!(case.stated.iter().all(|words| talk.contains(words)), "{name}: {talk}");
+        assert!(case.stated.iter().all(|words| stderr.contains(words)), "{name}: {stderr}");
         return;
     }
     let metrics: Value = serde_json::from_str(&figures).unwrap();

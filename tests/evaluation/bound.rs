@@ -126,8 +126,8 @@ fn a_range_offset_is_observable_with_walls_on_two_sides_and_not_on_one() {
     // With walls on both sides the difference observes the position, and the sum the offset: 2 n ranges each.
     let two = bound(model, at_rest, 4.0, &[Vector::x(), -Vector::x()]);
     assert_relative_eq!(two.axis_rmse_m.x.powi(2), mean_variance(3.0, 2 * n), max_relative = 0.01);
-    let told = 2.0 * n as f64 / (SIGMA_M * SIGMA_M) + 1.0 / 0.005_f64.powi(2);
-    assert_relative_eq!(two.range_offset_m.powi(2), 1.0 / told, max_relative = 0.01);
+    let information = 2.0 * n as f64 / (SIGMA_M * SIGMA_M) + 1.0 / 0.005_f64.powi(2);
+    assert_relative_eq!(two.range_offset_m.powi(2), 1.0 / information, max_relative = 0.01);
 }
 
 #[test]

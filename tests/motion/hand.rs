@@ -223,15 +223,15 @@ fn the_wave_goes_twice_round_its_box_with_constant_heading() {
 
 #[test]
 fn an_invalid_route_is_an_error_with_the_reason() {
-    let said = |route: Option<&Route>| edited("hand", &[], route).err().unwrap().to_string();
+    let error_of = |route: Option<&Route>| edited("hand", &[], route).err().unwrap().to_string();
     let line = |points: &[[f64; 3]]| route(points, false);
-    assert!(said(None).contains("the scene names none"));
-    assert!(said(Some(&line(&[[0.0; 3]]))).contains("has 1 point"));
-    assert!(said(Some(&line(&[[0.0; 3], [0.3, 0.0, 0.0]]))).contains("0.30 m long"));
-    assert!(said(Some(&line(&[[0.0; 3], [0.0; 3], [5.0, 0.0, 0.0]]))).contains("points 0 and 1"));
-    assert!(said(Some(&line(&[[0.0; 3], [f64::NAN, 0.0, 0.0]]))).contains("point 1 of the route"));
+    assert!(error_of(None).contains("the scene names none"));
+    assert!(error_of(Some(&line(&[[0.0; 3]]))).contains("has 1 point"));
+    assert!(error_of(Some(&line(&[[0.0; 3], [0.3, 0.0, 0.0]]))).contains("0.30 m long"));
+    assert!(error_of(Some(&line(&[[0.0; 3], [0.0; 3], [5.0, 0.0, 0.0]]))).contains("points 0 and 1"));
+    assert!(error_of(Some(&line(&[[0.0; 3], [f64::NAN, 0.0, 0.0]]))).contains("point 1 of the route"));
     let closed = route(&[[0.0; 3], [5.0, 0.0, 0.0], [5.0, 5.0, 0.0], [0.0; 3]], true);
-    assert!(said(Some(&closed)).contains("points 3 and 0"));
+    assert!(error_of(Some(&closed)).contains("points 3 and 0"));
 }
 
 #[test]

@@ -81,13 +81,13 @@ fn a_sweep_covers_its_band_at_constant_amplitude() {
 
 #[test]
 fn invalid_test_signals_are_errors() {
-    let said = |name: &str, from: &str, to: &str| edited(name, from, to, 60.0).err().unwrap().to_string();
-    assert!(said("multisine", "DegreesPerS(1.0)", "Metres(1.0)").contains("does not fit the axis Pitch"));
-    assert!(said("multisine", "DegreesPerS(1.0)", "DegreesPerS(-1.0)").contains("above 0"));
-    assert!(said("multisine", "high_hz: 10.0", "high_hz: 0.05").contains("not above its begin"));
-    assert!(said("multisine", "period_s: 20.0", "period_s: 1e9").contains("lines from"));
-    assert!(said("swept_sine", "still_s: 1.0", "still_s: 61.0").contains("before the sweep begins"));
-    assert!(said("swept_sine", "axis: Pitch", "axis: Nod").contains("Nod"));
+    let error_of = |name: &str, from: &str, to: &str| edited(name, from, to, 60.0).err().unwrap().to_string();
+    assert!(error_of("multisine", "DegreesPerS(1.0)", "Metres(1.0)").contains("does not fit the axis Pitch"));
+    assert!(error_of("multisine", "DegreesPerS(1.0)", "DegreesPerS(-1.0)").contains("above 0"));
+    assert!(error_of("multisine", "high_hz: 10.0", "high_hz: 0.05").contains("not above its begin"));
+    assert!(error_of("multisine", "period_s: 20.0", "period_s: 1e9").contains("lines from"));
+    assert!(error_of("swept_sine", "still_s: 1.0", "still_s: 61.0").contains("before the sweep begins"));
+    assert!(error_of("swept_sine", "axis: Pitch", "axis: Nod").contains("Nod"));
 }
 
 #[test]
@@ -124,19 +124,19 @@ fn a_replay_passes_through_the_recorded_poses() {
 
 #[test]
 fn a_replay_of_invalid_poses_is_an_error() {
-    let said = |poses: &str| {
+    let error_of = |poses: &str| {
         let text = format!("Replay((poses: {poses}, from_route: false, still_s: 1.0, ease_s: 0.5))");
         build("replay", text, 20.0).err().unwrap().to_string()
     };
     let row = |t: &str, yaw: &str| format!("({t}, (0.0, 0.0, 1.0), (0.0, 0.0, {yaw})),");
     let here = |rows: &[String]| format!("Here([{}])", rows.concat());
-    assert!(said("Here([])").contains("no poses"));
-    assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "0.0")])).contains("3 poses"));
-    assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "0.0"), row("0.5", "0.0")])).contains("not later"));
-    assert!(said(&here(&[row("0.0", "0.0"), row("NaN", "0.0"), row("2.0", "0.0")])).contains("not finite"));
-    assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "NaN"), row("2.0", "0.0")])).contains("not finite"));
-    assert!(said(&here(&[row("0.0", "0.0"), row("1.0", "120.0"), row("2.0", "0.0")])).contains("120 degrees"));
-    assert!(said("Tum(\"nowhere.tum\")").contains("nowhere.tum"));
+    assert!(error_of("Here([])").contains("no poses"));
+    assert!(error_of(&here(&[row("0.0", "0.0"), row("1.0", "0.0")])).contains("3 poses"));
+    assert!(error_of(&here(&[row("0.0", "0.0"), row("1.0", "0.0"), row("0.5", "0.0")])).contains("not later"));
+    assert!(error_of(&here(&[row("0.0", "0.0"), row("NaN", "0.0"), row("2.0", "0.0")])).contains("not finite"));
+    assert!(error_of(&here(&[row("0.0", "0.0"), row("1.0", "NaN"), row("2.0", "0.0")])).contains("not finite"));
+    assert!(error_of(&here(&[row("0.0", "0.0"), row("1.0", "120.0"), row("2.0", "0.0")])).contains("120 degrees"));
+    assert!(error_of("Tum(\"nowhere.tum\")").contains("nowhere.tum"));
 }
 
 #[test]
@@ -158,13 +158,13 @@ fn each_road_class_doubles_the_acceleration() {
 
 #[test]
 fn invalid_machine_motions_are_errors() {
-    let said = |name: &str, from: &str, to: &str| edited(name, from, to, 60.0).err().unwrap().to_string();
-    assert!(said("vehicle", "spring_n_per_m: 20000.0", "spring_n_per_m: 500.0").contains("tips it over"));
-    assert!(said("vehicle", "Class(D)", "Class(Z)").contains('Z'));
-    assert!(said("marine", "peakedness: 3.3", "peakedness: 40.0").contains("from 1 to 7"));
-    assert!(said("marine", "spreading: 4.0", "spreading: 1e9").contains("up to 1000"));
-    assert!(said("uav", "airspeed_m_per_s: 4.0", "airspeed_m_per_s: 0.0").contains("above 0"));
-    assert!(said("legged", "stride_hz: 1.6", "stride_hz: inf").contains("finite"));
+    let error_of = |name: &str, from: &str, to: &str| edited(name, from, to, 60.0).err().unwrap().to_string();
+    assert!(error_of("vehicle", "spring_n_per_m: 20000.0", "spring_n_per_m: 500.0").contains("tips it over"));
+    assert!(error_of("vehicle", "Class(D)", "Class(Z)").contains('Z'));
+    assert!(error_of("marine", "peakedness: 3.3", "peakedness: 40.0").contains("from 1 to 7"));
+    assert!(error_of("marine", "spreading: 4.0", "spreading: 1e9").contains("up to 1000"));
+    assert!(error_of("uav", "airspeed_m_per_s: 4.0", "airspeed_m_per_s: 0.0").contains("above 0"));
+    assert!(error_of("legged", "stride_hz: 1.6", "stride_hz: inf").contains("finite"));
     for name in ["vehicle", "cart", "uav", "legged"] {
         let source = find(Kind::Motion, name).unwrap();
         let spec: MotionSpec = parse(&source).unwrap();

@@ -78,22 +78,22 @@ fn recordings_of_base_and_head_are_replayed() {
 fn a_recording_that_cannot_be_replayed_is_an_error() {
     let here = tempfile::tempdir().unwrap();
     recorded(here.path());
-    let told = |poses: &str| replay(here.path(), poses).err().unwrap_or_else(|| panic!("{poses} was played"));
-    let of_scans = told("Recording(file: \"walk.mcap\", topic: \"/scan\")");
+    let error_of = |poses: &str| replay(here.path(), poses).err().unwrap_or_else(|| panic!("{poses} was played"));
+    let of_scans = error_of("Recording(file: \"walk.mcap\", topic: \"/scan\")");
     assert!(of_scans.contains("topic /scan is missing or not of type nav_msgs/msg/Odometry"), "{of_scans}");
     assert!(
         of_scans.contains("/ground_truth/base (geometry_msgs/msg/PoseStamped)"),
         "the error lists the topics: {of_scans}"
     );
-    assert!(told("Recording(file: \"walk.mcap\", topic: \"/odom\")").contains("topic /odom is missing"));
-    assert!(told("Recording(file: \"nowhere.mcap\")").contains("nowhere.mcap"));
-    assert!(told("Recording(file: \"again.ron\")").contains("not an MCAP file"));
-    assert!(told("Recording(path: \"walk.mcap\")").contains("path"));
+    assert!(error_of("Recording(file: \"walk.mcap\", topic: \"/odom\")").contains("topic /odom is missing"));
+    assert!(error_of("Recording(file: \"nowhere.mcap\")").contains("nowhere.mcap"));
+    assert!(error_of("Recording(file: \"again.ron\")").contains("not an MCAP file"));
+    assert!(error_of("Recording(path: \"walk.mcap\")").contains("path"));
 
     let whole = std::fs::read(here.path().join("walk.mcap")).unwrap();
     for kept in [whole.len() - 1, whole.len() / 2, 200] {
         std::fs::write(here.path().join("cut.mcap"), &whole[..kept]).unwrap();
-        let cut = told("Recording(file: \"cut.mcap\")");
+        let cut = error_of("Recording(file: \"cut.mcap\")");
         assert!(cut.contains("cut.mcap") && (cut.contains("cut short") || cut.contains("is missing")), "{cut}");
         assert!(cut.contains("again.ron:1:"), "it says where: {cut}");
     }
@@ -101,5 +101,5 @@ fn a_recording_that_cannot_be_replayed_is_an_error() {
     let middle = whole.len() / 2;
     damaged[middle..middle + 64].fill(0xA5);
     std::fs::write(here.path().join("damaged.mcap"), &damaged).unwrap();
-    assert!(told("Recording(file: \"damaged.mcap\")").contains("cut short or damaged"));
+    assert!(error_of("Recording(file: \"damaged.mcap\")").contains("cut short or damaged"));
 }

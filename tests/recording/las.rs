@@ -30,7 +30,7 @@ fn laspy_reads_coordinates_intensity_time_and_error() {
     std::fs::write(&expected, text).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/check_las.py");
     let Some(output) = run_or_skip("laspy", python().args([&script, &las, &expected])) else { return };
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
-    assert!(said.starts_with("ok 5000 "), "{said}");
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{stdout}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(stdout.starts_with("ok 5000 "), "{stdout}");
 }

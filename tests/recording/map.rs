@@ -87,22 +87,24 @@ fn another_ply_reader_reads_the_surfels() {
 
 #[test]
 fn files_that_are_not_a_map_are_errors_of_one_line() {
-    let said = |file: &[u8]| read(file).unwrap_err();
-    assert_eq!(said(b"solid x\n"), "map.ply:1: this is not a PLY file: it does not start with `ply`");
+    let error_of = |file: &[u8]| read(file).unwrap_err();
+    assert_eq!(error_of(b"solid x\n"), "map.ply:1: this is not a PLY file: it does not start with `ply`");
     let cloud = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n";
     assert_eq!(
-        said(cloud),
+        error_of(cloud),
         "map.ply:5: this is a PLY file, but not a surfel map of zsim: no comment `zsim surfel map`"
     );
-    let next = said(&with("zsim surfel map 1", "zsim surfel map 2"));
+    let next = error_of(&with("zsim surfel map 1", "zsim surfel map 2"));
     assert!(next.ends_with("the map has version 2; this program reads version 1"), "{next}");
-    assert!(said(&with("property double sigma\n", "")).ends_with("the properties are not those of surfels"));
-    assert!(said(&with("comment levels 4\n", "")).ends_with("the comment `levels` is missing"));
-    assert!(said(&with("levels 4", "levels many")).ends_with("`many` is not a valid `levels`"));
-    assert!(said(&with("element vertex 40", "element vertex 39")).ends_with("the file has data after its 39 surfels"));
-    let huge = said(&with("element vertex 40", "element vertex 18446744073709551615"));
+    assert!(error_of(&with("property double sigma\n", "")).ends_with("the properties are not those of surfels"));
+    assert!(error_of(&with("comment levels 4\n", "")).ends_with("the comment `levels` is missing"));
+    assert!(error_of(&with("levels 4", "levels many")).ends_with("`many` is not a valid `levels`"));
+    assert!(
+        error_of(&with("element vertex 40", "element vertex 39")).ends_with("the file has data after its 39 surfels")
+    );
+    let huge = error_of(&with("element vertex 40", "element vertex 18446744073709551615"));
     assert!(huge.ends_with("the file ends 18446744073709551575 surfels early"), "{huge}");
-    assert!(said(&FILE[..FILE.len() - 1]).ends_with("the file ends 1 surfels early"));
+    assert!(error_of(&FILE[..FILE.len() - 1]).ends_with("the file ends 1 surfels early"));
 }
 
 #[test]
@@ -119,8 +121,8 @@ fn invalid_surfels_with_a_correct_checksum_are_refused() {
         // Surfel 2 of 113 bytes each.
         file[end + 2 * 113 + 8 * at..][..8].copy_from_slice(&f64::to_le_bytes(value));
         assert!(read(&file).unwrap_err().contains("its checksum does not match"));
-        let said = read(&with_checksum(file, 40)).unwrap_err();
-        assert!(said.ends_with(&format!("surfel 2: {about}")), "{said}");
+        let error_of = read(&with_checksum(file, 40)).unwrap_err();
+        assert!(error_of.ends_with(&format!("surfel 2: {about}")), "{error_of}");
     }
 }
 

@@ -30,9 +30,9 @@ fn here(path: &str) -> PathBuf {
 fn read_by_others(name: &str, folder: &Path) -> Option<PathBuf> {
     let path = recording_in(folder);
     let output = run_or_skip(name, python().arg(here("tests/check_mcap.py")).arg(&path))?;
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
-    assert!(said.starts_with("ok "), "{said}");
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{stdout}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(stdout.starts_with("ok "), "{stdout}");
     Some(path)
 }
 
@@ -58,6 +58,6 @@ fn the_acceptance_check_passes() {
         "/ground_truth/odom:nav_msgs/msg/Odometry",
     ];
     let output = python().arg(script).arg(recording).arg("--need").args(needs).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{stdout}{}", String::from_utf8_lossy(&output.stderr));
 }

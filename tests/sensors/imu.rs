@@ -300,8 +300,8 @@ fn a_gyroscope_saturates_at_its_limit() {
         angular_velocity_rad_per_s: Vector::new(20.0, -20.0, 1.0),
         specific_force_m_per_s2: Vector::new(0.0, 60.0, -60.0),
     };
-    let said = errors.measure(&fast);
-    let (rate, force) = (said.angular_velocity_rad_per_s, said.specific_force_m_per_s2);
+    let reading = errors.measure(&fast);
+    let (rate, force) = (reading.angular_velocity_rad_per_s, reading.specific_force_m_per_s2);
     assert_relative_eq!(rate.xy(), nalgebra::Vector2::new(1.0, -1.0) * 600_f64.to_radians(), epsilon = 1e-12);
     assert!((rate.z - 1.0).abs() < 0.1);
     assert_relative_eq!(force.yz(), nalgebra::Vector2::new(1.0, -1.0) * 5.0 * G, epsilon = 1e-12);
@@ -329,13 +329,13 @@ fn scale_misalignment_and_turn_on_bias_have_the_specified_spread_over_runs() {
     let mut squares = Vector::zeros();
     for seed in 0..runs {
         let mut errors = ImuErrors::new(&imu, Seed(seed));
-        let mut said = |rate: Vector| {
+        let mut reading = |rate: Vector| {
             errors
                 .measure(&InertialReading { angular_velocity_rad_per_s: rate, ..at_rest() })
                 .angular_velocity_rad_per_s
         };
-        let bias = said(Vector::zeros());
-        let turned = said(Vector::x()) - bias;
+        let bias = reading(Vector::zeros());
+        let turned = reading(Vector::x()) - bias;
         squares += Vector::new(turned.x - 1.0, turned.y, bias.z).map(|x| x * x);
     }
     // Standard error of a sigma from n runs: 1 / sqrt(2 n) = 1.1 %.
@@ -360,14 +360,16 @@ fn a_random_walk_does_not_change_the_white_noise() {
 #[test]
 fn invalid_values_in_a_spec_are_refused_with_their_line() {
     let text = std::fs::read_to_string("specs/imus/3dm_gx2.ron").unwrap();
+    let line_of = |key: &str| text.lines().position(|line| line.contains(key)).unwrap() + 1;
     let negative = text.replace("density_ug_per_sqrt_hz: 80", "density_ug_per_sqrt_hz: -80");
     let error = spec::parse::<ImuSpec>(&Source::in_memory("imu.ron", negative)).unwrap_err();
-    assert_eq!(error.line_and_column().unwrap().0, 16);
+    assert_eq!(error.line_and_column().unwrap().0, line_of("density_ug_per_sqrt_hz:"));
     let unknown = text.replace("limit_g: 5", "limit_kg: 5");
     assert!(
         spec::parse::<ImuSpec>(&Source::in_memory("imu.ron", unknown)).unwrap_err().to_string().contains("limit_kg")
     );
     let coarse = Source::in_memory("imu.ron", text.replace("resolution_mg: 0", "resolution_mg: 6000"));
     let error = Imu::new(&spec::parse(&coarse).unwrap(), &coarse).unwrap_err();
-    assert!(error.to_string().contains("greater than the sensor's limit") && error.line_and_column().unwrap().0 == 22);
+    assert!(error.to_string().contains("greater than the sensor's limit"), "{error}");
+    assert_eq!(error.line_and_column().unwrap().0, line_of("resolution_mg:"));
 }

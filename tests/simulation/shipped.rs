@@ -197,11 +197,11 @@ fn the_ideal_imu_integrates_to_the_head_on_its_spring() {
 fn an_imu_on_the_base_measures_the_base_and_changes_nothing_else() {
     let with = Scenario { base_imu: Some("ideal_1khz".to_owned()), ..exact_office(6.0) };
     let mut with = recorded(&Simulation::prepare(&with).unwrap());
-    let said = std::mem::take(&mut with.base_samples);
+    let base_samples = std::mem::take(&mut with.base_samples);
     assert!(with == recorded(&Simulation::prepare(&exact_office(6.0)).unwrap()));
     // Ground truth is at full milliseconds; a sample covers the millisecond that follows.
-    assert!(said.len() + 2 >= with.truth.len() && said.len() > 5900, "{}", said.len());
-    for (sample, pair) in said.iter().zip(with.truth.windows(2)) {
+    assert!(base_samples.len() + 2 >= with.truth.len() && base_samples.len() > 5900, "{}", base_samples.len());
+    for (sample, pair) in base_samples.iter().zip(with.truth.windows(2)) {
         let [from, to] = [&pair[0].base, &pair[1].base];
         let turning = (from.angular_velocity_in_body() + to.angular_velocity_in_body()) * 0.5;
         let force = (from.specific_force_in_body() + to.specific_force_in_body()) * 0.5;

@@ -159,10 +159,10 @@ fn the_command_writes_the_table_and_a_second_call_does_not_change_it() {
     let here = tempfile::tempdir().unwrap();
     let path = small(here.path());
     let arguments = ["reproduce", path.to_str().unwrap(), "--quick", "--json"];
-    let told = zsim(here.path(), &arguments).assert().success().get_output().stdout.clone();
-    let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
-    assert_eq!(told["out"], "results/paper-quick");
-    assert_eq!(told["experiments"][0]["rows"].as_array().unwrap().len(), 7);
+    let printed = zsim(here.path(), &arguments).assert().success().get_output().stdout.clone();
+    let printed: serde_json::Value = serde_json::from_slice(&printed).unwrap();
+    assert_eq!(printed["out"], "results/paper-quick");
+    assert_eq!(printed["experiments"][0]["rows"].as_array().unwrap().len(), 7);
     let table = std::fs::read_to_string(here.path().join("results/paper-quick.md")).unwrap();
     assert!(table.contains("| 3a | peak gain, rate about y | about 15 | fitted 1"), "{table}");
     assert!(table.contains("## fig3\n\n- Not finished yet."), "{table}");
@@ -186,11 +186,11 @@ fn invalid_experiments_exit_with_2_and_a_message() {
         let file = here.path().join(format!("{name}.ron"));
         std::fs::write(&file, text.replacen(from, to, 1)).unwrap();
         let mut command = zsim(here.path(), &["reproduce", file.to_str().unwrap(), "--quick"]);
-        let said = command.assert().code(2).get_output().stderr.clone();
-        assert!(String::from_utf8(said).unwrap().contains(sentence), "{name}");
+        let stderr = command.assert().code(2).get_output().stderr.clone();
+        assert!(String::from_utf8(stderr).unwrap().contains(sentence), "{name}");
     }
-    let said = zsim(here.path(), &["reproduce", "fig99"]).assert().code(2).get_output().stderr.clone();
-    assert!(String::from_utf8(said).unwrap().contains("fig3"), "the error lists the known experiments");
+    let stderr = zsim(here.path(), &["reproduce", "fig99"]).assert().code(2).get_output().stderr.clone();
+    assert!(String::from_utf8(stderr).unwrap().contains("fig3"), "the error lists the known experiments");
 }
 
 #[test]

@@ -24,8 +24,8 @@ impl Cluster {
         // Its destructor stops the daemons that started, even if the others did not.
         let mut cluster = Self { folder, conf: String::new() };
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let said = String::from_utf8(output.stdout).unwrap();
-        cluster.conf = said.lines().find_map(|line| line.strip_prefix("SLURM_CONF=")).unwrap().to_owned();
+        let stdout = String::from_utf8(output.stdout).unwrap();
+        cluster.conf = stdout.lines().find_map(|line| line.strip_prefix("SLURM_CONF=")).unwrap().to_owned();
         Some(cluster)
     }
 
@@ -69,10 +69,10 @@ fn a_job_array_gives_the_bytes_of_a_local_run() {
     for name in ["slurm", "local"] {
         zsim(None, here.path(), &format!("sweep plan s.ron -o {name}"));
     }
-    let said = zsim(Some(&cluster), here.path(), "sweep submit slurm --slurm --elements 2 --json");
-    let told: Value = serde_json::from_str(&said).unwrap();
-    assert_eq!(told["elements"], 2);
-    let job = told["job"].as_u64().unwrap().to_string();
+    let stdout = zsim(Some(&cluster), here.path(), "sweep submit slurm --slurm --elements 2 --json");
+    let submitted: Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!(submitted["elements"], 2);
+    let job = submitted["job"].as_u64().unwrap().to_string();
     let mut nodes = Vec::new();
     for _ in 0..3000 {
         let queue = cluster.command("squeue").args(["-h", "-j", &job, "-o", "%T %N"]).output().unwrap();
@@ -93,6 +93,6 @@ fn a_job_array_gives_the_bytes_of_a_local_run() {
     for file in ["table.parquet", "table.csv"] {
         assert!(table("slurm", file) == table("local", file), "{file}");
     }
-    let said = zsim(Some(&cluster), here.path(), "sweep submit slurm --slurm --json");
-    assert_eq!(serde_json::from_str::<Value>(&said).unwrap()["elements"], 0, "no run is missing");
+    let stdout = zsim(Some(&cluster), here.path(), "sweep submit slurm --slurm --json");
+    assert_eq!(serde_json::from_str::<Value>(&stdout).unwrap()["elements"], 0, "no run is missing");
 }

@@ -12,8 +12,8 @@ use zsim::random::Seed;
 const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
 
 fn run_ok(folder: &Path, arguments: &str) -> String {
-    let (code, out, talk) = run(folder, arguments);
-    assert_eq!(code, 0, "`{arguments}`: {talk}");
+    let (code, out, stderr) = run(folder, arguments);
+    assert_eq!(code, 0, "`{arguments}`: {stderr}");
     out
 }
 
@@ -84,8 +84,8 @@ fn a_sweep_is_the_same_in_one_call_in_parts_and_after_kills() {
     for index in [2, 0, 1] {
         run_ok(here.path(), &format!("sweep run shares --threads 2 --index {index} --count 3"));
     }
-    let (code, _, talk) = run(here.path(), "sweep run shares --index 3 --count 3");
-    assert!(code == 2 && talk.contains("counted from 0"), "{talk}");
+    let (code, _, stderr) = run(here.path(), "sweep run shares --index 3 --count 3");
+    assert!(code == 2 && stderr.contains("counted from 0"), "{stderr}");
     run_ok(here.path(), "sweep merge shares");
     assert!(tables(&at("whole")) == tables(&at("shares")));
 
@@ -98,7 +98,7 @@ fn a_sweep_is_the_same_in_one_call_in_parts_and_after_kills() {
     }
     assert!(kills > 2, "the sweep ended before the kill");
     let (code, out, _) = run(here.path(), "sweep merge swept --json");
-    let left = serde_json::from_str::<Value>(&out).map_or(1, |told| told["status"]["missing"].as_u64().unwrap());
+    let left = serde_json::from_str::<Value>(&out).map_or(1, |result| result["status"]["missing"].as_u64().unwrap());
     assert!(code == 3 && left > 0 || code == 0 && left == 0 || code == 2, "{code} {left}");
     run_ok(here.path(), "sweep run swept");
     run_ok(here.path(), "sweep merge swept");
@@ -141,8 +141,8 @@ fn a_plan_is_continued_and_replaced_only_with_force() {
     run_ok(here.path(), "sweep plan a.ron -o swept");
     let out = run_ok(here.path(), "sweep status swept --json");
     assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 256);
-    let (code, _, talk) = run(here.path(), "sweep plan b.ron -o swept");
-    assert!(code == 2 && talk.contains("another experiment"), "{talk}");
+    let (code, _, stderr) = run(here.path(), "sweep plan b.ron -o swept");
+    assert!(code == 2 && stderr.contains("another experiment"), "{stderr}");
     run_ok(here.path(), "sweep plan b.ron -o swept --force");
     let out = run_ok(here.path(), "sweep status swept --json");
     assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 0);
@@ -150,8 +150,8 @@ fn a_plan_is_continued_and_replaced_only_with_force() {
     run_ok(here.path(), "sweep plan a.ron -o swept --force");
     let out = run_ok(here.path(), "sweep status swept --json");
     assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["done"], 256);
-    let (code, _, talk) = run(here.path(), "sweep run nowhere");
-    assert!(code == 2 && talk.contains("contains no sweep"), "{talk}");
+    let (code, _, stderr) = run(here.path(), "sweep run nowhere");
+    assert!(code == 2 && stderr.contains("contains no sweep"), "{stderr}");
 }
 
 #[test]
@@ -164,8 +164,8 @@ fn a_study_continues_for_the_same_spec_and_keeps_files_of_other_origin() {
     std::fs::create_dir(&foreign).unwrap();
     std::fs::write(foreign.join("table.csv"), "years of work").unwrap();
     for command in ["study a.ron -o thesis", "sweep plan a.ron -o thesis"] {
-        let (code, _, talk) = run(here.path(), command);
-        assert!(code == 2 && talk.contains("another experiment"), "{talk}");
+        let (code, _, stderr) = run(here.path(), command);
+        assert!(code == 2 && stderr.contains("another experiment"), "{stderr}");
     }
     assert_eq!(std::fs::read_to_string(foreign.join("table.csv")).unwrap(), "years of work");
     assert_eq!(std::fs::read_dir(&foreign).unwrap().count(), 1, "no file is added");
@@ -207,8 +207,8 @@ fn damaged_and_swapped_parts_are_computed_again() {
         let status = run_ok(here.path(), "sweep status swept --json");
         let status: Value = serde_json::from_str(&status).unwrap();
         assert_eq!((status["missing"].as_u64(), status["damaged"].as_u64()), (Some(damaged), Some(damaged)));
-        let (code, _, talk) = run(here.path(), "sweep merge swept");
-        assert_eq!(code, 3, "a merge without the damaged parts must report loss: {talk}");
+        let (code, _, stderr) = run(here.path(), "sweep merge swept");
+        assert_eq!(code, 3, "a merge without the damaged parts must report loss: {stderr}");
         run_ok(here.path(), "sweep run swept");
         run_ok(here.path(), "sweep merge swept");
         assert!(tables(&here.path().join("swept")) == whole);
@@ -227,12 +227,12 @@ fn names_in_a_plan_cannot_inject_into_a_slurm_script() {
         std::fs::write(&plan, text.replacen("name: \"a\"", &format!("name: \"{name}\""), 1)).unwrap();
         run(here.path(), "sweep submit swept --slurm --dry-run")
     };
-    let (code, _, talk) = named("a --uid=0; $(touch b)");
-    assert_eq!(code, 0, "{talk}");
+    let (code, _, stderr) = named("a --uid=0; $(touch b)");
+    assert_eq!(code, 0, "{stderr}");
     let script = std::fs::read_to_string(here.path().join("swept/slurm/array.sh")).unwrap();
     assert!(script.contains("#SBATCH --job-name=zsim-a_--uid_0____touch_b_\n"), "{script}");
-    let (code, _, talk) = named("a\\ntouch b\\u{1b}[2J");
-    assert!(code == 2 && talk.contains("control characters") && !talk.contains('\u{1b}'), "{talk}");
+    let (code, _, stderr) = named("a\\ntouch b\\u{1b}[2J");
+    assert!(code == 2 && stderr.contains("control characters") && !stderr.contains('\u{1b}'), "{stderr}");
 }
 
 const WALKS: &str = r#"(
@@ -278,9 +278,9 @@ fn full_runs_share_work_and_give_the_results_of_single_runs() {
     assert!(column(&here.path().join("swept"), "drift_m_per_min").iter().all(String::is_empty));
     for (row, imu) in [(0, "3dm_gx2"), (3, "tactical")] {
         let alone = format!("--scene mocap_room --duration 7s --seed 3 --imu {imu} --out {imu} --json");
-        let told: Value = serde_json::from_str(&run_ok(here.path(), &alone)).unwrap();
+        let result: Value = serde_json::from_str(&run_ok(here.path(), &alone)).unwrap();
         // A decimal number may differ in its last digit.
-        let one = told["open_loop"]["position_rmse_m"].as_f64().unwrap();
+        let one = result["open_loop"]["position_rmse_m"].as_f64().unwrap();
         assert!((one - errors[row]).abs() < 1e-12, "{one} and {}", errors[row]);
     }
 }
@@ -302,8 +302,8 @@ fn runs_over_an_axis_of_faults_share_rays() {
     assert_ne!(errors[0], errors[1]);
     for (error, faults) in errors.iter().zip(["", " --faults imu_dropout_50pct"]) {
         let alone = format!("--scene mocap_room --duration 7s --seed 3 --out alone --force --json{faults}");
-        let (_, out, talk) = run(here.path(), &alone);
-        let figures: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{talk}"));
+        let (_, out, stderr) = run(here.path(), &alone);
+        let figures: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{stderr}"));
         // A decimal number may differ in its last digit.
         let one = figures["open_loop"]["position_rmse_m"].as_f64().unwrap();
         assert!((one - error).abs() < 1e-12, "{one} and {error}");
@@ -344,9 +344,9 @@ fn invalid_sweeps_are_errors_with_the_line() {
         assert!(spec.contains(old), "{old}");
         let text = spec.replacen(old, new, 1);
         std::fs::write(here.path().join("bad.ron"), &text).unwrap();
-        let (code, _, talk) = run(here.path(), "sweep plan bad.ron -o bad");
-        assert_eq!(code, 2, "{new}: {talk}");
-        words.iter().for_each(|word| assert!(talk.contains(word), "{new}: {talk}"));
+        let (code, _, stderr) = run(here.path(), "sweep plan bad.ron -o bad");
+        assert_eq!(code, 2, "{new}: {stderr}");
+        words.iter().for_each(|word| assert!(stderr.contains(word), "{new}: {stderr}"));
         let (checked, _, _) = run(here.path(), "check bad.ron");
         assert_eq!(checked, 2, "{new}");
         assert!(!here.path().join("bad").exists());

@@ -105,8 +105,8 @@ fn a_scene_with_meshes_can_only_be_included_from_its_folder() {
     assert_eq!(built(&beside, "guest.ron").unwrap().triangle_count(), 25);
     let below = GUEST.replace("\"hall\"", "\"sub/hall.ron\"");
     let apart = [("sub/hall.ron", hall.as_str()), ("sub/wall.obj", wall), ("guest.ron", &below)];
-    let told = fault(&apart, "guest.ron");
-    assert!(told.contains("guest.ron:3:") && told.contains("keep it in the folder"), "{told}");
+    let message = fault(&apart, "guest.ron");
+    assert!(message.contains("guest.ron:3:") && message.contains("keep it in the folder"), "{message}");
 }
 
 #[test]

@@ -102,3 +102,19 @@ fn in_closed_rooms_every_ray_hits_a_surface() {
         }
     }
 }
+
+#[test]
+fn the_triangles_are_all_surfaces_and_the_floor_is_the_nearest_below() {
+    let office = World::load("office").unwrap();
+    let triangles: Vec<_> = office.triangles().collect();
+    assert_eq!(triangles.len(), office.triangle_count());
+    let (lower, upper) = office.bounds();
+    for corner in triangles.iter().flat_map(|(corners, _)| corners) {
+        assert!((0..3).all(|k| (lower[k] - 1e-3..=upper[k] + 1e-3).contains(&corner[k])), "{corner}");
+    }
+    // The route is on the floor, so the nearest surface of a point 5 cm above its start is 5 cm away.
+    let start = office.default_route().unwrap().points_in_world[0] + Vector::new(0.0, 0.0, 0.05);
+    let (surface, material) = office.nearest_material(&start, 1.0).unwrap();
+    assert!(((surface.point_in_world - start).norm() - 0.05).abs() < 1e-6);
+    assert_eq!(office.materials()[material.index()].name, "carpet");
+}

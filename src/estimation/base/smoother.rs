@@ -220,7 +220,7 @@ fn between(start_s: f64, intervals: &[Interval], [start_estimate, end]: [&Estima
     path
 }
 
-/// Mean of the timed innovations of an epoch that ends at `end_s`.
+/// Mean of the timed innovations of an epoch that ends at `end_s`, with their largest standard deviations.
 fn mean(innovations: &[(f64, Innovation)], end_s: f64) -> Option<Innovation> {
     let n = innovations.len() as f64;
     let vector = |of: fn(&Innovation) -> Vector| innovations.iter().map(|(_, one)| of(one)).sum::<Vector>() / n;

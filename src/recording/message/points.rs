@@ -68,7 +68,9 @@ pub fn encode_floats<const N: usize>(
     Ok(())
 }
 
-/// Encodes a cloud's fields from height to data length: float fields, then an optional integer field.
+/// Encodes the part of a `PointCloud2` from `height` to the length of `data`.
+///
+/// Each point consists of the 32-bit `floats`, then the optional 32-bit `integer`.
 fn encode_layout(
     out: &mut Encoder<'_>,
     count: usize,

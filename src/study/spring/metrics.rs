@@ -223,11 +223,13 @@ impl LinearSwing<'_> {
         std::array::from_fn(|k| per_base[k] * base_rad)
     }
 
-    /// State of base and head at `phase` of the shake, rad. Velocities are zero: their forces are of second order.
+    /// State of base and head at `phase` of the shake, rad.
+    ///
+    /// Velocities are set to zero: centrifugal and gyroscopic loads are of second order in the amplitude.
     fn state(&self, phase: f64) -> HeadState {
-        let turning = Complex::from_polar(1.0, phase);
-        let now = crate::elasticity::Vector6::from(self.amplitude().map(|a| (a * turning).re));
-        let (shift, turn) = split(&now);
+        let phasor = Complex::from_polar(1.0, phase);
+        let displacement = crate::elasticity::Vector6::from(self.amplitude().map(|a| (a * phasor).re));
+        let (shift, turn) = split(&displacement);
         let rest = self.head.base_from_head_at_rest();
         let centre_in_head = self.head.body().centre_of_mass_in_head;
         let rotation = Rotation::from_scaled_axis(turn) * rest.rotation;

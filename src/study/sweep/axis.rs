@@ -212,7 +212,7 @@ fn first_share(spec: &AxisSpec, sampling: Sampling) -> Result<Option<f64>, Strin
     }
     if values.len() < 2 || !(*share > 0.0 && *share < 1.0) {
         return Err(format!(
-            "`first_share` {share} of {} values: expected a number between 0 and 1, and at least two values",
+            "`first_share` is {share} for {} values: it must be between 0 and 1, and needs at least two values",
             values.len()
         ));
     }

@@ -35,7 +35,7 @@ pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> 
     if let Some(measure) = spec.measures.iter().find(|measure| !measure.is_available_for(&spec.base)) {
         let has: Vec<&str> =
             Measure::ALL.into_iter().filter(|measure| measure.is_available_for(&spec.base)).map(Measure::key).collect();
-        let message = format!("a run of this base does not measure {}; it measures {}", measure.key(), has.join(", "));
+        let message = format!("the run in `base` does not measure {}; it measures {}", measure.key(), has.join(", "));
         return Err(about(measure.key(), message));
     }
     if let Some(goal) = spec.front.iter().find(|goal| !spec.measures.contains(&goal.measure)) {

@@ -243,7 +243,7 @@ fn estimate(
             clock: comparison::clock_metrics(&run, known.as_ref()),
             closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
             status: integrity.status(),
-            integrity: integrity.metrics(&run, Some(pairs)),
+            integrity: integrity.metrics(&run, Some(&pairs)),
             path_length_m: path_length_m(map_from_head),
         })
     })

@@ -230,17 +230,18 @@ fn read_column(group: &dyn RowGroupReader, name: &str, column_type: ColumnType) 
     let index = (0..schema.num_columns()).find(|k| schema.column(*k).name() == name);
     let index = index.ok_or_else(|| ParquetError::General(format!("has no column `{name}`")))?;
     Ok(match column_type {
-        ColumnType::Counts => Column::Counts(cells::<Int64Type>(group, index)?),
-        ColumnType::Numbers => Column::Numbers(cells::<DoubleType>(group, index)?),
+        ColumnType::Counts => Column::Counts(read_cells::<Int64Type>(group, index)?),
+        ColumnType::Numbers => Column::Numbers(read_cells::<DoubleType>(group, index)?),
         ColumnType::Text => {
             let text = |bytes: ByteArray| bytes.as_utf8().map(str::to_owned);
-            let cells = cells::<ByteArrayType>(group, index)?;
+            let cells = read_cells::<ByteArrayType>(group, index)?;
             Column::Text(cells.into_iter().map(|cell| cell.map(text).transpose()).collect::<Result<_, _>>()?)
         }
     })
 }
 
-fn cells<T: DataType>(group: &dyn RowGroupReader, index: usize) -> Result<Vec<Option<T::T>>, ParquetError> {
+/// Reads the cells of column `index` in a row group; a null cell is `None`.
+fn read_cells<T: DataType>(group: &dyn RowGroupReader, index: usize) -> Result<Vec<Option<T::T>>, ParquetError> {
     if group.metadata().schema_descr().column(index).physical_type() != T::get_physical_type() {
         return Err(ParquetError::General(format!("column {index} has another type")));
     }

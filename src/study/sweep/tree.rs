@@ -222,7 +222,7 @@ pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
         "clock" => load::<ClocksSpec>(name),
         "faults" => load::<FaultsSpec>(name),
         "estimator" => load::<EstimatorSpec>(name),
-        _ => Err(SpecError::plain(name, format!("is not a spec of `{key}`")).into()),
+        _ => Err(SpecError::plain(name, format!("`{key}` is not set by the name of a spec")).into()),
     }
 }
 

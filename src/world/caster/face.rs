@@ -38,6 +38,12 @@ impl Face {
         self.corner + (self.u + self.v) / 2.0
     }
 
+    /// The triangles of the face; of a single triangle, the first one.
+    pub fn triangles(&self) -> [Triangle; 2] {
+        let Self { corner, u, v, .. } = *self;
+        [[corner, corner + u, corner + v], [corner + u, corner + u + v, corner + v]]
+    }
+
     /// The point of the face nearest to `point`.
     pub fn nearest(&self, point: &Vector) -> Vector {
         let Self { corner, u, v, is_parallelogram } = *self;

@@ -111,7 +111,7 @@ impl DesignSearch {
         }
         let measures = spec.goals.iter().map(|goal| goal.measure).chain(spec.limits.iter().map(|limit| limit.measure));
         if let Some(measure) = measures.into_iter().find(|measure| !measure.has_closed_form()) {
-            let message = format!("{} has no closed form", measure.key());
+            let message = format!("{} has no closed form, so it cannot be a goal or a limit: remove it", measure.key());
             return Err(SpecError::about(source, measure.key(), message).into());
         }
         if spec.evaluations == 0 || spec.candidates == 0 {

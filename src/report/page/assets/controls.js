@@ -1,0 +1,146 @@
+// Controls of the three-dimensional view.
+
+// The slice ends this far above the head if a ceiling would hide the path, m.
+const ABOVE_HEAD_M = 0.5;
+// A ceiling has at least this fraction of the points.
+const CEILING_FRACTION = 0.05;
+
+let view = null;
+try {
+  view = new View(byId("scene"));
+} catch (error) {
+  byId("legend").textContent = `The 3-D view needs WebGL, which this browser does not offer (${error.message}).`;
+}
+
+// Fills the list of colours; the first one that is known of error, height is chosen.
+const setUpColours = () => {
+  const select = byId("colour");
+  for (const [key, { name }] of Object.entries(channels)) {
+    const option = select.appendChild(document.createElement("option"));
+    [option.value, option.textContent] = [key, name];
+  }
+  select.value = "height";
+  select.addEventListener("change", () => {
+    view.cloud.colour(select.value);
+    view.draw();
+  });
+  view.cloud.colour(select.value);
+};
+
+// Sets up the two ends of the slice, in metres; a ceiling above the path is left out at first.
+const setUpSlice = () => {
+  const [low, high] = [byId("low"), byId("high")];
+  const { lower, upper, count } = data.cloud;
+  const [from, to] = count ? [lower[2], upper[2]] : [-1, 3];
+  for (const input of [low, high]) [input.min, input.max] = [from, to];
+  [low.value, high.value] = [from, to];
+  const heights = estimate.t.map((_, k) => estimate.pose[7 * k + 2]).sort();
+  const above = heights.length ? heights[Math.floor(0.99 * (heights.length - 1))] + ABOVE_HEAD_M : to;
+  let hiding = 0;
+  for (let k = 0; k < count; k += 16) hiding += view.cloud.place(k)[2] > above ? 16 : 0;
+  if (hiding > CEILING_FRACTION * count) high.value = above;
+  const update = () => {
+    const ends = [low.valueAsNumber, high.valueAsNumber].sort((a, b) => a - b);
+    view.slice = [ends[0] - 1e-3, ends[1] + 1e-3];
+    byId("slice").textContent = `${ends[0].toFixed(2)} to ${ends[1].toFixed(2)} m`;
+  };
+  [low, high].forEach((input) => input.addEventListener("input", update));
+  update();
+};
+
+const setUpShown = () => {
+  const check = (id, apply) => {
+    const input = byId(id);
+    const update = () => {
+      apply(input.checked);
+      view.draw();
+    };
+    input.addEventListener("change", update);
+    update();
+  };
+  document.querySelector("[data-needs=truth]").hidden = !truth.isKnown;
+  document.querySelector("[data-needs=surfaces]").hidden = data.surfaces === "";
+  byId("show-surfaces").checked = data.surfaces !== "";
+  check("show-cloud", (shown) => (view.cloud.points.visible = shown && data.cloud.count > 0));
+  check("show-estimate", (shown) => (view.estimate.visible = shown));
+  check("show-truth", (shown) => (view.truth.visible = shown && truth.isKnown));
+  check("show-surfaces", (shown) => (view.surfaces.visible = shown));
+  check("grow", (past) => (view.past = past));
+  check("follow", (follow) => {
+    const turnedOn = follow && !view.follow;
+    view.follow = follow;
+    if (turnedOn) {
+      const radius = view.camera.position.distanceTo(view.controls.target);
+      view.move(timer.t);
+      view.zoom(Math.min(1, 6 / radius));
+    }
+  });
+  const size = byId("size");
+  const resize = () => {
+    view.cloud.uniforms.size.value = size.valueAsNumber * Math.min(devicePixelRatio, 2);
+    view.draw();
+  };
+  size.addEventListener("input", resize);
+  resize();
+};
+
+const playback = {
+  isRunning: false,
+  toggle() {
+    this.isRunning = !this.isRunning;
+    const button = byId("play");
+    button.textContent = this.isRunning ? "Pause" : "Play";
+    button.setAttribute("aria-pressed", String(this.isRunning));
+    if (!this.isRunning) return;
+    if (timer.t >= duration - 1e-6) timer.set(0);
+    let last = performance.now();
+    const step = (now) => {
+      if (!this.isRunning) return;
+      timer.set(timer.t + Math.min((now - last) / 1000, 0.25) * Number(byId("speed").value));
+      last = now;
+      if (timer.t >= duration - 1e-6) this.toggle();
+      else requestAnimationFrame(step);
+    };
+    requestAnimationFrame(step);
+  },
+};
+
+const setUpPlayback = () => {
+  const slider = byId("time");
+  slider.max = duration;
+  slider.addEventListener("input", () => timer.set(slider.valueAsNumber));
+  byId("play").addEventListener("click", () => playback.toggle());
+  timer.listeners.push((t) => {
+    slider.value = t;
+    slider.setAttribute("aria-valuetext", `${t.toFixed(1)} s`);
+    byId("clock").textContent = `${t.toFixed(1)} s`;
+  });
+};
+
+const KEYS = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
+const onKey = (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  const [right, up] = KEYS[event.key] ?? [0, 0];
+  if (right || up) event.shiftKey ? view.pan(0.05 * right, 0.05 * up) : view.orbit(-0.1 * right, 0.1 * up);
+  else if (event.key === "+" || event.key === "=") view.zoom(0.85);
+  else if (event.key === "-") view.zoom(1 / 0.85);
+  else if (event.key === " ") playback.toggle();
+  else return;
+  event.preventDefault();
+};
+
+if (view) {
+  setUpColours();
+  setUpSlice();
+  setUpShown();
+  setUpPlayback();
+  byId("scene").addEventListener("keydown", onKey);
+  for (const [id, from] of [["camera-reset", "oblique"], ["camera-top", "top"], ["camera-side", "side"]]) {
+    byId(id).addEventListener("click", () => view.whole(from));
+  }
+}

@@ -1,0 +1,236 @@
+// The three-dimensional view: renderer, cameras, and a close-up of head and spring.
+
+// The close-up shows this height, m.
+const CLOSE_UP_M = 0.45;
+
+const surfaceMesh = () => {
+  const corners = floats(data.surfaces);
+  const shades = new Float32Array(corners.length);
+  const [a, b, c] = [new vendor.Vector3(), new vendor.Vector3(), new vendor.Vector3()];
+  const light = new vendor.Vector3(0.4, 0.25, 0.88).normalize();
+  for (let k = 0; k < corners.length; k += 9) {
+    a.fromArray(corners, k);
+    b.fromArray(corners, k + 3).sub(a);
+    c.fromArray(corners, k + 6).sub(a);
+    const shade = 0.35 + 0.65 * Math.abs(b.cross(c).normalize().dot(light));
+    shades.fill(shade, k, k + 9);
+  }
+  const geometry = new vendor.BufferGeometry();
+  geometry.setAttribute("position", new vendor.BufferAttribute(corners, 3));
+  geometry.setAttribute("color", new vendor.BufferAttribute(shades, 3));
+  const options = { vertexColors: true, transparent: true, opacity: 0.1, depthWrite: false, side: vendor.DoubleSide };
+  const mesh = new vendor.Mesh(geometry, new vendor.MeshBasicMaterial(options));
+  mesh.visible = false;
+  return mesh;
+};
+
+class View {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.renderer = new vendor.WebGLRenderer({ canvas, antialias: true });
+    this.renderer.localClippingEnabled = true;
+    this.renderer.autoClear = false;
+    this.scene = new vendor.Scene();
+    this.cloud = new Cloud(this.scene);
+    this.estimate = pathLine(estimate, false);
+    this.truth = pathLine(truth, true);
+    this.truth.visible = truth.isKnown;
+    this.surfaces = surfaceMesh();
+    this.planes = [new vendor.Plane(new vendor.Vector3(0, 0, 1), 1e9), new vendor.Plane(new vendor.Vector3(0, 0, -1), 1e9)];
+    this.surfaces.material.clippingPlanes = this.planes;
+    this.scene.add(this.surfaces, this.estimate, this.truth);
+    this.head = new Head(this.scene);
+    this.markers = new Markers(this.scene);
+
+    this.camera = new vendor.PerspectiveCamera(45, 1, 0.05, 2000);
+    this.camera.up.set(0, 0, 1);
+    this.closeUp = new vendor.PerspectiveCamera(30, 1, 0.05, 20);
+    this.closeUp.up.set(0, 0, 1);
+    this.controls = new vendor.OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("change", () => this.draw());
+    this.follow = false;
+    byId("closeup-label").textContent = data.links.length ? "Head and spring" : "Head and base";
+    this.resize();
+    this.whole("oblique");
+    this.paint();
+    onTheme.push(() => this.paint());
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    this.move(0);
+    timer.listeners.push((t) => this.move(t));
+  }
+
+  // Centre and radius of the path and most of the cloud.
+  get extent() {
+    const [low, high] = [new vendor.Vector3(1e9, 1e9, 1e9), new vendor.Vector3(-1e9, -1e9, -1e9)];
+    const spread = (values) => [values[Math.floor(0.02 * values.length)], values[Math.floor(0.98 * (values.length - 1))]];
+    const add = (axis, [from, to]) => {
+      low.setComponent(axis, Math.min(low.getComponent(axis), from));
+      high.setComponent(axis, Math.max(high.getComponent(axis), to));
+    };
+    for (let axis = 0; axis < 3; axis++) {
+      const places = Float32Array.from({ length: Math.min(data.cloud.count, 5000) }, (_, k) => {
+        return this.cloud.place(Math.floor((k / 5000) * data.cloud.count))[axis];
+      });
+      if (places.length) add(axis, spread(places.sort()));
+      const poses = estimate.t.map((_, k) => estimate.pose[7 * k + axis]).sort();
+      if (poses.length) add(axis, spread(poses));
+    }
+    if (low.x > high.x) return { centre: new vendor.Vector3(), radius: 5 };
+    return { centre: low.clone().add(high).multiplyScalar(0.5), radius: Math.max(high.distanceTo(low) / 2, 0.5) };
+  }
+
+  // Shows everything, from one of three directions.
+  whole(from) {
+    const { centre, radius } = this.extent;
+    const direction = { oblique: [-0.5, -0.75, 0.75], top: [0, -1e-3, 1], side: [0, -1, 0.02] }[from];
+    const portrait = Math.max(1, 0.9 / this.camera.aspect);
+    const away = (radius / Math.sin((this.camera.fov * Math.PI) / 360)) * 0.84 * portrait;
+    this.camera.position.set(...direction).normalize().multiplyScalar(away).add(centre);
+    this.camera.near = Math.max(away / 1000, 0.02);
+    this.camera.far = away * 20;
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(centre);
+    this.controls.update();
+    this.draw();
+  }
+
+  // Rotates the camera about its target; angles in rad.
+  orbit(azimuth, elevation) {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const radius = offset.length();
+    const about = Math.atan2(offset.y, offset.x) + azimuth;
+    const polar = Math.min(Math.max(Math.acos(offset.z / radius) - elevation, 0.01), Math.PI - 0.01);
+    offset.set(Math.sin(polar) * Math.cos(about), Math.sin(polar) * Math.sin(about), Math.cos(polar));
+    this.camera.position.copy(this.controls.target).addScaledVector(offset, radius);
+    this.controls.update();
+    this.draw();
+  }
+
+  // Moves camera and target sideways and up by fractions of their distance.
+  pan(right, up) {
+    const radius = this.camera.position.distanceTo(this.controls.target);
+    const shift = new vendor.Vector3(right * radius, up * radius, 0).applyQuaternion(this.camera.quaternion);
+    this.shift(shift);
+    this.draw();
+  }
+
+  shift(by) {
+    this.camera.position.add(by);
+    this.controls.target.add(by);
+    this.controls.update();
+  }
+
+  zoom(factor) {
+    const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.draw();
+  }
+
+  // Moves head, spring and live scan to time t.
+  move(t) {
+    const poses = this.head.update(t);
+    const shown = estimate.at(t) ?? poses?.head;
+    this.cloud.live(t, shown?.position);
+    this.poses = poses;
+    if (shown) this.markers.put(2, shown.position);
+    if (this.follow && shown) this.shift(shown.position.clone().sub(this.controls.target));
+    if (this.onlyPast) this.cloud.uniforms.latest.value = t / data.cloud.duration;
+    this.draw();
+  }
+
+  set past(onlyPast) {
+    this.onlyPast = onlyPast;
+    this.cloud.uniforms.latest.value = onlyPast ? timer.t / data.cloud.duration : 2;
+    this.draw();
+  }
+
+  set slice([low, high]) {
+    this.cloud.uniforms.slice.value = [low, high];
+    this.planes[0].constant = -low;
+    this.planes[1].constant = high;
+    this.draw();
+  }
+
+  // Takes the colours of the theme.
+  paint() {
+    const set = (material, name) => material.color.set(themeColour(name));
+    this.renderer.setClearColor(themeColour("stage"));
+    set(this.estimate.material, "estimate");
+    set(this.truth.material, "truth");
+    set(this.surfaces.material, "soft");
+    set(this.cloud.beams.material, "second");
+    set(this.head.materials.head, "soft");
+    set(this.head.materials.second, "part");
+    set(this.head.materials.front, "second");
+    set(this.head.materials.base, "soft");
+    set(this.head.materials.link, "ink");
+    const vector = (name) => new vendor.Vector3(...rgb(themeColour(name)).map((c) => c / 255));
+    const { uniforms } = this.markers.points.material;
+    uniforms.fill.value = [vector("paper"), vector("estimate"), vector("second")];
+    uniforms.edge.value = vector("ink");
+    this.draw();
+  }
+
+  resize() {
+    const { clientWidth, clientHeight } = this.canvas.parentElement;
+    if (!clientWidth || !clientHeight) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.markers.points.material.uniforms.ratio.value = Math.min(devicePixelRatio, 2);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+
+  // Draws before the next picture of the screen.
+  draw() {
+    if (this.isWaiting) return;
+    this.isWaiting = true;
+    requestAnimationFrame(() => {
+      this.isWaiting = false;
+      this.render();
+    });
+  }
+
+  render() {
+    const { renderer, scene } = this;
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    renderer.setViewport(0, 0, width, height);
+    renderer.setScissorTest(false);
+    renderer.clear();
+    this.head.head.visible = Boolean(this.poses);
+    renderer.render(scene, this.camera);
+    this.renderCloseUp(width, height);
+    document.documentElement.dataset.drawn ??= String(Math.round(performance.now()));
+  }
+
+  // Draws the head on its spring, upright and seen from its side, in the upper right corner.
+  renderCloseUp(width, height) {
+    const { poses, renderer } = this;
+    const isShown = Boolean(poses?.base);
+    byId("closeup-label").hidden = !isShown;
+    if (!isShown) return;
+    const size = Math.round(Math.min(0.34 * Math.min(width, height), 220));
+    const forward = new vendor.Vector3(1, 0, 0).applyQuaternion(poses.base.quaternion);
+    const heading = Math.atan2(forward.y, forward.x) - 1.2;
+    const away = CLOSE_UP_M / 2 / Math.tan((this.closeUp.fov * Math.PI) / 360);
+    const target = poses.base.position.clone().add(new vendor.Vector3(0, 0, 0.06));
+    this.closeUp.position.set(Math.cos(heading) * away, Math.sin(heading) * away, 0.1).add(target);
+    this.closeUp.lookAt(target);
+    const hidden = [this.cloud.points, this.cloud.beams, this.markers.points, this.surfaces, this.estimate, this.truth];
+    const visible = hidden.map((object) => object.visible);
+    hidden.forEach((object) => (object.visible = false));
+    const corner = [width - size - 8, height - size - 8, size, size];
+    renderer.setViewport(...corner);
+    renderer.setScissor(...corner);
+    renderer.setScissorTest(true);
+    renderer.setClearColor(themeColour("paper"));
+    renderer.clear();
+    renderer.render(this.scene, this.closeUp);
+    renderer.setScissorTest(false);
+    renderer.setClearColor(themeColour("stage"));
+    hidden.forEach((object, k) => (object.visible = visible[k]));
+    byId("closeup-label").style.cssText = `right:8px;top:${size + 12}px`;
+  }
+}

@@ -1,0 +1,202 @@
+//! The data of the page of a run.
+
+use crate::geometry::{Pose, Vector};
+use crate::report::Metrics;
+
+/// The data of the page of a run. Times are in s since the first measurement.
+pub struct RunPage<'a> {
+    /// The metrics, as in `metrics.json`.
+    pub metrics: &'a Metrics,
+    /// Text of the manifest.
+    pub manifest: &'a str,
+    /// Name and wall-clock time of each part of the estimator, s.
+    pub parts_s: Vec<(&'static str, f64)>,
+    /// The three-dimensional view.
+    pub view: View,
+    /// The charts, in groups.
+    pub charts: Vec<ChartGroup>,
+    /// The timeline of events.
+    pub timeline: Vec<TimelineRow>,
+}
+
+/// The three-dimensional view. Positions are in the world frame, or in the map frame without truth.
+#[derive(Default)]
+pub struct View {
+    /// Points of the registered cloud, in order of time.
+    pub points: Vec<ViewPoint>,
+    /// Names of the materials that [`ViewPoint::material`] refers to.
+    pub materials: Vec<String>,
+    /// Estimated poses of the head.
+    pub estimate: Vec<TimedPose>,
+    /// True poses of the head; empty without truth.
+    pub truth: Vec<TimedPose>,
+    /// True poses of the base; empty without truth.
+    pub base: Vec<TimedPose>,
+    /// Corners of the triangles of the true surfaces; empty if the scene is not known.
+    pub surfaces: Vec<[Vector; 3]>,
+    /// Whether small triangles are missing in `surfaces`.
+    pub surfaces_are_partial: bool,
+    /// Springs and cords between base and head.
+    pub links: Vec<Link>,
+    /// Parts of the head: blocks parallel to its axes.
+    pub parts: Vec<Block>,
+}
+
+/// A block parallel to the axes of the head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Block {
+    /// Centre in the head, m.
+    pub centre_in_head: Vector,
+    /// Edge lengths, m.
+    pub size_m: Vector,
+}
+
+/// A point of the cloud with the quantities that can colour it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewPoint {
+    /// Position, m.
+    pub position: Vector,
+    /// Time, s.
+    pub t_s: f64,
+    /// Intensity of the return, in the unit of the lidar.
+    pub intensity: f64,
+    /// Angular velocity of the head, degrees/s.
+    pub turn_rate_deg_per_s: f64,
+    /// Estimated standard deviation of the position, m; NaN if it is not known.
+    pub sigma_m: f64,
+    /// Signed distance from the nearest true surface, positive towards the lidar, m; NaN if it is not known.
+    pub error_m: f64,
+    /// Index of the material of the nearest true surface.
+    pub material: Option<usize>,
+}
+
+/// A pose with its time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedPose {
+    /// Time, s.
+    pub t_s: f64,
+    /// The pose in the frame of the view.
+    pub pose: Pose,
+}
+
+/// An elastic element between base and head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Link {
+    /// A helical spring.
+    Spring {
+        /// Pose of the foot in the base; z points along the spring.
+        base_from_foot: Pose,
+        /// Pose of the top in the head.
+        head_from_top: Pose,
+        /// Mean radius of the coil, m.
+        coil_radius_m: f64,
+        /// Number of coils.
+        coils: f64,
+    },
+    /// A rope or a cable.
+    Cord {
+        /// Attachment point in the base, m.
+        point_in_base: Vector,
+        /// Attachment point in the head, m.
+        point_in_head: Vector,
+    },
+}
+
+/// Section of the page that a chart belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Section {
+    /// Errors and their bounds.
+    Errors,
+    /// Offset between the clocks.
+    Clock,
+    /// Matches and conditioning.
+    Matching,
+    /// Run time of the estimator.
+    Timing,
+    /// Motion of the head.
+    Motion,
+}
+
+/// Charts of which the page shows one at a time.
+pub struct ChartGroup {
+    /// Section of the page.
+    pub section: Section,
+    /// The charts; the reader chooses between them if there are several.
+    pub charts: Vec<Chart>,
+}
+
+/// A chart over time.
+pub struct Chart {
+    /// Title.
+    pub title: String,
+    /// Quantity and unit of the ordinate.
+    pub label: String,
+    /// Whether the ordinate is logarithmic.
+    pub is_log: bool,
+    /// Times, s, in increasing order.
+    pub t_s: Vec<f64>,
+    /// The curves.
+    pub curves: Vec<Curve>,
+}
+
+/// A curve of a chart.
+pub struct Curve {
+    /// Name in the legend.
+    pub name: String,
+    /// Appearance.
+    pub style: CurveStyle,
+    /// A value for each time of the chart; not finite where there is none.
+    pub values: Vec<f64>,
+}
+
+/// Appearance of a curve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CurveStyle {
+    /// The estimate.
+    Estimate,
+    /// The truth, dashed.
+    Truth,
+    /// A second quantity.
+    Second,
+    /// An upper bound: the area below it is shaded.
+    Bound,
+    /// Upper edge of a band; the next curve is the lower edge.
+    BandTop,
+    /// Lower edge of a band.
+    BandBottom,
+    /// A theoretical limit, dotted.
+    Limit,
+}
+
+/// Events of one kind on the timeline.
+pub struct TimelineRow {
+    /// Kind of the events, in words.
+    pub name: String,
+    /// Severity of the events.
+    pub level: Level,
+    /// The events.
+    pub events: Vec<Interval>,
+}
+
+/// Severity of the events of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// The result is lost.
+    Lost,
+    /// The result is degraded.
+    Degraded,
+    /// Measurements are missing or unused, or the estimate has a gap.
+    Loss,
+    /// Information.
+    Note,
+}
+
+/// An event.
+pub struct Interval {
+    /// Start, s.
+    pub from_s: f64,
+    /// End, s.
+    pub to_s: f64,
+    /// Message.
+    pub sentence: String,
+}

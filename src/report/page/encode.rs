@@ -1,0 +1,148 @@
+//! Encodes the data of the page as JSON with binary arrays in base64 (RFC 4648).
+
+use super::data::{Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, RunPage, Section, TimedPose, TimelineRow};
+use super::quantise::cloud;
+use crate::geometry::{Pose, Vector};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+
+/// The data as JSON that is inert within a `<script>` element: it has no `<`, `>` or `&`.
+///
+/// # Errors
+/// When a value cannot be written as JSON.
+pub(super) fn inert_json(page: &RunPage) -> Result<String, serde_json::Error> {
+    let view = &page.view;
+    let value = json!({
+        "status": page.metrics.status,
+        "cloud": cloud(&view.points),
+        "materials": view.materials,
+        "estimate": path(&view.estimate),
+        "truth": path(&view.truth),
+        "base": path(&view.base),
+        "surfaces": base64_f32(view.surfaces.iter().flatten().flat_map(|corner| corner.iter().copied())),
+        "links": view.links.iter().map(link).collect::<Vec<_>>(),
+        "parts": view.parts.iter().map(block).collect::<Vec<_>>(),
+        "charts": page.charts.iter().map(chart_group).collect::<Vec<_>>(),
+        "timeline": page.timeline.iter().map(timeline_row).collect::<Vec<_>>(),
+    });
+    Ok(inert(&serde_json::to_string(&value)?))
+}
+
+/// Escapes the characters that end a script element or start a comment in it, and line ends that scripts do not allow.
+fn inert(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
+    for c in json.chars() {
+        match c {
+            '<' | '>' | '&' | '\u{2028}' | '\u{2029}' => text += &format!("\\u{:04x}", u32::from(c)),
+            _ => text.push(c),
+        }
+    }
+    text
+}
+
+/// Little-endian single-precision numbers in base64.
+pub(super) fn base64_f32(values: impl Iterator<Item = f64>) -> String {
+    base64_bytes(&values.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>())
+}
+
+pub(super) fn base64_bytes(bytes: &[u8]) -> String {
+    STANDARD.encode(bytes)
+}
+
+/// Times; positions and quaternions, seven numbers a pose.
+fn path(poses: &[TimedPose]) -> Value {
+    json!({
+        "t": base64_f32(poses.iter().map(|timed| timed.t_s)),
+        "pose": base64_f32(poses.iter().flat_map(|timed| seven(&timed.pose))),
+    })
+}
+
+/// Position x, y, z and quaternion x, y, z, w.
+fn seven(pose: &Pose) -> [f64; 7] {
+    let (p, q) = (pose.translation.vector, pose.rotation.coords);
+    [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+}
+
+fn numbers(v: &Vector) -> [f64; 3] {
+    [v.x, v.y, v.z]
+}
+
+fn block(block: &Block) -> Value {
+    json!({ "centre": numbers(&block.centre_in_head), "size": numbers(&block.size_m) })
+}
+
+fn link(link: &Link) -> Value {
+    match link {
+        Link::Spring { base_from_foot, head_from_top, coil_radius_m, coils } => json!({
+            "foot": seven(base_from_foot), "top": seven(head_from_top), "radius": coil_radius_m, "coils": coils,
+        }),
+        Link::Cord { point_in_base, point_in_head } => {
+            json!({ "from": numbers(point_in_base), "to": numbers(point_in_head) })
+        }
+    }
+}
+
+fn chart_group(group: &ChartGroup) -> Value {
+    let section = match group.section {
+        Section::Errors => "errors",
+        Section::Clock => "clock",
+        Section::Matching => "matching",
+        Section::Timing => "timing",
+        Section::Motion => "motion",
+    };
+    json!({ "section": section, "charts": group.charts.iter().map(chart).collect::<Vec<_>>() })
+}
+
+fn chart(chart: &Chart) -> Value {
+    json!({
+        "title": chart.title,
+        "label": chart.label,
+        "log": chart.is_log,
+        "t": base64_f32(chart.t_s.iter().copied()),
+        "curves": chart.curves.iter().map(curve).collect::<Vec<_>>(),
+    })
+}
+
+fn curve(curve: &Curve) -> Value {
+    let style = match curve.style {
+        CurveStyle::Estimate => "estimate",
+        CurveStyle::Truth => "truth",
+        CurveStyle::Second => "second",
+        CurveStyle::Bound => "bound",
+        CurveStyle::BandTop => "band-top",
+        CurveStyle::BandBottom => "band-bottom",
+        CurveStyle::Limit => "limit",
+    };
+    json!({ "name": curve.name, "style": style, "y": base64_f32(curve.values.iter().copied()) })
+}
+
+fn timeline_row(row: &TimelineRow) -> Value {
+    let level = match row.level {
+        Level::Lost => "lost",
+        Level::Degraded => "degraded",
+        Level::Loss => "loss",
+        Level::Note => "note",
+    };
+    let events = row.events.iter().map(|event| json!([event.from_s, event.to_s, event.sentence]));
+    json!({ "name": row.name, "level": level, "events": events.collect::<Vec<_>>() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_in_a_script_element_cannot_end_it() {
+        let hostile = "</script><script>alert(1)</script><!-- & \u{2028}";
+        let text = inert(&serde_json::to_string(hostile).unwrap());
+        assert!(!text.contains(['<', '>', '&', '\u{2028}']), "{text}");
+        assert_eq!(serde_json::from_str::<String>(&text).unwrap(), hostile);
+    }
+
+    #[test]
+    fn numbers_are_little_endian_base64() {
+        // 1.0 is 3f800000 and -2.0 is c0000000 in IEEE 754; their bytes are 00 00 80 3f 00 00 00 c0.
+        assert_eq!(base64_f32([1.0, -2.0].into_iter()), "AACAPwAAAMA=");
+    }
+}

@@ -1,0 +1,113 @@
+//! The parts of the page that are readable without scripts.
+
+use crate::report::quantity::{percent, time};
+use crate::report::{CauseMetrics, EventMetrics, Metrics, integrity, rows};
+
+/// Escapes text for elements and attributes.
+pub(super) fn escaped(text: &str) -> String {
+    let escape = |c: char| match c {
+        '&' => "&amp;".to_owned(),
+        '<' => "&lt;".to_owned(),
+        '>' => "&gt;".to_owned(),
+        '"' => "&quot;".to_owned(),
+        '\'' => "&#39;".to_owned(),
+        c if c.is_control() && c != '\n' && c != '\t' => format!("\\u{{{:x}}}", u32::from(c)),
+        c => c.to_string(),
+    };
+    text.chars().map(escape).collect()
+}
+
+/// Replaces each `{{name}}` of the template by its value, in one pass: values are not searched for names.
+pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
+    let mut parts = template.split("{{");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (name, rest) = part.split_once("}}").unwrap_or((part, ""));
+        let value = values.iter().find(|(known, _)| *known == name).map_or("", |(_, value)| value);
+        text += value;
+        text += rest;
+    }
+    text
+}
+
+/// The verdict: icon, status and reason.
+pub(super) fn verdict(metrics: &Metrics) -> String {
+    let (Some(verdict), Some(status)) = (integrity::verdict(metrics), metrics.status.as_deref()) else {
+        return String::new();
+    };
+    let (class, icon) = match status {
+        "good" => ("good", "<path d=\"M5 12.5l4.5 4.5L19 7.5\"/>"),
+        "degraded" => ("degraded", "<path d=\"M12 4v10M12 18.5v.5\"/>"),
+        _ => ("lost", "<path d=\"M6 6l12 12M18 6L6 18\"/>"),
+    };
+    let reason = verdict.strip_prefix(status).map_or(verdict.as_str(), |rest| rest.trim_start_matches(": "));
+    format!(
+        "<p class=\"verdict {class}\" role=\"status\"><svg viewBox=\"0 0 24 24\" aria-hidden=\"true\">{icon}</svg>\
+         <span><strong>{}</strong> {}</span></p>",
+        escaped(status),
+        escaped(reason)
+    )
+}
+
+/// Causes of the status, losses and notes.
+pub(super) fn events(metrics: &Metrics) -> String {
+    let cause = |cause: &CauseMetrics| {
+        format!("{}, {:.1} to {:.1} s: {}", cause.status, cause.from_s, cause.to_s, cause.sentence)
+    };
+    let lines = |events: &[EventMetrics]| events.iter().map(EventMetrics::line).collect::<Vec<_>>();
+    let causes: Vec<String> = metrics.integrity.causes.iter().map(cause).collect();
+    [("Causes", causes), ("Losses", lines(&metrics.losses)), ("Notes", lines(&metrics.notes))]
+        .iter()
+        .map(|(title, lines)| list(title, lines))
+        .collect()
+}
+
+fn list(title: &str, lines: &[String]) -> String {
+    if lines.is_empty() {
+        return format!("<h3>{title}</h3>\n<p class=\"none\">none</p>\n");
+    }
+    let items: String = lines.iter().map(|line| format!("<li>{}</li>\n", escaped(line))).collect();
+    format!("<h3>{title}</h3>\n<ul>\n{items}</ul>\n")
+}
+
+/// The metrics in groups, and the run time of each part of the estimator.
+pub(super) fn metrics_tables(metrics: &Metrics, parts_s: &[(&str, f64)]) -> String {
+    let mut html = String::new();
+    for group in rows::groups(metrics) {
+        let rows = group.rows.into_iter().map(|row| (row.name.to_owned(), row.value));
+        html += &table(group.title, rows);
+    }
+    let total_s = metrics.open_loop.wall_s.filter(|wall_s| *wall_s > 0.0);
+    let part = |(name, seconds): &(&str, f64)| {
+        let share = total_s.map_or_else(String::new, |total_s| format!(" ({})", percent(seconds / total_s)));
+        ((*name).to_owned(), time(*seconds) + &share)
+    };
+    if !parts_s.is_empty() {
+        html += &table("open loop, by part", parts_s.iter().map(part));
+    }
+    html
+}
+
+fn table(title: &str, rows: impl Iterator<Item = (String, String)>) -> String {
+    let rows: String = rows
+        .map(|(name, value)| {
+            format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escaped(&name), escaped(&value))
+        })
+        .collect();
+    format!("<table>\n<caption>{}</caption>\n{rows}</table>\n", escaped(title))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_not_filled_again() {
+        assert_eq!(fill("a {{x}} b {{y}} c", &[("x", "{{y}}"), ("y", "2")]), "a {{y}} b 2 c");
+    }
+
+    #[test]
+    fn text_cannot_become_markup() {
+        assert_eq!(escaped("<a b=\"c\" d='e'>&\u{1b}"), "&lt;a b=&quot;c&quot; d=&#39;e&#39;&gt;&amp;\\u{1b}");
+    }
+}

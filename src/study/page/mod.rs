@@ -1,0 +1,101 @@
+//! Gathers the data of the page of a run.
+
+mod charts;
+mod cloud;
+mod links;
+mod paths;
+mod timeline;
+
+use super::StudyError;
+use super::estimate::{BestEstimate, Origin};
+use super::integrity::Integrity;
+use super::open_loop::OpenLoopRun;
+use crate::evaluation::{Errors, InformationBound, Pairs};
+use crate::geometry::{Pose, Vector};
+use crate::recording::{CloudPoint, Reader};
+use crate::report::Metrics;
+use crate::report::page::{MAX_PAGE_TRIANGLES, RunPage, View};
+use crate::time::Stamp;
+use crate::world::World;
+
+/// Results of a run, from which the page is made.
+pub(super) struct RunResults<'a> {
+    pub reader: &'a Reader,
+    pub origin: &'a Origin<'a>,
+    pub open: &'a OpenLoopRun,
+    pub best: &'a BestEstimate<'a>,
+    /// Errors of the open loop if a closed loop was computed.
+    pub open_errors: Option<&'a Errors>,
+    pub bound: Option<&'a InformationBound>,
+    pub integrity: &'a Integrity,
+    /// Estimated and true poses; `None` without truth.
+    pub pairs: Option<&'a Pairs>,
+    /// Points of the cloud in the map frame.
+    pub points: &'a [CloudPoint],
+}
+
+impl RunResults<'_> {
+    /// Gathers the data of the page.
+    pub(super) fn page<'m>(&self, metrics: &'m Metrics, manifest: &'m str) -> Result<RunPage<'m>, StudyError> {
+        Ok(RunPage {
+            metrics,
+            manifest,
+            parts_s: self.open.timing.parts().to_vec(),
+            view: self.view()?,
+            charts: charts::all(self),
+            timeline: timeline::rows(self.open, &metrics.integrity.causes),
+        })
+    }
+
+    fn view(&self) -> Result<View, StudyError> {
+        let (truth, base) = match self.pairs {
+            Some(_) => paths::truth(self)?,
+            None => (Vec::new(), Vec::new()),
+        };
+        let world = self.world();
+        let (surfaces, surfaces_are_partial) = world.map(surfaces).unwrap_or_default();
+        let head = self.origin.manifest.run.as_ref().map(|run| &run.head.spec);
+        Ok(View {
+            points: cloud::points(self),
+            materials: world.map_or(&[][..], World::materials).iter().map(|material| material.name.clone()).collect(),
+            estimate: paths::estimate(self),
+            truth,
+            base,
+            surfaces,
+            surfaces_are_partial,
+            links: head.map(|head| links::of(&head.linkage)).unwrap_or_default(),
+            parts: head.map(|head| links::blocks(&head.parts)).unwrap_or_default(),
+        })
+    }
+
+    /// The scene, if it is known and the estimate is aligned with it.
+    fn world(&self) -> Option<&World> {
+        self.alignment().and(self.origin.surroundings.map(|surroundings| surroundings.world))
+    }
+
+    fn alignment(&self) -> Option<Pose> {
+        self.best.comparison.and_then(|comparison| comparison.world_from_map)
+    }
+
+    /// The transform from the map to the frame of the view; the identity without truth.
+    fn view_from_map(&self) -> Pose {
+        self.alignment().unwrap_or_else(Pose::identity)
+    }
+
+    /// Time since the first measurement, s.
+    fn seconds(&self, stamp: Stamp) -> f64 {
+        stamp.seconds_since(self.open.recorded.0)
+    }
+}
+
+/// The triangles of the scene: the largest ones, and whether others are missing.
+fn surfaces(world: &World) -> (Vec<[Vector; 3]>, bool) {
+    let mut triangles: Vec<_> = world.triangles().map(|(triangle, _)| triangle).collect();
+    let are_partial = triangles.len() > MAX_PAGE_TRIANGLES;
+    if are_partial {
+        let twice_area = |[a, b, c]: &[Vector; 3]| (b - a).cross(&(c - a)).norm();
+        triangles.sort_by(|a, b| twice_area(b).total_cmp(&twice_area(a)));
+        triangles.truncate(MAX_PAGE_TRIANGLES);
+    }
+    (triangles, are_partial)
+}

@@ -1,0 +1,61 @@
+//! Paths of head and base, and angular velocity of the head.
+
+use super::RunResults;
+use crate::geometry::Trajectory;
+use crate::recording::RecordingError;
+use crate::report::page::{MAX_PAGE_POSES, TimedPose};
+use crate::study::truth_cursor::TruthCursor;
+use crate::time::{Span, Stamp};
+
+/// Maximum rate of the poses: a dozen in a period of the fastest mode that is visible.
+const MAX_RATE_HZ: f64 = 50.0;
+/// Half the time over which the angular velocity is computed.
+const HALF_STEP: Span = Span::from_nanos(5_000_000);
+
+/// Stamps of the poses of the view.
+fn stamps(trajectory: &Trajectory) -> impl Iterator<Item = Stamp> + '_ {
+    let count = trajectory.len();
+    let seconds = trajectory.span().map_or(0.0, |(first, last)| last.seconds_since(first));
+    let wanted = (seconds * MAX_RATE_HZ).min(MAX_PAGE_POSES as f64).max(2.0);
+    let stride = (count as f64 / wanted).ceil().max(1.0) as usize;
+    trajectory.stamps().iter().copied().step_by(stride)
+}
+
+/// The estimated poses of the head.
+pub(super) fn estimate(results: &RunResults) -> Vec<TimedPose> {
+    let view_from_map = results.view_from_map();
+    let trajectory = results.best.map_from_head;
+    let timed =
+        |stamp: Stamp| Some(TimedPose { t_s: results.seconds(stamp), pose: view_from_map * trajectory.at(stamp)? });
+    stamps(trajectory).filter_map(timed).collect()
+}
+
+/// The true poses of head and base at the stamps of the estimate.
+pub(super) fn truth(results: &RunResults) -> Result<(Vec<TimedPose>, Vec<TimedPose>), RecordingError> {
+    let mut cursor = TruthCursor::new(results.reader.truth());
+    let (mut heads, mut bases) = (Vec::new(), Vec::new());
+    for stamp in stamps(results.best.map_from_head) {
+        let Some(state) = cursor.at(stamp)? else { continue };
+        let t_s = results.seconds(stamp);
+        heads.push(TimedPose { t_s, pose: state.world_from_head });
+        bases.extend(state.world_from_base.map(|pose| TimedPose { t_s, pose }));
+    }
+    Ok((heads, bases))
+}
+
+/// Angular velocity of the head.
+pub(super) struct TurnRates<'a>(&'a Trajectory);
+
+impl<'a> TurnRates<'a> {
+    pub(super) fn of(trajectory: &'a Trajectory) -> Self {
+        Self(trajectory)
+    }
+
+    /// Magnitude at `stamp`, degrees/s, from the rotation over 10 ms; 0 at the ends of the trajectory.
+    pub(super) fn at(&self, stamp: Stamp) -> f64 {
+        let (Some(before), Some(after)) = (self.0.at(stamp - HALF_STEP), self.0.at(stamp + HALF_STEP)) else {
+            return 0.0;
+        };
+        before.rotation.angle_to(&after.rotation).to_degrees() / (2.0 * HALF_STEP.seconds())
+    }
+}

@@ -1,0 +1,138 @@
+// Loads a report in a headless browser and uses it: node browser.mjs NODE_MODULES REPORT [PICTURES]
+//
+// Exits with 77 if a program or a module that it needs is not installed.
+// Fails on an error in the console, on a request to the network, on a control without effect, on an accessibility violation
+// that axe-core finds, and on a page that is wider than the screen. With PICTURES, it writes screenshots to that folder.
+import { createRequire } from "node:module";
+import { existsSync, readFileSync } from "node:fs";
+import { join, resolve } from "node:path";
+import { pathToFileURL } from "node:url";
+
+const [modules, report, pictures] = process.argv.slice(2);
+const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-headless-shell", "/usr/bin/google-chrome"];
+const cannotRun = (reason) => {
+  console.error(reason);
+  process.exit(77);
+};
+const executablePath = BROWSERS.find((path) => existsSync(path)) ?? cannotRun("Chromium is not installed");
+for (const name of ["playwright-core", "axe-core"]) {
+  if (!existsSync(join(modules, name))) cannotRun(`${name} is not in ${modules}; .ci/run installs it`);
+}
+const load = createRequire(join(resolve(modules), "x.js"));
+const browser = await load("playwright-core").chromium.launch({
+  executablePath,
+  args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+});
+const axe = readFileSync(load.resolve("axe-core/axe.min.js"), "utf8");
+const failures = [];
+const check = (isRight, sentence) => {
+  if (!isRight) failures.push(sentence);
+};
+
+async function open(colorScheme, width) {
+  const page = await browser.newPage({ colorScheme, viewport: { width, height: 900 } });
+  page.setDefaultTimeout(120_000);
+  const name = `${colorScheme}, ${width} px`;
+  page.on("console", (message) => check(message.type() !== "error", `${name}: console: ${message.text()}`));
+  page.on("pageerror", (error) => check(false, `${name}: ${error.message}`));
+  page.on("request", (request) => check(/^(file|data|blob):/.test(request.url()), `${name}: request to ${request.url()}`));
+  await page.goto(pathToFileURL(report).href);
+  await page.waitForFunction(() => document.documentElement.dataset.drawn);
+  return page;
+}
+
+// The pixels of the view after the next drawing.
+async function picture(page) {
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  return (await page.locator("#scene").screenshot()).toString("base64");
+}
+
+// Checks that an action changes the view.
+async function changes(page, sentence, action) {
+  const before = await picture(page);
+  await action();
+  check(before !== (await picture(page)), `${sentence} does not change the view`);
+}
+
+async function slide(page, id, fraction) {
+  await page.locator(`#${id}`).evaluate((input, fraction) => {
+    input.value = Number(input.min) + fraction * (Number(input.max) - Number(input.min));
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+  }, fraction);
+}
+
+async function use(page) {
+  // Only the drawing counts, not the focus ring, the legend and the label on it.
+  await page.addStyleTag({ content: "#scene{outline:none!important}.legend,.tag{visibility:hidden}" });
+  const stage = await page.locator("#scene").boundingBox();
+  const [x, y] = [stage.x + stage.width / 2, stage.y + stage.height / 2];
+  await changes(page, "dragging", async () => {
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x + 120, y + 40, { steps: 4 });
+    await page.mouse.up();
+  });
+  await changes(page, "the wheel", () => page.mouse.wheel(0, -300));
+  await changes(page, "an arrow key", () => page.locator("#scene").press("ArrowLeft"));
+  await changes(page, "shift and an arrow key", () => page.locator("#scene").press("Shift+ArrowUp"));
+  await changes(page, "the plus key", () => page.locator("#scene").press("+"));
+  await changes(page, "the upper end of the slice", () => slide(page, "high", 0.3));
+  await changes(page, "the lower end of the slice", () => slide(page, "low", 0.2));
+  await slide(page, "high", 1);
+  await slide(page, "low", 0);
+  const colours = await page.locator("#colour option").evaluateAll((options) => options.map((option) => option.value));
+  for (const colour of ["height", "error", "time", "turn_rate", "intensity", "material"]) {
+    check(colours.includes(colour), `colour by ${colour} is missing`);
+  }
+  for (const colour of colours.slice(1)) {
+    await changes(page, `colour by ${colour}`, () => page.locator("#colour").selectOption(colour));
+  }
+  for (const id of ["show-cloud", "show-surfaces", "show-estimate", "show-truth"]) {
+    await changes(page, id, () => page.locator(`#${id}`).click());
+    await page.locator(`#${id}`).click();
+  }
+  await changes(page, "playing", async () => {
+    await page.locator("#play").click();
+    await page.waitForFunction(() => document.getElementById("time").valueAsNumber > 0.3);
+    await page.locator("#play").click();
+  });
+  const time = () => page.locator("#time").evaluate((input) => input.valueAsNumber);
+  const stopped = await time();
+  const chart = page.locator("#errors .u-over").first();
+  await chart.scrollIntoViewIfNeeded();
+  const box = await chart.boundingBox();
+  await page.mouse.click(box.x + 0.8 * box.width, box.y + 0.5 * box.height);
+  check((await time()) > stopped, "a click on a chart does not move the time");
+  const choice = page.locator("#errors figcaption select");
+  const drawn = () => page.locator("#errors canvas").nth(1).screenshot();
+  const first = (await drawn()).toString("base64");
+  await choice.selectOption("2");
+  check(first !== (await drawn()).toString("base64"), "the choice of the error component has no effect");
+}
+
+async function audit(page, name) {
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => axe.run());
+  for (const { id, nodes } of violations) {
+    const places = nodes.slice(0, 3).map((node) => `${node.target}: ${node.any.map((each) => each.message).join("; ")}`);
+    check(false, `${name}: axe: ${id}: ${places.join(" | ")}`);
+  }
+  const width = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  check(width <= 0, `${name}: the page is ${width} px wider than the screen`);
+}
+
+for (const scheme of ["light", "dark"]) {
+  for (const width of [1400, 400]) {
+    const page = await open(scheme, width);
+    const drawn = await page.evaluate(() => document.documentElement.dataset.drawn);
+    console.log(`${scheme}, ${width} px: first picture after ${drawn} ms`);
+    check(await page.evaluate(() => window.hostile === undefined), "a hostile name has run as a script");
+    if (pictures) await page.screenshot({ path: join(pictures, `${scheme}-${width}.png`), fullPage: true });
+    await audit(page, `${scheme}, ${width} px`);
+    if (scheme === "light" && width === 1400) await use(page);
+    await page.close();
+  }
+}
+await browser.close();
+failures.forEach((sentence) => console.error(sentence));
+process.exitCode = failures.length ? 1 : 0;

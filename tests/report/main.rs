@@ -1,0 +1,9 @@
+//! The report in a browser.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+#[path = "../command/mod.rs"]
+mod command;
+mod page;
+#[path = "../skip/mod.rs"]
+mod skip;

@@ -1,0 +1,34 @@
+//! The page of a run in a headless browser.
+
+use crate::command::run;
+use crate::skip::run_or_skip;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Runs as a script if a page does not escape it.
+const HOSTILE: &str = "<script>window.hostile=1</script>";
+
+/// A scene with a hostile name in `folder`.
+fn hostile_scene(folder: &Path) -> PathBuf {
+    let office = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/office.ron")).unwrap();
+    let scene = folder.join("hostile.ron");
+    std::fs::write(&scene, office.replacen("name: \"office\"", &format!("name: \"{HOSTILE}\""), 1)).unwrap();
+    scene
+}
+
+#[test]
+fn the_page_works_in_a_browser_and_a_hostile_scene_name_is_inert() {
+    let here = tempfile::tempdir().unwrap();
+    let scene = hostile_scene(here.path());
+    let (code, _, errors) =
+        run(here.path(), &format!("--quiet --scene {} --duration 8s --seed 3 --out out", scene.display()));
+    assert!(code == 0 || code == 3, "{errors}");
+    let report = here.path().join("out/report.html");
+    assert!(std::fs::read_to_string(&report).unwrap().contains("&lt;script&gt;window.hostile"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (script, modules) = (root.join("tests/report/browser.mjs"), root.join("target/ci-node/node_modules"));
+    let mut node = Command::new("node");
+    let Some(output) = run_or_skip("browser", node.arg(script).arg(modules).arg(&report)) else { return };
+    println!("{}", String::from_utf8_lossy(&output.stdout));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
