@@ -71,7 +71,6 @@ fn each_kind_of_averaging_integrates_to_the_motion() {
         (ImuAveraging::None, 1000, 9e-3),
     ] {
         let error_m = error_m(&imu, &samples(&imu, kind, rate_hz), kind);
-        println!("MEASURED {kind:?} {rate_hz} {error_m}");
         assert!(error_m < limit_m, "{kind:?} at {rate_hz} Hz: {error_m} m");
     }
 }
