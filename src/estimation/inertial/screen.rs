@@ -226,6 +226,24 @@ mod tests {
     }
 
     #[test]
+    fn only_a_specific_force_within_the_range_may_be_a_shock() {
+        let limited = ImuNoise { accel_limit_m_per_s2: 49.0, ..noise() };
+        for (gyro, accel, expected) in [(0.0, 40.0, true), (10.0, 40.0, false), (10.0, 0.0, false), (0.0, 60.0, false)]
+        {
+            let mut samples = samples();
+            samples[500].1.angular_velocity_rad_per_s.y += gyro;
+            samples[500].1.specific_force_m_per_s2.y += accel;
+            let mut screen = Screen::new(&limited);
+            let screened = (0..=500).map(|k| screen.screen((samples[k].0, &samples[k].1), samples[k + 1..].iter()));
+            assert_eq!(
+                screened.last(),
+                Some(Screened::Outlier { may_be_shock: expected }),
+                "{gyro} rad/s, {accel} m/s^2"
+            );
+        }
+    }
+
+    #[test]
     fn a_shock_of_several_samples_is_no_outlier() {
         let mut samples = samples();
         for (k, push) in [(500, 20.0), (501, 60.0), (502, 55.0), (503, 25.0)] {
