@@ -111,6 +111,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn after_two_seconds_the_search_covers_a_metre_up_and_down() {
+        let limits = RelocalisationLimits::after_gap(2.0, 0.01);
+        let heights: Vec<f64> =
+            limits.starts(&Pose::identity(), &Vector::zeros()).iter().map(|(start, _)| start.translation.z).collect();
+        let (lowest, highest) =
+            (heights.iter().copied().fold(0.0, f64::min), heights.iter().copied().fold(0.0, f64::max));
+        assert_eq!((lowest, highest), (-1.0, 1.0));
+    }
+
+    #[test]
     fn the_start_poses_after_a_gap_of_a_day_are_a_few_thousand_at_most() {
         let count = |seconds: f64| {
             RelocalisationLimits::after_gap(seconds, 0.01).starts(&Pose::identity(), &Vector::zeros()).len()
