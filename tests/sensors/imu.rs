@@ -1,10 +1,9 @@
 //! IMU measurements compared with closed forms, and IMU noise compared with the spec.
 
+use crate::strapdown::integrate;
 use approx::assert_relative_eq;
 use std::f64::consts::PI;
-use zsim::geometry::{
-    Kinematics, Pose, Rotation, STANDARD_GRAVITY_M_PER_S2 as G, Vector, from_roll_pitch_yaw, gravity_in_world,
-};
+use zsim::geometry::{Kinematics, Pose, Rotation, STANDARD_GRAVITY_M_PER_S2 as G, Vector, from_roll_pitch_yaw};
 use zsim::measurement::ImuAveraging;
 use zsim::random::Seed;
 use zsim::sensors::{GaussMarkovSpec, Imu, ImuErrors, ImuSpec, InertialReading, coning_corrected, ideal_reading};
@@ -70,23 +69,16 @@ fn tumbling(t: f64) -> Kinematics {
 fn an_ideal_imu_at_1_khz_integrates_to_the_motion() {
     let mut errors = ImuErrors::new(&imu(&spec_of("ideal_1khz")), Seed(1));
     let dt = 1e-3;
-    let start = tumbling(0.0);
-    let (mut rotation, mut velocity) = (start.world_from_body.rotation, start.velocity_in_world);
-    let mut position = start.world_from_body.translation.vector;
-    for k in 0..10_000 {
+    let readings = (0..10_000).map(|k| {
         let t = f64::from(k) * dt;
-        let sample = errors.measure(&coning_corrected(&tumbling(t), &tumbling(t + dt), dt));
-        // Textbook strapdown integration, as a user of /imu/data_raw would write it.
-        let turn = sample.angular_velocity_rad_per_s * dt;
-        let middle = rotation * Rotation::from_scaled_axis(turn * 0.5);
-        let acceleration = middle * sample.specific_force_m_per_s2 + gravity_in_world();
-        position += velocity * dt + acceleration * (0.5 * dt * dt);
-        velocity += acceleration * dt;
-        rotation *= Rotation::from_scaled_axis(turn);
-    }
+        let reading = errors.measure(&coning_corrected(&tumbling(t), &tumbling(t + dt), dt));
+        (reading.angular_velocity_rad_per_s, reading.specific_force_m_per_s2)
+    });
+    let integrated = integrate(&tumbling(0.0), readings, dt);
     let end = tumbling(10.0).world_from_body;
-    assert!((position - end.translation.vector).norm() < 1e-4, "{}", position - end.translation.vector);
-    assert!(rotation.angle_to(&end.rotation).to_degrees() < 1e-6);
+    let error = integrated.translation.vector - end.translation.vector;
+    assert!(error.norm() < 1e-4, "{error}");
+    assert!(integrated.rotation.angle_to(&end.rotation).to_degrees() < 1e-6);
 }
 
 #[test]

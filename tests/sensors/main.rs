@@ -5,3 +5,5 @@
 mod imu;
 mod lidar;
 mod specs;
+#[path = "../strapdown/mod.rs"]
+mod strapdown;

@@ -6,3 +6,5 @@ mod faults;
 mod memory_sink;
 mod pipeline;
 mod shipped;
+#[path = "../strapdown/mod.rs"]
+mod strapdown;

@@ -1,8 +1,9 @@
 //! Simulation with the shipped specs: a head on its spring, carried by hand through the office.
 
+use crate::strapdown::integrate;
 use zsim::estimation::{estimate_all, load};
 use zsim::evaluation::{Errors, Pairs, align};
-use zsim::geometry::{Pose, Rotation, Surface, Trajectory, Vector, gravity_in_world};
+use zsim::geometry::{Pose, Surface, Trajectory, Vector};
 use zsim::measurement::{ImuSample, LidarScan, Measurement, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::sensors::Cylinder;
@@ -175,22 +176,14 @@ fn the_ideal_imu_integrates_to_the_head_on_its_spring() {
     let simulation = Simulation::prepare(&exact_office(16.0)).unwrap();
     let recorded = recorded(&simulation);
     let imu = |k: usize| recorded.truth[k].head.of_frame(&simulation.calibration().head_from_imu);
-    let dt = 1e-3;
     // Ten seconds from 6 s on, with walk and swing.
-    let start = imu(6000);
-    let (mut rotation, mut velocity) = (start.world_from_body.rotation, start.velocity_in_world);
-    let mut position = start.world_from_body.translation.vector;
-    for sample in &recorded.samples[6000..16_000] {
-        let turn = sample.angular_velocity_rad_per_s * dt;
-        let middle = rotation * Rotation::from_scaled_axis(turn * 0.5);
-        let acceleration = middle * sample.specific_force_m_per_s2 + gravity_in_world();
-        position += velocity * dt + acceleration * (0.5 * dt * dt);
-        velocity += acceleration * dt;
-        rotation *= Rotation::from_scaled_axis(turn);
-    }
+    let samples = recorded.samples[6000..16_000].iter();
+    let readings = samples.map(|sample| (sample.angular_velocity_rad_per_s, sample.specific_force_m_per_s2));
+    let integrated = integrate(&imu(6000), readings, 1e-3);
     let end = imu(16_000).world_from_body;
-    assert!((position - end.translation.vector).norm() < 2e-3, "{}", position - end.translation.vector);
-    assert!(rotation.angle_to(&end.rotation).to_degrees() < 0.02);
+    let error = integrated.translation.vector - end.translation.vector;
+    assert!(error.norm() < 2e-3, "{error}");
+    assert!(integrated.rotation.angle_to(&end.rotation).to_degrees() < 0.02);
 }
 
 #[test]
