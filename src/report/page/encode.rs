@@ -21,6 +21,7 @@ pub(super) fn inert_json(page: &RunPage) -> Result<String, serde_json::Error> {
         "truth": path(&view.truth),
         "base": path(&view.base),
         "surfaces": base64_f32(view.surfaces.iter().flatten().flat_map(|corner| corner.iter().copied())),
+        "surfacesArePartial": view.surfaces_are_partial,
         "links": view.links.iter().map(link).collect::<Vec<_>>(),
         "parts": view.parts.iter().map(block).collect::<Vec<_>>(),
         "charts": page.charts.iter().map(chart_group).collect::<Vec<_>>(),

@@ -61,6 +61,7 @@ const setUpShown = () => {
   document.querySelector("[data-needs=truth]").hidden = !truth.isKnown;
   document.querySelector("[data-needs=surfaces]").hidden = data.surfaces === "";
   byId("show-surfaces").checked = data.surfaces !== "";
+  if (data.surfacesArePartial) byId("surfaces-label").textContent = "largest true surfaces";
   check("show-cloud", (shown) => (view.cloud.points.visible = shown && data.cloud.count > 0));
   check("show-estimate", (shown) => (view.estimate.visible = shown));
   check("show-truth", (shown) => (view.truth.visible = shown && truth.isKnown));
