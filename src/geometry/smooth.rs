@@ -1,7 +1,7 @@
 //! Smooth interpolation of a trajectory.
 
 use super::{Pose, Rotation, Trajectory, Vector};
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 
 /// Interpolates a trajectory with cubics, for beams fired between poses at the IMU rate.
 ///
@@ -12,6 +12,7 @@ use crate::time::Stamp;
 #[derive(Debug, Clone)]
 pub struct SmoothCursor<'a> {
     trajectory: &'a Trajectory,
+    max_gap: Option<Span>,
     segment: Option<Segment>,
 }
 
@@ -28,15 +29,23 @@ struct Segment {
 impl<'a> SmoothCursor<'a> {
     /// Creates a cursor over `trajectory`.
     pub fn new(trajectory: &'a Trajectory) -> Self {
-        Self { trajectory, segment: None }
+        Self { trajectory, max_gap: None, segment: None }
     }
 
-    /// The pose at `stamp`; `None` outside the time span of the trajectory.
+    /// Creates a cursor that has no poses within longer gaps of the trajectory.
+    pub fn with_max_gap(trajectory: &'a Trajectory, max_gap: Span) -> Self {
+        Self { max_gap: Some(max_gap), ..Self::new(trajectory) }
+    }
+
+    /// The pose at `stamp`; `None` outside the time span of the trajectory and within a gap.
     pub fn at(&mut self, stamp: Stamp) -> Option<Pose> {
         if !self.segment.as_ref().is_some_and(|segment| (segment.start..=segment.end).contains(&stamp)) {
             self.segment = Segment::around(self.trajectory, stamp);
         }
-        self.segment.as_ref().map(|segment| segment.at(stamp))
+        let segment = self.segment.as_ref()?;
+        let is_end = stamp == segment.start || stamp == segment.end;
+        let is_gap = self.max_gap.is_some_and(|max_gap| segment.end - segment.start > max_gap);
+        (is_end || !is_gap).then(|| segment.at(stamp))
     }
 }
 
@@ -133,5 +142,16 @@ mod tests {
         assert_eq!(cursor.at(Stamp::from_nanos(-1)), None);
         assert_eq!(cursor.at(Stamp::from_nanos(1_000_000_001)), None);
         assert_eq!(SmoothCursor::new(&Trajectory::new()).at(Stamp::from_nanos(0)), None);
+    }
+
+    #[test]
+    fn there_are_no_poses_within_a_gap() {
+        let stamp = |ms: i64| Stamp::from_nanos(ms * 1_000_000);
+        let poses = [0, 10, 20, 1020, 1030].map(|ms| (stamp(ms), swing(ms as f64 * 1e-3)));
+        let trajectory = Trajectory::from_poses(poses).unwrap();
+        let mut cursor = SmoothCursor::with_max_gap(&trajectory, Span::from_seconds(0.1));
+        let known = [0, 5, 20, 21, 500, 1019, 1020, 1025].map(|ms| cursor.at(stamp(ms)).is_some());
+        assert_eq!(known, [true, true, true, false, false, false, true, true]);
+        assert!(SmoothCursor::new(&trajectory).at(stamp(500)).is_some());
     }
 }

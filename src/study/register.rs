@@ -9,13 +9,15 @@ use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
 use crate::recording::{CloudPoint, Measurements, Reader, RecordingError, Selection, write_result};
 use crate::report::page::MAX_PAGE_POINTS;
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use std::path::Path;
 
 /// Maximum number of beams in the sample for the evaluation.
 const MAX_SAMPLED_BEAMS: usize = 100_000;
 /// Maximum number of points for viewers, in `result.mcap`; the cloud files have all points.
 const MAX_VIEWER_POINTS: usize = 1_000_000;
+/// Returns between poses farther apart than this, s, are not projected: the estimate has a pose every 10 ms, except in gaps.
+const MAX_POSE_GAP_S: f64 = 0.1;
 
 /// A projected beam: origin and end point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,7 +100,7 @@ impl Registration<'_> {
         let noise = self.calibration.lidar;
         let mut beams = BeamProjection {
             measurements: self.reader.measurements(self.selection),
-            cursor: SmoothCursor::new(self.map_from_head),
+            cursor: SmoothCursor::with_max_gap(self.map_from_head, Span::from_seconds(MAX_POSE_GAP_S)),
             truth: self.with_truth.then(|| TruthCursor::new(self.reader.truth())),
             calibrated: LidarModel { head_from_laser: self.calibration.head_from_laser, range_m: 0.0 },
             corrected: LidarModel {
@@ -227,7 +229,7 @@ impl BeamProjection<'_, '_, '_> {
         let mut pending = Vec::with_capacity(scan.returns.len());
         for beam in &scan.returns {
             let stamp = scan.stamp + beam.offset;
-            // The estimate does not cover the start and the end of the recording.
+            // The estimate does not cover the start and the end of the recording, and gaps.
             let Some(map_from_head) = self.cursor.at(stamp) else { continue };
             pending.push(self.project(&map_from_head, beam, stamp)?);
         }
