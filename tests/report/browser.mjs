@@ -91,12 +91,15 @@ async function use(page) {
     await changes(page, id, () => page.locator(`#${id}`).click());
     await page.locator(`#${id}`).click();
   }
+  // The head is at rest in the first seconds.
+  await slide(page, "time", 0.6);
+  const time = () => page.locator("#time").evaluate((input) => input.valueAsNumber);
+  const begun = await time();
   await changes(page, "playing", async () => {
     await page.locator("#play").click();
-    await page.waitForFunction(() => document.getElementById("time").valueAsNumber > 0.3);
+    await page.waitForFunction((begun) => document.getElementById("time").valueAsNumber > begun + 0.3, begun);
     await page.locator("#play").click();
   });
-  const time = () => page.locator("#time").evaluate((input) => input.valueAsNumber);
   const stopped = await time();
   const chart = page.locator("#errors .u-over").first();
   await chart.scrollIntoViewIfNeeded();
