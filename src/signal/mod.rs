@@ -9,7 +9,7 @@ mod transfer;
 
 pub use allan::{AllanPoint, allan_deviation};
 pub use chi_squared::chi_squared_quantile;
-pub use regularity::{Regularity, StampPattern};
+pub use regularity::{Regularity, StampPattern, first_on_time_s, lost_before};
 pub use segments::{Segments, Window};
 pub use spectrum::{Spectrum, power_density};
 pub use transfer::{TransferPoint, transfer_function};

@@ -16,9 +16,27 @@ const DELAYED_SKEWNESS: f64 = 0.8;
 const MIN_SKEWNESS_STAMPS: usize = 30;
 /// Samples count as lost if the fit with losses has a relative jitter below this fraction of that without.
 const LOST_SAMPLES_JITTER_RATIO: f64 = 0.25;
+/// Delayed stamps with a smaller jitter, as a fraction of the period, have a period although intervals vary with the losses.
+/// Those of a sensor without a period are distributed over it: 0.25 and more.
+const MAX_DELAYED_JITTER: f64 = 0.23;
+/// Deviations of the first period from the median interval with which delayed stamps are counted.
+const PERIOD_STEP: f64 = 0.005;
+const PERIOD_STEPS: i32 = 12;
+/// Iterations of counting delayed stamps with losses, each with the period of the one before.
+const COUNTING_ITERATIONS: usize = 3;
 /// Iterations of the lower-envelope fit, and the weight of a late stamp in it.
 const ENVELOPE_ITERATIONS: usize = 30;
 const LATE_WEIGHT: f64 = 1e-3;
+/// Samples count as lost if the later stamps are so late with a probability below `exp(-9)` without a loss.
+const LOSS_EVIDENCE: f64 = 9.0;
+/// Rounding of the lateness to lost samples: a late reference must not hide a loss, an early one must not feign one.
+const LOSS_ROUNDING: f64 = 0.3;
+/// Time and number of later stamps that show whether samples were lost.
+const LOOK_AHEAD: (f64, usize) = (0.1, 64);
+/// Gain with which the count of delayed stamps with losses follows their lower envelope: it takes up an error of the period.
+const ENVELOPE_GAIN: f64 = 0.1;
+/// Standard deviation of exponential delays over the median deviation of the difference of two.
+const SIGMA_OVER_MEDIAN: f64 = 1.0 / std::f64::consts::LN_2;
 /// Stamps are in bursts if the median interval is below this fraction of the mean.
 const BURST_INTERVAL_RATIO: f64 = 0.3;
 
@@ -91,9 +109,12 @@ impl Regularity {
         let by_intervals = Self::about_line(counted);
         let line = match (by_intervals, without_losses) {
             // A long delay looks like a loss, and with large jitter a short interval looks like the period.
-            (Some(a), Some(b)) => {
-                let fits = a.jitter_s / a.period_s < LOST_SAMPLES_JITTER_RATIO * b.jitter_s / b.period_s;
-                if fits { a } else { b }
+            (Some(a), Some(b)) if a.relative_jitter() >= LOST_SAMPLES_JITTER_RATIO * b.relative_jitter() => {
+                match Self::of_delayed_with_losses(stamps_s, median) {
+                    Some(c) if c.relative_jitter() < MAX_DELAYED_JITTER.min(b.relative_jitter()) => return Some(c),
+                    Some(c) if c.relative_jitter() < b.relative_jitter() => c,
+                    _ => b,
+                }
             }
             (a, b) => a.or(b)?,
         };
@@ -103,6 +124,31 @@ impl Regularity {
             return Some(Self { period_s: median, jitter_s: 0.0, pattern: StampPattern::Irregular });
         }
         Some(line)
+    }
+
+    /// Standard deviation of the stamps about the line, as a fraction of the period.
+    fn relative_jitter(&self) -> f64 {
+        self.jitter_s / self.period_s
+    }
+
+    /// Fits a line through delayed stamps among which samples were lost; `None` if the stamps are not delayed.
+    ///
+    /// The samples are counted with the period of the line, which starts as the median interval.
+    fn of_delayed_with_losses(stamps_s: &[f64], median_s: f64) -> Option<Self> {
+        let mut deviations: Vec<f64> = stamps_s.windows(2).map(|pair| (pair[1] - pair[0] - median_s).abs()).collect();
+        deviations.sort_by(f64::total_cmp);
+        let jitter_s = SIGMA_OVER_MEDIAN * deviations.get(deviations.len() / 2)?;
+        let fit = |deviation: i32| {
+            let period_s = median_s * (1.0 + PERIOD_STEP * f64::from(deviation));
+            let mut line = Self { period_s, jitter_s, pattern: StampPattern::Delayed };
+            for _ in 0..COUNTING_ITERATIONS {
+                let counts = counts_of_delayed(stamps_s, &line);
+                line = Self::about_line(counts.zip(stamps_s.iter().copied()))?;
+            }
+            (line.pattern == StampPattern::Delayed).then_some(line)
+        };
+        let lines = (-PERIOD_STEPS..=PERIOD_STEPS).filter_map(fit);
+        lines.min_by(|a, b| a.relative_jitter().total_cmp(&b.relative_jitter()))
     }
 
     /// Fits a line through points (count, stamp); `None` unless it increases.
@@ -146,6 +192,48 @@ impl Regularity {
         }
         slope
     }
+}
+
+/// Number of samples lost before a delayed stamp, from its lateness and that of the later stamps, s.
+///
+/// Delays are independent and exponentially distributed with a mean of `jitter_s`: if no sample was lost, `n` stamps are all
+/// late by `least` with a probability of `exp(-n least / jitter_s)`. The lateness counts from the time at which the stamp
+/// would be on time without a loss; the stamps of the next 0.1 s are considered.
+pub fn lost_before(stamps_s: impl Iterator<Item = f64>, on_time_s: f64, line: (f64, f64)) -> f64 {
+    let (period_s, jitter_s) = line;
+    let (count, least_s) = least_lateness(stamps_s, on_time_s, period_s);
+    let lost = (least_s / period_s + LOSS_ROUNDING).floor().max(0.0);
+    if count as f64 * least_s > LOSS_EVIDENCE * jitter_s { lost } else { 0.0 }
+}
+
+/// The time of the first of delayed stamps without its delay, which the stamps after it show, s.
+pub fn first_on_time_s(stamps_s: impl Iterator<Item = f64>, period_s: f64) -> f64 {
+    let mut stamps_s = stamps_s.peekable();
+    let first_s = stamps_s.peek().copied().unwrap_or_default();
+    first_s + least_lateness(stamps_s, first_s, period_s).1.min(0.0)
+}
+
+/// Number of the stamps of the next 0.1 s, and the smallest lateness of them, s.
+fn least_lateness(stamps_s: impl Iterator<Item = f64>, on_time_s: f64, period_s: f64) -> (usize, f64) {
+    let mut stamps_s = stamps_s.take(LOOK_AHEAD.1).peekable();
+    let until_s = stamps_s.peek().map_or(0.0, |first_s| first_s + LOOK_AHEAD.0);
+    let lateness = stamps_s.take_while(|stamp_s| *stamp_s <= until_s).zip(0..);
+    let lateness = lateness.map(|(stamp_s, k)| stamp_s - on_time_s - f64::from(k) * period_s);
+    lateness.fold((0, f64::INFINITY), |(count, least_s), late_s| (count + 1, least_s.min(late_s)))
+}
+
+/// The sample count of each delayed stamp; `line` has the period and the jitter.
+fn counts_of_delayed(stamps_s: &[f64], line: &Regularity) -> impl Iterator<Item = f64> {
+    let Regularity { period_s, jitter_s, .. } = *line;
+    let (mut count, mut on_time_s) = (-1.0, first_on_time_s(stamps_s.iter().copied(), period_s) - period_s);
+    (0..stamps_s.len()).map(move |k| {
+        let later = || stamps_s[k..].iter().copied();
+        let advance = 1.0 + lost_before(later(), on_time_s + period_s, (period_s, jitter_s));
+        count += advance;
+        on_time_s += advance * period_s;
+        on_time_s += ENVELOPE_GAIN * least_lateness(later(), on_time_s, period_s).1;
+        count
+    })
 }
 
 /// Whether the intervals are independent, as those of a sensor without period.

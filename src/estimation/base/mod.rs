@@ -162,7 +162,10 @@ pub(super) fn intervals(
     let mut placed = Vec::new();
     for (k, (raw_s, sample)) in stamped.iter().enumerate() {
         match screen.screen((*raw_s, sample), stamped[k + 1..].iter()) {
-            Screened::Measured(clipped) => stream.push(*raw_s, (sample, clipped), &mut placed),
+            Screened::Measured(clipped) => {
+                let later_s = stamped[k + 1..].iter().map(|(later_s, _)| *later_s);
+                stream.push((*raw_s, later_s), (sample, clipped), &mut placed);
+            }
             Screened::Outlier { may_be_shock: true } => stream.note_possible_shock(),
             Screened::Outlier { may_be_shock: false } | Screened::Frozen => {}
         }

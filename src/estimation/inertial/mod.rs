@@ -137,15 +137,16 @@ impl InertialStream {
         self.possible_shock = true;
     }
 
-    /// Adds a sample stamped `raw_s`; appends the intervals that it completes to `into`, each with its start time.
+    /// Adds a sample stamped `raw_s`, before samples stamped `later_s`; appends the intervals that it completes to `into`,
+    /// each with its start time.
     pub(super) fn push(
         &mut self,
-        raw_s: f64,
+        (raw_s, later_s): (f64, impl Iterator<Item = f64>),
         (sample, clipped): (&ImuSample, Clipped),
         into: &mut Vec<(f64, Interval)>,
     ) {
         self.saturated += usize::from(clipped.any());
-        let centre_s = self.filter.smooth(raw_s);
+        let centre_s = self.filter.smooth(raw_s, later_s);
         let period = self.filter.period_s();
         if let Some(last) = self.group.last() {
             if centre_s - last.centre_s < 0.2 * period {

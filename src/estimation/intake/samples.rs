@@ -146,7 +146,8 @@ impl SampleQueue {
                         self.gaps.push((self.used_s, gap_s));
                     }
                     self.used_s = seconds;
-                    stream.push(seconds, (&sample, clipped), &mut self.intervals);
+                    let later_s = self.waiting.iter().map(|(later_s, _)| *later_s);
+                    stream.push((seconds, later_s), (&sample, clipped), &mut self.intervals);
                 }
                 Screened::Outlier { may_be_shock } => {
                     self.discarded.outliers += 1;

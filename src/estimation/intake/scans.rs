@@ -145,7 +145,8 @@ impl ScanQueue {
             }
             self.used_s = seconds;
             let after_s = scan.stamped_after.seconds();
-            let start_s = filter.smooth(seconds + after_s) - after_s;
+            let later_s = self.waiting.iter().map(|(later_s, scan, _)| later_s + scan.stamped_after.seconds());
+            let start_s = filter.smooth(seconds + after_s, later_s) - after_s;
             for hit in &scan.returns {
                 let point = hit.point_in_laser.cast::<f64>();
                 let range = point.norm();
