@@ -167,8 +167,8 @@ pub struct InertialSpec {
     /// Residual error of the accelerometer in proportion to the reading, added to the noise, 0..1.
     #[serde(with = "crate::spec::checked::Fraction")]
     pub accel_scale_error: f64,
-    /// Longest IMU gap that is bridged by interpolation, s. After a longer gap the estimate restarts and relocalises in
-    /// the surfaces seen before.
+    /// Longest IMU gap that is bridged by interpolation, s; gaps above 0.13 s only where the motion before them is slow
+    /// enough. After other gaps the estimate restarts and relocalises in the surfaces seen before.
     #[serde(with = "crate::spec::checked::Positive")]
     pub max_gap_s: f64,
     /// Duration of the initial rest, s. Rest or motion is decided from this time at the start.

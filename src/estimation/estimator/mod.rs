@@ -28,9 +28,6 @@ use std::time::Instant;
 /// Speed (m/s) or rotation rate (rad/s) above which too few matches are a problem. Below both the IMU is sufficient.
 const FAST_MOTION: (f64, f64) = (0.3, 0.5);
 
-/// While relocalisation after a gap is pending, gaps of up to this multiple of `max_gap_s` are bridged.
-const BRIDGING_FACTOR_WHILE_LOST: f64 = 3.0;
-
 /// An estimated noise above the specification by more than this factor causes a warning.
 const REPORTED_NOISE_FACTOR: f64 = 1.5;
 
@@ -170,7 +167,8 @@ impl Estimator {
     /// Adds a segment: handles a gap before it, starts the first window, and processes the segment.
     fn advance(&mut self, segment: Segment) -> Result<(), EstimationError> {
         // A restart before relocalisation would discard the pending search.
-        self.intake.bridge_gaps_up_to(if self.gap_relocalisation.is_some() { BRIDGING_FACTOR_WHILE_LOST } else { 1.0 });
+        // To restart again while a relocalisation is pending would leave no time for it.
+        self.intake.bridge_gaps(self.gap_relocalisation.is_some());
         self.warnings.extend(self.intake.take_warnings());
         if segment.after_gap {
             self.localise_in_map()?;

@@ -5,6 +5,7 @@
 mod averaging;
 mod clipping;
 mod interpolation;
+mod recent_motion;
 mod reconstruction;
 mod resampling;
 mod screen;
@@ -20,15 +21,17 @@ use crate::geometry::Vector;
 use crate::measurement::{ImuAveraging, ImuNoise, ImuSample};
 use averaging::{Compensation, Neighbours};
 use interpolation::InterpolationError;
+use recent_motion::RecentMotion;
 use reconstruction::{FIT_MEANS, bridge, reconstruct_clipped};
 use resampling::Resampler;
 use std::collections::VecDeque;
 
 /// Samples of a faster IMU are averaged to about this spacing, s.
 const SPACING_S: f64 = 0.01;
-/// Longest gap that is bridged in the data of an irregular sensor, s. Gaps are frequent there: to restart after each
-/// of them would leave no time to relocalise.
-const IRREGULAR_GAP_S: f64 = 0.3;
+/// A shorter gap of a sensor with a period is bridged whatever the motion, s.
+const SHORT_GAP_S: f64 = 0.13;
+/// A longer gap is bridged if the attitude after it errs by less, rad.
+const MAX_BRIDGING_ERROR_RAD: f64 = 0.1;
 /// Maximum time to wait for valid samples after a gap or a clipped reading, s; bounds the latency.
 const MAX_WAIT_S: f64 = 1.0;
 /// Extra standard deviation of the specific force where a possible shock was discarded, m/s^2.
@@ -64,6 +67,7 @@ pub(super) struct InertialStream {
     current: Option<Mean>,
     /// Error of the interpolation of a missing mean.
     bridging_error: InterpolationError,
+    recent_motion: RecentMotion,
     /// The means before the current one; a line through them predicts the motion into a gap or clipping.
     last_valid: VecDeque<Mean>,
     /// Means from the first gap or clipped reading on, until enough valid ones follow.
@@ -90,6 +94,7 @@ impl InertialStream {
             group: Vec::new(),
             current: None,
             bridging_error: InterpolationError::new(),
+            recent_motion: RecentMotion::default(),
             last_valid: VecDeque::new(),
             waiting: Vec::new(),
             end_s: None,
@@ -118,14 +123,18 @@ impl InertialStream {
         std::mem::take(&mut self.saturated)
     }
 
-    /// Longest gap that is bridged, s, where `regular_s` is that of a sensor with a period.
-    pub(super) fn max_gap_s(&self, regular_s: f64) -> f64 {
-        if self.resampler.is_some() { regular_s.max(IRREGULAR_GAP_S) } else { regular_s }
+    /// Whether a gap of the current motion can be bridged: a trial of the motion before it decides, if it is not short.
+    pub(super) fn can_bridge(&self, gap_s: f64) -> bool {
+        let error_rad = || self.recent_motion.bridging_error_rad(gap_s, self.spacing_s());
+        self.resampler.is_some()
+            || gap_s < SHORT_GAP_S
+            || error_rad().is_some_and(|error| error < MAX_BRIDGING_ERROR_RAD)
     }
 
     /// Discards the samples so far; the next interval does not continue the last one.
     pub(super) fn restart(&mut self) {
         self.group.clear();
+        self.recent_motion.clear();
         self.last_valid.clear();
         self.waiting.clear();
         self.resampler.iter_mut().for_each(Resampler::restart);
@@ -296,6 +305,7 @@ impl InertialStream {
     fn emit(&mut self, next: Mean, into: &mut Vec<(f64, Interval)>) {
         let Some(now) = self.current.replace(next) else { return };
         self.measure_bridging_error(&now, &next);
+        self.recent_motion.push(now, self.spacing_s());
         self.last_valid.push_back(now);
         if self.last_valid.len() >= FIT_MEANS {
             self.last_valid.pop_front();

@@ -62,8 +62,8 @@ pub(super) struct Intake {
     after_gap: bool,
     /// The lidar gap is so long that the estimate waits for the next scan.
     without_lidar: bool,
-    /// Longest IMU gap that is bridged, s.
-    max_bridged_s: f64,
+    /// Whether IMU gaps are bridged whatever the motion.
+    gaps_are_bridged: bool,
     warnings: Vec<Warning>,
 }
 
@@ -79,14 +79,14 @@ impl Intake {
             next_start_s: 0.0,
             after_gap: false,
             without_lidar: false,
-            max_bridged_s: spec.inertial.max_gap_s,
+            gaps_are_bridged: false,
             warnings: Vec::new(),
         }
     }
 
-    /// Bridges IMU gaps of up to `factor` times `max_gap_s` of the spec.
-    pub(super) fn bridge_gaps_up_to(&mut self, factor: f64) {
-        self.max_bridged_s = factor * self.spec.inertial.max_gap_s;
+    /// Bridges the IMU gaps up to `max_gap_s` of the spec whatever the motion, or only where the motion allows it.
+    pub(super) fn bridge_gaps(&mut self, always: bool) {
+        self.gaps_are_bridged = always;
     }
 
     /// Converts `seconds` since the origin into a stamp.
@@ -176,7 +176,7 @@ impl Intake {
                 return None;
             }
         }
-        let coverage = self.samples.advance(end_s, self.max_bridged_s, last);
+        let coverage = self.samples.advance(end_s, (self.spec.inertial.max_gap_s, self.gaps_are_bridged), last);
         if coverage == Coverage::Waiting && !last {
             return None;
         }

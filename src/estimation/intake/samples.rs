@@ -116,12 +116,11 @@ impl SampleQueue {
         }
     }
 
-    /// Uses samples until the intervals reach slightly past `end_s`, and bridges gaps of up to `max_bridged_s`. `last`:
-    /// no more data will arrive.
-    pub(super) fn advance(&mut self, end_s: f64, max_bridged_s: f64, last: bool) -> Coverage {
+    /// Uses samples until the intervals reach slightly past `end_s`. Bridges gaps of up to `max_gap_s`, if the motion
+    /// allows it or they are `always_bridged`. `last`: no more data will arrive.
+    pub(super) fn advance(&mut self, end_s: f64, (max_gap_s, always_bridged): (f64, bool), last: bool) -> Coverage {
         let complete_s = if last { f64::INFINITY } else { self.newest_s() - COMPLETE_AFTER_S };
         let Some(stream) = &mut self.stream else { return Coverage::Waiting };
-        let max_bridged_s = stream.max_gap_s(max_bridged_s);
         while let Some((seconds, sample)) = self.waiting.front().copied() {
             if self.used_s > end_s + MARGIN_S && stream.end_s() > end_s + 0.5 * MARGIN_S {
                 return Coverage::Complete;
@@ -133,7 +132,8 @@ impl SampleQueue {
             let gap_s = seconds - self.used_s;
             if let Screened::Measured(_) = screened
                 && gap_s.is_finite()
-                && gap_s > max_bridged_s
+                && gap_s > 4.5 * stream.period_s()
+                && !(gap_s < max_gap_s && (always_bridged || stream.can_bridge(gap_s)))
             {
                 stream.flush(&mut self.intervals);
                 return Coverage::Gap(self.used_s, seconds);
