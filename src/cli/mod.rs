@@ -8,6 +8,7 @@ mod bars;
 mod base;
 mod bound;
 mod check;
+mod completion;
 mod completions;
 mod coverage;
 mod coverage_text;
@@ -37,6 +38,7 @@ mod sweep_text;
 use arguments::Global;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
+use completion::Completion;
 use std::process::ExitCode;
 
 /// Design and simulate moving range sensors: a lidar and an IMU on a spring, and the continuous-time SLAM that makes a
@@ -79,13 +81,6 @@ enum Command {
     Spec(spec::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
-}
-
-/// Result of a command that did not fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Completion {
-    Done,
-    WithLoss,
 }
 
 /// Parses the arguments, runs the command, and returns the exit code.

@@ -24,6 +24,7 @@ mod joint;
 mod modes;
 mod mount;
 mod mounted_spring;
+mod placement;
 mod response;
 mod simulation;
 mod spec;

@@ -3,8 +3,8 @@
 use super::actuated::MotorSpec;
 use super::carrier::CarrierSpec;
 use super::elements::{CableSpec, ElementSpec, SpringMassSpec};
+pub use super::placement::PlacementSpec;
 use crate::elasticity::SpringSpec;
-use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use crate::spec::{Kind, Source, SpecError, checked, find, parse};
 use serde::{Deserialize, Serialize};
 
@@ -94,26 +94,6 @@ pub struct InertiaSpec {
     /// Tensor entry yz, kg m^2.
     #[serde(default, with = "checked::Finite")]
     pub yz: f64,
-}
-
-/// The pose of a frame in another frame.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlacementSpec {
-    /// Origin of the frame, m.
-    #[serde(with = "checked::FiniteArray::<3>")]
-    pub position_m: [f64; 3],
-    /// Roll, pitch and yaw (about fixed x, then y, then z), degrees.
-    #[serde(default, with = "checked::FiniteArray::<3>")]
-    pub roll_pitch_yaw_deg: [f64; 3],
-}
-
-impl PlacementSpec {
-    /// The pose as a rigid transform.
-    pub fn pose(&self) -> Pose {
-        let [roll, pitch, yaw] = self.roll_pitch_yaw_deg.map(f64::to_radians);
-        Pose::from_parts(Vector::from(self.position_m).into(), from_roll_pitch_yaw(roll, pitch, yaw))
-    }
 }
 
 /// The linkage between base and head.

@@ -16,6 +16,7 @@ mod deformation;
 mod element;
 mod error;
 mod haringx;
+mod six_vector;
 mod spec;
 mod spring;
 
@@ -24,23 +25,6 @@ pub use deformation::{Deformation, blocks, split, stack};
 pub use element::Element;
 pub use error::ElasticityError;
 pub use haringx::{Column, buckling_load_n, loaded_stiffness};
+pub use six_vector::{Matrix6, Vector6, conditioning};
 pub use spec::{Density, Material, SpringDesign, SpringSpec, StiffnessRow};
 pub use spring::{MAX_SEGMENTS, Spring, SpringState};
-
-/// A wrench, a twist, or a small displacement: translation, then rotation.
-pub type Vector6 = nalgebra::Vector6<f64>;
-/// A stiffness, damping or mass matrix: maps one [`Vector6`] to another.
-pub type Matrix6 = nalgebra::Matrix6<f64>;
-
-/// The smallest eigenvalue of a symmetric matrix after scaling to unit diagonal.
-///
-/// The scaling makes metres and radians comparable: 1 for a diagonal matrix, 0 for a singular one, negative for an
-/// indefinite one. Returns -1 if a diagonal entry is zero or negative.
-pub fn conditioning(matrix: &Matrix6) -> f64 {
-    if matrix.diagonal().iter().any(|d| d.is_nan() || *d <= 0.0) {
-        return -1.0;
-    }
-    let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
-    let scaled = Matrix6::from_fn(|i, j| 0.5 * (matrix[(i, j)] + matrix[(j, i)]) * scale[i] * scale[j]);
-    scaled.symmetric_eigenvalues().min()
-}

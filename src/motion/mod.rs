@@ -7,6 +7,7 @@
 //!
 //! The base frame is at the clamped end of the spring: x forward, y left, z up (REP-103).
 
+mod base_motion;
 mod cruise;
 mod drops;
 mod error;
@@ -28,6 +29,7 @@ mod uav;
 mod vehicle;
 mod walk;
 
+pub use base_motion::BaseMotion;
 pub use cruise::CruiseSpec;
 pub use drops::DropSpec;
 pub use error::{MAX_DURATION_S, MotionError};
@@ -42,17 +44,3 @@ pub use stops::StopsSpec;
 pub use uav::{GustSpec, RotorSpec, UavSpec};
 pub use vehicle::{EngineSpec, OrderSpec, RoadClass, RoadSpec, SuspensionSpec, VehicleSpec};
 pub use walk::WalkSpec;
-
-use crate::geometry::Kinematics;
-
-/// The prescribed motion of the base.
-pub trait BaseMotion: Send + Sync {
-    /// The motion at `t_s` seconds after the start: `world_from_base` with exact derivatives. Accelerations are
-    /// continuous. The base is at rest at the start, except in a cruise.
-    fn at(&self, t_s: f64) -> Kinematics;
-
-    /// Grip of the hand on the head: 0 is free, 1 is held still.
-    fn hold(&self, _t_s: f64) -> f64 {
-        0.0
-    }
-}

@@ -14,11 +14,12 @@ mod cell_set;
 mod density;
 mod dynamic;
 mod mixed;
+mod projected_return;
 mod sigma;
 
+pub use projected_return::ProjectedReturn;
 pub use sigma::point_sigma_m;
 
-use crate::geometry::Vector;
 use crate::measurement::LidarNoise;
 use crate::time::{Span, Stamp};
 use density::{BlockCounts, Density};
@@ -30,24 +31,6 @@ use std::collections::VecDeque;
 const BLOCK: Span = Span::from_nanos(1_000_000_000);
 /// Number of blocks before, and after, that are used to classify a block.
 const CONTEXT_BLOCKS: usize = 5;
-
-/// A lidar return, projected into the map by the estimate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ProjectedReturn {
-    /// Time of emission.
-    pub stamp: Stamp,
-    /// Measured point in the map, m.
-    pub point_in_map: Vector,
-    /// Position of the lidar in the map, m.
-    pub origin_in_map: Vector,
-}
-
-impl ProjectedReturn {
-    /// Distance from the lidar, m.
-    fn range_m(&self) -> f64 {
-        (self.point_in_map - self.origin_in_map).norm()
-    }
-}
 
 /// Class of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,12 +5,14 @@
 mod averaging;
 mod clipping;
 mod interpolation;
+mod mean;
 mod recent_motion;
 mod reconstruction;
 mod resampling;
 mod screen;
 
 pub(super) use clipping::Clipped;
+use mean::{Mean, SPACING_S};
 pub(super) use screen::{Screen, Screened};
 
 use super::initial::NoiseFactors;
@@ -26,8 +28,6 @@ use reconstruction::{FIT_MEANS, bridge, reconstruct_clipped};
 use resampling::Resampler;
 use std::collections::VecDeque;
 
-/// Samples of a faster IMU are averaged to about this spacing, s.
-const SPACING_S: f64 = 0.01;
 /// A shorter gap of a sensor with a period is bridged whatever the motion, s.
 const SHORT_GAP_S: f64 = 0.13;
 /// A longer gap is bridged if the attitude after it errs by less, rad.
@@ -36,20 +36,6 @@ const MAX_BRIDGING_ERROR_RAD: f64 = 0.1;
 const MAX_WAIT_S: f64 = 1.0;
 /// Extra standard deviation of the specific force where a possible shock was discarded, m/s^2.
 const SHOCK_ACCEL: f64 = 10.0;
-
-/// The mean of one or more consecutive samples, at the middle of the time that they cover.
-#[derive(Debug, Clone, Copy)]
-struct Mean {
-    centre_s: f64,
-    gyro: Vector,
-    accel: Vector,
-    /// Standard deviations in addition to the sensor noise, rad/s and m/s^2.
-    extra_gyro_sigma: f64,
-    extra_accel_sigma: f64,
-    clipped: Clipped,
-    /// Whether the mean is interpolated, without samples.
-    bridged: bool,
-}
 
 /// Converts ordered IMU samples to contiguous intervals.
 #[derive(Debug)]

@@ -5,52 +5,22 @@
 
 mod gust;
 mod rotors;
+mod spec;
 
 pub use gust::GustSpec;
 pub use rotors::RotorSpec;
+pub use spec::UavSpec;
 
 use super::jet::{Jet, PoseJet};
 use super::sines::SineSum;
 use super::smooth::SmoothSteps;
-use super::walk::{RouteMotion, WalkSpec};
+use super::walk::RouteMotion;
 use super::{BaseMotion, MotionError};
 use crate::geometry::{Kinematics, Route, STANDARD_GRAVITY_M_PER_S2};
 use crate::random::Seed;
 use crate::spec::Source;
-use crate::spec::checked::{NonNegative, Positive};
 use gust::{horizontal, vertical};
 use rotors::Rotors;
-use serde::{Deserialize, Serialize};
-
-/// A small multirotor that carries the base.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct UavSpec {
-    /// Time at rest at the start, s.
-    #[serde(with = "NonNegative")]
-    pub still_s: f64,
-    /// Time in which gusts and vibration rise to their full amplitude, s.
-    #[serde(with = "Positive")]
-    pub onset_s: f64,
-    /// Height of the base above the floor of the route, m.
-    #[serde(with = "Positive")]
-    pub height_m: f64,
-    /// How the craft follows the route.
-    pub follow: WalkSpec,
-    /// The wind.
-    pub gust: GustSpec,
-    /// Natural frequency of the position control, Hz. A higher value reduces the response to gusts.
-    #[serde(with = "Positive")]
-    pub hold_hz: f64,
-    /// Damping ratio of the position control.
-    #[serde(with = "Positive")]
-    pub hold_damping: f64,
-    /// Drag: acceleration per m/s of relative wind, 1/s.
-    #[serde(with = "NonNegative")]
-    pub drag_per_s: f64,
-    /// The rotors.
-    pub rotors: RotorSpec,
-}
 
 /// Motion of a multirotor.
 pub(super) struct Uav {

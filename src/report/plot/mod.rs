@@ -7,6 +7,7 @@
 mod axis;
 mod canvas;
 mod chart;
+mod error;
 mod figure;
 mod font;
 mod frame;
@@ -15,27 +16,6 @@ mod palette;
 mod stroke;
 
 pub use chart::{Cell, Cells, Chart, Mark, Series, SignedDots};
+pub use error::PlotError;
 pub use figure::Figure;
 pub use palette::Colour;
-
-/// Error of plotting or saving a plot.
-#[derive(Debug, thiserror::Error)]
-pub enum PlotError {
-    /// The drawing backend failed.
-    #[error("cannot draw the plot: {0}")]
-    Drawing(String),
-    /// The file cannot be written.
-    #[error("cannot write {path}: {source}")]
-    File {
-        /// Path of the file.
-        path: String,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-}
-
-impl PlotError {
-    fn drawing(error: impl std::fmt::Display) -> Self {
-        Self::Drawing(error.to_string())
-    }
-}

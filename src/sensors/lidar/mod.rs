@@ -1,5 +1,6 @@
 //! Lidars: beam pattern and timing, ray intersections, echoes and range errors.
 
+mod beam;
 mod echo;
 mod errors;
 mod interlaced;

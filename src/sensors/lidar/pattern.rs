@@ -1,13 +1,10 @@
+pub use super::beam::Beam;
+pub(super) use super::beam::MAX_BEAMS;
 use super::interlaced::Interlaced;
 use super::rosette::Rosette;
-use crate::geometry::Vector;
 use crate::spec::{Source, SpecError, checked};
-use crate::time::Span;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-
-/// Maximum number of beams per scan: a guard against a typing error, and for memory.
-pub(super) const MAX_BEAMS: usize = 1 << 20;
 
 /// Directions and times of the beams of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -84,17 +81,6 @@ pub(super) struct Pattern {
     pub turns_per_scan: f64,
 }
 
-/// A beam of a scan.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beam {
-    /// Direction, a unit vector in the lidar frame.
-    pub direction_in_laser: Vector,
-    /// Firing time after the first beam, on the crystal of the lidar.
-    pub offset: Span,
-    /// The same time, s, without rounding to 1 ns.
-    pub offset_s: f64,
-}
-
 /// Angles and timing of a planar scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Plane {
@@ -142,16 +128,6 @@ impl Plane {
     fn beam(&self, k: u32) -> Beam {
         let azimuth = self.angle_min_rad + f64::from(k) * self.angle_increment_rad;
         Beam::new(azimuth, 0.0, f64::from(k) * self.time_increment_s)
-    }
-}
-
-impl Beam {
-    /// The beam at `azimuth_rad` counter-clockwise from x about z and `elevation_rad` above the plane z = 0.
-    pub fn new(azimuth_rad: f64, elevation_rad: f64, offset_s: f64) -> Self {
-        let (sin, cos) = azimuth_rad.sin_cos();
-        let (up, level) = elevation_rad.sin_cos();
-        let direction_in_laser = Vector::new(level * cos, level * sin, up);
-        Self { direction_in_laser, offset: Span::from_seconds(offset_s), offset_s }
     }
 }
 

@@ -10,6 +10,7 @@
 //! the best latency, which should be zero.
 
 mod cross_section;
+mod disturbance;
 mod evaluate;
 mod figure;
 mod output;
@@ -18,6 +19,7 @@ mod result;
 mod spec;
 mod stamp_errors;
 
+pub use disturbance::{ClockState, Disturbance};
 pub(in crate::study) use evaluate::TimingRun;
 pub use evaluate::{MapErrors, Section};
 pub use figure::{curve_figure, map_figure};
@@ -26,30 +28,3 @@ pub use output::{csv, text_table};
 pub(in crate::study) use reference::Reference;
 pub use result::{LatencyResult, LatencyRun, Minimum, Recovery};
 pub use spec::TimingSpec;
-
-use serde::{Deserialize, Serialize};
-
-/// A timing error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Disturbance {
-    /// Delay of the IMU's stamps relative to the lidar's for the same time, ms.
-    pub latency_ms: f64,
-    /// Standard deviation of the white noise on the stamps of the lidar's scans, ms.
-    pub noise_ms: f64,
-}
-
-impl Disturbance {
-    /// No timing error.
-    pub const NONE: Self = Self { latency_ms: 0.0, noise_ms: 0.0 };
-}
-
-/// Treatment of clock errors by the estimator.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ClockState {
-    /// Offset fixed at zero; stamps are used as they are.
-    Off,
-    /// Offset and rate are estimated by the estimator's settings; stamps are smoothed with the known jitter.
-    On,
-}

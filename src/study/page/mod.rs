@@ -4,35 +4,16 @@ mod charts;
 mod cloud;
 mod links;
 mod paths;
+mod run_results;
 mod timeline;
 
 use super::StudyError;
-use super::estimate::{BestEstimate, Origin};
-use super::integrity::Integrity;
-use super::open_loop::OpenLoopRun;
-use crate::evaluation::{Errors, InformationBound, Pairs};
 use crate::geometry::{Pose, Vector};
-use crate::recording::{CloudPoint, Reader};
 use crate::report::Metrics;
 use crate::report::page::{MAX_PAGE_TRIANGLES, RunPage, View};
 use crate::time::Stamp;
 use crate::world::World;
-
-/// Results of a run, from which the page is made.
-pub(super) struct RunResults<'a> {
-    pub reader: &'a Reader,
-    pub origin: &'a Origin<'a>,
-    pub open: &'a OpenLoopRun,
-    pub best: &'a BestEstimate<'a>,
-    /// Errors of the open loop if a closed loop was computed.
-    pub open_errors: Option<&'a Errors>,
-    pub bound: Option<&'a InformationBound>,
-    pub integrity: &'a Integrity,
-    /// Estimated and true poses; `None` without truth.
-    pub pairs: Option<&'a Pairs>,
-    /// Points of the cloud in the map frame.
-    pub points: &'a [CloudPoint],
-}
+pub(super) use run_results::RunResults;
 
 impl RunResults<'_> {
     /// Gathers the data of the page.

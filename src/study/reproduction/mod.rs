@@ -5,6 +5,7 @@
 //! experiments in one table.
 
 mod damping;
+mod extent;
 mod gain_curves;
 mod gain_plots;
 mod result;
@@ -12,6 +13,7 @@ mod spec;
 mod timing;
 
 pub use damping::{DampingFit, FittedPeak, fit_damping};
+pub use extent::Extent;
 pub use result::{ComparedNumber, ExperimentResult, TABLE_HEADING, paper_table};
 pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, TimingMapsSpec};
 
@@ -21,16 +23,6 @@ use super::sweep::{ContentHash, Plan, Runner};
 use crate::spec::{Kind, Source, find, names, parse, to_text};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// Extent of an experiment: the complete one, or a smoke test.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Extent {
-    /// The complete experiment.
-    Whole,
-    /// A smoke test that takes seconds; its figures are not results.
-    Quick,
-}
 
 /// File with the result, which is written last.
 const RESULT_FILE: &str = "finding.ron";

@@ -17,9 +17,13 @@ mod correlation;
 mod database;
 mod loop_search;
 mod pose_graph;
+mod relative_pose;
 mod scan_context;
 mod spec;
 
+pub use relative_pose::LoopReport;
+use relative_pose::MATCHING_REACH;
+pub(super) use relative_pose::RelativePose;
 pub use spec::PlacesSpec;
 
 use super::corrected_trajectory::CorrectedTrajectory;
@@ -28,10 +32,8 @@ use crate::estimation::matching::Matcher;
 use crate::estimation::observed::ObservedSurfels;
 use crate::geometry::Trajectory;
 use crate::time::{Span, Stamp};
-use alignment::Alignment;
 use database::PlaceDatabase;
 use loop_search::{LoopFilter, LoopSearch};
-use nalgebra::Matrix4;
 use pose_graph::optimise;
 
 /// Open-loop drift that the pose graph assumes, a random walk in m/sqrt(s) and degrees/sqrt(s): large, so that the trajectory
@@ -41,30 +43,6 @@ const POSE_GRAPH_DRIFT: (f64, f64) = (0.1, 0.3);
 const MAX_PASSES: usize = 8;
 /// The passes end when the trajectory moves by less than this, m.
 const CONVERGED_M: f64 = 0.02;
-
-/// Matching converges from pose errors up to this, m and rad; larger ones need a loop closure.
-const MATCHING_REACH: (f64, f64) = (0.3, 0.03);
-
-/// Statistics of the loop closure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct LoopReport {
-    /// Number of similar pairs of nodes that disagree at the open-loop pose.
-    pub proposed: usize,
-    /// Number of these that were verified by registration.
-    pub verified: usize,
-    /// Number of applied loop closures that exceed the matching distance.
-    pub closed: usize,
-}
-
-/// Measured relative pose of two nodes: a constraint of the pose graph.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct RelativePose {
-    /// Times of the later and the earlier node, s; the alignment is the pose of the later one in the earlier one.
-    pub(super) times_s: (f64, f64),
-    pub(super) alignment: Alignment,
-    /// Information about `[yaw, shift]`, 1/rad^2 and 1/m^2.
-    pub(super) information: Matrix4<f64>,
-}
 
 /// A trajectory aligned to loop closures, within the convergence range of the matching.
 pub(super) struct PreAligned {

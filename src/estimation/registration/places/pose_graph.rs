@@ -13,7 +13,8 @@
 //! non-convexity: Yang, Antonante, Tzoumas and Carlone, IEEE Robotics and Automation Letters 5(2), 2020). Loops that remain
 //! inconsistent are removed as outliers; the others are then applied with their full information.
 
-use super::{Alignment, RelativePose};
+use super::RelativePose;
+use super::alignment::Alignment;
 use crate::estimation::nominal::Correction;
 use crate::estimation::registration::corrected_trajectory::CorrectedTrajectory;
 use crate::estimation::registration::equations::{Equations, PairTerm};

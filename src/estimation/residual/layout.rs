@@ -1,0 +1,42 @@
+//! Order of the unknowns.
+
+/// Number of border unknowns.
+///
+/// The border has the unknowns that all times share; they follow the knots and make the last rows of the equations
+/// dense: gyroscope bias, accelerometer bias, tilt of gravity, clock offset and rate, range bias, rotation and translation of
+/// the lidar, and scale and misalignment of gyroscope and accelerometer, each three by three.
+pub(in crate::estimation) const BORDER: usize = 35;
+/// Offsets of the unknowns in the border.
+pub(in crate::estimation) const GYRO_BIAS: usize = 0;
+pub(in crate::estimation) const ACCEL_BIAS: usize = 3;
+pub(in crate::estimation) const GRAVITY: usize = 6;
+pub(in crate::estimation) const CLOCK: usize = 8;
+pub(in crate::estimation) const LIDAR_ROTATION: usize = 11;
+pub(in crate::estimation) const GYRO_MATRIX: usize = 17;
+pub(in crate::estimation) const ACCEL_MATRIX: usize = 26;
+
+/// The order of a window's unknowns.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::estimation) struct Layout {
+    /// Index of the first knot; knot 0 is at time 0.
+    pub(in crate::estimation) first_knot: i64,
+    /// Number of knots.
+    pub(in crate::estimation) knots: usize,
+}
+
+impl Layout {
+    /// Number of unknowns.
+    pub(in crate::estimation) fn size(&self) -> usize {
+        self.knots * 6 + BORDER
+    }
+
+    /// The first unknown of the border.
+    pub(in crate::estimation) fn border(&self) -> usize {
+        self.knots * 6
+    }
+
+    /// The first unknown of a knot: three of rotation, three of translation.
+    pub(in crate::estimation) fn knot(&self, index: i64) -> usize {
+        (index - self.first_knot) as usize * 6
+    }
+}

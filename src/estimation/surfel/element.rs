@@ -1,0 +1,141 @@
+//! A surfel and the returns that it is built from.
+
+use super::super::Clock;
+use super::super::nominal::Nominal;
+use super::super::spline::Basis;
+use super::super::strapdown::Biases;
+use crate::geometry::Matrix;
+use crate::geometry::Vector;
+use crate::measurement::LidarCorrection;
+
+/// A lidar return in the IMU frame.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::estimation) struct TimedReturn {
+    /// Time of emission, lidar time, s.
+    pub(in crate::estimation) tau_s: f64,
+    /// Measured point in the IMU frame, m.
+    pub(in crate::estimation) point_in_imu: nalgebra::Vector3<f32>,
+    /// Measured range, m.
+    pub(in crate::estimation) range_m: f32,
+}
+
+/// A planar patch as measured by the calibrated lidar at the patch's mean time, in IMU axes.
+///
+/// The estimated correction of the lidar's calibration is applied when the surfel is placed in the map.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::estimation) struct Surfel {
+    /// Mean time of the points, lidar time, s.
+    pub(in crate::estimation) tau_s: f64,
+    /// Vector from the lidar to the mean of the points, by the calibration, m.
+    pub(in crate::estimation) ray_in_imu: Vector,
+    /// Unit normal towards the lidar, by the calibration.
+    pub(in crate::estimation) normal_in_imu: Vector,
+    /// Second central moment of the points, by the calibration, m^2.
+    pub(in crate::estimation) covariance_in_imu: Matrix,
+    /// Additional variance of the position along the normal because the surface is not flat, m^2.
+    pub(in crate::estimation) roughness_variance: f64,
+    /// Number of points.
+    pub(in crate::estimation) points: f64,
+    /// Resolution, 0 the finest.
+    pub(in crate::estimation) level: usize,
+}
+
+/// A planar patch of surface in the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::estimation) struct Patch {
+    /// Centre, m.
+    pub(in crate::estimation) centre: Vector,
+    /// Unit normal, towards the lidar.
+    pub(in crate::estimation) normal: Vector,
+    /// Number of points.
+    pub(in crate::estimation) points: f64,
+    /// Second central moment, m^2.
+    pub(in crate::estimation) covariance: Matrix,
+    /// Additional variance of the position along the normal because the surface is not flat, m^2.
+    pub(in crate::estimation) roughness_variance: f64,
+    /// Resolution, 0 the finest.
+    pub(in crate::estimation) level: usize,
+}
+
+/// A surfel placed in the map by the trajectory, with derivatives by the window's unknowns.
+#[derive(Debug, Clone)]
+pub(in crate::estimation) struct PlacedSurfel {
+    /// The surfel in the map.
+    pub(in crate::estimation) patch: Patch,
+    /// Mean time of the points, lidar time, s.
+    pub(in crate::estimation) tau_s: f64,
+    /// Vector from the IMU to the centre, in map axes, m.
+    pub(in crate::estimation) arm: Vector,
+    /// Unit vector from the lidar to the centre, in map axes.
+    pub(in crate::estimation) beam: Vector,
+    /// Distance from the lidar to the centre, m.
+    pub(in crate::estimation) range_m: f64,
+    /// Attitude of the IMU at that time.
+    pub(in crate::estimation) map_from_imu: Matrix,
+    /// Derivative of the centre by the clock offset, m/s.
+    pub(in crate::estimation) velocity: Vector,
+    /// The correction spline's basis at that time.
+    pub(in crate::estimation) basis: Basis,
+}
+
+impl Patch {
+    /// Variance of the normal's tilt towards `direction`, rad^2.
+    ///
+    /// A plane fitted to `N` points of variance `lambda` along the normal and `s^2` along the direction has `lambda / (N s^2)`.
+    pub(in crate::estimation) fn normal_tilt_variance(&self, direction: &Vector) -> f64 {
+        let along = direction - self.normal * self.normal.dot(direction);
+        let spread = along.dot(&(self.covariance * along)) / along.norm_squared();
+        let thin = self.normal.dot(&(self.covariance * self.normal)).max(0.0);
+        if spread > 0.0 { thin / (self.points * spread) } else { 0.0 }
+    }
+}
+
+impl PlacedSurfel {
+    /// Vector from the lidar to the centre, in map axes, m.
+    pub(in crate::estimation) fn ray(&self) -> Vector {
+        self.beam * self.range_m
+    }
+}
+
+/// Trajectory, clock and calibration that place surfels in the map.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::estimation) struct PlacementState<'a> {
+    pub(in crate::estimation) nominal: &'a Nominal,
+    pub(in crate::estimation) clock: &'a Clock,
+    pub(in crate::estimation) biases: &'a Biases,
+    /// Calibrated position of the lidar in the IMU frame, m.
+    pub(in crate::estimation) laser_in_imu: &'a Vector,
+    /// Estimated correction of the lidar's calibration.
+    pub(in crate::estimation) lidar: &'a LidarCorrection,
+    pub(in crate::estimation) knot_spacing_s: f64,
+}
+
+impl Surfel {
+    /// Places the surfel in the map.
+    pub(in crate::estimation) fn place(&self, by: &PlacementState<'_>) -> PlacedSurfel {
+        let u_s = by.clock.imu_s(self.tau_s);
+        let motion = by.nominal.at(u_s, &by.biases.gyro);
+        let ray_in_imu = by.lidar.apply(&self.ray_in_imu);
+        let arm = motion.rotation * (by.laser_in_imu + by.lidar.translation + ray_in_imu);
+        let map_from_calibrated = motion.rotation * by.lidar.rotation.to_rotation_matrix().matrix();
+        let patch = Patch {
+            centre: motion.position + arm,
+            normal: map_from_calibrated * self.normal_in_imu,
+            covariance: map_from_calibrated * self.covariance_in_imu * map_from_calibrated.transpose(),
+            roughness_variance: self.roughness_variance,
+            level: self.level,
+            points: self.points,
+        };
+        let range_m = ray_in_imu.norm();
+        PlacedSurfel {
+            patch,
+            tau_s: self.tau_s,
+            arm,
+            beam: motion.rotation * ray_in_imu / range_m,
+            range_m,
+            map_from_imu: motion.rotation,
+            velocity: motion.velocity + motion.angular_velocity.cross(&arm),
+            basis: Basis::at(u_s, by.knot_spacing_s),
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! Results of a run that the page shows.
+
+use super::super::estimate::BestEstimate;
+use super::super::estimate::Origin;
+use super::super::integrity::Integrity;
+use super::super::open_loop::OpenLoopRun;
+use crate::evaluation::Errors;
+use crate::evaluation::InformationBound;
+use crate::evaluation::Pairs;
+use crate::recording::CloudPoint;
+use crate::recording::Reader;
+
+/// Results of a run, from which the page is made.
+pub(in crate::study) struct RunResults<'a> {
+    pub reader: &'a Reader,
+    pub origin: &'a Origin<'a>,
+    pub open: &'a OpenLoopRun,
+    pub best: &'a BestEstimate<'a>,
+    /// Errors of the open loop if a closed loop was computed.
+    pub open_errors: Option<&'a Errors>,
+    pub bound: Option<&'a InformationBound>,
+    pub integrity: &'a Integrity,
+    /// Estimated and true poses; `None` without truth.
+    pub pairs: Option<&'a Pairs>,
+    /// Points of the cloud in the map frame.
+    pub points: &'a [CloudPoint],
+}
