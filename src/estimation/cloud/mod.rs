@@ -149,6 +149,7 @@ impl<T: Send + Sync> CloudFilter<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vector;
 
     const NOISE: LidarNoise = LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 };
 

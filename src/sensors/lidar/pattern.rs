@@ -164,6 +164,7 @@ fn spinning(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vector;
     use approx::assert_relative_eq;
 
     fn source() -> Source {
