@@ -1,7 +1,7 @@
 //! Imports between the files of `src/`, and the circles among them.
 //!
-//! A file imports the file that defines the name that it uses: a re-export counts as an import of the re-exported item's
-//! file. A module also imports the modules that it declares. Test modules do not count.
+//! A file imports the files that define the names that it uses, also if it takes a name over a re-export. The declaration
+//! of a submodule and a re-export that the file itself does not use are no imports. Test modules do not count.
 
 use super::code;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,8 +17,8 @@ struct Module {
     items: BTreeSet<String>,
     /// Names that `use` binds, with the paths that they stand for.
     bound: BTreeMap<String, Vec<String>>,
-    /// Modules declared with `mod name;`.
-    declared: Vec<String>,
+    /// Names among `bound` that the file re-exports without using them.
+    only_reexported: BTreeSet<String>,
     /// Every path of the code that has more than one segment.
     paths: Vec<Vec<String>>,
 }
@@ -49,9 +49,9 @@ impl Modules {
     /// The files that each file imports.
     fn imports(&self) -> BTreeMap<String, BTreeSet<String>> {
         let of_module = |path: &ModulePath, module: &Module| {
-            let used = module.paths.iter().chain(module.bound.values());
-            let declared = module.declared.iter().filter_map(|name| self.0.get(&child(path, name)));
-            let files = used.filter_map(|used| self.file_of(path, used, 0)).chain(declared.map(|m| m.file.clone()));
+            let bound = module.bound.iter().filter(|(name, _)| !module.only_reexported.contains(*name));
+            let used = module.paths.iter().chain(bound.map(|(_, path)| path));
+            let files = used.filter_map(|used| self.file_of(path, used, 0));
             (module.file.clone(), files.filter(|file| *file != module.file).collect())
         };
         self.0.iter().map(|(path, module)| of_module(path, module)).collect()
@@ -88,16 +88,19 @@ impl Modules {
 impl Module {
     fn of(file: &str, code: &str) -> Self {
         let (uses, rest) = split_uses(&without_tests(code));
-        let mut bound = BTreeMap::new();
-        uses.iter().for_each(|tree| bind(&[], tree, &mut bound));
-        let definitions: Vec<(&str, &str)> = rest.lines().filter_map(definition).collect();
-        let (modules, items): (Vec<_>, Vec<_>) = definitions.into_iter().partition(|(kind, _)| *kind == "mod");
+        let (mut bound, mut reexported) = (BTreeMap::new(), BTreeMap::new());
+        for (is_reexport, tree) in &uses {
+            bind(&[], tree, if *is_reexport { &mut reexported } else { &mut bound });
+        }
+        let words: BTreeSet<&str> = rest.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+        let only_reexported = reexported.keys().filter(|name| !words.contains(name.as_str())).cloned().collect();
+        bound.extend(reexported);
         Self {
             file: file.to_owned(),
-            items: items.into_iter().map(|(_, name)| name.to_owned()).collect(),
-            declared: modules.into_iter().map(|(_, name)| name.to_owned()).collect(),
+            items: rest.lines().filter_map(definition).map(str::to_owned).collect(),
             paths: paths(&rest),
             bound,
+            only_reexported,
         }
     }
 
@@ -141,17 +144,18 @@ fn without_tests(code: &str) -> String {
     rest
 }
 
-/// The trees of the `use` statements, and the other code.
-fn split_uses(code: &str) -> (Vec<String>, String) {
-    let (mut uses, mut rest, mut open) = (Vec::new(), String::new(), None::<String>);
+/// The trees of the `use` statements, with whether they are re-exports, and the other code.
+fn split_uses(code: &str) -> (Vec<(bool, String)>, String) {
+    let (mut uses, mut rest, mut open) = (Vec::new(), String::new(), None::<(bool, String)>);
     for line in code.lines() {
+        let is_reexport = line.trim_start().starts_with("pub");
         match (open.take(), without_visibility(line.trim_start()).strip_prefix("use ")) {
-            (Some(begun), _) => open = Some(begun + line),
-            (None, Some(tree)) => open = Some(tree.to_owned()),
+            (Some((is_reexport, begun)), _) => open = Some((is_reexport, begun + line)),
+            (None, Some(tree)) => open = Some((is_reexport, tree.to_owned())),
             (None, None) => rest.extend([line, "\n"]),
         }
-        if let Some(tree) = open.take_if(|tree| tree.ends_with(';')) {
-            uses.push(tree.trim_end_matches(';').to_owned());
+        if let Some((is_reexport, tree)) = open.take_if(|(_, tree)| tree.ends_with(';')) {
+            uses.push((is_reexport, tree.trim_end_matches(';').to_owned()));
         }
     }
     (uses, rest)
@@ -194,14 +198,14 @@ fn entries(group: &str) -> Vec<&str> {
     split.map(str::trim).filter(|entry| !entry.is_empty()).collect()
 }
 
-/// Kind and name of the item that a line at the top level defines; `mod` only for a module in a file of its own.
-fn definition(line: &str) -> Option<(&str, &str)> {
+/// Name of the item that a line at the top level defines.
+fn definition(line: &str) -> Option<&str> {
     let line = without_visibility(line);
     let line = line.strip_prefix("const fn ").map_or(line, |_| &line["const ".len()..]);
     let (kind, rest) = line.split_once(' ')?;
-    let kinds = ["fn", "struct", "enum", "trait", "type", "const", "static", "mod", "macro_rules!"];
+    let kinds = ["fn", "struct", "enum", "trait", "type", "const", "static", "macro_rules!"];
     let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next()?;
-    (kinds.contains(&kind) && (kind != "mod" || rest.ends_with(';'))).then_some((kind, name))
+    kinds.contains(&kind).then_some(name)
 }
 
 /// The paths of more than one segment in `code`.
