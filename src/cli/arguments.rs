@@ -1,7 +1,7 @@
 //! Arguments that several commands share.
 
-use super::failure::Usage;
 use super::quantity;
+use super::usage::Usage;
 use clap::{Args, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,7 @@
 
 use super::arguments::Global;
 use super::bars::{Bars, stop_flag};
-use super::failure::Usage;
+use super::usage::Usage;
 use super::{Completion, output};
 use clap::Args;
 use serde_json::{Value, json};

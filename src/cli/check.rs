@@ -1,7 +1,7 @@
 //! `zsim check`: are these scenes and specs right?
 
 use super::arguments::{Global, any_route};
-use super::{Completion, failure, output};
+use super::{Completion, output, usage};
 use clap::Args;
 use serde_json::json;
 use std::path::Path;
@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     output::print_result(global, &words, json!({ "files": figures }), None)?;
     let invalid = checked.iter().filter(|(_, result)| result.is_err()).count();
     if invalid > 0 {
-        return Err(failure::Usage(format!("{invalid} of {} files invalid", checked.len())).into());
+        return Err(usage::Usage(format!("{invalid} of {} files invalid", checked.len())).into());
     }
     Ok(Completion::Done)
 }

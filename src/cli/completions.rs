@@ -1,7 +1,7 @@
 //! `zsim completions`: completion scripts for shells.
 
-use super::{Cli, Completion, output};
-use clap::{Args, CommandFactory};
+use super::{Completion, output};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
 /// Print completions for a shell
@@ -13,9 +13,9 @@ pub(super) struct Arguments {
     shell: Shell,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Completion> {
+pub(super) fn run(arguments: &Arguments, command: &mut Command) -> anyhow::Result<Completion> {
     let mut text = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Cli::command(), "zsim", &mut text);
+    clap_complete::generate(arguments.shell, command, "zsim", &mut text);
     output::write_to_stdout(&String::from_utf8_lossy(&text))?;
     Ok(Completion::Done)
 }

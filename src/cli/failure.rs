@@ -2,6 +2,7 @@
 
 use super::output::printable;
 use super::signals;
+use super::usage::Usage;
 use std::error::Error;
 use std::process::ExitCode;
 use zsim::motion::MotionError;
@@ -41,15 +42,3 @@ fn is_invalid_input(error: &(dyn Error + 'static)) -> bool {
         || error.downcast_ref::<SimulationError>().is_some_and(simulation)
         || error.downcast_ref::<StudyError>().is_some_and(StudyError::is_invalid_input)
 }
-
-/// Invalid usage: arguments that are inconsistent or out of range.
-#[derive(Debug)]
-pub(super) struct Usage(pub String);
-
-impl std::fmt::Display for Usage {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl Error for Usage {}

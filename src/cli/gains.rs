@@ -2,7 +2,7 @@
 
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
-use super::failure::Usage;
+use super::usage::Usage;
 use super::{Completion, output};
 use anyhow::Context;
 use clap::{Args, ValueEnum};

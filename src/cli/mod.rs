@@ -34,6 +34,7 @@ mod spring_text;
 mod study;
 mod sweep;
 mod sweep_text;
+mod usage;
 
 use arguments::Global;
 use clap::error::ErrorKind;
@@ -121,7 +122,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
         Command::Check(arguments) => check::run(arguments, global),
         Command::Spec(arguments) => spec::run(arguments, global),
         Command::Info(arguments) => info::run(arguments, global),
-        Command::Completions(arguments) => completions::run(arguments),
+        Command::Completions(arguments) => completions::run(arguments, &mut Cli::command()),
     }
 }
 

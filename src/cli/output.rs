@@ -1,7 +1,7 @@
 //! Output of results: folders and files that are not overwritten, and stdout.
 
 use super::arguments::Global;
-use super::failure::Usage;
+use super::usage::Usage;
 use anyhow::{Context, anyhow, bail, ensure};
 use serde_json::Value;
 use std::borrow::Cow;

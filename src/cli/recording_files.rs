@@ -1,7 +1,7 @@
 //! The two files of a simulated recording, reserved before anything is computed.
 
-use super::failure::Usage;
 use super::output::{candidates, check_not_inputs, create_parent};
+use super::usage::Usage;
 use anyhow::{Context, bail, ensure};
 use std::fs::OpenOptions;
 use std::io::ErrorKind;

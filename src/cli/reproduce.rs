@@ -2,7 +2,7 @@
 
 use super::arguments::Global;
 use super::bars::{WorkBar, stop_flag};
-use super::failure::Usage;
+use super::usage::Usage;
 use super::{Completion, output};
 use anyhow::Context;
 use clap::Args;

@@ -1,7 +1,7 @@
 //! `zsim sweep submit`: a sweep as a Slurm job array.
 
 use super::arguments::Global;
-use super::failure::Usage;
+use super::usage::Usage;
 use super::{Completion, output};
 use anyhow::{Context, bail};
 use clap::Args;

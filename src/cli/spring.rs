@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     match (&arguments.search, &arguments.file) {
         (Some(Command::Design(design)), _) => search(design, global),
         (None, Some(file)) => print_report(file, arguments, global),
-        (None, None) => Err(super::failure::Usage("name a head or a spring".to_owned()).into()),
+        (None, None) => Err(super::usage::Usage("name a head or a spring".to_owned()).into()),
     }
 }
 
@@ -82,7 +82,7 @@ fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::R
     let given = [("--pitch", Some(arguments.pitch)), ("--frequency", arguments.frequency)];
     for (name, value) in given {
         if let Some(value) = value.filter(|x| !(x.is_finite() && *x > 0.0)) {
-            return Err(super::failure::Usage(format!("{name} {value}: expected a number above 0")).into());
+            return Err(super::usage::Usage(format!("{name} {value}: expected a number above 0")).into());
         }
     }
     let shake = Shake { pitch_deg: arguments.pitch, frequency_hz: arguments.frequency };

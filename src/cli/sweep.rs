@@ -2,8 +2,8 @@
 
 use super::arguments::Global;
 use super::bars::{WorkBar, stop_flag};
-use super::failure::Usage;
 use super::sweep_text::{plan_text, status_text};
+use super::usage::Usage;
 use super::{Completion, output, slurm};
 use anyhow::Context;
 use clap::{Args, Subcommand};

@@ -1,6 +1,6 @@
 //! A head that a motor rotates about an axis: spinning and nodding mounts.
 
-use super::spec::PlacementSpec;
+use super::placement::PlacementSpec;
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
 use crate::spec::checked::{FiniteArray, NonNegative, Positive};
 use crate::spec::{Source, SpecError};

@@ -1,6 +1,5 @@
 //! Parts of the carrier that the laser can hit: an operator, a handle, a cart.
 
-use super::spec::HeadSpec;
 use crate::geometry::Vector;
 use crate::spec::checked::{FiniteArray, Fraction, Positive};
 use crate::spec::{Source, SpecError};
@@ -36,8 +35,8 @@ impl CarrierSpec {
 /// Checks that the laser is outside all parts of the carrier.
 ///
 /// `laser_in_base` is the laser's position with the head in equilibrium, m.
-pub(super) fn check(spec: &HeadSpec, laser_in_base: &Vector, source: &Source) -> Result<(), SpecError> {
-    let Some(around) = spec.carrier.iter().find(|part| part.encloses(laser_in_base)) else { return Ok(()) };
+pub(super) fn check(carrier: &[CarrierSpec], laser_in_base: &Vector, source: &Source) -> Result<(), SpecError> {
+    let Some(around) = carrier.iter().find(|part| part.encloses(laser_in_base)) else { return Ok(()) };
     let [x, y, z]: [f64; 3] = (*laser_in_base).into();
     let message = format!(
         "the laser, with the head in equilibrium at ({x:.3}, {y:.3}, {z:.3}) m in the base frame, is inside the carrier's \

@@ -1,6 +1,6 @@
 //! Spec types of the elements of a linkage.
 
-use super::spec::PlacementSpec;
+use super::placement::PlacementSpec;
 use crate::elasticity::SpringSpec;
 use crate::spec::checked;
 use serde::{Deserialize, Serialize};

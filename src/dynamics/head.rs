@@ -63,7 +63,7 @@ impl HeadModel {
         let (head_from_laser, head_from_imu) = (spec.head_from_laser.pose(), spec.head_from_imu.pose());
         let model = Self { body, linkage, head_from_laser, head_from_imu };
         let base_from_laser = model.base_from_head_at_rest() * head_from_laser;
-        carrier::check(spec, &base_from_laser.translation.vector, source)?;
+        carrier::check(&spec.carrier, &base_from_laser.translation.vector, source)?;
         Ok(model)
     }
 

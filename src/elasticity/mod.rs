@@ -10,6 +10,7 @@
 //! - [`Spring`]: the force law for large rotations: one or several elements, each with a potential in those
 //!   coordinates, so that energy is conserved exactly; the nodes between elements are massless and in equilibrium.
 
+mod buckling;
 mod chain;
 mod coil;
 mod deformation;
@@ -20,11 +21,12 @@ mod six_vector;
 mod spec;
 mod spring;
 
+pub use buckling::buckling_load_n;
 pub use coil::{Coil, Moduli};
 pub use deformation::{Deformation, blocks, split, stack};
 pub use element::Element;
 pub use error::ElasticityError;
-pub use haringx::{Column, buckling_load_n, loaded_stiffness};
+pub use haringx::{Column, loaded_stiffness};
 pub use six_vector::{Matrix6, Vector6, conditioning};
 pub use spec::{Density, Material, SpringDesign, SpringSpec, StiffnessRow};
 pub use spring::{MAX_SEGMENTS, Spring, SpringState};

@@ -1,6 +1,7 @@
 //! Valid range of an integer key of a spec, for the error about a value out of range.
 
-use super::{Source, options};
+use super::Source;
+use super::ron_options::options;
 use ron::error::{Position, SpannedError};
 use serde::de::DeserializeOwned;
 

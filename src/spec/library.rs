@@ -1,29 +1,16 @@
 //! Search for specs: as a path, in `scenes/` and `specs/` of the working directory, in the binary.
 
-use super::{MAX_SPEC_BYTES, SpecError};
+use super::{Source, SpecError};
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
+
+/// Maximum size of a spec, bytes. A larger file is not a spec.
+pub const MAX_SPEC_BYTES: u64 = 16 << 20;
 
 static SCENES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenes");
 static SPECS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/specs");
 
-/// The text of a spec, and the name for errors.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Source {
-    /// Name for errors: the path as the user would type it.
-    pub name: String,
-    /// Folder from which relative paths in the spec are resolved; `None` for a built-in spec.
-    pub folder: Option<PathBuf>,
-    /// The text.
-    pub text: String,
-}
-
 impl Source {
-    /// A spec in memory, with `name` for errors.
-    pub fn in_memory(name: impl Into<String>, text: impl Into<String>) -> Self {
-        Self { name: name.into(), folder: None, text: text.into() }
-    }
-
     /// Reads the file of a spec.
     ///
     /// # Errors

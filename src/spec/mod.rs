@@ -9,19 +9,15 @@ mod bounds;
 pub mod checked;
 mod error;
 mod library;
+mod ron_options;
+mod source;
 
 pub use error::SpecError;
-pub use library::{Kind, Source, find, names, text_file};
+pub use library::{Kind, MAX_SPEC_BYTES, find, names, text_file};
+pub use source::Source;
 
+use ron_options::options;
 use serde::de::DeserializeOwned;
-
-/// Maximum size of a spec, bytes. A larger file is not a spec.
-pub const MAX_SPEC_BYTES: u64 = 16 << 20;
-
-/// Options of RON for specs: `Some` can be omitted around values.
-fn options() -> ron::Options {
-    ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
-}
 
 /// Parses the text of a spec.
 ///

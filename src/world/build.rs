@@ -4,7 +4,7 @@ use super::caster::Caster;
 use super::import::{self, MeshTriangles};
 use super::mover::{Mover, Path};
 use super::scatter;
-use super::shape::Triangle;
+use super::triangle::{MAX_TRIANGLES, Triangle};
 use super::{
     ItemSpec, LengthUnit, Material, MaterialId, MaterialKind, MoverSpec, Placement, SceneSpec, ShapeSpec, WorldError,
 };
@@ -13,8 +13,6 @@ use crate::spec::{Source, SpecError};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Maximum number of triangles of a scene: each needs about 350 bytes while the scene is built.
-pub(super) const MAX_TRIANGLES: usize = 10_000_000;
 /// Maximum coordinate of a surface or a route, m: beyond, single precision in the ray search is too coarse.
 const MAX_EXTENT_M: f64 = 100_000.0;
 /// Maximum nesting depth of templates: a guard against a template that contains itself.

@@ -1,20 +1,20 @@
-//! Ray casting against triangles, with parry's bounding-volume hierarchy; no other file uses parry.
+//! Ray casting against triangles, with parry's bounding-volume hierarchy; no other module uses parry.
 //!
 //! The hierarchy finds the face in single precision, relative to the centre of the scene. The distance is then computed
 //! from the plane of the face in double precision. Ranges are therefore exact for the given corners, while the search,
 //! the costly part, moves half the bytes.
 
 mod face;
+mod single_precision;
 
 use super::MaterialId;
-use super::shape::Triangle;
+use super::triangle::Triangle;
 use crate::geometry::{SurfacePoint, Vector};
 use face::{Plane, SingleFace};
 use glamx::Vec3A;
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
-
-type Vec3 = parry3d::math::Vector;
+use single_precision::{Vec3, single};
 
 /// Triangles in a bounding-volume hierarchy for ray casting.
 pub(super) struct Caster {
@@ -153,8 +153,4 @@ impl SingleRay {
 fn bounds(triangles: &[Triangle]) -> (Vector, Vector) {
     let first = triangles.first().map_or(Vector::zeros(), |[corner, ..]| *corner);
     triangles.iter().flatten().fold((first, first), |(lower, upper), corner| (lower.inf(corner), upper.sup(corner)))
-}
-
-fn single(v: &Vector) -> Vec3 {
-    Vec3::new(v.x as f32, v.y as f32, v.z as f32)
 }

@@ -31,6 +31,7 @@ mod ray;
 mod scatter;
 mod shape;
 mod spec;
+mod triangle;
 
 pub use error::WorldError;
 pub use material::{Material, MaterialId};

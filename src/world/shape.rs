@@ -1,5 +1,6 @@
 //! Shapes of scenes, as triangles in their own frame.
 
+mod divisions;
 mod height_field;
 mod prism;
 mod wall;
@@ -7,15 +8,11 @@ mod wall;
 pub use height_field::HeightsSpec;
 pub use wall::OpeningSpec;
 
+use super::triangle::{Triangle, parallelogram};
 use crate::geometry::Vector;
 use crate::spec::checked;
+use divisions::check_count;
 use serde::{Deserialize, Serialize};
-
-/// Three corners, m.
-pub(super) type Triangle = [Vector; 3];
-
-/// Maximum number of sides of a cylinder, steps of stairs, or nodes along a height field.
-const MAX_DIVISIONS: usize = 4096;
 
 /// A shape in its own frame with z up, on the plane z = 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -178,20 +175,6 @@ impl ShapeSpec {
             ShapeSpec::Mesh { .. } => Ok(Vec::new()),
         }
     }
-}
-
-/// Checks that a number of divisions is between `least` and the maximum.
-fn check_count(key: &'static str, count: usize, least: usize) -> Result<(), (&'static str, String)> {
-    if (least..=MAX_DIVISIONS).contains(&count) {
-        Ok(())
-    } else {
-        Err((key, format!("`{key}` is {count}; it must be from {least} to {MAX_DIVISIONS}")))
-    }
-}
-
-/// The two triangles of a parallelogram, in sequence, so that the ray caster can pair them.
-fn parallelogram(corner: Vector, u: Vector, v: Vector) -> [Triangle; 2] {
-    [[corner, corner + u, corner + u + v], [corner, corner + u + v, corner + v]]
 }
 
 #[cfg(test)]

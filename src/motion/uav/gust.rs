@@ -1,25 +1,11 @@
 //! Wind gusts, and the response of a hovering craft.
 
-use super::UavSpec;
+use super::{GustSpec, UavSpec};
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
 use crate::motion::sines::{FrequencyBin, SineSum, SpectralLine, log_bins};
 use crate::random::Stream;
-use crate::spec::checked::{NonNegative, Positive};
 use nalgebra::Complex;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
-
-/// Wind with Dryden gusts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct GustSpec {
-    /// Mean wind at 6 m (20 feet) above the ground, m/s; gusts scale with it. Light turbulence: 7.7, moderate: 15.4.
-    #[serde(with = "NonNegative")]
-    pub wind_m_per_s: f64,
-    /// Airspeed of the craft, m/s. A higher airspeed shifts gusts to higher frequencies.
-    #[serde(with = "Positive")]
-    pub airspeed_m_per_s: f64,
-}
 
 /// Direction of a gust component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

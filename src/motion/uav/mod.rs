@@ -7,9 +7,8 @@ mod gust;
 mod rotors;
 mod spec;
 
-pub use gust::GustSpec;
 pub use rotors::RotorSpec;
-pub use spec::UavSpec;
+pub use spec::{GustSpec, UavSpec};
 
 use super::jet::{Jet, PoseJet};
 use super::sines::SineSum;

@@ -1,7 +1,6 @@
 //! Settings of the flight.
 
 use super::super::walk::WalkSpec;
-use super::gust::GustSpec;
 use super::rotors::RotorSpec;
 use crate::spec::checked::NonNegative;
 use crate::spec::checked::Positive;
@@ -36,4 +35,16 @@ pub struct UavSpec {
     pub drag_per_s: f64,
     /// The rotors.
     pub rotors: RotorSpec,
+}
+
+/// Wind with Dryden gusts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GustSpec {
+    /// Mean wind at 6 m (20 feet) above the ground, m/s; gusts scale with it. Light turbulence: 7.7, moderate: 15.4.
+    #[serde(with = "NonNegative")]
+    pub wind_m_per_s: f64,
+    /// Airspeed of the craft, m/s. A higher airspeed shifts gusts to higher frequencies.
+    #[serde(with = "Positive")]
+    pub airspeed_m_per_s: f64,
 }

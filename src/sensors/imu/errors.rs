@@ -1,33 +1,8 @@
-use super::{GaussMarkovSpec, Imu, InertialReading};
+use super::triad_model::TriadModel;
+use super::{Imu, InertialReading};
 use crate::geometry::{Matrix, Vector};
 use crate::random::{Seed, Stream};
 use rand_distr::{Distribution, StandardNormal};
-
-/// Error model of three axes of the same kind, in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TriadModel {
-    pub density: f64,
-    pub turn_on: f64,
-    pub walk: f64,
-    pub gauss_markov: Option<GaussMarkov>,
-    pub scale: f64,
-    pub misalignment: f64,
-    pub limit: f64,
-    pub resolution: f64,
-}
-
-/// A first-order Gauss-Markov process in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct GaussMarkov {
-    sigma: f64,
-    time_s: f64,
-}
-
-impl GaussMarkov {
-    pub fn from_spec(spec: &GaussMarkovSpec, unit: f64) -> Self {
-        Self { sigma: spec.sigma * unit, time_s: spec.time_s }
-    }
-}
 
 /// Errors of an IMU in one run, sampled with a seed: scale, misalignment, and biases that change over time.
 ///

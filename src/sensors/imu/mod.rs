@@ -3,15 +3,15 @@
 mod errors;
 mod ideal;
 mod spec;
+mod triad_model;
 
 pub use errors::ImuErrors;
 pub use ideal::{InertialReading, coning_corrected, ideal_reading};
 pub use spec::{AccelSpec, GaussMarkovSpec, GyroSpec, ImuSpec};
 
-use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
 use crate::measurement::{ImuAveraging, ImuNoise};
 use crate::spec::{Source, SpecError};
-use errors::TriadModel;
+use triad_model::TriadModel;
 
 /// An inertial measurement unit.
 #[derive(Debug, Clone)]
@@ -65,6 +65,3 @@ impl Imu {
         }
     }
 }
-
-/// One thousandth of standard gravity, m/s^2.
-const MILLI_G: f64 = STANDARD_GRAVITY_M_PER_S2 * 1e-3;

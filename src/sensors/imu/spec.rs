@@ -1,5 +1,4 @@
-use super::MILLI_G;
-use super::errors::{GaussMarkov, TriadModel};
+use super::triad_model::{GaussMarkov, TriadModel};
 use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
 use crate::measurement::ImuAveraging;
 use crate::spec::{Source, SpecError, checked};
@@ -8,6 +7,9 @@ use std::ops::RangeInclusive;
 
 /// Accepted sample rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
+
+/// One thousandth of standard gravity, m/s^2.
+const MILLI_G: f64 = STANDARD_GRAVITY_M_PER_S2 * 1e-3;
 
 /// An inertial measurement unit, by the data sheet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -127,7 +129,7 @@ impl GyroSpec {
             density: self.density_deg_per_s_per_sqrt_hz.to_radians(),
             turn_on: self.turn_on_bias_deg_per_s.to_radians(),
             walk: self.bias_walk_rad_per_s_per_sqrt_s,
-            gauss_markov: self.wander_deg_per_h.map(|w| GaussMarkov::from_spec(&w, (1.0_f64 / 3600.0).to_radians())),
+            gauss_markov: self.wander_deg_per_h.map(|w| w.model((1.0_f64 / 3600.0).to_radians())),
             scale: self.scale_percent * 1e-2,
             misalignment: self.misalignment_deg.to_radians(),
             limit: self.limit_deg_per_s.to_radians(),
@@ -142,11 +144,18 @@ impl AccelSpec {
             density: self.density_ug_per_sqrt_hz * 1e-3 * MILLI_G,
             turn_on: self.turn_on_bias_mg * MILLI_G,
             walk: self.bias_walk_m_per_s2_per_sqrt_s,
-            gauss_markov: self.wander_mg.map(|w| GaussMarkov::from_spec(&w, MILLI_G)),
+            gauss_markov: self.wander_mg.map(|w| w.model(MILLI_G)),
             scale: self.scale_percent * 1e-2,
             misalignment: self.misalignment_deg.to_radians(),
             limit: self.limit_g * STANDARD_GRAVITY_M_PER_S2,
             resolution: self.resolution_mg * MILLI_G,
         }
+    }
+}
+
+impl GaussMarkovSpec {
+    /// The process in SI units; `unit` is the unit of the parent key.
+    fn model(&self, unit: f64) -> GaussMarkov {
+        GaussMarkov { sigma: self.sigma * unit, time_s: self.time_s }
     }
 }

@@ -1,4 +1,4 @@
-use super::pattern::{Beam, MAX_BEAMS};
+use super::beam::{Beam, MAX_BEAMS};
 use crate::spec::{Source, SpecError};
 
 /// A scan that takes several mirror turns, each offset by one step from the previous turn.

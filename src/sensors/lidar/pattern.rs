@@ -1,5 +1,5 @@
 pub use super::beam::Beam;
-pub(super) use super::beam::MAX_BEAMS;
+use super::beam::MAX_BEAMS;
 use super::interlaced::Interlaced;
 use super::rosette::Rosette;
 use crate::spec::{Source, SpecError, checked};

@@ -1,4 +1,4 @@
-use super::pattern::{Beam, MAX_BEAMS};
+use super::beam::{Beam, MAX_BEAMS};
 use crate::spec::{Source, SpecError};
 use std::f64::consts::TAU;
 

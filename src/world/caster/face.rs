@@ -1,9 +1,10 @@
 //! A flat face: ray intersection and nearest point.
 
-use super::{Aabb, Vec3, single};
+use super::single_precision::{Vec3, single};
 use crate::geometry::Vector;
 use crate::world::MaterialId;
-use crate::world::shape::Triangle;
+use crate::world::triangle::Triangle;
+use parry3d::bounding_volume::Aabb;
 
 /// Tolerance outside the edges of a face, as a fraction of the edges. Neighbouring faces overlap by this, so that no
 /// ray passes between them.

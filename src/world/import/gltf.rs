@@ -2,12 +2,15 @@
 
 mod accessor;
 mod document;
+mod error;
 
-use super::{MAX_BYTES, MeshError, Triangle, triangulate};
+use super::error::{MAX_BYTES, MeshError};
+use super::polygon::triangulate;
 use crate::geometry::Vector;
-use crate::world::build::MAX_TRIANGLES;
+use crate::world::triangle::{MAX_TRIANGLES, Triangle};
 use accessor::{Data, base64};
 use document::{Buffer, Document, Primitive};
+use error::malformed;
 use std::path::{Component, Path};
 
 type Transform = nalgebra::Matrix4<f64>;
@@ -33,10 +36,6 @@ pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Triangle>
         traversal.visit(root, &Transform::identity(), 0)?;
     }
     Ok(traversal.triangles)
-}
-
-fn malformed(problem: impl Into<String>) -> MeshError {
-    MeshError::Malformed { format: "glTF", problem: problem.into() }
 }
 
 /// The JSON and the binary chunk of a `.glb`; a `.gltf` is JSON only.

@@ -1,17 +1,21 @@
 //! Meshes from files. The file size is checked before parsing and the triangles afterwards, so that any file gives
 //! either triangles with an area or an error message.
 
+mod error;
 mod gltf;
 mod obj;
 mod ply;
+mod polygon;
 mod stl;
 
-use super::shape::{Triangle, UpAxis};
+pub(super) use error::MeshError;
+
+use super::shape::UpAxis;
+use super::triangle::Triangle;
 use crate::geometry::Vector;
+use error::MAX_BYTES;
 use std::path::Path;
 
-/// Maximum file size, bytes: twice the maximum number of triangles of a scene as binary STL.
-const MAX_BYTES: u64 = 1 << 30;
 /// Maximum fraction of triangles without area: a mesh with more is damaged.
 const MAX_FRACTION_WITHOUT_AREA: f64 = 0.1;
 /// A triangle counts as flat if its height is below this fraction of the longest edge.
@@ -24,35 +28,6 @@ pub(super) struct MeshTriangles {
     pub triangles: Vec<Triangle>,
     /// Number of removed triangles without area.
     pub without_area: usize,
-}
-
-/// Why a mesh cannot be used. The name of the file precedes the message.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum MeshError {
-    #[error("cannot be read: {0}")]
-    Io(#[from] std::io::Error),
-    #[error("has {0} bytes; a mesh has at most {MAX_BYTES}")]
-    TooLarge(u64),
-    #[error("ends in neither .obj, .stl, .ply, .gltf nor .glb")]
-    UnknownFormat,
-    #[error(
-        "is a COLLADA file, which is not supported: convert it to glTF with Blender (import the .dae, export as .glb) or with `assimp export model.dae model.glb`"
-    )]
-    Collada,
-    #[error("is not a valid {format} mesh: {problem}")]
-    Malformed { format: &'static str, problem: String },
-    #[error("declares {declared}, but contains {found}")]
-    CountMismatch { declared: String, found: String },
-    #[error("face {face} names the vertex {index}; there are {vertices}")]
-    NoSuchVertex { face: usize, index: i64, vertices: usize },
-    #[error("has no triangles")]
-    Empty,
-    #[error("triangle {0} has a corner that is not finite")]
-    NotFinite(usize),
-    #[error(
-        "{without} of its {all} triangles have no area (thinner than a millionth of their length); the maximum is 10 %: repair the mesh"
-    )]
-    WithoutArea { without: usize, all: usize },
 }
 
 /// Reads the mesh in a file. `scale` is metres per unit of the file; `up` overrides the up axis of the format.
@@ -117,20 +92,4 @@ fn is_flat([a, b, c]: &Triangle) -> bool {
     let longest = edges.iter().map(Vector::norm).fold(0.0, f64::max);
     let twice_area = edges[0].cross(&edges[1]).norm();
     twice_area <= FLAT_RATIO * longest * longest
-}
-
-/// Splits polygons into fans of triangles around their first corners; indices start at 0.
-fn triangulate(vertices: &[Vector], polygons: impl Iterator<Item = Vec<i64>>) -> Result<Vec<Triangle>, MeshError> {
-    let mut triangles = Vec::new();
-    for (face, polygon) in polygons.enumerate() {
-        let corner = |index: i64| {
-            let found = usize::try_from(index).ok().and_then(|index| vertices.get(index)).copied();
-            found.ok_or(MeshError::NoSuchVertex { face: face + 1, index, vertices: vertices.len() })
-        };
-        let corners = polygon.into_iter().map(corner).collect::<Result<Vec<Vector>, _>>()?;
-        if let [first, rest @ ..] = corners.as_slice() {
-            triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
-        }
-    }
-    Ok(triangles)
 }

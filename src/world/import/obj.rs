@@ -1,7 +1,9 @@
 //! Wavefront OBJ: `v` and `f` statements; others (normals, textures, groups, materials) are ignored.
 
-use super::{MeshError, Triangle, triangulate};
+use super::error::MeshError;
+use super::polygon::triangulate;
 use crate::geometry::Vector;
+use crate::world::triangle::Triangle;
 
 /// The triangles of an OBJ file; polygons are split into fans.
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {

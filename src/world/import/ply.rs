@@ -1,7 +1,9 @@
 //! PLY, ASCII and binary: the elements `vertex` (x, y, z) and `face` (`vertex_indices` or `vertex_index`).
 
-use super::{MeshError, Triangle, triangulate};
+use super::error::MeshError;
+use super::polygon::triangulate;
 use crate::geometry::Vector;
+use crate::world::triangle::Triangle;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
 use std::io::BufRead;

@@ -1,7 +1,8 @@
 //! STL, binary and ASCII. Both can start with `solid`; the file length distinguishes them.
 
-use super::{MeshError, Triangle};
+use super::error::MeshError;
 use crate::geometry::Vector;
+use crate::world::triangle::Triangle;
 use std::io::Cursor;
 
 const HEADER: usize = 84;

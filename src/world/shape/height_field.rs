@@ -1,7 +1,8 @@
-use super::{MAX_DIVISIONS, Triangle, check_count};
+use super::divisions::{MAX_DIVISIONS, check_count};
 use crate::geometry::Vector;
 use crate::random::{Seed, Stream};
 use crate::spec::checked;
+use crate::world::triangle::Triangle;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 

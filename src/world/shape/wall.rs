@@ -1,6 +1,6 @@
-use super::{Triangle, parallelogram};
 use crate::geometry::Vector;
 use crate::spec::checked;
+use crate::world::triangle::{Triangle, parallelogram};
 use serde::{Deserialize, Serialize};
 
 /// A doorway or a window: a rectangular opening in a wall.

@@ -1,8 +1,9 @@
 //! Access to the buffers of a glTF file, with checks of every index and offset.
 
 use super::document::{Accessor, Document};
-use super::{MeshError, malformed};
+use super::error::malformed;
 use crate::geometry::Vector;
+use crate::world::import::error::MeshError;
 
 /// Values of `componentType` in the specification.
 const U8: u32 = 5121;

@@ -1,0 +1,11 @@
+//! Vectors in single precision, as the ray search uses them.
+
+use crate::geometry::Vector;
+
+/// A vector in single precision.
+pub(super) type Vec3 = parry3d::math::Vector;
+
+/// Rounds a vector to single precision.
+pub(super) fn single(v: &Vector) -> Vec3 {
+    Vec3::new(v.x as f32, v.y as f32, v.z as f32)
+}

@@ -1,0 +1,33 @@
+//! Errors of meshes.
+
+/// Maximum file size, bytes: twice the maximum number of triangles of a scene as binary STL.
+pub(super) const MAX_BYTES: u64 = 1 << 30;
+
+/// Why a mesh cannot be used. The name of the file precedes the message.
+#[derive(Debug, thiserror::Error)]
+pub(in crate::world) enum MeshError {
+    #[error("cannot be read: {0}")]
+    Io(#[from] std::io::Error),
+    #[error("has {0} bytes; a mesh has at most {MAX_BYTES}")]
+    TooLarge(u64),
+    #[error("ends in neither .obj, .stl, .ply, .gltf nor .glb")]
+    UnknownFormat,
+    #[error(
+        "is a COLLADA file, which is not supported: convert it to glTF with Blender (import the .dae, export as .glb) or with `assimp export model.dae model.glb`"
+    )]
+    Collada,
+    #[error("is not a valid {format} mesh: {problem}")]
+    Malformed { format: &'static str, problem: String },
+    #[error("declares {declared}, but contains {found}")]
+    CountMismatch { declared: String, found: String },
+    #[error("face {face} names the vertex {index}; there are {vertices}")]
+    NoSuchVertex { face: usize, index: i64, vertices: usize },
+    #[error("has no triangles")]
+    Empty,
+    #[error("triangle {0} has a corner that is not finite")]
+    NotFinite(usize),
+    #[error(
+        "{without} of its {all} triangles have no area (thinner than a millionth of their length); the maximum is 10 %: repair the mesh"
+    )]
+    WithoutArea { without: usize, all: usize },
+}

@@ -1,0 +1,14 @@
+//! Triangles of a scene.
+
+use crate::geometry::Vector;
+
+/// Maximum number of triangles of a scene: each needs about 350 bytes while the scene is built.
+pub(super) const MAX_TRIANGLES: usize = 10_000_000;
+
+/// Three corners, m.
+pub(super) type Triangle = [Vector; 3];
+
+/// The two triangles of a parallelogram, in sequence, so that the ray caster can pair them.
+pub(super) fn parallelogram(corner: Vector, u: Vector, v: Vector) -> [Triangle; 2] {
+    [[corner, corner + u, corner + u + v], [corner, corner + u + v, corner + v]]
+}
