@@ -229,38 +229,6 @@ fn the_library_uses_no_wall_clock_and_no_hash_order() {
 /// entry here.
 const REMAINING_CIRCLES: &[&[&str]] = &[
     &[
-        "estimation/base/clock_offset.rs",
-        "estimation/base/filter.rs",
-        "estimation/base/fixes.rs",
-        "estimation/base/mod.rs",
-        "estimation/base/smoother.rs",
-    ],
-    &[
-        "estimation/border.rs",
-        "estimation/consider/gauge.rs",
-        "estimation/consider/mod.rs",
-        "estimation/map/limits.rs",
-        "estimation/map/relocaliser.rs",
-        "estimation/output.rs",
-        "estimation/window/correspondence.rs",
-        "estimation/window/equations.rs",
-        "estimation/window/mod.rs",
-        "estimation/window/solve.rs",
-        "estimation/window/uncertainty.rs",
-    ],
-    &["estimation/estimator/mod.rs", "estimation/estimator/reports.rs"],
-    &["estimation/intake/mod.rs", "estimation/intake/samples.rs"],
-    &["estimation/registration/equations.rs", "estimation/registration/lidar_model.rs"],
-    &["estimation/registration/mod.rs", "estimation/registration/places/mod.rs"],
-    &["estimation/registration/spec.rs", "estimation/spec.rs"],
-    &["estimation/residual/matched.rs", "estimation/residual/sums.rs"],
-    &[
-        "evaluation/bound/mod.rs",
-        "evaluation/bound/motion.rs",
-        "evaluation/bound/smoother.rs",
-        "evaluation/bound/state.rs",
-    ],
-    &[
         "recording/container/bag.rs",
         "recording/container/database.rs",
         "recording/container/file_index.rs",

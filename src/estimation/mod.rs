@@ -86,6 +86,7 @@ mod stamps;
 mod standstill;
 mod strapdown;
 mod surfel;
+mod surfel_spec;
 mod timing;
 mod views;
 mod window;

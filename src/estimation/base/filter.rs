@@ -11,12 +11,15 @@
 //!
 //! A fix, interpolated at `u - l` for the IMU time `u`, measures `theta + omega l` and `p + v l`.
 
-use super::FixSigmas;
+use super::fixes::FixSigmas;
 use crate::estimation::EstimatorSpec;
 use crate::estimation::strapdown::{Biases, Interval, State};
 use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, skew};
 use crate::measurement::ImuNoise;
 use nalgebra::{Matrix3, SMatrix, SVector};
+
+/// Time between two updates of the filter, s: the averaging time of [`FixSigmas`].
+pub(super) const EPOCH_S: f64 = 0.05;
 
 /// Dimension of the error state: attitude, position, velocity, two biases (3 each), clock offset, clock rate, gravity tilt (2).
 const STATES: usize = 19;

@@ -18,82 +18,24 @@
 mod clock_offset;
 mod filter;
 mod fixes;
+mod imu;
 mod smoother;
+
+pub use fixes::{BaseFix, FixSigmas};
+pub use imu::BaseImu;
+pub use smoother::BaseEstimate;
 
 use super::inertial::{InertialStream, Screen, Screened};
 use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use super::{EstimationError, EstimatorSpec};
-use crate::geometry::{Pose, Trajectory, Vector};
 use crate::measurement::{ImuAveraging, ImuNoise, ImuSample};
 use crate::signal::Regularity;
-use crate::time::{Span, Stamp};
+use crate::time::Stamp;
 use fixes::Fixes;
 
-/// Time between two updates of the filter, s: the averaging time of [`FixSigmas`].
-const EPOCH_S: f64 = 0.05;
 /// Minimum overlap in time of fixes and IMU samples, s: needed to find the sample rate and the clock offset.
 const MIN_OVERLAP_S: f64 = 5.0;
-
-/// A pose of the base from a source other than its IMU.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BaseFix {
-    /// Time on the clock of the head's trajectory.
-    pub stamp: Stamp,
-    /// The pose; the z axis of the world is vertical to about 0.5 degrees.
-    pub world_from_base: Pose,
-    /// Uncertainty of the pose.
-    pub sigmas: FixSigmas,
-}
-
-/// Standard deviations of fixes averaged over 50 ms, for each axis.
-///
-/// Errors of fixes are correlated over longer times, so these values exceed the scatter of the fixes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FixSigmas {
-    /// Standard deviation of the position, m.
-    pub position_m: f64,
-    /// Standard deviation of the attitude, rad.
-    pub rotation_rad: f64,
-}
-
-impl FixSigmas {
-    /// Fixes from the spring model and an estimated head trajectory.
-    ///
-    /// Measured on seeds 701 and 702, office and courtyard, hand-held and on the vehicle, after levelling the map. Position
-    /// error per axis: 0.1 to 0.2 mm between 0.3 and 1 Hz, 0.5 mm below 0.3 Hz. Attitude error: 0.01 degrees in both bands,
-    /// 0.05 degrees above 6 Hz. With these values the gyroscope dominates above about 0.4 Hz.
-    pub const SPRING: Self = Self { position_m: 1e-3, rotation_rad: 1e-3 };
-    /// Fixes that assume the head at rest on the base. Hand-held, the error is 20 degrees and 20 mm, correlated over half a
-    /// swing of the head.
-    pub const RIGID_LINK: Self = Self { position_m: 0.05, rotation_rad: 0.4 };
-}
-
-/// Estimated trajectory of the base and parameters of its IMU.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BaseEstimate {
-    /// `world_from_base` at the stamps of the fixes that the IMU covers.
-    pub trajectory: Trajectory,
-    /// Unit vector opposite to the estimated gravity, in the world frame of the fixes.
-    pub up_in_world: Vector,
-    /// Clock offset at the end: IMU stamp minus fix stamp of the same event, s.
-    pub clock_offset_s: f64,
-    /// Standard deviation of the clock offset, s; large, but without effect, if the base hardly moved.
-    pub clock_offset_sigma_s: f64,
-}
-
-/// Description of the base's IMU.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BaseImu {
-    /// Pose of the IMU in the base frame.
-    pub base_from_imu: Pose,
-    /// Noise parameters.
-    pub noise: ImuNoise,
-    /// How it derives its samples from the motion.
-    pub averaging: ImuAveraging,
-    /// Clock offset, IMU stamp minus fix stamp of the same event, to 1 or 2 ms, s; `None` to search within 1 s.
-    pub clock_offset_s: Option<f64>,
-}
 
 /// Smooths the trajectory of the base from IMU `samples` and pose `fixes`, both in time order.
 ///
@@ -173,9 +115,4 @@ pub(super) fn intervals(
     stream.flush(&mut placed);
     let start_s = placed.first().map_or(0.0, |(start_s, _)| *start_s);
     Ok((start_s, placed.into_iter().map(|(_, interval)| interval).collect()))
-}
-
-/// Converts seconds after `origin` to a stamp.
-fn stamp(origin: Stamp, seconds: f64) -> Stamp {
-    origin + Span::from_seconds(seconds)
 }

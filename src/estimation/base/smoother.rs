@@ -1,14 +1,27 @@
 //! Rauch-Tung-Striebel smoother: forward filter, backward pass, interpolated poses.
 
-use super::filter::{ErrorMatrix, Estimate, Filter, Innovation};
-use super::fixes::Fixes;
-use super::{BaseEstimate, BaseImu, EPOCH_S, FixSigmas};
+use super::filter::{EPOCH_S, ErrorMatrix, Estimate, Filter, Innovation};
+use super::fixes::{FixSigmas, Fixes};
+use super::imu::BaseImu;
 use crate::estimation::nominal::{Correction, Nominal};
 use crate::estimation::strapdown::Interval;
 use crate::estimation::{EstimationError, EstimatorSpec};
 use crate::geometry::{Pose, Rotation, Trajectory, Vector};
 use crate::time::Stamp;
 use std::ops::Range;
+
+/// Estimated trajectory of the base and parameters of its IMU.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BaseEstimate {
+    /// `world_from_base` at the stamps of the fixes that the IMU covers.
+    pub trajectory: Trajectory,
+    /// Unit vector opposite to the estimated gravity, in the world frame of the fixes.
+    pub up_in_world: Vector,
+    /// Clock offset at the end: IMU stamp minus fix stamp of the same event, s.
+    pub clock_offset_s: f64,
+    /// Standard deviation of the clock offset, s; large, but without effect, if the base hardly moved.
+    pub clock_offset_sigma_s: f64,
+}
 
 /// Number of epochs whose matrices are in memory at once (60 s).
 const EPOCHS_IN_MEMORY: usize = 1200;

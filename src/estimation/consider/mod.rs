@@ -13,6 +13,7 @@
 //! these terms, the vertical drift of a head that observes neither floor nor ceiling for seconds is four times the
 //! prediction.
 
+mod alignment;
 mod gauge;
 
 use self::gauge::{Gauge, Mark};

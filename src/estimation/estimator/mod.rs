@@ -3,6 +3,7 @@
 mod gauge;
 mod poses;
 mod reports;
+mod warnings;
 
 use self::gauge::GaugeBuilder;
 use self::reports::{is_dead_reckoning, problem, report};

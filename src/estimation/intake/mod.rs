@@ -3,7 +3,7 @@
 mod samples;
 mod scans;
 
-use self::samples::{Coverage, SampleQueue};
+use self::samples::{Coverage, MARGIN_S, SampleQueue};
 use self::scans::ScanQueue;
 use super::inertial::InertialStream;
 use super::initial::NoiseFactors;
@@ -17,8 +17,6 @@ use crate::measurement::{Calibration, Measurement};
 use crate::signal::Regularity;
 use crate::time::{Span, Stamp};
 
-/// Margin of the IMU intervals on both sides of a segment, s: room for a change of the clock offset.
-pub(super) const MARGIN_S: f64 = 0.05;
 /// Measurements that arrive out of order by up to this are sorted, s.
 const MAX_DISORDER_S: f64 = 0.1;
 /// Clipped samples are reported again when their number has grown by this factor.

@@ -1,11 +1,13 @@
 //! IMU input: queues and screens samples, and converts them to intervals.
 
-use super::MARGIN_S;
 use crate::estimation::inertial::{InertialStream, Screen, Screened};
 use crate::estimation::initial::NoiseFactors;
 use crate::estimation::strapdown::Interval;
 use crate::measurement::{ImuNoise, ImuSample};
 use std::collections::VecDeque;
+
+/// Margin of the IMU intervals on both sides of a segment, s: room for a change of the clock offset.
+pub(super) const MARGIN_S: f64 = 0.05;
 
 /// A sample is used when the newest one is later by this, s. By then delayed samples have arrived, and so have the
 /// later samples that the screening needs.

@@ -6,7 +6,8 @@
 //! Candidate poses come from correlative matching (Olson, ICRA 2009), here in 3-D and with the normals of all surfaces.
 
 use super::limits::MAP_LIMITS;
-use super::relocaliser::{LocalisedPose, Relocaliser, is_different_pose, offset_pose};
+use super::localised_pose::{LocalisedPose, offset_pose};
+use super::relocaliser::{Relocaliser, is_different_pose};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Pose, Vector};
 use rayon::prelude::*;

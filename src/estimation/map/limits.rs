@@ -1,6 +1,6 @@
 //! Search region and acceptance thresholds of the relocalisation.
 
-use super::relocaliser::{LocalisedPose, offset_pose, pose_distance};
+use super::localised_pose::{LocalisedPose, offset_pose, pose_distance};
 use crate::geometry::{Pose, Vector};
 
 /// Spacing of the start poses, m and rad: within half of it the coarsest surfels converge.

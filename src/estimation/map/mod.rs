@@ -3,10 +3,11 @@
 mod fuse;
 mod global_check;
 mod limits;
+mod localised_pose;
 mod relocaliser;
 
 pub(super) use limits::{MAP_LIMITS, RelocalisationLimits};
-pub use relocaliser::LocalisedPose;
+pub use localised_pose::LocalisedPose;
 pub(super) use relocaliser::Relocaliser;
 
 use super::observed::{ObservedSurfel, ObservedSurfels};

@@ -4,11 +4,15 @@
 
 use super::block_matrix::BlockMatrix;
 use super::conjugate_gradients::{self, PreconditionedSystem};
-use super::lidar_model::{SHARED_DIMENSION, Shared};
 use crate::estimation::spline::Basis;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt;
-use nalgebra::{Cholesky, Const, Matrix6, SMatrix, Vector6};
+use nalgebra::{Cholesky, Const, Matrix6, SMatrix, SVector, Vector6};
+
+/// Number of unknowns shared by all times: the range bias, m.
+pub(super) const SHARED_DIMENSION: usize = 1;
+/// Vector over the shared unknowns: a derivative or a step.
+pub(super) type Shared = SVector<f64, SHARED_DIMENSION>;
 
 /// Maximum distance of two spline segments for a local term: open-loop motion couples adjacent segments.
 const LOCAL_DISTANCE: i64 = 1;

@@ -6,18 +6,12 @@
 //! no information. As their estimate changed during the open loop, [`recalibrated`] recomputes the head's poses with the final
 //! extrinsics.
 
-use super::equations::SharedTerm;
+use super::equations::{Shared, SharedTerm};
 use crate::estimation::EstimatorSpec;
 use crate::estimation::observed::ObservedSurfels;
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Pose, Rotation, Trajectory, TrajectoryError, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
-use nalgebra::SVector;
-
-/// Number of unknowns shared by all times: the range bias, m.
-pub(super) const SHARED_DIMENSION: usize = 1;
-/// Vector over the shared unknowns: a derivative or a step.
-pub(super) type Shared = SVector<f64, SHARED_DIMENSION>;
 
 /// Pose and estimated correction of the lidar.
 #[derive(Debug, Clone, Copy)]
@@ -121,6 +115,7 @@ pub(super) fn recalibrated(
 
 #[cfg(test)]
 mod tests {
+    use super::super::equations::SHARED_DIMENSION;
     use super::*;
     use crate::estimation::load;
     use crate::geometry::{Matrix, from_roll_pitch_yaw};

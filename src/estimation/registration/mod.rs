@@ -33,6 +33,7 @@ mod spec;
 mod submaps;
 #[cfg(test)]
 mod tests;
+mod trajectory_difference;
 
 pub use places::{LoopReport, PlacesSpec};
 pub use spec::RegistrationSpec;
@@ -52,6 +53,7 @@ use matches::{MatchStatistics, Matches};
 use neighbours::Neighbours;
 use places::PreAligned;
 use scene::Scene;
+use trajectory_difference::largest_difference;
 
 /// Maximum correction in one solve, m and rad; a larger one is rejected as implausible.
 const MAX_CORRECTION: (f64, f64) = (20.0, 1.0);
@@ -155,7 +157,7 @@ fn register_without_gaps(
         Problem { input: RegistrationInput { map_from_head, ..input }, spec: registration, matcher: &matcher };
     let closed = match problem.solve(LidarModel::new(calibration, (lidar, observed.range_bias_is_fixed), spec)) {
         Ok((Registered { trajectory, lidar_model }, report)) => {
-            let report = RegistrationReport { moved: moved(map_from_head, &trajectory), ..report };
+            let report = RegistrationReport { moved: largest_difference(map_from_head, &trajectory), ..report };
             ClosedLoop { trajectory, lidar: lidar_model.lidar, open_loop_recalibrated: recalibrated, report }
         }
         Err(rejection) => {
@@ -223,7 +225,7 @@ impl Problem<'_> {
             let ((corrected, found), updated_report) = registered;
             (lidar_model, report) = (found, updated_report);
             let next = trajectory_of(corrected, map_from_head.stamps(), report)?;
-            let (shift_m, _) = moved(&pre_aligned.trajectory, &next);
+            let (shift_m, _) = largest_difference(&pre_aligned.trajectory, &next);
             let observed = pre_aligned.observed.along(&pre_aligned.trajectory, &next);
             pre_aligned = PreAligned { trajectory: next, observed };
             if shift_m < ROUNDS_CONVERGED_M {
@@ -241,14 +243,6 @@ fn trajectory_of(
     report: RegistrationReport,
 ) -> Result<Trajectory, Box<(RegistrationReport, &'static str)>> {
     corrected.into_trajectory(stamps).map_err(|_| Box::new((report, "the registered poses are not finite")))
-}
-
-/// Largest difference of two trajectories at the same stamps, m and rad.
-fn moved(from: &Trajectory, to: &Trajectory) -> (f64, f64) {
-    from.poses().iter().zip(to.poses()).fold((0.0, 0.0), |(shift, turn): (f64, f64), (from, to)| {
-        let difference = to.translation.vector - from.translation.vector;
-        (shift.max(difference.norm()), turn.max(from.rotation.angle_to(&to.rotation)))
-    })
 }
 
 /// State of the iterations.

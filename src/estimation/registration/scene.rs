@@ -1,7 +1,8 @@
 //! All surfels of the recording, placed in the map.
 
 use super::corrected_trajectory::CorrectedTrajectory;
-use super::lidar_model::{LidarModel, LidarRay, Shared, rotate_patch};
+use super::equations::Shared;
+use super::lidar_model::{LidarModel, LidarRay, rotate_patch};
 use super::{RegistrationSpec, submaps};
 use crate::estimation::nominal::Correction;
 use crate::estimation::observed::ObservedSurfels;

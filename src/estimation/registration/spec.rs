@@ -1,6 +1,6 @@
 use super::PlacesSpec;
 use crate::estimation::EstimationError;
-use crate::estimation::spec::{MatchingSpec, SurfelSpec};
+use crate::estimation::surfel_spec::{MatchingSpec, SurfelSpec};
 use serde::{Deserialize, Serialize};
 
 /// Global registration (loop-closed trajectory) settings.

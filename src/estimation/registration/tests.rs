@@ -1,6 +1,6 @@
 //! Registration of a synthetic trajectory through an empty room, with a known distortion of the open loop.
 
-use super::lidar_model::Shared;
+use super::equations::Shared;
 use super::matches::BinPairSums;
 use super::*;
 use crate::estimation::load;

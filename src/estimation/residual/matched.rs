@@ -8,7 +8,7 @@
 //! The unknowns common to all surfels are in the border. `B` of them are used: [`COMMON`], or only the first
 //! [`COMMON_WITHOUT_EXTRINSICS`] if the lidar extrinsics are not estimated.
 
-use super::sums::{SPAN_UNKNOWNS, add_scaled, over_knots};
+use super::knot_span::{SPAN_UNKNOWNS, add_scaled, over_knots};
 use super::{CLOCK, Layout};
 use crate::estimation::surfel::{Patch, PlacedSurfel};
 use crate::geometry::{Matrix, Vector};
@@ -58,6 +58,9 @@ fn adjugate(m: &Matrix) -> Matrix {
     let (a, b, c) = (m.column(0), m.column(1), m.column(2));
     Matrix::from_rows(&[b.cross(&c).transpose(), c.cross(&a).transpose(), a.cross(&b).transpose()])
 }
+
+/// Sine of the tilt of a normal towards a direction below which the tilt may be measurement error.
+pub(in crate::estimation) const MIN_SIGNIFICANT_TILT: f64 = 0.3;
 
 /// Common unknowns without extrinsics: clock offset, clock rate and range bias.
 pub(in crate::estimation) const COMMON_WITHOUT_EXTRINSICS: usize = 3;

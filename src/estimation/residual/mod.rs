@@ -2,6 +2,7 @@
 
 pub(super) mod contradiction;
 pub(super) mod inertial;
+mod knot_span;
 mod layout;
 pub(super) mod matched;
 pub(super) mod prior;

@@ -3,14 +3,12 @@
 //! All surfels of a span depend on the same four knots. Their terms are summed in small dense blocks, which fit into
 //! the L1 cache, and enter the equations a block at a time.
 
+use super::knot_span::{SPAN_UNKNOWNS, add_scaled, over_knots};
 use super::matched::SurfelJacobian;
 use super::{CLOCK, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::PlacedSurfel;
-
-/// Unknowns of the four knots about a span.
-pub(super) const SPAN_UNKNOWNS: usize = 24;
 
 /// The terms of all matches of a surfel by the motion of that surfel.
 ///
@@ -157,22 +155,5 @@ impl Coupling {
                 equations.add_entry(row, column, if row == column { 2.0 * sum } else { *sum });
             }
         }
-    }
-}
-
-/// Converts six derivatives by a surfel's motion to derivatives by the four knots of the span.
-#[inline(always)]
-pub(super) fn over_knots(by_motion: &[f64; 6], basis: &Basis) -> [f64; SPAN_UNKNOWNS] {
-    let mut knots = [0.0; SPAN_UNKNOWNS];
-    for (knot, value) in knots.chunks_exact_mut(6).zip(basis.value) {
-        add_scaled(knot, by_motion, value);
-    }
-    knots
-}
-
-#[inline(always)]
-pub(super) fn add_scaled(sums: &mut [f64], terms: &[f64], scale: f64) {
-    for (sum, term) in sums.iter_mut().zip(terms) {
-        *sum += scale * term;
     }
 }

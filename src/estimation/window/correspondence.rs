@@ -1,31 +1,26 @@
 //! Surfel matching: pairs within the window, and window surfels with patches of the fixed views.
 
-use super::{Window, WindowSegment};
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::surfel::{Patch, PlacedSurfel, Surfel};
+use crate::estimation::surfel::{Patch, PlacedSurfel};
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use rayon::prelude::*;
 
 /// The neighbour search is repeated when a surfel may have moved by this, m; smaller motion hardly changes the result.
 const SEARCH_MOTION_M: f64 = 0.02;
-/// Widening of the match gate in a first window that starts in motion, and after a bridged gap.
-const WIDE_GATE: f64 = 3.0;
-/// A tilt of a normal is significant above this multiple of the standard deviation.
-const SIGNIFICANT_SIGMAS: f64 = 4.0;
 
 /// Candidate pairs of surfels, before the distance gate.
 #[derive(Default)]
 pub(super) struct Neighbours {
     /// Within the window: indices into the scene.
-    pairs: Vec<(u32, u32)>,
+    pub pairs: Vec<(u32, u32)>,
     /// With views: a surfel of the scene, a view, a patch of the view.
-    fixed: Vec<(u32, u32, u32)>,
+    pub fixed: Vec<(u32, u32, u32)>,
     /// Number of surfels in the scene at the time of the search.
-    scene_len: usize,
+    pub scene_len: usize,
     /// Upper bound on the motion of any surfel since the search, m.
-    moved_m: f64,
+    pub moved_m: f64,
 }
 
 /// Cached fixed-view neighbours of a surfel, and the position at which they were searched.
@@ -115,7 +110,7 @@ impl<K: Copy + Send + Sync> Grouped<K> {
 }
 
 impl Matches {
-    fn of(all: Vec<Match>, scene: &[PlacedSurfel]) -> Self {
+    pub fn of(all: Vec<Match>, scene: &[PlacedSurfel]) -> Self {
         let mut offsets = vec![0; scene.len() + 1];
         let sides = |one: &Match| [Some(one.a as usize), one.other()];
         for surfel in all.iter().flat_map(sides).flatten() {
@@ -164,111 +159,9 @@ impl Neighbours {
     }
 }
 
-impl Window {
-    /// The window's surfels in the map frame, except surfels that a clock correction moved out of the window's knots.
-    pub(super) fn scene(&self) -> Vec<PlacedSurfel> {
-        let placing = self.placing();
-        let surfel_indices = self.surfel_indices();
-        surfel_indices
-            .par_iter()
-            .with_min_len(512)
-            .map(|(k, index)| self.segments[*k].surfels[*index].place(&placing))
-            .collect()
-    }
-
-    /// For each surfel of the scene: the segment, and the index into the surfels of that segment.
-    fn surfel_indices(&self) -> Vec<(usize, usize)> {
-        let (from, to) = (self.start.u_s, self.nominal.end_s());
-        let is_within = |surfel: &Surfel| (from..=to).contains(&self.clock.imu_s(surfel.tau_s));
-        let of_segment = |(k, segment): (usize, &'_ WindowSegment)| {
-            let within = segment.surfels.iter().enumerate().filter(|(_, surfel)| is_within(surfel));
-            within.map(|(index, _)| (k, index)).collect::<Vec<_>>()
-        };
-        self.segments.iter().enumerate().flat_map(of_segment).collect()
-    }
-
-    /// The `neighbours` in `scene` that pass the match gates.
-    pub(super) fn match_up(
-        &self,
-        scene: &[PlacedSurfel],
-        views: &Views,
-        neighbours: &Neighbours,
-        iteration: usize,
-    ) -> Matches {
-        let widening = if self.wide_matching || self.bridged_gap { WIDE_GATE } else { 1.0 };
-        let gate_m = widening * self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
-        let sigma_m = self.spec.solve.match_sigma_m;
-        let plane = |a: u32, other: &Patch| {
-            let patch = &scene[a as usize].patch;
-            self.matcher.pass_gates(patch, other, gate_m).then(|| Plane::of(patch, other, sigma_m))
-        };
-        let live = |(a, b): &(u32, u32)| {
-            let plane = plane(*a, &scene[*b as usize].patch)?;
-            Some(Match { a: *a, with: Counterpart::Live(*b), plane })
-        };
-        let fixed = |(a, view, patch): &(u32, u32, u32)| {
-            let plane = plane(*a, &views.view(*view as usize).patches[*patch as usize])?;
-            Some(Match { a: *a, with: Counterpart::Fixed { view: *view, patch: *patch }, plane })
-        };
-        let mut all: Vec<Option<Match>> = neighbours.pairs.par_iter().with_min_len(512).map(live).collect();
-        all.par_extend(neighbours.fixed.par_iter().with_min_len(512).map(fixed));
-        Matches::of(all.into_iter().flatten().collect(), scene)
-    }
-
-    /// Removes the component along `direction` from normals whose tilt towards it is within the normal error.
-    ///
-    /// The sum of many such errors would otherwise count as information about the motion along `direction`.
-    pub(super) fn remove_insignificant_tilt(
-        &self,
-        matches: &mut Matches,
-        scene: &[PlacedSurfel],
-        views: &Views,
-        direction: &Vector,
-    ) {
-        for Match { a, with, plane } in &mut matches.all {
-            let other = match *with {
-                Counterpart::Live(b) => &scene[b as usize].patch,
-                Counterpart::Fixed { view, patch } => &views.view(view as usize).patches[patch as usize],
-            };
-            let variance =
-                scene[*a as usize].patch.normal_tilt_variance(direction) + other.normal_tilt_variance(direction);
-            if plane.normal.dot(direction).abs() < SIGNIFICANT_SIGMAS * variance.sqrt() {
-                plane.remove_component(direction);
-            }
-        }
-    }
-
-    /// Searches the neighbours in `scene` and in the `chosen` views.
-    pub(super) fn search_neighbours(
-        &mut self,
-        scene: &[PlacedSurfel],
-        (views, chosen): (&Views, &[usize]),
-    ) -> Neighbours {
-        let patches: Vec<Patch> = scene.iter().map(|surfel| surfel.patch).collect();
-        let pairs = self.matcher.neighbour_pairs(scene, &self.matcher.build_trees(&patches));
-        let surfel_indices = self.surfel_indices();
-        let mut cached: Vec<CachedNeighbours> =
-            surfel_indices.iter().map(|(k, index)| std::mem::take(&mut self.segments[*k].cached[*index])).collect();
-        let search = |(a, (patch, cached)): (usize, (&Patch, &mut CachedNeighbours))| {
-            cached.update(patch, (views, chosen), &self.matcher, self.spec.views.neighbours);
-            let in_view = |index: &usize| {
-                let patches = cached.found_in(views.view(*index).number);
-                patches.iter().map(|patch| (a as u32, *index as u32, *patch)).collect::<Vec<_>>()
-            };
-            chosen.iter().flat_map(in_view).collect::<Vec<_>>()
-        };
-        let both = patches.par_iter().zip(cached.par_iter_mut()).enumerate();
-        let fixed: Vec<_> = both.with_min_len(256).map(search).collect();
-        for ((k, index), cached) in surfel_indices.into_iter().zip(cached) {
-            self.segments[k].cached[index] = cached;
-        }
-        Neighbours { pairs, fixed: fixed.into_iter().flatten().collect(), scene_len: scene.len(), moved_m: 0.0 }
-    }
-}
-
 impl CachedNeighbours {
     /// Updates the neighbours of `patch` in the `chosen` views; views searched from about this position stay cached.
-    fn update(&mut self, patch: &Patch, (views, chosen): (&Views, &[usize]), matcher: &Matcher, count: usize) {
+    pub fn update(&mut self, patch: &Patch, (views, chosen): (&Views, &[usize]), matcher: &Matcher, count: usize) {
         let is_chosen = |number: u64| chosen.iter().any(|index| views.view(*index).number == number);
         let moved = (patch.centre - self.centre).norm() > SEARCH_MOTION_M;
         self.found.retain(|(number, _)| !moved && is_chosen(*number));
@@ -283,7 +176,7 @@ impl CachedNeighbours {
     }
 
     /// The cached neighbours in the view with number `view`.
-    fn found_in(&self, view: u64) -> &[u32] {
+    pub fn found_in(&self, view: u64) -> &[u32] {
         self.found.iter().find(|(number, _)| *number == view).map_or(&[], |(_, patches)| patches)
     }
 }

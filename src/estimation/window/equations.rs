@@ -1,32 +1,21 @@
-//! The window's normal equations: IMU residuals and priors, then the matches with robust weights.
+//! Parts of the window's normal equations: buffers, the robust kernel, and the matches with robust weights.
 
-use super::Window;
 use super::correspondence::{Match, Matches};
-use crate::estimation::nominal::Correction;
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
-use crate::estimation::residual::inertial::add_inertial;
 use crate::estimation::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Plane, SurfelJacobian};
-use crate::estimation::residual::prior;
 use crate::estimation::residual::sums::{Coupling, SpanSums, SurfelSums};
 use crate::estimation::spec::SolveSpec;
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::PlacedSurfel;
-use crate::estimation::timing::{Stopwatch, Timing};
 use crate::geometry::Vector;
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// Standard deviation of the zero-velocity measurement at rest, m/s.
-const REST_VELOCITY_SIGMA: f64 = 0.003;
-
-/// Standard deviation of the zero-rate measurement at rest, rad/s.
-const REST_RATE_SIGMA: f64 = 0.003;
-
 /// Buffers that all solves of a window share.
 #[derive(Debug)]
 pub(super) struct Workspace {
-    equations: NormalEquations,
+    pub equations: NormalEquations,
     pub factor: Factor,
     pub bases: Vec<Basis>,
 }
@@ -85,79 +74,17 @@ impl Displacement {
     }
 }
 
-impl Window {
-    /// The order of the window's unknowns; also computes the spline bases at the nodes from `first` on.
-    pub(super) fn layout(&mut self, first: usize) -> Layout {
-        let spacing = self.spec.knot_spacing_s;
-        self.workspace.bases.clear();
-        self.workspace.bases.extend(self.nominal.times_s()[first..].iter().map(|t| Basis::at(*t, spacing)));
-        let first_knot = Basis::at(self.start.u_s, spacing).first;
-        let last_knot = Basis::at(self.nominal.end_s(), spacing).first + 3;
-        Layout { first_knot, knots: (last_knot - first_knot + 1) as usize }
-    }
-
-    /// Solves the linearised window and returns the solution with the displacement; adds the run time to `timing`.
-    pub(super) fn solve_linearised(
-        &mut self,
-        (first, total): (usize, &[f64]),
-        scene: &[PlacedSurfel],
-        (matches, robust): (&Matches, &Robust),
-        layout: &Layout,
-        timing: &mut Timing,
-    ) -> Option<(Vec<f64>, Displacement)> {
-        let mut watch = Stopwatch::start();
-        self.assemble_inertial(first, layout, total);
-        let weighted = WeightedMatches { scene, matches, robust, clock_reference_s: self.clock.at_s };
-        weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
-        timing.equations_s += watch.lap_s();
-        let Workspace { equations, factor, bases } = &mut self.workspace;
-        equations.factor(factor).ok()?;
-        let x = equations.solve(factor);
-        let moved = Displacement::max_of(bases.iter().map(|basis| {
-            let correction = Correction::of_spline(basis, layout.first_knot, &x);
-            (correction.rotation, correction.translation)
-        }));
-        timing.solve_s += watch.lap_s();
-        Some((x, moved))
-    }
-
-    /// Resets the equations and adds the terms that do not depend on matches: IMU and priors.
-    fn assemble_inertial(&mut self, first: usize, layout: &Layout, total: &[f64]) {
-        let Workspace { equations, bases, .. } = &mut self.workspace;
-        equations.reset(layout.size());
-        let states = self.nominal.states();
-        let known = (&self.biases, &self.gravity);
-        add_inertial(equations, layout, (&states[first..], bases), &self.nominal.intervals()[first..], known);
-        self.start.add_to(equations, layout, (total, self.border.total_step()), self.spec.knot_spacing_s);
-        self.border.add_to(equations, layout);
-        let nodes = self.nominal.times_s().iter().zip(states).skip(first);
-        for ((_, state), basis) in nodes.zip(&*bases).take_while(|((time, _), _)| **time < self.rested_until_s) {
-            prior::add_zero_velocity(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
-        }
-        for k in (first..self.nominal.intervals().len()).filter(|k| self.rests.at(self.nominal.times_s()[*k])) {
-            let (state, next, basis) = (&states[k], &states[k + 1], &bases[k - first]);
-            let turn = (next.rotation * state.rotation.inverse()).scaled_axis() / self.nominal.intervals()[k].h;
-            prior::add_zero_velocity(equations, layout, basis, &state.velocity, REST_VELOCITY_SIGMA);
-            prior::add_zero_rotation_rate(equations, layout, basis, &turn, REST_RATE_SIGMA);
-        }
-        // The outermost knots are hardly observed: a weak prior of 1 m and 1 rad keeps the system regular.
-        for unknown in 0..layout.border() {
-            equations.add_entry(unknown, unknown, 1.0);
-        }
-    }
-}
-
 /// The matches, with all that their normal equations need.
-struct WeightedMatches<'a> {
-    scene: &'a [PlacedSurfel],
-    matches: &'a Matches,
-    robust: &'a Robust,
-    clock_reference_s: f64,
+pub(super) struct WeightedMatches<'a> {
+    pub scene: &'a [PlacedSurfel],
+    pub matches: &'a Matches,
+    pub robust: &'a Robust,
+    pub clock_reference_s: f64,
 }
 
 impl WeightedMatches<'_> {
     /// Adds all matches; with `extrinsics`, including their derivatives by the lidar extrinsics.
-    fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, extrinsics: bool) {
+    pub fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, extrinsics: bool) {
         let weigh = |one: &Match| self.robust.weight(&one.plane, one.plane.distance_m);
         let weights: Vec<f64> = self.matches.all.iter().map(weigh).collect();
         if extrinsics {

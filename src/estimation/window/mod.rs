@@ -1,14 +1,17 @@
 //! The sliding window: states, solution and marginalisation.
 
+mod assembly;
 mod correspondence;
 mod equations;
+mod linearised;
 mod rests;
+mod search;
 mod solve;
 mod uncertainty;
 
 pub(super) use equations::Displacement;
-pub(super) use solve::{MIN_SIGNIFICANT_TILT, WindowSolution};
-pub(super) use uncertainty::Linearised;
+pub(super) use linearised::Linearised;
+pub(super) use solve::WindowSolution;
 
 use super::border::Border;
 use super::clock::Clock;

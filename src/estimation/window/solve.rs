@@ -3,9 +3,9 @@
 use super::Window;
 use super::correspondence::{Counterpart, Matches, Neighbours};
 use super::equations::Robust;
-use super::uncertainty::Linearised;
+use super::linearised::Linearised;
 use crate::estimation::nominal::Correction;
-use crate::estimation::residual::matched::Plane;
+use crate::estimation::residual::matched::{MIN_SIGNIFICANT_TILT, Plane};
 use crate::estimation::residual::{
     ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION, LIDAR_TRANSLATION,
     Layout, RANGE,
@@ -20,8 +20,6 @@ use crate::geometry::{Matrix, Rotation, Vector};
 const MAX_CORRECTION: (f64, f64) = (2.0, 0.8);
 /// Lever arm that converts a rotation of the head into surfel motion, m; more distant surfaces are in larger cells.
 const LEVER_ARM_M: f64 = 5.0;
-/// Sine of the tilt of a normal towards a direction below which the tilt may be measurement error.
-pub(in crate::estimation) const MIN_SIGNIFICANT_TILT: f64 = 0.3;
 /// Conditioning below which a just relocalised window is not corrected along the weakest direction. Only a few matches
 /// constrain it, and some of them are false.
 const UNCONSTRAINED: f64 = 0.01;

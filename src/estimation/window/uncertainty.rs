@@ -1,25 +1,15 @@
 //! Sensitivity of a window's solution to the start, to the views, and to the measurements.
 
 use super::Window;
-use super::correspondence::{Counterpart, Match, Matches};
-use super::equations::Robust;
+use super::correspondence::{Counterpart, Match};
+use super::linearised::Linearised;
 use crate::estimation::consider::{IMU_OFFSET, IMU_STATES, START_STATES, Sensitivity, StartMatrix};
 use crate::estimation::residual::prior::ByLidar;
 use crate::estimation::residual::{LIDAR_ROTATION, Layout, matched};
 use crate::estimation::spline::Basis;
-use crate::estimation::surfel::PlacedSurfel;
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use nalgebra::{Matrix6, SMatrix};
-
-/// The last linearisation of a solved window; the workspace still has the factor of it.
-#[derive(Debug)]
-pub(in crate::estimation) struct Linearised {
-    pub(super) layout: Layout,
-    pub(super) scene: Vec<PlacedSurfel>,
-    pub(super) matches: Matches,
-    pub(super) robust: Robust,
-}
 
 impl Window {
     /// Sensitivity of the states at `u_s`, IMU time, to the quantities that this window assumes fixed.

@@ -26,39 +26,20 @@
 //! Gravity is known.
 
 mod epoch;
+mod model;
 mod motion;
 mod smoother;
 mod state;
 
 pub use epoch::BeamObservation;
-use epoch::Epoch;
+pub use model::{BoundModel, InformationBound};
 
 use super::EvaluationError;
-use crate::geometry::{Pose, Vector};
-use crate::measurement::{ImuNoise, ImuSample};
+use crate::geometry::Pose;
+use crate::measurement::ImuSample;
 use crate::time::{Span, Stamp};
-
-/// Time between the epochs at which errors are reported.
-const EPOCH: Span = Span::from_nanos(20_000_000);
-
-/// Prior standard deviations of the sensors' errors.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BoundModel {
-    /// Pose of the IMU in the head.
-    pub head_from_imu: Pose,
-    /// Noise of the IMU.
-    pub imu: ImuNoise,
-    /// Scale error (diagonal, 1) and misalignment (off-diagonal, rad) of the gyroscope.
-    pub gyro_matrix: (f64, f64),
-    /// Scale error (diagonal, 1) and misalignment (off-diagonal, rad) of the accelerometer.
-    pub accel_matrix: (f64, f64),
-    /// Common offset of all ranges of the run, m.
-    pub range_offset_m: f64,
-    /// Clock offset, s.
-    pub clock_offset_s: f64,
-    /// Rate of the clock offset, s/s.
-    pub clock_rate: f64,
-}
+use epoch::Epoch;
+use model::EPOCH;
 
 /// Fisher information of a recording, accumulated while it is read.
 ///
@@ -68,30 +49,6 @@ pub struct FisherInformation {
     model: BoundModel,
     start: Stamp,
     epochs: Vec<Epoch>,
-}
-
-/// Cramer-Rao bounds: minimum RMS errors and standard deviations of any unbiased estimator.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InformationBound {
-    /// Stamps of the epochs, lidar time.
-    pub stamps: Vec<Stamp>,
-    /// Standard deviation of the head position along each world axis, m.
-    pub position_sigma_m: Vec<Vector>,
-    /// Standard deviation of the head attitude about each world axis, rad.
-    pub attitude_sigma_rad: Vec<Vector>,
-    /// RMS position error over the run in the world frame, m.
-    pub position_rmse_m: f64,
-    /// RMS position error along each world axis, m.
-    pub axis_rmse_m: Vector,
-    /// RMSE of the position after the rigid alignment that the evaluation uses, m: comparable with the RMSE of an
-    /// estimate.
-    pub aligned_position_rmse_m: f64,
-    /// RMS attitude error over the run in the world frame, rad.
-    pub attitude_rmse_rad: f64,
-    /// Standard deviation of the clock offset at the end, s.
-    pub clock_offset_s: f64,
-    /// Standard deviation of the range offset, m.
-    pub range_offset_m: f64,
 }
 
 impl FisherInformation {

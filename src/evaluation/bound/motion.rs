@@ -1,10 +1,10 @@
 //! Propagation of the errors between epochs.
 
 use super::epoch::Epoch;
+use super::model::{BoundModel, EPOCH};
 use super::state::{
     ACCEL_BIAS, ACCEL_MATRIX, ATTITUDE, CLOCK, CLOCK_RATE, GYRO_BIAS, GYRO_MATRIX, N, POSITION, SUMS, State, VELOCITY,
 };
-use super::{BoundModel, EPOCH};
 use crate::geometry::{Matrix, Vector, skew};
 use nalgebra::SMatrix;
 

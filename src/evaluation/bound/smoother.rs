@@ -12,9 +12,9 @@
 //! recomputes the others.
 
 use super::epoch::{BeamInformation, Epoch};
+use super::model::{BoundModel, EPOCH, InformationBound};
 use super::motion::{OutputJacobian, Step, attitude_jacobian, head_in_world, position_jacobian};
 use super::state::{ATTITUDE, CLOCK, CLOCK_RATE, N, POSITION, RANGE, SUMS, State, prior};
-use super::{BoundModel, EPOCH, InformationBound};
 use crate::geometry::{Matrix, Vector, skew};
 use crate::time::{Span, Stamp};
 use nalgebra::{Matrix6, SMatrix};

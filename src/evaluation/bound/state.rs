@@ -1,6 +1,6 @@
 //! Layout of the error state.
 
-use super::BoundModel;
+use super::model::BoundModel;
 use nalgebra::{SMatrix, SVector};
 
 /// Number of states.

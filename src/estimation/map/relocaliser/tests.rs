@@ -1,6 +1,7 @@
 //! Relocalisation in synthetic rooms, a corridor and on bare ground.
 
 use super::super::limits::MAP_LIMITS;
+use super::super::localised_pose::offset_pose;
 use super::*;
 use crate::estimation;
 use crate::geometry::from_roll_pitch_yaw;

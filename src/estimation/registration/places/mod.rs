@@ -26,8 +26,9 @@ use relative_pose::MATCHING_REACH;
 pub(super) use relative_pose::RelativePose;
 pub use spec::PlacesSpec;
 
+use super::RegistrationSpec;
 use super::corrected_trajectory::CorrectedTrajectory;
-use super::{RegistrationSpec, moved};
+use super::trajectory_difference::largest_difference;
 use crate::estimation::matching::Matcher;
 use crate::estimation::observed::ObservedSurfels;
 use crate::geometry::Trajectory;
@@ -93,7 +94,7 @@ pub(super) fn close_loops(
             },
         };
         let Ok(next) = corrected.into_trajectory(map_from_head.stamps()) else { return (report, None) };
-        let (shift_m, _) = moved(&trajectory, &next);
+        let (shift_m, _) = largest_difference(&trajectory, &next);
         (trajectory, observed) = (next.clone(), observed.along(&trajectory, &next));
         let was_out_of_reach =
             |times_s: &&(f64, f64)| is_out_of_reach(map_from_head, &trajectory, observed.origin, **times_s);

@@ -1,0 +1,54 @@
+//! Pose of observed surfels in a map, and distances between poses.
+
+use crate::geometry::{Pose, Rotation, Vector};
+use nalgebra::{Matrix6, Vector6};
+
+/// Pose of a query found in a map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LocalisedPose {
+    /// Pose of the query frame in the map.
+    pub map_from_query: Pose,
+    /// Fraction of the finest query surfels that match the map.
+    pub inlier_ratio: f64,
+    /// Fraction of matches among the surfels with a neighbour in the map.
+    pub(in crate::estimation) agreement: f64,
+    /// Root mean square distance of the matches along the normals, m.
+    pub residual_rms_m: f64,
+    /// Covariance of a rotation about the viewpoint (rad) and a translation (m), in map axes.
+    pub(in crate::estimation) covariance: Matrix6<f64>,
+}
+
+impl LocalisedPose {
+    /// Adds to the covariance the spread of equally good poses.
+    pub(super) fn with_alternatives(&self, others: &[&LocalisedPose], from: &Vector) -> Self {
+        let mut covariance = self.covariance;
+        for other in others {
+            let turn = (other.map_from_query.rotation * self.map_from_query.rotation.inverse()).scaled_axis();
+            let position = |located: &LocalisedPose| located.map_from_query.transform_point(&(*from).into()).coords;
+            let shift = position(other) - position(self);
+            let by = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
+            covariance += by * by.transpose() / (others.len() + 1) as f64;
+        }
+        Self { covariance, ..self.clone() }
+    }
+}
+
+/// Distance of the viewpoint between two poses, m, and their angle, rad.
+pub(super) fn pose_distance(a: &Pose, b: &Pose, from: &Vector) -> (f64, f64) {
+    let position = |pose: &Pose| pose.transform_point(&(*from).into()).coords;
+    ((position(a) - position(b)).norm(), a.rotation.angle_to(&b.rotation))
+}
+
+/// Pose rotated about the vertical through the viewpoint and translated.
+pub(super) fn offset_pose(map_from_query: &Pose, from: &Vector, yaw: f64, by: Vector) -> Pose {
+    let pivot = map_from_query.transform_point(&(*from).into()).coords;
+    apply_step(map_from_query, &pivot, &Vector6::new(0.0, 0.0, yaw, by.x, by.y, by.z))
+}
+
+/// Pose rotated about `pivot` and translated.
+pub(super) fn apply_step(pose: &Pose, pivot: &Vector, step: &Vector6<f64>) -> Pose {
+    let turn = Rotation::from_scaled_axis(step.fixed_rows::<3>(0).into_owned());
+    let shift: Vector = step.fixed_rows::<3>(3).into_owned();
+    let translation = pivot + shift + turn * (pose.translation.vector - pivot);
+    Pose::from_parts(translation.into(), turn * pose.rotation)
+}

@@ -1,0 +1,23 @@
+//! Derivatives by the four knots of a span.
+
+use crate::estimation::spline::Basis;
+
+/// Unknowns of the four knots about a span.
+pub(super) const SPAN_UNKNOWNS: usize = 24;
+
+/// Converts six derivatives by a surfel's motion to derivatives by the four knots of the span.
+#[inline(always)]
+pub(super) fn over_knots(by_motion: &[f64; 6], basis: &Basis) -> [f64; SPAN_UNKNOWNS] {
+    let mut knots = [0.0; SPAN_UNKNOWNS];
+    for (knot, value) in knots.chunks_exact_mut(6).zip(basis.value) {
+        add_scaled(knot, by_motion, value);
+    }
+    knots
+}
+
+#[inline(always)]
+pub(super) fn add_scaled(sums: &mut [f64], terms: &[f64], scale: f64) {
+    for (sum, term) in sums.iter_mut().zip(terms) {
+        *sum += scale * term;
+    }
+}

@@ -1,0 +1,15 @@
+//! The last linearisation of a window.
+
+use super::correspondence::Matches;
+use super::equations::Robust;
+use crate::estimation::residual::Layout;
+use crate::estimation::surfel::PlacedSurfel;
+
+/// The last linearisation of a solved window; the workspace still has the factor of it.
+#[derive(Debug)]
+pub(in crate::estimation) struct Linearised {
+    pub(super) layout: Layout,
+    pub(super) scene: Vec<PlacedSurfel>,
+    pub(super) matches: Matches,
+    pub(super) robust: Robust,
+}
