@@ -2,7 +2,6 @@
 
 use crate::geometry::Pose;
 use crate::measurement::ImuSample;
-use crate::recording::measurements::is_finite;
 use crate::recording::message::imu;
 use crate::recording::schema::MessageType;
 use crate::recording::selection::probe_imu;
@@ -39,7 +38,7 @@ impl Reader {
                 continue;
             }
             match imu::decode(message.data, unit) {
-                Ok(sample) if !is_finite(&sample) => loss.samples_not_finite += 1,
+                Ok(sample) if !imu::is_finite(&sample) => loss.samples_not_finite += 1,
                 Ok(sample) => samples.push(sample),
                 Err(_) => loss.unreadable_messages += 1,
             }

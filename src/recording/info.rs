@@ -3,6 +3,8 @@
 mod clock;
 mod intervals;
 
+pub use clock::ClockStatistics;
+
 use crate::recording::container::{Channel, ChannelId, RawMessage};
 use crate::recording::schema::MessageType;
 use crate::recording::wire::Decoder;
@@ -62,17 +64,6 @@ pub struct TopicInfo {
     pub out_of_order: u64,
     /// Clock of the stamps relative to log time; only for messages with stamps.
     pub clock: Option<ClockStatistics>,
-}
-
-/// Fit of stamps to log times: `stamp - log = offset + drift (log - first log) + jitter`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ClockStatistics {
-    /// Offset at the first message, s; positive if stamps are ahead.
-    pub offset_s: f64,
-    /// Drift, parts per million; positive if the clock of the stamps is fast.
-    pub drift_ppm: f64,
-    /// Standard deviation of the residuals, s.
-    pub jitter_s: f64,
 }
 
 /// Accumulates the statistics of a topic.

@@ -98,7 +98,7 @@ impl Measurements<'_> {
             let is_imu = self.imu.contains(&message.channel);
             if is_imu || self.accelerations.contains(&message.channel) {
                 match imu::decode(message.data, self.decoder.imu.unit) {
-                    Ok(sample) if !is_finite(&sample) => self.loss.samples_not_finite += 1,
+                    Ok(sample) if !imu::is_finite(&sample) => self.loss.samples_not_finite += 1,
                     Ok(sample) => self.decoder.imu_sample(sample, is_imu, &mut self.sorter),
                     Err(_) => self.loss.unreadable_messages += 1,
                 }
@@ -143,11 +143,6 @@ impl MeasurementDecoder {
             }
         }
     }
-}
-
-pub(super) fn is_finite(sample: &ImuSample) -> bool {
-    let numbers = sample.angular_velocity_rad_per_s.iter().chain(sample.specific_force_m_per_s2.iter());
-    numbers.into_iter().all(|x| x.is_finite())
 }
 
 impl Iterator for Measurements<'_> {

@@ -1,6 +1,6 @@
 //! Reads ROS 1 bags, format 2.0 (wiki.ros.org/Bags/Format/2.0): records of named fields, messages in chunks.
 
-use super::file_index::{Block, BlockKind, Ending, FileIndex};
+use super::file_index::{BagChunk, Block, BlockKind, Ending, FileIndex};
 use super::record::{ChannelRecord, Fields, SchemaRecord, begins_with_header};
 use super::source::Source;
 use crate::recording::RecordingError;
@@ -29,15 +29,6 @@ mod op {
     pub const CHUNK: u8 = 0x05;
     pub const CHUNK_INFO: u8 = 0x06;
     pub const CONNECTION: u8 = 0x07;
-}
-
-/// Compression of a chunk.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BagChunk {
-    /// `none`, `lz4` or `bz2`.
-    pub compression: String,
-    /// Uncompressed size, bytes.
-    pub size: u64,
 }
 
 /// Record within a chunk.
@@ -122,13 +113,23 @@ pub fn next_in_chunk(fields: &mut Fields<'_>) -> Option<(BagRecord, usize)> {
 }
 
 /// Reads a connection record: topic and message type.
-pub fn connection(record: &[u8]) -> Option<(ChannelRecord, SchemaRecord)> {
+fn connection(record: &[u8]) -> Option<(ChannelRecord, SchemaRecord)> {
     let Record { header, data } = next_record(&mut Fields::new(record))?;
     let (id, inner) = (header.connection()?, Header(data));
     let topic = header.text("topic").or_else(|| inner.text("topic"))?.to_owned();
     let has_header = begins_with_header(inner.text("message_definition").unwrap_or_default());
     let channel = ChannelRecord { id, schema: id, topic, encoding: "ros1".to_owned() };
     Some((channel, SchemaRecord { id, name: inner.text("type")?.to_owned(), has_header }))
+}
+
+impl FileIndex {
+    /// Adds a connection of a bag; the first one of each number applies. `false` if it is damaged.
+    pub fn define_connection(&mut self, bytes: &[u8]) -> bool {
+        let Some((channel, schema)) = connection(bytes) else { return false };
+        self.schemas.entry(schema.id).or_insert(schema);
+        self.channels.entry(channel.id).or_insert(channel);
+        true
+    }
 }
 
 /// Index at the end of a bag.

@@ -1,7 +1,7 @@
 //! Reads rosbag2 SQLite databases: a table of topics, and one of messages in recording order.
 
+use super::entry::{Damage, Entry};
 use super::file_index::{Block, BlockKind, Ending, FileIndex};
-use super::loaded_block::{Damage, Entry};
 use super::record::{ChannelRecord, SchemaRecord};
 use crate::recording::RecordingError;
 use rusqlite::limits::Limit;

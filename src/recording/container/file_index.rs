@@ -1,11 +1,12 @@
 //! Index of a file: topics, definitions and blocks, without the messages.
 
-use super::bag::{self, BagChunk};
 use super::record::{self, ChannelRecord, ChunkHeader, SchemaRecord, op};
-use super::recording_file::ChannelId;
 use crate::recording::topics::printable;
 use crate::recording::wire::WireFormat;
 use std::collections::BTreeMap;
+
+/// Number of a topic within a recording: number of the file and number within the file.
+pub type ChannelId = u32;
 
 /// Topic and message type.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,6 +56,15 @@ pub enum BlockKind {
         /// Last row number.
         last: i64,
     },
+}
+
+/// Compression of a chunk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BagChunk {
+    /// `none`, `lz4` or `bz2`.
+    pub compression: String,
+    /// Uncompressed size, bytes.
+    pub size: u64,
 }
 
 impl Block {
@@ -122,14 +132,6 @@ impl FileIndex {
             }),
         }
         .is_some()
-    }
-
-    /// Adds a connection of a bag; the first one of each number applies. `false` if it is damaged.
-    pub fn define_connection(&mut self, bytes: &[u8]) -> bool {
-        let Some((channel, schema)) = bag::connection(bytes) else { return false };
-        self.schemas.entry(schema.id).or_insert(schema);
-        self.channels.entry(channel.id).or_insert(channel);
-        true
     }
 
     /// Topics by number; `id_of` maps a number in the file to one in the recording.

@@ -2,6 +2,7 @@
 
 use super::bag::{self, BagRecord};
 use super::database::SqliteDatabase;
+use super::entry::{Damage, Entry};
 use super::file_index::{Block, BlockKind, FileIndex};
 use super::mcap_summary::next_record;
 use super::record::{self, Fields, op};
@@ -20,37 +21,6 @@ const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
 
 /// Maximum memory reserved before decompression, bytes.
 const INITIAL_CAPACITY: u64 = 1 << 20;
-
-/// Reason why a block cannot be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
-pub enum Damage {
-    /// It exceeds the maximum size.
-    #[error("its stated size exceeds 256 MiB")]
-    TooLarge,
-    /// Unsupported compression.
-    #[error("its compression is not supported")]
-    Compression,
-    /// The decompressed size is not the stated size.
-    #[error("it does not decompress")]
-    Decompression,
-    /// The bytes are corrupted.
-    #[error("its checksum does not match")]
-    Checksum,
-    /// The records are inconsistent.
-    #[error("its records are damaged")]
-    Records,
-}
-
-/// Message within a block.
-#[derive(Debug, Clone)]
-pub struct Entry {
-    /// Channel number of the topic.
-    pub channel: u16,
-    /// Log time, ns.
-    pub log_time_ns: u64,
-    /// Position of the data in the block.
-    pub data: Range<usize>,
-}
 
 /// Kind of a definition within a block.
 #[derive(Debug, Clone, Copy)]

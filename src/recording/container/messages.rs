@@ -1,8 +1,10 @@
 //! Reads the messages of a recording in order of log time.
 
+use super::entry::Damage;
 use super::file_index::Block;
-use super::loaded_block::{Damage, LoadedBlock};
-use super::recording_file::{ChannelId, RecordingFile};
+use super::file_index::ChannelId;
+use super::loaded_block::LoadedBlock;
+use super::recording_file::RecordingFile;
 use crate::recording::RecordingError;
 use crate::recording::wire::Payload;
 use std::collections::VecDeque;

@@ -7,6 +7,7 @@
 
 mod bag;
 mod database;
+mod entry;
 mod file_index;
 mod format;
 mod loaded_block;
@@ -17,6 +18,6 @@ mod record;
 mod recording_file;
 mod source;
 
-pub use file_index::{Block, Channel, Ending, FileIndex};
+pub use file_index::{Block, Channel, ChannelId, Ending, FileIndex};
 pub use messages::{Messages, RawMessage};
-pub use recording_file::{ChannelId, RecordingFile};
+pub use recording_file::RecordingFile;

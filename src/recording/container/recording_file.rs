@@ -1,13 +1,10 @@
 //! One file of a recording, of any container format.
 
 use super::database::SqliteDatabase;
-use super::file_index::{Channel, FileIndex};
+use super::file_index::{Channel, ChannelId, FileIndex};
 use super::source::Source;
 use crate::recording::wire::WireFormat;
 use std::collections::BTreeMap;
-
-/// Number of a topic within a recording: number of the file and number within the file.
-pub type ChannelId = u32;
 
 /// Bits of a [`ChannelId`] for the number within the file.
 const FILE_SHIFT: u32 = 16;

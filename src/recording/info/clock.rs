@@ -1,10 +1,21 @@
 //! Incremental line fit of one clock to another.
 
-use super::ClockStatistics;
 use crate::time::Stamp;
+use serde::Serialize;
 
 /// Minimum number of messages for a fit: two parameters and one residual.
 const MIN_MESSAGES: u64 = 3;
+
+/// Fit of stamps to log times: `stamp - log = offset + drift (log - first log) + jitter`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ClockStatistics {
+    /// Offset at the first message, s; positive if stamps are ahead.
+    pub offset_s: f64,
+    /// Drift, parts per million; positive if the clock of the stamps is fast.
+    pub drift_ppm: f64,
+    /// Standard deviation of the residuals, s.
+    pub jitter_s: f64,
+}
 
 /// Means and co-moments of log time and of stamp minus log time, updated incrementally (Welford 1962).
 #[derive(Debug, Clone)]

@@ -87,6 +87,12 @@ pub fn decode(message: Payload<'_>, unit: ForceUnit) -> Result<ImuSample, Decode
     Ok(ImuSample { stamp, angular_velocity_rad_per_s, specific_force_m_per_s2 })
 }
 
+/// Whether all numbers of a sample are finite.
+pub(in crate::recording) fn is_finite(sample: &ImuSample) -> bool {
+    let numbers = sample.angular_velocity_rad_per_s.iter().chain(sample.specific_force_m_per_s2.iter());
+    numbers.into_iter().all(|x| x.is_finite())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,6 @@ use super::clocks::LogTimes;
 use super::content::quantile;
 use crate::measurement::ImuSample;
 use crate::recording::container::{ChannelId, RawMessage};
-use crate::recording::measurements::is_finite;
 use crate::recording::message::imu::{self, ForceUnit};
 use crate::recording::wire::Decoder;
 use crate::recording::{Reader, RecordingError};
@@ -70,7 +69,7 @@ impl Reader {
             topics.flat_map(|topic| self.ids_of(topic).into_iter().map(move |id| (id, topic))).collect();
         let mut previews: BTreeMap<String, ImuPreview> = BTreeMap::new();
         self.for_first_messages(&ids.keys().copied().collect::<Vec<_>>(), |message, log| {
-            let sample = imu::decode(message.data, ForceUnit::default()).ok().filter(is_finite);
+            let sample = imu::decode(message.data, ForceUnit::default()).ok().filter(imu::is_finite);
             if let (Some(sample), Some(topic)) = (sample, ids.get(&message.channel)) {
                 let preview = previews.entry((*topic).to_owned()).or_default();
                 preview.samples.push(sample);
