@@ -12,6 +12,7 @@ mod quantity;
 mod rows;
 mod sensors;
 mod table;
+mod verdict;
 
 pub use figures::{
     bound_over_time, clock_offset, errors_over_time, head_pitch, length_unit, open_and_closed_loop_errors,

@@ -1,6 +1,6 @@
 //! Tables for the terminal (at most 80 columns) and for Markdown.
 
-use super::{Metrics, integrity, rows};
+use super::{Metrics, rows, verdict};
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle};
 
 /// Maximum width of a table, columns of the terminal.
@@ -58,6 +58,6 @@ pub fn summary(metrics: &Metrics) -> String {
             cells.push(vec![title.to_owned(), row.name.to_owned(), row.value]);
         }
     }
-    let verdict = integrity::verdict(metrics).map_or_else(String::new, |verdict| format!("verdict: {verdict}\n"));
+    let verdict = verdict::verdict(metrics).map_or_else(String::new, |verdict| format!("verdict: {verdict}\n"));
     format!("{}\n{verdict}{}", rows::title(metrics), table(&[], &cells, false))
 }

@@ -1,10 +1,9 @@
 //! Encodes the data of the page as JSON with binary arrays in base64 (RFC 4648).
 
+use super::binary::base64_f32;
 use super::data::{Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, RunPage, Section, TimedPose, TimelineRow};
 use super::quantise::cloud;
 use crate::geometry::{Pose, Vector};
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
 /// The data as JSON that is inert within a `<script>` element: it has no `<`, `>` or `&`.
@@ -40,15 +39,6 @@ fn inert(json: &str) -> String {
         }
     }
     text
-}
-
-/// Little-endian single-precision numbers in base64.
-pub(super) fn base64_f32(values: impl Iterator<Item = f64>) -> String {
-    base64_bytes(&values.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>())
-}
-
-pub(super) fn base64_bytes(bytes: &[u8]) -> String {
-    STANDARD.encode(bytes)
 }
 
 /// Times; positions and quaternions, seven numbers a pose.

@@ -1,7 +1,7 @@
 //! The parts of the page that are readable without scripts.
 
 use crate::report::quantity::{percent, time};
-use crate::report::{CauseMetrics, EventMetrics, Metrics, integrity, rows};
+use crate::report::{CauseMetrics, EventMetrics, Metrics, rows, verdict};
 
 /// Escapes text for elements and attributes.
 pub(super) fn escaped(text: &str) -> String {
@@ -32,7 +32,7 @@ pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
 
 /// The verdict: icon, status and reason.
 pub(super) fn verdict(metrics: &Metrics) -> String {
-    let (Some(verdict), Some(status)) = (integrity::verdict(metrics), metrics.status.as_deref()) else {
+    let (Some(verdict), Some(status)) = (verdict::verdict(metrics), metrics.status.as_deref()) else {
         return String::new();
     };
     let (class, icon) = match status {

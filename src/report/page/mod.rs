@@ -3,6 +3,7 @@
 //! The page has the verdict, a three-dimensional view, interactive charts, the metrics and the manifest. Scripts, style
 //! sheets and data are in the file. A content security policy forbids network access.
 
+mod binary;
 mod data;
 mod encode;
 mod html;

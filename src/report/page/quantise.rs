@@ -1,7 +1,7 @@
 //! Quantises the points of the view: 16 bits a coordinate and time, 8 bits a colour.
 
+use super::binary::base64_bytes;
 use super::data::ViewPoint;
-use super::encode::base64_bytes;
 use crate::geometry::Vector;
 use serde_json::{Value, json};
 

@@ -3,6 +3,10 @@
 use super::PlotError;
 use plotters::style::{FontStyle, register_font};
 
+/// Font sizes, points.
+pub(super) const TEXT: f64 = 12.0;
+pub(super) const SMALL_TEXT: f64 = 11.0;
+
 /// Family name of the font; an SVG contains it, and the viewer uses its own sans-serif font.
 pub(super) const NAME: &str = "sans-serif";
 

@@ -1,7 +1,7 @@
 //! Header of a chart: title and legend above the axes.
 
 use super::canvas::{Anchor, Canvas, CanvasPoint};
-use super::frame::{SMALL_TEXT, TEXT};
+use super::font::{SMALL_TEXT, TEXT};
 use super::palette::{INK, Rgb, shade, signed_shade};
 use super::{Chart, Mark, PlotError, Series, axis, stroke};
 use plotters::prelude::DrawingBackend;

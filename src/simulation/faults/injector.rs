@@ -1,5 +1,6 @@
 use super::clock::ClockFaults;
-use super::pipeline::{Message, Pipeline};
+use super::pipeline::Pipeline;
+use super::stage::Message;
 use super::{FaultKind, Faults};
 use crate::geometry::{Pose, Rotation, Vector, gravity_in_world};
 use crate::measurement::{ImuSample, LidarScan, Measurement, Sink, SinkError};

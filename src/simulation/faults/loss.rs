@@ -1,7 +1,7 @@
 //! Faults that lose messages.
 
 use super::FaultKind;
-use super::pipeline::{Message, Stage};
+use super::stage::{Message, Stage};
 use crate::random::Stream;
 use crate::time::{Span, Stamp};
 use rand::RngExt;

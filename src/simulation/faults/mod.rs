@@ -15,6 +15,7 @@ mod loss;
 mod pipeline;
 mod scan;
 mod spec;
+mod stage;
 mod timing;
 mod values;
 

@@ -1,65 +1,11 @@
 //! The faults of a sensor in order, one stage each.
 
 use super::interval::Interval;
+use super::stage::{Message, Stage};
 use super::{FaultKind, Faults, loss, scan, timing, values};
-use crate::geometry::Vector;
-use crate::measurement::Measurement;
 use crate::random::Seed;
 use crate::simulation::EPOCH;
 use crate::time::{Span, Stamp};
-
-/// A measurement between sensor and sink.
-#[derive(Debug, Clone)]
-pub(super) struct Message {
-    /// Arrival in true time without faults. The intervals of faults refer to this time.
-    pub taken: Stamp,
-    /// Arrival in true time.
-    pub arrival: Stamp,
-    pub measurement: Measurement,
-    /// Specific force of an IMU at rest in the attitude of this sample, m/s^2; computed only if a fault needs it.
-    pub force_at_rest: Vector,
-}
-
-impl Message {
-    /// Time since the start of the run, to which the intervals of faults refer.
-    pub fn since_start(&self) -> Span {
-        self.taken - EPOCH
-    }
-
-    pub fn stamp(&self) -> Stamp {
-        match &self.measurement {
-            Measurement::Imu(sample) => sample.stamp,
-            Measurement::Lidar(scan) => scan.stamp,
-        }
-    }
-
-    pub fn set_stamp(&mut self, stamp: Stamp) {
-        match &mut self.measurement {
-            Measurement::Imu(sample) => sample.stamp = stamp,
-            Measurement::Lidar(scan) => scan.stamp = stamp,
-        }
-    }
-}
-
-/// A stage that applies a fault. Its output messages arrive no earlier than its input messages.
-pub(super) trait Stage {
-    /// Processes a message within the interval of the fault.
-    fn take(&mut self, message: Message, out: &mut Vec<Message>);
-
-    /// Processes a message outside the interval.
-    fn pass(&mut self, message: Message, out: &mut Vec<Message>) {
-        self.finish(out);
-        out.push(message);
-    }
-
-    /// Emits all held messages at the end of the run.
-    fn finish(&mut self, _out: &mut Vec<Message>) {}
-
-    /// Earliest arrival of a held message.
-    fn earliest_held(&self) -> Option<Stamp> {
-        None
-    }
-}
 
 /// Time without messages after which a stage emits held messages: the message that they wait for may never come.
 const FLUSH_TIMEOUT: Span = Span::from_nanos(5_000_000_000);
@@ -143,7 +89,8 @@ fn flush(first: &mut TimedStage, rest: &mut [TimedStage], out: &mut Vec<Message>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement::ImuSample;
+    use crate::geometry::Vector;
+    use crate::measurement::{ImuSample, Measurement};
     use crate::simulation::FaultsSpec;
     use crate::spec::{Source, parse};
 

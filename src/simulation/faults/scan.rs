@@ -1,6 +1,6 @@
 //! Faults of lidar ranges.
 
-use super::pipeline::{Message, Stage};
+use super::stage::{Message, Stage};
 use super::{FaultKind, MissEncoding};
 use crate::measurement::{LidarReturn, LidarScan, Measurement, PlanarScan};
 use crate::time::Span;

@@ -2,7 +2,7 @@
 
 use super::FaultKind;
 use super::interval::Interval;
-use super::pipeline::{Message, Stage};
+use super::stage::{Message, Stage};
 use crate::random::Stream;
 use crate::time::{Span, Stamp};
 use rand::RngExt;

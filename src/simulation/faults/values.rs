@@ -1,7 +1,7 @@
 //! Faults of measured values.
 
 use super::FaultKind;
-use super::pipeline::{Message, Stage};
+use super::stage::{Message, Stage};
 use crate::geometry::Vector;
 use crate::measurement::{ImuSample, Measurement};
 use crate::random::Stream;
