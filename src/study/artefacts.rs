@@ -2,22 +2,19 @@
 
 use super::StudyError;
 use super::atomic_file::write_text;
+use super::decimation::decimated;
 use super::page::RunResults;
 use super::register::SampledBeam;
 use super::result_files::METRICS;
-use crate::evaluation::Errors;
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report;
 use crate::report::page::RunPage;
 use crate::report::plot::Figure;
-use crate::time::Stamp;
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Cell size of the outline in the top view, m; each occupied cell is one dot.
 const CELL_M: f64 = 0.05;
-/// Maximum number of points of a curve: about a dozen for each pixel of the plot's width.
-const MAX_PLOT_POINTS: usize = 50_000;
 /// Half the height of the slice of the cloud, about the head's mean height, that gives the outline, m.
 const SLICE_HALF_HEIGHT_M: f64 = 0.4;
 
@@ -48,22 +45,6 @@ pub(super) fn plots(results: &RunResults, sample: &[SampledBeam]) -> Vec<Plot> {
     let true_offsets = comparison.map_or(&[][..], |found| &found.clock_offsets);
     plots.push(plot("clock", report::clock_offset(true_offsets, &run.clock_offsets)));
     plots
-}
-
-/// Decimates poses to the maximum number of plot points.
-pub(super) fn decimated(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -> Trajectory {
-    let stride = stride(stamped.len());
-    Trajectory::from_poses(stamped.step_by(stride)).unwrap_or_default()
-}
-
-/// Decimates errors to the maximum number of plot points.
-pub(super) fn decimated_errors(errors: &Errors) -> Errors {
-    errors.decimated(stride(errors.stamps.len()))
-}
-
-/// The decimation factor for `count` points.
-fn stride(count: usize) -> usize {
-    count.div_ceil(MAX_PLOT_POINTS).max(1)
 }
 
 /// Outline of the walls in the top view: cloud points near the head's mean height, one for each cell.

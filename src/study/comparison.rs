@@ -1,7 +1,7 @@
 //! Comparison of an estimate with the truth in the recording.
 
-use super::artefacts::{decimated, decimated_errors};
 use super::closed_loop::ClosedLoopRun;
+use super::decimation::{decimated, decimated_errors};
 use super::open_loop::OpenLoopRun;
 use super::true_clock::true_offset;
 use super::{ProgressMonitor, StudyError};

@@ -1,13 +1,16 @@
 //! Estimation from a recording, with evaluation and output files.
 
+use super::best_estimate::BestEstimate;
 use super::bound::information_bound;
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
 use super::cloud_files::CloudOptions;
 use super::integrity::{Integrity, write_windows};
-use super::map::{MapOptions, write_map};
+use super::map::write_map;
+use super::map_options::MapOptions;
 use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
+use super::origin::Origin;
 use super::page::RunResults;
 use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
@@ -15,11 +18,9 @@ use super::sensor_models::SensorModels;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
 use crate::evaluation::{Errors, InformationBound};
-use crate::geometry::Trajectory;
-use crate::measurement::LidarCorrection;
 use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
-use crate::simulation::{SimulationSummary, carrier_of};
+use crate::simulation::carrier_of;
 use crate::spec::Source;
 use crate::world::World;
 use std::path::Path;
@@ -93,16 +94,6 @@ pub fn estimate_recording(
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
     let origin = Origin { manifest: &manifest.with_estimator(&options.estimator), surroundings, simulation: None };
     estimate_in(&reader, folder, options, &origin, watch)
-}
-
-/// Origin of a recording; only the evaluation uses it, not the estimator.
-pub(super) struct Origin<'a> {
-    /// Manifest of the recording, with the settings of the estimator.
-    pub manifest: &'a Manifest,
-    /// Scene and carrier, if they are known.
-    pub surroundings: Option<Surroundings<'a>>,
-    /// Summary of the simulation, if it ran in this process.
-    pub simulation: Option<&'a SimulationSummary>,
 }
 
 /// As [`estimate_recording`], with an open recording of known origin.
@@ -183,17 +174,6 @@ struct Loops {
     comparison: Option<comparison::Comparison>,
     closed: Option<ClosedLoopRun>,
     closed_comparison: Option<comparison::Comparison>,
-}
-
-/// The estimate for cloud, result and plots: the closed loop if it was computed, else the open loop.
-pub(super) struct BestEstimate<'a> {
-    pub map_from_head: &'a Trajectory,
-    /// The open-loop trajectory in which the surfels were observed.
-    pub observed_trajectory: &'a Trajectory,
-    /// Estimated correction of the lidar calibration.
-    pub lidar: &'a LidarCorrection,
-    /// Comparison with the truth, if it is known.
-    pub comparison: Option<&'a comparison::Comparison>,
 }
 
 impl Loops {

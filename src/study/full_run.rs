@@ -1,7 +1,8 @@
 //! The full run: simulation, recording, estimation, evaluation and report.
 
 use super::cloud::Surroundings;
-use super::estimate::{Origin, estimate_in};
+use super::estimate::estimate_in;
+use super::origin::Origin;
 use super::result_files::{full_run_files, remove};
 use super::{EstimateOptions, EstimateResult, Manifest, ProgressMonitor, StudyError, record};
 use crate::recording::Reader;

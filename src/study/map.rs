@@ -2,34 +2,14 @@
 
 use super::StudyError;
 use super::atomic_file::AtomicFile;
-use super::estimate::BestEstimate;
+use super::best_estimate::BestEstimate;
+use super::map_options::MapOptions;
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{EstimatorSpec, LocalisedPose, locate_map, map_of, merge_maps};
 use crate::geometry::Pose;
 use crate::recording::{read_surfel_map, write_surfel_map};
 use crate::surfel_map::SurfelMap;
 use std::path::Path;
-
-/// A map in which to localise the head.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MapOptions {
-    /// The map.
-    pub map: SurfelMap,
-    /// Approximate initial pose of the head in the map: within 1 m horizontally and 20 degrees in yaw.
-    pub map_from_head: Pose,
-    /// Whether to extend the map with the recording and write it.
-    pub extend: bool,
-}
-
-impl MapOptions {
-    /// Reads the map at `path`.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn read(path: &Path, map_from_head: Pose, extend: bool) -> Result<Self, StudyError> {
-        Ok(Self { map: read_surfel_map(path)?, map_from_head, extend })
-    }
-}
 
 /// Result of merging two maps.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,9 @@
 //! Results of a run that the page shows.
 
-use super::super::estimate::BestEstimate;
-use super::super::estimate::Origin;
+use super::super::best_estimate::BestEstimate;
 use super::super::integrity::Integrity;
 use super::super::open_loop::OpenLoopRun;
+use super::super::origin::Origin;
 use crate::evaluation::Errors;
 use crate::evaluation::InformationBound;
 use crate::evaluation::Pairs;

@@ -1,8 +1,8 @@
 //! Figure 3 of the paper: gain curves of several heads.
 
+use super::head_response::HeadResponse;
 use super::{
-    ComparedNumber, DampingFit, DesignedSpec, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping,
-    gain_plots,
+    ComparedNumber, DampingFit, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping, gain_plots,
 };
 use crate::dynamics::{DampingSpec, HeadSpec, Peak};
 use crate::motion::Axis;
@@ -14,13 +14,6 @@ use crate::study::gains::{AXES, GainCurve, GainPlan, GainsSpec, csv, with_dampin
 use crate::study::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec};
 use rayon::prelude::*;
 use std::path::Path;
-
-/// A head with fitted damping and its gain curves.
-pub(super) struct HeadResponse<'a> {
-    pub design: &'a DesignedSpec,
-    pub fit: DampingFit,
-    pub curves: Vec<GainCurve>,
-}
 
 /// Fits the damping of the heads, measures their gains, draws figures, and compares with the paper.
 pub(super) fn run(

@@ -1,6 +1,6 @@
 //! Plots of figure 3: one column per design with the paper's three panels.
 
-use super::gain_curves::HeadResponse;
+use super::head_response::HeadResponse;
 use crate::report::plot::{Chart, Figure};
 use crate::study::gains::{GainCurve, coherence_panels, gain_panels};
 

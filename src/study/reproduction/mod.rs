@@ -8,6 +8,7 @@ mod damping;
 mod extent;
 mod gain_curves;
 mod gain_plots;
+mod head_response;
 mod result;
 mod spec;
 mod timing;

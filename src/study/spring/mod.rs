@@ -6,6 +6,7 @@ mod mode_figure;
 mod outline;
 mod report;
 mod shake;
+mod view_plane;
 mod wire;
 
 pub use metrics::{DesignMetrics, closed_form, simulated};

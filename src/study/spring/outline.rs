@@ -1,7 +1,7 @@
 //! Outlines of the linkage and the parts of a head, for the plot of the modes.
 
 use super::Wire;
-use super::mode_figure::{Polyline, ViewPlane};
+use super::view_plane::{Polyline, ViewPlane};
 use crate::dynamics::{ElementSpec, LinkageSpec, PartSpec};
 use crate::elasticity::{SpringDesign, SpringSpec};
 use crate::geometry::{Pose, Vector};

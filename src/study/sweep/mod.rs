@@ -10,6 +10,7 @@
 //! with its error. Journeys run in worker processes, so that a crash does not affect other runs.
 
 mod axis;
+mod base_spec;
 mod bootstrap;
 mod check;
 mod design;
@@ -28,6 +29,7 @@ mod plan;
 mod plots;
 mod report;
 mod run;
+mod runner;
 mod runs;
 mod settings;
 mod simulated_run;
@@ -40,6 +42,7 @@ mod tree;
 mod trend;
 mod worker;
 
+pub use base_spec::{BaseSpec, LimitSpec};
 pub use bootstrap::{Block, ConfidenceInterval};
 pub(super) use bootstrap::{Resampling, pooled};
 pub use folder::Sweep;
@@ -50,8 +53,9 @@ pub use merge::SweepStatus;
 pub use pareto::{pareto_set, spread};
 pub use plan::Plan;
 pub use report::MergedReport;
-pub use run::{Runner, Shard};
-pub use spec::{AxisSpec, BaseSpec, LevelSpec, LimitSpec, Sampling, Setting, SweepSpec};
+pub use run::Shard;
+pub use runner::Runner;
+pub use spec::{AxisSpec, LevelSpec, Sampling, Setting, SweepSpec};
 pub use summary::{LevelSummary, RatioToFirst, SIGNIFICANCE_LEVEL, Summary, Trend};
 pub use task::{WorkerMessage, limit_process};
 pub(super) use tree::Journey;

@@ -1,12 +1,12 @@
 //! Runs the missing runs of a sweep, or of a shard of it.
 
 use super::part::RunOutcome;
+use super::runner::Runner;
 use super::worker::{Worker, WorkerExit};
 use super::{BaseSpec, Sweep};
 use crate::study::StudyError;
-use crate::study::progress::{OnProgress, PieceProgress};
+use crate::study::progress::PieceProgress;
 use rayon::prelude::*;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Shard of a sweep for one of several processes: number `index`, from 0, of `count` equal shards.
@@ -30,17 +30,6 @@ impl Shard {
     pub(super) fn select<T>(self, tasks: &[T]) -> impl Iterator<Item = &T> {
         tasks.iter().enumerate().filter(move |(task, _)| self.contains(*task)).map(|(_, task)| task)
     }
-}
-
-/// Execution options of a sweep.
-#[derive(Clone, Copy)]
-pub struct Runner<'a> {
-    /// Path of the `zsim` executable: journeys run in worker processes.
-    pub program: &'a Path,
-    /// Stop flag, set by the caller.
-    pub stop: &'a AtomicBool,
-    /// Receives the finished fraction of the missing runs.
-    pub on_progress: OnProgress<'a>,
 }
 
 impl Sweep {

@@ -1,11 +1,7 @@
 //! Spec of a sweep: `specs/studies/NAME.ron`.
 
-use super::{GoalSpec, Measure, MeasureLimitSpec};
-use crate::simulation::Scenario;
+use super::{BaseSpec, GoalSpec, Measure, MeasureLimitSpec};
 use crate::spec::checked;
-use crate::study::gains::GainsSpec;
-use crate::study::latency::TimingSpec;
-use crate::study::spring::Shake;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -33,74 +29,6 @@ pub struct SweepSpec {
     /// Limits of the runs in the Pareto front.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub limits: Vec<MeasureLimitSpec>,
-}
-
-/// The base run. Each spec is a path or a name in the library.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "snake_case")]
-#[expect(clippy::large_enum_variant, reason = "there is one a sweep")]
-pub enum BaseSpec {
-    /// A head on its spring, shaken by a hand, in closed form without simulation; takes below 1 ms.
-    Spring {
-        /// Head with its spring.
-        head: String,
-        /// Shake of the hand.
-        shake: Shake,
-    },
-    /// The gains of a head, by a simulation on a base that is shaken along or about one axis.
-    Gains {
-        /// Head with its linkage.
-        head: String,
-        /// Axis and settings of the measurement.
-        gains: GainsSpec,
-    },
-    /// A journey: simulation, recording, open-loop estimation, evaluation.
-    Journey {
-        /// Scene.
-        scene: String,
-        /// Head and its mount.
-        head: String,
-        /// Motion of the base.
-        motion: String,
-        /// Lidar.
-        lidar: String,
-        /// Inertial measurement unit.
-        imu: String,
-        /// Clocks of the sensors.
-        clock: String,
-        /// Faults of the sensors and of data delivery; none by default. An axis over faults requires this key; `"none"`
-        /// is a list without faults.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faults: Option<String>,
-        /// A second IMU on the base; none by default.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        base_imu: Option<String>,
-        /// Settings of the estimator.
-        estimator: String,
-        /// Timing errors that replace the true offset of the clocks, and the evaluation of the map with them; none by
-        /// default. An axis over timing requires this key.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        timing: Option<TimingSpec>,
-        /// Route in the scene; the scene's default route if omitted.
-        #[serde(default)]
-        route: Option<String>,
-        /// Duration of a run, s.
-        #[serde(with = "checked::Positive")]
-        duration_s: f64,
-        /// Limits of computing time and memory.
-        limit: LimitSpec,
-    },
-}
-
-/// Limits of computing time and memory; a run that exceeds them counts as failed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LimitSpec {
-    /// Time limit of a simulation, and of each estimate from it, s.
-    #[serde(with = "checked::Positive")]
-    pub time_s: f64,
-    /// Memory limit of the worker process, MiB; enforced only on Linux.
-    pub memory_mib: u64,
 }
 
 /// An axis: a parameter to vary.
@@ -211,39 +139,6 @@ pub enum Sampling {
         /// Number of samples.
         count: usize,
     },
-}
-
-impl BaseSpec {
-    /// Runs per part file: of fast runs, the work that a kill loses at most on each thread.
-    pub(super) fn runs_per_part(&self) -> u64 {
-        if matches!(self, Self::Spring { .. }) { 250 } else { 1 }
-    }
-
-    /// Replaces the scenario and the estimator of a journey; other runs have none.
-    pub fn set_scenario(&mut self, new: Scenario, new_estimator: &str) {
-        let Self::Journey {
-            scene,
-            head,
-            motion,
-            lidar,
-            imu,
-            clock,
-            faults,
-            base_imu,
-            estimator,
-            route,
-            duration_s,
-            timing: _,
-            limit: _,
-        } = self
-        else {
-            return;
-        };
-        (*scene, *head, *motion, *lidar) = (new.scene, new.head, new.motion, new.lidar);
-        (*imu, *clock, *faults, *base_imu) = (new.imu, new.clock, new.faults, new.base_imu);
-        (*route, *duration_s) = (new.route, new.duration_s);
-        new_estimator.clone_into(estimator);
-    }
 }
 
 impl AxisSpec {

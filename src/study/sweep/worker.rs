@@ -1,7 +1,7 @@
 //! Supervision of a worker process that runs a task.
 
 use super::Sweep;
-use super::run::Runner;
+use super::runner::Runner;
 use super::task::WorkerMessage;
 use crate::study::StudyError;
 use crate::study::progress::PieceProgress;

@@ -1,0 +1,16 @@
+//! The trajectory that an estimate results in.
+
+use super::comparison::Comparison;
+use crate::geometry::Trajectory;
+use crate::measurement::LidarCorrection;
+
+/// The estimate for cloud, result and plots: the closed loop if it was computed, else the open loop.
+pub(super) struct BestEstimate<'a> {
+    pub map_from_head: &'a Trajectory,
+    /// The open-loop trajectory in which the surfels were observed.
+    pub observed_trajectory: &'a Trajectory,
+    /// Estimated correction of the lidar calibration.
+    pub lidar: &'a LidarCorrection,
+    /// Comparison with the truth, if it is known.
+    pub comparison: Option<&'a Comparison>,
+}

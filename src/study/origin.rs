@@ -1,0 +1,15 @@
+//! Origin of a recording.
+
+use super::Manifest;
+use super::cloud::Surroundings;
+use crate::simulation::SimulationSummary;
+
+/// Origin of a recording; only the evaluation uses it, not the estimator.
+pub(super) struct Origin<'a> {
+    /// Manifest of the recording, with the settings of the estimator.
+    pub manifest: &'a Manifest,
+    /// Scene and carrier, if they are known.
+    pub surroundings: Option<Surroundings<'a>>,
+    /// Summary of the simulation, if it ran in this process.
+    pub simulation: Option<&'a SimulationSummary>,
+}
