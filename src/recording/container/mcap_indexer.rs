@@ -75,7 +75,7 @@ impl McapIndexer<'_> {
         let fits = opcode != 0 && length <= self.end - self.at;
         let next = self.at.saturating_add(length);
         let straddles = self.summary.next_record_after(start).is_some_and(|offset| offset < next);
-        let footer_is_last = opcode != op::FOOTER || next + MAGIC.len() as u64 == self.end;
+        let footer_is_last = opcode != op::FOOTER || self.end.checked_sub(MAGIC.len() as u64) == Some(next);
         if !fits || straddles || !footer_is_last {
             return self.resume(start);
         }
