@@ -144,7 +144,8 @@ impl RestReadings {
 ///
 /// `may_rest`: the lidar does not exclude a rest. To the IMU, constant velocity looks like rest.
 pub(super) fn estimate(
-    (intervals, may_rest): (&[Interval], bool),
+    intervals: &[Interval],
+    may_rest: bool,
     head_from_imu: &Pose,
     noise: &ImuNoise,
     spec: &EstimatorSpec,

@@ -1,9 +1,8 @@
 //! Localisation in a given map, and relocalisation after an IMU gap in the surfaces seen before it.
 
-use super::consider::ConsiderCovariance;
+use super::local_map::LocalMap;
 use super::map::{LocalisedPose, MAP_LIMITS, RelocalisationLimits, Relocaliser, map_covariance};
 use super::surfel::Patch;
-use super::views::Views;
 use super::window::Window;
 use super::{EstimationError, EstimatorSpec};
 use crate::geometry::{Pose, Rotation, Vector, roll_pitch_yaw};
@@ -98,8 +97,7 @@ fn ambiguous(found: &LocalisedPose, better: &LocalisedPose, map_from_head: &Pose
 /// Relocalisation after an IMU gap in the surfaces seen before it.
 #[derive(Debug)]
 pub(super) struct GapRelocalisation {
-    views: Views,
-    consider: ConsiderCovariance,
+    local_map: LocalMap,
     /// Patches of the last window before the gap, in addition to the views.
     last: Vec<Patch>,
     /// Start of the gap, IMU time, s.
@@ -107,28 +105,25 @@ pub(super) struct GapRelocalisation {
 }
 
 impl GapRelocalisation {
-    /// Prepares the search: the views with their covariance, the last patches, and the start of the gap.
-    pub(super) fn new((views, consider): (Views, ConsiderCovariance), last: Vec<Patch>, until_s: f64) -> Self {
-        Self { views, consider, last, until_s }
+    /// Prepares the search: the local map, the last patches, and the start of the gap.
+    pub(super) fn new(local_map: LocalMap, last: Vec<Patch>, until_s: f64) -> Self {
+        Self { local_map, last, until_s }
     }
 
     /// Localises the frame of `window`, which starts near the end of the trajectory before the gap.
     ///
-    /// Returns the pose of that frame in the map, the views, and their joint covariance with the relocalised pose; or the
+    /// Returns the pose of that frame in the map, and the local map with the covariance of the relocalised pose; or the
     /// reason of the failure.
-    pub(super) fn find(
-        mut self,
-        window: &Window,
-        spec: &EstimatorSpec,
-    ) -> Result<(Pose, Views, ConsiderCovariance), String> {
-        self.last.extend(self.views.patches());
+    pub(super) fn find(mut self, window: &Window, spec: &EstimatorSpec) -> Result<(Pose, LocalMap), String> {
+        self.last.extend(self.local_map.views.patches());
         let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
         let relocaliser = Relocaliser::in_patches(self.last, (&spec.matching, &spec.surfels), certainty);
         let window_start = window.start_pose().translation.vector;
         let search = RelocalisationLimits::after_gap(window.start_s() - self.until_s, spec.solve.match_sigma_m);
         let found = relocaliser.find(&window.patches(), (&window_start, &Pose::identity()), &search)?;
         let there = found.map_from_query.transform_point(&window_start.into()).coords;
-        self.consider.relocalise(there, &window.known_at_start().unwrap_or_default(), &found.covariance);
-        Ok((found.map_from_query, self.views, self.consider))
+        let known = window.known_at_start().unwrap_or_default();
+        self.local_map.consider.relocalise(there, &known, &found.covariance);
+        Ok((found.map_from_query, self.local_map))
     }
 }

@@ -70,6 +70,7 @@ mod inertial;
 mod initial;
 mod intake;
 mod integrity;
+mod local_map;
 mod localisation;
 mod map;
 mod matching;

@@ -49,6 +49,11 @@ impl Nominal {
         self.times_s.last().copied().unwrap_or(f64::NEG_INFINITY)
     }
 
+    /// State at the last node.
+    pub(super) fn end_state(&self) -> &State {
+        &self.states[self.states.len() - 1]
+    }
+
     /// Integrates the next interval.
     pub(super) fn extend(&mut self, interval: Interval, biases: &Biases, gravity: &Vector) {
         let (Some(time), Some(state)) = (self.times_s.last(), self.states.last()) else { return };

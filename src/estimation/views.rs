@@ -72,7 +72,8 @@ impl Views {
         &mut self,
         patches: &[Patch],
         seconds: f64,
-        (matcher, pivot): (&Matcher, Vector),
+        matcher: &Matcher,
+        pivot: Vector,
     ) -> ViewUpdate {
         if self.max_active == 0 {
             return ViewUpdate::default();

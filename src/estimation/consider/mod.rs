@@ -85,10 +85,10 @@ impl ConsiderCovariance {
     }
 
     /// For a head localised at `pivot` in a map: `found` is the covariance relative to the map, `of_map` that of the map.
-    pub(super) fn localised(pivot: Vector, known: &StartMatrix, (found, of_map): (Matrix6<f64>, Matrix6<f64>)) -> Self {
+    pub(super) fn localised(pivot: Vector, known: &StartMatrix, found: &Matrix6<f64>, of_map: &Matrix6<f64>) -> Self {
         let mut with_start = SMatrix::<f64, 6, START_STATES>::zeros();
-        with_start.fixed_view_mut::<6, 6>(0, 0).copy_from(&of_map);
-        let map = View { number: MAP, with_start, with_views: vec![of_map] };
+        with_start.fixed_view_mut::<6, 6>(0, 0).copy_from(of_map);
+        let map = View { number: MAP, with_start, with_views: vec![*of_map] };
         Self { views: vec![map], ..Self::new(pivot, &with_pose_covariance(known, &(found + of_map))) }
     }
 
@@ -274,7 +274,7 @@ mod tests {
         };
         let noise = pose_block(&sensitivity(1, &[]).noise);
         let after = |step: &Sensitivity| {
-            let mut consider = ConsiderCovariance::localised(Vector::zeros(), &StartMatrix::zeros(), (found, of_map));
+            let mut consider = ConsiderCovariance::localised(Vector::zeros(), &StartMatrix::zeros(), &found, &of_map);
             consider.advance(step);
             pose_block(&consider.start)
         };

@@ -1,6 +1,7 @@
 //! Output of final poses, which later windows do not change.
 
 use super::Estimator;
+use super::phase::Tracking;
 use crate::estimation::EstimatedPose;
 use crate::estimation::window::Window;
 use crate::geometry::{Pose, Rotation};
@@ -8,11 +9,11 @@ use crate::time::{Span, Stamp};
 
 impl Estimator {
     /// Outputs the poses up to `until_u_s` (IMU time) at whole multiples of the IMU period.
-    pub(super) fn output_poses(&mut self, until_u_s: f64) {
-        let Some(window) = &self.window else { return };
+    pub(super) fn output_poses(&mut self, tracking: &mut Tracking, until_u_s: f64) {
+        let window = &tracking.window;
         let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
         let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
-        let mut stamp = self.next_pose.unwrap_or_else(|| {
+        let mut stamp = tracking.next_pose.unwrap_or_else(|| {
             let start_ns = self.intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
             Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
         });
@@ -26,14 +27,15 @@ impl Estimator {
             if u_s.is_nan() || u_s > until_u_s {
                 break;
             }
-            self.poses.push(self.pose_at(window, stamp, (tau_s, u_s)));
+            self.poses.push(self.pose_at(window, stamp, tau_s, u_s));
             self.newest_pose = Some(stamp);
             stamp += Span::from_nanos(period_ns);
         }
-        self.next_pose = Some(stamp);
+        tracking.next_pose = Some(stamp);
     }
 
-    fn pose_at(&self, window: &Window, stamp: Stamp, (tau_s, u_s): (f64, f64)) -> EstimatedPose {
+    /// The pose at `stamp`, which is `tau_s` in lidar time and `u_s` in IMU time, s.
+    fn pose_at(&self, window: &Window, stamp: Stamp, tau_s: f64, u_s: f64) -> EstimatedPose {
         let imu_from_head = self.calibration.head_from_imu.inverse();
         let motion = window.nominal.at(u_s, &window.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
@@ -43,8 +45,11 @@ impl Estimator {
         EstimatedPose {
             stamp,
             map_from_head,
-            covariance: self.consider.covariance_at(&map_from_head.translation.vector),
-            covariance_against_gauge: self.consider.covariance_against_gauge(&map_from_head.translation.vector),
+            covariance: self.local_map.consider.covariance_at(&map_from_head.translation.vector),
+            covariance_against_gauge: self
+                .local_map
+                .consider
+                .covariance_against_gauge(&map_from_head.translation.vector),
             velocity_in_map_m_per_s: motion.velocity + motion.angular_velocity.cross(&arm),
             gyro_bias_rad_per_s: window.biases.gyro,
             accel_bias_m_per_s2: window.biases.accel,

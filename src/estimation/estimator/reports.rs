@@ -1,16 +1,20 @@
 //! Reports on solved windows.
 
+use crate::estimation::spec::SolveSpec;
 use crate::estimation::window::{Window, WindowSolution};
-use crate::estimation::{EstimatorSpec, Timing, WarningKind, WindowReport};
+use crate::estimation::{WarningKind, WindowReport};
 use crate::time::Stamp;
 
-/// The report on the solution of a window.
+/// The report on the solution of the window that ends at `stamp`.
+///
+/// `moving`: the head moves, so surfaces should have been matched. `elapsed_s`: run time, s.
 pub(super) fn report(
     solved: &WindowSolution,
-    (stamp, moving): (Stamp, bool),
     window: &Window,
-    problem: Option<WarningKind>,
-    (elapsed_s, timing): (f64, Timing),
+    spec: &SolveSpec,
+    stamp: Stamp,
+    moving: bool,
+    elapsed_s: f64,
 ) -> WindowReport {
     WindowReport {
         stamp,
@@ -31,31 +35,22 @@ pub(super) fn report(
         moving,
         resting: window.is_resting(),
         sees_rest: window.sees_rest(),
-        problem,
+        problem: problem(solved, spec, moving),
         elapsed_s,
-        timing,
+        timing: solved.timing,
     }
 }
 
 /// The problem of a window, if any; `expected`: whether surfaces should have been matched.
-pub(super) fn problem(solved: &WindowSolution, spec: &EstimatorSpec, expected: bool) -> Option<WarningKind> {
+fn problem(solved: &WindowSolution, spec: &SolveSpec, expected: bool) -> Option<WarningKind> {
     let matches = solved.matches + solved.view_matches;
     if let Some(reason) = solved.failure {
         Some(WarningKind::NotSolved { reason })
-    } else if expected && matches < spec.solve.min_matches {
+    } else if expected && matches < spec.min_matches {
         Some(WarningKind::FewMatches { matches })
-    } else if expected && solved.conditioning < spec.solve.weak_conditioning {
+    } else if expected && solved.conditioning < spec.weak_conditioning {
         Some(WarningKind::WeakGeometry { conditioning: solved.conditioning, direction_in_map: solved.weakest })
     } else {
         None
-    }
-}
-
-/// Whether a problem means that the window is dead reckoning with the IMU.
-pub(super) fn is_dead_reckoning(problem: &WarningKind) -> bool {
-    match problem {
-        WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
-        WarningKind::WeakGeometry { conditioning, .. } => *conditioning <= 0.0,
-        _ => false,
     }
 }

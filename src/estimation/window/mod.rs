@@ -131,14 +131,14 @@ impl Window {
     }
 
     /// The states that initialise the estimate after an IMU gap.
-    pub(super) fn state_before_gap(&self) -> Option<StateBeforeGap> {
-        let state = *self.nominal.states().last()?;
+    pub(super) fn state_before_gap(&self) -> StateBeforeGap {
+        let state = *self.nominal.end_state();
         let (scale_misalignment, lidar) = (self.scale_misalignment, self.builder.lidar);
         let until_s = self.nominal.end_s();
         let displacement = state.position - self.start_pose().translation.vector;
         let mean_velocity = displacement / (until_s - self.start.u_s).max(self.spec.step_s);
         let Self { biases, gravity, clock, .. } = *self;
-        Some(StateBeforeGap { until_s, state, mean_velocity, biases, gravity, clock, scale_misalignment, lidar })
+        StateBeforeGap { until_s, state, mean_velocity, biases, gravity, clock, scale_misalignment, lidar }
     }
 
     /// Sets clock and sensor corrections to the values before an IMU gap.

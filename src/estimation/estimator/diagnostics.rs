@@ -1,0 +1,104 @@
+//! Reports on the windows, and the warnings derived from them.
+
+use crate::estimation::{Warning, WarningKind, WindowReport};
+use crate::time::Stamp;
+use std::mem::discriminant;
+
+/// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise.
+///
+/// Noise causes less: the trajectory follows the IMU, and `noise_inflation` enlarges the assumed noise by half.
+const CONTRADICTION_THRESHOLD: f64 = 0.6;
+
+/// Tracking counts as lost after more dead reckoning than this, s, and than this fraction of the run.
+const TRACKING_LOST: (f64, f64) = (5.0, 0.2);
+
+/// The reports on all windows, and all warnings.
+#[derive(Debug)]
+pub(super) struct Diagnostics {
+    /// Duration of the segment that each window adds, s.
+    step_s: f64,
+    pub(super) windows: Vec<WindowReport>,
+    pub(super) warnings: Vec<Warning>,
+    /// Total time of dead reckoning with the IMU, s.
+    dead_reckoning_s: f64,
+    /// The problem of the newest window.
+    problem: Option<Problem>,
+}
+
+/// A problem of a window.
+#[derive(Debug)]
+struct Problem {
+    kind: WarningKind,
+    was_reported: bool,
+}
+
+impl Diagnostics {
+    /// Without windows; each will add `step_s`.
+    pub(super) fn new(step_s: f64) -> Self {
+        Self { step_s, windows: Vec::new(), warnings: Vec::new(), dead_reckoning_s: 0.0, problem: None }
+    }
+
+    /// Adds a warning.
+    pub(super) fn warn(&mut self, stamp: Stamp, kind: WarningKind) {
+        self.warnings.push(Warning { stamp, kind });
+    }
+
+    /// Adds the report on a window, and warns of its problem.
+    pub(super) fn record(&mut self, report: WindowReport) {
+        self.dead_reckoning_s += if report.problem.as_ref().is_some_and(is_dead_reckoning) { self.step_s } else { 0.0 };
+        self.warn_of_problem(report.problem.clone(), report.stamp);
+        self.windows.push(report);
+    }
+
+    /// Adds the warnings that concern the whole run.
+    pub(super) fn finish(&mut self) {
+        self.warn_of_loss();
+        self.warn_of_contradiction();
+    }
+
+    /// Warns if tracking was lost for a large part of the run.
+    fn warn_of_loss(&mut self) {
+        let (seconds, of_seconds) = (self.dead_reckoning_s, self.windows.len() as f64 * self.step_s);
+        if let Some(first) =
+            self.windows.first().filter(|_| seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds)
+        {
+            self.warnings.push(Warning { stamp: first.stamp, kind: WarningKind::Lost { seconds, of_seconds } });
+        }
+    }
+
+    /// Warns if IMU and lidar contradict each other by more than noise explains.
+    fn warn_of_contradiction(&mut self) {
+        let all = self.windows.iter().map(|window| window.imu_contradiction);
+        let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTION_THRESHOLD).collect();
+        let [seconds, of_seconds] = [times.len(), self.windows.len()].map(|count| count as f64 * self.step_s);
+        if seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds {
+            times.sort_unstable_by(f64::total_cmp);
+            let kind = WarningKind::Contradicted { times: times[times.len() / 2], seconds, of_seconds };
+            self.warnings.extend(self.windows.first().map(|first| Warning { stamp: first.stamp, kind }));
+        }
+    }
+
+    /// Warns of a problem of two consecutive windows, or immediately of a rejected solution.
+    ///
+    /// The warning is repeated only after a window without a problem or with another one.
+    fn warn_of_problem(&mut self, problem: Option<WarningKind>, stamp: Stamp) {
+        let previous = self.problem.take();
+        let Some(kind) = problem else { return };
+        let before = previous.filter(|before| discriminant(&before.kind) == discriminant(&kind));
+        let was_reported = before.as_ref().is_some_and(|before| before.was_reported);
+        let report = !was_reported && (before.is_some() || matches!(kind, WarningKind::NotSolved { .. }));
+        if report {
+            self.warn(stamp, kind.clone());
+        }
+        self.problem = Some(Problem { kind, was_reported: was_reported || report });
+    }
+}
+
+/// Whether a problem means that the window is dead reckoning with the IMU.
+fn is_dead_reckoning(problem: &WarningKind) -> bool {
+    match problem {
+        WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
+        WarningKind::WeakGeometry { conditioning, .. } => *conditioning <= 0.0,
+        _ => false,
+    }
+}

@@ -1,0 +1,92 @@
+//! The phases of the estimator: without and with a window.
+
+use crate::estimation::consider::Sensitivity;
+use crate::estimation::initial::StateBeforeGap;
+use crate::estimation::intake::Segment;
+use crate::estimation::localisation::GapRelocalisation;
+use crate::estimation::strapdown::Interval;
+use crate::estimation::surfel::TimedReturn;
+use crate::estimation::window::Window;
+use crate::time::Stamp;
+
+/// The phase of the estimator; an IMU gap or a long lidar gap leads from tracking back to gathering.
+#[derive(Debug)]
+pub(super) enum Phase {
+    /// No window: collects segments until they suffice to distinguish rest from motion.
+    Gathering(Gathering),
+    /// A window that each segment extends.
+    Tracking(Box<Tracking>),
+}
+
+/// The segments received before the first window, at the start or after a gap.
+#[derive(Debug, Default)]
+pub(super) struct Gathering {
+    pub(super) segments: Vec<Segment>,
+    /// What is known from before the gap; none at the start.
+    pub(super) recovery: Option<Box<GapRecovery>>,
+}
+
+/// The window, with what refers to it only.
+#[derive(Debug)]
+pub(super) struct Tracking {
+    pub(super) window: Window,
+    /// Segments that the window does not contain yet.
+    pub(super) waiting: Vec<Segment>,
+    /// What is known from before a gap, until the window is full.
+    pub(super) recovery: Option<Box<GapRecovery>>,
+    /// Sensitivity of the end of the window to the errors at its start.
+    pub(super) at_end: Option<Sensitivity>,
+    /// Stamp of the next pose; none before the first pose of the window.
+    pub(super) next_pose: Option<Stamp>,
+}
+
+/// What is known from before a gap.
+#[derive(Debug)]
+pub(super) struct GapRecovery {
+    /// The state at the start of the gap.
+    pub(super) before: StateBeforeGap,
+    /// Pending relocalisation in the surfaces seen before the gap; none in a given map.
+    pub(super) relocalisation: Option<GapRelocalisation>,
+}
+
+impl Default for Phase {
+    fn default() -> Self {
+        Self::Gathering(Gathering::default())
+    }
+}
+
+impl Phase {
+    /// Whether a relocalisation in the surfaces seen before a gap is pending.
+    pub(super) fn awaits_relocalisation(&self) -> bool {
+        let recovery = match self {
+            Self::Gathering(gathering) => &gathering.recovery,
+            Self::Tracking(tracking) => &tracking.recovery,
+        };
+        recovery.as_ref().is_some_and(|recovery| recovery.relocalisation.is_some())
+    }
+
+    /// Adds a segment that is processed with the window, as soon as it exists.
+    pub(super) fn queue(&mut self, segment: Segment) {
+        match self {
+            Self::Gathering(gathering) => gathering.segments.push(segment),
+            Self::Tracking(tracking) => tracking.waiting.push(segment),
+        }
+    }
+}
+
+impl Gathering {
+    /// The IMU intervals of all segments.
+    pub(super) fn intervals(&self) -> Vec<Interval> {
+        self.segments.iter().flat_map(|segment| &segment.intervals).map(|(_, interval)| *interval).collect()
+    }
+
+    /// The beams of all segments, in order of time.
+    pub(super) fn returns(&self) -> Vec<TimedReturn> {
+        self.segments.iter().flat_map(|segment| &segment.returns).copied().collect()
+    }
+
+    /// Start of the first IMU interval, IMU time, s.
+    pub(super) fn start_s(&self) -> Option<f64> {
+        self.segments.first()?.intervals.first().map(|(start_s, _)| *start_s)
+    }
+}
