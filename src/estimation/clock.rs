@@ -27,7 +27,7 @@ impl Clock {
     }
 
     /// The same clock after a gap from `from_s` to `to_s`.
-    pub(super) fn after_gap(&self, (from_s, to_s): (f64, f64)) -> Self {
+    pub(super) fn after_gap(&self, from_s: f64, to_s: f64) -> Self {
         let drifted_s = (to_s - from_s).min(MAX_EXTRAPOLATION_S);
         Self { offset_s: self.offset_at(from_s + drifted_s), rate: self.rate, at_s: to_s }
     }
@@ -45,9 +45,9 @@ mod tests {
     #[test]
     fn the_drift_is_extrapolated_for_at_most_a_minute() {
         let clock = Clock { offset_s: 0.003, rate: 1e-4, at_s: 10.0 };
-        let day = clock.after_gap((15.0, 86_415.0));
+        let day = clock.after_gap(15.0, 86_415.0);
         assert!((day.offset_at(86_415.0) - (0.0035 + 1e-4 * MAX_EXTRAPOLATION_S)).abs() < 1e-12, "{day:?}");
-        let second = clock.after_gap((15.0, 16.0));
+        let second = clock.after_gap(15.0, 16.0);
         assert!((second.offset_at(16.0) - clock.offset_at(16.0)).abs() < 1e-12, "{second:?}");
     }
 }

@@ -15,12 +15,13 @@ use crate::time::Span;
 /// When there are too few samples, or the integrated poses are not finite.
 pub fn integrate_imu(
     samples: &[ImuSample],
-    (noise, averaging): (&ImuNoise, ImuAveraging),
+    noise: &ImuNoise,
+    averaging: ImuAveraging,
     start: &Kinematics,
     spec: &EstimatorSpec,
 ) -> Result<Trajectory, EstimationError> {
     let origin = samples.first().map(|sample| sample.stamp).unwrap_or_default();
-    let (start_s, intervals) = base::intervals(samples, origin, (noise, averaging), spec)?;
+    let (start_s, intervals) = base::intervals(samples, origin, noise, averaging, spec)?;
     let biases = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
     let pose = start.world_from_body;
     let mut state =

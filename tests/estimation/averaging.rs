@@ -47,8 +47,7 @@ fn samples(imu: &Track, made_as: ImuAveraging, rate_hz: i64) -> Vec<ImuSample> {
 fn error_m(imu: &Track, samples: &[ImuSample], taken_as: ImuAveraging) -> f64 {
     let ideal: ImuSpec = spec::load(Kind::Imu, "ideal_1khz").unwrap();
     let noise = Imu::new(&ideal, &Source::in_memory("test.ron", "")).unwrap().noise();
-    let integrated =
-        integrate_imu(samples, (&noise, taken_as), &imu.kinematics(0.0), &load("default").unwrap()).unwrap();
+    let integrated = integrate_imu(samples, &noise, taken_as, &imu.kinematics(0.0), &load("default").unwrap()).unwrap();
     let error = |stamp: Stamp, pose: &Pose| {
         let truth = imu.pose(stamp.nanos() as f64 * 1e-9);
         (pose.translation.vector - truth.translation.vector).norm()

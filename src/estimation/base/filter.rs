@@ -127,9 +127,10 @@ pub(super) struct Filter {
 }
 
 impl Filter {
-    /// Initialises the filter at a fix, with the given velocity (m/s) and clock offset.
+    /// Initialises the filter at the fix `pose`, with the given velocity (m/s) and clock offset.
     pub(super) fn starting_at(
-        (pose, sigmas): (Pose, FixSigmas),
+        pose: Pose,
+        sigmas: FixSigmas,
         velocity: Vector,
         offset_s: f64,
         noise: &ImuNoise,

@@ -51,7 +51,7 @@ pub fn smooth_base(
     spec: &EstimatorSpec,
 ) -> Result<BaseEstimate, EstimationError> {
     let origin = check(fixes, samples)?;
-    let (start_s, intervals) = intervals(samples, origin, (&imu.noise, imu.averaging), spec)?;
+    let (start_s, intervals) = intervals(samples, origin, &imu.noise, imu.averaging, spec)?;
     let fixes = Fixes::new(fixes, origin, &imu.base_from_imu)?;
     let offset_s = imu.clock_offset_s.map_or_else(|| clock_offset::find(&fixes, start_s, &intervals), Ok)?;
     smoother::smooth(&fixes, start_s, &intervals, offset_s, imu, spec)
@@ -87,7 +87,8 @@ fn check(fixes: &[BaseFix], samples: &[ImuSample]) -> Result<Stamp, EstimationEr
 pub(super) fn intervals(
     samples: &[ImuSample],
     origin: Stamp,
-    (noise, averaging): (&ImuNoise, ImuAveraging),
+    noise: &ImuNoise,
+    averaging: ImuAveraging,
     spec: &EstimatorSpec,
 ) -> Result<(f64, Vec<Interval>), EstimationError> {
     let seconds: Vec<f64> = samples.iter().map(|sample| sample.stamp.seconds_since(origin)).collect();
@@ -98,15 +99,15 @@ pub(super) fn intervals(
         ))
     })?;
     let filter = StampFilter::new(regularity, spec.clock.jitter_s);
-    let mut stream = InertialStream::new(filter, (*noise, averaging), spec.inertial.clone());
+    let mut stream = InertialStream::new(filter, *noise, averaging, spec.inertial.clone());
     let stamped: Vec<(f64, ImuSample)> = seconds.into_iter().zip(samples.iter().copied()).collect();
     let mut screen = Screen::new(noise);
     let mut placed = Vec::new();
     for (k, (raw_s, sample)) in stamped.iter().enumerate() {
-        match screen.screen((*raw_s, sample), stamped[k + 1..].iter()) {
+        match screen.screen(*raw_s, sample, stamped[k + 1..].iter()) {
             Screened::Measured(clipped) => {
                 let later_s = stamped[k + 1..].iter().map(|(later_s, _)| *later_s);
-                stream.push((*raw_s, later_s), (sample, clipped), &mut placed);
+                stream.push(*raw_s, later_s, sample, clipped, &mut placed);
             }
             Screened::Outlier { may_be_shock: true } => stream.note_possible_shock(),
             Screened::Outlier { may_be_shock: false } | Screened::Frozen => {}

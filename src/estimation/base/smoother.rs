@@ -64,10 +64,10 @@ pub(super) fn smooth(
     let problem = Problem { fixes, intervals };
     let epochs = problem.epochs(start_s, offset_s);
     let start = epochs.first().and_then(|epoch| problem.start(epoch.start_s - offset_s));
-    let Some((fix, velocity)) = start else {
+    let Some(((pose, sigmas), velocity)) = start else {
         return Err(EstimationError::Base("no fixes within the time of the IMU samples".to_owned()));
     };
-    let mut filter = Filter::starting_at(fix, velocity, offset_s, &imu.noise, spec);
+    let mut filter = Filter::starting_at(pose, sigmas, velocity, offset_s, &imu.noise, spec);
     let mut checkpoints = Vec::new();
     for minute in epochs.chunks(EPOCHS_IN_MEMORY) {
         checkpoints.push(filter.clone());
@@ -158,8 +158,8 @@ impl Problem<'_> {
             for (k, epoch) in minute.iter().enumerate().rev() {
                 let end = smoothed.unwrap_or(steps[k].corrected);
                 let before = k.checked_sub(1).map(|k| &steps[k]);
-                let filtered = before.map_or((&start.estimate, &start.covariance), Step::end);
-                let start_estimate = steps[k].smoothed_start(filtered, &end)?;
+                let (filtered, covariance) = before.map_or((&start.estimate, &start.covariance), Step::end);
+                let start_estimate = steps[k].smoothed_start(filtered, covariance, &end)?;
                 pending = self.add_poses(epoch, [&start_estimate, &end], pending, &mut poses);
                 smoothed = Some(start_estimate);
             }
@@ -203,14 +203,20 @@ impl Step {
         (&self.corrected, &self.corrected_covariance)
     }
 
-    /// Smoothed estimate at the start of the epoch, from the `filtered` one there and the smoothed one at the `end`.
-    fn smoothed_start(&self, filtered: (&Estimate, &ErrorMatrix), end: &Estimate) -> Result<Estimate, EstimationError> {
+    /// Smoothed estimate at the start of the epoch, from the `filtered` one there, with its `covariance`, and the smoothed
+    /// one at the `end`.
+    fn smoothed_start(
+        &self,
+        filtered: &Estimate,
+        covariance: &ErrorMatrix,
+        end: &Estimate,
+    ) -> Result<Estimate, EstimationError> {
         let cholesky = self.predicted_covariance.cholesky().ok_or_else(|| {
             EstimationError::Base("the covariance became singular; check the noise parameters of the IMU".to_owned())
         })?;
         // P F' (F P F' + Q)^-1, transposed.
-        let gain = cholesky.solve(&(self.transition * filtered.1)).transpose();
-        Ok(filtered.0.plus(&(gain * end.minus(&self.predicted))))
+        let gain = cholesky.solve(&(self.transition * covariance)).transpose();
+        Ok(filtered.plus(&(gain * end.minus(&self.predicted))))
     }
 }
 

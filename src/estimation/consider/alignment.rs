@@ -17,7 +17,7 @@ impl ConsiderCovariance {
     pub(in crate::estimation) fn covariance_against_gauge(&self, point: &Vector) -> Matrix6<f64> {
         let with_start = |at: usize| self.views[at].with_start.fixed_columns::<6>(0).into_owned();
         let by = pose_error_matrix(&(point - self.pivot));
-        self.against_gauge(point, (&by, self.start.fixed_view::<6, 6>(0, 0).into_owned()), with_start)
+        self.against_gauge(point, &by, &self.start.fixed_view::<6, 6>(0, 0).into_owned(), with_start)
     }
 
     /// The same for an error with covariance `own` and effect `by` on `point`; `with` returns the covariance of that error
@@ -25,7 +25,8 @@ impl ConsiderCovariance {
     fn against_gauge(
         &self,
         point: &Vector,
-        (by, own): (&Matrix6<f64>, Matrix6<f64>),
+        by: &Matrix6<f64>,
+        own: &Matrix6<f64>,
         with: impl Fn(usize) -> Matrix6<f64>,
     ) -> Matrix6<f64> {
         let own = by * own * by.transpose();
@@ -109,7 +110,7 @@ impl ConsiderCovariance {
             let own = self.views.iter().position(|view| view.number == mark.number)?;
             let with = |at: usize| self.between(at, own);
             let by = pose_error_matrix(&Vector::zeros());
-            Some((mark.stamp, self.against_gauge(&mark.pivot, (&by, self.between(own, own)), with)))
+            Some((mark.stamp, self.against_gauge(&mark.pivot, &by, &self.between(own, own), with)))
         });
         let covariances = covariances.collect();
         marks.iter().for_each(|mark| self.remove_view(mark.number));

@@ -75,12 +75,13 @@ impl AxisExtreme {
     }
 }
 
-/// The axes of `reading`, followed by `ahead`, that are at a limit.
+/// The axes of `reading`, followed by `ahead`, that are at the limit `data_sheet` or at an observed one from `least` on.
 fn clipped_axes(
     axes: &mut [AxisExtreme; 3],
     reading: &Vector,
     ahead: &[Vector],
-    (data_sheet, least): (f64, f64),
+    data_sheet: f64,
+    least: f64,
 ) -> [bool; 3] {
     std::array::from_fn(|k| {
         axes[k].add(reading[k]);
@@ -108,8 +109,8 @@ impl RangeLimits {
         let (gyro_ahead, accel_ahead): (Vec<Vector>, Vec<Vector>) = readings.unzip();
         let (gyro, accel) = (&sample.angular_velocity_rad_per_s, &sample.specific_force_m_per_s2);
         Clipped {
-            gyro: clipped_axes(&mut self.gyro, gyro, &gyro_ahead, (self.data_sheet.0, MIN_LIMIT.0)),
-            accel: clipped_axes(&mut self.accel, accel, &accel_ahead, (self.data_sheet.1, MIN_LIMIT.1)),
+            gyro: clipped_axes(&mut self.gyro, gyro, &gyro_ahead, self.data_sheet.0, MIN_LIMIT.0),
+            accel: clipped_axes(&mut self.accel, accel, &accel_ahead, self.data_sheet.1, MIN_LIMIT.1),
         }
     }
 }

@@ -31,8 +31,8 @@ impl InterpolationError {
         if is_clipped || gap_s <= 0.0 {
             return;
         }
-        let slopes = (slope(Some(first), from, Some(to)), slope(Some(from), to, Some(last)));
-        let (gyro, accel) = between((from, to), &slopes, (middle.centre_s - from.centre_s) / gap_s);
+        let slopes = [slope(Some(first), from, Some(to)), slope(Some(from), to, Some(last))];
+        let (gyro, accel) = between(from, to, &slopes, (middle.centre_s - from.centre_s) / gap_s);
         let take = |mean: &mut f64, error: &Vector| {
             *mean += NEW_ERROR_WEIGHT * (error.norm_squared() / 3.0 / gap_s.powi(4) - *mean);
         };
@@ -49,6 +49,13 @@ impl InterpolationError {
     }
 }
 
+/// Slopes of angular velocity, rad/s^2, and specific force, m/s^3.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slopes {
+    gyro: Vector,
+    accel: Vector,
+}
+
 /// Cubic Hermite interpolation between two values with slopes, at `u` in 0..1.
 pub(super) fn hermite(from: (Vector, Vector), to: (Vector, Vector), length_s: f64, u: f64) -> Vector {
     let (h01, h10, h11) = (u * u * (3.0 - 2.0 * u), u * (1.0 - u) * (1.0 - u), u * u * (u - 1.0));
@@ -56,7 +63,7 @@ pub(super) fn hermite(from: (Vector, Vector), to: (Vector, Vector), length_s: f6
 }
 
 /// Slopes of angular velocity and specific force at `at`: the parabola through it and its neighbours.
-pub(super) fn slope(before: Option<&Mean>, at: &Mean, after: Option<&Mean>) -> (Vector, Vector) {
+pub(super) fn slope(before: Option<&Mean>, at: &Mean, after: Option<&Mean>) -> Slopes {
     let chord = |a: &Mean, b: &Mean| {
         let h = b.centre_s - a.centre_s;
         ((b.gyro - a.gyro) / h, (b.accel - a.accel) / h, h)
@@ -64,20 +71,18 @@ pub(super) fn slope(before: Option<&Mean>, at: &Mean, after: Option<&Mean>) -> (
     match (before.map(|before| chord(before, at)), after.map(|after| chord(at, after))) {
         (Some((g0, a0, h0)), Some((g1, a1, h1))) => {
             let share = h1 / (h0 + h1);
-            (g0 * share + g1 * (1.0 - share), a0 * share + a1 * (1.0 - share))
+            Slopes { gyro: g0 * share + g1 * (1.0 - share), accel: a0 * share + a1 * (1.0 - share) }
         }
-        (Some((gyro, accel, _)), None) | (None, Some((gyro, accel, _))) => (gyro, accel),
-        (None, None) => (Vector::zeros(), Vector::zeros()),
+        (Some((gyro, accel, _)), None) | (None, Some((gyro, accel, _))) => Slopes { gyro, accel },
+        (None, None) => Slopes { gyro: Vector::zeros(), accel: Vector::zeros() },
     }
 }
 
 /// Angular velocity and specific force `u` of the way between two readings with their slopes, `u` from 0 to 1.
-pub(super) fn between(
-    (from, to): (&Mean, &Mean),
-    slopes: &((Vector, Vector), (Vector, Vector)),
-    u: f64,
-) -> (Vector, Vector) {
+pub(super) fn between(from: &Mean, to: &Mean, slopes: &[Slopes; 2], u: f64) -> (Vector, Vector) {
+    let [leaving, arriving] = slopes;
     let gap_s = to.centre_s - from.centre_s;
     let cubic = |from, to| hermite(from, to, gap_s, u);
-    (cubic((from.gyro, slopes.0.0), (to.gyro, slopes.1.0)), cubic((from.accel, slopes.0.1), (to.accel, slopes.1.1)))
+    let gyro = cubic((from.gyro, leaving.gyro), (to.gyro, arriving.gyro));
+    (gyro, cubic((from.accel, leaving.accel), (to.accel, arriving.accel)))
 }

@@ -67,7 +67,7 @@ pub(super) struct InertialStream {
 }
 
 impl InertialStream {
-    pub(super) fn new(filter: StampFilter, (noise, averaging): (ImuNoise, ImuAveraging), spec: InertialSpec) -> Self {
+    pub(super) fn new(filter: StampFilter, noise: ImuNoise, averaging: ImuAveraging, spec: InertialSpec) -> Self {
         let is_irregular = filter.is_irregular();
         let per_group = if is_irregular { 1 } else { (SPACING_S / filter.period_s()).round().max(1.0) as usize };
         Self {
@@ -136,8 +136,10 @@ impl InertialStream {
     /// each with its start time.
     pub(super) fn push(
         &mut self,
-        (raw_s, later_s): (f64, impl Iterator<Item = f64>),
-        (sample, clipped): (&ImuSample, Clipped),
+        raw_s: f64,
+        later_s: impl Iterator<Item = f64>,
+        sample: &ImuSample,
+        clipped: Clipped,
         into: &mut Vec<(f64, Interval)>,
     ) {
         self.saturated += usize::from(clipped.any());

@@ -91,8 +91,8 @@ pub(super) fn bridge(before: &[Mean], after: &[Mean], steps: usize, error: &Inte
 fn cubic(before: &[Mean], after: &[Mean], steps: usize) -> Vec<(Vector, Vector)> {
     let (last, first) = (&before[before.len() - 1], &after[0]);
     let earlier = before.len().checked_sub(2).map(|k| &before[k]);
-    let slopes = (slope(earlier, last, Some(first)), slope(Some(last), first, after.get(1)));
-    (1..steps).map(|step| between((last, first), &slopes, step as f64 / steps as f64)).collect()
+    let slopes = [slope(earlier, last, Some(first)), slope(Some(last), first, after.get(1))];
+    (1..steps).map(|step| between(last, first, &slopes, step as f64 / steps as f64)).collect()
 }
 
 /// Angular velocity and specific force in a longer gap, from lines fitted to the readings on both sides.

@@ -60,7 +60,7 @@ impl Resampler {
     fn between(&self, k: usize) -> Vec<Mean> {
         let (from, to) = (self.readings[k], self.readings[k + 1]);
         let before = k.checked_sub(1).map(|k| &self.readings[k]);
-        let slopes = (slope(before, &from, Some(&to)), slope(Some(&from), &to, self.readings.get(k + 2)));
+        let slopes = [slope(before, &from, Some(&to)), slope(Some(&from), &to, self.readings.get(k + 2))];
         let gap_s = to.centre_s - from.centre_s;
         let steps = (gap_s / SPACING_S).round().max(1.0);
         let sigmas = self.error.sigmas(gap_s, steps);
@@ -68,7 +68,7 @@ impl Resampler {
         let inner = (1..steps as usize).map(|step| {
             let u = step as f64 / steps;
             let near = if u < 0.5 { &from } else { &to };
-            let (gyro, accel) = between((&from, &to), &slopes, u);
+            let (gyro, accel) = between(&from, &to, &slopes, u);
             let bridged = gap_s > 4.5 * SPACING_S;
             Mean {
                 centre_s: from.centre_s + u * gap_s,

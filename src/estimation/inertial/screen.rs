@@ -8,14 +8,29 @@ use crate::measurement::{ImuNoise, ImuSample};
 pub(in crate::estimation) const LOOKAHEAD_S: f64 = 0.1;
 /// Larger readings are implausible on a moving head, rad/s and m/s^2.
 const IMPLAUSIBLE: (f64, f64) = (100.0, 5000.0);
-/// Outlier gate: `(floor, factor)`, rad/s. A sample is an outlier if it differs from both neighbours by more than `floor
-/// + factor x` the difference of the neighbours.
-const OUTLIER_GYRO: (f64, f64) = (0.6, 4.0);
-/// The same for the accelerometer, m/s^2.
-const OUTLIER_ACCEL: (f64, f64) = (30.0, 6.0);
+/// Outlier gate of the gyroscope, rad/s.
+const OUTLIER_GYRO: OutlierGate = OutlierGate { floor: 0.6, factor: 4.0 };
+/// Outlier gate of the accelerometer, m/s^2.
+const OUTLIER_ACCEL: OutlierGate = OutlierGate { floor: 30.0, factor: 6.0 };
 /// All six readings unchanged for this time, s, and this number of samples: the sensor is frozen. The noise of a
 /// working sensor changes even rounded readings.
 const FROZEN: (f64, usize) = (0.08, 4);
+
+/// Gate on the deviation of a sample from both neighbours.
+#[derive(Debug, Clone, Copy)]
+struct OutlierGate {
+    /// Deviation that is always accepted.
+    floor: f64,
+    /// Accepted deviation in addition, as a multiple of the difference of the neighbours.
+    factor: f64,
+}
+
+impl OutlierGate {
+    /// The largest accepted deviation, if the neighbours differ by `usual`.
+    fn limit(self, usual: f64) -> f64 {
+        self.floor + self.factor * usual
+    }
+}
 
 /// Result of screening a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,14 +77,15 @@ impl Screen {
     /// used.
     pub(in crate::estimation) fn screen<'a>(
         &mut self,
-        (seconds, sample): (f64, &ImuSample),
+        seconds: f64,
+        sample: &ImuSample,
         ahead: impl Iterator<Item = &'a (f64, ImuSample)> + Clone,
     ) -> Screened {
         let ahead = ahead.take_while(|(s, _)| *s <= seconds + LOOKAHEAD_S);
         if is_implausible(sample) {
             return Screened::Outlier { may_be_shock: false };
         }
-        if self.is_frozen((seconds, sample), ahead.clone()) {
+        if self.is_frozen(seconds, sample, ahead.clone()) {
             return Screened::Frozen;
         }
         let usable = ahead.map(|(_, next)| next).filter(|next| !is_implausible(next));
@@ -83,7 +99,8 @@ impl Screen {
 
     fn is_frozen<'a>(
         &mut self,
-        (seconds, sample): (f64, &ImuSample),
+        seconds: f64,
+        sample: &ImuSample,
         ahead: impl Iterator<Item = &'a (f64, ImuSample)>,
     ) -> bool {
         let unchanged = self.reading.as_ref().filter(|(last, _)| is_same_reading(last, sample));
@@ -104,8 +121,8 @@ impl Screen {
     /// more than these differ from each other.
     fn outlier<'a>(&self, sample: &ImuSample, ahead: impl Iterator<Item = &'a ImuSample>) -> Option<Screened> {
         let next: Vec<&ImuSample> = ahead.take(3).collect();
-        let exceeds = |of: fn(&ImuSample) -> Vector, gate: (f64, f64)| match &self.before[0] {
-            Some(before) => self.exceeds_neighbours(of, gate, (sample, before), &next),
+        let exceeds = |of: fn(&ImuSample) -> Vector, gate: OutlierGate| match &self.before[0] {
+            Some(before) => self.exceeds_neighbours(of, gate, sample, before, &next),
             None => exceeds_successors(of, gate, sample, &next),
         };
         let force = exceeds(|s| s.specific_force_m_per_s2, OUTLIER_ACCEL);
@@ -118,8 +135,9 @@ impl Screen {
     fn exceeds_neighbours(
         &self,
         of: fn(&ImuSample) -> Vector,
-        (floor, factor): (f64, f64),
-        (sample, before): (&ImuSample, &ImuSample),
+        gate: OutlierGate,
+        sample: &ImuSample,
+        before: &ImuSample,
         next: &[&ImuSample],
     ) -> bool {
         let (x, last) = (of(sample), of(before));
@@ -128,20 +146,20 @@ impl Screen {
         if let Some(earlier) = &self.before[1] {
             usual = usual.max((of(earlier) - last).norm());
         }
-        (x - last).norm().min((x - median).norm()) > floor + factor * usual
+        (x - last).norm().min((x - median).norm()) > gate.limit(usual)
     }
 }
 
 /// The same for the first sample: only later neighbours exist, and they must agree with each other.
 fn exceeds_successors(
     of: fn(&ImuSample) -> Vector,
-    (floor, factor): (f64, f64),
+    gate: OutlierGate,
     sample: &ImuSample,
     next: &[&ImuSample],
 ) -> bool {
     let Some(median) = median(next, of).filter(|_| next.len() == 3) else { return false };
     let usual = next.iter().map(|other| (of(other) - median).norm()).fold(0.0, f64::max);
-    (of(sample) - median).norm() > floor + factor * usual
+    (of(sample) - median).norm() > gate.limit(usual)
 }
 
 /// The median of each axis.
@@ -193,7 +211,7 @@ mod tests {
 
     fn screened(samples: &[(f64, ImuSample)]) -> Vec<Screened> {
         let mut screen = Screen::new(&noise());
-        (0..samples.len()).map(|k| screen.screen((samples[k].0, &samples[k].1), samples[k + 1..].iter())).collect()
+        (0..samples.len()).map(|k| screen.screen(samples[k].0, &samples[k].1, samples[k + 1..].iter())).collect()
     }
 
     fn is_outlier(one: &Screened) -> bool {
@@ -234,7 +252,7 @@ mod tests {
             samples[500].1.angular_velocity_rad_per_s.y += gyro;
             samples[500].1.specific_force_m_per_s2.y += accel;
             let mut screen = Screen::new(&limited);
-            let screened = (0..=500).map(|k| screen.screen((samples[k].0, &samples[k].1), samples[k + 1..].iter()));
+            let screened = (0..=500).map(|k| screen.screen(samples[k].0, &samples[k].1, samples[k + 1..].iter()));
             assert_eq!(
                 screened.last(),
                 Some(Screened::Outlier { may_be_shock: expected }),

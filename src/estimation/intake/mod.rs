@@ -174,7 +174,7 @@ impl Intake {
                 return None;
             }
         }
-        let coverage = self.samples.advance(end_s, (self.spec.inertial.max_gap_s, self.gaps_are_bridged), last);
+        let coverage = self.samples.advance(end_s, self.spec.inertial.max_gap_s, self.gaps_are_bridged, last);
         if coverage == Coverage::Waiting && !last {
             return None;
         }
@@ -221,8 +221,8 @@ impl Intake {
         self.scans.start(first_scan, enough_s)?;
         // The IMU must cover the first beam for any clock offset.
         self.next_start_s = start_s + MARGIN_S;
-        let model = (self.calibration.imu, self.calibration.imu_averaging);
-        let stream = InertialStream::new(imu, model, self.spec.inertial.clone());
+        let Calibration { imu: noise, imu_averaging: averaging, .. } = self.calibration;
+        let stream = InertialStream::new(imu, noise, averaging, self.spec.inertial.clone());
         self.samples.start(stream, start_s - MARGIN_S);
         Some(())
     }

@@ -120,7 +120,7 @@ impl SampleQueue {
 
     /// Uses samples until the intervals reach slightly past `end_s`. Bridges gaps of up to `max_gap_s`, if the motion
     /// allows it or they are `always_bridged`. `last`: no more data will arrive.
-    pub(super) fn advance(&mut self, end_s: f64, (max_gap_s, always_bridged): (f64, bool), last: bool) -> Coverage {
+    pub(super) fn advance(&mut self, end_s: f64, max_gap_s: f64, always_bridged: bool, last: bool) -> Coverage {
         let complete_s = if last { f64::INFINITY } else { self.newest_s() - COMPLETE_AFTER_S };
         let Some(stream) = &mut self.stream else { return Coverage::Waiting };
         while let Some((seconds, sample)) = self.waiting.front().copied() {
@@ -130,7 +130,7 @@ impl SampleQueue {
             if seconds > complete_s && seconds > end_s + 2.0 * MARGIN_S {
                 return Coverage::Waiting;
             }
-            let screened = self.screen.screen((seconds, &sample), self.waiting.iter().skip(1));
+            let screened = self.screen.screen(seconds, &sample, self.waiting.iter().skip(1));
             let gap_s = seconds - self.used_s;
             if let Screened::Measured(_) = screened
                 && gap_s.is_finite()
@@ -149,7 +149,7 @@ impl SampleQueue {
                     }
                     self.used_s = seconds;
                     let later_s = self.waiting.iter().map(|(later_s, _)| *later_s);
-                    stream.push((seconds, later_s), (&sample, clipped), &mut self.intervals);
+                    stream.push(seconds, later_s, &sample, clipped, &mut self.intervals);
                 }
                 Screened::Outlier { may_be_shock } => {
                     self.discarded.outliers += 1;

@@ -11,12 +11,12 @@ const LOST_CLIPPED_FRACTION: f64 = 0.02;
 const INTERVAL_S: f64 = 5.0;
 /// Contradiction between IMU and lidar, as a multiple of the IMU noise, above which a result is degraded or lost. 0.12
 /// to 0.35 in 24 sound runs of all scenes, at most 0.61 in a window.
-const CONTRADICTION_LIMITS: (f64, f64) = (0.6, 3.0);
+const CONTRADICTION_LIMITS: Limits = Limits { degraded: 0.6, lost: 3.0 };
 /// Residual of matched surfaces above which a result is degraded or lost, m. 2 to 4.5 mm in sound runs, up to 6 mm in
 /// a window.
-const RESIDUAL_M: (f64, f64) = (0.010, 0.018);
+const RESIDUAL_M: Limits = Limits { degraded: 0.010, lost: 0.018 };
 /// Fraction of an interval with too few matches or unsolved windows, above which a result is degraded or lost.
-const UNTRACKED_FRACTIONS: (f64, f64) = (0.35, 0.6);
+const UNTRACKED_FRACTIONS: Limits = Limits { degraded: 0.35, lost: 0.6 };
 /// Fraction of a run without any match, and not at rest, above which the result is lost.
 const MAX_UNMATCHED_FRACTION: f64 = 0.5;
 /// Longer IMU gaps degrade a result, s.
@@ -30,13 +30,13 @@ const MISSING_FRACTION: f64 = 0.05;
 /// More repeated IMU samples or lidar scans than this are a frozen sensor.
 const MAX_REPEATED: (usize, usize) = (30, 10);
 /// Correction of all ranges above which a result is degraded or lost, m.
-const RANGE_CORRECTION_M: (f64, f64) = (0.06, 0.1);
+const RANGE_CORRECTION_M: Limits = Limits { degraded: 0.06, lost: 0.1 };
 /// Entry of the IMU scale and misalignment above which a result is degraded or lost.
-const IMU_SCALE: (f64, f64) = (0.009, 0.04);
+const IMU_SCALE: Limits = Limits { degraded: 0.009, lost: 0.04 };
 /// Implausible drift between the clocks, s/s: no quartz oscillator drifts by so much.
-const CLOCK_RATE: f64 = 5e-4;
+const CLOCK_RATE: Limits = Limits { degraded: 5e-4, lost: f64::INFINITY };
 /// Implausible speed, m/s: a result of dead reckoning.
-const SPEED_M_PER_S: f64 = 60.0;
+const SPEED_M_PER_S: Limits = Limits { degraded: 60.0, lost: 60.0 };
 
 /// Contradiction, residual (m) and IMU scale up to which the bound is not enlarged.
 const NOMINAL_EVIDENCE: (f64, f64, f64) = (0.4, 0.006, 0.004);
@@ -68,6 +68,13 @@ const WEAK_FACTOR: f64 = 4.0;
 const MAX_FACTOR: f64 = 1000.0;
 /// Upper limit of the factor from the IMU scale, which after a shock is a poor measure of the trajectory error.
 const MAX_SCALE_FACTOR: f64 = 10.0;
+
+/// Limits of a measure above which a result is degraded or lost.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    degraded: f64,
+    lost: f64,
+}
 
 /// The data used to assess an estimate.
 #[derive(Debug, Clone, Copy)]
@@ -122,17 +129,17 @@ fn attribute_loss_to_clipping(findings: &mut [Finding]) {
 fn over_intervals(
     windows: &[WindowReport],
     measure: impl Fn(&[WindowReport]) -> f64,
-    (degraded, lost): (f64, f64),
+    limits: Limits,
 ) -> Option<(Status, f64, Stamp, Stamp)> {
     let step_s = median(windows.windows(2).map(|pair| pair[1].stamp.seconds_since(pair[0].stamp)).collect());
     let length = ((INTERVAL_S / step_s.clamp(0.1, INTERVAL_S)).round() as usize).min(windows.len() / 2).max(1);
     let mut found: Option<(Status, f64, Stamp, Stamp)> = None;
     for interval in windows.windows(length) {
         let value = measure(interval);
-        if value <= degraded {
+        if value <= limits.degraded {
             continue;
         }
-        let status = if value > lost { Status::Lost } else { Status::Degraded };
+        let status = if value > limits.lost { Status::Lost } else { Status::Degraded };
         let (from, to) = (interval[0].stamp, interval[length - 1].stamp);
         found = Some(match found {
             // A loss lasts from the first lost interval.
@@ -173,9 +180,7 @@ fn window_findings(windows: &[WindowReport]) -> Vec<Finding> {
     add(over_intervals(windows, untracked, UNTRACKED_FRACTIONS), &|_, from, to| Cause::FewMatches {
         seconds: to.seconds_since(from),
     });
-    add(over_intervals(windows, fastest, (SPEED_M_PER_S, SPEED_M_PER_S)), &|speed_m_per_s, _, _| Cause::Speed {
-        speed_m_per_s,
-    });
+    add(over_intervals(windows, fastest, SPEED_M_PER_S), &|speed_m_per_s, _, _| Cause::Speed { speed_m_per_s });
     // The head neither rests nor matches any surface for most of the run: the trajectory is unknown.
     let (unobserved, assumed) =
         (mostly_unmatched(windows, |w| !w.resting), mostly_unmatched(windows, |w| w.resting && !w.sees_rest));
@@ -243,9 +248,9 @@ fn warning_finding(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
 fn calibration_findings(windows: &[WindowReport]) -> Vec<Finding> {
     let (Some(first), Some(last)) = (windows.first(), windows.last()) else { return Vec::new() };
     let late = &windows[windows.len() / 2..];
-    let of = |value: f64, (degraded, lost): (f64, f64), cause: Cause| {
-        let status = if value > lost { Status::Lost } else { Status::Degraded };
-        (value > degraded).then_some(Finding { status, cause, from: first.stamp, to: last.stamp })
+    let of = |value: f64, limits: Limits, cause: Cause| {
+        let status = if value > limits.lost { Status::Lost } else { Status::Degraded };
+        (value > limits.degraded).then_some(Finding { status, cause, from: first.stamp, to: last.stamp })
     };
     let correction_m = last.range_correction_m;
     let entry = late.iter().map(|window| window.imu_matrix).fold(0.0, f64::max);
@@ -253,7 +258,7 @@ fn calibration_findings(windows: &[WindowReport]) -> Vec<Finding> {
     [
         of(correction_m.abs(), RANGE_CORRECTION_M, Cause::RangeCorrection { correction_m }),
         of(entry, IMU_SCALE, Cause::ImuScale { entry }),
-        of(rate, (CLOCK_RATE, f64::INFINITY), Cause::ClockRate { rate }),
+        of(rate, CLOCK_RATE, Cause::ClockRate { rate }),
     ]
     .into_iter()
     .flatten()

@@ -143,7 +143,7 @@ impl Window {
 
     /// Sets clock and sensor corrections to the values before an IMU gap.
     pub(super) fn resume_from(&mut self, before_gap: &StateBeforeGap) {
-        self.clock = before_gap.clock.after_gap((before_gap.until_s, self.start.u_s));
+        self.clock = before_gap.clock.after_gap(before_gap.until_s, self.start.u_s);
         self.scale_misalignment = before_gap.scale_misalignment;
         self.builder.lidar = before_gap.lidar;
     }
@@ -234,9 +234,8 @@ impl Window {
         for (_, interval) in intervals.iter() {
             self.nominal.extend(interval.corrected_by(&self.scale_misalignment), &self.biases, &self.gravity);
             self.rest = self.rest.filter(|rest| rest.agrees_with(interval));
-            let at_end = (self.nominal.end_s(), self.speed_m_per_s());
             if self.speed_is_known {
-                self.rests.take(interval, &self.biases, at_end);
+                self.rests.take(interval, &self.biases, self.nominal.end_s(), self.speed_m_per_s());
             }
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;

@@ -27,7 +27,7 @@ pub(super) struct Rests {
 
 impl Rests {
     /// Adds the interval that ends at `end_s`, where the estimated speed is `speed_m_per_s`.
-    pub(super) fn take(&mut self, interval: &Interval, biases: &Biases, (end_s, speed_m_per_s): (f64, f64)) {
+    pub(super) fn take(&mut self, interval: &Interval, biases: &Biases, end_s: f64, speed_m_per_s: f64) {
         self.missing_s = if interval.bridged { self.missing_s + interval.h } else { 0.0 };
         if interval.bridged && self.missing_s < MAX_MISSING_S {
             return;
@@ -89,7 +89,7 @@ mod tests {
         for k in 1..=400 {
             let end_s = f64::from(k) * 0.01;
             let rate = if (1.0..3.0).contains(&(end_s - 0.005)) { 0.002 } else { 0.5 };
-            rests.take(&interval(rate), &biases, (end_s, speed));
+            rests.take(&interval(rate), &biases, end_s, speed);
         }
         rests
     }
@@ -110,7 +110,7 @@ mod tests {
             let mut rests = Rests::default();
             for k in 1..=400 {
                 let interval = Interval { bridged: is_lost(k), ..interval(0.002) };
-                rests.take(&interval, &biases, (k as f64 * 0.01, 0.01));
+                rests.take(&interval, &biases, k as f64 * 0.01, 0.01);
             }
             rests
         };
