@@ -152,7 +152,7 @@ mod tests {
     }
 
     /// Solves a window with a direct measurement of the border and returns the values after it.
-    fn solved(border: &mut Border, values: Values, (measured, information): (&Values, &Information)) -> Values {
+    fn solved(border: &mut Border, values: Values, measured: &Values, information: &Information) -> Values {
         let mut equations = NormalEquations::new(LAYOUT.size());
         border.start_window();
         border.add_to(&mut equations, &LAYOUT);
@@ -169,9 +169,9 @@ mod tests {
         let (prior, by) = (wave(1), wave(2));
         let measured = Values::from_fn(|k, _| 0.1 * (k as f64 + 1.0));
         let mut border = known(prior);
-        let once = solved(&mut border, Values::zeros(), (&measured, &by));
+        let once = solved(&mut border, Values::zeros(), &measured, &by);
         assert_relative_eq!(once, (prior + by).lu().solve(&(by * measured)).unwrap(), epsilon = 1e-9);
-        assert_relative_eq!(solved(&mut border, once, (&measured, &by)), once, epsilon = 1e-9);
+        assert_relative_eq!(solved(&mut border, once, &measured, &by), once, epsilon = 1e-9);
     }
 
     /// Compares with a measurement that has only the information carried over.
@@ -180,12 +180,12 @@ mod tests {
         let (prior, by) = (wave(1), wave(2));
         let measured = Values::from_fn(|k, _| 0.1 * (k as f64 + 1.0));
         let mut border = known(prior);
-        let values = solved(&mut border, Values::zeros(), (&measured, &by));
+        let values = solved(&mut border, Values::zeros(), &measured, &by);
         border.carry_over(0.25, 0.5);
         let carried_over = by * (0.25 * INDEPENDENT_FRACTION);
         let mean = (prior + carried_over).lu().solve(&(carried_over * measured)).unwrap();
-        let nothing = (&Values::zeros(), &Information::zeros());
-        assert_relative_eq!(solved(&mut border, values, nothing), mean, epsilon = 1e-6);
+        let after = solved(&mut border, values, &Values::zeros(), &Information::zeros());
+        assert_relative_eq!(after, mean, epsilon = 1e-6);
         // Only the random walk of gravity reduces it.
         assert_relative_eq!(border.prior, prior + carried_over, epsilon = 1e-6, max_relative = 1e-6);
     }
@@ -194,13 +194,13 @@ mod tests {
     fn a_rejected_solution_does_not_change_the_prior() {
         let (prior, measured) = (wave(1), Values::repeat(0.1));
         let mut border = known(prior);
-        let values = solved(&mut border, Values::zeros(), (&measured, &wave(2)));
-        solved(&mut border, values, (&Values::repeat(7.0), &wave(3)));
+        let values = solved(&mut border, Values::zeros(), &measured, &wave(2));
+        solved(&mut border, values, &Values::repeat(7.0), &wave(3));
         border.reset_to_window_start();
         border.carry_over(0.25, 0.0);
         assert_relative_eq!(border.prior, prior, max_relative = 1e-6);
-        let nothing = (&Values::zeros(), &Information::zeros());
-        assert_relative_eq!(solved(&mut border, values, nothing), Values::zeros(), epsilon = 1e-6);
+        let after = solved(&mut border, values, &Values::zeros(), &Information::zeros());
+        assert_relative_eq!(after, Values::zeros(), epsilon = 1e-6);
     }
 
     #[test]
@@ -208,11 +208,11 @@ mod tests {
         let (prior, measured) = (wave(1), Values::from_fn(|k, _| 0.1 * k as f64));
         let shifted = |later_s: f64| {
             let mut border = known(prior);
-            let mut values = solved(&mut border, Values::zeros(), (&measured, &wave(2)));
+            let mut values = solved(&mut border, Values::zeros(), &measured, &wave(2));
             border.carry_over(0.5, 0.0);
             border.shift_clock_reference(later_s);
             values[CLOCK] += values[CLOCK_RATE] * later_s;
-            solved(&mut border, values, (&Values::zeros(), &Information::zeros()))
+            solved(&mut border, values, &Values::zeros(), &Information::zeros())
         };
         let (before, after) = (shifted(0.0), shifted(3.0));
         assert_relative_eq!(after[CLOCK], before[CLOCK] + 3.0 * before[CLOCK_RATE], epsilon = 1e-6);

@@ -38,11 +38,12 @@ impl SummedResidual {
 pub(in crate::estimation) fn contradiction(
     states: &[State],
     intervals: &[Interval],
-    (biases, gravity): (&Biases, &Vector),
+    biases: &Biases,
+    gravity: &Vector,
 ) -> f64 {
     let (mut sum, mut times) = (SummedResidual::default(), [Vec::new(), Vec::new()]);
     for (ends, interval) in states.windows(2).zip(intervals) {
-        sum.add(&Inertial::between((&ends[0], &ends[1]), interval, biases, gravity), interval);
+        sum.add(&Inertial::between(&ends[0], &ends[1], interval, biases, gravity), interval);
         if sum.duration_s >= SUM_INTERVAL_S {
             let multiples = std::mem::take(&mut sum).multiples();
             times.iter_mut().zip(multiples).for_each(|(all, one)| all.push(one));
@@ -91,7 +92,7 @@ mod tests {
     fn white_noise_gives_the_median_of_its_norm_and_a_flipped_sign_a_large_value() {
         let (biases, gravity) = (Biases { gyro: Vector::zeros(), accel: Vector::zeros() }, gravity_in_world());
         let (states, mut intervals) = run(&biases, &gravity);
-        let multiples = |intervals: &[Interval]| contradiction(&states, intervals, (&biases, &gravity));
+        let multiples = |intervals: &[Interval]| contradiction(&states, intervals, &biases, &gravity);
         assert!(multiples(&intervals) < 1e-6);
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut noise = |sigma: f64| Vector::from_fn(|_, _| sigma * random.sample::<f64, _>(StandardNormal));

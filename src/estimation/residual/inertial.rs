@@ -59,7 +59,7 @@ pub(super) struct Inertial {
 
 impl Inertial {
     /// The residuals between the states at an interval's ends.
-    pub fn between((a, b): (&State, &State), interval: &Interval, biases: &Biases, gravity: &Vector) -> Self {
+    pub fn between(a: &State, b: &State, interval: &Interval, biases: &Biases, gravity: &Vector) -> Self {
         let turn = a.rotation.inverse() * b.rotation;
         let measured = Rotation::from_scaled_axis(interval.turn(biases));
         let middle = a.rotation * Rotation::from_scaled_axis(turn.scaled_axis() * 0.5);
@@ -75,7 +75,16 @@ impl Inertial {
     }
 }
 
-/// Adds the residuals of `intervals` between `states` to the equations, with the spline bases at the states.
+/// The nodes of the trajectory that a window corrects, and the IMU intervals between them.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::estimation) struct Nodes<'a> {
+    pub(in crate::estimation) states: &'a [State],
+    /// The spline basis at each state.
+    pub(in crate::estimation) bases: &'a [Basis],
+    pub(in crate::estimation) intervals: &'a [Interval],
+}
+
+/// Adds the residuals of the intervals between `nodes` to the equations.
 ///
 /// If the head rocks, a change of the accelerometer bias becomes a changing acceleration in the map. The second
 /// derivative of the correction is linear between knots, so it follows this acceleration on average over a knot spacing
@@ -86,19 +95,20 @@ impl Inertial {
 pub(in crate::estimation) fn add_inertial(
     equations: &mut NormalEquations,
     layout: &Layout,
-    (states, bases): (&[State], &[Basis]),
-    intervals: &[Interval],
-    (biases, gravity): (&Biases, &Vector),
+    nodes: &Nodes<'_>,
+    biases: &Biases,
+    gravity: &Vector,
 ) {
+    let Nodes { states, bases, intervals } = *nodes;
     let (mut each, mut whole) = (ResidualSums::none(), ResidualSums::none());
     let mut sum: Option<AccelResidual> = None;
     let near_steps = near_steps(intervals);
     for (k, interval) in intervals.iter().enumerate() {
         let interval = &if near_steps[k] { with_step_margin(interval) } else { *interval };
-        let terms = Inertial::between((&states[k], &states[k + 1]), interval, biases, gravity);
-        let bases = (&bases[k], &bases[k + 1]);
-        GyroResidual::of(&terms, bases, interval).add_to(&mut each, equations, layout);
-        let single = AccelResidual::of(&terms, bases, interval, gravity);
+        let terms = Inertial::between(&states[k], &states[k + 1], interval, biases, gravity);
+        let (start, end) = (&bases[k], &bases[k + 1]);
+        GyroResidual::of(&terms, start, end, interval).add_to(&mut each, equations, layout);
+        let single = AccelResidual::of(&terms, start, end, interval, gravity);
         single.add_to(SINGLE_SAMPLE_FACTOR, &mut each, equations, layout);
         if let Some(sum) = sum.as_mut().filter(|sum| sum.can_be_summed_with(&single)) {
             sum.append(&single);
@@ -166,10 +176,10 @@ struct ResidualSum {
 }
 
 impl ResidualSum {
-    /// The sum of a mean residual over an interval, between the bases at both ends.
-    fn over(deviation: &Vector, sigma: f64, h: f64, ends: (&Basis, &Basis)) -> Self {
-        let used = 4 + offset(ends.1.first, ends.0.first);
-        Self { first: ends.0.first, used, deviation: deviation * h, variance: (sigma * h).powi(2) }
+    /// The sum of a mean residual over an interval, between the bases `a` and `b` at the ends.
+    fn over(deviation: &Vector, sigma: f64, h: f64, a: &Basis, b: &Basis) -> Self {
+        let used = 4 + offset(b.first, a.first);
+        Self { first: a.first, used, deviation: deviation * h, variance: (sigma * h).powi(2) }
     }
 }
 
@@ -188,9 +198,9 @@ struct GyroResidual {
 }
 
 impl GyroResidual {
-    fn of(terms: &Inertial, (a, b): (&Basis, &Basis), interval: &Interval) -> Self {
+    fn of(terms: &Inertial, a: &Basis, b: &Basis, interval: &Interval) -> Self {
         let h = interval.h;
-        let sum = ResidualSum::over(&(terms.map_from_end * terms.rate), interval.gyro_sigma, h, (a, b));
+        let sum = ResidualSum::over(&(terms.map_from_end * terms.rate), interval.gyro_sigma, h, a, b);
         let mut by_turn = [0.0; KNOTS];
         for (basis, sign) in [(a, -1.0), (b, 1.0)] {
             for (sum, value) in by_turn[offset(basis.first, a.first)..].iter_mut().zip(basis.value) {
@@ -215,7 +225,7 @@ impl GyroResidual {
             for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
                 *row.border(GYRO_MATRIX + 3 * i + j) = self.by_gyro[1 + j][(axis, i)];
             }
-            rows.add(&row, (deviation[axis], variance.recip()), equations, layout);
+            rows.add(&row, deviation[axis], variance.recip(), equations, layout);
         }
     }
 }
@@ -234,7 +244,7 @@ struct AccelResidual {
 }
 
 impl AccelResidual {
-    fn of(terms: &Inertial, (a, b): (&Basis, &Basis), interval: &Interval, gravity: &Vector) -> Self {
+    fn of(terms: &Inertial, a: &Basis, b: &Basis, interval: &Interval, gravity: &Vector) -> Self {
         let (h, f) = (interval.h, &interval.accel);
         let by_middle = skew(&terms.acceleration) * (0.5 * h);
         let (mut by_shift, mut by_turn) = ([0.0; KNOTS], [Matrix::zeros(); KNOTS]);
@@ -248,7 +258,7 @@ impl AccelResidual {
         Self {
             span: span_of(a),
             sigma: interval.accel_sigma,
-            sum: ResidualSum::over(&(terms.map_from_middle * terms.force), interval.accel_sigma, h, (a, b)),
+            sum: ResidualSum::over(&(terms.map_from_middle * terms.force), interval.accel_sigma, h, a, b),
             by_shift,
             by_turn,
             by_accel: [1.0, f.x, f.y, f.z].map(|reading| terms.map_from_middle * (h * reading)),
@@ -298,7 +308,7 @@ impl AccelResidual {
             for i in 0..2 {
                 *row.border(GRAVITY + i) = self.by_tilt[(axis, i)];
             }
-            rows.add(&row, (deviation[axis], weight), equations, layout);
+            rows.add(&row, deviation[axis], weight, equations, layout);
         }
     }
 }
@@ -334,8 +344,8 @@ mod tests {
 
         fn equations(&self, layout: &Layout) -> NormalEquations {
             let mut equations = NormalEquations::new(layout.size());
-            let (bases, known) = (self.bases(), (&self.biases, &self.gravity));
-            add_inertial(&mut equations, layout, (&self.states, &bases), &self.intervals, known);
+            let nodes = Nodes { states: &self.states, bases: &self.bases(), intervals: &self.intervals };
+            add_inertial(&mut equations, layout, &nodes, &self.biases, &self.gravity);
             equations
         }
 
@@ -344,7 +354,7 @@ mod tests {
             let (mut whole, mut variance) = (Vector::zeros(), 0.0);
             let mut each = Vec::new();
             for (states, interval) in self.states.windows(2).zip(&self.intervals) {
-                let terms = Inertial::between((&states[0], &states[1]), interval, &self.biases, &self.gravity);
+                let terms = Inertial::between(&states[0], &states[1], interval, &self.biases, &self.gravity);
                 let speed = terms.map_from_middle * terms.force;
                 whole += speed * interval.h;
                 variance += (interval.accel_sigma * interval.h).powi(2);
@@ -469,7 +479,8 @@ mod tests {
         Start::continuing(0.013).add_to(
             &mut equations,
             &layout,
-            (&vec![0.0; layout.border()], &SVector::zeros()),
+            &vec![0.0; layout.border()],
+            &SVector::zeros(),
             SPACING_S,
         );
         (0..layout.size()).for_each(|unknown| equations.add_entry(unknown, unknown, 1e-3));

@@ -109,7 +109,8 @@ impl<const B: usize> SurfelJacobian<B> {
 pub(in crate::estimation) fn add_scaled_row(
     columns: &mut [Vec<f64>; 6],
     layout: &Layout,
-    (surfel, normal): (&PlacedSurfel, &Vector),
+    surfel: &PlacedSurfel,
+    normal: &Vector,
     scales: &[f64; 6],
     clock_reference_s: f64,
 ) {
@@ -203,8 +204,8 @@ mod tests {
         if let Some((b, other)) = other {
             let (early, late) = if a.tau_s < b.tau_s { ((a, &one), (b, &other)) } else { ((b, &other), (a, &one)) };
             let mut coupling = Coupling::NONE;
-            coupling.add(early, late, 3.0);
-            coupling.add_to(&mut equations, &layout, (early.0.basis.first, late.0.basis.first));
+            coupling.add(early.0, early.1, late.0, late.1, 3.0);
+            coupling.add_to(&mut equations, &layout, early.0.basis.first, late.0.basis.first);
         }
         assert_relative_eq!(equations.dense(), jacobian.transpose() * &jacobian * 3.0, epsilon = 1e-7);
         let right = jacobian.transpose() * (-3.0 * distance(&DVector::zeros(layout.size())));

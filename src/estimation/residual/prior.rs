@@ -46,7 +46,8 @@ impl Start {
         &self,
         equations: &mut NormalEquations,
         layout: &Layout,
-        (total, moved): (&[f64], &SVector<f64, BORDER>),
+        total: &[f64],
+        moved: &SVector<f64, BORDER>,
         knot_spacing_s: f64,
     ) {
         let basis = Basis::at(self.u_s, knot_spacing_s);
@@ -86,7 +87,8 @@ impl Start {
     pub(in crate::estimation) fn right_hand_side(
         &self,
         layout: &Layout,
-        (value, rate): (&[f64; 6], &[f64; 6]),
+        value: &[f64; 6],
+        rate: &[f64; 6],
         knot_spacing_s: f64,
     ) -> Vec<f64> {
         let basis = Basis::at(self.u_s, knot_spacing_s);
@@ -115,7 +117,7 @@ pub(in crate::estimation) fn add_zero_velocity(
     velocity: &Vector,
     sigma: f64,
 ) {
-    add_zero_derivative(equations, (layout, 3), basis, velocity, sigma);
+    add_zero_derivative(equations, layout, 3, basis, velocity, sigma);
 }
 
 /// Adds a zero-rate measurement at a node with rate `rate` (rad/s, in the map): `w + dr' = 0`, to `sigma`.
@@ -126,13 +128,14 @@ pub(in crate::estimation) fn add_zero_rotation_rate(
     rate: &Vector,
     sigma: f64,
 ) {
-    add_zero_derivative(equations, (layout, 0), basis, rate, sigma);
+    add_zero_derivative(equations, layout, 0, basis, rate, sigma);
 }
 
 /// Adds a measurement that `rate` plus the derivative of the correction is zero, from axis `of` of the correction on.
 fn add_zero_derivative(
     equations: &mut NormalEquations,
-    (layout, of): (&Layout, usize),
+    layout: &Layout,
+    of: usize,
     basis: &Basis,
     rate: &Vector,
     sigma: f64,
@@ -208,7 +211,7 @@ mod tests {
             jacobian.set_column(unknown, &(whitened(&step) - &residual));
         }
         let mut equations = NormalEquations::new(layout.size());
-        start.add_to(&mut equations, &layout, (total.as_slice(), &moved), SPACING_S);
+        start.add_to(&mut equations, &layout, total.as_slice(), &moved, SPACING_S);
         let square = jacobian.transpose() * &jacobian;
         assert_relative_eq!(equations.dense(), square, epsilon = 1e-9 * square.amax());
         let right = jacobian.transpose() * -residual;
@@ -221,7 +224,7 @@ mod tests {
             _ => 0.0,
         };
         let target = jacobian.transpose() * DVector::from_fn(18, |k, _| whitened(k / 6, k % 6));
-        let right = DVector::from_vec(start.right_hand_side(&layout, (&value, &rate), SPACING_S));
+        let right = DVector::from_vec(start.right_hand_side(&layout, &value, &rate, SPACING_S));
         assert_relative_eq!(right, target, epsilon = 1e-9 * target.amax());
     }
 }

@@ -58,7 +58,8 @@ impl ResidualSums {
     pub(super) fn add(
         &mut self,
         row: &ResidualRow,
-        (residual, weight): (f64, f64),
+        residual: f64,
+        weight: f64,
         equations: &mut NormalEquations,
         layout: &Layout,
     ) {

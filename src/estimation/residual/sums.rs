@@ -128,8 +128,10 @@ impl Coupling {
     #[inline(always)]
     pub(in crate::estimation) fn add<const B: usize>(
         &mut self,
-        (early, early_side): (&PlacedSurfel, &SurfelJacobian<B>),
-        (late, late_side): (&PlacedSurfel, &SurfelJacobian<B>),
+        early: &PlacedSurfel,
+        early_side: &SurfelJacobian<B>,
+        late: &PlacedSurfel,
+        late_side: &SurfelJacobian<B>,
         weight: f64,
     ) {
         let row = over_knots(&early_side.own, &early.basis);
@@ -143,7 +145,8 @@ impl Coupling {
         &self,
         equations: &mut NormalEquations,
         layout: &Layout,
-        (early, late): (i64, i64),
+        early: i64,
+        late: i64,
     ) {
         let (first_column, first_row) = (layout.knot(early), layout.knot(late));
         for (row, sums) in self.0.iter().enumerate().map(|(k, sums)| (first_row + k, sums)) {

@@ -50,11 +50,12 @@ impl SurfelBuilder {
         biases: &Biases,
     ) -> Vec<Surfel> {
         let Some(first) = returns.first() else { return Vec::new() };
-        let origin = nominal.at(clock.imu_s(first.tau_s), &biases.gyro).position;
+        let motion_at = |tau_s: f64| nominal.at(clock.imu_s(tau_s), &biases.gyro);
+        let origin = motion_at(first.tau_s).position;
         let edge = self.spec.finest_voxel_m;
         let mut regular = Fragments::new(origin, edge, 0.0);
         let mut offset = Fragments::new(origin, edge, 0.5 * edge);
-        self.project(returns, nominal, (clock, biases), |beam, point| {
+        self.project(returns, nominal, clock, biases, |beam, point| {
             let range = f64::from(beam.range_m);
             let noise2 = self.noise.sigma_m(range).powi(2);
             regular.add(&point, beam.tau_s, noise2);
@@ -75,7 +76,7 @@ impl SurfelBuilder {
         }
         let surfels_of = |(fragments, level, shift): &(&[Fragment], usize, i32)| -> Vec<SurfelThickness> {
             let cells = merge_by_cell(fragments, *level, *shift, &self.spec);
-            cells.iter().filter_map(|cell| self.fit_surfel(cell, *level, &origin, (nominal, clock, biases))).collect()
+            cells.iter().filter_map(|cell| self.fit_surfel(cell, *level, &origin, motion_at)).collect()
         };
         let shaped: Vec<Vec<SurfelThickness>> = grids.par_iter().map(surfels_of).collect();
         flatness::add_roughness_variance(shaped.concat(), &self.spec)
@@ -86,10 +87,10 @@ impl SurfelBuilder {
         &self,
         returns: &[TimedReturn],
         nominal: &Nominal,
-        state: (&Clock, &Biases),
+        clock: &Clock,
+        biases: &Biases,
         mut with: impl FnMut(&TimedReturn, Vector),
     ) {
-        let (clock, biases) = state;
         let mut cursor = 0;
         let mut pose = |tau_s: f64| nominal.at_cursor(&mut cursor, clock.imu_s(tau_s), &biases.gyro);
         let mut start_s = f64::NEG_INFINITY;
@@ -115,15 +116,14 @@ impl SurfelBuilder {
 
     /// Fits a surfel to a cell's points; `None` if they are not planar, too thick, or badly observed.
     ///
-    /// The scan plane must sweep across the surface fast enough, and the angle of incidence must be small enough.
+    /// `motion_at` is the motion of the IMU at a lidar time, s. The scan plane must sweep across the surface fast enough, and the angle of incidence must be small enough.
     fn fit_surfel(
         &self,
         moments: &Moments,
         level: usize,
         origin: &Vector,
-        state: (&Nominal, &Clock, &Biases),
+        motion_at: impl Fn(f64) -> Motion,
     ) -> Option<SurfelThickness> {
-        let (nominal, clock, biases) = state;
         let covariance = moments.covariance();
         let eigen = covariance.symmetric_eigen();
         let mut order = [0, 1, 2];
@@ -135,7 +135,7 @@ impl SurfelBuilder {
             return None;
         }
         let tau_s = moments.mean_time_s();
-        let motion = nominal.at(clock.imu_s(tau_s), &biases.gyro);
+        let motion = motion_at(tau_s);
         let imu_from_map = motion.rotation.transpose();
         let centre_in_imu = imu_from_map * (moments.mean() + origin - motion.position);
         let corrected = centre_in_imu - self.laser_in_imu - self.lidar.translation;
@@ -279,7 +279,7 @@ mod tests {
     }
 
     /// Absolute vertical components of the surfels' normals.
-    fn normal_heights((nominal, returns): (Nominal, Vec<TimedReturn>), max_incidence_deg: f64) -> Vec<f64> {
+    fn normal_heights(nominal: &Nominal, returns: &[TimedReturn], max_incidence_deg: f64) -> Vec<f64> {
         let shipped = spec::load("default").unwrap().surfels;
         let builder = SurfelBuilder {
             spec: SurfelSpec { max_incidence_deg, ..shipped },
@@ -290,19 +290,21 @@ mod tests {
         };
         let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0 };
         let still = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
-        builder.build(&returns, &nominal, &clock, &still).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
+        builder.build(returns, nominal, &clock, &still).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
     }
 
     #[test]
     fn slice_of_a_corner_is_rejected_and_its_walls_are_accepted() {
         let shipped_deg = spec::load("default").unwrap().surfels.max_incidence_deg;
-        let slices = normal_heights(scans_of_a_corner(0.3, 4), 90.0);
+        let (nominal, slow) = scans_of_a_corner(0.3, 4);
+        let slices = normal_heights(&nominal, &slow, 90.0);
         assert!(
             slices.iter().any(|z| *z > 0.9),
             "without the incidence gate a slice must be accepted, or this test is void"
         );
-        assert_eq!(normal_heights(scans_of_a_corner(0.3, 4), shipped_deg), [0.0; 0]);
-        let walls = normal_heights(scans_of_a_corner(0.8, 8), shipped_deg);
+        assert_eq!(normal_heights(&nominal, &slow, shipped_deg), [0.0; 0]);
+        let (nominal, fast) = scans_of_a_corner(0.8, 8);
+        let walls = normal_heights(&nominal, &fast, shipped_deg);
         assert!(walls.len() > 10 && walls.iter().all(|z| *z < 0.3), "{walls:?}");
     }
 }

@@ -1,13 +1,12 @@
 //! Assembly and solution of the window's normal equations.
 
 use super::Window;
-use super::correspondence::Matches;
-use super::equations::{Displacement, Robust, WeightedMatches, Workspace};
+use super::equations::{Displacement, WeightedMatches, Workspace};
+use super::linearised::Linearised;
 use crate::estimation::nominal::Correction;
-use crate::estimation::residual::inertial::add_inertial;
+use crate::estimation::residual::inertial::{Nodes, add_inertial};
 use crate::estimation::residual::{Layout, prior};
 use crate::estimation::spline::Basis;
-use crate::estimation::surfel::PlacedSurfel;
 use crate::estimation::timing::{Stopwatch, Timing};
 
 /// Standard deviation of the zero-velocity measurement at rest, m/s.
@@ -27,16 +26,18 @@ impl Window {
         Layout { first_knot, knots: (last_knot - first_knot + 1) as usize }
     }
 
-    /// Solves the linearised window and returns the solution with the displacement; adds the run time to `timing`.
+    /// Solves the window linearised `at` the current states, whose corrections so far sum up to `total`.
+    ///
+    /// Returns the solution with the displacement; adds the run time to `timing`.
     pub(super) fn solve_linearised(
         &mut self,
-        (first, total): (usize, &[f64]),
-        scene: &[PlacedSurfel],
-        (matches, robust): (&Matches, &Robust),
-        layout: &Layout,
+        first: usize,
+        total: &[f64],
+        at: &Linearised,
         timing: &mut Timing,
     ) -> Option<(Vec<f64>, Displacement)> {
         let mut watch = Stopwatch::start();
+        let Linearised { layout, scene, matches, robust } = at;
         self.assemble_inertial(first, layout, total);
         let weighted = WeightedMatches { scene, matches, robust, clock_reference_s: self.clock.at_s };
         weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
@@ -57,9 +58,9 @@ impl Window {
         let Workspace { equations, bases, .. } = &mut self.workspace;
         equations.reset(layout.size());
         let states = self.nominal.states();
-        let known = (&self.biases, &self.gravity);
-        add_inertial(equations, layout, (&states[first..], bases), &self.nominal.intervals()[first..], known);
-        self.start.add_to(equations, layout, (total, self.border.total_step()), self.spec.knot_spacing_s);
+        let nodes = Nodes { states: &states[first..], bases, intervals: &self.nominal.intervals()[first..] };
+        add_inertial(equations, layout, &nodes, &self.biases, &self.gravity);
+        self.start.add_to(equations, layout, total, self.border.total_step(), self.spec.knot_spacing_s);
         self.border.add_to(equations, layout);
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);
         for ((_, state), basis) in nodes.zip(&*bases).take_while(|((time, _), _)| **time < self.rested_until_s) {

@@ -161,7 +161,7 @@ impl Neighbours {
 
 impl CachedNeighbours {
     /// Updates the neighbours of `patch` in the `chosen` views; views searched from about this position stay cached.
-    pub fn update(&mut self, patch: &Patch, (views, chosen): (&Views, &[usize]), matcher: &Matcher, count: usize) {
+    pub fn update(&mut self, patch: &Patch, views: &Views, chosen: &[usize], matcher: &Matcher, count: usize) {
         let is_chosen = |number: u64| chosen.iter().any(|index| views.view(*index).number == number);
         let moved = (patch.centre - self.centre).norm() > SEARCH_MOTION_M;
         self.found.retain(|(number, _)| !moved && is_chosen(*number));

@@ -103,7 +103,7 @@ impl WeightedMatches<'_> {
         let pairs = pairs.map(|(pair, matches)| (pair, Arch::new().dispatch(|| self.coupling::<B>(matches, weights))));
         let (spans, pairs): (Vec<_>, Vec<_>) = rayon::join(|| spans.collect(), || pairs.collect());
         spans.iter().for_each(|(span, sum)| sum.add_to(equations, layout, *span));
-        pairs.iter().for_each(|(pair, sum)| sum.add_to(equations, layout, *pair));
+        pairs.iter().for_each(|((early, late), sum)| sum.add_to(equations, layout, *early, *late));
     }
 
     /// The normal equations of all matches of the surfels of a span, by the motion of each surfel.
@@ -137,9 +137,12 @@ impl WeightedMatches<'_> {
             let one = &self.matches.all[k];
             let Some(other) = one.other() else { continue };
             let (a, b) = (&self.scene[one.a as usize], &self.scene[other]);
-            let (a, b) = ((a, &self.side::<B>(one, true)), (b, &self.side(one, false)));
-            let (early, late) = if a.0.basis.first <= b.0.basis.first { (a, b) } else { (b, a) };
-            sum.add(early, late, weights[k]);
+            let (a_side, b_side) = (self.side::<B>(one, true), self.side(one, false));
+            if a.basis.first <= b.basis.first {
+                sum.add(a, &a_side, b, &b_side, weights[k]);
+            } else {
+                sum.add(b, &b_side, a, &a_side, weights[k]);
+            }
         }
         sum
     }

@@ -185,7 +185,7 @@ impl Window {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let states = self.nominal.states().get(first..).unwrap_or_default();
         let intervals = self.nominal.intervals().get(first..).unwrap_or_default();
-        contradiction(states, intervals, (&self.biases, &self.gravity))
+        contradiction(states, intervals, &self.biases, &self.gravity)
     }
 
     /// The speed of the IMU at the end of the window, m/s.

@@ -89,18 +89,14 @@ impl Window {
     }
 
     /// Searches the neighbours in `scene` and in the `chosen` views.
-    pub(super) fn search_neighbours(
-        &mut self,
-        scene: &[PlacedSurfel],
-        (views, chosen): (&Views, &[usize]),
-    ) -> Neighbours {
+    pub(super) fn search_neighbours(&mut self, scene: &[PlacedSurfel], views: &Views, chosen: &[usize]) -> Neighbours {
         let patches: Vec<Patch> = scene.iter().map(|surfel| surfel.patch).collect();
         let pairs = self.matcher.neighbour_pairs(scene, &self.matcher.build_trees(&patches));
         let surfel_indices = self.surfel_indices();
         let mut cached: Vec<CachedNeighbours> =
             surfel_indices.iter().map(|(k, index)| std::mem::take(&mut self.segments[*k].cached[*index])).collect();
         let search = |(a, (patch, cached)): (usize, (&Patch, &mut CachedNeighbours))| {
-            cached.update(patch, (views, chosen), &self.matcher, self.spec.views.neighbours);
+            cached.update(patch, views, chosen, &self.matcher, self.spec.views.neighbours);
             let in_view = |index: &usize| {
                 let patches = cached.found_in(views.view(*index).number);
                 patches.iter().map(|patch| (a as u32, *index as u32, *patch)).collect::<Vec<_>>()

@@ -65,7 +65,7 @@ impl Window {
             let chosen = chosen.get_or_insert_with(|| views.select(&scene));
             solved.timing.views_s += watch.lap_s();
             if !neighbours.are_valid_for(&scene) {
-                neighbours = self.search_neighbours(&scene, (views, chosen));
+                neighbours = self.search_neighbours(&scene, views, chosen);
             }
             solved.timing.neighbours_s += watch.lap_s();
             let matches = self.match_up(&scene, views, &neighbours, iteration);
@@ -74,9 +74,8 @@ impl Window {
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
             let matches = self.significant(matches, &solved, &scene, views);
             solved.timing.matches_s += watch.lap_s();
-            let weighted = (&matches, &robust);
-            let timing = &mut solved.timing;
-            let Some((x, by)) = self.solve_linearised((first, &total), &scene, weighted, &layout, timing) else {
+            let at = Linearised { layout, scene, matches, robust };
+            let Some((x, by)) = self.solve_linearised(first, &total, &at, &mut solved.timing) else {
                 solved.failure = Some("the normal equations are singular");
                 break;
             };
@@ -86,12 +85,12 @@ impl Window {
                 break;
             }
             self.apply(&x, first, &layout, &mut total);
-            self.speed_is_known |= !matches.all.is_empty();
-            self.sees_rest |= !matches.all.is_empty();
+            self.speed_is_known |= !at.matches.all.is_empty();
+            self.sees_rest |= !at.matches.all.is_empty();
             neighbours.moved(by.translation_m + LEVER_ARM_M * by.rotation_rad);
             solved.timing.correction_s += watch.lap_s();
             solved.last_correction_m = by.max();
-            linearised = Some(Linearised { layout, scene, matches, robust });
+            linearised = Some(at);
             if solved.last_correction_m < self.spec.solve.settled_m {
                 break;
             }

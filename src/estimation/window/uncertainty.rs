@@ -104,7 +104,7 @@ impl Window {
         std::array::from_fn(|of| {
             let mut target = [[0.0; 6]; 2];
             target[of / 6][of % 6] = 1.0;
-            self.start.right_hand_side(layout, (&target[0], &target[1]), self.spec.knot_spacing_s)
+            self.start.right_hand_side(layout, &target[0], &target[1], self.spec.knot_spacing_s)
         })
     }
 
@@ -127,7 +127,8 @@ impl Window {
             matched::add_scaled_row(
                 &mut columns[index_in_columns].1,
                 &at.layout,
-                (surfel, &plane.normal),
+                surfel,
+                &plane.normal,
                 &by,
                 self.clock.at_s,
             );
