@@ -24,8 +24,7 @@ pub(super) struct MapLocalisation {
 impl MapLocalisation {
     /// Localisation in `map`, with a pending search near `map_from_head`.
     pub(super) fn new(map: &SurfelMap, map_from_head: Pose, spec: &EstimatorSpec) -> Self {
-        let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
-        let relocaliser = Relocaliser::new(map, (&spec.matching, &spec.surfels), certainty);
+        let relocaliser = Relocaliser::new(map, &spec.matching, &spec.surfels, &spec.solve);
         Self { relocaliser, covariance: map_covariance(map), about: Some(map_from_head), found: None }
     }
 
@@ -67,7 +66,7 @@ impl MapLocalisation {
         let shift = about.translation.vector - rotation * here_from_head.translation.vector;
         let start = Pose::from_parts(shift.into(), rotation);
         let (seen, from) = (window.patches(), window_start.translation.vector);
-        let mut located = self.relocaliser.find(&seen, (&from, &start), &MAP_LIMITS);
+        let mut located = self.relocaliser.find(&seen, &from, &start, &MAP_LIMITS);
         if let (None, Ok(found)) = (&self.found, &located)
             && let Some(better) = self.relocaliser.find_better_elsewhere(&seen, &from, found)
         {
@@ -116,11 +115,10 @@ impl GapRelocalisation {
     /// reason of the failure.
     pub(super) fn find(mut self, window: &Window, spec: &EstimatorSpec) -> Result<(Pose, LocalMap), String> {
         self.last.extend(self.local_map.views.patches());
-        let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
-        let relocaliser = Relocaliser::in_patches(self.last, (&spec.matching, &spec.surfels), certainty);
+        let relocaliser = Relocaliser::in_patches(self.last, &spec.matching, &spec.surfels, &spec.solve);
         let window_start = window.start_pose().translation.vector;
         let search = RelocalisationLimits::after_gap(window.start_s() - self.until_s, spec.solve.match_sigma_m);
-        let found = relocaliser.find(&window.patches(), (&window_start, &Pose::identity()), &search)?;
+        let found = relocaliser.find(&window.patches(), &window_start, &Pose::identity(), &search)?;
         let there = found.map_from_query.transform_point(&window_start.into()).coords;
         let known = window.known_at_start().unwrap_or_default();
         self.local_map.consider.relocalise(there, &known, &found.covariance);

@@ -46,8 +46,8 @@ pub(super) fn write_map(
     (estimator, within): (&EstimatorSpec, Option<&MapOptions>),
     folder: &Path,
 ) -> Result<(), StudyError> {
-    let trajectories = (best.observed_trajectory, best.map_from_head);
-    let from_run = map_of(&run.observed, trajectories, &run.covariances, &estimator.registration)?;
+    let (open_loop, corrected) = (best.observed_trajectory, best.map_from_head);
+    let from_run = map_of(&run.observed, open_loop, corrected, &run.covariances, &estimator.registration)?;
     let map = match within {
         Some(within) => merge_maps(&within.map, &from_run, &Pose::identity())?,
         None => from_run,

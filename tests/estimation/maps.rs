@@ -103,8 +103,8 @@ impl Mapped {
         let OpenLoop { trajectory, lidar, observed, .. } = &run;
         let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, observed };
         let closed = register(travelled, &session.calibration, &spec()).unwrap();
-        let both = (&run.trajectory, &closed.trajectory);
-        let map = map_of(&run.observed, both, &covariances, &spec().registration).unwrap();
+        let (open, closed_trajectory) = (&run.trajectory, &closed.trajectory);
+        let map = map_of(&run.observed, open, closed_trajectory, &covariances, &spec().registration).unwrap();
         let pairs = Pairs::associate(&closed.trajectory, &session.truth).unwrap();
         let world_from_map = pairs.world_from_map().unwrap();
         let rmse_m = Errors::after(&pairs, &world_from_map).position_rmse_m();
@@ -222,8 +222,8 @@ fn extended_and_merged_maps_are_as_accurate_as_their_parts() {
     // Extended: the second session adds surfels to the map of the first.
     let start = second.session.start_in(&first.world_from_map);
     let run = second.session.estimate(Some((&first.map, &start))).unwrap();
-    let of_run = (&run.trajectory, &run.trajectory);
-    let seen = map_of(&run.observed, of_run, &covariances(&run.poses), &spec().registration).unwrap();
+    let (open, covariances) = (&run.trajectory, covariances(&run.poses));
+    let seen = map_of(&run.observed, open, open, &covariances, &spec().registration).unwrap();
     let longer = merge_maps(&first.map, &seen, &Pose::identity()).unwrap();
     let longer_off = of(&longer, &first.world_from_map);
     println!("extended {longer_off} m");

@@ -27,7 +27,8 @@ use nalgebra::Matrix6;
 /// When no surfels were observed.
 pub fn map_of(
     observed: &ObservedSurfels,
-    (open_loop, best): (&Trajectory, &Trajectory),
+    open_loop: &Trajectory,
+    best: &Trajectory,
     covariances: &[(Stamp, PoseCovariance)],
     spec: &RegistrationSpec,
 ) -> Result<SurfelMap, EstimationError> {
@@ -60,10 +61,9 @@ pub fn locate_map(
     spec: &EstimatorSpec,
 ) -> Result<LocalisedPose, EstimationError> {
     let surfels = spec.registration.surfels(&spec.surfels);
-    let certainty = (spec.solve.match_sigma_m, spec.solve.covariance_inflation);
-    let relocaliser = Relocaliser::new(map, (&spec.matching, &surfels), certainty);
+    let relocaliser = Relocaliser::new(map, &spec.matching, &surfels, &spec.solve);
     let query: Vec<Patch> = other.surfels().iter().map(Patch::from_map_surfel).collect();
-    relocaliser.find(&query, (&Vector::zeros(), start), &MAP_LIMITS).map_err(EstimationError::NotInMap)
+    relocaliser.find(&query, &Vector::zeros(), start, &MAP_LIMITS).map_err(EstimationError::NotInMap)
 }
 
 /// Merges two maps in the frame of the first; `map_from_other` is the pose of the second in it.

@@ -10,7 +10,7 @@ use super::localised_pose::{LocalisedPose, apply_step, pose_distance};
 use crate::estimation::matching::{Matcher, SearchTrees};
 use crate::estimation::residual::matched::MIN_SIGNIFICANT_TILT;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::spec::{MatchingSpec, SurfelSpec};
+use crate::estimation::spec::{MatchingSpec, SolveSpec, SurfelSpec};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Matrix, Pose, Vector};
 use crate::surfel_map::SurfelMap;
@@ -51,7 +51,9 @@ pub(in crate::estimation) struct Relocaliser {
     matcher: Matcher,
     patches: Vec<Patch>,
     trees: SearchTrees,
+    /// Factor on the covariance.
     inflation: f64,
+    /// Standard deviation of a match in addition to surfel thickness, m.
     sigma_m: f64,
 }
 
@@ -81,24 +83,35 @@ struct Gate {
 
 impl Relocaliser {
     /// Relocaliser in `map`, for queries with the surfel settings `surfels`.
-    ///
-    /// `certainty`: standard deviation of a match in addition to surfel thickness, m; factor on the covariance.
-    pub(in crate::estimation) fn new(map: &SurfelMap, by: (&MatchingSpec, &SurfelSpec), certainty: (f64, f64)) -> Self {
-        Self::in_patches(map.surfels().iter().map(Patch::from_map_surfel).collect(), by, certainty)
+    pub(in crate::estimation) fn new(
+        map: &SurfelMap,
+        matching: &MatchingSpec,
+        surfels: &SurfelSpec,
+        solve: &SolveSpec,
+    ) -> Self {
+        let patches = map.surfels().iter().map(Patch::from_map_surfel).collect();
+        Self::in_patches(patches, matching, surfels, solve)
     }
 
     /// Relocaliser in `patches`, which are in one frame.
     pub(in crate::estimation) fn in_patches(
         patches: Vec<Patch>,
-        (matching, surfels): (&MatchingSpec, &SurfelSpec),
-        (sigma_m, inflation): (f64, f64),
+        matching: &MatchingSpec,
+        surfels: &SurfelSpec,
+        solve: &SolveSpec,
     ) -> Self {
         let trees = Matcher::new(matching, surfels).build_trees(&patches);
         let wide = MatchingSpec {
             max_normal_angle_deg: NORMAL_GATE_DEG.max(matching.max_normal_angle_deg),
             ..matching.clone()
         };
-        Self { matcher: Matcher::new(&wide, surfels), patches, trees, inflation, sigma_m }
+        Self {
+            matcher: Matcher::new(&wide, surfels),
+            patches,
+            trees,
+            inflation: solve.covariance_inflation,
+            sigma_m: solve.match_sigma_m,
+        }
     }
 
     /// The map's patches.
@@ -113,7 +126,8 @@ impl Relocaliser {
     pub(in crate::estimation) fn find(
         &self,
         query: &[Patch],
-        (from, map_from_query): (&Vector, &Pose),
+        from: &Vector,
+        map_from_query: &Pose,
         limits: &RelocalisationLimits,
     ) -> Result<LocalisedPose, String> {
         let patches_by_level = self.patches_by_level(query);
@@ -165,7 +179,7 @@ impl Relocaliser {
         for (level, query) in patches_by_level.iter().enumerate().rev().filter(|(_, query)| !query.is_empty()) {
             let refined = poses
                 .par_iter()
-                .filter_map(|(start, pose)| Some((*start, self.refine((level, query), from, start, pose)?)));
+                .filter_map(|(start, pose)| Some((*start, self.refine(level, query, from, start, pose)?)));
             poses = refined.collect();
             remove_duplicates(&mut poses, from);
         }
@@ -187,7 +201,7 @@ impl Relocaliser {
     /// Refines a pose with the patches of one resolution; roll and pitch are constrained to the values at `start`.
     ///
     /// `None` if the matches do not determine the pose.
-    fn refine(&self, (level, query): (usize, &[Patch]), from: &Vector, start: &Pose, pose: &Pose) -> Option<Pose> {
+    fn refine(&self, level: usize, query: &[Patch], from: &Vector, start: &Pose, pose: &Pose) -> Option<Pose> {
         let mut pose = *pose;
         let edge_m = self.matcher.finest_voxel_m * f64::from(1_u32 << level);
         for iteration in 0..ITERATIONS {

@@ -209,8 +209,8 @@ impl Deviation {
         let (shift, turn) = self.variances;
         for row in 0..6 {
             let weight = if row < 3 { 1.0 / turn } else { 1.0 / shift };
-            let by = (&self.by_first.row(row).transpose(), &self.by_second.row(row).transpose());
-            pair_term.add(by, self.e[row], weight);
+            let (by_first, by_second) = (self.by_first.row(row).transpose(), self.by_second.row(row).transpose());
+            pair_term.add(&by_first, &by_second, self.e[row], weight);
         }
         pair_term
     }

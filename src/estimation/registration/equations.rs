@@ -46,7 +46,7 @@ pub(super) struct SharedTerm {
 
 impl PairTerm {
     /// Adds a residual `e` with derivatives by both corrections.
-    pub(super) fn add(&mut self, (by_first, by_second): (&Vector6<f64>, &Vector6<f64>), e: f64, weight: f64) {
+    pub(super) fn add(&mut self, by_first: &Vector6<f64>, by_second: &Vector6<f64>, e: f64, weight: f64) {
         let scaled = by_first * weight;
         self.cross += scaled * by_second.transpose();
         self.first.add(by_first, e, weight);
@@ -252,7 +252,7 @@ mod tests {
             for m in 0..5 {
                 let (by_a, by_b, e, weight) = (wave(k + 9 * m), wave(k + 50 + m), 0.3 * m as f64 - 0.5, 2.0 + k as f64);
                 let by_shared = Shared::from_fn(|r, _| ((k * 5 + r * 3 + m) as f64 * 0.7).cos());
-                pair_term.add((&by_a, &by_b), e, weight);
+                pair_term.add(&by_a, &by_b, e, weight);
                 pair_term.first.add_shared(&by_a, &by_shared, weight);
                 pair_term.second.add_shared(&by_b, &by_shared, weight);
                 equations.shared_term.add(&by_shared, e, weight);

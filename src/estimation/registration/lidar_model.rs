@@ -34,7 +34,8 @@ impl LidarModel {
     /// Starts with the estimate of the open loop; the range bias is fixed if it is unobservable.
     pub(super) fn new(
         calibration: &Calibration,
-        (lidar, range_bias_is_fixed): (&LidarCorrection, bool),
+        lidar: &LidarCorrection,
+        range_bias_is_fixed: bool,
         spec: &EstimatorSpec,
     ) -> Self {
         let range_sigma_m = if range_bias_is_fixed { 0.0 } else { spec.surfels.range_offset_sigma_m };
@@ -101,7 +102,8 @@ pub(super) fn rotate_patch(patch: &mut Patch, turn: &Rotation) {
 pub(super) fn recalibrated(
     map_from_head: &Trajectory,
     observed: &ObservedSurfels,
-    (calibration, lidar): (&Calibration, &LidarCorrection),
+    calibration: &Calibration,
+    lidar: &LidarCorrection,
 ) -> Result<Trajectory, TrajectoryError> {
     let laser_from_head = calibration.head_from_corrected_laser(lidar).inverse();
     let recalibrate = |(stamp, pose): (_, &Pose)| {
@@ -145,7 +147,7 @@ mod tests {
     fn model(lidar: LidarCorrection) -> LidarModel {
         let mut spec = load("default").unwrap();
         spec.extrinsics.estimated = true;
-        LidarModel::new(&calibration(), (&lidar, false), &spec)
+        LidarModel::new(&calibration(), &lidar, false, &spec)
     }
 
     fn map_from_head() -> Pose {
@@ -208,7 +210,7 @@ mod tests {
         });
         let open = Trajectory::from_poses(poses).unwrap();
         let calibration = calibration();
-        let anew = recalibrated(&open, &observed, (&calibration, &late)).unwrap();
+        let anew = recalibrated(&open, &observed, &calibration, &late).unwrap();
         for ((at, before), after) in open.iter().zip(anew.poses()) {
             let known_then = if at <= stamp(0) + Span::from_seconds(0.75) { early } else { late };
             let was = before * calibration.head_from_corrected_laser(&known_then);

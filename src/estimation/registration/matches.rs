@@ -35,7 +35,7 @@ pub(super) struct MatchStatistics {
 }
 
 impl MatchStatistics {
-    fn count(&mut self, plane: &Plane, weight: f64, (weakest, is_revisit): (&Vector, bool)) {
+    fn count(&mut self, plane: &Plane, weight: f64, weakest: &Vector, is_revisit: bool) {
         self.matches += 1;
         self.weights += weight;
         self.squares += weight * plane.distance_m * plane.distance_m;
@@ -118,19 +118,19 @@ impl Matches<'_> {
                 continue;
             }
             let plane = Plane::of(a, b, self.spec.match_sigma_m);
-            let weight = self.weight(&plane, (i, j));
+            let weight = self.weight(&plane, i, j);
             let by = |arm: &Vector, normal: &Vector| {
                 let turn = arm.cross(normal);
                 Vector6::new(turn.x, turn.y, turn.z, normal.x, normal.y, normal.z)
             };
             let (by_a, by_b) = (by(&self.scene.arms[i], &plane.normal), -by(&self.scene.arms[j], &plane.normal));
             let by_shared = self.scene.rays[i].derivative(&plane.normal) - self.scene.rays[j].derivative(&plane.normal);
-            sum.pair_term.add((&by_a, &by_b), plane.distance_m, weight);
+            sum.pair_term.add(&by_a, &by_b, plane.distance_m, weight);
             sum.pair_term.first.add_shared(&by_a, &by_shared, weight);
             sum.pair_term.second.add_shared(&by_b, &by_shared, weight);
             sum.shared_term.add(&by_shared, plane.distance_m, weight);
-            let is_revisit = self.scene.time_difference_s((i, j)) > self.spec.again_after_s;
-            sum.statistics.count(&plane, weight, (&self.weakest, is_revisit));
+            let is_revisit = self.scene.time_difference_s(i, j) > self.spec.again_after_s;
+            sum.statistics.count(&plane, weight, &self.weakest, is_revisit);
         }
         sum
     }
@@ -138,7 +138,7 @@ impl Matches<'_> {
     /// Weight of a match with a Cauchy kernel.
     ///
     /// The error of a surfel is common to all matches of the surfel; together they have the weight of one match.
-    fn weight(&self, plane: &Plane, (i, j): (usize, usize)) -> f64 {
+    fn weight(&self, plane: &Plane, i: usize, j: usize) -> f64 {
         let weight_share = |k: usize| 1.0 / f64::from(self.neighbours.counts[k].max(1));
         let normalised2 = plane.distance_m * plane.distance_m / plane.variance;
         let robust = 1.0 / (1.0 + normalised2 / (self.spec.cauchy * self.spec.cauchy));

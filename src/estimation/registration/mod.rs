@@ -150,12 +150,12 @@ fn register_without_gaps(
     let registration = &spec.registration;
     let matcher = Matcher::new(&registration.matching(&spec.matching), &registration.surfels(&spec.surfels));
     let RegistrationInput { map_from_head, lidar, observed, .. } = input;
-    let recalibrate = || lidar_model::recalibrated(map_from_head, observed, (calibration, lidar));
+    let recalibrate = || lidar_model::recalibrated(map_from_head, observed, calibration, lidar);
     let recalibrated = spec.extrinsics.estimated.then(recalibrate).transpose()?;
     let map_from_head = recalibrated.as_ref().unwrap_or(map_from_head);
     let problem =
         Problem { input: RegistrationInput { map_from_head, ..input }, spec: registration, matcher: &matcher };
-    let closed = match problem.solve(LidarModel::new(calibration, (lidar, observed.range_bias_is_fixed), spec)) {
+    let closed = match problem.solve(LidarModel::new(calibration, lidar, observed.range_bias_is_fixed, spec)) {
         Ok((Registered { trajectory, lidar_model }, report)) => {
             let report = RegistrationReport { moved: largest_difference(map_from_head, &trajectory), ..report };
             ClosedLoop { trajectory, lidar: lidar_model.lidar, open_loop_recalibrated: recalibrated, report }
@@ -192,12 +192,12 @@ impl Problem<'_> {
         let RegistrationInput { map_from_head, covariances, observed, .. } = self.input;
         let corrected = CorrectedTrajectory::new(map_from_head, covariances, observed.origin, self.spec);
         let corrected = corrected.ok_or_else(|| Box::new((empty, "no trajectory")))?;
-        let (loops, pre_aligned) = places::close_loops((map_from_head, observed), &corrected, self.matcher, self.spec);
+        let (loops, pre_aligned) = places::close_loops(map_from_head, observed, &corrected, self.matcher, self.spec);
         let report = RegistrationReport { loops, ..empty };
         if let Some(pre_aligned) = pre_aligned {
             return self.register_pre_aligned(pre_aligned, lidar_model, report);
         }
-        let ((corrected, lidar_model), report) = Registration::run(self, (corrected, lidar_model), observed, report)?;
+        let ((corrected, lidar_model), report) = Registration::run(self, corrected, lidar_model, observed, report)?;
         if report.conditioning < self.spec.weak_conditioning && report.revisited < self.spec.min_seen_again {
             return Err(Box::new((report, "too few revisited surfaces constrain the weakest direction")));
         }
@@ -221,7 +221,7 @@ impl Problem<'_> {
                 CorrectedTrajectory::new(&pre_aligned.trajectory, covariances, pre_aligned.observed.origin, self.spec);
             let corrected = corrected.ok_or_else(|| Box::new((report, "no trajectory")))?;
             let corrected = corrected.with_gravity_from(map_from_head, &pre_aligned.trajectory);
-            let registered = Registration::run(self, (corrected, lidar_model), &pre_aligned.observed, report)?;
+            let registered = Registration::run(self, corrected, lidar_model, &pre_aligned.observed, report)?;
             let ((corrected, found), updated_report) = registered;
             (lidar_model, report) = (found, updated_report);
             let next = trajectory_of(corrected, map_from_head.stamps(), report)?;
@@ -261,7 +261,8 @@ impl<'a> Registration<'a> {
     /// Registers the surfels `observed` along `corrected` by the lidar of `lidar_model`; returns the corrected two.
     fn run(
         problem: &Problem<'a>,
-        (corrected, lidar_model): (CorrectedTrajectory, LidarModel),
+        corrected: CorrectedTrajectory,
+        lidar_model: LidarModel,
         observed: &ObservedSurfels,
         report: RegistrationReport,
     ) -> RegistrationResult<(CorrectedTrajectory, LidarModel)> {

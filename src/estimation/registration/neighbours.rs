@@ -113,7 +113,7 @@ fn search_level(level: usize, scene: &Scene, matcher: &Matcher, count: usize) ->
         for (i, patch) in a.patches.iter().enumerate() {
             for j in matcher.neighbours(&b.trees, patch, count) {
                 let pair = (a.members[i], b.members[j as usize]);
-                let time_difference_s = scene.time_difference_s((pair.0 as usize, pair.1 as usize));
+                let time_difference_s = scene.time_difference_s(pair.0 as usize, pair.1 as usize);
                 if back[j as usize].contains(&(i as u32)) && time_difference_s >= matcher.spec.min_time_difference_s {
                     found.push(pair);
                 }

@@ -66,7 +66,7 @@ impl Scene {
     }
 
     /// Time of surfel `j` minus time of surfel `i`, s.
-    pub(super) fn time_difference_s(&self, (i, j): (usize, usize)) -> f64 {
+    pub(super) fn time_difference_s(&self, i: usize, j: usize) -> f64 {
         self.times_s[j] - self.times_s[i]
     }
 

@@ -92,14 +92,15 @@ fn distorted(distortion: impl Fn(f64) -> (Rotation, Vector)) -> Setup {
 
 /// The same with a range bias of `range_m`.
 fn distorted_with_bias(distortion: impl Fn(f64) -> (Rotation, Vector), range_m: f64) -> Setup {
-    simulated(distortion, range_m, (DURATION_S, 200.0), 1)
+    simulated(distortion, range_m, DURATION_S, 200.0, 1)
 }
 
 /// The same with the given duration and number of surfels per second, of three resolutions from `finest` on.
 fn simulated(
     distortion: impl Fn(f64) -> (Rotation, Vector),
     range_m: f64,
-    (duration_s, per_s): (f64, f64),
+    duration_s: f64,
+    per_s: f64,
     finest: usize,
 ) -> Setup {
     let stamp = |t_s: f64| Stamp::from_nanos((t_s * 1e9).round() as i64);
@@ -199,8 +200,8 @@ fn drift(t_s: f64, duration_s: f64) -> (Rotation, Vector) {
 
 #[test]
 fn drift_of_5_m_and_10_degrees_is_corrected_by_loop_closure() {
-    let length = (120.0, 400.0);
-    let setup = simulated(|t_s| drift(t_s, length.0), 0.0, length, 0);
+    let duration_s = 120.0;
+    let setup = simulated(|t_s| drift(t_s, duration_s), 0.0, duration_s, 400.0, 0);
     let recovered = setup.registered();
     let (before, after) =
         (rms_distance_m(&setup.open, &setup.truth).0, rms_distance_m(&recovered.trajectory, &setup.truth).0);
@@ -212,7 +213,7 @@ fn drift_of_5_m_and_10_degrees_is_corrected_by_loop_closure() {
 #[test]
 fn trajectory_without_drift_needs_no_loop_closure() {
     let straight = |_| (Rotation::identity(), Vector::zeros());
-    let closed = simulated(straight, 0.0, (60.0, 400.0), 0).registered();
+    let closed = simulated(straight, 0.0, 60.0, 400.0, 0).registered();
     assert_eq!((closed.report.loops.verified, closed.report.loops.closed), (0, 0), "{:?}", closed.report);
 }
 
@@ -328,7 +329,7 @@ fn derivatives_of_a_match_match_finite_differences() {
     let observed = ObservedSurfels { surfels: vec![surfel(0), surfel(1)], ..observed };
     let corrected = CorrectedTrajectory::new(&open, &covariances, observed.origin, &spec.registration).unwrap();
     let matcher = Matcher::new(&spec.registration.matching(&spec.matching), &spec.registration.surfels(&spec.surfels));
-    let lidar_model = LidarModel::new(&calibration(), (&LidarCorrection::default(), false), &spec);
+    let lidar_model = LidarModel::new(&calibration(), &LidarCorrection::default(), false, &spec);
     let scene = Scene::new(&observed, &corrected, &lidar_model, &spec.registration);
     let (first_knot, knots) = corrected.knots();
     let sum = |scene: &Scene| {

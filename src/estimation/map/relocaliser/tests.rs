@@ -42,7 +42,8 @@ fn all_levels(edge_m: f64, at: f64) -> Vec<Patch> {
 fn relocaliser(patches: &[Patch]) -> Relocaliser {
     let spec = estimation::load("default").unwrap();
     let map = SurfelMap::new(0.4, 3, patches.iter().map(|patch| patch.to_map_surfel(0.002)).collect()).unwrap();
-    Relocaliser::new(&map, (&spec.matching, &spec.surfels), (0.01, 7.0))
+    let solve = SolveSpec { match_sigma_m: 0.01, covariance_inflation: 7.0, ..spec.solve };
+    Relocaliser::new(&map, &spec.matching, &spec.surfels, &solve)
 }
 
 #[test]
@@ -60,7 +61,7 @@ fn room_is_found_from_a_start_1_m_and_20_degrees_off() {
             all_levels(0.37, 0.4).iter().map(|patch| patch.moved_by(&map_from_query.inverse())).collect();
         let direction = Vector::new(wave(2.3), wave(3.1), 0.3 * wave(4.7)).normalize();
         let start = offset_pose(&map_from_query, &from, 20_f64.to_radians() * wave(5.3).signum(), direction);
-        let found = relocaliser.find(&query, (&from, &start), &MAP_LIMITS).unwrap();
+        let found = relocaliser.find(&query, &from, &start, &MAP_LIMITS).unwrap();
         let error = found.map_from_query.inverse() * map_from_query;
         assert!(error.translation.vector.norm() < 2e-3 && error.rotation.angle() < 1e-3, "{k}: {error}");
         assert!(found.inlier_ratio > 0.9, "{}", found.inlier_ratio);
@@ -75,7 +76,7 @@ fn symmetric_room_started_at_the_wrong_end_matches_better_elsewhere() {
     // The room rotated by 180 degrees about the middle: only the pillar differs.
     let half = from_roll_pitch_yaw(0.0, 0.0, std::f64::consts::PI);
     let wrong = Pose::from_parts(Vector::new(6.0, 4.0, 0.0).into(), half);
-    let found = relocaliser.find(&query, (&from, &wrong), &MAP_LIMITS).unwrap();
+    let found = relocaliser.find(&query, &from, &wrong, &MAP_LIMITS).unwrap();
     assert!(
         pose_distance(&found.map_from_query, &wrong, &from).0 < 0.1 && found.inlier_ratio > 0.7,
         "{}",
@@ -85,12 +86,12 @@ fn symmetric_room_started_at_the_wrong_end_matches_better_elsewhere() {
     let (distance_m, angle) = pose_distance(&better.map_from_query, &Pose::identity(), &from);
     assert!(distance_m < 2e-3 && angle < 1e-3, "{distance_m} m, {angle} rad");
     // From the correct end no pose is better.
-    let found = relocaliser.find(&query, (&from, &Pose::identity()), &MAP_LIMITS).unwrap();
+    let found = relocaliser.find(&query, &from, &Pose::identity(), &MAP_LIMITS).unwrap();
     assert_eq!(relocaliser.find_better_elsewhere(&query, &from, &found), None);
 }
 
 /// Patches of one resolution of a corridor along x, 2 m wide, without end walls, between `from_m` and `to_m`.
-fn corridor(level: usize, (from_m, to_m): (f64, f64)) -> Vec<Patch> {
+fn corridor(level: usize, from_m: f64, to_m: f64) -> Vec<Patch> {
     let edge_m = 0.4 * f64::from(1 << level);
     let mut patches = Vec::new();
     for i in 0..((to_m - from_m) / edge_m) as usize {
@@ -113,32 +114,33 @@ fn corridor(level: usize, (from_m, to_m): (f64, f64)) -> Vec<Patch> {
 
 #[test]
 fn corridor_keeps_the_expected_pose_along_it_with_a_large_covariance() {
-    let all = |reach: (f64, f64)| (0..3).flat_map(|level| corridor(level, reach)).collect::<Vec<_>>();
-    let relocaliser = relocaliser(&all((0.0, 24.0)));
+    let all = |from_m: f64, to_m: f64| (0..3).flat_map(|level| corridor(level, from_m, to_m)).collect::<Vec<_>>();
+    let relocaliser = relocaliser(&all(0.0, 24.0));
     let from = Vector::new(14.0, 1.0, 1.2);
-    let query = all((8.0, 20.0));
+    let query = all(8.0, 20.0);
     // The expected pose is 0.2 m to the side, with a heading error of 0.1 rad.
     let start = offset_pose(&Pose::identity(), &from, 0.1, Vector::new(0.0, 0.2, 0.0));
-    let found = relocaliser.find(&query, (&from, &start), &RelocalisationLimits::after_gap(1.0, 0.01)).unwrap();
+    let found = relocaliser.find(&query, &from, &start, &RelocalisationLimits::after_gap(1.0, 0.01)).unwrap();
     let error = found.map_from_query.transform_point(&from.into()).coords - from;
     assert!(error.y.abs() < 2e-3 && error.z.abs() < 2e-3 && error.x.abs() < 0.05, "{error}");
     assert!(found.map_from_query.rotation.angle() < 1e-3, "{}", found.map_from_query);
     let sigma = |k: usize| found.covariance[(k, k)].sqrt();
     assert!(sigma(3) > 0.2 && sigma(4) < 0.01, "{} m along, {} m across", sigma(3), sigma(4));
     // In a complete map an ambiguous pose is rejected.
-    assert!(relocaliser.find(&query, (&from, &start), &MAP_LIMITS).unwrap_err().contains("matches as well"));
+    assert!(relocaliser.find(&query, &from, &start, &MAP_LIMITS).unwrap_err().contains("matches as well"));
 }
 
 #[test]
 fn bare_ground_is_rejected() {
-    let ground = |reach: (f64, f64)| {
-        let all = (0..3).flat_map(|level| corridor(level, reach));
+    let ground = |from_m: f64, to_m: f64| {
+        let all = (0..3).flat_map(|level| corridor(level, from_m, to_m));
         all.filter(|patch| patch.normal == Vector::z()).collect::<Vec<_>>()
     };
     let (from, start) = (Vector::new(14.0, 1.0, 1.2), Pose::identity());
-    let found = relocaliser(&ground((0.0, 24.0))).find(
-        &ground((8.0, 20.0)),
-        (&from, &start),
+    let found = relocaliser(&ground(0.0, 24.0)).find(
+        &ground(8.0, 20.0),
+        &from,
+        &start,
         &RelocalisationLimits::after_gap(0.5, 0.01),
     );
     assert!(found.is_err(), "{found:?}");
@@ -150,8 +152,8 @@ fn distant_pose_and_too_few_surfels_are_rejected() {
     let far = Pose::translation(30.0, 0.0, 0.0);
     let query = all_levels(0.4, 0.5);
     let from = Vector::new(4.0, 2.5, 1.2);
-    assert!(relocaliser.find(&query, (&from, &far), &MAP_LIMITS).unwrap_err().contains("match the map"));
+    assert!(relocaliser.find(&query, &from, &far, &MAP_LIMITS).unwrap_err().contains("match the map"));
     let few: Vec<Patch> = query.iter().take(20).copied().collect();
-    let message = relocaliser.find(&few, (&from, &Pose::identity()), &MAP_LIMITS).unwrap_err();
+    let message = relocaliser.find(&few, &from, &Pose::identity(), &MAP_LIMITS).unwrap_err();
     assert!(message.contains("20 finest surfels"), "{message}");
 }

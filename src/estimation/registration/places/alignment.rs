@@ -100,7 +100,7 @@ pub(super) fn align(from: &NodeSurfels, to: &NodeSurfels, start: &Alignment, mat
     for level in (0..from.queries.len()).rev() {
         let gate_m = GATE_EDGES * matcher.finest_voxel_m * f64::from(1_u32 << level);
         for _ in 0..MAX_ITERATIONS {
-            let step = step(&mut fit, (from, to), level, gate_m, matcher)?;
+            let step = step(&mut fit, from, to, level, gate_m, matcher)?;
             if step.norm() < CONVERGED {
                 break;
             }
@@ -112,7 +112,8 @@ pub(super) fn align(from: &NodeSurfels, to: &NodeSurfels, start: &Alignment, mat
 /// One Gauss-Newton step of `e = n^T (Rz x + shift - mu)` over yaw and shift.
 fn step(
     fit: &mut Fit,
-    (from, to): (&NodeSurfels, &NodeSurfels),
+    from: &NodeSurfels,
+    to: &NodeSurfels,
     level: usize,
     gate_m: f64,
     matcher: &Matcher,
@@ -146,7 +147,8 @@ pub(super) fn agreement(
     from: &NodeSurfels,
     to: &NodeSurfels,
     alignment: &Alignment,
-    (matcher, gate_m): (&Matcher, f64),
+    matcher: &Matcher,
+    gate_m: f64,
 ) -> Option<f64> {
     let queries = from.queries.get(COMPARED_LEVEL.min(from.queries.len().saturating_sub(1)))?;
     let turn = alignment.turn();

@@ -25,7 +25,7 @@ const MAX_WALLS: usize = 300;
 const SUPPRESSION: (i32, i32) = (2, 3);
 
 /// The `count` best alignments of `from` with `to`, at headings around `yaw` and with a vertical shift of `up_m`.
-pub(super) fn start_alignments(from: &[Patch], to: &[Patch], (yaw, up_m): (f64, f64), count: usize) -> Vec<Alignment> {
+pub(super) fn start_alignments(from: &[Patch], to: &[Patch], yaw: f64, up_m: f64, count: usize) -> Vec<Alignment> {
     let grid = Grid::of(to);
     let walls: Vec<&Patch> = from.iter().filter(|patch| is_wall(patch)).collect();
     let walls: Vec<&Patch> = walls.iter().step_by(walls.len().div_ceil(MAX_WALLS).max(1)).copied().collect();

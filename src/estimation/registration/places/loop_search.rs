@@ -27,11 +27,17 @@ pub(super) enum LoopFilter {
     OutOfReach,
 }
 
+/// Two nodes: indices into the database.
+#[derive(Debug, Clone, Copy)]
+struct NodePair {
+    late: usize,
+    early: usize,
+}
+
 /// A pair of similar nodes.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
-    /// Indices of the later and the earlier node.
-    nodes: (usize, usize),
+    nodes: NodePair,
     yaw: f64,
     distance: f64,
 }
@@ -73,7 +79,8 @@ impl LoopSearch<'_> {
         let of_node = |late: usize| {
             let to_candidate = |early: &usize| {
                 let similarity = contexts[late].compare(&contexts[*early])?;
-                let candidate = Candidate { nodes: (late, *early), yaw: similarity.yaw, distance: similarity.distance };
+                let nodes = NodePair { late, early: *early };
+                let candidate = Candidate { nodes, yaw: similarity.yaw, distance: similarity.distance };
                 Some(candidate).filter(|candidate| self.is_possible(candidate))
             };
             let earlier = near[late].iter().filter(|early| **early < late);
@@ -87,7 +94,8 @@ impl LoopSearch<'_> {
 
     /// Whether similarity, time difference and drift of a candidate are within the limits.
     fn is_possible(&self, candidate: &Candidate) -> bool {
-        let (late, early) = (&self.database.nodes[candidate.nodes.0], &self.database.nodes[candidate.nodes.1]);
+        let NodePair { late, early } = candidate.nodes;
+        let (late, early) = (&self.database.nodes[late], &self.database.nodes[early]);
         let (max_drift_m, max_heading_error) = self.max_drift(candidate.nodes);
         late.tau_s - early.tau_s >= self.spec.min_apart_s
             && candidate.distance < self.spec.max_distance
@@ -96,7 +104,7 @@ impl LoopSearch<'_> {
     }
 
     /// Maximum drift of the open loop between two times, m and rad.
-    fn max_drift(&self, (late, early): (usize, usize)) -> (f64, f64) {
+    fn max_drift(&self, NodePair { late, early }: NodePair) -> (f64, f64) {
         let minutes = (self.database.nodes[late].tau_s - self.database.nodes[early].tau_s) / 60.0;
         let spec = self.spec;
         let turn_deg = spec.max_turn_deg + spec.max_turn_deg_per_min * minutes;
@@ -109,16 +117,16 @@ impl LoopSearch<'_> {
     fn test_candidates(&self, candidates: &[Candidate], filter: LoopFilter) -> NodeSearch {
         let mut outcome = NodeSearch::default();
         let Some(first) = candidates.first() else { return outcome };
-        let late = self.surfels(first.nodes.0);
+        let late = self.surfels(first.nodes.late);
         for Candidate { nodes, yaw, .. } in candidates {
-            let early = self.surfels(nodes.1);
+            let early = self.surfels(nodes.early);
             let now = self.current_alignment(*nodes);
             let agrees = self.agreement(&late, &early, &now).is_some_and(|ratio| ratio >= self.spec.min_agreement);
             if agrees && filter == LoopFilter::OutOfReach {
                 return NodeSearch { found: None, ..outcome };
             }
             outcome.registered += 1;
-            let Some(fit) = self.verify((&late, &early), *nodes, *yaw) else { continue };
+            let Some(fit) = self.verify(&late, &early, *nodes, *yaw) else { continue };
             let (shift_m, turn) = fit.alignment.difference(&now);
             if shift_m < MATCHING_REACH.0 && turn < MATCHING_REACH.1 && filter == LoopFilter::OutOfReach {
                 return NodeSearch { found: None, ..outcome };
@@ -132,10 +140,10 @@ impl LoopSearch<'_> {
     }
 
     /// Registers two nodes; `None` if the agreement is insufficient or ambiguous.
-    fn verify(&self, (late, early): (&NodeSurfels, &NodeSurfels), nodes: (usize, usize), yaw: f64) -> Option<Fit> {
+    fn verify(&self, late: &NodeSurfels, early: &NodeSurfels, nodes: NodePair, yaw: f64) -> Option<Fit> {
         let ground_m = |node: usize| self.database.nodes[node].ground_m;
-        let up_m = ground_m(nodes.1) - ground_m(nodes.0);
-        let mut starts = correlation::start_alignments(late.finest(), early.finest(), (yaw, up_m), START_ALIGNMENTS);
+        let up_m = ground_m(nodes.early) - ground_m(nodes.late);
+        let mut starts = correlation::start_alignments(late.finest(), early.finest(), yaw, up_m, START_ALIGNMENTS);
         starts.push(self.current_alignment(nodes));
         let register = |start: &Alignment| {
             let fit = align(late, early, start, self.matcher)?;
@@ -154,15 +162,19 @@ impl LoopSearch<'_> {
     /// Relative poses of successive nodes with enough common surfaces.
     pub(super) fn links(&self) -> Vec<RelativePose> {
         let link = |early: usize| {
-            let nodes = (early + 1, early);
-            let fit =
-                align(&self.surfels(nodes.0), &self.surfels(nodes.1), &self.current_alignment(nodes), self.matcher)?;
+            let nodes = NodePair { late: early + 1, early };
+            let fit = align(
+                &self.surfels(nodes.late),
+                &self.surfels(nodes.early),
+                &self.current_alignment(nodes),
+                self.matcher,
+            )?;
             (fit.matches >= MIN_LINK_MATCHES).then(|| self.relative_pose(nodes, &fit))
         };
         (0..self.database.nodes.len().saturating_sub(1)).into_par_iter().filter_map(link).collect()
     }
 
-    fn relative_pose(&self, (late, early): (usize, usize), fit: &Fit) -> RelativePose {
+    fn relative_pose(&self, NodePair { late, early }: NodePair, fit: &Fit) -> RelativePose {
         let time_s = |node: usize| self.database.nodes[node].tau_s;
         let times_s = (time_s(late), time_s(early));
         RelativePose { times_s, alignment: fit.alignment, information: fit.information }
@@ -173,12 +185,12 @@ impl LoopSearch<'_> {
         NodeSurfels::new(levels.map(|level| self.database.patches(node, level).collect()).collect(), self.matcher)
     }
 
-    fn current_alignment(&self, (late, early): (usize, usize)) -> Alignment {
+    fn current_alignment(&self, NodePair { late, early }: NodePair) -> Alignment {
         let head = |node: usize| self.database.nodes[node].head;
         Alignment { yaw: 0.0, shift: head(late) - head(early) }
     }
 
     fn agreement(&self, late: &NodeSurfels, early: &NodeSurfels, alignment: &Alignment) -> Option<f64> {
-        agreement(late, early, alignment, (self.matcher, self.spec.max_plane_distance_m))
+        agreement(late, early, alignment, self.matcher, self.spec.max_plane_distance_m)
     }
 }

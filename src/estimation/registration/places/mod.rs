@@ -56,7 +56,8 @@ pub(super) struct PreAligned {
 ///
 /// Drift within a node distorts it and makes the measured drift too small; the alignment is repeated until convergence.
 pub(super) fn close_loops(
-    (map_from_head, observed): (&Trajectory, &ObservedSurfels),
+    map_from_head: &Trajectory,
+    observed: &ObservedSurfels,
     corrected: &CorrectedTrajectory,
     matcher: &Matcher,
     spec: &RegistrationSpec,
@@ -83,12 +84,12 @@ pub(super) fn close_loops(
         let level_sigma_rad = spec.level_sigma_deg.to_radians();
         let mut with_loops = corrected.clone();
         // Distorted nodes can make correct loops inconsistent: then optimise this pass without loops.
-        let closed = match optimise(&mut with_loops, (&loops, &links), level_sigma_rad) {
+        let closed = match optimise(&mut with_loops, &loops, &links, level_sigma_rad) {
             Some(closed) => {
                 corrected = with_loops;
                 closed
             }
-            None => match optimise(&mut corrected, (&[], &links), level_sigma_rad) {
+            None => match optimise(&mut corrected, &[], &links, level_sigma_rad) {
                 Some(none) => none,
                 None => return (report, None),
             },
@@ -96,8 +97,9 @@ pub(super) fn close_loops(
         let Ok(next) = corrected.into_trajectory(map_from_head.stamps()) else { return (report, None) };
         let (shift_m, _) = largest_difference(&trajectory, &next);
         (trajectory, observed) = (next.clone(), observed.along(&trajectory, &next));
-        let was_out_of_reach =
-            |times_s: &&(f64, f64)| is_out_of_reach(map_from_head, &trajectory, observed.origin, **times_s);
+        let was_out_of_reach = |(late_s, early_s): &&(f64, f64)| {
+            is_out_of_reach(map_from_head, &trajectory, observed.origin, *late_s, *early_s)
+        };
         closures = closed.iter().filter(was_out_of_reach).count();
         if shift_m < CONVERGED_M {
             break;
@@ -110,12 +112,7 @@ pub(super) fn close_loops(
 }
 
 /// Whether the relative pose between two times, s from `origin`, differs by more than the matching distance.
-fn is_out_of_reach(
-    open_loop: &Trajectory,
-    optimised: &Trajectory,
-    origin: Stamp,
-    (late_s, early_s): (f64, f64),
-) -> bool {
+fn is_out_of_reach(open_loop: &Trajectory, optimised: &Trajectory, origin: Stamp, late_s: f64, early_s: f64) -> bool {
     let between = |trajectory: &Trajectory| {
         let at = |tau_s: f64| trajectory.at(origin + Span::from_seconds(tau_s));
         Some(at(early_s)?.inverse() * at(late_s)?)

@@ -62,7 +62,8 @@ struct Edge {
 /// `None` if the loops contradict the links or the equations are singular; `corrected` is then invalid.
 pub(in crate::estimation::registration) fn optimise(
     corrected: &mut CorrectedTrajectory,
-    (loops, links): (&[RelativePose], &[RelativePose]),
+    loops: &[RelativePose],
+    links: &[RelativePose],
     level_sigma_rad: f64,
 ) -> Option<Vec<(f64, f64)>> {
     let (first_knot, knots) = corrected.knots();
@@ -152,8 +153,7 @@ impl Edge {
         let mut link = PairTerm::default();
         let eigen = information.symmetric_eigen();
         for (axis, weight) in eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter()) {
-            let by = (&by_late.tr_mul(&axis), &by_early.tr_mul(&axis));
-            link.add(by, axis.dot(&e), weight.max(0.0));
+            link.add(&by_late.tr_mul(&axis), &by_early.tr_mul(&axis), axis.dot(&e), weight.max(0.0));
         }
         equations.add_unary(&self.late.basis, &link.first);
         equations.add_unary(&self.early.basis, &link.second);
@@ -247,7 +247,7 @@ mod tests {
         let before = end_m(&corrected);
         let false_loops: Vec<RelativePose> =
             (10..15).map(|k| relative_pose((at_s[k], at_s[k - 6]), Vector::new(16.0, 0.0, 0.0))).collect();
-        let closed = optimise(&mut corrected, (&false_loops, &links(&at_s)), 0.002).unwrap();
+        let closed = optimise(&mut corrected, &false_loops, &links(&at_s), 0.002).unwrap();
         assert!(closed.is_empty(), "{closed:?}");
         assert!((end_m(&corrected) - before).norm() < 0.05, "{}", end_m(&corrected));
     }
@@ -264,7 +264,7 @@ mod tests {
         let loops = (20..24).map(|k| relative_pose((at_s[k], at_s[k - 15]), Vector::x() * 48.0 + drift));
         let outlier = relative_pose((at_s[25], at_s[5]), Vector::x() * 64.0 - drift * 4.0);
         let loops: Vec<RelativePose> = loops.chain([outlier]).collect();
-        let closed = optimise(&mut corrected, (&loops, &remaining), 0.002).unwrap();
+        let closed = optimise(&mut corrected, &loops, &remaining, 0.002).unwrap();
         assert_eq!(closed.len(), 4, "{closed:?}");
         assert!((end_m(&corrected) - before - drift).norm() < 0.1, "{}", end_m(&corrected) - before);
     }
