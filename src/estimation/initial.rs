@@ -1,14 +1,14 @@
 //! Initial state: attitude, biases, and detection of an initial rest.
 
-use super::clock::Clock;
 use super::residual::{
     ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION,
     LIDAR_TRANSLATION, RANGE,
 };
 use super::spec::EstimatorSpec;
-use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
+use super::strapdown::{Biases, Interval, State};
+use super::unknowns::Unknowns;
 use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
-use crate::measurement::{ImuNoise, LidarCorrection};
+use crate::measurement::ImuNoise;
 use nalgebra::{SMatrix, SVector};
 
 /// Standard deviations of offset (s) and rate (s/s) if the clock is not estimated: small enough to fix both.
@@ -62,13 +62,7 @@ pub(super) struct StateBeforeGap {
     pub(super) state: State,
     /// Mean velocity over the window, m/s: it predicts the position of a rocking head better than the last velocity.
     pub(super) mean_velocity: Vector,
-    pub(super) biases: Biases,
-    pub(super) gravity: Vector,
-    pub(super) clock: Clock,
-    /// Estimated scale errors and misalignments of the IMU.
-    pub(super) scale_misalignment: ImuScaleMisalignment,
-    /// Estimated corrections of the lidar calibration.
-    pub(super) lidar: LidarCorrection,
+    pub(super) unknowns: Unknowns,
 }
 
 impl InitialState {
@@ -85,7 +79,7 @@ impl InitialState {
         if self.rest.is_none() {
             self.state.velocity = carried.mean_velocity;
         }
-        self.biases = carried.biases;
+        self.biases = carried.unknowns.biases;
         self
     }
 }

@@ -89,11 +89,11 @@ mod strapdown;
 mod surfel;
 mod surfel_spec;
 mod timing;
+mod unknowns;
 mod views;
 mod window;
 
 pub use base::{BaseEstimate, BaseFix, BaseImu, FixSigmas, smooth_base};
-use clock::Clock;
 pub use cloud::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
 pub use dead_reckoning::integrate_imu;
 pub use error::{Discarded, EstimationError, Warning, WarningKind};

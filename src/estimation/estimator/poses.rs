@@ -14,7 +14,7 @@ impl Estimator {
         let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
         let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
         let mut stamp = tracking.next_pose.unwrap_or_else(|| {
-            let start_ns = self.intake.stamp(first_u_s - window.clock.offset_at(first_u_s)).nanos();
+            let start_ns = self.intake.stamp(first_u_s - window.unknowns.clock.offset_at(first_u_s)).nanos();
             Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
         });
         // After a gap the window may start before the last pose; the stamps must still increase strictly.
@@ -23,7 +23,7 @@ impl Estimator {
         }
         loop {
             let tau_s = stamp.seconds_since(self.intake.origin());
-            let u_s = window.clock.imu_s(tau_s);
+            let u_s = window.unknowns.clock.imu_s(tau_s);
             if u_s.is_nan() || u_s > until_u_s {
                 break;
             }
@@ -37,7 +37,7 @@ impl Estimator {
     /// The pose at `stamp`, which is `tau_s` in lidar time and `u_s` in IMU time, s.
     fn pose_at(&self, window: &Window, stamp: Stamp, tau_s: f64, u_s: f64) -> EstimatedPose {
         let imu_from_head = self.calibration.head_from_imu.inverse();
-        let motion = window.nominal.at(u_s, &window.biases.gyro);
+        let motion = window.nominal.at(u_s, &window.unknowns.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
         let map_from_imu = Pose::from_parts(motion.position.into(), rotation);
         let map_from_head = map_from_imu * imu_from_head;
@@ -51,9 +51,9 @@ impl Estimator {
                 .consider
                 .covariance_against_gauge(&map_from_head.translation.vector),
             velocity_in_map_m_per_s: motion.velocity + motion.angular_velocity.cross(&arm),
-            gyro_bias_rad_per_s: window.biases.gyro,
-            accel_bias_m_per_s2: window.biases.accel,
-            clock_offset_s: window.clock.offset_at(tau_s),
+            gyro_bias_rad_per_s: window.unknowns.biases.gyro,
+            accel_bias_m_per_s2: window.unknowns.biases.accel,
+            clock_offset_s: window.unknowns.clock.offset_at(tau_s),
         }
     }
 }

@@ -12,7 +12,6 @@ use crate::estimation::surfel::{SurfelBuilder, TimedReturn};
 use crate::estimation::window::Window;
 use crate::estimation::{EstimatorSpec, WarningKind};
 use crate::geometry::Vector;
-use crate::measurement::LidarCorrection;
 
 /// An estimated noise above the specification by more than this factor causes a warning.
 const REPORTED_NOISE_FACTOR: f64 = 1.5;
@@ -101,7 +100,6 @@ impl Estimator {
             noise: self.calibration.lidar,
             scan_normal: self.intake.is_planar().then(|| imu_from_laser.rotation * Vector::z()),
             laser_in_imu: imu_from_laser.translation.vector,
-            lidar: LidarCorrection::default(),
         };
         let border = Border::new(initial_state.information, &self.calibration.imu, self.spec.clock.estimated);
         let observed_builder = SurfelBuilder { spec: spec.registration.surfels(&spec.surfels), ..builder.clone() };

@@ -63,7 +63,7 @@ impl Estimator {
         if let Some(by) = linearised.and_then(|at| window.sensitivity_at(until_s, at, &local_map.views)) {
             local_map.consider.advance(&by);
         }
-        let tau_s = until_s - window.clock.offset_at(until_s);
+        let tau_s = until_s - window.unknowns.clock.offset_at(until_s);
         self.gauge.advance(&mut local_map.consider, until_s, self.intake.stamp(tau_s));
         let patches = window.remove_oldest(linearised)?;
         local_map.add_segment(&patches, self.spec.step_s, window.matcher());
@@ -72,7 +72,7 @@ impl Estimator {
 
     /// Adds the report on the window, and its clock offset.
     fn report(&mut self, window: &Window, solved: &WindowSolution, stamp: Stamp, turns_fast: bool, solution_s: f64) {
-        self.clock_offsets.push((self.intake.stamp(window.clock.at_s), window.clock.offset_s));
+        self.clock_offsets.push((self.intake.stamp(window.unknowns.clock.at_s), window.unknowns.clock.offset_s));
         let moving = window.speed_m_per_s() > FAST_MOTION.0 || turns_fast;
         let elapsed_s = solution_s + solved.timing.views_s;
         self.diagnostics.record(report(solved, window, &self.spec.solve, stamp, moving, elapsed_s));

@@ -3,10 +3,9 @@
 use super::flatness::{self, SurfelThickness};
 use super::moments::Moments;
 use super::{Surfel, TimedReturn};
-use crate::estimation::Clock;
 use crate::estimation::nominal::{Motion, Nominal};
 use crate::estimation::spec::SurfelSpec;
-use crate::estimation::strapdown::Biases;
+use crate::estimation::unknowns::Unknowns;
 use crate::geometry::{Matrix, Vector};
 use crate::measurement::{LidarCorrection, LidarNoise};
 use rayon::prelude::*;
@@ -27,8 +26,6 @@ pub(in super::super) struct SurfelBuilder {
     pub(in super::super) scan_normal: Option<Vector>,
     /// Calibrated position of the lidar in the IMU frame, m.
     pub(in super::super) laser_in_imu: Vector,
-    /// Estimated correction of the lidar's calibration.
-    pub(in super::super) lidar: LidarCorrection,
 }
 
 /// Moments of consecutive returns in the same finest cell.
@@ -46,16 +43,15 @@ impl SurfelBuilder {
         &self,
         returns: &[TimedReturn],
         nominal: &Nominal,
-        clock: &Clock,
-        biases: &Biases,
+        unknowns: &Unknowns,
     ) -> Vec<Surfel> {
         let Some(first) = returns.first() else { return Vec::new() };
-        let motion_at = |tau_s: f64| nominal.at(clock.imu_s(tau_s), &biases.gyro);
+        let motion_at = |tau_s: f64| nominal.at(unknowns.clock.imu_s(tau_s), &unknowns.biases.gyro);
         let origin = motion_at(first.tau_s).position;
         let edge = self.spec.finest_voxel_m;
         let mut regular = Fragments::new(origin, edge, 0.0);
         let mut offset = Fragments::new(origin, edge, 0.5 * edge);
-        self.project(returns, nominal, clock, biases, |beam, point| {
+        self.project(returns, nominal, unknowns, |beam, point| {
             let range = f64::from(beam.range_m);
             let noise2 = self.noise.sigma_m(range).powi(2);
             regular.add(&point, beam.tau_s, noise2);
@@ -76,7 +72,7 @@ impl SurfelBuilder {
         }
         let surfels_of = |(fragments, level, shift): &(&[Fragment], usize, i32)| -> Vec<SurfelThickness> {
             let cells = merge_by_cell(fragments, *level, *shift, &self.spec);
-            cells.iter().filter_map(|cell| self.fit_surfel(cell, *level, &origin, motion_at)).collect()
+            cells.iter().filter_map(|cell| self.fit_surfel(cell, *level, &origin, &unknowns.lidar, motion_at)).collect()
         };
         let shaped: Vec<Vec<SurfelThickness>> = grids.par_iter().map(surfels_of).collect();
         flatness::add_roughness_variance(shaped.concat(), &self.spec)
@@ -87,8 +83,7 @@ impl SurfelBuilder {
         &self,
         returns: &[TimedReturn],
         nominal: &Nominal,
-        clock: &Clock,
-        biases: &Biases,
+        Unknowns { biases, clock, lidar, .. }: &Unknowns,
         mut with: impl FnMut(&TimedReturn, Vector),
     ) {
         let mut cursor = 0;
@@ -96,8 +91,8 @@ impl SurfelBuilder {
         let mut start_s = f64::NEG_INFINITY;
         let mut end_s = f64::NEG_INFINITY;
         let mut ends: Option<(Motion, Motion)> = None;
-        let lidar_rotation = self.lidar.rotation.to_rotation_matrix();
-        let laser_in_imu = self.laser_in_imu + self.lidar.translation;
+        let lidar_rotation = lidar.rotation.to_rotation_matrix();
+        let laser_in_imu = self.laser_in_imu + lidar.translation;
         for beam in returns {
             if beam.tau_s >= end_s || ends.is_none() {
                 start_s = beam.tau_s;
@@ -109,19 +104,21 @@ impl SurfelBuilder {
             let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
             let position = a.position.lerp(&b.position, x);
             let ray = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
-            let ray = lidar_rotation * (ray * (1.0 + self.lidar.range_m / f64::from(beam.range_m)));
+            let ray = lidar_rotation * (ray * (1.0 + lidar.range_m / f64::from(beam.range_m)));
             with(beam, rotation * (laser_in_imu + ray) + position);
         }
     }
 
     /// Fits a surfel to a cell's points; `None` if they are not planar, too thick, or badly observed.
     ///
-    /// `motion_at` is the motion of the IMU at a lidar time, s. The scan plane must sweep across the surface fast enough, and the angle of incidence must be small enough.
+    /// The scan plane must sweep across the surface fast enough, and the angle of incidence must be small enough.
+    /// `motion_at` is the motion of the IMU at a lidar time, s.
     fn fit_surfel(
         &self,
         moments: &Moments,
         level: usize,
         origin: &Vector,
+        lidar: &LidarCorrection,
         motion_at: impl Fn(f64) -> Motion,
     ) -> Option<SurfelThickness> {
         let covariance = moments.covariance();
@@ -138,10 +135,10 @@ impl SurfelBuilder {
         let motion = motion_at(tau_s);
         let imu_from_map = motion.rotation.transpose();
         let centre_in_imu = imu_from_map * (moments.mean() + origin - motion.position);
-        let corrected = centre_in_imu - self.laser_in_imu - self.lidar.translation;
+        let corrected = centre_in_imu - self.laser_in_imu - lidar.translation;
         let range_m = corrected.norm();
-        let calibrated_from_map = self.lidar.rotation.inverse().to_rotation_matrix() * imu_from_map;
-        let beam = self.lidar.rotation.inverse() * corrected / range_m;
+        let calibrated_from_map = lidar.rotation.inverse().to_rotation_matrix() * imu_from_map;
+        let beam = lidar.rotation.inverse() * corrected / range_m;
         let rate = calibrated_from_map * motion.angular_velocity;
         let sweeps = self.scan_normal.is_none_or(|scan_normal| {
             rate.cross(&beam).dot(&scan_normal).abs() >= self.spec.min_sweep_deg_per_s.to_radians()
@@ -155,7 +152,7 @@ impl SurfelBuilder {
         }
         let surfel = Surfel {
             tau_s,
-            ray_in_imu: beam * (range_m - self.lidar.range_m),
+            ray_in_imu: beam * (range_m - lidar.range_m),
             normal_in_imu: if normal.dot(&beam) > 0.0 { -normal } else { normal },
             covariance_in_imu: calibrated_from_map * covariance * calibrated_from_map.transpose(),
             points: moments.count(),
@@ -245,8 +242,9 @@ fn merge_by_cell(fragments: &[Fragment], level: usize, shift: i32, spec: &Surfel
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimation::clock::Clock;
     use crate::estimation::spec;
-    use crate::estimation::strapdown::{Interval, State};
+    use crate::estimation::strapdown::{Biases, Interval, State};
     use crate::geometry::Rotation;
 
     /// Planar scans of a vertical corner with walls 2.1 m away, by a lidar that nods towards it at `rate`, rad/s.
@@ -286,11 +284,11 @@ mod tests {
             noise: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
             scan_normal: Some(Vector::z()),
             laser_in_imu: Vector::zeros(),
-            lidar: LidarCorrection::default(),
         };
         let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0 };
         let still = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
-        builder.build(returns, nominal, &clock, &still).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
+        let unknowns = Unknowns::initial(still, clock);
+        builder.build(returns, nominal, &unknowns).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
     }
 
     #[test]

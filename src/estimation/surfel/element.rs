@@ -1,12 +1,10 @@
 //! A surfel and the returns that it is built from.
 
-use super::super::Clock;
 use super::super::nominal::Nominal;
 use super::super::spline::Basis;
-use super::super::strapdown::Biases;
+use super::super::unknowns::Unknowns;
 use crate::geometry::Matrix;
 use crate::geometry::Vector;
-use crate::measurement::LidarCorrection;
 
 /// A lidar return in the IMU frame.
 #[derive(Debug, Clone, Copy)]
@@ -97,27 +95,25 @@ impl PlacedSurfel {
     }
 }
 
-/// Trajectory, clock and calibration that place surfels in the map.
+/// Trajectory and unknowns that place surfels in the map.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct PlacementState<'a> {
     pub(in crate::estimation) nominal: &'a Nominal,
-    pub(in crate::estimation) clock: &'a Clock,
-    pub(in crate::estimation) biases: &'a Biases,
+    pub(in crate::estimation) unknowns: &'a Unknowns,
     /// Calibrated position of the lidar in the IMU frame, m.
     pub(in crate::estimation) laser_in_imu: &'a Vector,
-    /// Estimated correction of the lidar's calibration.
-    pub(in crate::estimation) lidar: &'a LidarCorrection,
     pub(in crate::estimation) knot_spacing_s: f64,
 }
 
 impl Surfel {
     /// Places the surfel in the map.
     pub(in crate::estimation) fn place(&self, by: &PlacementState<'_>) -> PlacedSurfel {
-        let u_s = by.clock.imu_s(self.tau_s);
-        let motion = by.nominal.at(u_s, &by.biases.gyro);
-        let ray_in_imu = by.lidar.apply(&self.ray_in_imu);
-        let arm = motion.rotation * (by.laser_in_imu + by.lidar.translation + ray_in_imu);
-        let map_from_calibrated = motion.rotation * by.lidar.rotation.to_rotation_matrix().matrix();
+        let Unknowns { biases, clock, lidar, .. } = by.unknowns;
+        let u_s = clock.imu_s(self.tau_s);
+        let motion = by.nominal.at(u_s, &biases.gyro);
+        let ray_in_imu = lidar.apply(&self.ray_in_imu);
+        let arm = motion.rotation * (by.laser_in_imu + lidar.translation + ray_in_imu);
+        let map_from_calibrated = motion.rotation * lidar.rotation.to_rotation_matrix().matrix();
         let patch = Patch {
             centre: motion.position + arm,
             normal: map_from_calibrated * self.normal_in_imu,

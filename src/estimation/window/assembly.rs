@@ -39,7 +39,7 @@ impl Window {
         let mut watch = Stopwatch::start();
         let Linearised { layout, scene, matches, robust } = at;
         self.assemble_inertial(first, layout, total);
-        let weighted = WeightedMatches { scene, matches, robust, clock_reference_s: self.clock.at_s };
+        let weighted = WeightedMatches { scene, matches, robust, clock_reference_s: self.unknowns.clock.at_s };
         weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
         timing.equations_s += watch.lap_s();
         let Workspace { equations, factor, bases } = &mut self.workspace;
@@ -59,7 +59,7 @@ impl Window {
         equations.reset(layout.size());
         let states = self.nominal.states();
         let nodes = Nodes { states: &states[first..], bases, intervals: &self.nominal.intervals()[first..] };
-        add_inertial(equations, layout, &nodes, &self.biases, &self.gravity);
+        add_inertial(equations, layout, &nodes, &self.unknowns.biases, &self.unknowns.gravity);
         self.start.add_to(equations, layout, total, self.border.total_step(), self.spec.knot_spacing_s);
         self.border.add_to(equations, layout);
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);

@@ -22,10 +22,11 @@ use super::residual::contradiction::contradiction;
 use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
-use super::strapdown::{Biases, ImuScaleMisalignment, Interval};
+use super::strapdown::Interval;
 use super::surfel::{Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
 use super::timing::{Stopwatch, Timing};
-use crate::geometry::{Pose, Rotation, Vector};
+use super::unknowns::Unknowns;
+use crate::geometry::{Pose, Rotation};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
 use equations::Workspace;
@@ -59,7 +60,7 @@ struct WindowSegment {
     cached: Vec<CachedNeighbours>,
 }
 
-/// The state of the estimator: trajectory, biases, gravity, clock, and the surfels of the last few seconds.
+/// The state of the estimator: trajectory, unknowns, and the surfels of the last few seconds.
 #[derive(Debug)]
 pub(super) struct Window {
     spec: EstimatorSpec,
@@ -68,11 +69,7 @@ pub(super) struct Window {
     observed_builder: Option<SurfelBuilder>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
-    pub(super) clock: Clock,
-    pub(super) biases: Biases,
-    pub(super) gravity: Vector,
-    /// Estimated scale errors and misalignments of the IMU.
-    scale_misalignment: ImuScaleMisalignment,
+    pub(super) unknowns: Unknowns,
     border: Border,
     segments: VecDeque<WindowSegment>,
     start: Start,
@@ -111,10 +108,7 @@ impl Window {
             builder,
             observed_builder: None,
             nominal: Nominal::starting(start_u_s, initial_state.state),
-            clock,
-            biases: initial_state.biases,
-            gravity: crate::geometry::gravity_in_world(),
-            scale_misalignment: ImuScaleMisalignment::zero(),
+            unknowns: Unknowns::initial(initial_state.biases, clock),
             border,
             segments: VecDeque::new(),
             start: Start::first(start_u_s, initial_state.velocity_sigma),
@@ -133,27 +127,25 @@ impl Window {
     /// The states that initialise the estimate after an IMU gap.
     pub(super) fn state_before_gap(&self) -> StateBeforeGap {
         let state = *self.nominal.end_state();
-        let (scale_misalignment, lidar) = (self.scale_misalignment, self.builder.lidar);
         let until_s = self.nominal.end_s();
         let displacement = state.position - self.start_pose().translation.vector;
         let mean_velocity = displacement / (until_s - self.start.u_s).max(self.spec.step_s);
-        let Self { biases, gravity, clock, .. } = *self;
-        StateBeforeGap { until_s, state, mean_velocity, biases, gravity, clock, scale_misalignment, lidar }
+        StateBeforeGap { until_s, state, mean_velocity, unknowns: self.unknowns }
     }
 
     /// Sets clock and sensor corrections to the values before an IMU gap.
     pub(super) fn resume_from(&mut self, before_gap: &StateBeforeGap) {
-        self.clock = before_gap.clock.after_gap(before_gap.until_s, self.start.u_s);
-        self.scale_misalignment = before_gap.scale_misalignment;
-        self.builder.lidar = before_gap.lidar;
+        let Unknowns { clock, scale_misalignment, lidar, .. } = before_gap.unknowns;
+        let clock = clock.after_gap(before_gap.until_s, self.start.u_s);
+        self.unknowns = Unknowns { clock, scale_misalignment, lidar, ..self.unknowns };
     }
 
     /// Rotates the window by the smallest angle that aligns gravity with that before the gap.
     pub(super) fn align_gravity_with(&mut self, before_gap: &StateBeforeGap) {
-        let rotation =
-            Rotation::rotation_between(&self.gravity, &before_gap.gravity).unwrap_or_else(Rotation::identity);
+        let (from, to) = (&self.unknowns.gravity, &before_gap.unknowns.gravity);
+        let rotation = Rotation::rotation_between(from, to).unwrap_or_else(Rotation::identity);
         self.nominal.rotate(&rotation, &before_gap.state.position);
-        self.gravity = before_gap.gravity;
+        self.unknowns.gravity = before_gap.unknowns.gravity;
     }
 
     /// All patches of the window, in the map frame.
@@ -164,7 +156,7 @@ impl Window {
     /// Moves the window to the pose from relocalisation; from then on the map constrains it.
     pub(super) fn move_by(&mut self, map_from_here: &Pose) {
         self.nominal.move_by(map_from_here);
-        self.gravity = map_from_here.rotation * self.gravity;
+        self.unknowns.gravity = map_from_here.rotation * self.unknowns.gravity;
         self.start.sigmas[0] = RELOCALISED_SIGMA;
     }
 
@@ -175,7 +167,7 @@ impl Window {
 
     /// The IMU pose at the start of the window.
     pub(super) fn start_pose(&self) -> Pose {
-        let motion = self.nominal.at(self.start.u_s, &self.biases.gyro);
+        let motion = self.nominal.at(self.start.u_s, &self.unknowns.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
         Pose::from_parts(motion.position.into(), rotation)
     }
@@ -185,12 +177,12 @@ impl Window {
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let states = self.nominal.states().get(first..).unwrap_or_default();
         let intervals = self.nominal.intervals().get(first..).unwrap_or_default();
-        contradiction(states, intervals, &self.biases, &self.gravity)
+        contradiction(states, intervals, &self.unknowns.biases, &self.unknowns.gravity)
     }
 
     /// The speed of the IMU at the end of the window, m/s.
     pub(super) fn speed_m_per_s(&self) -> f64 {
-        self.nominal.at(self.nominal.end_s(), &self.biases.gyro).velocity.norm()
+        self.nominal.at(self.nominal.end_s(), &self.unknowns.biases.gyro).velocity.norm()
     }
 
     /// Whether the head rests at the end of the window, by the IMU and the estimated speed.
@@ -232,10 +224,11 @@ impl Window {
     ) -> Timing {
         let mut watch = Stopwatch::start();
         for (_, interval) in intervals.iter() {
-            self.nominal.extend(interval.corrected_by(&self.scale_misalignment), &self.biases, &self.gravity);
+            let Unknowns { biases, gravity, scale_misalignment, .. } = &self.unknowns;
+            self.nominal.extend(interval.corrected_by(scale_misalignment), biases, gravity);
             self.rest = self.rest.filter(|rest| rest.agrees_with(interval));
             if self.speed_is_known {
-                self.rests.take(interval, &self.biases, self.nominal.end_s(), self.speed_m_per_s());
+                self.rests.take(interval, &self.unknowns.biases, self.nominal.end_s(), self.speed_m_per_s());
             }
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
@@ -250,22 +243,22 @@ impl Window {
         self.bridged_gap = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
             || self.nominal.end_s() < self.wide_gate_until_s;
         let integration_s = watch.lap_s();
-        let surfels = self.builder.build(&returns, &self.nominal, &self.clock, &self.biases);
+        let surfels = self.builder.build(&returns, &self.nominal, &self.unknowns);
         let cached = vec![CachedNeighbours::default(); surfels.len()];
         self.segments.push_back(WindowSegment { end_tau_s, returns, surfels, cached });
         let surfels_s = watch.lap_s();
         // Reference time of the clock: the middle of the window, where offset and rate are least correlated.
         let length_s = self.spec.step_s * self.segments.len() as f64;
         let middle_s = end_tau_s - 0.5 * length_s;
-        self.border.shift_clock_reference(middle_s - self.clock.at_s);
-        self.clock = self.clock.with_reference_at(middle_s);
+        self.border.shift_clock_reference(middle_s - self.unknowns.clock.at_s);
+        self.unknowns.clock = self.unknowns.clock.with_reference_at(middle_s);
         Timing { integration_s, surfels_s, ..Timing::default() }
     }
 
     /// Rebuilds the surfels of the newest segment with the current trajectory.
     pub(super) fn rebuild_newest_surfels(&mut self) {
         if let Some(newest) = self.segments.back_mut() {
-            newest.surfels = self.builder.build(&newest.returns, &self.nominal, &self.clock, &self.biases);
+            newest.surfels = self.builder.build(&newest.returns, &self.nominal, &self.unknowns);
             newest.cached = vec![CachedNeighbours::default(); newest.surfels.len()];
             if self.observed_builder.is_none() {
                 newest.returns = Vec::new();
@@ -291,7 +284,7 @@ impl Window {
     pub(super) fn next_start_s(&self) -> Option<f64> {
         // After a gap the IMU intervals may end before the segment does.
         let end_s = self.nominal.end_s();
-        Some(self.clock.imu_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
+        Some(self.unknowns.clock.imu_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
     /// The observed surfels of the oldest segment in the map frame, each with the measurement time, s.
@@ -316,8 +309,7 @@ impl Window {
 
     fn observed(&self, segment: &WindowSegment) -> Vec<(f64, Patch)> {
         let Some(builder) = &self.observed_builder else { return Vec::new() };
-        let builder = SurfelBuilder { lidar: self.builder.lidar, ..builder.clone() };
-        let surfels = builder.build(&segment.returns, &self.nominal, &self.clock, &self.biases);
+        let surfels = builder.build(&segment.returns, &self.nominal, &self.unknowns);
         let placing = self.placing();
         surfels.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
     }
@@ -338,12 +330,12 @@ impl Window {
 
     /// The largest estimated scale error or misalignment of the IMU.
     pub(super) fn imu_matrix(&self) -> f64 {
-        self.scale_misalignment.gyro.amax().max(self.scale_misalignment.accel.amax())
+        self.unknowns.scale_misalignment.gyro.amax().max(self.unknowns.scale_misalignment.accel.amax())
     }
 
     /// The estimated corrections of the lidar calibration.
     pub(super) fn lidar(&self) -> LidarCorrection {
-        self.builder.lidar
+        self.unknowns.lidar
     }
 
     /// The lidar correction in the axes of the IMU calibration.
@@ -351,11 +343,11 @@ impl Window {
     /// If the extrinsics are estimated, the axes are midway between the gyroscope axes, which the estimated attitude
     /// refers to, and the accelerometer axes; both are equally accurate.
     pub(super) fn calibrated_lidar(&self) -> LidarCorrection {
-        let lidar = self.builder.lidar;
+        let lidar = self.unknowns.lidar;
         if !self.spec.extrinsics.estimated {
             return lidar;
         }
-        let imu_from_gyro = Rotation::from_scaled_axis(self.scale_misalignment.accel_against_gyro() * 0.5);
+        let imu_from_gyro = Rotation::from_scaled_axis(self.unknowns.scale_misalignment.accel_against_gyro() * 0.5);
         let position = self.builder.laser_in_imu + lidar.translation;
         let translation = lidar.translation + imu_from_gyro * position - position;
         LidarCorrection { rotation: imu_from_gyro * lidar.rotation, translation, ..lidar }
@@ -365,10 +357,8 @@ impl Window {
     fn placing(&self) -> PlacementState<'_> {
         PlacementState {
             nominal: &self.nominal,
-            clock: &self.clock,
-            biases: &self.biases,
+            unknowns: &self.unknowns,
             laser_in_imu: &self.builder.laser_in_imu,
-            lidar: &self.builder.lidar,
             knot_spacing_s: self.spec.knot_spacing_s,
         }
     }

@@ -5,16 +5,13 @@ use super::correspondence::{Counterpart, Matches, Neighbours};
 use super::equations::Robust;
 use super::linearised::Linearised;
 use crate::estimation::nominal::Correction;
+use crate::estimation::residual::Layout;
 use crate::estimation::residual::matched::{MIN_SIGNIFICANT_TILT, Plane};
-use crate::estimation::residual::{
-    ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION, LIDAR_TRANSLATION,
-    Layout, RANGE,
-};
-use crate::estimation::strapdown::ImuScaleMisalignment;
 use crate::estimation::surfel::PlacedSurfel;
 use crate::estimation::timing::{Stopwatch, Timing};
+use crate::estimation::unknowns::scale_misalignment_step;
 use crate::estimation::views::Views;
-use crate::geometry::{Matrix, Rotation, Vector};
+use crate::geometry::{Matrix, Vector};
 
 /// A correction above this (m, rad) in one iteration is rejected.
 const MAX_CORRECTION: (f64, f64) = (2.0, 0.8);
@@ -50,8 +47,7 @@ impl Window {
         }
         let first = self.nominal.times_s().partition_point(|t| *t < self.start.u_s - 1e-9);
         let layout = self.layout(first);
-        let lidar = self.builder.lidar;
-        let backup = (self.nominal.clone(), self.clock, self.biases, self.gravity, self.scale_misalignment);
+        let backup = (self.nominal.clone(), self.unknowns);
         self.border.start_window();
         let mut total = vec![0.0; layout.border()];
         let mut solved = WindowSolution::default();
@@ -96,8 +92,7 @@ impl Window {
             }
         }
         if solved.failure.is_some() {
-            (self.nominal, self.clock, self.biases, self.gravity, self.scale_misalignment) = backup;
-            self.builder.lidar = lidar;
+            (self.nominal, self.unknowns) = backup;
             self.border.reset_to_window_start();
             linearised = None;
         }
@@ -131,21 +126,9 @@ impl Window {
             *sum += term;
         }
         let border = &x[layout.border()..];
-        let three = |at: usize| Vector::new(border[at], border[at + 1], border[at + 2]);
-        self.biases.gyro += three(GYRO_BIAS);
-        self.biases.accel += three(ACCEL_BIAS);
-        let tilt = Vector::new(border[GRAVITY], border[GRAVITY + 1], 0.0);
-        self.gravity = Rotation::from_scaled_axis(tilt) * self.gravity;
-        self.clock.offset_s += border[CLOCK];
-        self.clock.rate += border[CLOCK_RATE];
+        self.nominal.correct_readings(&scale_misalignment_step(border));
+        self.unknowns = self.unknowns.plus(border);
         self.border.add_step(border, &self.workspace.factor);
-        let matrix = |at: usize| Matrix::from_fn(|r, c| border[at + 3 * r + c]);
-        let more = ImuScaleMisalignment { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
-        self.nominal.correct_readings(&more);
-        self.scale_misalignment.add(&more);
-        self.builder.lidar.range_m += border[RANGE];
-        self.builder.lidar.rotation = Rotation::from_scaled_axis(three(LIDAR_ROTATION)) * self.builder.lidar.rotation;
-        self.builder.lidar.translation += three(LIDAR_TRANSLATION);
     }
 }
 

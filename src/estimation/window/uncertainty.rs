@@ -36,7 +36,7 @@ impl Window {
         let own = all - start * self.known_at_start()? * start.transpose();
         let by_views = self.columns_of_views(at, views);
         Some(Sensitivity {
-            pivot: self.nominal.at(u_s, &self.biases.gyro).position,
+            pivot: self.nominal.at(u_s, &self.unknowns.biases.gyro).position,
             start,
             views: by_views.iter().map(|(number, c)| (*number, SMatrix::from_fn(|r, k| by(r, &c[k])))).collect(),
             noise: own * self.spec.solve.covariance_inflation + self.border.imu_random_walk(self.spec.step_s),
@@ -130,7 +130,7 @@ impl Window {
                 surfel,
                 &plane.normal,
                 &by,
-                self.clock.at_s,
+                self.unknowns.clock.at_s,
             );
         }
         columns.into_iter().map(|(index, columns)| (views.view(index as usize).number, columns)).collect()
