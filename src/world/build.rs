@@ -10,7 +10,8 @@ use super::{
 };
 use crate::geometry::{Pose, Route, Vector};
 use crate::spec::{Source, SpecError};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::rc::Rc;
 
 /// Maximum coordinate of a surface or a route, m: beyond, single precision in the ray search is too coarse.
@@ -25,6 +26,7 @@ pub(super) struct WorldParts {
     pub movers: Vec<Mover>,
     pub routes: BTreeMap<String, Route>,
     pub notes: Vec<String>,
+    pub mesh_files: BTreeSet<PathBuf>,
 }
 
 /// Triangles with one material each.
@@ -44,6 +46,7 @@ pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, Wor
         meshes: BTreeMap::new(),
         triangle_count: 0,
         notes: Vec::new(),
+        mesh_files: BTreeSet::new(),
     };
     let mut static_surfaces = Surfaces::default();
     builder.add_items(&spec.items, &Pose::identity(), 0, &mut static_surfaces)?;
@@ -51,8 +54,8 @@ pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, Wor
         return Err(SpecError::about(source, "items", "the scene has no surfaces: `items` is empty").into());
     }
     let movers = spec.movers.iter().map(|mover| builder.mover(mover)).collect::<Result<_, _>>()?;
-    let Builder { routes, notes, .. } = builder;
-    Ok(WorldParts { materials: materials(spec), static_surfaces, movers, routes, notes })
+    let Builder { routes, notes, mesh_files, .. } = builder;
+    Ok(WorldParts { materials: materials(spec), static_surfaces, movers, routes, notes, mesh_files })
 }
 
 /// The materials in order of their names, which is the order of their ids.
@@ -129,6 +132,7 @@ struct Builder<'a> {
     meshes: BTreeMap<String, Rc<MeshTriangles>>,
     triangle_count: usize,
     notes: Vec<String>,
+    mesh_files: BTreeSet<PathBuf>,
 }
 
 impl Builder<'_> {
@@ -233,8 +237,8 @@ impl Builder<'_> {
                 "the mesh `{file}` needs a folder: a scene without a folder cannot use mesh files"
             )));
         };
-        let mesh = import::read(&folder.join(file), scale, *up)
-            .map_err(|error| wrong(format!("the mesh `{file}` {error}")))?;
+        let path = folder.join(file);
+        let mesh = import::read(&path, scale, *up).map_err(|error| wrong(format!("the mesh `{file}` {error}")))?;
         if mesh.without_area > 0 {
             let count = mesh.without_area;
             self.notes.push(format!(
@@ -242,6 +246,7 @@ impl Builder<'_> {
                 count + mesh.triangles.len()
             ));
         }
+        self.mesh_files.insert(path);
         let mesh = Rc::new(mesh);
         self.meshes.insert(key, Rc::clone(&mesh));
         Ok(mesh)

@@ -21,6 +21,7 @@
 mod build;
 mod caster;
 mod error;
+mod export;
 mod import;
 mod include;
 mod material;
@@ -29,15 +30,18 @@ mod mover;
 mod placement;
 mod ray;
 mod scatter;
+mod section;
 mod shape;
 mod spec;
 mod triangle;
 
 pub use error::WorldError;
+pub use export::MeshFormat;
 pub use material::{Material, MaterialId};
 pub use model::World;
 pub use placement::Placement;
 pub use ray::{Hit, Ray};
+pub use section::{SectionPlane, Segment};
 pub use shape::{HeightsSpec, LengthUnit, OpeningSpec, ShapeSpec, UpAxis};
 pub use spec::{
     ItemSpec, MaterialKind, MaterialSpec, MoverSpec, RouteSpec, ScatterSpec, SceneSpec, Turn, WaypointSpec,

@@ -1,10 +1,12 @@
 use super::build::{WorldParts, build};
 use super::caster::{Caster, Crossing};
 use super::mover::Mover;
+use super::section::{SectionPlane, Segment, edges};
 use super::{Hit, Material, MaterialId, Ray, SceneSpec, WorldError};
 use crate::geometry::{Route, Surface, SurfacePoint, Vector};
 use crate::spec::{Kind, Source, find, parse};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 
 /// Distance within which two hits are the same surface for [`World::cast_beyond`], m.
 const SAME_SURFACE_M: f64 = 1e-4;
@@ -18,6 +20,7 @@ pub struct World {
     routes: BTreeMap<String, Route>,
     default_route: Option<String>,
     notes: Vec<String>,
+    mesh_files: BTreeSet<PathBuf>,
 }
 
 impl World {
@@ -37,10 +40,10 @@ impl World {
     /// If an included scene or a mesh is missing or invalid, a name is not defined, or values are inconsistent.
     pub fn build(spec: &SceneSpec, source: &Source) -> Result<Self, WorldError> {
         let spec = &spec.with_includes(source)?;
-        let WorldParts { materials, static_surfaces, movers, routes, notes } = build(spec, source)?;
+        let WorldParts { materials, static_surfaces, movers, routes, notes, mesh_files } = build(spec, source)?;
         let static_surfaces = Caster::new(&static_surfaces.triangles, &static_surfaces.materials);
         let (name, default_route) = (spec.name.clone(), spec.default_route.clone());
-        Ok(Self { name, materials, static_surfaces, movers, routes, default_route, notes })
+        Ok(Self { name, materials, static_surfaces, movers, routes, default_route, notes, mesh_files })
     }
 
     /// Name of the scene.
@@ -90,6 +93,23 @@ impl World {
         self.static_surfaces.triangles()
     }
 
+    /// The triangles of the movers at `t_s`, seconds of true time since the start of the run: corners in the world, m, and
+    /// material.
+    pub fn moving_triangles(&self, t_s: f64) -> impl Iterator<Item = ([Vector; 3], MaterialId)> + '_ {
+        self.movers.iter().flat_map(move |mover| mover.triangles(t_s))
+    }
+
+    /// The segments along which a plane cuts the static surfaces.
+    pub fn section(&self, plane: &SectionPlane) -> Vec<Segment> {
+        self.triangles().filter_map(|(triangle, _)| plane.cut(&triangle)).collect()
+    }
+
+    /// The edges of the static surfaces: where a surface ends, or meets another at more than 25 degrees.
+    pub fn edges(&self) -> Vec<Segment> {
+        let triangles: Vec<[Vector; 3]> = self.triangles().map(|(triangle, _)| triangle).collect();
+        edges(triangles.iter())
+    }
+
     /// A material of this world.
     pub fn material(&self, id: MaterialId) -> &Material {
         &self.materials[id.index()]
@@ -123,6 +143,11 @@ impl World {
     /// Warnings about the scene, one sentence each: triangles without area that were removed from a mesh.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// The mesh files that the scene was built from.
+    pub fn mesh_files(&self) -> &BTreeSet<PathBuf> {
+        &self.mesh_files
     }
 }
 

@@ -1,6 +1,8 @@
 //! Movers: rigid groups of triangles that follow timed waypoints.
 
+use super::MaterialId;
 use super::caster::{Caster, Crossing};
+use super::triangle::Triangle;
 use crate::geometry::{Pose, Vector};
 
 /// A rigid group of triangles that follows waypoints.
@@ -16,6 +18,13 @@ impl Mover {
         let (lower, upper) = surfaces.bounds();
         let radius = lower.abs().sup(&upper.abs()).norm();
         Self { surfaces, path, radius }
+    }
+
+    /// The triangles at `time_s`: corners in the world, and material.
+    pub fn triangles(&self, time_s: f64) -> impl Iterator<Item = (Triangle, MaterialId)> + '_ {
+        let world_from_body = self.path.at(time_s);
+        let place = move |corner: Vector| world_from_body.transform_point(&corner.into()).coords;
+        self.surfaces.triangles().map(move |(triangle, material)| (triangle.map(place), material))
     }
 
     /// The first intersection with a ray at `time_s`, within `reach`.

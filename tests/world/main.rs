@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod casts;
+mod exports;
 mod includes;
 mod meshes;
 mod scenes;
