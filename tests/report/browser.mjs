@@ -1,4 +1,4 @@
-// Loads a report in a headless browser and uses it: node browser.mjs NODE_MODULES REPORT [PICTURES]
+// Loads the page of a run or of a scene in a headless browser and uses it: node browser.mjs NODE_MODULES PAGE [PICTURES]
 //
 // Exits with 77 if a program or a module that it needs is not installed.
 // Fails on an error in the console, on a request to the network, on a control without effect, on an accessibility violation
@@ -64,6 +64,20 @@ async function slide(page, id, fraction) {
 async function use(page) {
   // Only the drawing counts, not the focus ring, the legend and the label on it.
   await page.addStyleTag({ content: "#scene{outline:none!important}.legend,.tag{visibility:hidden}" });
+  await moveCamera(page);
+  const isScene = await page.evaluate(() => document.documentElement.dataset.page === "scene");
+  if (!isScene) await colourCloud(page);
+  const shown = isScene ? ["show-surfaces", "show-estimate"] : ["show-cloud", "show-surfaces", "show-estimate", "show-truth"];
+  for (const id of shown) {
+    await changes(page, id, () => page.locator(`#${id}`).click());
+    await page.locator(`#${id}`).click();
+  }
+  await play(page);
+  if (isScene) check((await page.locator("#plan svg polyline").count()) > 100, "the floor plan is empty");
+  else await useCharts(page);
+}
+
+async function moveCamera(page) {
   const stage = await page.locator("#scene").boundingBox();
   const [x, y] = [stage.x + stage.width / 2, stage.y + stage.height / 2];
   await changes(page, "dragging", async () => {
@@ -80,6 +94,9 @@ async function use(page) {
   await changes(page, "the lower end of the slice", () => slide(page, "low", 0.2));
   await slide(page, "high", 1);
   await slide(page, "low", 0);
+}
+
+async function colourCloud(page) {
   const colours = await page.locator("#colour option").evaluateAll((options) => options.map((option) => option.value));
   for (const colour of ["height", "error", "time", "turn_rate", "intensity", "material"]) {
     check(colours.includes(colour), `colour by ${colour} is missing`);
@@ -87,25 +104,28 @@ async function use(page) {
   for (const colour of colours.slice(1)) {
     await changes(page, `colour by ${colour}`, () => page.locator("#colour").selectOption(colour));
   }
-  for (const id of ["show-cloud", "show-surfaces", "show-estimate", "show-truth"]) {
-    await changes(page, id, () => page.locator(`#${id}`).click());
-    await page.locator(`#${id}`).click();
-  }
+}
+
+const time = (page) => page.locator("#time").evaluate((input) => input.valueAsNumber);
+
+async function play(page) {
   // The head is at rest in the first seconds.
   await slide(page, "time", 0.6);
-  const time = () => page.locator("#time").evaluate((input) => input.valueAsNumber);
-  const begun = await time();
+  const begun = await time(page);
   await changes(page, "playing", async () => {
     await page.locator("#play").click();
     await page.waitForFunction((begun) => document.getElementById("time").valueAsNumber > begun + 0.3, begun);
     await page.locator("#play").click();
   });
-  const stopped = await time();
+}
+
+async function useCharts(page) {
+  const stopped = await time(page);
   const chart = page.locator("#errors .u-over").first();
   await chart.scrollIntoViewIfNeeded();
   const box = await chart.boundingBox();
   await page.mouse.click(box.x + 0.8 * box.width, box.y + 0.5 * box.height);
-  check((await time()) > stopped, "a click on a chart does not move the time");
+  check((await time(page)) > stopped, "a click on a chart does not move the time");
   const choice = page.locator("#errors figcaption select");
   const drawn = () => page.locator("#errors canvas").nth(1).screenshot();
   const first = (await drawn()).toString("base64");

@@ -1,4 +1,4 @@
-//! The page of a run in a headless browser.
+//! The pages of a run and of a scene in a headless browser.
 
 use crate::command::run;
 use crate::skip::run_or_skip;
@@ -25,10 +25,24 @@ fn the_page_works_in_a_browser_and_a_hostile_scene_name_is_inert() {
     assert!(code == 0 || code == 3, "{errors}");
     let report = here.path().join("out/report.html");
     assert!(std::fs::read_to_string(&report).unwrap().contains("&lt;script&gt;window.hostile"));
+    use_in_a_browser(&report);
+}
+
+#[test]
+fn the_page_of_a_scene_works_in_a_browser() {
+    let here = tempfile::tempdir().unwrap();
+    let scene = hostile_scene(here.path());
+    let (code, _, errors) = run(here.path(), &format!("scene view {} scene.html", scene.display()));
+    assert_eq!(code, 0, "{errors}");
+    use_in_a_browser(&here.path().join("scene.html"));
+}
+
+/// Uses a page in a headless browser; fails if something on it does not work.
+fn use_in_a_browser(page: &Path) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let (script, modules) = (root.join("tests/report/browser.mjs"), root.join("target/ci-node/node_modules"));
     let mut node = Command::new("node");
-    let Some(output) = run_or_skip("browser", node.arg(script).arg(modules).arg(&report)) else { return };
+    let Some(output) = run_or_skip("browser", node.arg(script).arg(modules).arg(page)) else { return };
     println!("{}", String::from_utf8_lossy(&output.stdout));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -34,6 +34,8 @@ pub struct View {
     pub base: Vec<TimedPose>,
     /// Corners of the triangles of the true surfaces; empty if the scene is not known.
     pub surfaces: Vec<[Vector; 3]>,
+    /// Index of the material of each triangle, for a view of the surfaces themselves; empty where they are the background.
+    pub surface_materials: Vec<usize>,
     /// Whether small triangles are missing in `surfaces`.
     pub surfaces_are_partial: bool,
     /// Springs and cords between base and head.

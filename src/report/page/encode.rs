@@ -1,32 +1,46 @@
 //! Encodes the data of the page as JSON with binary arrays in base64 (RFC 4648).
 
 use super::binary::base64_f32;
-use super::data::{Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, RunPage, Section, TimedPose, TimelineRow};
+use super::data::{
+    Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, RunPage, Section, TimedPose, TimelineRow, View,
+};
 use super::quantise::cloud;
 use crate::geometry::{Pose, Vector};
 use serde_json::{Value, json};
 
-/// The data as JSON that is inert within a `<script>` element: it has no `<`, `>` or `&`.
+/// The data of a run as JSON that is inert within a `<script>` element: it has no `<`, `>` or `&`.
 ///
 /// # Errors
 /// When a value cannot be written as JSON.
-pub(super) fn inert_json(page: &RunPage) -> Result<String, serde_json::Error> {
-    let view = &page.view;
-    let value = json!({
-        "status": page.metrics.status,
+pub(super) fn run_json(page: &RunPage) -> Result<String, serde_json::Error> {
+    let charts: Vec<Value> = page.charts.iter().map(chart_group).collect();
+    let timeline: Vec<Value> = page.timeline.iter().map(timeline_row).collect();
+    Ok(inert(&serde_json::to_string(&document(&page.view, &charts, &timeline))?))
+}
+
+/// The data of a page with a view only, as [`run_json`].
+///
+/// # Errors
+/// When a value cannot be written as JSON.
+pub(super) fn view_json(view: &View) -> Result<String, serde_json::Error> {
+    Ok(inert(&serde_json::to_string(&document(view, &[], &[]))?))
+}
+
+fn document(view: &View, charts: &[Value], timeline: &[Value]) -> Value {
+    json!({
         "cloud": cloud(&view.points),
         "materials": view.materials,
         "estimate": path(&view.estimate),
         "truth": path(&view.truth),
         "base": path(&view.base),
         "surfaces": base64_f32(view.surfaces.iter().flatten().flat_map(|corner| corner.iter().copied())),
+        "surfaceMaterials": view.surface_materials,
         "surfacesArePartial": view.surfaces_are_partial,
         "links": view.links.iter().map(link).collect::<Vec<_>>(),
         "parts": view.parts.iter().map(block).collect::<Vec<_>>(),
-        "charts": page.charts.iter().map(chart_group).collect::<Vec<_>>(),
-        "timeline": page.timeline.iter().map(timeline_row).collect::<Vec<_>>(),
-    });
-    Ok(inert(&serde_json::to_string(&value)?))
+        "charts": charts,
+        "timeline": timeline,
+    })
 }
 
 /// Escapes the characters that end a script element or start a comment in it, and line ends that scripts do not allow.

@@ -88,7 +88,7 @@ pub(super) fn metrics_tables(metrics: &Metrics, parts_s: &[(&str, f64)]) -> Stri
     html
 }
 
-fn table(title: &str, rows: impl Iterator<Item = (String, String)>) -> String {
+pub(super) fn table(title: &str, rows: impl Iterator<Item = (String, String)>) -> String {
     let rows: String = rows
         .map(|(name, value)| {
             format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escaped(&name), escaped(&value))

@@ -1,13 +1,15 @@
-//! The report of a run as one HTML file without external resources.
+//! Pages with a three-dimensional view, each one HTML file without external resources.
 //!
-//! The page has the verdict, a three-dimensional view, interactive charts, the metrics and the manifest. Scripts, style
-//! sheets and data are in the file. A content security policy forbids network access.
+//! The page of a run has the verdict, the view, interactive charts, the metrics and the manifest; that of a scene the view,
+//! the floor plan and the materials. Scripts, style sheets and data are in the file. A content security policy forbids
+//! network access.
 
 mod binary;
 mod data;
 mod encode;
 mod html;
 mod quantise;
+mod scene;
 
 use crate::report::rows;
 pub use data::{
@@ -24,7 +26,10 @@ pub const MAX_PAGE_TRIANGLES: usize = 30_000;
 /// Maximum number of poses of a path on a page; one takes 32 bytes, 43 in base64.
 pub const MAX_PAGE_POSES: usize = 20_000;
 
+pub use scene::{MaterialRow, ScenePage};
+
 const TEMPLATE: &str = include_str!("assets/page.html");
+const RUN_SECTIONS: &str = include_str!("assets/run.html");
 const STYLE: &str = concat!(include_str!("assets/vendor/uplot.min.css"), include_str!("assets/style.css"));
 /// The script of the page: libraries, then the parts of the page in order of their dependencies.
 const SCRIPTS: [&str; 9] = [
@@ -48,21 +53,31 @@ impl RunPage<'_> {
         let metrics = self.metrics;
         let title = html::escaped(&rows::title(metrics));
         let status = html::escaped(metrics.status.as_deref().unwrap_or_default());
-        let data = encode::inert_json(self)?;
-        let script = SCRIPTS.join("\n");
-        Ok(html::fill(
-            TEMPLATE,
+        let sections = html::fill(
+            RUN_SECTIONS,
             &[
-                ("title", &title),
-                ("status", &status),
-                ("style", STYLE),
-                ("verdict", &html::verdict(metrics)),
                 ("metrics", &html::metrics_tables(metrics, &self.parts_s)),
                 ("events", &html::events(metrics)),
                 ("manifest", &html::escaped(self.manifest)),
+            ],
+        );
+        Ok(html::fill(
+            TEMPLATE,
+            &[
+                ("page", "run"),
+                ("title", &title),
+                ("status", &status),
+                ("style", STYLE),
+                ("introduction", &html::verdict(metrics)),
+                ("without_scripts", "The folder plots/ has the plots as pictures."),
+                ("view_title", "Trajectory and cloud"),
+                ("path", "estimate"),
+                ("path_of", "head"),
+                ("sections", &sections),
+                ("footer", "Lines of the charts mark the time of the view; click on a chart to move to that time."),
                 ("version", &html::escaped(&metrics.version)),
-                ("data", &data),
-                ("script", &script),
+                ("data", &encode::run_json(self)?),
+                ("script", &SCRIPTS.join("\n")),
             ],
         ))
     }

@@ -48,6 +48,7 @@ fn full_view() -> View {
         truth: poses.clone(),
         base: poses,
         surfaces: (0..MAX_PAGE_TRIANGLES).map(|k| [at(k), at(k + 1), at(k + 2)]).collect(),
+        surface_materials: vec![],
         surfaces_are_partial: true,
         links: vec![],
         parts: vec![],

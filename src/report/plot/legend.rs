@@ -14,6 +14,8 @@ const ABOVE_AXES: f64 = 13.0;
 const SAMPLE_LENGTH: f64 = 20.0;
 /// Distances between two entries, and between the sample and the name of an entry, points.
 const ENTRY_GAP: f64 = 18.0;
+/// Least distance between a title and entries in the same line, points.
+const TITLE_GAP: f64 = 48.0;
 const NAME_GAP: f64 = 6.0;
 /// Length of the colour bar, points.
 const COLOUR_BAR: f64 = 96.0;
@@ -59,7 +61,7 @@ impl<'a> Header<'a> {
             }
         }
         let title = canvas.width_of(&chart.title, TEXT)?;
-        let legend = lines.first().map_or(0.0, |line| ENTRY_GAP + width_of(line));
+        let legend = lines.first().map_or(0.0, |line| TITLE_GAP + width_of(line));
         Ok(Self {
             title: &chart.title,
             lines,

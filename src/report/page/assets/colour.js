@@ -7,6 +7,8 @@ const SCALES = {
 const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#b8a800", "#7a4fb5", "#737373"].concat(
   ["#7f3b08", "#7fc97f", "#1b3a6b", "#f4a6a0", "#4d6b1e", "#a8d0d8", "#8b1a5c"],
 );
+// The two materials that cover most of a scene are neutral.
+const NEUTRAL = ["#d8d4cb", "#a39e94"];
 const UNKNOWN_COLOUR = "#8a8f96";
 
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
@@ -24,14 +26,18 @@ const table = (stops) => {
   return colours;
 };
 
-// Codes of the materials that occur, the most frequent first; the first ones have colours of their own.
-const materialsByCount = (codes) => {
-  const counts = new Uint32Array(256);
-  codes.forEach((code) => counts[code]++);
-  const occur = data.materials.map((_, code) => code).filter((code) => counts[code] > 0);
-  return occur.sort((a, b) => counts[b] - counts[a] || a - b);
+// Whether the page shows a scene: the surfaces in the colours of their materials.
+const isScene = data.surfaceMaterials.length > 0;
+
+// Codes of the materials that occur, by the sum of their weights; the first ones have colours of their own.
+const materialsByWeight = (codes, weight) => {
+  const sums = new Float64Array(256);
+  codes.forEach((code, k) => (sums[code] += weight(k)));
+  const occur = data.materials.map((_, code) => code).filter((code) => sums[code] > 0);
+  return occur.sort((a, b) => sums[b] - sums[a] || a - b);
 };
-const materialColour = (rank) => PALETTE[rank % PALETTE.length];
+const MATERIAL_COLOURS = isScene ? NEUTRAL.concat(PALETTE) : PALETTE;
+const materialColour = (rank) => MATERIAL_COLOURS[rank % MATERIAL_COLOURS.length];
 
 const materialTable = (order) => {
   const colours = table([UNKNOWN_COLOUR, UNKNOWN_COLOUR]);
@@ -59,7 +65,7 @@ const channels = (() => {
   add("intensity", "intensity", "", "sequential");
   const material = bytes(cloud.material);
   if (material.some((code) => code !== 255)) {
-    known.material = { name: "surface material", codes: material, order: materialsByCount(material) };
+    known.material = { name: "surface material", codes: material, order: materialsByWeight(material, () => 1) };
   }
   known.height.codes = heightCodes(known.height);
   return known;
@@ -79,26 +85,31 @@ function heightCodes(channel) {
   return Uint8Array.from(heights, (code) => Math.round(Math.min(Math.max((code - low) / (high - low), 0), 1) * 254));
 }
 
+const addElement = (parent, tag, text, className) => {
+  const element = parent.appendChild(document.createElement(tag));
+  element.textContent = text;
+  if (className) element.className = className;
+  return element;
+};
+
+// Shows the colours of materials in the legend.
+const showMaterials = (order) => {
+  byId("legend").replaceChildren();
+  addElement(byId("legend"), "span", "surface material");
+  const keys = addElement(byId("legend"), "div", "");
+  order.forEach((code, rank) => {
+    const key = addElement(keys, "span", "", "key");
+    addElement(key, "i", "").style.background = materialColour(rank);
+    addElement(key, "span", data.materials[code]);
+  });
+};
+
 // Shows the scale of a channel in the legend.
 const showLegend = (channel) => {
-  const legend = byId("legend");
+  if (!channel.scale) return showMaterials(channel.order);
+  const [legend, add] = [byId("legend"), addElement];
   legend.replaceChildren();
-  const add = (parent, tag, text, className) => {
-    const element = parent.appendChild(document.createElement(tag));
-    element.textContent = text;
-    if (className) element.className = className;
-    return element;
-  };
   add(legend, "span", channel.name);
-  if (!channel.scale) {
-    const keys = add(legend, "div", "");
-    channel.order.forEach((code, rank) => {
-      const key = add(keys, "span", "", "key");
-      add(key, "i", "").style.background = materialColour(rank);
-      add(key, "span", data.materials[code]);
-    });
-    return;
-  }
   add(legend, "span", "", "bar").style.background = `linear-gradient(to right, ${SCALES[channel.scale].join(",")})`;
   const ends = add(legend, "div", "", "ends");
   rangeInWords(channel.lower, channel.upper, channel.unit).forEach((end) => add(ends, "span", end));

@@ -4,6 +4,9 @@
 const ABOVE_HEAD_M = 0.5;
 // A ceiling has at least this fraction of the points.
 const CEILING_FRACTION = 0.05;
+// In a scene, the slice starts this far above the slice of a run: below a ceiling that is at most so much higher, m.
+const CUT_ABOVE_PATH_M = 0.3;
+const MAX_CEILING_M = 4;
 
 let view = null;
 try {
@@ -25,13 +28,15 @@ const setUpColours = () => {
     view.draw();
   });
   view.cloud.colour(select.value);
+  if (isScene) showMaterials(sceneMaterials);
 };
 
 // Sets up the two ends of the slice, in metres; a ceiling above the path is left out at first.
 const setUpSlice = () => {
   const [low, high] = [byId("low"), byId("high")];
   const { lower, upper, count } = data.cloud;
-  const [from, to] = count ? [lower[2], upper[2]] : [-1, 3];
+  const corners = isScene ? view.corners(2) : [];
+  const [from, to] = count ? [lower[2], upper[2]] : isScene ? [corners[0], corners[corners.length - 1]] : [-1, 3];
   for (const input of [low, high]) [input.min, input.max] = [from, to];
   [low.value, high.value] = [from, to];
   const heights = estimate.t.map((_, k) => estimate.pose[7 * k + 2]).sort();
@@ -39,6 +44,7 @@ const setUpSlice = () => {
   let hiding = 0;
   for (let k = 0; k < count; k += 16) hiding += view.cloud.place(k)[2] > above ? 16 : 0;
   if (hiding > CEILING_FRACTION * count) high.value = above;
+  if (isScene && heights.length && to - above < MAX_CEILING_M) high.value = above + CUT_ABOVE_PATH_M;
   const update = () => {
     const ends = [low.valueAsNumber, high.valueAsNumber].sort((a, b) => a - b);
     view.slice = [ends[0] - 1e-3, ends[1] + 1e-3];
@@ -58,10 +64,12 @@ const setUpShown = () => {
     input.addEventListener("change", update);
     update();
   };
+  document.querySelectorAll("[data-needs=cloud]").forEach((control) => (control.hidden = isScene));
   document.querySelector("[data-needs=truth]").hidden = !truth.isKnown;
   document.querySelector("[data-needs=surfaces]").hidden = data.surfaces === "";
   byId("show-surfaces").checked = data.surfaces !== "";
-  if (data.surfacesArePartial) byId("surfaces-label").textContent = "largest true surfaces";
+  const whose = isScene ? "" : "true ";
+  byId("surfaces-label").textContent = (data.surfacesArePartial ? "largest " : "") + whose + "surfaces";
   check("show-cloud", (shown) => (view.cloud.points.visible = shown && data.cloud.count > 0));
   check("show-estimate", (shown) => (view.estimate.visible = shown));
   check("show-truth", (shown) => (view.truth.visible = shown && truth.isKnown));

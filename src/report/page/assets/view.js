@@ -3,8 +3,18 @@
 // The close-up shows this height, m.
 const CLOSE_UP_M = 0.45;
 
+// Twice the area of a triangle.
+const twiceArea = (corners, k) => {
+  const at = (corner) => new vendor.Vector3().fromArray(corners, 9 * k + 3 * corner);
+  return at(1).sub(at(0)).cross(at(2).sub(at(0))).length();
+};
+const surfaceCorners = floats(data.surfaces);
+const sceneMaterials = materialsByWeight(data.surfaceMaterials, (k) => twiceArea(surfaceCorners, k));
+
+// The surfaces: those of a scene opaque, those of a run as a background.
 const surfaceMesh = () => {
-  const corners = floats(data.surfaces);
+  const corners = surfaceCorners;
+  const colours = data.materials.map((_, code) => rgb(materialColour(Math.max(sceneMaterials.indexOf(code), 0))));
   const shades = new Float32Array(corners.length);
   const [a, b, c] = [new vendor.Vector3(), new vendor.Vector3(), new vendor.Vector3()];
   const light = new vendor.Vector3(0.4, 0.25, 0.88).normalize();
@@ -13,12 +23,17 @@ const surfaceMesh = () => {
     b.fromArray(corners, k + 3).sub(a);
     c.fromArray(corners, k + 6).sub(a);
     const shade = 0.35 + 0.65 * Math.abs(b.cross(c).normalize().dot(light));
-    shades.fill(shade, k, k + 9);
+    if (!isScene) shades.fill(shade, k, k + 9);
+    else for (let at = k; at < k + 9; at++) {
+      // Vertex colours are linear; the exponent is that of sRGB.
+      shades[at] = Math.pow(colours[data.surfaceMaterials[k / 9]][(at - k) % 3] / 255, 2.2) * shade;
+    }
   }
   const geometry = new vendor.BufferGeometry();
   geometry.setAttribute("position", new vendor.BufferAttribute(corners, 3));
   geometry.setAttribute("color", new vendor.BufferAttribute(shades, 3));
-  const options = { vertexColors: true, transparent: true, opacity: 0.1, depthWrite: false, side: vendor.DoubleSide };
+  const background = { transparent: true, opacity: 0.1, depthWrite: false };
+  const options = { vertexColors: true, side: vendor.DoubleSide, ...(isScene ? {} : background) };
   const mesh = new vendor.Mesh(geometry, new vendor.MeshBasicMaterial(options));
   mesh.visible = false;
   return mesh;
@@ -59,7 +74,7 @@ class View {
     timer.listeners.push((t) => this.move(t));
   }
 
-  // Centre and radius of the path and most of the cloud.
+  // Centre and radius of the path and most of the cloud, or of the surfaces.
   get extent() {
     const [low, high] = [new vendor.Vector3(1e9, 1e9, 1e9), new vendor.Vector3(-1e9, -1e9, -1e9)];
     const spread = (values) => [values[Math.floor(0.02 * values.length)], values[Math.floor(0.98 * (values.length - 1))]];
@@ -72,11 +87,17 @@ class View {
         return this.cloud.place(Math.floor((k / 5000) * data.cloud.count))[axis];
       });
       if (places.length) add(axis, spread(places.sort()));
+      if (isScene) add(axis, spread(this.corners(axis)));
       const poses = estimate.t.map((_, k) => estimate.pose[7 * k + axis]).sort();
       if (poses.length) add(axis, spread(poses));
     }
     if (low.x > high.x) return { centre: new vendor.Vector3(), radius: 5 };
     return { centre: low.clone().add(high).multiplyScalar(0.5), radius: Math.max(high.distanceTo(low) / 2, 0.5) };
+  }
+
+  // The sorted coordinates of the corners of the surfaces along an axis.
+  corners(axis) {
+    return this.surfaces.geometry.attributes.position.array.filter((_, k) => k % 3 === axis).sort();
   }
 
   // Shows everything, from one of three directions.
@@ -158,7 +179,7 @@ class View {
     this.renderer.setClearColor(themeColour("stage"));
     set(this.estimate.material, "estimate");
     set(this.truth.material, "truth");
-    set(this.surfaces.material, "soft");
+    if (!isScene) set(this.surfaces.material, "soft");
     set(this.cloud.beams.material, "second");
     set(this.head.materials.head, "soft");
     set(this.head.materials.second, "part");

@@ -1,0 +1,77 @@
+//! The page of a scene.
+
+use super::data::View;
+use super::{SCRIPTS, STYLE, TEMPLATE, encode, html};
+use crate::report::plot::{Figure, PlotError};
+
+/// The page of a scene: its surfaces in three dimensions, a floor plan and its materials.
+pub struct ScenePage<'a> {
+    /// Name of the scene.
+    pub name: &'a str,
+    /// The surfaces, coloured by material, and the default route as the estimate.
+    pub view: View,
+    /// Size, routes and other properties: name and value.
+    pub properties: Vec<(String, String)>,
+    /// The materials in use.
+    pub materials: Vec<MaterialRow>,
+    /// Floor plan and elevation.
+    pub plan: Figure,
+}
+
+/// A material with the surface that it covers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MaterialRow {
+    /// Name.
+    pub name: String,
+    /// Fraction of light scattered back at normal incidence.
+    pub reflectance: f64,
+    /// Fraction of light transmitted.
+    pub transmission: f64,
+    /// Area, m^2.
+    pub area_m2: f64,
+}
+
+impl ScenePage<'_> {
+    /// The HTML of the page; the same data give the same bytes.
+    ///
+    /// # Errors
+    /// When the plan cannot be drawn, or a value cannot be written as JSON.
+    pub fn html(&self) -> Result<String, PlotError> {
+        let sections = format!(
+            "<section id=\"plan\"><h2>Floor plan and elevation</h2>\n{}</section>\n\
+             <section id=\"properties\"><h2>Contents</h2>\n<div class=\"tables\">\n{}{}</div></section>\n",
+            self.plan.svg()?,
+            html::table("scene", self.properties.iter().cloned()),
+            html::table("materials", self.materials.iter().map(MaterialRow::cells)),
+        );
+        let data = encode::view_json(&self.view).map_err(|error| PlotError::Drawing(error.to_string()))?;
+        Ok(html::fill(
+            TEMPLATE,
+            &[
+                ("page", "scene"),
+                ("title", &html::escaped(self.name)),
+                ("status", ""),
+                ("style", STYLE),
+                ("introduction", ""),
+                ("without_scripts", "The floor plan below does not."),
+                ("view_title", "Surfaces and route"),
+                ("path", "route"),
+                ("path_of", "route"),
+                ("sections", &sections),
+                ("footer", ""),
+                ("version", env!("CARGO_PKG_VERSION")),
+                ("data", &data),
+                ("script", &SCRIPTS.join("\n")),
+            ],
+        ))
+    }
+}
+
+impl MaterialRow {
+    fn cells(&self) -> (String, String) {
+        let transmission =
+            if self.transmission > 0.0 { format!(", transmits {:.2}", self.transmission) } else { String::new() };
+        let value = format!("reflectance {:.2}{transmission}, {:.0} m\u{b2}", self.reflectance, self.area_m2);
+        (self.name.clone(), value)
+    }
+}
