@@ -25,6 +25,7 @@ mod quantity;
 mod recording_files;
 mod recording_size;
 mod reproduce;
+mod scene;
 mod signals;
 mod simulate;
 mod slurm;
@@ -76,6 +77,7 @@ enum Command {
     Latency(latency::Arguments),
     Map(map::Arguments),
     Reproduce(reproduce::Arguments),
+    Scene(scene::Arguments),
     Study(study::Arguments),
     Sweep(sweep::Arguments),
     Check(check::Arguments),
@@ -117,6 +119,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
         Command::Latency(arguments) => latency::run(arguments, global),
         Command::Map(arguments) => map::run(arguments, global),
         Command::Reproduce(arguments) => reproduce::run(arguments, global),
+        Command::Scene(arguments) => scene::run(arguments, global),
         Command::Study(arguments) => study::run(arguments, global),
         Command::Sweep(arguments) => sweep::run(arguments, global),
         Command::Check(arguments) => check::run(arguments, global),

@@ -125,7 +125,7 @@ pub(super) fn check_not_inputs(inputs: &[PathBuf], outputs: &[PathBuf]) -> anyho
         None => Ok(()),
         Some(output) => {
             let message = format!(
-                "{} is an input of this command and would be replaced by the result: pass another path with --out",
+                "{} is an input of this command and would be replaced by the result: pass another path",
                 output.display()
             );
             Err(Usage(message).into())

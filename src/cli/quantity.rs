@@ -1,4 +1,4 @@
-//! Parses durations with units.
+//! Parses durations and lengths with units.
 
 /// Maximum duration on the command line, s (30 years); most commands have lower limits.
 const MAX_S: f64 = 1e9;
@@ -27,6 +27,27 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Maximum magnitude of a length on the command line, m.
+const MAX_M: f64 = 1e5;
+
+/// Parses a length such as `1.2m`, `80cm`, `900mm` or `1.2`; returns metres.
+pub(super) fn metres(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let unit_at = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
+    let (number, unit) = text.split_at(unit_at);
+    let number = number.trim().parse::<f64>();
+    let number =
+        number.map_err(|_| format!("`{text}` is not a length: write a number and a unit, as in 1.2m or 80cm"))?;
+    let factor = match unit {
+        "" | "m" => 1.0,
+        "cm" => 1e-2,
+        "mm" => 1e-3,
+        _ => return Err(format!("`{unit}` is not a unit of length: use mm, cm or m, as in 1.2m or 80cm")),
+    };
+    let metres = number * factor;
+    if metres.abs() <= MAX_M { Ok(metres) } else { Err(format!("the length must be within {MAX_M:e} m")) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -38,6 +59,16 @@ mod tests {
         }
         for text in ["", "s", "-3s", "0", "nan", "inf", "3 parsecs", "1e400s", "1e300s", "300000h"] {
             assert!(seconds(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_length_is_a_number_and_a_unit() {
+        for (text, expected) in [("1.2m", 1.2), ("80cm", 0.8), ("-900 mm", -0.9), ("2", 2.0)] {
+            assert_eq!(metres(text), Ok(expected), "{text}");
+        }
+        for text in ["", "m", "nan", "inf", "3 feet", "1e400m", "1e6m"] {
+            assert!(metres(text).is_err(), "{text}");
         }
     }
 }

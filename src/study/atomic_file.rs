@@ -60,13 +60,25 @@ impl Write for AtomicFile {
 /// # Errors
 /// When the folder or the file cannot be written.
 pub fn replace_text(target: &Path, text: &str) -> Result<(), StudyError> {
+    replace_bytes(target, text.as_bytes())
+}
+
+/// Writes a file atomically, with the temporary file beside it.
+///
+/// # Errors
+/// When the folder or the file cannot be written.
+pub fn replace_bytes(target: &Path, bytes: &[u8]) -> Result<(), StudyError> {
     let folder = target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    write_text(folder, target, text)
+    write_bytes(folder, target, bytes)
 }
 
 /// Writes a text file atomically, with the temporary file in `folder`.
 pub(super) fn write_text(folder: &Path, target: &Path, text: &str) -> Result<(), StudyError> {
+    write_bytes(folder, target, text.as_bytes())
+}
+
+fn write_bytes(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), StudyError> {
     let mut partial = AtomicFile::new(folder, target)?;
-    partial.write_all(text.as_bytes()).map_err(StudyError::file(target))?;
+    partial.write_all(bytes).map_err(StudyError::file(target))?;
     partial.finish()
 }

@@ -42,13 +42,14 @@ mod record;
 mod register;
 pub mod reproduction;
 mod result_files;
+pub mod scene;
 mod sensor_models;
 pub mod spring;
 pub mod sweep;
 mod true_clock;
 mod truth_cursor;
 
-pub use atomic_file::replace_text;
+pub use atomic_file::{replace_bytes, replace_text};
 pub use base::{base_by_imu, base_by_law};
 pub use bound::{RecordingBound, information_bound};
 pub use calibration::CalibrationSpec;

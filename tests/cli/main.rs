@@ -8,6 +8,7 @@ mod commands;
 mod gains;
 mod hostile;
 mod maps;
+mod scene;
 mod sensor_models;
 mod specs;
 mod summary;

@@ -43,6 +43,7 @@ impl RunResults<'_> {
             truth,
             base,
             surfaces,
+            surface_materials: Vec::new(),
             surfaces_are_partial,
             links: head.map(|head| links::of(&head.linkage)).unwrap_or_default(),
             parts: head.map(|head| links::blocks(&head.parts)).unwrap_or_default(),
