@@ -30,7 +30,8 @@ pub(super) fn parse(mut bytes: Vec<u8>) -> Result<Vec<Triangle>, MeshError> {
         triangles.push(triangle.vertices.map(|corner| Vector::from(corner.0.map(f64::from))));
     }
     if triangles.len() < facets {
-        let problem = format!("{} of its {facets} facets follow the end of the first solid", facets - triangles.len());
+        let after = facets - triangles.len();
+        let problem = format!("{after} of its {facets} facets follow the end of the first solid: merge the solids");
         return Err(malformed(problem));
     }
     Ok(triangles)
