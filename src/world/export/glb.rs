@@ -1,6 +1,6 @@
 //! glTF 2.0, binary (specification of Khronos, sections 3.6 and 4.4).
 
-use super::Part;
+use super::part::Part;
 use crate::geometry::Vector;
 use serde_json::{Value, json};
 use std::io::{Error, ErrorKind};

@@ -2,10 +2,11 @@
 
 mod glb;
 mod obj;
+mod part;
 mod stl;
 
-use super::triangle::Triangle;
-use super::{Material, World};
+use super::World;
+use part::Part;
 use std::path::Path;
 
 /// File format of a mesh.
@@ -29,12 +30,6 @@ impl MeshFormat {
             _ => None,
         }
     }
-}
-
-/// The triangles of a material.
-struct Part<'a> {
-    material: &'a Material,
-    triangles: Vec<Triangle>,
 }
 
 impl World {

@@ -1,6 +1,6 @@
 //! Wavefront OBJ.
 
-use super::Part;
+use super::part::Part;
 use std::fmt::Write;
 
 /// The text of the file: a group and a material name for each part, corners in order of the triangles.

@@ -1,6 +1,6 @@
 //! Binary STL.
 
-use super::Part;
+use super::part::Part;
 use stl_io::{Normal, Triangle, Vertex};
 
 /// The bytes of the file.

@@ -1,0 +1,10 @@
+//! Part of an exported mesh.
+
+use crate::world::Material;
+use crate::world::triangle::Triangle;
+
+/// The triangles of a material.
+pub(super) struct Part<'a> {
+    pub material: &'a Material,
+    pub triangles: Vec<Triangle>,
+}
