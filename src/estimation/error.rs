@@ -141,6 +141,13 @@ pub enum WarningKind {
     Relocalised {
         /// Distance from the position before the gap, m.
         distance_m: f64,
+        /// Distance that the true position may be from the one found because another pose matches too, m.
+        ambiguity_m: f64,
+    },
+    /// The data between two gaps, or after the last one, are too few to relocalise: they have no estimate.
+    TooShortToRelocalise {
+        /// Duration, s.
+        seconds: f64,
     },
     /// Relocalisation after the gap failed: the motion during the gap is missing from the trajectory.
     NotRelocalised {
@@ -207,8 +214,8 @@ impl WarningKind {
     pub fn size(&self) -> Option<f64> {
         match self {
             Self::ImuGap { seconds } | Self::LidarGap { seconds } | Self::Restarted { seconds } => Some(*seconds),
-            Self::Lost { seconds, .. } => Some(*seconds),
-            Self::Relocalised { distance_m } => Some(*distance_m),
+            Self::Lost { seconds, .. } | Self::TooShortToRelocalise { seconds } => Some(*seconds),
+            Self::Relocalised { distance_m, .. } => Some(*distance_m),
             Self::NoisyImu { gyro, accel } => Some(gyro.max(*accel)),
             Self::Discarded { count, .. } => Some(*count as f64),
             Self::Saturated { samples } => Some(*samples as f64),
@@ -227,6 +234,7 @@ impl WarningKind {
             Self::Restarted { .. } => "restarted",
             Self::Relocalised { .. } => "relocalised",
             Self::NotRelocalised { .. } => "not_relocalised",
+            Self::TooShortToRelocalise { .. } => "too_short_to_relocalise",
             Self::Discarded { what, .. } => what.name(),
             Self::FewMatches { .. } => "few_matches",
             Self::WeakGeometry { .. } => "weak_geometry",
@@ -274,8 +282,13 @@ impl fmt::Display for WarningKind {
             Self::Restarted { seconds } => {
                 write!(f, "no IMU sample for {seconds:.3} s, too long to bridge; re-initialised after the gap")
             }
-            Self::Relocalised { distance_m } => {
-                write!(f, "relocalised after the IMU gap, {distance_m:.2} m from the position before it")
+            Self::Relocalised { distance_m, ambiguity_m } => write!(
+                f,
+                "relocalised after the IMU gap, {distance_m:.2} m from the position before it; similar surfaces leave the \
+                 position uncertain by {ambiguity_m:.2} m"
+            ),
+            Self::TooShortToRelocalise { seconds } => {
+                write!(f, "{seconds:.1} s after an IMU gap are too short to relocalise; they have no estimate")
             }
             Self::NotRelocalised { why } => write!(
                 f,

@@ -109,19 +109,23 @@ impl GapRelocalisation {
         Self { local_map, last, until_s }
     }
 
-    /// Localises the frame of `window`, which starts near the end of the trajectory before the gap.
+    /// Pose in the map of the frame of `window`, which starts near the end of the trajectory before the gap.
     ///
-    /// Returns the pose of that frame in the map, and the local map with the covariance of the relocalised pose; or the
-    /// reason of the failure.
-    pub(super) fn find(mut self, window: &Window, spec: &EstimatorSpec) -> Result<(Pose, LocalMap), String> {
-        self.last.extend(self.local_map.views.patches());
-        let relocaliser = Relocaliser::in_patches(self.last, &spec.matching, &spec.surfels, &spec.solve);
+    /// # Errors
+    /// The reason why no pose is accepted; the search can be repeated.
+    pub(super) fn find(&self, window: &Window, spec: &EstimatorSpec) -> Result<LocalisedPose, String> {
+        let patches = self.last.iter().chain(self.local_map.views.patches()).copied().collect();
+        let relocaliser = Relocaliser::in_patches(patches, &spec.matching, &spec.surfels, &spec.solve);
         let window_start = window.start_pose().translation.vector;
         let search = RelocalisationLimits::after_gap(window.start_s() - self.until_s, spec.solve.match_sigma_m);
-        let found = relocaliser.find(&window.patches(), &window_start, &Pose::identity(), &search)?;
-        let there = found.map_from_query.transform_point(&window_start.into()).coords;
+        relocaliser.find(&window.patches(), &window_start, &Pose::identity(), &search)
+    }
+
+    /// The surfaces seen before the gap, with the covariance of the pose `found` for `window`.
+    pub(super) fn into_local_map(mut self, window: &Window, found: &LocalisedPose) -> LocalMap {
+        let there = found.map_from_query.transform_point(&window.start_pose().translation.vector.into()).coords;
         let known = window.known_at_start().unwrap_or_default();
         self.local_map.consider.relocalise(there, &known, &found.covariance);
-        Ok((found.map_from_query, self.local_map))
+        self.local_map
     }
 }

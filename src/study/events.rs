@@ -57,6 +57,7 @@ pub(super) fn is_loss(kind: &WarningKind) -> bool {
         | WarningKind::LidarGap { .. }
         | WarningKind::Restarted { .. }
         | WarningKind::NotRelocalised { .. }
+        | WarningKind::TooShortToRelocalise { .. }
         | WarningKind::LostInMap
         | WarningKind::Lost { .. } => true,
         WarningKind::Discarded { what, .. } => *what != Discarded::Outliers,

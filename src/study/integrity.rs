@@ -5,8 +5,8 @@ use super::atomic_file::AtomicFile;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{
-    ALIGNMENT_S, Cause, Evidence, Finding, Status, TURN_LEVER_M, WindowReport, bound_factors, covariance_blocks,
-    findings, radius_99,
+    ALIGNMENT_S, Cause, Evidence, Finding, Status, TURN_LEVER_M, Warning, WarningKind, WindowReport, bound_factors,
+    covariance_blocks, findings, radius_99,
 };
 use crate::evaluation::{Errors, Pairs, align_poses};
 use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
@@ -47,6 +47,7 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
     let aligned_until = aligned_until(trajectory).unwrap_or(run.recorded.0);
     let ratio = aligned_error_ratio(trajectory);
     let radii_m = radii(run);
+    let ambiguities = ambiguities(run);
     let mut covariances = run.covariances.iter().zip(&radii_m).peekable();
     let mut current: Option<(&PoseCovariance, f64)> = None;
     let bound = |stamp: Stamp| {
@@ -63,9 +64,25 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
             if k < 3 { position[(k, k)].sqrt() } else { attitude[(k - 3, k - 3)].sqrt().to_degrees() }
         };
         let sigmas = std::array::from_fn(sigma);
-        Some(PoseBound { stamp, bound_m_99: MIN_BOUND_M.hypot(ratio * radius_m * factor), sigmas })
+        let relocalised = ambiguities.partition_point(|(at, _)| *at <= stamp.max(aligned_until));
+        let ambiguity_m = relocalised.checked_sub(1).map_or(0.0, |last| ambiguities[last].1);
+        let bound_m_99 = MIN_BOUND_M.hypot(ratio * radius_m * factor).hypot(ambiguity_m);
+        Some(PoseBound { stamp, bound_m_99, sigmas })
     };
     trajectory.iter().map(|(stamp, _)| stamp).filter_map(bound).collect()
+}
+
+/// The distances that similar surfaces leave open after the relocalisations so far, in quadrature, m.
+fn ambiguities(run: &OpenLoopRun) -> Vec<(Stamp, f64)> {
+    let ambiguity = |warning: &Warning| match warning.kind {
+        WarningKind::Relocalised { ambiguity_m, .. } => Some((warning.stamp, ambiguity_m)),
+        _ => None,
+    };
+    let sum = |sum_m: &mut f64, (stamp, ambiguity_m): (Stamp, f64)| {
+        *sum_m = sum_m.hypot(ambiguity_m);
+        Some((stamp, *sum_m))
+    };
+    run.warnings.iter().filter_map(ambiguity).scan(0.0, sum).collect()
 }
 
 /// Ratio of the error after alignment to the predicted error, for the length of a trajectory.

@@ -11,17 +11,15 @@ impl Estimator {
     /// Discards what a gap makes useless: the window, whose content becomes final, or the gathered segments.
     pub(super) fn restart_after_gap(&mut self, phase: &mut Phase) -> Result<(), EstimationError> {
         match phase {
-            Phase::Gathering(gathering) => {
-                gathering.segments.clear();
-                // The search in the surfaces before the previous gap is given up.
-                gathering.recovery.iter_mut().for_each(|recovery| recovery.relocalisation = None);
-            }
+            Phase::Gathering(gathering) => gathering.segments.clear(),
             Phase::Tracking(tracking) => {
-                // A restart before relocalisation would discard the pending search.
-                self.localise(tracking)?;
-                self.output_window(tracking);
-                let recovery = self.prepare_recovery(&tracking.window);
-                *phase = Phase::Gathering(Gathering { segments: Vec::new(), recovery: Some(Box::new(recovery)) });
+                let recovery = if let Some(unplaced) = self.localise_at_end(tracking)? {
+                    unplaced
+                } else {
+                    self.output_window(tracking);
+                    Box::new(self.prepare_recovery(&tracking.window))
+                };
+                *phase = Phase::Gathering(Gathering { segments: Vec::new(), recovery: Some(recovery) });
             }
         }
         Ok(())

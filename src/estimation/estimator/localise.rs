@@ -1,9 +1,8 @@
 //! Localisation of the window in the given map, or after a gap in the surfaces seen before it.
 
 use super::Estimator;
-use super::phase::Tracking;
+use super::phase::{GapRecovery, Tracking};
 use crate::estimation::consider::ConsiderCovariance;
-use crate::estimation::localisation::GapRelocalisation;
 use crate::estimation::views::Views;
 use crate::estimation::window::Window;
 use crate::estimation::{EstimationError, WarningKind};
@@ -21,10 +20,27 @@ impl Estimator {
     }
 
     /// Performs the pending searches; returns whether one of them succeeded.
-    pub(super) fn localise(&mut self, tracking: &mut Tracking) -> Result<bool, EstimationError> {
-        let relocalisation = tracking.recovery.take().and_then(|recovery| recovery.relocalisation);
+    fn localise(&mut self, tracking: &mut Tracking) -> Result<bool, EstimationError> {
         let in_map = self.localise_in_map(&mut tracking.window)?;
-        Ok(in_map || relocalisation.is_some_and(|search| self.relocalise(&mut tracking.window, search)))
+        Ok(self.relocalise(tracking) || in_map)
+    }
+
+    /// Performs the pending searches with a window that ends at a gap or with the data.
+    ///
+    /// Returns what is known from before the previous gap if the window is too short to be relocalised after it. None of its
+    /// poses has been output, and none can be.
+    pub(super) fn localise_at_end(
+        &mut self,
+        tracking: &mut Tracking,
+    ) -> Result<Option<Box<GapRecovery>>, EstimationError> {
+        self.localise(tracking)?;
+        let unplaced = tracking.recovery.take().filter(|recovery| recovery.relocalisation.is_some());
+        if unplaced.is_some() {
+            let (start_s, end_s) = (tracking.window.start_s(), tracking.window.nominal.end_s());
+            let stamp = self.intake.stamp(start_s);
+            self.diagnostics.warn(stamp, WarningKind::TooShortToRelocalise { seconds: end_s - start_s });
+        }
+        Ok(unplaced)
     }
 
     /// Localises the window in the given map, if a search is pending; returns whether it succeeded.
@@ -50,19 +66,32 @@ impl Estimator {
     }
 
     /// Relocalises the window in the surfaces seen before a gap; returns whether it succeeded.
-    fn relocalise(&mut self, window: &mut Window, search: GapRelocalisation) -> bool {
-        let stamp = self.intake.stamp(window.nominal.end_s());
-        let (map_from_here, local_map) = match search.find(window, &self.spec) {
-            Ok(found) => found,
+    ///
+    /// After a failure the search remains pending only if the window is not full.
+    fn relocalise(&mut self, tracking: &mut Tracking) -> bool {
+        let Some(mut recovery) = tracking.recovery.take() else { return false };
+        let Some(search) = recovery.relocalisation.take() else { return false };
+        let window = &mut tracking.window;
+        let stamp = self.intake.stamp(window.start_s());
+        match search.find(window, &self.spec) {
+            Ok(found) => {
+                let local_map = search.into_local_map(window, &found);
+                let distance_m = (local_map.consider.pivot() - self.local_map.consider.pivot()).norm();
+                let ambiguity_m = found.ambiguity_m;
+                self.diagnostics.warn(stamp, WarningKind::Relocalised { distance_m, ambiguity_m });
+                window.move_by(&found.map_from_query);
+                self.local_map = local_map;
+                true
+            }
+            Err(_) if !window.is_full() => {
+                recovery.relocalisation = Some(search);
+                tracking.recovery = Some(recovery);
+                false
+            }
             Err(why) => {
                 self.diagnostics.warn(stamp, WarningKind::NotRelocalised { why });
-                return false;
+                false
             }
-        };
-        let distance_m = (local_map.consider.pivot() - self.local_map.consider.pivot()).norm();
-        self.diagnostics.warn(stamp, WarningKind::Relocalised { distance_m });
-        window.move_by(&map_from_here);
-        self.local_map = local_map;
-        true
+        }
     }
 }

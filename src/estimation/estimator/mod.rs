@@ -115,11 +115,13 @@ impl Estimator {
         let mut phase = std::mem::take(&mut self.phase);
         self.start_if_ready(&mut phase, true);
         let Phase::Tracking(mut tracking) = phase else { return Err(self.missing_data_error()) };
-        self.localise(&mut tracking)?;
+        let unplaced = self.localise_at_end(&mut tracking)?;
         self.intake.close();
         self.diagnostics.warnings.extend(self.intake.take_warnings());
         self.diagnostics.finish();
-        self.output_window(&mut tracking);
+        if unplaced.is_none() {
+            self.output_window(&mut tracking);
+        }
         self.into_open_loop(&tracking)
     }
 

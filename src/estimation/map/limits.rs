@@ -9,7 +9,7 @@ const START_SPACING: (f64, f64) = (0.7, 14.0 / 180.0 * std::f64::consts::PI);
 const GAP_RADIUS: (f64, f64, f64) = (0.3, 1.0, 2.5);
 /// Start poses go no farther than this, m: from there the matching converges over the rest of the search radius.
 const MAX_START_OFFSET_M: f64 = 1.4;
-/// After a gap longer than this, s, the search region is large, and a pose must agree better with the map.
+/// After a gap longer than this, s, the search region is large, and a pose must match more of the map and better.
 const LONG_GAP_S: f64 = 1.5;
 /// Vertical spacing of the start poses, m: stairs repeat every 0.3 m, and the coarsest surfels converge over more.
 const START_SPACING_UP_M: f64 = 0.5;
@@ -29,12 +29,18 @@ pub(in crate::estimation) struct RelocalisationLimits {
     pub(super) gate_m: Option<f64>,
     /// Minimum fraction of the finest patches that match the map.
     min_inlier_ratio: f64,
+    /// Minimum number of the finest patches that match the map.
+    min_matched: usize,
     /// Minimum fraction of matches among the patches that have a neighbour in the map.
     min_agreement: f64,
+    /// Exponent of this fraction in the score of a pose.
+    pub(super) agreement_power: i32,
     /// Maximum root mean square residual of the matches, m.
     max_residual_m: f64,
     /// Whether the pose nearest to the expected one wins among equally good poses; if not, they are ambiguous.
     pub(super) nearest: bool,
+    /// Distance that a pose of which nothing matches may be off, m.
+    unmatched_reach_m: f64,
 }
 
 /// Maximum residual in a map, m: correct poses have 3 to 7 mm, chance matches of surfaces 10 to 17 mm.
@@ -46,9 +52,12 @@ pub(in crate::estimation) const MAP_LIMITS: RelocalisationLimits = Relocalisatio
     reach_up_m: 0.0,
     gate_m: None,
     min_inlier_ratio: 0.4,
+    min_matched: 0,
     min_agreement: 0.0,
+    agreement_power: 0,
     max_residual_m: MAX_RESIDUAL_M,
     nearest: false,
+    unmatched_reach_m: 0.0,
 };
 
 impl RelocalisationLimits {
@@ -58,14 +67,18 @@ impl RelocalisationLimits {
     pub(in crate::estimation) fn after_gap(seconds: f64, sigma_m: f64) -> Self {
         let reach_m = (GAP_RADIUS.0 + GAP_RADIUS.1 * seconds).min(GAP_RADIUS.2);
         let reach_deg = (GAP_HEADING_DEG.0 + GAP_HEADING_DEG.1 * seconds).min(GAP_HEADING_DEG.2);
+        let is_long = seconds > LONG_GAP_S;
         Self {
             reach: (reach_m, reach_deg.to_radians()),
-            reach_up_m: if seconds > LONG_GAP_S { (CLIMB_M_PER_S * seconds).min(MAX_START_OFFSET_M) } else { 0.0 },
+            reach_up_m: if is_long { (CLIMB_M_PER_S * seconds).min(MAX_START_OFFSET_M) } else { 0.0 },
             gate_m: Some(1.5 * sigma_m),
-            min_inlier_ratio: 0.1,
-            min_agreement: if seconds > LONG_GAP_S { 0.85 } else { 0.6 },
+            min_inlier_ratio: if is_long { 0.15 } else { 0.1 },
+            min_matched: if is_long { 100 } else { 0 },
+            min_agreement: if is_long { 0.9 } else { 0.6 },
+            agreement_power: 6,
             max_residual_m: f64::INFINITY,
             nearest: true,
+            unmatched_reach_m: if is_long { reach_m } else { 0.0 },
         }
     }
 
@@ -88,9 +101,15 @@ impl RelocalisationLimits {
         starts
     }
 
+    /// Distance that the true position may be from that of a pose, because little of the query matches, m.
+    pub(super) fn unmatched_m(&self, inlier_ratio: f64) -> f64 {
+        self.unmatched_reach_m * (1.0 - inlier_ratio)
+    }
+
     /// Whether a pose meets the acceptance thresholds.
     pub(super) fn accepts(&self, found: &LocalisedPose) -> bool {
         found.inlier_ratio >= self.min_inlier_ratio
+            && found.matched >= self.min_matched
             && found.agreement >= self.min_agreement
             && found.residual_rms_m <= self.max_residual_m
     }

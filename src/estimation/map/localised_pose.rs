@@ -10,26 +10,39 @@ pub struct LocalisedPose {
     pub map_from_query: Pose,
     /// Fraction of the finest query surfels that match the map.
     pub inlier_ratio: f64,
+    /// Number of the finest query surfels that match the map.
+    pub(in crate::estimation) matched: usize,
     /// Fraction of matches among the surfels with a neighbour in the map.
     pub(in crate::estimation) agreement: f64,
     /// Root mean square distance of the matches along the normals, m.
     pub residual_rms_m: f64,
     /// Covariance of a rotation about the viewpoint (rad) and a translation (m), in map axes.
     pub(in crate::estimation) covariance: Matrix6<f64>,
+    /// Distance that the true position may be from this one because another pose matches too, m.
+    pub(in crate::estimation) ambiguity_m: f64,
 }
 
+/// Poses with at least this fraction of the best score may be the true one.
+const LIKELY_SCORE: f64 = 0.1;
+
 impl LocalisedPose {
-    /// Adds to the covariance the spread of equally good poses.
-    pub(super) fn with_alternatives(&self, others: &[&LocalisedPose], from: &Vector) -> Self {
+    /// Adds to the covariance the spread of poses that match too, weighted by their scores, and records the largest
+    /// distance of those with at least [`LIKELY_SCORE`] of the best score.
+    pub(super) fn with_alternatives(&self, scored: &[&(f64, LocalisedPose)], from: &Vector) -> Self {
+        let best = scored.iter().map(|(score, _)| *score).fold(0.0, f64::max);
+        let likely = scored.iter().filter(|(score, _)| *score > LIKELY_SCORE * best);
+        let distance = |found: &LocalisedPose| pose_distance(&found.map_from_query, &self.map_from_query, from).0;
+        let ambiguity_m = likely.map(|(_, found)| distance(found)).fold(self.ambiguity_m, f64::max);
+        let sum: f64 = scored.iter().map(|(score, _)| score).sum();
         let mut covariance = self.covariance;
-        for other in others {
+        for (score, other) in scored {
             let turn = (other.map_from_query.rotation * self.map_from_query.rotation.inverse()).scaled_axis();
             let position = |located: &LocalisedPose| located.map_from_query.transform_point(&(*from).into()).coords;
             let shift = position(other) - position(self);
             let by = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
-            covariance += by * by.transpose() / (others.len() + 1) as f64;
+            covariance += by * by.transpose() * (score / sum);
         }
-        Self { covariance, ..self.clone() }
+        Self { covariance, ambiguity_m, ..self.clone() }
     }
 }
 

@@ -41,9 +41,10 @@ const FIXED_INFORMATION: f64 = 1e12;
 const MIN_PATCHES: usize = 50;
 /// Poses that converged to within this distance, m and rad, are duplicates.
 const DUPLICATE_POSE_TOLERANCE: f64 = 0.01;
-/// Two poses are different above this distance, m, or angle, rad; a different pose competes with the best one if it has
-/// at least this fraction of the score of the best.
-const COMPETING_POSE: (f64, f64, f64) = (0.3, 0.1, 0.85);
+/// Two poses are different above this distance, m, or angle, rad.
+const DIFFERENT_POSE: (f64, f64) = (0.3, 0.1);
+/// A different pose competes with the best one if it has at least this fraction of the score of the best.
+const COMPETING_SCORE: f64 = 0.85;
 
 /// Finds poses in a map of patches.
 #[derive(Debug)]
@@ -138,7 +139,8 @@ impl Relocaliser {
         let poses = self.refine_all(&patches_by_level, limits.starts(map_from_query, from), from);
         let evaluated = self.evaluate_all(&patches_by_level[0], from, &poses, limits.gate_m);
         let score = |found: &LocalisedPose| {
-            found.inlier_ratio.powi(3) * limits.prior(&found.map_from_query, map_from_query, from)
+            let likelihood = found.inlier_ratio.powi(3) * found.agreement.powi(limits.agreement_power);
+            likelihood * limits.prior(&found.map_from_query, map_from_query, from)
         };
         let mut found: Vec<(f64, LocalisedPose)> = evaluated.map(|found| (score(&found), found)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -152,15 +154,21 @@ impl Relocaliser {
                  (residual {residual_mm:.0} mm)"
             ));
         };
-        let as_good = found.iter().filter(|(other, found)| *other > COMPETING_POSE.2 * score && limits.accepts(found));
-        let others: Vec<&LocalisedPose> =
-            as_good.map(|(_, other)| other).filter(|other| is_different_pose(best, other, from)).collect();
-        match others.first() {
-            Some(other) if !limits.nearest => {
+        let accepted: Vec<&(f64, LocalisedPose)> =
+            found.iter().filter(|(score, found)| *score > 0.0 && limits.accepts(found)).collect();
+        if limits.nearest {
+            let ambiguity_m = limits.unmatched_m(best.inlier_ratio);
+            return Ok(LocalisedPose { ambiguity_m, ..best.clone() }.with_alternatives(&accepted, from));
+        }
+        let competes = |(other, found): &&&(f64, LocalisedPose)| {
+            *other > COMPETING_SCORE * score && is_different_pose(best, found, from)
+        };
+        match accepted.iter().find(competes) {
+            Some((_, other)) => {
                 let (distance_m, _) = pose_distance(&best.map_from_query, &other.map_from_query, from);
                 Err(format!("ambiguous: another pose at a distance of {distance_m:.1} m matches as well"))
             }
-            _ => Ok(best.with_alternatives(&others, from)),
+            None => Ok(best.clone()),
         }
     }
 
@@ -242,7 +250,15 @@ impl Relocaliser {
         let residual_rms_m = (sums.squares / sums.matched.max(1) as f64).sqrt();
         let inlier_ratio = sums.matched as f64 / query.len() as f64;
         let agreement = sums.matched as f64 / sums.with_neighbour.max(1) as f64;
-        Some(LocalisedPose { map_from_query: *pose, inlier_ratio, agreement, residual_rms_m, covariance })
+        Some(LocalisedPose {
+            map_from_query: *pose,
+            inlier_ratio,
+            matched: sums.matched,
+            agreement,
+            residual_rms_m,
+            covariance,
+            ambiguity_m: 0.0,
+        })
     }
 
     /// Matches the query at `pose` with the map; unknowns are a rotation about `pivot` and a translation.
@@ -313,8 +329,8 @@ impl MatchSums {
     }
 }
 
-/// Whether two poses differ by more than `COMPETING_POSE`.
+/// Whether two poses differ by more than `DIFFERENT_POSE`.
 pub(super) fn is_different_pose(a: &LocalisedPose, b: &LocalisedPose, from: &Vector) -> bool {
     let (distance_m, angle) = pose_distance(&a.map_from_query, &b.map_from_query, from);
-    distance_m > COMPETING_POSE.0 || angle > COMPETING_POSE.1
+    distance_m > DIFFERENT_POSE.0 || angle > DIFFERENT_POSE.1
 }
