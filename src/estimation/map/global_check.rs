@@ -148,7 +148,7 @@ impl Relocaliser {
         });
         let poses = self.refine_all(&patches_by_level, starts.collect(), from);
         let accepted =
-            self.evaluate_all(&patches_by_level[0], from, &poses, None).filter(|located| MAP_LIMITS.accepts(located));
+            self.evaluate_all(&patches_by_level[..1], from, &poses, None).filter(|located| MAP_LIMITS.accepts(located));
         let best = accepted.max_by(|a, b| a.inlier_ratio.total_cmp(&b.inlier_ratio))?;
         (best.inlier_ratio > MAX_OTHER_INLIER_RATIO * found.inlier_ratio && is_different_pose(&best, found, from))
             .then_some(best)

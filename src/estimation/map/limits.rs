@@ -27,13 +27,11 @@ pub(in crate::estimation) struct RelocalisationLimits {
     reach_up_m: f64,
     /// Maximum distance of matched patches along their normals, m; `None` for a fixed fraction of the voxel edge.
     pub(super) gate_m: Option<f64>,
-    /// Minimum fraction of the finest patches that match the map.
-    min_inlier_ratio: f64,
-    /// Minimum number of the finest patches that match the map.
-    min_matched: usize,
-    /// Minimum fraction of matches among the patches that have a neighbour in the map.
-    min_agreement: f64,
-    /// Exponent of this fraction in the score of a pose.
+    /// A pose is accepted if it meets one of these.
+    evidence: &'static [Evidence],
+    /// Number of resolutions with which poses are evaluated, from the finest on.
+    pub(super) levels: usize,
+    /// Exponent of the agreement in the score of a pose.
     pub(super) agreement_power: i32,
     /// Maximum root mean square residual of the matches, m.
     max_residual_m: f64,
@@ -41,6 +39,34 @@ pub(in crate::estimation) struct RelocalisationLimits {
     pub(super) nearest: bool,
     /// Distance that a pose of which nothing matches may be off, m.
     unmatched_reach_m: f64,
+}
+
+/// Evidence for a pose: minimum numbers of matches.
+#[derive(Debug)]
+struct Evidence {
+    /// Fraction of the finest patches that match the map.
+    inlier_ratio: f64,
+    /// Number of the finest patches that match the map.
+    matched: usize,
+    /// Fraction of matches among the patches that have a neighbour in the map.
+    agreement: f64,
+}
+
+/// Evidence in a complete map.
+const IN_MAP: Evidence = Evidence { inlier_ratio: 0.4, matched: 0, agreement: 0.0 };
+/// Evidence after a short gap, where the expected pose is known to half a metre: many matches, or fewer that agree better, as
+/// outdoors, where the views before and after the gap share few surfaces.
+const AFTER_SHORT_GAP: [Evidence; 2] = [
+    Evidence { inlier_ratio: 0.1, matched: 0, agreement: 0.6 },
+    Evidence { inlier_ratio: 0.03, matched: 50, agreement: 0.9 },
+];
+/// Evidence after a long gap.
+const AFTER_LONG_GAP: Evidence = Evidence { inlier_ratio: 0.15, matched: 100, agreement: 0.9 };
+
+impl Evidence {
+    fn is_met_by(&self, found: &LocalisedPose) -> bool {
+        found.inlier_ratio >= self.inlier_ratio && found.matched >= self.matched && found.agreement >= self.agreement
+    }
 }
 
 /// Maximum residual in a map, m: correct poses have 3 to 7 mm, chance matches of surfaces 10 to 17 mm.
@@ -51,9 +77,8 @@ pub(in crate::estimation) const MAP_LIMITS: RelocalisationLimits = Relocalisatio
     reach: START_SPACING,
     reach_up_m: 0.0,
     gate_m: None,
-    min_inlier_ratio: 0.4,
-    min_matched: 0,
-    min_agreement: 0.0,
+    evidence: &[IN_MAP],
+    levels: 1,
     agreement_power: 0,
     max_residual_m: MAX_RESIDUAL_M,
     nearest: false,
@@ -72,9 +97,8 @@ impl RelocalisationLimits {
             reach: (reach_m, reach_deg.to_radians()),
             reach_up_m: if is_long { (CLIMB_M_PER_S * seconds).min(MAX_START_OFFSET_M) } else { 0.0 },
             gate_m: Some(1.5 * sigma_m),
-            min_inlier_ratio: if is_long { 0.15 } else { 0.1 },
-            min_matched: if is_long { 100 } else { 0 },
-            min_agreement: if is_long { 0.9 } else { 0.6 },
+            evidence: if is_long { &[AFTER_LONG_GAP] } else { &AFTER_SHORT_GAP },
+            levels: 3,
             agreement_power: 6,
             max_residual_m: f64::INFINITY,
             nearest: true,
@@ -108,10 +132,7 @@ impl RelocalisationLimits {
 
     /// Whether a pose meets the acceptance thresholds.
     pub(super) fn accepts(&self, found: &LocalisedPose) -> bool {
-        found.inlier_ratio >= self.min_inlier_ratio
-            && found.matched >= self.min_matched
-            && found.agreement >= self.min_agreement
-            && found.residual_rms_m <= self.max_residual_m
+        self.evidence.iter().any(|evidence| evidence.is_met_by(found)) && found.residual_rms_m <= self.max_residual_m
     }
 
     /// Prior likelihood of the pose `found` by the distance from the expected one, 0..1.

@@ -137,7 +137,8 @@ impl Relocaliser {
             return Err(format!("the query has {finest} finest surfels, at least {MIN_PATCHES} are needed"));
         }
         let poses = self.refine_all(&patches_by_level, limits.starts(map_from_query, from), from);
-        let evaluated = self.evaluate_all(&patches_by_level[0], from, &poses, limits.gate_m);
+        let evaluated =
+            self.evaluate_all(&patches_by_level[..limits.levels.min(self.matcher.levels)], from, &poses, limits.gate_m);
         let score = |found: &LocalisedPose| {
             let likelihood = found.inlier_ratio.powi(3) * found.agreement.powi(limits.agreement_power);
             likelihood * limits.prior(&found.map_from_query, map_from_query, from)
@@ -145,13 +146,13 @@ impl Relocaliser {
         let mut found: Vec<(f64, LocalisedPose)> = evaluated.map(|found| (score(&found), found)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some((score, best)) = found.iter().find(|(score, found)| *score > 0.0 && limits.accepts(found)) else {
-            let best =
-                found.first().map_or((0.0, 0.0), |(_, best)| (100.0 * best.inlier_ratio, 100.0 * best.agreement));
-            let (inliers, agreement) = best;
-            let residual_mm = found.first().map_or(0.0, |(_, best)| 1e3 * best.residual_rms_m);
+            let Some((_, best)) = found.first() else { return Err("no pose with matches".to_owned()) };
             return Err(format!(
-                "at the best pose {inliers:.0} % of the surfels match the map, {agreement:.0} % of those with a neighbour \
-                 (residual {residual_mm:.0} mm)"
+                "at the best pose {} surfels ({:.0} %) match the map, {:.0} % of those with a neighbour (residual {:.0} mm)",
+                best.matched,
+                100.0 * best.inlier_ratio,
+                100.0 * best.agreement,
+                1e3 * best.residual_rms_m
             ));
         };
         let accepted: Vec<&(f64, LocalisedPose)> =
@@ -194,16 +195,16 @@ impl Relocaliser {
         poses
     }
 
-    /// Evaluates poses with the finest patches; skips poses that the matches do not determine.
+    /// Evaluates poses with patches of one or more resolutions; skips poses that the matches do not determine.
     pub(super) fn evaluate_all<'a>(
         &'a self,
-        finest: &'a [Patch],
+        patches_by_level: &'a [Vec<Patch>],
         from: &'a Vector,
         poses: &'a [(Pose, Pose)],
         gate_m: Option<f64>,
     ) -> impl Iterator<Item = LocalisedPose> + 'a {
         let gate_m = gate_m.unwrap_or(self.matcher.finest_voxel_m * MATCH_GATE_EDGES.1);
-        poses.iter().filter_map(move |(_, pose)| self.evaluate(finest, from, pose, gate_m))
+        poses.iter().filter_map(move |(_, pose)| self.evaluate(patches_by_level, from, pose, gate_m))
     }
 
     /// Refines a pose with the patches of one resolution; roll and pitch are constrained to the values at `start`.
@@ -235,10 +236,22 @@ impl Relocaliser {
         Some(pose)
     }
 
-    /// Evaluates a pose with the finest patches; `None` if they leave too many directions unobservable.
-    fn evaluate(&self, query: &[Patch], from: &Vector, pose: &Pose, gate_m: f64) -> Option<LocalisedPose> {
+    /// Evaluates a pose with patches of some resolutions; `None` if they leave too many directions unobservable.
+    fn evaluate(
+        &self,
+        patches_by_level: &[Vec<Patch>],
+        from: &Vector,
+        pose: &Pose,
+        gate_m: f64,
+    ) -> Option<LocalisedPose> {
         let pivot = pose.transform_point(&(*from).into()).coords;
-        let sums = self.sum_matches(query, pose, &pivot, &Gate { level: 0, gate_m, sigma_m: self.sigma_m });
+        let mut sums = MatchSums::default();
+        for (level, query) in patches_by_level.iter().enumerate() {
+            // Larger surfels are less plane.
+            let edges = f64::from(1_u32 << level);
+            let gate = Gate { level, gate_m: edges * gate_m, sigma_m: edges * self.sigma_m };
+            sums.add(self.sum_matches(query, pose, &pivot, &gate));
+        }
         let unobservable = sums.unobservable();
         if unobservable.trace() > MAX_UNOBSERVABLE {
             return None;
@@ -248,7 +261,7 @@ impl Relocaliser {
         let information = observable * sums.information * observable + Matrix6::identity();
         let covariance = information.try_inverse()? * self.inflation;
         let residual_rms_m = (sums.squares / sums.matched.max(1) as f64).sqrt();
-        let inlier_ratio = sums.matched as f64 / query.len() as f64;
+        let inlier_ratio = sums.matched as f64 / patches_by_level.iter().map(Vec::len).sum::<usize>() as f64;
         let agreement = sums.matched as f64 / sums.with_neighbour.max(1) as f64;
         Some(LocalisedPose {
             map_from_query: *pose,
@@ -309,6 +322,16 @@ fn remove_duplicates(poses: &mut Vec<(Pose, Pose)>, from: &Vector) {
 }
 
 impl MatchSums {
+    /// Adds the sums over other matches.
+    fn add(&mut self, other: Self) {
+        self.information += other.information;
+        self.right += other.right;
+        self.matched += other.matched;
+        self.normals.extend(other.normals);
+        self.with_neighbour += other.with_neighbour;
+        self.squares += other.squares;
+    }
+
     /// Projector on the unobservable directions of translation, `sum e e^T`, in the translation block.
     ///
     /// Small components of normals along a direction are errors of the normals and do not count.
