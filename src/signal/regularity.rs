@@ -10,6 +10,12 @@ const APERIODIC_THRESHOLDS: (f64, f64) = (0.2, 0.4);
 const SLOW_APERIODIC_THRESHOLDS: (f64, f64) = (0.12, 0.2);
 /// Period of a slow sensor, s.
 const SLOW_PERIOD_S: f64 = 0.02;
+/// A sensor with a period of more than the first value, s, is also aperiodic if its jitter exceeds the second value times the
+/// standard deviation of its intervals. Jitter about a constant period is 0.71 times it, a random walk of the stamps 1.5 times
+/// and more.
+const WALKING_THRESHOLDS: (f64, f64) = (0.015, 1.15);
+/// Longer intervals, as multiples of the median, contain lost samples.
+const MAX_INTERVAL: f64 = 1.6;
 /// Skewness of the residuals above which stamps count as delayed; an exponential delay has 2.
 const DELAYED_SKEWNESS: f64 = 0.8;
 /// Minimum number of stamps for a meaningful skewness.
@@ -120,7 +126,9 @@ impl Regularity {
         };
         let (jitter, variance_ratio) =
             if median > SLOW_PERIOD_S { SLOW_APERIODIC_THRESHOLDS } else { APERIODIC_THRESHOLDS };
-        if line.jitter_s > jitter * line.period_s && has_independent_intervals(stamps_s, variance_ratio) {
+        let walks = median > WALKING_THRESHOLDS.0
+            && line.jitter_s > WALKING_THRESHOLDS.1 * interval_sigma_s(stamps_s, MAX_INTERVAL * median);
+        if line.jitter_s > jitter * line.period_s && (walks || has_independent_intervals(stamps_s, variance_ratio)) {
             return Some(Self { period_s: median, jitter_s: 0.0, pattern: StampPattern::Irregular });
         }
         Some(line)
@@ -236,6 +244,14 @@ fn counts_of_delayed(stamps_s: &[f64], line: &Regularity) -> impl Iterator<Item 
     })
 }
 
+/// Standard deviation of the intervals below `longest_s`, s.
+fn interval_sigma_s(stamps_s: &[f64], longest_s: f64) -> f64 {
+    let intervals = || stamps_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|interval| *interval < longest_s);
+    let n = intervals().count() as f64;
+    let mean_s = intervals().sum::<f64>() / n;
+    (intervals().map(|interval| (interval - mean_s).powi(2)).sum::<f64>() / n).sqrt()
+}
+
 /// Whether the intervals are independent, as those of a sensor without period.
 ///
 /// The variance of the duration of `n` independent intervals grows with `n`; jitter about a constant period does not.
@@ -298,6 +314,34 @@ mod tests {
             let to = samples.partition_point(|t| *t < f64::from(start) + 1.5);
             let found = Regularity::of(&samples[from..to]);
             assert_eq!(found.unwrap().pattern, StampPattern::Irregular, "{start}: {found:?}");
+        }
+    }
+
+    /// Any three seconds of stamps that are not measurements of a constant period: of a real sensor, as they are, and of loops
+    /// that sleep for a period and then work.
+    #[test]
+    fn stamps_that_walk_have_no_period() {
+        let text = include_str!("../../specs/faults/imu_arrivals_mcu.txt");
+        let arrivals: Vec<f64> =
+            text.lines().filter(|line| !line.starts_with('#')).map(|line| line.parse().unwrap()).collect();
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let mut at_s = 0.0;
+        let mut loops = |least_s: f64, most_s: f64| -> Vec<f64> {
+            let step_s = |_| {
+                at_s += least_s + (most_s - least_s) * random.random::<f64>();
+                at_s
+            };
+            (0..2000).map(step_s).collect()
+        };
+        let (uniform, wide) = (loops(0.015, 0.025), loops(0.03, 0.046));
+        for (stamps, allowed) in [(&arrivals, 0), (&uniform, 1), (&wide, 1)] {
+            let first_s = stamps[0];
+            let regular = (0..25).filter(|k| {
+                let (from_s, to_s) = (first_s + f64::from(*k), first_s + f64::from(*k) + 3.0);
+                let within: Vec<f64> = stamps.iter().copied().filter(|s| (from_s..to_s).contains(s)).collect();
+                Regularity::of(&within).unwrap().pattern != StampPattern::Irregular
+            });
+            assert!(regular.count() <= allowed, "{stamps:?}");
         }
     }
 
