@@ -115,6 +115,13 @@ impl fmt::Display for Discarded {
 pub enum WarningKind {
     /// The head moved at the start, so initial tilt and gyroscope bias are uncertain.
     StartedInMotion,
+    /// The first window was inconsistent: it was discarded, and the estimate starts later.
+    StartRejected {
+        /// Last correction of its solution, m.
+        correction_m: f64,
+        /// Contradiction between IMU and lidar in it, as a multiple of the IMU noise.
+        times: f64,
+    },
     /// The noise measured at rest exceeds the specification by these factors, and is used instead.
     NoisyImu {
         /// Factor of the gyroscope noise, at least 1.
@@ -220,6 +227,7 @@ impl WarningKind {
             Self::Discarded { count, .. } => Some(*count as f64),
             Self::Saturated { samples } => Some(*samples as f64),
             Self::Contradicted { times, .. } => Some(*times),
+            Self::StartRejected { correction_m, .. } => Some(*correction_m),
             _ => None,
         }
     }
@@ -228,6 +236,7 @@ impl WarningKind {
     pub fn name(&self) -> &'static str {
         match self {
             Self::StartedInMotion => "started_in_motion",
+            Self::StartRejected { .. } => "start_rejected",
             Self::NoisyImu { .. } => "noisy_imu",
             Self::ImuGap { .. } => "imu_gap",
             Self::LidarGap { .. } => "lidar_gap",
@@ -255,12 +264,22 @@ fn direction_text(direction: &Vector) -> String {
     format!("({:.2}, {:.2}, {:.2})", direction.x, direction.y, direction.z)
 }
 
+/// Text for a rejected start.
+fn start_text(correction_m: f64, times: f64) -> String {
+    let mm = 1e3 * correction_m;
+    format!(
+        "the first window is inconsistent (last correction {mm:.0} mm, IMU and lidar contradict each other by {times:.1} times \
+         the IMU noise): discarded, the estimate starts later"
+    )
+}
+
 impl fmt::Display for WarningKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::StartedInMotion => {
                 write!(f, "the head moved at the start; initial tilt and gyroscope bias are uncertain")
             }
+            Self::StartRejected { correction_m, times } => f.write_str(&start_text(*correction_m, *times)),
             Self::Lost { seconds, of_seconds } => write!(
                 f,
                 "tracking lost for {seconds:.0} of {of_seconds:.0} s (too few matched surfaces); trajectory unreliable"

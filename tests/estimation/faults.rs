@@ -215,6 +215,25 @@ fn gaps_and_frozen_sensors_are_reported() {
     }
 }
 
+/// The first two cases were lost before the sensor was judged again after a gap, the third before relocalisation counted the
+/// large surfels too.
+#[test]
+fn a_gap_is_survived_at_the_start_and_outdoors() {
+    let early = |thin| {
+        format!("(sensor: imu, from_s: 0.3, to_s: 4, fault: gap), (sensor: imu, fault: thin({thin}, repeat_s: 57.2))")
+    };
+    let micro_controller = early("file: \"FAULTS/imu_arrivals_mcu.txt\"");
+    let merged = early("file: \"FAULTS/imu_arrivals_mcu_merged.txt\"");
+    let outdoors = "(sensor: imu, from_s: 10, to_s: 10.6, fault: gap)";
+    for (name, faults, scene, stated, within) in [
+        ("irregular", &micro_controller[..], "office", &["started_in_motion", "imu_gap"][..], (0.012, 0.5)),
+        ("irregular, merged", &merged, "office", &["started_in_motion", "imu_gap"], (0.012, 0.5)),
+        ("outdoors", outdoors, "courtyard", &["relocalised"], (0.025, 2.0)),
+    ] {
+        check(&Case { name, faults, scene, duration_s: 20, code: 3, within: Some(within), stated, ..CASE });
+    }
+}
+
 #[test]
 fn constant_velocity_at_the_start_is_not_taken_for_rest() {
     let cruise = || Some("Cruise((height_m: 1.1, speed_m_per_s: 0.4))".to_owned());

@@ -38,6 +38,11 @@ impl Diagnostics {
         Self { step_s, windows: Vec::new(), warnings: Vec::new(), dead_reckoning_s: 0.0, problem: None }
     }
 
+    /// Forgets the windows of a rejected start; the warnings remain.
+    pub(super) fn forget_windows(&mut self) {
+        *self = Self { warnings: std::mem::take(&mut self.warnings), ..Self::new(self.step_s) };
+    }
+
     /// Adds a warning.
     pub(super) fn warn(&mut self, stamp: Stamp, kind: WarningKind) {
         self.warnings.push(Warning { stamp, kind });

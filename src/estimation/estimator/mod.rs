@@ -47,6 +47,8 @@ pub struct Estimator {
     newest_pose: Option<Stamp>,
     clock_offsets: Vec<(Stamp, f64)>,
     diagnostics: Diagnostics,
+    /// How often the estimate started again.
+    restarts: usize,
 }
 
 impl Estimator {
@@ -71,6 +73,7 @@ impl Estimator {
             newest_pose: None,
             clock_offsets: Vec::new(),
             diagnostics: Diagnostics::new(spec.step_s),
+            restarts: 0,
         })
     }
 
@@ -109,6 +112,7 @@ impl Estimator {
     /// # Errors
     /// If IMU or lidar data are missing or too short to start, localisation in the given map fails, or a pose is not finite.
     pub fn finish(mut self) -> Result<OpenLoop, EstimationError> {
+        self.keep_start();
         while let Some(segment) = self.intake.next_segment(true) {
             self.advance(segment)?;
         }
@@ -139,12 +143,24 @@ impl Estimator {
         self.intake.bridge_gaps(phase.awaits_relocalisation());
         self.diagnostics.warnings.extend(self.intake.take_warnings());
         if segment.after_gap {
+            if self.may_start_again(phase.recovery()) {
+                // The views of a few seconds are too few to relocalise in.
+                self.start_again(phase);
+                return Ok(());
+            }
             self.restart_after_gap(phase)?;
         }
         phase.queue(segment);
         self.start_if_ready(phase, false);
         let Phase::Tracking(tracking) = phase else { return Ok(()) };
-        std::mem::take(&mut tracking.waiting).into_iter().try_for_each(|segment| self.process(tracking, segment))
+        for segment in std::mem::take(&mut tracking.waiting) {
+            self.process(tracking, segment)?;
+            if tracking.is_rejected {
+                self.start_again(phase);
+                return Ok(());
+            }
+        }
+        Ok(())
     }
 
     /// The result of the run, with the states of the last window.

@@ -38,6 +38,8 @@ pub(super) struct Tracking {
     pub(super) at_end: Option<Sensitivity>,
     /// Stamp of the next pose; none before the first pose of the window.
     pub(super) next_pose: Option<Stamp>,
+    /// Whether the start of the estimate was wrong, so that the window is discarded.
+    pub(super) is_rejected: bool,
 }
 
 /// What is known from before a gap.
@@ -56,13 +58,17 @@ impl Default for Phase {
 }
 
 impl Phase {
+    /// What is known from before a gap, if anything.
+    pub(super) fn recovery(&self) -> Option<&GapRecovery> {
+        match self {
+            Self::Gathering(gathering) => gathering.recovery.as_deref(),
+            Self::Tracking(tracking) => tracking.recovery.as_deref(),
+        }
+    }
+
     /// Whether a relocalisation in the surfaces seen before a gap is pending.
     pub(super) fn awaits_relocalisation(&self) -> bool {
-        let recovery = match self {
-            Self::Gathering(gathering) => &gathering.recovery,
-            Self::Tracking(tracking) => &tracking.recovery,
-        };
-        recovery.as_ref().is_some_and(|recovery| recovery.relocalisation.is_some())
+        self.recovery().is_some_and(|recovery| recovery.relocalisation.is_some())
     }
 
     /// Adds a segment that is processed with the window, as soon as it exists.

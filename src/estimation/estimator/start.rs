@@ -1,22 +1,65 @@
 //! The first window, at the start and after a gap.
 
 use super::Estimator;
-use super::phase::{Gathering, Phase, Tracking};
+use super::phase::{GapRecovery, Gathering, Phase, Tracking};
 use crate::estimation::border::Border;
 use crate::estimation::consider::ConsiderCovariance;
 use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
 use crate::estimation::intake::Segment;
+use crate::estimation::local_map::LocalMap;
 use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::strapdown::Interval;
 use crate::estimation::surfel::{SurfelBuilder, TimedReturn};
-use crate::estimation::window::Window;
+use crate::estimation::window::{Window, WindowSolution};
 use crate::estimation::{EstimatorSpec, WarningKind};
 use crate::geometry::Vector;
+use crate::time::Stamp;
 
 /// An estimated noise above the specification by more than this factor causes a warning.
 const REPORTED_NOISE_FACTOR: f64 = 1.5;
 
+/// A first window is rejected if its solution still moves by more than this, m, or if IMU and lidar contradict each other by
+/// more than this multiple of the IMU noise (at most 0.6 in windows of sound runs): the start was wrong.
+const MAX_AT_START: (f64, f64) = (0.02, 0.9);
+/// The estimate starts again at most so often: a head that never starts well is reported as lost.
+const MAX_RESTARTS: usize = 3;
+
 impl Estimator {
+    /// Whether to start again costs nothing, because no pose has been output yet, and none is known from before a gap.
+    pub(super) fn may_start_again(&self, recovery: Option<&GapRecovery>) -> bool {
+        self.newest_pose.is_none() && recovery.is_none() && self.restarts < MAX_RESTARTS
+    }
+
+    /// Keeps the estimate even if its start is wrong: no data follow from which it could start again.
+    pub(super) fn keep_start(&mut self) {
+        self.restarts = MAX_RESTARTS;
+    }
+
+    /// Whether the first full window shows by its solution that the start was wrong.
+    ///
+    /// A head that swings while the IMU has gaps can start with a velocity and a tilt from which the matches do not converge.
+    pub(super) fn rejects_start(&mut self, tracking: &Tracking, solved: &WindowSolution, stamp: Stamp) -> bool {
+        let (correction_m, times) = (solved.last_correction_m, tracking.window.imu_contradiction());
+        let is_rejected = self.may_start_again(tracking.recovery.as_deref())
+            && self.map_localisation.is_none()
+            && tracking.window.is_full()
+            && (correction_m > MAX_AT_START.0 || times > MAX_AT_START.1);
+        if is_rejected {
+            self.diagnostics.warn(stamp, WarningKind::StartRejected { correction_m, times });
+        }
+        is_rejected
+    }
+
+    /// Discards everything estimated so far; the next data start the estimate.
+    pub(super) fn start_again(&mut self, phase: &mut Phase) {
+        self.restarts += 1;
+        *phase = Phase::default();
+        self.intake.start_again();
+        self.local_map = LocalMap::without_views(&self.spec, self.local_map.consider.clone());
+        self.clock_offsets.clear();
+        self.diagnostics.forget_windows();
+    }
+
     /// Starts the first window once there are enough data to distinguish rest from motion; with `last`, with any data.
     pub(super) fn start_if_ready(&mut self, phase: &mut Phase, last: bool) {
         let Phase::Gathering(gathering) = phase else { return };
@@ -52,7 +95,7 @@ impl Estimator {
             window.resume_from(before);
         }
         self.local_map.consider = self.covariance_at_start(&window, before);
-        Tracking { window, waiting, recovery, at_end: None, next_pose: None }
+        Tracking { window, waiting, recovery, at_end: None, next_pose: None, is_rejected: false }
     }
 
     /// The settings adapted to the scan geometry of the lidar.

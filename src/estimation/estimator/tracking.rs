@@ -24,6 +24,10 @@ impl Estimator {
         let extension = tracking.window.extend(&segment.intervals, segment.returns, segment.end_s);
         let (mut solved, linearised) = self.solve(tracking)?;
         solved.timing += extension;
+        if self.rejects_start(tracking, &solved, stamp) {
+            tracking.is_rejected = true;
+            return Ok(());
+        }
         let solution_s = watch.lap_s();
         self.record_oldest(&tracking.window);
         watch.lap_s(); // the observed surfels have their own time

@@ -27,6 +27,8 @@ const LIDAR_GAP_S: f64 = 0.5;
 const MAX_LIDAR_GAP_S: f64 = 3.0;
 /// Two scans of a head that turns faster than this on average cannot be equal, rad/s.
 const TURNING_RAD_PER_S: f64 = 0.1;
+/// So many samples show whether an IMU has a period; a slow one is judged by those of this time, s.
+const JUDGED_BY: (usize, f64) = (100, 3.0);
 /// Scans wait at most this long for IMU samples, s; this bounds the memory.
 const MAX_WAIT_FOR_IMU_S: f64 = 30.0;
 
@@ -206,11 +208,19 @@ impl Intake {
         both || imu_end_s > end_s + LIDAR_GAP_S + 2.0 * MAX_DISORDER_S
     }
 
+    /// Discards what is known of the sensors' periods: the next samples show them. An irregular sensor can look regular for a
+    /// second.
+    pub(super) fn start_again(&mut self) {
+        self.samples.stop();
+    }
+
     /// Estimates the periods of the sensors and sets the start of the first segment.
     fn start(&mut self, last: bool) -> Option<()> {
         let ((first_sample, last_sample), (first_scan, last_scan)) = (self.samples.span()?, self.scans.span()?);
         let start_s = first_sample.max(first_scan);
         let enough_s = start_s + self.spec.inertial.rest_s + self.spec.step_s;
+        let judged_s = self.samples.stamps().nth(JUDGED_BY.0).unwrap_or(f64::INFINITY);
+        let enough_s = judged_s.min(start_s + JUDGED_BY.1).max(enough_s);
         let both_s = last_sample.min(last_scan);
         if both_s < enough_s + MAX_DISORDER_S && !(last && both_s > start_s + 2.0 * self.spec.step_s) {
             return None;

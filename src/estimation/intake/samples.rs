@@ -106,6 +106,12 @@ impl SampleQueue {
         self.stream = Some(stream);
     }
 
+    /// Ends the conversion; samples are queued until it starts again.
+    pub(super) fn stop(&mut self) {
+        (self.stream, self.used_s) = (None, f64::NEG_INFINITY);
+        self.intervals.clear();
+    }
+
     /// Sampling period, once known, s.
     pub(super) fn period_s(&self) -> Option<f64> {
         self.stream.as_ref().map(InertialStream::period_s)
