@@ -5,6 +5,7 @@
 #[path = "../command/mod.rs"]
 mod command;
 mod commands;
+mod examples;
 mod gains;
 mod hostile;
 mod maps;

@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Chooses a spring for a head from a list of offered springs, and shows the head on its first spring for comparison.
+# Writes the folder springs (pareto.csv, pareto.svg, ...) into the current folder.
+set -euo pipefail
+here=$(realpath "$(dirname "$0")")
+
+zsim check "$here/head.ron"
+zsim --quiet spring "$here/head.ron"
+out=$PWD
+cd "$here" # names in design.ron are relative to the current folder
+zsim --quiet spring design design.ron --out "$out/springs" --force
