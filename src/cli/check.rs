@@ -71,7 +71,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     Ok(Completion::Done)
 }
 
-/// The kind of a valid spec.
+/// Checks a file, or a scene or spec of the library by name; returns its kind.
+///
+/// The folder of a file tells its kind, if it has the name of one; otherwise each kind is tried.
 fn check(file: &str) -> Result<Kind, SpecError> {
     if let Some(kind) = kind_by_folder(file) {
         return build(kind, &find(kind, file)?).map(|()| kind);
@@ -102,7 +104,7 @@ fn kind_by_trying(source: &Source) -> Result<Kind, SpecError> {
             }
         }
     }
-    Err(farthest.unwrap_or_else(|| SpecError::plain(source.name.clone(), "is no scene and no spec")))
+    Err(farthest.unwrap_or_else(|| SpecError::plain(source.name.clone(), "is neither a scene nor a spec")))
 }
 
 fn kind_by_folder(file: &str) -> Option<Kind> {

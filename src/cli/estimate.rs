@@ -44,8 +44,8 @@ pub(super) struct Arguments {
     /// The IMU's topic [default: found]
     #[arg(long, value_name = "TOPIC")]
     imu_topic: Option<String>,
-    /// Map of an earlier run (its map.ply) in which to localise the head: the trajectory is in the map's
-    /// frame then
+    /// Localise the head in this map of an earlier run (its map.ply); the trajectory is then in the frame of
+    /// the map
     #[arg(long, value_name = "MAP.ply")]
     map: Option<PathBuf>,
     /// Initial position and yaw in the map, accurate to a metre and twenty degrees: metres, and degrees about the

@@ -70,7 +70,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
             "second map in the first: x, y, z, yaw",
             format!("{:.3}, {:.3}, {:.3} m, {yaw_deg:.3}\u{b0}", position.x, position.y, position.z),
         ),
-        row("matched part of the second map", format!("{:.0} %", 100.0 * fraction)),
+        row("surfels of the second map that match", format!("{:.0} %", 100.0 * fraction)),
         row("residual, RMS", format!("{:.1} mm", 1e3 * residual_m)),
     ];
     let figures = json!({

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct RecordingFiles {
     recording: PathBuf,
     truth: PathBuf,
-    /// Where the recording is moved when it is complete, if it is not there already.
+    /// Final path of the complete recording, if it is written under a temporary name.
     replaces: Option<PathBuf>,
     is_finished: bool,
 }

@@ -60,7 +60,7 @@ struct Files {
     /// File for the result; if it exists, a number is added to the name
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Write the file even if it exists
+    /// Overwrite FILE if it exists
     #[arg(long)]
     force: bool,
 }

@@ -157,7 +157,8 @@ impl CompliantMount<'_> {
         if let Some(cable) = parameters.cable {
             let cord = Cord::through(cable, &parameters.ends).ok_or_else(|| {
                 let message = format!(
-                    "a cable of {} m under {} N would be {:.3} m long without tension (stiffness {} N/m)",
+                    "a cable of {} m under {} N would be {:.3} m long without tension (stiffness {} N/m): lower tension_n or \
+                     raise stiffness_n_per_m",
                     cable.length_m,
                     cable.tension_n,
                     cable.length_m - cable.tension_n / cable.stiffness_n_per_m,

@@ -52,7 +52,7 @@ pub(super) enum NoEquilibrium {
     NotFound,
     #[error("the equilibrium is {shift_mm:.0} mm and {turn_deg:.0} degrees away from base_from_head")]
     TooFar { shift_mm: f64, turn_deg: f64 },
-    #[error("nothing holds it against a {0}")]
+    #[error("no spring, rope, joint or buoyancy resists a {0}")]
     Unconstrained(&'static str),
 }
 

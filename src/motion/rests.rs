@@ -57,7 +57,9 @@ fn check(rests: &[(f64, f64)]) -> Result<(), String> {
     let mut free_s = 0.0;
     for (index, &(at_s, lasts_s)) in rests.iter().enumerate() {
         if !(at_s.is_finite() && lasts_s.is_finite() && lasts_s > 0.0) {
-            return Err(format!("rest {index} (counted from 0) is at {at_s} s for {lasts_s} s"));
+            return Err(format!(
+                "rest {index} (counted from 0) starts at {at_s} s and lasts {lasts_s} s; it must last longer than 0 s"
+            ));
         }
         if at_s < free_s + 4.0 * HALF_S {
             let least_s = free_s + 4.0 * HALF_S;

@@ -178,7 +178,7 @@ fn faults(run: &Run, lidar: &Lidar) -> Result<Option<Faults>, SpecError> {
     Ok(Some(faults))
 }
 
-/// Solids of a head's carrier that the lidar can see, in the base frame.
+/// The solids of what carries the head (a person, a vehicle), which the beams can hit, in the base frame.
 pub fn carrier_of(head: &HeadSpec) -> Vec<Cylinder> {
     let cylinder = |part: &CarrierSpec| Cylinder {
         foot_in_base: Vector::from(part.foot_in_base_m),

@@ -189,7 +189,7 @@ impl Loops {
         let prior_map = options.map.as_ref();
         let closes_loops = options.closed_loop && prior_map.is_none();
         if options.closed_loop && !closes_loops {
-            watch.note("localisation in a given map: no global registration, because it does not use the map");
+            watch.note("the global registration is skipped: it does not use the given map");
         }
         let writes_map = prior_map.map_or(options.closed_loop, |map| map.extend);
         let open_loop =

@@ -104,7 +104,7 @@ fn invalid_suspensions_are_errors_with_the_reason() {
     assert!(zero.starts_with("head.ron:") && zero.contains("above 0, found 0"), "{zero}");
     // A single rope does not constrain the rotation about itself.
     let loose = refused([0.0, 0.0, -0.45], &rope(0.0));
-    assert!(loose.contains("nothing holds it against a turn about z"), "{loose}");
+    assert!(loose.contains("resists a turn about z"), "{loose}");
     // Ropes cannot push: the head falls to a pose below them.
     let above = refused([0.0, 0.0, 0.45], &(rope(0.03) + &rope(-0.03)));
     assert!(above.contains("away from base_from_head"), "{above}");

@@ -69,7 +69,7 @@ impl Cluster {
 
     /// Adds a surfel's points.
     ///
-    /// Errors of one trajectory are correlated, so the variance of the position is averaged and does not decrease.
+    /// Errors of one trajectory are correlated, so the variance along the normal is averaged and does not decrease.
     fn add(&mut self, surfel: &MapSurfel) {
         let points = self.points + surfel.points;
         let (ours, theirs) = (self.points / points, surfel.points / points);

@@ -81,7 +81,7 @@ impl ResidualSums {
         }
     }
 
-    /// Moves the sum into the equations and clears it.
+    /// Adds the products summed since the last call, of rows with the same first knot, to the equations, and clears them.
     pub(super) fn flush_to(&mut self, equations: &mut NormalEquations, layout: &Layout) {
         let Some(first) = self.first.take().map(|first| layout.knot(first)) else { return };
         // Knots after the last used one may be outside of the window.

@@ -122,9 +122,10 @@ pub struct Projector {
 }
 
 impl Projector {
-    /// Projects a sweep that starts at `stamp`: the returns become points in firing order.
+    /// Converts a sweep to points in the laser frame, in firing order; the result also contains the sweep as it is.
     ///
-    /// `no_return_range_m` is the constant for beams without a return. The polar form is unchanged.
+    /// `stamp` is that of the message, the time of the first range. If the time increment is negative, the last range was fired
+    /// first: the stamp of the result is earlier by `stamped_after`. `no_return_range_m` is the range that means no return.
     pub fn project(&mut self, stamp: Stamp, planar: PlanarScan, no_return_range_m: Option<f32>) -> LidarScan {
         self.prepare(&planar);
         let step_s = time_increment_s(&planar);

@@ -165,7 +165,7 @@ fn check_values(fault: &FaultSpec) -> Result<(), Problem> {
             let limits = [*gyro_rad_per_s, *gyro_deg_per_s, *accel_m_per_s2];
             check_imu_values(limits.map(|limit| limit.map(|x| [x; 3])))?;
             match limits.into_iter().flatten().find(|limit| *limit <= 0.0) {
-                Some(limit) => Err(Problem("clip", format!("a limit of {limit}"), "limits are larger than 0")),
+                Some(limit) => Err(Problem("clip", format!("a limit of {limit}"), "give a limit above 0")),
                 None => Ok(()),
             }
         }

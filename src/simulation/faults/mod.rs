@@ -45,10 +45,16 @@ impl Faults {
         for (index, fault) in spec.faults.iter().enumerate() {
             match (&fault.fault, fault.sensor) {
                 (FaultKind::Thin { arrivals_s: None, .. }, _) => {
-                    return Err(check::about(source, index, "file", "the arrival times were not read".to_owned()));
+                    return Err(check::about(
+                        source,
+                        index,
+                        "file",
+                        "its arrival times have not been loaded".to_owned(),
+                    ));
                 }
                 (FaultKind::ClockJump { jump_s }, FaultySensor::Lidar | FaultySensor::Both) if *jump_s < 0.0 => {
-                    let message = format!("fault {index} (clock_jump): the lidar's clock jumps back by {} s", -jump_s);
+                    let message =
+                        format!("fault {index} (clock_jump): the lidar's clock would jump back by {} s", -jump_s);
                     let help = "the truth is stamped by the lidar's clock and must increase: let the lidar's clock jump \
                                 forward, or the IMU's back";
                     return Err(check::about(source, index, "jump_s", message).with_help(help));

@@ -65,7 +65,7 @@ fn bound_title(results: &RunResults) -> String {
     let title = match results.pairs {
         Some(pairs) => {
             let aligned_s = Integrity::aligned_seconds(pairs);
-            format!("Position error, aligned over the first {aligned_s:.0} s, and its 99 % bound")
+            format!("Position error after alignment over the first {aligned_s:.0} s, and its 99 % bound")
         }
         None => "99 % bound on the position error".to_owned(),
     };

@@ -11,7 +11,7 @@ pub const DEFAULT_CUT_M: f64 = 1.2;
 const MAX_EDGES: usize = 8_000;
 /// Edges whose ends are drawn within this distance are one line, m.
 const SAME_LINE_M: f64 = 0.01;
-/// Widths of cut surfaces, of edges behind the cut, and of the route, points.
+/// Widths of cut surfaces, of edges beyond them, and of the route, points.
 const CUT_WIDTH: f64 = 1.4;
 const EDGE_WIDTH: f64 = 0.5;
 const ROUTE_WIDTH: f64 = 1.4;
@@ -55,9 +55,10 @@ fn drawing(
     let mut chart = chart
         .as_map()
         .with(
-            Series::line("edges behind the cut", Colour::Backdrop, separate(&outlines)).marked(Mark::Line(EDGE_WIDTH)),
+            Series::line("edges beyond the section", Colour::Backdrop, separate(&outlines))
+                .marked(Mark::Line(EDGE_WIDTH)),
         )
-        .with(Series::line("cut", Colour::Truth, separate(&section)).marked(Mark::Line(CUT_WIDTH)));
+        .with(Series::line("section", Colour::Truth, separate(&section)).marked(Mark::Line(CUT_WIDTH)));
     if let Some(route) = world.default_route() {
         chart = with_route(chart, route, project);
     }

@@ -64,7 +64,7 @@ const MAX_PEAK_HZ: f64 = 20.0;
 /// The response is linear for any amplitude. The computation takes less than 1 ms.
 ///
 /// # Errors
-/// When the spec is invalid or the head has no stable rest pose; the error does not include the maximum mass.
+/// When the spec is invalid or the head has no stable rest pose. A head above the maximum mass of its spring is no error.
 pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignMetrics, StudyError> {
     let head = HeadModel::new_without_advice(spec, source)?;
     let model = SpringModel::of(spec, &head)?;

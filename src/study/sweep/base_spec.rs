@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// The base run. Each spec is a path or a name in the library.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
-#[expect(clippy::large_enum_variant, reason = "there is one a sweep")]
+#[expect(clippy::large_enum_variant, reason = "a sweep has only one base run")]
 pub enum BaseSpec {
     /// A head on its spring, shaken by a hand, in closed form without simulation; takes below 1 ms.
     Spring {

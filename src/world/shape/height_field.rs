@@ -124,6 +124,7 @@ impl Lattice {
         Ok(Self { spacing, columns, values })
     }
 
+    /// Value between -1 and 1 at `x` and `y`, m from the first node: smooth between the four nodes around.
     fn at(&self, x: f64, y: f64) -> f64 {
         let (u, v) = (x / self.spacing, y / self.spacing);
         let (i, j) = (u.floor(), v.floor());
