@@ -22,6 +22,9 @@ pub(super) struct Global {
     /// Suppress progress and notes; print results and errors only
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// Print all figures of a run, not the most important ones only
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
     /// Use this many threads (default: all of the machine's); results do not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,

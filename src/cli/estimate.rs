@@ -80,6 +80,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     output::check_not_inputs(&inputs.into_iter().flatten().cloned().collect::<Vec<_>>(), &written)?;
 
     let mut bars = Bars::new(global);
+    full_run::note_other_folder(&folder, &wanted, &bars);
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let outcome = study::estimate_recording(&arguments.recording, &folder, &options, &mut watch);
     bars.finish();

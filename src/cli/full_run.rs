@@ -34,6 +34,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let folder = output::folder(&wanted, arguments.out.force)?;
     let written: Vec<PathBuf> = study::full_run_files().iter().map(|name| folder.join(name)).collect();
     output::check_not_inputs(&arguments.scenario.inputs(scene), &written)?;
+    note_other_folder(&folder, &wanted, &bars);
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
@@ -41,6 +42,13 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     bars.finish();
     let outcome = outcome.inspect_err(|_| print_partial_results(&folder))?;
     print_outcome(global, &outcome, arguments.estimator.profile, &folder)
+}
+
+/// Notes at the start that the results go to another folder than that `wanted`, which exists.
+pub(super) fn note_other_folder(folder: &Path, wanted: &Path, bars: &Bars) {
+    if folder != wanted {
+        bars.note(&format!("{} exists: the results go to {}", wanted.display(), folder.display()));
+    }
 }
 
 /// Default folder for results.
@@ -71,7 +79,7 @@ pub(super) fn print_outcome(
     if let (true, Value::Object(object)) = (profile, &mut figures) {
         object.insert("profile".to_owned(), seconds_by_part(outcome));
     }
-    let mut words = report::summary(&outcome.metrics);
+    let mut words = if global.verbose { report::summary(&outcome.metrics) } else { report::brief(&outcome.metrics) };
     if let (true, Some(wall_s)) = (profile, outcome.metrics.open_loop.wall_s) {
         words += "\n";
         words += &report::timing_table(&outcome.timing, wall_s);

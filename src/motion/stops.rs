@@ -76,7 +76,9 @@ fn check(stops: &[(f64, f64)], grip_s: f64) -> Result<(), String> {
     let mut free_s = 0.0;
     for (index, &(at_s, length_s)) in stops.iter().enumerate() {
         if !(at_s.is_finite() && length_s.is_finite()) {
-            return Err(format!("stop {index} (counted from 0) starts at {at_s} s and lasts {length_s} s: both must be finite"));
+            return Err(format!(
+                "stop {index} (counted from 0) starts at {at_s} s and lasts {length_s} s: both must be finite"
+            ));
         }
         if length_s < 2.0 * grip_s {
             return Err(format!("a stop of {length_s} s is too short to grasp and release, {grip_s} s each"));

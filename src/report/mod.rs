@@ -2,6 +2,7 @@
 //!
 //! This module formats results; it does not compute them.
 
+mod brief;
 mod figures;
 mod integrity;
 mod metrics;
@@ -14,6 +15,7 @@ mod sensors;
 mod table;
 mod verdict;
 
+pub use brief::brief;
 pub use figures::{
     bound_over_time, clock_offset, errors_over_time, head_pitch, length_unit, open_and_closed_loop_errors,
     trajectory_top_view,

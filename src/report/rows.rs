@@ -154,7 +154,7 @@ fn memory(metrics: &Metrics) -> Group {
     rows.titled("memory")
 }
 
-fn degrees(deg: f64) -> String {
+pub(super) fn degrees(deg: f64) -> String {
     format!("{}\u{b0}", digits(deg))
 }
 

@@ -1,0 +1,66 @@
+//! The result of a run in four lines, for the terminal.
+
+use super::quantity::{length, percent, time};
+use super::rows::{degrees, title};
+use super::{Metrics, verdict};
+
+/// Title, verdict, accuracy and time of a run, a line each.
+pub fn brief(metrics: &Metrics) -> String {
+    let verdict = verdict::verdict(metrics).map(|verdict| format!("verdict: {verdict}"));
+    let times = times(metrics);
+    let lines = [Some(title(metrics)), verdict, Some(accuracy(metrics)), (!times.is_empty()).then_some(times)];
+    lines.into_iter().flatten().map(|line| line + "\n").collect()
+}
+
+fn accuracy(metrics: &Metrics) -> String {
+    let (open, closed) = (&metrics.open_loop, &metrics.closed_loop);
+    let loops = [
+        ("open loop", open.position_rmse_m, open.rotation_rmse_deg),
+        ("closed loop", closed.position_rmse_m, closed.rotation_rmse_deg),
+    ];
+    let known = loops.iter().filter_map(|(name, position_m, rotation_deg)| {
+        let rotation = rotation_deg.map_or_else(String::new, |deg| format!(" and {}", degrees(deg)));
+        Some(format!("{name} {}{rotation}", length((*position_m)?)))
+    });
+    match known.collect::<Vec<_>>() {
+        known if known.is_empty() => "accuracy: unknown, the recording has no ground truth".to_owned(),
+        known => format!("accuracy: {} (RMSE)", known.join(", ")),
+    }
+}
+
+fn times(metrics: &Metrics) -> String {
+    let of_acquisition = metrics.open_loop.fraction_of_acquisition;
+    let fraction = of_acquisition.map_or_else(String::new, |f| format!(" ({} of acquisition)", percent(f)));
+    let parts = [
+        metrics.simulation.wall_s.map(|s| format!("simulation {}", time(s))),
+        metrics.open_loop.wall_s.map(|s| format!("open loop {}{fraction}", time(s))),
+        metrics.closed_loop.wall_s.map(|s| format!("closed loop {}", time(s))),
+    ];
+    let known: Vec<String> = parts.into_iter().flatten().collect();
+    if known.is_empty() { String::new() } else { format!("time: {}", known.join(", ")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_figures_are_left_out_or_said() {
+        let mut metrics = Metrics { duration_s: 20.0, ..Metrics::default() };
+        assert_eq!(brief(&metrics), "20.0 s\naccuracy: unknown, the recording has no ground truth\n");
+        metrics.scene = Some("office".to_owned());
+        metrics.status = Some("good".to_owned());
+        metrics.open_loop.position_rmse_m = Some(0.0041);
+        metrics.closed_loop.position_rmse_m = Some(0.003);
+        metrics.closed_loop.rotation_rmse_deg = Some(0.05);
+        metrics.open_loop.wall_s = Some(2.0);
+        metrics.open_loop.fraction_of_acquisition = Some(0.1);
+        let text = brief(&metrics);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 4, "{text}");
+        assert_eq!(lines[0], "office, 20.0 s");
+        assert!(lines[1].starts_with("verdict: good"), "{text}");
+        assert_eq!(lines[2], "accuracy: open loop 4.10 mm, closed loop 3.00 mm and 0.0500\u{b0} (RMSE)");
+        assert_eq!(lines[3], "time: open loop 2.00 s (10.0 % of acquisition)");
+    }
+}
