@@ -9,7 +9,7 @@ use zsim::study::sweep::Shard;
 /// Vary the parameters of a run and report their effects: `zsim sweep` plan, run and merge in one
 ///
 /// Writes table.parquet and table.csv, a row per run; summary.csv and study.md, the effect of each axis and its
-/// significance; and plots. A second start in the same folder skips finished runs and continues.
+/// significance; report.html, a page with both, the plots and all runs to sort and filter; and plots. A second start in the same folder skips finished runs and continues.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim study estimator_ablation --out results/estimator_ablation")]
 pub(super) struct Arguments {

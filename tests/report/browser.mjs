@@ -1,4 +1,4 @@
-// Loads the page of a run or of a scene in a headless browser and uses it: node browser.mjs NODE_MODULES PAGE [PICTURES]
+// Loads the page of a run, a scene or a study in a headless browser and uses it: node browser.mjs NODE_MODULES PAGE [PICTURES]
 //
 // Exits with 77 if a program or a module that it needs is not installed.
 // Fails on an error in the console, on a request to the network, on a control without effect, on an accessibility violation
@@ -133,6 +133,29 @@ async function useCharts(page) {
   check(first !== (await drawn()).toString("base64"), "the choice of the error component has no effect");
 }
 
+// The words of a column of the visible runs.
+const column = (page, k) =>
+  page.locator("#runs tbody tr:not([hidden])").evaluateAll((rows, k) => rows.map((row) => row.cells[k].textContent), k);
+
+async function useTable(page) {
+  const all = await column(page, 0);
+  check(all.length > 1, "the table of the runs is empty");
+  check((await page.locator(".drawing svg").count()) > 0, "the page has no plots");
+  const button = page.locator("#runs thead button").first();
+  for (const [order, sign] of [["ascending", 1], ["descending", -1]]) {
+    await button.focus();
+    await page.keyboard.press("Enter");
+    const numbers = (await column(page, 0)).map(Number);
+    check(numbers.every((number, k) => k === 0 || sign * (number - numbers[k - 1]) > 0), `runs are not sorted: ${order}`);
+    check((await page.locator("#runs th").first().getAttribute("aria-sort")) === order, `aria-sort is not ${order}`);
+  }
+  const level = (await column(page, 1))[0];
+  await page.locator("#filter").fill(level);
+  const found = await column(page, 1);
+  check(found.length < all.length && found.length > 0, `the filter "${level}" shows ${found.length} of ${all.length} runs`);
+  check((await page.locator("#shown").textContent()).startsWith(`${found.length} of ${all.length}`), "the number of runs is wrong");
+}
+
 async function audit(page, name) {
   await page.evaluate(axe);
   const { violations } = await page.evaluate(() => axe.run());
@@ -152,7 +175,8 @@ for (const scheme of ["light", "dark"]) {
     check(await page.evaluate(() => window.hostile === undefined), "a hostile name has run as a script");
     if (pictures) await page.screenshot({ path: join(pictures, `${scheme}-${width}.png`), fullPage: true });
     await audit(page, `${scheme}, ${width} px`);
-    if (scheme === "light" && width === 1400) await use(page);
+    const isStudy = await page.evaluate(() => document.documentElement.dataset.page === "study");
+    if (scheme === "light" && width === 1400) await (isStudy ? useTable(page) : use(page));
     await page.close();
   }
 }

@@ -1,4 +1,4 @@
-//! The pages of a run and of a scene in a headless browser.
+//! The pages of a run, a scene and a study in a headless browser.
 
 use crate::command::run;
 use crate::skip::run_or_skip;
@@ -35,6 +35,17 @@ fn the_page_of_a_scene_works_in_a_browser() {
     let (code, _, errors) = run(here.path(), &format!("scene view {} scene.html", scene.display()));
     assert_eq!(code, 0, "{errors}");
     use_in_a_browser(&here.path().join("scene.html"));
+}
+
+#[test]
+fn the_page_of_a_study_works_in_a_browser() {
+    let here = tempfile::tempdir().unwrap();
+    let space = "(name: \"mass\", base: spring(head: \"handheld\", shake: (amplitude: 0.1)), sampling: grid, axes: [\
+                 (path: \"head.body.mass_kg\", values: [0.3, 0.35, 0.4]), (path: \"shake.frequency_hz\", values: [0.8, 1.2])])";
+    std::fs::write(here.path().join("mass.ron"), space).unwrap();
+    let (code, _, errors) = run(here.path(), "study mass.ron --out out");
+    assert_eq!(code, 0, "{errors}");
+    use_in_a_browser(&here.path().join("out/report.html"));
 }
 
 /// Uses a page in a headless browser; fails if something on it does not work.

@@ -126,7 +126,9 @@ fn a_sweep_is_the_same_in_one_call_in_parts_and_after_kills() {
     assert!(front.lines().skip(1).map(mass_of).all(|mass| mass >= 30.0), "{front}");
     let failed = column(&at("whole"), "error").iter().filter(|error| !error.is_empty()).count();
     assert_eq!(stable + failed, 4096, "an unstable head is a row with its error");
-    for name in ["study.md", "trends.csv", "front.csv", "plots/front.png", "plots/effects_rocking_hz.svg"] {
+    for name in
+        ["study.md", "report.html", "trends.csv", "front.csv", "plots/front.png", "plots/effects_rocking_hz.svg"]
+    {
         assert!(at("whole").join(name).metadata().unwrap().len() > 100, "{name}");
     }
 }

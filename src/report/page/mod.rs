@@ -1,7 +1,7 @@
 //! Pages with a three-dimensional view, each one HTML file without external resources.
 //!
 //! The page of a run has the verdict, the view, interactive charts, the metrics and the manifest; that of a scene the view,
-//! the floor plan and the materials. Scripts, style sheets and data are in the file. A content security policy forbids
+//! the floor plan and the materials; that of a study its tables, plots and runs, without a view. Scripts, style sheets and data are in the file. A content security policy forbids
 //! network access.
 
 mod binary;
@@ -10,6 +10,7 @@ mod encode;
 mod html;
 mod quantise;
 mod scene;
+mod study;
 
 use crate::report::rows;
 pub use data::{
@@ -27,6 +28,7 @@ pub const MAX_PAGE_TRIANGLES: usize = 30_000;
 pub const MAX_PAGE_POSES: usize = 20_000;
 
 pub use scene::{MaterialRow, ScenePage};
+pub use study::{MAX_PAGE_RUNS, PageTable, StudyPage};
 
 const TEMPLATE: &str = include_str!("assets/page.html");
 const RUN_SECTIONS: &str = include_str!("assets/run.html");

@@ -9,6 +9,8 @@ use super::stroke::dashes;
 use super::{Chart, Mark, PlotError, Series, SignedDots};
 use plotters::prelude::DrawingBackend;
 
+/// Room for labels in a font that is wider than the bundled one: an SVG is drawn with the fonts of its reader.
+const WIDER_FONT: f64 = 1.15;
 /// Margins around the axes, points: above for one line of title and legend, below and left for tick labels and axis label.
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;
@@ -111,7 +113,10 @@ fn frame_of(chart: &Chart, corner: CanvasPoint, size: (f64, f64), left: f64) -> 
 
 /// The left margin, wide enough for custom tick labels, points.
 fn left_margin<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &Chart) -> Result<f64, PlotError> {
-    chart.y_ticks.iter().try_fold(LEFT, |margin, (_, label)| Ok(margin.max(canvas.width_of(label, SMALL_TEXT)? + 16.0)))
+    chart
+        .y_ticks
+        .iter()
+        .try_fold(LEFT, |margin, (_, label)| Ok(margin.max(WIDER_FONT * canvas.width_of(label, SMALL_TEXT)? + 16.0)))
 }
 
 /// The custom ticks within the range of an axis, or about `wanted` round numbers if there are none.

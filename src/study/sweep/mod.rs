@@ -22,6 +22,7 @@ mod integrity;
 mod measure;
 mod merge;
 mod output;
+mod page;
 mod paired;
 mod pareto;
 mod part;

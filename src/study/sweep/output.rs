@@ -94,9 +94,9 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::SweepStat
 const MEASURES_PER_TABLE: usize = 3;
 
 /// Title, header and rows of a table.
-type TextTable = (String, Vec<String>, Vec<Vec<String>>);
+pub(super) type TextTable = (String, Vec<String>, Vec<Vec<String>>);
 
-fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TextTable> {
+pub(super) fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TextTable> {
     if !summary.trends.is_empty() {
         return vec![trend_table(summary)];
     }
@@ -137,7 +137,7 @@ fn level_table(
 ) -> TextTable {
     let mut header = vec![axis.to_owned()];
     for measure in measures {
-        header.extend([format!("{} {}", measure.short(), measure.unit().0), "ratio".to_owned()]);
+        header.extend([heading(*measure), "ratio".to_owned()]);
     }
     let within_level = within.map(|(_, level)| level);
     let Some(first) = measures.first() else { return (String::new(), header, Vec::new()) };
@@ -156,6 +156,14 @@ fn level_table(
     (format!("By {axis}, {place}"), header, rows)
 }
 
+/// Heading of a column: the measure and its unit, if it has one.
+pub(super) fn heading(measure: Measure) -> String {
+    match measure.unit().0 {
+        "1" => measure.short().to_owned(),
+        unit => format!("{} {unit}", measure.short()),
+    }
+}
+
 /// Median, with `bands` also quartiles, in display units.
 fn figures(line: &LevelSummary, bands: bool) -> String {
     let (_, per_unit) = line.measure.unit();
@@ -169,7 +177,7 @@ fn ratio(line: &LevelSummary) -> String {
 }
 
 /// A number with about three significant digits.
-fn digits(x: f64) -> String {
+pub(super) fn digits(x: f64) -> String {
     match x.abs() {
         size if size.is_nan() => "-".to_owned(),
         size if size.is_infinite() => "lost".to_owned(),

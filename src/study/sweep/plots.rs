@@ -7,7 +7,6 @@ use super::{Measure, Plan, Sweep};
 use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Mark, Series};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
-use std::path::Path;
 
 /// Height of a level's row in a ratio plot, points: fits a line of text.
 const ROW_HEIGHT: f64 = 17.0;
@@ -15,38 +14,45 @@ const ROW_HEIGHT: f64 = 17.0;
 const RATIO_TICKS: [f64; 15] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1.0, 1.4, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
 /// Maximum number of pairs of axes with a map, to keep the figure readable.
 const MAX_MAPS: usize = 6;
+/// Maximum number of levels of an axis of text in a map: the labels of more overlap.
+const MAX_TEXT_LEVELS: usize = 8;
+/// A measure whose largest value is more than this multiple of the smallest is drawn on a logarithmic axis.
+const LOGARITHMIC_RANGE: f64 = 300.0;
 /// Maximum number of dots in a plot; more are subsampled evenly to limit the size of the SVG.
 const MAX_DOTS: usize = 5_000;
 
 impl Sweep {
-    /// Draws all plots to `plots/`, and writes the Pareto front to `front.csv`.
+    /// Draws all plots to `plots/`, and writes the Pareto front to `front.csv`; returns the names of the plots.
     ///
     /// # Errors
     /// If the table is not merged, or if a file cannot be written.
-    pub(super) fn draw(&self, summary: &Summary) -> Result<(), StudyError> {
+    pub(super) fn draw(&self, summary: &Summary) -> Result<Vec<String>, StudyError> {
         let folder = self.folder.join("plots");
         std::fs::create_dir_all(&folder).map_err(StudyError::file(&folder))?;
         let runs = Runs::read(self)?;
+        let mut figures: Vec<(String, Figure)> = self.front(&runs)?.into_iter().collect();
         for measure in &summary.measures {
-            effects(&self.plan, summary, *measure).save(&folder, &format!("effects_{}", measure.key()))?;
+            figures.push((format!("effects_{}", measure.key()), effects(&self.plan, summary, *measure)));
             let maps = self.maps(&runs, *measure)?;
             if !maps.is_empty() {
-                Figure::of(maps).in_columns(2).save(&folder, &format!("maps_{}", measure.key()))?;
+                figures.push((format!("maps_{}", measure.key()), Figure::of(maps).in_columns(2)));
             }
         }
         for axis in self.plan.axes().iter().filter(|axis| !axis.is_number()) {
             let figure = summary.measures.first().and_then(|measure| ratios(summary, &axis.name, *measure));
-            if let Some(figure) = figure {
-                figure.save(&folder, &format!("ratios_{}", axis.name))?;
-            }
+            figures.extend(figure.map(|figure| (format!("ratios_{}", axis.name), figure)));
         }
-        self.draw_front(&runs, &folder)
+        figures
+            .into_iter()
+            .map(|(name, figure)| figure.save(&folder, &name).map(|()| name).map_err(StudyError::from))
+            .collect()
     }
 
     /// Maps of a measure's median, one for each pair of axes.
     fn maps(&self, runs: &Runs, measure: Measure) -> Result<Vec<Chart>, StudyError> {
         let axes = self.plan.axes().len();
-        let is_shown = |axis: &usize| (2..=60).contains(&level_count(&self.plan, *axis));
+        let most = |axis: usize| if self.plan.axes()[axis].is_number() { 60 } else { MAX_TEXT_LEVELS };
+        let is_shown = |axis: &usize| (2..=most(*axis)).contains(&level_count(&self.plan, *axis));
         let pairs = (0..axes).flat_map(|x| (x + 1..axes).map(move |y| (x, y)));
         let pairs: Vec<(usize, usize)> = pairs.filter(|(x, y)| is_shown(x) && is_shown(y)).take(MAX_MAPS).collect();
         if pairs.is_empty() {
@@ -56,10 +62,10 @@ impl Sweep {
         Ok(pairs.into_iter().map(|(x, y)| map(&self.plan, runs, &figures, (x, y, measure))).collect())
     }
 
-    /// Draws and writes the Pareto front of the spec's goals.
-    fn draw_front(&self, runs: &Runs, folder: &Path) -> Result<(), StudyError> {
+    /// The plot of the Pareto front of the spec's goals, with its name; writes the front to `front.csv`.
+    fn front(&self, runs: &Runs) -> Result<Option<(String, Figure)>, StudyError> {
         let goals = &self.plan.spec().front;
-        let [first, second, ..] = goals.as_slice() else { return Ok(()) };
+        let [first, second, ..] = goals.as_slice() else { return Ok(None) };
         let columns: Vec<Vec<f64>> = goals.iter().map(|goal| self.figures(goal.measure)).collect::<Result<_, _>>()?;
         let limits = &self.plan.spec().limits;
         let limited: Vec<Vec<f64>> =
@@ -84,8 +90,8 @@ impl Sweep {
             .with(Series::dots("front", Colour::Estimate, front.iter().map(at).collect()).marked(Mark::Dots(4.5)));
         let mut figure = Figure::of(vec![chart]);
         figure.chart_height = 420.0;
-        figure.save(folder, "front")?;
-        self.write_front(runs, &front, &columns)
+        self.write_front(runs, &front, &columns)?;
+        Ok(Some(("front".to_owned(), figure)))
     }
 
     fn write_front(&self, runs: &Runs, front: &[usize], columns: &[Vec<f64>]) -> Result<(), StudyError> {
@@ -135,22 +141,37 @@ fn effects(plan: &Plan, summary: &Summary, measure: Measure) -> Figure {
 fn text_level_chart(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Chart {
     let (_, per_unit) = measure.unit();
     let height = |index: usize| lines.len() as f64 - 1.0 - index as f64;
+    let all = lines.iter().flat_map(|line| [line.quarter, line.median, line.three_quarters]).map(|x| x * per_unit);
+    let (low, high) =
+        all.filter(|x| x.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    let is_logarithmic = low > 0.0 && high > LOGARITHMIC_RANGE * low;
+    let at = |x: f64| if is_logarithmic { (x * per_unit).log10() } else { x * per_unit };
     let bars = lines.iter().enumerate().flat_map(|(k, line)| {
-        let ends = [line.quarter, line.three_quarters].map(|x| (x * per_unit, height(k)));
+        let ends = [line.quarter, line.three_quarters].map(|x| (at(x), height(k)));
         [ends[0], ends[1], (f64::NAN, f64::NAN)]
     });
-    let dots = lines.iter().enumerate().map(|(k, line)| (line.median * per_unit, height(k)));
+    let dots = lines.iter().enumerate().map(|(k, line)| (at(line.median), height(k)));
     let ticks = lines.iter().enumerate().map(|(k, line)| (height(k), line.level.clone()));
     // An invisible line reserves half a row above and below.
-    let finite = lines.iter().flat_map(|line| [line.quarter, line.three_quarters]).filter(|x| x.is_finite());
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-    let middle = if low <= high { 0.5 * (low + high) * per_unit } else { 0.0 };
+    let middle = if low <= high { at(0.5 * (low + high) / per_unit) } else { 0.0 };
     let room = vec![(middle, -0.5), (f64::NAN, f64::NAN), (middle, lines.len() as f64 - 0.5)];
-    Chart::new(&format!("By {axis}"), measure.label(), "")
+    let chart = Chart::new(&format!("By {axis}"), measure.label(), "")
         .with(Series::line("", Colour::Backdrop, room))
         .with(Series::line("", Colour::Backdrop, bars.collect()).marked(Mark::Line(4.0)))
         .with(Series::dots("", Colour::Estimate, dots.collect()).marked(Mark::Dots(6.0)))
-        .with_y_ticks(ticks.collect())
+        .with_y_ticks(ticks.collect());
+    if is_logarithmic { chart.with_x_ticks(decades(low, high)) } else { chart }
+}
+
+/// Ticks at the powers of ten from `low` to `high`, every second or third if they are many.
+fn decades(low: f64, high: f64) -> Vec<(f64, String)> {
+    let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
+    let step = (1 + (last - first) / 4) as usize;
+    let label = |power: i32| match power {
+        -3..=4 => format!("{}", 10_f64.powi(power)),
+        _ => format!("1e{power}"),
+    };
+    (first..=last).step_by(step).map(|power| (f64::from(power), label(power))).collect()
 }
 
 /// Map of a measure's median over two axes.

@@ -23,8 +23,8 @@ pub struct MergedReport {
 impl Sweep {
     /// [Merges](Self::merge) the finished runs and reports them.
     ///
-    /// Writes `summary.csv`, `trends.csv` (for sampled axes), `study.md`, `latency.csv` and `metrics.json` (with timing
-    /// errors), and plots to `plots/`.
+    /// Writes `summary.csv`, `trends.csv` (for sampled axes), `study.md`, `report.html`, `latency.csv` and `metrics.json`
+    /// (with timing errors), and plots to `plots/`.
     ///
     /// # Errors
     /// If no run is finished, or if a file cannot be read or written.
@@ -45,7 +45,9 @@ impl Sweep {
         for (name, text) in files {
             write_text(&self.temporary(), &self.folder.join(name), &text)?;
         }
-        self.draw(&summary)?;
+        let plots = self.draw(&summary)?;
+        let page = self.page(&summary, &status, integrity.as_ref(), &plots)?;
+        write_text(&self.temporary(), &self.folder.join("report.html"), &page.html())?;
         let latency = self.latency_result()?;
         latency.as_ref().map_or(Ok(()), |study| self.write_latency(study))?;
         let text = text(&summary, &self.plan) + &integrity.map_or_else(String::new, |integrity| integrity.text());
