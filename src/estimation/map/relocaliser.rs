@@ -146,7 +146,7 @@ impl Relocaliser {
         let mut found: Vec<(f64, LocalisedPose)> = evaluated.map(|found| (score(&found), found)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some((score, best)) = found.iter().find(|(score, found)| *score > 0.0 && limits.accepts(found)) else {
-            let Some((_, best)) = found.first() else { return Err("no pose with matches".to_owned()) };
+            let Some((_, best)) = found.first() else { return Err("at no pose surfels match the map".to_owned()) };
             return Err(format!(
                 "at the best pose {} surfels ({:.0} %) match the map, {:.0} % of those with a neighbour (residual {:.0} mm)",
                 best.matched,
