@@ -77,7 +77,7 @@ fn check(stops: &[(f64, f64)], grip_s: f64) -> Result<(), String> {
     for (index, &(at_s, length_s)) in stops.iter().enumerate() {
         if !(at_s.is_finite() && length_s.is_finite()) {
             return Err(format!(
-                "stop {index} (counted from 0) starts at {at_s} s and lasts {length_s} s: both must be finite"
+                "stop {index} (counted from 0) starts at {at_s} s and lasts {length_s} s, which is not finite"
             ));
         }
         if length_s < 2.0 * grip_s {
