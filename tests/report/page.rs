@@ -40,10 +40,12 @@ fn the_page_of_a_scene_works_in_a_browser() {
 #[test]
 fn the_page_of_a_study_works_in_a_browser() {
     let here = tempfile::tempdir().unwrap();
-    let space = "(name: \"mass\", base: spring(head: \"handheld\", shake: (amplitude: 0.1)), sampling: grid, axes: [\
-                 (path: \"head.body.mass_kg\", values: [0.3, 0.35, 0.4]), (path: \"shake.frequency_hz\", values: [0.8, 1.2])])";
-    std::fs::write(here.path().join("mass.ron"), space).unwrap();
-    let (code, _, errors) = run(here.path(), "study mass.ron --out out");
+    let spec = "(base: spring(head: \"handheld\", shake: (pitch_deg: 2.0)), axes: [\
+                values(path: \"head.coil_diameter_mm\", values: [22.0, 23.0, 24.0]), \
+                values(path: \"head.wire_diameter_mm\", values: [2.6, 2.8])], \
+                sampling: grid, measures: [rocking_hz, peak_gain])";
+    std::fs::write(here.path().join("coil.ron"), spec).unwrap();
+    let (code, _, errors) = run(here.path(), "study coil.ron --out out");
     assert_eq!(code, 0, "{errors}");
     use_in_a_browser(&here.path().join("out/report.html"));
 }

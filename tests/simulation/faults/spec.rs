@@ -32,7 +32,7 @@ fn an_invalid_fault_is_refused_with_its_line_and_a_remedy() {
         ("(sensor: imu, fault: misses(encoding: zero))", "2:2", "use `sensor: lidar`"),
         ("(sensor: both, fault: extrinsics(position_m: (1, 0, 0)))", "2:2", "one fault each"),
         ("(sensor: imu, fault: clip(gyro_deg_per_s: 400, gyro_rad_per_s: 7))", "2:27", "give one of them"),
-        ("(sensor: imu, fault: clip(accel_m_per_s2: -1))", "2:22", "larger than 0"),
+        ("(sensor: imu, fault: clip(accel_m_per_s2: -1))", "2:22", "above 0"),
         ("(sensor: imu, fault: clip())", "2:", "neither a rate nor a specific force"),
         ("(sensor: imu, fault: spike(gyro_deg_per_s: (1, 2, inf), count: 3))", "2:", "finite"),
         ("(sensor: imu, fault: spike(gyro_deg_per_s: (1, 2, 3)))", "2:22", "needs times_s or count"),
