@@ -258,7 +258,7 @@ fn an_invalid_spec_is_an_error_with_line_and_column() {
     let rest = |list: &str| fault("grip_s: 0.5,", &format!("grip_s: 0.5, rests: [{list}],"));
     assert!(rest("(1.0, 5.0)").message().contains("3 s is the earliest"));
     assert!(rest("(10.0, 5.0), (16.0, 1.0)").message().contains("18 s is the earliest"));
-    assert!(rest("(10.0, NaN)").message().contains("for NaN s"));
+    assert!(rest("(10.0, NaN)").message().contains("lasts NaN s"));
     let random = "Random(every_s: 20.0, shortest_s: 5.0, longest_s: 4.0)";
     assert!(fault("At([])", random).message().contains("more than the longest"));
 }
