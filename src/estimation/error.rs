@@ -268,8 +268,8 @@ fn direction_text(direction: &Vector) -> String {
 fn start_text(correction_m: f64, times: f64) -> String {
     let mm = 1e3 * correction_m;
     format!(
-        "the first window is inconsistent (last correction {mm:.0} mm, IMU and lidar contradict each other by {times:.1} times \
-         the IMU noise): discarded, the estimate starts later"
+        "the first window, at the start or after a gap, is inconsistent (last correction {mm:.0} mm, IMU and lidar contradict each \
+         other by {times:.1} times the IMU noise): discarded, the estimate starts later"
     )
 }
 

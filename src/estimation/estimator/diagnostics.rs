@@ -19,8 +19,6 @@ pub(super) struct Diagnostics {
     step_s: f64,
     pub(super) windows: Vec<WindowReport>,
     pub(super) warnings: Vec<Warning>,
-    /// Total time of dead reckoning with the IMU, s.
-    dead_reckoning_s: f64,
     /// The problem of the newest window.
     problem: Option<Problem>,
 }
@@ -35,12 +33,13 @@ struct Problem {
 impl Diagnostics {
     /// Without windows; each will add `step_s`.
     pub(super) fn new(step_s: f64) -> Self {
-        Self { step_s, windows: Vec::new(), warnings: Vec::new(), dead_reckoning_s: 0.0, problem: None }
+        Self { step_s, windows: Vec::new(), warnings: Vec::new(), problem: None }
     }
 
-    /// Forgets the windows of a rejected start; the warnings remain.
-    pub(super) fn forget_windows(&mut self) {
-        *self = Self { warnings: std::mem::take(&mut self.warnings), ..Self::new(self.step_s) };
+    /// Forgets the windows after the first `count`; the warnings remain.
+    pub(super) fn forget_windows_after(&mut self, count: usize) {
+        self.windows.truncate(count);
+        self.problem = None;
     }
 
     /// Adds a warning.
@@ -50,7 +49,6 @@ impl Diagnostics {
 
     /// Adds the report on a window, and warns of its problem.
     pub(super) fn record(&mut self, report: WindowReport) {
-        self.dead_reckoning_s += if report.problem.as_ref().is_some_and(is_dead_reckoning) { self.step_s } else { 0.0 };
         self.warn_of_problem(report.problem.clone(), report.stamp);
         self.windows.push(report);
     }
@@ -63,7 +61,10 @@ impl Diagnostics {
 
     /// Warns if tracking was lost for a large part of the run.
     fn warn_of_loss(&mut self) {
-        let (seconds, of_seconds) = (self.dead_reckoning_s, self.windows.len() as f64 * self.step_s);
+        let dead_reckoning =
+            self.windows.iter().filter(|window| window.problem.as_ref().is_some_and(is_dead_reckoning));
+        let [seconds, of_seconds] =
+            [dead_reckoning.count(), self.windows.len()].map(|count| count as f64 * self.step_s);
         if let Some(first) =
             self.windows.first().filter(|_| seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds)
         {

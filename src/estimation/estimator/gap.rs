@@ -13,7 +13,8 @@ impl Estimator {
         match phase {
             Phase::Gathering(gathering) => gathering.segments.clear(),
             Phase::Tracking(tracking) => {
-                let recovery = if let Some(unplaced) = self.localise_at_end(tracking)? {
+                let recovery = if let Some(mut unplaced) = self.localise_at_end(tracking)? {
+                    unplaced.segments.clear();
                     unplaced
                 } else {
                     self.output_window(tracking);
@@ -43,15 +44,15 @@ impl Estimator {
     fn prepare_recovery(&mut self, window: &Window) -> GapRecovery {
         let empty = LocalMap::without_views(&self.spec, self.local_map.consider.clone());
         let mut old_map = std::mem::replace(&mut self.local_map, empty);
-        let before = window.state_before_gap();
+        let (before, windows) = (window.state_before_gap(), self.diagnostics.windows.len());
         if let Some(map_localisation) = &mut self.map_localisation {
             self.poses.last().into_iter().for_each(|last| map_localisation.restart_search(last.map_from_head));
-            return GapRecovery { before, relocalisation: None };
+            return GapRecovery::new(before, None, windows);
         }
         let last = window.patches();
         old_map.add_segment(&last, self.spec.views.length_s, window.matcher());
         let relocalisation = GapRelocalisation::new(old_map, last, window.nominal.end_s());
-        GapRecovery { before, relocalisation: Some(relocalisation) }
+        GapRecovery::new(before, Some(relocalisation), windows)
     }
 
     /// End of the newest window, lidar time, s.

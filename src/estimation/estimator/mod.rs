@@ -152,12 +152,11 @@ impl Estimator {
         }
         phase.queue(segment);
         self.start_if_ready(phase, false);
-        let Phase::Tracking(tracking) = phase else { return Ok(()) };
-        for segment in std::mem::take(&mut tracking.waiting) {
+        while let Phase::Tracking(tracking) = phase {
+            let Some(segment) = tracking.waiting.pop_front() else { break };
             self.process(tracking, segment)?;
             if tracking.is_rejected {
-                self.start_again(phase);
-                return Ok(());
+                self.start_later(phase);
             }
         }
         Ok(())

@@ -8,6 +8,7 @@ use crate::estimation::strapdown::Interval;
 use crate::estimation::surfel::TimedReturn;
 use crate::estimation::window::Window;
 use crate::time::Stamp;
+use std::collections::VecDeque;
 
 /// The phase of the estimator; an IMU gap or a long lidar gap leads from tracking back to gathering.
 #[derive(Debug)]
@@ -31,14 +32,14 @@ pub(super) struct Gathering {
 pub(super) struct Tracking {
     pub(super) window: Window,
     /// Segments that the window does not contain yet.
-    pub(super) waiting: Vec<Segment>,
+    pub(super) waiting: VecDeque<Segment>,
     /// What is known from before a gap, until the window is full.
     pub(super) recovery: Option<Box<GapRecovery>>,
     /// Sensitivity of the end of the window to the errors at its start.
     pub(super) at_end: Option<Sensitivity>,
     /// Stamp of the next pose; none before the first pose of the window.
     pub(super) next_pose: Option<Stamp>,
-    /// Whether the start of the estimate was wrong, so that the window is discarded.
+    /// Whether the start of the window was wrong, so that the window is discarded.
     pub(super) is_rejected: bool,
 }
 
@@ -49,6 +50,19 @@ pub(super) struct GapRecovery {
     pub(super) before: StateBeforeGap,
     /// Pending relocalisation in the surfaces seen before the gap; none in a given map.
     pub(super) relocalisation: Option<GapRelocalisation>,
+    /// The segments since the gap, with which the window can start again, later.
+    pub(super) segments: Vec<Segment>,
+    /// Number of windows up to the gap.
+    pub(super) windows: usize,
+    /// How often the window started again.
+    pub(super) restarts: usize,
+}
+
+impl GapRecovery {
+    /// Recovery from a gap after `windows` windows.
+    pub(super) fn new(before: StateBeforeGap, relocalisation: Option<GapRelocalisation>, windows: usize) -> Self {
+        Self { before, relocalisation, segments: Vec::new(), windows, restarts: 0 }
+    }
 }
 
 impl Default for Phase {
@@ -75,7 +89,7 @@ impl Phase {
     pub(super) fn queue(&mut self, segment: Segment) {
         match self {
             Self::Gathering(gathering) => gathering.segments.push(segment),
-            Self::Tracking(tracking) => tracking.waiting.push(segment),
+            Self::Tracking(tracking) => tracking.waiting.push_back(segment),
         }
     }
 }

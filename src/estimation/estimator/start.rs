@@ -21,8 +21,13 @@ const REPORTED_NOISE_FACTOR: f64 = 1.5;
 /// A first window is rejected if its solution still moves by more than this, m, or if IMU and lidar contradict each other by
 /// more than this multiple of the IMU noise (at most 0.6 in windows of sound runs): the start was wrong.
 const MAX_AT_START: (f64, f64) = (0.02, 0.9);
-/// The estimate starts again at most so often: a head that never starts well is reported as lost.
+/// The estimate, and the window after each gap, start again at most so often: a head that never starts well is reported as
+/// lost.
 const MAX_RESTARTS: usize = 3;
+/// Number of windows before the first full one after a gap that must converge, too.
+const EARLIER_WINDOWS: usize = 2;
+/// A window after a gap that starts again starts later by this, s.
+const LATER_S: f64 = 0.5;
 
 impl Estimator {
     /// Whether to start again costs nothing, because no pose has been output yet, and none is known from before a gap.
@@ -35,19 +40,40 @@ impl Estimator {
         self.restarts = MAX_RESTARTS;
     }
 
-    /// Whether the first full window shows by its solution that the start was wrong.
+    /// Whether the first full window, at the start or after a gap, shows by its solution that its start was wrong.
     ///
     /// A head that swings while the IMU has gaps can start with a velocity and a tilt from which the matches do not converge.
     pub(super) fn rejects_start(&mut self, tracking: &Tracking, solved: &WindowSolution, stamp: Stamp) -> bool {
-        let (correction_m, times) = (solved.last_correction_m, tracking.window.imu_contradiction());
-        let is_rejected = self.may_start_again(tracking.recovery.as_deref())
-            && self.map_localisation.is_none()
-            && tracking.window.is_full()
-            && (correction_m > MAX_AT_START.0 || times > MAX_AT_START.1);
+        let may_reject = match &tracking.recovery {
+            Some(recovery) => recovery.restarts < MAX_RESTARTS,
+            None => self.may_start_again(None) && self.map_localisation.is_none(),
+        };
+        if !(may_reject && tracking.window.is_full()) {
+            return false;
+        }
+        // A window after a gap can converge to a wrong motion in the end, so that the windows before count, too.
+        let earlier = tracking.recovery.as_ref().map_or(0, |_| EARLIER_WINDOWS);
+        let last = self.diagnostics.windows.iter().rev().take(earlier).map(|window| window.last_correction_m);
+        let correction_m = last.fold(solved.last_correction_m, f64::max);
+        let times = tracking.window.imu_contradiction();
+        let is_rejected = correction_m > MAX_AT_START.0 || times > MAX_AT_START.1;
         if is_rejected {
             self.diagnostics.warn(stamp, WarningKind::StartRejected { correction_m, times });
         }
         is_rejected
+    }
+
+    /// Discards a window whose start was wrong: after a gap it starts again later, else the next data start the estimate.
+    pub(super) fn start_later(&mut self, phase: &mut Phase) {
+        let Phase::Tracking(tracking) = phase else { return };
+        let Some(mut recovery) = tracking.recovery.take() else { return self.start_again(phase) };
+        let mut segments = std::mem::take(&mut recovery.segments);
+        segments.extend(tracking.waiting.drain(..));
+        segments.drain(..segments.len().min((LATER_S / self.spec.step_s).ceil() as usize));
+        recovery.restarts += 1;
+        self.forget_windows_after(recovery.windows);
+        *phase = Phase::Gathering(Gathering { segments, recovery: Some(recovery) });
+        self.start_if_ready(phase, false);
     }
 
     /// Discards everything estimated so far; the next data start the estimate.
@@ -56,8 +82,13 @@ impl Estimator {
         *phase = Phase::default();
         self.intake.start_again();
         self.local_map = LocalMap::without_views(&self.spec, self.local_map.consider.clone());
-        self.clock_offsets.clear();
-        self.diagnostics.forget_windows();
+        self.forget_windows_after(0);
+    }
+
+    /// Forgets what has been reported on the windows after the first `count`; the warnings remain.
+    fn forget_windows_after(&mut self, count: usize) {
+        self.diagnostics.forget_windows_after(count);
+        self.clock_offsets.truncate(count);
     }
 
     /// Starts the first window once there are enough data to distinguish rest from motion; with `last`, with any data.
@@ -95,7 +126,7 @@ impl Estimator {
             window.resume_from(before);
         }
         self.local_map.consider = self.covariance_at_start(&window, before);
-        Tracking { window, waiting, recovery, at_end: None, next_pose: None, is_rejected: false }
+        Tracking { window, waiting: waiting.into(), recovery, at_end: None, next_pose: None, is_rejected: false }
     }
 
     /// The settings adapted to the scan geometry of the lidar.

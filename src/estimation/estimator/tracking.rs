@@ -21,13 +21,15 @@ impl Estimator {
     pub(super) fn process(&mut self, tracking: &mut Tracking, segment: Segment) -> Result<(), EstimationError> {
         let mut watch = Stopwatch::start();
         let (stamp, turns_fast) = (self.intake.stamp(segment.end_s), turns_fast(&segment));
+        if let Some(recovery) = &mut tracking.recovery {
+            recovery.segments.push(segment.clone());
+        }
         let extension = tracking.window.extend(&segment.intervals, segment.returns, segment.end_s);
-        let (mut solved, linearised) = self.solve(tracking)?;
-        solved.timing += extension;
-        if self.rejects_start(tracking, &solved, stamp) {
-            tracking.is_rejected = true;
+        let (mut solved, linearised) = self.solve(tracking, stamp)?;
+        if tracking.is_rejected {
             return Ok(());
         }
+        solved.timing += extension;
         let solution_s = watch.lap_s();
         self.record_oldest(&tracking.window);
         watch.lap_s(); // the observed surfels have their own time
@@ -38,15 +40,20 @@ impl Estimator {
         Ok(())
     }
 
-    /// Solves the window; if the solution allows to localise it, solves it again.
+    /// Solves the window, and rejects a wrong start; if the solution allows to localise the window, solves it again.
     ///
     /// Returns the solution, and the last linearisation if the solution is accepted.
-    fn solve(&mut self, tracking: &mut Tracking) -> Result<(WindowSolution, Option<Linearised>), EstimationError> {
+    fn solve(
+        &mut self,
+        tracking: &mut Tracking,
+        stamp: Stamp,
+    ) -> Result<(WindowSolution, Option<Linearised>), EstimationError> {
         let (mut solved, linearised) = tracking.window.solve(&self.local_map.views);
         let mut watch = Stopwatch::start();
         tracking.window.rebuild_newest_surfels();
         solved.timing.surfels_s += watch.lap_s();
-        if !self.localise_if_full(tracking)? {
+        tracking.is_rejected = self.rejects_start(tracking, &solved, stamp);
+        if tracking.is_rejected || !self.localise_if_full(tracking)? {
             return Ok((solved, linearised));
         }
         // Solve again, with matches with the map or the old views.

@@ -33,7 +33,7 @@ const JUDGED_BY: (usize, f64) = (100, 3.0);
 const MAX_WAIT_FOR_IMU_S: f64 = 30.0;
 
 /// A time segment with the measurements of both sensors.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Segment {
     /// Start and end, lidar time, s.
     pub(super) start_s: f64,
