@@ -34,7 +34,8 @@ pub struct CalibrationSpec {
 ///
 /// Noise and averaging of the recording are those of the simulated sensors of `run`.
 pub(super) fn calibration(
-    (reader, selection): (&Reader, &Selection),
+    reader: &Reader,
+    selection: &Selection,
     given: &CalibrationSpec,
     run: Option<&Run>,
     body_frame: Option<&str>,
