@@ -122,7 +122,7 @@ fn by_imu(
     let reader = Reader::open(recording)?;
     let record = reader.base_imu(arguments.base_imu_topic.as_deref())?;
     let offset_s = arguments.clock_offset_ms.map(|ms| ms * 1e-3);
-    let estimate = study::base_by_imu(head, head_trajectory, (&reader, &record), offset_s);
+    let estimate = study::base_by_imu(head, head_trajectory, &reader, &record, offset_s);
     Ok((estimate.with_context(|| recording.display().to_string())?, record.loss))
 }
 

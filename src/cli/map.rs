@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let Command::Merge(merge) = &arguments.command;
     let estimator = estimation::load(&merge.estimator)?;
     let out = output::file(&merge.out, merge.force)?;
-    let merged = study::merge_map_files((&merge.first, &merge.second), &merge.start, &estimator, &out)?;
+    let merged = study::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, &out)?;
     let [first, second, both] = merged.surfels;
     let at = merged.located.map_from_query;
     let (position, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());

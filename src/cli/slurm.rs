@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     std::fs::create_dir_all(&logs).with_context(|| format!("cannot create {}", logs.display()))?;
     let script = logs.join("array.sh");
     let threads = global.threads.map_or(1, std::num::NonZeroUsize::get);
-    replace_text(&script, &text((&sweep, &log), &folder, elements, threads)?)?;
+    replace_text(&script, &text(&sweep, &log, &folder, elements, threads)?)?;
     if arguments.dry_run {
         output::print_result(global, "", json!({ "job": null, "elements": elements }), Some(&script))?;
         return Ok(Completion::Done);
@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 }
 
 /// The script of the job array.
-fn text((sweep, log): (&Sweep, &str), folder: &Path, elements: u64, threads: usize) -> anyhow::Result<String> {
+fn text(sweep: &Sweep, log: &str, folder: &Path, elements: u64, threads: usize) -> anyhow::Result<String> {
     let program = std::env::current_exe().context("this program's own path is not known")?;
     let memory_mib =
         sweep.limit().map_or(SUPERVISOR_MEMORY_MIB, |limit| limit.memory_mib * threads as u64) + SUPERVISOR_MEMORY_MIB;

@@ -55,11 +55,13 @@ impl Hold {
 }
 
 impl CompliantLinkage {
-    /// Linearises the head about the equilibrium and adds modal damping and hand hold.
+    /// Linearises the head about the equilibrium pose `rest` and adds modal damping and hand hold.
     ///
     /// `None` if a matrix is singular.
     pub fn linearised(
-        (mut law, rest, stiffness): (ForceLaw, Pose, Matrix6),
+        mut law: ForceLaw,
+        rest: Pose,
+        stiffness: Matrix6,
         body: &Body,
         damping: &DampingSpec,
         hand: Option<&HoldSpec>,

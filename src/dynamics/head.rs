@@ -213,9 +213,9 @@ impl Linkage {
             Mount::Actuated(actuated) => return Ok(Linkage::Actuated(Box::new(actuated))),
             Mount::Compliant(mount) => mount,
         };
-        let found = mount.equilibrium(1.0).map_err(|failure| explain(&mount, &failure, source))?;
+        let (law, rest, stiffness) = mount.equilibrium(1.0).map_err(|failure| explain(&mount, &failure, source))?;
         let LinkageOptions { damping_ratio, end_stop, hold } = mount.options();
-        let mut compliant = CompliantLinkage::linearised(found, body, &damping_ratio, hold.as_ref())
+        let mut compliant = CompliantLinkage::linearised(law, rest, stiffness, body, &damping_ratio, hold.as_ref())
             .ok_or_else(|| SpecError::about(source, "parts", "the mass matrix of the head is singular"))?;
         if let Some(stop) = &end_stop {
             compliant.add_end_stop(stop, body, source)?;

@@ -110,7 +110,8 @@ impl UniversalJoint {
     /// `None` if the iteration does not converge.
     pub fn constrained_change(
         &self,
-        (now, next_base): (&MotionState<'_>, &Pose),
+        now: &MotionState<'_>,
+        next_base: &Pose,
         step_s: f64,
         change: &Vector6,
         implicit: impl Fn(&Matrix6x4<f64>) -> Matrix6x4<f64>,

@@ -202,7 +202,7 @@ impl<'a> CompliantMotion<'a> {
             change = implicit.solve(&(push * self.step_s));
             if let Some((joint, next_base)) = &joint {
                 change = joint
-                    .constrained_change((now, next_base), self.step_s, &change, |wrenches| implicit.solve(wrenches))?;
+                    .constrained_change(now, next_base, self.step_s, &change, |wrenches| implicit.solve(wrenches))?;
             }
         }
         Some(change)

@@ -7,7 +7,7 @@
 
 use super::drops::DropSpec;
 use super::jet::{Jet, PoseJet};
-use super::oscillator::{BandLimitedNoise, Oscillator};
+use super::oscillator::{BandLimitedNoise, Oscillator, Variation};
 use super::rests::MovingTime;
 use super::smooth::{SmoothPath, SmoothSteps};
 use super::stand::start_on_route;
@@ -148,7 +148,6 @@ impl Hand {
         duration_s: f64,
         seed: Seed,
     ) -> Result<Self, MotionError> {
-        let times_s = (spec.still_s, duration_s);
         let carry = match &spec.carry {
             CarrySpec::Walk(walk) => {
                 walk.check(source)?;
@@ -156,10 +155,17 @@ impl Hand {
                 walk.along(route, spec.still_s, duration_s)?
             }
             CarrySpec::Box { size_m, rounds, speed_m_per_s, smoothing_s } => {
-                box_path((*size_m, *rounds), (*speed_m_per_s, *smoothing_s), times_s, route)
+                let path = BoxPath {
+                    size_m: *size_m,
+                    rounds: *rounds,
+                    speed_m_per_s: *speed_m_per_s,
+                    smoothing_s: *smoothing_s,
+                };
+                path.motion(route, spec.still_s, duration_s)
             }
         };
-        let grip = spec.stops.grip(source, spec.grip_s, times_s, &mut seed.stream("motion/hand/stops"))?;
+        let stream = &mut seed.stream("motion/hand/stops");
+        let grip = spec.stops.grip(source, spec.grip_s, spec.still_s, duration_s, stream)?;
         Ok(Self {
             carry,
             height_m: spec.height_m - spec.shake.wrist_below_m,
@@ -212,26 +218,32 @@ impl BaseMotion for Hand {
     }
 }
 
-/// A path round a box, from `from_s` until `rounds` are complete or `until_s` has passed.
-fn box_path(
-    (size_m, rounds): ([f64; 2], u32),
-    (speed_m_per_s, smoothing_s): (f64, f64),
-    (from_s, until_s): (f64, f64),
-    route: Option<&Route>,
-) -> RouteMotion {
-    let (start, heading) = start_on_route(route);
-    let ahead = Vector::new(heading.cos(), heading.sin(), 0.0) * size_m[0];
-    let left = Vector::new(-heading.sin(), heading.cos(), 0.0) * size_m[1];
-    let mut path = SmoothPath::new(start, from_s + smoothing_s, smoothing_s);
-    let corners = [(ahead, size_m[0]), (ahead + left, size_m[1]), (left, size_m[0]), (Vector::zeros(), size_m[1])];
-    for (corner, side_m) in (0..rounds).flat_map(|_| corners) {
-        if path.end_s() > until_s + smoothing_s {
-            break;
+/// The settings of [`CarrySpec::Box`].
+struct BoxPath {
+    size_m: [f64; 2],
+    rounds: u32,
+    speed_m_per_s: f64,
+    smoothing_s: f64,
+}
+
+impl BoxPath {
+    /// Motion round the box, from `from_s` until all rounds are complete or `until_s` has passed.
+    fn motion(&self, route: Option<&Route>, from_s: f64, until_s: f64) -> RouteMotion {
+        let Self { size_m, rounds, speed_m_per_s, smoothing_s } = *self;
+        let (start, heading) = start_on_route(route);
+        let ahead = Vector::new(heading.cos(), heading.sin(), 0.0) * size_m[0];
+        let left = Vector::new(-heading.sin(), heading.cos(), 0.0) * size_m[1];
+        let mut path = SmoothPath::new(start, from_s + smoothing_s, smoothing_s);
+        let corners = [(ahead, size_m[0]), (ahead + left, size_m[1]), (left, size_m[0]), (Vector::zeros(), size_m[1])];
+        for (corner, side_m) in (0..rounds).flat_map(|_| corners) {
+            if path.end_s() > until_s + smoothing_s {
+                break;
+            }
+            path.move_to(start + corner, side_m / speed_m_per_s);
         }
-        path.move_to(start + corner, side_m / speed_m_per_s);
+        let speed_fraction = path.speed_fraction(speed_m_per_s);
+        RouteMotion { path, heading: SmoothSteps::from_level(heading), speed_fraction }
     }
-    let speed_fraction = path.speed_fraction(speed_m_per_s);
-    RouteMotion { path, heading: SmoothSteps::from_level(heading), speed_fraction }
 }
 
 /// Body motion with the steps.
@@ -277,8 +289,12 @@ struct Shake {
 impl Shake {
     fn new(spec: &ShakeSpec, from_s: f64, seed: Seed) -> Self {
         let rhythm = |name: &str| {
-            let spreads = (spec.amplitude_spread, spec.phase_spread_rad);
-            Oscillator::new(spec.frequency_hz, spreads, spec.wander_hz, &mut seed.stream(name))
+            let variation = Variation {
+                strength: spec.amplitude_spread,
+                phase_rad: spec.phase_spread_rad,
+                bandwidth_hz: spec.wander_hz,
+            };
+            Oscillator::new(spec.frequency_hz, &variation, &mut seed.stream(name))
         };
         let mut onset = SmoothSteps::from_level(0.0);
         onset.push(from_s + spec.onset_s / 2.0, spec.onset_s / 2.0, 1.0);

@@ -112,13 +112,16 @@ impl SeaSpec {
         normalisation * moskowitz * (-1.25 * r.powi(-4)).exp() * peak
     }
 
-    /// Plane waves from 0.5 to 5 times the peak frequency: frequency, complex amplitude, direction (rad).
-    fn waves(&self, stream: &mut Stream) -> Vec<(f64, Complex<f64>, f64)> {
+    /// Plane waves from 0.5 to 5 times the peak frequency.
+    fn waves(&self, stream: &mut Stream) -> Vec<PlaneWave> {
         let peak_hz = 1.0 / self.peak_period_s;
         let bins = log_bins((0.5 * peak_hz, 5.0 * peak_hz), WAVES, stream);
         let mean = self.going_deg.to_radians();
-        let wave =
-            |bin: &FrequencyBin| (bin.at, bin.amplitude(self.density(bin.at)), mean + self.draw_spreading(stream));
+        let wave = |bin: &FrequencyBin| PlaneWave {
+            freq_hz: bin.at,
+            height_m: bin.amplitude(self.density(bin.at)),
+            direction_rad: mean + self.draw_spreading(stream),
+        };
         bins.iter().map(wave).collect()
     }
 
@@ -133,6 +136,15 @@ impl SeaSpec {
     }
 }
 
+/// A plane wave of the sea.
+struct PlaneWave {
+    freq_hz: f64,
+    /// Complex amplitude of the height, m.
+    height_m: Complex<f64>,
+    /// Direction in which the wave travels, rad.
+    direction_rad: f64,
+}
+
 impl HullSpec {
     /// Response of the hull to a plane wave: surge, sway, heave (m), roll and pitch (rad).
     ///
@@ -140,12 +152,13 @@ impl HullSpec {
     /// `-i k cos d a` and `-i k sin d a`, and the displacement of the water is `-i a` along the wave. A slope that
     /// rises forward lifts the bow: pitch is the negative. A slope that rises to the left lifts the left side: roll
     /// equals it.
-    fn wave_response(&self, (freq_hz, height, direction): (f64, Complex<f64>, f64)) -> SpectralLine<5> {
+    fn wave_response(&self, wave: &PlaneWave) -> SpectralLine<5> {
+        let PlaneWave { freq_hz, height_m, direction_rad } = *wave;
         let rate = TAU * freq_hz;
         let k = rate * rate / STANDARD_GRAVITY_M_PER_S2;
-        let (sin, cos) = direction.sin_cos();
+        let (sin, cos) = direction_rad.sin_cos();
         let averaging = sinc(0.5 * k * self.length_m * cos) * sinc(0.5 * k * self.beam_m * sin);
-        let effective = height * (averaging * (-k * self.draught_m).exp());
+        let effective = height_m * (averaging * (-k * self.draught_m).exp());
         let r = freq_hz * self.roll_period_s;
         let resonance = Complex::new(1.0 - r * r, 2.0 * self.roll_damping * r).inv();
         let quarter = Complex::new(0.0, -1.0);
@@ -186,7 +199,7 @@ impl Marine {
             rest: PoseJet::at_rest(&water, heading),
             start_s: spec.still_s,
             onset,
-            waves: SineSum::new(waves.into_iter().map(|wave| spec.hull.wave_response(wave))),
+            waves: SineSum::new(waves.iter().map(|wave| spec.hull.wave_response(wave))),
             waterplane_from_base: Pose::translation(x, y, z),
         })
     }
@@ -262,7 +275,8 @@ mod tests {
         // down.
         let k = TAU / 100.0;
         let freq_hz = (STANDARD_GRAVITY_M_PER_S2 * k).sqrt() / TAU;
-        let line = RAFT.wave_response((freq_hz, Complex::new(1.0, 0.0), 0.0));
+        let wave = PlaneWave { freq_hz, height_m: Complex::new(1.0, 0.0), direction_rad: 0.0 };
+        let line = RAFT.wave_response(&wave);
         // A quarter of a period before the crest: exp(-i pi / 2).
         let rising = Complex::new(0.0, -1.0);
         let [surge, sway, heave, roll, pitch] = line.amplitudes.map(|a| (a * rising).re);
@@ -272,7 +286,7 @@ mod tests {
         assert_eq!((sway.abs() < 1e-12, roll.abs() < 1e-12), (true, true));
         // A long hull averages the wave: half a wavelength along 50 m leaves 2/pi of heave and pitch.
         let ship = HullSpec { length_m: 50.0, ..RAFT };
-        let heave = ship.wave_response((freq_hz, Complex::new(1.0, 0.0), 0.0)).amplitudes[2].re;
+        let heave = ship.wave_response(&wave).amplitudes[2].re;
         assert_relative_eq!(heave, std::f64::consts::FRAC_2_PI, epsilon = 1e-9);
     }
 }

@@ -30,6 +30,16 @@ impl BandLimitedNoise {
     }
 }
 
+/// Random variation of an oscillation: standard deviations and bandwidth.
+pub(super) struct Variation {
+    /// Standard deviation of the relative amplitude, whose mean is 1.
+    pub strength: f64,
+    /// Standard deviation of the phase, rad.
+    pub phase_rad: f64,
+    /// Upper frequency limit of both variations, Hz.
+    pub bandwidth_hz: f64,
+}
+
 /// A sinusoid whose amplitude and phase vary at random.
 #[derive(Debug, Clone)]
 pub(super) struct Oscillator {
@@ -42,14 +52,16 @@ pub(super) struct Oscillator {
 
 impl Oscillator {
     /// An oscillator at `frequency_hz`.
-    ///
-    /// The relative amplitude has the mean 1 and the standard deviation `strength_spread`; the phase deviates by
-    /// `phase_spread` rad rms. Both vary with power up to `bandwidth_hz`.
-    pub fn new(frequency_hz: f64, spreads: (f64, f64), bandwidth_hz: f64, stream: &mut Stream) -> Self {
-        let (strength_spread, phase_spread) = spreads;
-        let strength = BandLimitedNoise::new(bandwidth_hz, stream);
-        let phase = BandLimitedNoise::new(bandwidth_hz, stream);
-        Self { rate: TAU * frequency_hz, strength_spread, strength, phase_spread, phase }
+    pub fn new(frequency_hz: f64, variation: &Variation, stream: &mut Stream) -> Self {
+        let strength = BandLimitedNoise::new(variation.bandwidth_hz, stream);
+        let phase = BandLimitedNoise::new(variation.bandwidth_hz, stream);
+        Self {
+            rate: TAU * frequency_hz,
+            strength_spread: variation.strength,
+            strength,
+            phase_spread: variation.phase_rad,
+            phase,
+        }
     }
 
     /// Relative amplitude (about 1) and phase, rad, at `t_s`.

@@ -76,8 +76,12 @@ impl Replay {
                 error(format!("a spline needs at least 3 poses; the trajectory has {}", trajectory.len())).into()
             );
         }
-        let world_from_recorded =
-            if spec.from_route { align_start(&start_on_route(route), first) } else { Pose::identity() };
+        let world_from_recorded = if spec.from_route {
+            let (floor, heading) = start_on_route(route);
+            align_start(&floor, heading, first)
+        } else {
+            Pose::identity()
+        };
         let length_s = end.seconds_since(start);
         let mut play = SmoothPath::new(Vector::zeros(), spec.still_s + spec.ease_s, spec.ease_s);
         play.move_to(Vector::new(length_s, 0.0, 0.0), length_s);
@@ -87,7 +91,7 @@ impl Replay {
 }
 
 /// Translation and turn about the vertical that move `first` to the start of the route; the height does not change.
-fn align_start((floor, heading): &(Vector, f64), first: &Pose) -> Pose {
+fn align_start(floor: &Vector, heading: f64, first: &Pose) -> Pose {
     let (_, _, yaw) = first.rotation.euler_angles();
     let turn = from_roll_pitch_yaw(0.0, 0.0, heading - yaw);
     let below = Vector::new(first.translation.x, first.translation.y, 0.0);

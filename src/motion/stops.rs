@@ -29,11 +29,14 @@ pub enum StopsSpec {
 
 impl StopsSpec {
     /// Grip over time, 0 to 1: in each stop it rises for `grip_s`, stays at 1, and falls for `grip_s`.
+    ///
+    /// Random stops are between `from_s` and `until_s`.
     pub(super) fn grip(
         &self,
         source: &Source,
         grip_s: f64,
-        (from_s, until_s): (f64, f64),
+        from_s: f64,
+        until_s: f64,
         stream: &mut Stream,
     ) -> Result<SmoothSteps, SpecError> {
         let stops = match self {

@@ -118,7 +118,8 @@ impl Reader {
     pub(super) fn sample(
         &self,
         channels: &[ChannelId],
-        (blocks, each): (usize, usize),
+        blocks: usize,
+        each: usize,
         mut take: impl FnMut(&RawMessage<'_>),
     ) -> Result<(), RecordingError> {
         let candidates = self.blocks_of(channels);

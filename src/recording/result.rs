@@ -30,7 +30,8 @@ const CLOUD_POINTS: usize = 50_000;
 pub fn write_result(
     path: &Path,
     body_frame: &str,
-    (map_from_body, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),
+    map_from_body: &Trajectory,
+    covariances: &[(Stamp, PoseCovariance)],
     cloud: impl IntoIterator<Item = CloudPoint>,
 ) -> Result<(), RecordingError> {
     let file = std::fs::File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
@@ -91,8 +92,9 @@ impl ResultWriter<'_> {
         while let Some(((at, covariance), rest)) = self.covariances.split_first().filter(|((at, _), _)| *at <= stamp) {
             self.covariances = rest;
             if *at == stamp {
-                let pose = (map_from_body, covariance);
-                self.mcap.message(Topic::Pose, log_time, |out| pose::encode_uncertain(out, MAP, stamp, pose))?;
+                self.mcap.message(Topic::Pose, log_time, |out| {
+                    pose::encode_uncertain(out, MAP, stamp, map_from_body, covariance)
+                })?;
             }
         }
         Ok(())
@@ -119,7 +121,7 @@ impl ResultWriter<'_> {
             [p.x, p.y, p.z, point.intensity, point.error_m]
         });
         let names = ["x", "y", "z", "intensity", "error"];
-        self.mcap.message(Topic::Cloud, log_time, |out| points::encode_floats(out, (stamp, MAP), names, rows))?;
+        self.mcap.message(Topic::Cloud, log_time, |out| points::encode_floats(out, MAP, stamp, names, rows))?;
         self.gathered = gathered;
         self.gathered.clear();
         Ok(())

@@ -83,8 +83,9 @@ const LIDAR_TYPES: [MessageType; 5] = [
 /// Clouds used to detect the unit of point times, and scans used to measure their duration: enough for a median.
 const PREVIEW_MESSAGES: usize = 20;
 
-/// Parts of the recording in which beams without a return are counted, and messages per part.
-const NO_RETURN_SAMPLES: (usize, usize) = (24, 4);
+/// Blocks of the recording in which beams without a return are counted, and messages per block.
+const NO_RETURN_BLOCKS: usize = 24;
+const NO_RETURN_MESSAGES: usize = 4;
 
 impl Reader {
     /// Selects the lidar and the IMU.
@@ -165,7 +166,7 @@ impl Reader {
     /// Detects how the lidar encodes beams without a return, from messages across the recording.
     fn detect_no_returns(&self, lidar: &Candidate, kind: LidarKind) -> Result<NoReturnDetector, RecordingError> {
         let mut detector = NoReturnDetector::default();
-        self.sample(&self.ids_of(&lidar.topic), NO_RETURN_SAMPLES, |message| {
+        self.sample(&self.ids_of(&lidar.topic), NO_RETURN_BLOCKS, NO_RETURN_MESSAGES, |message| {
             // Messages that cannot be decoded are counted as loss when measurements are read.
             let planar = match kind {
                 LidarKind::Scan => scan::decode(message.data),
@@ -177,8 +178,8 @@ impl Reader {
                 LidarKind::Livox => return,
             };
             let Ok((_, planar)) = planar else { return };
-            let limits = (planar.range_min_m, planar.range_max_m);
-            planar.ranges_m.iter().for_each(|range| detector.add_range(*range, limits));
+            let (min_m, max_m) = (planar.range_min_m, planar.range_max_m);
+            planar.ranges_m.iter().for_each(|range| detector.add_range(*range, min_m, max_m));
         })?;
         Ok(detector)
     }

@@ -130,8 +130,8 @@ impl Writer {
             return Ok(());
         }
         self.next_odometry = now.floor_to(ODOMETRY_PERIOD) + ODOMETRY_PERIOD;
-        let frames = (frame, topics::TRUTH_HEAD);
-        self.mcap.message(Topic::TruthOdometry, now, |out| pose::encode_odometry(out, frames, stamp, head))?;
+        let child = topics::TRUTH_HEAD;
+        self.mcap.message(Topic::TruthOdometry, now, |out| pose::encode_odometry(out, frame, child, stamp, head))?;
         if !self.run.truth_tf {
             return Ok(());
         }

@@ -104,8 +104,9 @@ impl<'a> Sensors<'a> {
             samples.into_iter().map(|(over_s, sample)| (self.rig.true_stamp(over_s), sample)).collect()
         };
         let (samples, base_samples) = (arrived(samples), arrived(base_samples));
+        let truths = self.schedule.truths(until_s);
         Events {
-            truth: self.schedule.truths(until_s).iter().map(|at| self.truth(head, base, *at)).collect(),
+            truth: truths.iter().map(|(t_s, stamp)| self.truth(head, base, *t_s, *stamp)).collect(),
             clocks: self.schedule.clocks(until_s).iter().map(|t_s| self.clock(*t_s)).collect(),
             samples,
             base_samples,
@@ -114,7 +115,7 @@ impl<'a> Sensors<'a> {
         }
     }
 
-    fn truth(&self, head: &Track, base: &Track, (t_s, lidar_stamp): (f64, Stamp)) -> (Stamp, TruthSample) {
+    fn truth(&self, head: &Track, base: &Track, t_s: f64, lidar_stamp: Stamp) -> (Stamp, TruthSample) {
         let sample = TruthSample { lidar_stamp, head: head.kinematics(t_s), base: base.kinematics(t_s) };
         (self.rig.true_stamp(t_s), sample)
     }
@@ -140,7 +141,7 @@ pub(super) fn measure(
     let each = sensors.iter_mut().zip(summaries.iter_mut());
     let mut events: Vec<Events> =
         each.map(|(sensors, summary)| sensors.measure_except_scans(&head, &base, until_s, summary)).collect();
-    let scans = scans(sensors, (&head, &base), until_s, summaries);
+    let scans = scans(sensors, &head, &base, until_s, summaries);
     for ((events, scans), summary) in events.iter_mut().zip(scans).zip(summaries) {
         summary.scans += scans.len() as u64;
         summary.returns += scans.iter().map(|(_, scan)| scan.returns.len() as u64).sum::<u64>();
@@ -152,7 +153,8 @@ pub(super) fn measure(
 /// The scans of each of `sensors`; the rays are cast once.
 fn scans(
     sensors: &mut [Sensors],
-    (head, base): (&Track, &Track),
+    head: &Track,
+    base: &Track,
     until_s: f64,
     summaries: &mut [SimulationSummary],
 ) -> Vec<Vec<(Stamp, LidarScan)>> {

@@ -33,7 +33,8 @@ const MAX_PASSES: usize = 8;
 pub fn base_by_imu(
     head: &HeadModel,
     world_from_head: &Trajectory,
-    (reader, record): (&Reader, &BaseImuRecord),
+    reader: &Reader,
+    record: &BaseImuRecord,
     clock_offset_s: Option<f64>,
 ) -> Result<BaseEstimate, StudyError> {
     check_gaps(&record.samples)?;

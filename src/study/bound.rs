@@ -49,7 +49,7 @@ pub fn information_bound(
     let selection = reader.select(&TopicPreference::default())?;
     let manifest = Manifest::in_recording(reader)?;
     let run = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
-    let (found, _) = calibration((reader, &selection), &CalibrationSpec::default(), run, None)?;
+    let (found, _) = calibration(reader, &selection, &CalibrationSpec::default(), run, None)?;
     let clock = TrueClock::read(reader, &selection)?;
     let mut span: Option<(Stamp, Stamp)> = None;
     let heads = reader.truth().filter_map(|record| match record {

@@ -34,7 +34,8 @@ pub struct CalibrationSpec {
 ///
 /// Noise and averaging of the recording are those of the simulated sensors of `run`.
 pub(super) fn calibration(
-    (reader, selection): (&Reader, &Selection),
+    reader: &Reader,
+    selection: &Selection,
     given: &CalibrationSpec,
     run: Option<&Run>,
     body_frame: Option<&str>,
@@ -43,7 +44,7 @@ pub(super) fn calibration(
     let (head_from_laser, head_from_imu) = (pose_of(given.head_from_laser), pose_of(given.head_from_imu));
     let known =
         GivenModels { imu: given.imu.as_ref(), imu_averaging: given.imu_averaging, lidar: given.lidar.as_ref() };
-    let models = SensorModels::new(known, run.map(|run| (&run.imu.spec, &run.lidar.spec)))?;
+    let models = SensorModels::new(known, run)?;
     let defaults = Calibration {
         head_from_laser: head_from_laser.unwrap_or_else(Pose::identity),
         head_from_imu: head_from_imu.unwrap_or_else(Pose::identity),

@@ -52,7 +52,8 @@ impl AlignedErrors {
 /// Returns `None` if the recording has no truth. Poses and errors are decimated, so that memory stays small in long runs.
 pub(super) fn compare_with_truth(
     reader: &Reader,
-    (map_from_head, covariances): (&Trajectory, &[(Stamp, PoseCovariance)]),
+    map_from_head: &Trajectory,
+    covariances: &[(Stamp, PoseCovariance)],
     watch: &mut ProgressMonitor,
 ) -> Result<Option<Comparison>, StudyError> {
     let mut clock_offsets = Vec::new();

@@ -108,11 +108,10 @@ pub(super) fn estimate_in(
     let selection = reader.select(&options.topics)?;
     let simulated = origin.manifest.run.as_ref().filter(|_| !options.ignore_manifest);
     let (found, models) =
-        calibration((reader, &selection), &options.calibration, simulated, options.body_frame.as_deref())?;
-    report_notes(&selection, (&found, &models), options, watch);
+        calibration(reader, &selection, &options.calibration, simulated, options.body_frame.as_deref())?;
+    report_notes(&selection, &found, &models, options, watch);
 
-    let expected_s = origin.simulation.map(|summary| summary.duration_s);
-    let loops = Loops::run((reader, &selection, &found), folder, options, expected_s, watch)?;
+    let loops = LoopInputs { reader, selection: &selection, found: &found, options, origin }.run(folder, watch)?;
     let (run, comparison, best) = (&loops.open, loops.comparison.as_ref(), loops.best());
     let registration = Registration {
         reader,
@@ -168,23 +167,19 @@ pub(super) fn estimate_in(
     Ok(EstimateResult { metrics, timing: loops.open.timing })
 }
 
-/// Open loop and closed loop, each with its comparison with the truth.
-struct Loops {
-    open: OpenLoopRun,
-    comparison: Option<comparison::Comparison>,
-    closed: Option<ClosedLoopRun>,
-    closed_comparison: Option<comparison::Comparison>,
+/// Inputs of the open loop and the closed loop.
+struct LoopInputs<'a> {
+    reader: &'a Reader,
+    selection: &'a Selection,
+    found: &'a FoundCalibration,
+    options: &'a EstimateOptions,
+    origin: &'a Origin<'a>,
 }
 
-impl Loops {
+impl LoopInputs<'_> {
     /// Runs both loops and writes the trajectories and the map to `folder`.
-    fn run(
-        (reader, selection, found): (&Reader, &Selection, &FoundCalibration),
-        folder: &Path,
-        options: &EstimateOptions,
-        expected_s: Option<f64>,
-        watch: &mut ProgressMonitor,
-    ) -> Result<Self, StudyError> {
+    fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<Loops, StudyError> {
+        let Self { reader, selection, found, options, origin } = *self;
         let (estimator, calibration) = (&options.estimator, &found.calibration);
         let prior_map = options.map.as_ref();
         let closes_loops = options.closed_loop && prior_map.is_none();
@@ -194,6 +189,7 @@ impl Loops {
         let writes_map = prior_map.map_or(options.closed_loop, |map| map.extend);
         let open_loop =
             OpenLoopOptions { estimator, calibration, recording_surfels: closes_loops || writes_map, map: prior_map };
+        let expected_s = origin.simulation.map(|summary| summary.duration_s);
         let open = run_open_loop(reader, selection, open_loop, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
         open.events.notes.iter().for_each(|note| watch.note(&note.line()));
         let closed = match closes_loops {
@@ -201,19 +197,29 @@ impl Loops {
             false => None,
         };
         let mut compare = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
-            true => comparison::compare_with_truth(reader, (map_from_head, covariances), watch),
+            true => comparison::compare_with_truth(reader, map_from_head, covariances, watch),
             false => Ok(None),
         };
         let comparison = compare(&open.map_from_head, &open.covariances[..])?;
         let closed_comparison =
             closed.as_ref().map(|closed| compare(&closed.map_from_head, &[])).transpose()?.flatten();
-        let loops = Self { open, comparison, closed, closed_comparison };
+        let loops = Loops { open, comparison, closed, closed_comparison };
         if writes_map && !loops.open.observed.is_empty() {
-            write_map(&loops.open, &loops.best(), (estimator, prior_map), folder)?;
+            write_map(&loops.open, &loops.best(), estimator, prior_map, folder)?;
         }
         Ok(loops)
     }
+}
 
+/// Open loop and closed loop, each with its comparison with the truth.
+struct Loops {
+    open: OpenLoopRun,
+    comparison: Option<comparison::Comparison>,
+    closed: Option<ClosedLoopRun>,
+    closed_comparison: Option<comparison::Comparison>,
+}
+
+impl Loops {
     fn best(&self) -> BestEstimate<'_> {
         let open = &self.open.map_from_head;
         match &self.closed {
@@ -312,7 +318,8 @@ fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
 /// Reports notes on the selection and on missing calibration data.
 fn report_notes(
     selection: &Selection,
-    (found, models): (&FoundCalibration, &SensorModels),
+    found: &FoundCalibration,
+    models: &SensorModels,
     options: &EstimateOptions,
     watch: &mut ProgressMonitor,
 ) {

@@ -27,7 +27,8 @@ pub struct MergedMap {
 /// # Errors
 /// When a map cannot be read, the maps cannot be registered, or the file cannot be written.
 pub fn merge_map_files(
-    (first, second): (&Path, &Path),
+    first: &Path,
+    second: &Path,
     start: &Pose,
     estimator: &EstimatorSpec,
     out: &Path,
@@ -43,7 +44,8 @@ pub fn merge_map_files(
 pub(super) fn write_map(
     run: &OpenLoopRun,
     best: &BestEstimate,
-    (estimator, within): (&EstimatorSpec, Option<&MapOptions>),
+    estimator: &EstimatorSpec,
+    within: Option<&MapOptions>,
     folder: &Path,
 ) -> Result<(), StudyError> {
     let (open_loop, corrected) = (best.observed_trajectory, best.map_from_head);

@@ -95,7 +95,7 @@ pub(super) fn run_open_loop(
     let mut poses = PoseOutput { tum, map_from_head: Trajectory::new(), covariances: Vec::new(), radii_m: Vec::new() };
     let mut counts = MeasurementCounts::default();
     let (pushed, loss) = read_ahead(reader, selection, |measurements| {
-        push_all(measurements, &mut estimator, (&mut counts, &mut poses), expected_s, watch)
+        push_all(measurements, &mut estimator, &mut counts, &mut poses, expected_s, watch)
     });
     if let Err(StudyError::Stopped) = pushed {
         poses.close()?;
@@ -142,7 +142,8 @@ pub(super) fn run_open_loop(
 fn push_all(
     measurements: &mut MeasurementStream,
     estimator: &mut Estimator,
-    (counts, poses): (&mut MeasurementCounts, &mut PoseOutput),
+    counts: &mut MeasurementCounts,
+    poses: &mut PoseOutput,
     expected_s: Option<f64>,
     watch: &mut ProgressMonitor,
 ) -> Result<(), StudyError> {

@@ -124,8 +124,8 @@ impl Registration<'_> {
             failure: None,
             watch,
         };
-        let (result, poses) = (folder.join("result.mcap"), (self.map_from_head, self.covariances));
-        write_result(&result, self.body_frame, poses, beams.by_ref())?;
+        let result = folder.join("result.mcap");
+        write_result(&result, self.body_frame, self.map_from_head, self.covariances, beams.by_ref())?;
         if let Some(failure) = beams.failure {
             return Err(failure);
         }

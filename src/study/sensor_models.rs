@@ -4,6 +4,7 @@ use super::StudyError;
 use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
 use crate::report::{NoiseMetrics, SensorMetrics};
 use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
+use crate::simulation::Run;
 use crate::spec::{Kind, Source, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -85,12 +86,12 @@ pub(super) struct GivenModels<'a> {
 }
 
 impl SensorModels {
-    /// Given values, completed by those of `simulated` sensors, else by those of unknown sensors.
-    pub fn new(given: GivenModels, simulated: Option<(&ImuSpec, &LidarSpec)>) -> Result<Self, StudyError> {
-        let (imu, lidar, source) = match simulated {
-            Some((imu, lidar)) => {
+    /// Given values, completed by those of the sensors of `run`, else by those of unknown sensors.
+    pub fn new(given: GivenModels, run: Option<&Run>) -> Result<Self, StudyError> {
+        let (imu, lidar, source) = match run {
+            Some(run) => {
                 let source = Source::in_memory("the recording's manifest", "");
-                (Imu::new(imu, &source)?, Lidar::new(lidar, &source)?, ValueSource::Manifest)
+                (Imu::new(&run.imu.spec, &source)?, Lidar::new(&run.lidar.spec, &source)?, ValueSource::Manifest)
             }
             None => (unknown_imu()?, unknown_lidar()?, ValueSource::Assumed),
         };

@@ -18,7 +18,7 @@ fn a_result_has_path_transform_pose_and_all_points_in_time_order() {
     });
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("result.mcap");
-    write_result(&path, "head", (&trajectory, &[]), points).unwrap();
+    write_result(&path, "head", &trajectory, &[], points).unwrap();
 
     let bytes = std::fs::read(path).unwrap();
     let mut counts = BTreeMap::new();

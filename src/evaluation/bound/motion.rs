@@ -28,7 +28,8 @@ impl Step {
     /// `middle_in_world` is the centre of the trajectory, `since_start_s` the time of the first epoch.
     pub(super) fn between(
         model: &BoundModel,
-        (from, to): (&Epoch, &Epoch),
+        from: &Epoch,
+        to: &Epoch,
         middle_in_world: &Vector,
         since_start_s: f64,
     ) -> Self {

@@ -41,8 +41,8 @@ impl Run<'_> {
 
     /// The step from epoch `index` to the next.
     fn step(&self, index: usize) -> Step {
-        let ends = (&self.epochs[index], &self.epochs[index + 1]);
-        Step::between(self.model, ends, &self.middle_in_world, self.since_start_s(index))
+        let (from, to) = (&self.epochs[index], &self.epochs[index + 1]);
+        Step::between(self.model, from, to, &self.middle_in_world, self.since_start_s(index))
     }
 
     /// `W` of the measurements of an epoch, for the measured states: `(I + M P)^-1 M` with the information `M`.
@@ -150,7 +150,7 @@ fn smooth_backwards(run: &Run<'_>, checkpoints: &[State], found: &mut Variances)
         for index in (from..to).rev() {
             let at = &predicted[index - from];
             let adjoint = updated(&run.weight(index, at), at, &later);
-            smooth(run, (index, at, &adjoint), found);
+            smooth(run, index, at, &adjoint, found);
             if index > 0 {
                 let transition = run.step(index - 1).transition;
                 later = symmetric(&(transition.transpose() * adjoint * transition));
@@ -172,7 +172,7 @@ fn updated(weight: &Measured, predicted: &State, later: &State) -> State {
 }
 
 /// Computes the smoothed variances of the epoch at `index`; `adjoint` is from the later epochs.
-fn smooth(run: &Run<'_>, (index, predicted, adjoint): (usize, &State, &State), found: &mut Variances) {
+fn smooth(run: &Run<'_>, index: usize, predicted: &State, adjoint: &State, found: &mut Variances) {
     let (epoch, since_start_s) = (&run.epochs[index], run.since_start_s(index));
     // C (P - P L~ P) C^T, for the reported errors only.
     let variances = |jacobian: &OutputJacobian| -> Vector {

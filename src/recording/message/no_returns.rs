@@ -62,7 +62,7 @@ pub struct NoReturnDetector {
 
 impl NoReturnDetector {
     /// Counts a beam of a scan with the stated range limits.
-    pub fn add_range(&mut self, range_m: f32, (range_min_m, range_max_m): (f32, f32)) {
+    pub fn add_range(&mut self, range_m: f32, range_min_m: f32, range_max_m: f32) {
         let limits = RangeLimits::new(range_min_m, range_max_m, None);
         if range_m.is_finite() && range_m >= limits.max_m {
             self.beams += 1;

@@ -8,7 +8,7 @@ use crate::recording::RecordingError;
 use crate::recording::message::no_returns::{NoReturnDetector, RangeLimits};
 use crate::recording::message::scan::sort_by_firing_time;
 use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
-use crate::time::Span;
+use crate::time::{Span, Stamp};
 pub use fields::TimeField;
 use fields::{FLOAT32, Field, UINT32};
 pub use time_unit::{CloudDuration, TimeUnit};
@@ -53,7 +53,8 @@ pub fn encode(out: &mut Encoder<'_>, frame: &str, scan: &LidarScan) -> Result<()
 /// When the stamp or the number of points does not fit into a message.
 pub fn encode_floats<const N: usize>(
     out: &mut Encoder<'_>,
-    (stamp, frame): (crate::time::Stamp, &str),
+    frame: &str,
+    stamp: Stamp,
     names: [&str; N],
     points: impl ExactSizeIterator<Item = [f32; N]>,
 ) -> Result<(), RecordingError> {
@@ -97,7 +98,7 @@ fn encode_layout(
 
 /// Layout and data of a cloud.
 struct Cloud<'a> {
-    stamp: crate::time::Stamp,
+    stamp: Stamp,
     fields: Vec<Field<'a>>,
     big_endian: bool,
     width: usize,

@@ -23,7 +23,8 @@ pub fn encode_uncertain(
     out: &mut Encoder<'_>,
     frame: &str,
     stamp: Stamp,
-    (pose, covariance): (&Pose, &PoseCovariance),
+    pose: &Pose,
+    covariance: &PoseCovariance,
 ) -> Result<(), RecordingError> {
     out.header(stamp, frame)?;
     out.pose(pose);
@@ -59,7 +60,8 @@ pub fn decode_odometry(message: Payload<'_>) -> Result<(Stamp, Pose), DecodeErro
 /// When the stamp does not fit into a message.
 pub fn encode_odometry(
     out: &mut Encoder<'_>,
-    (frame, child): (&str, &str),
+    frame: &str,
+    child: &str,
     stamp: Stamp,
     body: &Kinematics,
 ) -> Result<(), RecordingError> {
@@ -108,7 +110,7 @@ mod tests {
             ..Kinematics::at_rest(pose)
         };
         let mut bytes = Vec::new();
-        encode_odometry(&mut Encoder::new(&mut bytes), ("map", "head"), Stamp::from_nanos(5), &body).unwrap();
+        encode_odometry(&mut Encoder::new(&mut bytes), "map", "head", Stamp::from_nanos(5), &body).unwrap();
         let mut input = Decoder::new(Payload::cdr(&bytes)).unwrap();
         assert_eq!(input.header().unwrap(), (Stamp::from_nanos(5), "map"));
         assert_eq!(input.string().unwrap(), "head");

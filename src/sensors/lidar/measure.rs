@@ -15,7 +15,7 @@ impl Lidar {
         let mut returns = Vec::with_capacity(self.beams.len());
         let mut planar = self.empty_scan();
         for beam in 0..self.beams.len() {
-            let (range, intensity) = self.measure_beam(sweep, beam, (errors, draws.as_mut()), &mut returns);
+            let (range, intensity) = self.measure_beam(sweep, beam, errors, draws.as_mut(), &mut returns);
             if let Some(scan) = planar.as_mut() {
                 scan.ranges_m.push(range);
                 scan.intensities.push(intensity);
@@ -29,7 +29,8 @@ impl Lidar {
         &self,
         sweep: &Sweep,
         beam: usize,
-        (errors, mut draws): (&LidarErrors, Option<&mut ScanDraws>),
+        errors: &LidarErrors,
+        mut draws: Option<&mut ScanDraws>,
         returns: &mut Vec<LidarReturn>,
     ) -> (f32, f32) {
         let draw = draws.as_deref_mut().map(ScanDraws::next_beam);

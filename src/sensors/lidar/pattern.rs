@@ -108,8 +108,8 @@ impl PatternSpec {
                 Ok(Pattern { plane: Some(plane), ..unrotated(beams) })
             }
             Self::Spinning { elevations_deg, channel_period_us, round_period_us } => {
-                let times = (channel_period_us * 1e-6, round_period_us * 1e-6);
-                Ok(unrotated(spinning(elevations_deg, times, rate_hz, source)?))
+                let (channel_s, round_s) = (channel_period_us * 1e-6, round_period_us * 1e-6);
+                Ok(unrotated(spinning(elevations_deg, channel_s, round_s, rate_hz, source)?))
             }
             &Self::Interlaced { beams, first_deg, step_deg, slots_per_turn, mirror_turns } => {
                 let (first_rad, step_rad) = (first_deg.to_radians(), step_deg.to_radians());
@@ -133,7 +133,8 @@ impl Plane {
 
 fn spinning(
     elevations_deg: &[f64],
-    (channel_s, round_s): (f64, f64),
+    channel_s: f64,
+    round_s: f64,
     rate_hz: f64,
     source: &Source,
 ) -> Result<Vec<Beam>, SpecError> {

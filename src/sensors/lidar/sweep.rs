@@ -51,6 +51,14 @@ impl Sweep {
     }
 }
 
+/// A ray of a beam in the world.
+struct LidarRay {
+    origin: Vector,
+    direction: Vector,
+    /// Firing time of the beam, true seconds.
+    t_s: f64,
+}
+
 impl Lidar {
     /// Casts the rays of the scan with `timing` into `scenery`. Each ray starts at the pose of the lidar frame at the
     /// firing time of its beam; `laser` is the track of that frame.
@@ -70,7 +78,7 @@ impl Lidar {
                 sweep.rotation.map_or(world_from_laser.rotation, |turn| world_from_laser.rotation * turn);
             for ray in rays {
                 let direction = world_from_beams * ray;
-                self.trace(scenery, (&origin, &direction, t_s), &mut previous_m, &mut sweep.surfaces);
+                self.trace(scenery, &LidarRay { origin, direction, t_s }, &mut previous_m, &mut sweep.surfaces);
                 sweep.ends.push(sweep.surfaces.len() as u32);
             }
         }
@@ -79,14 +87,9 @@ impl Lidar {
 
     /// Traces a ray through glass to the last surface. `previous_m` is the range of the previous ray on entry, and of
     /// this ray on return.
-    fn trace(
-        &self,
-        scenery: &dyn Scenery,
-        (origin, direction, t_s): (&Vector, &Vector, f64),
-        previous_m: &mut f64,
-        surfaces: &mut Vec<SurfaceHit>,
-    ) {
-        let cast = |from: &Vector, reach_m: f64| scenery.first_hit(from, direction, reach_m, t_s);
+    fn trace(&self, scenery: &dyn Scenery, ray: &LidarRay, previous_m: &mut f64, surfaces: &mut Vec<SurfaceHit>) {
+        let LidarRay { origin, direction, t_s } = ray;
+        let cast = |from: &Vector, reach_m: f64| scenery.first_hit(from, direction, reach_m, *t_s);
         let near_m = *previous_m * (1.0 + SEARCH_MARGIN.0) + SEARCH_MARGIN.1;
         *previous_m = self.spec.range_max_m;
         let (mut from, mut travelled_m) = (*origin, 0.0);

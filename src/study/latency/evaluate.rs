@@ -5,7 +5,7 @@ use super::stamp_errors::DisturbedStamps;
 use super::{ClockState, TimingSpec};
 use crate::estimation::{ClockSpec, Estimator, EstimatorSpec, OpenLoop, smoothed_stamps};
 use crate::evaluation::{CloudErrors, Errors, Pairs};
-use crate::geometry::{Pose, SmoothCursor, Vector};
+use crate::geometry::{Pose, SmoothCursor, Trajectory, Vector};
 use crate::measurement::Calibration;
 use crate::recording::{Reader, Selection};
 use crate::simulation::Simulation;
@@ -71,22 +71,23 @@ impl TimingRun<'_> {
             block.poses += 1.0;
             block.position2_m2 += error.norm_squared();
         }
-        self.evaluate_cloud(&estimate, (&world_from_map, &scan_stamps), &mut blocks);
+        let cloud = EstimatedCloud { trajectory: &estimate.trajectory, world_from_map, scan_stamps: &scan_stamps };
+        self.evaluate_cloud(&cloud, &mut blocks);
         let offset_s = estimate.clock_offsets.last().map_or(0.0, |(_, offset_s)| *offset_s);
         Ok(MapErrors {
             blocks,
             clock_error_ms: offset_s * 1e3 - disturbance.latency_ms,
-            section: self.timing.shown.then(|| self.section(&estimate, &world_from_map, &scan_stamps)),
+            section: self.timing.shown.then(|| self.section(&cloud)),
         })
     }
 
-    fn section(&self, estimate: &OpenLoop, world_from_map: &Pose, scan_stamps: &[Stamp]) -> Section {
+    fn section(&self, cloud: &EstimatedCloud<'_>) -> Section {
         let coordinates = |projected: Option<(Vector, Vector)>| {
             let (along, up) =
                 projected.map_or((f64::NAN, f64::NAN), |(point, _)| self.reference.section.coordinates(&point));
             (along as f32, up as f32)
         };
-        let shown = self.project(&self.reference.shown, estimate, world_from_map, scan_stamps);
+        let shown = cloud.project(&self.reference.shown, &self.calibration.head_from_laser);
         Section {
             range_m: self.reference.range_m,
             points_m: shown.into_iter().map(coordinates).collect(),
@@ -112,14 +113,9 @@ impl TimingRun<'_> {
     }
 
     /// Adds the distances of the cloud to the true surfaces.
-    fn evaluate_cloud(
-        &self,
-        estimate: &OpenLoop,
-        (world_from_map, scan_stamps): (&Pose, &[Stamp]),
-        blocks: &mut Vec<Block>,
-    ) {
+    fn evaluate_cloud(&self, cloud: &EstimatedCloud<'_>, blocks: &mut Vec<Block>) {
         let returns = &self.reference.evaluated;
-        let projected = self.project(returns, estimate, world_from_map, scan_stamps);
+        let projected = cloud.project(returns, &self.calibration.head_from_laser);
         for (hit, (point, origin)) in returns.iter().zip(projected).filter_map(|(hit, ends)| Some((hit, ends?))) {
             let found = CloudErrors::to_surface(self.simulation.world(), &[(point, Some(origin))], REACH_M);
             if let Some(distance_m) = found.signed_m.first() {
@@ -131,24 +127,6 @@ impl TimingRun<'_> {
         }
     }
 
-    /// End and origin of beams in the world, by the estimate; `None` outside the estimated time.
-    fn project(
-        &self,
-        returns: &[SampledReturn],
-        estimate: &OpenLoop,
-        world_from_map: &Pose,
-        scan_stamps: &[Stamp],
-    ) -> Vec<Option<(Vector, Vector)>> {
-        let mut cursor = SmoothCursor::new(&estimate.trajectory);
-        let project = |hit: &SampledReturn| {
-            let map_from_head = cursor.at(scan_stamps[hit.scan] + hit.offset)?;
-            let world_from_laser = world_from_map * map_from_head * self.calibration.head_from_laser;
-            let end = world_from_laser.transform_point(&hit.point_in_laser.into()).coords;
-            Some((end, world_from_laser.translation.vector))
-        };
-        returns.iter().map(project).collect()
-    }
-
     /// The block of time that contains `stamp`.
     fn block_at<'b>(&self, blocks: &'b mut Vec<Block>, stamp: Stamp) -> &'b mut Block {
         let (first, last) = self.reference.truth.span().unwrap_or_default();
@@ -156,6 +134,29 @@ impl TimingRun<'_> {
         blocks.resize(count, Block::default());
         let index = (stamp.seconds_since(first) / self.timing.block_s).max(0.0) as usize;
         &mut blocks[index.min(count - 1)]
+    }
+}
+
+/// An estimate that projects returns into the world.
+struct EstimatedCloud<'a> {
+    /// `map_from_head`.
+    trajectory: &'a Trajectory,
+    world_from_map: Pose,
+    /// Stamps that the estimator assumed, by index of the scan.
+    scan_stamps: &'a [Stamp],
+}
+
+impl EstimatedCloud<'_> {
+    /// End and origin of beams in the world; `None` outside the estimated time.
+    fn project(&self, returns: &[SampledReturn], head_from_laser: &Pose) -> Vec<Option<(Vector, Vector)>> {
+        let mut cursor = SmoothCursor::new(self.trajectory);
+        let project = |hit: &SampledReturn| {
+            let map_from_head = cursor.at(self.scan_stamps[hit.scan] + hit.offset)?;
+            let world_from_laser = self.world_from_map * map_from_head * head_from_laser;
+            let end = world_from_laser.transform_point(&hit.point_in_laser.into()).coords;
+            Some((end, world_from_laser.translation.vector))
+        };
+        returns.iter().map(project).collect()
     }
 }
 

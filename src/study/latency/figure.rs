@@ -23,7 +23,7 @@ pub fn map_figure(study: &LatencyResult, clock: ClockState) -> Figure {
     for (row, is_noise) in [(latencies, false), (noises, true)] {
         for disturbance in row {
             let title = format!("({}) {}", letters.next().unwrap_or(' '), label(disturbance, is_noise));
-            charts.push(panel(study, (disturbance, clock), &title, charts.is_empty()));
+            charts.push(panel(study, disturbance, clock, &title, charts.is_empty()));
         }
     }
     let mut figure = Figure::of(charts).in_columns(columns);
@@ -39,7 +39,7 @@ fn label(disturbance: Disturbance, is_noise: bool) -> String {
     }
 }
 
-fn panel(study: &LatencyResult, (disturbance, clock): (Disturbance, ClockState), title: &str, is_first: bool) -> Chart {
+fn panel(study: &LatencyResult, disturbance: Disturbance, clock: ClockState, title: &str, is_first: bool) -> Chart {
     let chart = Chart::new(title, "Along the section (m)", "Up (m)").as_map();
     let Some(section) = study.run(disturbance, clock).and_then(|run| run.section.as_ref()) else { return chart };
     let dots = section.points_m.iter().zip(&section.rates_deg_per_s);

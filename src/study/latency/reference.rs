@@ -61,7 +61,8 @@ impl Reference {
     /// Reads the recording of `simulation`; the section has the returns of the middle `shown_s`.
     pub(in crate::study) fn read(
         reader: &Reader,
-        (selection, calibration): (&Selection, &Calibration),
+        selection: &Selection,
+        calibration: &Calibration,
         simulation: &Simulation,
         shown_s: f64,
         stop: &AtomicBool,

@@ -20,7 +20,8 @@ pub(super) fn run(
     spec: &GainCurvesSpec,
     heads: &[HeadSpec],
     extent: Extent,
-    (folder, anew): (&Path, bool),
+    folder: &Path,
+    anew: bool,
     runner: &Runner,
 ) -> Result<ExperimentResult, StudyError> {
     let fitted = spec.designs.par_iter().zip(heads).map(|(design, head)| {

@@ -85,10 +85,10 @@ impl Experiment {
         }
         let result = match &self.spec {
             ExperimentSpec::GainCurves(spec) => {
-                gain_curves::run(spec, &spec.heads(&self.source)?, extent, (folder, anew), runner)?
+                gain_curves::run(spec, &spec.heads(&self.source)?, extent, folder, anew, runner)?
             }
             ExperimentSpec::Latency(spec) => {
-                timing::run(&spec.figure, &self.timing_plan(spec, extent)?, (folder, anew), runner)?
+                timing::run(&spec.figure, &self.timing_plan(spec, extent)?, folder, anew, runner)?
             }
         };
         let stored = StoredResult { inputs: self.inputs(extent)?, result };

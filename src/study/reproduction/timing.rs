@@ -10,7 +10,8 @@ use std::path::Path;
 pub(super) fn run(
     figure: &str,
     plan: &Plan,
-    (folder, anew): (&Path, bool),
+    folder: &Path,
+    anew: bool,
     runner: &Runner,
 ) -> Result<ExperimentResult, StudyError> {
     let sweep = plan.write(folder, anew)?;
@@ -28,7 +29,7 @@ pub(super) fn run(
 
 /// Compares the maps with the paper's.
 fn compare(figure: &str, study: &LatencyResult) -> ExperimentResult {
-    let row = |disturbance: Disturbance, (what, paper): (String, &str)| {
+    let row = |disturbance: Disturbance, what: String, paper: &str| {
         let sigma_mm = |clock| study.run(disturbance, clock).map(|run| run.cloud_sigma_m.value * 1e3);
         let text = |clock, name: &str| sigma_mm(clock).map_or_else(String::new, |mm| format!("{mm:.1} mm {name}"));
         ComparedNumber {
@@ -43,11 +44,11 @@ fn compare(figure: &str, study: &LatencyResult) -> ExperimentResult {
     let mut rows = Vec::new();
     for shown in latencies {
         let what = format!("cloud sigma at {} ms of latency, clock state off and on", shown.latency_ms);
-        rows.push(row(shown, (what, misaligned(shown.latency_ms != 0.0))));
+        rows.push(row(shown, what, misaligned(shown.latency_ms != 0.0)));
     }
     for shown in noises.into_iter().filter(|shown| shown.noise_ms > 0.0) {
         let what = format!("cloud sigma at {} ms of timing noise, clock state off and on", shown.noise_ms);
-        rows.push(row(shown, (what, "-")));
+        rows.push(row(shown, what, "-"));
     }
     let mut notes = vec![
         "The paper shows maps without numbers; zsim reports the standard deviation of the cloud about the true surfaces. The \

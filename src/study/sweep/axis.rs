@@ -68,7 +68,8 @@ impl Axis {
     /// Locates the settings of `spec`; loads the specs that it names into `specs`.
     pub fn new(
         spec: &AxisSpec,
-        (base, sampling): (&BaseSpec, Sampling),
+        base: &BaseSpec,
+        sampling: Sampling,
         specs: &mut SpecSet,
         source: &Source,
     ) -> Result<Self, StudyError> {

@@ -79,7 +79,7 @@ impl Plan {
             return Err(SpecError::plain(&source.name, message).into());
         }
         specs.base.check(&spec.base).map_err(|message| SpecError::about(source, "base", message))?;
-        let axes = spec.axes.iter().map(|axis| Axis::new(axis, (&spec.base, spec.sampling), specs, source));
+        let axes = spec.axes.iter().map(|axis| Axis::new(axis, &spec.base, spec.sampling, specs, source));
         let axes: Vec<Axis> = axes.collect::<Result<_, _>>()?;
         let sizes: Vec<AxisSize> = axes.iter().map(Axis::size).collect();
         let about = |message: String| SpecError::about(source, "sampling", message);

@@ -59,7 +59,7 @@ impl Sweep {
             return Ok(Vec::new());
         }
         let figures = self.figures(measure)?;
-        Ok(pairs.into_iter().map(|(x, y)| map(&self.plan, runs, &figures, (x, y, measure))).collect())
+        Ok(pairs.into_iter().map(|(x, y)| map(&self.plan, runs, &figures, x, y, measure)).collect())
     }
 
     /// The plot of the Pareto front of the spec's goals, with its name; writes the front to `front.csv`.
@@ -174,8 +174,8 @@ fn decades(low: f64, high: f64) -> Vec<(f64, String)> {
     (first..=last).step_by(step).map(|power| (f64::from(power), label(power))).collect()
 }
 
-/// Map of a measure's median over two axes.
-fn map(plan: &Plan, runs: &Runs, figures: &[f64], (x, y, measure): (usize, usize, Measure)) -> Chart {
+/// Map of a measure's median over the axes `x` and `y`.
+fn map(plan: &Plan, runs: &Runs, figures: &[f64], x: usize, y: usize, measure: Measure) -> Chart {
     let (unit, per_unit) = measure.unit();
     let (wide, high) = (level_count(plan, x), level_count(plan, y));
     let mut figures_of_cell: Vec<Vec<f64>> = vec![Vec::new(); wide * high];

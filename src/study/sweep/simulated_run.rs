@@ -42,7 +42,8 @@ pub(super) struct TemporaryRecording {
 /// Without `recorded` the simulations are not run, and the recordings are empty.
 pub(super) fn record_simulations(
     simulations: Vec<Simulation>,
-    (recorded, readers): (bool, usize),
+    recorded: bool,
+    readers: usize,
     limit: LimitSpec,
 ) -> Result<Vec<TemporaryRecording>, StudyError> {
     let of = |(simulation, handles)| TemporaryRecording { simulation, handles, reference: Mutex::default() };
@@ -66,10 +67,10 @@ pub(super) fn record_simulations(
 
 impl TemporaryRecording {
     /// Evaluates a run on this recording, read by thread `reader`.
-    pub fn evaluate(&self, (plan, limit): (&Plan, LimitSpec), run: &Journey, reader: usize) -> RunOutcome {
+    pub fn evaluate(&self, plan: &Plan, limit: LimitSpec, run: &Journey, reader: usize) -> RunOutcome {
         let measures = plan.result_measures();
         let started = Instant::now();
-        let outcome = match self.figures((limit, &measures), run, reader) {
+        let outcome = match self.figures(limit, &measures, run, reader) {
             Ok((figures, details)) => RunOutcome { figures, details, ..RunOutcome::default() },
             Err(error) => RunOutcome::from_error(measures.len(), &error),
         };
@@ -78,7 +79,8 @@ impl TemporaryRecording {
 
     fn figures(
         &self,
-        (limit, measures): (LimitSpec, &[Measure]),
+        limit: LimitSpec,
+        measures: &[Measure],
         run: &Journey,
         reader: usize,
     ) -> Result<(Vec<Option<f64>>, Option<String>), StudyError> {
@@ -122,7 +124,7 @@ impl TemporaryRecording {
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&TopicPreference::default())?;
         let calibration = self.simulation.calibration();
-        let reference = self.reference(&reader, (&selection, &calibration), timing.shown_s, stop)?;
+        let reference = self.reference(&reader, &selection, &calibration, timing.shown_s, stop)?;
         let run = TimingRun {
             reader: &reader,
             selection: &selection,
@@ -139,7 +141,8 @@ impl TemporaryRecording {
     fn reference(
         &self,
         reader: &Reader,
-        inputs: (&Selection, &Calibration),
+        selection: &Selection,
+        calibration: &Calibration,
         shown_s: f64,
         stop: &AtomicBool,
     ) -> Result<Arc<Reference>, StudyError> {
@@ -147,7 +150,8 @@ impl TemporaryRecording {
         if let Some((_, reference)) = stored.as_ref().filter(|(stored_s, _)| *stored_s == shown_s) {
             return Ok(reference.clone());
         }
-        let reference = Arc::new(Reference::read(reader, inputs, &self.simulation, shown_s, stop)?);
+        let read = Reference::read(reader, selection, calibration, &self.simulation, shown_s, stop);
+        let reference = Arc::new(read?);
         *stored = Some((shown_s, reference.clone()));
         Ok(reference)
     }
@@ -224,18 +228,18 @@ fn estimate(
         let selection = reader.select(&TopicPreference::default())?;
         let manifest = Manifest::in_recording(&reader)?;
         let simulated = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
-        let (found, _) = calibration((&reader, &selection), &CalibrationSpec::default(), simulated, None)?;
+        let (found, _) = calibration(&reader, &selection, &CalibrationSpec::default(), simulated, None)?;
         let how =
             OpenLoopOptions { estimator, calibration: &found.calibration, recording_surfels: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
-        let known = comparison::compare_with_truth(&reader, (&run.map_from_head, &run.covariances), &mut watch)?;
+        let known = comparison::compare_with_truth(&reader, &run.map_from_head, &run.covariances, &mut watch)?;
         let open_loop = comparison::open_loop_metrics(&run, known.as_ref(), None);
         let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator)).transpose()?;
         let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
         let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
         let pairs = comparison::pairs_of(&reader, map_from_head)?;
         let closed_errors = match closed {
-            Some(_) => comparison::compare_with_truth(&reader, (map_from_head, &[]), &mut watch)?,
+            Some(_) => comparison::compare_with_truth(&reader, map_from_head, &[], &mut watch)?,
             None => None,
         };
         Ok(EstimateMetrics {

@@ -136,7 +136,7 @@ impl Sweep {
                 Err(error) => self.fail(each, &error, report)?,
             }
         }
-        let recordings = match record_simulations(simulations, (recorded, threads), limit) {
+        let recordings = match record_simulations(simulations, recorded, threads, limit) {
             Ok(recordings) => recordings,
             Err(error @ StudyError::File { .. }) => return Err(error),
             Err(error) => return groups.into_iter().try_for_each(|each| self.fail(each, &error, report)),
@@ -146,14 +146,15 @@ impl Sweep {
             .zip(groups)
             .flat_map(|(recording, each)| each.runs.iter().map(move |run| (recording, run)))
             .collect();
-        self.estimate_runs(&runs, (limit, threads), report)
+        self.estimate_runs(&runs, limit, threads, report)
     }
 
     /// Estimates the runs in parallel, each on one thread.
     fn estimate_runs(
         &self,
         runs: &[(&TemporaryRecording, &(usize, PlannedJourney))],
-        (limit, threads): (LimitSpec, usize),
+        limit: LimitSpec,
+        threads: usize,
         report: &(dyn Fn(WorkerMessage) + Sync),
     ) -> Result<(), StudyError> {
         let next = AtomicUsize::new(0);
@@ -164,7 +165,7 @@ impl Sweep {
                     continue;
                 }
                 report(WorkerMessage::Begin(*unit));
-                let outcome = recording.evaluate((&self.plan, limit), &run.inputs, reader);
+                let outcome = recording.evaluate(&self.plan, limit, &run.inputs, reader);
                 self.write_part(&self.units[*unit], &[outcome])?;
                 report(WorkerMessage::Done(*unit));
             }

@@ -166,7 +166,7 @@ impl DesignSearch {
                     let start = (0..samples).min_by(|a, b| cost(&sampled[*a]).total_cmp(&cost(&sampled[*b])));
                     let start = start.map_or([0.5; 4], |k| points[k]);
                     let seed = Seed(self.spec.seed).child(&format!("design/{k}")).0;
-                    optimise(&start, (evaluations_per_run, seed), &evaluate, &cost)
+                    optimise(&start, evaluations_per_run, seed, &evaluate, &cost)
                 });
                 let optimised: Vec<Vec<Evaluation>> = runs.collect();
                 evaluated += optimised.iter().map(Vec::len).sum::<usize>();
@@ -262,7 +262,8 @@ impl DesignSearch {
 /// Runs CMA-ES from `start` in the unit cube; returns all evaluations.
 fn optimise(
     start: &[f64; 4],
-    (evaluations, seed): (usize, u64),
+    evaluations: usize,
+    seed: u64,
     evaluate: &dyn Fn(&[f64]) -> Evaluation,
     cost: &dyn Fn(&Evaluation) -> f64,
 ) -> Vec<Evaluation> {
