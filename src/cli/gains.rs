@@ -13,15 +13,16 @@ use zsim::motion::Axis;
 use zsim::random::Seed;
 use zsim::report;
 use zsim::study::gains::{
-    AXES, GainCurve, GainPlan, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure, swing_csv,
-    swing_figure, swing_study, with_damping,
+    AXES, GainCurve, GainPlan, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure, min_coherence,
+    page, peak_table, swing_csv, swing_figure, swing_study, with_damping,
 };
 use zsim::study::replace_text;
 
 /// Measure a head's gain curves: head motion over base motion by frequency, from simulation and in closed form
 ///
 /// The base is excited on one axis at a time, about the foot of the spring, by a periodic multisine; the motion of the
-/// head is measured at the IMU. Writes gains.csv, swing.csv with --swing, and plots.
+/// head is measured at the IMU. Writes gains.csv, swing.csv with --swing, plots, and report.html, a
+/// page with gain and phase of each axis.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim gains --head handheld --out results/gains")]
 pub(super) struct Arguments {
@@ -87,6 +88,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         swing_figure(swings).save(&plots, "swing")?;
     }
     let swings = swings.unwrap_or_default();
+    replace_text(&folder.join("report.html"), &page(&name(arguments), &head, &curves, &swings)?)?;
     output::print_result(global, &text(&curves, &swings), figures(&curves, &swings)?, Some(&folder))?;
     Ok(Completion::Done)
 }
@@ -146,15 +148,8 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
 
 fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
     let dash = || "-".to_owned();
-    let row = |curve: &GainCurve| {
-        let peak = |peak: Option<zsim::dynamics::Peak>| {
-            peak.map_or([dash(), dash()], |p| [format!("{:.3}", p.freq_hz), format!("{:.2}", p.gain)])
-        };
-        let ([hz, gain], [model_hz, model_gain]) = (peak(curve.peak), peak(curve.peak_model));
-        vec![axis_name(curve.axis).to_owned(), hz, gain, model_hz, model_gain, format!("{:.4}", min_coherence(curve))]
-    };
-    let header = ["axis", "peak Hz", "gain", "closed form Hz", "gain", "min coherence"];
-    let mut words = report::table(&header, &curves.iter().map(row).collect::<Vec<_>>(), true);
+    let (header, rows) = peak_table(curves);
+    let mut words = report::table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows, true);
     for study in swings {
         let row = |p: &zsim::study::gains::SwingPoint| {
             let number = |x: Option<f64>, decimals: usize| x.map_or(dash(), |x| format!("{x:.decimals$}"));
@@ -172,11 +167,6 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
         words += &study.ended.as_ref().map(|why| format!("ended {why}\n")).unwrap_or_default();
     }
     words
-}
-
-/// The minimum coherence of a curve.
-fn min_coherence(curve: &GainCurve) -> f64 {
-    curve.points.iter().map(|p| p.coherence).fold(1.0, f64::min)
 }
 
 fn figures(curves: &[GainCurve], swings: &[SwingStudy]) -> anyhow::Result<Value> {

@@ -1,7 +1,7 @@
 //! The output of `zsim spring`.
 
 use super::coverage_text;
-use zsim::dynamics::{ElementKind, ElementLoad, ModeKind};
+use zsim::dynamics::{ElementKind, ElementLoad};
 use zsim::report::table;
 use zsim::study::spring::design::DesignStudy;
 use zsim::study::spring::{CoilReport, DesignMetrics, ShakeResponse, SpringReport};
@@ -87,14 +87,11 @@ fn modes(report: &SpringReport) -> String {
         .modes
         .iter()
         .map(|mode| {
-            let name = match mode.kind {
-                ModeKind::Rocking => "rocking",
-                ModeKind::Sway => "sway",
-                ModeKind::Bounce => "bounce",
-                ModeKind::Yaw => "yaw",
-            };
-            let mut cells =
-                vec![name.to_owned(), format!("{:.3}", mode.frequency_hz), format!("{:.3}", mode.damping_ratio)];
+            let mut cells = vec![
+                mode.kind.name().to_owned(),
+                format!("{:.3}", mode.frequency_hz),
+                format!("{:.3}", mode.damping_ratio),
+            ];
             cells.extend(mode.shape.iter().map(|x| rounded(*x)));
             cells
         })

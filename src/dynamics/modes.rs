@@ -19,6 +19,18 @@ pub enum ModeKind {
     Yaw,
 }
 
+impl ModeKind {
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            ModeKind::Rocking => "rocking",
+            ModeKind::Sway => "sway",
+            ModeKind::Bounce => "bounce",
+            ModeKind::Yaw => "yaw",
+        }
+    }
+}
+
 /// An undamped mode of the head about the equilibrium, with the base fixed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mode {

@@ -36,10 +36,10 @@ fn gains_writes_a_table_and_plots() {
     assert_eq!(figures["axes"].as_array().unwrap().len(), 6);
     assert_eq!(figures["out"], out.to_str().unwrap());
     let table = std::fs::read_to_string(out.join("gains.csv")).unwrap();
-    assert!(table.starts_with("axis,freq_hz,gain,coherence,gain_model"));
+    assert!(table.starts_with("axis,freq_hz,gain,coherence,gain_model,gain_sigma,phase_deg,phase_model_deg\n"));
     assert_eq!(table.lines().count(), 1 + 6 * 30);
-    for file in ["gains.svg", "gains.png", "coherence.svg", "coherence.png"] {
-        assert!(out.join("plots").join(file).is_file(), "{file}");
+    for file in ["plots/gains.svg", "plots/gains.png", "plots/coherence.svg", "plots/coherence.png", "report.html"] {
+        assert!(out.join(file).is_file(), "{file}");
     }
 }
 

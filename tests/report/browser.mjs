@@ -1,4 +1,4 @@
-// Loads the page of a run, a scene or a study in a headless browser and uses it: node browser.mjs NODE_MODULES PAGE [PICTURES]
+// Loads a page of zsim in a headless browser and uses it: node browser.mjs NODE_MODULES PAGE [PICTURES]
 //
 // Exits with 77 if a program or a module that it needs is not installed.
 // Fails on an error in the console, on a request to the network, on a control without effect, on an accessibility violation
@@ -133,6 +133,31 @@ async function useCharts(page) {
   check(first !== (await drawn()).toString("base64"), "the choice of the error component has no effect");
 }
 
+// The values at the cursor of the first chart of a section.
+const values = (page, section) => page.locator(`[data-charts="${section}"] figure`).first().locator(".keys").textContent();
+
+async function useGains(page) {
+  for (const axis of ["x_rot", "y_rot", "z_rot", "x", "y", "z"]) {
+    const canvases = await page.locator(`[data-charts="${axis}"] canvas`).count();
+    check(canvases === 2, `${axis}: ${canvases} charts instead of gain and phase`);
+  }
+  const chart = page.locator('[data-charts="x_rot"] .u-over').first();
+  await chart.scrollIntoViewIfNeeded();
+  const before = await values(page, "x_rot");
+  const box = await chart.boundingBox();
+  await page.mouse.move(box.x + 0.3 * box.width, box.y + 0.5 * box.height);
+  const hovered = await values(page, "x_rot");
+  check(before !== hovered && /Hz:.*simulated \d.*closed form \d/.test(hovered), `the values at the cursor are "${hovered}"`);
+  check(/Hz:/.test(await values(page, "z")), "the cursors of the axes do not move together");
+  await page.locator('[data-charts="x_rot"] [role=img]').first().press("ArrowRight");
+  const stepped = await values(page, "x_rot");
+  check(stepped !== hovered && /simulated \d/.test(stepped), `an arrow key leaves the values at "${stepped}"`);
+  const second = page.locator('[data-charts="x_rot"] figure').nth(1);
+  const phase = (await second.locator("canvas").screenshot()).toString("base64");
+  await second.locator("select").selectOption("1");
+  check(phase !== (await second.locator("canvas").screenshot()).toString("base64"), "the choice of the coherence has no effect");
+}
+
 // The words of a column of the visible runs.
 const column = (page, k) =>
   page.locator("#runs tbody tr:not([hidden])").evaluateAll((rows, k) => rows.map((row) => row.cells[k].textContent), k);
@@ -167,6 +192,7 @@ async function audit(page, name) {
   check(width <= 0, `${name}: the page is ${width} px wider than the screen`);
 }
 
+const USES = { gains: useGains, study: useTable };
 for (const scheme of ["light", "dark"]) {
   for (const width of [1400, 400]) {
     const page = await open(scheme, width);
@@ -175,8 +201,8 @@ for (const scheme of ["light", "dark"]) {
     check(await page.evaluate(() => window.hostile === undefined), "a hostile name has run as a script");
     if (pictures) await page.screenshot({ path: join(pictures, `${scheme}-${width}.png`), fullPage: true });
     await audit(page, `${scheme}, ${width} px`);
-    const isStudy = await page.evaluate(() => document.documentElement.dataset.page === "study");
-    if (scheme === "light" && width === 1400) await (isStudy ? useTable(page) : use(page));
+    const kind = await page.evaluate(() => document.documentElement.dataset.page);
+    if (scheme === "light" && width === 1400) await (USES[kind] ?? use)(page);
     await page.close();
   }
 }

@@ -1,4 +1,4 @@
-//! The pages of a run, a scene and a study in a headless browser.
+//! The pages of zsim in a headless browser.
 
 use crate::command::run;
 use crate::skip::run_or_skip;
@@ -35,6 +35,26 @@ fn the_page_of_a_scene_works_in_a_browser() {
     let (code, _, errors) = run(here.path(), &format!("scene view {} scene.html", scene.display()));
     assert_eq!(code, 0, "{errors}");
     use_in_a_browser(&here.path().join("scene.html"));
+}
+
+/// Copies a shipped head to `folder`; returns its hostile file name.
+fn hostile_head(folder: &Path) -> String {
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/heads/handheld.ron");
+    let name = "<script>window.hostile=1;.ron";
+    std::fs::copy(shipped, folder.join(name)).unwrap();
+    name.to_owned()
+}
+
+#[test]
+fn the_page_of_gains_works_in_a_browser() {
+    let here = tempfile::tempdir().unwrap();
+    let head = hostile_head(here.path());
+    let options = "--period 20 --realisations 2 --swing 2,5 --out out";
+    let (code, _, errors) = run(here.path(), &format!("gains --head {head} {options}"));
+    assert_eq!(code, 0, "{errors}");
+    let page = here.path().join("out/report.html");
+    assert!(std::fs::read_to_string(&page).unwrap().contains("Gains of &lt;script&gt;window.hostile=1;"));
+    use_in_a_browser(&page);
 }
 
 #[test]

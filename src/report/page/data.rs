@@ -107,6 +107,8 @@ pub enum Link {
 /// Section of the page that a chart belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Section {
+    /// Gain, phase and coherence of the axis with this name.
+    Axis(&'static str),
     /// Errors and their bounds.
     Errors,
     /// Offset between the clocks.
@@ -127,18 +129,40 @@ pub struct ChartGroup {
     pub charts: Vec<Chart>,
 }
 
-/// A chart over time.
+/// A chart over time or frequency.
 pub struct Chart {
     /// Title.
     pub title: String,
     /// Quantity and unit of the ordinate.
     pub label: String,
-    /// Whether the ordinate is logarithmic.
-    pub is_log: bool,
-    /// Times, s, in increasing order.
-    pub t_s: Vec<f64>,
+    /// Quantity of the abscissa.
+    pub abscissa: Abscissa,
+    /// Scale of the ordinate.
+    pub ordinate: Ordinate,
+    /// Abscissae in increasing order, s or Hz; frequencies are positive.
+    pub x: Vec<f64>,
     /// The curves.
     pub curves: Vec<Curve>,
+}
+
+/// Quantity of an abscissa.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Abscissa {
+    /// Time, s.
+    Time,
+    /// Frequency, Hz, on a logarithmic scale.
+    Frequency,
+}
+
+/// Scale of an ordinate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ordinate {
+    /// Linear.
+    Linear,
+    /// Logarithmic; only positive values are drawn.
+    Logarithmic,
+    /// Linear, with ticks at parts of a turn.
+    Degrees,
 }
 
 /// A curve of a chart.
@@ -147,7 +171,7 @@ pub struct Curve {
     pub name: String,
     /// Appearance.
     pub style: CurveStyle,
-    /// A value for each time of the chart; not finite where there is none.
+    /// A value for each abscissa of the chart; not finite where there is none.
     pub values: Vec<f64>,
 }
 
@@ -168,6 +192,10 @@ pub enum CurveStyle {
     BandBottom,
     /// A theoretical limit, dotted.
     Limit,
+    /// Measured points, as dots.
+    Measured,
+    /// A model of the measured points, in another colour.
+    Model,
 }
 
 /// Events of one kind on the timeline.

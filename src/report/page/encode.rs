@@ -2,7 +2,8 @@
 
 use super::binary::base64_f32;
 use super::data::{
-    Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, RunPage, Section, TimedPose, TimelineRow, View,
+    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, Ordinate, RunPage, Section, TimedPose,
+    TimelineRow, View,
 };
 use super::quantise::cloud;
 use crate::geometry::{Pose, Vector};
@@ -24,6 +25,15 @@ pub(super) fn run_json(page: &RunPage) -> Result<String, serde_json::Error> {
 /// When a value cannot be written as JSON.
 pub(super) fn view_json(view: &View) -> Result<String, serde_json::Error> {
     Ok(inert(&serde_json::to_string(&document(view, &[], &[]))?))
+}
+
+/// The data of a page with charts only, as [`run_json`].
+///
+/// # Errors
+/// When a value cannot be written as JSON.
+pub(super) fn charts_json(charts: &[ChartGroup]) -> Result<String, serde_json::Error> {
+    let charts: Vec<Value> = charts.iter().map(chart_group).collect();
+    Ok(inert(&serde_json::to_string(&json!({ "charts": charts }))?))
 }
 
 fn document(view: &View, charts: &[Value], timeline: &[Value]) -> Value {
@@ -90,6 +100,7 @@ fn link(link: &Link) -> Value {
 
 fn chart_group(group: &ChartGroup) -> Value {
     let section = match group.section {
+        Section::Axis(name) => name,
         Section::Errors => "errors",
         Section::Clock => "clock",
         Section::Matching => "matching",
@@ -103,8 +114,16 @@ fn chart(chart: &Chart) -> Value {
     json!({
         "title": chart.title,
         "label": chart.label,
-        "log": chart.is_log,
-        "t": base64_f32(chart.t_s.iter().copied()),
+        "abscissa": match chart.abscissa {
+            Abscissa::Time => "time",
+            Abscissa::Frequency => "frequency",
+        },
+        "ordinate": match chart.ordinate {
+            Ordinate::Linear => "linear",
+            Ordinate::Logarithmic => "logarithmic",
+            Ordinate::Degrees => "degrees",
+        },
+        "x": base64_f32(chart.x.iter().copied()),
         "curves": chart.curves.iter().map(curve).collect::<Vec<_>>(),
     })
 }
@@ -118,6 +137,8 @@ fn curve(curve: &Curve) -> Value {
         CurveStyle::BandTop => "band-top",
         CurveStyle::BandBottom => "band-bottom",
         CurveStyle::Limit => "limit",
+        CurveStyle::Measured => "measured",
+        CurveStyle::Model => "model",
     };
     json!({ "name": curve.name, "style": style, "y": base64_f32(curve.values.iter().copied()) })
 }

@@ -3,6 +3,9 @@
 use crate::report::quantity::{percent, time};
 use crate::report::{CauseMetrics, EventMetrics, Metrics, rows, verdict};
 
+const SHELL: &str = include_str!("assets/page.html");
+const STYLE: &str = concat!(include_str!("assets/vendor/uplot.min.css"), include_str!("assets/style.css"));
+
 /// Escapes text for elements and attributes.
 pub(super) fn escaped(text: &str) -> String {
     let escape = |c: char| match c {
@@ -28,6 +31,68 @@ pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
         text += rest;
     }
     text
+}
+
+/// Everything that differs between pages; the shell is the same.
+pub(super) struct Document<'a> {
+    /// Kind of the page, which the scripts read.
+    pub kind: &'a str,
+    /// Title, as text.
+    pub title: &'a str,
+    /// Status of the verdict, as text; empty without one.
+    pub status: &'a str,
+    /// First paragraph, as HTML.
+    pub introduction: &'a str,
+    /// What works without scripts, as text.
+    pub without_scripts: &'a str,
+    /// Sections, as HTML.
+    pub sections: &'a str,
+    /// Last line, as text.
+    pub footer: &'a str,
+    /// Version of zsim that made the data.
+    pub version: &'a str,
+    /// Data of the scripts: JSON without `<`, `>` and `&`.
+    pub data: &'a str,
+    /// Scripts in the order of their dependencies.
+    pub scripts: &'a [&'a str],
+}
+
+impl Document<'_> {
+    /// The page as one HTML file; the same values give the same bytes.
+    pub fn html(&self) -> String {
+        fill(
+            SHELL,
+            &[
+                ("page", self.kind),
+                ("title", &escaped(self.title)),
+                ("status", &escaped(self.status)),
+                ("style", STYLE),
+                ("introduction", self.introduction),
+                ("without_scripts", &escaped(self.without_scripts)),
+                ("sections", self.sections),
+                ("footer", &escaped(self.footer)),
+                ("version", &escaped(self.version)),
+                ("data", self.data),
+                ("script", &self.scripts.join("\n")),
+            ],
+        )
+    }
+}
+
+/// A paragraph with the result in short.
+pub(super) fn summary(text: &str) -> String {
+    format!("<p class=\"summary\">{}</p>", escaped(text))
+}
+
+/// Figures as SVG, each under its name.
+pub(super) fn figures(figures: &[(String, String)]) -> String {
+    let figure = |(name, svg): &(String, String)| {
+        format!(
+            "<figure class=\"drawing\" tabindex=\"0\">\n<figcaption>{}</figcaption>\n{svg}</figure>\n",
+            escaped(name)
+        )
+    };
+    figures.iter().map(figure).collect()
 }
 
 /// The verdict: icon, status and reason.

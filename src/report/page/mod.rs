@@ -1,22 +1,26 @@
-//! Pages with a three-dimensional view, each one HTML file without external resources.
+//! Interactive pages, each one HTML file without external resources.
 //!
-//! The page of a run has the verdict, the view, interactive charts, the metrics and the manifest; that of a scene the view,
-//! the floor plan and the materials; that of a study its tables, plots and runs, without a view. Scripts, style sheets and data are in the file. A content security policy forbids
-//! network access.
+//! The page of a run has the verdict, a three-dimensional view, interactive charts, the metrics and the manifest; that of a
+//! scene the view, the floor plan and the materials; that of a study its tables, plots and runs; that of a gain measurement
+//! gain and phase of each axis. Scripts, style sheets and data are in the file. A content security policy forbids network
+//! access.
 
 mod binary;
 mod data;
 mod encode;
+mod gains;
 mod html;
 mod quantise;
 mod scene;
 mod study;
+mod table;
 
 use crate::report::rows;
 pub use data::{
-    Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Level, Link, RunPage, Section, TimedPose, TimelineRow, View,
-    ViewPoint,
+    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Level, Link, Ordinate, RunPage, Section,
+    TimedPose, TimelineRow, View, ViewPoint,
 };
+pub use gains::{AxisGains, GainsPage};
 
 /// Maximum number of points of the cloud on a page.
 ///
@@ -28,21 +32,28 @@ pub const MAX_PAGE_TRIANGLES: usize = 30_000;
 pub const MAX_PAGE_POSES: usize = 20_000;
 
 pub use scene::{MaterialRow, ScenePage};
-pub use study::{MAX_PAGE_RUNS, PageTable, StudyPage};
+pub use study::{MAX_PAGE_RUNS, StudyPage};
+pub use table::PageTable;
 
-const TEMPLATE: &str = include_str!("assets/page.html");
+const VIEW: &str = include_str!("assets/view.html");
 const RUN_SECTIONS: &str = include_str!("assets/run.html");
-const STYLE: &str = concat!(include_str!("assets/vendor/uplot.min.css"), include_str!("assets/style.css"));
-/// The script of the page: libraries, then the parts of the page in order of their dependencies.
-const SCRIPTS: [&str; 9] = [
-    include_str!("assets/vendor/vendor.min.js"),
-    include_str!("assets/data.js"),
+const LIBRARIES: &str = include_str!("assets/vendor/vendor.min.js");
+const DATA: &str = include_str!("assets/data.js");
+const CHARTS: &str = include_str!("assets/charts.js");
+const TABLES: &str = include_str!("assets/table.js");
+const READY: &str = include_str!("assets/ready.js");
+/// The scripts of a page with the view of a run or a scene, in the order of their dependencies.
+const VIEW_SCRIPTS: [&str; 11] = [
+    LIBRARIES,
+    DATA,
+    include_str!("assets/paths.js"),
     include_str!("assets/colour.js"),
     include_str!("assets/cloud.js"),
     include_str!("assets/head.js"),
     include_str!("assets/view.js"),
     include_str!("assets/controls.js"),
-    include_str!("assets/charts.js"),
+    CHARTS,
+    include_str!("assets/time_charts.js"),
     include_str!("assets/timeline.js"),
 ];
 
@@ -53,8 +64,7 @@ impl RunPage<'_> {
     /// When a value cannot be written as JSON.
     pub fn html(&self) -> Result<String, serde_json::Error> {
         let metrics = self.metrics;
-        let title = html::escaped(&rows::title(metrics));
-        let status = html::escaped(metrics.status.as_deref().unwrap_or_default());
+        let view = [("view_title", "Trajectory and cloud"), ("path", "estimate"), ("path_of", "head")];
         let sections = html::fill(
             RUN_SECTIONS,
             &[
@@ -63,25 +73,19 @@ impl RunPage<'_> {
                 ("manifest", &html::escaped(self.manifest)),
             ],
         );
-        Ok(html::fill(
-            TEMPLATE,
-            &[
-                ("page", "run"),
-                ("title", &title),
-                ("status", &status),
-                ("style", STYLE),
-                ("introduction", &html::verdict(metrics)),
-                ("without_scripts", "The folder plots/ has the plots as pictures."),
-                ("view_title", "Trajectory and cloud"),
-                ("path", "estimate"),
-                ("path_of", "head"),
-                ("sections", &sections),
-                ("footer", "Lines of the charts mark the time of the view; click on a chart to move to that time."),
-                ("version", &html::escaped(&metrics.version)),
-                ("data", &encode::run_json(self)?),
-                ("script", &SCRIPTS.join("\n")),
-            ],
-        ))
+        Ok(html::Document {
+            kind: "run",
+            title: &rows::title(metrics),
+            status: metrics.status.as_deref().unwrap_or_default(),
+            introduction: &html::verdict(metrics),
+            without_scripts: "The three-dimensional view and the charts need scripts. The folder plots/ has the plots as pictures.",
+            sections: &(html::fill(VIEW, &view) + &sections),
+            footer: "Lines of the charts mark the time of the view; click on a chart to move to that time.",
+            version: &metrics.version,
+            data: &encode::run_json(self)?,
+            scripts: &VIEW_SCRIPTS,
+        }
+        .html())
     }
 }
 

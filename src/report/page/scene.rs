@@ -1,7 +1,7 @@
 //! The page of a scene.
 
 use super::data::View;
-use super::{SCRIPTS, STYLE, TEMPLATE, encode, html};
+use super::{VIEW, VIEW_SCRIPTS, encode, html};
 use crate::report::plot::{Figure, PlotError};
 
 /// The page of a scene: its surfaces in three dimensions, a floor plan and its materials.
@@ -37,33 +37,29 @@ impl ScenePage<'_> {
     /// # Errors
     /// When the plan cannot be drawn, or a value cannot be written as JSON.
     pub fn html(&self) -> Result<String, PlotError> {
+        let view = [("view_title", "Surfaces and route"), ("path", "route"), ("path_of", "route")];
         let sections = format!(
-            "<section id=\"plan\"><h2>Floor plan and elevation</h2>\n{}</section>\n\
+            "{}<section id=\"plan\"><h2>Floor plan and elevation</h2>\n{}</section>\n\
              <section id=\"properties\"><h2>Contents</h2>\n<div class=\"tables\">\n{}{}</div></section>\n",
+            html::fill(VIEW, &view),
             self.plan.svg()?,
             html::table("scene", self.properties.iter().cloned()),
             html::table("materials", self.materials.iter().map(MaterialRow::cells)),
         );
         let data = encode::view_json(&self.view).map_err(|error| PlotError::Drawing(error.to_string()))?;
-        Ok(html::fill(
-            TEMPLATE,
-            &[
-                ("page", "scene"),
-                ("title", &html::escaped(self.name)),
-                ("status", ""),
-                ("style", STYLE),
-                ("introduction", ""),
-                ("without_scripts", "The floor plan below does not."),
-                ("view_title", "Surfaces and route"),
-                ("path", "route"),
-                ("path_of", "route"),
-                ("sections", &sections),
-                ("footer", ""),
-                ("version", env!("CARGO_PKG_VERSION")),
-                ("data", &data),
-                ("script", &SCRIPTS.join("\n")),
-            ],
-        ))
+        Ok(html::Document {
+            kind: "scene",
+            title: self.name,
+            status: "",
+            introduction: "",
+            without_scripts: "The three-dimensional view needs scripts; the floor plan below does not.",
+            sections: &sections,
+            footer: "",
+            version: env!("CARGO_PKG_VERSION"),
+            data: &data,
+            scripts: &VIEW_SCRIPTS,
+        }
+        .html())
     }
 }
 

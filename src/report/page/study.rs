@@ -1,10 +1,11 @@
 //! The page of a study: its tables, plots and runs.
 
-use super::STYLE;
-use super::html::{escaped, fill};
+use super::html::{self, escaped};
+use super::table::PageTable;
+use super::{DATA, READY, TABLES};
 
-const TEMPLATE: &str = include_str!("assets/study.html");
-const SCRIPT: &str = include_str!("assets/table.js");
+const SECTIONS: &str = include_str!("assets/study.html");
+const RUNS: &str = include_str!("assets/runs.js");
 /// Maximum number of runs in the table of the page; a row takes about half a kilobyte.
 pub const MAX_PAGE_RUNS: usize = 5_000;
 
@@ -25,75 +26,33 @@ pub struct StudyPage {
     pub runs_note: String,
 }
 
-/// A table of text; rows have as many cells as the header.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PageTable {
-    /// Title.
-    pub title: String,
-    /// Names of the columns.
-    pub header: Vec<String>,
-    /// Rows; the first cell names the row.
-    pub rows: Vec<Vec<String>>,
-}
-
 impl StudyPage {
     /// The HTML of the page; the same data give the same bytes.
     pub fn html(&self) -> String {
-        let tables: String = self
-            .tables
-            .iter()
-            .map(|table| format!("<section><h2>{}</h2>\n{}</section>\n", escaped(&table.title), table.html()))
-            .collect();
-        let figure = |(name, svg): &(String, String)| {
-            format!(
-                "<figure class=\"drawing\" tabindex=\"0\">\n<figcaption>{0}</figcaption>\n{svg}</figure>\n",
-                escaped(name)
-            )
-        };
-        fill(
-            TEMPLATE,
+        let sections = html::fill(
+            SECTIONS,
             &[
-                ("title", &escaped(&self.name)),
-                ("introduction", &escaped(&self.introduction)),
-                ("style", STYLE),
-                ("tables", &tables),
-                ("figures", &self.figures.iter().map(figure).collect::<String>()),
+                ("tables", &self.tables.iter().map(PageTable::section).collect::<String>()),
+                ("figures", &html::figures(&self.figures)),
                 ("runs", &self.runs.html()),
                 ("runs_note", &escaped(&self.runs_note)),
-                ("version", env!("CARGO_PKG_VERSION")),
-                ("script", SCRIPT),
             ],
-        )
+        );
+        html::Document {
+            kind: "study",
+            title: &self.name,
+            status: "",
+            introduction: &html::summary(&self.introduction),
+            without_scripts: "Sorting and filtering need scripts; the tables and plots do not.",
+            sections: &sections,
+            footer: "Click on a column's name to sort by it. Plots are also in the folder plots/, all figures in table.csv and \
+                     summary.csv.",
+            version: env!("CARGO_PKG_VERSION"),
+            data: "{}",
+            scripts: &[DATA, TABLES, RUNS, READY],
+        }
+        .html()
     }
-}
-
-impl PageTable {
-    fn html(&self) -> String {
-        let name = |cell: &String| match cell.as_str() {
-            "" => "<td></td>".to_owned(),
-            name => format!("<th scope=\"col\">{}</th>", escaped(name)),
-        };
-        let header: String = self.header.iter().map(name).collect();
-        let row = |cells: &Vec<String>| {
-            let cells = cells.iter().enumerate().map(|(k, cell)| match k {
-                0 => format!("<th scope=\"row\">{}</th>", escaped(cell)),
-                _ if is_figure(cell) => format!("<td>{}</td>", escaped(cell)),
-                _ => format!("<td class=\"text\">{}</td>", escaped(cell)),
-            });
-            format!("<tr>{}</tr>\n", cells.collect::<String>())
-        };
-        format!(
-            "<div class=\"wide\" tabindex=\"0\" role=\"group\" aria-label=\"{}\">\n<table class=\"sortable\">\n<thead><tr>{header}</tr></thead>\n\
-             <tbody>\n{}</tbody>\n</table>\n</div>\n",
-            escaped(&self.title),
-            self.rows.iter().map(row).collect::<String>()
-        )
-    }
-}
-
-/// Whether a cell has a number, or the mark of a missing one.
-fn is_figure(cell: &str) -> bool {
-    matches!(cell, "" | "-" | "lost") || cell.starts_with(|c: char| c.is_ascii_digit() || "+-\u{2212}".contains(c))
 }
 
 #[cfg(test)]

@@ -64,6 +64,10 @@ pub struct GainPoint {
     pub gain_sigma: f64,
     /// Gain of the linearised head.
     pub gain_model: f64,
+    /// Measured phase of the head relative to the base, rad, -pi to pi.
+    pub phase_rad: f64,
+    /// Phase of the linearised head, rad, -pi to pi.
+    pub phase_model_rad: f64,
 }
 
 /// Gain curve along or about one axis.
@@ -96,6 +100,12 @@ impl GainCurve {
         }
     }
 }
+
+/// Half width of the 95 % band of a normal distribution, in standard errors.
+pub(super) const SIGMAS_95: f64 = 1.96;
+
+/// Minimum coherence of a plotted gain: below it noise and nonlinearity dominate.
+pub(super) const MIN_COHERENCE: f64 = 0.5;
 
 /// Name of an axis in tables: `x_rot` for the angular rate about x, `x` for the acceleration along x.
 pub fn axis_name(axis: Axis) -> &'static str {

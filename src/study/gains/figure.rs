@@ -1,5 +1,6 @@
 //! Figures of gain curves.
 
+use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::{GainCurve, GainPoint, SwingPoint, SwingStudy};
 use crate::motion::Axis;
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
@@ -10,12 +11,6 @@ const PANELS: [(&str, &str, &[Axis]); 3] = [
     ("Horizontal accelerations; lines: closed form", "Gain, x and y", &[Axis::X, Axis::Y]),
     ("Vertical acceleration; line: closed form", "Gain, z", &[Axis::Z]),
 ];
-
-/// Minimum coherence of a plotted gain: below it noise and nonlinearity dominate.
-const MIN_COHERENCE: f64 = 0.5;
-
-/// Half width of the 95 % band of a normal distribution, in standard errors.
-const SIGMAS_95: f64 = 1.96;
 
 /// Gains in three panels as in the paper: measurement as dots with 95 % bands, closed form as lines.
 pub fn gain_figure(curves: &[GainCurve]) -> Figure {

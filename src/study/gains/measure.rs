@@ -173,12 +173,17 @@ fn curve(
         transfer_function(&base_signal, &head_signal, 1.0 / plan.step_s, Segments::periods(schedule.period))?;
     let points = plan.points.unwrap_or_else(|| head.default_points());
     let response = head.frequency_response(&points);
-    let point = |p: &TransferPoint| GainPoint {
-        freq_hz: p.freq_hz,
-        gain: p.gain(),
-        coherence: p.coherence,
-        gain_sigma: p.gain_sigma,
-        gain_model: response.gain(axis, p.freq_hz, plan.acceleration),
+    let point = |p: &TransferPoint| {
+        let model = response.transfer(axis, p.freq_hz, plan.acceleration);
+        GainPoint {
+            freq_hz: p.freq_hz,
+            gain: p.gain(),
+            coherence: p.coherence,
+            gain_sigma: p.gain_sigma,
+            gain_model: model.norm(),
+            phase_rad: p.response.arg(),
+            phase_model_rad: model.arg(),
+        }
     };
     // Skip the constant; the excited lines end at the highest frequency.
     let lines = measured.iter().skip(1).take_while(|p| p.freq_hz <= plan.up_to_hz * (1.0 + 1e-9));
@@ -231,7 +236,15 @@ mod tests {
         let point = |k: u32| {
             let f = f64::from(k) * 0.025;
             let gain = 1.0 / ((f0 * f0 - f * f).powi(2) + (2.0 * zeta * f0 * f).powi(2)).sqrt();
-            GainPoint { freq_hz: f, gain, coherence: 1.0, gain_sigma: 0.0, gain_model: gain }
+            GainPoint {
+                freq_hz: f,
+                gain,
+                coherence: 1.0,
+                gain_sigma: 0.0,
+                gain_model: gain,
+                phase_rad: 0.0,
+                phase_model_rad: 0.0,
+            }
         };
         let points: Vec<_> = (1..200).map(point).collect();
         let peak = highest_peak(&points).unwrap();

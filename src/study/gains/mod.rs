@@ -11,14 +11,16 @@ mod curve;
 mod drive;
 mod figure;
 mod measure;
+mod page;
 mod swing;
 mod table;
 
 pub use curve::{AXES, GainCurve, GainPlan, GainPoint, axis_name};
 pub use figure::{coherence_figure, coherence_panels, gain_figure, gain_panels, swing_figure};
 pub use measure::{gain_curve, gain_curves};
+pub use page::page;
 pub use swing::{SwingPoint, SwingStudy, swing_study};
-pub use table::{csv, swing_csv};
+pub use table::{csv, min_coherence, peak_table, swing_csv};
 
 use crate::dynamics::{DampingSpec, HeadSpec};
 use crate::motion::Axis;

@@ -1,19 +1,45 @@
-//! Gain curves as CSV.
+//! Gain curves as CSV, and their peaks as a table.
 
 use super::{GainCurve, SwingStudy, axis_name};
+use crate::dynamics::Peak;
 use std::fmt::Write;
 
-/// CSV with one row per frequency: `axis,freq_hz,gain,coherence,gain_model,gain_sigma`.
+/// The highest peak of each curve, simulated and in closed form: header and one row per axis.
+pub fn peak_table(curves: &[GainCurve]) -> (Vec<String>, Vec<Vec<String>>) {
+    let peak = |peak: Option<Peak>| match peak {
+        Some(p) => [format!("{:.3}", p.freq_hz), format!("{:.2}", p.gain)],
+        None => ["-".to_owned(), "-".to_owned()],
+    };
+    let row = |curve: &GainCurve| {
+        let ([hz, gain], [model_hz, model_gain]) = (peak(curve.peak), peak(curve.peak_model));
+        vec![axis_name(curve.axis).to_owned(), hz, gain, model_hz, model_gain, format!("{:.4}", min_coherence(curve))]
+    };
+    let header = ["axis", "peak Hz", "gain", "closed form Hz", "gain", "min coherence"];
+    (header.map(str::to_owned).to_vec(), curves.iter().map(row).collect())
+}
+
+/// The minimum coherence of a curve, 0 to 1.
+pub fn min_coherence(curve: &GainCurve) -> f64 {
+    curve.points.iter().map(|p| p.coherence).fold(1.0, f64::min)
+}
+
+/// CSV with one row per frequency: `axis,freq_hz,gain,coherence,gain_model,gain_sigma,phase_deg,phase_model_deg`.
 pub fn csv(curves: &[GainCurve]) -> String {
-    let mut text = "axis,freq_hz,gain,coherence,gain_model,gain_sigma\n".to_owned();
+    let mut text = "axis,freq_hz,gain,coherence,gain_model,gain_sigma,phase_deg,phase_model_deg\n".to_owned();
     for curve in curves {
         let axis = axis_name(curve.axis);
         for p in &curve.points {
             // Writing to a string does not fail.
             let _ = writeln!(
                 text,
-                "{axis},{:.6},{:.6e},{:.6},{:.6e},{:.3e}",
-                p.freq_hz, p.gain, p.coherence, p.gain_model, p.gain_sigma
+                "{axis},{:.6},{:.6e},{:.6},{:.6e},{:.3e},{:.3},{:.3}",
+                p.freq_hz,
+                p.gain,
+                p.coherence,
+                p.gain_model,
+                p.gain_sigma,
+                p.phase_rad.to_degrees(),
+                p.phase_model_rad.to_degrees()
             );
         }
     }

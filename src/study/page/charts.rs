@@ -6,7 +6,7 @@ use crate::estimation::WindowReport;
 use crate::evaluation::Errors;
 use crate::geometry::Vector;
 use crate::report::length_unit;
-use crate::report::page::{Chart, ChartGroup, Curve, CurveStyle, Section};
+use crate::report::page::{Abscissa, Chart, ChartGroup, Curve, CurveStyle, Ordinate, Section};
 use crate::study::integrity::Integrity;
 use crate::time::Stamp;
 
@@ -25,7 +25,7 @@ pub(super) fn all(results: &RunResults) -> Vec<ChartGroup> {
     groups.push(group(Section::Clock, vec![clock(results)]));
     groups.extend(windows(results));
     groups.push(group(Section::Motion, vec![turn_rate(results)]));
-    groups.retain(|group| group.charts.iter().any(|chart| !chart.t_s.is_empty()));
+    groups.retain(|group| group.charts.iter().any(|chart| !chart.x.is_empty()));
     groups
 }
 
@@ -35,7 +35,8 @@ fn decimated(count: usize) -> impl Iterator<Item = usize> + Clone {
 }
 
 fn chart(title: &str, label: String, t_s: Vec<f64>, curves: Vec<Curve>) -> Chart {
-    Chart { title: title.to_owned(), label, is_log: false, t_s, curves }
+    let (abscissa, ordinate) = (Abscissa::Time, Ordinate::Linear);
+    Chart { title: title.to_owned(), label, abscissa, ordinate, x: t_s, curves }
 }
 
 fn curve(name: &str, style: CurveStyle, values: Vec<f64>) -> Curve {
@@ -104,7 +105,7 @@ fn components(results: &RunResults) -> Vec<Chart> {
             kept.clone().map(|at| sign * BAND_SIGMAS * bounds[at].sigmas[axis] * sigma_factor).collect::<Vec<_>>()
         };
         let curves = vec![
-            curve("+2 sigma", CurveStyle::BandTop, band(1.0)),
+            curve("2 sigma", CurveStyle::BandTop, band(1.0)),
             curve("\u{2212}2 sigma", CurveStyle::BandBottom, band(-1.0)),
             curve("error", CurveStyle::Estimate, kept.clone().map(|at| error(bounds[at].stamp)).collect()),
         ];
@@ -168,7 +169,7 @@ fn windows(results: &RunResults) -> Vec<ChartGroup> {
     let residual = vec![curve("residual", CurveStyle::Estimate, values(&|window| window.residual_rms_m * 1e3))];
     let elapsed = vec![curve("window", CurveStyle::Estimate, values(&|window| window.elapsed_s * 1e3))];
     let weak = Chart {
-        is_log: true,
+        ordinate: Ordinate::Logarithmic,
         ..one(
             "Conditioning of the position, 1 if all directions are constrained alike",
             "Eigenvalue ratio",

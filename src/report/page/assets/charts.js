@@ -1,7 +1,15 @@
-// Interactive charts over time; their cursors move together, and a click moves the view to that time.
+// Interactive charts; their cursors move together.
 const CHART_HEIGHT = 220;
-const chartSync = vendor.uPlot.sync("time");
+const chartSync = vendor.uPlot.sync("charts");
 const plots = [];
+// Called with a plot when it is drawn, and with the abscissa of a click on a plot.
+const onDraw = [];
+const onPick = [];
+
+const ABSCISSAE = {
+  time: { label: "Time (s)", unit: "s", isLog: false },
+  frequency: { label: "Frequency (Hz)", unit: "Hz", isLog: true },
+};
 
 const LOOKS = {
   estimate: { colour: "estimate", width: 1.5 },
@@ -11,23 +19,26 @@ const LOOKS = {
   "band-top": { colour: "band", width: 0.5 },
   "band-bottom": { colour: "band", width: 0.5 },
   limit: { colour: "limit", width: 1.5, dash: [2, 4] },
+  measured: { colour: "estimate", width: 1, isDots: true },
+  model: { colour: "second", width: 1.5 },
 };
 
-const columns = ({ t, curves, log }) => {
-  const values = (text) => Array.from(floats(text), (y) => (Number.isFinite(y) && (!log || y > 0) ? y : null));
-  return [Array.from(floats(t)), ...curves.map(({ y }) => values(y))];
+const columns = ({ x, curves, ordinate }) => {
+  const isKnown = (y) => Number.isFinite(y) && (ordinate !== "logarithmic" || y > 0);
+  return [Array.from(floats(x)), ...curves.map(({ y }) => Array.from(floats(y), (y) => (isKnown(y) ? y : null)))];
 };
 
 // A curve of a chart in the colours of the theme.
 const series = ({ name, style }) => {
-  const { colour, width, dash, fill } = LOOKS[style];
+  const { colour, width, dash, fill, isDots } = LOOKS[style];
   return {
     label: name,
     stroke: () => themeColour(colour),
     fill: fill && (() => themeColour(fill)),
     width,
     dash,
-    points: { show: false },
+    paths: isDots ? () => null : undefined,
+    points: isDots ? { show: true, size: 4, fill: () => themeColour(colour) } : { show: false },
     spanGaps: false,
   };
 };
@@ -38,9 +49,19 @@ const bands = (curves) => {
   return top < 0 ? [] : [{ series: [top + 1, top + 2], fill: () => themeColour("band") }];
 };
 
-// A tick of a logarithmic axis: powers of ten only.
-const powers = (plot, splits) =>
-  splits.map((y) => (y > 0 && Math.abs(Math.log10(y) % 1) < 1e-9 ? (y < 0.01 ? y.toExponential(0) : String(y)) : ""));
+// The labels of a logarithmic axis: powers of ten, and on a short axis also 2 and 5 times these.
+const logarithmicTicks = (plot, splits, at) => {
+  const { min, max } = plot.scales[plot.axes[at].scale];
+  const shown = max / min < 300 ? [1, 2, 5] : [1];
+  const label = (y) => (y < 0.01 || y >= 1e4 ? y.toExponential(0) : String(Number(y.toPrecision(1))));
+  return splits.map((y) => (y > 0 && shown.includes(Math.round(y / 10 ** Math.floor(Math.log10(y) + 1e-9))) ? label(y) : ""));
+};
+
+// A logarithmic scale that ends at the data, where uPlot would add up to a decade.
+const logarithmicScale = (margin) => ({
+  distr: 3,
+  range: (plot, min, max) => (min > 0 ? [min / margin, Math.max(max, 1.01 * min) * margin] : [0.1, 10]),
+});
 
 const axis = (label) => ({
   label,
@@ -52,54 +73,62 @@ const axis = (label) => ({
   ticks: { stroke: () => themeColour("rule"), width: 1, size: 5 },
 });
 
-// Draws the time of the view on a chart.
-const nowLine = (plot) => {
-  const x = Math.round(plot.valToPos(timer.t, "x", true));
-  const { left, top, width, height } = plot.bbox;
-  if (x < left || x > left + width) return;
-  const { ctx } = plot;
-  ctx.save();
-  ctx.strokeStyle = themeColour("ink");
-  ctx.lineWidth = devicePixelRatio;
-  ctx.beginPath();
-  ctx.moveTo(x, top);
-  ctx.lineTo(x, top + height);
-  ctx.stroke();
-  ctx.restore();
-};
-
-const options = (chart, width, onValues) => ({
-  width,
-  height: CHART_HEIGHT,
-  legend: { show: false },
-  cursor: { sync: { key: chartSync.key }, drag: { x: true, y: false }, points: { size: 6 } },
-  scales: { x: { time: false }, y: chart.log ? { distr: 3 } : {} },
-  series: [{}, ...chart.curves.map(series)],
-  bands: bands(chart.curves),
-  axes: [{ ...axis("Time (s)"), space: 60, size: 34 }, { ...axis(chart.label), size: 62, ...(chart.log && { values: powers }) }],
-  hooks: { draw: [nowLine], setCursor: [(plot) => onValues(plot.cursor.idx)] },
+const abscissaAxis = ({ label, isLog }) => ({
+  ...axis(label),
+  space: isLog ? 30 : 60,
+  size: 34,
+  ...(isLog && { values: logarithmicTicks }),
 });
+
+// Angles have ticks at parts of a turn.
+const ordinateAxis = ({ label, ordinate }) => ({
+  ...axis(label),
+  size: 62,
+  ...(ordinate === "logarithmic" && { values: logarithmicTicks, space: 18 }),
+  ...(ordinate === "degrees" && { incrs: [1, 5, 15, 45, 90, 180, 360] }),
+});
+
+const options = (chart, width, onValues) => {
+  const abscissa = ABSCISSAE[chart.abscissa];
+  return {
+    width,
+    height: CHART_HEIGHT,
+    legend: { show: false },
+    cursor: { sync: { key: chartSync.key }, drag: { x: true, y: false }, points: { size: 6 } },
+    scales: {
+      x: { time: false, ...(abscissa.isLog && logarithmicScale(1)) },
+      y: chart.ordinate === "logarithmic" ? logarithmicScale(1.3) : {},
+    },
+    series: [{}, ...chart.curves.map(series)],
+    bands: bands(chart.curves),
+    axes: [abscissaAxis(abscissa), ordinateAxis(chart)],
+    hooks: { draw: [(plot) => onDraw.forEach((draw) => draw(plot))], setCursor: [(plot) => onValues(plot.cursor.idx)] },
+  };
+};
 
 // Names, line samples and values at the cursor.
 const keyList = (chart, values) => {
   const list = document.createElement("ul");
   list.className = "keys";
+  const place = list.appendChild(document.createElement("li"));
   const isBand = ({ style }) => style === "band-bottom";
   const outputs = chart.curves.map((curve) => {
     if (isBand(curve)) return null;
-    const { colour, dash } = LOOKS[curve.style];
+    const { colour, dash, isDots } = LOOKS[curve.style];
     const item = list.appendChild(document.createElement("li"));
     const isWide = curve.style === "band-top";
-    const stroke = `stroke="var(--${colour})" stroke-width="${isWide ? 8 : 2}" stroke-dasharray="${dash ?? ""}"`;
+    const stroke = `stroke="var(--${colour})" stroke-width="${isWide ? 8 : 2}" stroke-dasharray="${dash ?? (isDots ? "3 5" : "")}"`;
     item.innerHTML = `<svg viewBox="0 0 26 8" aria-hidden="true"><path d="M0 4H26" ${stroke}/></svg>`;
-    item.append(isWide ? "2 sigma" : curve.name, " ");
+    item.append(curve.name, " ");
     return item.appendChild(document.createElement("b"));
   });
-  const show = (index) =>
+  const show = (index) => {
+    place.textContent = index == null ? "" : `${threeDigits(values[0][index])} ${ABSCISSAE[chart.abscissa].unit}:`;
     outputs.forEach((output, k) => {
       const value = index == null ? null : values[k + 1][index];
       if (output) output.textContent = value == null ? "" : threeDigits(value);
     });
+  };
   return { list, show };
 };
 
@@ -111,7 +140,7 @@ const description = (chart, values) => {
     const [low, high] = known.reduce(([low, high], y) => [Math.min(low, y), Math.max(high, y)], [Infinity, -Infinity]);
     return `${name}: ${threeDigits(low)} to ${threeDigits(high)}`;
   };
-  return `${chart.title}. ${chart.label}, over time. ${chart.curves.map(range).join("; ")}.`;
+  return `${chart.title}. ${chart.label}, over ${chart.abscissa}. ${chart.curves.map(range).join("; ")}.`;
 };
 
 class ChartFigure {
@@ -123,6 +152,8 @@ class ChartFigure {
     else caption.textContent = charts[0].title;
     this.place = this.figure.appendChild(document.createElement("div"));
     this.place.setAttribute("role", "img");
+    this.place.tabIndex = 0;
+    this.place.addEventListener("keydown", (event) => this.onKey(event));
     this.keys = this.figure.appendChild(document.createElement("div"));
     this.show(charts[0]);
     plots.push(this);
@@ -145,8 +176,20 @@ class ChartFigure {
     this.plot = new vendor.uPlot(options(chart, this.width, keys.show), values, this.place);
     this.plot.over.addEventListener("click", () => {
       const { left } = this.plot.cursor;
-      if (left >= 0) timer.set(this.plot.posToVal(left, "x"));
+      if (left >= 0) onPick.forEach((pick) => pick(this.plot.posToVal(left, "x")));
     });
+  }
+
+  // Moves the cursor by one point with the arrow keys, by ten with shift; its values are then read aloud.
+  onKey(event) {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!step || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    const [x] = this.plot.data;
+    const from = this.plot.cursor.idx ?? (step > 0 ? -1 : x.length);
+    const index = Math.min(Math.max(from + step * (event.shiftKey ? 10 : 1), 0), x.length - 1);
+    this.keys.setAttribute("aria-live", "polite");
+    this.plot.setCursor({ left: this.plot.valToPos(x[index], "x"), top: this.plot.over.clientHeight / 2 }, true, true);
   }
 
   get width() {
@@ -170,12 +213,3 @@ for (const { section, charts } of data.charts) {
 plots.forEach((figure) => figure.fit());
 addEventListener("resize", () => plots.forEach((figure) => figure.fit()));
 onTheme.push(() => plots.forEach((figure) => figure.redraw()));
-let isRedrawing = false;
-timer.listeners.push(() => {
-  if (isRedrawing) return;
-  isRedrawing = true;
-  setTimeout(() => {
-    isRedrawing = false;
-    plots.forEach((figure) => figure.redraw());
-  }, 100);
-});

@@ -1,4 +1,4 @@
-// Tables that are sorted by a click on a column's name; the table of the runs is also filtered by words.
+// Tables that are sorted by a click on a column's name.
 
 // The sorting key of a cell: numbers by value, "lost" above all, text by letters, missing ones last.
 function sortingKey(text) {
@@ -38,21 +38,3 @@ for (const table of document.querySelectorAll("table.sortable")) {
     button.addEventListener("click", () => sortBy(table, column, button));
   });
 }
-
-const filter = document.getElementById("filter");
-const runRows = [...document.querySelectorAll("#runs tbody tr")];
-const runWords = runRows.map((row) => row.textContent.toLowerCase());
-
-function showMatching() {
-  const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-  let shown = 0;
-  runRows.forEach((row, k) => {
-    row.hidden = !words.every((word) => runWords[k].includes(word));
-    if (!row.hidden) shown += 1;
-  });
-  document.getElementById("shown").textContent = `${shown} of ${runRows.length} runs`;
-}
-
-filter.addEventListener("input", showMatching);
-showMatching();
-document.documentElement.dataset.drawn = "true";

@@ -1,0 +1,53 @@
+//! Tables that can be sorted.
+
+use super::html::escaped;
+
+/// A table of text; rows have as many cells as the header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PageTable {
+    /// Title.
+    pub title: String,
+    /// Names of the columns.
+    pub header: Vec<String>,
+    /// Rows; the first cell names the row.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl PageTable {
+    /// The table under its title.
+    pub(super) fn section(&self) -> String {
+        format!("<section><h2>{}</h2>\n{}</section>\n", escaped(&self.title), self.html())
+    }
+
+    /// The table, which scrolls if it is too wide.
+    pub(super) fn html(&self) -> String {
+        let class = |k: usize| match self.rows.first().and_then(|row| row.get(k)) {
+            Some(cell) if k > 0 && is_figure(cell.as_str()) => " class=\"figure\"",
+            _ => "",
+        };
+        let name = |(k, cell): (usize, &String)| match cell.as_str() {
+            "" => "<td></td>".to_owned(),
+            name => format!("<th scope=\"col\"{}>{}</th>", class(k), escaped(name)),
+        };
+        let header: String = self.header.iter().enumerate().map(name).collect();
+        let row = |cells: &Vec<String>| {
+            let cells = cells.iter().enumerate().map(|(k, cell)| match k {
+                0 => format!("<th scope=\"row\">{}</th>", escaped(cell)),
+                _ if is_figure(cell) => format!("<td>{}</td>", escaped(cell)),
+                _ => format!("<td class=\"text\">{}</td>", escaped(cell)),
+            });
+            format!("<tr>{}</tr>\n", cells.collect::<String>())
+        };
+        format!(
+            "<div class=\"wide\" tabindex=\"0\" role=\"group\" aria-label=\"{}\">\n<table class=\"sortable\">\n<thead><tr>{header}</tr></thead>\n\
+             <tbody>\n{}</tbody>\n</table>\n</div>\n",
+            escaped(&self.title),
+            self.rows.iter().map(row).collect::<String>()
+        )
+    }
+}
+
+/// Whether a cell has a number, or the mark of a missing one.
+fn is_figure(cell: &str) -> bool {
+    matches!(cell, "" | "-" | "lost") || cell.starts_with(|c: char| c.is_ascii_digit() || "+-\u{2212}".contains(c))
+}
