@@ -14,7 +14,7 @@ mod source;
 mod unit;
 
 pub use error::SpecError;
-pub use library::{Kind, MAX_SPEC_BYTES, find, names, text_file};
+pub use library::{Kind, MAX_SPEC_BYTES, find, find_from, name_from, names, text_file};
 pub use source::Source;
 pub use unit::split_unit;
 
