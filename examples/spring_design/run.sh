@@ -6,6 +6,4 @@ here=$(realpath "$(dirname "$0")")
 
 zsim check "$here/head.ron"
 zsim --quiet spring "$here/head.ron"
-out=$PWD
-cd "$here" # names in design.ron are relative to the current folder
-zsim --quiet spring design design.ron --out "$out/springs" --force
+zsim --quiet spring design "$here/design.ron" --out springs --force

@@ -115,7 +115,7 @@ fn kind_by_folder(file: &str) -> Option<Kind> {
 fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
     match kind {
         Kind::Scene => parse::<SceneSpec>(source).map(drop),
-        Kind::Head => parse::<HeadSpec>(source).map(drop),
+        Kind::Head => HeadSpec::read(source).map(drop),
         Kind::Motion => parse::<MotionSpec>(source).map(drop),
         Kind::Lidar => parse::<LidarSpec>(source).map(drop),
         Kind::Imu => parse::<ImuSpec>(source).map(drop),
@@ -164,7 +164,7 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
             Ok(_) => Ok(()),
             Err(WorldError::Scene(error) | WorldError::Mesh(error)) => Err(error),
         },
-        Kind::Head => match HeadModel::new(&parse::<HeadSpec>(source)?, source) {
+        Kind::Head => match HeadModel::new(&HeadSpec::read(source)?, source) {
             Ok(_) => Ok(()),
             Err(zsim::dynamics::DynamicsError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),

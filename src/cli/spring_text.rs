@@ -124,8 +124,7 @@ fn under_shake(shaken: &ShakeResponse) -> String {
 
 /// The result of a search.
 pub(super) fn design(study: &DesignStudy) -> String {
-    let header =
-        ["D mm", "d mm", "coils", "L mm", "Hz", "view deg", "simulated", "rate", "sag mm", "g", "stress", "in limits"];
+    let header = ["coil", "Hz", "view", "simulated", "rate", "sag", "g", "stress", "holds"];
     let rows: Vec<_> = study
         .candidates
         .iter()
@@ -156,5 +155,9 @@ pub(super) fn design(study: &DesignStudy) -> String {
     if rows.is_empty() {
         return counts + "no design is within all limits: widen the bounds or relax a limit\n";
     }
-    format!("{counts}\n{}", table(&header, &rows, true))
+    let legend = "coil: mean diameter x wire diameter x active coils x free length, mm. Rocking frequency (Hz)\n\
+                  and field of view (deg) in closed form; field of view (deg), maximum rate (deg/s) and\n\
+                  stress / yield strength simulated. sag: static compression, mm. g: mass of the wire.\n\
+                  holds: whether the simulated figures are within the limits.\n";
+    format!("{counts}\n{}\n{legend}", table(&header, &rows, true))
 }

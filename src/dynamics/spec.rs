@@ -5,7 +5,7 @@ use super::carrier::CarrierSpec;
 use super::elements::{CableSpec, ElementSpec, SpringMassSpec};
 pub use super::placement::PlacementSpec;
 use crate::elasticity::SpringSpec;
-use crate::spec::{Kind, Source, SpecError, checked, find, parse};
+use crate::spec::{Kind, Source, SpecError, checked, find, name_from, parse};
 use serde::{Deserialize, Serialize};
 
 /// A head, the linkage to the base, and the carrier.
@@ -36,7 +36,39 @@ pub struct HeadSpec {
 /// When there is no such head, or the file is invalid.
 pub fn load(name: &str) -> Result<(HeadSpec, Source), SpecError> {
     let source = find(Kind::Head, name)?;
-    Ok((parse(&source)?, source))
+    Ok((HeadSpec::read(&source)?, source))
+}
+
+impl HeadSpec {
+    /// Parses `source`; files of springs are relative to its folder.
+    ///
+    /// # Errors
+    /// If the text is invalid.
+    pub fn read(source: &Source) -> Result<Self, SpecError> {
+        Ok(parse::<Self>(source)?.with_files_of(source))
+    }
+
+    /// The head with the paths of the spring files that are in the folder of `source`.
+    #[must_use]
+    pub fn with_files_of(mut self, source: &Source) -> Self {
+        let springs: Vec<&mut SpringSpec> = match &mut self.linkage {
+            LinkageSpec::Spring { spring, .. } => vec![spring],
+            LinkageSpec::Suspension { elements, .. } => {
+                let springs = elements.iter_mut().filter_map(|element| match element {
+                    ElementSpec::Spring(mounted) => Some(&mut mounted.spring),
+                    ElementSpec::Cord(_) | ElementSpec::Float(_) | ElementSpec::UniversalJoint(_) => None,
+                });
+                springs.collect()
+            }
+            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => Vec::new(),
+        };
+        for spring in springs {
+            if let SpringSpec::Named(name) = spring {
+                *name = name_from(source, name);
+            }
+        }
+        self
+    }
 }
 
 /// A part of the head: a rigid body.

@@ -8,29 +8,63 @@ use crate::time::Stamp;
 const TIME: &str = "Time (s)";
 /// Duration of the enlarged section of the pitch plot, s: several periods of the rocking mode.
 const CLOSE_UP_S: f64 = 10.0;
+/// Height of the side view, points.
+const SIDE_VIEW_HEIGHT: f64 = 210.0;
+/// Margins of the views as fractions of the range.
+const MAP_MARGIN: f64 = 0.04;
+const HEIGHT_MARGIN: f64 = 0.06;
+/// Minimum range of the axes of the side view, m: a sensor at rest is a line, not noise that fills the chart.
+const MIN_RANGE_M: f64 = 0.1;
 
-/// Top view of the true and the estimated trajectory, over the outline of the walls.
+/// Top view and side view of the true and the estimated trajectory; the top view also shows the outline of the walls.
 ///
 /// `truth` is empty if it is not known; the estimate is then in the map frame.
-pub fn trajectory_top_view(truth: &Trajectory, estimate: &Trajectory, outline_in_world: &[Vector]) -> Figure {
-    let outline = outline_in_world.iter().map(|point| (point.x, point.y)).collect();
-    let chart = Chart::new("Trajectory, top view", "x (m)", "y (m)")
-        .as_map()
-        .with(Series::dots("", Colour::Backdrop, outline).marked(Mark::Dots(1.0)));
-    Figure::of(vec![with_truth_and_estimate(chart, &horizontal_positions(truth), &horizontal_positions(estimate))])
+pub fn trajectory_views(truth: &Trajectory, estimate: &Trajectory, outline_in_world: &[Vector]) -> Figure {
+    let top = |at: &Vector| (at.x, at.y);
+    let side = |at: &Vector| (at.x, at.z);
+    let outline = Series::dots("", Colour::Backdrop, outline_in_world.iter().map(top).collect());
+    let top_chart = Chart::new("Trajectory, top view", "x (m)", "y (m)").as_map().with(outline.marked(Mark::Dots(1.0)));
+    let positions = || [truth, estimate].into_iter().flat_map(Trajectory::poses).map(|pose| &pose.translation.vector);
+    // The range in x is that of the top view; heights vary by centimetres over a way of many metres.
+    let x = range(positions().chain(outline_in_world).map(|at| at.x), MAP_MARGIN);
+    let z = range(positions().map(|at| at.z), HEIGHT_MARGIN);
+    let side_chart = Chart::new("Trajectory, side view (heights not to scale)", "x (m)", "z (m)").between(x, z);
+    let mut figure = Figure::of(vec![view(top_chart, truth, estimate, top), view(side_chart, truth, estimate, side)]);
+    figure.chart_height = SIDE_VIEW_HEIGHT;
+    figure
 }
 
-fn horizontal_positions(trajectory: &Trajectory) -> Vec<(f64, f64)> {
-    trajectory.poses().iter().map(|pose| (pose.translation.x, pose.translation.y)).collect()
-}
-
-/// Adds the truth, and the estimate in front of it, to a chart; an empty curve is omitted.
-fn with_truth_and_estimate(mut chart: Chart, truth: &[(f64, f64)], estimate: &[(f64, f64)]) -> Chart {
-    if !truth.is_empty() {
-        chart = chart.with(Series::line("truth", Colour::Truth, truth.to_vec()).marked(Mark::Line(2.2)));
+/// Range of `values`, widened to [`MIN_RANGE_M`] and on both sides by the fraction `margin`; the unit interval without values.
+fn range(values: impl Iterator<Item = f64>, margin: f64) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
+    if low > high {
+        return (0.0, 1.0);
     }
+    let half = (0.5 + margin) * (high - low).max(MIN_RANGE_M);
+    (0.5 * (low + high) - half, 0.5 * (low + high) + half)
+}
+
+/// Adds both trajectories with start and end of the estimate to a chart.
+fn view(chart: Chart, truth: &Trajectory, estimate: &Trajectory, project: fn(&Vector) -> (f64, f64)) -> Chart {
+    let projected = |trajectory: &Trajectory| -> Vec<(f64, f64)> {
+        trajectory.poses().iter().map(|pose| project(&pose.translation.vector)).collect()
+    };
+    let estimate = projected(estimate);
+    let ends = estimate.first().copied().zip(estimate.last().copied());
+    let chart = with_truth_and_estimate(chart, &projected(truth), &estimate);
+    match ends {
+        Some((start, end)) => chart.with_ends(start, Some(end)),
+        None => chart,
+    }
+}
+
+/// Adds the estimate, and the truth as dashes in front of it, to a chart; an empty curve is omitted.
+fn with_truth_and_estimate(mut chart: Chart, truth: &[(f64, f64)], estimate: &[(f64, f64)]) -> Chart {
     if !estimate.is_empty() {
-        chart = chart.with(Series::line("estimate", Colour::Estimate, estimate.to_vec()).marked(Mark::Line(1.1)));
+        chart = chart.with(Series::line("estimate", Colour::Estimate, estimate.to_vec()).marked(Mark::Line(2.4)));
+    }
+    if !truth.is_empty() {
+        chart = chart.with(Series::line("truth", Colour::Truth, truth.to_vec()).marked(Mark::Dashes(1.0)));
     }
     chart
 }

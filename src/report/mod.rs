@@ -6,6 +6,7 @@ mod brief;
 mod figures;
 mod integrity;
 mod metrics;
+mod names;
 pub mod page;
 pub mod plot;
 mod profile;
@@ -18,13 +19,14 @@ mod verdict;
 pub use brief::brief;
 pub use figures::{
     bound_over_time, clock_offset, errors_over_time, head_pitch, length_unit, open_and_closed_loop_errors,
-    trajectory_top_view,
+    trajectory_views,
 };
 pub use integrity::{CauseMetrics, EventMetrics, IntegrityMetrics};
 pub use metrics::{
     ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, LoopMetrics, Metrics, OpenLoopMetrics,
     SimulationMetrics,
 };
+pub use names::{axis_label, quantity_name};
 pub use profile::timing_table;
 pub use sensors::{NoiseMetrics, SensorMetrics};
 pub use table::{markdown, summary, table};

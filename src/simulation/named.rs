@@ -88,11 +88,12 @@ impl NamedSpec for HeadSpec {
     const KIND: Kind = Kind::Head;
 
     /// A spring that is given by name is replaced by its description, so that its settings can be varied.
-    fn resolved(mut self, _source: &Source) -> Result<Self, SimulationError> {
-        if let LinkageSpec::Spring { spring, .. } = &mut self.linkage {
+    fn resolved(self, source: &Source) -> Result<Self, SimulationError> {
+        let mut head = self.with_files_of(source);
+        if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
             *spring = spring.resolved()?;
         }
-        Ok(self)
+        Ok(head)
     }
 }
 

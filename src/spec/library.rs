@@ -120,18 +120,52 @@ impl Kind {
 /// # Errors
 /// If there is no such spec (the error lists the known names), or the file cannot be read.
 pub fn find(kind: Kind, name: &str) -> Result<Source, SpecError> {
-    let file = if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") };
+    found(kind, name)?.ok_or_else(|| {
+        let message = format!("no such {}: not a file, not in {}/, not built in", kind.noun(), kind.folder());
+        SpecError::plain(name, message).with_help(help(kind))
+    })
+}
+
+/// Finds the spec of `kind` that the spec `referring` calls `name`: in the folder of `referring`, then as [`find`] does.
+///
+/// # Errors
+/// If there is no such spec, with the position of the name in `referring`, or if the file cannot be read.
+pub fn find_from(kind: Kind, referring: &Source, name: &str) -> Result<Source, SpecError> {
+    found(kind, &name_from(referring, name))?.ok_or_else(|| {
+        let folder = referring.folder.as_ref().map_or_else(String::new, |folder| match folder.to_str() {
+            Some("") | None => "the folder of this file, ".to_owned(),
+            Some(folder) => format!("{folder}/, "),
+        });
+        let message = format!("no such {}: \"{name}\" is not in {folder}{}/, not built in", kind.noun(), kind.folder());
+        SpecError::about(referring, name, message).with_help(help(kind))
+    })
+}
+
+/// The name by which [`find`] finds the spec that `referring` calls `name`: the path of a file in the folder of
+/// `referring` if there is one, otherwise `name`.
+pub fn name_from(referring: &Source, name: &str) -> String {
+    let Some(folder) = &referring.folder else { return name.to_owned() };
+    let candidates = [folder.join(name), folder.join(file_of(name))];
+    candidates.iter().find(|path| path.is_file()).map_or_else(|| name.to_owned(), |path| path.display().to_string())
+}
+
+fn found(kind: Kind, name: &str) -> Result<Option<Source>, SpecError> {
+    let file = file_of(name);
     let local = Path::new(kind.folder()).join(&file);
     let candidates = [PathBuf::from(name), PathBuf::from(&file), local];
-    if let Some(path) = candidates.iter().find(|path| path.is_file()) {
-        return Source::read(path);
+    match candidates.iter().find(|path| path.is_file()) {
+        Some(path) => Source::read(path).map(Some),
+        None => Ok(built_in(kind, &file)),
     }
-    if let Some(source) = built_in(kind, &file) {
-        return Ok(source);
-    }
-    let noun = kind.noun();
-    Err(SpecError::plain(name, format!("no such {noun}: not a file, not in {}/, not built in", kind.folder()))
-        .with_help(format!("built in are: {}", names(kind).join(", "))))
+}
+
+/// File name of the spec `name`.
+fn file_of(name: &str) -> String {
+    if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") }
+}
+
+fn help(kind: Kind) -> String {
+    format!("built in are: {}", names(kind).join(", "))
 }
 
 fn built_in(kind: Kind, file: &str) -> Option<Source> {

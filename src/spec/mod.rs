@@ -11,10 +11,12 @@ mod error;
 mod library;
 mod ron_options;
 mod source;
+mod unit;
 
 pub use error::SpecError;
-pub use library::{Kind, MAX_SPEC_BYTES, find, names, text_file};
+pub use library::{Kind, MAX_SPEC_BYTES, find, find_from, name_from, names, text_file};
 pub use source::Source;
+pub use unit::split_unit;
 
 use ron_options::options;
 use serde::de::DeserializeOwned;

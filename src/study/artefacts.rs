@@ -4,8 +4,9 @@ use super::StudyError;
 use super::atomic_file::write_text;
 use super::decimation::decimated;
 use super::page::RunResults;
-use super::register::SampledBeam;
+use super::register::{ProjectedBeam, SampledBeam};
 use super::result_files::METRICS;
+use crate::estimation::ReturnClass;
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report;
 use crate::report::page::RunPage;
@@ -24,18 +25,22 @@ pub(super) struct Plot {
     figure: Figure,
 }
 
-/// The plots of an estimate.
-pub(super) fn plots(results: &RunResults, sample: &[SampledBeam]) -> Vec<Plot> {
+/// The plots of an estimate; returns closer than `min_range_m` are from the carrier.
+pub(super) fn plots(results: &RunResults, sample: &[SampledBeam], min_range_m: f64) -> Vec<Plot> {
     let RunResults { open: run, best, open_errors, bound, .. } = *results;
     let comparison = best.comparison;
     let world_from_map = comparison.and_then(|found| found.world_from_map).unwrap_or_else(Pose::identity);
     let estimate = decimated(best.map_from_head.iter().map(|(stamp, pose)| (stamp, world_from_map * pose)));
     let no_truth = Trajectory::new();
     let truth = comparison.map_or(&no_truth, |found| &found.truth);
-    let outline = outline(sample, &world_from_map, &estimate);
+    let is_wall = |beam: &&SampledBeam| {
+        let ProjectedBeam { point, origin } = beam.in_map;
+        beam.class == ReturnClass::Static && (point - origin).norm() >= min_range_m
+    };
+    let outline = outline(sample.iter().filter(is_wall), &world_from_map, &estimate);
     let plot = |name, figure: Figure| Plot { name, figure };
 
-    let mut plots = vec![plot("trajectory", report::trajectory_top_view(truth, &estimate, &outline))];
+    let mut plots = vec![plot("trajectory", report::trajectory_views(truth, &estimate, &outline))];
     if let Some(errors) = comparison.and_then(|found| found.errors.as_ref()).map(|errors| &errors.decimated) {
         plots.push(plot("errors", report::errors_over_time(errors)));
         plots.extend(open_errors.map(|open| plot("loops", report::open_and_closed_loop_errors(open, errors))));
@@ -47,12 +52,15 @@ pub(super) fn plots(results: &RunResults, sample: &[SampledBeam]) -> Vec<Plot> {
     plots
 }
 
-/// Outline of the walls in the top view: cloud points near the head's mean height, one for each cell.
-fn outline(sample: &[SampledBeam], world_from_map: &Pose, estimate: &Trajectory) -> Vec<Vector> {
+/// Outline of the walls in the top view: end points of beams near the head's mean height, one for each cell.
+fn outline<'a>(
+    beams: impl Iterator<Item = &'a SampledBeam>,
+    world_from_map: &Pose,
+    estimate: &Trajectory,
+) -> Vec<Vector> {
     let heights = estimate.poses().iter().map(|pose| pose.translation.z);
     let height = heights.sum::<f64>() / estimate.len().max(1) as f64;
-    let at_height = sample
-        .iter()
+    let at_height = beams
         .map(|beam| world_from_map.rotation * beam.in_map.point + world_from_map.translation.vector)
         .filter(|point| (point.z - height).abs() < SLICE_HALF_HEIGHT_M);
     let cells: BTreeSet<(i64, i64)> =

@@ -162,7 +162,7 @@ pub(super) fn estimate_in(
         pairs: pairs.as_ref(),
         points: &registered.page_points,
     };
-    let plots = artefacts::plots(&results, &registered.sample);
+    let plots = artefacts::plots(&results, &registered.sample, options.estimator.surfels.min_range_m);
     artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?)?)?;
     Ok(EstimateResult { metrics, timing: loops.open.timing })
 }

@@ -2,9 +2,8 @@
 
 use super::build::build;
 use super::{ItemSpec, SceneSpec, ShapeSpec, WorldError};
-use crate::spec::{Kind, Source, SpecError, find, parse};
+use crate::spec::{Kind, Source, SpecError, find_from, parse};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 /// Maximum depth of included scenes.
 const MAX_INCLUDE_DEPTH: usize = 16;
@@ -32,7 +31,8 @@ fn flatten(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError>
     let mut others: Option<SceneSpec> = None;
     for name in &spec.include {
         let wrong = |what: String| SpecError::about(source, name, format!("the included scene `{name}` {what}"));
-        let other = find_included(source, name).map_err(|error| wrong(format!("is missing: {}", error.message())))?;
+        let other =
+            find_from(Kind::Scene, source, name).map_err(|error| wrong(format!("is missing: {}", error.message())))?;
         if chain.iter().any(|before| before.text == other.text) {
             return Err(wrong("includes itself, directly or through another".to_owned()).into());
         }
@@ -54,16 +54,6 @@ fn flatten(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError>
     let Some(others) = others else { return Ok(own) };
     let default_route = own.default_route.clone().or_else(|| others.default_route.clone());
     Ok(SceneSpec { name: own.name.clone(), default_route, ..merge(others, own, source)? })
-}
-
-/// Finds the scene `name` in the folder of `source`, otherwise in the library.
-fn find_included(source: &Source, name: &str) -> Result<Source, SpecError> {
-    let file = if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") };
-    let path: Option<PathBuf> = source.folder.as_ref().map(|folder| folder.join(file));
-    match path.filter(|path| path.is_file()) {
-        Some(path) => Source::read(&path),
-        None => find(Kind::Scene, name),
-    }
 }
 
 fn has_meshes(spec: &SceneSpec) -> bool {

@@ -73,6 +73,33 @@ fn a_catalogue_is_searched_completely() {
 }
 
 #[test]
+fn files_that_a_search_names_are_relative_to_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |kind, name: &str| find(kind, name).unwrap().text;
+    std::fs::write(folder.path().join("mine.ron"), text(Kind::Head, "handheld_2")).unwrap();
+    let catalogue = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material\n\
+                     a,25.0,3.0,12.0,120.0,spring_steel\n";
+    std::fs::write(folder.path().join("springs.csv"), catalogue).unwrap();
+    let design = text(Kind::Study, "spring_stock").replace("\"stock\"", "\"springs.csv\"");
+    let search = |head: &str| {
+        let path = folder.path().join("design.ron");
+        std::fs::write(&path, design.replace("\"handheld\"", &format!("\"{head}\""))).unwrap();
+        let source = Source::read(&path).unwrap();
+        let spec: DesignSpec = parse(&source).unwrap();
+        DesignSearch::new(&spec, &source).map(|search| search.run(&|_| ()).unwrap())
+    };
+    // With and without the extension; a name without a file is that of a shipped head.
+    for head in ["mine.ron", "mine", "handheld"] {
+        assert_eq!(search(head).unwrap().evaluated, 1, "{head}");
+    }
+    let error = search("other.ron").map(|_| ()).unwrap_err().to_string();
+    let expected =
+        format!("no such head: \"other.ron\" is not in {}/, specs/heads/, not built in", folder.path().display());
+    assert!(error.contains(&expected), "{error}");
+    assert!(error.contains("design.ron:3:12"), "the position in the file of the search: {error}");
+}
+
+#[test]
 fn an_invalid_search_is_an_error_with_the_reason() {
     let (spec, source) = load("spring_design");
     let wrong = |change: fn(&mut DesignSpec)| {

@@ -375,6 +375,28 @@ fn invalid_sweeps_are_errors_with_the_line() {
 }
 
 #[test]
+fn specs_that_a_sweep_names_are_relative_to_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let specs = folder.path().join("specs");
+    std::fs::create_dir(&specs).unwrap();
+    let text = |name: &str| zsim::spec::find(zsim::spec::Kind::Head, name).unwrap().text;
+    std::fs::write(specs.join("mine.ron"), text("handheld")).unwrap();
+    std::fs::write(specs.join("other.ron"), text("handheld_2")).unwrap();
+    let sweep = r#"(
+        base: spring(head: "mine.ron", shake: (pitch_deg: 2.0)),
+        axes: [values(path: "head", values: ["mine.ron", "other", "handheld_2"])],
+        sampling: grid,
+        measures: [rocking_hz],
+    )"#;
+    std::fs::write(specs.join("heads.ron"), sweep).unwrap();
+    run_ok(folder.path(), "sweep plan specs/heads.ron -o swept");
+    run_ok(folder.path(), "sweep run swept");
+    run_ok(folder.path(), "sweep merge swept");
+    let [mine, other, shipped] = numbers(&folder.path().join("swept"), "rocking_hz")[..] else { panic!() };
+    assert!(other == shipped && mine != shipped, "{mine} {other} {shipped}");
+}
+
+#[test]
 fn every_shipped_study_is_valid() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let files = std::fs::read_dir(root.join("specs/studies")).unwrap();

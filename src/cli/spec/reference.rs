@@ -1,11 +1,9 @@
 //! The reference of a kind of spec, as Markdown, from the JSON schema of its types.
 
-mod unit;
-
 use schemars::Schema;
 use serde_json::Value;
 use std::collections::{BTreeSet, VecDeque};
-use zsim::spec::Kind;
+use zsim::spec::{Kind, split_unit};
 
 const HEADER: &str = "| key | type | unit | default | range | meaning |\n|---|---|---|---|---|---|\n";
 
@@ -85,7 +83,7 @@ fn keys_of(schema: &Value) -> Option<String> {
             None | Some(Value::Null) => "none".to_owned(),
             Some(default) => code(default),
         };
-        let unit = unit::of(key).unwrap_or_default();
+        let unit = split_unit(key).1.unwrap_or_default();
         format!(
             "| `{key}` | {} | {unit} | {default} | {} | {} |\n",
             type_of(schema),

@@ -56,13 +56,15 @@ fn decimals_of(step: f64) -> usize {
     (0..12).find(|d| ((step * 10_f64.powi(*d)).round() - step * 10_f64.powi(*d)).abs() < 1e-6).unwrap_or(12) as usize
 }
 
-/// Formats a number with two significant digits, without an exponent.
+/// Formats a number with at most three significant digits, without an exponent.
 pub(super) fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return label(value, 0);
     }
-    let decimals = (1 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
-    label(value, decimals)
+    let power = value.abs().log10().floor() as i32;
+    let decimals = (1 - power).clamp(0, 9) as usize;
+    let unit = 10_f64.powi(power - 2);
+    label(if unit > 1.0 { (value / unit).round() * unit } else { value }, decimals)
 }
 
 /// Formats a number with the minus sign U+2212, and zero without a sign.
@@ -85,6 +87,12 @@ mod tests {
         assert_eq!(labels(-0.31, 0.27, 5), ["\u{2212}0.2", "0.0", "0.2"]);
         assert_eq!(labels(0.0, 1.1, 5), ["0.00", "0.25", "0.50", "0.75", "1.00"]);
         assert_eq!(labels(1e4, 3.1e4, 4), ["10000", "20000", "30000"]);
+    }
+
+    #[test]
+    fn short_numbers_have_two_or_three_digits() {
+        let numbers = [0.0, 0.012_34, 8.54, 782.3, 24_960.0, -1456.0];
+        assert_eq!(numbers.map(short), ["0", "0.012", "8.5", "782", "25000", "\u{2212}1460"]);
     }
 
     #[test]

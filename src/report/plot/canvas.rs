@@ -119,6 +119,15 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
         self.area.draw(&square).map_err(PlotError::drawing)
     }
 
+    /// Draws a diagonal cross centred on `at`.
+    pub(super) fn cross(&self, at: CanvasPoint, colour: Rgb, size: f64) -> Result<(), PlotError> {
+        // Line width, points.
+        const WIDTH: f64 = 2.0;
+        let (x, y, half) = (at.0, at.1, size / 2.0);
+        self.line(&[(x - half, y - half), (x + half, y + half)], colour, WIDTH)?;
+        self.line(&[(x - half, y + half), (x + half, y - half)], colour, WIDTH)
+    }
+
     pub(super) fn text(&self, text: &str, at: CanvasPoint, anchor: Anchor, size: f64) -> Result<(), PlotError> {
         let (h, v) = match anchor {
             Anchor::Left => (HPos::Left, VPos::Center),

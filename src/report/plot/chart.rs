@@ -9,7 +9,12 @@ pub enum Mark {
     Dashes(f64),
     /// Dots of this diameter in points.
     Dots(f64),
+    /// Diagonal crosses of this width in points.
+    Crosses(f64),
 }
+
+/// Size of the marks of start and end, points.
+const END_SIZE: f64 = 7.0;
 
 /// A data series of a chart.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,6 +85,27 @@ pub struct Cells {
     pub cells: Vec<Cell>,
 }
 
+impl Cells {
+    /// A heat map whose colours cover the [`robust_range`] of the values; values outside have the colour of its ends.
+    pub fn with_robust_range(unit: &str, cells: Vec<Cell>) -> Self {
+        let range = robust_range(cells.iter().map(|cell| cell.value)).unwrap_or((0.0, 1.0));
+        let range = if range.0 < range.1 { range } else { (range.0 - 1.0, range.1) };
+        Self { unit: unit.to_owned(), range, cells }
+    }
+}
+
+/// Range of the finite values without outliers: those more than three interquartile ranges outside the quartiles (Tukey
+/// 1977: "far out"). `None` without finite values.
+pub fn robust_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let mut sorted: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let (least, most) = (*sorted.first()?, *sorted.last()?);
+    let (low, high) = (sorted[sorted.len() / 4], sorted[3 * sorted.len() / 4]);
+    let fence = 3.0 * (high - low);
+    // Without spread in the middle half, all other values would count as outliers.
+    if fence > 0.0 { Some((least.max(low - fence), most.min(high + fence))) } else { Some((least, most)) }
+}
+
 /// Dots with colours by a signed value, in front of all series; dots outside the axes are not drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignedDots {
@@ -145,6 +171,16 @@ impl Chart {
         self
     }
 
+    /// Marks the start of a path with a dot and its end with a cross, which differ in print without colour too.
+    #[must_use]
+    pub fn with_ends(self, start: (f64, f64), end: Option<(f64, f64)>) -> Self {
+        let chart = self.with(Series::dots("start", Colour::Third, vec![start]).marked(Mark::Dots(END_SIZE)));
+        match end {
+            Some(end) => chart.with(Series::dots("end", Colour::Second, vec![end]).marked(Mark::Crosses(END_SIZE))),
+            None => chart,
+        }
+    }
+
     /// Sets the heat map.
     #[must_use]
     pub fn with_cells(mut self, cells: Cells) -> Self {
@@ -206,5 +242,22 @@ impl Chart {
             }
         }
         ends.map(|(low, high)| if low <= high { (low, high) } else { (0.0, 1.0) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_outlier_does_not_determine_the_range() {
+        // Fields of view from 40 to 79 degrees; one of a spring near instability.
+        let mut values: Vec<f64> = (40..80).map(f64::from).collect();
+        assert_eq!(robust_range(values.iter().copied()), Some((40.0, 79.0)));
+        values.extend([4518.0, f64::INFINITY, f64::NAN]);
+        // 41 finite values: quartiles 50 and 70, fences at 50 - 60 and 70 + 60.
+        assert_eq!(robust_range(values.into_iter()), Some((40.0, 130.0)));
+        assert_eq!(robust_range([1.0, 1.0, 1.0, 5.0].into_iter()), Some((1.0, 5.0)));
+        assert_eq!(robust_range([f64::NAN].into_iter()), None);
     }
 }

@@ -174,17 +174,17 @@ fn band<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series)
 fn points<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series) -> Result<(), PlotError> {
     let colour = series.colour.rgb();
     let is_finite = |point: &(f64, f64)| point.0.is_finite() && point.1.is_finite();
-    if let Mark::Dots(size) = series.mark {
-        return series.points.iter().filter(|p| is_finite(p)).try_for_each(|p| canvas.dot(frame.at(*p), colour, size));
+    let mut single = series.points.iter().filter(|point| is_finite(point)).map(|point| frame.at(*point));
+    let mut paths = series
+        .points
+        .split(|point| !is_finite(point))
+        .map(|section| decimated(&section.iter().map(|point| frame.at(*point)).collect::<Vec<CanvasPoint>>()));
+    match series.mark {
+        Mark::Dots(size) => single.try_for_each(|at| canvas.dot(at, colour, size)),
+        Mark::Crosses(size) => single.try_for_each(|at| canvas.cross(at, colour, size)),
+        Mark::Line(width) => paths.try_for_each(|path| canvas.line(&path, colour, width)),
+        Mark::Dashes(width) => paths.try_for_each(|path| dashes(canvas, &path, series, width)),
     }
-    for section in series.points.split(|point| !is_finite(point)) {
-        let path = decimated(&section.iter().map(|point| frame.at(*point)).collect::<Vec<CanvasPoint>>());
-        match series.mark {
-            Mark::Dashes(width) => dashes(canvas, &path, series, width)?,
-            Mark::Line(width) | Mark::Dots(width) => canvas.line(&path, colour, width)?,
-        }
-    }
-    Ok(())
 }
 
 /// Decimates a path without visible change: within each column of half a point, it keeps the first, lowest, highest

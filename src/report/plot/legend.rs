@@ -22,9 +22,9 @@ const COLOUR_BAR: f64 = 96.0;
 
 /// Title and legend, wrapped into lines.
 pub(super) struct Header<'a> {
-    title: &'a str,
+    title: Vec<String>,
     lines: Vec<Vec<Entry<'a>>>,
-    /// Whether the title is on a separate line.
+    /// Whether the last line of the title has no legend beside it.
     title_is_separate: bool,
 }
 
@@ -48,10 +48,23 @@ impl<'a> Header<'a> {
             entries.push(Entry { content: EntryContent::Series(series), width: wide });
         }
         if let Some(cells) = &chart.cells {
-            entries.push(colour_bar(canvas, cells.range, &cells.unit, shade)?);
+            let beyond = |is_beyond: fn(f64, (f64, f64)) -> bool| {
+                cells.cells.iter().any(|cell| is_beyond(cell.value, cells.range))
+            };
+            let (low, high) = cells.range;
+            let min =
+                if beyond(|value, (low, _)| value < low) { "\u{2264} " } else { "" }.to_owned() + &axis::short(low);
+            let max =
+                if beyond(|value, (_, high)| value > high) { "\u{2265} " } else { "" }.to_owned() + &axis::short(high);
+            entries.push(colour_bar(canvas, (min, max), &cells.unit, shade)?);
         }
         if let Some(dots) = chart.signed_dots.as_ref().filter(|dots| !dots.unit.is_empty()) {
-            entries.push(colour_bar(canvas, (-dots.limit, dots.limit), &dots.unit, signed_shade)?);
+            entries.push(colour_bar(
+                canvas,
+                (axis::short(-dots.limit), axis::short(dots.limit)),
+                &dots.unit,
+                signed_shade,
+            )?);
         }
         let mut lines: Vec<Vec<Entry<'a>>> = Vec::new();
         for entry in entries {
@@ -60,18 +73,21 @@ impl<'a> Header<'a> {
                 _ => lines.push(vec![entry]),
             }
         }
-        let title = canvas.width_of(&chart.title, TEXT)?;
+        let title = wrapped(canvas, &chart.title, width)?;
+        let last = title.last().map_or(Ok(0.0), |line| canvas.width_of(line, TEXT))?;
         let legend = lines.first().map_or(0.0, |line| TITLE_GAP + width_of(line));
-        Ok(Self {
-            title: &chart.title,
-            lines,
-            title_is_separate: title > 0.0 && legend > 0.0 && title + legend > width,
-        })
+        let title_is_separate = last > 0.0 && legend > 0.0 && last + legend > width;
+        Ok(Self { title, lines, title_is_separate })
     }
 
     /// Height above that of a single line, points.
     pub fn extra_height(&self) -> f64 {
-        (self.lines.len() + usize::from(self.title_is_separate)).saturating_sub(1) as f64 * LINE_SPACING
+        (self.lines.len() + self.lines_above_legend()).max(self.title.len()).saturating_sub(1) as f64 * LINE_SPACING
+    }
+
+    /// Number of lines of the title above the first line of the legend.
+    fn lines_above_legend(&self) -> usize {
+        if self.title_is_separate { self.title.len() } else { self.title.len().saturating_sub(1) }
     }
 
     /// Draws the header above axes that extend from `left` to `right` and up to `top`.
@@ -82,9 +98,11 @@ impl<'a> Header<'a> {
         top: f64,
     ) -> Result<(), PlotError> {
         let first = top - ABOVE_AXES - self.extra_height();
-        canvas.text(self.title, (left, first), Anchor::Left, TEXT)?;
+        for (index, line) in self.title.iter().enumerate() {
+            canvas.text(line, (left, first + index as f64 * LINE_SPACING), Anchor::Left, TEXT)?;
+        }
         for (index, line) in self.lines.iter().enumerate() {
-            let y = first + (index + usize::from(self.title_is_separate)) as f64 * LINE_SPACING;
+            let y = first + (index + self.lines_above_legend()) as f64 * LINE_SPACING;
             let mut x = right - width_of(line);
             for entry in line {
                 entry.draw(canvas, (x, y))?;
@@ -95,17 +113,31 @@ impl<'a> Header<'a> {
     }
 }
 
+/// Breaks a title at its words into lines of at most `width`; a longer word has its own line.
+fn wrapped<DB: DrawingBackend>(canvas: &Canvas<DB>, title: &str, width: f64) -> Result<Vec<String>, PlotError> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in title.split_whitespace() {
+        let longer = lines.last().map(|line| format!("{line} {word}"));
+        let fits = longer.as_ref().map_or(Ok(false), |line| canvas.width_of(line, TEXT).map(|wide| wide <= width))?;
+        match (longer, lines.last_mut()) {
+            (Some(longer), Some(line)) if fits => *line = longer,
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    Ok(lines)
+}
+
 fn width_of(line: &[Entry<'_>]) -> f64 {
     line.iter().map(|entry| entry.width).sum::<f64>() + ENTRY_GAP * line.len().saturating_sub(1) as f64
 }
 
 fn colour_bar<'a, DB: DrawingBackend>(
     canvas: &Canvas<DB>,
-    (min, max): (f64, f64),
+    (min, max): (String, String),
     unit: &str,
     shade: fn(f64) -> Rgb,
 ) -> Result<Entry<'a>, PlotError> {
-    let (min, max) = (axis::short(min), format!("{} {unit}", axis::short(max)));
+    let max = if unit.is_empty() { max } else { format!("{max} {unit}") };
     let labels = canvas.width_of(&min, SMALL_TEXT)? + canvas.width_of(&max, SMALL_TEXT)?;
     Ok(Entry { content: EntryContent::ColourBar { min, max, shade }, width: labels + COLOUR_BAR + 2.0 * NAME_GAP })
 }
@@ -119,6 +151,7 @@ impl Entry<'_> {
                     Mark::Line(width) => canvas.line(&sample, series.colour.rgb(), width.max(1.5))?,
                     Mark::Dashes(width) => stroke::dashes(canvas, &sample, series, width.max(1.5))?,
                     Mark::Dots(_) => canvas.dot((x + SAMPLE_LENGTH / 2.0, y), series.colour.rgb(), 6.0)?,
+                    Mark::Crosses(_) => canvas.cross((x + SAMPLE_LENGTH / 2.0, y), series.colour.rgb(), 6.0)?,
                 }
                 canvas.text(&series.name, (x + SAMPLE_LENGTH + NAME_GAP, y), Anchor::Left, SMALL_TEXT)
             }

@@ -64,7 +64,7 @@ pub fn coherence_panels(curves: &[GainCurve]) -> Vec<Chart> {
 /// Resonance frequency, peak gain and coherence over the swing amplitude.
 pub fn swing_figure(studies: &[SwingStudy]) -> Figure {
     let chart = |label: &str, value: fn(&SwingPoint) -> Option<f64>| {
-        let empty = Chart::new("", "Swing amplitude of the head (degrees rms)", label);
+        let empty = Chart::new("", "Swing amplitude of the head, RMS (°)", label);
         studies.iter().fold(empty, |chart, study| {
             let (name, colour) = style(study.axis);
             let points: Vec<_> = study.points.iter().filter_map(|p| Some((p.swing_rms_deg, value(p)?))).collect();

@@ -156,7 +156,8 @@ impl ReturnSampler<'_> {
 /// The range of size [`SECTION_SIZE_M`] in the section with the most occupied grid cells.
 ///
 /// Counting cells rather than points keeps a dense nearby surface from dominating. Of several equal ranges, the leftmost
-/// and then the lowest is chosen.
+/// and then the lowest is chosen. It is moved so that its
+/// occupied cells are in the middle.
 fn densest_range(coordinates: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
     let cells: BTreeSet<(i64, i64)> =
         coordinates.iter().map(|(x, y)| ((x / CELL_M).round() as i64, (y / CELL_M).round() as i64)).collect();
@@ -172,8 +173,15 @@ fn densest_range(coordinates: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
             }
         }
     }
-    let (left, low) = (best.1.0 as f64 * CELL_M, best.1.1 as f64 * CELL_M);
-    ((left, left + SECTION_SIZE_M.0), (low, low + SECTION_SIZE_M.1))
+    let (left, low) = best.1;
+    let within = cells.iter().filter(|(x, y)| (left..left + size.0).contains(x) && (low..low + size.1).contains(y));
+    let (across, up): (Vec<i64>, Vec<i64>) = within.copied().unzip();
+    let centred = |cells: &[i64], low: i64, size: i64, size_m: f64| {
+        let ends = cells.iter().min().zip(cells.iter().max());
+        let middle_m = ends.map_or((2 * low + size) as f64, |(first, last)| (first + last) as f64) * 0.5 * CELL_M;
+        (middle_m - 0.5 * size_m, middle_m + 0.5 * size_m)
+    };
+    (centred(&across, left, size.0, SECTION_SIZE_M.0), centred(&up, low, size.1, SECTION_SIZE_M.1))
 }
 
 #[cfg(test)]
@@ -186,6 +194,8 @@ mod tests {
         let floor = (0..1000).map(|k| (-2.0 + 0.0002 * f64::from(k), -1.5));
         let walls = (0..60).flat_map(|k| [(2.0, 1.0 - 0.025 * f64::from(k)), (2.0 - 0.025 * f64::from(k), 1.0)]);
         let ((left, right), (low, high)) = densest_range(&floor.chain(walls).collect::<Vec<_>>());
+        // The walls are in the middle: their centre is (1.26, 0.26).
+        assert!((left + right - 2.52).abs() < 2.0 * CELL_M && (low + high - 0.52).abs() < 2.0 * CELL_M);
         assert!(left <= 0.6 && right >= 2.0 && low <= -0.4 && high >= 1.0, "{left} {right} {low} {high}");
         assert!((right - left - SECTION_SIZE_M.0).abs() < 1e-12 && (high - low - SECTION_SIZE_M.1).abs() < 1e-12);
     }

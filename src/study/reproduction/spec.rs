@@ -1,9 +1,9 @@
 //! Spec of an experiment: `specs/experiments/NAME.ron`.
 
 use super::Extent;
-use crate::dynamics::{self, HeadSpec};
+use crate::dynamics::HeadSpec;
 use crate::motion::Axis;
-use crate::spec::{Kind, Source, SpecError, checked, find, parse};
+use crate::spec::{Kind, Source, SpecError, checked, find_from, parse};
 use crate::study::gains::AXES;
 use crate::study::sweep::{BaseSpec, SweepSpec};
 use serde::{Deserialize, Serialize};
@@ -119,7 +119,7 @@ impl TimingMapsSpec {
             Extent::Whole => ("study", &self.study),
             Extent::Quick => ("quick_study", &self.quick_study),
         };
-        let of_study = find(Kind::Study, name)?;
+        let of_study = find_from(Kind::Study, source, name)?;
         let spec: SweepSpec = parse(&of_study)?;
         match spec.base {
             BaseSpec::Journey { timing: Some(_), .. } => Ok((spec, of_study)),
@@ -168,7 +168,7 @@ impl DesignedSpec {
         if let Some(peak) = peaks.into_iter().flatten().find(|peak| !(peak.is_finite() && *peak > 1.0)) {
             return invalid("peaks", format!("{peak}: expected a gain above 1"));
         }
-        let (mut head, _) = dynamics::load(&self.head)?;
+        let mut head = HeadSpec::read(&find_from(Kind::Head, source, &self.head)?)?;
         if head.linkage.damping_ratio_mut().is_none() {
             return invalid("head", format!("the head \"{}\" is rigid: it has no damping to fit", self.head));
         }

@@ -15,8 +15,6 @@ const SAME_LINE_M: f64 = 0.01;
 const CUT_WIDTH: f64 = 1.4;
 const EDGE_WIDTH: f64 = 0.5;
 const ROUTE_WIDTH: f64 = 1.4;
-/// Diameter of the marks of start and end, points.
-const END_SIZE: f64 = 7.0;
 
 /// A line of the drawing, m.
 type Line = [(f64, f64); 2];
@@ -72,9 +70,7 @@ fn with_route(chart: Chart, route: &Route, project: fn(&Vector) -> (f64, f64)) -
         points.push(points[0]);
     }
     let chart = chart.with(Series::line("default route", Colour::Estimate, points).marked(Mark::Line(ROUTE_WIDTH)));
-    let end = |name: &str, colour, at| Series::dots(name, colour, vec![at]).marked(Mark::Dots(END_SIZE));
-    let chart = chart.with(end("start", Colour::Third, ends.0));
-    if route.closed { chart } else { chart.with(end("end", Colour::Second, ends.1)) }
+    chart.with_ends(ends.0, (!route.closed).then_some(ends.1))
 }
 
 /// The lines of a drawing without those that coincide or are points; the longest first, [`MAX_EDGES`] at most.

@@ -4,7 +4,7 @@ use super::design::AxisSize;
 use super::spec::LevelSpec;
 use super::tree::{Assignment, Tree, load_named};
 use super::{AxisSpec, BaseSpec, Sampling, Setting};
-use crate::spec::{Source, SpecError};
+use crate::spec::{Source, SpecError, name_from};
 use crate::study::StudyError;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -44,20 +44,20 @@ pub(super) struct SpecSet {
 }
 
 impl SpecSet {
-    /// The spec `name` for the key `key`, loaded once.
-    fn load(&mut self, key: &str, name: &str) -> Result<Value, StudyError> {
+    /// The spec that `source` calls `name`, for the key `key`; loaded once.
+    fn load(&mut self, key: &str, name: &str, source: &Source) -> Result<Value, StudyError> {
         Ok(match self.named.entry(format!("{key}/{name}")) {
             Entry::Occupied(loaded) => loaded.get().clone(),
-            Entry::Vacant(free) => free.insert(load_named(key, name)?).clone(),
+            Entry::Vacant(free) => free.insert(load_named(key, &name_from(source, name))?).clone(),
         })
     }
 
-    /// Sets `path` to `setting`.
-    fn assignment(&mut self, path: &str, setting: &Setting) -> Result<Assignment, String> {
+    /// Sets `path` to `setting`; names of specs are relative to the folder of `source`.
+    fn assignment(&mut self, path: &str, setting: &Setting, source: &Source) -> Result<Assignment, String> {
         if let Setting::Text(name) = setting
             && self.base.is_named(path)
         {
-            let value = self.load(path, name).map_err(|error| error.to_string())?;
+            let value = self.load(path, name, source).map_err(|error| error.to_string())?;
             return Ok(Assignment { path: vec![path.to_owned()], value });
         }
         Ok(Assignment { path: self.base.locate(path)?, value: setting.value() })
@@ -83,7 +83,7 @@ impl Axis {
                     return Err(about("values", "needs at least one value".to_owned()));
                 }
                 let level = |setting: &Setting| {
-                    let assignment = specs.assignment(path, setting).map_err(|error| about(path, error))?;
+                    let assignment = specs.assignment(path, setting, source).map_err(|error| about(path, error))?;
                     Ok(Level { setting: setting.clone(), assignments: vec![assignment] })
                 };
                 Levels::Discrete(values.iter().map(level).collect::<Result<_, StudyError>>()?)
@@ -99,8 +99,9 @@ impl Axis {
                         SpecError::about_after(source, &anchor, &words, message).into()
                     };
                     let set = level.set.iter();
-                    let assignments =
-                        set.map(|(path, setting)| specs.assignment(path, setting).map_err(|error| about(path, error)));
+                    let assignments = set.map(|(path, setting)| {
+                        specs.assignment(path, setting, source).map_err(|error| about(path, error))
+                    });
                     let assignments = assignments.collect::<Result<_, _>>()?;
                     Ok(Level { setting: Setting::Text(level.name.clone()), assignments })
                 };

@@ -125,42 +125,38 @@ impl Measure {
     /// Key in files, short name for tables, axis label, display unit, and factor from the key's unit to the display unit.
     fn names(self) -> (&'static str, &'static str, &'static str, &'static str, f64) {
         match self {
-            Self::PositionRmseM => ("position_rmse_m", "position", "Position error (mm rms)", "mm", 1e3),
-            Self::RotationRmseDeg => ("rotation_rmse_deg", "rotation", "Rotation error (degrees rms)", "deg", 1.0),
+            Self::PositionRmseM => ("position_rmse_m", "position", "Position error, RMS (mm)", "mm", 1e3),
+            Self::RotationRmseDeg => ("rotation_rmse_deg", "rotation", "Rotation error, RMS (°)", "deg", 1.0),
             Self::DriftMPerMin => ("drift_m_per_min", "drift", "Drift (mm/min)", "mm/min", 1e3),
-            Self::YawDriftDegPerMin => {
-                ("yaw_drift_deg_per_min", "yaw drift", "Yaw drift (degrees/min)", "deg/min", 1.0)
-            }
-            Self::ClockRmseS => ("clock_rmse_s", "clock", "Clock offset error (ms rms)", "ms", 1e3),
+            Self::YawDriftDegPerMin => ("yaw_drift_deg_per_min", "yaw drift", "Yaw drift (°/min)", "deg/min", 1.0),
+            Self::ClockRmseS => ("clock_rmse_s", "clock", "Clock offset error, RMS (ms)", "ms", 1e3),
             Self::ClosedPositionRmseM => {
-                ("closed_position_rmse_m", "closed loop", "Position error, closed loop (mm rms)", "mm", 1e3)
+                ("closed_position_rmse_m", "closed loop", "Position error, closed loop, RMS (mm)", "mm", 1e3)
             }
             Self::Status => ("status", "status", "Verdict (0 good, 1 degraded, 2 lost)", "1", 1.0),
             Self::AlignedRmseM => {
-                ("aligned_rmse_m", "aligned", "Position error, aligned over the first 20 s (mm rms)", "mm", 1e3)
+                ("aligned_rmse_m", "aligned", "Position error, aligned over the first 20 s, RMS (mm)", "mm", 1e3)
             }
             Self::LargestErrorM => ("largest_error_m", "largest", "Largest position error (mm)", "mm", 1e3),
             Self::BoundM99 => ("bound_m_99", "bound", "Bound on the position error, 99 % (mm)", "mm", 1e3),
             Self::WithinBound => ("within_bound", "within", "Poses within their bound (%)", "%", 1e2),
-            Self::BoundOverError => ("bound_over_error", "bound/error", "Bound over error", "1", 1.0),
+            Self::BoundOverError => ("bound_over_error", "bound/error", "Ratio of bound to error", "1", 1.0),
             Self::WayM => ("way_m", "path", "Length of the path (m)", "m", 1.0),
-            Self::CloudSigmaM => ("cloud_sigma_m", "cloud", "Cloud, sigma (mm)", "mm", 1e3),
-            Self::CloudBiasM => ("cloud_bias_m", "cloud bias", "Cloud, bias (mm)", "mm", 1e3),
+            Self::CloudSigmaM => ("cloud_sigma_m", "cloud", "Standard deviation of the cloud (mm)", "mm", 1e3),
+            Self::CloudBiasM => ("cloud_bias_m", "cloud bias", "Bias of the cloud (mm)", "mm", 1e3),
             Self::ClockErrorS => ("clock_error_s", "clock error", "Clock offset error at the end (ms)", "ms", 1e3),
             Self::FractionSeen => ("fraction_seen", "coverage", "Observed fraction of the sphere (%)", "%", 1e2),
             Self::CoveredS => ("covered_s", "cover time", "Time to 90 % of the coverage (s)", "s", 1.0),
-            Self::DensityPerSrS => ("density_per_sr_s", "density", "Beams per sr and s", "1/sr/s", 1.0),
-            Self::FieldOfViewDeg => ("field_of_view_deg", "view", "Field of view (degrees)", "deg", 1.0),
-            Self::RateDegPerS => ("rate_deg_per_s", "rate", "Maximum rate (degrees/s)", "deg/s", 1.0),
-            Self::RateP99DegPerS => {
-                ("rate_p99_deg_per_s", "rate 99 %", "Rate, 99 % quantile (degrees/s)", "deg/s", 1.0)
-            }
-            Self::Saturated => ("saturated", "saturated", "Gyroscope saturated (% of the time)", "%", 1e2),
+            Self::DensityPerSrS => ("density_per_sr_s", "density", "Beam density (1/sr/s)", "1/sr/s", 1.0),
+            Self::FieldOfViewDeg => ("field_of_view_deg", "view", "Field of view (°)", "deg", 1.0),
+            Self::RateDegPerS => ("rate_deg_per_s", "rate", "Maximum rate (°/s)", "deg/s", 1.0),
+            Self::RateP99DegPerS => ("rate_p99_deg_per_s", "rate 99 %", "Rate, 99 % quantile (°/s)", "deg/s", 1.0),
+            Self::Saturated => ("saturated", "saturated", "Time with a saturated gyroscope (%)", "%", 1e2),
             Self::RockingHz => ("rocking_hz", "rocking", "Rocking frequency (Hz)", "Hz", 1.0),
             Self::PeakGain => ("peak_gain", "gain", "Peak gain of the pitch rate", "1", 1.0),
-            Self::SagMm => ("sag_mm", "sag", "Sag (mm)", "mm", 1.0),
+            Self::SagMm => ("sag_mm", "sag", "Static compression (mm)", "mm", 1.0),
             Self::SpringMassG => ("spring_mass_g", "mass", "Mass of the spring (g)", "g", 1.0),
-            Self::StressShare => ("stress_share", "stress", "Stress over yield (%)", "%", 1e2),
+            Self::StressShare => ("stress_share", "stress", "Stress over yield strength (%)", "%", 1e2),
             Self::WallS => ("wall_s", "time", "Computing time (s)", "s", 1.0),
         }
     }
@@ -178,6 +174,11 @@ impl Measure {
     /// Label of a plot axis, with the display unit.
     pub(in crate::study) fn label(self) -> &'static str {
         self.names().2
+    }
+
+    /// The label without the unit.
+    pub(super) fn quantity(self) -> &'static str {
+        self.label().split(" (").next().unwrap_or_default()
     }
 
     /// Display unit, and the factor from the unit in files to it.

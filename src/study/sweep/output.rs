@@ -122,7 +122,9 @@ fn trend_table(summary: &Summary) -> TextTable {
         })
     };
     let row = |axis: &String| {
-        std::iter::once(axis.clone()).chain(summary.measures.iter().map(|measure| cell(axis, measure))).collect()
+        std::iter::once(report::quantity_name(axis))
+            .chain(summary.measures.iter().map(|measure| cell(axis, measure)))
+            .collect()
     };
     ("Rank correlation of each measure with each axis".to_owned(), header, summary.axes.iter().map(row).collect())
 }
@@ -135,7 +137,7 @@ fn level_table(
     measures: &[Measure],
     bands: bool,
 ) -> TextTable {
-    let mut header = vec![axis.to_owned()];
+    let mut header = vec![report::quantity_name(axis)];
     for measure in measures {
         header.extend([heading(*measure), "ratio".to_owned()]);
     }
@@ -152,8 +154,9 @@ fn level_table(
         cells
     };
     let rows = summary.of_axis(axis, within_level, *first).map(row).collect();
-    let place = within.map_or_else(|| "over all runs".to_owned(), |(by, level)| format!("{by} {level}"));
-    (format!("By {axis}, {place}"), header, rows)
+    let place = within
+        .map_or_else(|| "over all runs".to_owned(), |(by, level)| format!("{} {level}", report::quantity_name(by)));
+    (format!("By {}, {place}", report::quantity_name(axis)), header, rows)
 }
 
 /// Heading of a column: the measure and its unit, if it has one.

@@ -5,6 +5,7 @@ use super::output::{digits, heading, tables};
 use super::runs::Runs;
 use super::{Measure, Summary, Sweep, SweepStatus};
 use crate::report::page::{MAX_PAGE_RUNS, PageTable, StudyPage};
+use crate::report::quantity_name;
 use crate::study::StudyError;
 
 /// Plots above this total size are left to the folder `plots/`, bytes: the page stays below 12 MB.
@@ -59,10 +60,10 @@ impl Sweep {
         let runs = Runs::read(self)?;
         let columns: Vec<Vec<f64>> = measures.iter().map(|measure| self.figures(*measure)).collect::<Result<_, _>>()?;
         let header = std::iter::once("run".to_owned())
-            .chain(self.plan.axes().iter().map(|axis| axis.name.clone()))
+            .chain(self.plan.axes().iter().map(|axis| quantity_name(&axis.name)))
             .chain(measures.iter().map(|measure| heading(*measure)));
         let row = |(row, number): (usize, &u64)| {
-            let settings = self.plan.settings(*number).into_iter().map(|setting| setting.to_string());
+            let settings = self.plan.settings(*number).into_iter().map(|setting| setting.label());
             let figures = measures.iter().zip(&columns).map(|(measure, column)| digits(column[row] * measure.unit().1));
             std::iter::once(number.to_string()).chain(settings).chain(figures).collect()
         };

@@ -40,7 +40,7 @@ impl Plan {
     /// # Errors
     /// If a spec is missing or invalid, with the position in `source`.
     pub fn new(name: &str, spec: &SweepSpec, source: &Source) -> Result<Self, StudyError> {
-        let mut specs = SpecSet { base: Tree::load(&spec.base)?, ..SpecSet::default() };
+        let mut specs = SpecSet { base: Tree::load(&spec.base, source)?, ..SpecSet::default() };
         let plan = Self::with_specs(name, spec, &mut specs, source)?;
         if let BaseSpec::Journey { .. } = spec.base {
             let journey = specs.base.journey(plan.spec.seeds[0]);

@@ -1,23 +1,17 @@
-//! Plots of a sweep: effect of each axis, maps over two axes, ratios, Pareto front.
+//! Plots of a sweep; here the ratios and the Pareto front.
 
+use super::effects::{ROW_HEIGHT, effects, room_for_rows};
 use super::pareto::pareto_set;
-use super::runs::{Runs, level_count, level_label};
-use super::summary::{LevelSummary, Summary, quantile};
-use super::{Measure, Plan, Sweep};
-use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Mark, Series};
+use super::runs::Runs;
+use super::summary::{LevelSummary, Summary};
+use super::{Measure, Sweep};
+use crate::report::plot::{Chart, Colour, Figure, Mark, Series, robust_range};
+use crate::report::quantity_name;
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
 
-/// Height of a level's row in a ratio plot, points: fits a line of text.
-const ROW_HEIGHT: f64 = 17.0;
 /// Ticks of the logarithmic ratio axis.
 const RATIO_TICKS: [f64; 15] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1.0, 1.4, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
-/// Maximum number of pairs of axes with a map, to keep the figure readable.
-const MAX_MAPS: usize = 6;
-/// Maximum number of levels of an axis of text in a map: the labels of more overlap.
-const MAX_TEXT_LEVELS: usize = 8;
-/// A measure whose largest value is more than this multiple of the smallest is drawn on a logarithmic axis.
-const LOGARITHMIC_RANGE: f64 = 300.0;
 /// Maximum number of dots in a plot; more are subsampled evenly to limit the size of the SVG.
 const MAX_DOTS: usize = 5_000;
 
@@ -33,10 +27,7 @@ impl Sweep {
         let mut figures: Vec<(String, Figure)> = self.front(&runs)?.into_iter().collect();
         for measure in &summary.measures {
             figures.push((format!("effects_{}", measure.key()), effects(&self.plan, summary, *measure)));
-            let maps = self.maps(&runs, *measure)?;
-            if !maps.is_empty() {
-                figures.push((format!("maps_{}", measure.key()), Figure::of(maps).in_columns(2)));
-            }
+            figures.extend(self.maps(&runs, *measure)?.map(|figure| (format!("maps_{}", measure.key()), figure)));
         }
         for axis in self.plan.axes().iter().filter(|axis| !axis.is_number()) {
             let figure = summary.measures.first().and_then(|measure| ratios(summary, &axis.name, *measure));
@@ -46,20 +37,6 @@ impl Sweep {
             .into_iter()
             .map(|(name, figure)| figure.save(&folder, &name).map(|()| name).map_err(StudyError::from))
             .collect()
-    }
-
-    /// Maps of a measure's median, one for each pair of axes.
-    fn maps(&self, runs: &Runs, measure: Measure) -> Result<Vec<Chart>, StudyError> {
-        let axes = self.plan.axes().len();
-        let most = |axis: usize| if self.plan.axes()[axis].is_number() { 60 } else { MAX_TEXT_LEVELS };
-        let is_shown = |axis: &usize| (2..=most(*axis)).contains(&level_count(&self.plan, *axis));
-        let pairs = (0..axes).flat_map(|x| (x + 1..axes).map(move |y| (x, y)));
-        let pairs: Vec<(usize, usize)> = pairs.filter(|(x, y)| is_shown(x) && is_shown(y)).take(MAX_MAPS).collect();
-        if pairs.is_empty() {
-            return Ok(Vec::new());
-        }
-        let figures = self.figures(measure)?;
-        Ok(pairs.into_iter().map(|(x, y)| map(&self.plan, runs, &figures, x, y, measure)).collect())
     }
 
     /// The plot of the Pareto front of the spec's goals, with its name; writes the front to `front.csv`.
@@ -81,17 +58,10 @@ impl Sweep {
             let shown = |measure: Measure, k: usize| columns[k][*row] * measure.unit().1;
             (shown(first.measure, 0), shown(second.measure, 1))
         };
-        let every = rows.len().div_ceil(MAX_DOTS).max(1);
-        let chart = Chart::new("Pareto front", first.measure.label(), second.measure.label())
-            .with(
-                Series::dots("runs", Colour::Backdrop, rows.iter().step_by(every).map(at).collect())
-                    .marked(Mark::Dots(2.0)),
-            )
-            .with(Series::dots("front", Colour::Estimate, front.iter().map(at).collect()).marked(Mark::Dots(4.5)));
-        let mut figure = Figure::of(vec![chart]);
-        figure.chart_height = 420.0;
+        let all: Vec<(f64, f64)> = rows.iter().map(at).collect();
+        let of_front: Vec<(f64, f64)> = front.iter().map(at).collect();
         self.write_front(runs, &front, &columns)?;
-        Ok(Some(("front".to_owned(), figure)))
+        Ok(Some(("front".to_owned(), front_figure((first.measure, second.measure), &all, &of_front))))
     }
 
     fn write_front(&self, runs: &Runs, front: &[usize], columns: &[Vec<f64>]) -> Result<(), StudyError> {
@@ -112,119 +82,26 @@ impl Sweep {
     }
 }
 
-/// Effect of each axis over all other settings: median and interquartile band.
-fn effects(plan: &Plan, summary: &Summary, measure: Measure) -> Figure {
-    let (_, per_unit) = measure.unit();
-    let charts = plan.axes().iter().map(|axis| {
-        let lines: Vec<&LevelSummary> = summary.of_axis(&axis.name, None, measure).collect();
-        if axis.is_number() {
-            let at = |line: &&LevelSummary| (line.value.unwrap_or(f64::NAN), line.median * per_unit);
-            let ends = |line: &&LevelSummary| {
-                let [low, high] = [line.quarter, line.three_quarters].map(|x| x * per_unit);
-                (line.value.unwrap_or(f64::NAN), low, high)
-            };
-            let band = lines.iter().map(ends).filter(|(_, low, high)| low.is_finite() && high.is_finite()).collect();
-            let curve = Series::line("", Colour::Estimate, lines.iter().map(at).collect()).with_band(band);
-            return Chart::new(&format!("By {}", axis.name), &axis.name, measure.label()).with(curve);
-        }
-        text_level_chart(&axis.name, measure, &lines)
-    });
-    let charts: Vec<Chart> = charts.collect();
-    let most = charts.iter().map(|chart| chart.y_ticks.len()).max().unwrap_or_default();
-    let columns = if charts.len() > 1 { 2 } else { 1 };
-    let mut figure = Figure::of(charts).in_columns(columns);
-    figure.chart_height = figure.chart_height.max(76.0 + ROW_HEIGHT * most as f64);
+/// The front in front of all runs, as far as the runs are near the others or the front.
+fn front_figure((x, y): (Measure, Measure), all: &[(f64, f64)], front: &[(f64, f64)]) -> Figure {
+    let shown_range = |coordinate: fn(&(f64, f64)) -> f64| {
+        let robust = robust_range(all.iter().map(coordinate)).unwrap_or((0.0, 1.0));
+        front.iter().map(coordinate).fold(robust, |(low, high), value| (low.min(value), high.max(value)))
+    };
+    let ((left, right), (low, high)) = (shown_range(|at| at.0), shown_range(|at| at.1));
+    let is_near = |at: &&(f64, f64)| (left..=right).contains(&at.0) && (low..=high).contains(&at.1);
+    let near: Vec<(f64, f64)> = all.iter().filter(is_near).copied().collect();
+    let name = match all.len() - near.len() {
+        0 => "runs".to_owned(),
+        far => format!("runs ({far} are outside the axes)"),
+    };
+    let every = near.len().div_ceil(MAX_DOTS).max(1);
+    let chart = Chart::new("Pareto front", x.label(), y.label())
+        .with(Series::dots(&name, Colour::Backdrop, near.into_iter().step_by(every).collect()).marked(Mark::Dots(2.0)))
+        .with(Series::dots("front", Colour::Estimate, front.to_vec()).marked(Mark::Dots(4.5)));
+    let mut figure = Figure::of(vec![chart]);
+    figure.chart_height = 420.0;
     figure
-}
-
-/// Median and quartiles of text levels in rows: such levels have no order for a curve.
-fn text_level_chart(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Chart {
-    let (_, per_unit) = measure.unit();
-    let height = |index: usize| lines.len() as f64 - 1.0 - index as f64;
-    let all = lines.iter().flat_map(|line| [line.quarter, line.median, line.three_quarters]).map(|x| x * per_unit);
-    let (low, high) =
-        all.filter(|x| x.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-    let is_logarithmic = low > 0.0 && high > LOGARITHMIC_RANGE * low;
-    let at = |x: f64| if is_logarithmic { (x * per_unit).log10() } else { x * per_unit };
-    let bars = lines.iter().enumerate().flat_map(|(k, line)| {
-        let ends = [line.quarter, line.three_quarters].map(|x| (at(x), height(k)));
-        [ends[0], ends[1], (f64::NAN, f64::NAN)]
-    });
-    let dots = lines.iter().enumerate().map(|(k, line)| (at(line.median), height(k)));
-    let ticks = lines.iter().enumerate().map(|(k, line)| (height(k), line.level.clone()));
-    // An invisible line reserves half a row above and below.
-    let middle = if low <= high { at(0.5 * (low + high) / per_unit) } else { 0.0 };
-    let room = vec![(middle, -0.5), (f64::NAN, f64::NAN), (middle, lines.len() as f64 - 0.5)];
-    let chart = Chart::new(&format!("By {axis}"), measure.label(), "")
-        .with(Series::line("", Colour::Backdrop, room))
-        .with(Series::line("", Colour::Backdrop, bars.collect()).marked(Mark::Line(4.0)))
-        .with(Series::dots("", Colour::Estimate, dots.collect()).marked(Mark::Dots(6.0)))
-        .with_y_ticks(ticks.collect());
-    if is_logarithmic { chart.with_x_ticks(decades(low, high)) } else { chart }
-}
-
-/// Ticks at the powers of ten from `low` to `high`, every second or third if they are many.
-fn decades(low: f64, high: f64) -> Vec<(f64, String)> {
-    let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
-    let step = (1 + (last - first) / 4) as usize;
-    let label = |power: i32| match power {
-        -3..=4 => format!("{}", 10_f64.powi(power)),
-        _ => format!("1e{power}"),
-    };
-    (first..=last).step_by(step).map(|power| (f64::from(power), label(power))).collect()
-}
-
-/// Map of a measure's median over the axes `x` and `y`.
-fn map(plan: &Plan, runs: &Runs, figures: &[f64], x: usize, y: usize, measure: Measure) -> Chart {
-    let (unit, per_unit) = measure.unit();
-    let (wide, high) = (level_count(plan, x), level_count(plan, y));
-    let mut figures_of_cell: Vec<Vec<f64>> = vec![Vec::new(); wide * high];
-    for (row, figure) in figures.iter().enumerate().filter(|(_, figure)| !figure.is_nan()) {
-        figures_of_cell[runs.levels[x][row] as usize * high + runs.levels[y][row] as usize].push(*figure);
-    }
-    let median = |mut figures: Vec<f64>| {
-        figures.sort_by(f64::total_cmp);
-        quantile(&figures, 0.5) * per_unit
-    };
-    let medians: Vec<f64> = figures_of_cell.into_iter().map(median).collect();
-    let finite = medians.iter().copied().filter(|median| median.is_finite());
-    let (low, most) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
-    let (across, up) = (edges(plan, x), edges(plan, y));
-    let cell = |(k, median): (usize, &f64)| {
-        let value = if median.is_finite() { *median } else { f64::NAN };
-        Cell { x: across[k / high], y: up[k % high], value }
-    };
-    let range = if low < most { (low, most) } else { (most - 1.0, most) };
-    let cells = Cells {
-        unit: format!("{} ({unit})", measure.short()),
-        range: if range.0.is_finite() { range } else { (0.0, 1.0) },
-        cells: medians.iter().enumerate().map(cell).collect(),
-    };
-    let chart = Chart::new("", &plan.axes()[x].name, &plan.axes()[y].name).with_cells(cells);
-    let chart = if plan.axes()[x].is_number() { chart } else { chart.with_x_ticks(level_ticks(plan, x)) };
-    if plan.axes()[y].is_number() { chart } else { chart.with_y_ticks(level_ticks(plan, y)) }
-}
-
-/// Extent of each level in a map: half way to its neighbours.
-fn edges(plan: &Plan, axis: usize) -> Vec<(f64, f64)> {
-    let count = level_count(plan, axis);
-    let number = |k: usize| level_label(plan, axis, k).1.filter(|_| plan.axes()[axis].is_number()).unwrap_or(k as f64);
-    let at: Vec<f64> = (0..count).map(number).collect();
-    let middle = |a: usize, b: usize| 0.5 * (at[a] + at[b]);
-    let step = if count > 1 { at[1] - at[0] } else { 1.0 };
-    let last = if count > 1 { at[count - 1] - at[count - 2] } else { 1.0 };
-    (0..count)
-        .map(|k| {
-            let from = if k == 0 { at[0] - 0.5 * step } else { middle(k - 1, k) };
-            let to = if k + 1 == count { at[k] + 0.5 * last } else { middle(k, k + 1) };
-            (from.min(to), from.max(to))
-        })
-        .collect()
-}
-
-/// Ticks with the labels of an axis's levels.
-fn level_ticks(plan: &Plan, axis: usize) -> Vec<(f64, String)> {
-    (0..level_count(plan, axis)).map(|k| (k as f64, level_label(plan, axis, k).0)).collect()
 }
 
 /// Ratio of a measure to an axis's first level, for each other level: median and range, logarithmic.
@@ -233,6 +110,10 @@ fn ratios(summary: &Summary, axis: &str, measure: Measure) -> Option<Figure> {
         summary.of_axis(axis, None, measure).skip(1).filter(|line| line.against_first.is_some()).collect();
     let count = lines.len() as f64;
     let height = |index: usize| count - 1.0 - index as f64;
+    let ratios =
+        lines.iter().filter_map(|line| line.against_first).flat_map(|against| [against.least, against.greatest]);
+    let ratios = ratios.map(f64::log10).filter(|logarithm| logarithm.is_finite());
+    let ends = ratios.fold((0.0, 0.0), |(low, high), ratio| (ratio.min(low), ratio.max(high)));
     let (mut ranges, mut similar, mut different) = (Vec::new(), Vec::new(), Vec::new());
     for (index, line) in lines.iter().enumerate() {
         let (y, against) = (height(index), line.against_first?);
@@ -246,11 +127,12 @@ fn ratios(summary: &Summary, axis: &str, measure: Measure) -> Option<Figure> {
         let lost = if line.lost > 0 { format!(" ({} lost)", line.lost) } else { String::new() };
         (height(index), format!("{}{lost}", line.level))
     };
-    let title = format!("{}, ratio to the first of {axis}", measure.short());
+    let title = format!("{}: ratio to the first {}", measure.quantity(), quantity_name(axis));
     let chart = Chart::new(&title, "Ratio (median, minimum and maximum of all runs)", "")
         .with_y_ticks(lines.iter().enumerate().map(named).collect())
         .with_x_ticks(RATIO_TICKS.map(|ratio| (ratio.log10(), ratio.to_string())).to_vec())
         .with(Series::line("", Colour::Truth, vec![(0.0, -0.5), (0.0, count - 0.5)]).marked(Mark::Dashes(1.0)))
+        .with(room_for_rows(ends, lines.len()))
         .with(Series::line("range", Colour::Backdrop, ranges).marked(Mark::Line(4.0)))
         .with(Series::dots("not significant", Colour::Estimate, similar).marked(Mark::Dots(6.0)))
         .with(Series::dots("significant", Colour::Second, different).marked(Mark::Dots(6.0)));

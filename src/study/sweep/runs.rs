@@ -64,5 +64,5 @@ pub(super) fn level_label(plan: &Plan, axis: usize, level: usize) -> (String, Op
         Levels::Range { .. } => AxisPosition::Along((level as f64 + 0.5) / RANGE_BINS as f64),
     };
     let setting = axis.level(position).setting;
-    (setting.to_string(), setting.number())
+    (setting.label(), setting.number())
 }

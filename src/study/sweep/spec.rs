@@ -183,6 +183,17 @@ impl Setting {
         }
     }
 
+    /// The value for labels and tables: a real number has at most six significant digits.
+    pub(super) fn label(&self) -> String {
+        match self {
+            // 3.0999999999999996 becomes 3.1.
+            Self::Number(number) => {
+                format!("{number:.5e}").parse().map_or_else(|_| self.to_string(), |x: f64| x.to_string())
+            }
+            _ => self.to_string(),
+        }
+    }
+
     /// The value as JSON.
     pub(super) fn value(&self) -> serde_json::Value {
         match self {

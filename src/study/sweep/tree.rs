@@ -7,7 +7,7 @@ use crate::motion::MotionSpec;
 use crate::random::Seed;
 use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
 use crate::simulation::{FaultsSpec, Named, NamedSpec, Run, Scenario};
-use crate::spec::{Kind, SpecError};
+use crate::spec::{Kind, Source, SpecError, name_from};
 use crate::study::StudyError;
 use crate::study::gains::GainsSpec;
 use crate::study::latency::TimingSpec;
@@ -61,11 +61,14 @@ pub(super) struct Assignment {
 const SEED: &str = "seed";
 
 impl Tree {
-    /// Loads the specs of a base run.
-    pub fn load(base: &BaseSpec) -> Result<Self, StudyError> {
+    /// Loads the specs of the base run of a sweep, read from `source`.
+    pub fn load(base: &BaseSpec, source: &Source) -> Result<Self, StudyError> {
+        let named = |name: &String| name_from(source, name);
         match base {
-            BaseSpec::Spring { head, shake } => Self::of(&ClosedForm { shake: *shake, head: Named::load(head)? }),
-            BaseSpec::Gains { head, gains } => Self::of(&GainRun { gains: *gains, head: Named::load(head)? }),
+            BaseSpec::Spring { head, shake } => {
+                Self::of(&ClosedForm { shake: *shake, head: Named::load(&named(head))? })
+            }
+            BaseSpec::Gains { head, gains } => Self::of(&GainRun { gains: *gains, head: Named::load(&named(head))? }),
             BaseSpec::Journey {
                 scene,
                 head,
@@ -82,20 +85,20 @@ impl Tree {
                 limit: _,
             } => {
                 let scenario = Scenario {
-                    scene: scene.clone(),
-                    head: head.clone(),
-                    motion: motion.clone(),
-                    lidar: lidar.clone(),
-                    imu: imu.clone(),
-                    clock: clock.clone(),
-                    base_imu: base_imu.clone(),
-                    faults: faults.clone(),
+                    scene: named(scene),
+                    head: named(head),
+                    motion: named(motion),
+                    lidar: named(lidar),
+                    imu: named(imu),
+                    clock: named(clock),
+                    base_imu: base_imu.as_ref().map(named),
+                    faults: faults.as_ref().map(named),
                     route: route.clone(),
                     duration_s: *duration_s,
                     seed: Seed(0),
                 };
                 let simulation = Run::load(&scenario)?;
-                Self::of(&Journey { simulation, estimator: Named::load(estimator)?, timing: *timing })
+                Self::of(&Journey { simulation, estimator: Named::load(&named(estimator))?, timing: *timing })
             }
         }
     }
@@ -229,11 +232,11 @@ pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{self, Source, names};
+    use crate::spec::{self, names};
 
     fn base() -> Tree {
         let source = spec::find(Kind::Study, "integrity").unwrap();
-        Tree::load(&spec::parse::<super::super::SweepSpec>(&source).unwrap().base).unwrap()
+        Tree::load(&spec::parse::<super::super::SweepSpec>(&source).unwrap().base, &source).unwrap()
     }
 
     #[test]

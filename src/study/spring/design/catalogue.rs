@@ -2,7 +2,7 @@
 
 use super::CoilDesign;
 use crate::elasticity::Material;
-use crate::spec::{Source, SpecError};
+use crate::spec::{Source, SpecError, name_from};
 use std::path::Path;
 
 /// The built-in catalogue: `specs/springs/catalogue.csv`.
@@ -10,14 +10,15 @@ pub const STOCK: &str = include_str!("../../../../specs/springs/catalogue.csv");
 
 const HEADER: &str = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material";
 
-/// Reads the catalogue `name`: a CSV file, or `"stock"` for the built-in one.
+/// Reads the catalogue that the spec `referring` calls `name`: a CSV file, in the folder of `referring` or in the current
+/// one, or `"stock"` for the built-in one.
 ///
 /// # Errors
 /// When the file cannot be read or a line is invalid; the error has the line number.
-pub fn catalogue(name: &str) -> Result<Vec<CoilDesign>, SpecError> {
+pub fn catalogue(name: &str, referring: &Source) -> Result<Vec<CoilDesign>, SpecError> {
     let source = match name {
         "stock" => Source::in_memory("specs/springs/catalogue.csv (built in)", STOCK),
-        path => Source::read(Path::new(path))?,
+        name => Source::read(Path::new(&name_from(referring, name)))?,
     };
     let lines = source.text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let mut lines = lines.map(|(index, line)| (index + 1, line.trim()));
@@ -67,7 +68,7 @@ mod tests {
 
     #[test]
     fn every_spring_of_the_built_in_catalogue_is_valid() {
-        let springs = catalogue("stock").unwrap();
+        let springs = catalogue("stock", &Source::in_memory("design.ron", "")).unwrap();
         assert!(springs.len() > 100);
         for spring in springs {
             assert!(spring.spring().design().is_ok(), "{spring:?}");
@@ -76,10 +77,11 @@ mod tests {
 
     #[test]
     fn the_error_of_an_invalid_line_has_its_number() {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), format!("{HEADER}\na,25,3,12,120,spring_steel\nb,25,-3,12,120,stainless\n"))
-            .unwrap();
-        let error = catalogue(file.path().to_str().unwrap()).unwrap_err().to_string();
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!("{HEADER}\na,25,3,12,120,spring_steel\nb,25,-3,12,120,stainless\n");
+        std::fs::write(folder.path().join("springs.csv"), text).unwrap();
+        let referring = Source { folder: Some(folder.path().to_owned()), ..Source::in_memory("design.ron", "") };
+        let error = catalogue("springs.csv", &referring).unwrap_err().to_string();
         assert!(error.contains("line 3") && error.contains("-3"), "{error}");
     }
 }

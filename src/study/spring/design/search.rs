@@ -1,11 +1,11 @@
 //! Search: evaluation of designs, Pareto set and verification.
 
 use super::{CoilDesign, DesignSpec, SpaceSpec, catalogue};
-use crate::dynamics::{self, HeadSpec, LinkageSpec};
+use crate::dynamics::{HeadSpec, LinkageSpec};
 use crate::elasticity::Material;
 use crate::random::{Seed, Stream};
 use crate::sensors::Lidar;
-use crate::spec::{Kind, Source, SpecError, find, parse};
+use crate::spec::{Kind, Source, SpecError, find_from, parse};
 use crate::study::coverage::CoveragePlan;
 use crate::study::progress::PieceProgress;
 use crate::study::spring::{DesignMetrics, closed_form, simulated};
@@ -99,12 +99,13 @@ impl DesignSearch {
     /// # Errors
     /// When a named spec does not exist, bounds are reversed, or there are no goals or evaluations.
     pub fn new(spec: &DesignSpec, source: &Source) -> Result<Self, StudyError> {
-        let (head, head_source) = dynamics::load(&spec.head)?;
+        let head_source = find_from(Kind::Head, source, &spec.head)?;
+        let head = HeadSpec::read(&head_source)?;
         if !matches!(head.linkage, LinkageSpec::Spring { .. }) {
             let message = format!("the head \"{}\" has no spring to replace", spec.head);
             return Err(SpecError::about(source, "head", message).into());
         }
-        let lidar_source = find(Kind::Lidar, &spec.lidar)?;
+        let lidar_source = find_from(Kind::Lidar, source, &spec.lidar)?;
         let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
         if spec.goals.is_empty() {
             return Err(SpecError::about(source, "goals", "at least one goal is required").into());
@@ -118,7 +119,7 @@ impl DesignSearch {
             return Err(SpecError::about(source, "evaluations", "evaluations and candidates must be at least 1").into());
         }
         let space = match &spec.space {
-            SpaceSpec::Catalogue(name) => Space::Catalogue(catalogue(name)?),
+            SpaceSpec::Catalogue(name) => Space::Catalogue(catalogue(name, source)?),
             SpaceSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, material } => {
                 let bounds = [*coil_diameter_mm, *wire_diameter_mm, *active_coils, *free_length_mm];
                 if let Some([low, high]) = bounds.iter().find(|[low, high]| high < low) {

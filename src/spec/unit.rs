@@ -1,4 +1,4 @@
-//! The unit that a key ends with, by the naming convention of specs (`stiffness_n_per_m` is in N/m).
+//! The unit that a key ends with, by the naming convention of specs and results (`stiffness_n_per_m` is in N/m).
 
 /// Parts of units in keys, and the symbols for them.
 const SYMBOLS: [(&str, &str); 26] = [
@@ -33,13 +33,19 @@ const SYMBOLS: [(&str, &str); 26] = [
 /// Parts that are units only after `per`, since names of quantities have them too.
 const DENOMINATORS: [(&str, &str); 2] = [("h", "h"), ("min", "min")];
 
-/// The unit of the quantity that `key` names; `None` for a key without one.
-pub(super) fn of(key: &str) -> Option<String> {
-    if key.ends_with("_m_deg") {
-        return Some("m, °".to_owned());
+/// Splits `key` into the name of the quantity and the symbol of its unit; `None` for a key without a unit.
+///
+/// The name is empty for a key that is only a unit.
+pub fn split_unit(key: &str) -> (&str, Option<String>) {
+    if let Some(name) = key.strip_suffix("_m_deg") {
+        return (name, Some("m, °".to_owned()));
     }
-    let parts: Vec<&str> = key.split('_').collect();
-    (0..parts.len()).find_map(|first| written(&parts[first..]))
+    let starts = std::iter::once(0).chain(key.match_indices('_').map(|(at, _)| at + 1));
+    let unit = |start: usize| Some((start, written(&key[start..].split('_').collect::<Vec<_>>())?));
+    match starts.into_iter().find_map(unit) {
+        Some((start, unit)) => (key[..start].trim_end_matches('_'), Some(unit)),
+        None => (key, None),
+    }
 }
 
 /// `parts` as a unit; `None` where one of them is no part of a unit.
@@ -65,24 +71,24 @@ fn written(parts: &[&str]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::of;
+    use super::split_unit;
 
     #[test]
     fn a_key_ends_with_its_unit() {
-        for (key, unit) in [
-            ("stiffness_n_per_m", "N/m"),
-            ("density_deg_per_s_per_sqrt_hz", "°/s/√Hz"),
-            ("inertia_kg_m2", "kg m²"),
-            ("damping_nm_s_per_rad", "N m s/rad"),
-            ("range_min_m", "m"),
-            ("max_drift_m_per_min", "m/min"),
-            ("n_per_m", "N/m"),
-            ("at_m_deg", "m, °"),
+        for (key, name, unit) in [
+            ("stiffness_n_per_m", "stiffness", "N/m"),
+            ("density_deg_per_s_per_sqrt_hz", "density", "°/s/√Hz"),
+            ("inertia_kg_m2", "inertia", "kg m²"),
+            ("damping_nm_s_per_rad", "damping", "N m s/rad"),
+            ("range_min_m", "range_min", "m"),
+            ("max_drift_m_per_min", "max_drift", "m/min"),
+            ("n_per_m", "", "N/m"),
+            ("at_m_deg", "at", "m, °"),
         ] {
-            assert_eq!(of(key).as_deref(), Some(unit), "{key}");
+            assert_eq!(split_unit(key), (name, Some(unit.to_owned())));
         }
         for key in ["count", "drag_per", "offset_grids", "h"] {
-            assert_eq!(of(key), None, "{key}");
+            assert_eq!(split_unit(key), (key, None));
         }
     }
 }
