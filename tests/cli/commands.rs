@@ -46,18 +46,19 @@ fn a_full_run_writes_all_files_independent_of_the_number_of_threads() {
     assert!(bytes("run") == bytes("run-2"), "one seed, one recording");
 
     assert_eq!((one["scene"].as_str(), one["duration_s"].as_f64()), (Some("mocap_room"), Some(8.0)));
-    assert!(one["open_loop"]["position_rmse_m"].as_f64().unwrap() < 0.1);
+    // Worst of ten seeds: 0.77 mm for the position, 8.4 and 9.0 mm for the cloud by truth and by estimate.
+    assert!(one["open_loop"]["position_rmse_m"].as_f64().unwrap() < 0.0023);
     assert!(one["cloud"]["sigma_by_truth_m"].as_f64().unwrap() < 0.02);
-    // The operator is in view at the edge of the scans and must not count as a misplaced wall.
-    assert!((1e-4..0.1).contains(&one["cloud"]["on_carrier_fraction"].as_f64().unwrap()));
+    // The operator is in view at the edge of the scans and must not count as a misplaced wall. Ten seeds: 1.0 to 1.3 %.
+    assert!((0.0035..0.038).contains(&one["cloud"]["on_carrier_fraction"].as_f64().unwrap()));
     assert_eq!(one["cloud"]["on_movers_fraction"].as_f64(), Some(0.0));
-    assert!(one["cloud"]["sigma_m"].as_f64().unwrap() < 0.03);
+    assert!(one["cloud"]["sigma_m"].as_f64().unwrap() < 0.027);
     let [open, closed] = ["open_loop", "closed_loop"].map(|loops| one[loops]["position_rmse_m"].as_f64().unwrap());
     assert!(closed < 1.05 * open, "{open} m open, {closed} m closed");
     // The bound is loose for eight seconds of a small room. The head rests for a third of the run; the estimator uses
-    // that constraint and the bound does not, so the error may be below the bound.
+    // that constraint and the bound does not, so the error may be below the bound. Ten seeds: 1.0 to 1.2 mm.
     let bound_m = one["closed_loop"]["bound_rmse_m"].as_f64().unwrap();
-    assert!((1e-5..3e-3).contains(&bound_m), "{bound_m}");
+    assert!((3e-4..3.5e-3).contains(&bound_m), "{bound_m}");
     for name in [
         "manifest.ron",
         "truth.tum",

@@ -26,13 +26,15 @@ fn a_recording_is_localised_in_the_map_of_another_and_maps_are_merged() {
     let causes = metrics["integrity"]["causes"].as_array().unwrap();
     assert!(causes.len() == 1 && causes[0]["kind"] == "uncertain" && metrics["status"] == "degraded", "{causes:?}");
     assert_eq!(metrics["integrity"]["within_bound"].as_f64(), Some(1.0));
-    assert!(metrics["open_loop"]["position_rmse_m"].as_f64().unwrap() < 0.01, "{metrics}");
+    // Worst of ten pairs of seeds: 3.1 mm.
+    assert!(metrics["open_loop"]["position_rmse_m"].as_f64().unwrap() < 0.0095, "{metrics}");
     let cloud = &metrics["cloud"];
     let count = |key: &str| cloud["filter"][key].as_u64().unwrap();
     let dropped = count("dropped_mixed") + count("dropped_isolated") + count("dropped_moving");
     assert_eq!(count("kept") + dropped, cloud["points"].as_u64().unwrap());
     assert!(cloud["judged"].as_str().unwrap().contains("before filtering"));
-    assert!(cloud["filter"]["standing_dropped_fraction"].as_f64().unwrap() < 0.02, "{cloud}");
+    // Worst of ten pairs of seeds: 0.19 %.
+    assert!(cloud["filter"]["standing_dropped_fraction"].as_f64().unwrap() < 0.0056, "{cloud}");
 
     let merged: Value = serde_json::from_str(&done("map merge a/map.ply b/map.ply --out both.ply --json")).unwrap();
     assert!(has("both.ply") && merged["residual_rms_m"].as_f64().unwrap() < 0.02, "{merged}");

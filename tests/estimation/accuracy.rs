@@ -251,7 +251,8 @@ fn a_second_gap_soon_after_the_first_does_not_end_the_relocalisation() {
             "{:?}",
             result.warnings
         );
-        assert!(score.worst_m < 0.02, "{second:?}: {score:?}");
+        // Worst of ten seeds: 4.8 mm.
+        assert!(score.worst_m < 0.0145, "{second:?}: {score:?}");
     }
 }
 
@@ -352,7 +353,8 @@ fn bias_and_noise_above_specification_are_estimated_at_rest() {
     assert!(result.warnings.iter().any(|w| noisy(&w.kind)), "{:?}", result.warnings);
     assert!(!result.warnings.iter().any(|w| w.kind == WarningKind::StartedInMotion), "{:?}", result.warnings);
     let score = Score::of(&result, &run);
-    assert!(score.worst_m < 0.05, "{score:?}");
+    // Worst of ten seeds: 3.9 mm.
+    assert!(score.worst_m < 0.012, "{score:?}");
 }
 
 #[test]

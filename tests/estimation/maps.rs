@@ -188,7 +188,8 @@ fn after_a_gap_the_head_is_relocalised_in_the_map() {
     let behind = Trajectory::from_poses(behind.map(|(stamp, pose)| (stamp, *pose))).unwrap();
     let rmse_m = second.error_in(&behind, &first.world_from_map).position_rmse_m();
     println!("after a gap {:.2} mm", 1e3 * rmse_m);
-    assert!(rmse_m < 0.01, "{rmse_m} m");
+    // Worst of ten pairs of seeds: 2.1 mm.
+    assert!(rmse_m < 0.0063, "{rmse_m} m");
 }
 
 #[test]
@@ -216,7 +217,8 @@ fn extended_and_merged_maps_are_as_accurate_as_their_parts() {
     let merged = merge_maps(&first.map, &second.map, &found.map_from_query).unwrap();
     let both = of(&merged, &first.world_from_map);
     println!("parts {parts:?} m, merged {both} m, pose error {:.4} m", apart.translation.vector.norm());
-    assert!(apart.translation.vector.norm() < 0.02 && apart.rotation.angle() < 0.003, "{apart}");
+    // Worst of ten pairs of seeds: 2.5 mm and 0.72 mrad.
+    assert!(apart.translation.vector.norm() < 0.0075 && apart.rotation.angle() < 0.0022, "{apart}");
     assert!(both < 1.1 * parts[0].max(parts[1]), "{parts:?} and {both}");
     assert!(merged.surfels().len() < first.map.surfels().len() + second.map.surfels().len());
     // Extended: the second session adds surfels to the map of the first.

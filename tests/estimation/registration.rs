@@ -121,5 +121,6 @@ fn a_drift_of_5_m_and_10_degrees_is_corrected() {
     let (before, after) = (score(&with_drift.trajectory), score(&recovered.trajectory));
     assert!(before > 1.0, "{before} m");
     assert!(recovered.report.loops.closed >= 2, "{:?}", recovered.report);
-    assert!(after < 0.03, "{before} m before, {after} m after: {:?}", recovered.report);
+    // Worst of ten seeds: 5.3 mm.
+    assert!(after < 0.016, "{before} m before, {after} m after: {:?}", recovered.report);
 }

@@ -158,7 +158,8 @@ fn the_carrier_does_not_affect_a_head_waved_outdoors() {
     let world_from_map = align(&positions(pairs.truth()), &positions(pairs.estimate())).unwrap();
     let rmse_m = Errors::after(&pairs, &world_from_map).position_rmse_m();
     println!("{rmse_m:.4} m");
-    assert!(rmse_m < 0.01, "{rmse_m} m");
+    // Worst of ten seeds: 2.8 mm.
+    assert!(rmse_m < 0.0085, "{rmse_m} m");
 }
 
 #[test]
