@@ -132,5 +132,5 @@ fn coverage_is_written_as_a_table_and_a_plot() {
     let coverage = coverage_of(0.97, &lidar("utm30lx"), &CoveragePlan { duration_s: 1.0, ..CoveragePlan::default() });
     assert_eq!(density_csv(&coverage).lines().count(), 1 + 32 * 64);
     let svg = coverage_figure(&coverage).svg().unwrap();
-    assert!(svg.contains("beams per sr and s") && svg.contains("Bearing"));
+    assert!(svg.contains("Beam density (1/sr/s)") && svg.contains("Bearing"));
 }
