@@ -36,10 +36,3 @@ const rangeInWords = (low, high, unit) => {
   const digits = Math.min(Math.max(-Math.floor(Math.log10(step)), 0), 6);
   return [low, high].map((x) => `${(isShort ? x * 1e3 : x).toFixed(digits).replace(/^-(?=[0.]*$)/, "")} ${isShort ? "mm" : unit}`.trim());
 };
-
-const SVG = "http://www.w3.org/2000/svg";
-const svgElement = (parent, tag, attributes) => {
-  const element = parent.appendChild(document.createElementNS(SVG, tag));
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  return element;
-};

@@ -1,6 +1,12 @@
 // Timeline of events: one row for each kind.
+const SVG = "http://www.w3.org/2000/svg";
 const LEVELS = { lost: "lost", degraded: "degraded", loss: "loss", note: "note" };
 
+const svgElement = (parent, tag, attributes) => {
+  const element = parent.appendChild(document.createElementNS(SVG, tag));
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  return element;
+};
 const percentOf = (t) => `${(100 * Math.min(Math.max(t / duration, 0), 1)).toFixed(3)}%`;
 const span = ([from, to]) => (to - from > 0.05 ? `${from.toFixed(1)} to ${to.toFixed(1)} s` : `${from.toFixed(1)} s`);
 
