@@ -115,9 +115,9 @@ impl fmt::Display for Discarded {
 pub enum WarningKind {
     /// The head moved at the start, so initial tilt and gyroscope bias are uncertain.
     StartedInMotion,
-    /// The first window was inconsistent: it was discarded, and the estimate starts later.
+    /// The first window, at the start or after a gap, was inconsistent: it was discarded, and the estimate starts later.
     StartRejected {
-        /// Last correction of its solution, m.
+        /// Last correction of its solution, m; after a gap the largest of this and the two windows before.
         correction_m: f64,
         /// Contradiction between IMU and lidar in it, as a multiple of the IMU noise.
         times: f64,
