@@ -159,7 +159,7 @@ pub enum Abscissa {
 pub enum Ordinate {
     /// Linear.
     Linear,
-    /// Logarithmic; only positive values are drawn.
+    /// Logarithmic; only positive values are shown.
     Logarithmic,
     /// Linear, with ticks at parts of a turn.
     Degrees,

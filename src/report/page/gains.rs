@@ -26,7 +26,7 @@ pub struct AxisGains {
     pub axis: &'static str,
     /// Title.
     pub title: String,
-    /// Charts that are drawn side by side; of a group, one at a time.
+    /// Charts side by side; of a group, one is shown at a time.
     pub charts: Vec<Vec<Chart>>,
 }
 

@@ -70,7 +70,7 @@ pub struct Cell {
     pub x: (f64, f64),
     /// Lower and upper edge, in the unit of the y axis.
     pub y: (f64, f64),
-    /// The value that the colour represents; a cell with NaN is not drawn.
+    /// The value that the colour represents; a cell with NaN is not shown.
     pub value: f64,
 }
 
@@ -106,7 +106,7 @@ pub fn robust_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     if fence > 0.0 { Some((least.max(low - fence), most.min(high + fence))) } else { Some((least, most)) }
 }
 
-/// Dots with colours by a signed value, in front of all series; dots outside the axes are not drawn.
+/// Dots with colours by a signed value, in front of all series; dots outside the axes are not shown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignedDots {
     /// Quantity and unit of the values, for the legend; an empty text has no entry.

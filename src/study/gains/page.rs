@@ -18,7 +18,7 @@ const LOWEST_SHARE: f64 = 0.01;
 /// `name` is the name of the head.
 ///
 /// # Errors
-/// When a plot cannot be drawn, or a value cannot be written as JSON.
+/// When a plot fails, or a value cannot be written as JSON.
 pub fn page(name: &str, head: &HeadModel, curves: &[GainCurve], swings: &[SwingStudy]) -> Result<String, StudyError> {
     let (header, rows) = peak_table(curves);
     let peaks = PageTable { title: "Highest peak of each axis".to_owned(), header, rows };

@@ -156,8 +156,7 @@ impl ReturnSampler<'_> {
 /// The range of size [`SECTION_SIZE_M`] in the section with the most occupied grid cells.
 ///
 /// Counting cells rather than points keeps a dense nearby surface from dominating. Of several equal ranges, the leftmost
-/// and then the lowest is chosen. It is moved so that its
-/// occupied cells are in the middle.
+/// and then the lowest is chosen. It is moved so that its occupied cells are in the middle.
 fn densest_range(coordinates: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
     let cells: BTreeSet<(i64, i64)> =
         coordinates.iter().map(|(x, y)| ((x / CELL_M).round() as i64, (y / CELL_M).round() as i64)).collect();

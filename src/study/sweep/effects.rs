@@ -7,7 +7,7 @@ use crate::report::{axis_label, quantity_name};
 
 /// Height of a level's row, points: fits a line of text.
 pub(super) const ROW_HEIGHT: f64 = 17.0;
-/// A measure whose largest value is more than this multiple of the smallest is drawn on a logarithmic axis.
+/// A measure whose largest value is more than this multiple of the smallest has a logarithmic axis.
 const LOGARITHMIC_RANGE: f64 = 20.0;
 
 /// Effect of each axis over all other settings: median and interquartile band.

@@ -21,7 +21,7 @@ pub enum MeshFormat {
 }
 
 impl MeshFormat {
-    /// The format that the ending of a file's name stands for; `None` if it is none of these.
+    /// The format with the ending of a file's name; `None` if there is none.
     pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "glb" => Some(Self::Glb),
