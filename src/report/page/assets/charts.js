@@ -57,11 +57,26 @@ const logarithmicTicks = (plot, splits, at) => {
   return splits.map((y) => (y > 0 && shown.includes(Math.round(y / 10 ** Math.floor(Math.log10(y) + 1e-9))) ? label(y) : ""));
 };
 
-// A logarithmic scale that ends at the data, where uPlot would add up to a decade.
-const logarithmicScale = (margin) => ({
+// A logarithmic scale that ends at the data, where uPlot would add up to a decade, and covers at least the ratio `least`.
+const logarithmicScale = (margin, least) => ({
   distr: 3,
-  range: (plot, min, max) => (min > 0 ? [min / margin, Math.max(max, 1.01 * min) * margin] : [0.1, 10]),
+  range: (plot, min, max) => {
+    if (!(min > 0)) return [0.1, 10];
+    const widened = Math.max(margin, Math.sqrt((least * min) / max));
+    return [min / widened, max * widened];
+  },
 });
+
+// A scale of angles that covers at least 10 degrees: less is noise.
+const angleScale = {
+  range: (plot, min, max) => {
+    const margin = Math.max(0.05 * (max - min), 5 - 0.5 * (max - min));
+    return [min - margin, max + margin];
+  },
+};
+
+const ordinateScale = ({ ordinate }) =>
+  ({ logarithmic: logarithmicScale(1.3, 10), degrees: angleScale })[ordinate] ?? {};
 
 const axis = (label) => ({
   label,
@@ -96,8 +111,8 @@ const options = (chart, width, onValues) => {
     legend: { show: false },
     cursor: { sync: { key: chartSync.key }, drag: { x: true, y: false }, points: { size: 6 } },
     scales: {
-      x: { time: false, ...(abscissa.isLog && logarithmicScale(1)) },
-      y: chart.ordinate === "logarithmic" ? logarithmicScale(1.3) : {},
+      x: { time: false, ...(abscissa.isLog && logarithmicScale(1, 1.01)) },
+      y: ordinateScale(chart),
     },
     series: [{}, ...chart.curves.map(series)],
     bands: bands(chart.curves),
