@@ -14,8 +14,11 @@ const WIDER_FONT: f64 = 1.15;
 /// Margins around the axes, points: above for one line of title and legend, below and left for tick labels and axis label.
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;
-const LEFT: f64 = 68.0;
+const LEFT: f64 = 72.0;
 const RIGHT: f64 = 18.0;
+/// Distance of the vertical label from the edge of the chart, and its room beside custom tick labels, points.
+const VERTICAL_LABEL: f64 = 14.0;
+const VERTICAL_LABEL_ROOM: f64 = 16.0;
 /// Approximate minimum distance between ticks, points.
 const TICK_X: f64 = 85.0;
 const TICK_Y: f64 = 28.0;
@@ -24,6 +27,8 @@ const MIN_TICKS: usize = 4;
 
 /// The axes of a chart on the canvas.
 struct Frame {
+    /// Edge of the chart.
+    edge: f64,
     left: f64,
     top: f64,
     width: f64,
@@ -99,7 +104,7 @@ fn ranges(chart: &Chart) -> [Axis; 2] {
 fn frame_of(chart: &Chart, corner: CanvasPoint, size: (f64, f64), left: f64) -> Frame {
     let [x, y] = ranges(chart);
     let (width, height) = (size.0 - left - RIGHT, size.1 - TOP - BOTTOM);
-    let mut frame = Frame { left: corner.0 + left, top: corner.1 + TOP, width, height, x, y };
+    let mut frame = Frame { edge: corner.0, left: corner.0 + left, top: corner.1 + TOP, width, height, x, y };
     if chart.equal_axes {
         let per_point = ((x.high - x.low) / width).max((y.high - y.low) / height);
         let widened = |axis: Axis, points: f64| {
@@ -111,12 +116,13 @@ fn frame_of(chart: &Chart, corner: CanvasPoint, size: (f64, f64), left: f64) -> 
     frame
 }
 
-/// The left margin, wide enough for custom tick labels, points.
+/// The left margin, wide enough for custom tick labels and the vertical label, points.
 fn left_margin<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &Chart) -> Result<f64, PlotError> {
+    let room = 16.0 + if chart.y_label.is_empty() { 0.0 } else { VERTICAL_LABEL_ROOM };
     chart
         .y_ticks
         .iter()
-        .try_fold(LEFT, |margin, (_, label)| Ok(margin.max(WIDER_FONT * canvas.width_of(label, SMALL_TEXT)? + 16.0)))
+        .try_fold(LEFT, |margin, (_, label)| Ok(margin.max(WIDER_FONT * canvas.width_of(label, SMALL_TEXT)? + room)))
 }
 
 /// The custom ticks within the range of an axis, or about `wanted` round numbers if there are none.
@@ -143,7 +149,7 @@ fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -
     let axes = [(frame.left, frame.top), (frame.left, frame.bottom()), (frame.right(), frame.bottom())];
     canvas.line(&axes, INK, 0.8)?;
     canvas.text(&chart.x_label, (frame.left + frame.width / 2.0, frame.bottom() + 25.0), Anchor::Below, TEXT)?;
-    canvas.text(&chart.y_label, (frame.left - LEFT + 14.0, frame.top + frame.height / 2.0), Anchor::Sideways, TEXT)
+    canvas.text(&chart.y_label, (frame.edge + VERTICAL_LABEL, frame.top + frame.height / 2.0), Anchor::Sideways, TEXT)
 }
 
 fn heat_map<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
