@@ -2,6 +2,7 @@
 
 use super::integrity::IntegrityReport;
 use super::output::{digits, heading, tables};
+use super::plots::PlotFile;
 use super::runs::Runs;
 use super::{Measure, Summary, Sweep, SweepStatus};
 use crate::report::page::{MAX_PAGE_RUNS, PageTable, StudyPage};
@@ -12,7 +13,7 @@ use crate::study::StudyError;
 const MAX_PLOTS_BYTES: usize = 8_000_000;
 
 impl Sweep {
-    /// The page of the merged runs, with the plots of these names in `plots/`.
+    /// The page of the merged runs, with the given plots.
     ///
     /// # Errors
     /// If the table is not merged, or if a file cannot be read.
@@ -21,7 +22,7 @@ impl Sweep {
         summary: &Summary,
         status: &SweepStatus,
         integrity: Option<&IntegrityReport>,
-        plots: &[String],
+        plots: &[PlotFile],
     ) -> Result<StudyPage, StudyError> {
         let of_axes = tables(summary, &self.plan, true).into_iter();
         let of_integrity = integrity.map(IntegrityReport::tables).into_iter().flatten();
@@ -41,15 +42,15 @@ impl Sweep {
         })
     }
 
-    /// The plots as SVG, each with its name, as far as there is room.
-    fn page_figures(&self, plots: &[String]) -> Result<Vec<(String, String)>, StudyError> {
+    /// The plots as SVG, each with its title, as far as there is room.
+    fn page_figures(&self, plots: &[PlotFile]) -> Result<Vec<(String, String)>, StudyError> {
         let (mut figures, mut bytes) = (Vec::new(), 0);
-        for name in plots {
+        for PlotFile { name, title } in plots {
             let path = self.folder.join("plots").join(format!("{name}.svg"));
             let svg = std::fs::read_to_string(&path).map_err(StudyError::file(&path))?;
             bytes += svg.len();
             if bytes <= MAX_PLOTS_BYTES {
-                figures.push((name.replace('_', " "), svg));
+                figures.push((title.clone(), svg));
             }
         }
         Ok(figures)

@@ -15,32 +15,49 @@ const RATIO_TICKS: [f64; 15] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1.0, 1.4, 
 /// Maximum number of dots in a plot; more are subsampled evenly to limit the size of the SVG.
 const MAX_DOTS: usize = 5_000;
 
+/// A plot in `plots/`.
+pub(super) struct PlotFile {
+    /// Name of the files, without ending.
+    pub name: String,
+    /// Title on the page.
+    pub title: String,
+}
+
 impl Sweep {
-    /// Draws all plots to `plots/`, and writes the Pareto front to `front.csv`; returns the names of the plots.
+    /// Draws all plots to `plots/`, and writes the Pareto front to `front.csv`; returns the plots.
     ///
     /// # Errors
     /// If the table is not merged, or if a file cannot be written.
-    pub(super) fn draw(&self, summary: &Summary) -> Result<Vec<String>, StudyError> {
+    pub(super) fn draw(&self, summary: &Summary) -> Result<Vec<PlotFile>, StudyError> {
         let folder = self.folder.join("plots");
         std::fs::create_dir_all(&folder).map_err(StudyError::file(&folder))?;
         let runs = Runs::read(self)?;
-        let mut figures: Vec<(String, Figure)> = self.front(&runs)?.into_iter().collect();
+        let mut plots = Vec::new();
+        let mut save = |name: String, title: String, figure: Figure| {
+            let saved = figure.save(&folder, &name);
+            plots.push(PlotFile { name, title });
+            saved
+        };
+        if let Some(figure) = self.front(&runs)? {
+            save("front".to_owned(), "Pareto front".to_owned(), figure)?;
+        }
         for measure in &summary.measures {
-            figures.push((format!("effects_{}", measure.key()), effects(&self.plan, summary, *measure)));
-            figures.extend(self.maps(&runs, *measure)?.map(|figure| (format!("maps_{}", measure.key()), figure)));
+            let (key, quantity) = (measure.key(), measure.quantity());
+            save(format!("effects_{key}"), format!("{quantity} by axis"), effects(&self.plan, summary, *measure))?;
+            if let Some(figure) = self.maps(&runs, *measure)? {
+                save(format!("maps_{key}"), format!("{quantity} by two axes"), figure)?;
+            }
         }
         for axis in self.plan.axes().iter().filter(|axis| !axis.is_number()) {
-            let figure = summary.measures.first().and_then(|measure| ratios(summary, &axis.name, *measure));
-            figures.extend(figure.map(|figure| (format!("ratios_{}", axis.name), figure)));
+            if let Some(figure) = summary.measures.first().and_then(|measure| ratios(summary, &axis.name, *measure)) {
+                save(format!("ratios_{}", axis.name), format!("Ratios by {}", quantity_name(&axis.name)), figure)?;
+            }
         }
-        figures
-            .into_iter()
-            .map(|(name, figure)| figure.save(&folder, &name).map(|()| name).map_err(StudyError::from))
-            .collect()
+        Ok(plots)
     }
 
-    /// The plot of the Pareto front of the spec's goals, with its name; writes the front to `front.csv`.
-    fn front(&self, runs: &Runs) -> Result<Option<(String, Figure)>, StudyError> {
+    /// The plot of the Pareto front of the spec's goals; writes the front to `front.csv`.
+    fn front(&self, runs: &Runs) -> Result<Option<Figure>, StudyError> {
         let goals = &self.plan.spec().front;
         let [first, second, ..] = goals.as_slice() else { return Ok(None) };
         let columns: Vec<Vec<f64>> = goals.iter().map(|goal| self.figures(goal.measure)).collect::<Result<_, _>>()?;
@@ -61,7 +78,7 @@ impl Sweep {
         let all: Vec<(f64, f64)> = rows.iter().map(at).collect();
         let of_front: Vec<(f64, f64)> = front.iter().map(at).collect();
         self.write_front(runs, &front, &columns)?;
-        Ok(Some(("front".to_owned(), front_figure((first.measure, second.measure), &all, &of_front))))
+        Ok(Some(front_figure((first.measure, second.measure), &all, &of_front)))
     }
 
     fn write_front(&self, runs: &Runs, front: &[usize], columns: &[Vec<f64>]) -> Result<(), StudyError> {
