@@ -7,6 +7,9 @@ use plotters::style::{FontStyle, register_font};
 pub(super) const TEXT: f64 = 12.0;
 pub(super) const SMALL_TEXT: f64 = 11.0;
 
+/// Room for labels in a font that is wider than the bundled one: a viewer shows an SVG with its own fonts.
+pub(super) const WIDER_FONT: f64 = 1.15;
+
 /// Family name of the font; an SVG contains it, and the viewer uses its own sans-serif font.
 pub(super) const NAME: &str = "sans-serif";
 

@@ -2,15 +2,13 @@
 
 use super::axis::Axis;
 use super::canvas::{Anchor, Canvas, CanvasPoint};
-use super::font::{SMALL_TEXT, TEXT};
+use super::font::{SMALL_TEXT, TEXT, WIDER_FONT};
 use super::legend::Header;
 use super::palette::{GRID, INK, shade, signed_shade};
 use super::stroke::dashes;
 use super::{Chart, Mark, PlotError, Series, SignedDots};
 use plotters::prelude::DrawingBackend;
 
-/// Room for labels in a font that is wider than the bundled one: an SVG is drawn with the fonts of its reader.
-const WIDER_FONT: f64 = 1.15;
 /// Margins around the axes, points: above for one line of title and legend, below and left for tick labels and axis label.
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;

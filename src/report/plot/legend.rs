@@ -1,7 +1,7 @@
 //! Header of a chart: title and legend above the axes.
 
 use super::canvas::{Anchor, Canvas, CanvasPoint};
-use super::font::{SMALL_TEXT, TEXT};
+use super::font::{SMALL_TEXT, TEXT, WIDER_FONT};
 use super::palette::{INK, Rgb, shade, signed_shade};
 use super::{Chart, Mark, PlotError, Series, axis, stroke};
 use plotters::prelude::DrawingBackend;
@@ -44,7 +44,7 @@ impl<'a> Header<'a> {
     pub fn of<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &'a Chart, width: f64) -> Result<Self, PlotError> {
         let mut entries = Vec::new();
         for series in chart.series.iter().filter(|series| !series.name.is_empty()) {
-            let wide = SAMPLE_LENGTH + NAME_GAP + canvas.width_of(&series.name, SMALL_TEXT)?;
+            let wide = SAMPLE_LENGTH + NAME_GAP + WIDER_FONT * canvas.width_of(&series.name, SMALL_TEXT)?;
             entries.push(Entry { content: EntryContent::Series(series), width: wide });
         }
         if let Some(cells) = &chart.cells {
