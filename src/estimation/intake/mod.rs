@@ -1,8 +1,10 @@
 //! Queues measurements as they arrive and cuts them into time segments that both sensors cover.
 
+mod position_uncertainty;
 mod samples;
 mod scans;
 
+use self::position_uncertainty::PositionUncertainty;
 use self::samples::{Coverage, MARGIN_S, SampleQueue};
 use self::scans::ScanQueue;
 use super::inertial::InertialStream;
@@ -23,7 +25,8 @@ const MAX_DISORDER_S: f64 = 0.1;
 const CLIPPED_REPORT_FACTOR: usize = 10;
 /// A longer time without lidar scans is reported as a gap, s.
 const LIDAR_GAP_S: f64 = 0.5;
-/// After a longer time without lidar scans the estimate stops and restarts with the next scan, s.
+/// After a longer time without lidar scans the estimate stops and restarts with the next scan, s; see also
+/// [`PositionUncertainty::is_too_large`].
 const MAX_LIDAR_GAP_S: f64 = 3.0;
 /// Two scans of a head that turns faster than this on average cannot be equal, rad/s.
 const TURNING_RAD_PER_S: f64 = 0.1;
@@ -60,8 +63,9 @@ pub(super) struct Intake {
     next_start_s: f64,
     /// The next segment is the first after an IMU gap that is not bridged.
     after_gap: bool,
-    /// The lidar gap is so long that the estimate waits for the next scan.
+    /// The lidar gap is so long, or the IMU so uncertain in it, that the estimate waits for the next scan.
     without_lidar: bool,
+    uncertainty: PositionUncertainty,
     /// Whether IMU gaps are bridged whatever the motion.
     gaps_are_bridged: bool,
     warnings: Vec<Warning>,
@@ -79,6 +83,7 @@ impl Intake {
             next_start_s: 0.0,
             after_gap: false,
             without_lidar: false,
+            uncertainty: PositionUncertainty::default(),
             gaps_are_bridged: false,
             warnings: Vec::new(),
         }
@@ -152,7 +157,12 @@ impl Intake {
         loop {
             let segment = self.cut(last)?;
             let lidar_is_missing = segment.returns.is_empty() && segment.end_s - self.scans.used_s() > MAX_LIDAR_GAP_S;
-            self.without_lidar |= lidar_is_missing;
+            if segment.returns.is_empty() {
+                self.uncertainty.add(&segment.intervals);
+            } else {
+                self.uncertainty = PositionUncertainty::default();
+            }
+            self.without_lidar |= lidar_is_missing || self.uncertainty.is_too_large();
             if self.without_lidar && segment.returns.is_empty() {
                 continue;
             }
