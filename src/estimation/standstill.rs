@@ -5,8 +5,8 @@
 //! parallel walls it is unknown.
 
 use super::surfel::TimedReturn;
-use crate::geometry::Vector;
-use nalgebra::{Matrix3, SymmetricEigen};
+use crate::geometry::{Matrix, Vector};
+use nalgebra::SymmetricEigen;
 use std::collections::BTreeMap;
 
 /// Cell size in azimuth and elevation, rad.
@@ -27,12 +27,15 @@ const MIN_COSINE: f64 = 0.1;
 const MIN_EIGENVALUE: f64 = 0.03;
 
 /// Evidence of the lidar on motion or rest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Standstill {
     /// The head moves.
     Moves,
     /// The head rests: a motion in the scan plane would be visible.
-    Rests,
+    Rests {
+        /// Projects onto the directions in which a motion would not be visible, IMU frame.
+        unobserved: Matrix,
+    },
     /// No motion is visible, but the surfaces do not constrain it.
     Unknown,
 }
@@ -42,7 +45,7 @@ pub(super) enum Standstill {
 struct Cell {
     count: f64,
     sum: Vector,
-    squares: Matrix3<f64>,
+    squares: Matrix,
     range_m: f64,
 }
 
@@ -69,8 +72,19 @@ impl Cell {
     }
 }
 
-/// Compares `early` and `late` returns of the assumed initial rest.
-pub(super) fn standstill(early: &[TimedReturn], late: &[TimedReturn]) -> Standstill {
+/// Compares the first with the last quarter of the returns, in order of time, during an assumed rest of up to `rest_s`.
+pub(super) fn standstill(returns: &[TimedReturn], rest_s: f64) -> Standstill {
+    let (Some(first), Some(last)) = (returns.first(), returns.last()) else { return Standstill::Unknown };
+    let quarter_s = 0.25 * (last.tau_s.min(first.tau_s + rest_s) - first.tau_s);
+    let until_s = first.tau_s + 4.0 * quarter_s;
+    let early = returns.partition_point(|one| one.tau_s < first.tau_s + quarter_s);
+    let late = returns.partition_point(|one| one.tau_s < until_s - quarter_s);
+    let end = returns.partition_point(|one| one.tau_s <= until_s);
+    compare(&returns[..early], &returns[late..end])
+}
+
+/// Compares `early` and `late` returns of an assumed rest.
+fn compare(early: &[TimedReturn], late: &[TimedReturn]) -> Standstill {
     let (early, late) = (by_direction(early), by_direction(late));
     let both: Vec<(&Cell, f64)> =
         early.iter().filter_map(|(key, cell)| Some((cell, late.get(key)?.mean_range_m()))).collect();
@@ -107,17 +121,17 @@ fn from_displacements(facing: &[(Vector, f64)]) -> Standstill {
     if facing.len() < MOTION_THRESHOLD.1 {
         return Standstill::Unknown;
     }
-    let mean = facing.iter().map(|(normal, _)| normal * normal.transpose()).sum::<Matrix3<f64>>() / facing.len() as f64;
+    let mean = facing.iter().map(|(normal, _)| normal * normal.transpose()).sum::<Matrix>() / facing.len() as f64;
     let parts = SymmetricEigen::new(mean);
     let observable: Vec<Vector> = (0..3)
         .filter(|k| parts.eigenvalues[*k] > MIN_EIGENVALUE)
         .map(|k| parts.eigenvectors.column(k).into())
         .collect();
     // The translation along the other directions stays zero.
-    let within = observable.iter().map(|along| along * along.transpose()).sum::<Matrix3<f64>>();
+    let within = observable.iter().map(|along| along * along.transpose()).sum::<Matrix>();
     let mut shift = Vector::zeros();
     for outlier_m in CAUCHY_SCALES_M {
-        let (mut information, mut right) = (Matrix3::identity() - within, Vector::zeros());
+        let (mut information, mut right) = (Matrix::identity() - within, Vector::zeros());
         for (normal, displacement_m) in facing {
             let weight = 1.0 / (1.0 + ((displacement_m - normal.dot(&shift)) / outlier_m).powi(2));
             let normal = within * normal;
@@ -129,7 +143,7 @@ fn from_displacements(facing: &[(Vector, f64)]) -> Standstill {
     match observable.len() {
         _ if shift.norm() > SHIFTED_M => Standstill::Moves,
         0 | 1 => Standstill::Unknown,
-        _ => Standstill::Rests,
+        _ => Standstill::Rests { unobserved: Matrix::identity() - within },
     }
 }
 
@@ -154,9 +168,9 @@ mod tests {
 
     #[test]
     fn constant_velocity_is_detected_as_motion() {
-        let seen = |moved_m: f64| standstill(&returns(0.0, true), &returns(moved_m, true));
-        assert_eq!(seen(0.0), Standstill::Rests);
-        assert_eq!(seen(0.01), Standstill::Rests);
+        let seen = |moved_m: f64| compare(&returns(0.0, true), &returns(moved_m, true));
+        assert!(matches!(seen(0.0), Standstill::Rests { .. }));
+        assert!(matches!(seen(0.01), Standstill::Rests { .. }));
         for moved_m in [0.06, 0.3, 1.0, 4.0] {
             assert_eq!(seen(moved_m), Standstill::Moves, "{moved_m}");
             assert_eq!(seen(-moved_m), Standstill::Moves, "{moved_m}");
@@ -165,8 +179,8 @@ mod tests {
 
     #[test]
     fn rest_is_unknown_in_a_corridor_without_ends() {
-        assert_eq!(standstill(&returns(0.0, false), &returns(5.0, false)), Standstill::Unknown);
-        assert_eq!(standstill(&returns(0.0, true), &[]), Standstill::Unknown);
+        assert_eq!(compare(&returns(0.0, false), &returns(5.0, false)), Standstill::Unknown);
+        assert_eq!(compare(&returns(0.0, true), &[]), Standstill::Unknown);
     }
 
     #[test]
@@ -175,6 +189,8 @@ mod tests {
         for beam in &mut late[100..200] {
             beam.range_m *= 0.8;
         }
-        assert_eq!(standstill(&returns(0.0, true), &late), Standstill::Rests);
+        // The scan plane is level: a vertical motion would not be visible.
+        let Standstill::Rests { unobserved } = compare(&returns(0.0, true), &late) else { panic!("no rest") };
+        approx::assert_relative_eq!(unobserved, Matrix::from_diagonal(&Vector::z()), epsilon = 1e-9);
     }
 }

@@ -9,7 +9,7 @@ use crate::estimation::intake::Segment;
 use crate::estimation::local_map::LocalMap;
 use crate::estimation::standstill::{Standstill, standstill};
 use crate::estimation::strapdown::Interval;
-use crate::estimation::surfel::{SurfelBuilder, TimedReturn};
+use crate::estimation::surfel::SurfelBuilder;
 use crate::estimation::window::{Window, WindowSolution};
 use crate::estimation::{EstimatorSpec, WarningKind};
 use crate::geometry::Vector;
@@ -106,7 +106,7 @@ impl Estimator {
     /// The first window, which starts at `start_s` (IMU time) with the first of the gathered `intervals`.
     fn start(&mut self, gathering: Gathering, intervals: &[Interval], start_s: f64) -> Tracking {
         let adapted = self.adapt_to_scan_geometry();
-        let standstill = lidar_standstill(&gathering.returns(), self.spec.inertial.rest_s);
+        let standstill = standstill(&gathering.returns(), self.spec.inertial.rest_s);
         let initial_state = self.initial_state(intervals, standstill, &adapted);
         let Gathering { segments: mut waiting, recovery } = gathering;
         self.raise_noise(initial_state.noise_factors, &mut waiting, start_s);
@@ -189,15 +189,4 @@ impl Estimator {
             None => ConsiderCovariance::new(pivot, &known),
         }
     }
-}
-
-/// Whether the lidar shows motion or rest during the assumed initial rest of `rest_s`.
-fn lidar_standstill(returns: &[TimedReturn], rest_s: f64) -> Standstill {
-    let (Some(first), Some(last)) = (returns.first(), returns.last()) else { return Standstill::Unknown };
-    let quarter_s = 0.25 * (last.tau_s.min(first.tau_s + rest_s) - first.tau_s);
-    let until_s = first.tau_s + 4.0 * quarter_s;
-    let early = returns.partition_point(|one| one.tau_s < first.tau_s + quarter_s);
-    let late = returns.partition_point(|one| one.tau_s < until_s - quarter_s);
-    let end = returns.partition_point(|one| one.tau_s <= until_s);
-    standstill(&returns[..early], &returns[late..end])
 }

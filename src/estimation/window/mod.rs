@@ -22,11 +22,12 @@ use super::residual::contradiction::contradiction;
 use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
+use super::standstill::{Standstill, standstill};
 use super::strapdown::Interval;
 use super::surfel::{Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
 use super::timing::{Stopwatch, Timing};
 use super::unknowns::Unknowns;
-use crate::geometry::{Pose, Rotation};
+use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
 use equations::Workspace;
@@ -185,6 +186,25 @@ impl Window {
         self.nominal.at(self.nominal.end_s(), &self.unknowns.biases.gyro).velocity.norm()
     }
 
+    /// The velocity of the IMU at the end of the window, IMU frame, m/s.
+    fn velocity_in_imu(&self) -> Vector {
+        let motion = self.nominal.at(self.nominal.end_s(), &self.unknowns.biases.gyro);
+        motion.rotation.transpose() * motion.velocity
+    }
+
+    /// Projects onto the directions in which the lidar does not exclude a motion of a head that does not turn, IMU frame.
+    ///
+    /// At rest a level scan constrains the estimate weakly, and after lost samples the estimated speed may drift.
+    fn motion_unobserved_in(&self, returns: &[TimedReturn], intervals: &[(f64, Interval)]) -> Matrix {
+        let is_still = |interval: &Interval| interval.bridged || !rests::turns(interval, &self.unknowns.biases);
+        let is_in_doubt = self.speed_m_per_s() >= rests::MAX_SPEED_M_PER_S
+            && intervals.iter().all(|(_, interval)| is_still(interval));
+        match is_in_doubt.then(|| standstill(returns, self.spec.step_s)) {
+            Some(Standstill::Rests { unobserved }) => unobserved,
+            _ => Matrix::identity(),
+        }
+    }
+
     /// Whether the head rests at the end of the window, by the IMU and the estimated speed.
     pub(super) fn is_resting(&self) -> bool {
         let end_s = self.nominal.end_s() - REST_MARGIN_S;
@@ -223,12 +243,14 @@ impl Window {
         end_tau_s: f64,
     ) -> Timing {
         let mut watch = Stopwatch::start();
+        let unobserved = self.motion_unobserved_in(&returns, intervals);
         for (_, interval) in intervals.iter() {
             let Unknowns { biases, gravity, scale_misalignment, .. } = &self.unknowns;
             self.nominal.extend(interval.corrected_by(scale_misalignment), biases, gravity);
             self.rest = self.rest.filter(|rest| rest.agrees_with(interval));
             if self.speed_is_known {
-                self.rests.take(interval, &self.unknowns.biases, self.nominal.end_s(), self.speed_m_per_s());
+                let speed_m_per_s = (unobserved * self.velocity_in_imu()).norm();
+                self.rests.take(interval, &self.unknowns.biases, self.nominal.end_s(), speed_m_per_s);
             }
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;

@@ -11,8 +11,8 @@ const MARGIN_S: f64 = 0.15;
 const MAX_MISSING_S: f64 = 0.1;
 /// Maximum turn rate at rest after subtraction of the gyroscope bias, rad/s; the sample noise is added to it.
 const MAX_RATE_RAD_PER_S: f64 = 0.01;
-/// Maximum estimated speed at rest, m/s: the IMU cannot distinguish constant motion from rest.
-const MAX_SPEED_M_PER_S: f64 = 0.15;
+/// Maximum estimated speed at rest, m/s, where the lidar does not show rest: the IMU cannot distinguish constant motion from it.
+pub(super) const MAX_SPEED_M_PER_S: f64 = 0.15;
 
 /// Detects rests in the sequence of intervals.
 #[derive(Debug, Default)]
@@ -26,16 +26,15 @@ pub(super) struct Rests {
 }
 
 impl Rests {
-    /// Adds the interval that ends at `end_s`, where the estimated speed is `speed_m_per_s`.
+    /// Adds the interval that ends at `end_s`, where the estimated speed is `speed_m_per_s`, as far as the lidar
+    /// does not show rest.
     pub(super) fn take(&mut self, interval: &Interval, biases: &Biases, end_s: f64, speed_m_per_s: f64) {
         self.missing_s = if interval.bridged { self.missing_s + interval.h } else { 0.0 };
         if interval.bridged && self.missing_s < MAX_MISSING_S {
             return;
         }
         let continues = self.candidate.is_some_and(|(rest, _)| rest.agrees_with(interval));
-        let is_still = (interval.gyro - biases.gyro).norm() < MAX_RATE_RAD_PER_S + 6.0 * interval.gyro_sigma
-            && !interval.bridged
-            && speed_m_per_s < MAX_SPEED_M_PER_S;
+        let is_still = !interval.bridged && !turns(interval, biases) && speed_m_per_s < MAX_SPEED_M_PER_S;
         if !(continues && is_still) {
             self.candidate = is_still.then(|| (RestReadings::from(interval), end_s));
             return;
@@ -61,6 +60,11 @@ impl Rests {
     pub(super) fn forget_before(&mut self, u_s: f64) {
         self.found.retain(|(_, until_s)| *until_s >= u_s);
     }
+}
+
+/// Whether the head turns during an interval, by more than noise.
+pub(super) fn turns(interval: &Interval, biases: &Biases) -> bool {
+    (interval.gyro - biases.gyro).norm() >= MAX_RATE_RAD_PER_S + 6.0 * interval.gyro_sigma
 }
 
 #[cfg(test)]
