@@ -19,6 +19,7 @@ mod full_run;
 mod gains;
 mod info;
 mod latency;
+mod man;
 mod map;
 mod output;
 mod quantity;
@@ -85,6 +86,7 @@ enum Command {
     Info(info::Arguments),
     Completions(completions::Arguments),
 }
+    Man(man::Arguments),
 
 /// Parses the arguments, runs the command, and returns the exit code.
 pub fn run() -> ExitCode {
@@ -131,6 +133,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
 
 #[cfg(test)]
 mod tests {
+        Command::Man(arguments) => man::run(arguments, Cli::command(), global),
     use super::*;
 
     #[test]

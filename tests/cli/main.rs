@@ -12,5 +12,7 @@ mod hostile;
 mod maps;
 mod scene;
 mod sensor_models;
+#[path = "../skip/mod.rs"]
+mod skip;
 mod specs;
 mod summary;
