@@ -139,7 +139,7 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
     let slowest_hz = head.linear_modes().first().map_or(plan.up_to_hz, |mode| mode.frequency_hz);
     let plan = GainPlan { up_to_hz: plan.up_to_hz.min(3.0 * slowest_hz), ..plan.clone() };
     let study = |(before, axis): (usize, &Axis)| {
-        bar.set_task(format!("swinging, {}", axis_name(*axis)));
+        bar.set_task(format!("swinging, {}", report::quantity_name(axis_name(*axis))));
         let on_progress = |fraction: f64| bar.set_fraction((before as f64 + fraction) / axes.len() as f64);
         Ok(swing_study(head, *axis, degrees, &plan, &on_progress)?)
     };
@@ -154,7 +154,7 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
         let row = |p: &zsim::study::gains::SwingPoint| {
             let number = |x: Option<f64>, decimals: usize| x.map_or(dash(), |x| format!("{x:.decimals$}"));
             vec![
-                format!("{} {:.1} deg", axis_name(study.axis), p.swing_rms_deg),
+                format!("{}, {:.1} deg", report::quantity_name(axis_name(study.axis)), p.swing_rms_deg),
                 format!("{:.1}", p.swing_most_deg),
                 number(p.peak.map(|peak| peak.freq_hz), 3),
                 number(p.peak.map(|peak| peak.gain), 2),
