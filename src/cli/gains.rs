@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let bar = WorkBar::new(global, "shaking");
     let curves = gain_curves(&head, &plan, &|fraction| bar.set_fraction(fraction))?;
     let swings = arguments.swing.as_ref().map(|degrees| swings(&head, degrees, &plan, &bar)).transpose()?;
-    drop(bar);
+    bar.set_phase("plotting");
 
     let wanted =
         arguments.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/gains-{}", name(arguments))));
@@ -89,6 +89,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     }
     let swings = swings.unwrap_or_default();
     replace_text(&folder.join("report.html"), &page(&name(arguments), &head, &curves, &swings)?)?;
+    drop(bar);
     output::print_result(global, &text(&curves, &swings), figures(&curves, &swings)?, Some(&folder))?;
     Ok(Completion::Done)
 }
@@ -164,7 +165,7 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
         let header = ["swing RMS", "max deg", "peak Hz", "gain", "coherence"];
         words += "\n";
         words += &report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
-        words += &study.ended.as_ref().map(|why| format!("ended {why}\n")).unwrap_or_default();
+        words += &study.ended.as_ref().map(|why| report::wrapped(&format!("ended {why}"), "  ")).unwrap_or_default();
     }
     words
 }

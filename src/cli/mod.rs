@@ -105,6 +105,10 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
     let Some(command) = &cli.command else { return full_run::run(&cli.full_run, global) };
+    // The supervisor of a worker tells by its signal why it ended.
+    if !matches!(&cli.command, Some(Command::Sweep(sweep)) if sweep.is_worker()) {
+        signals::watch();
+    }
     if cli.full_run.scene.is_some() {
         let message = "--scene before a command has no effect: put it after the command, or omit the command";
         Cli::command().error(ErrorKind::ArgumentConflict, message).exit();

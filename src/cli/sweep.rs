@@ -1,7 +1,7 @@
 //! `zsim sweep`: plan, run, status, merge, submit.
 
 use super::arguments::Global;
-use super::bars::{WorkBar, stop_flag};
+use super::bars::{WorkBar, end_polling, stop_flag};
 use super::sweep_text::{plan_text, status_text};
 use super::usage::Usage;
 use super::{Completion, output, slurm};
@@ -11,7 +11,7 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use zsim::spec::{Kind, find, parse};
-use zsim::study::sweep::{Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
+use zsim::study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///
@@ -25,6 +25,13 @@ use zsim::study::sweep::{Plan, Runner, Shard, Sweep, SweepStatus, limit_process}
 pub(super) struct Arguments {
     #[command(subcommand)]
     command: Command,
+}
+
+impl Arguments {
+    /// Whether this process is a worker of another one.
+    pub(super) fn is_worker(&self) -> bool {
+        matches!(self.command, Command::Task(_))
+    }
 }
 
 #[derive(Subcommand)]
@@ -132,6 +139,7 @@ pub(super) fn run_sweep(sweep: &Sweep, shard: Shard, global: &Global) -> anyhow:
     let bar = WorkBar::new(global, "sweeping");
     let on_progress = |fraction: f64| bar.set_fraction(fraction);
     sweep.run(shard, &Runner { program: &program, stop: stop_flag(), on_progress: &on_progress })?;
+    end_polling();
     Ok(())
 }
 
@@ -169,7 +177,7 @@ fn run_task(arguments: &TaskArguments) -> anyhow::Result<Completion> {
 
 /// Merges the finished runs and prints a summary.
 pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<Completion> {
-    let merged = sweep.merge_and_report()?;
+    let merged = merge_with_bar(sweep, global)?;
     let words = format!("{}\n{}", merged.text, status_text(&merged.status));
     let figures = json!({ "status": merged.status, "summary": merged.summary });
     output::print_result(global, &words, figures, Some(folder))?;
@@ -180,3 +188,9 @@ fn print_status(global: &Global, status: &SweepStatus, folder: &Path) -> anyhow:
     output::print_result(global, &status_text(status), serde_json::to_value(status)?, Some(folder))?;
     Ok(Completion::Done)
 }
+/// Merges the finished runs and writes plots and page, with a progress bar.
+pub(super) fn merge_with_bar(sweep: &Sweep, global: &Global) -> anyhow::Result<MergedReport> {
+    let _bar = WorkBar::new(global, "merging");
+    Ok(sweep.merge_and_report()?)
+}
+

@@ -16,3 +16,4 @@ mod sensor_models;
 mod skip;
 mod specs;
 mod summary;
+mod terminal;
