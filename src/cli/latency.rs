@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let plan = Plan::new(STUDY, &spec, &source)?;
     let folder = output::folder_to_resume(&arguments.out)?;
     let planned = plan.write(&folder, arguments.force)?;
-    sweep::run_sweep(&planned, Shard::WHOLE, global)
+    sweep::run_sweep(&planned, Shard::WHOLE, false, global)
         .inspect_err(|_| super::full_run::print_partial_results(&folder))?;
     let merged = sweep::merge_with_bar(&planned, global)?;
     let failed =

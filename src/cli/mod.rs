@@ -25,6 +25,7 @@ mod output;
 mod quantity;
 mod recording_files;
 mod recording_size;
+mod repeat;
 mod reproduce;
 mod scene;
 mod signals;

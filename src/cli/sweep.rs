@@ -4,7 +4,7 @@ use super::arguments::Global;
 use super::bars::{WorkBar, end_polling, stop_flag};
 use super::sweep_text::{plan_text, status_text};
 use super::usage::Usage;
-use super::{Completion, output, slurm};
+use super::{Completion, output, repeat, slurm};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use serde_json::json;
@@ -40,6 +40,7 @@ enum Command {
     Run(RunArguments),
     Status(FolderArguments),
     Merge(FolderArguments),
+    Repeat(repeat::Arguments),
     Submit(slurm::Arguments),
     #[command(hide = true)]
     Task(TaskArguments),
@@ -77,6 +78,9 @@ struct RunArguments {
     /// Number of parts that the runs are divided into
     #[arg(long, value_name = "M")]
     count: Option<usize>,
+    /// Then repeat each full run and keep its files and its page in DIR/runs
+    #[arg(long)]
+    keep_runs: bool,
 }
 
 /// The folder of a sweep
@@ -105,6 +109,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
             print_status(global, &Sweep::open(&folder.folder)?.status(Shard::WHOLE)?, &folder.folder)
         }
         Command::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
+        Command::Repeat(repeat) => repeat::run(repeat, global),
         Command::Submit(submit) => slurm::run(submit, global),
         Command::Task(task) => run_task(task),
     }
@@ -129,16 +134,24 @@ fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Complet
 fn run_shard(arguments: &RunArguments, global: &Global) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
     let shard = shard(arguments)?;
-    run_sweep(&sweep, shard, global)?;
+    run_sweep(&sweep, shard, arguments.keep_runs, global)?;
     print_status(global, &sweep.status(shard)?, &arguments.folder)
 }
 
-/// Runs the missing runs of a part, with a progress bar.
-pub(super) fn run_sweep(sweep: &Sweep, shard: Shard, global: &Global) -> anyhow::Result<()> {
+/// Runs the missing runs of a part, with a progress bar; with `keeps_runs`, then repeats each with its files.
+pub(super) fn run_sweep(sweep: &Sweep, shard: Shard, keeps_runs: bool, global: &Global) -> anyhow::Result<()> {
+    if keeps_runs {
+        // Refuse before the first run what has no files to keep.
+        sweep.runs_to_keep(shard)?;
+    }
     let program = std::env::current_exe().context("this program's own path is not known")?;
     let bar = WorkBar::new(global, "sweeping");
     let on_progress = |fraction: f64| bar.set_fraction(fraction);
     sweep.run(shard, &Runner { program: &program, stop: stop_flag(), on_progress: &on_progress })?;
+    drop(bar);
+    if keeps_runs {
+        repeat::keep_runs(sweep, shard, global)?;
+    }
     end_polling();
     Ok(())
 }
@@ -175,6 +188,12 @@ fn run_task(arguments: &TaskArguments) -> anyhow::Result<Completion> {
     Ok(Completion::Done)
 }
 
+/// Merges the finished runs and writes plots and page, with a progress bar.
+pub(super) fn merge_with_bar(sweep: &Sweep, global: &Global) -> anyhow::Result<MergedReport> {
+    let _bar = WorkBar::new(global, "merging");
+    Ok(sweep.merge_and_report()?)
+}
+
 /// Merges the finished runs and prints a summary.
 pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<Completion> {
     let merged = merge_with_bar(sweep, global)?;
@@ -188,9 +207,3 @@ fn print_status(global: &Global, status: &SweepStatus, folder: &Path) -> anyhow:
     output::print_result(global, &status_text(status), serde_json::to_value(status)?, Some(folder))?;
     Ok(Completion::Done)
 }
-/// Merges the finished runs and writes plots and page, with a progress bar.
-pub(super) fn merge_with_bar(sweep: &Sweep, global: &Global) -> anyhow::Result<MergedReport> {
-    let _bar = WorkBar::new(global, "merging");
-    Ok(sweep.merge_and_report()?)
-}
-

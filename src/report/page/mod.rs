@@ -10,6 +10,7 @@ mod data;
 mod encode;
 mod gains;
 mod html;
+mod points;
 mod quantise;
 mod scene;
 mod study;
@@ -31,6 +32,7 @@ pub const MAX_PAGE_TRIANGLES: usize = 30_000;
 /// Maximum number of poses of a path on a page; one takes 32 bytes, 43 in base64.
 pub const MAX_PAGE_POSES: usize = 20_000;
 
+pub use points::{PointColumn, RunPoints};
 pub use scene::{MaterialRow, ScenePage};
 pub use study::{MAX_PAGE_RUNS, StudyPage};
 pub use table::PageTable;
