@@ -86,8 +86,8 @@ enum Command {
     Spec(spec::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
-}
     Man(man::Arguments),
+}
 
 /// Parses the arguments, runs the command, and returns the exit code.
 pub fn run() -> ExitCode {
@@ -105,11 +105,11 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
-    let Some(command) = &cli.command else { return full_run::run(&cli.full_run, global) };
     // The supervisor of a worker tells by its signal why it ended.
     if !matches!(&cli.command, Some(Command::Sweep(sweep)) if sweep.is_worker()) {
         signals::watch();
     }
+    let Some(command) = &cli.command else { return full_run::run(&cli.full_run, global) };
     if cli.full_run.scene.is_some() {
         let message = "--scene before a command has no effect: put it after the command, or omit the command";
         Cli::command().error(ErrorKind::ArgumentConflict, message).exit();
@@ -133,12 +133,12 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
         Command::Spec(arguments) => spec::run(arguments, global),
         Command::Info(arguments) => info::run(arguments, global),
         Command::Completions(arguments) => completions::run(arguments, &mut Cli::command()),
+        Command::Man(arguments) => man::run(arguments, Cli::command(), global),
     }
 }
 
 #[cfg(test)]
 mod tests {
-        Command::Man(arguments) => man::run(arguments, Cli::command(), global),
     use super::*;
 
     #[test]

@@ -275,7 +275,16 @@ async function useStudy(page) {
   check(left.startsWith(`${shown} runs`), `after filtering, the points are "${left}" for ${shown} runs`);
 }
 
-const USES = { gains: useGains, study: useStudy };
+async function usePaper(page) {
+  check((await page.locator("section table tbody tr").count()) > 5, "the results are missing");
+  check((await page.locator(".drawing svg").count()) > 0, "the page has no plots");
+  const names = await page.locator("thead th").allTextContents();
+  for (const name of ["paper", "goal", "result, median", "worst", "ratio to the paper", "verdict"]) {
+    check(names.includes(name), `the column ${name} is missing`);
+  }
+}
+
+const USES = { gains: useGains, study: useStudy, paper: usePaper };
 for (const scheme of ["light", "dark"]) {
   for (const width of [1400, 400]) {
     const page = await open(scheme, width);

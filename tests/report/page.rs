@@ -94,6 +94,20 @@ fn the_page_of_a_study_opens_the_runs_that_it_keeps() {
     use_in_a_browser(&here.path().join("out/report.html"));
 }
 
+#[test]
+fn the_page_of_the_experiments_works_in_a_browser() {
+    let here = tempfile::tempdir().unwrap();
+    let (code, _, errors) = run(here.path(), "reproduce fig3 --quick --out <script>window.hostile=1;");
+    assert_eq!(code, 0, "{errors}");
+    let page = here.path().join("<script>window.hostile=1;/paper-quick/report.html");
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(text.contains("zsim reproduce fig3 --quick --out &lt;script&gt;window.hostile=1;"));
+    for content in ["<a href=\"fig3/report.html\">", "ratio to the paper", "Not finished yet.", "<svg"] {
+        assert!(text.contains(content), "{content}");
+    }
+    use_in_a_browser(&page);
+}
+
 /// Uses a page in a headless browser; fails if something on it does not work.
 fn use_in_a_browser(page: &Path) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
