@@ -1,7 +1,7 @@
 //! `zsim reproduce`: the paper's experiments.
 
 use super::arguments::Global;
-use super::bars::{WorkBar, stop_flag};
+use super::bars::{WorkBar, end_polling, stop_flag};
 use super::usage::Usage;
 use super::{Completion, output};
 use anyhow::Context;
@@ -54,6 +54,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         let result = experiment.run(&folder.join(&experiment.name), extent, arguments.force, &runner)?;
         found.push(Finding { experiment: experiment.clone(), result: Some(result) });
         table(arguments, extent, &folder, &found)?;
+        end_polling();
     }
     let rows: Vec<Vec<String>> = found
         .iter()
