@@ -49,7 +49,7 @@ const BELOW_CLI: &[&str] = &[
 const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
 
 /// Crates that are restricted to some modules, and these modules.
-const RESTRICTED_CRATES: [(&str, &[&str]); 18] = [
+const RESTRICTED_CRATES: [(&str, &[&str]); 19] = [
     ("base64", &["report"]),
     ("parry3d", &["world"]),
     ("rapier3d_f64", &["dynamics"]),
@@ -58,6 +58,7 @@ const RESTRICTED_CRATES: [(&str, &[&str]); 18] = [
     ("cdr_encoding", &["recording"]),
     ("plotters", &["report"]),
     ("clap", &["cli", "main"]),
+    ("clap_mangen", &["cli"]),
     ("anyhow", &["cli", "main"]),
     ("indicatif", &["cli"]),
     ("include_dir", &["spec"]),

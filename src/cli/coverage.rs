@@ -65,10 +65,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     };
     let bar = WorkBar::new(global, "swinging");
     let seen = coverage(&head, motion.as_ref(), &lidar, &plan, |state| bar.set_fraction(state.t_s / until_s))?;
-    drop(bar);
-
+    bar.set_phase("plotting");
     let folder =
         arguments.out.out.as_ref().map(|wanted| write_results(&seen, wanted, arguments.out.force)).transpose()?;
+    drop(bar);
     output::print_result(global, &text(&seen), serde_json::to_value(&seen)?, folder.as_deref())?;
     Ok(Completion::Done)
 }

@@ -2,7 +2,7 @@
 
 use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
-use super::bars::{Bars, stop_flag};
+use super::bars::{Bars, end_polling, stop_flag};
 use super::{output, recording_size};
 use clap::Args;
 use serde_json::{Value, json};
@@ -75,6 +75,8 @@ pub(super) fn print_outcome(
     profile: bool,
     folder: &Path,
 ) -> anyhow::Result<Completion> {
+    // A signal during the last plots comes too late to stop the run, but still determines the exit code.
+    end_polling();
     let mut figures = serde_json::to_value(&outcome.metrics)?;
     if let (true, Value::Object(object)) = (profile, &mut figures) {
         object.insert("profile".to_owned(), seconds_by_part(outcome));

@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let bar = WorkBar::new(global, "shaking");
     let curves = gain_curves(&head, &plan, &|fraction| bar.set_fraction(fraction))?;
     let swings = arguments.swing.as_ref().map(|degrees| swings(&head, degrees, &plan, &bar)).transpose()?;
-    drop(bar);
+    bar.set_phase("plotting");
 
     let wanted =
         arguments.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/gains-{}", name(arguments))));
@@ -89,6 +89,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     }
     let swings = swings.unwrap_or_default();
     replace_text(&folder.join("report.html"), &page(&name(arguments), &head, &curves, &swings)?)?;
+    drop(bar);
     output::print_result(global, &text(&curves, &swings), figures(&curves, &swings)?, Some(&folder))?;
     Ok(Completion::Done)
 }
@@ -139,7 +140,7 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
     let slowest_hz = head.linear_modes().first().map_or(plan.up_to_hz, |mode| mode.frequency_hz);
     let plan = GainPlan { up_to_hz: plan.up_to_hz.min(3.0 * slowest_hz), ..plan.clone() };
     let study = |(before, axis): (usize, &Axis)| {
-        bar.set_task(format!("swinging, {}", axis_name(*axis)));
+        bar.set_task(format!("swinging, {}", report::quantity_name(axis_name(*axis))));
         let on_progress = |fraction: f64| bar.set_fraction((before as f64 + fraction) / axes.len() as f64);
         Ok(swing_study(head, *axis, degrees, &plan, &on_progress)?)
     };
@@ -154,7 +155,7 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
         let row = |p: &zsim::study::gains::SwingPoint| {
             let number = |x: Option<f64>, decimals: usize| x.map_or(dash(), |x| format!("{x:.decimals$}"));
             vec![
-                format!("{} {:.1} deg", axis_name(study.axis), p.swing_rms_deg),
+                format!("{}, {:.1} deg", report::quantity_name(axis_name(study.axis)), p.swing_rms_deg),
                 format!("{:.1}", p.swing_most_deg),
                 number(p.peak.map(|peak| peak.freq_hz), 3),
                 number(p.peak.map(|peak| peak.gain), 2),
@@ -164,7 +165,7 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
         let header = ["swing RMS", "max deg", "peak Hz", "gain", "coherence"];
         words += "\n";
         words += &report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
-        words += &study.ended.as_ref().map(|why| format!("ended {why}\n")).unwrap_or_default();
+        words += &study.ended.as_ref().map(|why| report::wrapped(&format!("ended {why}"), "  ")).unwrap_or_default();
     }
     words
 }

@@ -45,7 +45,7 @@ fn text(info: &RecordingInfo) -> String {
     let clocks: Vec<_> = info.topics.iter().filter_map(clock_row).collect();
     let clocks =
         report::table(&["stamps against log time", "offset ms", "drift ppm", "jitter ms", "pattern"], &clocks, true);
-    format!("{head}\n\n{topics}\n{clocks}")
+    format!("{}\n{topics}\n{clocks}", report::wrapped(&head, "  "))
 }
 
 fn topic_row(topic: &TopicInfo) -> Vec<String> {

@@ -47,9 +47,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let plan = Plan::new(STUDY, &spec, &source)?;
     let folder = output::folder_to_resume(&arguments.out)?;
     let planned = plan.write(&folder, arguments.force)?;
-    sweep::run_sweep(&planned, Shard::WHOLE, global)
+    sweep::run_sweep(&planned, Shard::WHOLE, false, global)
         .inspect_err(|_| super::full_run::print_partial_results(&folder))?;
-    let merged = planned.merge_and_report()?;
+    let merged = sweep::merge_with_bar(&planned, global)?;
     let failed =
         || anyhow!("{} runs failed: {} has their errors", merged.status.failed, folder.join("table.csv").display());
     let study = merged.latency.as_ref().ok_or_else(failed)?;

@@ -19,11 +19,13 @@ mod full_run;
 mod gains;
 mod info;
 mod latency;
+mod man;
 mod map;
 mod output;
 mod quantity;
 mod recording_files;
 mod recording_size;
+mod repeat;
 mod reproduce;
 mod scene;
 mod signals;
@@ -84,6 +86,7 @@ enum Command {
     Spec(spec::Arguments),
     Info(info::Arguments),
     Completions(completions::Arguments),
+    Man(man::Arguments),
 }
 
 /// Parses the arguments, runs the command, and returns the exit code.
@@ -101,6 +104,10 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
     let global = &cli.global;
     if let Some(threads) = global.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
+    }
+    // The supervisor of a worker tells by its signal why it ended.
+    if !matches!(&cli.command, Some(Command::Sweep(sweep)) if sweep.is_worker()) {
+        signals::watch();
     }
     let Some(command) = &cli.command else { return full_run::run(&cli.full_run, global) };
     if cli.full_run.scene.is_some() {
@@ -126,6 +133,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
         Command::Spec(arguments) => spec::run(arguments, global),
         Command::Info(arguments) => info::run(arguments, global),
         Command::Completions(arguments) => completions::run(arguments, &mut Cli::command()),
+        Command::Man(arguments) => man::run(arguments, Cli::command(), global),
     }
 }
 

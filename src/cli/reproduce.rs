@@ -1,7 +1,7 @@
 //! `zsim reproduce`: the paper's experiments.
 
 use super::arguments::Global;
-use super::bars::{WorkBar, stop_flag};
+use super::bars::{WorkBar, end_polling, stop_flag};
 use super::usage::Usage;
 use super::{Completion, output};
 use anyhow::Context;
@@ -10,13 +10,13 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim::report;
 use zsim::study::replace_text;
-use zsim::study::reproduction::{Experiment, ExperimentResult, Extent, TABLE_HEADING, paper_table};
+use zsim::study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_page, paper_table};
 use zsim::study::sweep::Runner;
 
 /// Repeat the paper's experiments: compare the published results with zsim's
 ///
-/// Each writes its figures to DIR/paper/NAME/; DIR/paper.md is the table of all finished ones. An interrupted
-/// experiment continues from its last finished run.
+/// Each writes its figures to DIR/paper/NAME/; DIR/paper.md is the table of all finished ones, DIR/paper/report.html a page
+/// with their tables, verdicts and plots. An interrupted experiment continues from its last finished run.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim reproduce\n  zsim reproduce fig3 --out results")]
 pub(super) struct Arguments {
@@ -51,18 +51,22 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         bar.set_task(experiment.name.clone());
         let on_progress = |fraction: f64| bar.set_fraction(fraction);
         let runner = Runner { program: &program, stop: stop_flag(), on_progress: &on_progress };
-        let finding = experiment.run(&folder.join(&experiment.name), extent, arguments.force, &runner)?;
-        found.push((experiment.given.clone(), finding));
+        let result = experiment.run(&folder.join(&experiment.name), extent, arguments.force, &runner)?;
+        found.push(Finding { experiment: experiment.clone(), result: Some(result) });
         table(arguments, extent, &folder, &found)?;
+        end_polling();
     }
     let rows: Vec<Vec<String>> = found
         .iter()
-        .flat_map(|(_, finding)| &finding.rows)
+        .filter_map(|finding| finding.result.as_ref())
+        .flat_map(|result| &result.rows)
         .map(|row| vec![format!("{} {}", row.figure, row.what), row.paper.clone(), row.ours.clone()])
         .collect();
     let words = report::table(&["figure", "the paper", "ours"], &rows, false);
-    let figures =
-        found.iter().map(|(name, finding)| json!({ "name": name, "rows": finding.rows, "notes": finding.notes }));
+    let figures = found.iter().filter_map(|Finding { experiment, result }| {
+        let result = result.as_ref()?;
+        Some(json!({ "name": experiment.given, "rows": result.rows, "notes": result.notes }))
+    });
     output::print_result(global, &words, json!({ "experiments": figures.collect::<Vec<_>>() }), Some(&folder))?;
     Ok(Completion::Done)
 }
@@ -80,30 +84,28 @@ fn check_table(path: &Path, force: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the table of the findings of this and earlier runs.
-fn table(
-    arguments: &Arguments,
-    extent: Extent,
-    folder: &Path,
-    found: &[(String, ExperimentResult)],
-) -> anyhow::Result<()> {
-    let mut findings: Vec<(String, Option<ExperimentResult>)> = Vec::new();
+/// Writes the table and the page of the findings of this and earlier runs.
+fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[Finding]) -> anyhow::Result<()> {
+    let mut findings = Vec::new();
     for name in Experiment::all() {
-        let earlier = || Experiment::load(&name)?.finished(&folder.join(&name), extent);
-        let finding = match found.iter().find(|(other, _)| *other == name) {
-            Some((_, finding)) => Some(finding.clone()),
-            None => earlier()?,
+        let earlier = || -> anyhow::Result<Finding> {
+            let experiment = Experiment::load(&name)?;
+            let result = experiment.finished(&folder.join(&name), extent)?;
+            Ok(Finding { experiment, result })
         };
-        findings.push((name, finding));
+        let of_this_run = found.iter().find(|finding| finding.experiment.given == name);
+        findings.push(of_this_run.map_or_else(earlier, |finding| Ok(finding.clone()))?);
     }
-    let is_built_in = |name: &String| findings.iter().any(|(other, _)| other == name);
-    let others: Vec<_> = found.iter().filter(|(name, _)| !is_built_in(name)).collect();
-    findings.extend(others.into_iter().map(|(name, finding)| (name.clone(), Some(finding.clone()))));
+    let is_built_in =
+        |finding: &Finding| findings.iter().any(|other| other.experiment.given == finding.experiment.given);
+    let others: Vec<Finding> = found.iter().filter(|finding| !is_built_in(finding)).cloned().collect();
+    findings.extend(others);
     let mut options = if arguments.quick { " --quick".to_owned() } else { String::new() };
     if arguments.out != Path::new("results") {
         options += &format!(" --out {}", arguments.out.display());
     }
     let path = folder.with_extension("md");
     std::fs::create_dir_all(&arguments.out).with_context(|| format!("cannot create {}", arguments.out.display()))?;
-    Ok(replace_text(&path, &paper_table(&findings, extent, &options))?)
+    replace_text(&path, &paper_table(&findings, extent, &options))?;
+    Ok(replace_text(&folder.join("report.html"), &paper_page(&findings, folder, extent, &options)?)?)
 }

@@ -1,4 +1,6 @@
 //! SIGINT and SIGTERM: the first signal requests a clean stop, the second one ends the process immediately.
+//!
+//! A command that does not poll the flag is ended by the first signal. Either way the exit code is that of the signal.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
@@ -7,17 +9,33 @@ use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 static STOP: AtomicBool = AtomicBool::new(false);
 /// The number of the first signal; 0 before it.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
+/// Whether the running command polls [`STOP`].
+static IS_POLLED: AtomicBool = AtomicBool::new(false);
 
 /// Exit code of a process that a signal ended, minus the number of the signal, as shells report it.
 const BY_SIGNAL: i32 = 128;
 /// SIGINT, the signal of Ctrl-C.
 const INTERRUPT: i32 = 2;
 
-/// The flag that SIGINT and SIGTERM set from now on.
-pub(super) fn stop_flag() -> &'static AtomicBool {
+/// Handles the signals from now on: without this they end the process without an exit code of its own.
+pub(super) fn watch() {
     static HANDLER: Once = Once::new();
     HANDLER.call_once(install);
+}
+
+/// The flag that SIGINT and SIGTERM set from now on; the caller polls it.
+pub(super) fn stop_flag() -> &'static AtomicBool {
+    watch();
+    IS_POLLED.store(true, Ordering::SeqCst);
     &STOP
+}
+
+/// From now on nobody polls the flag: a signal ends the process, also one that has set the flag already.
+pub(super) fn end_polling() {
+    IS_POLLED.store(false, Ordering::SeqCst);
+    if STOP.load(Ordering::SeqCst) {
+        std::process::exit(i32::from(exit_code()));
+    }
 }
 
 /// The exit code of a run that was stopped: 130 after SIGINT, 143 after SIGTERM.
@@ -28,11 +46,15 @@ pub(super) fn exit_code() -> u8 {
 }
 
 fn stop_by(signal: i32) {
-    if STOP.load(Ordering::Relaxed) {
+    if STOP.load(Ordering::SeqCst) || !IS_POLLED.load(Ordering::SeqCst) {
         std::process::exit(BY_SIGNAL + signal);
     }
-    SIGNAL.store(signal, Ordering::Relaxed);
-    STOP.store(true, Ordering::Relaxed);
+    SIGNAL.store(signal, Ordering::SeqCst);
+    STOP.store(true, Ordering::SeqCst);
+    // The command may have stopped polling in the meantime.
+    if !IS_POLLED.load(Ordering::SeqCst) {
+        std::process::exit(BY_SIGNAL + signal);
+    }
 }
 
 /// Without the handlers a signal ends the program at once, which files survive too.

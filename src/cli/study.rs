@@ -22,13 +22,16 @@ pub(super) struct Arguments {
     /// Replace another plan in the folder; runs that are in both stay done
     #[arg(long)]
     force: bool,
+    /// Then repeat each full run and keep its files in DIR/runs; report.html links to their pages
+    #[arg(long)]
+    keep_runs: bool,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let plan = sweep::plan_of(&arguments.file)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(plan.name()));
     let planned = plan.write(&folder, arguments.force)?;
-    sweep::run_sweep(&planned, Shard::WHOLE, global)
+    sweep::run_sweep(&planned, Shard::WHOLE, arguments.keep_runs, global)
         .inspect_err(|_| super::full_run::print_partial_results(&folder))?;
     sweep::merge(&planned, &folder, global)
 }

@@ -1,17 +1,17 @@
 //! `zsim sweep`: plan, run, status, merge, submit.
 
 use super::arguments::Global;
-use super::bars::{WorkBar, stop_flag};
+use super::bars::{WorkBar, end_polling, stop_flag};
 use super::sweep_text::{plan_text, status_text};
 use super::usage::Usage;
-use super::{Completion, output, slurm};
+use super::{Completion, output, repeat, slurm};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use zsim::spec::{Kind, find, parse};
-use zsim::study::sweep::{Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
+use zsim::study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///
@@ -27,12 +27,20 @@ pub(super) struct Arguments {
     command: Command,
 }
 
+impl Arguments {
+    /// Whether this process is a worker of another one.
+    pub(super) fn is_worker(&self) -> bool {
+        matches!(self.command, Command::Task(_))
+    }
+}
+
 #[derive(Subcommand)]
 enum Command {
     Plan(PlanArguments),
     Run(RunArguments),
     Status(FolderArguments),
     Merge(FolderArguments),
+    Repeat(repeat::Arguments),
     Submit(slurm::Arguments),
     #[command(hide = true)]
     Task(TaskArguments),
@@ -70,6 +78,9 @@ struct RunArguments {
     /// Number of parts that the runs are divided into
     #[arg(long, value_name = "M")]
     count: Option<usize>,
+    /// Then repeat each full run and keep its files and its page in DIR/runs
+    #[arg(long)]
+    keep_runs: bool,
 }
 
 /// The folder of a sweep
@@ -98,6 +109,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
             print_status(global, &Sweep::open(&folder.folder)?.status(Shard::WHOLE)?, &folder.folder)
         }
         Command::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
+        Command::Repeat(repeat) => repeat::run(repeat, global),
         Command::Submit(submit) => slurm::run(submit, global),
         Command::Task(task) => run_task(task),
     }
@@ -122,16 +134,25 @@ fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Complet
 fn run_shard(arguments: &RunArguments, global: &Global) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
     let shard = shard(arguments)?;
-    run_sweep(&sweep, shard, global)?;
+    run_sweep(&sweep, shard, arguments.keep_runs, global)?;
     print_status(global, &sweep.status(shard)?, &arguments.folder)
 }
 
-/// Runs the missing runs of a part, with a progress bar.
-pub(super) fn run_sweep(sweep: &Sweep, shard: Shard, global: &Global) -> anyhow::Result<()> {
+/// Runs the missing runs of a part, with a progress bar; with `keeps_runs`, then repeats each with its files.
+pub(super) fn run_sweep(sweep: &Sweep, shard: Shard, keeps_runs: bool, global: &Global) -> anyhow::Result<()> {
+    if keeps_runs {
+        // Refuse before the first run what has no files to keep.
+        sweep.runs_to_keep(shard)?;
+    }
     let program = std::env::current_exe().context("this program's own path is not known")?;
     let bar = WorkBar::new(global, "sweeping");
     let on_progress = |fraction: f64| bar.set_fraction(fraction);
     sweep.run(shard, &Runner { program: &program, stop: stop_flag(), on_progress: &on_progress })?;
+    drop(bar);
+    if keeps_runs {
+        repeat::keep_runs(sweep, shard, global)?;
+    }
+    end_polling();
     Ok(())
 }
 
@@ -167,9 +188,15 @@ fn run_task(arguments: &TaskArguments) -> anyhow::Result<Completion> {
     Ok(Completion::Done)
 }
 
+/// Merges the finished runs and writes plots and page, with a progress bar.
+pub(super) fn merge_with_bar(sweep: &Sweep, global: &Global) -> anyhow::Result<MergedReport> {
+    let _bar = WorkBar::new(global, "merging");
+    Ok(sweep.merge_and_report()?)
+}
+
 /// Merges the finished runs and prints a summary.
 pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<Completion> {
-    let merged = sweep.merge_and_report()?;
+    let merged = merge_with_bar(sweep, global)?;
     let words = format!("{}\n{}", merged.text, status_text(&merged.status));
     let figures = json!({ "status": merged.status, "summary": merged.summary });
     output::print_result(global, &words, figures, Some(folder))?;

@@ -2,14 +2,14 @@
 
 use super::quantity::{length, percent, time};
 use super::rows::{degrees, title};
-use super::{Metrics, verdict};
+use super::{Metrics, verdict, wrapped};
 
-/// Title, verdict, accuracy and time of a run, a line each.
+/// Title, verdict, accuracy and time of a run, a line each; long lines are wrapped.
 pub fn brief(metrics: &Metrics) -> String {
     let verdict = verdict::verdict(metrics).map(|verdict| format!("verdict: {verdict}"));
     let times = times(metrics);
     let lines = [Some(title(metrics)), verdict, Some(accuracy(metrics)), (!times.is_empty()).then_some(times)];
-    lines.into_iter().flatten().map(|line| line + "\n").collect()
+    wrapped(&lines.into_iter().flatten().collect::<Vec<_>>().join("\n"), "  ")
 }
 
 fn accuracy(metrics: &Metrics) -> String {

@@ -15,6 +15,7 @@ mod rows;
 mod sensors;
 mod table;
 mod verdict;
+mod wrap;
 
 pub use brief::brief;
 pub use figures::{
@@ -30,3 +31,4 @@ pub use names::{axis_label, quantity_name};
 pub use profile::timing_table;
 pub use sensors::{NoiseMetrics, SensorMetrics};
 pub use table::{markdown, summary, table};
+pub use wrap::wrapped;

@@ -3,7 +3,7 @@
 use crate::spec::split_unit;
 
 /// Keys with another name than their own words. The unit follows from the key.
-const NAMES: [(&str, &str); 9] = [
+const NAMES: [(&str, &str); 15] = [
     ("bias_sigma_m", "standard deviation of the range bias"),
     ("bracket_kg", "mass of the bracket"),
     ("imu", "IMU"),
@@ -13,6 +13,12 @@ const NAMES: [(&str, &str); 9] = [
     ("noise_m", "range noise"),
     ("rate_hz", "scan rate"),
     ("seed", "random seed"),
+    ("x", "translation along x"),
+    ("x_rot", "rotation about x"),
+    ("y", "translation along y"),
+    ("y_rot", "rotation about y"),
+    ("z", "translation along z"),
+    ("z_rot", "rotation about z"),
 ];
 
 /// The name of the quantity with key `key`, with its unit in parentheses: `wire diameter (mm)` for `wire_diameter_mm`.
@@ -56,6 +62,8 @@ mod tests {
             ("n_per_m", "stiffness (N/m)"),
             ("mm", "mm"),
             ("imu", "IMU"),
+            ("y_rot", "rotation about y"),
+            ("z", "translation along z"),
         ] {
             assert_eq!(quantity_name(key), name);
         }

@@ -1,10 +1,8 @@
 //! Tables for the terminal (at most 80 columns) and for Markdown.
 
+use super::wrap::{MAX_WIDTH, wrapped};
 use super::{Metrics, rows, verdict};
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle};
-
-/// Maximum width of a table, columns of the terminal.
-const MAX_WIDTH: u16 = 80;
 
 /// Formats a table for the terminal, without rules between rows.
 ///
@@ -59,5 +57,6 @@ pub fn summary(metrics: &Metrics) -> String {
         }
     }
     let verdict = verdict::verdict(metrics).map_or_else(String::new, |verdict| format!("verdict: {verdict}\n"));
-    format!("{}\n{verdict}{}", rows::title(metrics), table(&[], &cells, false))
+    let head = wrapped(&format!("{}\n{verdict}", rows::title(metrics)), "  ");
+    head + &table(&[], &cells, false)
 }

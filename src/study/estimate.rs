@@ -162,6 +162,7 @@ pub(super) fn estimate_in(
         pairs: pairs.as_ref(),
         points: &registered.page_points,
     };
+    watch.check_stop()?;
     let plots = artefacts::plots(&results, &registered.sample, options.estimator.surfels.min_range_m);
     artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?)?)?;
     Ok(EstimateResult { metrics, timing: loops.open.timing })
@@ -196,6 +197,7 @@ impl LoopInputs<'_> {
             true => Some(close_loops(&open, folder, open_loop, watch)?),
             false => None,
         };
+        watch.progress(Stage::Evaluating, 0.0, None);
         let mut compare = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
             true => comparison::compare_with_truth(reader, map_from_head, covariances, watch),
             false => Ok(None),
@@ -263,7 +265,8 @@ fn close_loops(
     let closed = run_closed_loop(run, options.calibration, options.estimator)?;
     closed.notes.iter().for_each(|note| watch.note(note));
     write_tum(&folder.join("closed_loop.tum"), &closed.map_from_head)?;
-    if watch.is_stopped() { Err(StudyError::Stopped) } else { Ok(closed) }
+    watch.check_stop()?;
+    Ok(closed)
 }
 
 /// All metrics except those of the two loops, the clock and the integrity.

@@ -1,5 +1,6 @@
 //! Progress reports and cancellation of experiments.
 
+use super::StudyError;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Stage of an experiment.
@@ -11,6 +12,8 @@ pub enum Stage {
     Estimating,
     /// Global registration with loop closure.
     ClosingLoops,
+    /// Comparison with the truth, and writing of the map.
+    Evaluating,
     /// Registration of the cloud.
     Registering,
     /// Computation of the information bound.
@@ -46,6 +49,11 @@ pub struct ProgressMonitor<'a> {
 impl ProgressMonitor<'_> {
     pub(super) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Fails with [`StudyError::Stopped`] if the experiment is to stop.
+    pub(super) fn check_stop(&self) -> Result<(), StudyError> {
+        if self.is_stopped() { Err(StudyError::Stopped) } else { Ok(()) }
     }
 
     pub(super) fn progress(&mut self, stage: Stage, done_s: f64, total_s: Option<f64>) {

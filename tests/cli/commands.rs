@@ -1,6 +1,7 @@
 //! The commands: output, files and errors.
 
 use crate::command::run;
+use crate::skip;
 use assert_cmd::Command;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -198,7 +199,7 @@ fn the_kind_of_a_spec_is_determined_from_its_text() {
 #[test]
 fn help_and_completions_go_to_stdout() {
     let here = tempfile::tempdir().unwrap();
-    for verb in ["", "simulate", "estimate", "evaluate", "check", "info", "completions"] {
+    for verb in ["", "simulate", "estimate", "evaluate", "check", "info", "completions", "man"] {
         let (code, out, stderr) = run(here.path(), &format!("{verb} --help"));
         assert_eq!((code, stderr.as_str()), (0, ""));
         assert!(out.trim_end().lines().last().unwrap().trim().starts_with("zsim"), "{out}");
@@ -207,4 +208,31 @@ fn help_and_completions_go_to_stdout() {
         let (code, out, _) = run(here.path(), &format!("completions {shell}"));
         assert!(code == 0 && out.contains("fixed-views"), "{shell}");
     }
+}
+
+#[test]
+fn manual_pages_are_well_formed() {
+    let here = tempfile::tempdir().unwrap();
+    let (code, out, stderr) = run(here.path(), "man --out pages");
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    assert!(out.ends_with("pages\n"), "{out}");
+    let pages: Vec<PathBuf> =
+        std::fs::read_dir(here.path().join("pages")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(pages.len() > 25, "{}", pages.len());
+    for page in &pages {
+        let text = std::fs::read_to_string(page).unwrap();
+        let name = page.file_stem().unwrap().to_string_lossy().into_owned();
+        assert!(text.contains(&format!(".TH {name} 1 ")), "{name}: {text}");
+        for section in ["NAME", "SYNOPSIS", "DESCRIPTION", "OPTIONS"] {
+            assert!(text.contains(&format!("\n.SH {section}\n")), "{name}: {section}");
+        }
+    }
+    // groff warns of unknown requests and of unbalanced macros.
+    let mut groff = std::process::Command::new("groff");
+    if let Some(formatted) = skip::run_or_skip("groff", groff.args(["-man", "-Tutf8", "-ww", "-z"]).args(&pages)) {
+        let complaints = String::from_utf8_lossy(&formatted.stderr).into_owned();
+        assert!(formatted.status.success() && complaints.is_empty(), "{complaints}");
+    }
+    let (code, out, _) = run(here.path(), "man --out pages");
+    assert!(code == 0 && out.ends_with("pages-2\n"), "an existing folder is kept: {out}");
 }

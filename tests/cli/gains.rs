@@ -19,25 +19,18 @@ fn json(arguments: &[&str]) -> Value {
 fn gains_writes_a_table_and_plots() {
     let here = tempfile::tempdir().unwrap();
     let out = here.path().join("gains");
-    let figures = json(&[
-        "gains",
-        "--head",
-        "handheld",
-        "--period",
-        "10",
-        "--up-to",
-        "3",
-        "--realisations",
-        "2",
-        "--json",
-        "--out",
-        out.to_str().unwrap(),
-    ]);
+    let quick = ["gains", "--head", "handheld", "--period", "10", "--up-to", "3", "--realisations", "2"];
+    let figures = json(&[&quick[..], &["--json", "--out", out.to_str().unwrap()]].concat());
     assert_eq!(figures["axes"].as_array().unwrap().len(), 6);
     assert_eq!(figures["out"], out.to_str().unwrap());
     let table = std::fs::read_to_string(out.join("gains.csv")).unwrap();
     assert!(table.starts_with("axis,freq_hz,gain,coherence,gain_model,gain_sigma,phase_deg,phase_model_deg\n"));
     assert_eq!(table.lines().count(), 1 + 6 * 30);
+    assert!(table.contains("\nx_rot,") && table.contains("\nx,"));
+    let words = zsim(&quick).args(["--out", here.path().join("words").to_str().unwrap()]).assert().success();
+    let words = String::from_utf8(words.get_output().stdout.clone()).unwrap();
+    assert!(words.contains("rotation about x") && words.contains("translation along x"), "{words}");
+    assert!(!words.contains("x_rot"), "{words}");
     for file in ["plots/gains.svg", "plots/gains.png", "plots/coherence.svg", "plots/coherence.png", "report.html"] {
         assert!(out.join(file).is_file(), "{file}");
     }

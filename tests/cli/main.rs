@@ -12,5 +12,8 @@ mod hostile;
 mod maps;
 mod scene;
 mod sensor_models;
+#[path = "../skip/mod.rs"]
+mod skip;
 mod specs;
 mod summary;
+mod terminal;

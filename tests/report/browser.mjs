@@ -3,6 +3,7 @@
 // Exits with 77 if a program or a module that it needs is not installed.
 // Fails on an error in the console, on a request to the network, on a control without effect, on an accessibility violation
 // that axe-core finds, and on a page that is wider than the screen. With PICTURES, it writes screenshots to that folder.
+import { execFileSync } from "node:child_process";
 import { createRequire } from "node:module";
 import { existsSync, readFileSync } from "node:fs";
 import { join, resolve } from "node:path";
@@ -192,7 +193,98 @@ async function audit(page, name) {
   check(width <= 0, `${name}: the page is ${width} px wider than the screen`);
 }
 
-const USES = { gains: useGains, study: useTable };
+// The runs as points: axes, hover, the front by keyboard, and the way to a run.
+async function usePoints(page) {
+  const place = page.locator(".points");
+  await place.scrollIntoViewIfNeeded();
+  const drawn = async () => (await place.screenshot()).toString("base64");
+  const first = await drawn();
+  const options = await page.locator("#abscissa option").count();
+  check(options > 1, "there is one column to choose");
+  const chosen = await page.locator("#abscissa").inputValue();
+  const other = [...Array(options).keys()].map(String).find((k) => k !== chosen && k !== "1");
+  await page.locator("#abscissa").selectOption(other);
+  check(first !== (await drawn()), "the choice of the abscissa has no effect");
+  await page.locator("#abscissa").selectOption(chosen);
+  const point = place.locator(".front").first();
+  check((await point.count()) > 0, "the plot has no Pareto front");
+  const box = await point.boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  const hovered = await page.locator("#hovered").textContent();
+  check(/^run \d+: .+ \d.*, .+ \d.*, on the Pareto front$/.test(hovered), `the values of a point are "${hovered}"`);
+  const fronts = await place.locator(".front").count();
+  await point.focus();
+  if (fronts > 1) {
+    const before = await page.evaluate(() => document.activeElement.getAttribute("aria-label"));
+    await page.keyboard.press("ArrowRight");
+    const after = await page.evaluate(() => document.activeElement.getAttribute("aria-label"));
+    check(before !== after && after.startsWith("Pareto front, run "), "an arrow key does not move along the front");
+  }
+  await openRuns(page, point);
+}
+
+async function openRuns(page, point) {
+  const isKept = (await page.locator("#runs th a").count()) > 0;
+  const back = page.url();
+  const opened = async (sentence) => {
+    if (!isKept) {
+      check(await page.locator("#run").isVisible(), `${sentence} does not show the run`);
+      return page.locator("#run h2").textContent();
+    }
+    await page.waitForURL((url) => url.href !== back).catch(() => check(false, `${sentence} does not open the page of the run`));
+    check(/\/runs\/\d+-[0-9a-f]{8}\/report\.html$/.test(page.url()), `${sentence} opens ${page.url()}`);
+    await page.waitForFunction(() => document.documentElement.dataset.page === "run");
+    await page.goto(back);
+    return page.waitForFunction(() => document.documentElement.dataset.drawn);
+  };
+  await page.keyboard.press("Enter");
+  await opened("Enter on a point of the front");
+  await point.scrollIntoViewIfNeeded();
+  const box = await point.boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await opened("a click on a point of the front");
+  const row = page.locator("#runs tbody tr").last();
+  await row.locator("td").last().click();
+  await opened("a click on a row");
+  await row.locator("a, button").focus();
+  await page.keyboard.press("Enter");
+  await opened("Enter on a row");
+  if (!isKept) await repeatRun(page, row);
+}
+
+// The command that repeats a run, which a shell takes as it is.
+async function repeatRun(page, row) {
+  const number = await row.locator("th").textContent();
+  const command = await page.locator("#repeat code").textContent();
+  const folder = decodeURIComponent(new URL(page.url()).pathname).replace(/\/[^/]*$/, "");
+  const words = execFileSync("sh", ["-c", `printf '%s\\n' ${command}`], { encoding: "utf8" }).trimEnd().split("\n");
+  const expected = ["zsim", "sweep", "repeat", folder, "--run", number];
+  check(JSON.stringify(words) === JSON.stringify(expected), `the command is ${command}`);
+  const values = await page.locator("#run td").allTextContents();
+  const cells = await row.locator("td").allTextContents();
+  check(JSON.stringify(values) === JSON.stringify(cells), "the values of the run are not those of its row");
+  await page.locator("#copy").click();
+  await page.waitForFunction(() => document.querySelector("#repeat output").textContent);
+}
+
+async function useStudy(page) {
+  await usePoints(page);
+  await useTable(page);
+  const left = await page.locator("#hovered").textContent();
+  const shown = (await column(page, 0)).length;
+  check(left.startsWith(`${shown} runs`), `after filtering, the points are "${left}" for ${shown} runs`);
+}
+
+async function usePaper(page) {
+  check((await page.locator("section table tbody tr").count()) > 5, "the results are missing");
+  check((await page.locator(".drawing svg").count()) > 0, "the page has no plots");
+  const names = await page.locator("thead th").allTextContents();
+  for (const name of ["paper", "goal", "result, median", "worst", "ratio to the paper", "verdict"]) {
+    check(names.includes(name), `the column ${name} is missing`);
+  }
+}
+
+const USES = { gains: useGains, study: useStudy, paper: usePaper };
 for (const scheme of ["light", "dark"]) {
   for (const width of [1400, 400]) {
     const page = await open(scheme, width);

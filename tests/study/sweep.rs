@@ -288,6 +288,63 @@ fn full_runs_share_work_and_give_the_results_of_single_runs() {
     }
 }
 
+/// The spec of two short runs.
+fn two_walks() -> String {
+    let (head, rest) = WALKS.split_once("axes: [").unwrap();
+    let (_, tail) = rest.split_once("sampling:").unwrap();
+    format!("{head}axes: [values(path: \"imu\", values: [\"3dm_gx2\", \"tactical\"])], sampling:{tail}")
+}
+
+#[test]
+fn a_study_keeps_its_runs_and_its_page_links_to_theirs() {
+    let here = tempfile::tempdir().unwrap();
+    let kept = here.path().join("kept");
+    std::fs::write(here.path().join("walks.ron"), two_walks()).unwrap();
+    run_ok(here.path(), "study walks.ron -o kept");
+    let page = || std::fs::read_to_string(kept.join("report.html")).unwrap();
+    assert!(!kept.join("runs").exists() && !page().contains("href=\"runs/"));
+    let before = tables(&kept);
+
+    run_ok(here.path(), "sweep run kept --keep-runs");
+    run_ok(here.path(), "sweep merge kept");
+    let errors = numbers(&kept, "position_rmse_m");
+    let identities = column(&kept, "id");
+    for (number, error) in errors.iter().enumerate() {
+        let address = format!("runs/{number}-{}/report.html", &identities[number][..8]);
+        assert!(page().contains(&format!("<a href=\"{address}\">{number}</a>")), "{address}");
+        let figures = std::fs::read_to_string(kept.join(&address).with_file_name("metrics.json")).unwrap();
+        let figures: Value = serde_json::from_str(&figures).unwrap();
+        let repeated = figures["open_loop"]["position_rmse_m"].as_f64().unwrap();
+        // A decimal number may differ in its last digit.
+        assert!((repeated - error).abs() < 1e-12, "{repeated} and {error}");
+    }
+    assert!(tables(&kept) == before, "the tables do not depend on the runs that are kept");
+
+    let out: Value = serde_json::from_str(&run_ok(here.path(), "sweep repeat kept --run 1 --out one --json")).unwrap();
+    assert!((out["open_loop"]["position_rmse_m"].as_f64().unwrap() - errors[1]).abs() < 1e-12);
+    assert!(here.path().join("one/report.html").is_file());
+    let (code, _, stderr) = run(here.path(), "sweep repeat kept --run 2");
+    assert!(code == 2 && stderr.contains("runs 0 to 1"), "{stderr}");
+}
+
+#[test]
+fn a_closed_form_is_repeated_with_its_head_and_keeps_no_runs() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("springs.ron"), SPRINGS.replace("count: 4096", "count: 8")).unwrap();
+    run_ok(here.path(), "study springs.ron -o swept");
+    let masses = column(&here.path().join("swept"), "spring_mass_g");
+    let run_of_mass = masses.iter().position(|mass| !mass.is_empty()).unwrap();
+    let out = run_ok(here.path(), &format!("sweep repeat swept --run {run_of_mass} --out one --json"));
+    let figures: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(figures["spring_mass_g"].as_f64().unwrap().to_string(), masses[run_of_mass]);
+    // The head that is written is the one of the run: its spring has this mass.
+    let report: Value = serde_json::from_str(&run_ok(here.path(), "spring one/head.ron --json")).unwrap();
+    let mass_g: f64 = masses[run_of_mass].parse().unwrap();
+    assert!((report["coil"]["mass_g"].as_f64().unwrap() / mass_g - 1.0).abs() < 1e-9, "{report}");
+    let (code, _, stderr) = run(here.path(), "study springs.ron -o swept --keep-runs");
+    assert!(code == 2 && stderr.contains("only full runs"), "{stderr}");
+}
+
 #[test]
 fn runs_over_an_axis_of_faults_share_rays() {
     let here = tempfile::tempdir().unwrap();

@@ -11,6 +11,7 @@ use zsim::dynamics::HeadSpec;
 use zsim::elasticity::SpringSpec;
 use zsim::estimation::EstimatorSpec;
 use zsim::motion::MotionSpec;
+use zsim::report;
 use zsim::sensors::{ClocksSpec, ImuSpec, LidarSpec};
 use zsim::simulation::FaultsSpec;
 use zsim::spec::{Kind, find, names};
@@ -114,7 +115,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 fn list(wanted: Option<Kind>, global: &Global) -> anyhow::Result<()> {
     let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| wanted.is_none_or(|wanted| wanted == *kind)).collect();
     let width = kinds.iter().map(|kind| kind.folder().len()).max().unwrap_or_default();
-    let lines = kinds.iter().map(|kind| format!("{:width$}  {}\n", kind.folder(), names(*kind).join(", ")));
+    let line = |kind: &Kind| format!("{:width$}  {}", kind.folder(), names(*kind).join(", "));
+    let lines = kinds.iter().map(|kind| report::wrapped(&line(kind), &" ".repeat(width + 2)));
     let figures = kinds.iter().map(|kind| (kind.folder().to_owned(), json!(names(*kind)))).collect();
     output::print_result(global, &lines.collect::<String>(), serde_json::Value::Object(figures), None)
 }

@@ -54,7 +54,7 @@ fn document(view: &View, charts: &[Value], timeline: &[Value]) -> Value {
 }
 
 /// Escapes the characters that end a script element or start a comment in it, and line ends that scripts do not allow.
-fn inert(json: &str) -> String {
+pub(super) fn inert(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for c in json.chars() {
         match c {

@@ -1,15 +1,17 @@
 //! Interactive pages, each one HTML file without external resources.
 //!
 //! The page of a run has the verdict, a three-dimensional view, interactive charts, the metrics and the manifest; that of a
-//! scene the view, the floor plan and the materials; that of a study its tables, plots and runs; that of a gain measurement
-//! gain and phase of each axis. Scripts, style sheets and data are in the file. A content security policy forbids network
-//! access.
+//! scene the view, the floor plan and the materials; that of a study its tables, plots and runs; that of the paper's
+//! experiments their tables and plots; that of a gain measurement gain and phase of each axis. Scripts, style sheets and
+//! data are in the file. A content security policy forbids network access.
 
 mod binary;
 mod data;
 mod encode;
 mod gains;
 mod html;
+mod paper;
+mod points;
 mod quantise;
 mod scene;
 mod study;
@@ -31,6 +33,8 @@ pub const MAX_PAGE_TRIANGLES: usize = 30_000;
 /// Maximum number of poses of a path on a page; one takes 32 bytes, 43 in base64.
 pub const MAX_PAGE_POSES: usize = 20_000;
 
+pub use paper::{ExperimentSection, PageLink, PaperPage};
+pub use points::{PointColumn, RunPoints};
 pub use scene::{MaterialRow, ScenePage};
 pub use study::{MAX_PAGE_RUNS, StudyPage};
 pub use table::PageTable;

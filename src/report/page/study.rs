@@ -2,15 +2,16 @@
 
 use super::html::{self, escaped};
 use super::table::PageTable;
-use super::{DATA, READY, TABLES};
+use super::{DATA, READY, RunPoints, TABLES};
 
 const SECTIONS: &str = include_str!("assets/study.html");
+const POINTS: &str = include_str!("assets/points.js");
 const RUNS: &str = include_str!("assets/runs.js");
 /// Maximum number of runs in the table of the page; a row takes about half a kilobyte.
 pub const MAX_PAGE_RUNS: usize = 5_000;
 
 /// The page of a study.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct StudyPage {
     /// Name of the study.
     pub name: String,
@@ -24,6 +25,8 @@ pub struct StudyPage {
     pub runs: PageTable,
     /// A note on runs that the table does not have.
     pub runs_note: String,
+    /// The same runs as points.
+    pub points: RunPoints,
 }
 
 impl StudyPage {
@@ -45,11 +48,11 @@ impl StudyPage {
             introduction: &html::summary(&self.introduction),
             without_scripts: "Sorting and filtering need scripts; the tables and plots do not.",
             sections: &sections,
-            footer: "Click on a column's name to sort by it. Plots are also in the folder plots/, all figures in table.csv and \
+            footer: "Click on a column's name to sort by it, and on a run to open or repeat it. Plots are also in the folder plots/, all figures in table.csv and \
                      summary.csv.",
             version: env!("CARGO_PKG_VERSION"),
-            data: "{}",
-            scripts: &[DATA, TABLES, RUNS, READY],
+            data: &self.points.json(),
+            scripts: &[DATA, TABLES, RUNS, POINTS, READY],
         }
         .html()
     }
@@ -57,6 +60,7 @@ impl StudyPage {
 
 #[cfg(test)]
 mod tests {
+    use super::super::PointColumn;
     use super::*;
 
     #[test]
@@ -65,18 +69,23 @@ mod tests {
             title: "By <b>".to_owned(),
             header: vec!["scene".to_owned(), "mm".to_owned()],
             rows: vec![vec!["<script>".to_owned(), "{{version}}".to_owned()]],
+            links: vec![Some("runs/\"><script>".to_owned())],
         };
+        let column = PointColumn { label: "</script><script>".to_owned(), values: vec![1.0] };
         let page = StudyPage {
             name: "a & b".to_owned(),
             introduction: "1 run".to_owned(),
             tables: vec![table.clone()],
             figures: vec![("errors".to_owned(), "<svg></svg>".to_owned())],
             runs: table,
-            runs_note: String::new(),
+            points: RunPoints { columns: vec![column], folder: Some("<script>".to_owned()), ..RunPoints::default() },
+            ..StudyPage::default()
         };
         let html = page.html();
         assert_eq!(html.matches("<script>").count(), 1, "that of the page");
-        assert_eq!(html.matches("&lt;script&gt;").count(), 2);
+        // In both tables the cell and the address.
+        assert_eq!(html.matches("&lt;script&gt;").count(), 4);
+        assert_eq!(html.matches("<a href=\"runs/&quot;&gt;&lt;script&gt;\">").count(), 2);
         assert_eq!(html.matches("<td class=\"text\">{{version}}</td>").count(), 2);
         assert!(html.contains("a &amp; b") && html.contains("<svg></svg>"));
     }

@@ -3,7 +3,7 @@
 use super::html::escaped;
 
 /// A table of text; rows have as many cells as the header.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PageTable {
     /// Title.
     pub title: String,
@@ -11,6 +11,8 @@ pub struct PageTable {
     pub header: Vec<String>,
     /// Rows; the first cell names the row.
     pub rows: Vec<Vec<String>>,
+    /// For each row, the address that its name links to; empty if no row has one.
+    pub links: Vec<Option<String>>,
 }
 
 impl PageTable {
@@ -30,9 +32,9 @@ impl PageTable {
             name => format!("<th scope=\"col\"{}>{}</th>", class(k), escaped(name)),
         };
         let header: String = self.header.iter().enumerate().map(name).collect();
-        let row = |cells: &Vec<String>| {
+        let row = |(row, cells): (usize, &Vec<String>)| {
             let cells = cells.iter().enumerate().map(|(k, cell)| match k {
-                0 => format!("<th scope=\"row\">{}</th>", escaped(cell)),
+                0 => format!("<th scope=\"row\">{}</th>", self.named(row, cell)),
                 _ if is_figure(cell) => format!("<td>{}</td>", escaped(cell)),
                 _ => format!("<td class=\"text\">{}</td>", escaped(cell)),
             });
@@ -42,8 +44,16 @@ impl PageTable {
             "<div class=\"wide\" tabindex=\"0\" role=\"group\" aria-label=\"{}\">\n<table class=\"sortable\">\n<thead><tr>{header}</tr></thead>\n\
              <tbody>\n{}</tbody>\n</table>\n</div>\n",
             escaped(&self.title),
-            self.rows.iter().map(row).collect::<String>()
+            self.rows.iter().enumerate().map(row).collect::<String>()
         )
+    }
+
+    /// The name of a row as HTML, as a link if the row has an address.
+    fn named(&self, row: usize, name: &str) -> String {
+        match self.links.get(row).and_then(Option::as_ref) {
+            Some(address) => format!("<a href=\"{}\">{}</a>", escaped(address), escaped(name)),
+            None => escaped(name),
+        }
     }
 }
 

@@ -107,7 +107,7 @@ pub(super) const SIGMAS_95: f64 = 1.96;
 /// Minimum coherence of a plotted gain: below it noise and nonlinearity dominate.
 pub(super) const MIN_COHERENCE: f64 = 0.5;
 
-/// Name of an axis in tables: `x_rot` for the angular rate about x, `x` for the acceleration along x.
+/// Key of an axis in files, whose words are in [`quantity_name`](crate::report::quantity_name): `x_rot` for the angular rate about x, `x` for the acceleration along x.
 pub fn axis_name(axis: Axis) -> &'static str {
     match axis {
         Axis::X => "x",

@@ -21,7 +21,7 @@ const LOWEST_SHARE: f64 = 0.01;
 /// When a plot fails, or a value cannot be written as JSON.
 pub fn page(name: &str, head: &HeadModel, curves: &[GainCurve], swings: &[SwingStudy]) -> Result<String, StudyError> {
     let (header, rows) = peak_table(curves);
-    let peaks = PageTable { title: "Highest peak of each axis".to_owned(), header, rows };
+    let peaks = PageTable { title: "Highest peak of each axis".to_owned(), header, rows, ..PageTable::default() };
     let figures = match swings {
         [] => Vec::new(),
         swings => vec![("By swing amplitude".to_owned(), swing_figure(swings).svg()?)],
@@ -63,7 +63,7 @@ fn modes(head: &HeadModel) -> PageTable {
         ]
     });
     let header = ["mode", "natural Hz", "damped Hz", "damping ratio"].map(str::to_owned).to_vec();
-    PageTable { title: "Modes of the head at rest".to_owned(), header, rows: rows.collect() }
+    PageTable { title: "Modes of the head at rest".to_owned(), header, rows: rows.collect(), ..PageTable::default() }
 }
 
 /// Quantity and direction of an axis.

@@ -2,6 +2,7 @@
 
 use super::{GainCurve, SwingStudy, axis_name};
 use crate::dynamics::Peak;
+use crate::report::quantity_name;
 use std::fmt::Write;
 
 /// The highest peak of each curve, simulated and in closed form: header and one row per axis.
@@ -12,7 +13,14 @@ pub fn peak_table(curves: &[GainCurve]) -> (Vec<String>, Vec<Vec<String>>) {
     };
     let row = |curve: &GainCurve| {
         let ([hz, gain], [model_hz, model_gain]) = (peak(curve.peak), peak(curve.peak_model));
-        vec![axis_name(curve.axis).to_owned(), hz, gain, model_hz, model_gain, format!("{:.4}", min_coherence(curve))]
+        vec![
+            quantity_name(axis_name(curve.axis)),
+            hz,
+            gain,
+            model_hz,
+            model_gain,
+            format!("{:.4}", min_coherence(curve)),
+        ]
     };
     let header = ["axis", "peak Hz", "gain", "closed form Hz", "gain", "min coherence"];
     (header.map(str::to_owned).to_vec(), curves.iter().map(row).collect())

@@ -2,7 +2,8 @@
 
 use super::head_response::HeadResponse;
 use super::{
-    ComparedNumber, DampingFit, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping, gain_plots,
+    ComparedNumber, Comparison, DampingFit, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping,
+    gain_plots,
 };
 use crate::dynamics::{DampingSpec, HeadSpec, Peak};
 use crate::motion::Axis;
@@ -33,7 +34,7 @@ pub(super) fn run(
         heads.iter().zip(&fitted).map(|(head, fit)| with_damping(head, fit.damping_ratio)).collect();
     let sweep = plan(spec, &damped, extent)?.write(folder, anew)?;
     sweep.run(Shard::WHOLE, runner)?;
-    sweep.merge()?;
+    sweep.merge_and_report()?;
     let curves: Vec<GainCurve> = sweep.details()?.ok_or_else(|| sweep.failed())?;
     let responses: Vec<HeadResponse<'_>> = spec
         .designs
@@ -135,6 +136,10 @@ fn rows(figure: &str, response: &HeadResponse<'_>) -> Vec<ComparedNumber> {
         what: format!("peak gain, {}", axis_label(fitted.axis)),
         paper: fitted.paper.map_or("-".to_owned(), |peak| format!("about {peak}")),
         ours: ours(fitted, curve),
+        comparison: fitted.paper.map(|paper| {
+            // A curve without a peak has no resonance: its gain counts as 1.
+            Comparison::near("", paper, curve.peak.map_or(1.0, |peak| peak.gain))
+        }),
     });
     let mut rows: Vec<ComparedNumber> = of_axis.collect();
     rows.extend(response.fit.rms_log_ratio().map(|rms| ComparedNumber {
@@ -142,6 +147,7 @@ fn rows(figure: &str, response: &HeadResponse<'_>) -> Vec<ComparedNumber> {
         what: "misfit of all peaks".to_owned(),
         paper: "-".to_owned(),
         ours: format!("{rms:.2} rms of the log ratios (a factor of {:.2})", rms.exp()),
+        comparison: None,
     }));
     rows
 }

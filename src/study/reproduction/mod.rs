@@ -1,125 +1,27 @@
 //! Reproduction of the paper's experiments, and comparison with its results.
 //!
 //! An experiment is a spec ([`ExperimentSpec`], the files of `specs/experiments/`). Its runs are a [sweep](super::sweep), so
-//! that an interrupted experiment can be resumed; [`Experiment::run`] also draws the figures. [`paper_table`] combines all finished
-//! experiments in one table.
+//! that an interrupted experiment can be resumed; [`Experiment::run`] also draws the figures. [`paper_table`] and
+//! [`paper_page`] combine all finished experiments in a table and on a page.
 
+mod comparison;
 mod damping;
+mod experiment;
 mod extent;
 mod gain_curves;
 mod gain_plots;
 mod head_response;
+mod page;
+mod paper_table;
 mod result;
 mod spec;
 mod timing;
 
+pub use comparison::{Comparison, Verdict};
 pub use damping::{DampingFit, FittedPeak, fit_damping};
+pub use experiment::{Experiment, Finding};
 pub use extent::Extent;
-pub use result::{ComparedNumber, ExperimentResult, TABLE_HEADING, paper_table};
+pub use page::paper_page;
+pub use paper_table::{TABLE_HEADING, paper_table};
+pub use result::{ComparedNumber, ExperimentResult};
 pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, TimingMapsSpec};
-
-use super::StudyError;
-use super::atomic_file::write_text;
-use super::sweep::{ContentHash, Plan, Runner};
-use crate::spec::{Kind, Source, find, names, parse, to_text};
-use serde::{Deserialize, Serialize};
-use std::path::Path;
-
-/// File with the result, which is written last.
-const RESULT_FILE: &str = "finding.ron";
-
-/// Content of the file with the result.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredResult {
-    /// Hash of everything that determines the result.
-    inputs: String,
-    result: ExperimentResult,
-}
-
-/// An experiment with its spec.
-#[derive(Debug, Clone)]
-pub struct Experiment {
-    /// Name or path given by the user.
-    pub given: String,
-    /// File name of the spec without folder and extension.
-    pub name: String,
-    spec: ExperimentSpec,
-    source: Source,
-}
-
-impl Experiment {
-    /// Loads the experiment `name`: a path, or a name in the library.
-    ///
-    /// # Errors
-    /// If there is no such experiment, or if its spec or a spec that it refers to is invalid.
-    pub fn load(name: &str) -> Result<Self, StudyError> {
-        let source = find(Kind::Experiment, name)?;
-        let spec: ExperimentSpec = parse(&source)?;
-        spec.check(&source)?;
-        let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { given: name.to_owned(), name: stem, spec, source })
-    }
-
-    /// Names of all built-in experiments, sorted.
-    pub fn all() -> Vec<String> {
-        names(Kind::Experiment)
-    }
-
-    /// Runs the experiment in `folder`, resuming an interrupted one.
-    ///
-    /// The result does not depend on the number of threads, nor on interruptions.
-    ///
-    /// # Errors
-    /// If the folder contains another experiment (or this one by another spec or version) and `anew` does not permit
-    /// replacing it, if a run fails, or if a file cannot be written.
-    pub fn run(
-        &self,
-        folder: &Path,
-        extent: Extent,
-        anew: bool,
-        runner: &Runner,
-    ) -> Result<ExperimentResult, StudyError> {
-        if let Some(result) = self.finished(folder, extent)?.filter(|_| !anew) {
-            return Ok(result);
-        }
-        let result = match &self.spec {
-            ExperimentSpec::GainCurves(spec) => {
-                gain_curves::run(spec, &spec.heads(&self.source)?, extent, folder, anew, runner)?
-            }
-            ExperimentSpec::Latency(spec) => {
-                timing::run(&spec.figure, &self.timing_plan(spec, extent)?, folder, anew, runner)?
-            }
-        };
-        let stored = StoredResult { inputs: self.inputs(extent)?, result };
-        write_text(folder, &folder.join(RESULT_FILE), &(to_text(&stored)? + "\n"))?;
-        Ok(stored.result)
-    }
-
-    /// Reads the result of an earlier run from `folder`; `None` if the experiment is not finished there.
-    ///
-    /// # Errors
-    /// If a spec is missing, or if the folder cannot be read.
-    pub fn finished(&self, folder: &Path, extent: Extent) -> Result<Option<ExperimentResult>, StudyError> {
-        let path = folder.join(RESULT_FILE);
-        if !path.is_file() {
-            return Ok(None);
-        }
-        let stored: StoredResult = parse(&Source::read(&path)?)?;
-        Ok((stored.inputs == self.inputs(extent)?).then_some(stored.result))
-    }
-
-    fn timing_plan(&self, spec: &TimingMapsSpec, extent: Extent) -> Result<Plan, StudyError> {
-        let (study, source) = spec.study(extent, &self.source)?;
-        Plan::new(&self.name, &study, &source)
-    }
-
-    /// Hash of everything that determines the result.
-    fn inputs(&self, extent: Extent) -> Result<String, StudyError> {
-        let text = match &self.spec {
-            ExperimentSpec::GainCurves(spec) => to_text(&(extent, &self.spec, spec.heads(&self.source)?))?,
-            ExperimentSpec::Latency(spec) => to_text(&(extent, &self.spec, self.timing_plan(spec, extent)?.text()?))?,
-        };
-        Ok(ContentHash::of([env!("CARGO_PKG_VERSION"), &text].map(str::as_bytes)).to_string())
-    }
-}

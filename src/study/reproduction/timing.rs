@@ -1,10 +1,15 @@
 //! Figure 4 of the paper: latency and timing noise.
 
-use super::{ComparedNumber, ExperimentResult};
+use super::{ComparedNumber, Comparison, ExperimentResult};
 use crate::study::StudyError;
 use crate::study::latency::{ClockState, Disturbance, LatencyResult, conclusions, curve_figure, map_figure};
 use crate::study::sweep::{Plan, Runner, Shard};
 use std::path::Path;
+
+/// What the paper shows of a map with latency.
+const MISALIGNED: &str = "visible misalignment";
+/// A map whose sigma exceeds that without timing errors by this factor counts as visibly misaligned.
+const VISIBLE_FACTOR: f64 = 1.2;
 
 /// Runs the study, draws figures, and compares with the paper.
 pub(super) fn run(
@@ -29,6 +34,8 @@ pub(super) fn run(
 
 /// Compares the maps with the paper's.
 fn compare(figure: &str, study: &LatencyResult) -> ExperimentResult {
+    let sharp = study.run(Disturbance::NONE, ClockState::Off);
+    let sharp_mm = sharp.map_or(f64::NAN, |run| run.cloud_sigma_m.value * 1e3);
     let row = |disturbance: Disturbance, what: String, paper: &str| {
         let sigma_mm = |clock| study.run(disturbance, clock).map(|run| run.cloud_sigma_m.value * 1e3);
         let text = |clock, name: &str| sigma_mm(clock).map_or_else(String::new, |mm| format!("{mm:.1} mm {name}"));
@@ -37,9 +44,13 @@ fn compare(figure: &str, study: &LatencyResult) -> ExperimentResult {
             what,
             paper: paper.to_owned(),
             ours: format!("{}, {}", text(ClockState::Off, "off"), text(ClockState::On, "on")),
+            comparison: (paper == MISALIGNED).then(|| {
+                let sigma_mm = sigma_mm(ClockState::Off).unwrap_or(f64::NAN);
+                Comparison::above("mm", sharp_mm, VISIBLE_FACTOR, sigma_mm)
+            }),
         }
     };
-    let misaligned = |disturbed: bool| if disturbed { "visible misalignment" } else { "sharp" };
+    let misaligned = |disturbed: bool| if disturbed { MISALIGNED } else { "sharp" };
     let [latencies, noises] = study.shown();
     let mut rows = Vec::new();
     for shown in latencies {

@@ -51,9 +51,9 @@ fn cell(number: f64) -> String {
 pub(super) fn text(summary: &Summary, plan: &Plan) -> String {
     let tables = tables(summary, plan, false).into_iter().map(|(title, header, rows)| {
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        format!("{title}\n{}\n", report::table(&header, &rows, true))
+        format!("{}{}\n", report::wrapped(&title, "  "), report::table(&header, &rows, true))
     });
-    tables.collect::<String>() + &legend(summary) + "\n"
+    tables.collect::<String>() + &report::wrapped(&legend(summary), "") + "\n"
 }
 
 /// The tables as Markdown, and again at each level of the axis `by`.

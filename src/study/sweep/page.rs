@@ -5,12 +5,15 @@ use super::output::{digits, heading, tables};
 use super::plots::PlotFile;
 use super::runs::Runs;
 use super::{Measure, Summary, Sweep, SweepStatus};
-use crate::report::page::{MAX_PAGE_RUNS, PageTable, StudyPage};
-use crate::report::quantity_name;
+use crate::report::page::{MAX_PAGE_RUNS, PageTable, PointColumn, RunPoints, StudyPage};
+use crate::report::{axis_label, quantity_name};
 use crate::study::StudyError;
 
 /// Plots above this total size are left to the folder `plots/`, bytes: the page stays below 12 MB.
 const MAX_PLOTS_BYTES: usize = 8_000_000;
+
+/// Maximum number of runs of the front on the page in addition to the first [`MAX_PAGE_RUNS`] runs.
+const MAX_LATER_RUNS: usize = 500;
 
 impl Sweep {
     /// The page of the merged runs, with the given plots.
@@ -26,8 +29,22 @@ impl Sweep {
     ) -> Result<StudyPage, StudyError> {
         let of_axes = tables(summary, &self.plan, true).into_iter();
         let of_integrity = integrity.map(IntegrityReport::tables).into_iter().flatten();
-        let tables = of_integrity.chain(of_axes).map(|(title, header, rows)| PageTable { title, header, rows });
-        let (runs, runs_note) = self.page_runs(&summary.measures)?;
+        let tables = of_integrity.chain(of_axes).map(|(title, header, rows)| PageTable {
+            title,
+            header,
+            rows,
+            ..PageTable::default()
+        });
+        let runs = Runs::read(self)?;
+        let front = self.front(&runs)?.map_or_else(Vec::new, |front| front.optimal);
+        let shown = shown_rows(runs.numbers.len(), &front);
+        let left_out = runs.numbers.len() - shown.len();
+        let runs_note = match left_out {
+            0 => String::new(),
+            _ => {
+                format!("The table has the first {MAX_PAGE_RUNS} runs and the front; {left_out} more are in table.csv.")
+            }
+        };
         Ok(StudyPage {
             name: self.plan.name().to_owned(),
             introduction: format!(
@@ -37,8 +54,9 @@ impl Sweep {
             ),
             tables: tables.collect(),
             figures: self.page_figures(plots)?,
-            runs,
+            runs: self.page_runs(&summary.measures, &runs, &shown)?,
             runs_note,
+            points: self.page_points(&summary.measures, &runs, &shown, &front)?,
         })
     }
 
@@ -56,24 +74,66 @@ impl Sweep {
         Ok(figures)
     }
 
-    /// Settings and figures of each run, and a note if there are more runs than the page has room for.
-    fn page_runs(&self, measures: &[Measure]) -> Result<(PageTable, String), StudyError> {
-        let runs = Runs::read(self)?;
+    /// Settings and figures of the shown runs; those that are kept link to their pages.
+    fn page_runs(&self, measures: &[Measure], runs: &Runs, shown: &[usize]) -> Result<PageTable, StudyError> {
         let columns: Vec<Vec<f64>> = measures.iter().map(|measure| self.figures(*measure)).collect::<Result<_, _>>()?;
+        let has_seeds = !self.plan.spec().seeds.is_empty();
         let header = std::iter::once("run".to_owned())
             .chain(self.plan.axes().iter().map(|axis| quantity_name(&axis.name)))
+            .chain(has_seeds.then(|| quantity_name("seed")))
             .chain(measures.iter().map(|measure| heading(*measure)));
-        let row = |(row, number): (usize, &u64)| {
-            let settings = self.plan.settings(*number).into_iter().map(|setting| setting.label());
-            let figures = measures.iter().zip(&columns).map(|(measure, column)| digits(column[row] * measure.unit().1));
-            std::iter::once(number.to_string()).chain(settings).chain(figures).collect()
+        let row = |row: &usize| {
+            let number = runs.numbers[*row];
+            let settings = self.plan.settings(number).into_iter().map(|setting| setting.label());
+            let seed = has_seeds.then(|| self.plan.seed(number).map_or_else(String::new, |seed| seed.to_string()));
+            let figures =
+                measures.iter().zip(&columns).map(|(measure, column)| digits(column[*row] * measure.unit().1));
+            std::iter::once(number.to_string()).chain(settings).chain(seed).chain(figures).collect()
         };
-        let rows = runs.numbers.iter().enumerate().take(MAX_PAGE_RUNS).map(row).collect();
-        let left_out = runs.numbers.len().saturating_sub(MAX_PAGE_RUNS);
-        let note = match left_out {
-            0 => String::new(),
-            _ => format!("The table has the first {MAX_PAGE_RUNS} runs; {left_out} more are in table.csv."),
-        };
-        Ok((PageTable { title: "Runs".to_owned(), header: header.collect(), rows }, note))
+        Ok(PageTable {
+            title: "Runs".to_owned(),
+            header: header.collect(),
+            rows: shown.iter().map(row).collect(),
+            links: shown.iter().map(|row| self.page_of_run(runs.numbers[*row])).collect(),
+        })
     }
+
+    /// The shown runs as points: numeric axes, then measures; at first over the goals, or else the first two measures.
+    fn page_points(
+        &self,
+        measures: &[Measure],
+        runs: &Runs,
+        shown: &[usize],
+        front: &[usize],
+    ) -> Result<RunPoints, StudyError> {
+        let pick = |column: &[f64], per_unit: f64| shown.iter().map(|row| column[*row] * per_unit).collect();
+        let mut columns = Vec::new();
+        for (axis, values) in self.plan.axes().iter().zip(&runs.settings) {
+            let column =
+                values.as_ref().map(|values| PointColumn { label: axis_label(&axis.name), values: pick(values, 1.0) });
+            columns.extend(column);
+        }
+        let before = columns.len();
+        for measure in measures {
+            let values = pick(&self.figures(*measure)?, measure.unit().1);
+            columns.push(PointColumn { label: measure.label().to_owned(), values });
+        }
+        let goals = self.plan.spec().front.iter().map(|goal| goal.measure);
+        let place = |measure| measures.iter().position(|other| *other == measure).map(|place| before + place);
+        let mut first: Vec<usize> = goals.filter_map(place).collect();
+        first.extend((before..columns.len()).chain(0..before));
+        first.dedup();
+        let x = first.first().copied().unwrap_or_default();
+        let y = first.iter().copied().find(|column| *column != x).unwrap_or(x);
+        let front = (0..shown.len()).filter(|k| front.contains(&shown[*k])).collect();
+        let folder = self.can_repeat().then(|| format!("results/{}", self.plan.name()));
+        Ok(RunPoints { columns, x, y, front, folder })
+    }
+}
+
+/// Rows of the table on the page: the first [`MAX_PAGE_RUNS`], and after them those of the front, as far as there is room.
+fn shown_rows(count: usize, front: &[usize]) -> Vec<usize> {
+    let mut later: Vec<usize> = front.iter().copied().filter(|row| *row >= MAX_PAGE_RUNS).collect();
+    later.sort_unstable();
+    (0..count.min(MAX_PAGE_RUNS)).chain(later.into_iter().take(MAX_LATER_RUNS)).collect()
 }

@@ -23,6 +23,16 @@ pub(super) struct PlotFile {
     pub title: String,
 }
 
+/// The Pareto front of the runs.
+pub(super) struct Front {
+    /// Figures of each goal, one per run.
+    columns: Vec<Vec<f64>>,
+    /// Rows of the runs within all limits.
+    rows: Vec<usize>,
+    /// Rows of the front, by the first goal.
+    pub optimal: Vec<usize>,
+}
+
 impl Sweep {
     /// Draws all plots to `plots/`, and writes the Pareto front to `front.csv`; returns the plots.
     ///
@@ -38,8 +48,9 @@ impl Sweep {
             plots.push(PlotFile { name, title });
             saved
         };
-        if let Some(figure) = self.front(&runs)? {
-            save("front".to_owned(), "Pareto front".to_owned(), figure)?;
+        if let Some(front) = self.front(&runs)? {
+            self.write_front(&runs, &front)?;
+            save("front".to_owned(), "Pareto front".to_owned(), self.front_figure(&front))?;
         }
         for measure in &summary.measures {
             let (key, quantity) = (measure.key(), measure.quantity());
@@ -56,10 +67,15 @@ impl Sweep {
         Ok(plots)
     }
 
-    /// The plot of the Pareto front of the spec's goals; writes the front to `front.csv`.
-    fn front(&self, runs: &Runs) -> Result<Option<Figure>, StudyError> {
+    /// The Pareto front of the spec's goals; `None` with fewer than two goals.
+    ///
+    /// # Errors
+    /// If the table is not merged.
+    pub(super) fn front(&self, runs: &Runs) -> Result<Option<Front>, StudyError> {
         let goals = &self.plan.spec().front;
-        let [first, second, ..] = goals.as_slice() else { return Ok(None) };
+        if goals.len() < 2 {
+            return Ok(None);
+        }
         let columns: Vec<Vec<f64>> = goals.iter().map(|goal| self.figures(goal.measure)).collect::<Result<_, _>>()?;
         let limits = &self.plan.spec().limits;
         let limited: Vec<Vec<f64>> =
@@ -70,28 +86,34 @@ impl Sweep {
         let rows: Vec<usize> = (0..runs.numbers.len()).filter(|row| is_complete(row) && is_within(row)).collect();
         let costs = |row: &usize| goals.iter().zip(&columns).map(|(goal, column)| goal.cost(column[*row])).collect();
         let costs: Vec<Vec<f64>> = rows.iter().map(costs).collect();
-        let front: Vec<usize> = pareto_set(&costs).into_iter().map(|k| rows[k]).collect();
-        let at = |row: &usize| {
-            let shown = |measure: Measure, k: usize| columns[k][*row] * measure.unit().1;
-            (shown(first.measure, 0), shown(second.measure, 1))
-        };
-        let all: Vec<(f64, f64)> = rows.iter().map(at).collect();
-        let of_front: Vec<(f64, f64)> = front.iter().map(at).collect();
-        self.write_front(runs, &front, &columns)?;
-        Ok(Some(front_figure((first.measure, second.measure), &all, &of_front)))
+        let optimal = pareto_set(&costs).into_iter().map(|k| rows[k]).collect();
+        Ok(Some(Front { columns, rows, optimal }))
     }
 
-    fn write_front(&self, runs: &Runs, front: &[usize], columns: &[Vec<f64>]) -> Result<(), StudyError> {
+    /// The plot of the front over the first two goals.
+    fn front_figure(&self, front: &Front) -> Figure {
+        let goals = &self.plan.spec().front;
+        let (x, y) = (goals[0].measure, goals[1].measure);
+        let at = |row: &usize| {
+            let shown = |measure: Measure, k: usize| front.columns[k][*row] * measure.unit().1;
+            (shown(x, 0), shown(y, 1))
+        };
+        let all: Vec<(f64, f64)> = front.rows.iter().map(at).collect();
+        let optimal: Vec<(f64, f64)> = front.optimal.iter().map(at).collect();
+        front_figure((x, y), &all, &optimal)
+    }
+
+    fn write_front(&self, runs: &Runs, front: &Front) -> Result<(), StudyError> {
         let goals = &self.plan.spec().front;
         let axes = self.plan.axes().iter().map(|axis| axis.name.as_str());
         let names: Vec<&str> =
             std::iter::once("point").chain(axes).chain(goals.iter().map(|goal| goal.measure.key())).collect();
         let mut text = names.join(",") + "\n";
-        for row in front {
+        for row in &front.optimal {
             let number = runs.numbers[*row];
             let settings = self.plan.settings(number).into_iter().map(|setting| setting.to_string());
             let cells = std::iter::once(number.to_string()).chain(settings);
-            let cells: Vec<String> = cells.chain(columns.iter().map(|column| column[*row].to_string())).collect();
+            let cells: Vec<String> = cells.chain(front.columns.iter().map(|column| column[*row].to_string())).collect();
             text += &(cells.join(",") + "\n");
         }
         let path = self.folder.join("front.csv");

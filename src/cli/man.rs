@@ -1,0 +1,94 @@
+//! `zsim man`: manual pages of all commands.
+
+use super::arguments::{Global, OutArguments};
+use super::{Completion, output};
+use anyhow::Context;
+use clap::{Args, Command};
+use clap_mangen::Man;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use zsim::study::replace_text;
+
+/// Write the manual pages of all commands: zsim.1, zsim-simulate.1, zsim-sweep-plan.1, ...
+///
+/// With --force the pages are added to a folder that has others, for example ~/.local/share/man/man1.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim man --out ~/.local/share/man/man1 --force")]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    out: OutArguments,
+}
+
+pub(super) fn run(arguments: &Arguments, command: Command, global: &Global) -> anyhow::Result<Completion> {
+    let wanted = arguments.out.out.clone().unwrap_or_else(|| PathBuf::from("man"));
+    let pages = pages(command)?;
+    let folder = output::folder(&wanted, arguments.out.force)?;
+    for page in &pages {
+        replace_text(&folder.join(&page.file), &page.roff)?;
+    }
+    let files: Vec<&Path> = pages.iter().map(|page| page.file.as_path()).collect();
+    let words = format!("{} manual pages", pages.len());
+    output::print_result(global, &words, json!({ "pages": files }), Some(&folder))?;
+    Ok(Completion::Done)
+}
+
+/// A manual page in section 1.
+struct Page {
+    file: PathBuf,
+    roff: String,
+}
+
+/// The page of the command itself, and one of each subcommand that is not hidden.
+fn pages(command: Command) -> anyhow::Result<Vec<Page>> {
+    // Without this, `zsim help` and the `help` of each subcommand have pages too.
+    let mut command = command.disable_help_subcommand(true);
+    command.build();
+    let mut pages = Vec::new();
+    add_pages(&command, &mut pages)?;
+    Ok(pages)
+}
+
+fn add_pages(command: &Command, pages: &mut Vec<Page>) -> anyhow::Result<()> {
+    let man = Man::new(command.clone()).source(format!("zsim {}", env!("CARGO_PKG_VERSION"))).manual("zsim manual");
+    let mut roff = Vec::new();
+    man.render(&mut roff).with_context(|| format!("the manual page of {} cannot be made", command.get_name()))?;
+    // The text after the help is the examples; clap_mangen gives its section another name.
+    let roff = String::from_utf8(roff)?.replace("\n.SH EXTRA\n", "\n.SH EXAMPLES\n");
+    pages.push(Page { file: PathBuf::from(man.get_filename()), roff });
+    let shown = command.get_subcommands().filter(|subcommand| !subcommand.is_hide_set());
+    shown.into_iter().try_for_each(|subcommand| add_pages(subcommand, pages))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+    use std::collections::BTreeSet;
+
+    /// Names of the pages that the help of each command lists: from its text, not from clap's tree.
+    fn listed(command: &Command, name: &str, into: &mut BTreeSet<String>) {
+        into.insert(format!("{name}.1"));
+        let help = command.clone().render_long_help().to_string();
+        let list = help.split("Commands:\n").nth(1).and_then(|rest| rest.split("\n\n").next()).unwrap_or_default();
+        // The lines that continue a description are indented further.
+        let entries = list.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+        for entry in entries.filter_map(|line| line.split_whitespace().next()).filter(|entry| *entry != "help") {
+            let subcommand = command.find_subcommand(entry).unwrap();
+            listed(subcommand, &format!("{name}-{entry}"), into);
+        }
+    }
+
+    #[test]
+    fn every_command_of_the_help_has_a_page_and_no_other() {
+        let command = crate::cli::Cli::command();
+        let mut expected = BTreeSet::new();
+        listed(&command, "zsim", &mut expected);
+        let pages = pages(command).unwrap();
+        let files: BTreeSet<String> = pages.iter().map(|page| page.file.display().to_string()).collect();
+        assert_eq!(files, expected);
+        assert!(files.contains("zsim-sweep-plan.1") && !files.contains("zsim-sweep-task.1"));
+        for page in &pages {
+            assert!(page.roff.contains("\n.SH EXAMPLES\n") || page.file.to_string_lossy().matches('-').count() > 1);
+        }
+    }
+}
