@@ -1,11 +1,10 @@
 //! The page of a study: its tables, plots and runs.
 
 use super::html::{self, escaped};
+use super::scripts::{DATA, READY, RUNS, TABLES};
 use super::table::PageTable;
-use super::{DATA, READY, TABLES};
 
 const SECTIONS: &str = include_str!("assets/study.html");
-const RUNS: &str = include_str!("assets/runs.js");
 /// Maximum number of runs in the table of the page; a row takes about half a kilobyte.
 pub const MAX_PAGE_RUNS: usize = 5_000;
 
