@@ -1,12 +1,13 @@
-// Screenshots for docs/gallery.sh: node gallery.mjs NODE_MODULES PLAN.svg REPORT.html FOLDER
+// Screenshots for docs/gallery.sh: node gallery.mjs NODE_MODULES PLAN.svg REPORT.html SPRING.html FOLDER
 //
-// Writes plan.png, report.png (the page at 1400 x 900) and frame-NN.png (the 3-D view, one each second of the run).
+// Writes plan.png, spring.png (a head in its rocking mode), report.png (the page at 1400 x 900) and frame-NN.png (the 3-D view, one each
+// second of the run).
 import { createRequire } from "node:module";
 import { existsSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 
-const [modules, plan, report, folder] = process.argv.slice(2);
+const [modules, plan, report, spring, folder] = process.argv.slice(2);
 const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-headless-shell", "/usr/bin/google-chrome"];
 const browser = await createRequire(join(resolve(modules), "x.js"))("playwright-core").chromium.launch({
   executablePath: BROWSERS.find((path) => existsSync(path)),
@@ -26,8 +27,15 @@ const drawn = (page) =>
 const plans = await open(plan, 720, 720, 2);
 await plans.locator("svg").screenshot({ path: join(folder, "plan.png") });
 
+const isDrawn = () => document.documentElement.dataset.drawn;
+const springs = await open(spring, 1400, 900, 1);
+await springs.waitForFunction(isDrawn);
+await springs.locator("[name=mode]").nth(2).check();
+await drawn(springs);
+await springs.screenshot({ path: join(folder, "spring.png") });
+
 const page = await open(report, 1400, 900, 1);
-await page.waitForFunction(() => document.documentElement.dataset.drawn);
+await page.waitForFunction(isDrawn);
 const time = page.locator("#time");
 const set = async (t) => {
   await time.evaluate((input, t) => {

@@ -13,9 +13,11 @@ trap 'rm -rf "$work"' EXIT
 "$zsim" --quiet --scene office --duration 60s --seed 1 --out "$work/office" >/dev/null
 "$zsim" --quiet scene plan office "$work/plan.svg" >/dev/null
 "$zsim" --quiet gains --head handheld --out "$work/gains" >/dev/null
+"$zsim" --quiet spring handheld --out "$work/spring" >/dev/null
 "$zsim" --quiet spring design spring_design --out "$work/springs" >/dev/null
 "$zsim" --quiet coverage --head handheld --motion hand --duration 20s --out "$work/coverage" >/dev/null
-node docs/gallery.mjs "${NODE_MODULES:-target/ci-node/node_modules}" "$work/plan.svg" "$work/office/report.html" "$work"
+node docs/gallery.mjs "${NODE_MODULES:-target/ci-node/node_modules}" "$work/plan.svg" "$work/office/report.html" \
+  "$work/spring/report.html" "$work"
 
 # Each PNG gets a palette of 256 colours and at most 1200 px (octree: median cut loses colours of small areas); the frames of
 # the map become an animated WebP.
@@ -28,6 +30,7 @@ work, pictures = map(Path, sys.argv[1:])
 files = {
     "plan": "plan.png",
     "report": "report.png",
+    "spring": "spring.png",
     "trajectory": "office/plots/trajectory.png",
     "errors": "office/plots/errors.png",
     "gains": "gains/plots/gains.png",

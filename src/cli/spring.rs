@@ -12,7 +12,7 @@ use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::coverage::{CoveragePlan, coverage_figure};
 use zsim::study::replace_text;
 use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure};
-use zsim::study::spring::{Shake, mode_figure, spring_report};
+use zsim::study::spring::{Shake, SpringReport, mode_figure, page, spring_report};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
 /// search for one
@@ -44,7 +44,7 @@ pub(super) struct Arguments {
     /// Frequency of the hand's nod, Hz [default: the head's slowest mode]
     #[arg(long, value_name = "HZ")]
     frequency: Option<f64>,
-    /// Folder for plots of the modes and of the lidar coverage
+    /// Folder for the page (report.html), plots of the modes and of the lidar coverage, and all figures (spring.json)
     #[command(flatten)]
     out: OutArguments,
 }
@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 }
 
 fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
-    let (spec, source) = head_of(file, &arguments.head)?;
+    let subject = head_of(file, &arguments.head)?;
     let lidar_source = find(Kind::Lidar, &arguments.lidar)?;
     let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
     let imu_source = find(Kind::Imu, &arguments.imu)?;
@@ -88,19 +88,12 @@ fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::R
     let shake = Shake { pitch_deg: arguments.pitch, frequency_hz: arguments.frequency };
     let plan =
         CoveragePlan { from_s: 10.0, rate_limit_deg_per_s: imu.spec().gyro.limit_deg_per_s, ..CoveragePlan::default() };
-    let report = spring_report(&spec, &source, &shake, &lidar, &plan)?;
+    let report = spring_report(&subject.spec, &subject.source, &shake, &lidar, &plan)?;
     let folder = match &arguments.out.out {
         None => None,
         Some(wanted) => {
             let folder = output::folder(wanted, arguments.out.force)?;
-            if report.stands {
-                mode_figure(&spec, &HeadModel::new(&spec, &source)?).save(&folder, "modes")?;
-            }
-            if let Some(seen) = report.shaken.as_ref().and_then(|shaken| shaken.coverage.as_ref()) {
-                coverage_figure(seen).save(&folder, "coverage")?;
-            }
-            let text = serde_json::to_string_pretty(&report)? + "\n";
-            replace_text(&folder.join("spring.json"), &text)?;
+            write_files(&folder, &subject, &report)?;
             Some(folder)
         }
     };
@@ -108,12 +101,36 @@ fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::R
     Ok(Completion::Done)
 }
 
+/// The head of the report.
+struct Subject {
+    /// Name of the head, or of the spring and the head on it.
+    name: String,
+    spec: HeadSpec,
+    source: Source,
+}
+
+/// Writes the page, the plots and the figures.
+fn write_files(folder: &Path, subject: &Subject, report: &SpringReport) -> anyhow::Result<()> {
+    let Subject { name, spec, source } = subject;
+    let head = report.stands.then(|| HeadModel::new(spec, source)).transpose()?;
+    if let Some(head) = &head {
+        mode_figure(spec, head).save(folder, "modes")?;
+    }
+    if let Some(seen) = report.shaken.as_ref().and_then(|shaken| shaken.coverage.as_ref()) {
+        coverage_figure(seen).save(folder, "coverage")?;
+    }
+    replace_text(&folder.join("report.html"), &page(name, spec, head.as_ref(), report)?)?;
+    replace_text(&folder.join("spring.json"), &(serde_json::to_string_pretty(report)? + "\n"))?;
+    Ok(())
+}
+
 /// The head in `file`, or `head` on the spring in it.
-fn head_of(file: &str, head: &str) -> anyhow::Result<(HeadSpec, Source)> {
+fn head_of(file: &str, head: &str) -> anyhow::Result<Subject> {
+    let stem = |path: &str| Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let as_spring =
         find(Kind::Spring, file).and_then(|source| parse::<SpringSpec>(&source).map(|spring| (spring, source)));
     match (dynamics::load(file), as_spring) {
-        (Ok(found), _) => Ok(found),
+        (Ok((spec, source)), _) => Ok(Subject { name: stem(file), spec, source }),
         (Err(_), Ok((bare, source))) => {
             let (mut spec, _) = dynamics::load(head)?;
             let LinkageSpec::Spring { spring, .. } = &mut spec.linkage else {
@@ -121,7 +138,7 @@ fn head_of(file: &str, head: &str) -> anyhow::Result<(HeadSpec, Source)> {
                 return Err(SpecError::plain(head, message).into());
             };
             *spring = bare;
-            Ok((spec, source))
+            Ok(Subject { name: format!("{} under {}", stem(file), stem(head)), spec, source })
         }
         (Err(as_head), Err(as_spring)) => {
             // The parser that accepted more lines determines the intended kind.

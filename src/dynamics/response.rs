@@ -162,6 +162,13 @@ impl FrequencyResponse {
             .fold(start.into_owned(), |sum, (term, amplitude)| sum + term.shape.map(|x| amplitude * x))
     }
 
+    /// Amplitude of each mode over the base's displacement along or about `input`, at `freq_hz`; zero for absent modes.
+    ///
+    /// The modes move the head relative to the rigid motion with the base; their shapes have unit modal mass.
+    pub fn modal_amplitudes(&self, input: Axis, freq_hz: f64) -> Matrix6x1<Complex<f64>> {
+        self.amplitudes(index(input), TAU * freq_hz)
+    }
+
     /// Modal amplitudes for a unit displacement of the base along `input` at `omega`; zero for absent modes.
     fn amplitudes(&self, input: usize, omega: f64) -> Matrix6x1<Complex<f64>> {
         let zero = Complex::new(0.0, 0.0);

@@ -3,6 +3,7 @@
 use assert_cmd::Command;
 use predicates::prelude::*;
 use serde_json::Value;
+use std::path::Path;
 
 fn zsim(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("zsim").unwrap();
@@ -49,6 +50,59 @@ fn spring_describes_a_head_and_a_single_spring() {
     assert_eq!(fallen["stands"], false);
     assert!(fallen["heaviest_head_kg"].as_f64().unwrap() < 0.35);
     zsim(&["spring", file.to_str().unwrap()]).assert().success().stdout(predicate::str::contains("cannot stand"));
+}
+
+/// Runs `spring` on a head or spring with `--out`; returns the page and the figures.
+fn spring_files(of: &str, out: &Path) -> (String, Value) {
+    zsim(&["spring", of, "--out", out.to_str().unwrap()]).assert().success();
+    let figures = std::fs::read_to_string(out.join("spring.json")).unwrap();
+    (std::fs::read_to_string(out.join("report.html")).unwrap(), serde_json::from_str(&figures).unwrap())
+}
+
+#[test]
+fn the_page_of_a_hanging_head_has_a_longer_spring_and_six_named_modes() {
+    let here = tempfile::tempdir().unwrap();
+    let out = here.path().join("hanging");
+    let (page, figures) = spring_files("hanging", &out);
+    // k = G d^4 / (8 D^3 n) = 79.3e9 * 0.002^4 / (8 * 0.025^3 * 12) = 845.9 N/m. The wire of pi^2 D n d^2 / 4 = 2.961e-6 m^3
+    // has 23.2 g, half of which hangs with the head of 350 g: 0.3616 kg * 9.80665 / 845.9 = 4.19 mm.
+    assert!(page.contains("Free length 100.0 mm, 104.2 mm under the head"), "{}", summary(&page));
+    // 12 coils of 2 mm leave (104.19 - 24) / 12 = 6.68 mm between them.
+    let coil = &figures["coil"];
+    assert!((coil["gap_mm"].as_f64().unwrap() - 6.68).abs() < 0.005, "{coil}");
+    assert!((coil["load_n"].as_f64().unwrap() + 0.3616 * 9.80665).abs() < 0.002, "{coil}");
+    assert!(coil["buckling_margin"].is_null() && page.contains("cannot buckle"), "{coil}");
+    let names: Vec<_> =
+        figures["modes"].as_array().unwrap().iter().map(|mode| mode["name"].as_str().unwrap()).collect();
+    assert_eq!(page.matches("name=\"mode\"").count(), 1 + names.len());
+    for name in ["rocking about x", "rocking about y", "sway along x", "sway along y", "bounce along z", "yaw about z"]
+    {
+        assert!(names.contains(&name), "{name} is not in {names:?}");
+    }
+    assert!(page.contains("Reference point: the centre of mass of the head"));
+    assert!(out.join("modes.svg").is_file());
+}
+
+#[test]
+fn the_page_of_a_head_that_falls_says_so_and_has_no_modes() {
+    let here = tempfile::tempdir().unwrap();
+    let file = here.path().join("soft.ron");
+    let soft = "coil(coil_diameter_mm: 25, wire_diameter_mm: 2.0, active_coils: 10, free_length_mm: 100, material: spring_steel)";
+    std::fs::write(&file, soft).unwrap();
+    let (page, figures) = spring_files(file.to_str().unwrap(), &here.path().join("out"));
+    assert_eq!(figures["stands"], false);
+    assert!(page.contains("<h1>Spring and modes of soft under handheld</h1>"));
+    assert!(
+        summary(&page).contains("no stable rest pose") && summary(&page).contains("use a thicker wire"),
+        "{}",
+        summary(&page)
+    );
+    assert!(page.contains("No modes") && !page.contains("name=\"mode\"") && !page.contains("id=\"play\""));
+}
+
+/// The first paragraph of a page.
+fn summary(page: &str) -> &str {
+    page.split("<p class=\"summary\">").nth(1).and_then(|rest| rest.split("</p>").next()).unwrap()
 }
 
 #[test]

@@ -62,10 +62,14 @@ async function slide(page, id, fraction) {
   }, fraction);
 }
 
+// Only the drawing counts, not the focus ring, the legend and the labels on it.
+const hideLabels = (page) =>
+  page.addStyleTag({ content: "#scene{outline:none!important}.legend,.tag,.axis{visibility:hidden}" });
+
 async function use(page) {
-  // Only the drawing counts, not the focus ring, the legend and the label on it.
-  await page.addStyleTag({ content: "#scene{outline:none!important}.legend,.tag{visibility:hidden}" });
+  await hideLabels(page);
   await moveCamera(page);
+  await slice(page);
   const isScene = await page.evaluate(() => document.documentElement.dataset.page === "scene");
   if (!isScene) await colourCloud(page);
   const shown = isScene ? ["show-surfaces", "show-estimate"] : ["show-cloud", "show-surfaces", "show-estimate", "show-truth"];
@@ -91,6 +95,9 @@ async function moveCamera(page) {
   await changes(page, "an arrow key", () => page.locator("#scene").press("ArrowLeft"));
   await changes(page, "shift and an arrow key", () => page.locator("#scene").press("Shift+ArrowUp"));
   await changes(page, "the plus key", () => page.locator("#scene").press("+"));
+}
+
+async function slice(page) {
   await changes(page, "the upper end of the slice", () => slide(page, "high", 0.3));
   await changes(page, "the lower end of the slice", () => slide(page, "low", 0.2));
   await slide(page, "high", 1);
@@ -157,6 +164,45 @@ async function useGains(page) {
   const phase = (await second.locator("canvas").screenshot()).toString("base64");
   await second.locator("select").selectOption("1");
   check(phase !== (await second.locator("canvas").screenshot()).toString("base64"), "the choice of the coherence has no effect");
+}
+
+async function useSpring(page) {
+  await hideLabels(page);
+  await moveCamera(page);
+  for (const from of ["top", "side", "oblique"]) {
+    await changes(page, `the camera ${from}`, () => page.locator(`#camera-${from}`).click());
+  }
+  const modes = page.locator("[name=mode]");
+  check((await modes.count()) === 7, `${await modes.count()} motions instead of the rest pose and six modes`);
+  for (let k = 1; k < (await modes.count()); k++) {
+    await changes(page, `mode ${k}`, () => modes.nth(k).check());
+  }
+  await changes(page, "an arrow key in the list of modes", () => modes.nth(6).press("ArrowUp"));
+  check(await modes.nth(5).isChecked(), "an arrow key does not choose another mode");
+  await changes(page, "the rest pose", () => page.locator("#show-rest").click());
+  await changes(page, "the axes", () => page.locator("#show-axes").click());
+  const words = () => page.locator("#amplitude-words").textContent();
+  const large = await words();
+  check(/enlarged/.test(large), `the amplitude of a fast mode is not labelled as enlarged: "${large}"`);
+  await changes(page, "the amplitude", () => slide(page, "amplitude", 0.4));
+  check(large !== (await words()), "the words of the amplitude do not follow the slider");
+  await changes(page, "the phase", () => slide(page, "time", 0.6));
+  await playMode(page);
+  await changes(page, "the return to rest", () => modes.first().check());
+}
+
+// Plays with the button, and pauses with the space key on the view.
+async function playMode(page) {
+  const began = await time(page);
+  await changes(page, "playing a mode", async () => {
+    await page.locator("#play").click();
+    await page.waitForFunction((began) => Math.abs(document.getElementById("time").valueAsNumber - began) > 0.1, began);
+    await page.locator("#scene").press(" ");
+  });
+  const stopped = await time(page);
+  check((await page.locator("#play").getAttribute("aria-pressed")) === "false", "the space key does not pause");
+  await picture(page);
+  check(stopped === (await time(page)), "a paused mode moves");
 }
 
 // The words of a column of the visible runs.
@@ -284,7 +330,7 @@ async function usePaper(page) {
   }
 }
 
-const USES = { gains: useGains, study: useStudy, paper: usePaper };
+const USES = { gains: useGains, spring: useSpring, study: useStudy, paper: usePaper };
 for (const scheme of ["light", "dark"]) {
   for (const width of [1400, 400]) {
     const page = await open(scheme, width);

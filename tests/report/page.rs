@@ -58,6 +58,17 @@ fn the_page_of_gains_works_in_a_browser() {
 }
 
 #[test]
+fn the_page_of_a_spring_works_in_a_browser() {
+    let here = tempfile::tempdir().unwrap();
+    let head = hostile_head(here.path());
+    let (code, _, errors) = run(here.path(), &format!("spring {head} --out out"));
+    assert_eq!(code, 0, "{errors}");
+    let page = here.path().join("out/report.html");
+    assert!(std::fs::read_to_string(&page).unwrap().contains("modes of &lt;script&gt;window.hostile=1;"));
+    use_in_a_browser(&page);
+}
+
+#[test]
 fn the_page_of_a_study_works_in_a_browser() {
     let here = tempfile::tempdir().unwrap();
     let spec = "(base: spring(head: \"handheld\", shake: (pitch_deg: 2.0)), axes: [\

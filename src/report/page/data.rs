@@ -1,4 +1,4 @@
-//! The data of the page of a run.
+//! The data of the pages with a view.
 
 use crate::geometry::{Pose, Vector};
 use crate::report::Metrics;
@@ -92,16 +92,51 @@ pub enum Link {
         head_from_top: Pose,
         /// Mean radius of the coil, m.
         coil_radius_m: f64,
+        /// Diameter of the wire, m.
+        wire_diameter_m: f64,
         /// Number of coils.
         coils: f64,
     },
-    /// A rope or a cable.
-    Cord {
+    /// A straight line: a rope, a cable, or the link from a joint to the head.
+    Straight {
         /// Attachment point in the base, m.
         point_in_base: Vector,
         /// Attachment point in the head, m.
         point_in_head: Vector,
     },
+}
+
+/// Head and linkage to scale, with the modes.
+pub struct SpringView {
+    /// Parts of the head.
+    pub parts: Vec<Block>,
+    /// Springs and cords between base and head.
+    pub links: Vec<Link>,
+    /// Pose of the head in the base.
+    pub base_from_head: Pose,
+    /// Centre of mass in the base, m: the modes displace it, and rotate the head about it.
+    pub centre_in_base: Vector,
+    /// What the pose is, and what the drawing assumes.
+    pub note: String,
+    /// The modes, slowest first; empty without a rest pose.
+    pub modes: Vec<ShownMode>,
+    /// The shake of the base with which the amplitudes are compared, in words.
+    pub shake: String,
+}
+
+/// A mode of the view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShownMode {
+    /// Name, such as "rocking about y".
+    pub name: String,
+    /// Undamped frequency, Hz.
+    pub frequency_hz: f64,
+    /// Frequency and damping in words.
+    pub details: String,
+    /// Displacement of the centre of mass (m) and rotation (rad) at the amplitude 1, in the axes of the base.
+    pub shape: [f64; 6],
+    /// Amplitude in the response to the shake.
+    pub shaken: f64,
 }
 
 /// Section of the page that a chart belongs to.

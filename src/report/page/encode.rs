@@ -2,8 +2,8 @@
 
 use super::binary::base64_f32;
 use super::data::{
-    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, Ordinate, RunPage, Section, TimedPose,
-    TimelineRow, View,
+    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, Ordinate, RunPage, Section, ShownMode,
+    SpringView, TimedPose, TimelineRow, View,
 };
 use super::quantise::cloud;
 use crate::geometry::{Pose, Vector};
@@ -34,6 +34,22 @@ pub(super) fn view_json(view: &View) -> Result<String, serde_json::Error> {
 pub(super) fn charts_json(charts: &[ChartGroup]) -> Result<String, serde_json::Error> {
     let charts: Vec<Value> = charts.iter().map(chart_group).collect();
     Ok(inert(&serde_json::to_string(&json!({ "charts": charts }))?))
+}
+
+/// The data of the page of a spring, as [`run_json`].
+///
+/// # Errors
+/// When a value cannot be written as JSON.
+pub(super) fn spring_json(view: &SpringView) -> Result<String, serde_json::Error> {
+    let mode = |mode: &ShownMode| json!({ "frequency": mode.frequency_hz, "shape": mode.shape, "shaken": mode.shaken });
+    let document = json!({
+        "parts": view.parts.iter().map(block).collect::<Vec<_>>(),
+        "links": view.links.iter().map(link).collect::<Vec<_>>(),
+        "rest": seven(&view.base_from_head),
+        "centre": numbers(&view.centre_in_base),
+        "modes": view.modes.iter().map(mode).collect::<Vec<_>>(),
+    });
+    Ok(inert(&serde_json::to_string(&document)?))
 }
 
 fn document(view: &View, charts: &[Value], timeline: &[Value]) -> Value {
@@ -89,10 +105,11 @@ fn block(block: &Block) -> Value {
 
 fn link(link: &Link) -> Value {
     match link {
-        Link::Spring { base_from_foot, head_from_top, coil_radius_m, coils } => json!({
-            "foot": seven(base_from_foot), "top": seven(head_from_top), "radius": coil_radius_m, "coils": coils,
+        Link::Spring { base_from_foot, head_from_top, coil_radius_m, wire_diameter_m, coils } => json!({
+            "foot": seven(base_from_foot), "top": seven(head_from_top), "radius": coil_radius_m,
+            "wire": wire_diameter_m, "coils": coils,
         }),
-        Link::Cord { point_in_base, point_in_head } => {
+        Link::Straight { point_in_base, point_in_head } => {
             json!({ "from": numbers(point_in_base), "to": numbers(point_in_head) })
         }
     }

@@ -1,9 +1,10 @@
 //! The page of a gain measurement.
 
 use super::data::{Chart, ChartGroup, Section};
+use super::encode;
 use super::html::{self, escaped};
+use super::scripts::{CHARTS, DATA, LIBRARIES, READY, TABLES};
 use super::table::PageTable;
-use super::{CHARTS, DATA, LIBRARIES, READY, TABLES, encode};
 use crate::report::plot::PlotError;
 
 /// The page of a gain measurement: gain, phase and coherence of each axis over frequency.

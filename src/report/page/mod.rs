@@ -2,8 +2,9 @@
 //!
 //! The page of a run has the verdict, a three-dimensional view, interactive charts, the metrics and the manifest; that of a
 //! scene the view, the floor plan and the materials; that of a study its tables, plots and runs; that of the paper's
-//! experiments their tables and plots; that of a gain measurement gain and phase of each axis. Scripts, style sheets and
-//! data are in the file. A content security policy forbids network access.
+//! experiments their tables and plots; that of a gain measurement gain and phase of each axis; that of a spring head and linkage
+//! to scale, modes and stiffness. Scripts, style sheets and data are in the file. A content security policy forbids network
+//! access.
 
 mod binary;
 mod data;
@@ -14,13 +15,16 @@ mod paper;
 mod points;
 mod quantise;
 mod scene;
+mod scripts;
+mod spring;
+mod stage;
 mod study;
 mod table;
 
 use crate::report::rows;
 pub use data::{
     Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Level, Link, Ordinate, RunPage, Section,
-    TimedPose, TimelineRow, View, ViewPoint,
+    ShownMode, SpringView, TimedPose, TimelineRow, View, ViewPoint,
 };
 pub use gains::{AxisGains, GainsPage};
 
@@ -36,31 +40,11 @@ pub const MAX_PAGE_POSES: usize = 20_000;
 pub use paper::{ExperimentSection, PageLink, PaperPage};
 pub use points::{PointColumn, RunPoints};
 pub use scene::{MaterialRow, ScenePage};
+pub use spring::{NotedTable, SpringPage};
 pub use study::{MAX_PAGE_RUNS, StudyPage};
 pub use table::PageTable;
 
-const VIEW: &str = include_str!("assets/view.html");
 const RUN_SECTIONS: &str = include_str!("assets/run.html");
-const LIBRARIES: &str = include_str!("assets/vendor/vendor.min.js");
-const DATA: &str = include_str!("assets/data.js");
-const CHARTS: &str = include_str!("assets/charts.js");
-const TABLES: &str = include_str!("assets/table.js");
-const READY: &str = include_str!("assets/ready.js");
-/// The scripts of a page with the view of a run or a scene, in the order of their dependencies.
-const VIEW_SCRIPTS: [&str; 11] = [
-    LIBRARIES,
-    DATA,
-    include_str!("assets/paths.js"),
-    include_str!("assets/colour.js"),
-    include_str!("assets/cloud.js"),
-    include_str!("assets/head.js"),
-    include_str!("assets/view.js"),
-    include_str!("assets/controls.js"),
-    CHARTS,
-    include_str!("assets/time_charts.js"),
-    include_str!("assets/timeline.js"),
-];
-
 impl RunPage<'_> {
     /// The HTML of the page; the same data give the same bytes.
     ///
@@ -68,7 +52,6 @@ impl RunPage<'_> {
     /// When a value cannot be written as JSON.
     pub fn html(&self) -> Result<String, serde_json::Error> {
         let metrics = self.metrics;
-        let view = [("view_title", "Trajectory and cloud"), ("path", "estimate"), ("path_of", "head")];
         let sections = html::fill(
             RUN_SECTIONS,
             &[
@@ -83,11 +66,11 @@ impl RunPage<'_> {
             status: metrics.status.as_deref().unwrap_or_default(),
             introduction: &html::verdict(metrics),
             without_scripts: "The three-dimensional view and the charts need scripts. The folder plots/ has the plots as pictures.",
-            sections: &(html::fill(VIEW, &view) + &sections),
+            sections: &(stage::view_section("Trajectory and cloud", "estimate", "head") + &sections),
             footer: "Lines of the charts mark the time of the view; click on a chart to move to that time.",
             version: &metrics.version,
             data: &encode::run_json(self)?,
-            scripts: &VIEW_SCRIPTS,
+            scripts: &scripts::VIEW,
         }
         .html())
     }

@@ -1,8 +1,8 @@
 //! The page of the paper's experiments.
 
 use super::html::{self, escaped};
+use super::scripts::{DATA, READY, TABLES};
 use super::table::PageTable;
-use super::{DATA, READY, TABLES};
 
 /// The page of the paper's experiments: a section each.
 #[derive(Debug, Clone, PartialEq, Default)]

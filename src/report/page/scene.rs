@@ -1,7 +1,7 @@
 //! The page of a scene.
 
 use super::data::View;
-use super::{VIEW, VIEW_SCRIPTS, encode, html};
+use super::{encode, html, scripts, stage};
 use crate::report::plot::{Figure, PlotError};
 
 /// The page of a scene: its surfaces in three dimensions, a floor plan and its materials.
@@ -37,11 +37,10 @@ impl ScenePage<'_> {
     /// # Errors
     /// When the plan cannot be drawn, or a value cannot be written as JSON.
     pub fn html(&self) -> Result<String, PlotError> {
-        let view = [("view_title", "Surfaces and route"), ("path", "route"), ("path_of", "route")];
         let sections = format!(
             "{}<section id=\"plan\"><h2>Floor plan and elevation</h2>\n{}</section>\n\
              <section id=\"properties\"><h2>Contents</h2>\n<div class=\"tables\">\n{}{}</div></section>\n",
-            html::fill(VIEW, &view),
+            stage::view_section("Surfaces and route", "route", "route"),
             self.plan.svg()?,
             html::table("scene", self.properties.iter().cloned()),
             html::table("materials", self.materials.iter().map(MaterialRow::cells)),
@@ -57,7 +56,7 @@ impl ScenePage<'_> {
             footer: "",
             version: env!("CARGO_PKG_VERSION"),
             data: &data,
-            scripts: &VIEW_SCRIPTS,
+            scripts: &scripts::VIEW,
         }
         .html())
     }

@@ -1,12 +1,11 @@
 //! The page of a study: its tables, plots and runs.
 
 use super::html::{self, escaped};
+use super::points::RunPoints;
+use super::scripts::{DATA, POINTS, READY, RUNS, TABLES};
 use super::table::PageTable;
-use super::{DATA, READY, RunPoints, TABLES};
 
 const SECTIONS: &str = include_str!("assets/study.html");
-const POINTS: &str = include_str!("assets/points.js");
-const RUNS: &str = include_str!("assets/runs.js");
 /// Maximum number of runs in the table of the page; a row takes about half a kilobyte.
 pub const MAX_PAGE_RUNS: usize = 5_000;
 

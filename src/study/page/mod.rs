@@ -2,7 +2,7 @@
 
 mod charts;
 mod cloud;
-mod links;
+pub(super) mod links;
 mod paths;
 mod run_results;
 mod timeline;

@@ -68,7 +68,7 @@ const MAX_PEAK_HZ: f64 = 20.0;
 pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignMetrics, StudyError> {
     let head = HeadModel::new_without_advice(spec, source)?;
     let model = SpringModel::of(spec, &head)?;
-    let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
+    let frequency_hz = shake.frequency_of(&head);
     let foot = head.default_points().base_in_base;
     let points = GainPoints { base_in_base: foot, head_in_head: head.body().centre_of_mass_in_head };
     let response = head.frequency_response(&points);
@@ -99,7 +99,7 @@ pub fn simulated(
 ) -> Result<(DesignMetrics, Coverage), StudyError> {
     let head = HeadModel::new(spec, source)?;
     let model = SpringModel::of(spec, &head)?;
-    let frequency_hz = shake.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz));
+    let frequency_hz = shake.frequency_of(&head);
     let amplitude = Level::Degrees(shake.pitch_deg);
     let signal = SignalSpec::SweptSine { from_hz: frequency_hz, to_hz: frequency_hz, amplitude };
     let drives = vec![DriveSpec { axis: Axis::Pitch, signal }];
@@ -218,7 +218,7 @@ struct LinearSwing<'a> {
 impl LinearSwing<'_> {
     /// Complex amplitude of translation (m) and rotation (rad) of the centre of mass.
     fn amplitude(&self) -> [Complex<f64>; 6] {
-        let base_rad = self.shake.pitch_deg.to_radians();
+        let base_rad = self.shake.base_rad();
         let per_base = self.response.displacement(Axis::Pitch, self.omega / TAU);
         std::array::from_fn(|k| per_base[k] * base_rad)
     }
@@ -239,7 +239,7 @@ impl LinearSwing<'_> {
         let mut head = Kinematics::at_rest(Pose::from_parts((centre.coords - arm).into(), rotation));
         head.angular_acceleration_in_world = angular_acceleration;
         head.acceleration_in_world = shift * -(self.omega * self.omega) - angular_acceleration.cross(&arm);
-        let pitch = self.shake.pitch_deg.to_radians() * phase.cos();
+        let pitch = self.shake.base_rad() * phase.cos();
         let base_rotation = Rotation::from_scaled_axis(Vector::y() * pitch);
         let origin = self.foot - base_rotation * self.foot;
         let base = Kinematics::at_rest(Pose::from_parts(origin.into(), base_rotation));

@@ -3,14 +3,20 @@
 pub mod design;
 mod metrics;
 mod mode_figure;
+mod mode_name;
 mod outline;
+mod page;
 mod report;
 mod shake;
+mod tables;
 mod view_plane;
 mod wire;
 
 pub use metrics::{DesignMetrics, closed_form, simulated};
 pub use mode_figure::mode_figure;
+pub use mode_name::mode_name;
+pub use page::page;
 pub use report::{CoilReport, ModeReport, RestReport, ShakeResponse, SpringReport, spring_report};
 pub use shake::Shake;
+pub use tables::{Property, mode_table, properties, stiffness_table};
 pub use wire::{SpringMounting, Wire, WireLoad};

@@ -3,12 +3,18 @@
 use super::outline::{Link, edges};
 use super::view_plane::{Polyline, ViewPlane};
 use crate::dynamics::{HeadModel, HeadSpec, Mode, ModeKind};
-use crate::elasticity::split;
+use crate::elasticity::{Vector6, split};
 use crate::geometry::{Pose, Rotation};
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
 
 /// Displayed amplitude: rotation in rad, or translation in units of 0.1 m.
 const DISPLAYED_AMPLITUDE: f64 = 0.3;
+
+/// The shape of a mode with a rotation of 1 rad or a translation of 0.1 m, whichever is reached first.
+pub(super) fn displayed_shape(mode: &Mode) -> Vector6 {
+    let (shift, turn) = split(&mode.shape);
+    mode.shape / turn.norm().max(10.0 * shift.norm()).max(f64::MIN_POSITIVE)
+}
 
 /// Plots the mode shapes, slowest first, at the same scale.
 ///
@@ -65,11 +71,10 @@ struct ModeDrawing {
 impl ModeDrawing {
     fn of(spec: &HeadSpec, head: &HeadModel, mode: Mode) -> Self {
         let rest = *head.base_from_head_at_rest();
-        let (shift, turn) = split(&mode.shape);
-        let scale = DISPLAYED_AMPLITUDE / turn.norm().max(10.0 * shift.norm()).max(f64::MIN_POSITIVE);
+        let (shift, turn) = split(&(displayed_shape(&mode) * DISPLAYED_AMPLITUDE));
         let centre = (rest * nalgebra::Point3::from(head.body().centre_of_mass_in_head)).coords;
-        let rotation = Rotation::from_scaled_axis(turn * scale);
-        let moved = Pose::from_parts((centre + shift * scale - rotation * centre).into(), rotation);
+        let rotation = Rotation::from_scaled_axis(turn);
+        let moved = Pose::from_parts((centre + shift - rotation * centre).into(), rotation);
         let plane = ViewPlane::of(mode.kind, &shift, &turn);
         let links = Link::all(&spec.linkage);
         let outline = |head: &Pose| {
@@ -97,6 +102,6 @@ impl ModeDrawing {
 }
 
 /// Formats a damping ratio with significant decimals.
-fn ratio(ratio: f64) -> String {
+pub(super) fn ratio(ratio: f64) -> String {
     if ratio < 0.01 { format!("{ratio:.4}") } else { format!("{ratio:.3}") }
 }

@@ -1,7 +1,7 @@
 //! Report on a spring under a head: rest pose, stiffness, modes, limits and response to a shake.
 
 use super::metrics::SpringModel;
-use super::{DesignMetrics, Shake, closed_form, simulated};
+use super::{DesignMetrics, Shake, closed_form, mode_name, simulated};
 use crate::dynamics::{
     AccelerationKind, ElementLoad, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, max_head_mass_kg,
 };
@@ -44,6 +44,8 @@ pub struct SpringReport {
 /// A coil spring and its margins.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CoilReport {
+    /// Free length, mm.
+    pub free_length_mm: f64,
     /// Spring index: mean coil diameter divided by wire diameter.
     pub index: f64,
     /// Mass of the active wire, g; `None` for a material specified by its moduli only.
@@ -52,14 +54,16 @@ pub struct CoilReport {
     pub axial_n_per_m: f64,
     /// Torsional stiffness, N m/rad.
     pub torsion_nm_per_rad: f64,
-    /// Stiffness matrix of the top end with a clamped foot, under the weight of the head; x, y, z, rx, ry, rz; `None`
-    /// if the spring is beyond its limits.
+    /// Compressive load, N, negative for tension: that at rest, or the weight of a head without a rest pose.
+    pub load_n: f64,
+    /// Stiffness matrix of the top end with a clamped foot, under that load; x, y, z, rx, ry, rz; `None` if the spring is
+    /// beyond its limits.
     pub stiffness_at_top: Option<[[f64; 6]; 6]>,
     /// Buckling load with a guided top, N; `None` if the spring does not buckle.
     pub buckling_load_n: Option<f64>,
-    /// Buckling load divided by the weight of the head.
+    /// Buckling load divided by the load; `None` if the spring does not buckle or the load is a tension.
     pub buckling_margin: Option<f64>,
-    /// Gap between adjacent coils under the weight of the head, mm; negative if the coils touch.
+    /// Gap between adjacent coils under the load, mm; negative if the coils touch.
     pub gap_mm: f64,
     /// Bending angle at which the coils touch on the inner side, degrees.
     pub clash_bend_deg: f64,
@@ -76,7 +80,7 @@ pub struct RestReport {
     pub position_m: [f64; 3],
     /// Roll, pitch and yaw, degrees.
     pub roll_pitch_yaw_deg: [f64; 3],
-    /// Static compression of a single spring, mm.
+    /// Static compression of a single spring, mm; negative for an extension.
     pub sag_mm: Option<f64>,
 }
 
@@ -85,6 +89,8 @@ pub struct RestReport {
 pub struct ModeReport {
     /// Dominant motion.
     pub kind: ModeKind,
+    /// Dominant motion with its direction in words.
+    pub name: String,
     /// Undamped frequency, Hz.
     pub frequency_hz: f64,
     /// Damped frequency, Hz.
@@ -142,7 +148,9 @@ pub fn spring_report(
         base: Kinematics::at_rest(Pose::identity()),
     };
     let stress_pa = model.stress_pa(&at_rest);
-    let coil = coil_of(spec)?.map(|coil| coil_report(&coil, &model, mass_kg, stress_pa));
+    let bearings = head.element_loads();
+    let load_n = bearings.first().and_then(|spring| spring.load_n).unwrap_or(mass_kg * STANDARD_GRAVITY_M_PER_S2);
+    let coil = coil_of(spec)?.map(|coil| coil_report(&coil, &model, load_n, stress_pa));
     let response = head.frequency_response(&head.default_points());
     let peak = |axis| (axis_name(axis), response.peak(axis, 20.0, AccelerationKind::Kinematic));
     Ok(SpringReport {
@@ -150,7 +158,7 @@ pub fn spring_report(
         stands: true,
         falls_because: None,
         heaviest_head_kg,
-        bearings: head.element_loads(),
+        bearings,
         coil,
         rest: Some(rest_report(&head, model.free_length_m.map(|_| model.sag_m(&head)))),
         stiffness: head.linear().map(|linear| rows(&linear.stiffness)),
@@ -187,7 +195,7 @@ fn unstable_report(
         falls_because: Some(because),
         heaviest_head_kg,
         bearings: Vec::new(),
-        coil: coil_of(spec)?.map(|coil| coil_report(&coil, &model, head_mass_kg, None)),
+        coil: coil_of(spec)?.map(|coil| coil_report(&coil, &model, head_mass_kg * STANDARD_GRAVITY_M_PER_S2, None)),
         rest: None,
         stiffness: None,
         modes: Vec::new(),
@@ -220,22 +228,24 @@ fn coil_of(spec: &HeadSpec) -> Result<Option<Coil>, StudyError> {
     })
 }
 
-fn coil_report(coil: &Coil, model: &SpringModel, head_mass_kg: f64, stress_pa: Option<f64>) -> CoilReport {
-    let weight_n = head_mass_kg * STANDARD_GRAVITY_M_PER_S2;
-    let length_m = coil.free_length_m() - weight_n / coil.axial_n_per_m();
+/// The report on a coil under the compressive load `load_n`.
+fn coil_report(coil: &Coil, model: &SpringModel, load_n: f64, stress_pa: Option<f64>) -> CoilReport {
+    let length_m = coil.free_length_m() - load_n / coil.axial_n_per_m();
     let open_m = length_m - coil.solid_length_m();
     let (radius_m, wire_m) = model.wire.map_or((f64::NAN, f64::NAN), |w| (w.coil_radius_m, w.diameter_m));
     let coils = coil.solid_length_m() / wire_m;
     let buckling = buckling_load_n(coil);
-    let at_top = coil.under_load(weight_n).and_then(|column| loaded_stiffness(&column)).ok();
+    let at_top = coil.under_load(load_n).and_then(|column| loaded_stiffness(&column)).ok();
     CoilReport {
+        free_length_mm: coil.free_length_m() * 1e3,
+        load_n,
         index: 2.0 * radius_m / wire_m,
         mass_g: model.mass_kg.map(|mass_kg| mass_kg * 1e3),
         axial_n_per_m: coil.axial_n_per_m(),
         torsion_nm_per_rad: coil.torsion_nm_per_rad(),
         stiffness_at_top: at_top.as_ref().map(rows),
         buckling_load_n: buckling,
-        buckling_margin: buckling.map(|load_n| load_n / weight_n),
+        buckling_margin: buckling.filter(|_| load_n > 0.0).map(|buckling_n| buckling_n / load_n),
         gap_mm: open_m / coils * 1e3,
         // Bending by phi reduces each of the n gaps by phi R / n on the inner side.
         clash_bend_deg: (open_m / radius_m).to_degrees(),
@@ -259,6 +269,7 @@ fn mode_report(mode: &Mode) -> ModeReport {
     let shape = mode.shape / mode.shape[mode.shape.iamax()];
     ModeReport {
         kind: mode.kind,
+        name: mode_name(mode),
         frequency_hz: mode.frequency_hz,
         damped_frequency_hz: mode.damped_frequency_hz(),
         damping_ratio: mode.damping_ratio,

@@ -1,5 +1,6 @@
 //! The shake of a spring.
 
+use crate::dynamics::HeadModel;
 use serde::Deserialize;
 use serde::Serialize;
 
@@ -13,6 +14,18 @@ pub struct Shake {
     /// Frequency, Hz; default: that of the slowest mode of the head.
     #[serde(default)]
     pub frequency_hz: Option<f64>,
+}
+
+impl Shake {
+    /// Amplitude of the base's pitch, rad.
+    pub(super) fn base_rad(&self) -> f64 {
+        self.pitch_deg.to_radians()
+    }
+
+    /// The frequency, Hz; 1 Hz for a head without modes.
+    pub(super) fn frequency_of(&self, head: &HeadModel) -> f64 {
+        self.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz))
+    }
 }
 
 impl Default for Shake {

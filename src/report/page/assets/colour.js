@@ -11,8 +11,6 @@ const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00
 const NEUTRAL = ["#d8d4cb", "#a39e94"];
 const UNKNOWN_COLOUR = "#8a8f96";
 
-const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
-
 // 256 colours for the codes of a quantity; the last one is for unknown values.
 const table = (stops) => {
   const colours = new Uint8Array(4 * 256);
@@ -84,13 +82,6 @@ function heightCodes(channel) {
   channel.upper = metres(high);
   return Uint8Array.from(heights, (code) => Math.round(Math.min(Math.max((code - low) / (high - low), 0), 1) * 254));
 }
-
-const addElement = (parent, tag, text, className) => {
-  const element = parent.appendChild(document.createElement(tag));
-  element.textContent = text;
-  if (className) element.className = className;
-  return element;
-};
 
 // Shows the colours of materials in the legend.
 const showMaterials = (order) => {

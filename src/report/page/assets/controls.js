@@ -8,12 +8,7 @@ const CEILING_FRACTION = 0.05;
 const CUT_ABOVE_PATH_M = 0.3;
 const MAX_CEILING_M = 4;
 
-let view = null;
-try {
-  view = new View(byId("scene"));
-} catch (error) {
-  byId("legend").textContent = `The 3-D view needs WebGL, which this browser does not offer (${error.message}).`;
-}
+const view = openView(View);
 
 // Fills the list of colours; the first one that is known of error, height is chosen.
 const setUpColours = () => {
@@ -93,32 +88,16 @@ const setUpShown = () => {
   resize();
 };
 
-const playback = {
-  isRunning: false,
-  toggle() {
-    this.isRunning = !this.isRunning;
-    const button = byId("play");
-    button.textContent = this.isRunning ? "Pause" : "Play";
-    button.setAttribute("aria-pressed", String(this.isRunning));
-    if (!this.isRunning) return;
-    if (timer.t >= duration - 1e-6) timer.set(0);
-    let last = performance.now();
-    const step = (now) => {
-      if (!this.isRunning) return;
-      timer.set(timer.t + Math.min((now - last) / 1000, 0.25) * Number(byId("speed").value));
-      last = now;
-      if (timer.t >= duration - 1e-6) this.toggle();
-      else requestAnimationFrame(step);
-    };
-    requestAnimationFrame(step);
-  },
-};
-
 const setUpPlayback = () => {
   const slider = byId("time");
   slider.max = duration;
   slider.addEventListener("input", () => timer.set(slider.valueAsNumber));
-  byId("play").addEventListener("click", () => playback.toggle());
+  const isOver = () => timer.t >= duration - 1e-6;
+  const advance = (seconds) => {
+    timer.set(timer.t + seconds * Number(byId("speed").value));
+    return !isOver();
+  };
+  view.playback = new Playback(advance, () => isOver() && timer.set(0));
   timer.listeners.push((t) => {
     slider.value = t;
     slider.setAttribute("aria-valuetext", `${t.toFixed(1)} s`);
@@ -126,30 +105,9 @@ const setUpPlayback = () => {
   });
 };
 
-const KEYS = {
-  ArrowLeft: [-1, 0],
-  ArrowRight: [1, 0],
-  ArrowUp: [0, 1],
-  ArrowDown: [0, -1],
-};
-const onKey = (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
-  const [right, up] = KEYS[event.key] ?? [0, 0];
-  if (right || up) event.shiftKey ? view.pan(0.05 * right, 0.05 * up) : view.orbit(-0.1 * right, 0.1 * up);
-  else if (event.key === "+" || event.key === "=") view.zoom(0.85);
-  else if (event.key === "-") view.zoom(1 / 0.85);
-  else if (event.key === " ") playback.toggle();
-  else return;
-  event.preventDefault();
-};
-
 if (view) {
   setUpColours();
   setUpSlice();
   setUpShown();
   setUpPlayback();
-  byId("scene").addEventListener("keydown", onKey);
-  for (const [id, from] of [["camera-reset", "oblique"], ["camera-top", "top"], ["camera-side", "side"]]) {
-    byId(id).addEventListener("click", () => view.whole(from));
-  }
 }

@@ -36,3 +36,13 @@ const rangeInWords = (low, high, unit) => {
   const digits = Math.min(Math.max(-Math.floor(Math.log10(step)), 0), 6);
   return [low, high].map((x) => `${(isShort ? x * 1e3 : x).toFixed(digits).replace(/^-(?=[0.]*$)/, "")} ${isShort ? "mm" : unit}`.trim());
 };
+
+// Red, green and blue of a colour like "#0060a8", 0 to 255.
+const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+
+const addElement = (parent, tag, text, className) => {
+  const element = parent.appendChild(document.createElement(tag));
+  element.textContent = text;
+  if (className) element.className = className;
+  return element;
+};

@@ -1,4 +1,4 @@
-// Paths of head and base, and the time of the view.
+// Paths of head and base, their lines and markers, and the time of the view.
 
 // A path of the head or the base: times in s and poses of seven numbers, position and quaternion.
 class Path {
@@ -31,6 +31,76 @@ class Path {
       position: this.position(before).lerp(this.position(after), share),
       quaternion: quaternion.slerp(next, share),
     };
+  }
+}
+
+// Length of a dash: a fraction of the size of a path, m.
+const dashLength = (positions) => {
+  const spread = (axis) => {
+    const values = positions.filter((_, k) => k % 3 === axis);
+    return values.reduce((most, x) => Math.max(most, x), -Infinity) - values.reduce((least, x) => Math.min(least, x), Infinity);
+  };
+  return Math.min(Math.max(Math.hypot(spread(0), spread(1), spread(2)) / 100, 0.02), 2) || 0.1;
+};
+
+// A path as a line that nothing hides; the truth is dashed and in front.
+const pathLine = (path, isDashed) => {
+  const options = { linewidth: isDashed ? 1.6 : 3, depthTest: false, depthWrite: false, transparent: true };
+  const positions = [];
+  for (let k = 0; k < path.t.length; k++) positions.push(...path.pose.subarray(7 * k, 7 * k + 3));
+  const dashes = { dashed: true, dashSize: dashLength(positions), gapSize: dashLength(positions) };
+  const line = wideLine(positions, new vendor.LineMaterial(isDashed ? { ...options, ...dashes } : options));
+  if (isDashed && positions.length) line.computeLineDistances();
+  line.renderOrder = isDashed ? 3 : 2;
+  return line;
+};
+
+// Round or square markers of a fixed size on the screen: start, end and present position.
+class Markers {
+  constructor(scene) {
+    const geometry = new vendor.BufferGeometry();
+    geometry.setAttribute("position", new vendor.BufferAttribute(new Float32Array(9), 3));
+    geometry.setAttribute("kind", new vendor.BufferAttribute(new Float32Array([0, 1, 2]), 1));
+    const material = new vendor.ShaderMaterial({
+      uniforms: { ratio: { value: 1 }, fill: { value: [] }, edge: { value: new vendor.Vector3() } },
+      vertexShader: `
+        attribute float kind;
+        uniform float ratio;
+        varying float what;
+        void main() {
+          what = kind;
+          gl_PointSize = ratio * (kind > 1.5 ? 12.0 : 14.0);
+          gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+        }`,
+      fragmentShader: `
+        uniform vec3 fill[3];
+        uniform vec3 edge;
+        varying float what;
+        void main() {
+          vec2 from = abs(gl_PointCoord - 0.5) * 2.0;
+          float away = what > 0.5 && what < 1.5 ? max(from.x, from.y) : length(from);
+          if (away > 1.0) discard;
+          vec3 inside = what < 0.5 ? fill[0] : what < 1.5 ? fill[1] : fill[2];
+          gl_FragColor = vec4(away > 0.7 ? edge : inside, 1.0);
+        }`,
+      depthTest: false,
+      transparent: true,
+    });
+    this.points = new vendor.Points(geometry, material);
+    this.points.frustumCulled = false;
+    this.points.renderOrder = 5;
+    this.points.visible = estimate.isKnown;
+    if (estimate.isKnown) {
+      this.put(0, estimate.position(0));
+      this.put(1, estimate.position(estimate.t.length - 1));
+    }
+    scene.add(this.points);
+  }
+
+  put(index, position) {
+    const attribute = this.points.geometry.attributes.position;
+    attribute.setXYZ(index, position.x, position.y, position.z);
+    attribute.needsUpdate = true;
   }
 }
 

@@ -1,4 +1,4 @@
-// The three-dimensional view: renderer, cameras, and a close-up of head and spring.
+// The three-dimensional view of a run or a scene, with a close-up of head and spring.
 
 // The close-up shows this height, m.
 const CLOSE_UP_M = 0.45;
@@ -39,13 +39,10 @@ const surfaceMesh = () => {
   return mesh;
 };
 
-class View {
+class View extends Stage {
   constructor(canvas) {
-    this.canvas = canvas;
-    this.renderer = new vendor.WebGLRenderer({ canvas, antialias: true });
+    super(canvas);
     this.renderer.localClippingEnabled = true;
-    this.renderer.autoClear = false;
-    this.scene = new vendor.Scene();
     this.cloud = new Cloud(this.scene);
     this.estimate = pathLine(estimate, false);
     this.truth = pathLine(truth, true);
@@ -54,22 +51,16 @@ class View {
     this.planes = [new vendor.Plane(new vendor.Vector3(0, 0, 1), 1e9), new vendor.Plane(new vendor.Vector3(0, 0, -1), 1e9)];
     this.surfaces.material.clippingPlanes = this.planes;
     this.scene.add(this.surfaces, this.estimate, this.truth);
-    this.head = new Head(this.scene);
+    // The elements between base and head need the true poses of both.
+    this.head = new Head(this.scene, { parts: data.parts, links: base.isKnown ? data.links : [] });
+    this.head.addHandle();
     this.markers = new Markers(this.scene);
 
-    this.camera = new vendor.PerspectiveCamera(45, 1, 0.05, 2000);
-    this.camera.up.set(0, 0, 1);
     this.closeUp = new vendor.PerspectiveCamera(30, 1, 0.05, 20);
     this.closeUp.up.set(0, 0, 1);
-    this.controls = new vendor.OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("change", () => this.draw());
     this.follow = false;
     byId("closeup-label").textContent = data.links.length ? "Head and spring" : "Head and base";
-    this.resize();
-    this.whole("oblique");
-    this.paint();
-    onTheme.push(() => this.paint());
-    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    this.start();
     this.move(0);
     timer.listeners.push((t) => this.move(t));
   }
@@ -100,57 +91,12 @@ class View {
     return this.surfaces.geometry.attributes.position.array.filter((_, k) => k % 3 === axis).sort();
   }
 
-  // Shows everything, from one of three directions.
-  whole(from) {
-    const { centre, radius } = this.extent;
-    const direction = { oblique: [-0.5, -0.75, 0.75], top: [0, -1e-3, 1], side: [0, -1, 0.02] }[from];
-    const portrait = Math.max(1, 0.9 / this.camera.aspect);
-    const away = (radius / Math.sin((this.camera.fov * Math.PI) / 360)) * 0.84 * portrait;
-    this.camera.position.set(...direction).normalize().multiplyScalar(away).add(centre);
-    this.camera.near = Math.max(away / 1000, 0.02);
-    this.camera.far = away * 20;
-    this.camera.updateProjectionMatrix();
-    this.controls.target.copy(centre);
-    this.controls.update();
-    this.draw();
-  }
-
-  // Rotates the camera about its target; angles in rad.
-  orbit(azimuth, elevation) {
-    const offset = this.camera.position.clone().sub(this.controls.target);
-    const radius = offset.length();
-    const about = Math.atan2(offset.y, offset.x) + azimuth;
-    const polar = Math.min(Math.max(Math.acos(offset.z / radius) - elevation, 0.01), Math.PI - 0.01);
-    offset.set(Math.sin(polar) * Math.cos(about), Math.sin(polar) * Math.sin(about), Math.cos(polar));
-    this.camera.position.copy(this.controls.target).addScaledVector(offset, radius);
-    this.controls.update();
-    this.draw();
-  }
-
-  // Moves camera and target sideways and up by fractions of their distance.
-  pan(right, up) {
-    const radius = this.camera.position.distanceTo(this.controls.target);
-    const shift = new vendor.Vector3(right * radius, up * radius, 0).applyQuaternion(this.camera.quaternion);
-    this.shift(shift);
-    this.draw();
-  }
-
-  shift(by) {
-    this.camera.position.add(by);
-    this.controls.target.add(by);
-    this.controls.update();
-  }
-
-  zoom(factor) {
-    const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
-    this.camera.position.copy(this.controls.target).add(offset);
-    this.controls.update();
-    this.draw();
-  }
-
   // Moves head, spring and live scan to time t.
   move(t) {
-    const poses = this.head.update(t);
+    // The head is drawn where it truly is, if that is known.
+    const [headPose, basePose] = [truth.at(t) ?? estimate.at(t), base.at(t)];
+    this.head.place(headPose, basePose);
+    const poses = headPose && { head: headPose, base: basePose };
     const shown = estimate.at(t) ?? poses?.head;
     this.cloud.live(t, shown?.position);
     this.poses = poses;
@@ -173,57 +119,29 @@ class View {
     this.draw();
   }
 
-  // Takes the colours of the theme.
   paint() {
     const set = (material, name) => material.color.set(themeColour(name));
-    this.renderer.setClearColor(themeColour("stage"));
     set(this.estimate.material, "estimate");
     set(this.truth.material, "truth");
     if (!isScene) set(this.surfaces.material, "soft");
     set(this.cloud.beams.material, "second");
-    set(this.head.materials.head, "soft");
-    set(this.head.materials.second, "part");
-    set(this.head.materials.front, "second");
-    set(this.head.materials.base, "soft");
-    set(this.head.materials.link, "ink");
-    const vector = (name) => new vendor.Vector3(...rgb(themeColour(name)).map((c) => c / 255));
+    this.head.paint();
     const { uniforms } = this.markers.points.material;
-    uniforms.fill.value = [vector("paper"), vector("estimate"), vector("second")];
-    uniforms.edge.value = vector("ink");
-    this.draw();
+    uniforms.fill.value = ["paper", "estimate", "second"].map(shaderColour);
+    uniforms.edge.value = shaderColour("ink");
+    super.paint();
   }
 
   resize() {
-    const { clientWidth, clientHeight } = this.canvas.parentElement;
-    if (!clientWidth || !clientHeight) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(clientWidth, clientHeight, false);
     this.markers.points.material.uniforms.ratio.value = Math.min(devicePixelRatio, 2);
-    this.camera.aspect = clientWidth / clientHeight;
-    this.camera.updateProjectionMatrix();
-    this.draw();
-  }
-
-  // Draws before the next picture of the screen.
-  draw() {
-    if (this.isWaiting) return;
-    this.isWaiting = true;
-    requestAnimationFrame(() => {
-      this.isWaiting = false;
-      this.render();
-    });
+    super.resize();
   }
 
   render() {
-    const { renderer, scene } = this;
-    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
-    renderer.setViewport(0, 0, width, height);
-    renderer.setScissorTest(false);
-    renderer.clear();
     this.head.head.visible = Boolean(this.poses);
-    renderer.render(scene, this.camera);
+    super.render();
+    const { width, height } = this.size;
     this.renderCloseUp(width, height);
-    document.documentElement.dataset.drawn ??= String(Math.round(performance.now()));
   }
 
   // Draws the head on its spring, upright and seen from its side, in the upper right corner.

@@ -1,0 +1,78 @@
+//! Names of modes in words.
+
+use crate::dynamics::{Mode, ModeKind};
+use crate::elasticity::split;
+use crate::geometry::Vector;
+
+/// A direction within this angle of an axis, or of the horizontal plane, counts as along it, degrees.
+const TOLERANCE_DEG: f64 = 10.0;
+/// Rotation by 1 rad counts as much as this displacement, m.
+const ROTATION_LENGTH_M: f64 = 0.1;
+/// A rocking mode rotates by at least this fraction of its displacement; else it only shifts.
+const LEAST_ROTATION: f64 = 0.05;
+
+/// The name of a mode with its direction, such as "rocking about y" or "bounce along z".
+///
+/// Axes are those of the base. Rocking and yaw rotate about the direction, sway and bounce move the centre of mass along it.
+pub fn mode_name(mode: &Mode) -> String {
+    let (shift, turn) = split(&mode.shape);
+    let turns = match mode.kind {
+        ModeKind::Rocking => ROTATION_LENGTH_M * turn.norm() > LEAST_ROTATION * shift.norm(),
+        ModeKind::Yaw => true,
+        ModeKind::Sway | ModeKind::Bounce => false,
+    };
+    let (word, along) = if turns { ("about", turn) } else { ("along", shift) };
+    format!("{} {word} {}", mode.kind.name(), direction(&along))
+}
+
+/// A direction in words; its sign does not matter.
+fn direction(along: &Vector) -> String {
+    let Some(unit) = along.try_normalize(f64::MIN_POSITIVE) else { return "no axis".to_owned() };
+    let tolerance = TOLERANCE_DEG.to_radians();
+    let nearest = unit.iamax();
+    if unit[nearest].abs() > tolerance.cos() {
+        return ["x", "y", "z"][nearest].to_owned();
+    }
+    if unit.z.abs() > tolerance.sin() {
+        return format!("({:.2}, {:.2}, {:.2})", unit.x, unit.y, unit.z);
+    }
+    let unit = if unit.x < 0.0 { -unit } else { unit };
+    let towards = if unit.y < 0.0 { "-y" } else { "y" };
+    format!("an axis {:.0}\u{b0} from x towards {towards}", unit.y.abs().atan2(unit.x).to_degrees())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elasticity::stack;
+
+    fn name(kind: ModeKind, shift: [f64; 3], turn: [f64; 3]) -> String {
+        let shape = stack(&Vector::from(shift), &Vector::from(turn));
+        mode_name(&Mode { kind, frequency_hz: 1.0, damping_ratio: 0.1, shape })
+    }
+
+    #[test]
+    fn a_mode_is_named_by_the_axis_of_its_dominant_motion() {
+        // A head that tips forward about y moves its centre, above the foot, along x.
+        assert_eq!(name(ModeKind::Rocking, [0.14, 0.0, 0.0], [0.0, 1.0, 0.02]), "rocking about y");
+        assert_eq!(name(ModeKind::Sway, [-0.1, 0.001, 0.0], [0.0, 3.0, 0.0]), "sway along x");
+        assert_eq!(name(ModeKind::Bounce, [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]), "bounce along z");
+        assert_eq!(name(ModeKind::Yaw, [0.0, 0.0, 0.0], [0.0, 0.1, -2.0]), "yaw about z");
+    }
+
+    #[test]
+    fn a_direction_between_the_axes_is_an_angle_whatever_its_sign() {
+        // tan 60 deg = 1.732.
+        let expected = "sway along an axis 60\u{b0} from x towards y";
+        assert_eq!(name(ModeKind::Sway, [1.0, 1.732, 0.0], [0.0; 3]), expected);
+        assert_eq!(name(ModeKind::Sway, [-1.0, -1.732, 0.0], [0.0; 3]), expected);
+        let expected = "rocking about an axis 45\u{b0} from x towards -y";
+        assert_eq!(name(ModeKind::Rocking, [0.0; 3], [-1.0, 1.0, 0.0]), expected);
+        assert_eq!(name(ModeKind::Bounce, [0.6, 0.0, 0.8], [0.0; 3]), "bounce along (0.60, 0.00, 0.80)");
+    }
+
+    #[test]
+    fn a_slow_mode_without_rotation_is_named_by_its_displacement() {
+        assert_eq!(name(ModeKind::Rocking, [1.0, 0.0, 0.0], [0.0, 1e-9, 0.0]), "rocking along x");
+    }
+}
