@@ -24,7 +24,12 @@ pub(super) fn run_json(page: &RunPage) -> Result<String, serde_json::Error> {
 /// # Errors
 /// When a value cannot be written as JSON.
 pub(super) fn view_json(view: &View) -> Result<String, serde_json::Error> {
-    Ok(inert(&serde_json::to_string(&document(view, &[], &[]))?))
+    Ok(inert(&serde_json::to_string(&self::view(view))?))
+}
+
+/// The data of a view only.
+pub(super) fn view(view: &View) -> Value {
+    document(view, &[], &[])
 }
 
 /// The data of a page with charts only, as [`run_json`].
@@ -54,7 +59,7 @@ fn document(view: &View, charts: &[Value], timeline: &[Value]) -> Value {
 }
 
 /// Escapes the characters that end a script element or start a comment in it, and line ends that scripts do not allow.
-fn inert(json: &str) -> String {
+pub(super) fn inert(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for c in json.chars() {
         match c {
@@ -66,7 +71,7 @@ fn inert(json: &str) -> String {
 }
 
 /// Times; positions and quaternions, seven numbers a pose.
-fn path(poses: &[TimedPose]) -> Value {
+pub(super) fn path(poses: &[TimedPose]) -> Value {
     json!({
         "t": base64_f32(poses.iter().map(|timed| timed.t_s)),
         "pose": base64_f32(poses.iter().flat_map(|timed| seven(&timed.pose))),
@@ -79,7 +84,7 @@ fn seven(pose: &Pose) -> [f64; 7] {
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 }
 
-fn numbers(v: &Vector) -> [f64; 3] {
+pub(super) fn numbers(v: &Vector) -> [f64; 3] {
     [v.x, v.y, v.z]
 }
 

@@ -3,17 +3,19 @@
 //! The page of a run has the verdict, a three-dimensional view, interactive charts, the metrics and the manifest; that of a
 //! scene the view, the floor plan and the materials; that of a study its tables, plots and runs; that of a gain measurement
 //! gain and phase of each axis. Scripts, style sheets and data are in the file. A content security policy forbids network
-//! access.
+//! access. The page of a run that is not complete is an exception: it requests updates from the server that it is from.
 
 mod binary;
 mod data;
 mod encode;
 mod gains;
 mod html;
+mod live;
 mod quantise;
 mod scene;
 mod study;
 mod table;
+mod update;
 
 use crate::report::rows;
 pub use data::{
@@ -21,6 +23,7 @@ pub use data::{
     TimedPose, TimelineRow, View, ViewPoint,
 };
 pub use gains::{AxisGains, GainsPage};
+pub use live::LivePage;
 
 /// Maximum number of points of the cloud on a page.
 ///
@@ -34,6 +37,7 @@ pub const MAX_PAGE_POSES: usize = 20_000;
 pub use scene::{MaterialRow, ScenePage};
 pub use study::{MAX_PAGE_RUNS, StudyPage};
 pub use table::PageTable;
+pub use update::{Increment, LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TruePoses, Volume};
 
 const VIEW: &str = include_str!("assets/view.html");
 const RUN_SECTIONS: &str = include_str!("assets/run.html");

@@ -9,7 +9,7 @@ use crate::report::page::{Block, Link};
 const ASSUMED_COIL: (f64, f64) = (0.0125, 10.0);
 
 /// The elements between base and head; empty for a rigid or actuated mount.
-pub(super) fn of(linkage: &LinkageSpec) -> Vec<Link> {
+pub(in crate::study) fn of(linkage: &LinkageSpec) -> Vec<Link> {
     match linkage {
         LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => Vec::new(),
         LinkageSpec::Spring { spring: spec, base_from_spring, head_from_spring, .. } => {
@@ -20,7 +20,7 @@ pub(super) fn of(linkage: &LinkageSpec) -> Vec<Link> {
 }
 
 /// The blocks among the parts of a head; bodies have no shape.
-pub(super) fn blocks(parts: &[PartSpec]) -> Vec<Block> {
+pub(in crate::study) fn blocks(parts: &[PartSpec]) -> Vec<Block> {
     let block = |part: &PartSpec| match part {
         PartSpec::Block { size_m, centre_m, .. } => {
             Some(Block { centre_in_head: Vector::from(*centre_m), size_m: Vector::from(*size_m) })

@@ -20,11 +20,16 @@ const dashLength = (positions) => {
   return Math.min(Math.max(Math.hypot(spread(0), spread(1), spread(2)) / 100, 0.02), 2) || 0.1;
 };
 
+const pathPositions = (path) => {
+  const positions = [];
+  for (let k = 0; k < path.t.length; k++) positions.push(...path.pose.subarray(7 * k, 7 * k + 3));
+  return positions;
+};
+
 // A path as a line that nothing hides; the truth is dashed and in front.
 const pathLine = (path, isDashed) => {
   const options = { linewidth: isDashed ? 1.6 : 3, depthTest: false, depthWrite: false, transparent: true };
-  const positions = [];
-  for (let k = 0; k < path.t.length; k++) positions.push(...path.pose.subarray(7 * k, 7 * k + 3));
+  const positions = pathPositions(path);
   const dashes = { dashed: true, dashSize: dashLength(positions), gapSize: dashLength(positions) };
   const line = wideLine(positions, new vendor.LineMaterial(isDashed ? { ...options, ...dashes } : options));
   if (isDashed && positions.length) line.computeLineDistances();
@@ -153,7 +158,7 @@ class Head {
     this.head.add(box([1.04 * parts[0].size[0], 1.04 * parts[0].size[1], 0.008], this.materials.front));
     this.base = box([0.036, 0.036, 0.13], this.materials.base);
     const link = (spec) => new (spec.foot ? Spring : Cord)(spec, this.materials.link);
-    this.links = base.isKnown ? data.links.map(link) : [];
+    this.links = data.links.map(link);
     scene.add(this.head, this.base, ...this.links.map((each) => each.line));
   }
 

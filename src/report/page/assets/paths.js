@@ -37,7 +37,8 @@ class Path {
 const estimate = new Path(data.estimate);
 const truth = new Path(data.truth);
 const base = new Path(data.base);
-const duration = Math.max(estimate.end, truth.end, data.cloud.count ? data.cloud.duration : 0, 1e-3);
+// On the page of a run that is not complete it grows.
+let duration = Math.max(estimate.end, truth.end, data.cloud.count ? data.cloud.duration : 0, 1e-3);
 
 // The time of the view; each listener is called when it changes.
 const timer = {
