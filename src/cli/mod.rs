@@ -19,6 +19,7 @@ mod full_run;
 mod gains;
 mod info;
 mod latency;
+mod live;
 mod map;
 mod output;
 mod quantity;
