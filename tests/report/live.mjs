@@ -10,6 +10,17 @@ import { audit, check, finish, launch } from "./chromium.mjs";
 const [modules, address, pictures] = process.argv.slice(2);
 const { browser, axe } = await launch(modules);
 
+// In the page: keeps each number of points and each time that it shows, and whether the run goes on.
+function recordGrowth() {
+  window.shown = [];
+  addEventListener("DOMContentLoaded", () => {
+    const [count, time, end] = ["count", "time", "end"].map((id) => document.getElementById(id));
+    const keep = () =>
+      window.shown.push({ points: parseInt(count.textContent.replaceAll(",", ""), 10), t: time.valueAsNumber, runs: end.hidden });
+    new MutationObserver(keep).observe(count, { childList: true });
+  });
+}
+
 async function open(colorScheme, width) {
   const page = await browser.newPage({ colorScheme, viewport: { width, height: 900 } });
   page.setDefaultTimeout(120_000);
@@ -17,28 +28,20 @@ async function open(colorScheme, width) {
   page.on("console", (message) => check(message.type() !== "error", `${name}: console: ${message.text()}`));
   page.on("pageerror", (error) => check(false, `${name}: ${error.message}`));
   const isAllowed = (url) => url.startsWith(address) || /^(data|blob):/.test(url);
+  await page.addInitScript(recordGrowth);
   page.on("request", (request) => check(isAllowed(request.url()), `${name}: request to ${request.url()}`));
   await page.goto(address);
   await page.waitForFunction(() => document.documentElement.dataset.drawn);
   return { page, name };
 }
 
-const points = (page) => page.locator("#count").evaluate((output) => parseInt(output.textContent.replaceAll(",", ""), 10) || 0);
-const time = (page) => page.locator("#time").evaluate((input) => input.valueAsNumber);
 const shoot = async (page, name) => {
   if (pictures) await page.screenshot({ path: join(pictures, `${name.replaceAll(/[ ,]+/g, "-")}.png`), fullPage: true });
 };
 
 // Waits until the map and the time have grown.
 async function seeGrowth({ page, name }) {
-  await page.waitForFunction(() => parseInt(document.getElementById("count").textContent, 10) > 0);
-  const [few, early] = [await points(page), await time(page)];
-  await page.waitForFunction(
-    ([few, early]) =>
-      parseInt(document.getElementById("count").textContent.replaceAll(",", ""), 10) > few &&
-      document.getElementById("time").valueAsNumber > early,
-    [few, early],
-  );
+  await page.waitForFunction(() => window.shown.length > 3);
   await shoot(page, `running ${name}`);
   await audit(page, axe, `${name}, running`);
 }
@@ -47,7 +50,10 @@ async function seeGrowth({ page, name }) {
 async function seeEnd({ page, name }) {
   await page.locator("#end a").waitFor();
   check((await page.locator("#verdicts .verdict:visible").count()) === 1, `${name}: there is not one verdict`);
-  check((await points(page)) > 1000, `${name}: the map has ${await points(page)} points`);
+  const shown = await page.evaluate(() => window.shown);
+  const grown = shown.filter(({ points, t }, k) => k > 0 && points > shown[k - 1].points && t >= shown[k - 1].t);
+  check(grown.length > 2, `${name}: the map has grown ${grown.length} times`);
+  check(shown.at(-1).points > 1000, `${name}: the map has ${shown.at(-1).points} points`);
   check(await page.evaluate(() => window.hostile === undefined), "a hostile name has run as a script");
   await shoot(page, `end ${name}`);
   await audit(page, axe, `${name}, at the end`);

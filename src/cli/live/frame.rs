@@ -9,7 +9,7 @@ use zsim::study::{Stage, StageData, StudyEvent};
 use zsim::time::{Span, Stamp};
 
 /// Maximum number of returns that are copied from a scan.
-const MAX_RETURNS: usize = 256;
+const MAX_RETURNS: usize = 128;
 /// Time between copied poses: points are projected with poses interpolated between them.
 const POSE_PERIOD: Span = Span::from_nanos(10_000_000);
 /// Wall-clock time between verdicts: to compute one takes longer, the longer the run is.

@@ -4,7 +4,7 @@ use super::frame::Frame;
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Maximum number of frames: at most 40 MB.
+/// Maximum number of frames: at most 20 MB.
 const CAPACITY: usize = 4096;
 
 /// A queue of limited length that drops old frames.

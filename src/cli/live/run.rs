@@ -32,6 +32,14 @@ pub(super) struct PageState {
     pub next_scan: u64,
 }
 
+/// A warning of the estimator.
+#[derive(Debug, Clone, PartialEq)]
+struct Warning {
+    /// Time since the first measurement, s.
+    t_s: f64,
+    sentence: String,
+}
+
 /// The state of a run.
 #[derive(Debug)]
 pub(super) struct LiveRun {
@@ -54,7 +62,7 @@ pub(super) struct LiveRun {
     next_scan: u64,
     verdict: Option<LiveVerdict>,
     notes: Vec<String>,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
     /// Notes and warnings.
     events: Vec<String>,
     end: Option<LiveEnd>,
@@ -112,8 +120,8 @@ impl LiveRun {
             Frame::Poses(poses) => poses.into_iter().for_each(|(stamp, pose)| self.take_pose(stamp, &pose)),
             Frame::Verdict { verdict, events } => {
                 self.verdict = Some(verdict);
-                let line = |(stamp, sentence)| format!("{:.1} s: {sentence}", self.seconds_after_start(stamp));
-                self.warnings = events.into_iter().map(line).collect();
+                let warning = |(stamp, sentence)| Warning { t_s: self.seconds_after_start(stamp), sentence };
+                self.warnings = events.into_iter().map(warning).collect();
                 self.list_events();
             }
         }
@@ -241,8 +249,12 @@ impl LiveRun {
         self.origin.map_or(0.0, |origin| stamp.seconds_since(origin))
     }
 
+    /// Lists notes and warnings. At the end of the estimate its warnings are notes too, which are not repeated.
     fn list_events(&mut self) {
-        self.events = self.notes.iter().chain(&self.warnings).cloned().collect();
+        let is_repeated = |note: &String| self.warnings.iter().any(|warning| note.contains(&warning.sentence));
+        let notes = self.notes.iter().filter(|note| !is_repeated(note)).cloned();
+        let warnings = self.warnings.iter().map(|Warning { t_s, sentence }| format!("{t_s:.1} s: {sentence}"));
+        self.events = notes.chain(warnings).collect();
     }
 }
 
@@ -320,6 +332,17 @@ mod tests {
         // One metre ahead in the map is one metre at a yaw of 1 rad in the world.
         let moved = estimate[1].translation.vector - estimate[0].translation.vector;
         assert!((moved - Vector::new(1_f64.cos(), 1_f64.sin(), 0.0)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_warning_that_is_also_a_note_is_listed_once() {
+        let mut run = LiveRun::new(Volume::default());
+        run.take(Frame::Poses(vec![(stamp(0.0), at_x(0.0))]));
+        let verdict = LiveVerdict { status: "good".to_owned(), reason: String::new() };
+        run.take(Frame::Verdict { verdict, events: vec![(stamp(4.0), "weak geometry".to_owned())] });
+        run.take(Frame::Note("4.00 s: weak geometry (2 times, last at 5.00 s)".to_owned()));
+        run.take(Frame::Note("another note".to_owned()));
+        assert_eq!(run.events, ["another note", "4.0 s: weak geometry"]);
     }
 
     #[test]
