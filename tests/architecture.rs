@@ -49,7 +49,7 @@ const BELOW_CLI: &[&str] = &[
 const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
 
 /// Crates that are restricted to some modules, and these modules.
-const RESTRICTED_CRATES: [(&str, &[&str]); 19] = [
+const RESTRICTED_CRATES: [(&str, &[&str]); 23] = [
     ("base64", &["report"]),
     ("parry3d", &["world"]),
     ("rapier3d_f64", &["dynamics"]),
@@ -61,6 +61,10 @@ const RESTRICTED_CRATES: [(&str, &[&str]); 19] = [
     ("clap_mangen", &["cli"]),
     ("anyhow", &["cli", "main"]),
     ("indicatif", &["cli"]),
+    ("http_body_util", &["cli"]),
+    ("hyper", &["cli"]),
+    ("hyper_util", &["cli"]),
+    ("tokio", &["cli"]),
     ("include_dir", &["spec"]),
     ("cmaes", &["study"]),
     ("faer", &["estimation"]),
@@ -71,8 +75,8 @@ const RESTRICTED_CRATES: [(&str, &[&str]); 19] = [
     ("sobol", &["study"]),
 ];
 
-/// Names that the library must not use: the wall clock, and collections with random iteration order.
-const FORBIDDEN_IN_LIBRARY: [&str; 3] = ["SystemTime::now", "HashMap", "HashSet"];
+/// Names that the library must not use: the wall clock, collections with random iteration order, and sockets.
+const FORBIDDEN_IN_LIBRARY: [&str; 4] = ["SystemTime::now", "HashMap", "HashSet", "std::net"];
 
 fn sources() -> BTreeMap<PathBuf, String> {
     fn walk(folder: &Path, into: &mut BTreeMap<PathBuf, String>) {
@@ -217,7 +221,7 @@ fn estimation_uses_no_files() {
 }
 
 #[test]
-fn the_library_uses_no_wall_clock_and_no_hash_order() {
+fn the_library_uses_no_wall_clock_no_hash_order_and_no_sockets() {
     for (path, text) in sources().iter().filter(|(path, _)| !["cli", "main"].contains(&module_of(path).as_str())) {
         let code = code(text);
         for word in FORBIDDEN_IN_LIBRARY {

@@ -28,6 +28,7 @@ impl Bars {
             return;
         }
         match event {
+            StudyEvent::Data(_) => {}
             StudyEvent::Note(text) => self.note(text),
             StudyEvent::Progress { stage, fraction, done_s } => {
                 let bar = self.bar_of(stage);

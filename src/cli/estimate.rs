@@ -3,12 +3,14 @@
 use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, calibration, start};
 use super::bars::{Bars, stop_flag};
+use super::live::LiveArguments;
 use super::{full_run, output};
 use clap::Args;
 use std::path::PathBuf;
 use zsim::geometry::Pose;
 use zsim::recording::{Reader, TopicPreference};
-use zsim::study::{self, EstimateOptions, MapOptions, ProgressMonitor};
+use zsim::report::page::LivePage;
+use zsim::study::{self, EstimateOptions, MapOptions, ProgressMonitor, StudyEvent};
 
 /// Estimate trajectory and map from a recording of any program
 ///
@@ -58,6 +60,8 @@ pub(super) struct Arguments {
     extend_map: bool,
     #[command(flatten)]
     out: OutArguments,
+    #[command(flatten)]
+    live: LiveArguments,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
@@ -73,6 +77,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     // Open the recording first: a recording that is missing, or lacks a sensor, must not create a folder.
     Reader::open(&arguments.recording)?.select(&options.topics)?;
     let stem = arguments.recording.file_stem().unwrap_or_default().to_string_lossy();
+    let mut live = arguments.live.start(|| LivePage::of_recording(&stem))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| full_run::default_folder(&stem));
     let folder = output::folder(&wanted, arguments.out.force)?;
     let inputs = [Some(&arguments.recording), arguments.map.as_ref(), arguments.calibration.as_ref()];
@@ -81,9 +86,14 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 
     let mut bars = Bars::new(global);
     full_run::note_other_folder(&folder, &wanted, &bars);
-    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
+    let mut report = |event: StudyEvent| {
+        live.iter_mut().for_each(|live| live.observe(&event));
+        bars.update(event);
+    };
+    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
     let outcome = study::estimate_recording(&arguments.recording, &folder, &options, &mut watch);
     bars.finish();
+    live.into_iter().for_each(|live| live.finish(&outcome, &folder));
     let outcome = outcome.inspect_err(|_| full_run::print_partial_results(&folder))?;
     full_run::print_outcome(global, &outcome, arguments.estimator.profile, &folder)
 }

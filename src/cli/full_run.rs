@@ -3,13 +3,14 @@
 use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
 use super::bars::{Bars, end_polling, stop_flag};
+use super::live::LiveArguments;
 use super::{output, recording_size};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim::report::{self, Metrics};
 use zsim::simulation::Simulation;
-use zsim::study::{self, EstimateResult, ProgressMonitor};
+use zsim::study::{self, EstimateResult, ProgressMonitor, StudyEvent};
 
 #[derive(Args)]
 pub(super) struct Arguments {
@@ -22,6 +23,8 @@ pub(super) struct Arguments {
     estimator: EstimatorArguments,
     #[command(flatten)]
     out: OutArguments,
+    #[command(flatten)]
+    live: LiveArguments,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
@@ -29,6 +32,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let options = arguments.estimator.options()?;
     let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
+    let mut live = arguments.live.start(|| study::live_page(&simulation))?;
     let mut bars = Bars::new(global);
     recording_size::check(&simulation, &wanted, |note| bars.note(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
@@ -37,9 +41,14 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     note_other_folder(&folder, &wanted, &bars);
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));
-    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
+    let mut report = |event: StudyEvent| {
+        live.iter_mut().for_each(|live| live.observe(&event));
+        bars.update(event);
+    };
+    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
     let outcome = study::simulate_and_estimate(&simulation, &options, &folder, &mut watch);
     bars.finish();
+    live.into_iter().for_each(|live| live.finish(&outcome, &folder));
     let outcome = outcome.inspect_err(|_| print_partial_results(&folder))?;
     print_outcome(global, &outcome, arguments.estimator.profile, &folder)
 }

@@ -19,6 +19,7 @@ mod full_run;
 mod gains;
 mod info;
 mod latency;
+mod live;
 mod man;
 mod map;
 mod output;

@@ -3,9 +3,9 @@
 use super::cadence::Cadence;
 use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
-use super::{MapOptions, ProgressMonitor, Stage, StudyError};
+use super::{MapOptions, ProgressMonitor, Stage, StageData, StudyError};
 use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
+    EstimatedPose, Estimator, EstimatorSpec, Evidence, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
     covariance_blocks, radius_99,
 };
 use crate::geometry::{PoseCovariance, Trajectory};
@@ -91,6 +91,7 @@ pub(super) fn run_open_loop(
         Some(prior) => estimator.in_map(&prior.map, &prior.map_from_head),
         None => estimator,
     };
+    watch.data(StageData::Start { stage: Stage::Estimating, calibration: options.calibration });
     let tum = tum.map(TumWriter::create).transpose()?;
     let mut poses = PoseOutput { tum, map_from_head: Trajectory::new(), covariances: Vec::new(), radii_m: Vec::new() };
     let mut counts = MeasurementCounts::default();
@@ -105,6 +106,7 @@ pub(super) fn run_open_loop(
     let result = estimator.finish()?;
     poses.take(&result.poses)?;
     poses.close()?;
+    watch.data(StageData::Poses(&result.poses));
     let PoseOutput { map_from_head, covariances, radii_m, .. } = poses;
 
     // The reported offsets relate to the recorded stamps, without the shift that the selection applies.
@@ -150,9 +152,18 @@ fn push_all(
     for (index, measurement) in measurements.enumerate() {
         let measurement = measurement?;
         counts.take(&measurement);
+        if let Measurement::Lidar(scan) = &measurement {
+            watch.data(StageData::Scan(scan));
+        }
         estimator.push(measurement)?;
         if index % PROGRESS_INTERVAL == 0 {
-            poses.take(&estimator.take_poses())?;
+            let newest = estimator.take_poses();
+            poses.take(&newest)?;
+            watch.data(StageData::Poses(&newest));
+            poses
+                .evidence(estimator, counts)
+                .into_iter()
+                .for_each(|evidence| watch.data(StageData::Evidence(evidence)));
             watch.progress(Stage::Estimating, counts.seconds(), expected_s);
             if watch.is_stopped() {
                 return Err(StudyError::Stopped);
@@ -194,6 +205,13 @@ impl PoseOutput {
             }
         }
         Ok(())
+    }
+
+    /// The evidence on the poses so far; `None` without poses.
+    fn evidence<'a>(&self, estimator: &'a Estimator, counts: &MeasurementCounts) -> Option<Evidence<'a>> {
+        let estimated = self.map_from_head.span()?;
+        let (windows, warnings) = (estimator.windows(), estimator.warnings());
+        Some(Evidence { windows, warnings, samples: counts.imu.count(), recorded: estimated, estimated })
     }
 
     /// Completes the TUM file.

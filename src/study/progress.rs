@@ -1,6 +1,9 @@
 //! Progress reports and cancellation of experiments.
 
 use super::StudyError;
+use crate::estimation::{EstimatedPose, Evidence};
+use crate::measurement::{Calibration, LidarScan};
+use crate::truth::TruthSample;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Stage of an experiment.
@@ -36,6 +39,28 @@ pub enum StudyEvent<'a> {
     },
     /// A message for the user.
     Note(&'a str),
+    /// Data of the current stage, for a live view.
+    Data(StageData<'a>),
+}
+
+/// Data that a stage produces or reads, in the order in which it does so.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StageData<'a> {
+    /// The stage starts; its scans have this calibration.
+    Start {
+        /// The stage.
+        stage: Stage,
+        /// Extrinsics of the sensors.
+        calibration: &'a Calibration,
+    },
+    /// Simulated motion of head and base.
+    Truth(&'a TruthSample),
+    /// A scan that was simulated, or that the estimator receives next.
+    Scan(&'a LidarScan),
+    /// Estimated poses that have become final.
+    Poses(&'a [EstimatedPose]),
+    /// Windows and warnings of the estimator so far, as if the recording ended at the last final pose.
+    Evidence(Evidence<'a>),
 }
 
 /// Progress callback and stop flag of an experiment.
@@ -63,6 +88,10 @@ impl ProgressMonitor<'_> {
 
     pub(super) fn note(&mut self, text: &str) {
         (self.report)(StudyEvent::Note(text));
+    }
+
+    pub(super) fn data(&mut self, data: StageData) {
+        (self.report)(StudyEvent::Data(data));
     }
 }
 

@@ -1,11 +1,13 @@
 //! Writes the measurements and the truth of a simulation to files.
 
-use super::{Manifest, ProgressMonitor, Stage, StudyError};
+use super::observed_sink::ObservedSink;
+use super::{Manifest, ProgressMonitor, Stage, StageData, StudyError};
 use crate::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use crate::recording::{BaseImuDescription, RunDescription, TumWriter, Writer};
 use crate::simulation::{Simulation, SimulationSummary};
 use crate::time::Stamp;
 use crate::truth::{ClockTruth, TruthSample, TruthSink};
+use std::cell::RefCell;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -26,12 +28,16 @@ pub fn record(
     watch: &mut ProgressMonitor,
 ) -> Result<SimulationSummary, StudyError> {
     let recording = Writer::create(recording, description(simulation, truth_tf)?)?;
-    let mut files = FileSink { recording, truth: Some(TumWriter::create(truth)?), stop: watch.stop };
+    let files = FileSink { recording, truth: Some(TumWriter::create(truth)?), stop: watch.stop };
     let duration_s = simulation.inputs().duration_s;
-    let mut progress = |fraction: f64| watch.progress(Stage::Simulating, fraction * duration_s, Some(duration_s));
-    let ran = simulation.run(&mut files, &mut progress);
-    files.finish()?;
-    if watch.is_stopped() {
+    watch.data(StageData::Start { stage: Stage::Simulating, calibration: &simulation.calibration() });
+    let watch = RefCell::new(watch);
+    let mut progress =
+        |fraction: f64| watch.borrow_mut().progress(Stage::Simulating, fraction * duration_s, Some(duration_s));
+    let mut sink = ObservedSink { sink: files, watch: &watch };
+    let ran = simulation.run(&mut sink, &mut progress);
+    sink.sink.finish()?;
+    if watch.borrow().is_stopped() {
         return Err(StudyError::Stopped);
     }
     Ok(ran?)

@@ -9,6 +9,9 @@ mod documents;
 mod examples;
 mod gains;
 mod hostile;
+mod live;
+#[path = "../live_run/mod.rs"]
+mod live_run;
 mod maps;
 mod scene;
 mod sensor_models;

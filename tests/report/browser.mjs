@@ -4,31 +4,12 @@
 // Fails on an error in the console, on a request to the network, on a control without effect, on an accessibility violation
 // that axe-core finds, and on a page that is wider than the screen. With PICTURES, it writes screenshots to that folder.
 import { execFileSync } from "node:child_process";
-import { createRequire } from "node:module";
-import { existsSync, readFileSync } from "node:fs";
-import { join, resolve } from "node:path";
+import { join } from "node:path";
 import { pathToFileURL } from "node:url";
+import { audit, check, finish, launch } from "./chromium.mjs";
 
 const [modules, report, pictures] = process.argv.slice(2);
-const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-headless-shell", "/usr/bin/google-chrome"];
-const cannotRun = (reason) => {
-  console.error(reason);
-  process.exit(77);
-};
-const executablePath = BROWSERS.find((path) => existsSync(path)) ?? cannotRun("Chromium is not installed");
-for (const name of ["playwright-core", "axe-core"]) {
-  if (!existsSync(join(modules, name))) cannotRun(`${name} is not in ${modules}; .ci/run installs it`);
-}
-const load = createRequire(join(resolve(modules), "x.js"));
-const browser = await load("playwright-core").chromium.launch({
-  executablePath,
-  args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
-});
-const axe = readFileSync(load.resolve("axe-core/axe.min.js"), "utf8");
-const failures = [];
-const check = (isRight, sentence) => {
-  if (!isRight) failures.push(sentence);
-};
+const { browser, axe } = await launch(modules);
 
 async function open(colorScheme, width) {
   const page = await browser.newPage({ colorScheme, viewport: { width, height: 900 } });
@@ -228,17 +209,6 @@ async function useTable(page) {
   check((await page.locator("#shown").textContent()).startsWith(`${found.length} of ${all.length}`), "the number of runs is wrong");
 }
 
-async function audit(page, name) {
-  await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => axe.run());
-  for (const { id, nodes } of violations) {
-    const places = nodes.slice(0, 3).map((node) => `${node.target}: ${node.any.map((each) => each.message).join("; ")}`);
-    check(false, `${name}: axe: ${id}: ${places.join(" | ")}`);
-  }
-  const width = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
-  check(width <= 0, `${name}: the page is ${width} px wider than the screen`);
-}
-
 // The runs as points: axes, hover, the front by keyboard, and the way to a run.
 async function usePoints(page) {
   const place = page.locator(".points");
@@ -338,12 +308,11 @@ for (const scheme of ["light", "dark"]) {
     console.log(`${scheme}, ${width} px: first picture after ${drawn} ms`);
     check(await page.evaluate(() => window.hostile === undefined), "a hostile name has run as a script");
     if (pictures) await page.screenshot({ path: join(pictures, `${scheme}-${width}.png`), fullPage: true });
-    await audit(page, `${scheme}, ${width} px`);
+    await audit(page, axe, `${scheme}, ${width} px`);
     const kind = await page.evaluate(() => document.documentElement.dataset.page);
     if (scheme === "light" && width === 1400) await (USES[kind] ?? use)(page);
     await page.close();
   }
 }
 await browser.close();
-failures.forEach((sentence) => console.error(sentence));
-process.exitCode = failures.length ? 1 : 0;
+finish();

@@ -4,6 +4,9 @@
 
 #[path = "../command/mod.rs"]
 mod command;
+mod live;
+#[path = "../live_run/mod.rs"]
+mod live_run;
 mod page;
 #[path = "../skip/mod.rs"]
 mod skip;

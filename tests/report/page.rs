@@ -1,20 +1,10 @@
 //! The pages of zsim in a headless browser.
 
 use crate::command::run;
+use crate::live_run::hostile_scene;
 use crate::skip::run_or_skip;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-
-/// Runs as a script if a page does not escape it.
-const HOSTILE: &str = "<script>window.hostile=1</script>";
-
-/// A scene with a hostile name in `folder`.
-fn hostile_scene(folder: &Path) -> PathBuf {
-    let office = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/office.ron")).unwrap();
-    let scene = folder.join("hostile.ron");
-    std::fs::write(&scene, office.replacen("name: \"office\"", &format!("name: \"{HOSTILE}\""), 1)).unwrap();
-    scene
-}
 
 #[test]
 fn the_page_works_in_a_browser_and_a_hostile_scene_name_is_inert() {

@@ -18,7 +18,7 @@ use crate::estimation::intake::{Intake, Segment};
 use crate::estimation::local_map::LocalMap;
 use crate::estimation::localisation::MapLocalisation;
 use crate::estimation::observed::ObservedSurfels;
-use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop};
+use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WindowReport};
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::measurement::{Calibration, Measurement};
 use crate::surfel_map::SurfelMap;
@@ -105,6 +105,16 @@ impl Estimator {
     /// The poses that became final since the last call, in order of time.
     pub fn take_poses(&mut self) -> Vec<EstimatedPose> {
         std::mem::take(&mut self.poses)
+    }
+
+    /// The reports on all windows so far, in order of time.
+    pub fn windows(&self) -> &[WindowReport] {
+        &self.diagnostics.windows
+    }
+
+    /// The warnings so far, without those that concern the whole run.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.diagnostics.warnings
     }
 
     /// Processes the remaining data; the result has the poses not yet returned, and the reports of all windows.

@@ -77,7 +77,7 @@ struct Limits {
 }
 
 /// The data used to assess an estimate.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence<'a> {
     /// The windows' reports, in order.
     pub windows: &'a [WindowReport],

@@ -24,7 +24,12 @@ pub(super) fn run_json(page: &RunPage) -> Result<String, serde_json::Error> {
 /// # Errors
 /// When a value cannot be written as JSON.
 pub(super) fn view_json(view: &View) -> Result<String, serde_json::Error> {
-    Ok(inert(&serde_json::to_string(&document(view, &[], &[]))?))
+    Ok(inert(&serde_json::to_string(&self::view(view))?))
+}
+
+/// The data of a view only.
+pub(super) fn view(view: &View) -> Value {
+    document(view, &[], &[])
 }
 
 /// The data of a page with charts only, as [`run_json`].
@@ -82,7 +87,7 @@ pub(super) fn inert(json: &str) -> String {
 }
 
 /// Times; positions and quaternions, seven numbers a pose.
-fn path(poses: &[TimedPose]) -> Value {
+pub(super) fn path(poses: &[TimedPose]) -> Value {
     json!({
         "t": base64_f32(poses.iter().map(|timed| timed.t_s)),
         "pose": base64_f32(poses.iter().flat_map(|timed| seven(&timed.pose))),
@@ -95,7 +100,7 @@ fn seven(pose: &Pose) -> [f64; 7] {
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 }
 
-fn numbers(v: &Vector) -> [f64; 3] {
+pub(super) fn numbers(v: &Vector) -> [f64; 3] {
     [v.x, v.y, v.z]
 }
 

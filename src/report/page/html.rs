@@ -33,6 +33,9 @@ pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
     text
 }
 
+/// Kind of the page of a run that is not complete, the only one that may connect to its server.
+pub(super) const LIVE: &str = "live";
+
 /// Everything that differs between pages; the shell is the same.
 pub(super) struct Document<'a> {
     /// Kind of the page, which the scripts read.
@@ -64,6 +67,7 @@ impl Document<'_> {
             SHELL,
             &[
                 ("page", self.kind),
+                ("connections", if self.kind == LIVE { "; connect-src 'self'" } else { "" }),
                 ("title", &escaped(self.title)),
                 ("status", &escaped(self.status)),
                 ("style", STYLE),
@@ -100,12 +104,21 @@ pub(super) fn verdict(metrics: &Metrics) -> String {
     let (Some(verdict), Some(status)) = (verdict::verdict(metrics), metrics.status.as_deref()) else {
         return String::new();
     };
+    verdict_line(status, reason(&verdict, status))
+}
+
+/// The verdict without its status.
+pub(super) fn reason<'a>(verdict: &'a str, status: &str) -> &'a str {
+    verdict.strip_prefix(status).map_or(verdict, |rest| rest.trim_start_matches(": "))
+}
+
+/// A status with its icon and a reason.
+pub(super) fn verdict_line(status: &str, reason: &str) -> String {
     let (class, icon) = match status {
         "good" => ("good", "<path d=\"M5 12.5l4.5 4.5L19 7.5\"/>"),
         "degraded" => ("degraded", "<path d=\"M12 4v10M12 18.5v.5\"/>"),
         _ => ("lost", "<path d=\"M6 6l12 12M18 6L6 18\"/>"),
     };
-    let reason = verdict.strip_prefix(status).map_or(verdict.as_str(), |rest| rest.trim_start_matches(": "));
     format!(
         "<p class=\"verdict {class}\" role=\"status\"><svg viewBox=\"0 0 24 24\" aria-hidden=\"true\">{icon}</svg>\
          <span><strong>{}</strong> {}</span></p>",

@@ -4,13 +4,14 @@
 //! scene the view, the floor plan and the materials; that of a study its tables, plots and runs; that of the paper's
 //! experiments their tables and plots; that of a gain measurement gain and phase of each axis; that of a spring head and linkage
 //! to scale, modes and stiffness. Scripts, style sheets and data are in the file. A content security policy forbids network
-//! access.
+//! access. The page of a run that is not complete is an exception: it requests updates from the server that it is from.
 
 mod binary;
 mod data;
 mod encode;
 mod gains;
 mod html;
+mod live;
 mod paper;
 mod points;
 mod quantise;
@@ -20,6 +21,7 @@ mod spring;
 mod stage;
 mod study;
 mod table;
+mod update;
 
 use crate::report::rows;
 pub use data::{
@@ -27,6 +29,7 @@ pub use data::{
     ShownMode, SpringView, TimedPose, TimelineRow, View, ViewPoint,
 };
 pub use gains::{AxisGains, GainsPage};
+pub use live::LivePage;
 
 /// Maximum number of points of the cloud on a page.
 ///
@@ -43,6 +46,7 @@ pub use scene::{MaterialRow, ScenePage};
 pub use spring::{NotedTable, SpringPage};
 pub use study::{MAX_PAGE_RUNS, StudyPage};
 pub use table::PageTable;
+pub use update::{Increment, LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TruePoses, Volume};
 
 const RUN_SECTIONS: &str = include_str!("assets/run.html");
 impl RunPage<'_> {

@@ -16,10 +16,8 @@ const TAIL: f64 = 0.01;
 pub(super) fn cloud(points: &[ViewPoint]) -> Value {
     let (lower, upper) = bounds(points);
     let duration_s = points.iter().map(|point| point.t_s).fold(0.0, f64::max).max(1e-9);
-    let coordinate = |x: f64, k: usize| code16(x, (lower[k], upper[k])).to_le_bytes();
-    let positions: Vec<u8> =
-        points.iter().flat_map(|point| (0..3).flat_map(move |k| coordinate(point.position[k], k))).collect();
-    let times: Vec<u8> = points.iter().flat_map(|point| code16(point.t_s, (0.0, duration_s)).to_le_bytes()).collect();
+    let positions = positions(points.iter().map(|point| point.position), lower, upper);
+    let times = times(points.iter().map(|point| point.t_s), duration_s);
     let materials: Vec<u8> = points.iter().map(|point| material_code(point.material)).collect();
     json!({
         "count": points.len(),
@@ -36,6 +34,17 @@ pub(super) fn cloud(points: &[ViewPoint]) -> Value {
             "error": channel(points, |point| point.error_m, Scale::Symmetric),
         },
     })
+}
+
+/// Codes of positions between two corners: x, y, z in 16 bits each, little-endian.
+pub(super) fn positions(points: impl Iterator<Item = Vector>, lower: Vector, upper: Vector) -> Vec<u8> {
+    let coordinate = move |x: f64, k: usize| code16(x, (lower[k], upper[k])).to_le_bytes();
+    points.flat_map(|point| (0..3).flat_map(move |k| coordinate(point[k], k))).collect()
+}
+
+/// Codes of times from 0 to `duration_s`: 16 bits each, little-endian.
+pub(super) fn times(times_s: impl Iterator<Item = f64>, duration_s: f64) -> Vec<u8> {
+    times_s.flat_map(|t_s| code16(t_s, (0.0, duration_s)).to_le_bytes()).collect()
 }
 
 /// Lower and upper corner of the points, with at least 1 mm between them.

@@ -13,6 +13,7 @@ use crate::report::Metrics;
 use crate::report::page::{MAX_PAGE_TRIANGLES, RunPage, View};
 use crate::time::Stamp;
 use crate::world::World;
+pub(super) use links::{blocks as blocks_of, of as links_of};
 pub(super) use run_results::RunResults;
 
 impl RunResults<'_> {
@@ -71,7 +72,7 @@ impl RunResults<'_> {
 }
 
 /// The triangles of the scene: the largest ones, and whether others are missing.
-fn surfaces(world: &World) -> (Vec<[Vector; 3]>, bool) {
+pub(super) fn surfaces(world: &World) -> (Vec<[Vector; 3]>, bool) {
     let mut triangles: Vec<_> = world.triangles().map(|(triangle, _)| triangle).collect();
     let are_partial = triangles.len() > MAX_PAGE_TRIANGLES;
     if are_partial {

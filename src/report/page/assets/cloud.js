@@ -89,11 +89,14 @@ class Cloud {
     const code = (seconds) => (seconds / data.cloud.duration) * 65535;
     const first = firstAfter(this.times, code(t - LIVE_S));
     const last = sensor ? Math.min(firstAfter(this.times, code(t)), first + MAX_BEAMS) : first;
+    this.drawBeams(sensor, last - first, (k) => this.place(first + k));
+  }
+
+  // Draws beams from the sensor to a number of points.
+  drawBeams(sensor, count, place) {
     const { position } = this.beams.geometry.attributes;
-    for (let k = first; k < last; k++) {
-      position.array.set([sensor.x, sensor.y, sensor.z, ...this.place(k)], 6 * (k - first));
-    }
+    for (let k = 0; k < count; k++) position.array.set([sensor.x, sensor.y, sensor.z, ...place(k)], 6 * k);
     position.needsUpdate = true;
-    this.beams.geometry.setDrawRange(0, 2 * (last - first));
+    this.beams.geometry.setDrawRange(0, 2 * count);
   }
 }

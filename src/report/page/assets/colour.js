@@ -65,14 +65,13 @@ const channels = (() => {
   if (material.some((code) => code !== 255)) {
     known.material = { name: "surface material", codes: material, order: materialsByWeight(material, () => 1) };
   }
-  known.height.codes = heightCodes(known.height);
+  known.height.codes = heightCodes(known.height, shorts(cloud.position));
   return known;
 })();
 
 // Codes of the height between the 1st and the 99th percentile, which become the range of the channel.
-function heightCodes(channel) {
+function heightCodes(channel, positions) {
   const { cloud } = data;
-  const positions = shorts(cloud.position);
   const heights = Uint16Array.from({ length: cloud.count }, (_, k) => positions[3 * k + 2]);
   const sorted = heights.slice().sort();
   const low = sorted[Math.floor(0.01 * sorted.length)] ?? 0;

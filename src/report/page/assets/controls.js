@@ -26,27 +26,35 @@ const setUpColours = () => {
   if (isScene) showMaterials(sceneMaterials);
 };
 
-// Sets up the two ends of the slice, in metres; a ceiling above the path is left out at first.
-const setUpSlice = () => {
+// Applies the two ends of the slice, in metres.
+const updateSlice = () => {
+  const ends = [byId("low").valueAsNumber, byId("high").valueAsNumber].sort((a, b) => a - b);
+  view.slice = [ends[0] - 1e-3, ends[1] + 1e-3];
+  byId("slice").textContent = `${ends[0].toFixed(2)} to ${ends[1].toFixed(2)} m`;
+};
+
+// Sets the range of the slice, in metres; a ceiling above the path is left out.
+const fitSlice = (from, to) => {
   const [low, high] = [byId("low"), byId("high")];
-  const { lower, upper, count } = data.cloud;
-  const corners = isScene ? view.corners(2) : [];
-  const [from, to] = count ? [lower[2], upper[2]] : isScene ? [corners[0], corners[corners.length - 1]] : [-1, 3];
+  const { count } = data.cloud;
+  const path = estimate.isKnown ? estimate : truth;
   for (const input of [low, high]) [input.min, input.max] = [from, to];
   [low.value, high.value] = [from, to];
-  const heights = estimate.t.map((_, k) => estimate.pose[7 * k + 2]).sort();
+  const heights = path.t.map((_, k) => path.pose[7 * k + 2]).sort();
   const above = heights.length ? heights[Math.floor(0.99 * (heights.length - 1))] + ABOVE_HEAD_M : to;
   let hiding = 0;
   for (let k = 0; k < count; k += 16) hiding += view.cloud.place(k)[2] > above ? 16 : 0;
   if (hiding > CEILING_FRACTION * count) high.value = above;
   if (isScene && heights.length && to - above < MAX_CEILING_M) high.value = above + CUT_ABOVE_PATH_M;
-  const update = () => {
-    const ends = [low.valueAsNumber, high.valueAsNumber].sort((a, b) => a - b);
-    view.slice = [ends[0] - 1e-3, ends[1] + 1e-3];
-    byId("slice").textContent = `${ends[0].toFixed(2)} to ${ends[1].toFixed(2)} m`;
-  };
-  [low, high].forEach((input) => input.addEventListener("input", update));
-  update();
+  updateSlice();
+};
+
+const setUpSlice = () => {
+  const { lower, upper, count } = data.cloud;
+  const corners = isScene ? view.corners(2) : [];
+  const [from, to] = count ? [lower[2], upper[2]] : isScene ? [corners[0], corners[corners.length - 1]] : [-1, 3];
+  fitSlice(from, to);
+  for (const id of ["low", "high"]) byId(id).addEventListener("input", updateSlice);
 };
 
 const setUpShown = () => {

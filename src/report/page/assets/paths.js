@@ -43,11 +43,16 @@ const dashLength = (positions) => {
   return Math.min(Math.max(Math.hypot(spread(0), spread(1), spread(2)) / 100, 0.02), 2) || 0.1;
 };
 
+const pathPositions = (path) => {
+  const positions = [];
+  for (let k = 0; k < path.t.length; k++) positions.push(...path.pose.subarray(7 * k, 7 * k + 3));
+  return positions;
+};
+
 // A path as a line that nothing hides; the truth is dashed and in front.
 const pathLine = (path, isDashed) => {
   const options = { linewidth: isDashed ? 1.6 : 3, depthTest: false, depthWrite: false, transparent: true };
-  const positions = [];
-  for (let k = 0; k < path.t.length; k++) positions.push(...path.pose.subarray(7 * k, 7 * k + 3));
+  const positions = pathPositions(path);
   const dashes = { dashed: true, dashSize: dashLength(positions), gapSize: dashLength(positions) };
   const line = wideLine(positions, new vendor.LineMaterial(isDashed ? { ...options, ...dashes } : options));
   if (isDashed && positions.length) line.computeLineDistances();
@@ -107,7 +112,8 @@ class Markers {
 const estimate = new Path(data.estimate);
 const truth = new Path(data.truth);
 const base = new Path(data.base);
-const duration = Math.max(estimate.end, truth.end, data.cloud.count ? data.cloud.duration : 0, 1e-3);
+// On the page of a run that is not complete it grows.
+let duration = Math.max(estimate.end, truth.end, data.cloud.count ? data.cloud.duration : 0, 1e-3);
 
 // The time of the view; each listener is called when it changes.
 const timer = {

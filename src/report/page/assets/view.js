@@ -51,8 +51,7 @@ class View extends Stage {
     this.planes = [new vendor.Plane(new vendor.Vector3(0, 0, 1), 1e9), new vendor.Plane(new vendor.Vector3(0, 0, -1), 1e9)];
     this.surfaces.material.clippingPlanes = this.planes;
     this.scene.add(this.surfaces, this.estimate, this.truth);
-    // The elements between base and head need the true poses of both.
-    this.head = new Head(this.scene, { parts: data.parts, links: base.isKnown ? data.links : [] });
+    this.head = new Head(this.scene, { parts: data.parts, links: data.links });
     this.head.addHandle();
     this.markers = new Markers(this.scene);
 

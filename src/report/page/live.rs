@@ -1,0 +1,60 @@
+//! The page of a run that is not complete.
+
+use super::data::View;
+use super::update::Volume;
+use super::{MAX_PAGE_POINTS, MAX_PAGE_POSES, encode, html, scripts, stage};
+use serde_json::json;
+
+const SECTIONS: &str = include_str!("assets/live.html");
+const EVENTS: &str = "<section id=\"events\"><h2>Events</h2>\n<ul id=\"event-list\"></ul></section>\n";
+const SCRIPT: &str = include_str!("assets/live.js");
+
+/// The page of a run that is not complete. It requests [`LiveUpdate`]s from its server.
+pub struct LivePage {
+    /// Name of the run.
+    pub title: String,
+    /// What is known before the run: the true surfaces, the parts of the head, and its springs.
+    pub view: View,
+    /// The volume of the points.
+    pub volume: Volume,
+}
+
+impl LivePage {
+    /// The page of an estimate from a recording: nothing else is known before.
+    pub fn of_recording(title: &str) -> Self {
+        Self { title: title.to_owned(), view: View::default(), volume: Volume::default() }
+    }
+
+    /// The HTML of the page.
+    ///
+    /// # Errors
+    /// When a value cannot be written as JSON.
+    pub fn html(&self) -> Result<String, serde_json::Error> {
+        let view = stage::view_section("Trajectory and map so far", "estimate", "head");
+        let verdicts: String = ["good", "degraded", "lost"].map(|status| html::verdict_line(status, "")).concat();
+        let scripts = [&scripts::VIEW[..], &[SCRIPT]].concat();
+        Ok(html::Document {
+            kind: html::LIVE,
+            title: &self.title,
+            status: "",
+            introduction: &html::fill(SECTIONS, &[("verdicts", &verdicts)]),
+            without_scripts: "This page needs scripts.",
+            sections: &(view + EVENTS),
+            footer: "Points are thinned for this page; the report and cloud.ply have all of them.",
+            version: env!("CARGO_PKG_VERSION"),
+            data: &self.data()?,
+            scripts: &scripts,
+        }
+        .html())
+    }
+
+    /// The data of the view, without points; their codes refer to the volume.
+    fn data(&self) -> Result<String, serde_json::Error> {
+        let mut data = encode::view(&self.view);
+        data["cloud"]["lower"] = json!(encode::numbers(&self.volume.lower));
+        data["cloud"]["upper"] = json!(encode::numbers(&self.volume.upper));
+        data["cloud"]["duration"] = json!(Volume::duration_s());
+        data["capacity"] = json!({ "points": MAX_PAGE_POINTS, "poses": MAX_PAGE_POSES });
+        Ok(encode::inert(&serde_json::to_string(&data)?))
+    }
+}

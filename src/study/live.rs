@@ -1,0 +1,23 @@
+//! The page of a run that is not complete.
+
+use super::page::{blocks_of, links_of, surfaces};
+use crate::report::page::{LivePage, View, Volume};
+use crate::simulation::Simulation;
+
+/// The page of a full run of `simulation`, before its start: the true surfaces, the head and its springs.
+pub fn live_page(simulation: &Simulation) -> LivePage {
+    let (world, head) = (simulation.world(), &simulation.inputs().head.spec);
+    let (surfaces, surfaces_are_partial) = surfaces(world);
+    let (lower, upper) = world.bounds();
+    LivePage {
+        title: world.name().to_owned(),
+        view: View {
+            surfaces,
+            surfaces_are_partial,
+            links: links_of(&head.linkage),
+            parts: blocks_of(&head.parts),
+            ..View::default()
+        },
+        volume: Volume::around(lower, upper),
+    }
+}
