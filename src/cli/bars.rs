@@ -10,6 +10,8 @@ use zsim::study::{Stage, StudyEvent};
 
 /// Number of steps of a bar.
 const STEPS: u64 = 1000;
+/// From this fraction a bar would show 100 %.
+const NEAR_END: f64 = 0.995;
 
 /// Progress bar of the current stage, with notes above it.
 pub(super) struct Bars {
@@ -127,7 +129,8 @@ impl Bar {
 
     /// Sets the completed fraction, 0 to 1; `None` if it is not known.
     fn set_fraction(&self, fraction: Option<f64>) {
-        let position = fraction.map(|fraction| (fraction * STEPS as f64) as u64).filter(|steps| *steps < STEPS);
+        let position =
+            fraction.filter(|fraction| *fraction < NEAR_END).map(|fraction| (fraction * STEPS as f64) as u64);
         if self.is_spinner.swap(position.is_none(), Ordering::Relaxed) != position.is_none() {
             self.drawn.set_style(style(position.is_none()));
         }

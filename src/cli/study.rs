@@ -31,6 +31,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let plan = sweep::plan_of(&arguments.file)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(plan.name()));
     let planned = plan.write(&folder, arguments.force)?;
+    if arguments.keep_runs {
+        // Refuse a study without files to keep before its first run.
+        planned.runs_to_keep(Shard::WHOLE)?;
+    }
     sweep::run_sweep(&planned, Shard::WHOLE, arguments.keep_runs, global)
         .inspect_err(|_| super::full_run::print_partial_results(&folder))?;
     sweep::merge(&planned, &folder, global)

@@ -134,16 +134,16 @@ fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Complet
 fn run_shard(arguments: &RunArguments, global: &Global) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
     let shard = shard(arguments)?;
+    if arguments.keep_runs {
+        // Refuse a sweep without files to keep before its first run.
+        sweep.runs_to_keep(shard)?;
+    }
     run_sweep(&sweep, shard, arguments.keep_runs, global)?;
     print_status(global, &sweep.status(shard)?, &arguments.folder)
 }
 
 /// Runs the missing runs of a part, with a progress bar; with `keeps_runs`, then repeats each with its files.
 pub(super) fn run_sweep(sweep: &Sweep, shard: Shard, keeps_runs: bool, global: &Global) -> anyhow::Result<()> {
-    if keeps_runs {
-        // Refuse before the first run what has no files to keep.
-        sweep.runs_to_keep(shard)?;
-    }
     let program = std::env::current_exe().context("this program's own path is not known")?;
     let bar = WorkBar::new(global, "sweeping");
     let on_progress = |fraction: f64| bar.set_fraction(fraction);

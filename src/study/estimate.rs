@@ -297,7 +297,9 @@ fn bound_of(
     watch: &mut ProgressMonitor,
 ) -> Result<Option<InformationBound>, StudyError> {
     let Some(Surroundings { world, .. }) = origin.surroundings else { return Ok(None) };
-    Ok(Some(information_bound(reader, world, watch)?.bound))
+    let bound = information_bound(reader, world, watch)?.bound;
+    watch.progress(Stage::Reporting, 0.0, None);
+    Ok(Some(bound))
 }
 
 /// The manifest of a recording; without simulation, and with a note, if it cannot be parsed.

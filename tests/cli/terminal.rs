@@ -9,7 +9,7 @@ const MAX_WIDTH: usize = 80;
 const SPRINGS: &str = r#"(
     base: spring(head: "handheld", shake: (pitch_deg: 2.0)),
     axes: [values(path: "head.coil_diameter_mm", values: [22.0, 23.0]),
-           levels(name: "material of the wire, in many words", levels: [
+           levels(name: "material of the wire in many words", levels: [
                (name: "spring steel"), (name: "stainless", set: { "head.material": "stainless" })])],
     sampling: grid,
     measures: [rocking_hz, peak_gain, spring_mass_g, stress_share, sag_mm, field_of_view_deg, rate_deg_per_s],

@@ -66,7 +66,7 @@ fn the_page_of_a_study_works_in_a_browser() {
                 values(path: \"head.wire_diameter_mm\", values: [2.6, 2.8])], \
                 levels(name: \"<script>window.hostile=2</script>\", levels: [\
                 (name: \"<script>window.hostile=3</script>\"), \
-                (name: \"'\\\"><img src=x onerror='window.hostile=4'>\", set: {\"head.material\": \"stainless\"})])], \
+                (name: \"><img src=x onerror=window.hostile=4>\", set: {\"head.material\": \"stainless\"})])], \
                 sampling: grid, measures: [rocking_hz, peak_gain, spring_mass_g], \
                 front: [(measure: spring_mass_g, aim: least), (measure: peak_gain, aim: least)])";
     std::fs::write(here.path().join("coil.ron"), spec).unwrap();

@@ -82,13 +82,18 @@ fn table(name: &str, rows: &[ComparedNumber]) -> PageTable {
     let row = |row: &ComparedNumber| {
         let dash = || "-".to_owned();
         let quantity = format!("{} {}", row.figure, row.what);
+        let paper = if row.paper == "-" { String::new() } else { row.paper.clone() };
         let Some(of) = &row.comparison else {
-            return vec![quantity, row.paper.clone(), dash(), dash(), dash(), dash(), dash(), row.ours.clone()];
+            let none = String::new;
+            return vec![quantity, paper, none(), dash(), dash(), dash(), none(), row.ours.clone()];
         };
-        let number = |x: f64| format!("{x:.3} {}", of.unit).trim_end().to_owned();
+        let number = |x: f64| {
+            let decimals = if x.abs() >= 100.0 { 0 } else { 2 };
+            format!("{x:.decimals$} {}", of.unit).trim_end().to_owned()
+        };
         vec![
             quantity,
-            row.paper.clone(),
+            paper,
             of.goal.clone(),
             number(of.median),
             of.worst.map_or_else(dash, number),

@@ -53,7 +53,7 @@ pub(super) fn text(summary: &Summary, plan: &Plan) -> String {
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         format!("{}{}\n", report::wrapped(&title, "  "), report::table(&header, &rows, true))
     });
-    tables.collect::<String>() + &report::wrapped(&legend(summary), "") + "\n"
+    tables.collect::<String>() + &report::wrapped(&legend(summary), "")
 }
 
 /// The tables as Markdown, and again at each level of the axis `by`.

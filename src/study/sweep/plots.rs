@@ -61,7 +61,9 @@ impl Sweep {
         }
         for axis in self.plan.axes().iter().filter(|axis| !axis.is_number()) {
             if let Some(figure) = summary.measures.first().and_then(|measure| ratios(summary, &axis.name, *measure)) {
-                save(format!("ratios_{}", axis.name), format!("Ratios by {}", quantity_name(&axis.name)), figure)?;
+                // The name of an axis may contain the separator of a path.
+                let name = format!("ratios_{}", axis.name.replace(['/', '\\'], "_"));
+                save(name, format!("Ratios by {}", quantity_name(&axis.name)), figure)?;
             }
         }
         Ok(plots)
