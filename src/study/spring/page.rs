@@ -40,8 +40,8 @@ pub fn page(
 /// Free length, length under load, lowest frequency, and the margin to buckling or coil contact.
 fn summary(report: &SpringReport) -> String {
     if let Some(why) = &report.falls_because {
-        let lines: Vec<&str> = why.lines().map(str::trim).collect();
-        return format!("This head has no stable rest pose: {}.", lines.join(". "));
+        let lines: Vec<&str> = why.lines().map(|line| line.trim().trim_start_matches("help: ")).collect();
+        return format!("This head has no stable rest pose: {}.", lines.join("; "));
     }
     let mut parts: Vec<String> = Vec::new();
     if let (Some(coil), Some(RestReport { sag_mm: Some(sag_mm), .. })) = (&report.coil, &report.rest) {
