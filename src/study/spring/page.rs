@@ -174,7 +174,7 @@ fn tables(head: Option<&HeadModel>, report: &SpringReport) -> Vec<NotedTable> {
     if !report.modes.is_empty() {
         let note = "Undamped frequency. The shape is the displacement of the centre of mass (m) and the rotation (rad) in the \
                     axes of the base; its largest entry is 1.";
-        tables.push(noted(mode_table(report), note));
+        tables.push(noted(mode_table(report, |mode| &mode.name), note));
     }
     if let (Some(stiffness), Some(head)) = (&report.stiffness, head) {
         let [x, y, z] = centre_mm(head);
