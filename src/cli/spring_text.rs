@@ -12,7 +12,7 @@ pub(super) fn report(report: &SpringReport) -> String {
     let mut words = table(&[], &rows, false);
     words += &report.falls_because.as_ref().map(|why| format!("\n{why}\n")).unwrap_or_default();
     if !report.modes.is_empty() {
-        words += &figures(&mode_table(report));
+        words += &figures(&mode_table(report, |mode| mode.kind.name()));
     }
     if let Some(stiffness) = &report.stiffness {
         words += &figures(&stiffness_table("", stiffness));

@@ -40,8 +40,8 @@ pub fn page(
 /// Free length, length under load, lowest frequency, and the margin to buckling or coil contact.
 fn summary(report: &SpringReport) -> String {
     if let Some(why) = &report.falls_because {
-        let lines: Vec<&str> = why.lines().map(str::trim).collect();
-        return format!("This head has no stable rest pose: {}.", lines.join(". "));
+        let lines: Vec<&str> = why.lines().map(|line| line.trim().trim_start_matches("help: ")).collect();
+        return format!("This head has no stable rest pose: {}.", lines.join("; "));
     }
     let mut parts: Vec<String> = Vec::new();
     if let (Some(coil), Some(RestReport { sag_mm: Some(sag_mm), .. })) = (&report.coil, &report.rest) {
@@ -174,7 +174,7 @@ fn tables(head: Option<&HeadModel>, report: &SpringReport) -> Vec<NotedTable> {
     if !report.modes.is_empty() {
         let note = "Undamped frequency. The shape is the displacement of the centre of mass (m) and the rotation (rad) in the \
                     axes of the base; its largest entry is 1.";
-        tables.push(noted(mode_table(report), note));
+        tables.push(noted(mode_table(report, |mode| &mode.name), note));
     }
     if let (Some(stiffness), Some(head)) = (&report.stiffness, head) {
         let [x, y, z] = centre_mm(head);

@@ -1,7 +1,7 @@
 //! Tables of the report on a spring, for terminal and page.
 
 use super::mode_figure::ratio;
-use super::{CoilReport, RestReport, SpringReport};
+use super::{CoilReport, ModeReport, RestReport, SpringReport};
 use crate::dynamics::{ElementKind, ElementLoad};
 use crate::report::page::PageTable;
 
@@ -29,10 +29,10 @@ pub fn properties(report: &SpringReport) -> Vec<Property> {
     rows
 }
 
-/// The modes, slowest first: name, natural frequency, damping ratio and shape.
-pub fn mode_table(report: &SpringReport) -> PageTable {
+/// The modes, slowest first: `name`, natural frequency, damping ratio and shape.
+pub fn mode_table(report: &SpringReport, name: fn(&ModeReport) -> &str) -> PageTable {
     let rows = report.modes.iter().map(|mode| {
-        let mut cells = vec![mode.name.clone(), format!("{:.3}", mode.frequency_hz), ratio(mode.damping_ratio)];
+        let mut cells = vec![name(mode).to_owned(), format!("{:.3}", mode.frequency_hz), ratio(mode.damping_ratio)];
         cells.extend(mode.shape.iter().map(|x| rounded(*x)));
         cells
     });

@@ -8,8 +8,9 @@ const LEAST_SHAKEN = 1e-4;
 const ASSUMED_M = 0.06;
 // Length of the axes as a fraction of the radius of the view.
 const AXIS_FRACTION = 0.38;
-// Radius of the view over that of head and linkage at rest.
-const MARGIN = 1.4;
+// Radius of the view over that of head and linkage at rest, and the largest displacement of a mode, m.
+const MARGIN = 1.25;
+const LARGEST_SHIFT_M = 0.04;
 
 const fixedBase = { position: new vendor.Vector3(), quaternion: new vendor.Quaternion() };
 const rest = within(fixedBase, data.rest);
@@ -88,7 +89,7 @@ class ModesView extends Stage {
     }
     const low = points.reduce((low, point) => low.min(point), new vendor.Vector3(1e9, 1e9, 1e9));
     const high = points.reduce((high, point) => high.max(point), new vendor.Vector3(-1e9, -1e9, -1e9));
-    return { centre: low.clone().add(high).multiplyScalar(0.5), radius: (MARGIN * high.distanceTo(low)) / 2 };
+    return { centre: low.clone().add(high).multiplyScalar(0.5), radius: (MARGIN * high.distanceTo(low)) / 2 + LARGEST_SHIFT_M };
   }
 
   // Shows a mode (null: the rest pose) displaced by an amount.
