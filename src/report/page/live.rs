@@ -9,7 +9,7 @@ const SECTIONS: &str = include_str!("assets/live.html");
 const EVENTS: &str = "<section id=\"events\"><h2>Events</h2>\n<ul id=\"event-list\"></ul></section>\n";
 const SCRIPT: &str = include_str!("assets/live.js");
 
-/// The page of a run that is not complete. It requests [`LiveUpdate`]s from its server.
+/// The page of a run that is not complete. It requests [`super::LiveUpdate`]s from its server.
 pub struct LivePage {
     /// Name of the run.
     pub title: String,
