@@ -171,7 +171,7 @@ class Head {
     this.head.add(box([1.04 * known[0].size[0], 1.04 * known[0].size[1], 0.008], materials.front));
     this.links = links.map((link) => new (link.foot ? Spring : Cord)(link, materials));
     this.base = new vendor.Group();
-    this.base.add(...this.links.map((link) => link.mount(materials.base)));
+    this.links.forEach((link) => this.base.add(link.mount(materials.base)));
     scene.add(this.head, this.base, ...this.links.map((link) => link.object));
   }
 
