@@ -186,7 +186,7 @@ pub struct FilterMetrics {
     pub dropped_isolated: Option<u64>,
     /// Removed returns from moving objects.
     pub dropped_moving: Option<u64>,
-    /// Standard deviation of the signed distance of the static points that remain, m.
+    /// Standard deviation of the signed distance of all points in the cloud files, returns from moving objects included, m.
     pub kept_sigma_m: Option<f64>,
     /// Fraction of the returns from static surfaces that the filter removed by mistake.
     pub standing_dropped_fraction: Option<f64>,

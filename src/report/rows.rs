@@ -144,7 +144,7 @@ fn cloud(metrics: &Metrics) -> Group {
     rows.add("removed: moving", fraction(m.filter.dropped_moving), percent);
     rows.add("static points removed by mistake", m.filter.standing_dropped_fraction, percent);
     rows.add("moving points removed", m.filter.movers_dropped_fraction, percent);
-    rows.add("sigma after filtering", m.filter.kept_sigma_m, length);
+    rows.add("sigma of the filtered cloud", m.filter.kept_sigma_m, length);
     rows.titled("cloud")
 }
 
