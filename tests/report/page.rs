@@ -63,7 +63,7 @@ fn the_page_of_a_study_works_in_a_browser() {
     let here = tempfile::tempdir().unwrap();
     let spec = "(base: spring(head: \"handheld\", shake: (pitch_deg: 2.0)), axes: [\
                 values(path: \"head.coil_diameter_mm\", values: [22.0, 23.0, 24.0]), \
-                values(path: \"head.wire_diameter_mm\", values: [2.6, 2.8])], \
+                values(path: \"head.wire_diameter_mm\", values: [2.6, 2.8]), \
                 levels(name: \"<script>window.hostile=2</script>\", levels: [\
                 (name: \"<script>window.hostile=3</script>\"), \
                 (name: \"><img src=x onerror=window.hostile=4>\", set: {\"head.material\": \"stainless\"})])], \
