@@ -57,10 +57,10 @@ fn people_are_removed_from_a_cloud_and_static_surfaces_are_not() {
     assert!(dropped("standing_dropped_fraction") < 0.01, "{metrics}");
     // The same errors of the cloud in both commands; the run evaluates a sample of its points.
     let evaluate =
-        "evaluate --estimate a/open_loop.tum --truth a/truth.tum --cloud a/cloud.ply --scene office_people --json";
+        "evaluate --estimate a/open_loop.tum --truth people.tum --cloud a/cloud.ply --scene office_people --json";
     let evaluated: Value = serde_json::from_str(&done(evaluate)).unwrap();
     let ratio = evaluated["sigma_m"].as_f64().unwrap() / dropped("kept_sigma_m");
-    assert!((ratio - 1.0).abs() < 0.1, "{ratio}: {evaluated} {metrics}");
+    assert!((ratio - 1.0).abs() < 0.03, "{ratio}: {evaluated} {metrics}");
 }
 
 #[test]
