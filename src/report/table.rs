@@ -2,7 +2,10 @@
 
 use super::wrap::{MAX_WIDTH, wrapped};
 use super::{Metrics, rows, verdict};
-use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle, Width};
+
+/// Row names that are narrower are not worth whole numbers.
+const MIN_NAME_WIDTH: usize = 12;
 
 /// Formats a table for the terminal, without rules between rows.
 ///
@@ -21,10 +24,7 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     table.column_iter_mut().for_each(|column| {
         column.set_padding(padding);
     });
-    let widest_name = table.column_max_content_widths().first().copied().unwrap_or_default();
-    if let Some(names) = table.column_mut(0).filter(|_| widest_name <= MAX_WIDTH / 2) {
-        names.set_constraint(ColumnConstraint::ContentWidth);
-    }
+    keep_whole(&mut table, rows, numbers, padding.0 + padding.1);
     if numbers {
         table.column_iter_mut().skip(1).for_each(|column| {
             column.set_cell_alignment(CellAlignment::Right);
@@ -32,6 +32,26 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     }
     let text = table.to_string();
     text.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
+}
+
+/// Keeps names and `numbers` on one line as far as the width permits: a broken number would be read as two.
+fn keep_whole(table: &mut Table, rows: &[Vec<String>], numbers: bool, padding: u16) {
+    let limit = usize::from(MAX_WIDTH);
+    let names = table.column_max_content_widths().first().map_or(0, |width| usize::from(*width));
+    let widest =
+        |k: usize| rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).max().unwrap_or(0);
+    let figures: Vec<usize> = (1..table.column_count()).map(|k| widest(k) + usize::from(padding)).collect();
+    let remaining = limit.saturating_sub(figures.iter().sum());
+    if let Some(column) = table.column_mut(0).filter(|_| names <= limit / 2)
+        && (!numbers || names + usize::from(padding) <= remaining)
+    {
+        column.set_constraint(ColumnConstraint::ContentWidth);
+    }
+    if numbers && remaining > MIN_NAME_WIDTH {
+        table.column_iter_mut().skip(1).zip(figures).for_each(|(column, width)| {
+            column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(width as u16)));
+        });
+    }
 }
 
 /// Formats a table in Markdown; columns of numbers, except the first, are right-aligned.
@@ -59,4 +79,23 @@ pub fn summary(metrics: &Metrics) -> String {
     let verdict = verdict::verdict(metrics).map_or_else(String::new, |verdict| format!("verdict: {verdict}\n"));
     let head = wrapped(&format!("{}\n{verdict}", rows::title(metrics)), "  ");
     head + &table(&[], &cells, false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_not_broken_in_a_table_with_long_names() {
+        let names = ["courtyard vehicle vehicle_three_springs", "mocap_room band_noise universal_joint"];
+        let row = |name: &&str| {
+            std::iter::once((*name).to_owned()).chain((0..6).map(|k| format!("{}.5", 17_530 + k))).collect()
+        };
+        let rows: Vec<Vec<String>> = names.iter().map(row).collect();
+        let text = table(&["place", "closed loop mm", "ratio", "aligned mm", "ratio", "status", "ratio"], &rows, true);
+        assert!(text.lines().all(|line| line.chars().count() <= usize::from(MAX_WIDTH)), "{text}");
+        for number in rows.iter().flat_map(|row| &row[1..]) {
+            assert_eq!(text.matches(number.as_str()).count(), 2, "{number} in\n{text}");
+        }
+    }
 }
