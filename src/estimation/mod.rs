@@ -37,7 +37,8 @@
 //! - The trajectory is that of the IMU, in IMU time. The clock offset `l` enters in the lookup of the beam times, `u =
 //!   tau + l(tau)`. The paper has the trajectory in lidar time and `l` in the IMU residuals. Here a change of `l` also
 //!   shifts the fast motion, which only the IMU measures; otherwise the smooth splines would have to follow it at the
-//!   rocking frequency of the head. The IMU residuals need no lever arm either.
+//!   rocking frequency of the head. The IMU residuals need no lever arm either. [`Formulation::Paper`] is the paper's
+//!   form, for comparison.
 //! - The IMU residuals compare velocities, corrected by the exact derivative of the spline, so no second difference of
 //!   positions is needed.
 //! - A match may link any two times of the window, so the information matrix of the knots may be full. The solver stores
@@ -66,6 +67,7 @@ mod dead_reckoning;
 mod error;
 mod estimator;
 mod gaps;
+mod imu_signal;
 mod inertial;
 mod initial;
 mod intake;
@@ -105,6 +107,8 @@ pub use output::{ALIGNMENT_S, EstimatedPose, OpenLoop, TURN_LEVER_M, WindowRepor
 pub use registration::{
     ClosedLoop, LoopReport, PlacesSpec, RegistrationInput, RegistrationReport, RegistrationSpec, register,
 };
-pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
+pub use spec::{
+    ClockSpec, EstimatorSpec, Formulation, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load,
+};
 pub use stamps::smoothed_stamps;
 pub use timing::Timing;

@@ -4,7 +4,7 @@ use super::spline::Basis;
 use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 
-/// Nominal trajectory: states at the boundaries of the IMU intervals, in IMU time.
+/// Nominal trajectory: states at the boundaries of the IMU intervals, in IMU time unless the formulation is the paper's.
 ///
 /// In IMU time a change of the clock offset does not change the trajectory. In lidar time, the corrections would have to
 /// shift the fast motion, which only the IMU measures. Lidar time `tau` corresponds to `u = tau + l(tau)`.
@@ -58,6 +58,13 @@ impl Nominal {
     pub(super) fn extend(&mut self, interval: Interval, biases: &Biases, gravity: &Vector) {
         let (Some(time), Some(state)) = (self.times_s.last(), self.states.last()) else { return };
         let (time, state) = (time + interval.h, state.after(&interval, biases, gravity));
+        self.times_s.push(time);
+        self.states.push(state);
+        self.push_readings(interval);
+    }
+
+    /// Appends the readings of an interval.
+    fn push_readings(&mut self, interval: Interval) {
         // At a boundary the measured rate is about the mean of both sides; the outermost nodes have one side only.
         let half_slope = interval.gyro_slope * (0.5 * interval.h);
         if let Some(rate) = self.rates.last_mut() {
@@ -65,9 +72,17 @@ impl Nominal {
             *rate = if self.intervals.is_empty() { from_this } else { (*rate + from_this) * 0.5 };
         }
         self.rates.push(interval.gyro + half_slope);
-        self.times_s.push(time);
-        self.states.push(state);
         self.intervals.push(interval);
+    }
+
+    /// Replaces the readings of all intervals by `readings`, a function of start and end, s; the states do not change.
+    pub(super) fn replace_readings(&mut self, readings: impl Fn(f64, f64) -> Option<Interval>) {
+        let old = std::mem::take(&mut self.intervals);
+        self.rates = vec![Vector::zeros()];
+        for (k, old) in old.into_iter().enumerate() {
+            let new = readings(self.times_s[k], self.times_s[k + 1]).unwrap_or(old);
+            self.push_readings(Interval { h: old.h, ..new });
+        }
     }
 
     /// Removes the nodes before `time_s`, except the last one at or before it.
@@ -120,7 +135,7 @@ impl Nominal {
         }
     }
 
-    /// Pose and velocities at `u_s`, IMU time; constant before the first and after the last node.
+    /// Pose and velocities at `u_s`, trajectory time; constant before the first and after the last node.
     pub(super) fn at(&self, u_s: f64, gyro_bias: &Vector) -> Motion {
         let after = self.times_s.partition_point(|t| *t <= u_s).clamp(1, self.times_s.len().max(2) - 1);
         self.within(after - 1, u_s, gyro_bias)

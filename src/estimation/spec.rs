@@ -18,6 +18,9 @@ pub struct EstimatorSpec {
     /// Knot spacing of the correction splines, s; 0.03 s to `step_s`.
     #[serde(with = "crate::spec::checked::Positive")]
     pub knot_spacing_s: f64,
+    /// Time of the trajectory and form of the IMU residuals.
+    #[serde(default)]
+    pub formulation: Formulation,
     /// Maximum number of fixed views (keyframes) that a window is matched with; 0 for none.
     pub fixed_views: usize,
     /// Surfel extraction.
@@ -36,6 +39,19 @@ pub struct EstimatorSpec {
     pub views: ViewSpec,
     /// Global registration after the open loop.
     pub registration: RegistrationSpec,
+}
+
+/// Time of the trajectory and form of the IMU residuals of a window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Formulation {
+    /// The trajectory is in IMU time, and the clock offset shifts the lidar beams. The residuals of the accelerometer compare
+    /// velocities, also summed over a knot spacing.
+    #[default]
+    ImuTime,
+    /// As in Bosse et al. 2012, section III-B: the trajectory is in lidar time, and the clock offset shifts the IMU samples.
+    /// The residuals of the accelerometer compare second differences of positions, sample by sample. For comparison.
+    Paper,
 }
 
 /// Solution of a window.

@@ -92,6 +92,12 @@ impl Interval {
         }
     }
 
+    /// Slope of the specific force in the axes of the body half-way along [`Self::turn`], not rotating, m/s^3; `force` is the
+    /// mean.
+    pub(super) fn force_slope(&self, biases: &Biases, force: &Vector) -> Vector {
+        self.accel_slope + (self.gyro - biases.gyro).cross(force)
+    }
+
     /// Rotation vector from the start to the end of the interval, in the body frame, rad.
     pub(super) fn turn(&self, biases: &Biases) -> Vector {
         let rate = self.gyro - biases.gyro;
@@ -126,7 +132,7 @@ impl State {
         let middle = self.rotation * Rotation::from_scaled_axis(turn * 0.5);
         let force = interval.force_in_middle(biases);
         let acceleration = middle * force + gravity;
-        let jerk = middle * (interval.accel_slope + (interval.gyro - biases.gyro).cross(&force));
+        let jerk = middle * interval.force_slope(biases, &force);
         let velocity = self.velocity + acceleration * h;
         // Trapezoidal rule for the velocity, with the correction for a linear acceleration.
         let position = self.position + (self.velocity + velocity) * (0.5 * h) - jerk * (h.powi(3) / 12.0);

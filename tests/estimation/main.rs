@@ -9,6 +9,7 @@ mod base;
 mod command;
 mod faults;
 mod fixture;
+mod formulation;
 mod maps;
 #[path = "../recordings/mod.rs"]
 mod recordings;

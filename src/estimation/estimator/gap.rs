@@ -29,7 +29,7 @@ impl Estimator {
     /// Outputs the content of the whole window, which is final.
     pub(super) fn output_window(&mut self, tracking: &mut Tracking) {
         let window = &tracking.window;
-        let end_s = window.nominal.end_s().min(window.unknowns.clock.imu_s(self.end_tau_s()));
+        let end_s = window.nominal.end_s().min(window.unknowns.clock.trajectory_s(self.end_tau_s()));
         if let Some(end) = tracking.at_end.take() {
             self.local_map.consider.propagate_to(&end);
         }

@@ -11,16 +11,16 @@ const MARK_INTERVAL_S: f64 = 1.0;
 /// Builds the alignment over the first seconds.
 #[derive(Debug, Clone, Default)]
 pub(super) struct GaugeBuilder {
-    /// Window starts up to this time are part of the gauge, IMU time, s.
+    /// Window starts up to this time are part of the gauge, trajectory time, s.
     until_s: Option<f64>,
-    /// Time of the last marked window start, IMU time, s.
+    /// Time of the last marked window start, trajectory time, s.
     marked_s: Option<f64>,
     /// Covariances of the marked window starts relative to the alignment.
     aligned_covariances: Vec<(Stamp, PoseCovariance)>,
 }
 
 impl GaugeBuilder {
-    /// Adds the window start at `until_s` (IMU time), `stamp` (lidar time), to the alignment over the first seconds.
+    /// Adds the window start at `until_s` (trajectory time), `stamp` (lidar time), to the alignment over the first seconds.
     ///
     /// Window starts are marked for twice that time, because a run that ends earlier is aligned over its first half.
     pub(super) fn advance(&mut self, consider: &mut ConsiderCovariance, until_s: f64, stamp: Stamp) {

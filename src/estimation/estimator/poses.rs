@@ -8,13 +8,13 @@ use crate::geometry::{Pose, Rotation};
 use crate::time::{Span, Stamp};
 
 impl Estimator {
-    /// Outputs the poses up to `until_u_s` (IMU time) at whole multiples of the IMU period.
+    /// Outputs the poses up to `until_u_s` (trajectory time) at whole multiples of the IMU period.
     pub(super) fn output_poses(&mut self, tracking: &mut Tracking, until_u_s: f64) {
         let window = &tracking.window;
         let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
         let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
         let mut stamp = tracking.next_pose.unwrap_or_else(|| {
-            let start_ns = self.intake.stamp(first_u_s - window.unknowns.clock.offset_at(first_u_s)).nanos();
+            let start_ns = self.intake.stamp(window.unknowns.clock.lidar_s(first_u_s)).nanos();
             Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
         });
         // After a gap the window may start before the last pose; the stamps must still increase strictly.
@@ -23,7 +23,7 @@ impl Estimator {
         }
         loop {
             let tau_s = stamp.seconds_since(self.intake.origin());
-            let u_s = window.unknowns.clock.imu_s(tau_s);
+            let u_s = window.unknowns.clock.trajectory_s(tau_s);
             if u_s.is_nan() || u_s > until_u_s {
                 break;
             }
@@ -34,7 +34,7 @@ impl Estimator {
         tracking.next_pose = Some(stamp);
     }
 
-    /// The pose at `stamp`, which is `tau_s` in lidar time and `u_s` in IMU time, s.
+    /// The pose at `stamp`, which is `tau_s` in lidar time and `u_s` in trajectory time, s.
     fn pose_at(&self, window: &Window, stamp: Stamp, tau_s: f64, u_s: f64) -> EstimatedPose {
         let imu_from_head = self.calibration.head_from_imu.inverse();
         let motion = window.nominal.at(u_s, &window.unknowns.biases.gyro);

@@ -3,6 +3,7 @@
 use super::Estimator;
 use super::phase::{GapRecovery, Gathering, Phase, Tracking};
 use crate::estimation::border::Border;
+use crate::estimation::clock::Clock;
 use crate::estimation::consider::ConsiderCovariance;
 use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
 use crate::estimation::intake::Segment;
@@ -118,7 +119,11 @@ impl Estimator {
         if before.is_none() && initial_state.rest.is_none() {
             self.diagnostics.warn(self.intake.stamp(start_s), WarningKind::StartedInMotion);
         }
-        let mut window = self.first_window(&adapted, &initial_state, start_s);
+        let clock = match before {
+            Some(before) => before.unknowns.clock.after_gap(before.until_s, start_s),
+            None => Clock::starting(&self.spec, start_s),
+        };
+        let mut window = self.first_window(&adapted, &initial_state, start_s, clock);
         if standstill == Standstill::Unknown {
             window = window.with_unobservable_rest();
         }
@@ -166,8 +171,8 @@ impl Estimator {
         }
     }
 
-    /// The window after the start or a restart.
-    fn first_window(&self, spec: &EstimatorSpec, initial_state: &InitialState, start_s: f64) -> Window {
+    /// The window after the start or a restart at `start_s`, IMU time, s.
+    fn first_window(&self, spec: &EstimatorSpec, initial_state: &InitialState, start_s: f64, clock: Clock) -> Window {
         let imu_from_laser = self.calibration.head_from_imu.inverse() * self.calibration.head_from_laser;
         let builder = SurfelBuilder {
             spec: spec.surfels.clone(),
@@ -177,7 +182,7 @@ impl Estimator {
         };
         let border = Border::new(initial_state.information, &self.calibration.imu, self.spec.clock.estimated);
         let observed_builder = SurfelBuilder { spec: spec.registration.surfels(&spec.surfels), ..builder.clone() };
-        let window = Window::new(spec, builder, initial_state, start_s, border);
+        let window = Window::new(spec, builder, initial_state, start_s, clock, border);
         if self.observed.is_some() { window.with_observed_builder(observed_builder) } else { window }
     }
 

@@ -62,7 +62,7 @@ impl Estimator {
         Ok((again, linearised))
     }
 
-    /// Removes the oldest segment if the window is full. Returns the time up to which poses are final, IMU time, s.
+    /// Removes the oldest segment if the window is full. Returns the time of the trajectory up to which poses are final, s.
     fn finish_oldest_segment(&mut self, tracking: &mut Tracking, linearised: Option<&Linearised>) -> Option<f64> {
         let Tracking { window, at_end, .. } = tracking;
         let local_map = &mut self.local_map;
@@ -74,7 +74,7 @@ impl Estimator {
         if let Some(by) = linearised.and_then(|at| window.sensitivity_at(until_s, at, &local_map.views)) {
             local_map.consider.advance(&by);
         }
-        let tau_s = until_s - window.unknowns.clock.offset_at(until_s);
+        let tau_s = window.unknowns.clock.lidar_s(until_s);
         self.gauge.advance(&mut local_map.consider, until_s, self.intake.stamp(tau_s));
         let patches = window.remove_oldest(linearised)?;
         local_map.add_segment(&patches, self.spec.step_s, window.matcher());
@@ -89,7 +89,7 @@ impl Estimator {
         self.diagnostics.record(report(solved, window, &self.spec.solve, stamp, moving, elapsed_s));
     }
 
-    /// Outputs the poses up to `final_until_s`, IMU time, and forgets the states before them.
+    /// Outputs the poses up to `final_until_s`, trajectory time, and forgets the states before them.
     fn output_final_poses(&mut self, tracking: &mut Tracking, final_until_s: Option<f64>) {
         let Some(until_s) = final_until_s else { return };
         self.output_poses(tracking, until_s);

@@ -21,7 +21,7 @@
 //! correction can follow the effect of a bias.
 
 use super::rows::{KNOTS, ResidualRow, ResidualSums};
-use super::{ACCEL_BIAS, ACCEL_MATRIX, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
+use super::{ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::estimation::strapdown::{Biases, Interval, State};
@@ -128,7 +128,7 @@ pub(in crate::estimation) fn add_inertial(
 /// After such a run velocity or attitude are uncertain by more than [`STEP`], so the correction needs a step. The
 /// correction is smooth over some knot spacings and spreads the step to both sides of the run, where it contradicts
 /// valid samples. With their nominal sigmas these samples would move the biases instead.
-fn near_steps(intervals: &[Interval]) -> Vec<bool> {
+pub(super) fn near_steps(intervals: &[Interval]) -> Vec<bool> {
     let mut near = vec![false; intervals.len()];
     let (mut step2, mut since_s) = ((0.0, 0.0), f64::INFINITY);
     for (k, interval) in intervals.iter().enumerate() {
@@ -153,7 +153,7 @@ fn near_steps(intervals: &[Interval]) -> Vec<bool> {
 }
 
 /// The same interval with [`STEP_MARGIN_SIGMA`] added to the sigmas.
-fn with_step_margin(interval: &Interval) -> Interval {
+pub(super) fn with_step_margin(interval: &Interval) -> Interval {
     let (gyro_sigma, accel_sigma) =
         (interval.gyro_sigma.hypot(STEP_MARGIN_SIGMA.0), interval.accel_sigma.hypot(STEP_MARGIN_SIGMA.1));
     Interval { gyro_sigma, accel_sigma, ..*interval }
@@ -184,21 +184,23 @@ impl ResidualSum {
 }
 
 /// The offset of a knot from `first`.
-fn offset(knot: i64, first: i64) -> usize {
+pub(super) fn offset(knot: i64, first: i64) -> usize {
     ((knot - first).max(0) as usize).min(KNOTS - 4)
 }
 
 /// The gyroscope residual over an interval, with the derivatives by the unknowns.
 #[derive(Debug, Clone, Copy)]
-struct GyroResidual {
+pub(super) struct GyroResidual {
     sum: ResidualSum,
     by_turn: [f64; KNOTS],
     /// By the bias, and by the columns of the scale and misalignment matrix.
     by_gyro: [Matrix; 4],
+    /// By the clock offset and the clock rate; zero if the trajectory is in IMU time.
+    by_clock: [Vector; 2],
 }
 
 impl GyroResidual {
-    fn of(terms: &Inertial, a: &Basis, b: &Basis, interval: &Interval) -> Self {
+    pub(super) fn of(terms: &Inertial, a: &Basis, b: &Basis, interval: &Interval) -> Self {
         let h = interval.h;
         let sum = ResidualSum::over(&(terms.map_from_end * terms.rate), interval.gyro_sigma, h, a, b);
         let mut by_turn = [0.0; KNOTS];
@@ -209,10 +211,16 @@ impl GyroResidual {
         }
         let w = &interval.gyro;
         let by_gyro = [1.0, w.x, w.y, w.z].map(|reading| terms.map_from_end * (h * reading));
-        Self { sum, by_turn, by_gyro }
+        Self { sum, by_turn, by_gyro, by_clock: [Vector::zeros(); 2] }
     }
 
-    fn add_to(&self, rows: &mut ResidualSums, equations: &mut NormalEquations, layout: &Layout) {
+    /// The same residual of a trajectory in lidar time; the middle of the interval is `time_s` after the clock's reference.
+    pub(super) fn with_clock(self, terms: &Inertial, interval: &Interval, time_s: f64) -> Self {
+        let by_offset = -(terms.map_from_end * interval.gyro_slope) * interval.h;
+        Self { by_clock: [by_offset, by_offset * time_s], ..self }
+    }
+
+    pub(super) fn add_to(&self, rows: &mut ResidualSums, equations: &mut NormalEquations, layout: &Layout) {
         let ResidualSum { first, used, deviation, variance } = self.sum;
         for axis in 0..3 {
             let mut row = ResidualRow::from(first);
@@ -225,6 +233,8 @@ impl GyroResidual {
             for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
                 *row.border(GYRO_MATRIX + 3 * i + j) = self.by_gyro[1 + j][(axis, i)];
             }
+            *row.border(CLOCK) = self.by_clock[0][axis];
+            *row.border(CLOCK_RATE) = self.by_clock[1][axis];
             rows.add(&row, deviation[axis], variance.recip(), equations, layout);
         }
     }

@@ -5,6 +5,7 @@ pub(super) mod inertial;
 mod knot_span;
 mod layout;
 pub(super) mod matched;
+pub(super) mod paper;
 pub(super) mod prior;
 mod rows;
 pub(super) mod sums;

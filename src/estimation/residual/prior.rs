@@ -9,7 +9,7 @@ use nalgebra::{Matrix6, SMatrix, SVector};
 /// Prior on the correction at the start of the window, which makes it continuous with the previous window.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct Start {
-    /// Start of the window, IMU time, s.
+    /// Start of the window, trajectory time, s.
     pub(in crate::estimation) u_s: f64,
     /// Standard deviations of rotation and translation (rad, m), of their first (1/s) and second derivative (1/s^2).
     pub(in crate::estimation) sigmas: [[f64; 2]; 3],

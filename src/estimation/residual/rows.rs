@@ -2,7 +2,7 @@
 //!
 //! All samples of a knot span depend on the same unknowns, so their products are summed in one small dense block.
 
-use super::{CLOCK, GYRO_MATRIX, Layout};
+use super::{GYRO_MATRIX, Layout, RANGE};
 use crate::estimation::normal_equations::NormalEquations;
 use pulp::Arch;
 
@@ -10,8 +10,10 @@ use pulp::Arch;
 pub(super) const KNOTS: usize = 6;
 /// Unknowns of the knots.
 const KNOT_UNKNOWNS: usize = 6 * KNOTS;
-/// Knots, then biases and tilt (start of the border), then both scale and misalignment matrices (end of the border).
-const UNKNOWNS: usize = KNOT_UNKNOWNS + CLOCK + 18;
+/// Unknowns at the start of the border that a residual may depend on: biases, tilt, clock offset and rate.
+const START: usize = RANGE;
+/// Knots, then the start of the border, then both scale and misalignment matrices (end of the border).
+const UNKNOWNS: usize = KNOT_UNKNOWNS + START + 18;
 
 /// The derivatives of a residual.
 #[derive(Debug)]
@@ -32,9 +34,9 @@ impl ResidualRow {
         &mut self.by[6 * knot + axis]
     }
 
-    /// The derivative by an unknown of the border: bias, tilt, scale or misalignment.
+    /// The derivative by an unknown of the border: bias, tilt, clock, scale or misalignment.
     pub(super) fn border(&mut self, unknown: usize) -> &mut f64 {
-        let index = if unknown < CLOCK { unknown } else { CLOCK + unknown - GYRO_MATRIX };
+        let index = if unknown < START { unknown } else { START + unknown - GYRO_MATRIX };
         &mut self.by[KNOT_UNKNOWNS + index]
     }
 }
@@ -104,5 +106,5 @@ impl ResidualSums {
 
 fn border_index(unknown: usize, layout: &Layout) -> usize {
     let index = unknown - KNOT_UNKNOWNS;
-    layout.border() + if index < CLOCK { index } else { GYRO_MATRIX + index - CLOCK }
+    layout.border() + if index < START { index } else { GYRO_MATRIX + index - START }
 }

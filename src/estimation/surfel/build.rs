@@ -46,7 +46,7 @@ impl SurfelBuilder {
         unknowns: &Unknowns,
     ) -> Vec<Surfel> {
         let Some(first) = returns.first() else { return Vec::new() };
-        let motion_at = |tau_s: f64| nominal.at(unknowns.clock.imu_s(tau_s), &unknowns.biases.gyro);
+        let motion_at = |tau_s: f64| nominal.at(unknowns.clock.trajectory_s(tau_s), &unknowns.biases.gyro);
         let origin = motion_at(first.tau_s).position;
         let edge = self.spec.finest_voxel_m;
         let mut regular = Fragments::new(origin, edge, 0.0);
@@ -87,7 +87,7 @@ impl SurfelBuilder {
         mut with: impl FnMut(&TimedReturn, Vector),
     ) {
         let mut cursor = 0;
-        let mut pose = |tau_s: f64| nominal.at_cursor(&mut cursor, clock.imu_s(tau_s), &biases.gyro);
+        let mut pose = |tau_s: f64| nominal.at_cursor(&mut cursor, clock.trajectory_s(tau_s), &biases.gyro);
         let mut start_s = f64::NEG_INFINITY;
         let mut end_s = f64::NEG_INFINITY;
         let mut ends: Option<(Motion, Motion)> = None;
@@ -242,6 +242,7 @@ fn merge_by_cell(fragments: &[Fragment], level: usize, shift: i32, spec: &Surfel
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimation::Formulation;
     use crate::estimation::clock::Clock;
     use crate::estimation::spec;
     use crate::estimation::strapdown::{Biases, Interval, State};
@@ -285,7 +286,7 @@ mod tests {
             scan_normal: Some(Vector::z()),
             laser_in_imu: Vector::zeros(),
         };
-        let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0 };
+        let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0, formulation: Formulation::ImuTime };
         let still = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
         let unknowns = Unknowns::initial(still, clock);
         builder.build(returns, nominal, &unknowns).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()

@@ -1,6 +1,7 @@
 //! A surfel and the returns that it is built from.
 
 use super::super::nominal::Nominal;
+use super::super::spec::Formulation;
 use super::super::spline::Basis;
 use super::super::unknowns::Unknowns;
 use crate::geometry::Matrix;
@@ -70,7 +71,7 @@ pub(in crate::estimation) struct PlacedSurfel {
     pub(in crate::estimation) range_m: f64,
     /// Attitude of the IMU at that time.
     pub(in crate::estimation) map_from_imu: Matrix,
-    /// Derivative of the centre by the clock offset, m/s.
+    /// Derivative of the centre by the clock offset, m/s; zero if the trajectory is in lidar time.
     pub(in crate::estimation) velocity: Vector,
     /// The correction spline's basis at that time.
     pub(in crate::estimation) basis: Basis,
@@ -109,7 +110,7 @@ impl Surfel {
     /// Places the surfel in the map.
     pub(in crate::estimation) fn place(&self, by: &PlacementState<'_>) -> PlacedSurfel {
         let Unknowns { biases, clock, lidar, .. } = by.unknowns;
-        let u_s = clock.imu_s(self.tau_s);
+        let u_s = clock.trajectory_s(self.tau_s);
         let motion = by.nominal.at(u_s, &biases.gyro);
         let ray_in_imu = lidar.apply(&self.ray_in_imu);
         let arm = motion.rotation * (by.laser_in_imu + lidar.translation + ray_in_imu);
@@ -123,6 +124,10 @@ impl Surfel {
             points: self.points,
         };
         let range_m = ray_in_imu.norm();
+        let velocity = match clock.formulation {
+            Formulation::ImuTime => motion.velocity + motion.angular_velocity.cross(&arm),
+            Formulation::Paper => Vector::zeros(),
+        };
         PlacedSurfel {
             patch,
             tau_s: self.tau_s,
@@ -130,7 +135,7 @@ impl Surfel {
             beam: motion.rotation * ray_in_imu / range_m,
             range_m,
             map_from_imu: motion.rotation,
-            velocity: motion.velocity + motion.angular_velocity.cross(&arm),
+            velocity,
             basis: Basis::at(u_s, by.knot_spacing_s),
         }
     }

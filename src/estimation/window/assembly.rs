@@ -5,9 +5,11 @@ use super::equations::{Displacement, WeightedMatches, Workspace};
 use super::linearised::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::inertial::{Nodes, add_inertial};
-use crate::estimation::residual::{Layout, prior};
+use crate::estimation::residual::{Layout, paper, prior};
+use crate::estimation::spec::Formulation;
 use crate::estimation::spline::Basis;
 use crate::estimation::timing::{Stopwatch, Timing};
+use crate::estimation::unknowns::Unknowns;
 
 /// Standard deviation of the zero-velocity measurement at rest, m/s.
 const REST_VELOCITY_SIGMA: f64 = 0.003;
@@ -59,7 +61,14 @@ impl Window {
         equations.reset(layout.size());
         let states = self.nominal.states();
         let nodes = Nodes { states: &states[first..], bases, intervals: &self.nominal.intervals()[first..] };
-        add_inertial(equations, layout, &nodes, &self.unknowns.biases, &self.unknowns.gravity);
+        let Unknowns { biases, gravity, clock, .. } = &self.unknowns;
+        match self.spec.formulation {
+            Formulation::ImuTime => add_inertial(equations, layout, &nodes, biases, gravity),
+            Formulation::Paper => {
+                let times_s: Vec<f64> = self.nominal.times_s()[first..].iter().map(|t| t - clock.at_s).collect();
+                paper::add_inertial(equations, layout, &nodes, &times_s, biases, gravity);
+            }
+        }
         self.start.add_to(equations, layout, total, self.border.total_step(), self.spec.knot_spacing_s);
         self.border.add_to(equations, layout);
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);

@@ -4,6 +4,7 @@ mod assembly;
 mod correspondence;
 mod equations;
 mod linearised;
+mod readings;
 mod rests;
 mod search;
 mod solve;
@@ -31,6 +32,7 @@ use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
 use equations::Workspace;
+use readings::Readings;
 use rests::Rests;
 use std::collections::VecDeque;
 
@@ -70,6 +72,7 @@ pub(super) struct Window {
     observed_builder: Option<SurfelBuilder>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
+    readings: Readings,
     pub(super) unknowns: Unknowns,
     border: Border,
     segments: VecDeque<WindowSegment>,
@@ -78,11 +81,11 @@ pub(super) struct Window {
     wide_matching: bool,
     /// Whether the newest segment bridges an IMU gap, or a shock or clipping makes the velocity uncertain.
     bridged_gap: bool,
-    /// End of the wide match gate after a shock, IMU time, s.
+    /// End of the wide match gate after a shock, trajectory time, s.
     wide_gate_until_s: f64,
     /// The IMU readings at rest, until the head first moves.
     rest: Option<RestReadings>,
-    /// End of the initial rest, IMU time, s.
+    /// End of the initial rest, trajectory time, s.
     rested_until_s: f64,
     /// Later rests.
     rests: Rests,
@@ -94,25 +97,27 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// A window that starts with the first IMU interval, at `start_u_s`.
+    /// A window that starts with the first IMU interval, at `start_u_s`, IMU time, s.
     pub(super) fn new(
         spec: &EstimatorSpec,
         builder: SurfelBuilder,
         initial_state: &InitialState,
         start_u_s: f64,
+        clock: Clock,
         border: Border,
     ) -> Self {
-        let clock = Clock { offset_s: spec.clock.start_s, rate: 0.0, at_s: start_u_s };
+        let start_s = clock.trajectory_from_imu_s(start_u_s);
         Self {
             spec: spec.clone(),
             matcher: Matcher::new(&spec.matching, &spec.surfels),
             builder,
             observed_builder: None,
-            nominal: Nominal::starting(start_u_s, initial_state.state),
+            nominal: Nominal::starting(start_s, initial_state.state),
+            readings: Readings::of(spec.formulation),
             unknowns: Unknowns::initial(initial_state.biases, clock),
             border,
             segments: VecDeque::new(),
-            start: Start::first(start_u_s, initial_state.velocity_sigma),
+            start: Start::first(start_s, initial_state.velocity_sigma),
             wide_matching: initial_state.rest.is_none(),
             bridged_gap: false,
             wide_gate_until_s: f64::NEG_INFINITY,
@@ -134,11 +139,10 @@ impl Window {
         StateBeforeGap { until_s, state, mean_velocity, unknowns: self.unknowns }
     }
 
-    /// Sets clock and sensor corrections to the values before an IMU gap.
+    /// Sets the sensor corrections to the values before an IMU gap.
     pub(super) fn resume_from(&mut self, before_gap: &StateBeforeGap) {
-        let Unknowns { clock, scale_misalignment, lidar, .. } = before_gap.unknowns;
-        let clock = clock.after_gap(before_gap.until_s, self.start.u_s);
-        self.unknowns = Unknowns { clock, scale_misalignment, lidar, ..self.unknowns };
+        let Unknowns { scale_misalignment, lidar, .. } = before_gap.unknowns;
+        self.unknowns = Unknowns { scale_misalignment, lidar, ..self.unknowns };
     }
 
     /// Rotates the window by the smallest angle that aligns gravity with that before the gap.
@@ -221,7 +225,7 @@ impl Window {
         Self { sees_rest: false, ..self }
     }
 
-    /// Start of the window, IMU time, s.
+    /// Start of the window, trajectory time, s.
     pub(super) fn start_s(&self) -> f64 {
         self.start.u_s
     }
@@ -244,13 +248,17 @@ impl Window {
     ) -> Timing {
         let mut watch = Stopwatch::start();
         let unobserved = self.motion_unobserved_in(&returns, intervals);
-        for (_, interval) in intervals.iter() {
+        self.readings.forget_before(&self.nominal, &self.unknowns.clock);
+        for (start_s, interval) in intervals {
+            let Some(interval) = self.readings.next(*start_s, interval, &self.nominal, &self.unknowns.clock) else {
+                continue;
+            };
             let Unknowns { biases, gravity, scale_misalignment, .. } = &self.unknowns;
             self.nominal.extend(interval.corrected_by(scale_misalignment), biases, gravity);
-            self.rest = self.rest.filter(|rest| rest.agrees_with(interval));
+            self.rest = self.rest.filter(|rest| rest.agrees_with(&interval));
             if self.speed_is_known {
                 let speed_m_per_s = (unobserved * self.velocity_in_imu()).norm();
-                self.rests.take(interval, &self.unknowns.biases, self.nominal.end_s(), speed_m_per_s);
+                self.rests.take(&interval, &self.unknowns.biases, self.nominal.end_s(), speed_m_per_s);
             }
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;
@@ -302,11 +310,11 @@ impl Window {
         windows(swept) > 1.0 || all > MAX_LENGTH_RATIO || (all > 1.0 && !self.segments.front().is_some_and(is_swept))
     }
 
-    /// Start of the window after removal of the oldest segment, IMU time, s.
+    /// Start of the window after removal of the oldest segment, trajectory time, s.
     pub(super) fn next_start_s(&self) -> Option<f64> {
         // After a gap the IMU intervals may end before the segment does.
         let end_s = self.nominal.end_s();
-        Some(self.unknowns.clock.imu_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
+        Some(self.unknowns.clock.trajectory_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
     /// The observed surfels of the oldest segment in the map frame, each with the measurement time, s.

@@ -17,11 +17,11 @@ pub(super) const MAX_SPEED_M_PER_S: f64 = 0.15;
 /// Detects rests in the sequence of intervals.
 #[derive(Debug, Default)]
 pub(super) struct Rests {
-    /// The IMU readings of a possible rest, and the start of it, IMU time, s.
+    /// The IMU readings of a possible rest, and the start of it, trajectory time, s.
     candidate: Option<(RestReadings, f64)>,
     /// Duration of the missing samples so far, s.
     missing_s: f64,
-    /// Start and end of each rest, in order, IMU time, s.
+    /// Start and end of each rest, in order, trajectory time, s.
     found: Vec<(f64, f64)>,
 }
 
@@ -50,7 +50,7 @@ impl Rests {
         }
     }
 
-    /// Whether the head rests at `u_s`, IMU time.
+    /// Whether the head rests at `u_s`, trajectory time.
     pub(super) fn at(&self, u_s: f64) -> bool {
         let after = self.found.partition_point(|(from_s, _)| *from_s <= u_s);
         after.checked_sub(1).is_some_and(|k| u_s <= self.found[k].1)

@@ -29,7 +29,7 @@ impl Window {
     /// For each surfel of the scene: the segment, and the index into the surfels of that segment.
     fn surfel_indices(&self) -> Vec<(usize, usize)> {
         let (from, to) = (self.start.u_s, self.nominal.end_s());
-        let is_within = |surfel: &Surfel| (from..=to).contains(&self.unknowns.clock.imu_s(surfel.tau_s));
+        let is_within = |surfel: &Surfel| (from..=to).contains(&self.unknowns.clock.trajectory_s(surfel.tau_s));
         let of_segment = |(k, segment): (usize, &'_ WindowSegment)| {
             let within = segment.surfels.iter().enumerate().filter(|(_, surfel)| is_within(surfel));
             within.map(|(index, _)| (k, index)).collect::<Vec<_>>()

@@ -9,7 +9,6 @@ use crate::estimation::residual::Layout;
 use crate::estimation::residual::matched::{MIN_SIGNIFICANT_TILT, Plane};
 use crate::estimation::surfel::PlacedSurfel;
 use crate::estimation::timing::{Stopwatch, Timing};
-use crate::estimation::unknowns::scale_misalignment_step;
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Vector};
 
@@ -126,8 +125,8 @@ impl Window {
             *sum += term;
         }
         let border = &x[layout.border()..];
-        self.nominal.correct_readings(&scale_misalignment_step(border));
         self.unknowns = self.unknowns.plus(border);
+        self.correct_readings(border);
         self.border.add_step(border, &self.workspace.factor);
     }
 }

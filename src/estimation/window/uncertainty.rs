@@ -12,7 +12,7 @@ use crate::geometry::Vector;
 use nalgebra::{Matrix6, SMatrix};
 
 impl Window {
-    /// Sensitivity of the states at `u_s`, IMU time, to the quantities that this window assumes fixed.
+    /// Sensitivity of the states at `u_s`, trajectory time, to the quantities that this window assumes fixed.
     pub(in crate::estimation) fn sensitivity_at(
         &self,
         u_s: f64,
@@ -53,7 +53,7 @@ impl Window {
         Some(known)
     }
 
-    /// Regression of the corrections at `u_s` (IMU time) and of their derivatives on the lidar extrinsics.
+    /// Regression of the corrections at `u_s` (trajectory time) and of their derivatives on the lidar extrinsics.
     ///
     /// With all other unknowns solved: `P_xl P_ll^-1` of the covariances `P`. None if the extrinsics are not estimated.
     pub(super) fn regression_on_lidar(&self, u_s: f64, at: &Linearised) -> Option<ByLidar> {
