@@ -1,12 +1,11 @@
 //! The IMU readings of the window's intervals, as the clock offset and the corrections of the IMU change.
 
-use super::Window;
 use crate::estimation::clock::Clock;
 use crate::estimation::imu_signal::ImuSignal;
 use crate::estimation::nominal::Nominal;
 use crate::estimation::spec::Formulation;
 use crate::estimation::strapdown::Interval;
-use crate::estimation::unknowns::scale_misalignment_step;
+use crate::estimation::unknowns::{Unknowns, scale_misalignment_step};
 
 /// A node of the trajectory is left out if it would be closer to the last one than this fraction of the interval.
 const MIN_INTERVAL_RATIO: f64 = 0.25;
@@ -56,18 +55,16 @@ impl Readings {
             signal.forget_before(clock.imu_from_trajectory_s(*first_s) - KEPT_S);
         }
     }
-}
 
-impl Window {
-    /// Updates the readings of all intervals after a step of the border, which the unknowns include.
-    pub(super) fn correct_readings(&mut self, step: &[f64]) {
-        let Readings::OfSignal(signal) = &self.readings else {
-            return self.nominal.correct_readings(&scale_misalignment_step(step));
+    /// Updates the readings of all intervals of `nominal` after a step of the border, which the `unknowns` include.
+    pub(super) fn update(&self, nominal: &mut Nominal, unknowns: &Unknowns, step: &[f64]) {
+        let Self::OfSignal(signal) = self else {
+            return nominal.correct_readings(&scale_misalignment_step(step));
         };
-        let (clock, errors) = (&self.unknowns.clock, &self.unknowns.scale_misalignment);
-        self.nominal.replace_readings(|from_s, to_s| {
+        let clock = &unknowns.clock;
+        nominal.replace_readings(|from_s, to_s| {
             let (from_u_s, to_u_s) = (clock.imu_from_trajectory_s(from_s), clock.imu_from_trajectory_s(to_s));
-            signal.mean(from_u_s, to_u_s).map(|readings| readings.corrected_by(errors))
+            signal.mean(from_u_s, to_u_s).map(|readings| readings.corrected_by(&unknowns.scale_misalignment))
         });
     }
 }

@@ -126,7 +126,7 @@ impl Window {
         }
         let border = &x[layout.border()..];
         self.unknowns = self.unknowns.plus(border);
-        self.correct_readings(border);
+        self.readings.update(&mut self.nominal, &self.unknowns, border);
         self.border.add_step(border, &self.workspace.factor);
     }
 }
