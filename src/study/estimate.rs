@@ -1,11 +1,12 @@
 //! Estimation from a recording, with evaluation and output files.
 
 use super::best_estimate::BestEstimate;
-use super::bound::information_bound;
+use super::bound::BoundAccumulator;
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
 use super::cloud_files::CloudOptions;
+use super::comparison::Comparison;
 use super::integrity::{Integrity, write_windows};
 use super::map::write_map;
 use super::map_options::MapOptions;
@@ -14,10 +15,11 @@ use super::origin::Origin;
 use super::page::RunResults;
 use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
+use super::sampled_truth::SampledTruth;
 use super::sensor_models::SensorModels;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
-use crate::evaluation::{Errors, InformationBound};
+use crate::evaluation::{Errors, Pairs};
 use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::carrier_of;
@@ -111,8 +113,18 @@ pub(super) fn estimate_in(
         calibration(reader, &selection, &options.calibration, simulated, options.body_frame.as_deref())?;
     report_notes(&selection, &found, &models, options, watch);
 
-    let loops = LoopInputs { reader, selection: &selection, found: &found, options, origin }.run(folder, watch)?;
-    let (run, comparison, best) = (&loops.open, loops.comparison.as_ref(), loops.best());
+    let mut bound = match origin.surroundings {
+        Some(Surroundings { world, .. }) => {
+            Some(BoundAccumulator::new(reader, &selection, world, origin.manifest.run.as_ref())?)
+        }
+        None => None,
+    };
+    let loops = LoopInputs { reader, selection: &selection, found: &found, options, origin }.run(
+        bound.as_mut(),
+        folder,
+        watch,
+    )?;
+    let (run, truth, best) = (&loops.open, loops.truth.as_ref(), loops.best());
     let registration = Registration {
         reader,
         selection: &selection,
@@ -122,49 +134,49 @@ pub(super) fn estimate_in(
         covariances: &run.covariances,
         lidar: best.lidar,
         returns: run.returns,
-        with_truth: comparison.is_some(),
+        with_truth: truth.is_some(),
         options: options.cloud,
     };
-    let registered = registration.run(folder, watch)?;
+    let registered = registration.run(bound.filter(|_| truth.is_some()), folder, watch)?;
 
     watch.progress(Stage::Reporting, 0.0, None);
-    let imu_only_drift = match comparison {
-        Some(_) => comparison::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
-        None => None,
-    };
-    let bound = comparison.map(|_| bound_of(reader, origin, watch)).transpose()?.flatten();
-    let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
+    let imu_only_drift = truth.and_then(|truth| comparison::imu_only(run, truth, watch));
+    let bound = registered.bound.as_ref().map(|recording| &recording.bound);
+    let bound_rmse_m = bound.map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(options.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
-    let pairs = comparison.map(|_| comparison::pairs_of(reader, best.map_from_head)).transpose()?;
+    let pairs = truth.map(|truth| Pairs::of(best.map_from_head, &truth.heads));
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
         integrity: integrity.metrics(run, pairs.as_ref()),
         sensors: models.metrics(),
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),
-        open_loop: OpenLoopMetrics { fixed_views, ..comparison::open_loop_metrics(run, comparison, imu_only_drift) },
+        open_loop: OpenLoopMetrics {
+            fixed_views,
+            ..comparison::open_loop_metrics(run, loops.comparison.as_ref(), imu_only_drift)
+        },
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
-        clock: comparison::clock_metrics(run, comparison),
+        clock: comparison::clock_metrics(run, truth),
         lidar: comparison::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &options.estimator),
         ..metrics(origin, run, &registered, best.comparison)
     };
     integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
     let results = RunResults {
-        reader,
         origin,
         open: run,
+        truth,
         best: &best,
         open_errors: loops.open_errors(),
-        bound: bound.as_ref(),
+        bound,
         integrity: &integrity,
         pairs: pairs.as_ref(),
         points: &registered.page_points,
     };
     watch.check_stop()?;
     let plots = artefacts::plots(&results, &registered.sample, options.estimator.surfels.min_range_m);
-    artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?)?)?;
+    artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?))?;
     Ok(EstimateResult { metrics, timing: loops.open.timing })
 }
 
@@ -179,7 +191,14 @@ struct LoopInputs<'a> {
 
 impl LoopInputs<'_> {
     /// Runs both loops and writes the trajectories and the map to `folder`.
-    fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<Loops, StudyError> {
+    ///
+    /// The truth is also added to `bound`.
+    fn run(
+        &self,
+        bound: Option<&mut BoundAccumulator>,
+        folder: &Path,
+        watch: &mut ProgressMonitor,
+    ) -> Result<Loops, StudyError> {
         let Self { reader, selection, found, options, origin } = *self;
         let (estimator, calibration) = (&options.estimator, &found.calibration);
         let prior_map = options.map.as_ref();
@@ -198,14 +217,16 @@ impl LoopInputs<'_> {
             false => None,
         };
         watch.progress(Stage::Evaluating, 0.0, None);
-        let mut compare = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
-            true => comparison::compare_with_truth(reader, map_from_head, covariances, watch),
-            false => Ok(None),
+        let truth = match found.body_frame == TRUE_FRAME {
+            true => SampledTruth::read(reader, &open, bound)?,
+            false => None,
         };
-        let comparison = compare(&open.map_from_head, &open.covariances[..])?;
-        let closed_comparison =
-            closed.as_ref().map(|closed| compare(&closed.map_from_head, &[])).transpose()?.flatten();
-        let loops = Loops { open, comparison, closed, closed_comparison };
+        let mut compare = |map_from_head, covariances| {
+            truth.as_ref().map(|truth| Comparison::new(map_from_head, covariances, truth, watch))
+        };
+        let comparison = compare(&open.map_from_head, &open.covariances[..]);
+        let closed_comparison = closed.as_ref().and_then(|closed| compare(&closed.map_from_head, &[]));
+        let loops = Loops { open, truth, comparison, closed, closed_comparison };
         if writes_map && !loops.open.observed.is_empty() {
             write_map(&loops.open, &loops.best(), estimator, prior_map, folder)?;
         }
@@ -216,9 +237,10 @@ impl LoopInputs<'_> {
 /// Open loop and closed loop, each with its comparison with the truth.
 struct Loops {
     open: OpenLoopRun,
-    comparison: Option<comparison::Comparison>,
+    truth: Option<SampledTruth>,
+    comparison: Option<Comparison>,
     closed: Option<ClosedLoopRun>,
-    closed_comparison: Option<comparison::Comparison>,
+    closed_comparison: Option<Comparison>,
 }
 
 impl Loops {
@@ -274,7 +296,7 @@ fn metrics(
     origin: &Origin,
     run: &OpenLoopRun,
     registered: &RegisteredCloud,
-    comparison: Option<&comparison::Comparison>,
+    comparison: Option<&Comparison>,
 ) -> Metrics {
     let inputs = origin.manifest.run.as_ref();
     let world_from_map = comparison.and_then(|comparison| comparison.world_from_map);
@@ -288,18 +310,6 @@ fn metrics(
         peak_rss_mib: memory::peak_rss_mib(),
         ..Metrics::default()
     }
-}
-
-/// The information bound of the recording, if its scene is known.
-fn bound_of(
-    reader: &Reader,
-    origin: &Origin,
-    watch: &mut ProgressMonitor,
-) -> Result<Option<InformationBound>, StudyError> {
-    let Some(Surroundings { world, .. }) = origin.surroundings else { return Ok(None) };
-    let bound = information_bound(reader, world, watch)?.bound;
-    watch.progress(Stage::Reporting, 0.0, None);
-    Ok(Some(bound))
 }
 
 /// The manifest of a recording; without simulation, and with a note, if it cannot be parsed.

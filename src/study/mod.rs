@@ -44,6 +44,7 @@ mod record;
 mod register;
 pub mod reproduction;
 mod result_files;
+mod sampled_truth;
 pub mod scene;
 mod sensor_models;
 pub mod spring;

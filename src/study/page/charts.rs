@@ -146,7 +146,7 @@ fn clock(results: &RunResults) -> Chart {
     let t_s = kept.clone().map(|k| results.seconds(estimate[k].0)).collect();
     let estimated = kept.clone().map(|k| estimate[k].1 * 1e3).collect();
     let mut curves = vec![curve("estimate", CurveStyle::Estimate, estimated)];
-    if let Some(truth) = results.best.comparison.map(|found| &found.clock_offsets).filter(|truth| !truth.is_empty()) {
+    if let Some(truth) = results.truth.map(|truth| &truth.clock_offsets).filter(|offsets| !offsets.is_empty()) {
         let at = |stamp: Stamp| truth[truth.partition_point(|(at, _)| *at < stamp).min(truth.len() - 1)].1 * 1e3;
         curves.push(curve("truth", CurveStyle::Truth, kept.map(|k| at(estimate[k].0)).collect()));
     }
