@@ -20,7 +20,7 @@ use super::sensor_models::SensorModels;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
 use crate::evaluation::{Errors, Pairs};
-use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
+use crate::recording::{FoundCalibration, Reader, Selection, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::carrier_of;
 use crate::spec::Source;
@@ -41,8 +41,6 @@ pub struct EstimateOptions {
     pub ignore_manifest: bool,
     /// The frame whose pose is estimated; `None` for `head` if the recording has it, else the IMU frame.
     pub body_frame: Option<String>,
-    /// Topics to read; topics that are not named are selected automatically.
-    pub topics: TopicPreference,
     /// Whether to run the global registration with loop closure after the open loop.
     pub closed_loop: bool,
     /// Options of the cloud.
@@ -54,10 +52,9 @@ pub struct EstimateOptions {
 impl EstimateOptions {
     /// Options with these estimator settings, loop closure, and defaults.
     pub fn with(estimator: EstimatorSpec) -> Self {
-        let (calibration, topics) = (CalibrationSpec::default(), TopicPreference::default());
-        let cloud = CloudOptions::default();
+        let (calibration, cloud) = (CalibrationSpec::default(), CloudOptions::default());
         let (ignore_manifest, body_frame, closed_loop, map) = (false, None, true, None);
-        Self { estimator, calibration, ignore_manifest, body_frame, topics, closed_loop, cloud, map }
+        Self { estimator, calibration, ignore_manifest, body_frame, closed_loop, cloud, map }
     }
 }
 
@@ -70,7 +67,7 @@ pub struct EstimateResult {
     pub timing: Timing,
 }
 
-/// Estimates the trajectory from the recording at `path` and writes the results to `folder`.
+/// Estimates the trajectory from the sensors `selection` of the recording of `reader` and writes the results to `folder`.
 ///
 /// The files are `manifest.ron`, `open_loop.tum`, `closed_loop.tum`, `map.ply`, `result.mcap`, `cloud.ply` or `cloud.las`,
 /// `integrity.csv`, `windows.csv`, `metrics.json`, `plots/` and `report.html`. Map, cloud and result are those of the
@@ -83,51 +80,47 @@ pub struct EstimateResult {
 /// # Errors
 /// When the recording cannot be read, the estimation fails, a file cannot be written, or the run is stopped.
 pub fn estimate_recording(
-    path: &Path,
+    reader: &Reader,
+    selection: &Selection,
     folder: &Path,
     options: &EstimateOptions,
     watch: &mut ProgressMonitor,
 ) -> Result<EstimateResult, StudyError> {
-    let reader = Reader::open(path)?;
     remove(folder, &estimate_files())?;
-    let manifest = manifest_of(&reader, watch);
+    let manifest = manifest_of(reader, watch);
     let world = world_of(&manifest, watch);
     let carrier = manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
     let origin = Origin { manifest: &manifest.with_estimator(&options.estimator), surroundings, simulation: None };
-    estimate_in(&reader, folder, options, &origin, watch)
+    estimate_in(reader, selection, folder, options, &origin, watch)
 }
 
-/// As [`estimate_recording`], with an open recording of known origin.
+/// As [`estimate_recording`], for a recording of known origin.
 pub(super) fn estimate_in(
     reader: &Reader,
+    selection: &Selection,
     folder: &Path,
     options: &EstimateOptions,
     origin: &Origin,
     watch: &mut ProgressMonitor,
 ) -> Result<EstimateResult, StudyError> {
     origin.manifest.write(&folder.join("manifest.ron"))?;
-    let selection = reader.select(&options.topics)?;
     let simulated = origin.manifest.run.as_ref().filter(|_| !options.ignore_manifest);
     let (found, models) =
-        calibration(reader, &selection, &options.calibration, simulated, options.body_frame.as_deref())?;
-    report_notes(&selection, &found, &models, options, watch);
+        calibration(reader, selection, &options.calibration, simulated, options.body_frame.as_deref())?;
+    report_notes(selection, &found, &models, options, watch);
 
     let mut bound = match origin.surroundings {
         Some(Surroundings { world, .. }) => {
-            Some(BoundAccumulator::new(reader, &selection, world, origin.manifest.run.as_ref())?)
+            Some(BoundAccumulator::new(reader, selection, world, origin.manifest.run.as_ref())?)
         }
         None => None,
     };
-    let loops = LoopInputs { reader, selection: &selection, found: &found, options, origin }.run(
-        bound.as_mut(),
-        folder,
-        watch,
-    )?;
+    let loops = LoopInputs { reader, selection, found: &found, options, origin }.run(bound.as_mut(), folder, watch)?;
     let (run, truth, best) = (&loops.open, loops.truth.as_ref(), loops.best());
     let registration = Registration {
         reader,
-        selection: &selection,
+        selection,
         calibration: &found.calibration,
         body_frame: &found.body_frame,
         map_from_head: best.map_from_head,
