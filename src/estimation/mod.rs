@@ -107,4 +107,4 @@ pub use registration::{
 };
 pub use spec::{ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load};
 pub use stamps::smoothed_stamps;
-pub use timing::Timing;
+pub use timing::{PartTime, Timing};

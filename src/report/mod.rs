@@ -19,7 +19,7 @@ mod wrap;
 
 pub use brief::brief;
 pub use figures::{
-    bound_over_time, clock_offset, errors_over_time, head_pitch, length_unit, open_and_closed_loop_errors,
+    LengthUnit, bound_over_time, clock_offset, errors_over_time, head_pitch, open_and_closed_loop_errors,
     trajectory_views,
 };
 pub use integrity::{CauseMetrics, EventMetrics, IntegrityMetrics};

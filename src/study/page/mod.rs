@@ -22,7 +22,7 @@ impl RunResults<'_> {
         RunPage {
             metrics,
             manifest,
-            parts_s: self.open.timing.parts().to_vec(),
+            parts: self.open.timing.parts().to_vec(),
             view: self.view(),
             charts: charts::all(self),
             timeline: timeline::rows(self.open, &metrics.integrity.causes),
