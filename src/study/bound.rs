@@ -1,6 +1,7 @@
 //! The information bound of a recording in its scene.
 
 use super::calibration::calibration;
+use super::sensor_models::RecordedSensors;
 use super::true_clock::TrueClock;
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError};
@@ -112,7 +113,8 @@ impl<'a> BoundAccumulator<'a> {
         world: &'a World,
         run: Option<&Run>,
     ) -> Result<Self, StudyError> {
-        let (found, _) = calibration(reader, selection, &CalibrationSpec::default(), run, None)?;
+        let recorded = run.map(RecordedSensors::of).unwrap_or_default();
+        let (found, _) = calibration(reader, selection, &CalibrationSpec::default(), recorded, None)?;
         Ok(Self {
             world,
             information: FisherInformation::new(model(run, &found.calibration)),

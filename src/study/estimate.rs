@@ -13,10 +13,11 @@ use super::map_options::MapOptions;
 use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use super::origin::Origin;
 use super::page::RunResults;
+use super::recorded_manifest::RecordedManifest;
 use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
 use super::sampled_truth::SampledTruth;
-use super::sensor_models::SensorModels;
+use super::sensor_models::RecordedSensors;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
 use crate::evaluation::{Errors, Pairs};
@@ -87,11 +88,13 @@ pub fn estimate_recording(
     watch: &mut ProgressMonitor,
 ) -> Result<EstimateResult, StudyError> {
     remove(folder, &estimate_files())?;
-    let manifest = manifest_of(reader, watch);
-    let world = world_of(&manifest, watch);
-    let carrier = manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
+    let recorded = RecordedManifest::read(reader);
+    recorded.note.iter().for_each(|note| watch.note(note));
+    let world = world_of(&recorded.manifest, watch);
+    let carrier = recorded.manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
-    let origin = Origin { manifest: &manifest.with_estimator(&options.estimator), surroundings, simulation: None };
+    let manifest = &recorded.manifest.clone().with_estimator(&options.estimator);
+    let origin = Origin { manifest, sensors: recorded.sensors(), surroundings, simulation: None };
     estimate_in(reader, selection, folder, options, &origin, watch)
 }
 
@@ -105,10 +108,13 @@ pub(super) fn estimate_in(
     watch: &mut ProgressMonitor,
 ) -> Result<EstimateResult, StudyError> {
     origin.manifest.write(&folder.join("manifest.ron"))?;
-    let simulated = origin.manifest.run.as_ref().filter(|_| !options.ignore_manifest);
+    let recorded = if options.ignore_manifest { RecordedSensors::default() } else { origin.sensors };
     let (found, models) =
-        calibration(reader, selection, &options.calibration, simulated, options.body_frame.as_deref())?;
-    report_notes(selection, &found, &models, options, watch);
+        calibration(reader, selection, &options.calibration, recorded, options.body_frame.as_deref())?;
+    report_notes(selection, &found, options, watch);
+    if origin.simulation.is_none() {
+        watch.note(&models.note());
+    }
 
     let mut bound = match origin.surroundings {
         Some(Surroundings { world, .. }) => {
@@ -305,17 +311,6 @@ fn metrics(
     }
 }
 
-/// The manifest of a recording; without simulation, and with a note, if it cannot be parsed.
-fn manifest_of(reader: &Reader, watch: &mut ProgressMonitor) -> Manifest {
-    let read = Manifest::in_recording(reader).inspect_err(|error| {
-        watch.note(&format!(
-            "the manifest in the recording cannot be read ({error}): sensor models are assumed and the cloud is not evaluated; \
-             another version of zsim may have written it"
-        ));
-    });
-    read.ok().flatten().unwrap_or_else(Manifest::without_simulation)
-}
-
 /// Builds the world of a recording's manifest; `None` if there is none or a mesh file is missing.
 fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
     let scene = &manifest.run.as_ref()?.scene.spec;
@@ -323,11 +318,10 @@ fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
     built.inspect_err(|error| watch.note(&format!("no evaluation of the cloud: {error}"))).ok()
 }
 
-/// Reports notes on the selection and on missing calibration data.
+/// Reports notes on the selection and on missing extrinsics.
 fn report_notes(
     selection: &Selection,
     found: &FoundCalibration,
-    models: &SensorModels,
     options: &EstimateOptions,
     watch: &mut ProgressMonitor,
 ) {
@@ -338,8 +332,5 @@ fn report_notes(
             "the recording has no /tf_static: assuming that lidar and IMU coincide and have the same axes; if not, pass the \
              extrinsics with --calibration",
         );
-    }
-    if let Some(note) = models.note() {
-        watch.note(&note);
     }
 }

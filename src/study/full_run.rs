@@ -4,6 +4,7 @@ use super::cloud::Surroundings;
 use super::estimate::estimate_in;
 use super::origin::Origin;
 use super::result_files::{full_run_files, remove};
+use super::sensor_models::RecordedSensors;
 use super::{EstimateOptions, EstimateResult, Manifest, ProgressMonitor, StudyError, record};
 use crate::recording::{Reader, TopicPreference};
 use crate::simulation::Simulation;
@@ -34,6 +35,11 @@ pub fn simulate_and_estimate(
     let reader = Reader::open(&recording)?;
     let selection = reader.select(&TopicPreference::default())?;
     let surroundings = Some(Surroundings { world: simulation.world(), carrier: simulation.carrier() });
-    let origin = Origin { manifest: &manifest, surroundings, simulation: Some(&summary) };
+    let origin = Origin {
+        manifest: &manifest,
+        sensors: RecordedSensors::of(simulation.inputs()),
+        surroundings,
+        simulation: Some(&summary),
+    };
     estimate_in(&reader, &selection, folder, options, &origin, watch)
 }

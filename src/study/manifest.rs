@@ -39,7 +39,9 @@ impl Manifest {
     /// # Errors
     /// When it cannot be parsed, for example because another version of zsim wrote it.
     pub fn in_recording(reader: &Reader) -> Result<Option<Self>, SpecError> {
-        reader.manifest().map(|text| spec::parse(&Source::in_memory("the recording's manifest", text))).transpose()
+        let text = reader.manifest().map(|text| Source::in_memory("the recording's manifest", text));
+        let help = "if another version of zsim wrote the recording, use that version";
+        text.map(|source| spec::parse(&source).map_err(|error: SpecError| error.with_help(help))).transpose()
     }
 
     /// Adds the settings of the estimator.

@@ -41,6 +41,7 @@ mod page;
 mod progress;
 mod read_ahead;
 mod record;
+mod recorded_manifest;
 mod register;
 pub mod reproduction;
 mod result_files;

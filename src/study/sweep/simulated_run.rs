@@ -21,6 +21,7 @@ use crate::study::latency::{MapErrors, Reference, TimingRun, TimingSpec};
 use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
 use crate::study::sampled_truth::SampledTruth;
+use crate::study::sensor_models::RecordedSensors;
 use crate::study::{CalibrationSpec, Manifest, ProgressMonitor, StudyError, comparison};
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -230,8 +231,9 @@ fn estimate(
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&TopicPreference::default())?;
         let manifest = Manifest::in_recording(&reader)?;
-        let simulated = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
-        let (found, _) = calibration(&reader, &selection, &CalibrationSpec::default(), simulated, None)?;
+        let recorded = manifest.as_ref().and_then(|manifest| manifest.run.as_ref()).map(RecordedSensors::of);
+        let recorded = recorded.unwrap_or_default();
+        let (found, _) = calibration(&reader, &selection, &CalibrationSpec::default(), recorded, None)?;
         let how =
             OpenLoopOptions { estimator, calibration: &found.calibration, recording_surfels: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
