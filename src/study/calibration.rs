@@ -7,7 +7,7 @@ use crate::geometry::Pose;
 use crate::measurement::{Calibration, ImuAveraging, ImuNoise};
 use crate::recording::{FoundCalibration, Reader, Selection};
 use crate::sensors::Imu;
-use crate::spec::{Source, SpecError};
+use crate::spec::SpecError;
 use serde::{Deserialize, Serialize};
 
 /// Sensor calibration given by the user.
@@ -66,7 +66,7 @@ pub(super) fn calibration(
 pub(super) fn base_imu(reader: &Reader) -> Result<(ImuNoise, ImuAveraging), SpecError> {
     let run = Manifest::in_recording(reader)?.and_then(|manifest| manifest.run);
     let imu = match run.and_then(|run| run.base_imu) {
-        Some(imu) => Imu::new(&imu.spec, &Source::in_memory("the recording's manifest", ""))?,
+        Some(imu) => Imu::new(&imu.spec, &Manifest::source(""))?,
         None => unknown_imu()?,
     };
     Ok((imu.noise(), imu.averaging()))

@@ -18,14 +18,12 @@ use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
 use super::sampled_truth::SampledTruth;
 use super::sensor_models::RecordedSensors;
-use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
+use super::{CalibrationSpec, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
 use crate::evaluation::{Errors, Pairs};
 use crate::recording::{FoundCalibration, Reader, Selection, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::carrier_of;
-use crate::spec::Source;
-use crate::world::World;
 use std::path::Path;
 
 /// The frame of the true poses in recordings of zsim.
@@ -90,7 +88,8 @@ pub fn estimate_recording(
     remove(folder, &estimate_files())?;
     let recorded = RecordedManifest::read(reader);
     recorded.note.iter().for_each(|note| watch.note(note));
-    let world = world_of(&recorded.manifest, watch);
+    let world = recorded.manifest.world().transpose();
+    let world = world.inspect_err(|error| watch.note(&format!("no evaluation of the cloud: {error}"))).ok().flatten();
     let carrier = recorded.manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
     let manifest = &recorded.manifest.clone().with_estimator(&options.estimator);
@@ -309,13 +308,6 @@ fn metrics(
         peak_rss_mib: memory::peak_rss_mib(),
         ..Metrics::default()
     }
-}
-
-/// Builds the world of a recording's manifest; `None` if there is none or a mesh file is missing.
-fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
-    let scene = &manifest.run.as_ref()?.scene.spec;
-    let built = World::build(scene, &Source::in_memory("the recording's scene", ""));
-    built.inspect_err(|error| watch.note(&format!("no evaluation of the cloud: {error}"))).ok()
 }
 
 /// Reports notes on the selection and on missing extrinsics.

@@ -5,7 +5,7 @@ use super::sensor_models::RecordedSensors;
 use crate::recording::Reader;
 use crate::sensors::{ImuSpec, LidarSpec};
 use crate::simulation::{Named, NamedSpec};
-use crate::spec::{self, Source, SpecError};
+use crate::spec::{self, SpecError};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -91,7 +91,7 @@ impl RecordedManifest {
 
 /// The value of `text`, if this version can read it.
 fn parsed<T: DeserializeOwned>(text: &str) -> Option<T> {
-    spec::parse(&Source::in_memory("the recording's manifest", text)).ok()
+    spec::parse(&Manifest::source(text)).ok()
 }
 
 /// A sensor with or without its name.

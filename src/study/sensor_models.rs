@@ -1,11 +1,11 @@
 //! Sensor models for an estimate: noise and averaging, each value with its source.
 
-use super::StudyError;
+use super::{Manifest, StudyError};
 use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
 use crate::report::{NoiseMetrics, SensorMetrics, noise_sources};
 use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use crate::simulation::Run;
-use crate::spec::{Kind, Source, SpecError, find, parse};
+use crate::spec::{Kind, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -102,7 +102,7 @@ pub(super) struct GivenModels<'a> {
 impl SensorModels {
     /// Given values, completed by those of the `recorded` sensors, else by those of unknown sensors.
     pub fn new(given: GivenModels, recorded: RecordedSensors) -> Result<Self, StudyError> {
-        let manifest = Source::in_memory("the recording's manifest", "");
+        let manifest = Manifest::source("");
         let (imu, imu_source) = match recorded.imu {
             Some(spec) => (Imu::new(spec, &manifest)?, ValueSource::Manifest),
             None => (unknown_imu()?, ValueSource::Assumed),
