@@ -115,27 +115,11 @@ pub(super) fn estimate_in(
         watch.note(&models.note());
     }
 
-    let mut bound = match origin.surroundings {
-        Some(Surroundings { world, .. }) => {
-            Some(BoundAccumulator::new(reader, selection, world, origin.manifest.run.as_ref())?)
-        }
-        None => None,
-    };
-    let loops = LoopInputs { reader, selection, found: &found, options, origin }.run(bound.as_mut(), folder, watch)?;
+    let inputs = LoopInputs { reader, selection, found: &found, options, origin };
+    let mut bound = inputs.bound()?;
+    let loops = inputs.run(bound.as_mut(), folder, watch)?;
+    let registered = inputs.register(&loops, bound, folder, watch)?;
     let (run, truth, best) = (&loops.open, loops.truth.as_ref(), loops.best());
-    let registration = Registration {
-        reader,
-        selection,
-        calibration: &found.calibration,
-        body_frame: &found.body_frame,
-        map_from_head: best.map_from_head,
-        covariances: &run.covariances,
-        lidar: best.lidar,
-        returns: run.returns,
-        with_truth: truth.is_some(),
-        options: options.cloud,
-    };
-    let registered = registration.run(bound.filter(|_| truth.is_some()), folder, watch)?;
 
     watch.progress(Stage::Reporting, 0.0, None);
     let imu_only_drift = truth.and_then(|truth| comparison::imu_only(run, truth, watch));
@@ -178,7 +162,7 @@ pub(super) fn estimate_in(
     Ok(EstimateResult { metrics, timing: loops.open.timing })
 }
 
-/// Inputs of the open loop and the closed loop.
+/// Inputs of the open loop, the closed loop and the registration of the cloud.
 struct LoopInputs<'a> {
     reader: &'a Reader,
     selection: &'a Selection,
@@ -187,7 +171,37 @@ struct LoopInputs<'a> {
     origin: &'a Origin<'a>,
 }
 
-impl LoopInputs<'_> {
+impl<'a> LoopInputs<'a> {
+    /// The information bound, without truth and measurements; `None` if the scene is not known.
+    fn bound(&self) -> Result<Option<BoundAccumulator<'a>>, StudyError> {
+        let Some(Surroundings { world, .. }) = self.origin.surroundings else { return Ok(None) };
+        BoundAccumulator::new(self.reader, self.selection, world, self.origin.manifest.run.as_ref()).map(Some)
+    }
+
+    /// Registers the cloud along the best estimate, and completes `bound` if the truth is known.
+    fn register(
+        &self,
+        loops: &Loops,
+        bound: Option<BoundAccumulator>,
+        folder: &Path,
+        watch: &mut ProgressMonitor,
+    ) -> Result<RegisteredCloud, StudyError> {
+        let (best, with_truth) = (loops.best(), loops.truth.is_some());
+        let registration = Registration {
+            reader: self.reader,
+            selection: self.selection,
+            calibration: &self.found.calibration,
+            body_frame: &self.found.body_frame,
+            map_from_head: best.map_from_head,
+            covariances: &loops.open.covariances,
+            lidar: best.lidar,
+            returns: loops.open.returns,
+            with_truth,
+            options: self.options.cloud,
+        };
+        registration.run(bound.filter(|_| with_truth), folder, watch)
+    }
+
     /// Runs both loops and writes the trajectories and the map to `folder`.
     ///
     /// The truth is also added to `bound`.
