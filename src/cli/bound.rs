@@ -9,7 +9,6 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim::recording::Reader;
 use zsim::report;
-use zsim::spec::Source;
 use zsim::study::{Manifest, ProgressMonitor, RecordingBound, information_bound, replace_text};
 use zsim::world::World;
 
@@ -53,11 +52,11 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
     if let Some(scene) = &arguments.scene {
         return Ok(World::load(scene)?);
     }
-    let Some(run) = Manifest::in_recording(reader)?.and_then(|manifest| manifest.run) else {
+    let Some(world) = Manifest::in_recording(reader)?.and_then(|manifest| manifest.world()) else {
         let message = format!("{} has no scene: pass one with --scene", reader.name());
         return Err(Usage(message).into());
     };
-    Ok(World::build(&run.scene.spec, &Source::in_memory("the recording's scene", ""))?)
+    Ok(world?)
 }
 
 fn write_results(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {

@@ -71,11 +71,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         calibration: calibration(arguments.calibration.as_deref())?,
         ignore_manifest: arguments.ignore_manifest,
         body_frame: arguments.body_frame.clone(),
-        topics: TopicPreference { lidar_topic: arguments.lidar_topic.clone(), imu_topic: arguments.imu_topic.clone() },
         ..arguments.estimator.options()?
     };
     // Open the recording first: a recording that is missing, or lacks a sensor, must not create a folder.
-    Reader::open(&arguments.recording)?.select(&options.topics)?;
+    let reader = Reader::open(&arguments.recording)?;
+    let (lidar_topic, imu_topic) = (arguments.lidar_topic.clone(), arguments.imu_topic.clone());
+    let selection = reader.select(&TopicPreference { lidar_topic, imu_topic })?;
     let stem = arguments.recording.file_stem().unwrap_or_default().to_string_lossy();
     let mut live = arguments.live.start(|| LivePage::of_recording(&stem))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| full_run::default_folder(&stem));
@@ -91,7 +92,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         bars.update(event);
     };
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
-    let outcome = study::estimate_recording(&arguments.recording, &folder, &options, &mut watch);
+    let outcome = study::estimate_recording(&reader, &selection, &folder, &options, &mut watch);
     bars.finish();
     live.into_iter().for_each(|live| live.finish(&outcome, &folder));
     let outcome = outcome.inspect_err(|_| full_run::print_partial_results(&folder))?;

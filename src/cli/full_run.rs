@@ -72,7 +72,7 @@ pub(super) fn print_partial_results(folder: &Path) {
 
 /// Time of each part of the estimator, s, and of the open loop in total.
 fn seconds_by_part(outcome: &EstimateResult) -> Value {
-    let parts = outcome.timing.parts().into_iter().map(|(name, seconds)| (format!("{name}_s"), json!(seconds)));
+    let parts = outcome.timing.parts().into_iter().map(|part| (format!("{}_s", part.name), json!(part.seconds)));
     let whole = ("open_loop_s".to_owned(), json!(outcome.metrics.open_loop.wall_s));
     Value::Object(parts.chain([whole]).collect())
 }

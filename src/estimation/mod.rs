@@ -111,4 +111,4 @@ pub use spec::{
     ClockSpec, EstimatorSpec, Formulation, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load,
 };
 pub use stamps::smoothed_stamps;
-pub use timing::Timing;
+pub use timing::{PartTime, Timing};

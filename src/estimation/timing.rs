@@ -27,9 +27,18 @@ pub struct Timing {
     pub views_s: f64,
 }
 
+/// Run time of a part of the estimator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartTime {
+    /// Name of the part.
+    pub name: &'static str,
+    /// Run time, s.
+    pub seconds: f64,
+}
+
 impl Timing {
-    /// Name and run time of each part, in order of execution.
-    pub fn parts(&self) -> [(&'static str, f64); 9] {
+    /// The run time of each part, in order of execution.
+    pub fn parts(&self) -> [PartTime; 9] {
         [
             ("integration", self.integration_s),
             ("surfels", self.surfels_s),
@@ -41,6 +50,7 @@ impl Timing {
             ("correction", self.correction_s),
             ("views", self.views_s),
         ]
+        .map(|(name, seconds)| PartTime { name, seconds })
     }
 }
 

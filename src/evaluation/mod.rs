@@ -30,5 +30,5 @@ pub use consistency::{Consistency, consistency};
 pub use dead_reckoning::{DeadReckoning, RestDetection};
 pub use drift::{Drift, TAIL_S, drift};
 pub use error::EvaluationError;
-pub use pairs::Pairs;
+pub use pairs::{Pairs, PoseSampler};
 pub use relative::{RelativeError, relative_error};

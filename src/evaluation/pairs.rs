@@ -1,7 +1,6 @@
 use super::EvaluationError;
 use crate::geometry::{Pose, Trajectory, Vector};
 use crate::time::{Span, Stamp};
-use std::convert::Infallible;
 
 /// Estimated poses, each with the true pose of the same time.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -17,43 +16,30 @@ impl Pairs {
     /// # Errors
     /// When no pose does.
     pub fn associate(estimate: &Trajectory, truth: &Trajectory) -> Result<Self, EvaluationError> {
-        let poses = truth.iter().map(|(stamp, pose)| Ok::<_, Infallible>((stamp, *pose)));
-        let Ok(pairs) = Self::gather(estimate, poses);
+        let mut sampler = PoseSampler::at(estimate.stamps());
+        truth.iter().for_each(|(stamp, pose)| sampler.add(stamp, *pose));
+        let pairs = Self::of(estimate, &sampler.finish());
         if pairs.is_empty() {
             return Err(EvaluationError::NothingInCommon { estimate: span_of(estimate), truth: span_of(truth) });
         }
         Ok(pairs)
     }
 
-    /// The same, for a truth that is read pose by pose in order of time and never stored in full. The result may be
-    /// empty.
+    /// Pairs the estimate's poses with the true poses at the same stamps, as a [`PoseSampler`] returns them.
     ///
-    /// # Errors
-    /// When reading the truth fails.
-    pub fn gather<E>(
-        estimate: &Trajectory,
-        truth: impl IntoIterator<Item = Result<(Stamp, Pose), E>>,
-    ) -> Result<Self, E> {
-        let capacity = estimate.len();
-        let (estimated, truths) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
-        let mut pairs = Self { stamps: Vec::with_capacity(capacity), estimate: estimated, truth: truths };
-        let mut waiting = estimate.iter().peekable();
-        let mut before: Option<(Stamp, Pose)> = None;
-        for pose in truth {
-            let now = pose?;
-            // Poses before the first true pose have no partner.
-            while let Some((stamp, pose)) = waiting.next_if(|(stamp, _)| *stamp <= now.0) {
-                let around = before.into_iter().filter(|before| before.0 < now.0).chain([now]);
-                let between = Trajectory::from_poses(around).unwrap_or_default();
-                if let Some(true_pose) = between.at(stamp) {
-                    pairs.stamps.push(stamp);
-                    pairs.estimate.push(*pose);
-                    pairs.truth.push(true_pose);
-                }
+    /// Poses without a true pose are not paired; the result may be empty.
+    pub fn of(estimate: &Trajectory, truth: &[(Stamp, Pose)]) -> Self {
+        let mut pairs = Self::default();
+        let mut poses = estimate.iter().peekable();
+        for (stamp, true_pose) in truth {
+            while poses.next_if(|(at, _)| at < stamp).is_some() {}
+            if let Some((_, pose)) = poses.next_if(|(at, _)| at == stamp) {
+                pairs.stamps.push(*stamp);
+                pairs.estimate.push(*pose);
+                pairs.truth.push(*true_pose);
             }
-            before = Some(now);
         }
-        Ok(pairs)
+        pairs
     }
 
     /// How many pairs.
@@ -128,6 +114,41 @@ impl Pairs {
     }
 }
 
+/// Interpolates a trajectory at given stamps while it is read pose by pose, and never stored in full.
+#[derive(Debug, Clone)]
+pub struct PoseSampler<'a> {
+    /// Stamps after the last pose.
+    waiting: &'a [Stamp],
+    before: Option<(Stamp, Pose)>,
+    sampled: Vec<(Stamp, Pose)>,
+}
+
+impl<'a> PoseSampler<'a> {
+    /// Creates a sampler at these increasing stamps.
+    pub fn at(stamps: &'a [Stamp]) -> Self {
+        Self { waiting: stamps, before: None, sampled: Vec::with_capacity(stamps.len()) }
+    }
+
+    /// Adds the next pose, in order of time.
+    pub fn add(&mut self, now: Stamp, pose: Pose) {
+        while let [stamp, later @ ..] = self.waiting
+            && *stamp <= now
+        {
+            self.waiting = later;
+            let adjacent = self.before.into_iter().filter(|(before, _)| *before < now).chain([(now, pose)]);
+            // A stamp before the first pose has no partner.
+            let interpolated = Trajectory::from_poses(adjacent).unwrap_or_default().at(*stamp);
+            self.sampled.extend(interpolated.map(|interpolated| (*stamp, interpolated)));
+        }
+        self.before = Some((now, pose));
+    }
+
+    /// The poses at the stamps that the trajectory covers.
+    pub fn finish(self) -> Vec<(Stamp, Pose)> {
+        self.sampled
+    }
+}
+
 fn span_of(trajectory: &Trajectory) -> String {
     match trajectory.span() {
         Some((first, last)) => {
@@ -153,6 +174,16 @@ mod tests {
         let pairs = Pairs::associate(&line(45, 10), &line(0, 10)).unwrap();
         assert_eq!(pairs.len(), 5);
         assert!((pairs.truth()[0].translation.x - 4.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn poses_with_gaps_in_the_truth_are_paired_by_stamp() {
+        // The truth has the stamps 10, 30 and 45 ms; the estimate 0, 10, ..., 90 ms with x = t / 10 ms.
+        let at = |ms: i64| (Stamp::from_nanos(ms * 1_000_000), Pose::translation(0.0, ms as f64, 0.0));
+        let pairs = Pairs::of(&line(0, 10), &[at(10), at(30), at(45)]);
+        let x: Vec<f64> = pairs.estimate().iter().map(|pose| pose.translation.x).collect();
+        let y: Vec<f64> = pairs.truth().iter().map(|pose| pose.translation.y).collect();
+        assert_eq!((x, y), (vec![1.0, 3.0], vec![10.0, 30.0]));
     }
 
     #[test]

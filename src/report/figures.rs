@@ -72,7 +72,7 @@ fn with_truth_and_estimate(mut chart: Chart, truth: &[(f64, f64)], estimate: &[(
 /// Position and rotation errors over time: components in the world frame and magnitude.
 pub fn errors_over_time(errors: &Errors) -> Figure {
     let max_norm = |vectors: &[Vector]| vectors.iter().map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(max_norm(&errors.position_m));
+    let LengthUnit { symbol: unit, per_m } = LengthUnit::for_lengths_up_to(max_norm(&errors.position_m));
     let position = Chart::new("Position error, after alignment", TIME, &format!("Error ({unit})"));
     let rotation = Chart::new("Rotation error, after alignment", TIME, "Error (\u{b0})");
     Figure::of(vec![
@@ -84,7 +84,7 @@ pub fn errors_over_time(errors: &Errors) -> Figure {
 /// Position error over time of the open loop and of the closed loop, each after its own alignment.
 pub fn open_and_closed_loop_errors(open: &Errors, closed: &Errors) -> Figure {
     let max_m = open.position_m.iter().chain(&closed.position_m).map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(max_m);
+    let LengthUnit { symbol: unit, per_m } = LengthUnit::for_lengths_up_to(max_m);
     let curve = |errors: &Errors| -> Vec<(f64, f64)> {
         seconds_of(&errors.stamps).into_iter().zip(errors.position_m.iter().map(|e| e.norm() * per_m)).collect()
     };
@@ -111,7 +111,7 @@ fn with_axes(mut chart: Chart, stamps: &[Stamp], vectors: &[Vector], factor: f64
 /// Cramer-Rao bound over time: standard deviations of position and attitude on each world axis.
 pub fn bound_over_time(bound: &InformationBound) -> Figure {
     let max_m = bound.position_sigma_m.iter().map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(max_m);
+    let LengthUnit { symbol: unit, per_m } = LengthUnit::for_lengths_up_to(max_m);
     let position = Chart::new("Information bound on the position", TIME, &format!("Sigma ({unit})"));
     let attitude = Chart::new("Information bound on the attitude", TIME, "Sigma (\u{b0})");
     Figure::of(vec![
@@ -162,12 +162,24 @@ fn seconds_of(stamps: &[Stamp]) -> Vec<f64> {
     stamps.iter().map(|stamp| stamp.seconds_since(origin)).collect()
 }
 
-/// The unit for an axis with lengths up to `max_m`, and its number of units per metre.
-pub fn length_unit(max_m: f64) -> (&'static str, f64) {
-    match max_m {
-        m if m < 0.02 => ("mm", 1e3),
-        m if m < 2.0 => ("cm", 1e2),
-        m if m < 2e3 => ("m", 1.0),
-        _ => ("km", 1e-3),
+/// A unit of length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LengthUnit {
+    /// Symbol of the unit.
+    pub symbol: &'static str,
+    /// Number of units per metre.
+    pub per_m: f64,
+}
+
+impl LengthUnit {
+    /// The unit for an axis with lengths up to `max_m`.
+    pub fn for_lengths_up_to(max_m: f64) -> Self {
+        let (symbol, per_m) = match max_m {
+            m if m < 0.02 => ("mm", 1e3),
+            m if m < 2.0 => ("cm", 1e2),
+            m if m < 2e3 => ("m", 1.0),
+            _ => ("km", 1e-3),
+        };
+        Self { symbol, per_m }
     }
 }

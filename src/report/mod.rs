@@ -19,7 +19,7 @@ mod wrap;
 
 pub use brief::brief;
 pub use figures::{
-    bound_over_time, clock_offset, errors_over_time, head_pitch, length_unit, open_and_closed_loop_errors,
+    LengthUnit, bound_over_time, clock_offset, errors_over_time, head_pitch, open_and_closed_loop_errors,
     trajectory_views,
 };
 pub use integrity::{CauseMetrics, EventMetrics, IntegrityMetrics};
@@ -29,6 +29,6 @@ pub use metrics::{
 };
 pub use names::{axis_label, quantity_name};
 pub use profile::timing_table;
-pub use sensors::{NoiseMetrics, SensorMetrics};
+pub use sensors::{NoiseMetrics, SensorMetrics, noise_sources};
 pub use table::{markdown, summary, table};
 pub use wrap::wrapped;

@@ -9,9 +9,9 @@ use crate::estimation::Timing;
 /// The remaining time is reading the recording, ordering the measurements and writing the poses.
 pub fn timing_table(timing: &Timing, wall_s: f64) -> String {
     let parts = timing.parts();
-    let rest_s = wall_s - parts.iter().map(|(_, seconds)| seconds).sum::<f64>();
+    let rest_s = wall_s - parts.iter().map(|part| part.seconds).sum::<f64>();
     let row = |name: &str, seconds: f64| vec![name.to_owned(), time(seconds), percent(seconds / wall_s)];
-    let mut rows: Vec<_> = parts.iter().map(|(name, seconds)| row(name, *seconds)).collect();
+    let mut rows: Vec<_> = parts.iter().map(|part| row(part.name, part.seconds)).collect();
     rows.push(row("reading and other", rest_s.max(0.0)));
     rows.push(row("open loop", wall_s));
     table(&["part", "time", "percent"], &rows, true)

@@ -2,7 +2,7 @@
 
 use super::Metrics;
 use super::quantity::{count, digits, length, percent, time};
-use super::sensors::sources;
+use super::sensors::noise_sources;
 
 /// A metric: name and formatted value.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -121,7 +121,7 @@ fn sensors(metrics: &Metrics) -> Group {
     let averaging = m.imu_averaging.as_deref().zip(m.imu_averaging_source.as_deref());
     rows.add("IMU averaging", averaging, |(kind, source)| format!("{kind}, {source}"));
     for (name, sensor) in [("IMU noise", "imu."), ("range noise", "lidar.")] {
-        rows.0.extend(sources(&m.noise, sensor).map(|value| MetricRow { name, value }));
+        rows.0.extend(noise_sources(&m.noise, sensor).map(|value| MetricRow { name, value }));
     }
     rows.titled("sensors")
 }

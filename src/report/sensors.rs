@@ -29,7 +29,7 @@ pub struct NoiseMetrics {
 }
 
 /// The sources of the parameters of a sensor, with their number if there are several; `None` without parameters.
-pub(super) fn sources(noise: &[NoiseMetrics], sensor: &str) -> Option<String> {
+pub fn noise_sources(noise: &[NoiseMetrics], sensor: &str) -> Option<String> {
     let mut counts: Vec<(&str, usize)> = Vec::new();
     for parameter in noise.iter().filter(|parameter| parameter.key.starts_with(sensor)) {
         match counts.iter_mut().find(|(source, _)| *source == parameter.source) {
@@ -58,8 +58,8 @@ mod tests {
             parameter("imu.c", "assumed"),
             parameter("lidar.a", "assumed"),
         ];
-        assert_eq!(sources(&noise, "imu.").unwrap(), "1 from --calibration, 2 assumed");
-        assert_eq!(sources(&noise, "lidar.").unwrap(), "assumed");
-        assert_eq!(sources(&noise, "base."), None);
+        assert_eq!(noise_sources(&noise, "imu.").unwrap(), "1 from --calibration, 2 assumed");
+        assert_eq!(noise_sources(&noise, "lidar.").unwrap(), "assumed");
+        assert_eq!(noise_sources(&noise, "base."), None);
     }
 }

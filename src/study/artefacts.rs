@@ -47,7 +47,7 @@ pub(super) fn plots(results: &RunResults, sample: &[SampledBeam], min_range_m: f
     }
     plots.extend(bound.map(|bound| plot("bound", report::bound_over_time(bound))));
     plots.push(plot("pitch", report::head_pitch(truth, &estimate)));
-    let true_offsets = comparison.map_or(&[][..], |found| &found.clock_offsets);
+    let true_offsets = results.truth.map_or(&[][..], |truth| &truth.clock_offsets);
     plots.push(plot("clock", report::clock_offset(true_offsets, &run.clock_offsets)));
     plots
 }

@@ -1,13 +1,14 @@
 //! The information bound of a recording in its scene.
 
 use super::calibration::calibration;
+use super::sensor_models::RecordedSensors;
 use super::true_clock::TrueClock;
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError};
 use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
 use crate::geometry::{Pose, Rotation, Vector};
-use crate::measurement::{Calibration, LidarReturn, LidarScan, Measurement};
-use crate::recording::{Reader, TopicPreference, Truth};
+use crate::measurement::{Calibration, ImuSample, LidarReturn, LidarScan, Measurement};
+use crate::recording::{Reader, Selection, TopicPreference, Truth};
 use crate::sensors::ImuSpec;
 use crate::simulation::Run;
 use crate::time::{Span, Stamp};
@@ -49,42 +50,27 @@ pub fn information_bound(
     let selection = reader.select(&TopicPreference::default())?;
     let manifest = Manifest::in_recording(reader)?;
     let run = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
-    let (found, _) = calibration(reader, &selection, &CalibrationSpec::default(), run, None)?;
-    let clock = TrueClock::read(reader, &selection)?;
-    let mut span: Option<(Stamp, Stamp)> = None;
-    let heads = reader.truth().filter_map(|record| match record {
-        Ok(Truth::Head(stamp, pose)) => {
-            span = Some((span.map_or(stamp, |(first, _)| first), stamp));
-            Some(Ok((stamp, pose)))
-        }
-        Ok(Truth::Base(..) | Truth::Clock(..)) => None,
-        Err(error) => Some(Err(error)),
-    });
-    let information = FisherInformation::new(model(run, &found.calibration), heads)?;
-    let Some((first, last)) = span else {
+    let mut bound = BoundAccumulator::new(reader, &selection, world, run)?;
+    for truth in reader.truth() {
+        bound.add_truth(&truth?);
+    }
+    let Some((first, last)) = bound.span else {
         let message = "the recording has no true trajectory, which the bound requires".to_owned();
         return Err(StudyError::Plan { what: "information bound", message });
     };
-    let truth = TruthCursor::new(reader.truth());
-    let calibration = &found.calibration;
-    let mut accumulator = BoundAccumulator { world, calibration, truth, information, beams: 0, rejected: 0 };
+    let mut truth = TruthCursor::new(reader.truth());
     for measurement in reader.measurements(&selection) {
         match measurement? {
-            Measurement::Imu(sample) => {
-                accumulator.information.add_imu_sample(clock.on_lidar_clock(sample.stamp), &sample);
-            }
+            Measurement::Imu(sample) => bound.add_imu_sample(&sample),
             Measurement::Lidar(scan) => {
-                if watch.is_stopped() {
-                    return Err(StudyError::Stopped);
-                }
+                watch.check_stop()?;
                 let (done_s, total_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
                 watch.progress(Stage::Bounding, done_s, Some(total_s));
-                accumulator.take(&scan)?;
+                bound.add_scan(&scan, &mut truth)?;
             }
         }
     }
-    let BoundAccumulator { information, beams, rejected, .. } = accumulator;
-    Ok(RecordingBound { bound: information.bound()?, beams, rejected })
+    bound.finish()
 }
 
 /// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
@@ -104,24 +90,68 @@ fn model(run: Option<&Run>, calibration: &Calibration) -> BoundModel {
     }
 }
 
-/// Accumulates the information of the beams, scan by scan.
-struct BoundAccumulator<'a> {
+/// Accumulates the information of a recording: first all of its truth, then its measurements.
+pub(super) struct BoundAccumulator<'a> {
     world: &'a World,
-    calibration: &'a Calibration,
-    truth: TruthCursor<'a>,
+    calibration: Calibration,
+    imu_shift: Span,
+    clock: TrueClock,
+    /// Time span of the truth, lidar time; `None` without truth.
+    span: Option<(Stamp, Stamp)>,
     information: FisherInformation,
     beams: u64,
     rejected: u64,
 }
 
-impl BoundAccumulator<'_> {
-    fn take(&mut self, scan: &LidarScan) -> Result<(), StudyError> {
+impl<'a> BoundAccumulator<'a> {
+    /// Creates an accumulator for the measurements of `selection`, with the calibration in the recording.
+    ///
+    /// `run` has the sensor models of a simulated recording.
+    pub(super) fn new(
+        reader: &Reader,
+        selection: &Selection,
+        world: &'a World,
+        run: Option<&Run>,
+    ) -> Result<Self, StudyError> {
+        let recorded = run.map(RecordedSensors::of).unwrap_or_default();
+        let (found, _) = calibration(reader, selection, &CalibrationSpec::default(), recorded, None)?;
+        Ok(Self {
+            world,
+            information: FisherInformation::new(model(run, &found.calibration)),
+            calibration: found.calibration,
+            imu_shift: selection.imu_shift(),
+            clock: TrueClock::default(),
+            span: None,
+            beams: 0,
+            rejected: 0,
+        })
+    }
+
+    /// Adds the next item of the truth.
+    pub(super) fn add_truth(&mut self, truth: &Truth) {
+        match truth {
+            Truth::Head(stamp, pose) => {
+                self.span = Some((self.span.map_or(*stamp, |(first, _)| first), *stamp));
+                self.information.add_head(*stamp, pose);
+            }
+            Truth::Base(..) => {}
+            Truth::Clock(now, clock) => self.clock.add(*now, clock, self.imu_shift),
+        }
+    }
+
+    /// Adds the next IMU sample.
+    pub(super) fn add_imu_sample(&mut self, sample: &ImuSample) {
+        self.information.add_imu_sample(self.clock.on_lidar_clock(sample.stamp), sample);
+    }
+
+    /// Adds the beams of the next scan.
+    pub(super) fn add_scan(&mut self, scan: &LidarScan, truth: &mut TruthCursor) -> Result<(), StudyError> {
         let mut scan_motion = ScanMotion { first: scan.stamp - TRUTH_STEP, states: Vec::new() };
         let sweep = scan.returns.iter().map(|hit| hit.offset).max().unwrap_or(Span::ZERO);
         let steps = (sweep.nanos() / TRUTH_STEP.nanos()).max(0) + 3;
         for step in 0..=steps {
             let stamp = scan_motion.first + Span::from_nanos(step * TRUTH_STEP.nanos());
-            scan_motion.states.push(self.truth.at(stamp)?);
+            scan_motion.states.push(truth.at(stamp)?);
         }
         let beams: Vec<Option<BeamObservation>> =
             scan.returns.par_iter().map(|hit| self.observation(scan, hit, &scan_motion)).collect();
@@ -135,6 +165,11 @@ impl BoundAccumulator<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The bound of all measurements.
+    pub(super) fn finish(self) -> Result<RecordingBound, StudyError> {
+        Ok(RecordingBound { bound: self.information.bound()?, beams: self.beams, rejected: self.rejected })
     }
 
     /// The observation of a beam, if it hit a static surface.

@@ -1,14 +1,13 @@
 //! Extrinsics and sensor models of a recording.
 
-use super::sensor_models::{GivenModels, ImuNoiseSpec, LidarNoiseSpec, SensorModels, unknown_imu};
+use super::sensor_models::{GivenModels, ImuNoiseSpec, LidarNoiseSpec, RecordedSensors, SensorModels, unknown_imu};
 use super::{Manifest, StudyError};
 use crate::dynamics::PlacementSpec;
 use crate::geometry::Pose;
 use crate::measurement::{Calibration, ImuAveraging, ImuNoise};
 use crate::recording::{FoundCalibration, Reader, Selection};
 use crate::sensors::Imu;
-use crate::simulation::Run;
-use crate::spec::{Source, SpecError};
+use crate::spec::SpecError;
 use serde::{Deserialize, Serialize};
 
 /// Sensor calibration given by the user.
@@ -32,19 +31,19 @@ pub struct CalibrationSpec {
 
 /// The calibration for an estimate: from the user, else from the recording, else the defaults.
 ///
-/// Noise and averaging of the recording are those of the simulated sensors of `run`.
+/// Noise and averaging of the recording are those of the `recorded` sensors.
 pub(super) fn calibration(
     reader: &Reader,
     selection: &Selection,
     given: &CalibrationSpec,
-    run: Option<&Run>,
+    recorded: RecordedSensors,
     body_frame: Option<&str>,
 ) -> Result<(FoundCalibration, SensorModels), StudyError> {
     let pose_of = |placement: Option<PlacementSpec>| placement.map(|placement| placement.pose());
     let (head_from_laser, head_from_imu) = (pose_of(given.head_from_laser), pose_of(given.head_from_imu));
     let known =
         GivenModels { imu: given.imu.as_ref(), imu_averaging: given.imu_averaging, lidar: given.lidar.as_ref() };
-    let models = SensorModels::new(known, run)?;
+    let models = SensorModels::new(known, recorded)?;
     let defaults = Calibration {
         head_from_laser: head_from_laser.unwrap_or_else(Pose::identity),
         head_from_imu: head_from_imu.unwrap_or_else(Pose::identity),
@@ -67,7 +66,7 @@ pub(super) fn calibration(
 pub(super) fn base_imu(reader: &Reader) -> Result<(ImuNoise, ImuAveraging), SpecError> {
     let run = Manifest::in_recording(reader)?.and_then(|manifest| manifest.run);
     let imu = match run.and_then(|run| run.base_imu) {
-        Some(imu) => Imu::new(&imu.spec, &Source::in_memory("the recording's manifest", ""))?,
+        Some(imu) => Imu::new(&imu.spec, &Manifest::source(""))?,
         None => unknown_imu()?,
     };
     Ok((imu.noise(), imu.averaging()))

@@ -152,7 +152,6 @@ fn in_world(beam: &ProjectedBeam, world_from: &Pose) -> (Vector, Option<Vector>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::EvaluationError;
     use crate::spec::{Source, parse};
     use approx::assert_relative_eq;
 
@@ -217,7 +216,7 @@ mod tests {
             page_points: Vec::new(),
             filtered: true,
             sample: ends.iter().map(judged).collect(),
-            dead_reckoning: Err(EvaluationError::OnALine),
+            bound: None,
         };
         let metrics = cloud_metrics(&registered, Some(&Pose::identity()), Some(surroundings));
         assert_eq!((metrics.on_carrier_fraction, metrics.on_movers_fraction), (Some(0.15), Some(0.05)));

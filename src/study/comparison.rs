@@ -1,17 +1,16 @@
 //! Comparison of an estimate with the truth in the recording.
 
+use super::ProgressMonitor;
 use super::closed_loop::ClosedLoopRun;
 use super::decimation::{decimated, decimated_errors};
 use super::open_loop::OpenLoopRun;
-use super::true_clock::true_offset;
-use super::{ProgressMonitor, StudyError};
+use super::sampled_truth::SampledTruth;
 use crate::estimation::EstimatorSpec;
 use crate::evaluation::{
     Consistency, Drift, Errors, EvaluationError, Pairs, RelativeError, clock_error, consistency, drift, relative_error,
 };
 use crate::geometry::{Pose, PoseCovariance, Trajectory};
 use crate::measurement::LidarCorrection;
-use crate::recording::{Reader, RecordingError, Truth};
 use crate::report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, OpenLoopMetrics, SimulationMetrics};
 use crate::simulation::SimulationSummary;
 use crate::time::{Span, Stamp};
@@ -20,8 +19,6 @@ use crate::time::{Span, Stamp};
 pub(super) struct Comparison {
     /// The true trajectory, `world_from_head`, decimated for plots.
     pub truth: Trajectory,
-    /// The true clock offset over lidar time, s.
-    pub clock_offsets: Vec<(Stamp, f64)>,
     /// Rigid alignment of the estimate by all positions; `None` if they do not determine it.
     pub world_from_map: Option<Pose>,
     /// Errors after this alignment.
@@ -47,50 +44,28 @@ impl AlignedErrors {
     }
 }
 
-/// Compares an estimate and its covariances with the truth at the stamps of the estimate.
-///
-/// Returns `None` if the recording has no truth. Poses and errors are decimated, so that memory stays small in long runs.
-pub(super) fn compare_with_truth(
-    reader: &Reader,
-    map_from_head: &Trajectory,
-    covariances: &[(Stamp, PoseCovariance)],
-    watch: &mut ProgressMonitor,
-) -> Result<Option<Comparison>, StudyError> {
-    let mut clock_offsets = Vec::new();
-    let heads = reader.truth().filter_map(|record| match record {
-        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
-        Ok(Truth::Clock(now, clock)) => {
-            clock_offsets.push(true_offset(now, &clock));
-            None
+impl Comparison {
+    /// Compares an estimate at the stamps of `truth`, and its covariances, with the truth.
+    ///
+    /// Poses and errors are decimated, so that memory stays small in long runs.
+    pub(super) fn new(
+        map_from_head: &Trajectory,
+        covariances: &[(Stamp, PoseCovariance)],
+        truth: &SampledTruth,
+        watch: &mut ProgressMonitor,
+    ) -> Self {
+        let pairs = Pairs::of(map_from_head, &truth.heads);
+        let world_from_map = or_note(pairs.world_from_map(), watch);
+        let errors = world_from_map.map(|world_from_map| AlignedErrors::after(&pairs, &world_from_map));
+        Self {
+            truth: decimated(pairs.stamps().iter().copied().zip(pairs.truth().iter().copied())),
+            world_from_map,
+            errors,
+            drift: drift(&pairs).ok(),
+            consistency: consistency(&pairs, covariances),
+            per_minute: relative_error(&pairs, Span::from_seconds(60.0)).ok(),
         }
-        Ok(Truth::Base(..)) => None,
-        Err(error) => Some(Err::<(Stamp, Pose), RecordingError>(error)),
-    });
-    let pairs = Pairs::gather(map_from_head, heads)?;
-    if pairs.is_empty() {
-        return Ok(None);
     }
-    let world_from_map = or_note(pairs.world_from_map(), watch);
-    let errors = world_from_map.map(|world_from_map| AlignedErrors::after(&pairs, &world_from_map));
-    Ok(Some(Comparison {
-        truth: decimated(pairs.stamps().iter().copied().zip(pairs.truth().iter().copied())),
-        clock_offsets,
-        world_from_map,
-        errors,
-        drift: drift(&pairs).ok(),
-        consistency: consistency(&pairs, covariances),
-        per_minute: relative_error(&pairs, Span::from_seconds(60.0)).ok(),
-    }))
-}
-
-/// Pairs the poses of `map_from_head` with the true poses at the same stamps.
-pub(super) fn pairs_of(reader: &Reader, map_from_head: &Trajectory) -> Result<Pairs, StudyError> {
-    let heads = reader.truth().filter_map(|record| match record {
-        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
-        Ok(_) => None,
-        Err(error) => Some(Err::<(Stamp, Pose), RecordingError>(error)),
-    });
-    Ok(Pairs::gather(map_from_head, heads)?)
 }
 
 /// Returns the value, or reports the error as a note.
@@ -162,29 +137,19 @@ pub(super) fn closed_loop_metrics(
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ImuOnlyDrift(f64);
 
-/// Computes the drift of IMU dead reckoning; `None` without truth or if the drift is not defined.
+/// Computes the drift of IMU dead reckoning; `None` if it is not defined.
 ///
 /// The trajectory is on the IMU clock, which differs from the lidar clock by milliseconds; the effect is negligible
 /// relative to the drift.
-pub(super) fn imu_only(
-    reader: &Reader,
-    dead_reckoning: Result<&Trajectory, &EvaluationError>,
-    watch: &mut ProgressMonitor,
-) -> Result<Option<ImuOnlyDrift>, StudyError> {
-    let dead_reckoning = dead_reckoning.map_err(Clone::clone);
-    let Some(map_from_head) = or_note(dead_reckoning, watch) else { return Ok(None) };
-    let heads = reader.truth().filter_map(|record| match record {
-        Ok(Truth::Head(stamp, pose)) => Some(Ok((stamp, pose))),
-        Ok(Truth::Base(..) | Truth::Clock(..)) => None,
-        Err(error) => Some(Err(error)),
-    });
-    let pairs = Pairs::gather(map_from_head, heads)?;
-    Ok(drift(&pairs).ok().map(|drift| ImuOnlyDrift(drift.position_m_per_min)))
+pub(super) fn imu_only(run: &OpenLoopRun, truth: &SampledTruth, watch: &mut ProgressMonitor) -> Option<ImuOnlyDrift> {
+    let dead_reckoning = run.dead_reckoning.as_ref().map_err(Clone::clone);
+    let pairs = Pairs::of(or_note(dead_reckoning, watch)?, &truth.dead_reckoned_heads);
+    drift(&pairs).ok().map(|drift| ImuOnlyDrift(drift.position_m_per_min))
 }
 
 /// Metrics of the clock offset.
-pub(super) fn clock_metrics(run: &OpenLoopRun, comparison: Option<&Comparison>) -> ClockMetrics {
-    let error = comparison.and_then(|found| clock_error(&run.clock_offsets, &found.clock_offsets));
+pub(super) fn clock_metrics(run: &OpenLoopRun, truth: Option<&SampledTruth>) -> ClockMetrics {
+    let error = truth.and_then(|truth| clock_error(&run.clock_offsets, &truth.clock_offsets));
     ClockMetrics {
         offset_end_s: run.clock_offsets.last().map(|(_, offset_s)| *offset_s),
         offset_rmse_s: error.map(|error| error.offset_rmse_s),

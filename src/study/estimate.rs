@@ -1,28 +1,29 @@
 //! Estimation from a recording, with evaluation and output files.
 
 use super::best_estimate::BestEstimate;
-use super::bound::information_bound;
+use super::bound::BoundAccumulator;
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
 use super::cloud_files::CloudOptions;
+use super::comparison::Comparison;
 use super::integrity::{Integrity, write_windows};
 use super::map::write_map;
 use super::map_options::MapOptions;
 use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use super::origin::Origin;
 use super::page::RunResults;
+use super::recorded_manifest::RecordedManifest;
 use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
-use super::sensor_models::SensorModels;
-use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
+use super::sampled_truth::SampledTruth;
+use super::sensor_models::RecordedSensors;
+use super::{CalibrationSpec, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
-use crate::evaluation::{Errors, InformationBound};
-use crate::recording::{FoundCalibration, Reader, Selection, TopicPreference, write_tum};
+use crate::evaluation::{Errors, Pairs};
+use crate::recording::{FoundCalibration, Reader, Selection, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::carrier_of;
-use crate::spec::Source;
-use crate::world::World;
 use std::path::Path;
 
 /// The frame of the true poses in recordings of zsim.
@@ -39,8 +40,6 @@ pub struct EstimateOptions {
     pub ignore_manifest: bool,
     /// The frame whose pose is estimated; `None` for `head` if the recording has it, else the IMU frame.
     pub body_frame: Option<String>,
-    /// Topics to read; topics that are not named are selected automatically.
-    pub topics: TopicPreference,
     /// Whether to run the global registration with loop closure after the open loop.
     pub closed_loop: bool,
     /// Options of the cloud.
@@ -52,10 +51,9 @@ pub struct EstimateOptions {
 impl EstimateOptions {
     /// Options with these estimator settings, loop closure, and defaults.
     pub fn with(estimator: EstimatorSpec) -> Self {
-        let (calibration, topics) = (CalibrationSpec::default(), TopicPreference::default());
-        let cloud = CloudOptions::default();
+        let (calibration, cloud) = (CalibrationSpec::default(), CloudOptions::default());
         let (ignore_manifest, body_frame, closed_loop, map) = (false, None, true, None);
-        Self { estimator, calibration, ignore_manifest, body_frame, topics, closed_loop, cloud, map }
+        Self { estimator, calibration, ignore_manifest, body_frame, closed_loop, cloud, map }
     }
 }
 
@@ -68,7 +66,7 @@ pub struct EstimateResult {
     pub timing: Timing,
 }
 
-/// Estimates the trajectory from the recording at `path` and writes the results to `folder`.
+/// Estimates the trajectory from the sensors `selection` of the recording of `reader` and writes the results to `folder`.
 ///
 /// The files are `manifest.ron`, `open_loop.tum`, `closed_loop.tum`, `map.ply`, `result.mcap`, `cloud.ply` or `cloud.las`,
 /// `integrity.csv`, `windows.csv`, `metrics.json`, `plots/` and `report.html`. Map, cloud and result are those of the
@@ -81,94 +79,90 @@ pub struct EstimateResult {
 /// # Errors
 /// When the recording cannot be read, the estimation fails, a file cannot be written, or the run is stopped.
 pub fn estimate_recording(
-    path: &Path,
+    reader: &Reader,
+    selection: &Selection,
     folder: &Path,
     options: &EstimateOptions,
     watch: &mut ProgressMonitor,
 ) -> Result<EstimateResult, StudyError> {
-    let reader = Reader::open(path)?;
     remove(folder, &estimate_files())?;
-    let manifest = manifest_of(&reader, watch);
-    let world = world_of(&manifest, watch);
-    let carrier = manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
+    let recorded = RecordedManifest::read(reader);
+    recorded.note.iter().for_each(|note| watch.note(note));
+    let world = recorded.manifest.world().transpose();
+    let world = world.inspect_err(|error| watch.note(&format!("no evaluation of the cloud: {error}"))).ok().flatten();
+    let carrier = recorded.manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
-    let origin = Origin { manifest: &manifest.with_estimator(&options.estimator), surroundings, simulation: None };
-    estimate_in(&reader, folder, options, &origin, watch)
+    let manifest = &recorded.manifest.clone().with_estimator(&options.estimator);
+    let origin = Origin { manifest, sensors: recorded.sensors(), surroundings, simulation: None };
+    estimate_in(reader, selection, folder, options, &origin, watch)
 }
 
-/// As [`estimate_recording`], with an open recording of known origin.
+/// As [`estimate_recording`], for a recording of known origin.
 pub(super) fn estimate_in(
     reader: &Reader,
+    selection: &Selection,
     folder: &Path,
     options: &EstimateOptions,
     origin: &Origin,
     watch: &mut ProgressMonitor,
 ) -> Result<EstimateResult, StudyError> {
     origin.manifest.write(&folder.join("manifest.ron"))?;
-    let selection = reader.select(&options.topics)?;
-    let simulated = origin.manifest.run.as_ref().filter(|_| !options.ignore_manifest);
+    let recorded = if options.ignore_manifest { RecordedSensors::default() } else { origin.sensors };
     let (found, models) =
-        calibration(reader, &selection, &options.calibration, simulated, options.body_frame.as_deref())?;
-    report_notes(&selection, &found, &models, options, watch);
+        calibration(reader, selection, &options.calibration, recorded, options.body_frame.as_deref())?;
+    report_notes(selection, &found, options, watch);
+    if origin.simulation.is_none() {
+        watch.note(&models.note());
+    }
 
-    let loops = LoopInputs { reader, selection: &selection, found: &found, options, origin }.run(folder, watch)?;
-    let (run, comparison, best) = (&loops.open, loops.comparison.as_ref(), loops.best());
-    let registration = Registration {
-        reader,
-        selection: &selection,
-        calibration: &found.calibration,
-        body_frame: &found.body_frame,
-        map_from_head: best.map_from_head,
-        covariances: &run.covariances,
-        lidar: best.lidar,
-        returns: run.returns,
-        with_truth: comparison.is_some(),
-        options: options.cloud,
-    };
-    let registered = registration.run(folder, watch)?;
+    let inputs = LoopInputs { reader, selection, found: &found, options, origin };
+    let mut bound = inputs.bound()?;
+    let loops = inputs.run(bound.as_mut(), folder, watch)?;
+    let registered = inputs.register(&loops, bound, folder, watch)?;
+    let (run, truth, best) = (&loops.open, loops.truth.as_ref(), loops.best());
 
     watch.progress(Stage::Reporting, 0.0, None);
-    let imu_only_drift = match comparison {
-        Some(_) => comparison::imu_only(reader, registered.dead_reckoning.as_ref(), watch)?,
-        None => None,
-    };
-    let bound = comparison.map(|_| bound_of(reader, origin, watch)).transpose()?.flatten();
-    let bound_rmse_m = bound.as_ref().map(|bound| bound.aligned_position_rmse_m);
+    let imu_only_drift = truth.and_then(|truth| comparison::imu_only(run, truth, watch));
+    let bound = registered.bound.as_ref().map(|recording| &recording.bound);
+    let bound_rmse_m = bound.map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(options.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
-    let pairs = comparison.map(|_| comparison::pairs_of(reader, best.map_from_head)).transpose()?;
+    let pairs = truth.map(|truth| Pairs::of(best.map_from_head, &truth.heads));
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
         integrity: integrity.metrics(run, pairs.as_ref()),
         sensors: models.metrics(),
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),
-        open_loop: OpenLoopMetrics { fixed_views, ..comparison::open_loop_metrics(run, comparison, imu_only_drift) },
+        open_loop: OpenLoopMetrics {
+            fixed_views,
+            ..comparison::open_loop_metrics(run, loops.comparison.as_ref(), imu_only_drift)
+        },
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
-        clock: comparison::clock_metrics(run, comparison),
+        clock: comparison::clock_metrics(run, truth),
         lidar: comparison::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &options.estimator),
         ..metrics(origin, run, &registered, best.comparison)
     };
     integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
     let results = RunResults {
-        reader,
         origin,
         open: run,
+        truth,
         best: &best,
         open_errors: loops.open_errors(),
-        bound: bound.as_ref(),
+        bound,
         integrity: &integrity,
         pairs: pairs.as_ref(),
         points: &registered.page_points,
     };
     watch.check_stop()?;
     let plots = artefacts::plots(&results, &registered.sample, options.estimator.surfels.min_range_m);
-    artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?)?)?;
+    artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?))?;
     Ok(EstimateResult { metrics, timing: loops.open.timing })
 }
 
-/// Inputs of the open loop and the closed loop.
+/// Inputs of the open loop, the closed loop and the registration of the cloud.
 struct LoopInputs<'a> {
     reader: &'a Reader,
     selection: &'a Selection,
@@ -177,9 +171,46 @@ struct LoopInputs<'a> {
     origin: &'a Origin<'a>,
 }
 
-impl LoopInputs<'_> {
+impl<'a> LoopInputs<'a> {
+    /// The information bound, without truth and measurements; `None` if the scene is not known.
+    fn bound(&self) -> Result<Option<BoundAccumulator<'a>>, StudyError> {
+        let Some(Surroundings { world, .. }) = self.origin.surroundings else { return Ok(None) };
+        BoundAccumulator::new(self.reader, self.selection, world, self.origin.manifest.run.as_ref()).map(Some)
+    }
+
+    /// Registers the cloud along the best estimate, and completes `bound` if the truth is known.
+    fn register(
+        &self,
+        loops: &Loops,
+        bound: Option<BoundAccumulator>,
+        folder: &Path,
+        watch: &mut ProgressMonitor,
+    ) -> Result<RegisteredCloud, StudyError> {
+        let (best, with_truth) = (loops.best(), loops.truth.is_some());
+        let registration = Registration {
+            reader: self.reader,
+            selection: self.selection,
+            calibration: &self.found.calibration,
+            body_frame: &self.found.body_frame,
+            map_from_head: best.map_from_head,
+            covariances: &loops.open.covariances,
+            lidar: best.lidar,
+            returns: loops.open.returns,
+            with_truth,
+            options: self.options.cloud,
+        };
+        registration.run(bound.filter(|_| with_truth), folder, watch)
+    }
+
     /// Runs both loops and writes the trajectories and the map to `folder`.
-    fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<Loops, StudyError> {
+    ///
+    /// The truth is also added to `bound`.
+    fn run(
+        &self,
+        bound: Option<&mut BoundAccumulator>,
+        folder: &Path,
+        watch: &mut ProgressMonitor,
+    ) -> Result<Loops, StudyError> {
         let Self { reader, selection, found, options, origin } = *self;
         let (estimator, calibration) = (&options.estimator, &found.calibration);
         let prior_map = options.map.as_ref();
@@ -198,14 +229,16 @@ impl LoopInputs<'_> {
             false => None,
         };
         watch.progress(Stage::Evaluating, 0.0, None);
-        let mut compare = |map_from_head, covariances| match found.body_frame == TRUE_FRAME {
-            true => comparison::compare_with_truth(reader, map_from_head, covariances, watch),
-            false => Ok(None),
+        let truth = match found.body_frame == TRUE_FRAME {
+            true => SampledTruth::read(reader, &open, bound)?,
+            false => None,
         };
-        let comparison = compare(&open.map_from_head, &open.covariances[..])?;
-        let closed_comparison =
-            closed.as_ref().map(|closed| compare(&closed.map_from_head, &[])).transpose()?.flatten();
-        let loops = Loops { open, comparison, closed, closed_comparison };
+        let mut compare = |map_from_head, covariances| {
+            truth.as_ref().map(|truth| Comparison::new(map_from_head, covariances, truth, watch))
+        };
+        let comparison = compare(&open.map_from_head, &open.covariances[..]);
+        let closed_comparison = closed.as_ref().and_then(|closed| compare(&closed.map_from_head, &[]));
+        let loops = Loops { open, truth, comparison, closed, closed_comparison };
         if writes_map && !loops.open.observed.is_empty() {
             write_map(&loops.open, &loops.best(), estimator, prior_map, folder)?;
         }
@@ -216,9 +249,10 @@ impl LoopInputs<'_> {
 /// Open loop and closed loop, each with its comparison with the truth.
 struct Loops {
     open: OpenLoopRun,
-    comparison: Option<comparison::Comparison>,
+    truth: Option<SampledTruth>,
+    comparison: Option<Comparison>,
     closed: Option<ClosedLoopRun>,
-    closed_comparison: Option<comparison::Comparison>,
+    closed_comparison: Option<Comparison>,
 }
 
 impl Loops {
@@ -274,7 +308,7 @@ fn metrics(
     origin: &Origin,
     run: &OpenLoopRun,
     registered: &RegisteredCloud,
-    comparison: Option<&comparison::Comparison>,
+    comparison: Option<&Comparison>,
 ) -> Metrics {
     let inputs = origin.manifest.run.as_ref();
     let world_from_map = comparison.and_then(|comparison| comparison.world_from_map);
@@ -290,41 +324,10 @@ fn metrics(
     }
 }
 
-/// The information bound of the recording, if its scene is known.
-fn bound_of(
-    reader: &Reader,
-    origin: &Origin,
-    watch: &mut ProgressMonitor,
-) -> Result<Option<InformationBound>, StudyError> {
-    let Some(Surroundings { world, .. }) = origin.surroundings else { return Ok(None) };
-    let bound = information_bound(reader, world, watch)?.bound;
-    watch.progress(Stage::Reporting, 0.0, None);
-    Ok(Some(bound))
-}
-
-/// The manifest of a recording; without simulation, and with a note, if it cannot be parsed.
-fn manifest_of(reader: &Reader, watch: &mut ProgressMonitor) -> Manifest {
-    let read = Manifest::in_recording(reader).inspect_err(|error| {
-        watch.note(&format!(
-            "the manifest in the recording cannot be read ({error}): sensor models are assumed and the cloud is not evaluated; \
-             another version of zsim may have written it"
-        ));
-    });
-    read.ok().flatten().unwrap_or_else(Manifest::without_simulation)
-}
-
-/// Builds the world of a recording's manifest; `None` if there is none or a mesh file is missing.
-fn world_of(manifest: &Manifest, watch: &mut ProgressMonitor) -> Option<World> {
-    let scene = &manifest.run.as_ref()?.scene.spec;
-    let built = World::build(scene, &Source::in_memory("the recording's scene", ""));
-    built.inspect_err(|error| watch.note(&format!("no evaluation of the cloud: {error}"))).ok()
-}
-
-/// Reports notes on the selection and on missing calibration data.
+/// Reports notes on the selection and on missing extrinsics.
 fn report_notes(
     selection: &Selection,
     found: &FoundCalibration,
-    models: &SensorModels,
     options: &EstimateOptions,
     watch: &mut ProgressMonitor,
 ) {
@@ -335,8 +338,5 @@ fn report_notes(
             "the recording has no /tf_static: assuming that lidar and IMU coincide and have the same axes; if not, pass the \
              extrinsics with --calibration",
         );
-    }
-    if let Some(note) = models.note() {
-        watch.note(&note);
     }
 }

@@ -4,8 +4,9 @@ use super::cloud::Surroundings;
 use super::estimate::estimate_in;
 use super::origin::Origin;
 use super::result_files::{full_run_files, remove};
+use super::sensor_models::RecordedSensors;
 use super::{EstimateOptions, EstimateResult, Manifest, ProgressMonitor, StudyError, record};
-use crate::recording::Reader;
+use crate::recording::{Reader, TopicPreference};
 use crate::simulation::Simulation;
 use std::path::Path;
 
@@ -32,7 +33,13 @@ pub fn simulate_and_estimate(
 
     // The estimator gets its input only from the file. The truth in it is read only for the evaluation.
     let reader = Reader::open(&recording)?;
+    let selection = reader.select(&TopicPreference::default())?;
     let surroundings = Some(Surroundings { world: simulation.world(), carrier: simulation.carrier() });
-    let origin = Origin { manifest: &manifest, surroundings, simulation: Some(&summary) };
-    estimate_in(&reader, folder, options, &origin, watch)
+    let origin = Origin {
+        manifest: &manifest,
+        sensors: RecordedSensors::of(simulation.inputs()),
+        surroundings,
+        simulation: Some(&summary),
+    };
+    estimate_in(&reader, &selection, folder, options, &origin, watch)
 }

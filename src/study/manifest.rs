@@ -6,6 +6,7 @@ use crate::estimation::EstimatorSpec;
 use crate::recording::Reader;
 use crate::simulation::{Run, Simulation};
 use crate::spec::{self, Source, SpecError};
+use crate::world::{World, WorldError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -39,7 +40,23 @@ impl Manifest {
     /// # Errors
     /// When it cannot be parsed, for example because another version of zsim wrote it.
     pub fn in_recording(reader: &Reader) -> Result<Option<Self>, SpecError> {
-        reader.manifest().map(|text| spec::parse(&Source::in_memory("the recording's manifest", text))).transpose()
+        let text = reader.manifest().map(Self::source);
+        let help = "if another version of zsim wrote the recording, use that version";
+        text.map(|source| spec::parse(&source).map_err(|error: SpecError| error.with_help(help))).transpose()
+    }
+
+    /// The manifest of a recording as the source of specs, for errors.
+    pub(super) fn source(text: &str) -> Source {
+        Source::in_memory("the recording's manifest", text)
+    }
+
+    /// Builds the scene of the simulation; `None` without simulation.
+    ///
+    /// # Errors
+    /// When a mesh file of the scene is missing.
+    pub fn world(&self) -> Option<Result<World, WorldError>> {
+        let scene = &self.run.as_ref()?.scene.spec;
+        Some(World::build(scene, &Source::in_memory("the recording's scene", "")))
     }
 
     /// Adds the settings of the estimator.

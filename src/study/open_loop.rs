@@ -8,6 +8,7 @@ use crate::estimation::{
     EstimatedPose, Estimator, EstimatorSpec, Evidence, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
     covariance_blocks, radius_99,
 };
+use crate::evaluation::{DeadReckoning, EvaluationError, RestDetection};
 use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection, Measurement};
 use crate::recording::{Reader, RecordingError, Selection, TumWriter};
@@ -53,6 +54,8 @@ pub(super) struct OpenLoopRun {
     pub returns: usize,
     /// Duration of the recording, s.
     pub acquisition_s: f64,
+    /// Trajectory by IMU dead reckoning, for comparison.
+    pub dead_reckoning: Result<Trajectory, EvaluationError>,
     /// Observations for the closed loop and the map; empty without `recording_surfels`.
     pub observed: ObservedSurfels,
     /// Wall-clock time, including reading but not building the observed surfels, s.
@@ -94,9 +97,9 @@ pub(super) fn run_open_loop(
     watch.data(StageData::Start { stage: Stage::Estimating, calibration: options.calibration });
     let tum = tum.map(TumWriter::create).transpose()?;
     let mut poses = PoseOutput { tum, map_from_head: Trajectory::new(), covariances: Vec::new(), radii_m: Vec::new() };
-    let mut counts = MeasurementCounts::default();
+    let mut inputs = InputSummary::new(options.calibration);
     let (pushed, loss) = read_ahead(reader, selection, |measurements| {
-        push_all(measurements, &mut estimator, &mut counts, &mut poses, expected_s, watch)
+        push_all(measurements, &mut estimator, &mut inputs, &mut poses, expected_s, watch)
     });
     if let Err(StudyError::Stopped) = pushed {
         poses.close()?;
@@ -113,11 +116,11 @@ pub(super) fn run_open_loop(
     let shift_s = selection.imu_shift().seconds();
     let mut events = Events::default();
     loss.sentences().into_iter().for_each(|sentence| events.add_loss("recording", sentence));
-    counts.imu.missing("IMU samples").into_iter().for_each(|sentence| events.add_loss("missing_samples", sentence));
-    counts.lidar.missing("scans").into_iter().for_each(|sentence| events.add_loss("missing_scans", sentence));
+    inputs.imu.missing("IMU samples").into_iter().for_each(|sentence| events.add_loss("missing_samples", sentence));
+    inputs.lidar.missing("scans").into_iter().for_each(|sentence| events.add_loss("missing_scans", sentence));
     result.located.iter().for_each(|located| events.add_note("located", located_message(located)));
     loss.notes().into_iter().for_each(|sentence| events.add_note("recording", sentence));
-    let start = counts.start();
+    let start = inputs.start();
     events.add_warnings(&result.warnings, start);
     Ok(OpenLoopRun {
         map_from_head,
@@ -129,12 +132,13 @@ pub(super) fn run_open_loop(
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,
         events,
-        samples: counts.imu.count(),
-        recorded: (start, start + Span::from_seconds(counts.seconds())),
+        samples: inputs.imu.count(),
+        recorded: (start, start + Span::from_seconds(inputs.seconds())),
         windows: result.windows,
         warnings: result.warnings,
-        returns: counts.returns,
-        acquisition_s: counts.seconds(),
+        returns: inputs.returns,
+        acquisition_s: inputs.seconds(),
+        dead_reckoning: inputs.dead_reckoning.finish(),
         wall_s: started.elapsed().as_secs_f64() - result.observed.elapsed_s(),
         observed: result.observed,
     })
@@ -144,14 +148,14 @@ pub(super) fn run_open_loop(
 fn push_all(
     measurements: &mut MeasurementStream,
     estimator: &mut Estimator,
-    counts: &mut MeasurementCounts,
+    inputs: &mut InputSummary,
     poses: &mut PoseOutput,
     expected_s: Option<f64>,
     watch: &mut ProgressMonitor,
 ) -> Result<(), StudyError> {
     for (index, measurement) in measurements.enumerate() {
         let measurement = measurement?;
-        counts.take(&measurement);
+        inputs.take(&measurement);
         if let Measurement::Lidar(scan) = &measurement {
             watch.data(StageData::Scan(scan));
         }
@@ -161,10 +165,10 @@ fn push_all(
             poses.take(&newest)?;
             watch.data(StageData::Poses(&newest));
             poses
-                .evidence(estimator, counts)
+                .evidence(estimator, inputs)
                 .into_iter()
                 .for_each(|evidence| watch.data(StageData::Evidence(evidence)));
-            watch.progress(Stage::Estimating, counts.seconds(), expected_s);
+            watch.progress(Stage::Estimating, inputs.seconds(), expected_s);
             if watch.is_stopped() {
                 return Err(StudyError::Stopped);
             }
@@ -208,10 +212,10 @@ impl PoseOutput {
     }
 
     /// The evidence on the poses so far; `None` without poses.
-    fn evidence<'a>(&self, estimator: &'a Estimator, counts: &MeasurementCounts) -> Option<Evidence<'a>> {
+    fn evidence<'a>(&self, estimator: &'a Estimator, inputs: &InputSummary) -> Option<Evidence<'a>> {
         let estimated = self.map_from_head.span()?;
         let (windows, warnings) = (estimator.windows(), estimator.warnings());
-        Some(Evidence { windows, warnings, samples: counts.imu.count(), recorded: estimated, estimated })
+        Some(Evidence { windows, warnings, samples: inputs.imu.count(), recorded: estimated, estimated })
     }
 
     /// Completes the TUM file.
@@ -220,18 +224,26 @@ impl PoseOutput {
     }
 }
 
-/// Counts and time spans of the measurements.
-#[derive(Default)]
-struct MeasurementCounts {
+/// Counts, time spans and dead reckoning of the measurements.
+struct InputSummary {
     imu: Cadence,
     lidar: Cadence,
     returns: usize,
+    dead_reckoning: DeadReckoning,
 }
 
-impl MeasurementCounts {
+impl InputSummary {
+    fn new(calibration: &Calibration) -> Self {
+        let dead_reckoning = DeadReckoning::new(&calibration.head_from_imu, RestDetection::default());
+        Self { imu: Cadence::default(), lidar: Cadence::default(), returns: 0, dead_reckoning }
+    }
+
     fn take(&mut self, measurement: &Measurement) {
         match measurement {
-            Measurement::Imu(sample) => self.imu.take(sample.stamp),
+            Measurement::Imu(sample) => {
+                self.imu.take(sample.stamp);
+                self.dead_reckoning.push(sample);
+            }
             Measurement::Lidar(scan) => {
                 self.lidar.take(scan.stamp);
                 self.returns += scan.returns.len();

@@ -1,10 +1,11 @@
-//! Registration of the beams into a cloud: output files, points for viewers and a sample for the evaluation.
+//! Registration of the beams into a cloud: output files, points for viewers, and what the evaluation needs of them.
 
+use super::bound::{BoundAccumulator, RecordingBound};
 use super::cloud_files::{CloudFiles, CloudOptions};
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{ProgressMonitor, Stage, StudyError};
 use crate::estimation::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
-use crate::evaluation::{DeadReckoning, EvaluationError, RestDetection, Thinning};
+use crate::evaluation::Thinning;
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
 use crate::recording::{CloudPoint, Measurements, Reader, RecordingError, Selection, write_result};
@@ -72,8 +73,8 @@ pub(super) struct RegisteredCloud {
     pub sample: Vec<SampledBeam>,
     /// Points for the page, after filtering.
     pub page_points: Vec<CloudPoint>,
-    /// Trajectory by IMU dead reckoning.
-    pub dead_reckoning: Result<Trajectory, EvaluationError>,
+    /// The information bound, if it was requested.
+    pub bound: Option<RecordingBound>,
 }
 
 /// Inputs of the registration.
@@ -96,7 +97,14 @@ pub(super) struct Registration<'a> {
 
 impl Registration<'_> {
     /// Projects all beams by the estimate and writes the cloud files and `result.mcap` to `folder`.
-    pub(super) fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<RegisteredCloud, StudyError> {
+    ///
+    /// The same pass over the recording adds the measurements to `bound`, which has the truth already.
+    pub(super) fn run(
+        &self,
+        bound: Option<BoundAccumulator>,
+        folder: &Path,
+        watch: &mut ProgressMonitor,
+    ) -> Result<RegisteredCloud, StudyError> {
         let noise = self.calibration.lidar;
         let mut beams = BeamProjection {
             measurements: self.reader.measurements(self.selection),
@@ -114,7 +122,7 @@ impl Registration<'_> {
             sampled: Thinning::to_at_most(MAX_SAMPLED_BEAMS, self.returns),
             displayed: Thinning::to_at_most(MAX_VIEWER_POINTS, self.returns),
             on_page: Thinning::to_at_most(MAX_PAGE_POINTS, self.returns),
-            dead_reckoning: DeadReckoning::new(&self.calibration.head_from_imu, RestDetection::default()),
+            bound,
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
             projected: 0,
@@ -131,9 +139,9 @@ impl Registration<'_> {
         }
         beams.files.finish()?;
         let filtered = !self.options.keep_outliers;
-        let dead_reckoning = beams.dead_reckoning.finish();
-        let BeamProjection { class_counts, sample, page_points, .. } = beams;
-        Ok(RegisteredCloud { class_counts, filtered, sample, page_points, dead_reckoning })
+        let BeamProjection { class_counts, sample, page_points, bound, .. } = beams;
+        let bound = bound.map(BoundAccumulator::finish).transpose()?;
+        Ok(RegisteredCloud { class_counts, filtered, sample, page_points, bound })
     }
 }
 
@@ -168,7 +176,7 @@ struct BeamProjection<'a, 'w, 's> {
     sampled: Thinning,
     displayed: Thinning,
     on_page: Thinning,
-    dead_reckoning: DeadReckoning,
+    bound: Option<BoundAccumulator<'a>>,
     ready: std::vec::IntoIter<CloudPoint>,
     span: Option<(Stamp, Stamp)>,
     /// Number of projected returns.
@@ -209,7 +217,9 @@ impl BeamProjection<'_, '_, '_> {
                     let Some(filter) = self.filter.take() else { return Ok(None) };
                     return Ok(Some(self.settle(filter.finish())?));
                 }
-                Some(Measurement::Imu(sample)) => self.dead_reckoning.push(&sample),
+                Some(Measurement::Imu(sample)) => {
+                    self.bound.iter_mut().for_each(|bound| bound.add_imu_sample(&sample));
+                }
                 Some(Measurement::Lidar(scan)) => {
                     if self.watch.is_stopped() {
                         return Err(StudyError::Stopped);
@@ -218,7 +228,11 @@ impl BeamProjection<'_, '_, '_> {
                         let (done_s, total_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
                         self.watch.progress(Stage::Registering, done_s, Some(total_s));
                     }
-                    return Ok(Some(self.register(&scan)?));
+                    let points = self.register(&scan)?;
+                    if let (Some(bound), Some(truth)) = (&mut self.bound, &mut self.truth) {
+                        bound.add_scan(&scan, truth)?;
+                    }
+                    return Ok(Some(points));
                 }
             }
         }

@@ -1,11 +1,11 @@
 //! Sensor models for an estimate: noise and averaging, each value with its source.
 
-use super::StudyError;
+use super::{Manifest, StudyError};
 use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
-use crate::report::{NoiseMetrics, SensorMetrics};
+use crate::report::{NoiseMetrics, SensorMetrics, noise_sources};
 use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use crate::simulation::Run;
-use crate::spec::{Kind, Source, SpecError, find, parse};
+use crate::spec::{Kind, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -77,6 +77,20 @@ pub(super) struct SensorModels {
     noise: Vec<(String, f64, ValueSource)>,
 }
 
+/// Sensors of the simulation in a recording's manifest; `None` for those that are not known.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct RecordedSensors<'a> {
+    pub imu: Option<&'a ImuSpec>,
+    pub lidar: Option<&'a LidarSpec>,
+}
+
+impl<'a> RecordedSensors<'a> {
+    /// The sensors of `run`.
+    pub fn of(run: &'a Run) -> Self {
+        Self { imu: Some(&run.imu.spec), lidar: Some(&run.lidar.spec) }
+    }
+}
+
 /// Values that a calibration file contains.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GivenModels<'a> {
@@ -86,21 +100,25 @@ pub(super) struct GivenModels<'a> {
 }
 
 impl SensorModels {
-    /// Given values, completed by those of the sensors of `run`, else by those of unknown sensors.
-    pub fn new(given: GivenModels, run: Option<&Run>) -> Result<Self, StudyError> {
-        let (imu, lidar, source) = match run {
-            Some(run) => {
-                let source = Source::in_memory("the recording's manifest", "");
-                (Imu::new(&run.imu.spec, &source)?, Lidar::new(&run.lidar.spec, &source)?, ValueSource::Manifest)
-            }
-            None => (unknown_imu()?, unknown_lidar()?, ValueSource::Assumed),
+    /// Given values, completed by those of the `recorded` sensors, else by those of unknown sensors.
+    pub fn new(given: GivenModels, recorded: RecordedSensors) -> Result<Self, StudyError> {
+        let manifest = Manifest::source("");
+        let (imu, imu_source) = match recorded.imu {
+            Some(spec) => (Imu::new(spec, &manifest)?, ValueSource::Manifest),
+            None => (unknown_imu()?, ValueSource::Assumed),
         };
-        let mut values = Values { source, noise: Vec::new() };
+        let (lidar, lidar_source) = match recorded.lidar {
+            Some(spec) => (Lidar::new(spec, &manifest)?, ValueSource::Manifest),
+            None => (unknown_lidar()?, ValueSource::Assumed),
+        };
+        let mut values = Values { source: imu_source, noise: Vec::new() };
+        let imu_noise = values.imu(given.imu.copied().unwrap_or_default(), &imu.noise());
+        values.source = lidar_source;
         Ok(Self {
-            imu: values.imu(given.imu.copied().unwrap_or_default(), &imu.noise()),
+            imu: imu_noise,
             lidar: values.lidar(given.lidar.copied().unwrap_or_default(), &lidar.noise()),
             imu_averaging: given.imu_averaging.unwrap_or(imu.averaging()),
-            averaging_source: given.imu_averaging.map_or(source, |_| ValueSource::Calibration),
+            averaging_source: given.imu_averaging.map_or(imu_source, |_| ValueSource::Calibration),
             noise: values.noise,
         })
     }
@@ -124,22 +142,26 @@ impl SensorModels {
         }
     }
 
-    /// A note on the values that had to be assumed, if any.
-    pub fn note(&self) -> Option<String> {
-        let assumed = |sensor: &str| {
-            self.noise.iter().any(|(key, _, source)| key.starts_with(sensor) && *source == ValueSource::Assumed)
-        };
+    /// A note on the source of the noise of each sensor, and on the values that had to be assumed.
+    pub fn note(&self) -> String {
+        let noise = self.metrics().noise;
+        let of = |sensor: &str| noise_sources(&noise, sensor).unwrap_or_default();
+        let (imu, lidar) = (of("imu."), of("lidar."));
+        let sources = if imu == lidar { imu.clone() } else { format!("IMU {imu}; lidar {lidar}") };
         let unknown: Vec<&str> = [
-            ("imu.", "IMU noise of a typical IMU (specs/imus/unknown.ron)"),
-            ("lidar.", "range noise of a UTM-30LX (10 mm)"),
+            (imu, "IMU noise of a typical IMU (specs/imus/unknown.ron)"),
+            (lidar, "range noise of a UTM-30LX (10 mm)"),
         ]
         .into_iter()
-        .filter(|(sensor, _)| assumed(sensor))
+        .filter(|(sources, _)| sources.contains(&ValueSource::Assumed.to_string()))
         .map(|(_, what)| what)
         .collect();
-        let values = unknown.join(" and ");
-        (!unknown.is_empty())
-            .then(|| format!("assumed: {values}; pass the values of the data sheet with --calibration"))
+        match unknown.join(" and ") {
+            known if known.is_empty() => format!("noise: {sources}"),
+            values => {
+                format!("noise: {sources}; assumed are {values}: pass the values of the data sheet with --calibration")
+            }
+        }
     }
 }
 

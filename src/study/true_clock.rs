@@ -16,15 +16,19 @@ pub(super) struct TrueClock(Vec<(Stamp, f64)>);
 impl TrueClock {
     /// Reads the true offset, including the shift of the IMU stamps that `selection` applies if the clock epochs differ.
     pub(super) fn read(reader: &Reader, selection: &Selection) -> Result<Self, RecordingError> {
-        let shift_s = selection.imu_shift().seconds();
-        let mut offsets = Vec::new();
+        let mut read = Self::default();
         for record in reader.truth() {
             if let Truth::Clock(now, clock) = record? {
-                let (at, offset_s) = true_offset(now, &clock);
-                offsets.push((at, offset_s + shift_s));
+                read.add(now, &clock, selection.imu_shift());
             }
         }
-        Ok(Self(offsets))
+        Ok(read)
+    }
+
+    /// Adds the next record; `imu_shift` is the shift of the IMU stamps that the selection applies.
+    pub(super) fn add(&mut self, now: Stamp, clock: &ClockTruth, imu_shift: Span) {
+        let (at, offset_s) = true_offset(now, clock);
+        self.0.push((at, offset_s + imu_shift.seconds()));
     }
 
     /// A clock with the given offsets, s, in order of time.

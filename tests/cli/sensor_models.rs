@@ -5,18 +5,21 @@ use serde_json::Value;
 use std::path::Path;
 use zsim::recording::{RunDescription, Writer};
 use zsim::simulation::{Scenario, Simulation};
+use zsim::spec::{Source, parse, to_text};
+use zsim::study::Manifest;
 
 const MANIFEST: &str = "from the recording's manifest";
 
-/// A simulation of 6 s, recorded with `manifest`.
-fn record(folder: &Path, manifest: &str) {
+/// A simulation of 6 s, recorded with its manifest as changed by `changed`.
+fn record(folder: &Path, changed: impl FnOnce(String) -> String) {
     let scenario = Scenario { duration_s: 6.0, ..Scenario::in_scene("mocap_room") };
     let simulation = Simulation::prepare(&scenario).unwrap();
+    let manifest = changed(Manifest::of(&simulation).to_ron().unwrap());
     let description = RunDescription {
         calibration: simulation.calibration(),
         imu_rate_hz: 100.0,
         base_imu: None,
-        manifest: manifest.to_owned(),
+        manifest,
         truth_tf: false,
     };
     let mut writer = Writer::create(&folder.join("run.mcap"), description).unwrap();
@@ -48,7 +51,7 @@ fn each_value_is_from_the_calibration_else_the_manifest_else_assumed() {
     assert_eq!(noise(&simulated, "lidar.near_sigma_m"), (0.01, MANIFEST));
     assert_eq!(simulated["sensors"]["imu_averaging"], "coning_corrected");
     assert_eq!(simulated["sensors"]["imu_averaging_source"], MANIFEST);
-    assert!(!stderr.contains("assumed"), "{stderr}");
+    assert!(stderr.contains("note: noise: from the recording's manifest\n"), "{stderr}");
 
     std::fs::write(
         here.path().join("own.ron"),
@@ -61,17 +64,79 @@ fn each_value_is_from_the_calibration_else_the_manifest_else_assumed() {
     assert_eq!(noise(&own, "lidar.near_sigma_m").1, "assumed");
     assert_eq!(own["sensors"]["imu_averaging"], "none");
     assert_eq!(own["sensors"]["imu_averaging_source"], "from --calibration");
-    assert!(stderr.contains("assumed: IMU noise of a typical IMU"), "{stderr}");
+    let sources = "noise: IMU 1 from --calibration, 7 assumed; lidar assumed; assumed are IMU noise of a typical IMU";
+    assert!(stderr.contains(sources), "{stderr}");
     assert!(own["open_loop"]["position_rmse_m"].as_f64().is_some(), "the truth is still used");
 }
 
 #[test]
 fn a_manifest_that_cannot_be_parsed_is_a_note_of_the_estimate_and_an_error_of_the_bound() {
     let here = tempfile::tempdir().unwrap();
-    record(here.path(), "(sceen: 1)");
+    record(here.path(), |_| "(sceen: 1)".to_owned());
     let (metrics, stderr) = estimated(here.path(), "");
     assert!(stderr.contains("the manifest in the recording cannot be read") && stderr.contains("sceen"), "{stderr}");
     assert_eq!(noise(&metrics, "imu.gyro_limit_rad_per_s").1, "assumed");
     let (code, _, stderr) = run(here.path(), "bound run.mcap --scene mocap_room");
     assert!(code != 0 && stderr.contains("sceen"), "{code}: {stderr}");
+}
+
+/// An estimate of a recording whose manifest has `key` changed to `by` after the start of `section`.
+fn estimated_with(section: &str, key: &str, by: &str) -> (Value, String) {
+    let here = tempfile::tempdir().unwrap();
+    record(here.path(), |manifest| {
+        let start = manifest.find(section).unwrap();
+        let (before, after) = manifest.split_at(start);
+        assert!(after.contains(key), "{section} {key}");
+        before.replace(env!("CARGO_PKG_VERSION"), "0.0.9") + &after.replacen(key, by, 1)
+    });
+    estimated(here.path(), "")
+}
+
+#[test]
+fn of_a_manifest_with_a_renamed_key_the_other_sensor_is_read() {
+    let (metrics, stderr) = estimated_with("lidar: (", "near_sigma_m:", "sigma_near_m:");
+    for part in ["written by zsim 0.0.9", "sigma_near_m", "the model of the IMU is from it, that of the lidar is not"] {
+        assert!(stderr.contains(part), "{part}: {stderr}");
+    }
+    assert!(
+        stderr.contains("noise: IMU from the recording's manifest; lidar assumed; assumed are range noise"),
+        "{stderr}"
+    );
+    // The 3DM-GX2 measures up to 600 degrees/s, the IMU that is assumed otherwise up to 2000.
+    assert_eq!(noise(&metrics, "imu.gyro_limit_rad_per_s"), (600_f64.to_radians(), MANIFEST));
+    assert_eq!(noise(&metrics, "lidar.near_sigma_m").1, "assumed");
+    assert!(metrics["cloud"]["sigma_m"].is_null() && !metrics["open_loop"]["position_rmse_m"].is_null());
+}
+
+#[test]
+fn of_a_manifest_without_a_key_of_the_imu_the_lidar_is_read() {
+    let (metrics, stderr) = estimated_with("imu: (", "rate_hz: 100.0,", "");
+    assert!(stderr.contains("the model of the lidar is from it, that of the IMU is not"), "{stderr}");
+    assert!(stderr.contains("missing field named `rate_hz`"), "{stderr}");
+    assert_eq!(noise(&metrics, "imu.gyro_limit_rad_per_s"), (2000_f64.to_radians(), "assumed"));
+    assert_eq!(noise(&metrics, "lidar.near_sigma_m"), (0.01, MANIFEST));
+}
+
+#[test]
+fn of_a_manifest_in_the_form_before_0_1_0_both_sensors_are_read() {
+    let here = tempfile::tempdir().unwrap();
+    record(here.path(), |manifest| {
+        let Manifest { run, .. } = parse(&Source::in_memory("manifest", manifest)).unwrap();
+        let (lidar, imu) = run.map(|run| (run.lidar.spec, run.imu.spec)).unwrap();
+        let (lidar, imu) = (to_text(&lidar).unwrap(), to_text(&imu).unwrap());
+        format!("(version: \"0.0.9\", scenario: (seed: 1), specs: (scene: (), lidar: {lidar}, imu: {imu}))")
+    });
+    let (metrics, stderr) = estimated(here.path(), "");
+    assert!(stderr.contains("written by zsim 0.0.9") && stderr.contains("scenario"), "{stderr}");
+    assert_eq!(noise(&metrics, "imu.gyro_limit_rad_per_s"), (600_f64.to_radians(), MANIFEST));
+    assert_eq!(noise(&metrics, "lidar.near_sigma_m"), (0.01, MANIFEST));
+}
+
+#[test]
+fn of_a_manifest_with_a_renamed_key_of_the_scene_both_sensors_are_read() {
+    let (metrics, stderr) = estimated_with("scene: (", "materials:", "surfaces:");
+    assert!(stderr.contains("the models of IMU and lidar are from it, and the cloud is not evaluated"), "{stderr}");
+    assert!(stderr.contains("note: noise: from the recording's manifest\n"), "{stderr}");
+    assert_eq!(noise(&metrics, "lidar.near_sigma_m"), (0.01, MANIFEST));
+    assert!(metrics["cloud"]["sigma_m"].is_null());
 }

@@ -45,7 +45,7 @@ fn a_multi_plane_lidar_is_tracked_without_swing() {
     assert!(score.rmse_m < 0.02, "{score:?}");
     assert!(result.windows.iter().skip(4).all(|window| window.matches > 200), "{:?}", result.windows.last());
     for window in &result.windows {
-        let parts: f64 = window.timing.parts().iter().map(|(_, seconds)| seconds).sum();
+        let parts: f64 = window.timing.parts().iter().map(|part| part.seconds).sum();
         assert!(parts > 0.0 && parts <= window.elapsed_s, "{window:?}");
     }
 }

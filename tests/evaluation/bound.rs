@@ -1,7 +1,6 @@
 //! The information bound compared with closed forms.
 
 use approx::assert_relative_eq;
-use std::convert::Infallible;
 use zsim::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
 use zsim::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
 use zsim::measurement::{ImuNoise, ImuSample};
@@ -56,8 +55,8 @@ fn swinging(t: f64) -> (f64, f64, f64) {
 fn bound(model: BoundModel, along: Along, seconds: f64, towards: &[Vector]) -> InformationBound {
     let steps = (seconds * 1e3) as i64;
     let pose = |t_s: f64| Pose::translation(along(t_s).0, 0.0, 0.0);
-    let heads = (0..=steps).map(|ms| Ok::<_, Infallible>((stamp(ms as f64 * 1e-3), pose(ms as f64 * 1e-3))));
-    let Ok(mut information) = FisherInformation::new(model, heads);
+    let mut information = FisherInformation::new(model);
+    (0..=steps).map(|ms| ms as f64 * 1e-3).for_each(|t_s| information.add_head(stamp(t_s), &pose(t_s)));
     for k in 0..=(seconds / 0.01) as i64 {
         let t_s = k as f64 * 0.01;
         let force = Vector::new(along(t_s).2, 0.0, STANDARD_GRAVITY_M_PER_S2);
@@ -178,8 +177,8 @@ fn oblique_beams_observe_position_and_yaw() {
     // four times the information. Such a beam observes rotation too, so a second one from the other side separates both.
     let askew = |side: f64| Vector::new(0.5, side * 0.75_f64.sqrt(), 0.0);
     let n = beams(4.0);
-    let heads = (0..=4000).map(|ms| Ok::<_, Infallible>((stamp(f64::from(ms) * 1e-3), Pose::identity())));
-    let Ok(mut information) = FisherInformation::new(exact(), heads);
+    let mut information = FisherInformation::new(exact());
+    (0..=4000).for_each(|ms| information.add_head(stamp(f64::from(ms) * 1e-3), &Pose::identity()));
     for k in 0..n {
         let t_s = k as f64 * BEAM_S;
         for side in [-1.0, 1.0] {

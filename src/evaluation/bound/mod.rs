@@ -47,29 +47,28 @@ use model::EPOCH;
 #[derive(Debug, Clone)]
 pub struct FisherInformation {
     model: BoundModel,
-    start: Stamp,
+    start: Option<Stamp>,
+    /// Last true pose of the IMU.
+    before: Option<(Stamp, Pose)>,
     epochs: Vec<Epoch>,
 }
 
 impl FisherInformation {
-    /// Creates an accumulator without measurements.
-    ///
-    /// `heads` is the true trajectory `world_from_head` in lidar time, in order, at 50 Hz or more.
-    pub fn new<E>(model: BoundModel, heads: impl Iterator<Item = Result<(Stamp, Pose), E>>) -> Result<Self, E> {
-        let mut epochs: Vec<Epoch> = Vec::new();
-        let (mut start, mut before): (Option<Stamp>, Option<(Stamp, Pose)>) = (None, None);
-        for head in heads {
-            let (stamp, world_from_head) = head?;
-            let world_from_imu = world_from_head * model.head_from_imu;
-            let start = *start.get_or_insert(stamp);
-            let due = start + Span::from_nanos(epochs.len() as i64 * EPOCH.nanos());
-            if stamp >= due {
-                let previous = before.unwrap_or((stamp - EPOCH, world_from_imu));
-                epochs.push(Epoch::new(&world_from_imu, &previous.1, stamp.seconds_since(previous.0)));
-            }
-            before = Some((stamp, world_from_imu));
+    /// Creates an accumulator without motion and measurements.
+    pub fn new(model: BoundModel) -> Self {
+        Self { model, start: None, before: None, epochs: Vec::new() }
+    }
+
+    /// Adds the next true pose of the head, in lidar time, at 50 Hz or more; measurements of a time follow its poses.
+    pub fn add_head(&mut self, stamp: Stamp, world_from_head: &Pose) {
+        let world_from_imu = world_from_head * self.model.head_from_imu;
+        let start = *self.start.get_or_insert(stamp);
+        let due = start + Span::from_nanos(self.epochs.len() as i64 * EPOCH.nanos());
+        if stamp >= due {
+            let previous = self.before.unwrap_or((stamp - EPOCH, world_from_imu));
+            self.epochs.push(Epoch::new(&world_from_imu, &previous.1, stamp.seconds_since(previous.0)));
         }
-        Ok(Self { model, start: start.unwrap_or_default(), epochs })
+        self.before = Some((stamp, world_from_imu));
     }
 
     /// Adds an IMU sample; `stamp` is on the lidar clock.
@@ -89,7 +88,7 @@ impl FisherInformation {
 
     /// The epoch at a time.
     fn epoch_at(&mut self, stamp: Stamp) -> Option<&mut Epoch> {
-        let index = (stamp.seconds_since(self.start) / EPOCH.seconds()).round();
+        let index = (stamp.seconds_since(self.start?) / EPOCH.seconds()).round();
         (index >= 0.0).then(|| self.epochs.get_mut(index as usize)).flatten()
     }
 
@@ -102,6 +101,6 @@ impl FisherInformation {
         if found_s < 0.1 {
             return Err(EvaluationError::TooShort { measure: "the information bound", needed_s: 0.1, found_s });
         }
-        Ok(smoother::bound(&self.model, self.start, &self.epochs))
+        Ok(smoother::bound(&self.model, self.start.unwrap_or_default(), &self.epochs))
     }
 }

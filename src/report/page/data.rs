@@ -1,5 +1,6 @@
 //! The data of the pages with a view.
 
+use crate::estimation::PartTime;
 use crate::geometry::{Pose, Vector};
 use crate::report::Metrics;
 
@@ -9,8 +10,8 @@ pub struct RunPage<'a> {
     pub metrics: &'a Metrics,
     /// Text of the manifest.
     pub manifest: &'a str,
-    /// Name and wall-clock time of each part of the estimator, s.
-    pub parts_s: Vec<(&'static str, f64)>,
+    /// Run time of each part of the estimator.
+    pub parts: Vec<PartTime>,
     /// The three-dimensional view.
     pub view: View,
     /// The charts, in groups.

@@ -2,7 +2,7 @@
 
 use super::data::{Chart, ChartGroup, Section};
 use super::encode;
-use super::html::{self, escaped};
+use super::html::{self, PagePlot, escaped};
 use super::scripts::{CHARTS, DATA, LIBRARIES, READY, TABLES};
 use super::table::PageTable;
 use crate::report::plot::PlotError;
@@ -17,8 +17,8 @@ pub struct GainsPage {
     pub tables: Vec<PageTable>,
     /// The axes.
     pub axes: Vec<AxisGains>,
-    /// Plots as SVG, each with its name.
-    pub figures: Vec<(String, String)>,
+    /// Plots.
+    pub plots: Vec<PagePlot>,
 }
 
 /// Charts of the gains along or about one axis.
@@ -47,7 +47,7 @@ impl GainsPage {
         let sections = [
             self.tables.iter().map(PageTable::section).collect::<String>(),
             self.axes.iter().map(of_axis).collect(),
-            html::figures(&self.figures),
+            html::plots(&self.plots),
         ];
         let groups = self.axes.into_iter().flat_map(|axis| {
             let section = Section::Axis(axis.axis);

@@ -1,5 +1,6 @@
 //! The parts of the page that are readable without scripts.
 
+use crate::estimation::PartTime;
 use crate::report::quantity::{percent, time};
 use crate::report::{CauseMetrics, EventMetrics, Metrics, rows, verdict};
 
@@ -88,15 +89,40 @@ pub(super) fn summary(text: &str) -> String {
     format!("<p class=\"summary\">{}</p>", escaped(text))
 }
 
-/// Figures as SVG, each under its name.
-pub(super) fn figures(figures: &[(String, String)]) -> String {
-    let figure = |(name, svg): &(String, String)| {
+/// A plot on a page.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PagePlot {
+    /// Name above the plot.
+    pub name: String,
+    /// The plot as SVG.
+    pub svg: String,
+}
+
+/// A row of a table of names and values.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedValue {
+    /// Name.
+    pub name: String,
+    /// Value with its unit.
+    pub value: String,
+}
+
+impl NamedValue {
+    /// A row with this name and value.
+    pub fn new(name: impl Into<String>, value: impl Into<String>) -> Self {
+        Self { name: name.into(), value: value.into() }
+    }
+}
+
+/// Plots, each under its name.
+pub(super) fn plots(plots: &[PagePlot]) -> String {
+    let figure = |PagePlot { name, svg }: &PagePlot| {
         format!(
             "<figure class=\"drawing\" tabindex=\"0\">\n<figcaption>{}</figcaption>\n{svg}</figure>\n",
             escaped(name)
         )
     };
-    figures.iter().map(figure).collect()
+    plots.iter().map(figure).collect()
 }
 
 /// The verdict: icon, status and reason.
@@ -149,26 +175,27 @@ fn list(title: &str, lines: &[String]) -> String {
 }
 
 /// The metrics in groups, and the run time of each part of the estimator.
-pub(super) fn metrics_tables(metrics: &Metrics, parts_s: &[(&str, f64)]) -> String {
+pub(super) fn metrics_tables(metrics: &Metrics, parts: &[PartTime]) -> String {
     let mut html = String::new();
     for group in rows::groups(metrics) {
-        let rows = group.rows.into_iter().map(|row| (row.name.to_owned(), row.value));
+        let rows = group.rows.into_iter().map(|row| NamedValue::new(row.name, row.value));
         html += &table(group.title, rows);
     }
     let total_s = metrics.open_loop.wall_s.filter(|wall_s| *wall_s > 0.0);
-    let part = |(name, seconds): &(&str, f64)| {
+    let part = |PartTime { name, seconds }: &PartTime| {
         let share = total_s.map_or_else(String::new, |total_s| format!(" ({})", percent(seconds / total_s)));
-        ((*name).to_owned(), time(*seconds) + &share)
+        NamedValue::new(*name, time(*seconds) + &share)
     };
-    if !parts_s.is_empty() {
-        html += &table("open loop, by part", parts_s.iter().map(part));
+    if !parts.is_empty() {
+        html += &table("open loop, by part", parts.iter().map(part));
     }
     html
 }
 
-pub(super) fn table(title: &str, rows: impl Iterator<Item = (String, String)>) -> String {
+/// A table of names and values.
+pub(super) fn table(title: &str, rows: impl Iterator<Item = NamedValue>) -> String {
     let rows: String = rows
-        .map(|(name, value)| {
+        .map(|NamedValue { name, value }| {
             format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escaped(&name), escaped(&value))
         })
         .collect();

@@ -29,6 +29,7 @@ pub use data::{
     ShownMode, SpringView, TimedPose, TimelineRow, View, ViewPoint,
 };
 pub use gains::{AxisGains, GainsPage};
+pub use html::{NamedValue, PagePlot};
 pub use live::LivePage;
 
 /// Maximum number of points of the cloud on a page.
@@ -59,7 +60,7 @@ impl RunPage<'_> {
         let sections = html::fill(
             RUN_SECTIONS,
             &[
-                ("metrics", &html::metrics_tables(metrics, &self.parts_s)),
+                ("metrics", &html::metrics_tables(metrics, &self.parts)),
                 ("events", &html::events(metrics)),
                 ("manifest", &html::escaped(self.manifest)),
             ],

@@ -1,6 +1,6 @@
 //! The page of the paper's experiments.
 
-use super::html::{self, escaped};
+use super::html::{self, PagePlot, escaped};
 use super::scripts::{DATA, READY, TABLES};
 use super::table::PageTable;
 
@@ -24,8 +24,8 @@ pub struct ExperimentSection {
     pub table: PageTable,
     /// Assumptions and differences.
     pub notes: Vec<String>,
-    /// Plots as SVG, each with its name.
-    pub figures: Vec<(String, String)>,
+    /// Plots.
+    pub plots: Vec<PagePlot>,
     /// Files of the experiment, each with its name.
     pub links: Vec<PageLink>,
 }
@@ -70,7 +70,7 @@ impl ExperimentSection {
             "<section><h2>{}</h2>\n<p><code>{}</code></p>\n{table}{links}<ul>\n{notes}</ul>\n{}</section>\n",
             escaped(&self.title),
             escaped(&self.command),
-            html::figures(&self.figures)
+            html::plots(&self.plots)
         )
     }
 }
@@ -88,7 +88,7 @@ mod tests {
             command: hostile(),
             table,
             notes: vec![hostile()],
-            figures: vec![(hostile(), "<svg></svg>".to_owned())],
+            plots: vec![PagePlot { name: hostile(), svg: "<svg></svg>".to_owned() }],
             links: vec![PageLink { name: hostile(), address: hostile() }],
         };
         let html = PaperPage { summary: hostile(), experiments: vec![experiment] }.html();

@@ -1,6 +1,7 @@
 //! The page of a scene.
 
 use super::data::View;
+use super::html::NamedValue;
 use super::{encode, html, scripts, stage};
 use crate::report::plot::{Figure, PlotError};
 
@@ -10,8 +11,8 @@ pub struct ScenePage<'a> {
     pub name: &'a str,
     /// The surfaces, coloured by material, and the default route as the estimate.
     pub view: View,
-    /// Size, routes and other properties: name and value.
-    pub properties: Vec<(String, String)>,
+    /// Size, routes and other properties.
+    pub properties: Vec<NamedValue>,
     /// The materials in use.
     pub materials: Vec<MaterialRow>,
     /// Floor plan and elevation.
@@ -43,7 +44,7 @@ impl ScenePage<'_> {
             stage::view_section("Surfaces and route", "route", "route"),
             self.plan.svg()?,
             html::table("scene", self.properties.iter().cloned()),
-            html::table("materials", self.materials.iter().map(MaterialRow::cells)),
+            html::table("materials", self.materials.iter().map(MaterialRow::row)),
         );
         let data = encode::view_json(&self.view).map_err(|error| PlotError::Drawing(error.to_string()))?;
         Ok(html::Document {
@@ -63,10 +64,10 @@ impl ScenePage<'_> {
 }
 
 impl MaterialRow {
-    fn cells(&self) -> (String, String) {
+    fn row(&self) -> NamedValue {
         let transmission =
             if self.transmission > 0.0 { format!(", transmits {:.2}", self.transmission) } else { String::new() };
         let value = format!("reflectance {:.2}{transmission}, {:.0} m\u{b2}", self.reflectance, self.area_m2);
-        (self.name.clone(), value)
+        NamedValue { name: self.name.clone(), value }
     }
 }

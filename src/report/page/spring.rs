@@ -1,7 +1,7 @@
 //! The page of a spring, or another linkage, under a head.
 
 use super::data::{ShownMode, SpringView};
-use super::html::{self, escaped};
+use super::html::{self, NamedValue, escaped};
 use super::stage::Stage;
 use super::table::PageTable;
 use super::{encode, scripts};
@@ -20,8 +20,8 @@ pub struct SpringPage {
     pub view: SpringView,
     /// Tables under the view.
     pub tables: Vec<NotedTable>,
-    /// Load, rest pose and limits: name and value.
-    pub properties: Vec<(String, String)>,
+    /// Load, rest pose and limits.
+    pub properties: Vec<NamedValue>,
 }
 
 /// A table with a note under it.

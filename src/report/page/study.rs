@@ -1,6 +1,6 @@
 //! The page of a study: its tables, plots and runs.
 
-use super::html::{self, escaped};
+use super::html::{self, PagePlot, escaped};
 use super::points::RunPoints;
 use super::scripts::{DATA, POINTS, READY, RUNS, TABLES};
 use super::table::PageTable;
@@ -18,8 +18,8 @@ pub struct StudyPage {
     pub introduction: String,
     /// The summary, in several tables.
     pub tables: Vec<PageTable>,
-    /// Plots as SVG, each with its name.
-    pub figures: Vec<(String, String)>,
+    /// Plots.
+    pub plots: Vec<PagePlot>,
     /// Settings and figures of each run.
     pub runs: PageTable,
     /// A note on runs that the table does not have.
@@ -35,7 +35,7 @@ impl StudyPage {
             SECTIONS,
             &[
                 ("tables", &self.tables.iter().map(PageTable::section).collect::<String>()),
-                ("figures", &html::figures(&self.figures)),
+                ("figures", &html::plots(&self.plots)),
                 ("runs", &self.runs.html()),
                 ("runs_note", &escaped(&self.runs_note)),
             ],
@@ -75,7 +75,7 @@ mod tests {
             name: "a & b".to_owned(),
             introduction: "1 run".to_owned(),
             tables: vec![table.clone()],
-            figures: vec![("errors".to_owned(), "<svg></svg>".to_owned())],
+            plots: vec![PagePlot { name: "errors".to_owned(), svg: "<svg></svg>".to_owned() }],
             runs: table,
             points: RunPoints { columns: vec![column], folder: Some("<script>".to_owned()), ..RunPoints::default() },
             ..StudyPage::default()

@@ -24,7 +24,7 @@ fn metrics(status: &str) -> Metrics {
 fn page<'a>(metrics: &'a Metrics, view: View) -> RunPage<'a> {
     let interval = Interval { from_s: 1.0, to_s: 2.0, sentence: HOSTILE.to_owned() };
     let row = TimelineRow { name: HOSTILE.to_owned(), level: Level::Lost, events: vec![interval] };
-    RunPage { metrics, manifest: HOSTILE, parts_s: vec![], view, charts: vec![], timeline: vec![row] }
+    RunPage { metrics, manifest: HOSTILE, parts: vec![], view, charts: vec![], timeline: vec![row] }
 }
 
 /// A full view: the maximum number of points and triangles, and ten minutes of poses.

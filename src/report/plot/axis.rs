@@ -1,5 +1,7 @@
 //! Axis ranges and ticks.
 
+use super::chart::Tick;
+
 /// The range of an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axis {
@@ -34,13 +36,13 @@ impl Axis {
     }
 
     /// About `wanted` ticks at round numbers, with labels of equal decimals.
-    pub(super) fn ticks(&self, wanted: usize) -> Vec<(f64, String)> {
+    pub(super) fn ticks(&self, wanted: usize) -> Vec<Tick> {
         let step = round_step((self.high - self.low) / wanted.max(1) as f64);
         let decimals = decimals_of(step);
         let tolerance = step * 1e-6;
         let (first, last) =
             (((self.low - tolerance) / step).ceil() as i64, ((self.high + tolerance) / step).floor() as i64);
-        (first..=last).map(|k| (k as f64 * step, label(k as f64 * step, decimals))).collect()
+        (first..=last).map(|k| k as f64 * step).map(|at| Tick { at, label: label(at, decimals) }).collect()
     }
 }
 
@@ -78,7 +80,7 @@ mod tests {
     use super::*;
 
     fn labels(low: f64, high: f64, wanted: usize) -> Vec<String> {
-        Axis { low, high }.ticks(wanted).into_iter().map(|(_, label)| label).collect()
+        Axis { low, high }.ticks(wanted).into_iter().map(|tick| tick.label).collect()
     }
 
     #[test]

@@ -27,8 +27,19 @@ pub struct Series {
     pub mark: Mark,
     /// Points (x, y) in the units of the axes; a non-finite point interrupts the line.
     pub points: Vec<(f64, f64)>,
-    /// A band behind the points, such as a confidence interval: x, lower and upper end.
-    pub band: Vec<(f64, f64, f64)>,
+    /// A band behind the points, such as a confidence interval.
+    pub band: Vec<BandPoint>,
+}
+
+/// The ends of a band at one x, in the units of the axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BandPoint {
+    /// Position along the x axis.
+    pub x: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
 }
 
 impl Series {
@@ -51,14 +62,14 @@ impl Series {
 
     /// Sets the band.
     #[must_use]
-    pub fn with_band(mut self, band: Vec<(f64, f64, f64)>) -> Self {
+    pub fn with_band(mut self, band: Vec<BandPoint>) -> Self {
         self.band = band;
         self
     }
 
     /// All finite points, including the ends of the band.
     pub(super) fn extent(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let band = self.band.iter().flat_map(|(x, low, high)| [(*x, *low), (*x, *high)]);
+        let band = self.band.iter().flat_map(|at| [(at.x, at.low), (at.x, at.high)]);
         self.points.iter().copied().chain(band).filter(|(x, y)| x.is_finite() && y.is_finite())
     }
 }
@@ -115,8 +126,28 @@ pub struct SignedDots {
     pub limit: f64,
     /// Diameter, points.
     pub size: f64,
-    /// Position x, y and value.
-    pub dots: Vec<(f64, f64, f64)>,
+    /// The dots.
+    pub dots: Vec<SignedDot>,
+}
+
+/// A dot with a colour by its value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SignedDot {
+    /// Position along the x axis.
+    pub x: f64,
+    /// Position along the y axis.
+    pub y: f64,
+    /// The value that the colour represents; a dot with NaN is not shown.
+    pub value: f64,
+}
+
+/// A tick of an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tick {
+    /// Position on the axis.
+    pub at: f64,
+    /// Label.
+    pub label: String,
 }
 
 /// A pair of axes with its data.
@@ -138,10 +169,10 @@ pub struct Chart {
     pub cells: Option<Cells>,
     /// Dots with colours by a signed value.
     pub signed_dots: Option<SignedDots>,
-    /// Custom ticks of the x axis: value and label. Ticks outside the data range are omitted; empty for round numbers.
-    pub x_ticks: Vec<(f64, String)>,
+    /// Custom ticks of the x axis. Ticks outside the data range are omitted; empty for round numbers.
+    pub x_ticks: Vec<Tick>,
     /// Custom ticks of the y axis, as `x_ticks`.
-    pub y_ticks: Vec<(f64, String)>,
+    pub y_ticks: Vec<Tick>,
     /// The series, from back to front.
     pub series: Vec<Series>,
 }
@@ -204,14 +235,14 @@ impl Chart {
 
     /// Sets custom ticks of the x axis.
     #[must_use]
-    pub fn with_x_ticks(mut self, ticks: Vec<(f64, String)>) -> Self {
+    pub fn with_x_ticks(mut self, ticks: Vec<Tick>) -> Self {
         self.x_ticks = ticks;
         self
     }
 
     /// Sets custom ticks of the y axis.
     #[must_use]
-    pub fn with_y_ticks(mut self, ticks: Vec<(f64, String)>) -> Self {
+    pub fn with_y_ticks(mut self, ticks: Vec<Tick>) -> Self {
         self.y_ticks = ticks;
         self
     }
@@ -235,7 +266,7 @@ impl Chart {
         let mut ends = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         let corners = |cell: &Cell| [(cell.x.0, cell.y.0), (cell.x.1, cell.y.1)];
         let cells = self.cells.iter().flat_map(|cells| cells.cells.iter().flat_map(corners));
-        let dots = self.signed_dots.iter().flat_map(|dots| dots.dots.iter().map(|(x, y, _)| (*x, *y)));
+        let dots = self.signed_dots.iter().flat_map(|dots| dots.dots.iter().map(|dot| (dot.x, dot.y)));
         for (x, y) in self.series.iter().flat_map(Series::extent).chain(cells).chain(dots) {
             for (end, value) in ends.iter_mut().zip([x, y]) {
                 *end = (end.0.min(value), end.1.max(value));

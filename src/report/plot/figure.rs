@@ -127,11 +127,11 @@ fn downsampled(drawn: &[u8], wide: usize, side: usize) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::plot::{Colour, Series};
+    use crate::report::plot::{BandPoint, Colour, Series};
 
     fn figure() -> Figure {
         let wave = (0..200).map(|k| (k as f64 * 0.1, (k as f64 * 0.1).sin())).collect();
-        let band = (0..200).map(|k| (k as f64 * 0.1, -0.5, 0.5)).collect();
+        let band = (0..200).map(|k| BandPoint { x: k as f64 * 0.1, low: -0.5, high: 0.5 }).collect();
         let series = Series::line("sine & <co>", Colour::Estimate, wave).with_band(band);
         Figure::of(vec![Chart::new("A wave", "Time (s)", "Height (m)").with(series)])
     }

@@ -6,7 +6,7 @@ use super::font::{SMALL_TEXT, TEXT, WIDER_FONT};
 use super::legend::Header;
 use super::palette::{GRID, INK, shade, signed_shade};
 use super::stroke::dashes;
-use super::{Chart, Mark, PlotError, Series, SignedDots};
+use super::{Chart, Mark, PlotError, Series, SignedDots, Tick};
 use plotters::prelude::DrawingBackend;
 
 /// Margins around the axes, points: above for one line of title and legend, below and left for tick labels and axis label.
@@ -120,26 +120,26 @@ fn left_margin<DB: DrawingBackend>(canvas: &Canvas<DB>, chart: &Chart) -> Result
     chart
         .y_ticks
         .iter()
-        .try_fold(LEFT, |margin, (_, label)| Ok(margin.max(WIDER_FONT * canvas.width_of(label, SMALL_TEXT)? + room)))
+        .try_fold(LEFT, |margin, tick| Ok(margin.max(WIDER_FONT * canvas.width_of(&tick.label, SMALL_TEXT)? + room)))
 }
 
 /// The custom ticks within the range of an axis, or about `wanted` round numbers if there are none.
-fn ticks(axis: &Axis, custom: &[(f64, String)], wanted: f64) -> Vec<(f64, String)> {
+fn ticks(axis: &Axis, custom: &[Tick], wanted: f64) -> Vec<Tick> {
     if custom.is_empty() {
         return axis.ticks((wanted as usize).max(MIN_TICKS));
     }
-    custom.iter().filter(|(value, _)| (axis.low..=axis.high).contains(value)).cloned().collect()
+    custom.iter().filter(|tick| (axis.low..=axis.high).contains(&tick.at)).cloned().collect()
 }
 
 fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
-    for (value, label) in ticks(&frame.x, &chart.x_ticks, frame.width / TICK_X) {
-        let (x, _) = frame.at((value, frame.y.low));
+    for Tick { at, label } in ticks(&frame.x, &chart.x_ticks, frame.width / TICK_X) {
+        let (x, _) = frame.at((at, frame.y.low));
         canvas.line(&[(x, frame.top), (x, frame.bottom())], GRID, 0.8)?;
         canvas.line(&[(x, frame.bottom()), (x, frame.bottom() + 4.0)], INK, 0.8)?;
         canvas.text(&label, (x, frame.bottom() + 7.0), Anchor::Below, SMALL_TEXT)?;
     }
-    for (value, label) in ticks(&frame.y, &chart.y_ticks, frame.height / TICK_Y) {
-        let (_, y) = frame.at((frame.x.low, value));
+    for Tick { at, label } in ticks(&frame.y, &chart.y_ticks, frame.height / TICK_Y) {
+        let (_, y) = frame.at((frame.x.low, at));
         canvas.line(&[(frame.left, y), (frame.right(), y)], GRID, 0.8)?;
         canvas.line(&[(frame.left - 4.0, y), (frame.left, y)], INK, 0.8)?;
         canvas.text(&label, (frame.left - 8.0, y), Anchor::Right, SMALL_TEXT)?;
@@ -163,13 +163,13 @@ fn signed_dots<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &C
     let Some(SignedDots { limit, size, dots, .. }) = &chart.signed_dots else { return Ok(()) };
     let within = |axis: &Axis, value: f64| (axis.low..=axis.high).contains(&value);
     dots.iter()
-        .filter(|(x, y, value)| within(&frame.x, *x) && within(&frame.y, *y) && value.is_finite())
-        .try_for_each(|(x, y, value)| canvas.dot(frame.at((*x, *y)), signed_shade(0.5 + 0.5 * value / limit), *size))
+        .filter(|dot| within(&frame.x, dot.x) && within(&frame.y, dot.y) && dot.value.is_finite())
+        .try_for_each(|dot| canvas.dot(frame.at((dot.x, dot.y)), signed_shade(0.5 + 0.5 * dot.value / limit), *size))
 }
 
 fn band<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Series) -> Result<(), PlotError> {
-    let upper = series.band.iter().map(|(x, _, high)| (*x, *high));
-    let lower = series.band.iter().rev().map(|(x, low, _)| (*x, *low));
+    let upper = series.band.iter().map(|at| (at.x, at.high));
+    let lower = series.band.iter().rev().map(|at| (at.x, at.low));
     let outline: Vec<CanvasPoint> =
         upper.chain(lower).filter(|(x, y)| x.is_finite() && y.is_finite()).map(|point| frame.at(point)).collect();
     if outline.len() < 3 { Ok(()) } else { canvas.polygon(&outline, series.colour.rgb(), 0.2) }

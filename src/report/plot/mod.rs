@@ -15,7 +15,7 @@ mod legend;
 mod palette;
 mod stroke;
 
-pub use chart::{Cell, Cells, Chart, Mark, Series, SignedDots, robust_range};
+pub use chart::{BandPoint, Cell, Cells, Chart, Mark, Series, SignedDot, SignedDots, Tick, robust_range};
 pub use error::PlotError;
 pub use figure::Figure;
 pub use palette::Colour;

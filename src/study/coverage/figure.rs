@@ -1,7 +1,7 @@
 //! Figure of a lidar's coverage.
 
 use super::{Coverage, CoverageCell};
-use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Series};
+use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Series, Tick};
 
 /// Fraction of the cells that saturate the colour scale.
 ///
@@ -65,10 +65,10 @@ fn bearing(cell: &CoverageCell) -> (f64, f64) {
 }
 
 /// Ticks at the multiples of `step`, degrees.
-fn angle_ticks((low, high): (f64, f64), step: f64) -> Vec<(f64, String)> {
+fn angle_ticks((low, high): (f64, f64), step: f64) -> Vec<Tick> {
     let (first, last) = ((low / step).ceil() as i32, (high / step).floor() as i32);
     let angles = (first..=last).map(|k| f64::from(k) * step);
-    angles.map(|angle| (angle, format!("{angle:.0}").replace('-', "\u{2212}"))).collect()
+    angles.map(|at| Tick { at, label: format!("{at:.0}").replace('-', "\u{2212}") }).collect()
 }
 
 /// Equirectangular map of the observed part of the sphere as viewed from inside; unobserved cells are white.

@@ -3,7 +3,7 @@
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::{GainCurve, GainPoint, SwingPoint, SwingStudy};
 use crate::motion::Axis;
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
+use crate::report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series};
 
 /// Panels of the paper's figure 3: title, label, axes.
 const PANELS: [(&str, &str, &[Axis]); 3] = [
@@ -31,8 +31,10 @@ pub fn gain_panels(curves: &[GainCurve]) -> Vec<Chart> {
             model.sort_by(|a, b| a.0.total_cmp(&b.0));
             let measured = |p: &&GainPoint| p.coherence >= MIN_COHERENCE;
             let dots = curve.points.iter().filter(measured).map(|p| (p.freq_hz, p.gain)).collect();
-            let ends = |p: &GainPoint| {
-                (p.freq_hz, (p.gain - SIGMAS_95 * p.gain_sigma).max(0.0), p.gain + SIGMAS_95 * p.gain_sigma)
+            let ends = |p: &GainPoint| BandPoint {
+                x: p.freq_hz,
+                low: (p.gain - SIGMAS_95 * p.gain_sigma).max(0.0),
+                high: p.gain + SIGMAS_95 * p.gain_sigma,
             };
             let band = curve.points.iter().filter(measured).map(ends).collect();
             chart

@@ -4,7 +4,7 @@ use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::{GainCurve, GainPoint, SwingStudy, axis_name, peak_table, swing_figure};
 use crate::dynamics::HeadModel;
 use crate::motion::Axis;
-use crate::report::page::{Abscissa, AxisGains, Chart, Curve, CurveStyle, GainsPage, Ordinate, PageTable};
+use crate::report::page::{Abscissa, AxisGains, Chart, Curve, CurveStyle, GainsPage, Ordinate, PagePlot, PageTable};
 use crate::study::StudyError;
 use std::f64::consts::TAU;
 
@@ -22,16 +22,16 @@ const LOWEST_SHARE: f64 = 0.01;
 pub fn page(name: &str, head: &HeadModel, curves: &[GainCurve], swings: &[SwingStudy]) -> Result<String, StudyError> {
     let (header, rows) = peak_table(curves);
     let peaks = PageTable { title: "Highest peak of each axis".to_owned(), header, rows, ..PageTable::default() };
-    let figures = match swings {
+    let plots = match swings {
         [] => Vec::new(),
-        swings => vec![("By swing amplitude".to_owned(), swing_figure(swings).svg()?)],
+        swings => vec![PagePlot { name: "By swing amplitude".to_owned(), svg: swing_figure(swings).svg()? }],
     };
     let page = GainsPage {
         name: name.to_owned(),
         summary: summary(head, curves),
         tables: vec![peaks, modes(head)],
         axes: curves.iter().map(axis_gains).collect(),
-        figures,
+        plots,
     };
     Ok(page.html()?)
 }

@@ -1,7 +1,7 @@
 //! Figures: sections through the map as in the paper's figure 4, and error curves.
 
 use super::{ClockState, Disturbance, LatencyResult, LatencyRun};
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series, SignedDots};
+use crate::report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series, SignedDot, SignedDots};
 use crate::study::sweep::ConfidenceInterval;
 
 /// Angular rate at the ends of the colour scale, degrees/s; larger rates saturate the colour.
@@ -48,7 +48,7 @@ fn panel(study: &LatencyResult, disturbance: Disturbance, clock: ClockState, tit
         unit: if is_first { "\u{b0}/s" } else { "" }.to_owned(),
         limit: FULL_COLOUR_DEG_PER_S,
         size: 1.6,
-        dots: dots.map(|((x, y), rate)| (f64::from(*x), f64::from(*y), *rate)).collect(),
+        dots: dots.map(|((x, y), rate)| SignedDot { x: f64::from(*x), y: f64::from(*y), value: *rate }).collect(),
     })
 }
 
@@ -92,6 +92,6 @@ pub fn curve_figure(study: &LatencyResult) -> Figure {
 /// A curve with its confidence band, in mm.
 fn curve(name: &str, colour: Colour, points: &[(f64, ConfidenceInterval)]) -> Series {
     let values = points.iter().map(|(x, y)| (*x, y.value * 1e3)).collect();
-    let band = points.iter().map(|(x, y)| (*x, y.low * 1e3, y.high * 1e3)).collect();
+    let band = points.iter().map(|(x, y)| BandPoint { x: *x, low: y.low * 1e3, high: y.high * 1e3 }).collect();
     Series::line(name, colour, values).marked(Mark::Line(1.5)).with_band(band)
 }

@@ -5,7 +5,7 @@ use super::paths::TurnRates;
 use crate::estimation::WindowReport;
 use crate::evaluation::Errors;
 use crate::geometry::Vector;
-use crate::report::length_unit;
+use crate::report::LengthUnit;
 use crate::report::page::{Abscissa, Chart, ChartGroup, Curve, CurveStyle, Ordinate, Section};
 use crate::study::integrity::Integrity;
 use crate::time::Stamp;
@@ -49,7 +49,7 @@ fn error_and_bound(results: &RunResults) -> Chart {
     let errors = results.pairs.and_then(Integrity::aligned_errors);
     let finite = bounds.iter().map(|bound| bound.bound_m_99).filter(|bound| bound.is_finite());
     let largest_error_m = errors.iter().flat_map(|errors| &errors.position_m).map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(finite.fold(largest_error_m, f64::max));
+    let LengthUnit { symbol: unit, per_m } = LengthUnit::for_lengths_up_to(finite.fold(largest_error_m, f64::max));
     let kept = decimated(bounds.len());
     let t_s = kept.clone().map(|k| results.seconds(bounds[k].stamp)).collect();
     let mut curves =
@@ -94,7 +94,7 @@ fn components(results: &RunResults) -> Vec<Chart> {
     let kept = decimated(bounds.len());
     let t_s: Vec<f64> = kept.clone().map(|k| results.seconds(bounds[k].stamp)).collect();
     let largest_m = errors.position_m.iter().map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(largest_m);
+    let LengthUnit { symbol: unit, per_m } = LengthUnit::for_lengths_up_to(largest_m);
     let component = |axis: usize, name: &str| {
         let (is_position, k) = (axis < 3, axis % 3);
         let vectors = if is_position { &errors.position_m } else { &errors.rotation_rad };
@@ -119,7 +119,8 @@ fn components(results: &RunResults) -> Vec<Chart> {
 fn loops(results: &RunResults) -> Option<Chart> {
     let best = &results.best.comparison?.errors.as_ref()?.decimated;
     let largest = |errors: &Errors| errors.position_m.iter().map(Vector::norm).fold(0.0, f64::max);
-    let (unit, per_m) = length_unit(results.open_errors.map_or(0.0, largest).max(largest(best)));
+    let LengthUnit { symbol: unit, per_m } =
+        LengthUnit::for_lengths_up_to(results.open_errors.map_or(0.0, largest).max(largest(best)));
     let kept = decimated(best.stamps.len());
     let t_s = kept.clone().map(|k| results.seconds(best.stamps[k])).collect();
     let error =
@@ -146,7 +147,7 @@ fn clock(results: &RunResults) -> Chart {
     let t_s = kept.clone().map(|k| results.seconds(estimate[k].0)).collect();
     let estimated = kept.clone().map(|k| estimate[k].1 * 1e3).collect();
     let mut curves = vec![curve("estimate", CurveStyle::Estimate, estimated)];
-    if let Some(truth) = results.best.comparison.map(|found| &found.clock_offsets).filter(|truth| !truth.is_empty()) {
+    if let Some(truth) = results.truth.map(|truth| &truth.clock_offsets).filter(|offsets| !offsets.is_empty()) {
         let at = |stamp: Stamp| truth[truth.partition_point(|(at, _)| *at < stamp).min(truth.len() - 1)].1 * 1e3;
         curves.push(curve("truth", CurveStyle::Truth, kept.map(|k| at(estimate[k].0)).collect()));
     }

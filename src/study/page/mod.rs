@@ -7,7 +7,7 @@ mod paths;
 mod run_results;
 mod timeline;
 
-use super::StudyError;
+use super::sampled_truth::SampledTruth;
 use crate::geometry::{Pose, Vector};
 use crate::report::Metrics;
 use crate::report::page::{MAX_PAGE_TRIANGLES, RunPage, View};
@@ -18,37 +18,36 @@ pub(super) use run_results::RunResults;
 
 impl RunResults<'_> {
     /// Gathers the data of the page.
-    pub(super) fn page<'m>(&self, metrics: &'m Metrics, manifest: &'m str) -> Result<RunPage<'m>, StudyError> {
-        Ok(RunPage {
+    pub(super) fn page<'m>(&self, metrics: &'m Metrics, manifest: &'m str) -> RunPage<'m> {
+        RunPage {
             metrics,
             manifest,
-            parts_s: self.open.timing.parts().to_vec(),
-            view: self.view()?,
+            parts: self.open.timing.parts().to_vec(),
+            view: self.view(),
             charts: charts::all(self),
             timeline: timeline::rows(self.open, &metrics.integrity.causes),
-        })
+        }
     }
 
-    fn view(&self) -> Result<View, StudyError> {
-        let (truth, base) = match self.pairs {
-            Some(_) => paths::truth(self)?,
-            None => (Vec::new(), Vec::new()),
+    fn view(&self) -> View {
+        let of_truth = |poses: fn(&SampledTruth) -> &[(Stamp, Pose)]| {
+            self.truth.map(|truth| paths::truth(self, poses(truth))).unwrap_or_default()
         };
         let world = self.world();
         let (surfaces, surfaces_are_partial) = world.map(surfaces).unwrap_or_default();
         let head = self.origin.manifest.run.as_ref().map(|run| &run.head.spec);
-        Ok(View {
+        View {
             points: cloud::points(self),
             materials: world.map_or(&[][..], World::materials).iter().map(|material| material.name.clone()).collect(),
             estimate: paths::estimate(self),
-            truth,
-            base,
+            truth: of_truth(|truth| &truth.heads),
+            base: of_truth(|truth| &truth.bases),
             surfaces,
             surface_materials: Vec::new(),
             surfaces_are_partial,
             links: head.map(|head| links::of(&head.linkage)).unwrap_or_default(),
             parts: head.map(|head| links::blocks(&head.parts)).unwrap_or_default(),
-        })
+        }
     }
 
     /// The scene, if it is known and the estimate is aligned with it.

@@ -1,10 +1,8 @@
 //! Paths of head and base, and angular velocity of the head.
 
 use super::RunResults;
-use crate::geometry::Trajectory;
-use crate::recording::RecordingError;
+use crate::geometry::{Pose, Trajectory};
 use crate::report::page::{MAX_PAGE_POSES, TimedPose};
-use crate::study::truth_cursor::TruthCursor;
 use crate::time::{Span, Stamp};
 
 /// Maximum rate of the poses: a dozen in a period of the fastest mode that is visible.
@@ -30,17 +28,16 @@ pub(super) fn estimate(results: &RunResults) -> Vec<TimedPose> {
     stamps(trajectory).filter_map(timed).collect()
 }
 
-/// The true poses of head and base at the stamps of the estimate.
-pub(super) fn truth(results: &RunResults) -> Result<(Vec<TimedPose>, Vec<TimedPose>), RecordingError> {
-    let mut cursor = TruthCursor::new(results.reader.truth());
-    let (mut heads, mut bases) = (Vec::new(), Vec::new());
+/// The poses of `sampled`, the truth at the stamps of the estimate, at the stamps of the view.
+pub(super) fn truth(results: &RunResults, sampled: &[(Stamp, Pose)]) -> Vec<TimedPose> {
+    let mut sampled = sampled.iter().peekable();
+    let mut poses = Vec::new();
     for stamp in stamps(results.best.map_from_head) {
-        let Some(state) = cursor.at(stamp)? else { continue };
-        let t_s = results.seconds(stamp);
-        heads.push(TimedPose { t_s, pose: state.world_from_head });
-        bases.extend(state.world_from_base.map(|pose| TimedPose { t_s, pose }));
+        while sampled.next_if(|(at, _)| *at < stamp).is_some() {}
+        let found = sampled.next_if(|(at, _)| *at == stamp);
+        poses.extend(found.map(|(_, pose)| TimedPose { t_s: results.seconds(stamp), pose: *pose }));
     }
-    Ok((heads, bases))
+    poses
 }
 
 /// Angular velocity of the head.

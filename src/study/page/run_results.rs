@@ -4,17 +4,18 @@ use super::super::best_estimate::BestEstimate;
 use super::super::integrity::Integrity;
 use super::super::open_loop::OpenLoopRun;
 use super::super::origin::Origin;
+use super::super::sampled_truth::SampledTruth;
 use crate::evaluation::Errors;
 use crate::evaluation::InformationBound;
 use crate::evaluation::Pairs;
 use crate::recording::CloudPoint;
-use crate::recording::Reader;
 
 /// Results of a run, from which the page is made.
 pub(in crate::study) struct RunResults<'a> {
-    pub reader: &'a Reader,
     pub origin: &'a Origin<'a>,
     pub open: &'a OpenLoopRun,
+    /// The truth at the stamps of the estimate, if it is known.
+    pub truth: Option<&'a SampledTruth>,
     pub best: &'a BestEstimate<'a>,
     /// Errors of the open loop if a closed loop was computed.
     pub open_errors: Option<&'a Errors>,

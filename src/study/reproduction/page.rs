@@ -1,7 +1,7 @@
 //! The page of the paper's experiments.
 
 use super::{ComparedNumber, Extent, Finding, Verdict};
-use crate::report::page::{ExperimentSection, PageLink, PageTable, PaperPage};
+use crate::report::page::{ExperimentSection, PageLink, PagePlot, PageTable, PaperPage};
 use crate::study::StudyError;
 use std::path::Path;
 
@@ -47,11 +47,12 @@ fn section(finding: &Finding, folder: &Path, options: &str) -> Result<Experiment
     };
     let Some(result) = result else { return Ok(unfinished) };
     let own = folder.join(&experiment.name);
-    let mut figures = Vec::new();
+    let mut plots = Vec::new();
     for (name, title) in experiment.plots() {
         let path = own.join(format!("{name}.svg"));
         if path.is_file() {
-            figures.push(((*title).to_owned(), std::fs::read_to_string(&path).map_err(StudyError::file(&path))?));
+            let svg = std::fs::read_to_string(&path).map_err(StudyError::file(&path))?;
+            plots.push(PagePlot { name: (*title).to_owned(), svg });
         }
     }
     let files = [("page of the study", "report.html"), ("table of the runs", "table.csv")];
@@ -62,7 +63,7 @@ fn section(finding: &Finding, folder: &Path, options: &str) -> Result<Experiment
     Ok(ExperimentSection {
         table: table(&experiment.name, &result.rows),
         notes: result.notes.clone(),
-        figures,
+        plots,
         links: links.collect(),
         ..unfinished
     })

@@ -2,7 +2,7 @@
 
 use super::plan::{DEFAULT_CUT_M, plan};
 use crate::geometry::{Pose, Route, Vector};
-use crate::report::page::{MAX_PAGE_TRIANGLES, MaterialRow, ScenePage, TimedPose, View};
+use crate::report::page::{MAX_PAGE_TRIANGLES, MaterialRow, NamedValue, ScenePage, TimedPose, View};
 use crate::study::StudyError;
 use crate::world::{MaterialId, World};
 
@@ -82,17 +82,17 @@ fn materials(world: &World, triangles: &[(Triangle, MaterialId)]) -> Vec<Materia
     rows
 }
 
-fn properties(world: &World, triangles: usize) -> Vec<(String, String)> {
+fn properties(world: &World, triangles: usize) -> Vec<NamedValue> {
     let (lower, upper) = world.bounds();
     let size = upper - lower;
     let mut rows = vec![
-        ("size in x, y, z".to_owned(), format!("{:.1} x {:.1} x {:.1} m", size.x, size.y, size.z)),
-        ("triangles".to_owned(), triangles.to_string()),
+        NamedValue::new("size in x, y, z", format!("{:.1} x {:.1} x {:.1} m", size.x, size.y, size.z)),
+        NamedValue::new("triangles", triangles.to_string()),
     ];
     for (name, route) in world.routes() {
         let length_m = walk(route).last().map_or(0.0, |last| last.t_s * WALK_M_PER_S);
         let kind = if route.closed { "closed" } else { "open" };
-        rows.push((format!("route {name}"), format!("{length_m:.1} m, {kind}")));
+        rows.push(NamedValue::new(format!("route {name}"), format!("{length_m:.1} m, {kind}")));
     }
     rows
 }

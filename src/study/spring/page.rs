@@ -6,7 +6,7 @@ use crate::dynamics::{GainPoints, HeadModel, HeadSpec, LinkageSpec, Mode, PartSp
 use crate::elasticity::SpringDesign;
 use crate::geometry::{Pose, Vector};
 use crate::motion::Axis;
-use crate::report::page::{NotedTable, PageTable, ShownMode, SpringPage, SpringView};
+use crate::report::page::{NamedValue, NotedTable, PageTable, ShownMode, SpringPage, SpringView};
 use crate::study::StudyError;
 use crate::study::page::links;
 use nalgebra::Complex;
@@ -32,7 +32,7 @@ pub fn page(
         summary: summary(report),
         view,
         tables: tables(head, report),
-        properties: properties(report).into_iter().map(|row| (row.name.to_owned(), row.value)).collect(),
+        properties: properties(report).into_iter().map(|row| NamedValue::new(row.name, row.value)).collect(),
     };
     Ok(page.html()?)
 }

@@ -2,7 +2,7 @@
 
 use super::summary::{LevelSummary, Summary};
 use super::{Measure, Plan};
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
+use crate::report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series, Tick};
 use crate::report::{axis_label, quantity_name};
 
 /// Height of a level's row, points: fits a line of text.
@@ -32,8 +32,12 @@ fn curve(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Chart {
     let scale = MeasureScale::of(measure, lines);
     let level = |line: &LevelSummary| line.value.unwrap_or(f64::NAN);
     let medians = lines.iter().map(|line| (level(line), scale.at(line.median))).collect();
-    let band = lines.iter().map(|line| (level(line), scale.at(line.quarter), scale.at(line.three_quarters)));
-    let band = band.filter(|(_, low, high)| low.is_finite() && high.is_finite()).collect();
+    let quartiles = |line: &&LevelSummary| BandPoint {
+        x: level(line),
+        low: scale.at(line.quarter),
+        high: scale.at(line.three_quarters),
+    };
+    let band = lines.iter().map(quartiles).filter(|at| at.low.is_finite() && at.high.is_finite()).collect();
     Chart::new("", &axis_label(axis), measure.label())
         .with(Series::line("", Colour::Estimate, medians).with_band(band))
         .with_y_ticks(scale.ticks())
@@ -48,7 +52,7 @@ fn rows(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Chart {
         [ends[0], ends[1], (f64::NAN, f64::NAN)]
     });
     let dots = lines.iter().enumerate().map(|(k, line)| (scale.at(line.median), height(k)));
-    let ticks = lines.iter().enumerate().map(|(k, line)| (height(k), line.level.clone()));
+    let ticks = lines.iter().enumerate().map(|(k, line)| Tick { at: height(k), label: line.level.clone() });
     let room = room_for_rows(scale.ends(), lines.len());
     Chart::new(&format!("By {}", quantity_name(axis)), measure.label(), "")
         .with(room)
@@ -101,14 +105,14 @@ impl MeasureScale {
     }
 
     /// Ticks of a logarithmic axis; none for a linear one, whose ticks are at round numbers.
-    fn ticks(&self) -> Vec<(f64, String)> {
+    fn ticks(&self) -> Vec<Tick> {
         self.logarithmic().map_or_else(Vec::new, |(low, high)| logarithmic_ticks(low, high))
     }
 }
 
 /// Ticks at the powers of ten around the range: with their multiples by 2 and 5 if they are few, or only every second or
 /// third power if they are many.
-fn logarithmic_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+fn logarithmic_ticks(low: f64, high: f64) -> Vec<Tick> {
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let multiples: &[u8] = if last - first <= 3 { &[1, 2, 5] } else { &[1] };
     let step = (1 + (last - first) / 5) as usize;
@@ -120,7 +124,10 @@ fn logarithmic_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let powers = (first..=last).step_by(step);
     powers
         .flat_map(|power| multiples.iter().map(move |multiple| (*multiple, power)))
-        .map(|(multiple, power)| ((f64::from(multiple) * 10_f64.powi(power)).log10(), label(multiple, power)))
+        .map(|(multiple, power)| Tick {
+            at: (f64::from(multiple) * 10_f64.powi(power)).log10(),
+            label: label(multiple, power),
+        })
         .collect()
 }
 
@@ -130,7 +137,7 @@ mod tests {
 
     #[test]
     fn logarithmic_ticks_are_round_numbers_without_an_exponent_near_one() {
-        let labels = |low, high| logarithmic_ticks(low, high).into_iter().map(|(_, label)| label).collect::<Vec<_>>();
+        let labels = |low, high| logarithmic_ticks(low, high).into_iter().map(|tick| tick.label).collect::<Vec<_>>();
         assert_eq!(labels(0.03, 2.0), ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"]);
         assert_eq!(labels(2e3, 9e9), ["1000", "1e5", "1e7", "1e9"]);
     }

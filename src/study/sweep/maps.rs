@@ -4,7 +4,7 @@ use super::runs::{Runs, level_count, level_label};
 use super::summary::quantile;
 use super::{Measure, Plan, Sweep};
 use crate::report::axis_label;
-use crate::report::plot::{Cell, Cells, Chart, Figure};
+use crate::report::plot::{Cell, Cells, Chart, Figure, Tick};
 use crate::study::StudyError;
 
 /// Maximum number of pairs of axes with a map, to keep the figure readable.
@@ -93,6 +93,6 @@ fn edges(plan: &Plan, axis: usize) -> Vec<(f64, f64)> {
 }
 
 /// Ticks with the labels of an axis's levels.
-fn level_ticks(plan: &Plan, axis: usize) -> Vec<(f64, String)> {
-    (0..level_count(plan, axis)).map(|k| (k as f64, level_label(plan, axis, k).0)).collect()
+fn level_ticks(plan: &Plan, axis: usize) -> Vec<Tick> {
+    (0..level_count(plan, axis)).map(|k| Tick { at: k as f64, label: level_label(plan, axis, k).0 }).collect()
 }

@@ -5,7 +5,7 @@ use super::output::{digits, heading, tables};
 use super::plots::PlotFile;
 use super::runs::Runs;
 use super::{Measure, Summary, Sweep, SweepStatus};
-use crate::report::page::{MAX_PAGE_RUNS, PageTable, PointColumn, RunPoints, StudyPage};
+use crate::report::page::{MAX_PAGE_RUNS, PagePlot, PageTable, PointColumn, RunPoints, StudyPage};
 use crate::report::{axis_label, quantity_name};
 use crate::study::StudyError;
 
@@ -53,7 +53,7 @@ impl Sweep {
                 status.points, status.failed, status.missing
             ),
             tables: tables.collect(),
-            figures: self.page_figures(plots)?,
+            plots: self.page_plots(plots)?,
             runs: self.page_runs(&summary.measures, &runs, &shown)?,
             runs_note,
             points: self.page_points(&summary.measures, &runs, &shown, &front)?,
@@ -61,17 +61,17 @@ impl Sweep {
     }
 
     /// The plots as SVG, each with its title, as far as there is room.
-    fn page_figures(&self, plots: &[PlotFile]) -> Result<Vec<(String, String)>, StudyError> {
-        let (mut figures, mut bytes) = (Vec::new(), 0);
+    fn page_plots(&self, plots: &[PlotFile]) -> Result<Vec<PagePlot>, StudyError> {
+        let (mut shown, mut bytes) = (Vec::new(), 0);
         for PlotFile { name, title } in plots {
             let path = self.folder.join("plots").join(format!("{name}.svg"));
             let svg = std::fs::read_to_string(&path).map_err(StudyError::file(&path))?;
             bytes += svg.len();
             if bytes <= MAX_PLOTS_BYTES {
-                figures.push((title.clone(), svg));
+                shown.push(PagePlot { name: title.clone(), svg });
             }
         }
-        Ok(figures)
+        Ok(shown)
     }
 
     /// Settings and figures of the shown runs; those that are kept link to their pages.

@@ -5,7 +5,7 @@ use super::pareto::pareto_set;
 use super::runs::Runs;
 use super::summary::{LevelSummary, Summary};
 use super::{Measure, Sweep};
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series, robust_range};
+use crate::report::plot::{Chart, Colour, Figure, Mark, Series, Tick, robust_range};
 use crate::report::quantity_name;
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
@@ -166,12 +166,12 @@ fn ratios(summary: &Summary, axis: &str, measure: Measure) -> Option<Figure> {
     }
     let named = |(index, line): (usize, &&LevelSummary)| {
         let lost = if line.lost > 0 { format!(" ({} lost)", line.lost) } else { String::new() };
-        (height(index), format!("{}{lost}", line.level))
+        Tick { at: height(index), label: format!("{}{lost}", line.level) }
     };
     let title = format!("{}: ratio to the first {}", measure.quantity(), quantity_name(axis));
     let chart = Chart::new(&title, "Ratio (median, minimum and maximum of all runs)", "")
         .with_y_ticks(lines.iter().enumerate().map(named).collect())
-        .with_x_ticks(RATIO_TICKS.map(|ratio| (ratio.log10(), ratio.to_string())).to_vec())
+        .with_x_ticks(RATIO_TICKS.map(|ratio| Tick { at: ratio.log10(), label: ratio.to_string() }).to_vec())
         .with(Series::line("", Colour::Truth, vec![(0.0, -0.5), (0.0, count - 0.5)]).marked(Mark::Dashes(1.0)))
         .with(room_for_rows(ends, lines.len()))
         .with(Series::line("range", Colour::Backdrop, ranges).marked(Mark::Line(4.0)))

@@ -6,6 +6,7 @@ use super::part::RunOutcome;
 use super::tree::Journey;
 use super::{LimitSpec, Plan, timing};
 use crate::estimation::{EstimatorSpec, Status};
+use crate::evaluation::Pairs;
 use crate::measurement::Calibration;
 use crate::recording::{Reader, Selection, TopicPreference, Writer};
 use crate::report::IntegrityMetrics;
@@ -13,11 +14,14 @@ use crate::simulation::Simulation;
 use crate::spec;
 use crate::study::calibration::calibration;
 use crate::study::closed_loop::run_closed_loop;
+use crate::study::comparison::Comparison;
 use crate::study::coverage::{Coverage, CoveragePlan, coverage};
 use crate::study::integrity::{Integrity, path_length_m};
 use crate::study::latency::{MapErrors, Reference, TimingRun, TimingSpec};
 use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
+use crate::study::sampled_truth::SampledTruth;
+use crate::study::sensor_models::RecordedSensors;
 use crate::study::{CalibrationSpec, Manifest, ProgressMonitor, StudyError, comparison};
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -227,24 +231,26 @@ fn estimate(
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&TopicPreference::default())?;
         let manifest = Manifest::in_recording(&reader)?;
-        let simulated = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
-        let (found, _) = calibration(&reader, &selection, &CalibrationSpec::default(), simulated, None)?;
+        let recorded = manifest.as_ref().and_then(|manifest| manifest.run.as_ref()).map(RecordedSensors::of);
+        let recorded = recorded.unwrap_or_default();
+        let (found, _) = calibration(&reader, &selection, &CalibrationSpec::default(), recorded, None)?;
         let how =
             OpenLoopOptions { estimator, calibration: &found.calibration, recording_surfels: closes_loops, map: None };
         let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
-        let known = comparison::compare_with_truth(&reader, &run.map_from_head, &run.covariances, &mut watch)?;
+        let truth = SampledTruth::read(&reader, &run, None)?;
+        let mut compare = |map_from_head, covariances| {
+            truth.as_ref().map(|truth| Comparison::new(map_from_head, covariances, truth, &mut watch))
+        };
+        let known = compare(&run.map_from_head, &run.covariances[..]);
         let open_loop = comparison::open_loop_metrics(&run, known.as_ref(), None);
         let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator)).transpose()?;
         let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
         let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
-        let pairs = comparison::pairs_of(&reader, map_from_head)?;
-        let closed_errors = match closed {
-            Some(_) => comparison::compare_with_truth(&reader, map_from_head, &[], &mut watch)?,
-            None => None,
-        };
+        let pairs = truth.as_ref().map(|truth| Pairs::of(map_from_head, &truth.heads)).unwrap_or_default();
+        let closed_errors = closed.as_ref().and_then(|_| compare(map_from_head, &[]));
         Ok(EstimateMetrics {
             open_loop,
-            clock: comparison::clock_metrics(&run, known.as_ref()),
+            clock: comparison::clock_metrics(&run, truth.as_ref()),
             closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
             status: integrity.status(),
             integrity: integrity.metrics(&run, Some(&pairs)),
