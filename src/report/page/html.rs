@@ -88,15 +88,38 @@ pub(super) fn summary(text: &str) -> String {
     format!("<p class=\"summary\">{}</p>", escaped(text))
 }
 
+/// A wider figure does not share its row with another, points.
+const BROAD_FIGURE: f64 = 800.0;
+
 /// Figures as SVG, each under its name.
 pub(super) fn figures(figures: &[(String, String)]) -> String {
     let figure = |(name, svg): &(String, String)| {
+        let class = if width_of(svg) > BROAD_FIGURE { "drawing broad" } else { "drawing" };
         format!(
-            "<figure class=\"drawing\" tabindex=\"0\">\n<figcaption>{}</figcaption>\n{svg}</figure>\n",
+            "<figure class=\"{class}\" tabindex=\"0\">\n<figcaption>{}</figcaption>\n{svg}</figure>\n",
             escaped(name)
         )
     };
-    figures.iter().map(figure).collect()
+    format!("<div class=\"drawings\">\n{}</div>\n", figures.iter().map(figure).collect::<String>())
+}
+
+/// Width of an SVG by its first attribute of that name; 0 without one.
+fn width_of(svg: &str) -> f64 {
+    let rest = svg.split_once(" width=\"").map_or("", |(_, rest)| rest);
+    rest.split('"').next().and_then(|width| width.parse().ok()).unwrap_or(0.0)
+}
+
+/// Escapes text with code between backticks, as in Markdown.
+pub(super) fn with_code(text: &str) -> String {
+    let parts: Vec<&str> = text.split('`').collect();
+    if parts.len() % 2 == 0 {
+        return escaped(text);
+    }
+    let part = |(k, part): (usize, &&str)| match k % 2 {
+        0 => escaped(part),
+        _ => format!("<code>{}</code>", escaped(part)),
+    };
+    parts.iter().enumerate().map(part).collect()
 }
 
 /// The verdict: icon, status and reason.
@@ -185,7 +208,16 @@ mod tests {
     }
 
     #[test]
+    fn a_broad_figure_has_its_own_row() {
+        let of_width =
+            |width: &str| figures(&[("a".to_owned(), format!("<svg viewBox=\"0 0 9 9\" width=\"{width}\"></svg>"))]);
+        assert!(of_width("1180").contains("class=\"drawing broad\"") && of_width("720").contains("class=\"drawing\""));
+    }
+
+    #[test]
     fn text_cannot_become_markup() {
+        assert_eq!(with_code("head `a<b`, `c`"), "head <code>a&lt;b</code>, <code>c</code>");
+        assert_eq!(with_code("a`b"), "a`b");
         assert_eq!(escaped("<a b=\"c\" d='e'>&\u{1b}"), "&lt;a b=&quot;c&quot; d=&#39;e&#39;&gt;&amp;\\u{1b}");
     }
 }
