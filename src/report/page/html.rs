@@ -112,7 +112,7 @@ fn width_of(svg: &str) -> f64 {
 /// Escapes text with code between backticks, as in Markdown.
 pub(super) fn with_code(text: &str) -> String {
     let parts: Vec<&str> = text.split('`').collect();
-    if parts.len() % 2 == 0 {
+    if parts.len().is_multiple_of(2) {
         return escaped(text);
     }
     let part = |(k, part): (usize, &&str)| match k % 2 {
