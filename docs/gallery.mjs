@@ -49,6 +49,8 @@ await page.screenshot({ path: join(folder, "report.png") });
 
 await page.locator("#grow").click();
 await page.setViewportSize({ width: 960, height: 900 });
+await drawn(page);
+await page.locator("#camera-oblique").click();
 const stage = page.locator(".stage");
 const end = Number(await time.getAttribute("max"));
 for (let k = 0; k <= end; k++) {

@@ -161,7 +161,10 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
     let spec_error = |error: &dyn std::error::Error| SpecError::plain(source.name.clone(), error.to_string());
     match kind {
         Kind::Scene => match World::build(&parse::<SceneSpec>(source)?, source) {
-            Ok(_) => Ok(()),
+            Ok(world) => {
+                world.notes().iter().for_each(|note| eprintln!("note: {note}"));
+                Ok(())
+            }
             Err(WorldError::Scene(error) | WorldError::Mesh(error)) => Err(error),
         },
         Kind::Head => match HeadModel::new(&HeadSpec::read(source)?, source) {

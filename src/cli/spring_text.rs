@@ -2,7 +2,7 @@
 
 use super::coverage_text;
 use zsim::report::page::PageTable;
-use zsim::report::table;
+use zsim::report::{table, wrapped};
 use zsim::study::spring::design::DesignStudy;
 use zsim::study::spring::{DesignMetrics, ShakeResponse, SpringReport, mode_table, properties, stiffness_table};
 
@@ -82,9 +82,9 @@ pub(super) fn design(study: &DesignStudy) -> String {
     if rows.is_empty() {
         return counts + "no design is within all limits: widen the bounds or relax a limit\n";
     }
-    let legend = "coil: mean diameter x wire diameter x active coils x free length, mm. Rocking frequency (Hz)\n\
-                  and field of view (deg) in closed form; field of view (deg), maximum rate (deg/s) and\n\
-                  stress / yield strength simulated. sag: static compression, mm. g: mass of the wire.\n\
-                  holds: whether the simulated figures are within the limits.\n";
+    let legend = "coil: mean diameter x wire diameter x active coils x free length, mm. Rocking frequency (Hz) and field of \
+                  view (deg) in closed form; field of view (deg), maximum rate (deg/s) and stress / yield strength simulated. \
+                  sag: static compression, mm. g: mass of the wire. holds: whether the simulated figures are within the limits.";
+    let legend = wrapped(legend, "");
     format!("{counts}\n{}\n{legend}", table(&header, &rows, true))
 }

@@ -261,7 +261,16 @@ fn direction_text(direction: &Vector) -> String {
     if direction.z.abs() > 0.9 {
         return "z".to_owned();
     }
-    format!("({:.2}, {:.2}, {:.2})", direction.x, direction.y, direction.z)
+    // Its sign is arbitrary: the largest component is positive, and 0 has no sign.
+    let largest = direction[direction.iamax()];
+    let [x, y, z] =
+        [direction.x, direction.y, direction.z].map(|part| (part * largest.signum() * 100.0).round() / 100.0 + 0.0);
+    format!("({x:.2}, {y:.2}, {z:.2})")
+}
+
+/// Text for a conditioning.
+fn conditioning_text(conditioning: f64) -> String {
+    if conditioning == 0.0 { "0".to_owned() } else { format!("{conditioning:.1e}") }
 }
 
 /// Text for a rejected start.
@@ -319,9 +328,10 @@ impl fmt::Display for WarningKind {
             }
             Self::WeakGeometry { conditioning, direction_in_map } => write!(
                 f,
-                "degenerate geometry: the lidar does not constrain {} in the map frame (conditioning {conditioning:.1e}); dead \
+                "degenerate geometry: the lidar does not constrain {} in the map frame (conditioning {}); dead \
                  reckoning with the IMU along it",
-                direction_text(direction_in_map)
+                direction_text(direction_in_map),
+                conditioning_text(*conditioning)
             ),
             Self::NotSolved { reason } => write!(f, "window solution rejected ({reason}); IMU prediction used"),
             Self::LostInMap => {

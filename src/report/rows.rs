@@ -131,7 +131,7 @@ fn cloud(metrics: &Metrics) -> Group {
     let mut rows = RowBuilder(Vec::new());
     rows.add("points", m.points, count);
     rows.add("bias", m.bias_m, length);
-    rows.add("sigma", m.sigma_m, length);
+    rows.add("sigma, static points", m.sigma_m, length);
     rows.add("sigma, true trajectory", m.sigma_by_truth_m, length);
     rows.add("95th percentile", m.p95_m, length);
     rows.add("more than 1 m off", m.far_fraction, percent);
@@ -144,7 +144,7 @@ fn cloud(metrics: &Metrics) -> Group {
     rows.add("removed: moving", fraction(m.filter.dropped_moving), percent);
     rows.add("static points removed by mistake", m.filter.standing_dropped_fraction, percent);
     rows.add("moving points removed", m.filter.movers_dropped_fraction, percent);
-    rows.add("sigma of the filtered cloud", m.filter.kept_sigma_m, length);
+    rows.add("sigma, all points in the file", m.filter.kept_sigma_m, length);
     rows.titled("cloud")
 }
 

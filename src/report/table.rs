@@ -19,8 +19,11 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
         table.set_header(header.to_vec());
     }
     table.add_rows(rows.iter().cloned());
-    // Tables of many columns have less padding; row names are not wrapped.
-    let padding = if table.column_count() > 6 { (0, 1) } else { (1, 1) };
+    // Tables of many or broad columns have less padding; row names are not wrapped.
+    let columns = table.column_count();
+    let content: usize = (0..columns).map(|k| widest(rows, k)).sum();
+    let is_broad = numbers && content + 2 * columns > room(columns);
+    let padding = if columns > 6 || is_broad { (0, 1) } else { (1, 1) };
     table.column_iter_mut().for_each(|column| {
         column.set_padding(padding);
     });
@@ -36,11 +39,9 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
 
 /// Keeps names and `numbers` on one line as far as the width permits: a broken number would be read as two.
 fn keep_whole(table: &mut Table, rows: &[Vec<String>], numbers: bool, padding: u16) {
-    let limit = usize::from(MAX_WIDTH);
+    let limit = room(table.column_count());
     let names = table.column_max_content_widths().first().map_or(0, |width| usize::from(*width));
-    let widest =
-        |k: usize| rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).max().unwrap_or(0);
-    let figures: Vec<usize> = (1..table.column_count()).map(|k| widest(k) + usize::from(padding)).collect();
+    let figures: Vec<usize> = (1..table.column_count()).map(|k| widest(rows, k) + usize::from(padding)).collect();
     let remaining = limit.saturating_sub(figures.iter().sum());
     if let Some(column) = table.column_mut(0).filter(|_| names <= limit / 2)
         && (!numbers || names + usize::from(padding) <= remaining)
@@ -52,6 +53,16 @@ fn keep_whole(table: &mut Table, rows: &[Vec<String>], numbers: bool, padding: u
             column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(width as u16)));
         });
     }
+}
+
+/// The width of the columns of a table together: one column of the terminal is on each side of each of them.
+fn room(columns: usize) -> usize {
+    usize::from(MAX_WIDTH).saturating_sub(columns + 1)
+}
+
+/// Width of the widest cell of column `k`.
+fn widest(rows: &[Vec<String>], k: usize) -> usize {
+    rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).max().unwrap_or(0)
 }
 
 /// Formats a table in Markdown; columns of numbers, except the first, are right-aligned.
@@ -84,6 +95,16 @@ pub fn summary(metrics: &Metrics) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_that_is_nearly_too_wide_has_80_columns() {
+        let numbers = ["108.34 \u{b1}39.52", "81.18 \u{b1}19.88", "8.59 \u{b1}0.00", "2.00 \u{b1}0.15", "+0.337"];
+        let row = std::iter::once("noise 10 ms").chain(numbers).map(str::to_owned).collect();
+        let header = ["timing", "cloud", "position", "cloud, on", "position, on", "clock ms"];
+        let text = table(&header, &[row], true);
+        assert!(text.lines().all(|line| line.chars().count() <= usize::from(MAX_WIDTH)), "{text}");
+        assert!(numbers.iter().all(|number| text.contains(number)), "{text}");
+    }
 
     #[test]
     fn numbers_are_not_broken_in_a_table_with_long_names() {

@@ -14,6 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::rc::Rc;
 
+/// A mesh without a unit that is longer is probably in mm, m.
+const LARGE_MESH_M: f64 = 500.0;
 /// Maximum coordinate of a surface or a route, m: beyond, single precision in the ray search is too coarse.
 const MAX_EXTENT_M: f64 = 100_000.0;
 /// Maximum nesting depth of templates: a guard against a template that contains itself.
@@ -245,6 +247,10 @@ impl Builder<'_> {
                 "{file}: removed {count} of {} triangles, which have no area",
                 count + mesh.triangles.len()
             ));
+        }
+        let size_m = mesh.size_m();
+        if unit.is_none() && scale == 1.0 && size_m > LARGE_MESH_M {
+            self.notes.push(format!("{file} is {size_m:.0} m long: if it is drawn in mm, add `unit: mm`"));
         }
         self.mesh_files.insert(path);
         let mesh = Rc::new(mesh);

@@ -125,9 +125,12 @@ impl World {
         &self.routes
     }
 
-    /// The route that a run follows by default.
+    /// The route that a run follows by default: the one that the scene names, or its only one.
     pub fn default_route(&self) -> Option<&Route> {
-        self.default_route.as_ref().and_then(|name| self.routes.get(name))
+        match &self.default_route {
+            Some(name) => self.routes.get(name),
+            None => self.routes.values().next().filter(|_| self.routes.len() == 1),
+        }
     }
 
     /// Lower and upper corner of the bounding box of all static surfaces, m.
@@ -140,7 +143,7 @@ impl World {
         self.static_surfaces.len()
     }
 
-    /// Warnings about the scene, one sentence each: triangles without area that were removed from a mesh.
+    /// Warnings about the scene, one sentence each: triangles without area that were removed from a mesh, and meshes that may be in mm.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }

@@ -27,7 +27,7 @@ pub struct SceneSpec {
     /// Routes to walk, by name.
     #[serde(default)]
     pub routes: BTreeMap<String, RouteSpec>,
-    /// The route that a run follows by default.
+    /// The route that a run follows by default; a scene with one route does not need it.
     #[serde(default)]
     pub default_route: Option<String>,
 }

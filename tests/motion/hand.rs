@@ -225,7 +225,7 @@ fn the_wave_goes_twice_round_its_box_with_constant_heading() {
 fn an_invalid_route_is_an_error_with_the_reason() {
     let error_of = |route: Option<&Route>| edited("hand", &[], route).err().unwrap().to_string();
     let line = |points: &[[f64; 3]]| route(points, false);
-    assert!(error_of(None).contains("the scene names none"));
+    assert!(error_of(None).contains("the scene has no default route"));
     assert!(error_of(Some(&line(&[[0.0; 3]]))).contains("has 1 point"));
     assert!(error_of(Some(&line(&[[0.0; 3], [0.3, 0.0, 0.0]]))).contains("0.30 m long"));
     assert!(error_of(Some(&line(&[[0.0; 3], [0.0; 3], [5.0, 0.0, 0.0]]))).contains("points 0 and 1"));

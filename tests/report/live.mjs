@@ -49,6 +49,8 @@ async function seeGrowth({ page, name }) {
 // Waits for the end of the run, and opens its report.
 async function seeEnd({ page, name }) {
   await page.locator("#end a").waitFor();
+  const title = await page.locator("h1").textContent();
+  check(title.includes("<script>window.hostile"), `${name}: the title "${title}" has not the hostile name`);
   check((await page.locator("#verdicts .verdict:visible").count()) === 1, `${name}: there is not one verdict`);
   const shown = await page.evaluate(() => window.shown);
   const grown = shown.filter(({ points, t }, k) => k > 0 && points > shown[k - 1].points && t >= shown[k - 1].t);

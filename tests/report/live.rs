@@ -1,16 +1,42 @@
-//! The page of a run that is not complete in a headless browser.
+//! The pages of a run and of an estimate that are not complete in a headless browser.
 
+use crate::command::run;
 use crate::live_run::{LiveRun, hostile_scene};
 use crate::skip::run_or_skip;
 use std::path::Path;
 use std::process::Command;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// The server of a run ends soon after the run, so two of these tests at the same time would be too slow for it.
+static TURN: Mutex<()> = Mutex::new(());
+
+fn turn() -> MutexGuard<'static, ()> {
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 #[test]
 fn the_page_of_a_run_works_in_a_browser_while_the_run_goes_on() {
+    let _turn = turn();
     let here = tempfile::tempdir().unwrap();
     let scene = hostile_scene(here.path());
     let arguments = format!("--quiet --scene {} --duration 120s --seed 3 --out out --live", scene.display());
-    let live = LiveRun::start(here.path(), &arguments);
+    use_in_a_browser(LiveRun::start(here.path(), &arguments));
+}
+
+#[test]
+fn the_page_of_an_estimate_works_in_a_browser_while_it_goes_on() {
+    let _turn = turn();
+    let here = tempfile::tempdir().unwrap();
+    let scene = hostile_scene(here.path());
+    let recording = "<script>window.hostile=1;.mcap";
+    let arguments = format!("simulate --scene {} --duration 120s --seed 3 --out {recording}", scene.display());
+    let (code, _, errors) = run(here.path(), &arguments);
+    assert_eq!(code, 0, "{errors}");
+    use_in_a_browser(LiveRun::start(here.path(), &format!("--quiet estimate {recording} --out out --live")));
+}
+
+/// Uses the page of a run in a headless browser until the run ends; fails if something on the page does not work.
+fn use_in_a_browser(live: LiveRun) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let (script, modules) = (root.join("tests/report/live.mjs"), root.join("target/ci-node/node_modules"));
     let address = format!("http://{}/", live.address);

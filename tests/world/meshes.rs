@@ -301,6 +301,16 @@ fn a_few_triangles_without_area_are_removed_with_a_note() {
 }
 
 #[test]
+fn a_mesh_that_is_probably_in_mm_has_a_note() {
+    let scene = Scene::new();
+    let of_length = |x: f64| format!("v 0 0 0\nv {x} 0 0\nv 0 1 0\nf 1 2 3\n");
+    let notes =
+        |x: f64, keys: &str| scene.build_with("stair.obj", of_length(x).as_bytes(), keys).unwrap().notes().to_vec();
+    assert_eq!(notes(2400.0, "scale: 1"), ["stair.obj is 2400 m long: if it is drawn in mm, add `unit: mm`"]);
+    assert!(notes(2400.0, "unit: mm").is_empty() && notes(100.0, "scale: 1").is_empty());
+}
+
+#[test]
 fn up_to_a_tenth_of_the_triangles_may_have_no_area() {
     let scene = Scene::new();
     let flat = |count: usize| "v 0 0 0\nv 1 1 1\nv 2 2 2\nf -3 -2 -1\n".repeat(count);

@@ -47,6 +47,16 @@ fn the_reference_scene_is_valid() {
 }
 
 #[test]
+fn the_only_route_is_the_default_route() {
+    let without = VALID.replacen("    default_route: \"way\",\n", "", 1);
+    assert_eq!(build(&without).unwrap().default_route().unwrap().points_in_world.len(), 2);
+    let way = "\"way\": (closed: false, points_m: [(0, 0, 0), (1, 0, 0)]),";
+    let two = without.replacen(way, &format!("{way}\n{}", way.replace("way", "other")), 1);
+    let world = build(&two).unwrap();
+    assert_eq!((world.routes().len(), world.default_route()), (2, None));
+}
+
+#[test]
 fn each_error_has_its_line() {
     // Text, its replacement, line of the error, and a part of the message.
     let faults = [

@@ -114,15 +114,38 @@ impl NamedValue {
     }
 }
 
+/// A wider plot does not share its row with another, points.
+const BROAD_PLOT: f64 = 800.0;
+
 /// Plots, each under its name.
 pub(super) fn plots(plots: &[PagePlot]) -> String {
     let figure = |PagePlot { name, svg }: &PagePlot| {
+        let class = if width_of(svg) > BROAD_PLOT { "drawing broad" } else { "drawing" };
         format!(
-            "<figure class=\"drawing\" tabindex=\"0\">\n<figcaption>{}</figcaption>\n{svg}</figure>\n",
+            "<figure class=\"{class}\" tabindex=\"0\">\n<figcaption>{}</figcaption>\n{svg}</figure>\n",
             escaped(name)
         )
     };
-    plots.iter().map(figure).collect()
+    format!("<div class=\"drawings\">\n{}</div>\n", plots.iter().map(figure).collect::<String>())
+}
+
+/// Width of an SVG by its first attribute of that name; 0 without one.
+fn width_of(svg: &str) -> f64 {
+    let rest = svg.split_once(" width=\"").map_or("", |(_, rest)| rest);
+    rest.split('"').next().and_then(|width| width.parse().ok()).unwrap_or(0.0)
+}
+
+/// Escapes text with code between backticks, as in Markdown.
+pub(super) fn with_code(text: &str) -> String {
+    let parts: Vec<&str> = text.split('`').collect();
+    if parts.len().is_multiple_of(2) {
+        return escaped(text);
+    }
+    let part = |(k, part): (usize, &&str)| match k % 2 {
+        0 => escaped(part),
+        _ => format!("<code>{}</code>", escaped(part)),
+    };
+    parts.iter().enumerate().map(part).collect()
 }
 
 /// The verdict: icon, status and reason.
@@ -212,7 +235,17 @@ mod tests {
     }
 
     #[test]
+    fn a_broad_figure_has_its_own_row() {
+        let of_width = |width: &str| {
+            plots(&[PagePlot { name: "a".into(), svg: format!("<svg viewBox=\"0 0 9 9\" width=\"{width}\"></svg>") }])
+        };
+        assert!(of_width("1180").contains("class=\"drawing broad\"") && of_width("720").contains("class=\"drawing\""));
+    }
+
+    #[test]
     fn text_cannot_become_markup() {
+        assert_eq!(with_code("head `a<b`, `c`"), "head <code>a&lt;b</code>, <code>c</code>");
+        assert_eq!(with_code("a`b"), "a`b");
         assert_eq!(escaped("<a b=\"c\" d='e'>&\u{1b}"), "&lt;a b=&quot;c&quot; d=&#39;e&#39;&gt;&amp;\\u{1b}");
     }
 }

@@ -62,7 +62,7 @@ impl PaperPage {
 impl ExperimentSection {
     fn html(&self) -> String {
         let table = if self.table.rows.is_empty() { String::new() } else { self.table.html() };
-        let notes: String = self.notes.iter().map(|note| format!("<li>{}</li>\n", escaped(note))).collect();
+        let notes: String = self.notes.iter().map(|note| format!("<li>{}</li>\n", html::with_code(note))).collect();
         let link = |link: &PageLink| format!("<a href=\"{}\">{}</a>", escaped(&link.address), escaped(&link.name));
         let links: Vec<String> = self.links.iter().map(link).collect();
         let links = if links.is_empty() { String::new() } else { format!("<p>{}</p>\n", links.join(", ")) };

@@ -23,10 +23,12 @@ impl PageTable {
 
     /// The table, which scrolls if it is too wide.
     pub(super) fn html(&self) -> String {
-        let class = |k: usize| match self.rows.first().and_then(|row| row.get(k)) {
-            Some(cell) if k > 0 && is_figure(cell.as_str()) => " class=\"figure\"",
-            _ => "",
-        };
+        // A column is aligned as a whole.
+        let of_figures: Vec<bool> = (0..self.header.len())
+            .map(|k| k > 0 && self.rows.iter().filter_map(|row| row.get(k)).all(|cell| is_figure(cell)))
+            .collect();
+        let has_figures = |k: usize| of_figures.get(k).copied().unwrap_or_default();
+        let class = |k: usize| if has_figures(k) { " class=\"figure\"" } else { "" };
         let name = |(k, cell): (usize, &String)| match cell.as_str() {
             "" => "<td></td>".to_owned(),
             name => format!("<th scope=\"col\"{}>{}</th>", class(k), escaped(name)),
@@ -35,7 +37,7 @@ impl PageTable {
         let row = |(row, cells): (usize, &Vec<String>)| {
             let cells = cells.iter().enumerate().map(|(k, cell)| match k {
                 0 => format!("<th scope=\"row\">{}</th>", self.named(row, cell)),
-                _ if is_figure(cell) => format!("<td>{}</td>", escaped(cell)),
+                _ if has_figures(k) => format!("<td>{}</td>", escaped(cell)),
                 _ => format!("<td class=\"text\">{}</td>", escaped(cell)),
             });
             format!("<tr>{}</tr>\n", cells.collect::<String>())

@@ -55,8 +55,12 @@ impl Figure {
         let mut top = 0.0;
         let width = self.width / self.columns as f64;
         for (row, height) in self.rows() {
+            let header = row.iter().try_fold(0.0, |most: f64, chart| {
+                Ok::<_, PlotError>(most.max(frame::extra_header_height(&canvas, chart, width)?))
+            })?;
             for (column, chart) in row.iter().enumerate() {
-                frame::draw(&canvas, chart, (column as f64 * width, top), (width, height))?;
+                let corner = (column as f64 * width, top);
+                frame::draw(&canvas, chart, corner, (width, height), header)?;
             }
             top += height;
         }

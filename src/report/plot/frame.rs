@@ -59,16 +59,27 @@ pub(super) fn height_of(chart: &Chart, width: f64, wanted: f64) -> f64 {
     ((width - LEFT - RIGHT) * shape).clamp(150.0, 620.0) + TOP + BOTTOM
 }
 
-/// Draws a chart into the rectangle of `size` at the upper left `corner`.
+/// Height of the title and legend above that of a single line, for a chart of this width, points.
+pub(super) fn extra_header_height<DB: DrawingBackend>(
+    canvas: &Canvas<DB>,
+    chart: &Chart,
+    width: f64,
+) -> Result<f64, PlotError> {
+    let left = left_margin(canvas, chart)?;
+    Ok(Header::of(canvas, chart, width - left - RIGHT)?.extra_height())
+}
+
+/// Draws a chart into the rectangle of `size` at the upper left `corner`; `extra` is the extra height of the headers of
+/// its row, so that the axes of a row have one height.
 pub(super) fn draw<DB: DrawingBackend>(
     canvas: &Canvas<DB>,
     chart: &Chart,
     corner: CanvasPoint,
     size: (f64, f64),
+    extra: f64,
 ) -> Result<(), PlotError> {
     let left = left_margin(canvas, chart)?;
     let header = Header::of(canvas, chart, size.0 - left - RIGHT)?;
-    let extra = header.extra_height();
     let frame = frame_of(chart, (corner.0, corner.1 + extra), (size.0, size.1 - extra), left);
     grid(canvas, &frame, chart)?;
     heat_map(canvas, &frame, chart)?;

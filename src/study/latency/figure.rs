@@ -6,8 +6,12 @@ use crate::study::sweep::ConfidenceInterval;
 
 /// Angular rate at the ends of the colour scale, degrees/s; larger rates saturate the colour.
 const FULL_COLOUR_DEG_PER_S: f64 = 150.0;
-/// Width of a panel, points.
-const PANEL_WIDTH: f64 = 400.0;
+/// Area of the axes of a panel, square points.
+const PANEL_AREA: f64 = 72_000.0;
+/// Minimum and maximum width of the axes of a panel, points.
+const AXES_WIDTH: (f64, f64) = (160.0, 440.0);
+/// Approximate room beside the axes of a panel, points.
+const PANEL_MARGIN: f64 = 90.0;
 
 /// An error measure of a run.
 type ErrorMeasure = fn(&LatencyRun) -> ConfidenceInterval;
@@ -27,8 +31,15 @@ pub fn map_figure(study: &LatencyResult, clock: ClockState) -> Figure {
         }
     }
     let mut figure = Figure::of(charts).in_columns(columns);
-    figure.width = PANEL_WIDTH * columns as f64;
+    figure.width = panel_width(study) * columns as f64;
     figure
+}
+
+/// Width of a panel, points: a high section has narrow panels.
+fn panel_width(study: &LatencyResult) -> f64 {
+    let range = study.runs.iter().find_map(|run| Some(run.section.as_ref()?.range_m));
+    let shape = range.map_or(1.0, |((left, right), (low, high))| (right - left) / (high - low));
+    (PANEL_AREA * shape).sqrt().clamp(AXES_WIDTH.0, AXES_WIDTH.1) + PANEL_MARGIN
 }
 
 fn label(disturbance: Disturbance, is_noise: bool) -> String {

@@ -41,13 +41,13 @@ pub fn text_table(study: &LatencyResult) -> String {
     let noise = |run: &&LatencyRun| row(format!("noise {} ms", run.disturbance.noise_ms), run.disturbance);
     let rows: Vec<Vec<String>> = latencies.iter().map(latency).chain(noises.iter().skip(1).map(noise)).collect();
     let header = ["timing", "cloud", "position", "cloud, on", "position, on", "clock ms"];
-    format!(
-        "{}\nCloud: standard deviation about the true surfaces, mm. Position: RMSE, mm. First with the clock state off, then on; clock: \
+    let words = format!(
+        "Cloud: standard deviation about the true surfaces, mm. Position: RMSE, mm. First with the clock state off, then on; clock: \
          error of the estimated offset at the end. Intervals: 95 %, bootstrap of blocks of {} s.\n\n{}\n",
-        report::table(&header, &rows, true),
         study.block_s,
         conclusions(study).join("\n")
-    )
+    );
+    format!("{}\n{}", report::table(&header, &rows, true), report::wrapped(&words, ""))
 }
 
 /// Conclusions from the curves, one sentence each.

@@ -19,12 +19,19 @@ const EVALUATED_RETURNS: usize = 60_000;
 /// Maximum number of returns in the section's plot: limits the size of the SVG.
 const SHOWN_RETURNS: usize = 6000;
 
-/// Size of the shown part of the section (along it, up), m.
+/// Maximum size of the shown part of the section (along it, up), m.
 const SECTION_SIZE_M: (f64, f64) = (3.6, 2.8);
 /// Maximum distance of the shown part's edges from the section's centre (along it, up), m.
 const REACH_M: (f64, f64) = (5.0, 2.4);
 /// Side of the grid cells for the choice of the shown part, m.
 const CELL_M: f64 = 0.05;
+/// Fraction of the occupied cells on each side that do not determine the shown range.
+const OUTERMOST: f64 = 0.03;
+/// Margin of the shown range about its cells: at least this, m, and this fraction of it.
+const MARGIN_M: f64 = 0.15;
+const MARGIN: f64 = 0.05;
+/// Minimum ratio of the shorter to the longer side of the shown range.
+const MIN_SIDE_RATIO: f64 = 0.36;
 
 /// A return that truly is from a static surface.
 #[derive(Debug, Clone, Copy)]
@@ -153,10 +160,10 @@ impl ReturnSampler<'_> {
     }
 }
 
-/// The range of size [`SECTION_SIZE_M`] in the section with the most occupied grid cells.
+/// The range that shows the part of the section with the most occupied grid cells, of at most [`SECTION_SIZE_M`].
 ///
-/// Counting cells rather than points keeps a dense nearby surface from dominating. Of several equal ranges, the leftmost
-/// and then the lowest is chosen. It is moved so that its occupied cells are in the middle.
+/// Counting cells rather than points keeps a dense nearby surface from dominating. Of several equal parts, the leftmost
+/// and then the lowest is chosen. The range fits the occupied cells of the part, so that these fill the plot.
 fn densest_range(coordinates: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
     let cells: BTreeSet<(i64, i64)> =
         coordinates.iter().map(|(x, y)| ((x / CELL_M).round() as i64, (y / CELL_M).round() as i64)).collect();
@@ -175,12 +182,25 @@ fn densest_range(coordinates: &[(f64, f64)]) -> ((f64, f64), (f64, f64)) {
     let (left, low) = best.1;
     let within = cells.iter().filter(|(x, y)| (left..left + size.0).contains(x) && (low..low + size.1).contains(y));
     let (across, up): (Vec<i64>, Vec<i64>) = within.copied().unzip();
-    let centred = |cells: &[i64], low: i64, size: i64, size_m: f64| {
-        let ends = cells.iter().min().zip(cells.iter().max());
-        let middle_m = ends.map_or((2 * low + size) as f64, |(first, last)| (first + last) as f64) * 0.5 * CELL_M;
-        (middle_m - 0.5 * size_m, middle_m + 0.5 * size_m)
-    };
-    (centred(&across, left, size.0, SECTION_SIZE_M.0), centred(&up, low, size.1, SECTION_SIZE_M.1))
+    let (across, up) = (fitted(across), fitted(up));
+    let length = |(low, high): (f64, f64)| high - low;
+    (widened(across, length(up) * MIN_SIDE_RATIO), widened(up, length(across) * MIN_SIDE_RATIO))
+}
+
+/// The range of these cells with a margin, m, without a few outermost cells on each side.
+fn fitted(mut cells: Vec<i64>) -> (f64, f64) {
+    cells.sort_unstable();
+    let left_out = (cells.len() as f64 * OUTERMOST) as usize;
+    let ends = cells.get(left_out).zip(cells.iter().rev().nth(left_out));
+    let (low, high) = ends.map_or((0.0, 0.0), |(first, last)| (*first as f64 * CELL_M, *last as f64 * CELL_M));
+    let margin_m = MARGIN_M.max(MARGIN * (high - low));
+    (low - margin_m, high + margin_m)
+}
+
+/// The range with the same middle and at least this length.
+fn widened((low, high): (f64, f64), length: f64) -> (f64, f64) {
+    let more = 0.5 * (length - (high - low)).max(0.0);
+    (low - more, high + more)
 }
 
 #[cfg(test)]
@@ -193,9 +213,19 @@ mod tests {
         let floor = (0..1000).map(|k| (-2.0 + 0.0002 * f64::from(k), -1.5));
         let walls = (0..60).flat_map(|k| [(2.0, 1.0 - 0.025 * f64::from(k)), (2.0 - 0.025 * f64::from(k), 1.0)]);
         let ((left, right), (low, high)) = densest_range(&floor.chain(walls).collect::<Vec<_>>());
-        // The walls are in the middle: their centre is (1.26, 0.26).
-        assert!((left + right - 2.52).abs() < 2.0 * CELL_M && (low + high - 0.52).abs() < 2.0 * CELL_M);
-        assert!(left <= 0.6 && right >= 2.0 && low <= -0.4 && high >= 1.0, "{left} {right} {low} {high}");
-        assert!((right - left - SECTION_SIZE_M.0).abs() < 1e-12 && (high - low - SECTION_SIZE_M.1).abs() < 1e-12);
+        // The walls end at 0.525 and 2, and at -0.475 and 1; they fill at least three quarters of the range each way.
+        assert!(left < 0.6 && right > 2.1 && low < -0.4 && high > 1.1, "{left} {right} {low} {high}");
+        assert!(right - left < 1.475 / 0.75 && high - low < 1.475 / 0.75, "{left} {right} {low} {high}");
+    }
+
+    #[test]
+    fn the_range_of_one_wall_is_narrow_and_that_of_no_points_not_empty() {
+        // A wall of 2 m at x = 1; one point far from it does not matter.
+        let wall = (0..80).map(|k| (1.0, -1.0 + 0.025 * f64::from(k))).chain([(2.5, 0.0)]);
+        let ((left, right), (low, high)) = densest_range(&wall.collect::<Vec<_>>());
+        assert!((left + right - 2.0).abs() < 2.0 * CELL_M && right - left < 1.0, "{left} {right}");
+        assert!(low < -1.0 && high > 0.975 && high - low < 2.5, "{low} {high}");
+        let ((left, right), (low, high)) = densest_range(&[]);
+        assert!(left < right && low < high);
     }
 }

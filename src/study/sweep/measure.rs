@@ -153,7 +153,7 @@ impl Measure {
             Self::RateP99DegPerS => ("rate_p99_deg_per_s", "rate 99 %", "Rate, 99 % quantile (°/s)", "deg/s", 1.0),
             Self::Saturated => ("saturated", "saturated", "Time with a saturated gyroscope (%)", "%", 1e2),
             Self::RockingHz => ("rocking_hz", "rocking", "Rocking frequency (Hz)", "Hz", 1.0),
-            Self::PeakGain => ("peak_gain", "gain", "Peak gain of the pitch rate", "1", 1.0),
+            Self::PeakGain => ("peak_gain", "gain", "Peak gain", "1", 1.0),
             Self::SagMm => ("sag_mm", "sag", "Static compression (mm)", "mm", 1.0),
             Self::SpringMassG => ("spring_mass_g", "mass", "Mass of the spring (g)", "g", 1.0),
             Self::StressShare => ("stress_share", "stress", "Stress over yield strength (%)", "%", 1e2),

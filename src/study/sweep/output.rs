@@ -181,6 +181,8 @@ fn ratio(line: &LevelSummary) -> String {
 
 /// A number with about three significant digits.
 pub(super) fn digits(x: f64) -> String {
+    // What would be -0.0000 is 0.
+    let x = if x.abs() < 0.000_05 { 0.0 } else { x };
     match x.abs() {
         size if size.is_nan() => "-".to_owned(),
         size if size.is_infinite() => "lost".to_owned(),

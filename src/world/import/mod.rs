@@ -30,6 +30,18 @@ pub(super) struct MeshTriangles {
     pub without_area: usize,
 }
 
+impl MeshTriangles {
+    /// The longest side of the bounding box, m.
+    pub fn size_m(&self) -> f64 {
+        let side = |axis: usize| {
+            let coordinates = self.triangles.iter().flatten().map(|corner| corner[axis]);
+            let (low, high) = coordinates.fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+            high - low
+        };
+        (0..3).map(side).fold(0.0, f64::max)
+    }
+}
+
 /// Reads the mesh in a file. `scale` is metres per unit of the file; `up` overrides the up axis of the format.
 pub(super) fn read(path: &Path, scale: f64, up: Option<UpAxis>) -> Result<MeshTriangles, MeshError> {
     let meta = std::fs::metadata(path)?;

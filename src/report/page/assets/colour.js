@@ -8,7 +8,7 @@ const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00
   ["#7f3b08", "#7fc97f", "#1b3a6b", "#f4a6a0", "#4d6b1e", "#a8d0d8", "#8b1a5c"],
 );
 // The two materials that cover most of a scene are neutral.
-const NEUTRAL = ["#d8d4cb", "#a39e94"];
+const NEUTRAL = ["#d8d4cb", "#8a6f4d"];
 const UNKNOWN_COLOUR = "#8a8f96";
 
 // 256 colours for the codes of a quantity; the last one is for unknown values.

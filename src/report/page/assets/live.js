@@ -136,6 +136,7 @@ const redraw = (line, path, isShown) => {
   line.geometry = new vendor.LineGeometry();
   line.geometry.setPositions(positions);
   line.visible = isShown;
+  if (line.casing) line.casing.geometry = line.geometry;
   if (!line.material.dashed) return;
   line.material.dashSize = line.material.gapSize = dashLength(positions);
   line.computeLineDistances();
@@ -151,9 +152,9 @@ const fitView = () => {
   const [from, to] = cloud.heights;
   if (!reader.hasSliced) fitSlice(from, to);
   else for (const id of ["low", "high"]) [byId(id).min, byId(id).max] = [from, to];
-  const { extent } = view;
-  if (!reader.hasMoved && (extent.radius > GROWTH * radius || extent.radius < radius / 2)) {
-    radius = extent.radius;
+  const shown = radiusOf(view.extent);
+  if (!reader.hasMoved && (shown > GROWTH * radius || shown < radius / 2)) {
+    radius = shown;
     view.whole("oblique");
   }
   view.draw();

@@ -8,8 +8,7 @@ const LEAST_SHAKEN = 1e-4;
 const ASSUMED_M = 0.06;
 // Length of the axes as a fraction of the radius of the view.
 const AXIS_FRACTION = 0.38;
-// Radius of the view over that of head and linkage at rest, and the largest displacement of a mode, m.
-const MARGIN = 1.25;
+// The largest displacement of a mode, m.
 const LARGEST_SHIFT_M = 0.04;
 
 const fixedBase = { position: new vendor.Vector3(), quaternion: new vendor.Quaternion() };
@@ -63,7 +62,7 @@ class ModesView extends Stage {
   addAxes() {
     this.axes = new vendor.Group();
     this.axes.position.copy(centre);
-    const length = AXIS_FRACTION * this.extent.radius;
+    const length = AXIS_FRACTION * radiusOf(this.extent);
     this.axisMaterial = new vendor.LineMaterial({ linewidth: 2, depthTest: false, transparent: true });
     this.axisNames = ["x", "y", "z"].map((name, axis) => {
       const end = [0, 1, 2].map((k) => (k === axis ? length : 0));
@@ -77,7 +76,7 @@ class ModesView extends Stage {
     this.scene.add(this.axes);
   }
 
-  // Centre and radius of head and linkage at rest.
+  // The box of head and linkage at rest, with room for their displacement.
   get extent() {
     const points = data.parts.flatMap(partCorners);
     if (!points.length) points.push(rest.position.clone().subScalar(ASSUMED_M), rest.position.clone().addScalar(ASSUMED_M));
@@ -89,7 +88,8 @@ class ModesView extends Stage {
     }
     const low = points.reduce((low, point) => low.min(point), new vendor.Vector3(1e9, 1e9, 1e9));
     const high = points.reduce((high, point) => high.max(point), new vendor.Vector3(-1e9, -1e9, -1e9));
-    return { centre: low.clone().add(high).multiplyScalar(0.5), radius: (MARGIN * high.distanceTo(low)) / 2 + LARGEST_SHIFT_M };
+    const room = new vendor.Vector3(1, 1, 0.5).multiplyScalar(LARGEST_SHIFT_M);
+    return { low: low.sub(room), high: high.add(room) };
   }
 
   // Shows a mode (null: the rest pose) displaced by an amount.

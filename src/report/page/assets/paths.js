@@ -49,7 +49,8 @@ const pathPositions = (path) => {
   return positions;
 };
 
-// A path as a line that nothing hides; the truth is dashed and in front.
+// A path as a line that nothing hides; the truth is dashed and in front. The casing of the other one separates it from points and
+// surfaces of a similar colour.
 const pathLine = (path, isDashed) => {
   const options = { linewidth: isDashed ? 1.6 : 3, depthTest: false, depthWrite: false, transparent: true };
   const positions = pathPositions(path);
@@ -57,7 +58,11 @@ const pathLine = (path, isDashed) => {
   const line = wideLine(positions, new vendor.LineMaterial(isDashed ? { ...options, ...dashes } : options));
   if (isDashed && positions.length) line.computeLineDistances();
   line.renderOrder = isDashed ? 3 : 2;
-  return line;
+  if (isDashed) return line;
+  line.casing = new vendor.Line2(line.geometry, new vendor.LineMaterial({ ...options, linewidth: 6, opacity: 0.8 }));
+  line.casing.frustumCulled = false;
+  line.casing.renderOrder = 1;
+  return line.add(line.casing);
 };
 
 // Round or square markers of a fixed size on the screen: start, end and present position.

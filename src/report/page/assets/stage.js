@@ -10,7 +10,24 @@ const ARROWS = {
 // Colour of the theme for a shader.
 const shaderColour = (name) => new vendor.Vector3(...rgb(themeColour(name)).map((c) => c / 255));
 
-// A view derives from it, gives the centre and radius of what it shows as `extent`, and calls `start` when the scene is complete.
+// Half the size of the picture that "whole" fills, as a fraction.
+const FILLED = 0.92;
+
+const radiusOf = ({ low, high }) => low.distanceTo(high) / 2;
+
+// The corners of a box; the bits of the index choose the sides.
+const boxCorners = ({ low, high }) =>
+  Array.from({ length: 8 }, (_, bits) => new vendor.Vector3(...[0, 1, 2].map((axis) => ((bits >> axis) & 1 ? high : low).getComponent(axis))));
+
+// Where the camera must be on an axis of its picture, and how far back, so that it sees all corners between lines of sight with
+// this slope. Corners are in the axes of the camera: x to the right, y up, z back.
+const fitted = (corners, axis, slope) => {
+  const reach = (sign) => Math.max(...corners.map((corner) => sign * corner.getComponent(axis) + slope * corner.z));
+  const [right, left] = [reach(1), reach(-1)];
+  return { middle: (right - left) / 2, back: (right + left) / (2 * slope) };
+};
+
+// A view derives from it, gives the box of what it shows as `extent`, and calls `start` when the scene is complete.
 class Stage {
   constructor(canvas) {
     this.canvas = canvas;
@@ -39,14 +56,21 @@ class Stage {
 
   // Shows everything, from one of three directions.
   whole(from) {
-    const { centre, radius } = this.extent;
-    const portrait = Math.max(1, 0.9 / this.camera.aspect);
-    const away = (radius / Math.sin((this.camera.fov * Math.PI) / 360)) * 0.84 * portrait;
-    this.camera.position.set(...this.directions[from]).normalize().multiplyScalar(away).add(centre);
+    const { extent } = this;
+    this.camera.position.set(...this.directions[from]);
+    this.camera.lookAt(0, 0, 0);
+    const { quaternion } = this.camera;
+    const turned = boxCorners(extent).map((corner) => corner.applyQuaternion(quaternion.clone().invert()));
+    const half = FILLED * Math.tan((this.camera.fov * Math.PI) / 360);
+    const [x, y] = [half * this.camera.aspect, half].map((slope, axis) => fitted(turned, axis, slope));
+    const target = extent.low.clone().add(extent.high).multiplyScalar(0.5).applyQuaternion(quaternion.clone().invert());
+    const place = new vendor.Vector3(x.middle, y.middle, Math.max(x.back, y.back));
+    const away = place.z - target.z;
+    this.camera.position.copy(place).applyQuaternion(quaternion);
+    this.controls.target.set(place.x, place.y, target.z).applyQuaternion(quaternion);
     this.camera.near = Math.max(away / 1000, 0.02);
     this.camera.far = away * 20;
     this.camera.updateProjectionMatrix();
-    this.controls.target.copy(centre);
     this.controls.update();
     this.draw();
   }

@@ -7,6 +7,11 @@ const svgElement = (parent, tag, attributes) => {
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   return element;
 };
+// A round time between ticks, s: there are at most seven.
+const tickStep = (duration) => {
+  const decade = 10 ** Math.floor(Math.log10(duration / 6));
+  return decade * [1, 2, 5, 10].find((digit) => digit * decade >= duration / 6);
+};
 const percentOf = (t) => `${(100 * Math.min(Math.max(t / duration, 0), 1)).toFixed(3)}%`;
 const span = ([from, to]) => (to - from > 0.05 ? `${from.toFixed(1)} to ${to.toFixed(1)} s` : `${from.toFixed(1)} s`);
 
@@ -40,8 +45,10 @@ if (data.timeline.length) {
   const lines = data.timeline.map((row) => timelineRow(rows, row));
   const ticks = rows.appendChild(document.createElement("div"));
   ticks.className = "ticks";
-  for (let k = 0; k <= 4; k++) {
-    ticks.appendChild(document.createElement("span")).textContent = `${((k / 4) * duration).toFixed(0)} s`;
+  for (let t = 0; t <= 1.01 * duration; t += tickStep(duration)) {
+    const tick = addElement(ticks, "span", `${Number(t.toFixed(1))} s`);
+    tick.style.left = percentOf(t);
+    tick.style.transform = `translateX(-${percentOf(t)})`;
   }
   const picked = rows.appendChild(document.createElement("p"));
   picked.id = "picked";

@@ -64,7 +64,7 @@ class View extends Stage {
     timer.listeners.push((t) => this.move(t));
   }
 
-  // Centre and radius of the path and most of the cloud, or of the surfaces.
+  // The box of the path and most of the cloud, or of the surfaces.
   get extent() {
     const [low, high] = [new vendor.Vector3(1e9, 1e9, 1e9), new vendor.Vector3(-1e9, -1e9, -1e9)];
     const spread = (values) => [values[Math.floor(0.02 * values.length)], values[Math.floor(0.98 * (values.length - 1))]];
@@ -81,8 +81,9 @@ class View extends Stage {
       const poses = estimate.t.map((_, k) => estimate.pose[7 * k + axis]).sort();
       if (poses.length) add(axis, spread(poses));
     }
-    if (low.x > high.x) return { centre: new vendor.Vector3(), radius: 5 };
-    return { centre: low.clone().add(high).multiplyScalar(0.5), radius: Math.max(high.distanceTo(low) / 2, 0.5) };
+    if (low.x > high.x) return { low: new vendor.Vector3(-3, -3, -3), high: new vendor.Vector3(3, 3, 3) };
+    const margin = 0.25;
+    return { low: low.subScalar(margin), high: high.addScalar(margin) };
   }
 
   // The sorted coordinates of the corners of the surfaces along an axis.
@@ -121,6 +122,7 @@ class View extends Stage {
   paint() {
     const set = (material, name) => material.color.set(themeColour(name));
     set(this.estimate.material, "estimate");
+    set(this.estimate.casing.material, "stage");
     set(this.truth.material, "truth");
     if (!isScene) set(this.surfaces.material, "soft");
     set(this.cloud.beams.material, "second");
@@ -149,7 +151,7 @@ class View extends Stage {
     const isShown = Boolean(poses?.base);
     byId("closeup-label").hidden = !isShown;
     if (!isShown) return;
-    const size = Math.round(Math.min(0.34 * Math.min(width, height), 220));
+    const size = Math.round(Math.min(0.3 * Math.min(width, height), 180));
     const forward = new vendor.Vector3(1, 0, 0).applyQuaternion(poses.base.quaternion);
     const heading = Math.atan2(forward.y, forward.x) - 1.2;
     const away = CLOSE_UP_M / 2 / Math.tan((this.closeUp.fov * Math.PI) / 360);
