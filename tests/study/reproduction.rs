@@ -9,7 +9,7 @@ use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
 use zsim::motion::Axis;
 use zsim::study::StudyError;
 use zsim::study::gains::with_damping;
-use zsim::study::reproduction::{Experiment, Extent, PeaksSpec, fit_damping};
+use zsim::study::reproduction::{Experiment, Extent, PeaksSpec, Verdict, fit_damping};
 use zsim::study::sweep::Runner;
 
 const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
@@ -199,4 +199,29 @@ fn the_shipped_experiments_are_valid() {
     for name in Experiment::all() {
         Experiment::load(&name).unwrap();
     }
+}
+
+#[test]
+fn five_fixed_views_drift_less_than_none_in_the_smoke_test_of_motion_capture() {
+    let here = tempfile::tempdir().unwrap();
+    let experiment = Experiment::load("fig11").unwrap();
+    let (stop, on_progress) = (AtomicBool::new(false), |_: f64| {});
+    let runner = Runner { program: Path::new(ZSIM), stop: &stop, on_progress: &on_progress };
+    let result = experiment.run(here.path(), Extent::Quick, false, &runner).unwrap();
+    assert_eq!(result.rows.len(), 7);
+    let claim = result.rows[6].comparison.as_ref().unwrap();
+    assert!(claim.verdict == Verdict::Agrees && claim.median < 1.0, "{result:?}");
+    let drift = result.rows[0].comparison.as_ref().unwrap();
+    assert!(drift.paper == Some(75.0) && drift.unit == "mm/min" && drift.median > 0.0, "{drift:?}");
+}
+
+#[test]
+fn an_experiment_with_a_level_that_its_study_lacks_is_an_error() {
+    let here = tempfile::tempdir().unwrap();
+    let path = here.path().join("wrong.ron");
+    let text = r#"runs((figure: "1", title: "t", study: "paper_office", quick: (duration_s: 9.0), notes: [],
+        results: [(figure: "1", what: "w", level: "attic", measure: position_rmse_m, goal: 1.0)]))"#;
+    std::fs::write(&path, text).unwrap();
+    let error = Experiment::load(path.to_str().unwrap()).unwrap_err().to_string();
+    assert!(error.contains("no level \"attic\""), "{error}");
 }

@@ -1,10 +1,10 @@
 //! An experiment: its spec, its run, and its stored result.
 
-use super::{ExperimentResult, ExperimentSpec, Extent, TimingMapsSpec, gain_curves, timing};
+use super::{ExperimentResult, ExperimentSpec, Extent, gain_curves, runs, timing};
 use crate::spec::{Kind, Source, find, names, parse, to_text};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
-use crate::study::sweep::{ContentHash, Plan, Runner};
+use crate::study::sweep::{ContentHash, Plan, Runner, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -80,7 +80,10 @@ impl Experiment {
                 gain_curves::run(spec, &spec.heads(&self.source)?, extent, folder, anew, runner)?
             }
             ExperimentSpec::Latency(spec) => {
-                timing::run(&spec.figure, &self.timing_plan(spec, extent)?, folder, anew, runner)?
+                timing::run(&spec.figure, &self.plan(spec.study(extent, &self.source)?)?, folder, anew, runner)?
+            }
+            ExperimentSpec::Runs(spec) => {
+                runs::run(spec, &self.plan(spec.study(extent, &self.source)?)?, folder, anew, runner)?
             }
         };
         let stored = StoredResult { inputs: self.inputs(extent)?, result };
@@ -106,6 +109,7 @@ impl Experiment {
         match &self.spec {
             ExperimentSpec::GainCurves(spec) => format!("Figure {}: gain curves of heads on springs", spec.figure),
             ExperimentSpec::Latency(spec) => format!("Figure {}: maps with latency and timing noise", spec.figure),
+            ExperimentSpec::Runs(spec) => format!("Figure {}: {}", spec.figure, spec.title),
         }
     }
 
@@ -118,11 +122,11 @@ impl Experiment {
                 ("maps_clock_on", "Maps with timing errors, clock state on"),
                 ("curves", "Errors over latency and timing noise"),
             ],
+            ExperimentSpec::Runs(_) => &[],
         }
     }
 
-    fn timing_plan(&self, spec: &TimingMapsSpec, extent: Extent) -> Result<Plan, StudyError> {
-        let (study, source) = spec.study(extent, &self.source)?;
+    fn plan(&self, (study, source): (SweepSpec, Source)) -> Result<Plan, StudyError> {
         Plan::new(&self.name, &study, &source)
     }
 
@@ -130,8 +134,14 @@ impl Experiment {
     fn inputs(&self, extent: Extent) -> Result<String, StudyError> {
         let text = match &self.spec {
             ExperimentSpec::GainCurves(spec) => to_text(&(extent, &self.spec, spec.heads(&self.source)?))?,
-            ExperimentSpec::Latency(spec) => to_text(&(extent, &self.spec, self.timing_plan(spec, extent)?.text()?))?,
+            ExperimentSpec::Latency(spec) => self.text_with(extent, spec.study(extent, &self.source)?)?,
+            ExperimentSpec::Runs(spec) => self.text_with(extent, spec.study(extent, &self.source)?)?,
         };
         Ok(ContentHash::of([env!("CARGO_PKG_VERSION"), &text].map(str::as_bytes)).to_string())
+    }
+
+    /// The experiment and its study as text.
+    fn text_with(&self, extent: Extent, study: (SweepSpec, Source)) -> Result<String, StudyError> {
+        Ok(to_text(&(extent, &self.spec, self.plan(study)?.text()?))?)
     }
 }

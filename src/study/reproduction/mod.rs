@@ -14,6 +14,7 @@ mod head_response;
 mod page;
 mod paper_table;
 mod result;
+mod runs;
 mod spec;
 mod timing;
 
@@ -24,4 +25,6 @@ pub use extent::Extent;
 pub use page::paper_page;
 pub use paper_table::{TABLE_HEADING, paper_table};
 pub use result::{ComparedNumber, ExperimentResult};
-pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, TimingMapsSpec};
+pub use spec::{
+    ClaimSpec, DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, QuickSpec, ResultSpec, RunsSpec, TimingMapsSpec,
+};

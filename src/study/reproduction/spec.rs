@@ -5,7 +5,7 @@ use crate::dynamics::HeadSpec;
 use crate::motion::Axis;
 use crate::spec::{Kind, Source, SpecError, checked, find_from, parse};
 use crate::study::gains::AXES;
-use crate::study::sweep::{BaseSpec, SweepSpec};
+use crate::study::sweep::{AxisSpec, BaseSpec, Measure, SweepSpec};
 use serde::{Deserialize, Serialize};
 
 /// An experiment of the paper.
@@ -16,6 +16,75 @@ pub enum ExperimentSpec {
     GainCurves(GainCurvesSpec),
     /// Maps of one recording with timing errors.
     Latency(TimingMapsSpec),
+    /// Measures of the runs of a study.
+    Runs(RunsSpec),
+}
+
+/// Measures of the runs of a study, compared with the paper and with goals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunsSpec {
+    /// Number of the figure in the paper.
+    pub figure: String,
+    /// What the experiment shows.
+    pub title: String,
+    /// The study: a name under `specs/studies/`, or a file. It has one axis.
+    pub study: String,
+    /// The smoke test.
+    pub quick: QuickSpec,
+    /// Results to compare.
+    pub results: Vec<ResultSpec>,
+    /// Statements of the paper about two levels.
+    #[serde(default)]
+    pub claims: Vec<ClaimSpec>,
+    /// Assumptions and discrepancies.
+    pub notes: Vec<String>,
+}
+
+/// The smoke test of an experiment: the first seed of its study, with shorter runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct QuickSpec {
+    /// Duration of a run, s.
+    #[serde(with = "checked::Positive")]
+    pub duration_s: f64,
+}
+
+/// A measure of a level of the study, median and worst of the seeds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ResultSpec {
+    /// Number of the figure in the paper.
+    pub figure: String,
+    /// Name of the quantity.
+    pub what: String,
+    /// Level of the study's axis.
+    pub level: String,
+    /// Measure of the study.
+    pub measure: Measure,
+    /// Number in the paper, in the display unit of the measure (mm, mm/min, degrees/min, ms).
+    #[serde(default)]
+    pub paper: Option<f64>,
+    /// What the paper states, if more than the number.
+    #[serde(default)]
+    pub paper_text: Option<String>,
+    /// Goal for the median, in the same unit; the worst may be twice as large.
+    #[serde(with = "checked::Positive")]
+    pub goal: f64,
+}
+
+/// A statement of the paper: a measure is smaller at one level than at another.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ClaimSpec {
+    /// The statement.
+    pub what: String,
+    /// Measure of the study.
+    pub measure: Measure,
+    /// Level with the smaller median.
+    pub smaller: String,
+    /// Level with the larger median.
+    pub larger: String,
 }
 
 /// Gain curves of several heads.
@@ -102,6 +171,7 @@ impl ExperimentSpec {
     pub fn check(&self, source: &Source) -> Result<(), SpecError> {
         match self {
             ExperimentSpec::GainCurves(spec) => spec.heads(source).map(drop),
+            ExperimentSpec::Runs(spec) => spec.study(Extent::Whole, source).map(drop),
             ExperimentSpec::Latency(spec) => {
                 [Extent::Whole, Extent::Quick].into_iter().try_for_each(|extent| spec.study(extent, source).map(drop))
             }
@@ -125,6 +195,38 @@ impl TimingMapsSpec {
             BaseSpec::Journey { timing: Some(_), .. } => Ok((spec, of_study)),
             _ => Err(SpecError::about(source, key, format!("the study \"{name}\" has no `timing`"))),
         }
+    }
+}
+
+impl RunsSpec {
+    /// The study of an extent, and its source.
+    ///
+    /// # Errors
+    /// As [`ExperimentSpec::check`].
+    pub(super) fn study(&self, extent: Extent, source: &Source) -> Result<(SweepSpec, Source), SpecError> {
+        let of_study = find_from(Kind::Study, source, &self.study)?;
+        let mut spec: SweepSpec = parse(&of_study)?;
+        let wrong = |key: &str, message: String| Err(SpecError::about(source, key, message));
+        let [AxisSpec::Levels { levels, .. }] = spec.axes.as_slice() else {
+            return wrong("study", format!("the study \"{}\" does not have one axis with named levels", self.study));
+        };
+        let results = self.results.iter().map(|result| (&result.level, result.measure));
+        let claims = self.claims.iter().flat_map(|claim| [&claim.smaller, &claim.larger].map(|of| (of, claim.measure)));
+        for (level, measure) in results.chain(claims) {
+            if levels.iter().all(|other| other.name != *level) {
+                return wrong("results", format!("the study \"{}\" has no level \"{level}\"", self.study));
+            }
+            if !spec.measures.contains(&measure) {
+                return wrong("results", format!("the study \"{}\" does not measure {}", self.study, measure.key()));
+            }
+        }
+        if extent == Extent::Quick {
+            spec.seeds.truncate(1);
+            if let BaseSpec::Journey { duration_s, .. } = &mut spec.base {
+                *duration_s = self.quick.duration_s;
+            }
+        }
+        Ok((spec, of_study))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::axis::Levels;
 use super::design::AxisPosition;
 use super::table::ColumnType;
-use super::{Plan, Sweep};
+use super::{Measure, Plan, Sweep};
 use crate::study::StudyError;
 
 /// Number of bins of a continuous axis in summaries and plots.
@@ -45,6 +45,21 @@ impl Runs {
     /// Row of run `number` in the table.
     pub fn row(&self, number: u64) -> Option<usize> {
         self.numbers.binary_search(&number).ok()
+    }
+}
+
+impl Sweep {
+    /// A measure of the runs at a level of the first axis, by name, in the unit of files; `None` for a failed run.
+    ///
+    /// # Errors
+    /// If the sweep is not merged.
+    pub(in crate::study) fn values_at(&self, level: &str, measure: Measure) -> Result<Vec<Option<f64>>, StudyError> {
+        let table = self.open_merged(&self.table())?;
+        let Some(axis) = self.plan.axes().first() else { return Ok(Vec::new()) };
+        let levels = table.column(&axis.name, ColumnType::Text)?.texts();
+        let values = table.column(measure.key(), ColumnType::Numbers)?.numbers();
+        let at_level = levels.into_iter().zip(values).filter(|(of, _)| of.as_deref() == Some(level));
+        Ok(at_level.map(|(_, value)| value).collect())
     }
 }
 
