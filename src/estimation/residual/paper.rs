@@ -43,10 +43,9 @@ pub(in crate::estimation) fn add_inertial(
 ) {
     let (mut gyro, mut accel) = (ResidualSums::none(), ResidualSums::none());
     let near_steps = near_steps(nodes.intervals);
-    let interval = |k: usize| if near_steps[k] { with_step_margin(&nodes.intervals[k]) } else { nodes.intervals[k] };
     let mut before: Option<(Interval, Inertial)> = None;
-    for k in 0..nodes.intervals.len() {
-        let interval = interval(k);
+    for (k, interval) in nodes.intervals.iter().enumerate() {
+        let interval = if near_steps[k] { with_step_margin(interval) } else { *interval };
         let terms = Inertial::between(&nodes.states[k], &nodes.states[k + 1], &interval, biases, gravity);
         let (start, end) = (&nodes.bases[k], &nodes.bases[k + 1]);
         GyroResidual::of(&terms, start, end, &interval)
