@@ -77,7 +77,7 @@ impl<const N: usize> SineSum<N> {
 /// A bin of a spectrum, represented by one sinusoid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FrequencyBin {
-    /// Frequency of the sinusoid: drawn at random within the bin, so that the sum does not repeat.
+    /// Frequency of the sinusoid: random within the bin, so that the sum does not repeat.
     pub at: f64,
     /// Width of the bin.
     pub width: f64,
@@ -108,7 +108,7 @@ pub(super) fn log_bins((low, high): (f64, f64), count: usize, stream: &mut Strea
     let bin = |k| {
         let start = low * ratio.powf(f64::from(k));
         let at = start * ratio.powf(stream.random::<f64>());
-        // The width at the drawn frequency makes the expected power of the bin equal to the integral of the density:
+        // The width at the random frequency makes the expected power of the bin equal to the integral of the density:
         // with a uniform logarithm, density * f * ln(ratio) has that mean.
         FrequencyBin { at, width: at * ratio.ln(), phase: random_phase(stream) }
     };

@@ -23,7 +23,7 @@ pub struct Stamper {
     noise: Stream,
     /// Noisy stamps that are not yet assigned: as many as can precede the stamp of the next sample.
     pending: BinaryHeap<Reverse<Stamp>>,
-    drawn: u64,
+    generated: u64,
     returned: u64,
     last: Option<Stamp>,
 }
@@ -31,14 +31,14 @@ pub struct Stamper {
 impl Stamper {
     /// Stamps for samples at `first`, `first + period_s`, ... on the crystal of `clock`.
     pub fn new(clock: Clock, first: Stamp, period_s: f64, noise: Stream) -> Self {
-        Self { clock, first, period_s, noise, pending: BinaryHeap::new(), drawn: 0, returned: 0, last: None }
+        Self { clock, first, period_s, noise, pending: BinaryHeap::new(), generated: 0, returned: 0, last: None }
     }
 
     fn draw(&mut self) -> Stamp {
         let z: f64 = StandardNormal.sample(&mut self.noise);
         let jitter_s = self.clock.jitter_s() * z.clamp(-MAX_JITTER_SIGMAS, MAX_JITTER_SIGMAS);
-        let since_first = self.drawn as f64 * self.period_s + jitter_s;
-        self.drawn += 1;
+        let since_first = self.generated as f64 * self.period_s + jitter_s;
+        self.generated += 1;
         self.first + Span::from_seconds(since_first)
     }
 }
@@ -51,7 +51,7 @@ impl Iterator for Stamper {
         // A later sample gets an earlier stamp only if their jitters differ by the time between them, which is at most
         // 2 MAX_JITTER_SIGMAS sigma.
         let lookahead = (2.0 * MAX_JITTER_SIGMAS * self.clock.jitter_s() / self.period_s).ceil() as u64;
-        while self.drawn <= self.returned + lookahead {
+        while self.generated <= self.returned + lookahead {
             let stamp = self.draw();
             self.pending.push(Reverse(stamp));
         }

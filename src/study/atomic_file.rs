@@ -55,7 +55,7 @@ impl Write for AtomicFile {
     }
 }
 
-/// Writes a text file atomically, with the temporary file beside it.
+/// Writes a text file atomically, with the temporary file next to it.
 ///
 /// # Errors
 /// When the folder or the file cannot be written.
@@ -63,7 +63,7 @@ pub fn replace_text(target: &Path, text: &str) -> Result<(), StudyError> {
     replace_bytes(target, text.as_bytes())
 }
 
-/// Writes a file atomically, with the temporary file beside it.
+/// Writes a file atomically, with the temporary file next to it.
 ///
 /// # Errors
 /// When the folder or the file cannot be written.

@@ -23,7 +23,7 @@ pub(super) enum Anchor {
     Sideways,
 }
 
-/// How lines and text are drawn.
+/// Output of lines and text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pen {
     /// As vector elements (SVG).

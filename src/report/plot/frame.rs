@@ -14,7 +14,7 @@ const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;
 const LEFT: f64 = 72.0;
 const RIGHT: f64 = 18.0;
-/// Distance of the vertical label from the edge of the chart, and its room beside custom tick labels, points.
+/// Distance of the vertical label from the edge of the chart, and its room next to custom tick labels, points.
 const VERTICAL_LABEL: f64 = 14.0;
 const VERTICAL_LABEL_ROOM: f64 = 16.0;
 /// Approximate minimum distance between ticks, points.

@@ -24,7 +24,7 @@ const COLOUR_BAR: f64 = 96.0;
 pub(super) struct Header<'a> {
     title: Vec<String>,
     lines: Vec<Vec<Entry<'a>>>,
-    /// Whether the last line of the title has no legend beside it.
+    /// Whether the last line of the title has no legend next to it.
     title_is_separate: bool,
 }
 

@@ -10,7 +10,7 @@ const FULL_COLOUR_DEG_PER_S: f64 = 150.0;
 const PANEL_AREA: f64 = 72_000.0;
 /// Minimum and maximum width of the axes of a panel, points.
 const AXES_WIDTH: (f64, f64) = (160.0, 440.0);
-/// Approximate room beside the axes of a panel, points.
+/// Approximate room next to the axes of a panel, points.
 const PANEL_MARGIN: f64 = 90.0;
 
 /// An error measure of a run.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// Height of the cut above the route's floor, m, as of an architect's plan.
 pub const DEFAULT_CUT_M: f64 = 1.2;
-/// Maximum number of edges behind a cut; the longest are drawn.
+/// Maximum number of edges behind a cut; the longest are shown.
 const MAX_EDGES: usize = 8_000;
 /// Edges whose ends are drawn within this distance are one line, m.
 const SAME_LINE_M: f64 = 0.01;

@@ -40,7 +40,7 @@ impl Sweep {
 
 /// Length of the longest label of an axis of text, characters; 0 for a numeric axis.
 ///
-/// The axis of a map with the longer labels is vertical, where labels are beside each other.
+/// The axis of a map with the longer labels is vertical, where labels are next to each other.
 fn label_length(plan: &Plan, axis: usize) -> usize {
     if plan.axes()[axis].is_number() {
         return 0;
