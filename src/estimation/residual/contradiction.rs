@@ -1,6 +1,6 @@
 //! Contradiction between the IMU measurements and a trajectory.
 
-use super::inertial::Inertial;
+use super::imu_residual::Inertial;
 use crate::estimation::strapdown::{Biases, Interval, State};
 use crate::geometry::Vector;
 

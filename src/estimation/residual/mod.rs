@@ -1,6 +1,7 @@
 //! Residuals of the window with derivatives: IMU, matched surfels, priors.
 
 pub(super) mod contradiction;
+mod imu_residual;
 pub(super) mod inertial;
 mod knot_span;
 mod layout;

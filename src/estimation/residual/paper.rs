@@ -24,9 +24,10 @@
 //!
 //! Every sample has its full weight.
 
-use super::inertial::{GyroResidual, Inertial, Nodes, near_steps, offset, with_step_margin};
-use super::rows::{KNOTS, ResidualRow, ResidualSums};
-use super::{ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, Layout};
+use super::Layout;
+use super::imu_residual::{AccelResidual, GyroResidual, Inertial, ResidualSum, offset, span_of};
+use super::inertial::{Nodes, near_steps, with_step_margin};
+use super::rows::{KNOTS, ResidualSums};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::spline::Basis;
 use crate::estimation::strapdown::{Biases, Interval};
@@ -53,7 +54,7 @@ pub(in crate::estimation) fn add_inertial(
             .add_to(&mut gyro, equations, layout);
         if let Some(before) = before {
             let pair = [before, (interval, terms)];
-            SecondDifference::at(k, nodes, &pair, biases, gravity).add_to(times_s[k], &mut accel, equations, layout);
+            second_difference(k, times_s[k], nodes, &pair, biases, gravity).add_to(1.0, &mut accel, equations, layout);
         }
         before = Some((interval, terms));
     }
@@ -61,88 +62,52 @@ pub(in crate::estimation) fn add_inertial(
     accel.flush_to(equations, layout);
 }
 
-/// The accelerometer's residual at a node, map axes, with the derivatives by the unknowns.
-#[derive(Debug, Clone, Copy)]
-struct SecondDifference {
-    /// Index of the first knot, and how many knots.
-    first: i64,
-    used: usize,
-    /// m/s^2.
-    deviation: Vector,
-    sigma: f64,
-    by_shift: [f64; KNOTS],
-    by_turn: [Matrix; KNOTS],
-    /// By the bias, and by the columns of the scale and misalignment matrix.
-    by_accel: [Matrix; 4],
-    by_tilt: Matrix,
-    by_clock: Vector,
-}
-
-impl SecondDifference {
-    /// The residual at node `k`, between two intervals.
-    fn at(k: usize, nodes: &Nodes<'_>, pair: &[(Interval, Inertial); 2], biases: &Biases, gravity: &Vector) -> Self {
-        let [h0, h1] = [pair[0].0.h, pair[1].0.h];
-        let scale = 2.0 / (h0 + h1);
-        // Weights of the three positions in the second difference.
-        let weights = [scale / h0, -scale / h0 - scale / h1, scale / h1];
-        let measured = (0..3).map(|i| nodes.states[k + i - 1].position * weights[i]).sum::<Vector>();
-        let (mut predicted, mut by_clock) = (*gravity, Vector::zeros());
-        let mut by_accel = [Matrix::zeros(); 4];
-        for ((interval, terms), sign) in pair.iter().zip([-1.0, 1.0]) {
-            let (h, from_body) = (interval.h, &terms.map_from_middle);
-            let force = interval.force_in_middle(biases);
-            let slope = interval.force_slope(biases, &force);
-            let weight = 0.5 * scale * h;
-            predicted += from_body * (force * weight - slope * (sign * scale * h * h / 12.0));
-            by_clock -= from_body * interval.accel_slope * weight;
-            let readings = [1.0, interval.accel.x, interval.accel.y, interval.accel.z];
-            by_accel.iter_mut().zip(readings).for_each(|(by, reading)| *by += from_body * (weight * reading));
-        }
-        let bases = [-1, 0, 1].map(|i: isize| &nodes.bases[k.wrapping_add_signed(i)]);
-        let first = bases[0].first;
-        let mut by_shift = [0.0; KNOTS];
-        for (basis, weight) in bases.iter().zip(weights) {
-            add_basis(&mut by_shift, basis, first, |value, by| *by += weight * value);
-        }
-        let mut by_turn = [Matrix::zeros(); KNOTS];
-        let by_rotation = skew(&(measured - gravity));
-        add_basis(&mut by_turn, bases[1], first, |value, by| *by += by_rotation * value);
-        Self {
-            first,
-            used: 4 + offset(bases[2].first, first),
-            deviation: measured - predicted,
-            sigma: 0.5 * (pair[0].0.accel_sigma + pair[1].0.accel_sigma),
-            by_shift,
-            by_turn,
-            by_accel,
-            by_tilt: skew(gravity),
-            by_clock,
-        }
+/// The accelerometer's residual at node `k`, between two intervals; the node is `time_s` after the clock's reference.
+fn second_difference(
+    k: usize,
+    time_s: f64,
+    nodes: &Nodes<'_>,
+    pair: &[(Interval, Inertial); 2],
+    biases: &Biases,
+    gravity: &Vector,
+) -> AccelResidual {
+    let [h0, h1] = [pair[0].0.h, pair[1].0.h];
+    let scale = 2.0 / (h0 + h1);
+    // Weights of the three positions in the second difference.
+    let weights = [scale / h0, -scale / h0 - scale / h1, scale / h1];
+    let measured = (0..3).map(|i| nodes.states[k + i - 1].position * weights[i]).sum::<Vector>();
+    let (mut predicted, mut by_clock) = (*gravity, Vector::zeros());
+    let mut by_accel = [Matrix::zeros(); 4];
+    for ((interval, terms), sign) in pair.iter().zip([-1.0, 1.0]) {
+        let (h, from_body) = (interval.h, &terms.map_from_middle);
+        let force = interval.force_in_middle(biases);
+        let slope = interval.force_slope(biases, &force);
+        let weight = 0.5 * scale * h;
+        predicted += from_body * (force * weight - slope * (sign * scale * h * h / 12.0));
+        by_clock -= from_body * interval.accel_slope * weight;
+        let readings = [1.0, interval.accel.x, interval.accel.y, interval.accel.z];
+        by_accel.iter_mut().zip(readings).for_each(|(by, reading)| *by += from_body * (weight * reading));
     }
-
-    /// Adds the residual, of a node `time_s` after the clock's reference.
-    fn add_to(&self, time_s: f64, rows: &mut ResidualSums, equations: &mut NormalEquations, layout: &Layout) {
-        for axis in 0..3 {
-            let mut row = ResidualRow::from(self.first);
-            for knot in 0..self.used {
-                for i in 0..3 {
-                    *row.knot(knot, i) = self.by_turn[knot][(axis, i)];
-                }
-                *row.knot(knot, 3 + axis) = self.by_shift[knot];
-            }
-            for i in 0..3 {
-                *row.border(ACCEL_BIAS + i) = self.by_accel[0][(axis, i)];
-            }
-            for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
-                *row.border(ACCEL_MATRIX + 3 * i + j) = self.by_accel[1 + j][(axis, i)];
-            }
-            for i in 0..2 {
-                *row.border(GRAVITY + i) = self.by_tilt[(axis, i)];
-            }
-            *row.border(CLOCK) = self.by_clock[axis];
-            *row.border(CLOCK_RATE) = self.by_clock[axis] * time_s;
-            rows.add(&row, self.deviation[axis], self.sigma.powi(-2), equations, layout);
-        }
+    let bases = [-1, 0, 1].map(|i: isize| &nodes.bases[k.wrapping_add_signed(i)]);
+    let first = bases[0].first;
+    let mut by_shift = [0.0; KNOTS];
+    for (basis, weight) in bases.iter().zip(weights) {
+        add_basis(&mut by_shift, basis, first, |value, by| *by += weight * value);
+    }
+    let mut by_turn = [Matrix::zeros(); KNOTS];
+    let by_rotation = skew(&(measured - gravity));
+    add_basis(&mut by_turn, bases[1], first, |value, by| *by += by_rotation * value);
+    let sigma = 0.5 * (pair[0].0.accel_sigma + pair[1].0.accel_sigma);
+    let used = 4 + offset(bases[2].first, first);
+    AccelResidual {
+        span: span_of(bases[1]),
+        sigma,
+        sum: ResidualSum { first, used, deviation: measured - predicted, variance: sigma * sigma },
+        by_shift,
+        by_turn,
+        by_accel,
+        by_tilt: skew(gravity),
+        by_clock: [by_clock, by_clock * time_s],
     }
 }
 
@@ -157,7 +122,7 @@ mod tests {
     use super::*;
     use crate::estimation::imu_signal::ImuSignal;
     use crate::estimation::nominal::Correction;
-    use crate::estimation::residual::GYRO_BIAS;
+    use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
     use crate::estimation::strapdown::State;
     use crate::geometry::{Rotation, gravity_in_world};
     use approx::assert_relative_eq;
@@ -251,8 +216,8 @@ mod tests {
             terms.map_from_end * terms.rate / interval.gyro_sigma
         };
         let force = |k| {
-            let at = SecondDifference::at(k, &nodes, &[terms(k - 1), terms(k)], biases, gravity);
-            at.deviation / at.sigma
+            let at = second_difference(k, 0.0, &nodes, &[terms(k - 1), terms(k)], biases, gravity);
+            at.sum.deviation / at.sigma
         };
         let all = (0..COUNT).map(rate).chain((1..COUNT).map(force));
         DVector::from_vec(all.flat_map(|residual: Vector| [residual.x, residual.y, residual.z]).collect())

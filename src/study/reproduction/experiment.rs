@@ -4,7 +4,7 @@ use super::{ExperimentResult, ExperimentSpec, Extent, gain_curves, runs, timing}
 use crate::spec::{Kind, Source, find, names, parse, to_text};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
-use crate::study::sweep::{ContentHash, Plan, Runner, SweepSpec};
+use crate::study::sweep::{ContentHash, MergedReport, Plan, Runner, Shard, Sweep, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -80,10 +80,11 @@ impl Experiment {
                 gain_curves::run(spec, &spec.heads(&self.source)?, extent, folder, anew, runner)?
             }
             ExperimentSpec::Latency(spec) => {
-                timing::run(&spec.figure, &self.plan(spec.study(extent, &self.source)?)?, folder, anew, runner)?
+                let (sweep, report) = self.run_study(spec.study(extent, &self.source)?, folder, anew, runner)?;
+                timing::result(&spec.figure, &report.latency.ok_or_else(|| sweep.failed())?, folder)?
             }
             ExperimentSpec::Runs(spec) => {
-                runs::run(spec, &self.plan(spec.study(extent, &self.source)?)?, folder, anew, runner)?
+                runs::result(spec, &self.run_study(spec.study(extent, &self.source)?, folder, anew, runner)?.0)?
             }
         };
         let stored = StoredResult { inputs: self.inputs(extent)?, result };
@@ -124,6 +125,20 @@ impl Experiment {
             ],
             ExperimentSpec::Runs(_) => &[],
         }
+    }
+
+    /// Runs a study in `folder`, and merges its results.
+    fn run_study(
+        &self,
+        study: (SweepSpec, Source),
+        folder: &Path,
+        anew: bool,
+        runner: &Runner,
+    ) -> Result<(Sweep, MergedReport), StudyError> {
+        let sweep = self.plan(study)?.write(folder, anew)?;
+        sweep.run(Shard::WHOLE, runner)?;
+        let report = sweep.merge_and_report()?;
+        Ok((sweep, report))
     }
 
     fn plan(&self, (study, source): (SweepSpec, Source)) -> Result<Plan, StudyError> {

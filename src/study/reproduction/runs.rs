@@ -3,22 +3,12 @@
 use super::spec::{ClaimSpec, ResultSpec, RunsSpec};
 use super::{ComparedNumber, Comparison, ExperimentResult};
 use crate::study::StudyError;
-use crate::study::sweep::{Measure, Plan, Runner, Shard, Sweep};
-use std::path::Path;
+use crate::study::sweep::{Measure, Sweep};
 
-/// Runs the study, and compares measures of its levels with the paper and the goals.
-pub(super) fn run(
-    spec: &RunsSpec,
-    plan: &Plan,
-    folder: &Path,
-    anew: bool,
-    runner: &Runner,
-) -> Result<ExperimentResult, StudyError> {
-    let sweep = plan.write(folder, anew)?;
-    sweep.run(Shard::WHOLE, runner)?;
-    sweep.merge_and_report()?;
-    let results = spec.results.iter().map(|result| compared(result, &sweep));
-    let claims = spec.claims.iter().map(|claim| claimed(spec, claim, &sweep));
+/// Compares measures of the levels of the finished study with the paper and the goals.
+pub(super) fn result(spec: &RunsSpec, sweep: &Sweep) -> Result<ExperimentResult, StudyError> {
+    let results = spec.results.iter().map(|result| compared(result, sweep));
+    let claims = spec.claims.iter().map(|claim| claimed(spec, claim, sweep));
     let rows = results.chain(claims).collect::<Result<_, StudyError>>()?;
     Ok(ExperimentResult { rows, notes: spec.notes.clone() })
 }

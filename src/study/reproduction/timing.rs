@@ -3,7 +3,6 @@
 use super::{ComparedNumber, Comparison, ExperimentResult};
 use crate::study::StudyError;
 use crate::study::latency::{ClockState, Disturbance, LatencyResult, conclusions, curve_figure, map_figure};
-use crate::study::sweep::{Plan, Runner, Shard};
 use std::path::Path;
 
 /// What the paper shows of a map with latency.
@@ -11,25 +10,16 @@ const MISALIGNED: &str = "visible misalignment";
 /// A map whose sigma exceeds that without timing errors by this factor counts as visibly misaligned.
 const VISIBLE_FACTOR: f64 = 1.2;
 
-/// Runs the study, draws figures, and compares with the paper.
-pub(super) fn run(
-    figure: &str,
-    plan: &Plan,
-    folder: &Path,
-    anew: bool,
-    runner: &Runner,
-) -> Result<ExperimentResult, StudyError> {
-    let sweep = plan.write(folder, anew)?;
-    sweep.run(Shard::WHOLE, runner)?;
-    let study = sweep.merge_and_report()?.latency.ok_or_else(|| sweep.failed())?;
+/// Draws the figures of the finished study in `folder`, and compares with the paper.
+pub(super) fn result(figure: &str, study: &LatencyResult, folder: &Path) -> Result<ExperimentResult, StudyError> {
     for (name, figure) in [
-        ("maps", map_figure(&study, ClockState::Off)),
-        ("maps_clock_on", map_figure(&study, ClockState::On)),
-        ("curves", curve_figure(&study)),
+        ("maps", map_figure(study, ClockState::Off)),
+        ("maps_clock_on", map_figure(study, ClockState::On)),
+        ("curves", curve_figure(study)),
     ] {
         figure.save(folder, name)?;
     }
-    Ok(compare(figure, &study))
+    Ok(compare(figure, study))
 }
 
 /// Compares the maps with the paper's.
