@@ -29,6 +29,7 @@ mod matches;
 mod neighbours;
 mod places;
 mod scene;
+mod sensed_motion;
 mod spec;
 mod submaps;
 #[cfg(test)]
@@ -53,6 +54,7 @@ use matches::{MatchStatistics, Matches};
 use neighbours::Neighbours;
 use places::PreAligned;
 use scene::Scene;
+use sensed_motion::sensed_motion;
 use trajectory_difference::largest_difference;
 
 /// Maximum correction in one solve, m and rad; a larger one is rejected as implausible.
@@ -190,7 +192,9 @@ impl Problem<'_> {
     fn solve(&self, lidar_model: LidarModel) -> RegistrationResult<Registered> {
         let empty = RegistrationReport::default();
         let RegistrationInput { map_from_head, covariances, observed, .. } = self.input;
-        let corrected = CorrectedTrajectory::new(map_from_head, covariances, observed.origin, self.spec);
+        let sensed =
+            sensed_motion(map_from_head, observed).map_err(|_| Box::new((empty, "the motion is not finite")))?;
+        let corrected = CorrectedTrajectory::new(map_from_head, &sensed, covariances, observed.origin, self.spec);
         let corrected = corrected.ok_or_else(|| Box::new((empty, "no trajectory")))?;
         let (loops, pre_aligned) = places::close_loops(map_from_head, observed, &corrected, self.matcher, self.spec);
         let report = RegistrationReport { loops, ..empty };
@@ -217,8 +221,8 @@ impl Problem<'_> {
     ) -> RegistrationResult<Registered> {
         let RegistrationInput { map_from_head, covariances, .. } = self.input;
         for _ in 0..MAX_ROUNDS {
-            let corrected =
-                CorrectedTrajectory::new(&pre_aligned.trajectory, covariances, pre_aligned.observed.origin, self.spec);
+            let (start, origin) = (&pre_aligned.trajectory, pre_aligned.observed.origin);
+            let corrected = CorrectedTrajectory::new(start, start, covariances, origin, self.spec);
             let corrected = corrected.ok_or_else(|| Box::new((report, "no trajectory")))?;
             let corrected = corrected.with_gravity_from(map_from_head, &pre_aligned.trajectory);
             let registered = Registration::run(self, corrected, lidar_model, &pre_aligned.observed, report)?;
