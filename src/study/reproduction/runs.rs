@@ -127,7 +127,7 @@ mod tests {
         assert!(!wrong(run(Some(0.0), 0.04, 1.0)) && !wrong(run(Some(0.0), 0.39, 40.0)));
         assert!(!wrong(run(Some(1.0), 9.0, 40.0)) && !wrong(run(None, 9.0, 40.0)));
         let runs = [run(Some(0.0), 0.01, 40.0), run(Some(0.0), 0.03, 40.0), run(Some(2.0), 5.0, 40.0)];
-        assert_eq!(statuses(&runs), "2 good, 1 lost; error 30.0 mm, worst 5000 mm of 3 runs");
+        assert_eq!(statuses(&runs), "2 good, 1 lost; error 30.0 mm, worst 5000 of 3 runs");
     }
 
     #[test]
