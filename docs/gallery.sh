@@ -2,7 +2,7 @@
 # Makes the pictures of README and docs with zsim: docs/gallery.sh [FOLDER], by default docs/pictures.
 #
 # Needs zsim (ZSIM, by default target/release/zsim), Chromium, Node with playwright-core (target/ci-node, from .ci/run), and
-# Python with Pillow. Takes a minute on two cores.
+# Python with Pillow. Takes three minutes on two cores.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 zsim=$(realpath "${ZSIM:-target/release/zsim}")
@@ -18,6 +18,18 @@ trap 'rm -rf "$work"' EXIT
 "$zsim" --quiet coverage --head handheld --motion hand --duration 20s --out "$work/coverage" >/dev/null
 node docs/gallery.mjs "${NODE_MODULES:-target/ci-node/node_modules}" "$work/plan.svg" "$work/office/report.html" \
   "$work/spring/report.html" "$work"
+
+# Scenes: plan and perspective. Heads of the paper's figure 2 on their springs.
+mkdir "$work/scenes"
+for file in scenes/*.ron; do
+  name=$(basename "$file" .ron)
+  "$zsim" --quiet scene plan "$name" "$work/scenes/$name.svg" >/dev/null
+  "$zsim" --quiet scene view "$name" "$work/scenes/$name.html" >/dev/null
+done
+for name in handheld handheld_2 backpack vehicle_three_springs vehicle_stiff_spring; do
+  "$zsim" --quiet spring "$name" --out "$work/scenes/$name" >/dev/null
+done
+node docs/scenes.mjs "${NODE_MODULES:-target/ci-node/node_modules}" "$work/scenes"
 
 # Each PNG gets a palette of 256 colours and at most 1200 px (octree: median cut loses colours of small areas); the frames of
 # the map become an animated WebP.
@@ -43,6 +55,25 @@ for name, file in files.items():
     side = 1050 if name == "report" else 1200
     picture.thumbnail((side, side), Image.Resampling.LANCZOS)
     picture.quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(pictures / f"{name}.png", optimize=True)
+
+(pictures / "scenes").mkdir(exist_ok=True)
+for view in sorted((work / "scenes").glob("*-view.png")):
+    name = view.name.removesuffix("-view.png")
+    for kind in ["view", "plan"]:
+        picture = Image.open(work / "scenes" / f"{name}-{kind}.png").convert("RGB")
+        picture.thumbnail((700, 900), Image.Resampling.LANCZOS)
+        picture.save(pictures / "scenes" / f"{name}-{kind}.webp", quality=55, method=6)
+
+heads = ["handheld", "handheld_2", "backpack", "vehicle_three_springs", "vehicle_stiff_spring"]
+sides = [Image.open(work / "scenes" / f"{head}.png").convert("RGB") for head in heads]
+for side in sides:
+    side.thumbnail((400, 400), Image.Resampling.LANCZOS)
+row = Image.new("RGB", (sum(side.width for side in sides), sides[0].height), "white")
+left = 0
+for side in sides:
+    row.paste(side, (left, 0))
+    left += side.width
+row.save(pictures / "designs.webp", quality=60, method=6)
 
 frames = [Image.open(file).convert("RGB") for file in sorted(work.glob("frame-*.png"))]
 height = round(640 * frames[0].height / frames[0].width)

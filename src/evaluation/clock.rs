@@ -19,6 +19,17 @@ pub fn clock_error(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Option<
     Some(ClockError { offset_rmse_s: mean_square.sqrt(), offset_end_error_s: last })
 }
 
+/// The absolute error of the offset `after_s` seconds after the first estimate: that of the last estimate until then, s.
+///
+/// `None` if the estimate ends earlier, or the truth does not cover the time.
+pub fn clock_error_after(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)], after_s: f64) -> Option<f64> {
+    let (first, _) = estimate.first()?;
+    let next = estimate.partition_point(|(stamp, _)| stamp.seconds_since(*first) <= after_s);
+    let is_covered = estimate.last()?.0.seconds_since(*first) >= after_s;
+    let (stamp, offset_s) = estimate[next.checked_sub(1).filter(|_| is_covered)?];
+    Some((offset_s - offset_at(truth, stamp)?).abs())
+}
+
 /// The offset at `stamp`, interpolated linearly.
 fn offset_at(offsets: &[(Stamp, f64)], stamp: Stamp) -> Option<f64> {
     let after = offsets.partition_point(|(at, _)| *at <= stamp);
@@ -46,5 +57,18 @@ mod tests {
         assert_relative_eq!(found.offset_end_error_s, -1e-4, epsilon = 1e-12);
         assert_relative_eq!(found.offset_rmse_s, ((9.0_f64 + 0.01 + 0.01) / 3.0).sqrt() * 1e-3, epsilon = 1e-12);
         assert_eq!(clock_error(&estimate, &[]), None);
+    }
+
+    #[test]
+    fn the_error_after_a_time_is_that_of_the_last_estimate_until_then() {
+        // Truth 3 ms + 1 ms/min: 3.5 ms at 30 s, 3.75 ms at 45 s.
+        let at = |s: i64| Stamp::from_nanos(s * 1_000_000_000);
+        let truth = [(at(0), 3e-3), (at(60), 4e-3)];
+        let estimate = [(at(0), 0.0), (at(30), 3.6e-3), (at(45), 3.7e-3)];
+        for (after_s, error_s) in [(0.0, 3e-3), (30.0, 1e-4), (44.0, 1e-4), (45.0, 5e-5)] {
+            assert_relative_eq!(clock_error_after(&estimate, &truth, after_s).unwrap(), error_s, epsilon = 1e-12);
+        }
+        assert_eq!(clock_error_after(&estimate, &truth, 46.0), None);
+        assert_eq!(clock_error_after(&[], &truth, 0.0), None);
     }
 }

@@ -24,7 +24,7 @@ mod relative;
 pub use absolute::Errors;
 pub use alignment::{align, align_poses};
 pub use bound::{BeamObservation, BoundModel, FisherInformation, InformationBound};
-pub use clock::{ClockError, clock_error};
+pub use clock::{ClockError, clock_error, clock_error_after};
 pub use cloud::{CloudErrors, CloudSummary, Thinning};
 pub use consistency::{Consistency, consistency};
 pub use dead_reckoning::{DeadReckoning, RestDetection};

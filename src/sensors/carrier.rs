@@ -1,4 +1,4 @@
-use super::{Scenery, SurfaceHit, Track};
+use super::{CanopyPart, Scenery, SurfaceHit, Track};
 use crate::geometry::Vector;
 
 /// An upright cylinder with closed ends, fixed in the base frame: an operator's body, a handle, the mast of a cart.
@@ -76,6 +76,10 @@ impl Scenery for SceneryWithCarrier<'_> {
         let nearest = solids.filter(|hit| hit.range_m <= reach_m).min_by(|a, b| a.range_m.total_cmp(&b.range_m));
         let beyond_m = nearest.map_or(reach_m, |hit| hit.range_m);
         self.scenery.first_hit(origin, direction, beyond_m, t_s).or(nearest)
+    }
+
+    fn canopies(&self, origin: &Vector, direction: &Vector, reach_m: f64, into: &mut Vec<CanopyPart>) {
+        self.scenery.canopies(origin, direction, reach_m, into);
     }
 }
 

@@ -30,6 +30,6 @@ pub use lidar::{
     Beam, BeamModel, DetectionSpec, GlassSpec, GrazingSpec, Lidar, LidarErrors, LidarErrorsSpec, LidarSpec,
     PatternSpec, RangeNoiseSpec, ScanTiming, Sweep, Switch,
 };
-pub use scenery::{Scenery, SurfaceHit};
+pub use scenery::{CanopyPart, Scenery, SurfaceHit};
 pub use stamper::Stamper;
 pub use track::Track;

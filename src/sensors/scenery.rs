@@ -21,11 +21,27 @@ impl SurfaceHit {
     }
 }
 
+/// Part of a ray in a canopy, in which it is stopped at random.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CanopyPart {
+    /// Distance along the ray at which it enters, m.
+    pub from_m: f64,
+    /// Distance at which it leaves, m.
+    pub to_m: f64,
+    /// Extinction coefficient, 1/m.
+    pub extinction_per_m: f64,
+    /// Fraction of light that a leaf returns diffusely at normal incidence, 0..=1.
+    pub reflectance: f32,
+}
+
 /// Surroundings of a lidar, into which rays can be cast.
 pub trait Scenery: Sync {
     /// The first surface within `reach_m` on the ray from `origin` along the unit vector `direction`, both in the
     /// world, at `t_s` seconds after the start.
     fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, t_s: f64) -> Option<SurfaceHit>;
+
+    /// Appends the parts of a ray in canopies, within `reach_m`. By default there are none.
+    fn canopies(&self, _origin: &Vector, _direction: &Vector, _reach_m: f64, _into: &mut Vec<CanopyPart>) {}
 }
 
 impl Scenery for World {
@@ -39,5 +55,15 @@ impl Scenery for World {
             reflectance: material.reflectance as f32,
             transmission: material.transmission as f32,
         })
+    }
+
+    fn canopies(&self, origin: &Vector, direction: &Vector, reach_m: f64, into: &mut Vec<CanopyPart>) {
+        let ray = Ray { origin_in_world: *origin, direction_in_world: *direction };
+        into.extend(self.canopies(&ray, reach_m).map(|part| CanopyPart {
+            from_m: part.from_m,
+            to_m: part.to_m,
+            extinction_per_m: part.extinction_per_m,
+            reflectance: self.material(part.material).reflectance as f32,
+        }));
     }
 }

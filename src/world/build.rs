@@ -1,12 +1,15 @@
 //! Builds triangles from the spec of a scene: places templates, scatters objects, reads meshes, and checks everything.
 
+use super::canopy::Canopy;
 use super::caster::Caster;
 use super::import::{self, MeshTriangles};
+use super::meadow::Meadow;
 use super::mover::{Mover, Path};
 use super::scatter;
 use super::triangle::{MAX_TRIANGLES, Triangle};
 use super::{
-    ItemSpec, LengthUnit, Material, MaterialId, MaterialKind, MoverSpec, Placement, SceneSpec, ShapeSpec, WorldError,
+    CanopySpec, ItemSpec, LengthUnit, Material, MaterialId, MaterialKind, MoverSpec, Placement, ScatterSpec, SceneSpec,
+    ShapeSpec, SwaySpec, WorldError,
 };
 use crate::geometry::{Pose, Route, Vector};
 use crate::spec::{Source, SpecError};
@@ -26,6 +29,8 @@ pub(super) struct WorldParts {
     pub materials: Vec<Material>,
     pub static_surfaces: Surfaces,
     pub movers: Vec<Mover>,
+    pub meadows: Vec<Meadow>,
+    pub canopies: Vec<Canopy>,
     pub routes: BTreeMap<String, Route>,
     pub notes: Vec<String>,
     pub mesh_files: BTreeSet<PathBuf>,
@@ -56,8 +61,13 @@ pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, Wor
         return Err(SpecError::about(source, "items", "the scene has no surfaces: `items` is empty").into());
     }
     let movers = spec.movers.iter().map(|mover| builder.mover(mover)).collect::<Result<_, _>>()?;
+    let meadows = spec.swaying.iter().map(|sway| builder.meadow(sway)).collect::<Result<_, _>>()?;
+    let canopies: Vec<Vec<Canopy>> =
+        spec.canopies.iter().map(|canopy| builder.canopies(canopy)).collect::<Result<_, _>>()?;
+    let canopies = canopies.into_iter().flatten().collect();
     let Builder { routes, notes, mesh_files, .. } = builder;
-    Ok(WorldParts { materials: materials(spec), static_surfaces, movers, routes, notes, mesh_files })
+    let materials = materials(spec);
+    Ok(WorldParts { materials, static_surfaces, movers, meadows, canopies, routes, notes, mesh_files })
 }
 
 /// The materials in order of their names, which is the order of their ids.
@@ -160,10 +170,7 @@ impl Builder<'_> {
                     }
                 }
                 ItemSpec::Scatter(scatter) => {
-                    let routes: Vec<&Route> = self.routes.values().collect();
-                    let poses = scatter::poses(scatter, at, &routes)
-                        .map_err(|(key, sentence)| SpecError::about(self.source, key, sentence))?;
-                    for pose in poses {
+                    for pose in self.scattered(scatter, at)? {
                         self.add_template(&scatter.template, &(at * pose), depth, into)?;
                     }
                 }
@@ -187,6 +194,30 @@ impl Builder<'_> {
         self.add_items(items, at, depth + 1, into)
     }
 
+    /// Poses of scattered copies in the frame of the scatter, whose pose is `at`.
+    fn scattered(&self, scatter: &ScatterSpec, at: &Pose) -> Result<Vec<Pose>, SpecError> {
+        let routes: Vec<&Route> = self.routes.values().collect();
+        scatter::poses(scatter, at, &routes).map_err(|(key, sentence)| SpecError::about(self.source, key, sentence))
+    }
+
+    fn meadow(&mut self, spec: &SwaySpec) -> Result<Meadow, WorldError> {
+        let poses = self.scattered(&spec.scatter, &Pose::identity())?;
+        Ok(Meadow::new(spec, self.template_surfaces(&spec.scatter.template)?, poses))
+    }
+
+    fn canopies(&self, spec: &CanopySpec) -> Result<Vec<Canopy>, SpecError> {
+        let id = self.material_id(&spec.material)?;
+        let poses = self.poses(&spec.at_m_deg, &spec.material)?;
+        Ok(poses.iter().map(|pose| Canopy::new(pose, spec.size_m, spec.extinction_per_m, id)).collect())
+    }
+
+    /// The surfaces of a template in its own frame.
+    fn template_surfaces(&mut self, name: &str) -> Result<Caster, WorldError> {
+        let mut surfaces = Surfaces::default();
+        self.add_template(name, &Pose::identity(), 0, &mut surfaces)?;
+        Ok(Caster::new(&surfaces.triangles, &surfaces.materials))
+    }
+
     fn mover(&mut self, mover: &MoverSpec) -> Result<Mover, WorldError> {
         let wrong = |sentence: &str| {
             let message = format!("the mover `{}` {sentence}", mover.template);
@@ -204,9 +235,8 @@ impl Builder<'_> {
         if waypoints.windows(2).any(turns_half) {
             return Err(wrong("turns by 180 degrees between two waypoints: add a waypoint to fix the direction"));
         }
-        let mut surfaces = Surfaces::default();
-        self.add_template(&mover.template, &Pose::identity(), 0, &mut surfaces)?;
-        Ok(Mover::new(Caster::new(&surfaces.triangles, &surfaces.materials), Path::new(&waypoints, mover.repeats)))
+        let surfaces = self.template_surfaces(&mover.template)?;
+        Ok(Mover::new(surfaces, Path::new(&waypoints, mover.repeats)))
     }
 
     fn material_id(&self, name: &str) -> Result<MaterialId, SpecError> {

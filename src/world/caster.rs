@@ -4,8 +4,11 @@
 //! from the plane of the face in double precision. Ranges are therefore exact for the given corners, while the search,
 //! the costly part, moves half the bytes.
 
+mod boxes;
 mod face;
 mod single_precision;
+
+pub(super) use boxes::BoxTree;
 
 use super::MaterialId;
 use super::triangle::Triangle;

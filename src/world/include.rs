@@ -68,6 +68,8 @@ fn merge(mut first: SceneSpec, second: SceneSpec, source: &Source) -> Result<Sce
     merge_named(&mut first.routes, second.routes, "route", source)?;
     first.items.extend(second.items);
     first.movers.extend(second.movers);
+    first.swaying.extend(second.swaying);
+    first.canopies.extend(second.canopies);
     first.default_route = first.default_route.or(second.default_route);
     Ok(first)
 }

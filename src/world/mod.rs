@@ -1,7 +1,7 @@
 //! Worlds: surfaces built from the file of a scene, into which rays can be cast.
 //!
 //! A [`SceneSpec`] (RON, under `scenes/`) lists materials, shapes, templates of furniture, scattered objects, meshes
-//! from files, movers, and routes to walk. [`World::build`] checks it and builds one set of triangles. [`World::cast`]
+//! from files, movers, swaying plants, canopies, and routes to walk. [`World::build`] checks it and builds one set of triangles. [`World::cast`]
 //! returns the first surface on a ray: distance, normal and material.
 //!
 //! ```
@@ -19,12 +19,14 @@
 //! ```
 
 mod build;
+mod canopy;
 mod caster;
 mod error;
 mod export;
 mod import;
 mod include;
 mod material;
+mod meadow;
 mod model;
 mod mover;
 mod placement;
@@ -33,8 +35,10 @@ mod scatter;
 mod section;
 mod shape;
 mod spec;
+mod sway;
 mod triangle;
 
+pub use canopy::CanopyCrossing;
 pub use error::WorldError;
 pub use export::MeshFormat;
 pub use material::{Material, MaterialId};
@@ -44,5 +48,6 @@ pub use ray::{Hit, Ray};
 pub use section::{SectionPlane, Segment};
 pub use shape::{HeightsSpec, LengthUnit, OpeningSpec, ShapeSpec, UpAxis};
 pub use spec::{
-    ItemSpec, MaterialKind, MaterialSpec, MoverSpec, RouteSpec, ScatterSpec, SceneSpec, Turn, WaypointSpec,
+    CanopySpec, ItemSpec, MaterialKind, MaterialSpec, MoverSpec, RouteSpec, ScatterSpec, SceneSpec, SwaySpec, Turn,
+    WaypointSpec,
 };

@@ -1,5 +1,7 @@
 use super::build::{WorldParts, build};
+use super::canopy::{Canopy, CanopyCrossing};
 use super::caster::{Caster, Crossing};
+use super::meadow::Meadow;
 use super::mover::Mover;
 use super::section::{SectionPlane, Segment, edges};
 use super::{Hit, Material, MaterialId, Ray, SceneSpec, WorldError};
@@ -17,6 +19,8 @@ pub struct World {
     materials: Vec<Material>,
     static_surfaces: Caster,
     movers: Vec<Mover>,
+    meadows: Vec<Meadow>,
+    canopies: Vec<Canopy>,
     routes: BTreeMap<String, Route>,
     default_route: Option<String>,
     notes: Vec<String>,
@@ -40,10 +44,20 @@ impl World {
     /// If an included scene or a mesh is missing or invalid, a name is not defined, or values are inconsistent.
     pub fn build(spec: &SceneSpec, source: &Source) -> Result<Self, WorldError> {
         let spec = &spec.with_includes(source)?;
-        let WorldParts { materials, static_surfaces, movers, routes, notes, mesh_files } = build(spec, source)?;
-        let static_surfaces = Caster::new(&static_surfaces.triangles, &static_surfaces.materials);
-        let (name, default_route) = (spec.name.clone(), spec.default_route.clone());
-        Ok(Self { name, materials, static_surfaces, movers, routes, default_route, notes, mesh_files })
+        let WorldParts { materials, static_surfaces, movers, meadows, canopies, routes, notes, mesh_files } =
+            build(spec, source)?;
+        Ok(Self {
+            name: spec.name.clone(),
+            materials,
+            static_surfaces: Caster::new(&static_surfaces.triangles, &static_surfaces.materials),
+            movers,
+            meadows,
+            canopies,
+            routes,
+            default_route: spec.default_route.clone(),
+            notes,
+            mesh_files,
+        })
     }
 
     /// Name of the scene.
@@ -59,6 +73,10 @@ impl World {
         for mover in &self.movers {
             let reach = first.map_or(max_range_m, |crossing| crossing.distance);
             first = mover.cast(origin, direction, reach, t_s).or(first);
+        }
+        for meadow in &self.meadows {
+            let reach = first.map_or(max_range_m, |crossing| crossing.distance);
+            first = meadow.cast(origin, direction, reach, t_s).or(first);
         }
         first.map(|Crossing { distance, normal, material }| Hit {
             distance_m: distance,
@@ -76,10 +94,19 @@ impl World {
         Some(Hit { distance_m: hit.distance_m + skipped, ..hit })
     }
 
-    /// Distance of a point from the nearest mover at `t_s`, seconds of true time since the start of the run, m; `None`
-    /// above `reach_m`. [`Surface::nearest`] covers static surfaces only.
+    /// The parts of `ray` in canopies, up to `max_range_m`. [`World::cast`] ignores canopies: a ray is stopped in them at
+    /// random.
+    pub fn canopies(&self, ray: &Ray, max_range_m: f64) -> impl Iterator<Item = CanopyCrossing> {
+        self.canopies.iter().filter_map(move |canopy| canopy.crossing(ray, max_range_m))
+    }
+
+    /// Distance of a point from the nearest mover, swaying plant or canopy at `t_s`, seconds of true time since the start
+    /// of the run, m; `None` above `reach_m`. [`Surface::nearest`] covers static surfaces only.
     pub fn distance_to_movers_m(&self, point_in_world: &Vector, reach_m: f64, t_s: f64) -> Option<f64> {
-        let distances = self.movers.iter().filter_map(|mover| mover.distance(point_in_world, reach_m, t_s));
+        let movers = self.movers.iter().filter_map(|mover| mover.distance(point_in_world, reach_m, t_s));
+        let meadows = self.meadows.iter().filter_map(|meadow| meadow.distance(point_in_world, reach_m, t_s));
+        let canopies = self.canopies.iter().map(|canopy| canopy.distance_m(point_in_world));
+        let distances = movers.chain(meadows).chain(canopies.filter(|distance_m| *distance_m <= reach_m));
         distances.min_by(f64::total_cmp)
     }
 
@@ -93,10 +120,11 @@ impl World {
         self.static_surfaces.triangles()
     }
 
-    /// The triangles of the movers at `t_s`, seconds of true time since the start of the run: corners in the world, m, and
+    /// The triangles of movers and swaying plants at `t_s`, seconds of true time since the start of the run: corners in the world, m, and
     /// material.
     pub fn moving_triangles(&self, t_s: f64) -> impl Iterator<Item = ([Vector; 3], MaterialId)> + '_ {
-        self.movers.iter().flat_map(move |mover| mover.triangles(t_s))
+        let movers = self.movers.iter().flat_map(move |mover| mover.triangles(t_s));
+        movers.chain(self.meadows.iter().flat_map(move |meadow| meadow.triangles(t_s)))
     }
 
     /// The segments along which a plane cuts the static surfaces.

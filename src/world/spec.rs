@@ -24,6 +24,12 @@ pub struct SceneSpec {
     /// Movers: templates that move along waypoints.
     #[serde(default)]
     pub movers: Vec<MoverSpec>,
+    /// Plants that sway in the wind.
+    #[serde(default)]
+    pub swaying: Vec<SwaySpec>,
+    /// Canopies: volumes of leaves or blades that are finer than a laser beam.
+    #[serde(default)]
+    pub canopies: Vec<CanopySpec>,
     /// Routes to walk, by name.
     #[serde(default)]
     pub routes: BTreeMap<String, RouteSpec>,
@@ -140,6 +146,53 @@ pub struct WaypointSpec {
     pub time_s: f64,
     /// Pose at that time.
     pub at_m_deg: Placement,
+}
+
+/// Scattered copies of a template that sway about their feet.
+///
+/// A copy is rigid. At time t it is tilted towards the wind's direction by
+/// `lean_deg + amplitude_deg sin(2 pi frequency_hz (t - s / gust_speed_m_per_s))`, with s the position of its foot along the
+/// wind: waves travel over a meadow with the gusts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SwaySpec {
+    /// Poses at rest.
+    pub scatter: ScatterSpec,
+    /// Direction in which the wind blows, from x towards y, degrees.
+    #[serde(with = "checked::Finite")]
+    pub wind_deg: f64,
+    /// Mean tilt, degrees.
+    #[serde(with = "checked::NonNegative")]
+    pub lean_deg: f64,
+    /// Amplitude of the sway, degrees.
+    #[serde(with = "checked::NonNegative")]
+    pub amplitude_deg: f64,
+    /// Frequency of the sway, Hz.
+    #[serde(with = "checked::Positive")]
+    pub frequency_hz: f64,
+    /// Speed at which gusts travel over the plants, m/s.
+    #[serde(with = "checked::Positive")]
+    pub gust_speed_m_per_s: f64,
+}
+
+/// A box filled with leaves or blades that are finer than a laser beam.
+///
+/// A ray is stopped in it at a random depth: it passes a length d with probability exp(-k d) (Beer and Lambert). The leaves
+/// have no preferred direction. With the errors of a lidar switched off, beams pass.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CanopySpec {
+    /// Extents along x, y, z, m; the box is centred on the origin in x and y, from z = 0 upward.
+    #[serde(with = "checked::PositiveArray::<3>")]
+    pub size_m: [f64; 3],
+    /// Extinction coefficient k, 1/m: half the leaf area per volume, for leaves without preferred direction.
+    #[serde(with = "checked::Positive")]
+    pub extinction_per_m: f64,
+    /// Name of the material.
+    pub material: String,
+    /// Poses. Default: the origin.
+    #[serde(default = "Placement::at_origin")]
+    pub at_m_deg: Vec<Placement>,
 }
 
 /// A route to walk.

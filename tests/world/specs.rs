@@ -161,3 +161,27 @@ proptest! {
         let _ = build(&String::from_utf8(bytes).unwrap());
     }
 }
+
+#[test]
+fn invalid_plants_and_canopies_are_refused() {
+    let plants = r#"    canopies: [(size_m: (4, 3, 1), extinction_per_m: 2, material: "stone", at_m_deg: [(1, 0)])],
+    swaying: [(scatter: (template: "pillar", seed: 1, count: 3, region_m: ((-4, -3, 0), (4, 3, 0)), min_spacing_m: 0.5, turn: Fixed),
+        wind_deg: 0, lean_deg: 5, amplitude_deg: 5, frequency_hz: 1, gust_speed_m_per_s: 3)],
+    routes: {"#;
+    let valid = VALID.replacen("    routes: {", plants, 1);
+    assert_eq!(build(&valid).unwrap_or_else(|error| panic!("{error}")).moving_triangles(0.0).count(), 4 * 24 * 4);
+    for (right, wrong, part) in [
+        ("material: \"stone\", at_m_deg: [(1, 0)]", "material: \"hay\"", "no material `hay`"),
+        ("at_m_deg: [(1, 0)]", "at_m_deg: []", "empty list"),
+        ("extinction_per_m: 2", "extinction_per_m: 0", "above 0, found 0"),
+        ("size_m: (4, 3, 1)", "size_m: (4, 3, -1)", "above 0, found -1"),
+        ("scatter: (template: \"pillar\"", "scatter: (template: \"reed\"", "no template `reed`"),
+        ("count: 3", "count: 3000", "of 3000 copies"),
+        ("frequency_hz: 1", "frequency_hz: NaN", "NaN"),
+        ("gust_speed_m_per_s: 3", "gust_speed_m_per_s: 0", "above 0, found 0"),
+    ] {
+        assert!(valid.contains(right), "{right}");
+        let error = build(&valid.replacen(right, wrong, 1)).err().unwrap_or_else(|| panic!("{wrong} is accepted"));
+        assert!(error.to_string().contains(part), "{wrong}: {error}");
+    }
+}

@@ -107,3 +107,31 @@ fn a_vehicle_drives_round_the_courtyard_without_collisions() {
     // 120 s at 1.5 m/s less the rest and eight corners: more than a lap of 97 m.
     assert!(length_m > 97.0 && length_m < 180.0, "{length_m} m");
 }
+
+#[test]
+fn nothing_in_the_assembly_plant_runs_into_the_operator_or_through_walls() {
+    let world = World::load("assembly_plant").unwrap();
+    let hand = motion_in("hand", &world, 180.0);
+    let mut moved = 0;
+    for step in 0..720 {
+        let t_s = 0.25 * f64::from(step);
+        let at = hand.at(t_s).world_from_body.translation.vector;
+        for height_m in [0.4, 1.0, 1.4] {
+            let near = world.distance_to_movers_m(&Vector::new(at.x, at.y, height_m), 0.9, t_s);
+            assert!(near.is_none(), "{near:?} m from the operator at {t_s} s, {at:?}");
+        }
+        moved += usize::from(world.distance_to_movers_m(&at, 4.0, t_s).is_some());
+    }
+    assert!(moved > 20, "people or vehicles pass within 4 m in {moved} of 720 samples only");
+    // The people walk free of everything that stands.
+    let movers = parse::<SceneSpec>(&find(Kind::Scene, "assembly_plant").unwrap()).unwrap().movers;
+    for (index, person) in movers.iter().enumerate().filter(|(_, mover)| mover.template == "person") {
+        for step in 0..480 {
+            let foot = position_of(person, 0.25 * f64::from(step));
+            for height_m in [0.5, 1.0, 1.5] {
+                let near = world.nearest(&(foot + Vector::z() * height_m), 0.3);
+                assert!(near.is_none(), "person {index} at {foot:?}: {near:?}");
+            }
+        }
+    }
+}

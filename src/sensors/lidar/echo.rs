@@ -1,5 +1,7 @@
 //! Echoes of a beam, from the surfaces that the rays hit.
 
+use super::canopy::{LEAF_COS_INCIDENCE, stop};
+use super::errors::BeamDraws;
 use super::{GlassSpec, Lidar, Sweep};
 
 /// Maximum number of echoes of a beam: one per ray.
@@ -77,13 +79,15 @@ fn mixed(a: &Echo, b: &Echo) -> Echo {
 impl Lidar {
     /// The echoes of beam `beam`.
     ///
-    /// `glass_draw`, uniform in 0..1, determines which glass surface reflects the beam. `None` lets the beam pass all
-    /// glass without attenuation.
-    pub(super) fn echoes(&self, sweep: &Sweep, beam: usize, glass_draw: Option<f64>) -> Echoes {
+    /// `draws` determines which glass surface reflects the beam, and where canopies stop its rays. `None` lets the beam pass
+    /// all glass and canopies without attenuation.
+    pub(super) fn echoes(&self, sweep: &Sweep, beam: usize, draws: Option<&BeamDraws>) -> Echoes {
         let per_beam = self.rays_per_beam();
         let mut echoes = Echoes::default();
         for (k, weight) in self.weights.iter().enumerate() {
-            if let Some(echo) = self.ray_echo(sweep, beam * per_beam + k, *weight, glass_draw) {
+            let ray = beam * per_beam + k;
+            let leaf = draws.and_then(|draws| stop(sweep.canopies(ray), draws.canopy[k]));
+            if let Some(echo) = self.ray_echo(sweep, ray, (*weight, leaf), draws.map(|draws| draws.glass)) {
                 echoes.insert(echo);
             }
         }
@@ -93,16 +97,29 @@ impl Lidar {
         echoes
     }
 
-    fn ray_echo(&self, sweep: &Sweep, ray: usize, weight: f64, glass_draw: Option<f64>) -> Option<Echo> {
+    /// The echo of a ray; with its weight, and range and reflectance of the leaf that stops it unless a surface is nearer.
+    fn ray_echo(
+        &self,
+        sweep: &Sweep,
+        ray: usize,
+        (weight, leaf): (f64, Option<(f64, f64)>),
+        glass_draw: Option<f64>,
+    ) -> Option<Echo> {
         let GlassSpec { echo: glass_echo, delay_m } = self.spec.errors.glass;
         let (mut light, mut late_m, mut draw) = (weight, 0.0, glass_draw.unwrap_or(1.0));
+        let returned = |light: f64, late_m: f64, range_m: f64, reflectance: f64, cos_incidence: f64| Echo {
+            range_m: range_m + late_m,
+            power: light * reflectance * cos_incidence / (range_m * range_m),
+            cos_incidence,
+        };
         for surface in sweep.surfaces(ray) {
+            if leaf.is_some_and(|(range_m, _)| range_m < surface.range_m) {
+                break;
+            }
             let cos = f64::from(surface.cos_incidence);
             let turns_back = glass_echo * cos;
             if !surface.is_glass() || draw < turns_back {
-                let range_m = surface.range_m + late_m;
-                let power = light * f64::from(surface.reflectance) * cos / (surface.range_m * surface.range_m);
-                return Some(Echo { range_m, power, cos_incidence: cos });
+                return Some(returned(light, late_m, surface.range_m, f64::from(surface.reflectance), cos));
             }
             if glass_draw.is_some() {
                 // Given that the beam passed, the draw is uniform in turns_back..1. Rescaled to 0..1 it decides at the
@@ -112,6 +129,6 @@ impl Lidar {
                 late_m += delay_m;
             }
         }
-        None
+        leaf.map(|(range_m, reflectance)| returned(light, late_m, range_m, reflectance, LEAF_COS_INCIDENCE))
     }
 }

@@ -1,4 +1,5 @@
-use super::{Lidar, LidarErrorsSpec, Switch, echo::Echo};
+use super::echo::{Echo, MAX_ECHOES};
+use super::{Lidar, LidarErrorsSpec, Switch};
 use crate::measurement::LidarNoise;
 use crate::random::{Seed, Stream};
 use rand::RngExt;
@@ -30,12 +31,13 @@ pub struct LidarErrors {
 }
 
 /// Random numbers of one scan. Each beam takes the same count from each stream, whether or not it hits a surface, so
-/// that a change at one beam does not change the noise of another.
+/// that a change at one beam does not change the noise of another. Numbers for canopies are drawn in scans that cross one.
 pub(super) struct ScanDraws {
     range: Stream,
     later: Stream,
     threshold: Stream,
     glass: Stream,
+    canopy: Stream,
 }
 
 /// Random numbers of one beam.
@@ -43,6 +45,8 @@ pub(super) struct BeamDraws {
     pub range: f64,
     pub threshold: f64,
     pub glass: f64,
+    /// One number for each ray, in scans that cross a canopy.
+    pub canopy: [f64; MAX_ECHOES],
 }
 
 impl LidarErrors {
@@ -77,6 +81,7 @@ impl LidarErrors {
             later: part("lidar/range/later_echoes"),
             threshold: part("lidar/threshold"),
             glass: part("lidar/glass"),
+            canopy: part("lidar/canopy"),
         })
     }
 
@@ -105,8 +110,12 @@ impl LidarErrors {
 }
 
 impl ScanDraws {
-    pub fn next_beam(&mut self) -> BeamDraws {
+    /// The numbers of the next beam, of which `canopy_rays` rays can be stopped in a canopy.
+    pub fn next_beam(&mut self, canopy_rays: usize) -> BeamDraws {
+        let mut canopy = [0.0; MAX_ECHOES];
+        canopy[..canopy_rays].fill_with(|| self.canopy.random());
         BeamDraws {
+            canopy,
             range: StandardNormal.sample(&mut self.range),
             threshold: f64::from(self.threshold.random::<f32>()),
             glass: f64::from(self.glass.random::<f32>()),

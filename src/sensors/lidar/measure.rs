@@ -9,7 +9,7 @@ use crate::time::Span;
 impl Lidar {
     /// The scan that the sensor reports for the ray intersections of `sweep`.
     ///
-    /// With errors switched off, a beam passes all glass, and each echo has the exact range without rounding.
+    /// With errors switched off, a beam passes all glass and canopies, and each echo has the exact range without rounding.
     pub fn measure(&self, sweep: &Sweep, errors: &LidarErrors) -> LidarScan {
         let mut draws = errors.scan_draws(sweep.timing.index);
         let mut returns = Vec::with_capacity(self.beams.len());
@@ -33,8 +33,9 @@ impl Lidar {
         mut draws: Option<&mut ScanDraws>,
         returns: &mut Vec<LidarReturn>,
     ) -> (f32, f32) {
-        let draw = draws.as_deref_mut().map(ScanDraws::next_beam);
-        let mut echoes = self.echoes(sweep, beam, draw.as_ref().map(|draw| draw.glass));
+        let canopy_rays = if sweep.has_canopies() { self.rays_per_beam() } else { 0 };
+        let draw = draws.as_deref_mut().map(|draws| draws.next_beam(canopy_rays));
+        let mut echoes = self.echoes(sweep, beam, draw.as_ref());
         echoes.keep_strongest(usize::from(self.spec.echoes));
         let (mut best, mut best_power) = ((f32::INFINITY, 0.0), f64::NEG_INFINITY);
         for (order, echo) in echoes.as_slice().iter().enumerate() {

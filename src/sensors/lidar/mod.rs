@@ -1,6 +1,7 @@
 //! Lidars: beam pattern and timing, ray intersections, echoes and range errors.
 
 mod beam;
+mod canopy;
 mod echo;
 mod errors;
 mod interlaced;

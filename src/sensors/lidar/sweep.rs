@@ -1,6 +1,6 @@
 use super::Lidar;
 use crate::geometry::{Rotation, Vector};
-use crate::sensors::{Scenery, SurfaceHit, Track};
+use crate::sensors::{CanopyPart, Scenery, SurfaceHit, Track};
 use crate::time::Stamp;
 
 /// Maximum number of glass surfaces that a ray passes; a ray that hits more is lost.
@@ -34,15 +34,31 @@ pub struct Sweep {
     /// Rotation of the beams relative to scan 0.
     pub(super) rotation: Option<Rotation>,
     surfaces: Vec<SurfaceHit>,
-    /// End index in `surfaces` for each ray.
-    ends: Vec<u32>,
+    canopies: Vec<CanopyPart>,
+    /// End indices in `surfaces` and `canopies` for each ray.
+    ends: Vec<[u32; 2]>,
 }
 
 impl Sweep {
     /// The surfaces that ray `ray` hits, in order: any number of glass surfaces, then at most one of another material.
     pub fn surfaces(&self, ray: usize) -> &[SurfaceHit] {
-        let start = ray.checked_sub(1).map_or(0, |before| self.ends[before]);
-        &self.surfaces[start as usize..self.ends[ray] as usize]
+        let [start, _] = self.starts(ray);
+        &self.surfaces[start as usize..self.ends[ray][0] as usize]
+    }
+
+    /// The parts of ray `ray` in canopies, before its last surface.
+    pub fn canopies(&self, ray: usize) -> &[CanopyPart] {
+        let [_, start] = self.starts(ray);
+        &self.canopies[start as usize..self.ends[ray][1] as usize]
+    }
+
+    /// Whether any ray crosses a canopy.
+    pub fn has_canopies(&self) -> bool {
+        !self.canopies.is_empty()
+    }
+
+    fn starts(&self, ray: usize) -> [u32; 2] {
+        ray.checked_sub(1).map_or([0; 2], |before| self.ends[before])
     }
 
     /// Number of rays cast, over all beams.
@@ -67,6 +83,7 @@ impl Lidar {
             timing: *timing,
             rotation: self.scan_rotation(timing.index),
             surfaces: Vec::with_capacity(self.rays.len() + self.rays.len() / 8),
+            canopies: Vec::new(),
             ends: Vec::with_capacity(self.rays.len()),
         };
         let mut previous_m = self.spec.range_max_m;
@@ -79,7 +96,8 @@ impl Lidar {
             for ray in rays {
                 let direction = world_from_beams * ray;
                 self.trace(scenery, &LidarRay { origin, direction, t_s }, &mut previous_m, &mut sweep.surfaces);
-                sweep.ends.push(sweep.surfaces.len() as u32);
+                scenery.canopies(&origin, &direction, previous_m, &mut sweep.canopies);
+                sweep.ends.push([sweep.surfaces.len(), sweep.canopies.len()].map(|end| end as u32));
             }
         }
         sweep

@@ -26,5 +26,6 @@ pub use page::paper_page;
 pub use paper_table::{TABLE_HEADING, paper_table};
 pub use result::{ComparedNumber, ExperimentResult};
 pub use spec::{
-    ClaimSpec, DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, QuickSpec, ResultSpec, RunsSpec, TimingMapsSpec,
+    ClaimSpec, DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, QuickSpec, ResultSpec, RunsSpec,
+    TimingMapsSpec, WarningSpec,
 };

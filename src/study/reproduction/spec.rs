@@ -37,6 +37,9 @@ pub struct RunsSpec {
     /// Statements of the paper about two levels.
     #[serde(default)]
     pub claims: Vec<ClaimSpec>,
+    /// Levels whose status must not be "good" where the error is large.
+    #[serde(default)]
+    pub warns: Vec<WarningSpec>,
     /// Assumptions and discrepancies.
     pub notes: Vec<String>,
 }
@@ -85,6 +88,24 @@ pub struct ClaimSpec {
     pub smaller: String,
     /// Level with the larger median.
     pub larger: String,
+}
+
+/// A limit of the method, which the result must state: no run of a level has the status "good" and an error above both 5 cm and
+/// 1 % of the path.
+///
+/// The study measures `status`, `aligned_rmse_m` and `way_m`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WarningSpec {
+    /// The limit.
+    pub what: String,
+    /// Level of the study's axis.
+    pub level: String,
+}
+
+impl WarningSpec {
+    /// Measures that it needs.
+    pub(super) const MEASURES: [Measure; 3] = [Measure::Status, Measure::AlignedRmseM, Measure::WayM];
 }
 
 /// Gain curves of several heads.
@@ -212,7 +233,8 @@ impl RunsSpec {
         };
         let results = self.results.iter().map(|result| (&result.level, result.measure));
         let claims = self.claims.iter().flat_map(|claim| [&claim.smaller, &claim.larger].map(|of| (of, claim.measure)));
-        for (level, measure) in results.chain(claims) {
+        let warns = self.warns.iter().flat_map(|warning| WarningSpec::MEASURES.map(|of| (&warning.level, of)));
+        for (level, measure) in results.chain(claims).chain(warns) {
             if levels.iter().all(|other| other.name != *level) {
                 return wrong("results", format!("the study \"{}\" has no level \"{level}\"", self.study));
             }

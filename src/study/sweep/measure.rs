@@ -17,6 +17,15 @@ pub enum Measure {
     YawDriftDegPerMin,
     /// Error of the estimated clock offset over the complete run including its start, root mean square, s.
     ClockRmseS,
+    /// Absolute error of the estimated clock offset 30 s after the first estimate, s; the offset starts from 0.
+    #[serde(rename = "clock_error_30s_s")]
+    ClockError30S,
+    /// The same after 120 s, s.
+    #[serde(rename = "clock_error_120s_s")]
+    ClockError120S,
+    /// Position error of the base computed from the open-loop estimate of the head as if the link between them were rigid,
+    /// after rigid alignment, root mean square, m.
+    RigidLinkRmseM,
     /// Position error after loop closure and rigid alignment, root mean square, m. Loops are closed only if this measure
     /// is requested.
     ClosedPositionRmseM,
@@ -90,12 +99,15 @@ pub(super) enum Origin {
 
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 32] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
         Self::YawDriftDegPerMin,
         Self::ClockRmseS,
+        Self::ClockError30S,
+        Self::ClockError120S,
+        Self::RigidLinkRmseM,
         Self::ClosedPositionRmseM,
         Self::Status,
         Self::AlignedRmseM,
@@ -130,6 +142,13 @@ impl Measure {
             Self::DriftMPerMin => ("drift_m_per_min", "drift", "Drift (mm/min)", "mm/min", 1e3),
             Self::YawDriftDegPerMin => ("yaw_drift_deg_per_min", "yaw drift", "Yaw drift (°/min)", "deg/min", 1.0),
             Self::ClockRmseS => ("clock_rmse_s", "clock", "Clock offset error, RMS (ms)", "ms", 1e3),
+            Self::ClockError30S => ("clock_error_30s_s", "clock 30 s", "Clock offset error after 30 s (ms)", "ms", 1e3),
+            Self::ClockError120S => {
+                ("clock_error_120s_s", "clock 120 s", "Clock offset error after 120 s (ms)", "ms", 1e3)
+            }
+            Self::RigidLinkRmseM => {
+                ("rigid_link_rmse_m", "rigid link", "Position error of the base, rigid link, RMS (mm)", "mm", 1e3)
+            }
             Self::ClosedPositionRmseM => {
                 ("closed_position_rmse_m", "closed loop", "Position error, closed loop, RMS (mm)", "mm", 1e3)
             }
@@ -198,6 +217,9 @@ impl Measure {
             | Self::DriftMPerMin
             | Self::YawDriftDegPerMin
             | Self::ClockRmseS
+            | Self::ClockError30S
+            | Self::ClockError120S
+            | Self::RigidLinkRmseM
             | Self::ClosedPositionRmseM
             | Self::Status
             | Self::AlignedRmseM

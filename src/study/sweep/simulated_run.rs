@@ -5,8 +5,10 @@ use super::measure::Origin;
 use super::part::RunOutcome;
 use super::tree::Journey;
 use super::{LimitSpec, Plan, timing};
+use crate::dynamics::HeadModel;
 use crate::estimation::{EstimatorSpec, Status};
-use crate::evaluation::Pairs;
+use crate::evaluation::{Errors, Pairs, clock_error_after};
+use crate::geometry::Trajectory;
 use crate::measurement::Calibration;
 use crate::recording::{Reader, Selection, TopicPreference, Writer};
 use crate::report::IntegrityMetrics;
@@ -99,7 +101,8 @@ impl TemporaryRecording {
             let closes_loops = measures.contains(&Measure::ClosedPositionRmseM);
             match &run.timing {
                 None => {
-                    let work = |stop: &AtomicBool| estimate(file, &run.estimator.spec, closes_loops, stop);
+                    let head = self.simulation.head();
+                    let work = |stop: &AtomicBool| estimate(file, head, &run.estimator.spec, closes_loops, stop);
                     estimated = Some(with_time_limit(limit, work)?);
                 }
                 Some(timing) => {
@@ -190,6 +193,9 @@ fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {
 struct EstimateMetrics {
     open_loop: crate::report::OpenLoopMetrics,
     clock: crate::report::ClockMetrics,
+    /// Errors of the clock offset after 30 s and 120 s, s.
+    clock_errors_s: [Option<f64>; 2],
+    rigid_link_rmse_m: Option<f64>,
     closed_position_rmse_m: Option<f64>,
     status: Status,
     integrity: IntegrityMetrics,
@@ -204,6 +210,9 @@ impl EstimateMetrics {
             Measure::DriftMPerMin => self.open_loop.drift_m_per_min,
             Measure::YawDriftDegPerMin => self.open_loop.yaw_drift_deg_per_min,
             Measure::ClockRmseS => self.clock.offset_rmse_s,
+            Measure::ClockError30S => self.clock_errors_s[0],
+            Measure::ClockError120S => self.clock_errors_s[1],
+            Measure::RigidLinkRmseM => self.rigid_link_rmse_m,
             Measure::ClosedPositionRmseM => self.closed_position_rmse_m,
             Measure::Status => Some(f64::from(self.status as u8)),
             Measure::AlignedRmseM => self.integrity.aligned_rmse_m,
@@ -221,6 +230,7 @@ impl EstimateMetrics {
 /// Estimates from a recording on one thread, and evaluates the result.
 fn estimate(
     recording: File,
+    head: &HeadModel,
     estimator: &EstimatorSpec,
     closes_loops: bool,
     stop: &AtomicBool,
@@ -251,12 +261,23 @@ fn estimate(
         Ok(EstimateMetrics {
             open_loop,
             clock: comparison::clock_metrics(&run, truth.as_ref()),
+            clock_errors_s: [30.0, 120.0].map(|after_s| {
+                truth.as_ref().and_then(|truth| clock_error_after(&run.clock_offsets, &truth.clock_offsets, after_s))
+            }),
+            rigid_link_rmse_m: truth.as_ref().and_then(|truth| rigid_link_rmse_m(head, &run.map_from_head, truth)),
             closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
             status: integrity.status(),
             integrity: integrity.metrics(&run, Some(&pairs)),
             path_length_m: path_length_m(map_from_head),
         })
     })
+}
+
+/// Position error of the base computed with the rigid link, as `zsim base` does; `None` without a true trajectory of it.
+fn rigid_link_rmse_m(head: &HeadModel, map_from_head: &Trajectory, truth: &SampledTruth) -> Option<f64> {
+    let base = Trajectory::from_poses(head.base_from_rigid_link(map_from_head)).ok()?;
+    let pairs = Pairs::of(&base, &truth.bases);
+    Some(Errors::after(&pairs, &pairs.world_from_map().ok()?).position_rmse_m())
 }
 
 /// Does `work`, and sets its stop flag when the time limit is exceeded.
