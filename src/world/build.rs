@@ -4,7 +4,7 @@ use super::caster::Caster;
 use super::import::{self, MeshTriangles};
 use super::mover::{Mover, Path};
 use super::scatter;
-use super::triangle::{MAX_TRIANGLES, Triangle};
+use super::triangle::{MAX_TRIANGLES, Surfaces};
 use super::{
     ItemSpec, LengthUnit, Material, MaterialId, MaterialKind, MoverSpec, Placement, SceneSpec, ShapeSpec, WorldError,
 };
@@ -31,13 +31,6 @@ pub(super) struct WorldParts {
     pub mesh_files: BTreeSet<PathBuf>,
 }
 
-/// Triangles with one material each.
-#[derive(Default)]
-pub(super) struct Surfaces {
-    pub triangles: Vec<Triangle>,
-    pub materials: Vec<MaterialId>,
-}
-
 /// Builds all parts of a world.
 pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, WorldError> {
     let mut builder = Builder {
@@ -47,6 +40,7 @@ pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, Wor
         routes: routes(spec, source)?,
         meshes: BTreeMap::new(),
         triangle_count: 0,
+        solid_count: 0,
         notes: Vec::new(),
         mesh_files: BTreeSet::new(),
     };
@@ -133,6 +127,7 @@ struct Builder<'a> {
     routes: BTreeMap<String, Route>,
     meshes: BTreeMap<String, Rc<MeshTriangles>>,
     triangle_count: usize,
+    solid_count: u32,
     notes: Vec<String>,
     mesh_files: BTreeSet<PathBuf>,
 }
@@ -206,7 +201,7 @@ impl Builder<'_> {
         }
         let mut surfaces = Surfaces::default();
         self.add_template(&mover.template, &Pose::identity(), 0, &mut surfaces)?;
-        Ok(Mover::new(Caster::new(&surfaces.triangles, &surfaces.materials), Path::new(&waypoints, mover.repeats)))
+        Ok(Mover::new(Caster::new(&surfaces), Path::new(&waypoints, mover.repeats)))
     }
 
     fn material_id(&self, name: &str) -> Result<MaterialId, SpecError> {
@@ -272,7 +267,9 @@ impl Builder<'_> {
             }
             into.triangles.push(corners);
             into.materials.push(id);
+            into.solids.push(self.solid_count);
         }
+        self.solid_count += 1;
         Ok(())
     }
 }

@@ -1,6 +1,7 @@
 use super::build::{WorldParts, build};
 use super::caster::{Caster, Crossing};
 use super::mover::Mover;
+use super::planes::PlaneMap;
 use super::section::{SectionPlane, Segment, edges};
 use super::{Hit, Material, MaterialId, Ray, SceneSpec, WorldError};
 use crate::geometry::{Route, Surface, SurfacePoint, Vector};
@@ -41,7 +42,7 @@ impl World {
     pub fn build(spec: &SceneSpec, source: &Source) -> Result<Self, WorldError> {
         let spec = &spec.with_includes(source)?;
         let WorldParts { materials, static_surfaces, movers, routes, notes, mesh_files } = build(spec, source)?;
-        let static_surfaces = Caster::new(&static_surfaces.triangles, &static_surfaces.materials);
+        let static_surfaces = Caster::new(&static_surfaces);
         let (name, default_route) = (spec.name.clone(), spec.default_route.clone());
         Ok(Self { name, materials, static_surfaces, movers, routes, default_route, notes, mesh_files })
     }
@@ -56,14 +57,18 @@ impl World {
     pub fn cast(&self, ray: &Ray, max_range_m: f64, t_s: f64) -> Option<Hit> {
         let (origin, direction) = (&ray.origin_in_world, &ray.direction_in_world);
         let mut first = self.static_surfaces.cast(origin, direction, max_range_m);
+        let mut is_static = true;
         for mover in &self.movers {
             let reach = first.map_or(max_range_m, |crossing| crossing.distance);
-            first = mover.cast(origin, direction, reach, t_s).or(first);
+            if let Some(crossing) = mover.cast(origin, direction, reach, t_s) {
+                (first, is_static) = (Some(crossing), false);
+            }
         }
-        first.map(|Crossing { distance, normal, material }| Hit {
+        first.map(|Crossing { distance, normal, material, face }| Hit {
             distance_m: distance,
             normal_in_world: normal,
             material,
+            face: is_static.then_some(face),
         })
     }
 
@@ -102,6 +107,11 @@ impl World {
     /// The segments along which a plane cuts the static surfaces.
     pub fn section(&self, plane: &SectionPlane) -> Vec<Segment> {
         self.triangles().filter_map(|(triangle, _)| plane.cut(&triangle)).collect()
+    }
+
+    /// The planes of the static surfaces: which faces are parts of one plane.
+    pub fn planes(&self) -> PlaneMap {
+        PlaneMap::of(&self.static_surfaces.flat_faces().collect::<Vec<_>>())
     }
 
     /// The edges of the static surfaces: where a surface ends, or meets another at more than 25 degrees.

@@ -6,6 +6,7 @@ mod casts;
 mod exports;
 mod includes;
 mod meshes;
+mod planes;
 mod scenes;
 mod specs;
 mod traffic;
