@@ -18,8 +18,11 @@ pub enum Measure {
     /// Error of the estimated clock offset over the complete run including its start, root mean square, s.
     ClockRmseS,
     /// Position error after loop closure and rigid alignment, root mean square, m. Loops are closed only if this measure
-    /// is requested.
+    /// or the next is requested.
     ClosedPositionRmseM,
+    /// Ratio of that error to the information bound with an unknown map (`zsim bound --map unknown`), for runs of up to
+    /// 300 s. The bound takes up to a minute for each recording, which `wall_s` does not include.
+    ErrorOverSlamBound,
     /// Integrity verdict on the estimate: 0 good, 1 degraded, 2 lost.
     Status,
     /// Position error of the final trajectory (loop-closed if that is requested) after rigid alignment over the first
@@ -90,13 +93,14 @@ pub(super) enum Origin {
 
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
         Self::YawDriftDegPerMin,
         Self::ClockRmseS,
         Self::ClosedPositionRmseM,
+        Self::ErrorOverSlamBound,
         Self::Status,
         Self::AlignedRmseM,
         Self::LargestErrorM,
@@ -132,6 +136,9 @@ impl Measure {
             Self::ClockRmseS => ("clock_rmse_s", "clock", "Clock offset error, RMS (ms)", "ms", 1e3),
             Self::ClosedPositionRmseM => {
                 ("closed_position_rmse_m", "closed loop", "Position error, closed loop, RMS (mm)", "mm", 1e3)
+            }
+            Self::ErrorOverSlamBound => {
+                ("error_over_slam_bound", "error/bound", "Ratio of closed-loop error to bound", "1", 1.0)
             }
             Self::Status => ("status", "status", "Verdict (0 good, 1 degraded, 2 lost)", "1", 1.0),
             Self::AlignedRmseM => {
@@ -199,6 +206,7 @@ impl Measure {
             | Self::YawDriftDegPerMin
             | Self::ClockRmseS
             | Self::ClosedPositionRmseM
+            | Self::ErrorOverSlamBound
             | Self::Status
             | Self::AlignedRmseM
             | Self::LargestErrorM
