@@ -38,8 +38,8 @@ pub(super) fn bound(problem: &Problem<'_>, start: Stamp, information: &Informati
         clock_offset_s: variance(OUTPUTS * kept.len()).sqrt(),
         range_offset_m: variance(OUTPUTS * kept.len() + 1).sqrt(),
         unknown_map: Some(UnknownMap {
-            planes: problem.tracking.planes,
-            joint_beam_fraction: problem.tracking.beam_fraction,
+            planes: problem.joint.planes,
+            joint_beam_fraction: problem.joint.beam_fraction,
         }),
     })
 }

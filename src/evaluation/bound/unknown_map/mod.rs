@@ -12,10 +12,10 @@ mod chain;
 mod dense;
 mod division;
 mod errors;
+mod joint_planes;
 mod problem;
 mod segment;
 mod sightings;
-mod tracking;
 
 pub(super) use problem::MapPrior;
 pub(super) use sightings::Sightings;
@@ -28,20 +28,22 @@ use crate::time::Stamp;
 use chain::{CONSTANTS, HEADING, OWN, POSITION, prior_sigmas, with_minimum_noise};
 use dense::Information;
 use division::{kept_epochs, segments};
+use joint_planes::JointPlanes;
 use problem::Problem;
 use rayon::prelude::*;
 use segment::{Kept, keep};
-use tracking::Tracking;
 
-/// Maximum number of epochs: 300 s. Bounds time and memory.
-const MAX_EPOCHS: usize = 15_000;
+/// Maximum length of a run, s. Bounds time and memory.
+const MAX_S: f64 = 300.0;
+/// Excess over the maximum that is allowed, s: a recording of 300 s has a few scans more.
+const EXCESS_S: f64 = 1.0;
 /// Number of segments that are in memory at a time.
 const BATCH: usize = 4;
 
 /// Information on the constants and on the states of the kept epochs, with all planes marginalised. `None` if it is
 /// singular.
 fn information(problem: &Problem<'_>) -> Option<Information> {
-    let planes = 3 * problem.tracking.count();
+    let planes = 3 * problem.joint.count();
     let mut sum = Information::zeros(planes + CONSTANTS + OWN * problem.kept.len());
     let mut states = planes + CONSTANTS;
     for batch in problem.segments.chunks(BATCH) {
@@ -61,7 +63,7 @@ fn information(problem: &Problem<'_>) -> Option<Information> {
 }
 
 fn add_priors(problem: &Problem<'_>, sum: &mut Information) {
-    let planes = 3 * problem.tracking.count();
+    let planes = 3 * problem.joint.count();
     (0..planes).for_each(|k| sum.add_prior(k, problem.prior.plane[k % 3]));
     let (own, constants) = prior_sigmas(&prior(&problem.model));
     let first = planes + CONSTANTS;
@@ -85,15 +87,14 @@ pub(super) fn bound(
     prior: MapPrior,
 ) -> Result<InformationBound, EvaluationError> {
     let seconds = epochs.len() as f64 * EPOCH.seconds();
-    if epochs.len() > MAX_EPOCHS {
-        let limit_s = MAX_EPOCHS as f64 * EPOCH.seconds();
-        return Err(EvaluationError::TooLong { measure: MEASURE, limit_s, found_s: seconds });
+    if seconds > MAX_S + EXCESS_S {
+        return Err(EvaluationError::TooLong { measure: MEASURE, limit_s: MAX_S, found_s: seconds });
     }
     let segments = segments(epochs.len());
-    let tracking = Tracking::of(sightings, &segments, prior.max_joint_planes);
+    let joint = JointPlanes::of(sightings, &segments, prior.max_joint_planes);
     let kept = kept_epochs(&segments);
     let model = with_minimum_noise(model, seconds);
-    let problem = Problem { model, epochs, sightings, segments, kept, tracking, prior };
+    let problem = Problem { model, epochs, sightings, segments, kept, joint, prior };
     let information = information(&problem).ok_or(EvaluationError::Singular { measure: MEASURE })?;
     errors::bound(&problem, start, &information).ok_or(EvaluationError::Singular { measure: MEASURE })
 }

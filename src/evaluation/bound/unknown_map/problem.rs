@@ -3,8 +3,8 @@
 use super::super::epoch::Epoch;
 use super::super::model::{BoundModel, EPOCH};
 use super::division::Segment;
+use super::joint_planes::JointPlanes;
 use super::sightings::Sightings;
-use super::tracking::Tracking;
 use nalgebra::{Matrix3, Vector3};
 
 /// Maximum number of planes that are unknowns of the whole run. Bounds time and memory.
@@ -42,7 +42,7 @@ pub(super) struct Problem<'a> {
     pub segments: Vec<Segment>,
     /// The kept epochs of all segments.
     pub kept: Vec<usize>,
-    pub tracking: Tracking,
+    pub joint: JointPlanes,
     pub prior: MapPrior,
 }
 

@@ -1,4 +1,4 @@
-//! The information of a segment of the run on its kept epochs, the constants and the tracked planes.
+//! The information of a segment of the run on its kept epochs, the constants and the joint planes.
 
 use super::super::motion::Step;
 use super::chain::{CONSTANTS, OWN, POSITION, STEP, step_information};
@@ -10,11 +10,11 @@ use crate::geometry::Vector;
 use nalgebra::{Matrix3, Matrix3xX, SMatrix};
 use std::collections::BTreeMap;
 
-/// Variables of a segment: other epochs, then kept epochs, constants, tracked planes.
+/// Variables of a segment: other epochs, then kept epochs, constants, joint planes.
 struct Layout<'a> {
     /// Epochs that are kept, in order.
     kept: &'a [usize],
-    /// Positions of the tracked planes that the segment sees.
+    /// Positions of the joint planes that the segment sees.
     planes: Vec<usize>,
 }
 
@@ -65,17 +65,17 @@ impl Layout<'_> {
 
 /// Information of a segment on the variables that are kept.
 pub(super) struct Kept {
-    /// Positions of the tracked planes that the segment sees.
+    /// Positions of the joint planes that the segment sees.
     pub planes: Vec<usize>,
     /// Kept epochs, constants, planes.
     pub information: Information,
 }
 
-/// The information of a segment, with the other epochs and the planes that are not tracked marginalised. `None` if it
+/// The information of a segment, with the other epochs and the planes that are not joint marginalised. `None` if it
 /// is singular.
 pub(super) fn keep(problem: &Problem<'_>, segment: &Segment) -> Option<Kept> {
     let sightings = || segment.measured.clone().flat_map(|epoch| problem.sightings.of(epoch));
-    let mut planes: Vec<usize> = sightings().filter_map(|seen| problem.tracking.rank(seen.plane)).collect();
+    let mut planes: Vec<usize> = sightings().filter_map(|seen| problem.joint.rank(seen.plane)).collect();
     planes.sort_unstable();
     planes.dedup();
     let layout = Layout { kept: &segment.kept, planes };
@@ -120,7 +120,7 @@ fn add_sighting(
     let imu = &problem.epochs[epoch].position_in_world;
     let jacobian = problem.sightings.jacobian(sighting, imu, problem.since_start_s(epoch));
     let (weight, at) = (sighting.information(), layout.measured(epoch));
-    let Some(plane) = problem.tracking.rank(sighting.plane).and_then(|rank| layout.plane(rank)) else {
+    let Some(plane) = problem.joint.rank(sighting.plane).and_then(|rank| layout.plane(rank)) else {
         information.add(&at, &(jacobian.transpose() * weight * jacobian));
         let across = weight.fixed_rows::<3>(0) * jacobian;
         let prior = problem.prior.plane_information();

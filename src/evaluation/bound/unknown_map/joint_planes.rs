@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 /// The planes that are unknowns of the whole run. Every other plane is an unknown of its segment: because no other
 /// segment sees it, or because there are too many planes and this one has few beams; then it counts as a new one in each
 /// segment.
-pub(super) struct Tracking {
+pub(super) struct JointPlanes {
     /// Numbers, increasing.
-    tracked: Vec<u32>,
+    numbers: Vec<u32>,
     /// Number of planes.
     pub planes: usize,
     /// Fraction of the beams on planes that are one plane in all segments.
@@ -23,7 +23,7 @@ struct Seen {
     again: bool,
 }
 
-impl Tracking {
+impl JointPlanes {
     /// Selects the `limit` planes with the most beams of those that several segments see.
     pub(super) fn of(sightings: &Sightings, segments: &[Segment], limit: usize) -> Self {
         let mut seen: BTreeMap<u32, Seen> = BTreeMap::new();
@@ -40,18 +40,18 @@ impl Tracking {
         again.sort_unstable_by_key(|(beams, number)| (std::cmp::Reverse(*beams), *number));
         let divided: u64 = again.iter().skip(limit).map(|(beams, _)| beams).sum();
         let all: u64 = seen.values().map(|plane| plane.beams).sum();
-        let mut tracked: Vec<u32> = again.iter().take(limit).map(|(_, number)| *number).collect();
-        tracked.sort_unstable();
-        Self { tracked, planes: seen.len(), beam_fraction: 1.0 - divided as f64 / all.max(1) as f64 }
+        let mut numbers: Vec<u32> = again.iter().take(limit).map(|(_, number)| *number).collect();
+        numbers.sort_unstable();
+        Self { numbers, planes: seen.len(), beam_fraction: 1.0 - divided as f64 / all.max(1) as f64 }
     }
 
     /// Number of planes that are unknowns of the whole run.
     pub(super) fn count(&self) -> usize {
-        self.tracked.len()
+        self.numbers.len()
     }
 
     /// Position of a plane among those; `None` if it is not one.
     pub(super) fn rank(&self, plane: u32) -> Option<usize> {
-        self.tracked.binary_search(&plane).ok()
+        self.numbers.binary_search(&plane).ok()
     }
 }
