@@ -67,7 +67,7 @@ const RESTRICTED_CRATES: [(&str, &[&str]); 23] = [
     ("tokio", &["cli"]),
     ("include_dir", &["spec"]),
     ("cmaes", &["study"]),
-    ("faer", &["estimation"]),
+    ("faer", &["estimation", "evaluation"]),
     ("parquet", &["study"]),
     ("rustix", &["study"]),
     ("sha2", &["study"]),

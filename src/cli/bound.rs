@@ -4,9 +4,10 @@ use super::arguments::Global;
 use super::bars::{Bars, stop_flag};
 use super::usage::Usage;
 use super::{Completion, output};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use zsim::evaluation::MapKnowledge;
 use zsim::recording::Reader;
 use zsim::report;
 use zsim::study::{Manifest, ProgressMonitor, RecordingBound, information_bound, replace_text};
@@ -15,10 +16,11 @@ use zsim::world::World;
 /// Compute the Cramer-Rao bound of a recording: the accuracy that no estimator can exceed
 ///
 /// The bound includes each beam on a surface of the scene, with noise and incidence, and the IMU, with noise, biases,
-/// scale errors and clock offset. The surfaces are assumed to be known. The recording must have the truth. With --out,
-/// writes bound.csv (by time) and a plot.
+/// scale errors and clock offset. With --map known the surfaces are known: the bound of localisation. With --map unknown
+/// each plane of the scene is an unknown of three parameters: the bound of SLAM, for recordings of up to 300 s. The
+/// recording must have the truth. With --out, writes bound.csv (by time) and a plot.
 #[derive(Args)]
-#[command(after_help = "Example:\n  zsim bound run.mcap --scene office.ron --out results/bound")]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
@@ -26,6 +28,9 @@ pub(super) struct Arguments {
     /// The scene, a name under scenes/ or a file [default: that in the recording's manifest]
     #[arg(long, value_name = "NAME|FILE")]
     scene: Option<String>,
+    /// What is known of the surfaces before the run
+    #[arg(long, value_enum, default_value_t = Map::Known)]
+    map: Map,
     /// Folder for results; if it exists and is not empty, a number is appended to the name [default: none is
     /// written]
     #[arg(long, short, value_name = "DIR")]
@@ -35,12 +40,32 @@ pub(super) struct Arguments {
     force: bool,
 }
 
+const EXAMPLES: &str = "Examples:\n  zsim bound run.mcap --scene office.ron --out results/bound
+  zsim bound run.mcap --map unknown    # the bound of SLAM";
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Map {
+    /// All surfaces, exactly: the bound of localisation
+    Known,
+    /// Nothing: the bound of SLAM
+    Unknown,
+}
+
+impl From<Map> for MapKnowledge {
+    fn from(map: Map) -> Self {
+        match map {
+            Map::Known => Self::Known,
+            Map::Unknown => Self::Unknown,
+        }
+    }
+}
+
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let reader = Reader::open(&arguments.recording)?;
     let world = world(arguments, &reader)?;
     let mut bars = Bars::new(global);
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
-    let bounded = information_bound(&reader, &world, &mut watch);
+    let bounded = information_bound(&reader, &world, arguments.map.into(), &mut watch);
     bars.finish();
     let bounded = bounded?;
     let folder = arguments.out.as_ref().map(|wanted| write_results(&bounded, wanted, arguments.force)).transpose()?;
@@ -82,23 +107,35 @@ fn text(bounded: &RecordingBound) -> String {
     let bound = &bounded.bound;
     let mm = |m: f64| format!("{:.3} mm", m * 1e3);
     let axes = bound.axis_rmse_m;
-    let rows = [
-        ("position RMSE, aligned", mm(bound.aligned_position_rmse_m)),
-        ("position RMSE, in the world", mm(bound.position_rmse_m)),
+    let mut rows = vec![("position RMSE, aligned", mm(bound.aligned_position_rmse_m))];
+    // With an unknown map, all errors are after the alignment.
+    let attitude = if bound.unknown_map.is_some() {
+        "attitude RMSE, aligned"
+    } else {
+        rows.push(("position RMSE, in the world", mm(bound.position_rmse_m)));
+        "attitude RMSE, in the world"
+    };
+    rows.extend([
         ("along x, y, z", format!("{}, {}, {}", mm(axes.x), mm(axes.y), mm(axes.z))),
-        ("attitude RMSE", format!("{:.4} deg", bound.attitude_rmse_rad.to_degrees())),
+        (attitude, format!("{:.4} deg", bound.attitude_rmse_rad.to_degrees())),
         ("clock offset at the end", format!("{:.3} us", bound.clock_offset_s * 1e6)),
         ("range offset", mm(bound.range_offset_m)),
         ("beams", format!("{} ({} skipped)", bounded.beams, bounded.rejected)),
-    ];
+    ]);
+    if let Some(map) = &bound.unknown_map {
+        rows.push(("unknown planes", map.planes.to_string()));
+        rows.push(("beams on joint planes", format!("{:.1} %", 1e2 * map.joint_beam_fraction)));
+    }
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
     format!("No unbiased estimate can be better than:\n{}", report::table(&[], &rows, false))
 }
 
 fn figures(bounded: &RecordingBound, scene: &str) -> Value {
     let bound = &bounded.bound;
+    let map = bound.unknown_map.as_ref();
     json!({
         "scene": scene,
+        "map": if map.is_some() { "unknown" } else { "known" },
         "bound_rmse_m": bound.aligned_position_rmse_m,
         "position_rmse_m": bound.position_rmse_m,
         "axis_rmse_m": bound.axis_rmse_m.as_slice(),
@@ -107,5 +144,7 @@ fn figures(bounded: &RecordingBound, scene: &str) -> Value {
         "range_offset_m": bound.range_offset_m,
         "beams": bounded.beams,
         "left_out": bounded.rejected,
+        "planes": map.map(|map| map.planes),
+        "joint_beam_fraction": map.map(|map| map.joint_beam_fraction),
     })
 }

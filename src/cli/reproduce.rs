@@ -29,6 +29,9 @@ pub(super) struct Arguments {
     /// Smoke test: run a small variant of each experiment, in seconds, in DIR/paper-quick/; do not use its results
     #[arg(long)]
     quick: bool,
+    /// Text for the head of the table, such as the date of the program
+    #[arg(long, value_name = "TEXT")]
+    label: Option<String>,
     /// Start anew even if a folder has work by another spec or version
     #[arg(long)]
     force: bool,
@@ -106,6 +109,6 @@ fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[Finding]
     }
     let path = folder.with_extension("md");
     std::fs::create_dir_all(&arguments.out).with_context(|| format!("cannot create {}", arguments.out.display()))?;
-    replace_text(&path, &paper_table(&findings, extent, &options))?;
+    replace_text(&path, &paper_table(&findings, extent, &options, arguments.label.as_deref()))?;
     Ok(replace_text(&folder.join("report.html"), &paper_page(&findings, folder, extent, &options)?)?)
 }

@@ -28,6 +28,24 @@ pub enum EvaluationError {
         /// Actual length, s.
         found_s: f64,
     },
+    /// The trajectory is too long for the measure.
+    #[error(
+        "{measure} is limited to {limit_s} s of trajectory, and there are {found_s:.0} s; use a part of the recording"
+    )]
+    TooLong {
+        /// The measure.
+        measure: &'static str,
+        /// Maximum length, s.
+        limit_s: f64,
+        /// Actual length, s.
+        found_s: f64,
+    },
+    /// The information matrix of a measure cannot be inverted.
+    #[error("{measure}: the information is singular; check the noise of the sensors in the calibration")]
+    Singular {
+        /// The measure.
+        measure: &'static str,
+    },
     /// The IMU never rested long enough to find down and the gyroscope's bias.
     #[error("the IMU rests for {found_s:.3} s at the start; dead reckoning needs {needed_s} s of rest")]
     NoRest {

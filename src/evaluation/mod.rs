@@ -23,7 +23,7 @@ mod relative;
 
 pub use absolute::Errors;
 pub use alignment::{align, align_poses};
-pub use bound::{BeamObservation, BoundModel, FisherInformation, InformationBound};
+pub use bound::{BeamObservation, BoundModel, FisherInformation, InformationBound, MapKnowledge, UnknownMap};
 pub use clock::{ClockError, clock_error, clock_error_after};
 pub use cloud::{CloudErrors, CloudSummary, Thinning};
 pub use consistency::{Consistency, consistency};

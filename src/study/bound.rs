@@ -5,14 +5,14 @@ use super::sensor_models::RecordedSensors;
 use super::true_clock::TrueClock;
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError};
-use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
+use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound, MapKnowledge};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::{Calibration, ImuSample, LidarReturn, LidarScan, Measurement};
 use crate::recording::{Reader, Selection, TopicPreference, Truth};
 use crate::sensors::ImuSpec;
 use crate::simulation::Run;
 use crate::time::{Span, Stamp};
-use crate::world::{Hit, Ray, World};
+use crate::world::{Hit, PlaneMap, Ray, World};
 use rayon::prelude::*;
 
 /// Prior standard deviations of the clock offset, s, and the clock rate, s/s: wide, so that they carry no information.
@@ -38,19 +38,20 @@ pub struct RecordingBound {
     pub rejected: u64,
 }
 
-/// Computes the information bound of the recording of `reader` in `world`.
+/// Computes the information bound of the recording of `reader` in `world`, for an estimate with the knowledge `map`.
 ///
 /// # Errors
 /// When the recording cannot be read, has no sensors or no truth, or the computation is stopped.
 pub fn information_bound(
     reader: &Reader,
     world: &World,
+    map: MapKnowledge,
     watch: &mut ProgressMonitor,
 ) -> Result<RecordingBound, StudyError> {
     let selection = reader.select(&TopicPreference::default())?;
     let manifest = Manifest::in_recording(reader)?;
     let run = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
-    let mut bound = BoundAccumulator::new(reader, &selection, world, run)?;
+    let mut bound = BoundAccumulator::new(reader, &selection, (world, map), run)?;
     for truth in reader.truth() {
         bound.add_truth(&truth?);
     }
@@ -93,6 +94,8 @@ fn model(run: Option<&Run>, calibration: &Calibration) -> BoundModel {
 /// Accumulates the information of a recording: first all of its truth, then its measurements.
 pub(super) struct BoundAccumulator<'a> {
     world: &'a World,
+    /// Planes of the world, if the map is unknown.
+    planes: Option<PlaneMap>,
     calibration: Calibration,
     imu_shift: Span,
     clock: TrueClock,
@@ -110,14 +113,15 @@ impl<'a> BoundAccumulator<'a> {
     pub(super) fn new(
         reader: &Reader,
         selection: &Selection,
-        world: &'a World,
+        (world, map): (&'a World, MapKnowledge),
         run: Option<&Run>,
     ) -> Result<Self, StudyError> {
         let recorded = run.map(RecordedSensors::of).unwrap_or_default();
         let (found, _) = calibration(reader, selection, &CalibrationSpec::default(), recorded, None)?;
         Ok(Self {
             world,
-            information: FisherInformation::new(model(run, &found.calibration)),
+            planes: (map == MapKnowledge::Unknown).then(|| world.planes()),
+            information: FisherInformation::new(model(run, &found.calibration), map),
             calibration: found.calibration,
             imu_shift: selection.imu_shift(),
             clock: TrueClock::default(),
@@ -195,6 +199,7 @@ impl<'a> BoundAccumulator<'a> {
             direction_in_world: ray.direction_in_world,
             normal_in_world: surface.normal_in_world,
             range_sigma_m: self.calibration.lidar.sigma_m(surface.distance_m),
+            plane: self.planes.as_ref().zip(surface.face).map_or(0, |(planes, face)| planes.plane(face).0),
         })
     }
 

@@ -20,7 +20,7 @@ use super::sampled_truth::SampledTruth;
 use super::sensor_models::RecordedSensors;
 use super::{CalibrationSpec, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
-use crate::evaluation::{Errors, Pairs};
+use crate::evaluation::{Errors, MapKnowledge, Pairs};
 use crate::recording::{FoundCalibration, Reader, Selection, write_tum};
 use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
 use crate::simulation::carrier_of;
@@ -175,7 +175,13 @@ impl<'a> LoopInputs<'a> {
     /// The information bound, without truth and measurements; `None` if the scene is not known.
     fn bound(&self) -> Result<Option<BoundAccumulator<'a>>, StudyError> {
         let Some(Surroundings { world, .. }) = self.origin.surroundings else { return Ok(None) };
-        BoundAccumulator::new(self.reader, self.selection, world, self.origin.manifest.run.as_ref()).map(Some)
+        BoundAccumulator::new(
+            self.reader,
+            self.selection,
+            (world, MapKnowledge::Known),
+            self.origin.manifest.run.as_ref(),
+        )
+        .map(Some)
     }
 
     /// Registers the cloud along the best estimate, and completes `bound` if the truth is known.

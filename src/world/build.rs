@@ -6,7 +6,7 @@ use super::import::{self, MeshTriangles};
 use super::meadow::Meadow;
 use super::mover::{Mover, Path};
 use super::scatter;
-use super::triangle::{MAX_TRIANGLES, Triangle};
+use super::triangle::{MAX_TRIANGLES, Surfaces};
 use super::{
     CanopySpec, ItemSpec, LengthUnit, Material, MaterialId, MaterialKind, MoverSpec, Placement, ScatterSpec, SceneSpec,
     ShapeSpec, SwaySpec, WorldError,
@@ -36,13 +36,6 @@ pub(super) struct WorldParts {
     pub mesh_files: BTreeSet<PathBuf>,
 }
 
-/// Triangles with one material each.
-#[derive(Default)]
-pub(super) struct Surfaces {
-    pub triangles: Vec<Triangle>,
-    pub materials: Vec<MaterialId>,
-}
-
 /// Builds all parts of a world.
 pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, WorldError> {
     let mut builder = Builder {
@@ -52,6 +45,7 @@ pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, Wor
         routes: routes(spec, source)?,
         meshes: BTreeMap::new(),
         triangle_count: 0,
+        solid_count: 0,
         notes: Vec::new(),
         mesh_files: BTreeSet::new(),
     };
@@ -143,6 +137,7 @@ struct Builder<'a> {
     routes: BTreeMap<String, Route>,
     meshes: BTreeMap<String, Rc<MeshTriangles>>,
     triangle_count: usize,
+    solid_count: u32,
     notes: Vec<String>,
     mesh_files: BTreeSet<PathBuf>,
 }
@@ -215,7 +210,7 @@ impl Builder<'_> {
     fn template_surfaces(&mut self, name: &str) -> Result<Caster, WorldError> {
         let mut surfaces = Surfaces::default();
         self.add_template(name, &Pose::identity(), 0, &mut surfaces)?;
-        Ok(Caster::new(&surfaces.triangles, &surfaces.materials))
+        Ok(Caster::new(&surfaces))
     }
 
     fn mover(&mut self, mover: &MoverSpec) -> Result<Mover, WorldError> {
@@ -302,7 +297,9 @@ impl Builder<'_> {
             }
             into.triangles.push(corners);
             into.materials.push(id);
+            into.solids.push(self.solid_count);
         }
+        self.solid_count += 1;
         Ok(())
     }
 }

@@ -11,7 +11,8 @@ mod single_precision;
 pub(super) use boxes::BoxTree;
 
 use super::MaterialId;
-use super::triangle::Triangle;
+use super::planes::{FaceId, FlatFace};
+use super::triangle::{Surfaces, Triangle};
 use crate::geometry::{SurfacePoint, Vector};
 use face::{Plane, SingleFace};
 use glamx::Vec3A;
@@ -29,6 +30,8 @@ pub(super) struct Caster {
     faces: Vec<SingleFace>,
     planes: Vec<Plane>,
     materials: Vec<MaterialId>,
+    /// Number of the solid of each face.
+    solids: Vec<u32>,
     triangle_count: usize,
 }
 
@@ -41,11 +44,14 @@ pub(super) struct Crossing {
     pub normal: Vector,
     /// Material of the triangle.
     pub material: MaterialId,
+    /// The face.
+    pub face: FaceId,
 }
 
 impl Caster {
-    /// A caster for triangles with non-zero area and one material each.
-    pub fn new(triangles: &[Triangle], materials: &[MaterialId]) -> Self {
+    /// A caster for triangles with non-zero area.
+    pub fn new(surfaces: &Surfaces) -> Self {
+        let Surfaces { triangles, materials, solids } = surfaces;
         let (lower, upper) = bounds(triangles);
         let middle = if triangles.is_empty() { Vector::zeros() } else { (lower + upper) / 2.0 };
         let mut order = face::faces(triangles, materials, &middle);
@@ -62,6 +68,7 @@ impl Caster {
             faces,
             planes: order.iter().map(|(_, face)| Plane::new(face)).collect(),
             materials: order.iter().map(|(at, _)| materials[*at]).collect(),
+            solids: order.iter().map(|(at, _)| solids[*at]).collect(),
             triangle_count: triangles.len(),
         }
     }
@@ -90,7 +97,12 @@ impl Caster {
         let plane = &self.planes[at as usize];
         let distance = plane.distance(&origin, direction).unwrap_or(f64::from(near));
         let normal = if plane.normal.dot(direction) > 0.0 { -plane.normal } else { plane.normal };
-        (distance <= reach).then(|| Crossing { distance, normal, material: self.materials[at as usize] })
+        (distance <= reach).then(|| Crossing {
+            distance,
+            normal,
+            material: self.materials[at as usize],
+            face: FaceId(at),
+        })
     }
 
     /// The corners of all triangles, in single precision, with their materials.
@@ -100,6 +112,14 @@ impl Caster {
             let count = if face.is_parallelogram { 2 } else { 1 };
             let in_world = |triangle: Triangle| (triangle.map(|corner| corner + self.middle), *material);
             face.triangles().into_iter().take(count).map(in_world)
+        })
+    }
+
+    /// The faces, in the order of their [`FaceId`].
+    pub fn flat_faces(&self) -> impl Iterator<Item = FlatFace> + '_ {
+        self.faces.iter().zip(&self.planes).zip(&self.solids).map(|((face, plane), solid)| {
+            let face = face.to_double();
+            FlatFace { corners: face.corners(), normal: plane.normal, solid: *solid }
         })
     }
 

@@ -3,6 +3,7 @@ use super::canopy::{Canopy, CanopyCrossing};
 use super::caster::{Caster, Crossing};
 use super::meadow::Meadow;
 use super::mover::Mover;
+use super::planes::PlaneMap;
 use super::section::{SectionPlane, Segment, edges};
 use super::{Hit, Material, MaterialId, Ray, SceneSpec, WorldError};
 use crate::geometry::{Route, Surface, SurfacePoint, Vector};
@@ -49,7 +50,7 @@ impl World {
         Ok(Self {
             name: spec.name.clone(),
             materials,
-            static_surfaces: Caster::new(&static_surfaces.triangles, &static_surfaces.materials),
+            static_surfaces: Caster::new(&static_surfaces),
             movers,
             meadows,
             canopies,
@@ -70,18 +71,24 @@ impl World {
     pub fn cast(&self, ray: &Ray, max_range_m: f64, t_s: f64) -> Option<Hit> {
         let (origin, direction) = (&ray.origin_in_world, &ray.direction_in_world);
         let mut first = self.static_surfaces.cast(origin, direction, max_range_m);
+        let mut is_static = true;
         for mover in &self.movers {
             let reach = first.map_or(max_range_m, |crossing| crossing.distance);
-            first = mover.cast(origin, direction, reach, t_s).or(first);
+            if let Some(crossing) = mover.cast(origin, direction, reach, t_s) {
+                (first, is_static) = (Some(crossing), false);
+            }
         }
         for meadow in &self.meadows {
             let reach = first.map_or(max_range_m, |crossing| crossing.distance);
-            first = meadow.cast(origin, direction, reach, t_s).or(first);
+            if let Some(crossing) = meadow.cast(origin, direction, reach, t_s) {
+                (first, is_static) = (Some(crossing), false);
+            }
         }
-        first.map(|Crossing { distance, normal, material }| Hit {
+        first.map(|Crossing { distance, normal, material, face }| Hit {
             distance_m: distance,
             normal_in_world: normal,
             material,
+            face: is_static.then_some(face),
         })
     }
 
@@ -130,6 +137,11 @@ impl World {
     /// The segments along which a plane cuts the static surfaces.
     pub fn section(&self, plane: &SectionPlane) -> Vec<Segment> {
         self.triangles().filter_map(|(triangle, _)| plane.cut(&triangle)).collect()
+    }
+
+    /// The planes of the static surfaces: which faces are parts of one plane.
+    pub fn planes(&self) -> PlaneMap {
+        PlaneMap::of(&self.static_surfaces.flat_faces().collect::<Vec<_>>())
     }
 
     /// The edges of the static surfaces: where a surface ends, or meets another at more than 25 degrees.

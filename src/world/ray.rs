@@ -1,4 +1,4 @@
-use super::MaterialId;
+use super::{FaceId, MaterialId};
 use crate::geometry::Vector;
 
 /// A ray of light.
@@ -19,6 +19,8 @@ pub struct Hit {
     pub normal_in_world: Vector,
     /// Material of the surface.
     pub material: MaterialId,
+    /// Static face that the ray hit; `None` on a mover.
+    pub face: Option<FaceId>,
 }
 
 impl Ray {

@@ -115,6 +115,27 @@ fn info_and_estimate_read_a_recording_and_report_loss_when_it_is_truncated() {
 }
 
 #[test]
+fn the_bound_of_slam_is_above_that_of_localisation_for_any_number_of_threads() {
+    let here = tempfile::tempdir().unwrap();
+    run(here.path(), "simulate --scene mocap_room --duration 8s --out a.mcap");
+    let bound = |options: &str| -> Value {
+        let (code, out, stderr) = run(here.path(), &format!("bound a.mcap --json {options}"));
+        assert_eq!(code, 0, "{stderr}");
+        serde_json::from_str(&out).unwrap()
+    };
+    let [known, unknown] = ["", "--map unknown --threads 1"].map(bound);
+    let aligned = |figures: &Value| figures["bound_rmse_m"].as_f64().unwrap();
+    assert_eq!((known["map"].as_str(), unknown["map"].as_str()), (Some("known"), Some("unknown")));
+    assert!(aligned(&unknown) > 1.02 * aligned(&known), "{known} {unknown}");
+    assert!(known["planes"].is_null() && unknown["planes"].as_u64() > Some(50), "{unknown}");
+    assert_eq!(unknown["joint_beam_fraction"].as_f64(), Some(1.0));
+    assert_eq!(unknown, bound("--map unknown --threads 2"));
+    bound("--map unknown --out bound");
+    let csv = std::fs::read_to_string(here.path().join("bound/bound.csv")).unwrap();
+    assert!(csv.starts_with("stamp_ns,x_m") && csv.lines().count() > 25, "{csv}");
+}
+
+#[test]
 fn evaluate_agrees_with_evo() {
     // `evo_ape tum truth.tum estimate.tum -a` (evo 1.38.1) gives rmse 0.029285.
     let data = root().join("tests/data/evo");

@@ -1,7 +1,7 @@
 //! The information bound compared with closed forms.
 
 use approx::assert_relative_eq;
-use zsim::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound};
+use zsim::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound, MapKnowledge};
 use zsim::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
 use zsim::measurement::{ImuNoise, ImuSample};
 use zsim::time::{Span, Stamp};
@@ -12,7 +12,7 @@ const SIGMA_M: f64 = 0.01;
 const BEAM_S: f64 = 0.005;
 
 /// A model with an error-free IMU.
-fn exact() -> BoundModel {
+pub(super) fn exact() -> BoundModel {
     BoundModel {
         head_from_imu: Pose::identity(),
         imu: ImuNoise {
@@ -33,7 +33,7 @@ fn exact() -> BoundModel {
     }
 }
 
-fn stamp(t_s: f64) -> Stamp {
+pub(super) fn stamp(t_s: f64) -> Stamp {
     Stamp::from_nanos(1_000_000_000) + Span::from_seconds(t_s)
 }
 
@@ -55,7 +55,7 @@ fn swinging(t: f64) -> (f64, f64, f64) {
 fn bound(model: BoundModel, along: Along, seconds: f64, towards: &[Vector]) -> InformationBound {
     let steps = (seconds * 1e3) as i64;
     let pose = |t_s: f64| Pose::translation(along(t_s).0, 0.0, 0.0);
-    let mut information = FisherInformation::new(model);
+    let mut information = FisherInformation::new(model, MapKnowledge::Known);
     (0..=steps).map(|ms| ms as f64 * 1e-3).for_each(|t_s| information.add_head(stamp(t_s), &pose(t_s)));
     for k in 0..=(seconds / 0.01) as i64 {
         let t_s = k as f64 * 0.01;
@@ -80,6 +80,7 @@ fn bound(model: BoundModel, along: Along, seconds: f64, towards: &[Vector]) -> I
                 direction_in_world: *direction,
                 normal_in_world: -direction,
                 range_sigma_m: SIGMA_M,
+                plane: 0,
             });
         }
     }
@@ -177,7 +178,7 @@ fn oblique_beams_observe_position_and_yaw() {
     // four times the information. Such a beam observes rotation too, so a second one from the other side separates both.
     let askew = |side: f64| Vector::new(0.5, side * 0.75_f64.sqrt(), 0.0);
     let n = beams(4.0);
-    let mut information = FisherInformation::new(exact());
+    let mut information = FisherInformation::new(exact(), MapKnowledge::Known);
     (0..=4000).for_each(|ms| information.add_head(stamp(f64::from(ms) * 1e-3), &Pose::identity()));
     for k in 0..n {
         let t_s = k as f64 * BEAM_S;
@@ -191,6 +192,7 @@ fn oblique_beams_observe_position_and_yaw() {
                 direction_in_world: askew(side),
                 normal_in_world: Vector::x(),
                 range_sigma_m: SIGMA_M,
+                plane: 0,
             });
         }
         let force = Vector::z() * STANDARD_GRAVITY_M_PER_S2;

@@ -4,5 +4,7 @@
 
 mod bound;
 mod evo;
+mod shaft_bound;
 #[path = "../skip/mod.rs"]
 mod skip;
+mod slam_bound;

@@ -59,7 +59,10 @@ async function use(page) {
     await page.locator(`#${id}`).click();
   }
   await play(page);
-  if (isScene) check((await page.locator("#plan svg polyline").count()) > 100, "the floor plan is empty");
+  if (isScene) {
+    const paths = await page.locator("#plan svg path").evaluateAll((all) => all.map((path) => path.getAttribute("d")));
+    check(paths.join("").split("M").length > 100, "the floor plan is empty");
+  }
   else await useCharts(page);
 }
 

@@ -10,6 +10,7 @@ mod latency;
 mod reproduction;
 #[path = "../skip/mod.rs"]
 mod skip;
+mod slam_bound;
 mod slurm;
 mod spring_design;
 mod sweep;

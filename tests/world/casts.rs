@@ -8,7 +8,7 @@ use zsim::spec::{Source, parse};
 use zsim::world::{Ray, World};
 
 /// A world of `items` with the opaque materials `a` and `b` and transparent `glass`, and further scene `fields`.
-fn world(items: &str, fields: &str) -> World {
+pub(super) fn world(items: &str, fields: &str) -> World {
     let text = format!(
         r#"(
             name: "test",

@@ -6,6 +6,7 @@ mod casts;
 mod exports;
 mod includes;
 mod meshes;
+mod planes;
 mod plants;
 mod scenes;
 mod specs;

@@ -1,13 +1,14 @@
 //! Global registration: corrects the open-loop trajectory with matches between surfels of any two times.
 //!
 //! After Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012). Their global optimisation minimises match
-//! errors, deviations from the open loop's velocities and deviations from gravity; biases and latency come from the open
+//! errors, deviations from the open loop's velocities (here without the influence of fixed views, see `sensed_motion`) and deviations
+//! from gravity; biases and latency come from the open
 //! loop. The unknowns are a correction of the trajectory, a cubic B-spline with coarse knots as in a window: `R' = exp(dr) R`,
 //! `t' = t + dt`; and a range bias of the lidar. The lidar extrinsics are those of the open loop, see `lidar_model`. The cost is
 //!
 //! ```text
 //! sum over matches      rho(zeta n^T (mu_i - mu_j))            between any two times, see `matches`
-//! + sum over intervals  |e_r / sigma_r|^2 + |e_t / sigma_t|^2  open-loop relative motion, see `corrected_trajectory`
+//! + sum over intervals  |e_r / sigma_r|^2 + |e_t / sigma_t|^2  relative motion without views, see `corrected_trajectory`
 //! + sum over nodes      |e_l / sigma_l|^2                      open-loop roll and pitch
 //! + |bias / sigma|^2                                           prior of the range bias
 //! ```

@@ -24,6 +24,8 @@ pub struct BeamObservation {
     pub normal_in_world: Vector,
     /// Standard deviation of the range, m.
     pub range_sigma_m: f64,
+    /// Number of the plane that the surface is part of; used if the map is unknown.
+    pub plane: u32,
 }
 
 /// Minimum cosine of the incidence angle; the first-order model does not apply at grazing incidence.
@@ -74,10 +76,12 @@ impl Epoch {
         (self.samples > 0.0).then(|| (self.rate_sum / self.samples, self.force_sum / self.samples))
     }
 
-    pub(super) fn add_beam(&mut self, beam: &BeamObservation, head_from_imu: &Pose) {
+    /// Adds a beam. Returns the derivative of its range with respect to the clock offset, m/s; `None` if the beam grazes the
+    /// surface and is not used.
+    pub(super) fn add_beam(&mut self, beam: &BeamObservation, head_from_imu: &Pose) -> Option<f64> {
         let along = beam.normal_in_world.dot(&beam.direction_in_world);
         if along.abs() < MIN_INCIDENCE_COSINE {
-            return;
+            return None;
         }
         let arm = beam.world_from_head.rotation * head_from_imu.translation.vector;
         let imu_in_world = beam.world_from_head.translation.vector + arm;
@@ -94,6 +98,7 @@ impl Epoch {
         row /= beam.range_sigma_m;
         let products = (0..8).flat_map(|i| (0..=i).map(move |j| row[i] * row[j]));
         self.triangle.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        Some(by_clock)
     }
 
     /// Fisher information of the beams.

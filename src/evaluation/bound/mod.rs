@@ -1,9 +1,9 @@
-//! The Cramer-Rao bound of a recording in a known scene: the accuracy that no estimator can exceed.
+//! The Cramer-Rao bound of a recording: the accuracy that no estimator can exceed.
 //!
 //! The covariance of the errors of any unbiased estimator is at least the inverse of the Fisher information of the
-//! measurements. Here these are all beams, of known noise, on surfaces that are known exactly, and an inertial
-//! measurement unit of known noise with random-walk biases. An estimator without the map has less information, so the bound
-//! applies to it too, but is optimistic.
+//! measurements. Here these are all beams, of known noise, and an inertial measurement unit of known noise with random-walk
+//! biases. The surfaces are known exactly (the bound of localisation), or planes of unknown offset and slopes (the bound
+//! of SLAM, `unknown_map`). The bound of localisation applies to SLAM too, but is optimistic.
 //!
 //! # The model
 //!
@@ -30,9 +30,10 @@ mod model;
 mod motion;
 mod smoother;
 mod state;
+mod unknown_map;
 
 pub use epoch::BeamObservation;
-pub use model::{BoundModel, InformationBound};
+pub use model::{BoundModel, InformationBound, MapKnowledge, UnknownMap};
 
 use super::EvaluationError;
 use crate::geometry::Pose;
@@ -40,10 +41,12 @@ use crate::measurement::ImuSample;
 use crate::time::{Span, Stamp};
 use epoch::Epoch;
 use model::EPOCH;
+use unknown_map::{MapPrior, Sightings};
 
 /// Fisher information of a recording, accumulated while it is read.
 ///
-/// Stores some hundred bytes for each 20 ms: the information of the beams and the motion of the head.
+/// Stores some hundred bytes for each 20 ms: the information of the beams and the motion of the head. With an unknown map,
+/// also some hundred bytes for each plane that the beams of 20 ms hit.
 #[derive(Debug, Clone)]
 pub struct FisherInformation {
     model: BoundModel,
@@ -51,12 +54,15 @@ pub struct FisherInformation {
     /// Last true pose of the IMU.
     before: Option<(Stamp, Pose)>,
     epochs: Vec<Epoch>,
+    /// Beams by plane, if the map is unknown.
+    sightings: Option<Sightings>,
 }
 
 impl FisherInformation {
     /// Creates an accumulator without motion and measurements.
-    pub fn new(model: BoundModel) -> Self {
-        Self { model, start: None, before: None, epochs: Vec::new() }
+    pub fn new(model: BoundModel, map: MapKnowledge) -> Self {
+        let sightings = (map == MapKnowledge::Unknown).then(Sightings::default);
+        Self { model, start: None, before: None, epochs: Vec::new(), sightings }
     }
 
     /// Adds the next true pose of the head, in lidar time, at 50 Hz or more; measurements of a time follow its poses.
@@ -73,34 +79,40 @@ impl FisherInformation {
 
     /// Adds an IMU sample; `stamp` is on the lidar clock.
     pub fn add_imu_sample(&mut self, stamp: Stamp, sample: &ImuSample) {
-        if let Some(epoch) = self.epoch_at(stamp) {
+        if let Some(epoch) = self.index_at(stamp).and_then(|index| self.epochs.get_mut(index)) {
             epoch.add_imu_sample(sample);
         }
     }
 
     /// Adds the observation of a surface by a beam.
     pub fn add_beam(&mut self, beam: &BeamObservation) {
-        let head_from_imu = self.model.head_from_imu;
-        if let Some(epoch) = self.epoch_at(beam.stamp) {
-            epoch.add_beam(beam, &head_from_imu);
+        let Some(index) = self.index_at(beam.stamp) else { return };
+        let Some(epoch) = self.epochs.get_mut(index) else { return };
+        let by_clock = epoch.add_beam(beam, &self.model.head_from_imu);
+        if let (Some(sightings), Some(by_clock)) = (&mut self.sightings, by_clock) {
+            sightings.add(index, beam, by_clock);
         }
     }
 
-    /// The epoch at a time.
-    fn epoch_at(&mut self, stamp: Stamp) -> Option<&mut Epoch> {
+    /// Index of the epoch at a time.
+    fn index_at(&self, stamp: Stamp) -> Option<usize> {
         let index = (stamp.seconds_since(self.start?) / EPOCH.seconds()).round();
-        (index >= 0.0).then(|| self.epochs.get_mut(index as usize)).flatten()
+        (index >= 0.0).then_some(index as usize)
     }
 
     /// Computes the bound.
     ///
     /// # Errors
-    /// When the truth is shorter than 0.1 s.
+    /// When the truth is shorter than 0.1 s; with an unknown map, also when it is longer than 300 s.
     pub fn bound(self) -> Result<InformationBound, EvaluationError> {
         let found_s = self.epochs.len() as f64 * EPOCH.seconds();
         if found_s < 0.1 {
             return Err(EvaluationError::TooShort { measure: "the information bound", needed_s: 0.1, found_s });
         }
-        Ok(smoother::bound(&self.model, self.start.unwrap_or_default(), &self.epochs))
+        let start = self.start.unwrap_or_default();
+        match &self.sightings {
+            None => Ok(smoother::bound(&self.model, start, &self.epochs)),
+            Some(sightings) => unknown_map::bound(&self.model, start, &self.epochs, sightings, MapPrior::UNKNOWN),
+        }
     }
 }

@@ -27,6 +27,9 @@ pub struct BoundModel {
 }
 
 /// Cramer-Rao bounds: minimum RMS errors and standard deviations of any unbiased estimator.
+///
+/// With an unknown map, position and heading of the whole trajectory are not observable. All errors are then those after the
+/// rigid alignment of the positions that the evaluation uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InformationBound {
     /// Stamps of the epochs, lidar time.
@@ -48,4 +51,26 @@ pub struct InformationBound {
     pub clock_offset_s: f64,
     /// Standard deviation of the range offset, m.
     pub range_offset_m: f64,
+    /// Results that only an unknown map has.
+    pub unknown_map: Option<UnknownMap>,
+}
+
+/// What is known of the map before the run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MapKnowledge {
+    /// All surfaces are known exactly: the bound of localisation.
+    #[default]
+    Known,
+    /// Nothing is known of the surfaces: the bound of SLAM.
+    Unknown,
+}
+
+/// Results of the bound with an unknown map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnknownMap {
+    /// Number of planes that beams hit.
+    pub planes: usize,
+    /// Fraction of the beams on planes that are one plane in the whole run. There are too many planes to treat the others
+    /// so: they count as new planes in each 2 s, which raises the bound.
+    pub joint_beam_fraction: f64,
 }

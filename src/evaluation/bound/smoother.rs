@@ -117,6 +117,7 @@ pub(super) fn bound(model: &BoundModel, start: Stamp, epochs: &[Epoch]) -> Infor
         attitude_rmse_rad: attitude.sum().max(0.0).sqrt(),
         clock_offset_s: found.clock.max(0.0).sqrt(),
         range_offset_m: found.range.max(0.0).sqrt(),
+        unknown_map: None,
     }
 }
 

@@ -1,4 +1,5 @@
 use super::canvas::{Canvas, Pen};
+use super::merged_lines::merged_lines;
 use super::{Chart, PlotError, font, frame};
 use plotters::prelude::{BitMapBackend, BitMapElement, DrawingBackend, IntoDrawingArea, SVGBackend};
 use std::path::Path;
@@ -78,7 +79,7 @@ impl Figure {
         self.draw(SVGBackend::with_string(&mut text, (wide, high)), SVG_UNITS_PER_POINT, Pen::Vector)?;
         let size_in_units = format!("width=\"{wide}\" height=\"{high}\"");
         let size_in_points = format!("width=\"{width}\" height=\"{height}\"");
-        Ok(text.replacen(&size_in_units, &size_in_points, 1))
+        Ok(merged_lines(&text.replacen(&size_in_units, &size_in_points, 1)))
     }
 
     /// Writes `NAME.svg` and `NAME.png` into `folder`.

@@ -12,6 +12,7 @@ mod figure;
 mod font;
 mod frame;
 mod legend;
+mod merged_lines;
 mod palette;
 mod stroke;
 

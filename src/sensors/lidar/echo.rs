@@ -1,11 +1,8 @@
 //! Echoes of a beam, from the surfaces that the rays hit.
 
 use super::canopy::{LEAF_COS_INCIDENCE, stop};
-use super::errors::BeamDraws;
-use super::{GlassSpec, Lidar, Sweep};
-
-/// Maximum number of echoes of a beam: one per ray.
-pub(super) const MAX_ECHOES: usize = 7;
+use super::draws::BeamDraws;
+use super::{GlassSpec, Lidar, MAX_RAYS, Sweep};
 
 /// Light returned from one distance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -21,7 +18,8 @@ pub(super) struct Echo {
 /// The echoes of a beam in order of distance.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Echoes {
-    list: [Echo; MAX_ECHOES],
+    /// At most one echo for each ray.
+    list: [Echo; MAX_RAYS],
     count: usize,
 }
 

@@ -1,8 +1,8 @@
-use super::echo::{Echo, MAX_ECHOES};
+use super::draws::ScanDraws;
+use super::echo::Echo;
 use super::{Lidar, LidarErrorsSpec, Switch};
 use crate::measurement::LidarNoise;
-use crate::random::{Seed, Stream};
-use rand::RngExt;
+use crate::random::Seed;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Reflectance of the white target (Kent sheet) with which data sheets specify range.
@@ -28,25 +28,6 @@ pub struct LidarErrors {
     fast_path_power: f64,
     cos_grazing: f64,
     on: bool,
-}
-
-/// Random numbers of one scan. Each beam takes the same count from each stream, whether or not it hits a surface, so
-/// that a change at one beam does not change the noise of another. Numbers for canopies are drawn in scans that cross one.
-pub(super) struct ScanDraws {
-    range: Stream,
-    later: Stream,
-    threshold: Stream,
-    glass: Stream,
-    canopy: Stream,
-}
-
-/// Random numbers of one beam.
-pub(super) struct BeamDraws {
-    pub range: f64,
-    pub threshold: f64,
-    pub glass: f64,
-    /// One number for each ray, in scans that cross a canopy.
-    pub canopy: [f64; MAX_ECHOES],
 }
 
 impl LidarErrors {
@@ -75,14 +56,7 @@ impl LidarErrors {
 
     /// Random numbers of a scan; `None` if the errors are switched off.
     pub(super) fn scan_draws(&self, scan: u64) -> Option<ScanDraws> {
-        let part = |name: &str| self.seed.part(name, scan);
-        self.on.then(|| ScanDraws {
-            range: part("lidar/range"),
-            later: part("lidar/range/later_echoes"),
-            threshold: part("lidar/threshold"),
-            glass: part("lidar/glass"),
-            canopy: part("lidar/canopy"),
-        })
+        self.on.then(|| ScanDraws::of(&self.seed, scan))
     }
 
     /// Whether an echo is detected, given a draw uniform in 0..1.
@@ -106,24 +80,5 @@ impl LidarErrors {
     pub(super) fn quantised_m(&self, range_m: f64) -> f64 {
         let step = self.spec.range.resolution_m;
         if step > 0.0 { (range_m / step).round() * step } else { range_m }
-    }
-}
-
-impl ScanDraws {
-    /// The numbers of the next beam, of which `canopy_rays` rays can be stopped in a canopy.
-    pub fn next_beam(&mut self, canopy_rays: usize) -> BeamDraws {
-        let mut canopy = [0.0; MAX_ECHOES];
-        canopy[..canopy_rays].fill_with(|| self.canopy.random());
-        BeamDraws {
-            canopy,
-            range: StandardNormal.sample(&mut self.range),
-            threshold: f64::from(self.threshold.random::<f32>()),
-            glass: f64::from(self.glass.random::<f32>()),
-        }
-    }
-
-    /// Random number for the second and later echoes of a beam.
-    pub fn next_later_echo(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.later)
     }
 }

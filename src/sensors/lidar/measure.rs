@@ -1,6 +1,6 @@
 //! From echoes to the scan that the sensor reports.
 
-use super::errors::ScanDraws;
+use super::draws::ScanDraws;
 use super::{Beam, Lidar, LidarErrors, Sweep};
 use crate::geometry::Vector;
 use crate::measurement::{LidarReturn, LidarScan, PlanarScan};

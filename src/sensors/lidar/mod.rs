@@ -2,6 +2,7 @@
 
 mod beam;
 mod canopy;
+mod draws;
 mod echo;
 mod errors;
 mod interlaced;
@@ -22,6 +23,9 @@ use crate::spec::{Source, SpecError};
 use crate::time::Span;
 use pattern::{Pattern, Plane};
 use std::f64::consts::TAU;
+
+/// Maximum number of rays of a beam.
+const MAX_RAYS: usize = 7;
 
 /// A lidar: beam pattern, timing and error model.
 #[derive(Debug, Clone)]

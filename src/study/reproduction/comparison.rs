@@ -22,11 +22,11 @@ impl Verdict {
         if agrees { Self::Agrees } else { Self::Differs }
     }
 
-    /// The verdict in a word.
+    /// Whether the goal is met, in a word.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Agrees => "agrees",
-            Self::Differs => "differs",
+            Self::Agrees => "met",
+            Self::Differs => "missed",
         }
     }
 }
@@ -89,6 +89,21 @@ impl Comparison {
             worst: (sorted.len() > 1).then_some(worst),
             verdict: Verdict::of(median <= goal && worst <= WORST_FACTOR * goal),
         })
+    }
+
+    /// Goal, median, worst, ratio to the paper and verdict as cells of a table; empty where there is none.
+    pub(super) fn cells(&self) -> [String; 5] {
+        let number = |x: f64| {
+            let decimals = if x.abs() >= 100.0 { 0 } else { 2 };
+            format!("{x:.decimals$} {}", self.unit).trim_end().to_owned()
+        };
+        [
+            self.goal.clone(),
+            number(self.median),
+            self.worst.map_or_else(String::new, number),
+            self.ratio().map_or_else(String::new, |ratio| format!("{ratio:.2}")),
+            self.verdict.name().to_owned(),
+        ]
     }
 
     /// Ratio of the result to the number in the paper.

@@ -1,6 +1,6 @@
 //! The page of the paper's experiments.
 
-use super::{ComparedNumber, Extent, Finding, Verdict};
+use super::{ComparedNumber, Comparison, Extent, Finding, Verdict};
 use crate::report::page::{ExperimentSection, PageLink, PagePlot, PageTable, PaperPage};
 use crate::study::StudyError;
 use std::path::Path;
@@ -26,7 +26,7 @@ fn summary(findings: &[Finding], extent: Extent) -> String {
     let verdicts: Vec<Verdict> = verdicts.filter_map(|row| Some(row.comparison.as_ref()?.verdict)).collect();
     let agree = verdicts.iter().filter(|verdict| **verdict == Verdict::Agrees).count();
     let mut text = format!(
-        "{finished} of {} experiments are finished; {agree} of {} compared numbers agree.",
+        "{finished} of {} experiments are finished; {agree} of {} goals are met.",
         findings.len(),
         verdicts.len()
     );
@@ -79,29 +79,14 @@ fn address_part(name: &str) -> String {
 }
 
 fn table(name: &str, rows: &[ComparedNumber]) -> PageTable {
-    let header = ["quantity", "paper", "goal", "result, median", "worst", "ratio to the paper", "verdict", "in words"];
+    let header = ["quantity", "paper", "goal", "result, median", "worst", "ratio to the paper", "goal is", "in words"];
     let row = |row: &ComparedNumber| {
-        let dash = || "-".to_owned();
         let quantity = format!("{} {}", row.figure, row.what);
         let paper = if row.paper == "-" { String::new() } else { row.paper.clone() };
-        let Some(of) = &row.comparison else {
-            let none = String::new;
-            return vec![quantity, paper, none(), dash(), dash(), dash(), none(), row.ours.clone()];
-        };
-        let number = |x: f64| {
-            let decimals = if x.abs() >= 100.0 { 0 } else { 2 };
-            format!("{x:.decimals$} {}", of.unit).trim_end().to_owned()
-        };
-        vec![
-            quantity,
-            paper,
-            of.goal.clone(),
-            number(of.median),
-            of.worst.map_or_else(dash, number),
-            of.ratio().map_or_else(dash, |ratio| format!("{ratio:.2}")),
-            of.verdict.name().to_owned(),
-            row.ours.clone(),
-        ]
+        let [goal, numbers @ ..] = row.comparison.as_ref().map_or_else(Default::default, Comparison::cells);
+        // A number and its unit stay on one line.
+        let numbers = numbers.map(|cell| if cell.is_empty() { "-".to_owned() } else { cell.replace(' ', "\u{a0}") });
+        [quantity, paper, goal].into_iter().chain(numbers).chain([row.ours.clone()]).collect()
     };
     PageTable {
         title: format!("Results of {name}"),

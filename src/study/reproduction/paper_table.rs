@@ -1,6 +1,6 @@
 //! The table of the paper's experiments.
 
-use super::{Extent, Finding};
+use super::{Comparison, Extent, Finding};
 use crate::report;
 
 /// First line of [`paper_table`]; identifies a file written by `zsim reproduce`.
@@ -8,22 +8,28 @@ pub const TABLE_HEADING: &str = "# The paper's experiments, reproduced";
 
 /// Table of all experiments as Markdown.
 ///
-/// `options` are appended to the commands in the table.
-pub fn paper_table(findings: &[Finding], extent: Extent, options: &str) -> String {
+/// `options` are appended to the commands in the table; `label`, such as the date of the program, follows the version.
+pub fn paper_table(findings: &[Finding], extent: Extent, options: &str, label: Option<&str>) -> String {
     let mut text = TABLE_HEADING.to_owned();
     text += "\n\n\
         Bosse, Zlot and Flick, \"Zebedee: Design of a Spring-Mounted 3-D Range Sensor with Application to Mobile Mapping\", \
-        IEEE Transactions on Robotics 28(5), 2012. This file is written by `zsim reproduce`.\n\n";
+        IEEE Transactions on Robotics 28(5), 2012. Written by `zsim reproduce`, ";
+    text +=
+        &format!("zsim {}{}.", env!("CARGO_PKG_VERSION"), label.map_or_else(String::new, |label| format!(", {label}")));
+    text += " Results are the median and the worst of the seeds; the worst may be twice the goal.\n\n";
     if extent == Extent::Quick {
         text += "This is a smoke test with short simulations: its figures are not results.\n\n";
     }
     let rows = findings.iter().flat_map(|Finding { experiment, result }| {
         let command = format!("`zsim reproduce {}{options}`", experiment.given);
         result.iter().flat_map(|result| &result.rows).map(move |row| {
-            vec![row.figure.clone(), row.what.clone(), row.paper.clone(), row.ours.clone(), command.clone()]
+            let one = || [String::new(), row.ours.clone(), String::new(), String::new(), String::new()];
+            let numbers = row.comparison.as_ref().map_or_else(one, Comparison::cells);
+            let quantity = [row.figure.clone(), row.what.clone(), row.paper.clone()];
+            quantity.into_iter().chain(numbers).chain([command.clone()]).collect::<Vec<_>>()
         })
     });
-    let header = ["figure", "quantity", "paper", "zsim", "command"];
+    let header = ["figure", "quantity", "paper", "goal", "zsim, median", "worst", "zsim / paper", "goal is", "command"];
     text += &report::markdown(&header, &rows.collect::<Vec<_>>());
     for Finding { experiment, result } in findings {
         let notes = result.as_ref().map(|result| result.notes.clone());
@@ -50,8 +56,17 @@ mod tests {
         };
         let result = ExperimentResult { rows: vec![row], notes: vec!["Read off a plot.".to_owned()] };
         let finding = |name: &str, result| Finding { experiment: Experiment::load(name).unwrap(), result };
-        let text = paper_table(&[finding("fig3", Some(result)), finding("fig4", None)], Extent::Quick, " --quick");
-        assert!(text.contains("| 3a | gain \\| peak | 15 | 14.9 | `zsim reproduce fig3 --quick` |"), "{text}");
+        let text = paper_table(
+            &[finding("fig3", Some(result)), finding("fig4", None)],
+            Extent::Quick,
+            " --quick",
+            Some("2026-11-01"),
+        );
+        assert!(
+            text.contains("| 3a | gain \\| peak | 15 |  | 14.9 |  |  |  | `zsim reproduce fig3 --quick` |"),
+            "{text}"
+        );
+        assert!(text.contains(", 2026-11-01. Results"), "{text}");
         assert!(text.contains("not results"));
         assert!(
             text.contains("## fig3\n\n- Read off a plot.\n") && text.contains("## fig4\n\n- Not finished yet."),

@@ -27,8 +27,11 @@ pub enum Measure {
     /// after rigid alignment, root mean square, m.
     RigidLinkRmseM,
     /// Position error after loop closure and rigid alignment, root mean square, m. Loops are closed only if this measure
-    /// is requested.
+    /// or the next is requested.
     ClosedPositionRmseM,
+    /// Ratio of that error to the information bound with an unknown map (`zsim bound --map unknown`), for runs of up to
+    /// 300 s. The bound takes up to a minute for each recording, which `wall_s` does not include.
+    ErrorOverSlamBound,
     /// Integrity verdict on the estimate: 0 good, 1 degraded, 2 lost.
     Status,
     /// Position error of the final trajectory (loop-closed if that is requested) after rigid alignment over the first
@@ -99,7 +102,7 @@ pub(super) enum Origin {
 
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 32] = [
+    pub const ALL: [Self; 33] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
@@ -109,6 +112,7 @@ impl Measure {
         Self::ClockError120S,
         Self::RigidLinkRmseM,
         Self::ClosedPositionRmseM,
+        Self::ErrorOverSlamBound,
         Self::Status,
         Self::AlignedRmseM,
         Self::LargestErrorM,
@@ -151,6 +155,9 @@ impl Measure {
             }
             Self::ClosedPositionRmseM => {
                 ("closed_position_rmse_m", "closed loop", "Position error, closed loop, RMS (mm)", "mm", 1e3)
+            }
+            Self::ErrorOverSlamBound => {
+                ("error_over_slam_bound", "error/bound", "Ratio of closed-loop error to bound", "1", 1.0)
             }
             Self::Status => ("status", "status", "Verdict (0 good, 1 degraded, 2 lost)", "1", 1.0),
             Self::AlignedRmseM => {
@@ -221,6 +228,7 @@ impl Measure {
             | Self::ClockError120S
             | Self::RigidLinkRmseM
             | Self::ClosedPositionRmseM
+            | Self::ErrorOverSlamBound
             | Self::Status
             | Self::AlignedRmseM
             | Self::LargestErrorM

@@ -7,7 +7,7 @@ use super::tree::Journey;
 use super::{LimitSpec, Plan, timing};
 use crate::dynamics::HeadModel;
 use crate::estimation::{EstimatorSpec, Status};
-use crate::evaluation::{Errors, Pairs, clock_error_after};
+use crate::evaluation::{Errors, MapKnowledge, Pairs, clock_error_after};
 use crate::geometry::Trajectory;
 use crate::measurement::Calibration;
 use crate::recording::{Reader, Selection, TopicPreference, Writer};
@@ -24,7 +24,7 @@ use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
 use crate::study::sampled_truth::SampledTruth;
 use crate::study::sensor_models::RecordedSensors;
-use crate::study::{CalibrationSpec, Manifest, ProgressMonitor, StudyError, comparison};
+use crate::study::{CalibrationSpec, Manifest, ProgressMonitor, StudyError, comparison, information_bound};
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -41,6 +41,8 @@ pub(super) struct TemporaryRecording {
     handles: Vec<File>,
     /// Ground truth for runs with timing errors, read by the first of them, and the time range of their maps, s.
     reference: Mutex<Option<(f64, Arc<Reference>)>>,
+    /// Information bound with an unknown map, m, computed by the first run that needs it.
+    slam_bound_m: Mutex<Option<f64>>,
 }
 
 /// Runs simulations that share physics and rays, and records them for `readers` threads.
@@ -52,7 +54,12 @@ pub(super) fn record_simulations(
     readers: usize,
     limit: LimitSpec,
 ) -> Result<Vec<TemporaryRecording>, StudyError> {
-    let of = |(simulation, handles)| TemporaryRecording { simulation, handles, reference: Mutex::default() };
+    let of = |(simulation, handles)| TemporaryRecording {
+        simulation,
+        handles,
+        reference: Mutex::default(),
+        slam_bound_m: Mutex::default(),
+    };
     if !recorded {
         return Ok(simulations.into_iter().map(|simulation| of((simulation, Vec::new()))).collect());
     }
@@ -75,8 +82,12 @@ impl TemporaryRecording {
     /// Evaluates a run on this recording, read by thread `reader`.
     pub fn evaluate(&self, plan: &Plan, limit: LimitSpec, run: &Journey, reader: usize) -> RunOutcome {
         let measures = plan.result_measures();
+        let bound = match measures.contains(&Measure::ErrorOverSlamBound) {
+            true => self.slam_bound_m(limit, reader),
+            false => Ok(None),
+        };
         let started = Instant::now();
-        let outcome = match self.figures(limit, &measures, run, reader) {
+        let outcome = match bound.and_then(|bound_m| self.figures(limit, &measures, run, reader, bound_m)) {
             Ok((figures, details)) => RunOutcome { figures, details, ..RunOutcome::default() },
             Err(error) => RunOutcome::from_error(measures.len(), &error),
         };
@@ -89,6 +100,7 @@ impl TemporaryRecording {
         measures: &[Measure],
         run: &Journey,
         reader: usize,
+        slam_bound_m: Option<f64>,
     ) -> Result<(Vec<Option<f64>>, Option<String>), StudyError> {
         let needs = |origin: Origin| measures.iter().any(|measure| measure.origin() == origin);
         let swing = match needs(Origin::Swing) || needs(Origin::SwingOrClosedForm) {
@@ -98,12 +110,12 @@ impl TemporaryRecording {
         let (mut estimated, mut map_errors) = (None, None);
         if let Some(handle) = self.handles.get(reader).filter(|_| needs(Origin::Estimate) || needs(Origin::Map)) {
             let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
-            let closes_loops = measures.contains(&Measure::ClosedPositionRmseM);
+            let closes_loops = measures.contains(&Measure::ClosedPositionRmseM) || slam_bound_m.is_some();
             match &run.timing {
                 None => {
                     let head = self.simulation.head();
                     let work = |stop: &AtomicBool| estimate(file, head, &run.estimator.spec, closes_loops, stop);
-                    estimated = Some(with_time_limit(limit, work)?);
+                    estimated = Some(EstimateMetrics { slam_bound_m, ..with_time_limit(limit, work)? });
                 }
                 Some(timing) => {
                     let work = |stop: &AtomicBool| self.map_errors(file, timing, &run.estimator.spec, stop);
@@ -163,6 +175,26 @@ impl TemporaryRecording {
         Ok(reference)
     }
 
+    /// The information bound with an unknown map, m; computed once, on one thread, while other threads wait for it.
+    fn slam_bound_m(&self, limit: LimitSpec, reader: usize) -> Result<Option<f64>, StudyError> {
+        let Some(handle) = self.handles.get(reader) else { return Ok(None) };
+        let mut stored = self.slam_bound_m.lock().unwrap_or_else(PoisonError::into_inner);
+        if stored.is_none() {
+            let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
+            let reader = Reader::new("the recording", file)?;
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+            let bounded = with_time_limit(limit, |stop| {
+                let world = self.simulation.world();
+                pool.install(|| {
+                    let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
+                    information_bound(&reader, world, MapKnowledge::Unknown, &mut watch)
+                })
+            })?;
+            *stored = Some(bounded.bound.aligned_position_rmse_m);
+        }
+        Ok(*stored)
+    }
+
     /// Coverage of the lidar and use of the gyroscope's range, from 5 s (after the rest at the start) to the run's end.
     fn swing(&self) -> Result<Coverage, StudyError> {
         let simulation = &self.simulation;
@@ -197,6 +229,7 @@ struct EstimateMetrics {
     clock_errors_s: [Option<f64>; 2],
     rigid_link_rmse_m: Option<f64>,
     closed_position_rmse_m: Option<f64>,
+    slam_bound_m: Option<f64>,
     status: Status,
     integrity: IntegrityMetrics,
     path_length_m: f64,
@@ -214,6 +247,9 @@ impl EstimateMetrics {
             Measure::ClockError120S => self.clock_errors_s[1],
             Measure::RigidLinkRmseM => self.rigid_link_rmse_m,
             Measure::ClosedPositionRmseM => self.closed_position_rmse_m,
+            Measure::ErrorOverSlamBound => {
+                self.closed_position_rmse_m.zip(self.slam_bound_m).map(|(error_m, bound_m)| error_m / bound_m)
+            }
             Measure::Status => Some(f64::from(self.status as u8)),
             Measure::AlignedRmseM => self.integrity.aligned_rmse_m,
             Measure::LargestErrorM => self.integrity.largest_error_m,
@@ -266,6 +302,7 @@ fn estimate(
             }),
             rigid_link_rmse_m: truth.as_ref().and_then(|truth| rigid_link_rmse_m(head, &run.map_from_head, truth)),
             closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
+            slam_bound_m: None,
             status: integrity.status(),
             integrity: integrity.metrics(&run, Some(&pairs)),
             path_length_m: path_length_m(map_from_head),

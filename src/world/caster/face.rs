@@ -45,6 +45,12 @@ impl Face {
         [[corner, corner + u, corner + v], [corner + u, corner + u + v, corner + v]]
     }
 
+    /// The corners; of a single triangle, the last one repeats.
+    pub fn corners(&self) -> [Vector; 4] {
+        let Self { corner, u, v, is_parallelogram } = *self;
+        [corner, corner + u, corner + v, if is_parallelogram { corner + u + v } else { corner + v }]
+    }
+
     /// The point of the face nearest to `point`.
     pub fn nearest(&self, point: &Vector) -> Vector {
         let Self { corner, u, v, is_parallelogram } = *self;
