@@ -50,7 +50,7 @@ impl Start {
         moved: &SVector<f64, BORDER>,
         knot_spacing_s: f64,
     ) {
-        self.add_orders([1.0; 3], equations, layout, total, moved, knot_spacing_s);
+        self.add_orders([1.0; 3], equations, layout, (total, moved), knot_spacing_s);
     }
 
     /// Removes the part of the prior that [`Self::add_to`] added for the first and second derivatives.
@@ -62,17 +62,16 @@ impl Start {
         moved: &SVector<f64, BORDER>,
         knot_spacing_s: f64,
     ) {
-        self.add_orders([0.0, -1.0, -1.0], equations, layout, total, moved, knot_spacing_s);
+        self.add_orders([0.0, -1.0, -1.0], equations, layout, (total, moved), knot_spacing_s);
     }
 
-    /// Adds the prior of each order of derivative times a factor.
+    /// Adds the prior of each order of derivative times a factor, with the corrections as in [`Self::add_to`].
     fn add_orders(
         &self,
         factors: [f64; 3],
         equations: &mut NormalEquations,
         layout: &Layout,
-        total: &[f64],
-        moved: &SVector<f64, BORDER>,
+        (total, moved): (&[f64], &SVector<f64, BORDER>),
         knot_spacing_s: f64,
     ) {
         let basis = Basis::at(self.u_s, knot_spacing_s);
