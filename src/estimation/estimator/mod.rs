@@ -7,7 +7,6 @@ mod localise;
 mod phase;
 mod poses;
 mod reports;
-mod sensed;
 mod start;
 mod tracking;
 

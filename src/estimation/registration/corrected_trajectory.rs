@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! e_r = log(C_b C_a^-1)                             relative rotation between two nodes
-//! e_t = (t'_b - t'_a) - C (t_b - t_a)               relative translation
+//! e_t = (t'_b - t'_a) - C (t_b - t_a)               relative translation, in open-loop axes
 //! e_l = (-(C z)_y, (C z)_x)                         roll and pitch, which gravity determined
 //! ```
 //!
@@ -38,16 +38,12 @@ pub(super) struct CorrectedTrajectory {
 struct Node {
     stamp: Stamp,
     basis: Basis,
-    /// Position of the measured motion, m.
-    measured_position: Vector,
-    /// Position at the start of the registration, m.
-    first_position: Vector,
+    /// Open-loop position, m.
+    open_position: Vector,
     /// Corrected position, m.
     position: Vector,
-    /// Rotation of the correction.
+    /// Rotation `C` of the correction.
     correction: Rotation,
-    /// Rotation from the measured motion to the start of the registration.
-    from_measured: Rotation,
     /// Rotation of a previous pose graph optimisation.
     previous_correction: Rotation,
     /// Variances per axis of the open-loop translation and rotation since the previous node, m^2 and rad^2.
@@ -55,13 +51,11 @@ struct Node {
 }
 
 impl CorrectedTrajectory {
-    /// Starts with the trajectory `map_from_head`; `None` if it has fewer than two poses. Its motion is to remain that of
-    /// `measured`, which has the same stamps.
+    /// Starts with the open-loop trajectory; `None` if it has fewer than two poses.
     ///
     /// The spacing of the nodes is half the knot spacing.
     pub(super) fn new(
         map_from_head: &Trajectory,
-        measured: &Trajectory,
         covariances: &[(Stamp, PoseCovariance)],
         origin: Stamp,
         spec: &RegistrationSpec,
@@ -76,7 +70,7 @@ impl CorrectedTrajectory {
         let node = |k: usize| {
             let tau_s = (start_s + step_s * k as f64).min(end_s);
             let stamp = (origin + Span::from_seconds(tau_s)).clamp(first, last);
-            let (first, measured) = (map_from_head.at(stamp)?, measured.at(stamp)?);
+            let open_position = map_from_head.at(stamp)?.translation.vector;
             let (translation, rotation) =
                 drift(covariances, stamp - Span::from_seconds(step_s), stamp, spec.correlation_s);
             let variances = (translation_walk * step_s + translation, rotation_walk * step_s + rotation);
@@ -85,11 +79,9 @@ impl CorrectedTrajectory {
             Some(Node {
                 stamp,
                 basis,
-                measured_position: measured.translation.vector,
-                first_position: first.translation.vector,
-                position: first.translation.vector,
+                open_position,
+                position: open_position,
                 correction,
-                from_measured: first.rotation * measured.rotation.inverse(),
                 previous_correction,
                 variances,
             })
@@ -160,7 +152,7 @@ impl CorrectedTrajectory {
         let Some(first) = self.nodes.first() else { return };
         let mut unary = UnaryTerm::default();
         unary.add(&unit(2), first.correction.scaled_axis().z, START_SIGMA.1.powi(-2));
-        let moved = first.position - first.first_position;
+        let moved = first.position - first.open_position;
         for axis in 0..3 {
             unary.add(&unit(3 + axis), moved[axis], START_SIGMA.0.powi(-2));
         }
@@ -198,10 +190,9 @@ struct Deviation {
 }
 
 fn deviation(a: &Node, b: &Node) -> Deviation {
-    let correction = |node: &Node| node.correction * node.from_measured;
-    let rotation_error = (correction(b) * correction(a).inverse()).scaled_axis();
-    let middle = Rotation::from_scaled_axis(rotation_error * 0.5) * correction(a);
-    let shift = middle * (b.measured_position - a.measured_position);
+    let rotation_error = (b.correction * a.correction.inverse()).scaled_axis();
+    let middle = Rotation::from_scaled_axis(rotation_error * 0.5) * a.correction;
+    let shift = middle * (b.open_position - a.open_position);
     let e_t = (b.position - a.position) - shift;
     let mut by_first = -Matrix6::identity();
     let mut by_second = Matrix6::identity();
@@ -260,9 +251,7 @@ mod tests {
             stamp: Stamp::from_nanos(0),
             previous_correction: Rotation::identity(),
             basis: Basis::at(0.3, 1.0),
-            measured_position: Vector::new(wave(0.0), wave(1.0), wave(2.0)) * 3.0,
-            first_position: Vector::zeros(),
-            from_measured: from_roll_pitch_yaw(0.001 * wave(9.0), 0.002, -0.1),
+            open_position: Vector::new(wave(0.0), wave(1.0), wave(2.0)) * 3.0,
             position: Vector::new(wave(3.0), wave(4.0), wave(5.0)) * 3.0,
             correction: from_roll_pitch_yaw(0.001 * wave(6.0), 0.001 * wave(7.0), 0.2 + 0.001 * wave(8.0)),
             variances: (1e-6, 1e-8),
@@ -293,11 +282,8 @@ mod tests {
     #[test]
     fn rigidly_transformed_trajectory_has_no_residual() {
         let correction = from_roll_pitch_yaw(0.1, -0.2, 1.3);
-        let rigidly = |node: &Node| Node {
-            position: correction * node.measured_position + Vector::x(),
-            correction: correction * node.from_measured.inverse(),
-            ..node.clone()
-        };
+        let rigidly =
+            |node: &Node| Node { position: correction * node.open_position + Vector::x(), correction, ..node.clone() };
         let at = deviation(&rigidly(&node(1.0)), &rigidly(&node(2.0)));
         assert!(at.e.norm() < 1e-12, "{}", at.e);
     }

@@ -4,7 +4,6 @@ mod assembly;
 mod correspondence;
 mod equations;
 mod linearised;
-mod local_motion;
 mod readings;
 mod rests;
 mod search;
@@ -173,12 +172,7 @@ impl Window {
 
     /// The IMU pose at the start of the window.
     pub(super) fn start_pose(&self) -> Pose {
-        self.pose_at(self.start.u_s)
-    }
-
-    /// The IMU pose at `u_s`, trajectory time, s.
-    pub(super) fn pose_at(&self, u_s: f64) -> Pose {
-        let motion = self.nominal.at(u_s, &self.unknowns.biases.gyro);
+        let motion = self.nominal.at(self.start.u_s, &self.unknowns.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
         Pose::from_parts(motion.position.into(), rotation)
     }
