@@ -1,7 +1,7 @@
 // Screenshots of scenes and heads for docs/gallery.sh: node scenes.mjs NODE_MODULES FOLDER
 //
-// For each folder NAME in FOLDER (`zsim spring NAME --out NAME`): NAME.png, the head on its spring. For each NAME.html and NAME.svg in FOLDER (`zsim scene view` and `plan`): NAME-view.png, the surfaces in perspective, cut below
-// the ceiling, and NAME-plan.png.
+// For each folder NAME in FOLDER (`zsim spring NAME --out NAME`): NAME.png, the head on its spring. For each NAME.html and
+// NAME.svg (`zsim scene view` and `plan`): NAME-view.png, the surfaces in perspective, cut below the ceiling, and NAME-plan.png.
 import { createRequire } from "node:module";
 import { existsSync, readdirSync } from "node:fs";
 import { join, resolve } from "node:path";

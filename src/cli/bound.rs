@@ -43,6 +43,10 @@ pub(super) struct Arguments {
 const EXAMPLES: &str = "Examples:\n  zsim bound run.mcap --scene office.ron --out results/bound
   zsim bound run.mcap --map unknown    # the bound of SLAM";
 
+/// What to say if some beams are not on joint planes.
+const CAVEAT: &str = "The other beams are on small planes, of which there are too many: each counts as a\n\
+    new one every 2 s, so the bound is somewhat too high.\n";
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Map {
     /// All surfaces, exactly: the bound of localisation
@@ -127,7 +131,9 @@ fn text(bounded: &RecordingBound) -> String {
         rows.push(("beams on joint planes", format!("{:.1} %", 1e2 * map.joint_beam_fraction)));
     }
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
-    format!("No unbiased estimate can be better than:\n{}", report::table(&[], &rows, false))
+    let divided = bound.unknown_map.as_ref().is_some_and(|map| map.joint_beam_fraction < 1.0);
+    let caveat = if divided { CAVEAT } else { "" };
+    format!("No unbiased estimate can be better than:\n{}{caveat}", report::table(&[], &rows, false))
 }
 
 fn figures(bounded: &RecordingBound, scene: &str) -> Value {

@@ -42,8 +42,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let names = if arguments.names.is_empty() { &all } else { &arguments.names };
     // Check all names before the first experiment runs for hours.
     let wanted = names.iter().map(|name| Ok(Experiment::load(name)?)).collect::<anyhow::Result<Vec<_>>>()?;
-    let (extent, stem) = if arguments.quick { (Extent::Quick, "paper-quick") } else { (Extent::Whole, "paper") };
-    let folder = arguments.out.join(stem);
+    let extent = if arguments.quick { Extent::Quick } else { Extent::Whole };
+    let folder = arguments.out.join(extent.folder());
     check_table(&folder.with_extension("md"), arguments.force)?;
     let folder = output::folder_to_resume(&folder)?;
     let program = std::env::current_exe().context("this program's own path is not known")?;

@@ -189,6 +189,10 @@ impl<'a> BoundAccumulator<'a> {
         };
         let surface = self.surface_at_range(&ray, range_m, motion.t_s)?;
         let hit_in_world = ray.at(surface.distance_m);
+        let plane = match &self.planes {
+            None => 0,
+            Some(planes) => planes.plane(surface.face?).0,
+        };
         let is_moving = self.world.distance_to_movers_m(&hit_in_world, MOVER_DISTANCE_M, motion.t_s).is_some();
         (!is_moving).then(|| BeamObservation {
             stamp,
@@ -199,7 +203,7 @@ impl<'a> BoundAccumulator<'a> {
             direction_in_world: ray.direction_in_world,
             normal_in_world: surface.normal_in_world,
             range_sigma_m: self.calibration.lidar.sigma_m(surface.distance_m),
-            plane: self.planes.as_ref().zip(surface.face).map_or(0, |(planes, face)| planes.plane(face).0),
+            plane,
         })
     }
 

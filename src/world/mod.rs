@@ -1,8 +1,8 @@
 //! Worlds: surfaces built from the file of a scene, into which rays can be cast.
 //!
 //! A [`SceneSpec`] (RON, under `scenes/`) lists materials, shapes, templates of furniture, scattered objects, meshes
-//! from files, movers, swaying plants, canopies, and routes to walk. [`World::build`] checks it and builds one set of triangles. [`World::cast`]
-//! returns the first surface on a ray: distance, normal and material.
+//! from files, movers, swaying plants, canopies, and routes to walk. [`World::build`] checks it and builds one set of
+//! triangles. [`World::cast`] returns the first surface on a ray: distance, normal and material.
 //!
 //! ```
 //! use zsim::geometry::Vector;

@@ -127,8 +127,8 @@ impl World {
         self.static_surfaces.triangles()
     }
 
-    /// The triangles of movers and swaying plants at `t_s`, seconds of true time since the start of the run: corners in the world, m, and
-    /// material.
+    /// The triangles of movers and swaying plants at `t_s`, seconds of true time since the start of the run: corners in
+    /// the world, m, and material.
     pub fn moving_triangles(&self, t_s: f64) -> impl Iterator<Item = ([Vector; 3], MaterialId)> + '_ {
         let movers = self.movers.iter().flat_map(move |mover| mover.triangles(t_s));
         movers.chain(self.meadows.iter().flat_map(move |meadow| meadow.triangles(t_s)))

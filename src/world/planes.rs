@@ -38,7 +38,7 @@ pub struct PlaneMap {
 impl PlaneMap {
     /// The planes of `faces`, in the order of their [`FaceId`]. Their numbers depend on the scene only.
     pub(super) fn of(faces: &[FlatFace]) -> Self {
-        let mut corners: Vec<(u32, [i32; 3], u32)> = Vec::new();
+        let mut corners: Vec<(u32, [i64; 3], u32)> = Vec::new();
         for (index, face) in (0..).zip(faces) {
             let cells = face.corners.iter().flat_map(cells_around);
             corners.extend(cells.map(|cell| (face.solid, cell, index)));
@@ -82,8 +82,8 @@ impl PlaneMap {
 }
 
 /// Cells of a grid that contain a point within the tolerance: two points that are one corner share a cell.
-fn cells_around(point: &Vector) -> impl Iterator<Item = [i32; 3]> + use<> {
-    let cell = |x: f64| (x / (4.0 * SAME_CORNER_M)).floor() as i32;
+fn cells_around(point: &Vector) -> impl Iterator<Item = [i64; 3]> + use<> {
+    let cell = |x: f64| (x / (4.0 * SAME_CORNER_M)).floor() as i64;
     let ranges = [0, 1, 2].map(|axis| {
         let x = point[axis];
         [cell(x - SAME_CORNER_M / 2.0), cell(x + SAME_CORNER_M / 2.0)]

@@ -19,7 +19,7 @@ pub struct Hit {
     pub normal_in_world: Vector,
     /// Material of the surface.
     pub material: MaterialId,
-    /// Static face that the ray hit; `None` on a mover.
+    /// Static face that the ray hit; `None` on a mover or a swaying plant.
     pub face: Option<FaceId>,
 }
 

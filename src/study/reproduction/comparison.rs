@@ -12,21 +12,21 @@ const WORST_FACTOR: f64 = 2.0;
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Agrees with the paper, or meets the goal.
-    Agrees,
+    Met,
     /// Differs from the paper, or misses the goal.
-    Differs,
+    Missed,
 }
 
 impl Verdict {
-    fn of(agrees: bool) -> Self {
-        if agrees { Self::Agrees } else { Self::Differs }
+    fn of(is_met: bool) -> Self {
+        if is_met { Self::Met } else { Self::Missed }
     }
 
     /// Whether the goal is met, in a word.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Agrees => "met",
-            Self::Differs => "missed",
+            Self::Met => "met",
+            Self::Missed => "missed",
         }
     }
 }
@@ -119,14 +119,14 @@ mod tests {
     #[test]
     fn a_result_is_compared_with_the_paper_or_the_goal() {
         let near = Comparison::near("", 15.0, 12.0);
-        assert_eq!((near.verdict, near.ratio()), (Verdict::Agrees, Some(0.8)));
-        assert_eq!(Comparison::near("", 15.0, 9.0).verdict, Verdict::Differs);
-        assert_eq!(Comparison::near("", 15.0, f64::NAN).verdict, Verdict::Differs);
-        assert_eq!(Comparison::above("mm", 10.0, 1.2, 11.0).verdict, Verdict::Differs);
-        assert_eq!(Comparison::above("mm", 10.0, 1.2, 13.0).verdict, Verdict::Agrees);
+        assert_eq!((near.verdict, near.ratio()), (Verdict::Met, Some(0.8)));
+        assert_eq!(Comparison::near("", 15.0, 9.0).verdict, Verdict::Missed);
+        assert_eq!(Comparison::near("", 15.0, f64::NAN).verdict, Verdict::Missed);
+        assert_eq!(Comparison::above("mm", 10.0, 1.2, 11.0).verdict, Verdict::Missed);
+        assert_eq!(Comparison::above("mm", 10.0, 1.2, 13.0).verdict, Verdict::Met);
         let seeds = Comparison::at_most("mm", Some(6.9), 0.5, &[0.9, 0.3, 0.5, 0.4]).unwrap();
-        assert_eq!((seeds.median, seeds.worst, seeds.verdict), (0.45, Some(0.9), Verdict::Agrees));
-        assert_eq!(Comparison::at_most("mm", None, 0.5, &[0.4, 0.4, 1.1]).unwrap().verdict, Verdict::Differs);
+        assert_eq!((seeds.median, seeds.worst, seeds.verdict), (0.45, Some(0.9), Verdict::Met));
+        assert_eq!(Comparison::at_most("mm", None, 0.5, &[0.4, 0.4, 1.1]).unwrap().verdict, Verdict::Missed);
         assert!(Comparison::at_most("mm", None, 0.5, &[]).is_none());
     }
 }

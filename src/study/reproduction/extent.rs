@@ -12,3 +12,13 @@ pub enum Extent {
     /// A smoke test that takes seconds; its figures are not results.
     Quick,
 }
+
+impl Extent {
+    /// Name of the folder of all experiments, and of their table without extension.
+    pub fn folder(self) -> &'static str {
+        match self {
+            Self::Whole => "paper",
+            Self::Quick => "paper-quick",
+        }
+    }
+}

@@ -24,9 +24,9 @@ fn summary(findings: &[Finding], extent: Extent) -> String {
     let finished = findings.iter().filter(|finding| finding.result.is_some()).count();
     let verdicts = findings.iter().filter_map(|finding| finding.result.as_ref()).flat_map(|result| &result.rows);
     let verdicts: Vec<Verdict> = verdicts.filter_map(|row| Some(row.comparison.as_ref()?.verdict)).collect();
-    let agree = verdicts.iter().filter(|verdict| **verdict == Verdict::Agrees).count();
+    let met = verdicts.iter().filter(|verdict| **verdict == Verdict::Met).count();
     let mut text = format!(
-        "{finished} of {} experiments are finished; {agree} of {} goals are met.",
+        "{finished} of {} experiments are finished; {met} of {} goals are met.",
         findings.len(),
         verdicts.len()
     );

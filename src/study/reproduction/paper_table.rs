@@ -36,6 +36,13 @@ pub fn paper_table(findings: &[Finding], extent: Extent, options: &str, label: O
         let notes = notes.unwrap_or_else(|| vec!["Not finished yet.".to_owned()]);
         text += &format!("\n## {}\n\n", experiment.given);
         notes.iter().for_each(|note| text += &format!("- {note}\n"));
+        if result.is_some() {
+            let file = |name: &str| format!("{}/{}/{name}.svg", extent.folder(), experiment.name);
+            experiment
+                .plots()
+                .iter()
+                .for_each(|(name, title)| text += &format!("- Figure: [{title}]({})\n", file(name)));
+        }
     }
     text
 }
@@ -69,7 +76,8 @@ mod tests {
         assert!(text.contains(", 2026-11-01. Results"), "{text}");
         assert!(text.contains("not results"));
         assert!(
-            text.contains("## fig3\n\n- Read off a plot.\n") && text.contains("## fig4\n\n- Not finished yet."),
+            text.contains("## fig3\n\n- Read off a plot.\n- Figure: [Gain curves](paper-quick/fig3/gains.svg)\n")
+                && text.contains("## fig4\n\n- Not finished yet."),
             "{text}"
         );
     }

@@ -30,7 +30,7 @@ pub enum Measure {
     /// or the next is requested.
     ClosedPositionRmseM,
     /// Ratio of that error to the information bound with an unknown map (`zsim bound --map unknown`), for runs of up to
-    /// 300 s. The bound takes up to a minute for each recording, which `wall_s` does not include.
+    /// 300 s. The bound takes up to a minute for a recording of 150 s, which `wall_s` does not include.
     ErrorOverSlamBound,
     /// Integrity verdict on the estimate: 0 good, 1 degraded, 2 lost.
     Status,
