@@ -3,7 +3,7 @@
 //! If a clock is set by a day in the middle of a recording, there is a gap of a day. Quantities at regular times (knots,
 //! nodes) would fill it. They are placed on a time axis on which no gap exceeds [`MAX_GAP_S`].
 
-use super::observed::{LidarCorrectionPeriod, ObservedSurfel, ObservedSurfels};
+use super::observed::{LidarCorrectionPeriod, MotionByViews, ObservedSurfel, ObservedSurfels};
 use crate::geometry::{PoseCovariance, Trajectory, TrajectoryError};
 use crate::time::{Span, Stamp};
 
@@ -56,7 +56,10 @@ impl Gaps {
         let seconds = |tau_s: f64| self.shortened(origin + Span::from_seconds(tau_s)).seconds_since(origin);
         let surfel = |one: &ObservedSurfel| ObservedSurfel { tau_s: seconds(one.tau_s), ..*one };
         let known = |one: &LidarCorrectionPeriod| LidarCorrectionPeriod { until_s: seconds(one.until_s), ..*one };
+        let by_views =
+            |one: &MotionByViews| MotionByViews { from_s: seconds(one.from_s), until_s: seconds(one.until_s), ..*one };
         ObservedSurfels {
+            by_views: observed.by_views.iter().map(by_views).collect(),
             surfels: observed.surfels.iter().map(surfel).collect(),
             lidars: observed.lidars.iter().map(known).collect(),
             ..*observed

@@ -1,9 +1,10 @@
 //! Surfaces observed by the open loop, the input of the global registration.
 
 use super::surfel::Patch;
-use crate::geometry::Trajectory;
+use crate::geometry::{Pose, Trajectory};
 use crate::measurement::LidarCorrection;
 use crate::time::{Span, Stamp};
+use nalgebra::Matrix6;
 use rayon::prelude::*;
 
 /// Surface patches observed by the open loop, in the map frame, each with its time.
@@ -17,10 +18,25 @@ pub struct ObservedSurfels {
     pub(super) surfels: Vec<ObservedSurfel>,
     /// The lidar corrections with which the patches were built, in order of time.
     pub(super) lidars: Vec<LidarCorrectionPeriod>,
+    /// How fixed views changed the motion of the open loop, in order of time.
+    pub(super) by_views: Vec<MotionByViews>,
     /// Whether the range bias is unobservable and fixed, because the lidar looks in one direction only.
     pub(super) range_bias_is_fixed: bool,
     /// Run time of building the surfels, s.
     pub(super) elapsed_s: f64,
+}
+
+/// How fixed views changed the motion of the open loop from `from_s` to `until_s`, lidar time, s from the origin of the times.
+///
+/// With the poses `a` and `b` of the open loop, the motion without views is `a^-1 c b`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MotionByViews {
+    pub(super) from_s: f64,
+    pub(super) until_s: f64,
+    /// `c`, in the map frame.
+    pub(super) change: Pose,
+    /// Covariance of the motion without views per second: rotation (rad), then translation (m), map axes.
+    pub(super) covariance_per_s: Matrix6<f64>,
 }
 
 /// The lidar correction during a part of the trajectory.

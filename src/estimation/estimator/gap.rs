@@ -34,6 +34,9 @@ impl Estimator {
             self.local_map.consider.propagate_to(&end);
         }
         self.output_poses(tracking, end_s);
+        if let Some(observed) = &mut self.observed {
+            tracking.sensed.settle(&tracking.window, end_s, observed);
+        }
         self.record_observed(&tracking.window, Window::observed_in_all, Window::end_s);
     }
 

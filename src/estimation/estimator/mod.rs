@@ -7,6 +7,7 @@ mod localise;
 mod phase;
 mod poses;
 mod reports;
+mod sensed;
 mod start;
 mod tracking;
 

@@ -1,5 +1,6 @@
 //! The phases of the estimator: without and with a window.
 
+use super::sensed::SensedMotion;
 use crate::estimation::consider::Sensitivity;
 use crate::estimation::initial::StateBeforeGap;
 use crate::estimation::intake::Segment;
@@ -37,6 +38,8 @@ pub(super) struct Tracking {
     pub(super) recovery: Option<Box<GapRecovery>>,
     /// Sensitivity of the end of the window to the errors at its start.
     pub(super) at_end: Option<Sensitivity>,
+    /// The motion without views, for the registration.
+    pub(super) sensed: SensedMotion,
     /// Stamp of the next pose; none before the first pose of the window.
     pub(super) next_pose: Option<Stamp>,
     /// Whether the start of the window was wrong, so that the window is discarded.

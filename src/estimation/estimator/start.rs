@@ -2,6 +2,7 @@
 
 use super::Estimator;
 use super::phase::{GapRecovery, Gathering, Phase, Tracking};
+use super::sensed::SensedMotion;
 use crate::estimation::border::Border;
 use crate::estimation::clock::Clock;
 use crate::estimation::consider::ConsiderCovariance;
@@ -131,7 +132,8 @@ impl Estimator {
             window.resume_from(before);
         }
         self.local_map.consider = self.covariance_at_start(&window, before);
-        Tracking { window, waiting: waiting.into(), recovery, at_end: None, next_pose: None, is_rejected: false }
+        let (waiting, sensed) = (waiting.into(), SensedMotion::default());
+        Tracking { window, waiting, recovery, at_end: None, sensed, next_pose: None, is_rejected: false }
     }
 
     /// The settings adapted to the scan geometry of the lidar.

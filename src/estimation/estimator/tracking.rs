@@ -64,7 +64,7 @@ impl Estimator {
 
     /// Removes the oldest segment if the window is full. Returns the time of the trajectory up to which poses are final, s.
     fn finish_oldest_segment(&mut self, tracking: &mut Tracking, linearised: Option<&Linearised>) -> Option<f64> {
-        let Tracking { window, at_end, .. } = tracking;
+        let Tracking { window, at_end, sensed, .. } = tracking;
         let local_map = &mut self.local_map;
         *at_end = linearised.and_then(|at| window.sensitivity_at(window.nominal.end_s(), at, &local_map.views));
         if !window.is_full() {
@@ -75,6 +75,9 @@ impl Estimator {
             local_map.consider.advance(&by);
         }
         let tau_s = window.unknowns.clock.lidar_s(until_s);
+        if let (Some(observed), Some(at)) = (&mut self.observed, linearised) {
+            sensed.advance(window, at, until_s, observed);
+        }
         self.gauge.advance(&mut local_map.consider, until_s, self.intake.stamp(tau_s));
         let patches = window.remove_oldest(linearised)?;
         local_map.add_segment(&patches, self.spec.step_s, window.matcher());

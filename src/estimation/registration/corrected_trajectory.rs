@@ -1,8 +1,8 @@
-//! The trajectory under correction, and the residuals against the motion of the open loop.
+//! The trajectory under correction, and the residuals against the motion that the windows measured without views.
 //!
 //! ```text
 //! e_r = log(C_b C_a^-1)                             relative rotation between two nodes
-//! e_t = (t'_b - t'_a) - C (t_b - t_a)               relative translation, in open-loop axes
+//! e_t = (t'_b - t'_a) - C (t_b - t_a)               relative translation
 //! e_l = (-(C z)_y, (C z)_x)                         roll and pitch, which gravity determined
 //! ```
 //!
@@ -16,6 +16,7 @@
 use super::RegistrationSpec;
 use super::equations::{Equations, PairTerm, UnaryTerm};
 use crate::estimation::nominal::Correction;
+use crate::estimation::observed::MotionByViews;
 use crate::estimation::spline::Basis;
 use crate::geometry::{Pose, PoseCovariance, Rotation, Trajectory, TrajectoryError, Vector, skew};
 use crate::time::{Span, Stamp};
@@ -23,6 +24,9 @@ use nalgebra::{Matrix6, Vector6};
 
 /// Standard deviation of position, m, and heading, rad, of the first pose: it defines the map frame.
 const START_SIGMA: (f64, f64) = (1e-4, 1e-5);
+
+/// Least variance of the measured motion along any direction, rad^2 or m^2: positive in spite of rounding.
+const MIN_VARIANCE: f64 = 1e-14;
 
 /// A trajectory under iterative correction.
 #[derive(Debug, Clone)]
@@ -38,24 +42,30 @@ pub(super) struct CorrectedTrajectory {
 struct Node {
     stamp: Stamp,
     basis: Basis,
-    /// Open-loop position, m.
-    open_position: Vector,
+    /// Position of the measured motion, m.
+    measured_position: Vector,
+    /// Position at the start of the registration, m.
+    first_position: Vector,
     /// Corrected position, m.
     position: Vector,
-    /// Rotation `C` of the correction.
+    /// Rotation of the correction.
     correction: Rotation,
+    /// Rotation from the measured motion to the start of the registration.
+    from_measured: Rotation,
     /// Rotation of a previous pose graph optimisation.
     previous_correction: Rotation,
-    /// Variances per axis of the open-loop translation and rotation since the previous node, m^2 and rad^2.
-    variances: (f64, f64),
+    /// Covariance of the measured motion since the previous node: rotation (rad), then translation (m), map axes.
+    covariance: Matrix6<f64>,
 }
 
 impl CorrectedTrajectory {
-    /// Starts with the open-loop trajectory; `None` if it has fewer than two poses.
+    /// Starts with the trajectory `map_from_head`; `None` if it has fewer than two poses. Its motion is to remain that of
+    /// `measured`, which has the same stamps.
     ///
     /// The spacing of the nodes is half the knot spacing.
     pub(super) fn new(
         map_from_head: &Trajectory,
+        measured: &Trajectory,
         covariances: &[(Stamp, PoseCovariance)],
         origin: Stamp,
         spec: &RegistrationSpec,
@@ -65,30 +75,48 @@ impl CorrectedTrajectory {
         let (start_s, end_s) = (seconds(first), seconds(last));
         let intervals = ((end_s - start_s) / (0.5 * spec.knot_spacing_s)).ceil().max(1.0) as usize;
         let step_s = (end_s - start_s) / intervals as f64;
-        let (translation_walk, rotation_walk) =
-            (spec.drift_m_per_sqrt_s.powi(2), spec.turn_deg_per_sqrt_s.to_radians().powi(2));
+        let (translation_walk, rotation_walk) = random_walk(spec);
         let node = |k: usize| {
             let tau_s = (start_s + step_s * k as f64).min(end_s);
             let stamp = (origin + Span::from_seconds(tau_s)).clamp(first, last);
-            let open_position = map_from_head.at(stamp)?.translation.vector;
+            let (first, measured) = (map_from_head.at(stamp)?, measured.at(stamp)?);
             let (translation, rotation) =
                 drift(covariances, stamp - Span::from_seconds(step_s), stamp, spec.correlation_s);
-            let variances = (translation_walk * step_s + translation, rotation_walk * step_s + rotation);
+            let covariance = diagonal((translation_walk * step_s + translation, rotation_walk * step_s + rotation));
             let basis = Basis::at(tau_s, spec.knot_spacing_s);
             let (correction, previous_correction) = (Rotation::identity(), Rotation::identity());
             Some(Node {
                 stamp,
                 basis,
-                open_position,
-                position: open_position,
+                measured_position: measured.translation.vector,
+                first_position: first.translation.vector,
+                position: first.translation.vector,
                 correction,
+                from_measured: first.rotation * measured.rotation.inverse(),
                 previous_correction,
-                variances,
+                covariance,
             })
         };
         let nodes = (0..=intervals).map(node).collect::<Option<_>>()?;
         let times_s = map_from_head.stamps().iter().map(|stamp| seconds(*stamp)).collect();
         Some(Self { spacing_s: spec.knot_spacing_s, times_s, poses: map_from_head.poses().to_vec(), nodes })
+    }
+
+    /// Takes the weight of the motion from the windows that measured it; at other times the weight remains.
+    ///
+    /// The covariance is that of a window without views, because views repeat errors: with them, the motion of every lap errs alike.
+    /// It is loose where the window's surfaces and the IMU do not hold the motion, as the height on stairs.
+    pub(super) fn weighted_by(mut self, motions: &[MotionByViews], origin: Stamp, spec: &RegistrationSpec) -> Self {
+        for k in 1..self.nodes.len() {
+            let step_s = self.nodes[k].stamp.seconds_since(self.nodes[k - 1].stamp);
+            let middle_s = self.nodes[k].stamp.seconds_since(origin) - 0.5 * step_s;
+            let next = motions.partition_point(|motion| motion.until_s < middle_s);
+            if let Some(motion) = motions.get(next).filter(|motion| motion.from_s <= middle_s) {
+                let walk = random_walk(spec);
+                self.nodes[k].covariance = (diagonal(walk) + motion.covariance_per_s) * step_s;
+            }
+        }
+        self
     }
 
     /// First and last time, s.
@@ -152,7 +180,7 @@ impl CorrectedTrajectory {
         let Some(first) = self.nodes.first() else { return };
         let mut unary = UnaryTerm::default();
         unary.add(&unit(2), first.correction.scaled_axis().z, START_SIGMA.1.powi(-2));
-        let moved = first.position - first.open_position;
+        let moved = first.position - first.first_position;
         for axis in 0..3 {
             unary.add(&unit(3 + axis), moved[axis], START_SIGMA.0.powi(-2));
         }
@@ -186,13 +214,23 @@ struct Deviation {
     e: Vector6<f64>,
     by_first: Matrix6<f64>,
     by_second: Matrix6<f64>,
-    variances: (f64, f64),
+    covariance: Matrix6<f64>,
+}
+
+/// Variances per second and axis of the random walk of position and attitude, m^2 and rad^2.
+fn random_walk(spec: &RegistrationSpec) -> (f64, f64) {
+    (spec.drift_m_per_sqrt_s.powi(2), spec.turn_deg_per_sqrt_s.to_radians().powi(2))
+}
+
+fn diagonal((shift, turn): (f64, f64)) -> Matrix6<f64> {
+    Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift))
 }
 
 fn deviation(a: &Node, b: &Node) -> Deviation {
-    let rotation_error = (b.correction * a.correction.inverse()).scaled_axis();
-    let middle = Rotation::from_scaled_axis(rotation_error * 0.5) * a.correction;
-    let shift = middle * (b.open_position - a.open_position);
+    let correction = |node: &Node| node.correction * node.from_measured;
+    let rotation_error = (correction(b) * correction(a).inverse()).scaled_axis();
+    let middle = Rotation::from_scaled_axis(rotation_error * 0.5) * correction(a);
+    let shift = middle * (b.measured_position - a.measured_position);
     let e_t = (b.position - a.position) - shift;
     let mut by_first = -Matrix6::identity();
     let mut by_second = Matrix6::identity();
@@ -200,17 +238,21 @@ fn deviation(a: &Node, b: &Node) -> Deviation {
     by_first.fixed_view_mut::<3, 3>(3, 0).copy_from(&half);
     by_second.fixed_view_mut::<3, 3>(3, 0).copy_from(&half);
     let e = Vector6::new(rotation_error.x, rotation_error.y, rotation_error.z, e_t.x, e_t.y, e_t.z);
-    Deviation { e, by_first, by_second, variances: b.variances }
+    Deviation { e, by_first, by_second, covariance: b.covariance }
 }
 
 impl Deviation {
     fn pair_term(&self) -> PairTerm {
         let mut pair_term = PairTerm::default();
-        let (shift, turn) = self.variances;
+        let eigen = self.covariance.symmetric_eigen();
+        let (e, by_first, by_second) = (
+            eigen.eigenvectors.tr_mul(&self.e),
+            eigen.eigenvectors.tr_mul(&self.by_first),
+            eigen.eigenvectors.tr_mul(&self.by_second),
+        );
         for row in 0..6 {
-            let weight = if row < 3 { 1.0 / turn } else { 1.0 / shift };
-            let (by_first, by_second) = (self.by_first.row(row).transpose(), self.by_second.row(row).transpose());
-            pair_term.add(&by_first, &by_second, self.e[row], weight);
+            let weight = eigen.eigenvalues[row].max(MIN_VARIANCE).recip();
+            pair_term.add(&by_first.row(row).transpose(), &by_second.row(row).transpose(), e[row], weight);
         }
         pair_term
     }
@@ -251,10 +293,12 @@ mod tests {
             stamp: Stamp::from_nanos(0),
             previous_correction: Rotation::identity(),
             basis: Basis::at(0.3, 1.0),
-            open_position: Vector::new(wave(0.0), wave(1.0), wave(2.0)) * 3.0,
+            measured_position: Vector::new(wave(0.0), wave(1.0), wave(2.0)) * 3.0,
+            first_position: Vector::zeros(),
+            from_measured: from_roll_pitch_yaw(0.001 * wave(9.0), 0.002, -0.1),
             position: Vector::new(wave(3.0), wave(4.0), wave(5.0)) * 3.0,
             correction: from_roll_pitch_yaw(0.001 * wave(6.0), 0.001 * wave(7.0), 0.2 + 0.001 * wave(8.0)),
-            variances: (1e-6, 1e-8),
+            covariance: diagonal((1e-6, 1e-8)),
         }
     }
 
@@ -282,10 +326,41 @@ mod tests {
     #[test]
     fn rigidly_transformed_trajectory_has_no_residual() {
         let correction = from_roll_pitch_yaw(0.1, -0.2, 1.3);
-        let rigidly =
-            |node: &Node| Node { position: correction * node.open_position + Vector::x(), correction, ..node.clone() };
+        let rigidly = |node: &Node| Node {
+            position: correction * node.measured_position + Vector::x(),
+            correction: correction * node.from_measured.inverse(),
+            ..node.clone()
+        };
         let at = deviation(&rigidly(&node(1.0)), &rigidly(&node(2.0)));
         assert!(at.e.norm() < 1e-12, "{}", at.e);
+    }
+
+    #[test]
+    fn the_motion_of_a_window_has_its_covariance() {
+        let spec = crate::estimation::load("default").unwrap().registration;
+        let at = |k: i64| Stamp::from_nanos(k * 100_000_000);
+        let poses = (0..41).map(|k| (at(k), Pose::translation(0.1 * k as f64, 0.0, 0.0)));
+        let trajectory = Trajectory::from_poses(poses).unwrap();
+        let covariance_per_s = Matrix6::from_fn(|r, c| if r == c { 1e-5 } else { 2e-6 * (r + c) as f64 / 10.0 });
+        let motion = MotionByViews { from_s: 1.0, until_s: 2.5, change: Pose::identity(), covariance_per_s };
+        let before = CorrectedTrajectory::new(&trajectory, &trajectory, &[], at(0), &spec).unwrap();
+        let after = before.clone().weighted_by(&[motion], at(0), &spec);
+        // Nodes every 0.5 s: the intervals that end with the nodes 3 to 5 are within the motion.
+        for (k, (before, after)) in before.nodes.iter().zip(&after.nodes).enumerate() {
+            let added = if (3..=5).contains(&k) { covariance_per_s * 0.5 } else { Matrix6::zeros() };
+            assert_relative_eq!(after.covariance, before.covariance + added, epsilon = 1e-15);
+        }
+    }
+
+    /// A motion that is certain along one direction has no weight along another.
+    #[test]
+    fn weights_are_the_inverse_covariance() {
+        let mixed = Matrix6::from_fn(|r, c| ((r * 7 + c * 3) as f64).sin());
+        let covariance = (mixed * mixed.transpose() + Matrix6::identity()) * 1e-6;
+        let (a, b) = (node(1.0), Node { covariance, ..node(2.0) });
+        let deviation = deviation(&a, &b);
+        let expected = deviation.by_second.transpose() * covariance.try_inverse().unwrap() * deviation.by_second;
+        assert_relative_eq!(deviation.pair_term().second.square, expected, max_relative = 1e-9, epsilon = 1e-3);
     }
 
     #[test]

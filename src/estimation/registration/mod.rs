@@ -2,13 +2,14 @@
 //!
 //! After Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012). Their global optimisation minimises match
 //! errors, deviations from the open loop's velocities and deviations from gravity; biases and latency come from the open
-//! loop. The unknowns are a correction of the trajectory, a cubic B-spline with coarse knots as in a window: `R' = exp(dr) R`,
-//! `t' = t + dt`; a range bias of the lidar, and one of weak echoes. The lidar extrinsics are those of the open loop, see
-//! `lidar_model`. The cost is
+//! loop. Here the velocities are those that each window measured without its fixed views (`sensed_motion`), with the covariance of
+//! that window. The unknowns are a correction of the trajectory, a cubic B-spline with coarse knots as in a window:
+//! `R' = exp(dr) R`, `t' = t + dt`; a range bias of the lidar, and one of weak echoes. The lidar extrinsics are those of the open
+//! loop, see `lidar_model`. The cost is
 //!
 //! ```text
 //! sum over matches      rho(zeta n^T (mu_i - mu_j))            between any two times, see `matches`
-//! + sum over intervals  |e_r / sigma_r|^2 + |e_t / sigma_t|^2  open-loop relative motion, see `corrected_trajectory`
+//! + sum over intervals  |e_r / sigma_r|^2 + |e_t / sigma_t|^2  relative motion without views, see `corrected_trajectory`
 //! + sum over nodes      |e_l / sigma_l|^2                      open-loop roll and pitch
 //! + sum over both |bias / sigma|^2                             prior of the range biases
 //! ```
@@ -30,6 +31,7 @@ mod matches;
 mod neighbours;
 mod places;
 mod scene;
+mod sensed_motion;
 mod spec;
 mod submaps;
 #[cfg(test)]
@@ -54,6 +56,7 @@ use matches::{MatchStatistics, Matches};
 use neighbours::Neighbours;
 use places::PreAligned;
 use scene::Scene;
+use sensed_motion::{combined_with_open_loop, sensed_motion};
 use trajectory_difference::largest_difference;
 
 /// Maximum correction in one solve, m and rad; a larger one is rejected as implausible.
@@ -194,8 +197,12 @@ impl Problem<'_> {
     fn solve(&self, lidar_model: LidarModel) -> RegistrationResult<Registered> {
         let empty = RegistrationReport::default();
         let RegistrationInput { map_from_head, covariances, observed, .. } = self.input;
-        let corrected = CorrectedTrajectory::new(map_from_head, covariances, observed.origin, self.spec);
+        let by_views = combined_with_open_loop(&observed.by_views, map_from_head, observed.origin, self.spec);
+        let sensed = sensed_motion(map_from_head, &by_views, observed.origin)
+            .map_err(|_| Box::new((empty, "the motion is not finite")))?;
+        let corrected = CorrectedTrajectory::new(map_from_head, &sensed, covariances, observed.origin, self.spec);
         let corrected = corrected.ok_or_else(|| Box::new((empty, "no trajectory")))?;
+        let corrected = corrected.weighted_by(&by_views, observed.origin, self.spec);
         let (loops, pre_aligned) = places::close_loops(map_from_head, observed, &corrected, self.matcher, self.spec);
         let report = RegistrationReport { loops, ..empty };
         if let Some(pre_aligned) = pre_aligned {
@@ -221,8 +228,8 @@ impl Problem<'_> {
     ) -> RegistrationResult<Registered> {
         let RegistrationInput { map_from_head, covariances, .. } = self.input;
         for _ in 0..MAX_ROUNDS {
-            let corrected =
-                CorrectedTrajectory::new(&pre_aligned.trajectory, covariances, pre_aligned.observed.origin, self.spec);
+            let (start, origin) = (&pre_aligned.trajectory, pre_aligned.observed.origin);
+            let corrected = CorrectedTrajectory::new(start, start, covariances, origin, self.spec);
             let corrected = corrected.ok_or_else(|| Box::new((report, "no trajectory")))?;
             let corrected = corrected.with_gravity_from(map_from_head, &pre_aligned.trajectory);
             let registered = Registration::run(self, corrected, lidar_model, &pre_aligned.observed, report)?;

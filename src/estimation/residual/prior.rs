@@ -50,11 +50,35 @@ impl Start {
         moved: &SVector<f64, BORDER>,
         knot_spacing_s: f64,
     ) {
+        self.add_orders([1.0; 3], equations, layout, (total, moved), knot_spacing_s);
+    }
+
+    /// Removes the part of the prior that [`Self::add_to`] added for the first and second derivatives.
+    pub(in crate::estimation) fn remove_velocity(
+        &self,
+        equations: &mut NormalEquations,
+        layout: &Layout,
+        total: &[f64],
+        moved: &SVector<f64, BORDER>,
+        knot_spacing_s: f64,
+    ) {
+        self.add_orders([0.0, -1.0, -1.0], equations, layout, (total, moved), knot_spacing_s);
+    }
+
+    /// Adds the prior of each order of derivative times a factor, with the corrections as in [`Self::add_to`].
+    fn add_orders(
+        &self,
+        factors: [f64; 3],
+        equations: &mut NormalEquations,
+        layout: &Layout,
+        (total, moved): (&[f64], &SVector<f64, BORDER>),
+        knot_spacing_s: f64,
+    ) {
         let basis = Basis::at(self.u_s, knot_spacing_s);
         let first = layout.knot(basis.first);
         for (order, by) in [basis.value, basis.rate, basis.acceleration].iter().enumerate() {
             for axis in 0..6 {
-                let weight = self.sigmas[order][axis / 3].powi(-2);
+                let weight = factors[order] * self.sigmas[order][axis / 3].powi(-2);
                 let column = |a: usize| first + 6 * a + axis;
                 let by_lidar = self.by_lidar.map(|by_lidar| -by_lidar[order].row(axis));
                 let target = by_lidar.map_or(0.0, |by_lidar| (by_lidar * moved.fixed_rows::<6>(LIDAR_ROTATION))[0]);
@@ -174,6 +198,23 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
+
+    #[test]
+    fn without_the_velocity_the_start_holds_only_the_pose() {
+        const SPACING_S: f64 = 0.2;
+        let layout = Layout { first_knot: 2, knots: 6 };
+        let total: Vec<f64> = (0..layout.border()).map(|k| 0.01 * (k as f64).sin()).collect();
+        let moved = SVector::<f64, BORDER>::zeros();
+        let start = Start { u_s: 0.53, sigmas: [[0.1, 0.2], [0.3, 0.5], [0.7, 0.9]], by_lidar: None };
+        let mut without = NormalEquations::new(layout.size());
+        start.add_to(&mut without, &layout, &total, &moved, SPACING_S);
+        start.remove_velocity(&mut without, &layout, &total, &moved, SPACING_S);
+        let free = Start { sigmas: [start.sigmas[0], [1e9; 2], [1e9; 2]], ..start };
+        let mut expected = NormalEquations::new(layout.size());
+        free.add_to(&mut expected, &layout, &total, &moved, SPACING_S);
+        assert_relative_eq!(without.dense(), expected.dense(), epsilon = 1e-9);
+        assert_relative_eq!(without.right(), expected.right(), epsilon = 1e-9);
+    }
 
     /// Against the definition: residuals of the correction minus the effect of the extrinsics, differentiated
     /// numerically.

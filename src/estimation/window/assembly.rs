@@ -39,9 +39,10 @@ impl Window {
         timing: &mut Timing,
     ) -> Option<(Vec<f64>, Displacement)> {
         let mut watch = Stopwatch::start();
-        let Linearised { layout, scene, matches, robust } = at;
+        let Linearised { layout, scene, matches, robust, .. } = at;
         self.assemble_inertial(first, layout, total);
-        let weighted = WeightedMatches { scene, matches, robust, clock_reference_s: self.unknowns.clock.at_s };
+        let clock_reference_s = self.unknowns.clock.at_s;
+        let weighted = WeightedMatches { scene, matches, robust, clock_reference_s, sign: 1.0 };
         weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
         timing.equations_s += watch.lap_s();
         let Workspace { equations, factor, bases } = &mut self.workspace;

@@ -80,12 +80,14 @@ pub(super) struct WeightedMatches<'a> {
     pub matches: &'a Matches,
     pub robust: &'a Robust,
     pub clock_reference_s: f64,
+    /// 1 to add the matches, -1 to remove them.
+    pub sign: f64,
 }
 
 impl WeightedMatches<'_> {
     /// Adds all matches; with `extrinsics`, including their derivatives by the lidar extrinsics.
     pub fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, extrinsics: bool) {
-        let weigh = |one: &Match| self.robust.weight(&one.plane, one.plane.distance_m);
+        let weigh = |one: &Match| self.sign * self.robust.weight(&one.plane, one.plane.distance_m);
         let weights: Vec<f64> = self.matches.all.iter().map(weigh).collect();
         if extrinsics {
             self.add_weighted::<COMMON>(&weights, equations, layout);

@@ -5,11 +5,15 @@ use super::equations::Robust;
 use crate::estimation::residual::Layout;
 use crate::estimation::surfel::PlacedSurfel;
 
-/// The last linearisation of a solved window; the workspace still has the factor of it.
+/// The last linearisation of a solved window; the workspace still has the equations and the factor of it.
 #[derive(Debug)]
 pub(in crate::estimation) struct Linearised {
     pub(super) layout: Layout,
     pub(super) scene: Vec<PlacedSurfel>,
     pub(super) matches: Matches,
     pub(super) robust: Robust,
+    /// Sum of the corrections of the window before this linearisation.
+    pub(super) total_before: Vec<f64>,
+    /// The solution; empty until it is applied.
+    pub(super) step: Vec<f64>,
 }

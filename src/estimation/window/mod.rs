@@ -4,6 +4,7 @@ mod assembly;
 mod correspondence;
 mod equations;
 mod linearised;
+mod local_motion;
 mod readings;
 mod rests;
 mod search;
@@ -12,6 +13,7 @@ mod uncertainty;
 
 pub(super) use equations::Displacement;
 pub(super) use linearised::Linearised;
+pub(super) use local_motion::LocalMotion;
 pub(super) use solve::WindowSolution;
 
 use super::border::Border;
@@ -173,7 +175,12 @@ impl Window {
 
     /// The IMU pose at the start of the window.
     pub(super) fn start_pose(&self) -> Pose {
-        let motion = self.nominal.at(self.start.u_s, &self.unknowns.biases.gyro);
+        self.pose_at(self.start.u_s)
+    }
+
+    /// The IMU pose at `u_s`, trajectory time, s.
+    pub(super) fn pose_at(&self, u_s: f64) -> Pose {
+        let motion = self.nominal.at(u_s, &self.unknowns.biases.gyro);
         let rotation = Rotation::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(motion.rotation));
         Pose::from_parts(motion.position.into(), rotation)
     }

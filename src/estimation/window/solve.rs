@@ -69,7 +69,8 @@ impl Window {
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
             let matches = self.significant(matches, &solved, &scene, views);
             solved.timing.matches_s += watch.lap_s();
-            let at = Linearised { layout, scene, matches, robust };
+            let total_before = total.clone();
+            let at = Linearised { layout, scene, matches, robust, total_before, step: Vec::new() };
             let Some((x, by)) = self.solve_linearised(first, &total, &at, &mut solved.timing) else {
                 solved.failure = Some("the normal equations are singular");
                 break;
@@ -85,7 +86,7 @@ impl Window {
             neighbours.moved(by.translation_m + LEVER_ARM_M * by.rotation_rad);
             solved.timing.correction_s += watch.lap_s();
             solved.last_correction_m = by.max();
-            linearised = Some(at);
+            linearised = Some(Linearised { step: x, ..at });
             if solved.last_correction_m < self.spec.solve.settled_m {
                 break;
             }

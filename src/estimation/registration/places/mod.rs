@@ -74,7 +74,8 @@ pub(super) fn close_loops(
     let (mut trajectory, mut observed) = (map_from_head.clone(), observed.clone());
     let mut closures = 0;
     for _ in 0..MAX_PASSES {
-        let Some(corrected) = CorrectedTrajectory::new(&trajectory, &[], observed.origin, &with_pose_graph_drift(spec))
+        let Some(corrected) =
+            CorrectedTrajectory::new(&trajectory, &trajectory, &[], observed.origin, &with_pose_graph_drift(spec))
         else {
             break;
         };

@@ -222,7 +222,8 @@ mod tests {
         let poses = (0..1201).map(|k| 0.1 * f64::from(k)).map(|t_s| (stamp(t_s), pose(t_s)));
         let trajectory = Trajectory::from_poses(poses).unwrap();
         let with_pose_graph_drift = with_pose_graph_drift(&load("default").unwrap().registration);
-        let corrected = CorrectedTrajectory::new(&trajectory, &[], stamp(0.0), &with_pose_graph_drift).unwrap();
+        let corrected =
+            CorrectedTrajectory::new(&trajectory, &trajectory, &[], stamp(0.0), &with_pose_graph_drift).unwrap();
         (corrected, (0..30).map(|k| 2.0 + 4.0 * f64::from(k)).collect())
     }
 
