@@ -47,7 +47,8 @@ impl Wedge {
         let (directions, origins) = (&rays.direction, &rays.origin);
         let [axis, across, up] = frame(directions);
         let (cos, depths) = (along(simd, directions, &axis), along(simd, origins, &axis));
-        if !(range(simd, &cos).0 > MIN_COS) {
+        let least_cos = range(simd, &cos).0;
+        if least_cos.is_nan() || least_cos <= MIN_COS {
             return None;
         }
         let slabs = [Slab::new(simd, rays, 0), Slab::new(simd, rays, 1), Slab::new(simd, rays, 2)];
