@@ -31,12 +31,22 @@ pub(super) struct LidarCorrectionPeriod {
     pub(super) until_s: f64,
 }
 
+/// A patch of a window at the mean time of its points, as [`ObservedSurfel`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ObservedPatch {
+    pub(super) tau_s: f64,
+    pub(super) patch: Patch,
+    pub(super) weakness: f64,
+}
+
 /// An observed patch at the mean time of its points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ObservedSurfel {
     /// Lidar time, s from the origin of the times.
     pub(super) tau_s: f64,
     pub(super) patch: Patch,
+    /// Mean inverse square of the intensity of the returns, in the unit of the sensor; 0 without intensity.
+    pub(super) weakness: f64,
     /// Index of the lidar correction with which the patch was built.
     pub(super) lidar: u32,
 }
@@ -82,7 +92,7 @@ impl ObservedSurfels {
     pub(super) fn extend(
         &mut self,
         origin: Stamp,
-        patches: impl Iterator<Item = (f64, Patch)>,
+        patches: impl Iterator<Item = ObservedPatch>,
         lidar: LidarCorrection,
         until_s: f64,
     ) {
@@ -92,6 +102,11 @@ impl ObservedSurfels {
             None => self.lidars.push(LidarCorrectionPeriod { lidar, until_s }),
         }
         let lidar = (self.lidars.len() - 1) as u32;
-        self.surfels.extend(patches.map(|(tau_s, patch)| ObservedSurfel { tau_s, patch, lidar }));
+        self.surfels.extend(patches.map(|ObservedPatch { tau_s, patch, weakness }| ObservedSurfel {
+            tau_s,
+            patch,
+            weakness,
+            lidar,
+        }));
     }
 }

@@ -193,7 +193,7 @@ mod tests {
             let along = if has_ends { along } else { f64::INFINITY };
             let range = along.min(3.0 / sin.abs()) + 0.01 * (f64::from(k) * 7.3).sin();
             let point = nalgebra::Vector3::new(range * cos, range * sin, 0.0).cast();
-            TimedReturn { tau_s: 0.0, point_in_imu: point, range_m: range as f32 }
+            TimedReturn { tau_s: 0.0, point_in_imu: point, range_m: range as f32, weakness: 0.0 }
         };
         (0..1440).map(beam).filter(|beam| beam.range_m < 30.0).collect()
     }

@@ -5,7 +5,7 @@ use super::phase::Tracking;
 use super::reports::report;
 use crate::estimation::EstimationError;
 use crate::estimation::intake::Segment;
-use crate::estimation::surfel::Patch;
+use crate::estimation::observed::ObservedPatch;
 use crate::estimation::timing::Stopwatch;
 use crate::estimation::window::{Linearised, Window, WindowSolution};
 use crate::time::Stamp;
@@ -107,7 +107,7 @@ impl Estimator {
     pub(super) fn record_observed(
         &mut self,
         window: &Window,
-        surfels: fn(&Window) -> Vec<(f64, Patch)>,
+        surfels: fn(&Window) -> Vec<ObservedPatch>,
         until: fn(&Window) -> f64,
     ) {
         if let Some(observed) = &mut self.observed {

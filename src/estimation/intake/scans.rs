@@ -153,7 +153,8 @@ impl ScanQueue {
                 if (least..=most).contains(&range) {
                     let in_imu = self.imu_from_laser.rotation * point + self.imu_from_laser.translation.vector;
                     let tau_s = start_s + hit.offset.seconds();
-                    self.returns.push_back(TimedReturn { tau_s, point_in_imu: in_imu.cast(), range_m: range as f32 });
+                    let (point_in_imu, range_m, weakness) = (in_imu.cast(), range as f32, weakness(hit.intensity));
+                    self.returns.push_back(TimedReturn { tau_s, point_in_imu, range_m, weakness });
                 }
             }
         }
@@ -166,6 +167,12 @@ impl ScanQueue {
         let early = self.returns.iter().take_while(|one| one.tau_s < seconds).count();
         self.returns.drain(..early);
     }
+}
+
+/// Inverse square of an intensity; 0 if it is not reported.
+fn weakness(intensity: f32) -> f32 {
+    let weakness = intensity.powi(-2);
+    if intensity > 0.0 && weakness.is_finite() { weakness } else { 0.0 }
 }
 
 /// Hash of a scan: FNV-1a over the bits of all points.

@@ -10,7 +10,7 @@ use faer::sparse::linalg::solvers::Llt;
 use nalgebra::{Cholesky, Const, Matrix6, SMatrix, SVector, Vector6};
 
 /// Number of unknowns shared by all times: the range bias, m.
-pub(super) const SHARED_DIMENSION: usize = 1;
+pub(super) const SHARED_DIMENSION: usize = 2;
 /// Vector over the shared unknowns: a derivative or a step.
 pub(super) type Shared = SVector<f64, SHARED_DIMENSION>;
 

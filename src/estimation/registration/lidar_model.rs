@@ -1,6 +1,11 @@
-//! Lidar model of the registration: a range bias common to all surfels.
+//! Lidar model of the registration: a range bias common to all surfels, and one of weak echoes.
 //!
-//! A range bias of `o` moves the centre of a surfel by `u o`, with `u` the unit vector from the lidar to it.
+//! A rangefinder that triggers on the leading edge of the echo measures a longer range to a weaker echo. The bias is modelled as
+//! proportional to the inverse power of the echo, with an intensity proportional to the square root of the power. It makes
+//! distant walls seem to approach by more than the head moves, and so a map too large.
+//!
+//! A surfel with the intensity `I` moves by `u (o + w (I_median / I)^2)`, with `u` the unit vector from the lidar to it, the common
+//! bias `o` and the bias `w` of an echo of median intensity.
 //!
 //! The extrinsics are not estimated here: the open loop determined them with the IMU, and the matches of the registration add
 //! no information. As their estimate changed during the open loop, [`recalibrated`] recomputes the head's poses with the final
@@ -13,14 +18,21 @@ use crate::estimation::surfel::Patch;
 use crate::geometry::{Pose, Rotation, Trajectory, TrajectoryError, Vector};
 use crate::measurement::{Calibration, LidarCorrection};
 
+/// Largest assumed squared ratio of the median intensity to that of a surfel: limits the effect of a wrong intensity.
+const MAX_WEAKNESS: f64 = 100.0;
+
 /// Pose and estimated correction of the lidar.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LidarModel {
     /// Pose of the lidar in the head frame, by the open loop.
     head_from_laser: Pose,
     pub(super) lidar: LidarCorrection,
-    /// Prior standard deviation of the range bias, m.
-    range_sigma_m: f64,
+    /// Range correction of an echo of median intensity, in proportion to the inverse square of the intensity, m.
+    pub(super) weak_range_m: f64,
+    /// Squared median intensity of the surfels; 0 without intensities.
+    median_power: f64,
+    /// Prior standard deviations of both range biases, m.
+    sigmas_m: [f64; 2],
 }
 
 /// The vector from the lidar to a surfel.
@@ -28,51 +40,71 @@ pub(super) struct LidarModel {
 pub(super) struct LidarRay {
     /// Vector to the centre of the surfel, in map axes, m.
     vector: Vector,
+    /// Squared ratio of the median intensity to that of the surfel.
+    weakness: f64,
 }
 
 impl LidarModel {
-    /// Starts with the estimate of the open loop; the range bias is fixed if it is unobservable.
+    /// Starts with the estimate of the open loop; the range biases are fixed if they are unobservable.
     pub(super) fn new(
         calibration: &Calibration,
         lidar: &LidarCorrection,
-        range_bias_is_fixed: bool,
+        observed: &ObservedSurfels,
         spec: &EstimatorSpec,
     ) -> Self {
-        let range_sigma_m = if range_bias_is_fixed { 0.0 } else { spec.surfels.range_offset_sigma_m };
+        let sigmas_m = [spec.surfels.range_offset_sigma_m, spec.registration.weak_bias_sigma_m];
+        let sigmas_m = if observed.range_bias_is_fixed { [0.0; 2] } else { sigmas_m };
+        let mut weaknesses: Vec<f64> =
+            observed.surfels.iter().map(|surfel| surfel.weakness).filter(|weakness| *weakness > 0.0).collect();
+        weaknesses.sort_unstable_by(f64::total_cmp);
         Self {
             head_from_laser: calibration.head_from_corrected_laser(lidar),
             lidar: *lidar,
-            // A tiny standard deviation fixes the bias.
-            range_sigma_m: range_sigma_m.max(1e-9),
+            // A tiny standard deviation fixes a bias.
+            sigmas_m: sigmas_m.map(|sigma_m| sigma_m.max(1e-9)),
+            weak_range_m: 0.0,
+            median_power: weaknesses.get(weaknesses.len() / 2).map_or(0.0, |weakness| weakness.recip()),
         }
     }
 
     /// Vector from the lidar to `patch`, observed by a head at `map_from_head`.
     ///
-    /// The patch was built with the correction `made_by`; it is moved to match the current range bias.
-    pub(super) fn ray_to(&self, map_from_head: &Pose, patch: &mut Patch, made_by: &LidarCorrection) -> LidarRay {
+    /// The patch was built with the correction `made_by` from returns of the mean `weakness`; it is moved to match the current
+    /// range biases.
+    pub(super) fn ray_to(
+        &self,
+        map_from_head: &Pose,
+        patch: &mut Patch,
+        made_by: &LidarCorrection,
+        weakness: f64,
+    ) -> LidarRay {
         let lidar_at = (map_from_head * self.head_from_laser).translation.vector;
         let old_vector = patch.centre - lidar_at;
-        let vector = old_vector * (1.0 + (self.lidar.range_m - made_by.range_m) / old_vector.norm());
+        let weakness = (weakness * self.median_power).min(MAX_WEAKNESS);
+        let longer_m = self.lidar.range_m - made_by.range_m + self.weak_range_m * weakness;
+        let vector = old_vector * (1.0 + longer_m / old_vector.norm());
         patch.centre = lidar_at + vector;
-        LidarRay { vector }
+        LidarRay { vector, weakness }
     }
 
-    /// Adds the prior of the range bias.
+    /// Adds the prior of the range biases.
     pub(super) fn add_to(&self, shared_term: &mut SharedTerm) {
-        shared_term.add(&Shared::new(1.0), self.lidar.range_m, self.range_sigma_m.powi(-2));
+        let [range_sigma_m, weak_sigma_m] = self.sigmas_m;
+        shared_term.add(&Shared::new(1.0, 0.0), self.lidar.range_m, range_sigma_m.powi(-2));
+        shared_term.add(&Shared::new(0.0, 1.0), self.weak_range_m, weak_sigma_m.powi(-2));
     }
 
     /// Applies a step.
     pub(super) fn correct(&mut self, step: &Shared) {
         self.lidar.range_m += step[0];
+        self.weak_range_m += step[1];
     }
 }
 
 impl LidarRay {
-    /// Derivative of the distance along `normal` by the range bias.
+    /// Derivative of the distance along `normal` by the range biases.
     pub(super) fn derivative(&self, normal: &Vector) -> Shared {
-        Shared::new(normal.dot(&self.vector.normalize()))
+        Shared::new(1.0, self.weakness) * normal.dot(&self.vector.normalize())
     }
 
     /// Rotates the vector with the trajectory.
@@ -82,7 +114,7 @@ impl LidarRay {
 
     /// Moves the patch by a step of the lidar; returns the displacement of the centre, m.
     pub(super) fn correct(&mut self, step: &Shared, patch: &mut Patch) -> Vector {
-        let moved = self.vector * (step[0] / self.vector.norm());
+        let moved = self.vector * ((step[0] + step[1] * self.weakness) / self.vector.norm());
         patch.centre += moved;
         self.vector += moved;
         moved
@@ -120,6 +152,7 @@ mod tests {
     use super::super::equations::SHARED_DIMENSION;
     use super::*;
     use crate::estimation::load;
+    use crate::estimation::observed::ObservedSurfel;
     use crate::geometry::{Matrix, from_roll_pitch_yaw};
     use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
     use crate::time::{Span, Stamp};
@@ -147,7 +180,17 @@ mod tests {
     fn model(lidar: LidarCorrection) -> LidarModel {
         let mut spec = load("default").unwrap();
         spec.extrinsics.estimated = true;
-        LidarModel::new(&calibration(), &lidar, false, &spec)
+        let wall = Patch {
+            centre: Vector::x(),
+            normal: Vector::x(),
+            points: 50.0,
+            covariance: Matrix::identity(),
+            roughness_variance: 0.0,
+            level: 0,
+        };
+        let surfel = |weakness: f64| ObservedSurfel { tau_s: 0.0, patch: wall, weakness, lidar: 0 };
+        let surfels = vec![surfel(1e-6), surfel(4e-6), surfel(9e-6)];
+        LidarModel::new(&calibration(), &lidar, &ObservedSurfels { surfels, ..ObservedSurfels::default() }, &spec)
     }
 
     fn map_from_head() -> Pose {
@@ -175,7 +218,7 @@ mod tests {
         let (direction, now) = (Vector::new(2.0, 3.0, -1.0).normalize(), model(correction(1.0)));
         let then = LidarCorrection { range_m: -0.007, ..now.lidar };
         let mut patch = patch_at(&now, &direction, 3.0 + then.range_m);
-        now.ray_to(&map_from_head(), &mut patch, &then);
+        now.ray_to(&map_from_head(), &mut patch, &then, 0.0);
         assert_relative_eq!(patch.centre, patch_at(&now, &direction, 3.0 + now.lidar.range_m).centre, epsilon = 1e-12);
     }
 
@@ -183,13 +226,13 @@ mod tests {
     fn derivatives_match_finite_differences_and_steps() {
         let (start, normal) = (model(correction(1.0)), Vector::new(0.3, -0.8, 0.5).normalize());
         let patch = patch_at(&start, &Vector::new(2.0, 3.0, -4.0).normalize(), 4.0);
-        let ray = start.ray_to(&map_from_head(), &mut { patch }, &start.lidar);
+        let ray = start.ray_to(&map_from_head(), &mut { patch }, &start.lidar, 1e-5);
         for k in 0..SHARED_DIMENSION {
             let step = Shared::from_fn(|row, _| if row == k { 1e-6 } else { 0.0 });
             let mut there = start;
             there.correct(&step);
             let mut moved = patch;
-            there.ray_to(&map_from_head(), &mut moved, &start.lidar);
+            there.ray_to(&map_from_head(), &mut moved, &start.lidar, 1e-5);
             let moved = moved.centre - patch.centre;
             assert_relative_eq!(ray.derivative(&normal)[k], normal.dot(&moved) * 1e6, epsilon = 1e-5);
             let by_step = { ray }.correct(&step, &mut { patch });

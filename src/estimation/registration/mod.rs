@@ -3,13 +3,14 @@
 //! After Bosse, Zlot and Flick (IEEE Transactions on Robotics 28(5), 2012). Their global optimisation minimises match
 //! errors, deviations from the open loop's velocities and deviations from gravity; biases and latency come from the open
 //! loop. The unknowns are a correction of the trajectory, a cubic B-spline with coarse knots as in a window: `R' = exp(dr) R`,
-//! `t' = t + dt`; and a range bias of the lidar. The lidar extrinsics are those of the open loop, see `lidar_model`. The cost is
+//! `t' = t + dt`; a range bias of the lidar, and one of weak echoes. The lidar extrinsics are those of the open loop, see
+//! `lidar_model`. The cost is
 //!
 //! ```text
 //! sum over matches      rho(zeta n^T (mu_i - mu_j))            between any two times, see `matches`
 //! + sum over intervals  |e_r / sigma_r|^2 + |e_t / sigma_t|^2  open-loop relative motion, see `corrected_trajectory`
 //! + sum over nodes      |e_l / sigma_l|^2                      open-loop roll and pitch
-//! + |bias / sigma|^2                                           prior of the range bias
+//! + sum over both |bias / sigma|^2                             prior of the range biases
 //! ```
 //!
 //! 1. The open loop records the *observed surfels*, built from all returns with the final trajectory,
@@ -100,6 +101,8 @@ pub struct RegistrationReport {
     pub conditioning: f64,
     /// Fraction of the information along the weakest direction due to revisited surfaces, 0..1.
     pub revisited: f64,
+    /// Range correction of an echo of median intensity, proportional to the inverse square of the intensity, m.
+    pub weak_range_m: f64,
     /// Reason for returning the open-loop trajectory; `None` if the registration was accepted.
     pub rejected_because: Option<&'static str>,
 }
@@ -155,9 +158,10 @@ fn register_without_gaps(
     let map_from_head = recalibrated.as_ref().unwrap_or(map_from_head);
     let problem =
         Problem { input: RegistrationInput { map_from_head, ..input }, spec: registration, matcher: &matcher };
-    let closed = match problem.solve(LidarModel::new(calibration, lidar, observed.range_bias_is_fixed, spec)) {
+    let closed = match problem.solve(LidarModel::new(calibration, lidar, observed, spec)) {
         Ok((Registered { trajectory, lidar_model }, report)) => {
-            let report = RegistrationReport { moved: largest_difference(map_from_head, &trajectory), ..report };
+            let moved = largest_difference(map_from_head, &trajectory);
+            let report = RegistrationReport { moved, weak_range_m: lidar_model.weak_range_m, ..report };
             ClosedLoop { trajectory, lidar: lidar_model.lidar, open_loop_recalibrated: recalibrated, report }
         }
         Err(rejection) => {
@@ -306,7 +310,7 @@ impl<'a> Registration<'a> {
                 self.corrected.correct(&x);
                 self.lidar_model.correct(&step);
                 self.scene.correct(first_knot, &x, &step);
-                let by_lidar_m = step[0].abs();
+                let by_lidar_m = step.abs().sum();
                 neighbours.add_motion(translation_m + max_distance_m * rotation_rad + by_lidar_m);
                 self.report.iterations += 1;
                 self.describe(&statistics);

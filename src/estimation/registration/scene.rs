@@ -50,7 +50,8 @@ impl Scene {
         let mut arms = Vec::with_capacity(patches.len());
         for (surfel, patch) in surfels().zip(&mut patches) {
             let map_from_head = corrected.pose_at(surfel.tau_s);
-            rays.push(lidar_model.ray_to(&map_from_head, patch, &observed.lidars[surfel.lidar as usize].lidar));
+            let made_by = &observed.lidars[surfel.lidar as usize].lidar;
+            rays.push(lidar_model.ray_to(&map_from_head, patch, made_by, surfel.weakness));
             arms.push(patch.centre - map_from_head.translation.vector);
         }
         let length_s = 0.5 * spec.knot_spacing_s;

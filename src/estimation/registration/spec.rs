@@ -43,6 +43,10 @@ pub struct RegistrationSpec {
     /// Weight of all matches of a surfel together, relative to one independent match: errors of matches are correlated.
     #[serde(with = "crate::spec::checked::Positive")]
     pub match_weight: f64,
+    /// Prior standard deviation of the range bias of an echo of median intensity, m; the bias is inversely proportional to the
+    /// square of the intensity. 0 to estimate none.
+    #[serde(with = "crate::spec::checked::NonNegative")]
+    pub weak_bias_sigma_m: f64,
     /// Correlation time of the open-loop error, s; the size of the error is that of the open-loop covariance.
     #[serde(with = "crate::spec::checked::Positive")]
     pub correlation_s: f64,

@@ -134,7 +134,7 @@ fn simulated(
             roughness_variance: 0.0,
             level,
         };
-        ObservedSurfel { tau_s, patch, lidar: 0 }
+        ObservedSurfel { tau_s, patch, weakness: 0.0, lidar: 0 }
     };
     let surfels = (0..((duration_s - 0.05) * per_s) as usize).map(surfel).collect();
     let covariances = times().step_by(10).map(|t| (stamp(t), PoseCovariance::identity() * (1e-5 * t))).collect();
@@ -236,6 +236,30 @@ fn range_bias_is_estimated() {
     assert!(rms_distance_m(&closed.trajectory, &setup.truth).0 < 0.003);
 }
 
+/// The power of an echo falls with the square of the range, and the range is longer by 0.1 mm at 1 m, 10 mm at 10 m.
+#[test]
+fn range_bias_of_weak_echoes_is_estimated() {
+    const BIAS_PER_M: f64 = 1e-4;
+    let mut setup = distorted(distortion);
+    let mut squares = Vec::new();
+    for surfel in &mut setup.observed.surfels {
+        let head = setup.open.at(Stamp::from_nanos((surfel.tau_s * 1e9).round() as i64)).unwrap();
+        let ray = surfel.patch.centre - (head * nalgebra::Point3::from(LASER_IN_HEAD)).coords;
+        surfel.patch.centre += ray * (BIAS_PER_M * ray.norm());
+        squares.push(ray.norm_squared());
+        surfel.weakness = 1e-6 * ray.norm_squared();
+    }
+    squares.sort_by(f64::total_cmp);
+    let closed = setup.registered();
+    let expected = -BIAS_PER_M * squares[squares.len() / 2];
+    assert!((closed.report.weak_range_m / expected - 1.0).abs() < 0.1, "{expected} {:?}", closed.report);
+    setup.observed.surfels.iter_mut().for_each(|surfel| surfel.weakness = 0.0);
+    let without = setup.registered();
+    assert_eq!(without.report.weak_range_m, 0.0);
+    let error = |closed: &ClosedLoop| rms_distance_m(&closed.trajectory, &setup.truth).0;
+    assert!(error(&closed) < 0.7 * error(&without), "{} {}", error(&closed), error(&without));
+}
+
 #[test]
 fn open_loop_extrinsics_are_kept_and_the_head_is_recalibrated() {
     let mut spec = load("default").unwrap();
@@ -324,12 +348,12 @@ fn derivatives_of_a_match_match_finite_differences() {
     let wall = observed.surfels.iter().find(|surfel| surfel.patch.normal.x > 0.5).unwrap();
     let surfel = |k: usize| {
         let centre = Vector::new(-4.9 + 0.004 * k as f64, 0.4 + 0.1 * k as f64, 1.4);
-        ObservedSurfel { tau_s: times_s[k], patch: Patch { centre, ..wall.patch }, lidar: 0 }
+        ObservedSurfel { tau_s: times_s[k], patch: Patch { centre, ..wall.patch }, ..*wall }
     };
     let observed = ObservedSurfels { surfels: vec![surfel(0), surfel(1)], ..observed };
     let corrected = CorrectedTrajectory::new(&open, &covariances, observed.origin, &spec.registration).unwrap();
     let matcher = Matcher::new(&spec.registration.matching(&spec.matching), &spec.registration.surfels(&spec.surfels));
-    let lidar_model = LidarModel::new(&calibration(), &LidarCorrection::default(), false, &spec);
+    let lidar_model = LidarModel::new(&calibration(), &LidarCorrection::default(), &observed, &spec);
     let scene = Scene::new(&observed, &corrected, &lidar_model, &spec.registration);
     let (first_knot, knots) = corrected.knots();
     let sum = |scene: &Scene| {

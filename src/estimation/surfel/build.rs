@@ -54,9 +54,9 @@ impl SurfelBuilder {
         self.project(returns, nominal, unknowns, |beam, point| {
             let range = f64::from(beam.range_m);
             let noise2 = self.noise.sigma_m(range).powi(2);
-            regular.add(&point, beam.tau_s, noise2);
+            regular.add(&point, beam, noise2);
             if self.spec.offset_grids {
-                offset.add(&point, beam.tau_s, noise2);
+                offset.add(&point, beam, noise2);
             }
         });
         let (regular, offset) = (regular.finish(), offset.finish());
@@ -156,6 +156,7 @@ impl SurfelBuilder {
             normal_in_imu: if normal.dot(&beam) > 0.0 { -normal } else { normal },
             covariance_in_imu: calibrated_from_map * covariance * calibrated_from_map.transpose(),
             points: moments.count(),
+            weakness: moments.mean_weakness(),
             roughness_variance: 0.0,
             level,
         };
@@ -182,15 +183,15 @@ impl Fragments {
         Self { origin, per_edge: 1.0 / edge_m, shift: shift_m, done: Vec::new(), current: None }
     }
 
-    fn add(&mut self, point: &Vector, time_s: f64, noise2: f64) {
+    fn add(&mut self, point: &Vector, beam: &TimedReturn, noise2: f64) {
         let cell = [point.x, point.y, point.z].map(|x| ((x + self.shift) * self.per_edge).floor() as i32);
         if let Some(current) = self.current.as_mut().filter(|f| f.cell == cell) {
-            current.moments.add(&(point - self.origin), time_s, noise2);
-            current.last_s = time_s;
+            current.moments.add(&(point - self.origin), beam, noise2);
+            current.last_s = beam.tau_s;
             return;
         }
-        let mut fragment = Fragment { cell, first_s: time_s, last_s: time_s, moments: Moments::default() };
-        fragment.moments.add(&(point - self.origin), time_s, noise2);
+        let mut fragment = Fragment { cell, first_s: beam.tau_s, last_s: beam.tau_s, moments: Moments::default() };
+        fragment.moments.add(&(point - self.origin), beam, noise2);
         self.done.extend(self.current.replace(fragment));
     }
 
@@ -272,7 +273,7 @@ mod tests {
             let beam = Vector::new(angle.cos(), angle.sin(), 0.0);
             let direction = Rotation::from_scaled_axis(nodding * tau_s) * beam;
             let range = 2.1 / direction.x.max(direction.y);
-            TimedReturn { tau_s, point_in_imu: (beam * range).cast(), range_m: range as f32 }
+            TimedReturn { tau_s, point_in_imu: (beam * range).cast(), range_m: range as f32, weakness: 0.0 }
         };
         (nominal, (0..scans * 181).map(beam).collect())
     }

@@ -16,6 +16,8 @@ pub(in crate::estimation) struct TimedReturn {
     pub(in crate::estimation) point_in_imu: nalgebra::Vector3<f32>,
     /// Measured range, m.
     pub(in crate::estimation) range_m: f32,
+    /// Inverse square of the intensity, in the unit of the sensor; 0 without intensity.
+    pub(in crate::estimation) weakness: f32,
 }
 
 /// A planar patch as measured by the calibrated lidar at the patch's mean time, in IMU axes.
@@ -35,6 +37,8 @@ pub(in crate::estimation) struct Surfel {
     pub(in crate::estimation) roughness_variance: f64,
     /// Number of points.
     pub(in crate::estimation) points: f64,
+    /// Mean weakness of the returns.
+    pub(in crate::estimation) weakness: f64,
     /// Resolution, 0 the finest.
     pub(in crate::estimation) level: usize,
 }

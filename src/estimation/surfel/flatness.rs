@@ -78,6 +78,7 @@ mod tests {
             normal_in_imu: Vector::z(),
             covariance_in_imu: Matrix::from_diagonal(&Vector::new(0.013, 0.013, thickness_m.powi(2))),
             points: 200.0,
+            weakness: 0.0,
             roughness_variance: 0.0,
             level: 0,
         };

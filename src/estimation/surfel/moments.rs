@@ -1,3 +1,4 @@
+use super::TimedReturn;
 use crate::geometry::{Matrix, Vector};
 
 /// Additive sums over points: their number, mean time, mean and second central moment.
@@ -6,18 +7,20 @@ pub(in super::super) struct Moments {
     count: f64,
     time_s: f64,
     noise2: f64,
+    weakness: f64,
     sum: [f64; 3],
     /// Sums of xx, xy, xz, yy, yz, zz.
     outer: [f64; 6],
 }
 
 impl Moments {
-    /// Adds a point at `time_s`, measured with variance `noise2` (m^2) along its beam.
-    pub(in super::super) fn add(&mut self, point: &Vector, time_s: f64, noise2: f64) {
+    /// Adds the point of `beam`, measured with variance `noise2` (m^2) along the beam.
+    pub(in super::super) fn add(&mut self, point: &Vector, beam: &TimedReturn, noise2: f64) {
         let [x, y, z] = [point.x, point.y, point.z];
         self.count += 1.0;
-        self.time_s += time_s;
+        self.time_s += beam.tau_s;
         self.noise2 += noise2;
+        self.weakness += f64::from(beam.weakness);
         for (sum, term) in self.sum.iter_mut().zip([x, y, z]) {
             *sum += term;
         }
@@ -31,6 +34,7 @@ impl Moments {
         self.count += other.count;
         self.time_s += other.time_s;
         self.noise2 += other.noise2;
+        self.weakness += other.weakness;
         for (sum, term) in self.sum.iter_mut().zip(other.sum) {
             *sum += term;
         }
@@ -52,6 +56,11 @@ impl Moments {
     /// Mean range variance of the points along their beams, m^2.
     pub(in super::super) fn mean_noise2(&self) -> f64 {
         self.noise2 / self.count
+    }
+
+    /// Mean weakness of the returns.
+    pub(in super::super) fn mean_weakness(&self) -> f64 {
+        self.weakness / self.count
     }
 
     /// Mean of the points, m.
@@ -79,7 +88,9 @@ mod tests {
             (0..40).map(f64::from).map(|k| Vector::new((k * 0.7).sin(), (k * 1.3).cos(), 0.1 * k)).collect();
         let (mut first, mut second) = (Moments::default(), Moments::default());
         for (k, point) in points.iter().enumerate() {
-            if k % 3 == 0 { &mut first } else { &mut second }.add(point, k as f64, 1e-4);
+            let beam =
+                TimedReturn { tau_s: k as f64, point_in_imu: point.cast(), range_m: 1.0, weakness: (k * k) as f32 };
+            if k % 3 == 0 { &mut first } else { &mut second }.add(point, &beam, 1e-4);
         }
         first.merge(&second);
         let mean = points.iter().sum::<Vector>() / 40.0;
@@ -87,6 +98,8 @@ mod tests {
         assert_eq!(first.count(), 40.0);
         assert_relative_eq!(first.mean(), mean, epsilon = 1e-13);
         assert_relative_eq!(first.mean_time_s(), 19.5, epsilon = 1e-13);
+        // The sum of the squares below 40 is 39 * 40 * 79 / 6.
+        assert_relative_eq!(first.mean_weakness(), 39.0 * 79.0 / 6.0, epsilon = 1e-9);
         assert_relative_eq!(first.covariance(), expected, epsilon = 1e-12);
     }
 }

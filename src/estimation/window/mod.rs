@@ -19,6 +19,7 @@ use super::clock::Clock;
 use super::initial::{InitialState, RestReadings, StateBeforeGap};
 use super::matching::Matcher;
 use super::nominal::Nominal;
+use super::observed::ObservedPatch;
 use super::residual::contradiction::contradiction;
 use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
@@ -317,13 +318,13 @@ impl Window {
         Some(self.unknowns.clock.trajectory_s(self.segments.front()?.end_tau_s).min(end_s).max(self.start.u_s))
     }
 
-    /// The observed surfels of the oldest segment in the map frame, each with the measurement time, s.
-    pub(super) fn observed_in_oldest(&self) -> Vec<(f64, Patch)> {
+    /// The observed surfels of the oldest segment in the map frame.
+    pub(super) fn observed_in_oldest(&self) -> Vec<ObservedPatch> {
         self.segments.front().map_or_else(Vec::new, |oldest| self.observed(oldest))
     }
 
     /// The observed surfels of all segments of the window, as [`Self::observed_in_oldest`].
-    pub(super) fn observed_in_all(&self) -> Vec<(f64, Patch)> {
+    pub(super) fn observed_in_all(&self) -> Vec<ObservedPatch> {
         self.segments.iter().flat_map(|segment| self.observed(segment)).collect()
     }
 
@@ -337,11 +338,15 @@ impl Window {
         self.segments.back().map_or(f64::NEG_INFINITY, |newest| newest.end_tau_s)
     }
 
-    fn observed(&self, segment: &WindowSegment) -> Vec<(f64, Patch)> {
+    fn observed(&self, segment: &WindowSegment) -> Vec<ObservedPatch> {
         let Some(builder) = &self.observed_builder else { return Vec::new() };
         let surfels = builder.build(&segment.returns, &self.nominal, &self.unknowns);
         let placing = self.placing();
-        surfels.iter().map(|surfel| (surfel.tau_s, surfel.place(&placing).patch)).collect()
+        let observed = |surfel: &Surfel| {
+            let patch = surfel.place(&placing).patch;
+            ObservedPatch { tau_s: surfel.tau_s, patch, weakness: surfel.weakness }
+        };
+        surfels.iter().map(observed).collect()
     }
 
     /// Removes the oldest segment, whose states become final; returns the patches of that segment in the map frame.
