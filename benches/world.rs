@@ -6,7 +6,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use zsim::geometry::{Surface, Vector, from_roll_pitch_yaw};
 use zsim::spec::{Source, parse};
-use zsim::world::{Ray, World};
+use zsim::world::{Ray, TimedRay, World};
 
 const MAX_RANGE_M: f64 = 30.0;
 
@@ -50,10 +50,17 @@ fn casts(c: &mut Criterion) {
     let mut group = c.benchmark_group("cast");
     for world in [World::load("office").unwrap(), World::load("courtyard").unwrap(), million()] {
         let rays = rays(&world);
+        let timed: Vec<TimedRay> =
+            rays.iter().map(|ray| TimedRay { ray: *ray, reach_m: MAX_RANGE_M, t_s: 0.0 }).collect();
         group.throughput(Throughput::Elements(rays.len() as u64));
         group.sample_size(20);
-        group.bench_function(format!("{}, {} triangles", world.name(), world.triangle_count()), |b| {
+        let scene = format!("{}, {} triangles", world.name(), world.triangle_count());
+        group.bench_function(format!("{scene}, single rays"), |b| {
             b.iter(|| rays.iter().filter(|ray| world.cast(black_box(ray), MAX_RANGE_M, 0.0).is_some()).count());
+        });
+        group.bench_function(format!("{scene}, scans"), |b| {
+            let cast = |scan: &[TimedRay]| world.cast_all(black_box(scan)).iter().flatten().count();
+            b.iter(|| timed.chunks(1081).map(cast).sum::<usize>());
         });
     }
 }

@@ -18,7 +18,9 @@ use zsim::study::sweep::Runner;
 /// Each writes its figures to DIR/paper/NAME/; DIR/paper.md is the table of all finished ones, DIR/paper/report.html a page
 /// with their tables, verdicts and plots. An interrupted experiment continues from its last finished run.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  zsim reproduce\n  zsim reproduce fig3 --out results")]
+#[command(
+    after_help = "Examples:\n  zsim reproduce\n  zsim reproduce fig3 --out results\n  zsim reproduce accuracy --seeds 1,2,3 --out fresh"
+)]
 pub(super) struct Arguments {
     /// Experiments, names under specs/experiments/ or files [default: all]
     #[arg(value_name = "NAME")]
@@ -29,6 +31,9 @@ pub(super) struct Arguments {
     /// Smoke test: run a small variant of each experiment, in seconds, in DIR/paper-quick/; do not use its results
     #[arg(long)]
     quick: bool,
+    /// Seeds instead of those of the experiments, for example 1,2,3; use another folder than that of the usual seeds
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', requires = "names")]
+    seeds: Vec<u64>,
     /// Text for the head of the table, such as the date of the program
     #[arg(long, value_name = "TEXT")]
     label: Option<String>,
@@ -41,7 +46,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let all = Experiment::all();
     let names = if arguments.names.is_empty() { &all } else { &arguments.names };
     // Check all names before the first experiment runs for hours.
-    let wanted = names.iter().map(|name| Ok(Experiment::load(name)?)).collect::<anyhow::Result<Vec<_>>>()?;
+    let wanted = names.iter().map(|name| load(name, &arguments.seeds)).collect::<anyhow::Result<Vec<_>>>()?;
     let extent = if arguments.quick { Extent::Quick } else { Extent::Whole };
     let folder = arguments.out.join(extent.folder());
     check_table(&folder.with_extension("md"), arguments.force)?;
@@ -72,6 +77,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     });
     output::print_result(global, &words, json!({ "experiments": figures.collect::<Vec<_>>() }), Some(&folder))?;
     Ok(Completion::Done)
+}
+
+/// Loads an experiment, with other seeds if there are any.
+fn load(name: &str, seeds: &[u64]) -> anyhow::Result<Experiment> {
+    let experiment = Experiment::load(name)?;
+    Ok(if seeds.is_empty() { experiment } else { experiment.with_seeds(seeds)? })
 }
 
 /// Refuses to replace a table that `zsim reproduce` did not write.

@@ -1,5 +1,6 @@
 //! Initial state: attitude, biases, and detection of an initial rest.
 
+use super::coasting::Coasting;
 use super::residual::{
     ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION,
     LIDAR_TRANSLATION, RANGE,
@@ -80,6 +81,19 @@ impl InitialState {
             self.state.velocity = carried.mean_velocity;
         }
         self.biases = carried.unknowns.biases;
+        self
+    }
+
+    /// Replaces this state by that before a lidar gap, propagated through the gap with the IMU.
+    pub(super) fn after_coasting(mut self, carried: &StateBeforeGap, coasting: &Coasting) -> Self {
+        let Unknowns { biases, gravity, scale_misalignment, .. } = &carried.unknowns;
+        let propagate = |state: State, interval: &Interval| {
+            state.after(&interval.corrected_by(scale_misalignment), biases, gravity)
+        };
+        let predicted = coasting.intervals().iter().fold(carried.state, propagate);
+        let velocity = if self.rest.is_some() { self.state.velocity } else { predicted.velocity };
+        self.state = State { velocity, ..predicted };
+        self.biases = *biases;
         self
     }
 }

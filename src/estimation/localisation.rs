@@ -1,5 +1,6 @@
 //! Localisation in a given map, and relocalisation after an IMU gap in the surfaces seen before it.
 
+use super::coasting::Coasting;
 use super::local_map::LocalMap;
 use super::map::{LocalisedPose, MAP_LIMITS, RelocalisationLimits, Relocaliser, map_covariance};
 use super::surfel::Patch;
@@ -109,16 +110,29 @@ impl GapRelocalisation {
         Self { local_map, last, until_s }
     }
 
-    /// Pose in the map of the frame of `window`, which starts near the end of the trajectory before the gap.
+    /// Pose in the map of the frame of `window`, which starts near the end of the trajectory before the gap, or where
+    /// `coasting` predicts.
     ///
     /// # Errors
     /// The reason why no pose is accepted; the search can be repeated.
-    pub(super) fn find(&self, window: &Window, spec: &EstimatorSpec) -> Result<LocalisedPose, String> {
+    pub(super) fn find(
+        &self,
+        window: &Window,
+        spec: &EstimatorSpec,
+        coasting: Option<&Coasting>,
+    ) -> Result<LocalisedPose, String> {
         let patches = self.last.iter().chain(self.local_map.views.patches()).copied().collect();
         let relocaliser = Relocaliser::in_patches(patches, &spec.matching, &spec.surfels, &spec.solve);
         let window_start = window.start_pose().translation.vector;
-        let search = RelocalisationLimits::after_gap(window.start_s() - self.until_s, spec.solve.match_sigma_m);
-        relocaliser.find(&window.patches(), &window_start, &Pose::identity(), &search)
+        let sigma_m = spec.solve.match_sigma_m;
+        let search = match coasting {
+            Some(coasting) => RelocalisationLimits::after_coasting(coasting.position_sigma_m(), sigma_m),
+            None => RelocalisationLimits::after_gap(window.start_s() - self.until_s, sigma_m),
+        };
+        let query = window.patches();
+        let found = relocaliser.find(&query, &window_start, &Pose::identity(), &search)?;
+        relocaliser.refuse_ambiguous(&query, &window_start, &found, &search)?;
+        Ok(found)
     }
 
     /// The surfaces seen before the gap, with the covariance of the pose `found` for `window`.

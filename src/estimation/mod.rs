@@ -62,6 +62,7 @@ mod base;
 mod border;
 mod clock;
 mod cloud;
+mod coasting;
 mod consider;
 mod dead_reckoning;
 mod error;

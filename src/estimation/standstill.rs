@@ -13,8 +13,15 @@ use std::collections::BTreeMap;
 const CELL_RAD: f64 = 0.05;
 /// Two ranges in a cell are different if they differ by more than this, m, plus this fraction.
 const RANGE_TOLERANCE: (f64, f64) = (0.1, 0.03);
-/// The head moves if more than this fraction of the cells have different ranges, out of at least this number.
+/// The head may move if more than this fraction of the cells have different ranges, out of at least this number.
 const MOTION_THRESHOLD: (f64, usize) = (0.12, 20);
+/// The head then rests if in each direction the surfaces that stay have at least this multiple of the weight of those that
+/// change: a motion of the head changes every surface that faces it, a passing vehicle only its own.
+const MIN_STAYING: f64 = 0.3;
+/// Part of the weight of the changes that errors of the normals cause in a direction without surfaces.
+const NEGLIGIBLE: f64 = 0.01;
+/// Nearer surfaces are the operator or the mount, which move with the head, m.
+const OWN_BODY_M: f64 = 0.7;
 /// The head moves if its translation exceeds this, m.
 const SHIFTED_M: f64 = 0.03;
 /// Cauchy threshold of the residuals in successive solutions, m. Outliers are edges and moving objects.
@@ -90,14 +97,39 @@ fn compare(early: &[TimedReturn], late: &[TimedReturn]) -> Standstill {
         early.iter().filter_map(|(key, cell)| Some((cell, late.get(key)?.mean_range_m()))).collect();
     let is_different = |a: f64, b: f64| (a - b).abs() > RANGE_TOLERANCE.0 + RANGE_TOLERANCE.1 * a.min(b);
     let differ = both.iter().filter(|(a, b)| is_different(a.mean_range_m(), *b)).count();
-    if both.len() >= MOTION_THRESHOLD.1 && differ as f64 > MOTION_THRESHOLD.0 * both.len() as f64 {
+    let may_move = both.len() >= MOTION_THRESHOLD.1 && differ as f64 > MOTION_THRESHOLD.0 * both.len() as f64;
+    if may_move && !stays(&both) {
         return Standstill::Moves;
     }
     let facing = both.iter().filter_map(|(cell, late_m)| {
         let (direction, normal) = cell.facing()?;
         Some((normal, (cell.mean_range_m() - late_m) * normal.dot(&direction)))
     });
-    from_displacements(&facing.collect::<Vec<_>>())
+    let is_passing = |(_, displacement_m): &(Vector, f64)| may_move && displacement_m.abs() > RANGE_TOLERANCE.0;
+    from_displacements(&facing.filter(|cell| !is_passing(cell)).collect::<Vec<_>>())
+}
+
+/// Whether surfaces stay in all directions in which others change, so that only these move.
+fn stays(both: &[(&Cell, f64)]) -> bool {
+    let (mut stay, mut change) = (Matrix::zeros(), Matrix::zeros());
+    for (cell, late_m) in both.iter().filter(|(cell, _)| cell.mean_range_m() > OWN_BODY_M) {
+        let displacement_m = cell.mean_range_m() - late_m;
+        match cell.facing() {
+            Some((direction, normal)) if (displacement_m * normal.dot(&direction)).abs() < RANGE_TOLERANCE.0 => {
+                stay += normal * normal.transpose();
+            }
+            Some((_, normal)) => change += normal * normal.transpose(),
+            // Edges and foliage: along the beam.
+            None if displacement_m.abs() > RANGE_TOLERANCE.0 => {
+                let along = cell.sum.normalize();
+                change += along * along.transpose();
+            }
+            None => {}
+        }
+    }
+    // No direction in which the changes outweigh the surfaces that stay.
+    let excess = SymmetricEigen::new(stay - change * MIN_STAYING).eigenvalues.min();
+    excess > -NEGLIGIBLE * change.trace()
 }
 
 /// Sorts returns into cells of direction.
@@ -181,6 +213,27 @@ mod tests {
     fn rest_is_unknown_in_a_corridor_without_ends() {
         assert_eq!(compare(&returns(0.0, false), &returns(5.0, false)), Standstill::Unknown);
         assert_eq!(compare(&returns(0.0, true), &[]), Standstill::Unknown);
+    }
+
+    #[test]
+    fn a_forklift_that_drives_off_in_front_is_not_a_motion_of_the_head() {
+        // It fills 40 degrees in front and drives from 2 m to 2.6 m; the hall's end is behind it, the other one is in view.
+        let with_forklift = |moved_m: f64, at_m: f64| {
+            let mut beams = returns(moved_m, true);
+            for beam in &mut beams {
+                let [x, y] = [beam.point_in_imu.x, beam.point_in_imu.y].map(f64::from);
+                if x > 0.0 && y.abs() < 0.36 * x {
+                    let scale = (at_m / x) as f32;
+                    beam.range_m *= scale;
+                    beam.point_in_imu *= scale;
+                }
+            }
+            beams
+        };
+        let rests = compare(&with_forklift(0.0, 2.0), &with_forklift(0.0, 2.6));
+        assert!(matches!(rests, Standstill::Rests { .. }), "{rests:?}");
+        // The same change of the view ahead, by a motion of the head.
+        assert_eq!(compare(&with_forklift(0.0, 2.6), &with_forklift(0.6, 2.0)), Standstill::Moves);
     }
 
     #[test]

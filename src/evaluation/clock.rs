@@ -12,11 +12,15 @@ pub struct ClockError {
 /// Computes the error of estimated offsets between the IMU and lidar clocks, both over lidar time; the truth
 /// is interpolated linearly. `None` where the two do not overlap in time.
 pub fn clock_error(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Option<ClockError> {
-    let errors: Vec<f64> =
-        estimate.iter().filter_map(|(stamp, offset_s)| Some(offset_s - offset_at(truth, *stamp)?)).collect();
-    let last = *errors.last()?;
-    let mean_square = errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64;
+    let errors = clock_errors(estimate, truth);
+    let (_, last) = *errors.last()?;
+    let mean_square = errors.iter().map(|(_, error)| error * error).sum::<f64>() / errors.len() as f64;
     Some(ClockError { offset_rmse_s: mean_square.sqrt(), offset_end_error_s: last })
+}
+
+/// Estimated minus true offset at the stamps of the estimate that the truth covers, s.
+pub fn clock_errors(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Vec<(Stamp, f64)> {
+    estimate.iter().filter_map(|(stamp, offset_s)| Some((*stamp, offset_s - offset_at(truth, *stamp)?))).collect()
 }
 
 /// The absolute error of the offset `after_s` seconds after the first estimate: that of the last estimate until then, s.

@@ -1,5 +1,6 @@
 use super::{CanopyPart, Scenery, SurfaceHit, Track};
 use crate::geometry::Vector;
+use crate::world::{Ray, TimedRay};
 
 /// An upright cylinder with closed ends, fixed in the base frame: an operator's body, a handle, the mast of a cart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,15 +68,34 @@ pub struct SceneryWithCarrier<'a> {
     pub base: &'a Track,
 }
 
+impl SceneryWithCarrier<'_> {
+    /// The first solid of the carrier on a ray.
+    fn carrier_hit(&self, timed: &TimedRay) -> Option<SurfaceHit> {
+        let world_from_base = self.base.pose(timed.t_s);
+        let origin = world_from_base.inverse_transform_point(&timed.ray.origin_in_world.into()).coords;
+        let direction = world_from_base.inverse_transform_vector(&timed.ray.direction_in_world);
+        let solids = self.carrier.iter().filter_map(|solid| solid.first_hit(&origin, &direction));
+        solids.filter(|hit| hit.range_m <= timed.reach_m).min_by(|a, b| a.range_m.total_cmp(&b.range_m))
+    }
+}
+
 impl Scenery for SceneryWithCarrier<'_> {
     fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, t_s: f64) -> Option<SurfaceHit> {
-        let world_from_base = self.base.pose(t_s);
-        let origin_in_base = world_from_base.inverse_transform_point(&(*origin).into()).coords;
-        let direction_in_base = world_from_base.inverse_transform_vector(direction);
-        let solids = self.carrier.iter().filter_map(|solid| solid.first_hit(&origin_in_base, &direction_in_base));
-        let nearest = solids.filter(|hit| hit.range_m <= reach_m).min_by(|a, b| a.range_m.total_cmp(&b.range_m));
+        let ray = Ray { origin_in_world: *origin, direction_in_world: *direction };
+        let nearest = self.carrier_hit(&TimedRay { ray, reach_m, t_s });
         let beyond_m = nearest.map_or(reach_m, |hit| hit.range_m);
         self.scenery.first_hit(origin, direction, beyond_m, t_s).or(nearest)
+    }
+
+    fn first_hits(&self, rays: &[TimedRay]) -> Vec<Option<SurfaceHit>> {
+        let carrier_hits: Vec<Option<SurfaceHit>> = rays.iter().map(|timed| self.carrier_hit(timed)).collect();
+        let nearer = |(timed, hit): (&TimedRay, &Option<SurfaceHit>)| TimedRay {
+            reach_m: hit.map_or(timed.reach_m, |hit| hit.range_m),
+            ..*timed
+        };
+        let shortened: Vec<TimedRay> = rays.iter().zip(&carrier_hits).map(nearer).collect();
+        let hits = self.scenery.first_hits(&shortened);
+        hits.into_iter().zip(carrier_hits).map(|(hit, of_carrier)| hit.or(of_carrier)).collect()
     }
 
     fn canopies(&self, origin: &Vector, direction: &Vector, reach_m: f64, into: &mut Vec<CanopyPart>) {

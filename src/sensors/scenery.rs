@@ -1,5 +1,5 @@
 use crate::geometry::Vector;
-use crate::world::{Ray, World};
+use crate::world::{Hit, Ray, TimedRay, World};
 
 /// Intersection of a ray with a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +40,15 @@ pub trait Scenery: Sync {
     /// world, at `t_s` seconds after the start.
     fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, t_s: f64) -> Option<SurfaceHit>;
 
+    /// The first surface on each ray of a scan, as [`Scenery::first_hit`] finds it. Neighbours in the slice should be
+    /// neighbours in space, so that an implementation can search them together.
+    fn first_hits(&self, rays: &[TimedRay]) -> Vec<Option<SurfaceHit>> {
+        let first_hit = |TimedRay { ray, reach_m, t_s }: &TimedRay| {
+            self.first_hit(&ray.origin_in_world, &ray.direction_in_world, *reach_m, *t_s)
+        };
+        rays.iter().map(first_hit).collect()
+    }
+
     /// Appends the parts of a ray in canopies, within `reach_m`. By default there are none.
     fn canopies(&self, _origin: &Vector, _direction: &Vector, _reach_m: f64, _into: &mut Vec<CanopyPart>) {}
 }
@@ -47,14 +56,15 @@ pub trait Scenery: Sync {
 impl Scenery for World {
     fn first_hit(&self, origin: &Vector, direction: &Vector, reach_m: f64, t_s: f64) -> Option<SurfaceHit> {
         let ray = Ray { origin_in_world: *origin, direction_in_world: *direction };
-        let hit = self.cast(&ray, reach_m, t_s)?;
-        let material = self.material(hit.material);
-        Some(SurfaceHit {
-            range_m: hit.distance_m,
-            cos_incidence: hit.normal_in_world.dot(direction).abs() as f32,
-            reflectance: material.reflectance as f32,
-            transmission: material.transmission as f32,
-        })
+        self.cast(&ray, reach_m, t_s).map(|hit| surface_hit(self, direction, &hit))
+    }
+
+    fn first_hits(&self, rays: &[TimedRay]) -> Vec<Option<SurfaceHit>> {
+        let hits = self.cast_all(rays);
+        let surface = |(timed, hit): (&TimedRay, Option<Hit>)| {
+            hit.map(|hit| surface_hit(self, &timed.ray.direction_in_world, &hit))
+        };
+        rays.iter().zip(hits).map(surface).collect()
     }
 
     fn canopies(&self, origin: &Vector, direction: &Vector, reach_m: f64, into: &mut Vec<CanopyPart>) {
@@ -65,5 +75,16 @@ impl Scenery for World {
             extinction_per_m: part.extinction_per_m,
             reflectance: self.material(part.material).reflectance as f32,
         }));
+    }
+}
+
+/// A hit with the optical properties of its material.
+fn surface_hit(world: &World, direction: &Vector, hit: &Hit) -> SurfaceHit {
+    let material = world.material(hit.material);
+    SurfaceHit {
+        range_m: hit.distance_m,
+        cos_incidence: hit.normal_in_world.dot(direction).abs() as f32,
+        reflectance: material.reflectance as f32,
+        transmission: material.transmission as f32,
     }
 }

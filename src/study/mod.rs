@@ -45,6 +45,7 @@ mod recorded_manifest;
 mod register;
 pub mod reproduction;
 mod result_files;
+mod sampled_cloud;
 mod sampled_truth;
 pub mod scene;
 mod sensor_models;

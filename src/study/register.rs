@@ -18,7 +18,7 @@ const MAX_SAMPLED_BEAMS: usize = 100_000;
 /// Maximum number of points for viewers, in `result.mcap`; the cloud files have all points.
 const MAX_VIEWER_POINTS: usize = 1_000_000;
 /// Returns between poses farther apart than this, s, are not projected: the estimate has a pose every 10 ms, except in gaps.
-const MAX_POSE_GAP_S: f64 = 0.1;
+pub(super) const MAX_POSE_GAP_S: f64 = 0.1;
 
 /// A projected beam: origin and end point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,11 +110,8 @@ impl Registration<'_> {
             measurements: self.reader.measurements(self.selection),
             cursor: SmoothCursor::with_max_gap(self.map_from_head, Span::from_seconds(MAX_POSE_GAP_S)),
             truth: self.with_truth.then(|| TruthCursor::new(self.reader.truth())),
-            calibrated: LidarModel { head_from_laser: self.calibration.head_from_laser, range_m: 0.0 },
-            corrected: LidarModel {
-                head_from_laser: self.calibration.head_from_corrected_laser(self.lidar),
-                range_m: self.lidar.range_m,
-            },
+            calibrated: LidarModel::calibrated(self.calibration),
+            corrected: LidarModel::corrected(self.calibration, self.lidar),
             noise,
             covariances: self.covariances,
             filter: (!self.options.keep_outliers).then(|| CloudFilter::new(noise)),
@@ -306,15 +303,25 @@ impl BeamProjection<'_, '_, '_> {
 }
 
 /// Extrinsics and range correction of the lidar.
-struct LidarModel {
+pub(super) struct LidarModel {
     head_from_laser: Pose,
     /// Added to each range, m.
     range_m: f64,
 }
 
 impl LidarModel {
+    /// The lidar as calibrated, for projection by the truth.
+    pub(super) fn calibrated(calibration: &Calibration) -> Self {
+        Self { head_from_laser: calibration.head_from_laser, range_m: 0.0 }
+    }
+
+    /// The lidar with the estimated correction, for projection by the estimate.
+    pub(super) fn corrected(calibration: &Calibration, lidar: &LidarCorrection) -> Self {
+        Self { head_from_laser: calibration.head_from_corrected_laser(lidar), range_m: lidar.range_m }
+    }
+
     /// Projects the beam that measured `point_in_laser` from the head pose `frame_from_head`.
-    fn beam(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> ProjectedBeam {
+    pub(super) fn beam(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> ProjectedBeam {
         let frame_from_laser = frame_from_head * self.head_from_laser;
         let origin = frame_from_laser.translation.vector;
         let scale = 1.0 + self.range_m / point_in_laser.norm();

@@ -3,22 +3,31 @@
 //! The hierarchy finds the face in single precision, relative to the centre of the scene. The distance is then computed
 //! from the plane of the face in double precision. Ranges are therefore exact for the given corners, while the search,
 //! the costly part, moves half the bytes.
+//!
+//! Rays of a scan are searched in groups of 16, in a tree of their own; single rays and nearest points use parry's. Both
+//! find the same faces.
 
 mod boxes;
 mod face;
+mod lanes;
+mod packet;
+mod packet_tree;
 mod single_precision;
+mod wedge;
+mod wide_tree;
 
 pub(super) use boxes::BoxTree;
 
-use super::MaterialId;
 use super::planes::{FaceId, FlatFace};
 use super::triangle::{Surfaces, Triangle};
+use super::{MaterialId, TimedRay};
 use crate::geometry::{SurfacePoint, Vector};
 use face::{Plane, SingleFace};
 use glamx::Vec3A;
+use packet_tree::{Found, PacketTree};
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
-use single_precision::{Vec3, single};
+use single_precision::{Vec3, single, single_reach};
 
 /// Triangles in a bounding-volume hierarchy for ray casting.
 pub(super) struct Caster {
@@ -27,6 +36,7 @@ pub(super) struct Caster {
     lower: Vector,
     upper: Vector,
     tree: Bvh,
+    packet_tree: PacketTree,
     faces: Vec<SingleFace>,
     planes: Vec<Plane>,
     materials: Vec<MaterialId>,
@@ -58,13 +68,15 @@ impl Caster {
         face::sort_along_curve(&mut order);
         let faces: Vec<SingleFace> = order.iter().map(|(_, face)| SingleFace::new(face)).collect();
         // Single precision moves corners by at most half a unit in the last place: enlarge the boxes accordingly.
-        let margin = 4.0 * f32::EPSILON * (upper - middle).amax() as f32;
+        let extent = (upper - middle).amax() as f32;
+        let margin = 4.0 * f32::EPSILON * extent;
         let boxes: Vec<Aabb> = faces.iter().map(|face| face.bounds(margin)).collect();
         Self {
             middle,
             lower,
             upper,
             tree: Bvh::from_leaves(BvhBuildStrategy::Ploc, &boxes),
+            packet_tree: PacketTree::new(&faces, &boxes, extent),
             faces,
             planes: order.iter().map(|(_, face)| Plane::new(face)).collect(),
             materials: order.iter().map(|(at, _)| materials[*at]).collect(),
@@ -87,22 +99,38 @@ impl Caster {
     pub fn cast(&self, origin: &Vector, direction: &Vector, reach: f64) -> Option<Crossing> {
         let origin = origin - self.middle;
         let ray = SingleRay::new(&origin, direction);
-        // A slightly larger reach in single precision, so that the double-precision distance decides.
-        let reach_single = (reach * (1.0 + 1e-6)) as f32;
         let (at, near) = self.tree.find_best(
-            reach_single,
+            single_reach(reach),
             |node, _| ray.enters(node),
             |leaf, _| self.faces[leaf as usize].cross(&ray.origin, &ray.direction),
         )?;
-        let plane = &self.planes[at as usize];
-        let distance = plane.distance(&origin, direction).unwrap_or(f64::from(near));
+        self.crossing(at as usize, near, (&origin, direction), reach)
+    }
+
+    /// The first triangle on each ray within its reach, in the order of the rays; times are ignored. Rays that are
+    /// neighbours in the slice should be neighbours in space.
+    pub fn cast_all(&self, rays: &[TimedRay]) -> Vec<Option<Crossing>> {
+        let crossing = |(timed, found): (&TimedRay, Found)| {
+            let TimedRay { ray, reach_m, .. } = timed;
+            let (origin, direction) = (&ray.origin_in_world, &ray.direction_in_world);
+            match found {
+                Found::Face(at, near) => self.crossing(at, near, (&(origin - self.middle), direction), *reach_m),
+                Found::Nothing => None,
+                Found::NotSearched => self.cast(origin, direction, *reach_m),
+            }
+        };
+        rays.iter().zip(self.packet_tree.search(rays, &self.middle)).map(crossing).collect()
+    }
+
+    /// The intersection of a ray, given its local origin and direction, with the plane of a face at about `near`.
+    #[inline(always)]
+    fn crossing(&self, at: usize, near: f32, ray: (&Vector, &Vector), reach: f64) -> Option<Crossing> {
+        let plane = &self.planes[at];
+        let (origin, direction) = ray;
+        let distance = plane.distance(origin, direction).unwrap_or(f64::from(near));
         let normal = if plane.normal.dot(direction) > 0.0 { -plane.normal } else { plane.normal };
-        (distance <= reach).then(|| Crossing {
-            distance,
-            normal,
-            material: self.materials[at as usize],
-            face: FaceId(at),
-        })
+        let (material, face) = (self.materials[at], FaceId(at as u32));
+        (distance <= reach).then_some(Crossing { distance, normal, material, face })
     }
 
     /// The corners of all triangles, in single precision, with their materials.

@@ -46,7 +46,7 @@ pub use material::{Material, MaterialId};
 pub use model::World;
 pub use placement::Placement;
 pub use planes::{FaceId, PlaneId, PlaneMap};
-pub use ray::{Hit, Ray};
+pub use ray::{Hit, Ray, TimedRay};
 pub use section::{SectionPlane, Segment};
 pub use shape::{HeightsSpec, LengthUnit, OpeningSpec, ShapeSpec, UpAxis};
 pub use spec::{

@@ -5,7 +5,7 @@ use super::meadow::Meadow;
 use super::mover::Mover;
 use super::planes::PlaneMap;
 use super::section::{SectionPlane, Segment, edges};
-use super::{Hit, Material, MaterialId, Ray, SceneSpec, WorldError};
+use super::{Hit, Material, MaterialId, Ray, SceneSpec, TimedRay, WorldError};
 use crate::geometry::{Route, Surface, SurfacePoint, Vector};
 use crate::spec::{Kind, Source, find, parse};
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// Distance within which two hits are the same surface for [`World::cast_beyond`], m.
 const SAME_SURFACE_M: f64 = 1e-4;
 
-/// A world into which rays can be cast, from any number of threads, without allocation.
+/// A world into which rays can be cast, from any number of threads.
 pub struct World {
     name: String,
     materials: Vec<Material>,
@@ -69,18 +69,33 @@ impl World {
     /// The first surface within `max_range_m` along `ray` at `t_s`, seconds of true time since the start of the run.
     /// Glass counts as a surface; see [`World::cast_beyond`] for surfaces behind it.
     pub fn cast(&self, ray: &Ray, max_range_m: f64, t_s: f64) -> Option<Hit> {
+        let timed = TimedRay { ray: *ray, reach_m: max_range_m, t_s };
+        self.first_hit(&timed, self.static_surfaces.cast(&ray.origin_in_world, &ray.direction_in_world, max_range_m))
+    }
+
+    /// The first surface on each ray of a scan, as [`World::cast`] finds it, but several times faster.
+    ///
+    /// Each 16 rays in sequence are searched together, so neighbours in the slice should be neighbours in space. Rays
+    /// that diverge by more than 60 degrees are correct too, but not faster.
+    pub fn cast_all(&self, rays: &[TimedRay]) -> Vec<Option<Hit>> {
+        let crossings = self.static_surfaces.cast_all(rays);
+        rays.iter().zip(crossings).map(|(timed, crossing)| self.first_hit(timed, crossing)).collect()
+    }
+
+    /// The first surface on a ray, given the first static one.
+    fn first_hit(&self, timed: &TimedRay, static_crossing: Option<Crossing>) -> Option<Hit> {
+        let TimedRay { ray, reach_m, t_s } = timed;
         let (origin, direction) = (&ray.origin_in_world, &ray.direction_in_world);
-        let mut first = self.static_surfaces.cast(origin, direction, max_range_m);
-        let mut is_static = true;
+        let (mut first, mut is_static) = (static_crossing, true);
         for mover in &self.movers {
-            let reach = first.map_or(max_range_m, |crossing| crossing.distance);
-            if let Some(crossing) = mover.cast(origin, direction, reach, t_s) {
+            let reach = first.map_or(*reach_m, |crossing| crossing.distance);
+            if let Some(crossing) = mover.cast(origin, direction, reach, *t_s) {
                 (first, is_static) = (Some(crossing), false);
             }
         }
         for meadow in &self.meadows {
-            let reach = first.map_or(max_range_m, |crossing| crossing.distance);
-            if let Some(crossing) = meadow.cast(origin, direction, reach, t_s) {
+            let reach = first.map_or(*reach_m, |crossing| crossing.distance);
+            if let Some(crossing) = meadow.cast(origin, direction, reach, *t_s) {
                 (first, is_static) = (Some(crossing), false);
             }
         }

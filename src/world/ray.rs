@@ -10,6 +10,17 @@ pub struct Ray {
     pub direction_in_world: Vector,
 }
 
+/// A ray of a scan: its time and its reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedRay {
+    /// The ray.
+    pub ray: Ray,
+    /// Maximum distance from its origin, m.
+    pub reach_m: f64,
+    /// True time since the start of the run, s.
+    pub t_s: f64,
+}
+
 /// The first surface on a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {

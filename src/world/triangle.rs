@@ -3,7 +3,7 @@
 use super::MaterialId;
 use crate::geometry::Vector;
 
-/// Maximum number of triangles of a scene: each needs about 350 bytes while the scene is built.
+/// Maximum number of triangles of a scene: each needs about 450 bytes while the scene is built.
 pub(super) const MAX_TRIANGLES: usize = 10_000_000;
 
 /// Three corners, m.

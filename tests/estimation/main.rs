@@ -10,6 +10,7 @@ mod command;
 mod faults;
 mod fixture;
 mod formulation;
+mod lidar_gaps;
 mod maps;
 #[path = "../recordings/mod.rs"]
 mod recordings;

@@ -133,7 +133,8 @@ fn beams_projected_by_poses_at_1_khz_lie_on_the_surface() {
 
 #[test]
 fn a_sweep_hits_the_same_surfaces_as_single_rays() {
-    // A sweep starts each search at the previous hit; the office has edges, glass and open doors.
+    // A sweep searches rays in groups; the office has edges, glass and open doors. On the common edge of two faces of one
+    // plane either can be found, and their planes, computed from other corners, differ in the last bits of 5 m: 1e-15.
     let office = World::load("office").unwrap();
     let mut spec = spec_of("utm30lx");
     spec.range_max_m = 12.0;
@@ -151,7 +152,11 @@ fn a_sweep_hits_the_same_surfaces_as_single_rays() {
             let world_from_laser = track.pose(beam.offset_s);
             let direction = world_from_laser.rotation * beam.direction_in_laser;
             let alone = office.first_hit(&world_from_laser.translation.vector, &direction, 12.0, beam.offset_s);
-            assert_eq!(sweep.surfaces(ray).first(), alone.as_ref(), "{k}: ray {ray}");
+            let first = sweep.surfaces(ray).first();
+            let same_range = |hit: &SurfaceHit| alone.map(|alone| SurfaceHit { range_m: hit.range_m, ..alone });
+            assert_eq!(first.copied(), first.and_then(same_range).or(alone), "{k}: ray {ray}");
+            let difference_m = first.zip(alone).map_or(0.0, |(first, alone)| (first.range_m - alone.range_m).abs());
+            assert!(difference_m < 1e-12, "{k}: ray {ray} differs by {difference_m} m");
             met += usize::from(alone.is_some());
         }
     }

@@ -7,6 +7,7 @@ mod command;
 mod coverage;
 mod gains;
 mod latency;
+mod reference_system;
 mod reproduction;
 #[path = "../skip/mod.rs"]
 mod skip;

@@ -4,8 +4,8 @@ use approx::assert_relative_eq;
 use rand::RngExt;
 use zsim::geometry::{Surface, Vector};
 use zsim::random::Seed;
-use zsim::spec::{Source, parse};
-use zsim::world::{Ray, World};
+use zsim::spec::{Kind, Source, names, parse};
+use zsim::world::{Ray, TimedRay, World};
 
 /// A world of `items` with the opaque materials `a` and `b` and transparent `glass`, and further scene `fields`.
 pub(super) fn world(items: &str, fields: &str) -> World {
@@ -252,4 +252,51 @@ fn no_ray_passes_between_the_triangles_of_a_closed_room() {
 fn a_world_can_be_shared_between_threads() {
     fn is_shared<T: Send + Sync>(_: &T) {}
     is_shared(&World::load("mocap_room").unwrap());
+}
+
+/// Groups of rays from random places in a scene, as from a lidar that moves: 16 rays of one group are spread over up to
+/// 0.1 to 100 degrees, by less than a centimetre at their origins, and over 1 ms.
+fn groups_of_rays(world: &World, groups: usize) -> Vec<TimedRay> {
+    let (lower, upper) = world.bounds();
+    let mut stream = Seed(11).stream(world.name());
+    let mut rays = Vec::with_capacity(16 * groups);
+    for _ in 0..groups {
+        let middle = Vector::from_fn(|axis, _| stream.random_range(lower[axis]..=upper[axis]));
+        let mut draw = |scale: f64| Vector::from_fn(|_, _| scale * stream.random_range(-1.0..1.0));
+        let (axis, fan, jitter) = (draw(1.0).normalize(), draw(1.0), draw(0.004));
+        let spread = [0.001, 0.01, 0.05, 0.3, 2.0][rays.len() / 16 % 5];
+        let (start_s, reach_m) = (20.0 * fan.x.abs(), 5.0 + 30.0 * fan.y.abs());
+        rays.extend((0..16).map(|k| {
+            let along = f64::from(k) / 15.0 - 0.5;
+            let direction = axis + (fan * along + draw(0.03)) * spread;
+            TimedRay { ray: ray(middle + jitter * along, direction), reach_m, t_s: start_s + 1e-3 * along }
+        }));
+    }
+    rays
+}
+
+#[test]
+fn groups_of_rays_hit_what_single_rays_hit_in_all_scenes() {
+    // Both find the face in single precision and compute the distance from its plane. Where two faces are within the
+    // rounding of single precision, at an edge, either can be found: allow one ray in 100,000.
+    let (mut count, mut other) = (0, 0);
+    for name in names(Kind::Scene) {
+        let world = World::load(&name).unwrap();
+        let rays = groups_of_rays(&world, 8000);
+        let together = world.cast_all(&rays);
+        assert_eq!(together.len(), rays.len());
+        let mut hits = 0;
+        for (timed, found) in rays.iter().zip(&together) {
+            let alone = world.cast(&timed.ray, timed.reach_m, timed.t_s);
+            let is_same = match (found, &alone) {
+                (Some(found), Some(alone)) => (found.distance_m - alone.distance_m).abs() < 5e-6,
+                (found, alone) => found.is_none() && alone.is_none(),
+            };
+            (hits, other) = (hits + usize::from(found.is_some()), other + usize::from(!is_same));
+        }
+        assert!(hits > rays.len() / 20, "{name}: {hits} of {} rays hit a surface", rays.len());
+        count += rays.len();
+    }
+    assert!(count > 1_000_000, "{count} rays");
+    assert!(other <= count / 100_000, "{other} of {count} rays hit another surface in a group");
 }

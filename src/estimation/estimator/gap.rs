@@ -3,22 +3,33 @@
 use super::Estimator;
 use super::phase::{GapRecovery, Gathering, Phase, Tracking};
 use crate::estimation::EstimationError;
+use crate::estimation::coasting::Coasting;
 use crate::estimation::local_map::LocalMap;
 use crate::estimation::localisation::GapRelocalisation;
 use crate::estimation::window::Window;
 
 impl Estimator {
     /// Discards what a gap makes useless: the window, whose content becomes final, or the gathered segments.
-    pub(super) fn restart_after_gap(&mut self, phase: &mut Phase) -> Result<(), EstimationError> {
+    ///
+    /// `coasting`: the IMU data of a lidar gap. They predict the motion only from a window that the gap ends.
+    pub(super) fn restart_after_gap(
+        &mut self,
+        phase: &mut Phase,
+        coasting: Option<Coasting>,
+    ) -> Result<(), EstimationError> {
         match phase {
-            Phase::Gathering(gathering) => gathering.segments.clear(),
+            Phase::Gathering(gathering) => {
+                gathering.segments.clear();
+                gathering.recovery.iter_mut().for_each(|recovery| recovery.coasting = None);
+            }
             Phase::Tracking(tracking) => {
                 let recovery = if let Some(mut unplaced) = self.localise_at_end(tracking)? {
                     unplaced.segments.clear();
+                    unplaced.coasting = None;
                     unplaced
                 } else {
                     self.output_window(tracking);
-                    Box::new(self.prepare_recovery(&tracking.window))
+                    Box::new(GapRecovery { coasting, ..self.prepare_recovery(&tracking.window) })
                 };
                 *phase = Phase::Gathering(Gathering { segments: Vec::new(), recovery: Some(recovery) });
             }

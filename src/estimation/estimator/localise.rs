@@ -73,7 +73,7 @@ impl Estimator {
         let Some(search) = recovery.relocalisation.take() else { return false };
         let window = &mut tracking.window;
         let stamp = self.intake.stamp(window.start_s());
-        match search.find(window, &self.spec) {
+        match search.find(window, &self.spec, recovery.coasting.as_ref()) {
             Ok(found) => {
                 let local_map = search.into_local_map(window, &found);
                 let distance_m = (local_map.consider.pivot() - self.local_map.consider.pivot()).norm();

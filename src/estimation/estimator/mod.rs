@@ -149,7 +149,7 @@ impl Estimator {
     }
 
     /// Takes in a segment: restarts after a gap, starts the first window, and processes the segment with the window.
-    fn advance_phase(&mut self, phase: &mut Phase, segment: Segment) -> Result<(), EstimationError> {
+    fn advance_phase(&mut self, phase: &mut Phase, mut segment: Segment) -> Result<(), EstimationError> {
         // To restart again while a relocalisation is pending would leave no time for it.
         self.intake.bridge_gaps(phase.awaits_relocalisation());
         self.diagnostics.warnings.extend(self.intake.take_warnings());
@@ -159,7 +159,7 @@ impl Estimator {
                 self.start_again(phase);
                 return Ok(());
             }
-            self.restart_after_gap(phase)?;
+            self.restart_after_gap(phase, segment.coasting.take())?;
         }
         phase.queue(segment);
         self.start_if_ready(phase, false);

@@ -1,6 +1,7 @@
 //! The phases of the estimator: without and with a window.
 
 use super::sensed::SensedMotion;
+use crate::estimation::coasting::Coasting;
 use crate::estimation::consider::Sensitivity;
 use crate::estimation::initial::StateBeforeGap;
 use crate::estimation::intake::Segment;
@@ -53,6 +54,8 @@ pub(super) struct GapRecovery {
     pub(super) before: StateBeforeGap,
     /// Pending relocalisation in the surfaces seen before the gap; none in a given map.
     pub(super) relocalisation: Option<GapRelocalisation>,
+    /// The IMU data of a lidar gap; none after a gap of the IMU.
+    pub(super) coasting: Option<Coasting>,
     /// The segments since the gap, with which the window can start again, later.
     pub(super) segments: Vec<Segment>,
     /// Number of windows up to the gap.
@@ -64,7 +67,7 @@ pub(super) struct GapRecovery {
 impl GapRecovery {
     /// Recovery from a gap after `windows` windows.
     pub(super) fn new(before: StateBeforeGap, relocalisation: Option<GapRelocalisation>, windows: usize) -> Self {
-        Self { before, relocalisation, segments: Vec::new(), windows, restarts: 0 }
+        Self { before, relocalisation, coasting: None, segments: Vec::new(), windows, restarts: 0 }
     }
 }
 

@@ -71,7 +71,10 @@ impl Estimator {
         let Some(mut recovery) = tracking.recovery.take() else { return self.start_again(phase) };
         let mut segments = std::mem::take(&mut recovery.segments);
         segments.extend(tracking.waiting.drain(..));
-        segments.drain(..segments.len().min((LATER_S / self.spec.step_s).ceil() as usize));
+        let skipped = segments.drain(..segments.len().min((LATER_S / self.spec.step_s).ceil() as usize));
+        for segment in skipped {
+            recovery.coasting.iter_mut().for_each(|coasting| coasting.add_skipped(&segment.intervals));
+        }
         recovery.restarts += 1;
         self.forget_windows_after(recovery.windows);
         *phase = Phase::Gathering(Gathering { segments, recovery: Some(recovery) });
@@ -113,8 +116,11 @@ impl Estimator {
         let Gathering { segments: mut waiting, recovery } = gathering;
         self.raise_noise(initial_state.noise_factors, &mut waiting, start_s);
         let before = recovery.as_ref().map(|recovery| &recovery.before);
-        let initial_state = match before {
-            Some(before) => initial_state.continued_from(before, start_s),
+        let initial_state = match &recovery {
+            Some(recovery) => match &recovery.coasting {
+                Some(coasting) => initial_state.after_coasting(&recovery.before, coasting),
+                None => initial_state.continued_from(&recovery.before, start_s),
+            },
             None => initial_state,
         };
         if before.is_none() && initial_state.rest.is_none() {

@@ -7,6 +7,7 @@ mod scans;
 use self::position_uncertainty::PositionUncertainty;
 use self::samples::{Coverage, MARGIN_S, SampleQueue};
 use self::scans::ScanQueue;
+use super::coasting::Coasting;
 use super::inertial::InertialStream;
 use super::initial::NoiseFactors;
 use super::scan_geometry::ScanGeometry;
@@ -47,6 +48,8 @@ pub(super) struct Segment {
     pub(super) returns: Vec<TimedReturn>,
     /// Whether an IMU gap too long to bridge, or a long lidar gap, precedes the segment.
     pub(super) after_gap: bool,
+    /// The IMU data of a long lidar gap before the segment, if they cover it.
+    pub(super) coasting: Option<Coasting>,
 }
 
 /// Sorts the measurements of both sensors and cuts them into segments.
@@ -66,6 +69,8 @@ pub(super) struct Intake {
     /// The lidar gap is so long, or the IMU so uncertain in it, that the estimate waits for the next scan.
     without_lidar: bool,
     uncertainty: PositionUncertainty,
+    /// IMU data since the estimate waits for a scan.
+    coasting: Coasting,
     /// Whether IMU gaps are bridged whatever the motion.
     gaps_are_bridged: bool,
     warnings: Vec<Warning>,
@@ -84,6 +89,7 @@ impl Intake {
             after_gap: false,
             without_lidar: false,
             uncertainty: PositionUncertainty::default(),
+            coasting: Coasting::default(),
             gaps_are_bridged: false,
             warnings: Vec::new(),
         }
@@ -156,21 +162,35 @@ impl Intake {
         }
         loop {
             let segment = self.cut(last)?;
-            let lidar_is_missing = segment.returns.is_empty() && segment.end_s - self.scans.used_s() > MAX_LIDAR_GAP_S;
-            if segment.returns.is_empty() {
-                self.uncertainty.add(&segment.intervals);
-            } else {
-                self.uncertainty = PositionUncertainty::default();
-            }
-            self.without_lidar |= lidar_is_missing || self.uncertainty.is_too_large();
-            if self.without_lidar && segment.returns.is_empty() {
+            if self.is_skipped(&segment) {
                 continue;
             }
             if !segment.intervals.is_empty() {
                 let after_gap = segment.after_gap || std::mem::take(&mut self.without_lidar);
-                return Some(Segment { after_gap, ..segment });
+                let coasting = std::mem::take(&mut self.coasting).if_complete();
+                return Some(Segment { after_gap, coasting, ..segment });
             }
         }
+    }
+
+    /// Whether a segment is in a lidar gap in which the estimate waits; keeps its IMU data for a prediction.
+    fn is_skipped(&mut self, segment: &Segment) -> bool {
+        let silent_s = segment.end_s - self.scans.used_s();
+        let is_silent = segment.returns.is_empty();
+        if is_silent {
+            self.uncertainty.add(&segment.intervals);
+        } else {
+            self.uncertainty = PositionUncertainty::default();
+        }
+        self.without_lidar |= (is_silent && silent_s > MAX_LIDAR_GAP_S) || self.uncertainty.is_too_large();
+        if self.without_lidar && (segment.after_gap || self.uncertainty.is_too_large()) {
+            self.coasting.interrupt();
+        }
+        let is_skipped = self.without_lidar && is_silent;
+        if is_skipped {
+            self.coasting.add(&segment.intervals, silent_s);
+        }
+        is_skipped
     }
 
     /// Cuts the next segment from the queues.
@@ -196,7 +216,7 @@ impl Intake {
         let intervals = self.samples.take_intervals();
         let returns = self.scans.take_until(end_s, is_turning(&intervals));
         let after_gap = std::mem::take(&mut self.after_gap);
-        let segment = Segment { start_s, end_s, intervals, returns, after_gap };
+        let segment = Segment { start_s, end_s, intervals, returns, after_gap, coasting: None };
         self.report(&segment);
         self.next_start_s = end_s;
         if let Coverage::Gap(from_s, until_s) = coverage {

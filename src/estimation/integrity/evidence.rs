@@ -15,6 +15,13 @@ const CONTRADICTION_LIMITS: Limits = Limits { degraded: 0.6, lost: 3.0 };
 /// Residual of matched surfaces above which a result is degraded or lost, m. 2 to 4.5 mm in sound runs, up to 6 mm in
 /// a window.
 const RESIDUAL_M: Limits = Limits { degraded: 0.010, lost: 0.018 };
+/// A result is lost if in one interval the contradiction, and the residual or the IMU scale, exceed their limits of a
+/// degraded result.
+///
+/// The trajectory then follows a wrong motion: that of a large moving surface, which neither fits the static ones nor the
+/// IMU, or that of wrong sensor data. The ratio is at most 0.8 in sound runs, 1.04 to 3.8 in a cabin or along a wall that
+/// moves by metres.
+const INCONSISTENT: Limits = Limits { degraded: 1.0, lost: 1.0 };
 /// Fraction of an interval with too few matches or unsolved windows, above which a result is degraded or lost.
 const UNTRACKED_FRACTIONS: Limits = Limits { degraded: 0.35, lost: 0.6 };
 /// Fraction of a run without any match, and not at rest, above which the result is lost.
@@ -93,7 +100,7 @@ pub struct Evidence<'a> {
 
 /// The findings of a run, one for each kind of cause, ordered by severity, then time.
 pub fn findings(evidence: &Evidence) -> Vec<Finding> {
-    let mut all = window_findings(evidence.windows);
+    let mut all = window_findings(evidence);
     all.extend(evidence.warnings.iter().filter_map(|warning| warning_finding(warning, evidence)));
     all.extend(calibration_findings(evidence.windows));
     all.extend(coverage_finding(evidence));
@@ -165,7 +172,9 @@ fn is_untracked(window: &WindowReport) -> bool {
 }
 
 /// Findings from the window reports.
-fn window_findings(windows: &[WindowReport]) -> Vec<Finding> {
+fn window_findings(evidence: &Evidence) -> Vec<Finding> {
+    let windows = evidence.windows;
+    let is_clipped = evidence.warnings.iter().any(|warning| matches!(warning.kind, WarningKind::Saturated { .. }));
     let contradiction = |interval: &[WindowReport]| median(interval.iter().map(|w| w.imu_contradiction).collect());
     let residual = |interval: &[WindowReport]| median(interval.iter().map(|w| w.residual_rms_m).collect());
     let untracked =
@@ -177,11 +186,19 @@ fn window_findings(windows: &[WindowReport]) -> Vec<Finding> {
     };
     add(over_intervals(windows, contradiction, CONTRADICTION_LIMITS), &|times, _, _| Cause::Contradiction { times });
     add(over_intervals(windows, residual, RESIDUAL_M), &|residual_m, _, _| Cause::PoorFit { residual_m });
+    let both = |interval: &[WindowReport]| {
+        // Clipped samples explain an implausible scale.
+        let scale = if is_clipped { 0.0 } else { median(interval.iter().map(|w| w.imu_matrix).collect()) };
+        let lidar = (residual(interval) / RESIDUAL_M.degraded).max(scale / IMU_SCALE.degraded);
+        lidar.min(contradiction(interval) / CONTRADICTION_LIMITS.degraded)
+    };
+    add(over_intervals(windows, both, INCONSISTENT), &|ratio, _, _| Cause::Inconsistent { ratio });
     add(over_intervals(windows, untracked, UNTRACKED_FRACTIONS), &|_, from, to| Cause::FewMatches {
         seconds: to.seconds_since(from),
     });
     add(over_intervals(windows, fastest, SPEED_M_PER_S), &|speed_m_per_s, _, _| Cause::Speed { speed_m_per_s });
-    // The head neither rests nor matches any surface for most of the run: the trajectory is unknown.
+    // The head matches no surface for most of the run, and does not rest, or might move at constant velocity where the
+    // lidar would not show it: the trajectory is unknown.
     let (unobserved, assumed) =
         (mostly_unmatched(windows, |w| !w.resting), mostly_unmatched(windows, |w| w.resting && !w.sees_rest));
     all.extend(unobserved.map(|(seconds, from, to)| Finding {
@@ -191,7 +208,7 @@ fn window_findings(windows: &[WindowReport]) -> Vec<Finding> {
         to,
     }));
     all.extend(assumed.map(|(seconds, from, to)| Finding {
-        status: Status::Degraded,
+        status: Status::Lost,
         cause: Cause::RestAssumed { seconds },
         from,
         to,
@@ -386,6 +403,26 @@ mod tests {
     }
 
     #[test]
+    fn a_contradiction_with_surfaces_that_do_not_fit_loses_the_run() {
+        // A wall that slides through the view: neither alone would exceed the limit of a lost result.
+        let mut windows = sound(80);
+        windows[40..60].iter_mut().for_each(|window| window.imu_contradiction = 1.2);
+        windows[65..].iter_mut().for_each(|window| window.residual_rms_m = 0.012);
+        assert!(judged(&windows, &[]).iter().all(|finding| finding.status == Status::Degraded));
+        let lost_from = |windows: &[WindowReport]| {
+            let found = judged(windows, &[]);
+            assert_eq!((found[0].status, found[0].cause.kind()), (Status::Lost, "inconsistent"));
+            found[0].from
+        };
+        let mut unfit = windows.clone();
+        unfit[45..60].iter_mut().for_each(|window| window.residual_rms_m = 0.012);
+        assert!(lost_from(&unfit) >= windows[35].stamp);
+        // A cabin that moves: the estimated IMU scale absorbs its motion.
+        windows[45..60].iter_mut().for_each(|window| window.imu_matrix = 0.012);
+        assert!(lost_from(&windows) >= windows[35].stamp);
+    }
+
+    #[test]
     fn a_contradiction_is_found_at_its_time_and_enlarges_the_later_bound() {
         let mut windows = sound(80);
         windows[40..60].iter_mut().for_each(|window| window.imu_contradiction = 1.2);
@@ -414,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_without_matches_is_lost_unless_it_rests() {
+    fn a_head_without_matches_is_lost_unless_the_lidar_shows_that_it_rests() {
         let mut windows = sound(20);
         windows.iter_mut().for_each(|window| (window.matches, window.view_matches, window.moving) = (0, 0, false));
         assert_eq!(judged(&windows, &[])[0].status, Status::Lost);
@@ -422,7 +459,7 @@ mod tests {
         assert_eq!(judged(&windows, &[]), vec![]);
         windows.iter_mut().for_each(|window| window.sees_rest = false);
         let found = judged(&windows, &[]);
-        assert_eq!((found[0].status, found[0].cause.kind()), (Status::Degraded, "rest_assumed"));
+        assert_eq!((found[0].status, found[0].cause.kind()), (Status::Lost, "rest_assumed"));
     }
 
     #[test]

@@ -53,6 +53,12 @@ pub enum Cause {
         /// Median multiple of the IMU noise over the interval; 0.1 to 0.4 in a sound run.
         times: f64,
     },
+    /// IMU and lidar contradict each other, and at the same time the matched surfaces fit badly or the IMU scale is not
+    /// plausible.
+    Inconsistent {
+        /// The smaller measure, as a multiple of its limit of a degraded result.
+        ratio: f64,
+    },
     /// Too few surfaces were matched; dead reckoning with the IMU.
     FewMatches {
         /// Duration, s.
@@ -138,6 +144,7 @@ impl Cause {
     pub(super) fn magnitude(&self) -> f64 {
         match self {
             Self::Contradiction { times } => *times,
+            Self::Inconsistent { ratio } => *ratio,
             Self::FewMatches { seconds }
             | Self::RestAssumed { seconds }
             | Self::Gap { seconds, .. }
@@ -159,6 +166,7 @@ impl Cause {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Contradiction { .. } => "contradiction",
+            Self::Inconsistent { .. } => "inconsistent",
             Self::FewMatches { .. } => "few_matches",
             Self::RestAssumed { .. } => "rest_assumed",
             Self::PoorFit { .. } => "poor_fit",
@@ -185,13 +193,19 @@ impl fmt::Display for Cause {
                 "IMU and lidar contradict each other by {times:.1} times the IMU noise (0.1 to 0.4 is usual); check the \
                  extrinsics, the units, signs and range of the IMU, and the clocks"
             ),
+            Self::Inconsistent { .. } => write!(
+                f,
+                "the motion by the lidar contradicts the IMU, and no calibration explains it: a large moving surface fills the \
+                 view, or a sensor is wrong; the trajectory has an unknown error"
+            ),
             Self::FewMatches { seconds } => {
                 write!(f, "tracking lost for {seconds:.1} s (too few matched surfaces); position from the IMU only")
             }
             Self::RestAssumed { seconds } => {
                 write!(
                     f,
-                    "at rest for {seconds:.1} s according to the IMU only; the visible surfaces cannot confirm it"
+                    "at rest for {seconds:.1} s according to the IMU only: the visible surfaces would look the same at \
+                     constant velocity; start at rest where the lidar sees surfaces on all sides"
                 )
             }
             Self::PoorFit { residual_m } => {

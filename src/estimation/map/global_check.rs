@@ -5,8 +5,8 @@
 //! the query, no property of the false pose separates it from the correct one; the comparison with all other poses does.
 //! Candidate poses come from correlative matching (Olson, ICRA 2009), here in 3-D and with the normals of all surfaces.
 
-use super::limits::MAP_LIMITS;
-use super::localised_pose::{LocalisedPose, offset_pose};
+use super::limits::{MAP_LIMITS, RelocalisationLimits};
+use super::localised_pose::{LocalisedPose, offset_pose, pose_distance};
 use super::relocaliser::{Relocaliser, is_different_pose};
 use crate::estimation::surfel::Patch;
 use crate::geometry::{Pose, Vector};
@@ -38,6 +38,8 @@ const HORIZONTAL_NORMAL_Z: f64 = 0.8;
 /// An accepted pose is rejected if another has more than this multiple of its inlier ratio. In 144 starts in office, mocap
 /// room, courtyard and stairwell the best false pose has at most 0.88 times the inlier ratio of the correct one.
 const MAX_OTHER_INLIER_RATIO: f64 = 1.05;
+/// After a gap a pose is rejected if another has more than this multiple of its likelihood.
+const MIN_RIVAL_LIKELIHOOD: f64 = 0.5;
 
 /// Candidate pose on the search grid: heading steps and cells relative to the accepted pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -138,6 +140,46 @@ impl Relocaliser {
         from: &Vector,
         found: &LocalisedPose,
     ) -> Option<LocalisedPose> {
+        let best = self.find_elsewhere(query, from, found, &MAP_LIMITS)?;
+        (best.inlier_ratio > MAX_OTHER_INLIER_RATIO * found.inlier_ratio).then_some(best)
+    }
+
+    /// Refuses the pose `found` after a gap if another pose that the head can have reached, with any heading, matches about
+    /// as well.
+    ///
+    /// # Errors
+    /// The distance of the other pose.
+    pub(in crate::estimation) fn refuse_ambiguous(
+        &self,
+        query: &[Patch],
+        from: &Vector,
+        found: &LocalisedPose,
+        limits: &RelocalisationLimits,
+    ) -> Result<(), String> {
+        if limits.rival_reach_m <= 0.0 {
+            return Ok(());
+        }
+        match self.find_elsewhere(query, from, found, limits) {
+            Some(other) if limits.likelihood(&other) > MIN_RIVAL_LIKELIHOOD * limits.likelihood(found) => {
+                let (distance_m, angle) = pose_distance(&other.map_from_query, &found.map_from_query, from);
+                Err(format!(
+                    "ambiguous: another pose at a distance of {distance_m:.1} m and {:.0} degrees matches about as well",
+                    angle.to_degrees()
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the pose of `query`, observed from the point `from`, that matches best according to `limits`, with any
+    /// heading, among those that differ from `found`.
+    fn find_elsewhere(
+        &self,
+        query: &[Patch],
+        from: &Vector,
+        found: &LocalisedPose,
+        limits: &RelocalisationLimits,
+    ) -> Option<LocalisedPose> {
         let here = found.map_from_query;
         let patches_by_level = self.patches_by_level(query);
         let candidates_here = candidates(self.patches(), &patches_by_level[0], from, &here);
@@ -147,11 +189,14 @@ impl Relocaliser {
             (start, start)
         });
         let poses = self.refine_all(&patches_by_level, starts.collect(), from);
-        let accepted =
-            self.evaluate_all(&patches_by_level[..1], from, &poses, None).filter(|located| MAP_LIMITS.accepts(located));
-        let best = accepted.max_by(|a, b| a.inlier_ratio.total_cmp(&b.inlier_ratio))?;
-        (best.inlier_ratio > MAX_OTHER_INLIER_RATIO * found.inlier_ratio && is_different_pose(&best, found, from))
-            .then_some(best)
+        let levels = limits.levels.min(patches_by_level.len());
+        let evaluated = self.evaluate_all(&patches_by_level[..levels], from, &poses, limits.gate_m);
+        let is_rival = |other: &LocalisedPose| {
+            let (distance_m, _) = pose_distance(&other.map_from_query, &here, from);
+            distance_m < limits.rival_reach_m && is_different_pose(other, found, from) && limits.accepts(other)
+        };
+        let others = evaluated.filter(is_rival);
+        others.max_by(|a, b| limits.likelihood(a).total_cmp(&limits.likelihood(b)))
     }
 }
 

@@ -17,6 +17,8 @@ const START_SPACING_UP_M: f64 = 0.5;
 const CLIMB_M_PER_S: f64 = 0.5;
 /// Search range of the heading after a gap, degrees: initial value, growth per second of the gap, upper limit.
 const GAP_HEADING_DEG: (f64, f64, f64) = (15.0, 60.0, 90.0);
+/// Radius within which the head can be after a long gap, m: initial value, growth per second of the gap.
+const RIVAL_REACH: (f64, f64) = (1.0, 2.0);
 
 /// Search region around an expected pose, and thresholds for accepting a pose.
 #[derive(Debug)]
@@ -32,13 +34,15 @@ pub(in crate::estimation) struct RelocalisationLimits {
     /// Number of resolutions with which poses are evaluated, from the finest on.
     pub(super) levels: usize,
     /// Exponent of the agreement in the score of a pose.
-    pub(super) agreement_power: i32,
+    agreement_power: i32,
     /// Maximum root mean square residual of the matches, m.
     max_residual_m: f64,
     /// Whether the pose nearest to the expected one wins among equally good poses; if not, they are ambiguous.
     pub(super) nearest: bool,
     /// Distance that a pose of which nothing matches may be off, m.
     unmatched_reach_m: f64,
+    /// Poses with any heading within this distance of the found one must not match about as well, m.
+    pub(super) rival_reach_m: f64,
 }
 
 /// Evidence for a pose: minimum numbers of matches.
@@ -83,6 +87,7 @@ pub(in crate::estimation) const MAP_LIMITS: RelocalisationLimits = Relocalisatio
     max_residual_m: MAX_RESIDUAL_M,
     nearest: false,
     unmatched_reach_m: 0.0,
+    rival_reach_m: f64::INFINITY,
 };
 
 impl RelocalisationLimits {
@@ -103,6 +108,19 @@ impl RelocalisationLimits {
             max_residual_m: f64::INFINITY,
             nearest: true,
             unmatched_reach_m: if is_long { reach_m } else { 0.0 },
+            rival_reach_m: if is_long { RIVAL_REACH.0 + RIVAL_REACH.1 * seconds } else { 0.0 },
+        }
+    }
+
+    /// Limits after a lidar gap that the IMU bridged, which predicts the position to `predicted_sigma_m` and the heading.
+    pub(in crate::estimation) fn after_coasting(predicted_sigma_m: f64, sigma_m: f64) -> Self {
+        let reach_m = (GAP_RADIUS.0 + 2.0 * predicted_sigma_m).min(GAP_RADIUS.2);
+        Self {
+            reach: (reach_m, GAP_HEADING_DEG.0.to_radians()),
+            reach_up_m: reach_m.min(MAX_START_OFFSET_M),
+            unmatched_reach_m: reach_m,
+            rival_reach_m: 0.0,
+            ..Self::after_gap(f64::INFINITY, sigma_m)
         }
     }
 
@@ -133,6 +151,11 @@ impl RelocalisationLimits {
     /// Whether a pose meets the acceptance thresholds.
     pub(super) fn accepts(&self, found: &LocalisedPose) -> bool {
         self.evidence.iter().any(|evidence| evidence.is_met_by(found)) && found.residual_rms_m <= self.max_residual_m
+    }
+
+    /// Likelihood of a pose by its matches, 0..1.
+    pub(super) fn likelihood(&self, found: &LocalisedPose) -> f64 {
+        found.inlier_ratio.powi(3) * found.agreement.powi(self.agreement_power)
     }
 
     /// Prior likelihood of the pose `found` by the distance from the expected one, 0..1.

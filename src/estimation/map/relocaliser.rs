@@ -45,6 +45,8 @@ const DUPLICATE_POSE_TOLERANCE: f64 = 0.01;
 const DIFFERENT_POSE: (f64, f64) = (0.3, 0.1);
 /// A different pose competes with the best one if it has at least this fraction of the score of the best.
 const COMPETING_SCORE: f64 = 0.85;
+/// After a gap a pose is rejected if another with more than this multiple of its score is farther away than this, m.
+const ALTERNATIVE: (f64, f64) = (0.5, 1.0);
 
 /// Finds poses in a map of patches.
 #[derive(Debug)]
@@ -140,8 +142,7 @@ impl Relocaliser {
         let evaluated =
             self.evaluate_all(&patches_by_level[..limits.levels.min(self.matcher.levels)], from, &poses, limits.gate_m);
         let score = |found: &LocalisedPose| {
-            let likelihood = found.inlier_ratio.powi(3) * found.agreement.powi(limits.agreement_power);
-            likelihood * limits.prior(&found.map_from_query, map_from_query, from)
+            limits.likelihood(found) * limits.prior(&found.map_from_query, map_from_query, from)
         };
         let mut found: Vec<(f64, LocalisedPose)> = evaluated.map(|found| (score(&found), found)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -158,6 +159,7 @@ impl Relocaliser {
         let accepted: Vec<&(f64, LocalisedPose)> =
             found.iter().filter(|(score, found)| *score > 0.0 && limits.accepts(found)).collect();
         if limits.nearest {
+            refuse_distant_alternative(&accepted, best, from)?;
             let ambiguity_m = limits.unmatched_m(best.inlier_ratio);
             return Ok(LocalisedPose { ambiguity_m, ..best.clone() }.with_alternatives(&accepted, from));
         }
@@ -350,6 +352,22 @@ impl MatchSums {
         }
         unobservable
     }
+}
+
+/// Refuses `best` if another of the accepted poses, metres away, is about as likely.
+fn refuse_distant_alternative(
+    accepted: &[&(f64, LocalisedPose)],
+    best: &LocalisedPose,
+    from: &Vector,
+) -> Result<(), String> {
+    let best_score = accepted.iter().map(|(score, _)| *score).fold(0.0, f64::max);
+    let likely = accepted.iter().filter(|(score, _)| *score > ALTERNATIVE.0 * best_score);
+    let distance_m =
+        likely.map(|(_, other)| pose_distance(&best.map_from_query, &other.map_from_query, from).0).fold(0.0, f64::max);
+    if distance_m > ALTERNATIVE.1 {
+        return Err(format!("ambiguous: another pose at a distance of {distance_m:.1} m is about as likely"));
+    }
+    Ok(())
 }
 
 /// Whether two poses differ by more than `DIFFERENT_POSE`.

@@ -1,17 +1,16 @@
 use super::Lidar;
-use crate::geometry::{Rotation, Vector};
+use crate::geometry::Rotation;
 use crate::sensors::{CanopyPart, Scenery, SurfaceHit, Track};
 use crate::time::Stamp;
+use crate::world::{Ray, TimedRay};
 
 /// Maximum number of glass surfaces that a ray passes; a ray that hits more is lost.
 const MAX_GLASS: usize = 8;
 /// Distance behind a glass surface at which a ray continues, m: more than the rounding of the intersection.
 const GLASS_OFFSET_M: f64 = 1e-4;
 
-/// A ray is first cast up to the range of the previous ray plus this margin: fraction of the range, and m.
-///
-/// Successive rays mostly hit the same surface, so the short cast usually succeeds, and it is faster.
-const SEARCH_MARGIN: (f64, f64) = (0.05, 0.1);
+/// Rays are cast in blocks of about this number, which limits the memory of a scan with many rays.
+const BLOCK_RAYS: usize = 1024;
 
 /// Timing of a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,14 +66,6 @@ impl Sweep {
     }
 }
 
-/// A ray of a beam in the world.
-struct LidarRay {
-    origin: Vector,
-    direction: Vector,
-    /// Firing time of the beam, true seconds.
-    t_s: f64,
-}
-
 impl Lidar {
     /// Casts the rays of the scan with `timing` into `scenery`. Each ray starts at the pose of the lidar frame at the
     /// firing time of its beam; `laser` is the track of that frame.
@@ -86,43 +77,53 @@ impl Lidar {
             canopies: Vec::new(),
             ends: Vec::with_capacity(self.rays.len()),
         };
-        let mut previous_m = self.spec.range_max_m;
-        for (beam, rays) in self.beams.iter().zip(self.rays.chunks_exact(self.rays_per_beam())) {
-            let t_s = timing.start_s + beam.offset_s / timing.pace;
-            let world_from_laser = laser.pose(t_s);
-            let origin = world_from_laser.translation.vector;
-            let world_from_beams =
-                sweep.rotation.map_or(world_from_laser.rotation, |turn| world_from_laser.rotation * turn);
-            for ray in rays {
-                let direction = world_from_beams * ray;
-                self.trace(scenery, &LidarRay { origin, direction, t_s }, &mut previous_m, &mut sweep.surfaces);
-                scenery.canopies(&origin, &direction, previous_m, &mut sweep.canopies);
-                sweep.ends.push([sweep.surfaces.len(), sweep.canopies.len()].map(|end| end as u32));
+        let per_beam = self.rays_per_beam();
+        let block = (BLOCK_RAYS / per_beam).max(1);
+        let mut timed = Vec::with_capacity(block * per_beam);
+        for (beams, rays) in self.beams.chunks(block).zip(self.rays.chunks(block * per_beam)) {
+            timed.clear();
+            for (beam, rays) in beams.iter().zip(rays.chunks_exact(per_beam)) {
+                let t_s = timing.start_s + beam.offset_s / timing.pace;
+                let world_from_laser = laser.pose(t_s);
+                let world_from_beams =
+                    sweep.rotation.map_or(world_from_laser.rotation, |turn| world_from_laser.rotation * turn);
+                timed.extend(rays.iter().map(|ray| {
+                    let origin_in_world = world_from_laser.translation.vector;
+                    let ray = Ray { origin_in_world, direction_in_world: world_from_beams * ray };
+                    TimedRay { ray, reach_m: self.spec.range_max_m, t_s }
+                }));
             }
+            sweep.add(scenery, &timed);
         }
         sweep
     }
+}
 
-    /// Traces a ray through glass to the last surface. `previous_m` is the range of the previous ray on entry, and of
-    /// this ray on return.
-    fn trace(&self, scenery: &dyn Scenery, ray: &LidarRay, previous_m: &mut f64, surfaces: &mut Vec<SurfaceHit>) {
-        let LidarRay { origin, direction, t_s } = ray;
-        let cast = |from: &Vector, reach_m: f64| scenery.first_hit(from, direction, reach_m, *t_s);
-        let near_m = *previous_m * (1.0 + SEARCH_MARGIN.0) + SEARCH_MARGIN.1;
-        *previous_m = self.spec.range_max_m;
-        let (mut from, mut travelled_m) = (*origin, 0.0);
+impl Sweep {
+    /// Adds the surfaces and canopies on rays, in sequence.
+    fn add(&mut self, scenery: &dyn Scenery, rays: &[TimedRay]) {
+        for (timed, hit) in rays.iter().zip(scenery.first_hits(rays)) {
+            let end_m = self.trace(scenery, timed, hit);
+            let Ray { origin_in_world, direction_in_world } = &timed.ray;
+            scenery.canopies(origin_in_world, direction_in_world, end_m, &mut self.canopies);
+            self.ends.push([self.surfaces.len(), self.canopies.len()].map(|end| end as u32));
+        }
+    }
+
+    /// Adds the surfaces on a ray, given the first one: through glass to the last surface. Returns where the ray ends, m.
+    fn trace(&mut self, scenery: &dyn Scenery, timed: &TimedRay, first: Option<SurfaceHit>) -> f64 {
+        let TimedRay { ray, reach_m, t_s } = timed;
+        let (mut next, mut travelled_m) = (first, 0.0);
         for _ in 0..MAX_GLASS {
-            let (near_m, reach_m) = (near_m - travelled_m, self.spec.range_max_m - travelled_m);
-            let near = if (0.0..reach_m).contains(&near_m) { cast(&from, near_m) } else { None };
-            let Some(hit) = near.or_else(|| cast(&from, reach_m)) else { return };
+            let Some(hit) = next else { return *reach_m };
             let range_m = travelled_m + hit.range_m;
-            surfaces.push(SurfaceHit { range_m, ..hit });
+            self.surfaces.push(SurfaceHit { range_m, ..hit });
             if !hit.is_glass() {
-                *previous_m = range_m;
-                return;
+                return range_m;
             }
             travelled_m = range_m + GLASS_OFFSET_M;
-            from = origin + direction * travelled_m;
+            next = scenery.first_hit(&ray.at(travelled_m), &ray.direction_in_world, reach_m - travelled_m, *t_s);
         }
+        *reach_m
     }
 }

@@ -1,6 +1,6 @@
 //! An experiment: its spec, its run, and its stored result.
 
-use super::{ExperimentResult, ExperimentSpec, Extent, gain_curves, runs, timing};
+use super::{ExperimentResult, ExperimentSpec, Extent, RunsSpec, gain_curves, runs, timing};
 use crate::spec::{Kind, Source, find, names, parse, to_text};
 use crate::study::StudyError;
 use crate::study::atomic_file::write_text;
@@ -29,6 +29,8 @@ pub struct Experiment {
     pub name: String,
     spec: ExperimentSpec,
     source: Source,
+    /// Seeds that replace those of the study; empty for those of the study.
+    seeds: Vec<u64>,
 }
 
 /// An experiment and its result, `None` if it is not finished.
@@ -50,7 +52,21 @@ impl Experiment {
         let spec: ExperimentSpec = parse(&source)?;
         spec.check(&source)?;
         let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { given: name.to_owned(), name: stem, spec, source })
+        Ok(Self { given: name.to_owned(), name: stem, spec, source, seeds: Vec::new() })
+    }
+
+    /// The experiment with other seeds.
+    ///
+    /// # Errors
+    /// If it is not made of runs with seeds, or if the seeds are invalid.
+    pub fn with_seeds(mut self, seeds: &[u64]) -> Result<Self, StudyError> {
+        let ExperimentSpec::Runs(spec) = &self.spec else {
+            let message = format!("the experiment {} has no seeds to replace", self.given);
+            return Err(StudyError::Plan { what: "--seeds", message });
+        };
+        self.seeds = seeds.to_vec();
+        self.plan(self.study_of_runs(spec, Extent::Whole)?)?;
+        Ok(self)
     }
 
     /// Names of all built-in experiments, sorted.
@@ -84,7 +100,9 @@ impl Experiment {
                 timing::result(&spec.figure, &report.latency.ok_or_else(|| sweep.failed())?, folder)?
             }
             ExperimentSpec::Runs(spec) => {
-                runs::result(spec, &self.run_study(spec.study(extent, &self.source)?, folder, anew, runner)?.0)?
+                let (sweep, _) = self.run_study(self.study_of_runs(spec, extent)?, folder, anew, runner)?;
+                runs::plot(spec, &sweep, folder)?;
+                runs::result(spec, &sweep)?
             }
         };
         let stored = StoredResult { inputs: self.inputs(extent)?, result };
@@ -110,19 +128,20 @@ impl Experiment {
         match &self.spec {
             ExperimentSpec::GainCurves(spec) => format!("Figure {}: gain curves of heads on springs", spec.figure),
             ExperimentSpec::Latency(spec) => format!("Figure {}: maps with latency and timing noise", spec.figure),
-            ExperimentSpec::Runs(spec) => format!("Figure {}: {}", spec.figure, spec.title),
+            ExperimentSpec::Runs(spec) => spec.heading(),
         }
     }
 
     /// File name, without ending, and title of each plot.
     pub(super) fn plots(&self) -> &'static [(&'static str, &'static str)] {
-        match self.spec {
+        match &self.spec {
             ExperimentSpec::GainCurves(_) => &[("gains", "Gain curves"), ("coherence", "Coherence")],
             ExperimentSpec::Latency(_) => &[
                 ("maps", "Maps with timing errors, clock state off"),
                 ("maps_clock_on", "Maps with timing errors, clock state on"),
                 ("curves", "Errors over latency and timing noise"),
             ],
+            ExperimentSpec::Runs(RunsSpec { plots_clock: true, .. }) => &[("clock", "Clock offsets")],
             ExperimentSpec::Runs(_) => &[],
         }
     }
@@ -141,6 +160,15 @@ impl Experiment {
         Ok((sweep, report))
     }
 
+    /// The study of an experiment made of runs, with the seeds of this experiment.
+    fn study_of_runs(&self, spec: &RunsSpec, extent: Extent) -> Result<(SweepSpec, Source), StudyError> {
+        let (mut study, source) = spec.study(extent, &self.source)?;
+        if !self.seeds.is_empty() {
+            study.seeds.clone_from(&self.seeds);
+        }
+        Ok((study, source))
+    }
+
     fn plan(&self, (study, source): (SweepSpec, Source)) -> Result<Plan, StudyError> {
         Plan::new(&self.name, &study, &source)
     }
@@ -150,7 +178,7 @@ impl Experiment {
         let text = match &self.spec {
             ExperimentSpec::GainCurves(spec) => to_text(&(extent, &self.spec, spec.heads(&self.source)?))?,
             ExperimentSpec::Latency(spec) => self.text_with(extent, spec.study(extent, &self.source)?)?,
-            ExperimentSpec::Runs(spec) => self.text_with(extent, spec.study(extent, &self.source)?)?,
+            ExperimentSpec::Runs(spec) => self.text_with(extent, self.study_of_runs(spec, extent)?)?,
         };
         Ok(ContentHash::of([env!("CARGO_PKG_VERSION"), &text].map(str::as_bytes)).to_string())
     }

@@ -4,6 +4,7 @@
 //! that an interrupted experiment can be resumed; [`Experiment::run`] also draws the figures. [`paper_table`] and
 //! [`paper_page`] combine all finished experiments in a table and on a page.
 
+mod clock_plot;
 mod comparison;
 mod damping;
 mod experiment;

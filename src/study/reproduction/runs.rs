@@ -1,10 +1,22 @@
 //! Experiments whose results are measures of the runs of a study.
 
 use super::spec::{ClaimSpec, ResultSpec, RunsSpec, WarningSpec};
-use super::{ComparedNumber, Comparison, ExperimentResult};
+use super::{ComparedNumber, Comparison, ExperimentResult, clock_plot};
 use crate::study::StudyError;
 use crate::study::integrity::large_error_m;
 use crate::study::sweep::{Measure, Sweep};
+use std::path::Path;
+
+/// Draws the figure of an experiment that has one in `folder`.
+pub(super) fn plot(spec: &RunsSpec, sweep: &Sweep, folder: &Path) -> Result<(), StudyError> {
+    if !spec.plots_clock {
+        return Ok(());
+    }
+    if let Some(figure) = clock_plot::figure(sweep)? {
+        figure.save(folder, "clock")?;
+    }
+    Ok(())
+}
 
 /// Compares measures of the levels of the finished study with the paper and the goals.
 pub(super) fn result(spec: &RunsSpec, sweep: &Sweep) -> Result<ExperimentResult, StudyError> {

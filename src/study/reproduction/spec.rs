@@ -5,7 +5,7 @@ use crate::dynamics::HeadSpec;
 use crate::motion::Axis;
 use crate::spec::{Kind, Source, SpecError, checked, find_from, parse};
 use crate::study::gains::AXES;
-use crate::study::sweep::{AxisSpec, BaseSpec, Measure, SweepSpec};
+use crate::study::sweep::{AxisSpec, BaseSpec, Measure, Setting, SweepSpec};
 use serde::{Deserialize, Serialize};
 
 /// An experiment of the paper.
@@ -24,7 +24,7 @@ pub enum ExperimentSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunsSpec {
-    /// Number of the figure in the paper.
+    /// Number of the figure or the section in the paper, `-` for an experiment that the paper does not have.
     pub figure: String,
     /// What the experiment shows.
     pub title: String,
@@ -32,6 +32,9 @@ pub struct RunsSpec {
     pub study: String,
     /// The smoke test.
     pub quick: QuickSpec,
+    /// Whether to plot the clock offset of each run over time. The study measures `clock_error_30s_s`.
+    #[serde(default)]
+    pub plots_clock: bool,
     /// Results to compare.
     pub results: Vec<ResultSpec>,
     /// Statements of the paper about two levels.
@@ -220,6 +223,16 @@ impl TimingMapsSpec {
 }
 
 impl RunsSpec {
+    /// Heading: the figure or the section of the paper, and what the experiment shows.
+    pub(super) fn heading(&self) -> String {
+        let Self { figure, title, .. } = self;
+        match figure.chars().next() {
+            Some(first) if first.is_ascii_digit() => format!("Figure {figure}: {title}"),
+            Some(first) if first.is_alphabetic() => format!("Section {figure}: {title}"),
+            _ => title.clone(),
+        }
+    }
+
     /// The study of an extent, and its source.
     ///
     /// # Errors
@@ -242,13 +255,32 @@ impl RunsSpec {
                 return wrong("results", format!("the study \"{}\" does not measure {}", self.study, measure.key()));
             }
         }
+        if self.plots_clock && !spec.measures.contains(&Measure::ClockError30S) {
+            let key = Measure::ClockError30S.key();
+            return wrong("plots_clock", format!("the study \"{}\" does not measure {key}", self.study));
+        }
         if extent == Extent::Quick {
-            spec.seeds.truncate(1);
-            if let BaseSpec::Journey { duration_s, .. } = &mut spec.base {
-                *duration_s = self.quick.duration_s;
-            }
+            self.quick.shorten(&mut spec);
         }
         Ok((spec, of_study))
+    }
+}
+
+impl QuickSpec {
+    /// Keeps the first seed of a study, and shortens its runs.
+    fn shorten(&self, spec: &mut SweepSpec) {
+        spec.seeds.truncate(1);
+        if let BaseSpec::Journey { duration_s, .. } = &mut spec.base {
+            *duration_s = self.duration_s;
+        }
+        for axis in &mut spec.axes {
+            let AxisSpec::Levels { levels, .. } = axis else { continue };
+            for duration in levels.iter_mut().filter_map(|level| level.set.get_mut("duration_s")) {
+                if let Setting::Number(duration_s) = duration {
+                    *duration_s = duration_s.min(self.duration_s);
+                }
+            }
+        }
     }
 }
 

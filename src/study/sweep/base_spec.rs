@@ -53,6 +53,13 @@ pub enum BaseSpec {
         /// default. An axis over timing requires this key.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         timing: Option<TimingSpec>,
+        /// A second system in the same scene; the map of each run is compared with its map. None by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        reference: Option<ReferenceSpec>,
+        /// Whether the estimator ignores the sensor models in the recording's manifest, as for a recording of unknown
+        /// sensors.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        ignore_manifest: bool,
         /// Route in the scene; the scene's default route if omitted.
         #[serde(default)]
         route: Option<String>,
@@ -85,6 +92,8 @@ impl BaseSpec {
             route,
             duration_s,
             timing: _,
+            reference: _,
+            ignore_manifest: _,
             limit: _,
         } = self
         else {
@@ -95,6 +104,20 @@ impl BaseSpec {
         (*route, *duration_s) = (new.route, new.duration_s);
         new_estimator.clone_into(estimator);
     }
+}
+
+/// A reference system: another head, lidar and motion in the scene of a run, with its IMU, clocks, estimator, duration and seed.
+///
+/// It has its own simulation: neither system is in the other's view.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReferenceSpec {
+    /// Head and its mount.
+    pub head: String,
+    /// Motion of the base.
+    pub motion: String,
+    /// Lidar.
+    pub lidar: String,
 }
 
 /// Limits of computing time and memory; a run that exceeds them counts as failed.

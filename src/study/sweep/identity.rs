@@ -52,11 +52,13 @@ pub(super) struct InputHash {
 /// Key of the settings without a name.
 const UNNAMED: &str = "run";
 
-/// Key of the timing errors, which do not affect the recording.
-const TIMING: &str = "timing";
+/// Keys of the settings without a name that do not affect the recording.
+const SETTINGS_AFTER_RECORDING: [&str; 3] = ["timing", "reference", "ignore_manifest"];
 
-/// Keys of the inputs that do not affect the recording.
-pub(super) const AFTER_RECORDING: [&str; 2] = [TIMING, "estimator"];
+/// Whether the input of this key does not affect the recording.
+pub(super) fn is_after_recording(key: &str) -> bool {
+    key == "estimator" || SETTINGS_AFTER_RECORDING.contains(&key)
+}
 
 /// Hashes of the inputs of a run by key, in the order of its tree; settings without a name come first.
 pub(super) type InputHashes = Vec<(String, InputHash)>;
@@ -70,10 +72,11 @@ pub(super) fn input_hashes(tree: &Tree, known: Option<(&Tree, &InputHashes)>) ->
         Ok((key.to_owned(), hash.map_or_else(|| named_hash(key, &tree.0[key]), Ok)?))
     };
     let mut settings = tree.unnamed();
-    settings.retain(|key, _| key != TIMING);
+    settings.retain(|key, _| !is_after_recording(key));
     let unnamed = (UNNAMED.to_owned(), input_hash(UNNAMED, &Value::Object(settings), None)?);
-    let timing = tree.0.get(TIMING).map(|timing| Ok((TIMING.to_owned(), input_hash(TIMING, timing, None)?)));
-    std::iter::once(Ok(unnamed)).chain(timing).chain(tree.named_keys().map(of)).collect()
+    let later = SETTINGS_AFTER_RECORDING.into_iter().filter_map(|key| Some((key, tree.0.get(key)?)));
+    let later = later.map(|(key, input)| Ok((key.to_owned(), input_hash(key, input, None)?)));
+    std::iter::once(Ok(unnamed)).chain(later).chain(tree.named_keys().map(of)).collect()
 }
 
 fn named_hash(key: &str, named: &Value) -> Result<InputHash, StudyError> {

@@ -48,10 +48,23 @@ pub enum Measure {
     BoundOverError,
     /// Length of the estimated path, from positions one second apart, m.
     WayM,
-    /// Standard deviation of the map's points about the true surfaces, with timing errors, m.
+    /// Open loop aligned over the first 20 s: position error at the end over the length of the path.
+    DriftOverPath,
+    /// Standard deviation of the map's points about the true surfaces, with timing errors or a reference system, m.
     CloudSigmaM,
-    /// Mean signed distance of the map's points to the true surfaces, with timing errors, m.
+    /// Mean signed distance of the map's points to the true surfaces, with timing errors or a reference system, m:
+    /// positive where they are too near to the sensor.
     CloudBiasM,
+    /// Ratio of that standard deviation to that of the same beams projected by the true trajectory; with a reference
+    /// system.
+    CloudOverTruth,
+    /// Standard deviation of the map's points about the surfaces of the reference system's map, along their normals, m
+    /// (Bosse, Zlot and Flick 2012, section IV-A). Both maps are aligned with the truth.
+    ReferenceSigmaM,
+    /// Mean signed distance of the same points, m: positive where they are too near to the sensor.
+    ReferenceBiasM,
+    /// Position error of the reference system after rigid alignment, root mean square, m.
+    ReferenceRmseM,
     /// Error of the estimated clock offset at the end of a run with timing errors, s.
     ClockErrorS,
     /// Fraction of the sphere of directions that the lidar observed.
@@ -90,6 +103,10 @@ pub(super) enum Origin {
     Estimate,
     /// Estimation from a recording, only with timing errors.
     Map,
+    /// Estimation from a recording, with timing errors or with a reference system.
+    AnyMap,
+    /// Estimation from two recordings, of a run and of its reference system.
+    Reference,
     /// Simulation of the head's swing without ray casting.
     Swing,
     /// The closed form of the linearised head.
@@ -100,9 +117,16 @@ pub(super) enum Origin {
     WallClock,
 }
 
+impl Origin {
+    /// Whether the measure needs a recording and an estimate.
+    pub(super) fn is_estimate(self) -> bool {
+        matches!(self, Self::Estimate | Self::Map | Self::AnyMap | Self::Reference)
+    }
+}
+
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 33] = [
+    pub const ALL: [Self; 38] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
@@ -120,8 +144,13 @@ impl Measure {
         Self::WithinBound,
         Self::BoundOverError,
         Self::WayM,
+        Self::DriftOverPath,
         Self::CloudSigmaM,
         Self::CloudBiasM,
+        Self::CloudOverTruth,
+        Self::ReferenceSigmaM,
+        Self::ReferenceBiasM,
+        Self::ReferenceRmseM,
         Self::ClockErrorS,
         Self::FractionSeen,
         Self::CoveredS,
@@ -168,8 +197,21 @@ impl Measure {
             Self::WithinBound => ("within_bound", "within", "Poses within their bound (%)", "%", 1e2),
             Self::BoundOverError => ("bound_over_error", "bound/error", "Ratio of bound to error", "1", 1.0),
             Self::WayM => ("way_m", "path", "Length of the path (m)", "m", 1.0),
+            Self::DriftOverPath => ("drift_over_path", "drift/path", "Drift over the length of the path (%)", "%", 1e2),
             Self::CloudSigmaM => ("cloud_sigma_m", "cloud", "Standard deviation of the cloud (mm)", "mm", 1e3),
             Self::CloudBiasM => ("cloud_bias_m", "cloud bias", "Bias of the cloud (mm)", "mm", 1e3),
+            Self::CloudOverTruth => {
+                ("cloud_over_truth", "cloud/truth", "Ratio of the cloud's deviation to that by the truth", "1", 1.0)
+            }
+            Self::ReferenceSigmaM => {
+                ("reference_sigma_m", "from reference", "Standard deviation from the reference cloud (mm)", "mm", 1e3)
+            }
+            Self::ReferenceBiasM => {
+                ("reference_bias_m", "reference bias", "Bias from the reference cloud (mm)", "mm", 1e3)
+            }
+            Self::ReferenceRmseM => {
+                ("reference_rmse_m", "reference", "Position error of the reference, RMS (mm)", "mm", 1e3)
+            }
             Self::ClockErrorS => ("clock_error_s", "clock error", "Clock offset error at the end (ms)", "ms", 1e3),
             Self::FractionSeen => ("fraction_seen", "coverage", "Observed fraction of the sphere (%)", "%", 1e2),
             Self::CoveredS => ("covered_s", "cover time", "Time to 90 % of the coverage (s)", "s", 1.0),
@@ -214,7 +256,7 @@ impl Measure {
 
     /// Value of a missing figure: infinite for the error of a lost estimate, else NaN.
     pub(super) fn missing_value(self) -> f64 {
-        if matches!(self.origin(), Origin::Estimate | Origin::Map) { f64::INFINITY } else { f64::NAN }
+        if self.origin().is_estimate() { f64::INFINITY } else { f64::NAN }
     }
 
     pub(super) fn origin(self) -> Origin {
@@ -235,8 +277,13 @@ impl Measure {
             | Self::BoundM99
             | Self::WithinBound
             | Self::BoundOverError
-            | Self::WayM => Origin::Estimate,
-            Self::CloudSigmaM | Self::CloudBiasM | Self::ClockErrorS => Origin::Map,
+            | Self::WayM
+            | Self::DriftOverPath => Origin::Estimate,
+            Self::ClockErrorS => Origin::Map,
+            Self::CloudSigmaM | Self::CloudBiasM => Origin::AnyMap,
+            Self::CloudOverTruth | Self::ReferenceSigmaM | Self::ReferenceBiasM | Self::ReferenceRmseM => {
+                Origin::Reference
+            }
             Self::FractionSeen | Self::CoveredS | Self::DensityPerSrS | Self::RateP99DegPerS | Self::Saturated => {
                 Origin::Swing
             }
@@ -246,6 +293,11 @@ impl Measure {
             }
             Self::WallS => Origin::WallClock,
         }
+    }
+
+    /// Whether runs with this measure keep the clock offset over time.
+    pub(super) fn has_clock_curve(self) -> bool {
+        matches!(self, Self::ClockError30S | Self::ClockError120S)
     }
 
     /// Whether a head on its spring has this measure in closed form.
@@ -263,6 +315,8 @@ impl Measure {
             Origin::ClosedForm => matches!(base, BaseSpec::Spring { .. }),
             Origin::Estimate if self != Self::PositionRmseM => matches!(base, BaseSpec::Journey { timing: None, .. }),
             Origin::Map => matches!(base, BaseSpec::Journey { timing: Some(_), .. }),
+            Origin::AnyMap => Self::ClockErrorS.is_available_for(base) || Self::ReferenceRmseM.is_available_for(base),
+            Origin::Reference => matches!(base, BaseSpec::Journey { reference: Some(_), .. }),
             Origin::Estimate | Origin::Swing => matches!(base, BaseSpec::Journey { .. }),
         }
     }

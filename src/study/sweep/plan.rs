@@ -3,7 +3,7 @@
 use super::axis::{Axis, Level, SpecSet};
 use super::check::{MAX_RUNS, check};
 use super::design::{AxisSize, Design};
-use super::identity::{AFTER_RECORDING, ContentHash, InputHashes, input_hashes};
+use super::identity::{ContentHash, InputHashes, input_hashes, is_after_recording};
 use super::tree::{GainRun, Journey, Tree};
 use super::{BaseSpec, LimitSpec, Measure, Setting, SweepSpec};
 use crate::dynamics::HeadSpec;
@@ -184,10 +184,7 @@ impl Plan {
         let hashes = self.hashes(inputs)?;
         let rays = serde_json::to_string(&journey.simulation.ray_inputs()?)?;
         let files = hashes.iter().map(|(_, hash)| hash.files.bytes());
-        let recorded = hashes
-            .iter()
-            .filter(|(key, _)| !AFTER_RECORDING.contains(&key.as_str()))
-            .map(|(_, hash)| hash.full.bytes());
+        let recorded = hashes.iter().filter(|(key, _)| !is_after_recording(key)).map(|(_, hash)| hash.full.bytes());
         Ok(PlannedJourney {
             inputs: journey,
             recording: self.hash(index, b"simulation", recorded),

@@ -96,7 +96,8 @@ impl Sweep {
         if let BaseSpec::Journey { .. } = self.plan.spec().base {
             let journey = self.plan.journey(number, &inputs)?.inputs;
             let simulation = Simulation::build(journey.simulation)?;
-            let options = EstimateOptions::with(journey.estimator.spec);
+            let ignore_manifest = journey.ignore_manifest;
+            let options = EstimateOptions { ignore_manifest, ..EstimateOptions::with(journey.estimator.spec) };
             let result = simulate_and_estimate(&simulation, &options, folder, watch)?;
             return Ok(RepeatedRun::Journey(Box::new(result)));
         }

@@ -1,30 +1,23 @@
 //! Runs that are simulated, recorded and estimated.
 
 use super::Measure;
+use super::estimated_run::{RunInputs, estimate};
 use super::measure::Origin;
 use super::part::RunOutcome;
+use super::reference_inputs::ReferenceInputs;
+use super::reference_system::ReferenceMap;
 use super::tree::Journey;
 use super::{LimitSpec, Plan, timing};
-use crate::dynamics::HeadModel;
-use crate::estimation::{EstimatorSpec, Status};
-use crate::evaluation::{Errors, MapKnowledge, Pairs, clock_error_after};
-use crate::geometry::Trajectory;
+use crate::estimation::EstimatorSpec;
+use crate::evaluation::MapKnowledge;
 use crate::measurement::Calibration;
 use crate::recording::{Reader, Selection, TopicPreference, Writer};
-use crate::report::IntegrityMetrics;
 use crate::simulation::Simulation;
 use crate::spec;
-use crate::study::calibration::calibration;
-use crate::study::closed_loop::run_closed_loop;
-use crate::study::comparison::Comparison;
 use crate::study::coverage::{Coverage, CoveragePlan, coverage};
-use crate::study::integrity::{Integrity, path_length_m};
 use crate::study::latency::{MapErrors, Reference, TimingRun, TimingSpec};
-use crate::study::open_loop::{OpenLoopOptions, run_open_loop};
 use crate::study::record::{description, record_together};
-use crate::study::sampled_truth::SampledTruth;
-use crate::study::sensor_models::RecordedSensors;
-use crate::study::{CalibrationSpec, Manifest, ProgressMonitor, StudyError, comparison, information_bound};
+use crate::study::{ProgressMonitor, StudyError, information_bound};
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -43,6 +36,8 @@ pub(super) struct TemporaryRecording {
     reference: Mutex<Option<(f64, Arc<Reference>)>>,
     /// Information bound with an unknown map, m, computed by the first run that needs it.
     slam_bound_m: Mutex<Option<f64>>,
+    /// Map of the reference system, computed by the first run that needs it.
+    reference_map: Mutex<Option<Arc<ReferenceMap>>>,
 }
 
 /// Runs simulations that share physics and rays, and records them for `readers` threads.
@@ -59,6 +54,7 @@ pub(super) fn record_simulations(
         handles,
         reference: Mutex::default(),
         slam_bound_m: Mutex::default(),
+        reference_map: Mutex::default(),
     };
     if !recorded {
         return Ok(simulations.into_iter().map(|simulation| of((simulation, Vec::new()))).collect());
@@ -82,16 +78,31 @@ impl TemporaryRecording {
     /// Evaluates a run on this recording, read by thread `reader`.
     pub fn evaluate(&self, plan: &Plan, limit: LimitSpec, run: &Journey, reader: usize) -> RunOutcome {
         let measures = plan.result_measures();
-        let bound = match measures.contains(&Measure::ErrorOverSlamBound) {
-            true => self.slam_bound_m(limit, reader),
-            false => Ok(None),
-        };
+        let compared = self.compared_with(limit, &measures, run, reader);
         let started = Instant::now();
-        let outcome = match bound.and_then(|bound_m| self.figures(limit, &measures, run, reader, bound_m)) {
+        let outcome = match compared.and_then(|compared| self.figures(limit, &measures, run, reader, &compared)) {
             Ok((figures, details)) => RunOutcome { figures, details, ..RunOutcome::default() },
             Err(error) => RunOutcome::from_error(measures.len(), &error),
         };
         RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
+    }
+
+    /// What several runs on this recording are compared with.
+    fn compared_with(
+        &self,
+        limit: LimitSpec,
+        measures: &[Measure],
+        run: &Journey,
+        reader: usize,
+    ) -> Result<Compared, StudyError> {
+        let needs_bound = measures.contains(&Measure::ErrorOverSlamBound);
+        let needs_reference =
+            measures.iter().any(|measure| matches!(measure.origin(), Origin::Reference | Origin::AnyMap));
+        let reference = run.reference.as_ref().filter(|_| needs_reference);
+        Ok(Compared {
+            slam_bound_m: if needs_bound { self.slam_bound_m(limit, reader)? } else { None },
+            reference: reference.map(|inputs| self.reference_map(limit, inputs, run)).transpose()?,
+        })
     }
 
     fn figures(
@@ -100,7 +111,7 @@ impl TemporaryRecording {
         measures: &[Measure],
         run: &Journey,
         reader: usize,
-        slam_bound_m: Option<f64>,
+        compared: &Compared,
     ) -> Result<(Vec<Option<f64>>, Option<String>), StudyError> {
         let needs = |origin: Origin| measures.iter().any(|measure| measure.origin() == origin);
         let swing = match needs(Origin::Swing) || needs(Origin::SwingOrClosedForm) {
@@ -108,14 +119,20 @@ impl TemporaryRecording {
             false => None,
         };
         let (mut estimated, mut map_errors) = (None, None);
-        if let Some(handle) = self.handles.get(reader).filter(|_| needs(Origin::Estimate) || needs(Origin::Map)) {
+        let estimates = measures.iter().any(|measure| measure.origin().is_estimate());
+        if let Some(handle) = self.handles.get(reader).filter(|_| estimates) {
             let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
-            let closes_loops = measures.contains(&Measure::ClosedPositionRmseM) || slam_bound_m.is_some();
             match &run.timing {
                 None => {
-                    let head = self.simulation.head();
-                    let work = |stop: &AtomicBool| estimate(file, head, &run.estimator.spec, closes_loops, stop);
-                    estimated = Some(EstimateMetrics { slam_bound_m, ..with_time_limit(limit, work)? });
+                    let slam_bound_m = compared.slam_bound_m;
+                    let inputs = RunInputs {
+                        simulation: &self.simulation,
+                        journey: run,
+                        closes_loops: measures.contains(&Measure::ClosedPositionRmseM) || slam_bound_m.is_some(),
+                        slam_bound_m,
+                        reference: compared.reference.as_deref(),
+                    };
+                    estimated = Some(with_time_limit(limit, |stop| estimate(file, &inputs, stop))?);
                 }
                 Some(timing) => {
                     let work = |stop: &AtomicBool| self.map_errors(file, timing, &run.estimator.spec, stop);
@@ -128,7 +145,9 @@ impl TemporaryRecording {
             let by_map = || map_errors.as_ref().and_then(|errors| timing::figure(errors, *measure));
             by_swing.or_else(by_map).or_else(|| estimated.as_ref().and_then(|estimated| estimated.figure(*measure)))
         };
-        let details = map_errors.as_ref().map(spec::to_text).transpose()?;
+        let has_curve = measures.iter().any(|measure| measure.has_clock_curve());
+        let curve = estimated.as_ref().filter(|_| has_curve).and_then(|estimated| estimated.clock_curve.as_ref());
+        let details = map_errors.as_ref().map(spec::to_text).or_else(|| curve.map(spec::to_text)).transpose()?;
         Ok((measures.iter().map(figure).collect(), details))
     }
 
@@ -195,6 +214,22 @@ impl TemporaryRecording {
         Ok(*stored)
     }
 
+    /// The map of a reference system; computed once, while other threads wait for it.
+    fn reference_map(
+        &self,
+        limit: LimitSpec,
+        inputs: &ReferenceInputs,
+        run: &Journey,
+    ) -> Result<Arc<ReferenceMap>, StudyError> {
+        let mut stored = self.reference_map.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(map) = stored.as_ref().filter(|map| map.is_of(inputs)) {
+            return Ok(map.clone());
+        }
+        let map = Arc::new(with_time_limit(limit, |stop| ReferenceMap::of(inputs, run, stop))?);
+        *stored = Some(map.clone());
+        Ok(map)
+    }
+
     /// Coverage of the lidar and use of the gyroscope's range, from 5 s (after the rest at the start) to the run's end.
     fn swing(&self) -> Result<Coverage, StudyError> {
         let simulation = &self.simulation;
@@ -208,6 +243,13 @@ impl TemporaryRecording {
     }
 }
 
+/// What a run is compared with.
+struct Compared {
+    /// Information bound with an unknown map, m.
+    slam_bound_m: Option<f64>,
+    reference: Option<Arc<ReferenceMap>>,
+}
+
 fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {
     match measure {
         Measure::FractionSeen => Some(coverage.fraction_seen),
@@ -219,102 +261,6 @@ fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {
         Measure::Saturated => Some(coverage.gyro.saturated),
         _ => None,
     }
-}
-
-/// Metrics of an estimate.
-struct EstimateMetrics {
-    open_loop: crate::report::OpenLoopMetrics,
-    clock: crate::report::ClockMetrics,
-    /// Errors of the clock offset after 30 s and 120 s, s.
-    clock_errors_s: [Option<f64>; 2],
-    rigid_link_rmse_m: Option<f64>,
-    closed_position_rmse_m: Option<f64>,
-    slam_bound_m: Option<f64>,
-    status: Status,
-    integrity: IntegrityMetrics,
-    path_length_m: f64,
-}
-
-impl EstimateMetrics {
-    fn figure(&self, measure: Measure) -> Option<f64> {
-        let figure = match measure {
-            Measure::PositionRmseM => self.open_loop.position_rmse_m,
-            Measure::RotationRmseDeg => self.open_loop.rotation_rmse_deg,
-            Measure::DriftMPerMin => self.open_loop.drift_m_per_min,
-            Measure::YawDriftDegPerMin => self.open_loop.yaw_drift_deg_per_min,
-            Measure::ClockRmseS => self.clock.offset_rmse_s,
-            Measure::ClockError30S => self.clock_errors_s[0],
-            Measure::ClockError120S => self.clock_errors_s[1],
-            Measure::RigidLinkRmseM => self.rigid_link_rmse_m,
-            Measure::ClosedPositionRmseM => self.closed_position_rmse_m,
-            Measure::ErrorOverSlamBound => {
-                self.closed_position_rmse_m.zip(self.slam_bound_m).map(|(error_m, bound_m)| error_m / bound_m)
-            }
-            Measure::Status => Some(f64::from(self.status as u8)),
-            Measure::AlignedRmseM => self.integrity.aligned_rmse_m,
-            Measure::LargestErrorM => self.integrity.largest_error_m,
-            Measure::BoundM99 => self.integrity.bound_m_99,
-            Measure::WithinBound => self.integrity.within_bound,
-            Measure::BoundOverError => self.integrity.bound_over_error,
-            Measure::WayM => Some(self.path_length_m),
-            _ => None,
-        };
-        figure.filter(|figure| figure.is_finite())
-    }
-}
-
-/// Estimates from a recording on one thread, and evaluates the result.
-fn estimate(
-    recording: File,
-    head: &HeadModel,
-    estimator: &EstimatorSpec,
-    closes_loops: bool,
-    stop: &AtomicBool,
-) -> Result<EstimateMetrics, StudyError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    pool.install(|| {
-        let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
-        let reader = Reader::new("the recording", recording)?;
-        let selection = reader.select(&TopicPreference::default())?;
-        let manifest = Manifest::in_recording(&reader)?;
-        let recorded = manifest.as_ref().and_then(|manifest| manifest.run.as_ref()).map(RecordedSensors::of);
-        let recorded = recorded.unwrap_or_default();
-        let (found, _) = calibration(&reader, &selection, &CalibrationSpec::default(), recorded, None)?;
-        let how =
-            OpenLoopOptions { estimator, calibration: &found.calibration, recording_surfels: closes_loops, map: None };
-        let run = run_open_loop(&reader, &selection, how, None, None, &mut watch)?;
-        let truth = SampledTruth::read(&reader, &run, None)?;
-        let mut compare = |map_from_head, covariances| {
-            truth.as_ref().map(|truth| Comparison::new(map_from_head, covariances, truth, &mut watch))
-        };
-        let known = compare(&run.map_from_head, &run.covariances[..]);
-        let open_loop = comparison::open_loop_metrics(&run, known.as_ref(), None);
-        let closed = closes_loops.then(|| run_closed_loop(&run, &found.calibration, estimator)).transpose()?;
-        let map_from_head = closed.as_ref().map_or(&run.map_from_head, |closed| &closed.map_from_head);
-        let integrity = Integrity::of(&run, closed.as_ref(), map_from_head);
-        let pairs = truth.as_ref().map(|truth| Pairs::of(map_from_head, &truth.heads)).unwrap_or_default();
-        let closed_errors = closed.as_ref().and_then(|_| compare(map_from_head, &[]));
-        Ok(EstimateMetrics {
-            open_loop,
-            clock: comparison::clock_metrics(&run, truth.as_ref()),
-            clock_errors_s: [30.0, 120.0].map(|after_s| {
-                truth.as_ref().and_then(|truth| clock_error_after(&run.clock_offsets, &truth.clock_offsets, after_s))
-            }),
-            rigid_link_rmse_m: truth.as_ref().and_then(|truth| rigid_link_rmse_m(head, &run.map_from_head, truth)),
-            closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
-            slam_bound_m: None,
-            status: integrity.status(),
-            integrity: integrity.metrics(&run, Some(&pairs)),
-            path_length_m: path_length_m(map_from_head),
-        })
-    })
-}
-
-/// Position error of the base computed with the rigid link, as `zsim base` does; `None` without a true trajectory of it.
-fn rigid_link_rmse_m(head: &HeadModel, map_from_head: &Trajectory, truth: &SampledTruth) -> Option<f64> {
-    let base = Trajectory::from_poses(head.base_from_rigid_link(map_from_head)).ok()?;
-    let pairs = Pairs::of(&base, &truth.bases);
-    Some(Errors::after(&pairs, &pairs.world_from_map().ok()?).position_rmse_m())
 }
 
 /// Does `work`, and sets its stop flag when the time limit is exceeded.

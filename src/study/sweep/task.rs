@@ -1,7 +1,6 @@
 //! Execution of a task in a worker process, which limits its resources and isolates its crashes.
 
 use super::identity::ContentHash;
-use super::measure::Origin;
 use super::part::RunOutcome;
 use super::plan::PlannedJourney;
 use super::simulated_run::{MAX_RECORDINGS, TemporaryRecording, record_simulations};
@@ -122,7 +121,7 @@ impl Sweep {
     ) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
         let measures = self.plan.result_measures();
-        let recorded = measures.iter().any(|measure| matches!(measure.origin(), Origin::Estimate | Origin::Map));
+        let recorded = measures.iter().any(|measure| measure.origin().is_estimate());
         let mut simulations: Vec<Simulation> = Vec::new();
         let mut groups: Vec<&SharedRecording> = Vec::new();
         for each in shared {

@@ -1,6 +1,7 @@
 //! The inputs of a run as one tree of settings: an axis of a sweep is a path into it.
 
-use super::{BaseSpec, settings};
+use super::reference_inputs::ReferenceInputs;
+use super::{BaseSpec, ReferenceSpec, settings};
 use crate::dynamics::HeadSpec;
 use crate::estimation::EstimatorSpec;
 use crate::motion::MotionSpec;
@@ -25,6 +26,10 @@ pub(in crate::study) struct Journey {
     pub estimator: Named<EstimatorSpec>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timing: Option<TimingSpec>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) reference: Option<ReferenceInputs>,
+    #[serde(default)]
+    pub ignore_manifest: bool,
 }
 
 /// Inputs of a closed form.
@@ -80,6 +85,8 @@ impl Tree {
                 base_imu,
                 estimator,
                 timing,
+                reference,
+                ignore_manifest,
                 route,
                 duration_s,
                 limit: _,
@@ -98,7 +105,14 @@ impl Tree {
                     seed: Seed(0),
                 };
                 let simulation = Run::load(&scenario)?;
-                Self::of(&Journey { simulation, estimator: Named::load(&named(estimator))?, timing: *timing })
+                let of_reference = |spec: &ReferenceSpec| ReferenceInputs::load(spec, source);
+                Self::of(&Journey {
+                    simulation,
+                    estimator: Named::load(&named(estimator))?,
+                    timing: *timing,
+                    reference: reference.as_ref().map(of_reference).transpose()?,
+                    ignore_manifest: *ignore_manifest,
+                })
             }
         }
     }

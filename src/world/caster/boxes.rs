@@ -1,7 +1,7 @@
 //! Boxes in a bounding-volume hierarchy.
 
 use super::SingleRay;
-use super::single_precision::single;
+use super::single_precision::{single, single_reach};
 use crate::geometry::Vector;
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
@@ -32,7 +32,7 @@ impl BoxTree {
     ) -> Option<usize> {
         let ray = SingleRay::new(&(origin - self.middle), direction);
         let in_box = |leaf: u32, _| distance(leaf as usize).map(|distance| distance as f32);
-        let found = self.tree.find_best((reach * (1.0 + 1e-6)) as f32, |node, _| ray.enters(node), in_box);
+        let found = self.tree.find_best(single_reach(reach), |node, _| ray.enters(node), in_box);
         found.map(|(leaf, _)| leaf as usize)
     }
 }

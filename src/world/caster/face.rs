@@ -8,7 +8,7 @@ use parry3d::bounding_volume::Aabb;
 
 /// Tolerance outside the edges of a face, as a fraction of the edges. Neighbouring faces overlap by this, so that no
 /// ray passes between them.
-const OVERLAP: f32 = 1e-6;
+pub(super) const OVERLAP: f32 = 1e-6;
 
 /// Two triangles form a parallelogram if the fourth corner deviates by less than this, m.
 const SAME_CORNER_M: f64 = 1e-9;
@@ -112,6 +112,11 @@ impl SingleFace {
     pub fn to_double(&self) -> Face {
         let [corner, u, v] = [self.corner, self.u, self.v].map(|x| Vector::new(x.x.into(), x.y.into(), x.z.into()));
         Face { corner, u, v, is_parallelogram: self.max_sum > 1.5 }
+    }
+
+    /// Coordinates of the corner and the edges, and the maximum sum of the fractions along the edges.
+    pub fn corner_and_edges(&self) -> ([[f32; 3]; 3], f32) {
+        ([self.corner, self.u, self.v].map(|x| x.to_array()), self.max_sum)
     }
 
     /// Bounding box, enlarged by `margin` on each side.

@@ -9,3 +9,9 @@ pub(super) type Vec3 = parry3d::math::Vector;
 pub(super) fn single(v: &Vector) -> Vec3 {
     Vec3::new(v.x as f32, v.y as f32, v.z as f32)
 }
+
+/// A slightly larger reach, so that the double-precision distance decides.
+#[inline(always)]
+pub(super) fn single_reach(reach: f64) -> f32 {
+    (reach * (1.0 + 1e-6)) as f32
+}

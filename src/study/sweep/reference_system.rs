@@ -1,0 +1,153 @@
+//! A reference system: a second simulated system in the scene of a run, whose map the map of the run is compared with.
+
+use super::Measure;
+use super::reference_inputs::ReferenceInputs;
+use super::run_recording::{Estimates, RunRecording};
+use super::tree::Journey;
+use crate::evaluation::{CloudErrors, CloudSummary, Errors, Pairs, ReferenceCloud, align_poses};
+use crate::geometry::{Pose, Surface, Vector};
+use crate::recording::Writer;
+use crate::simulation::{Simulation, carrier_of};
+use crate::study::cloud::Surroundings;
+use crate::study::record::{description, record_together};
+use crate::study::register::ProjectedBeam;
+use crate::study::{ProgressMonitor, StudyError};
+use std::sync::atomic::AtomicBool;
+
+/// Maximum number of points of the reference cloud.
+const MAX_REFERENCE_POINTS: usize = 500_000;
+/// Maximum number of points of the compared cloud.
+const MAX_POINTS: usize = 100_000;
+/// Maximum distance from a point to a surface, m.
+const REACH_M: f64 = 1.0;
+/// Weight of a rotation in the alignment with the truth: equivalent shift per angle, m. A reference that stands still has
+/// no path that determines the rotation.
+const TURN_LEVER_M: f64 = 0.3;
+
+/// Map of a reference system.
+pub(super) struct ReferenceMap {
+    inputs: ReferenceInputs,
+    cloud: ReferenceCloud,
+    /// Position error of the reference system, m.
+    rmse_m: f64,
+}
+
+impl ReferenceMap {
+    /// Simulates, records and estimates the reference system `inputs` of a journey, on one thread.
+    ///
+    /// # Errors
+    /// If its specs do not make a simulation, if the recording cannot be written, or if the estimate fails.
+    pub(super) fn of(inputs: &ReferenceInputs, journey: &Journey, stop: &AtomicBool) -> Result<Self, StudyError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        pool.install(|| Self::estimate(inputs, journey, stop))
+    }
+
+    fn estimate(inputs: &ReferenceInputs, journey: &Journey, stop: &AtomicBool) -> Result<Self, StudyError> {
+        let mut run = journey.simulation.clone();
+        (run.head, run.motion, run.lidar) = (inputs.head.clone(), inputs.motion.clone(), inputs.lidar.clone());
+        (run.faults, run.base_imu) = (None, None);
+        let simulation = Simulation::build(run)?;
+        let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
+        let file = tempfile::tempfile().map_err(StudyError::file(&std::env::temp_dir()))?;
+        let written = file.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
+        let writer = Writer::new(written, description(&simulation, false)?)?;
+        record_together(
+            std::slice::from_ref(&simulation),
+            vec![writer],
+            &ProgressMonitor { stop, report: &mut |_| {} },
+        )?;
+        let recording = RunRecording::open(file, false)?;
+        let estimates = recording.estimate(journey, true, &mut watch)?;
+        let aligned = AlignedCloud::new(&recording, &estimates, &simulation, MAX_REFERENCE_POINTS, &watch)?;
+        let points = aligned.estimated.into_iter().map(|(point, _)| point);
+        Ok(Self { inputs: inputs.clone(), cloud: ReferenceCloud::new(points), rmse_m: aligned.rmse_m })
+    }
+
+    /// Whether the map is that of these specs.
+    pub(super) fn is_of(&self, inputs: &ReferenceInputs) -> bool {
+        self.inputs == *inputs
+    }
+
+    /// Compares the cloud of an estimate with this map and with the true surfaces.
+    ///
+    /// # Errors
+    /// If the recording cannot be read, or if the run is stopped.
+    pub(super) fn compare(
+        &self,
+        recording: &RunRecording,
+        estimates: &Estimates,
+        simulation: &Simulation,
+        watch: &ProgressMonitor,
+    ) -> Result<CloudComparison, StudyError> {
+        let aligned = AlignedCloud::new(recording, estimates, simulation, MAX_POINTS, watch)?;
+        let summary =
+            |surface: &dyn Surface, points: &[SeenPoint]| CloudErrors::to_surface(surface, points, REACH_M).summary();
+        Ok(CloudComparison {
+            to_reference: summary(&self.cloud, &aligned.estimated),
+            to_truth: summary(simulation.world(), &aligned.estimated),
+            by_truth: summary(simulation.world(), &aligned.by_truth),
+            reference_rmse_m: self.rmse_m,
+        })
+    }
+}
+
+/// A point in the world and the position of the sensor, m.
+type SeenPoint = (Vector, Option<Vector>);
+
+/// Points on static surfaces, aligned with the truth.
+struct AlignedCloud {
+    /// Projected by the estimate.
+    estimated: Vec<SeenPoint>,
+    /// The same beams projected by the truth.
+    by_truth: Vec<SeenPoint>,
+    /// Position error of the estimate after the same alignment, m.
+    rmse_m: f64,
+}
+
+impl AlignedCloud {
+    fn new(
+        recording: &RunRecording,
+        estimates: &Estimates,
+        simulation: &Simulation,
+        limit: usize,
+        watch: &ProgressMonitor,
+    ) -> Result<Self, StudyError> {
+        let pairs: Pairs = estimates.pairs();
+        let world_from_map = align_poses(pairs.truth(), pairs.estimate(), TURN_LEVER_M)?;
+        let carrier = carrier_of(&simulation.inputs().head.spec);
+        let surroundings = Surroundings { world: simulation.world(), carrier: &carrier };
+        let beams = recording.with(estimates).static_beams(surroundings, limit, watch)?;
+        let moved = |beam: &ProjectedBeam, by: &Pose| {
+            let at = |of: &Vector| by.rotation * of + by.translation.vector;
+            (at(&beam.point), Some(at(&beam.origin)))
+        };
+        Ok(Self {
+            estimated: beams.iter().map(|(in_map, _)| moved(in_map, &world_from_map)).collect(),
+            by_truth: beams.iter().map(|(_, by_truth)| moved(by_truth, &Pose::identity())).collect(),
+            rmse_m: Errors::after(&pairs, &world_from_map).position_rmse_m(),
+        })
+    }
+}
+
+/// Distances of a cloud to the map of a reference system and to the true surfaces.
+pub(super) struct CloudComparison {
+    to_reference: Option<CloudSummary>,
+    to_truth: Option<CloudSummary>,
+    by_truth: Option<CloudSummary>,
+    reference_rmse_m: f64,
+}
+
+impl CloudComparison {
+    pub(super) fn figure(&self, measure: Measure) -> Option<f64> {
+        let sigma_m = |of: Option<CloudSummary>| of.map(|summary| summary.sigma_m);
+        match measure {
+            Measure::CloudSigmaM => sigma_m(self.to_truth),
+            Measure::CloudBiasM => self.to_truth.map(|summary| summary.bias_m),
+            Measure::CloudOverTruth => sigma_m(self.to_truth).zip(sigma_m(self.by_truth)).map(|(of, by)| of / by),
+            Measure::ReferenceSigmaM => sigma_m(self.to_reference),
+            Measure::ReferenceBiasM => self.to_reference.map(|summary| summary.bias_m),
+            Measure::ReferenceRmseM => Some(self.reference_rmse_m),
+            _ => None,
+        }
+    }
+}
