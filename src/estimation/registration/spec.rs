@@ -50,9 +50,6 @@ pub struct RegistrationSpec {
     /// Correlation time of the open-loop error, s; the size of the error is that of the open-loop covariance.
     #[serde(with = "crate::spec::checked::Positive")]
     pub correlation_s: f64,
-    /// Factor on the covariance of the motion that each window measured without views: the errors of its matches are correlated.
-    #[serde(with = "crate::spec::checked::Positive")]
-    pub motion_inflation: f64,
     /// Random walk of the position of the open loop by errors that views repeat, m/sqrt(s); with the covariance of the motion
     /// without views it determines how much of that motion is used.
     #[serde(with = "crate::spec::checked::Positive")]
