@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn bias_and_spread_of_a_cloud_along_the_normal_of_the_reference_are_recovered() {
         // The reference deviates by 10 mm to either side; the cloud is 20 mm nearer to the sensor, and deviates by 30 mm.
-        let alternate = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 };
+        let alternate = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let reference = ReferenceCloud::new(wall(|k| 0.010 * alternate(k)));
         let sensor = Some(Rotation::from_euler_angles(0.2, -0.4, 0.7) * Vector::new(2.0, 1.0, 5.0));
         let cloud: Vec<_> =
