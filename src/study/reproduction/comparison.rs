@@ -84,7 +84,7 @@ impl Comparison {
         Some(Self {
             unit: unit.to_owned(),
             paper,
-            goal: format!("at most {goal} {unit}"),
+            goal: format!("at most {goal} {unit}").trim_end().to_owned(),
             median,
             worst: (sorted.len() > 1).then_some(worst),
             verdict: Verdict::of(median <= goal && worst <= WORST_FACTOR * goal),

@@ -27,15 +27,21 @@ pub(super) fn result(spec: &RunsSpec, sweep: &Sweep) -> Result<ExperimentResult,
     Ok(ExperimentResult { rows, notes: spec.notes.clone() })
 }
 
+/// Display unit of a measure, empty for a ratio, and the factor from the unit of files to it.
+fn display_unit(measure: Measure) -> (&'static str, f64) {
+    let (unit, factor) = measure.unit();
+    (if unit == "1" { "" } else { unit }, factor)
+}
+
 /// A measure of a level in its display unit, one number for each seed; infinite for a failed run.
 fn values(sweep: &Sweep, level: &str, measure: Measure) -> Result<Vec<f64>, StudyError> {
-    let (_, factor) = measure.unit();
+    let (_, factor) = display_unit(measure);
     let values = sweep.values_at(level, measure)?;
     Ok(values.into_iter().map(|value| value.map_or(f64::INFINITY, |value| value * factor)).collect())
 }
 
 fn compared(result: &ResultSpec, sweep: &Sweep) -> Result<ComparedNumber, StudyError> {
-    let (unit, _) = result.measure.unit();
+    let (unit, _) = display_unit(result.measure);
     let values = values(sweep, &result.level, result.measure)?;
     let comparison = Comparison::at_most(unit, result.paper, result.goal, &values);
     let paper = match (&result.paper_text, result.paper) {
@@ -53,9 +59,10 @@ fn compared(result: &ResultSpec, sweep: &Sweep) -> Result<ComparedNumber, StudyE
 }
 
 fn in_words(of: &Comparison, seeds: usize) -> String {
+    let median = format!("{} {}", rounded(of.median), of.unit);
     match of.worst {
-        Some(worst) => format!("{} {}, worst {} of {seeds} runs", rounded(of.median), of.unit, rounded(worst)),
-        None => format!("{} {}, one run", rounded(of.median), of.unit),
+        Some(worst) => format!("{}, worst {} of {seeds} runs", median.trim_end(), rounded(worst)),
+        None => format!("{}, one run", median.trim_end()),
     }
 }
 
@@ -68,7 +75,7 @@ fn rounded(x: f64) -> String {
 
 /// The ratio of the medians of two levels, which the paper states to be below 1.
 fn claimed(spec: &RunsSpec, claim: &ClaimSpec, sweep: &Sweep) -> Result<ComparedNumber, StudyError> {
-    let (unit, _) = claim.measure.unit();
+    let (unit, _) = display_unit(claim.measure);
     let median = |level: &str| -> Result<f64, StudyError> {
         let values = values(sweep, level, claim.measure)?;
         Ok(Comparison::at_most(unit, None, 0.0, &values).map_or(f64::NAN, |of| of.median))
@@ -146,5 +153,8 @@ mod tests {
     fn numbers_have_three_significant_digits() {
         assert_eq!([0.01234, 1.0, 56.78, 1234.5, 0.0].map(rounded), ["0.0123", "1.00", "56.8", "1234", "0.00"]);
         assert_eq!(rounded(f64::INFINITY), "inf");
+        // A ratio has no unit.
+        let ratio = Comparison::at_most(display_unit(Measure::CloudOverTruth).0, None, 1.02, &[1.0, 1.01]).unwrap();
+        assert_eq!((in_words(&ratio, 2).as_str(), ratio.goal.as_str()), ("1.00, worst 1.01 of 2 runs", "at most 1.02"));
     }
 }
