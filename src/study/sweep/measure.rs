@@ -59,7 +59,8 @@ pub enum Measure {
     /// system.
     CloudOverTruth,
     /// Standard deviation of the map's points about the surfaces of the reference system's map, along their normals, m
-    /// (Bosse, Zlot and Flick 2012, section IV-A). Both maps are aligned with the truth.
+    /// (Bosse, Zlot and Flick 2012, section IV-A). Both maps are aligned with the truth. It is missing if the reference
+    /// system is lost.
     ReferenceSigmaM,
     /// Mean signed distance of the same points, m: positive where they are too near to the sensor.
     ReferenceBiasM,

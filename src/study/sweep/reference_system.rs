@@ -4,6 +4,7 @@ use super::Measure;
 use super::reference_inputs::ReferenceInputs;
 use super::run_recording::{Estimates, RunRecording};
 use super::tree::Journey;
+use crate::estimation::Status;
 use crate::evaluation::{CloudErrors, CloudSummary, Errors, Pairs, ReferenceCloud, align_poses};
 use crate::geometry::{Pose, Surface, Vector};
 use crate::recording::Writer;
@@ -24,7 +25,7 @@ const REACH_M: f64 = 1.0;
 /// no path that determines the rotation.
 const TURN_LEVER_M: f64 = 0.3;
 
-/// Map of a reference system.
+/// Map of a reference system; it has no surfaces if the estimate of that system is lost.
 pub(super) struct ReferenceMap {
     inputs: ReferenceInputs,
     cloud: ReferenceCloud,
@@ -59,7 +60,9 @@ impl ReferenceMap {
         let recording = RunRecording::open(file, false)?;
         let estimates = recording.estimate(journey, true, &mut watch)?;
         let aligned = AlignedCloud::new(&recording, &estimates, &simulation, MAX_REFERENCE_POINTS, &watch)?;
-        let points = aligned.estimated.into_iter().map(|(point, _)| point);
+        // A lost reference has no surfaces to compare with.
+        let is_known = estimates.status() != Status::Lost;
+        let points = aligned.estimated.into_iter().filter(|_| is_known).map(|(point, _)| point);
         Ok(Self { inputs: inputs.clone(), cloud: ReferenceCloud::new(points), rmse_m: aligned.rmse_m })
     }
 

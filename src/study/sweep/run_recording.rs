@@ -1,12 +1,14 @@
 //! A recording of a sweep, read by one thread, and the estimates from it.
 
 use super::tree::Journey;
+use crate::estimation::Status;
 use crate::evaluation::Pairs;
 use crate::geometry::Trajectory;
 use crate::measurement::Calibration;
 use crate::recording::{Reader, Selection, TopicPreference};
 use crate::study::calibration::calibration;
 use crate::study::closed_loop::{ClosedLoopRun, run_closed_loop};
+use crate::study::integrity::Integrity;
 use crate::study::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use crate::study::sampled_cloud::EstimatedRecording;
 use crate::study::sampled_truth::SampledTruth;
@@ -73,6 +75,11 @@ impl Estimates {
     /// The estimate of the closed loop, or of the open loop if the loops were not closed.
     pub(super) fn map_from_head(&self) -> &Trajectory {
         self.closed.as_ref().map_or(&self.open.map_from_head, |closed| &closed.map_from_head)
+    }
+
+    /// The verdict on that estimate.
+    pub(super) fn status(&self) -> Status {
+        Integrity::of(&self.open, self.closed.as_ref(), self.map_from_head()).status()
     }
 
     /// Pairs of that estimate and the truth.
