@@ -254,7 +254,7 @@ fn a_world_can_be_shared_between_threads() {
     is_shared(&World::load("mocap_room").unwrap());
 }
 
-/// Groups of rays from random places in a scene, as from a lidar that moves: 16 rays of one group are spread over up to
+/// Groups of rays from random positions in a scene, as from a lidar that moves: 16 rays of one group are spread over up to
 /// 0.1 to 100 degrees, by less than a centimetre at their origins, and over 1 ms.
 fn groups_of_rays(world: &World, groups: usize) -> Vec<TimedRay> {
     let (lower, upper) = world.bounds();

@@ -21,7 +21,7 @@ const MAX_REFERENCE_POINTS: usize = 500_000;
 const MAX_POINTS: usize = 100_000;
 /// Maximum distance from a point to a surface, m.
 const REACH_M: f64 = 1.0;
-/// Weight of a rotation in the alignment with the truth: equivalent shift per angle, m. A reference that stands still has
+/// Weight of a rotation in the alignment with the truth: equivalent shift per angle, m. A reference at rest has
 /// no path that determines the rotation.
 const TURN_LEVER_M: f64 = 0.3;
 
