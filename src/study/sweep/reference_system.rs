@@ -4,7 +4,7 @@ use super::Measure;
 use super::reference_inputs::ReferenceInputs;
 use super::run_recording::{Estimates, RunRecording};
 use super::tree::Journey;
-use crate::estimation::Status;
+use crate::estimation::{EstimatorSpec, Status};
 use crate::evaluation::{CloudErrors, CloudSummary, Errors, Pairs, ReferenceCloud, align_poses};
 use crate::geometry::{Pose, Surface, Vector};
 use crate::recording::Writer;
@@ -28,6 +28,8 @@ const TURN_LEVER_M: f64 = 0.3;
 /// Map of a reference system; it has no surfaces if the estimate of that system is lost.
 pub(super) struct ReferenceMap {
     inputs: ReferenceInputs,
+    /// Settings with which it was estimated.
+    estimator: EstimatorSpec,
     cloud: ReferenceCloud,
     /// Position error of the reference system, m.
     rmse_m: f64,
@@ -63,12 +65,13 @@ impl ReferenceMap {
         // A lost reference has no surfaces to compare with.
         let is_known = estimates.status() != Status::Lost;
         let points = aligned.estimated.into_iter().filter(|_| is_known).map(|(point, _)| point);
-        Ok(Self { inputs: inputs.clone(), cloud: ReferenceCloud::new(points), rmse_m: aligned.rmse_m })
+        let estimator = journey.estimator.spec.clone();
+        Ok(Self { inputs: inputs.clone(), estimator, cloud: ReferenceCloud::new(points), rmse_m: aligned.rmse_m })
     }
 
-    /// Whether the map is that of these specs.
-    pub(super) fn is_of(&self, inputs: &ReferenceInputs) -> bool {
-        self.inputs == *inputs
+    /// Whether the map is that of these specs, estimated with the settings of `journey`.
+    pub(super) fn is_of(&self, inputs: &ReferenceInputs, journey: &Journey) -> bool {
+        self.inputs == *inputs && self.estimator == journey.estimator.spec
     }
 
     /// Compares the cloud of an estimate with this map and with the true surfaces.

@@ -222,7 +222,7 @@ impl TemporaryRecording {
         run: &Journey,
     ) -> Result<Arc<ReferenceMap>, StudyError> {
         let mut stored = self.reference_map.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(map) = stored.as_ref().filter(|map| map.is_of(inputs)) {
+        if let Some(map) = stored.as_ref().filter(|map| map.is_of(inputs, run)) {
             return Ok(map.clone());
         }
         let map = Arc::new(with_time_limit(limit, |stop| ReferenceMap::of(inputs, run, stop))?);
