@@ -1,7 +1,7 @@
 //! Surfel matching: nearest neighbours in position and normal, with gates on normals, distance and time.
 
 use super::spec::{MatchingSpec, SurfelSpec};
-use super::surfel::{Patch, PlacedSurfel};
+use super::surfel::{FINE, Patch, PlacedSurfel, voxel_edge_m};
 use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 use rayon::prelude::*;
 
@@ -27,7 +27,7 @@ pub(super) struct Matcher {
     pub(super) levels: usize,
 }
 
-/// A k-d tree of patches for each resolution.
+/// A k-d tree of patches for each resolution, 0 to [`FINE`].
 pub(super) struct SearchTrees {
     levels: Vec<Level>,
 }
@@ -69,7 +69,7 @@ impl Matcher {
     }
 
     fn feature(&self, patch: &Patch) -> Feature {
-        let per_edge = 1.0 / (self.finest_voxel_m * f64::from(1_u32 << patch.level));
+        let per_edge = 1.0 / voxel_edge_m(self.finest_voxel_m, patch.level);
         let [x, y, z] = <[f64; 3]>::from(patch.centre * per_edge).map(not_nan);
         let [a, b, c] = <[f64; 3]>::from(patch.normal * self.spec.normal_scale).map(not_nan);
         Feature([x, y, z, a, b, c])
@@ -78,7 +78,7 @@ impl Matcher {
     /// Builds a tree for each resolution.
     pub(super) fn build_trees(&self, patches: &[Patch]) -> SearchTrees {
         let build = |level| Level::of(level, patches, |patch| self.feature(patch));
-        SearchTrees { levels: (0..self.levels).map(build).collect() }
+        SearchTrees { levels: (0..=FINE).map(build).collect() }
     }
 
     /// The `count` patches nearest to `patch` in six dimensions, nearest first.

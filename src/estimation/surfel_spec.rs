@@ -15,6 +15,9 @@ pub struct SurfelSpec {
     pub offset_grids: bool,
     /// Minimum number of points of a surfel, at least 4.
     pub min_points: usize,
+    /// Additional surfels where the geometry is weak.
+    #[serde(default)]
+    pub fine: FineSurfelSpec,
     /// The points of a voxel are split where consecutive times differ by more than this, s.
     #[serde(with = "crate::spec::checked::Positive")]
     pub split_gap_s: f64,
@@ -53,6 +56,24 @@ pub struct SurfelSpec {
     /// Maximum range, m.
     #[serde(with = "crate::spec::checked::Positive")]
     pub max_range_m: f64,
+}
+
+/// Additional surfels where the geometry is weak, as along a corridor or on stairs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FineSurfelSpec {
+    /// While the conditioning of the last windows is below this, surfels are also built of voxels of half the finest edge;
+    /// 0 for never.
+    #[serde(with = "crate::spec::checked::Fraction")]
+    pub below_conditioning: f64,
+    /// Minimum number of points of all surfels there, at least 4.
+    pub min_points: usize,
+}
+
+impl Default for FineSurfelSpec {
+    fn default() -> Self {
+        Self { below_conditioning: 0.03, min_points: 10 }
+    }
 }
 
 /// Surfel matching.

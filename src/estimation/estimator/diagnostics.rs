@@ -100,11 +100,16 @@ impl Diagnostics {
     }
 }
 
+/// Conditioning below which a direction is not observed.
+///
+/// Against the information of ten thousand matches it is that of a tenth of a match, which may be false.
+const UNOBSERVED: f64 = 1e-5;
+
 /// Whether a problem means that the window is dead reckoning with the IMU.
 fn is_dead_reckoning(problem: &WarningKind) -> bool {
     match problem {
         WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
-        WarningKind::WeakGeometry { conditioning, .. } => *conditioning <= 0.0,
+        WarningKind::WeakGeometry { conditioning, .. } => *conditioning < UNOBSERVED,
         _ => false,
     }
 }

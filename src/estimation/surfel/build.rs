@@ -1,5 +1,6 @@
 //! Builds surfels from lidar returns: voxels at several resolutions on two grids, merged from fine to coarse.
 
+use super::element::FINE;
 use super::flatness::{self, SurfelThickness};
 use super::moments::Moments;
 use super::{Surfel, TimedReturn};
@@ -28,6 +29,25 @@ pub(in super::super) struct SurfelBuilder {
     pub(in super::super) laser_in_imu: Vector,
 }
 
+/// Resolutions of which surfels are built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) enum Detail {
+    /// Those of the settings.
+    Usual,
+    /// Also [`FINE`], and of all resolutions also surfels of few points, for weak geometry: in a corridor only narrow faces
+    /// (frames of doors, edges of lamps) show the motion along it.
+    Fine,
+}
+
+/// A grid of cells: fragments of returns, merged by cells of `1 << doublings` of their edges, offset by `shift` edges.
+struct Grid<'a> {
+    fragments: &'a [Fragment],
+    doublings: usize,
+    shift: i32,
+    /// Resolution of the surfels.
+    level: usize,
+}
+
 /// Moments of consecutive returns in the same finest cell.
 #[derive(Debug, Clone, Copy)]
 struct Fragment {
@@ -44,38 +64,54 @@ impl SurfelBuilder {
         returns: &[TimedReturn],
         nominal: &Nominal,
         unknowns: &Unknowns,
+        detail: Detail,
     ) -> Vec<Surfel> {
         let Some(first) = returns.first() else { return Vec::new() };
         let motion_at = |tau_s: f64| nominal.at(unknowns.clock.trajectory_s(tau_s), &unknowns.biases.gyro);
         let origin = motion_at(first.tau_s).position;
         let edge = self.spec.finest_voxel_m;
-        let mut regular = Fragments::new(origin, edge, 0.0);
-        let mut offset = Fragments::new(origin, edge, 0.5 * edge);
+        let edges: &[f64] = if detail == Detail::Fine { &[edge, 0.5 * edge] } else { &[edge] };
+        let mut pairs: Vec<[Fragments; 2]> =
+            edges.iter().map(|edge| [0.0, 0.5 * edge].map(|shift| Fragments::new(origin, *edge, shift))).collect();
         self.project(returns, nominal, unknowns, |beam, point| {
-            let range = f64::from(beam.range_m);
-            let noise2 = self.noise.sigma_m(range).powi(2);
-            regular.add(&point, beam, noise2);
-            if self.spec.offset_grids {
-                offset.add(&point, beam, noise2);
+            let noise2 = self.noise.sigma_m(f64::from(beam.range_m)).powi(2);
+            for [regular, offset] in &mut pairs {
+                regular.add(&point, beam, noise2);
+                if self.spec.offset_grids {
+                    offset.add(&point, beam, noise2);
+                }
             }
         });
-        let (regular, offset) = (regular.finish(), offset.finish());
+        let min_points = if detail == Detail::Fine { self.spec.fine.min_points } else { self.spec.min_points };
+        let surfels_of = |grid: &Grid| -> Vec<SurfelThickness> {
+            let cells = merge_by_cell(grid, &self.spec, min_points);
+            let fit = |cell| self.fit_surfel(cell, grid.level, &origin, &unknowns.lidar, motion_at);
+            cells.iter().filter_map(fit).collect()
+        };
+        let pairs: Vec<[&[Fragment]; 2]> =
+            pairs.iter_mut().map(|pair| pair.each_mut().map(Fragments::finish)).collect();
+        let shaped: Vec<Vec<SurfelThickness>> = self.grids(&pairs).par_iter().map(surfels_of).collect();
+        flatness::add_roughness_variance(shaped.concat(), &self.spec)
+    }
+
+    /// The grids of all resolutions, of the `[regular, offset]` fragments of the usual and, if there are any, the fine voxels.
+    fn grids<'a>(&self, fragments: &[[&'a [Fragment]; 2]]) -> Vec<Grid<'a>> {
         let mut grids = Vec::new();
-        for level in 0..self.spec.levels {
-            grids.push((regular, level, 0));
-            match (self.spec.offset_grids, level) {
-                (false, _) => {}
-                (true, 0) => grids.push((offset, 0, 0)),
-                // Half a coarse cell is an integer number of finest cells: the regular fragments serve both grids.
-                (true, _) => grids.push((regular, level, 1 << (level - 1))),
+        for (pair, [regular, offset]) in fragments.iter().enumerate() {
+            for doublings in 0..if pair == 0 { self.spec.levels } else { 1 } {
+                let level = if pair == 0 { doublings } else { FINE };
+                grids.push(Grid { fragments: regular, doublings, shift: 0, level });
+                match (self.spec.offset_grids, doublings) {
+                    (false, _) => {}
+                    (true, 0) => grids.push(Grid { fragments: offset, doublings, shift: 0, level }),
+                    // Half a coarse cell is an integer number of finest cells: the regular fragments serve both grids.
+                    (true, _) => {
+                        grids.push(Grid { fragments: regular, doublings, shift: 1 << (doublings - 1), level });
+                    }
+                }
             }
         }
-        let surfels_of = |(fragments, level, shift): &(&[Fragment], usize, i32)| -> Vec<SurfelThickness> {
-            let cells = merge_by_cell(fragments, *level, *shift, &self.spec);
-            cells.iter().filter_map(|cell| self.fit_surfel(cell, *level, &origin, &unknowns.lidar, motion_at)).collect()
-        };
-        let shaped: Vec<Vec<SurfelThickness>> = grids.par_iter().map(surfels_of).collect();
-        flatness::add_roughness_variance(shaped.concat(), &self.spec)
+        grids
     }
 
     /// Calls `with` for each return and the point in the map, m.
@@ -202,23 +238,23 @@ impl Fragments {
     }
 }
 
-/// Sortable key of the cell of resolution `level` that contains a finest cell.
-fn cell_key(cell: &[i32; 3], level: usize, shift: i32) -> u64 {
-    let part = |x: i32| ((x.wrapping_add(shift) >> level).wrapping_add(1 << 20)) as u64 & 0x1f_ffff;
+/// Sortable key of the cell of a grid that contains a finest cell.
+fn cell_key(cell: &[i32; 3], grid: &Grid) -> u64 {
+    let part = |x: i32| ((x.wrapping_add(grid.shift) >> grid.doublings).wrapping_add(1 << 20)) as u64 & 0x1f_ffff;
     part(cell[0]) << 42 | part(cell[1]) << 21 | part(cell[2])
 }
 
 /// Merges the fragments of each cell, split at time gaps and at the maximum duration.
 ///
 /// Returns only groups with at least `min_points` points.
-fn merge_by_cell(fragments: &[Fragment], level: usize, shift: i32, spec: &SurfelSpec) -> Vec<Moments> {
-    let keyed = fragments.iter().enumerate().map(|(k, f)| (cell_key(&f.cell, level, shift), k as u32));
+fn merge_by_cell(grid: &Grid, spec: &SurfelSpec, min_points: usize) -> Vec<Moments> {
+    let keyed = grid.fragments.iter().enumerate().map(|(k, f)| (cell_key(&f.cell, grid), k as u32));
     let mut keyed: Vec<(u64, u32)> = keyed.collect();
     keyed.sort_unstable();
     let mut groups: Vec<Moments> = Vec::new();
     let mut open: Option<(u64, f64, f64, Moments)> = None;
     for (cell, k) in keyed {
-        let fragment = &fragments[k as usize];
+        let fragment = &grid.fragments[k as usize];
         let joins = |(at, first_s, last_s, _): &(u64, f64, f64, Moments)| {
             *at == cell
                 && fragment.first_s - last_s <= spec.split_gap_s
@@ -236,7 +272,7 @@ fn merge_by_cell(fragments: &[Fragment], level: usize, shift: i32, spec: &Surfel
         }
     }
     groups.extend(open.map(|(.., moments)| moments));
-    groups.retain(|moments| moments.count() >= spec.min_points as f64);
+    groups.retain(|moments| moments.count() >= min_points as f64);
     groups
 }
 
@@ -249,9 +285,8 @@ mod tests {
     use crate::estimation::strapdown::{Biases, Interval, State};
     use crate::geometry::Rotation;
 
-    /// Planar scans of a vertical corner with walls 2.1 m away, by a lidar that nods towards it at `rate`, rad/s.
-    fn scans_of_a_corner(rate: f64, scans: usize) -> (Nominal, Vec<TimedReturn>) {
-        let nodding = Vector::new(-1.0, 1.0, 0.0).normalize() * rate;
+    /// Planar scans by a lidar that turns at `nodding`, rad/s; `range_m` is the range along a direction in the map.
+    fn scans(nodding: Vector, scans: usize, range_m: impl Fn(&Vector) -> f64) -> (Nominal, Vec<TimedReturn>) {
         let none = Vector::zeros();
         let start = State { rotation: Rotation::identity(), position: none, velocity: none };
         let mut nominal = Nominal::starting(0.0, start);
@@ -271,26 +306,58 @@ mod tests {
             let tau_s = (k / 181) as f64 * 0.025 + (k % 181) as f64 * 5e-5;
             let angle = ((k % 181) as f64 * 0.5).to_radians();
             let beam = Vector::new(angle.cos(), angle.sin(), 0.0);
-            let direction = Rotation::from_scaled_axis(nodding * tau_s) * beam;
-            let range = 2.1 / direction.x.max(direction.y);
+            let range = range_m(&(Rotation::from_scaled_axis(nodding * tau_s) * beam));
             TimedReturn { tau_s, point_in_imu: (beam * range).cast(), range_m: range as f32, weakness: 0.0 }
         };
         (nominal, (0..scans * 181).map(beam).collect())
     }
 
-    /// Absolute vertical components of the surfels' normals.
-    fn normal_heights(nominal: &Nominal, returns: &[TimedReturn], max_incidence_deg: f64) -> Vec<f64> {
+    /// Scans of a vertical corner with walls 2.1 m away, by a lidar that nods towards it at `rate`, rad/s.
+    fn scans_of_a_corner(rate: f64, count: usize) -> (Nominal, Vec<TimedReturn>) {
+        scans(Vector::new(-1.0, 1.0, 0.0).normalize() * rate, count, |to| 2.1 / to.x.max(to.y))
+    }
+
+    /// Builder with the shipped settings and this maximum incidence, degrees.
+    fn builder(max_incidence_deg: f64) -> SurfelBuilder {
         let shipped = spec::load("default").unwrap().surfels;
-        let builder = SurfelBuilder {
+        SurfelBuilder {
             spec: SurfelSpec { max_incidence_deg, ..shipped },
             noise: LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 },
             scan_normal: Some(Vector::z()),
             laser_in_imu: Vector::zeros(),
-        };
+        }
+    }
+
+    fn surfels(builder: &SurfelBuilder, nominal: &Nominal, returns: &[TimedReturn], detail: Detail) -> Vec<Surfel> {
         let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0, formulation: Formulation::ImuTime };
         let still = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
-        let unknowns = Unknowns::initial(still, clock);
-        builder.build(returns, nominal, &unknowns).iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
+        builder.build(returns, nominal, &Unknowns::initial(still, clock), detail)
+    }
+
+    /// Absolute vertical components of the surfels' normals.
+    fn normal_heights(nominal: &Nominal, returns: &[TimedReturn], max_incidence_deg: f64) -> Vec<f64> {
+        let surfels = surfels(&builder(max_incidence_deg), nominal, returns, Detail::Usual);
+        surfels.iter().map(|surfel| surfel.normal_in_imu.z.abs()).collect()
+    }
+
+    #[test]
+    fn a_narrow_face_has_surfels_in_fine_detail_only() {
+        // A wall with a step of 0.2 m at y = 1 m, as the frame of a door: the face of the step looks along the wall.
+        let range_m = |to: &Vector| match [2.0 / to.x, 1.0 / to.y, 2.2 / to.x] {
+            [near, ..] if near * to.y >= 1.0 => near,
+            [_, face, far] => face.min(far),
+        };
+        let (nominal, returns) = scans(Vector::new(0.0, -0.6, 0.0), 8, range_m);
+        let shipped = spec::load("default").unwrap().surfels.max_incidence_deg;
+        let along = |detail| {
+            let surfels = surfels(&builder(shipped), &nominal, &returns, detail);
+            assert!(surfels.iter().any(|surfel| surfel.normal_in_imu.x.abs() > 0.9), "the wall itself must be seen");
+            let along = surfels.into_iter().filter(|surfel| surfel.normal_in_imu.y.abs() > 0.9);
+            along.map(|surfel| surfel.level).collect::<Vec<_>>()
+        };
+        assert!(along(Detail::Usual).is_empty());
+        let fine = along(Detail::Fine);
+        assert!(fine.contains(&FINE), "{fine:?}");
     }
 
     #[test]

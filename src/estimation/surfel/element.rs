@@ -7,6 +7,14 @@ use super::super::unknowns::Unknowns;
 use crate::geometry::Matrix;
 use crate::geometry::Vector;
 
+/// Resolution of half the finest voxel, of which surfels are built where the geometry is weak; the others are 0 to 5.
+pub(in crate::estimation) const FINE: usize = 6;
+
+/// Edge of the voxels of resolution `level`, m, if those of resolution 0 have `finest_m`.
+pub(in crate::estimation) fn voxel_edge_m(finest_m: f64, level: usize) -> f64 {
+    if level == FINE { 0.5 * finest_m } else { finest_m * f64::from(1_u32 << level) }
+}
+
 /// A lidar return in the IMU frame.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::estimation) struct TimedReturn {
@@ -39,7 +47,7 @@ pub(in crate::estimation) struct Surfel {
     pub(in crate::estimation) points: f64,
     /// Mean weakness of the returns.
     pub(in crate::estimation) weakness: f64,
-    /// Resolution, 0 the finest.
+    /// Resolution: 0 for the finest voxels, or [`FINE`].
     pub(in crate::estimation) level: usize,
 }
 
@@ -56,7 +64,7 @@ pub(in crate::estimation) struct Patch {
     pub(in crate::estimation) covariance: Matrix,
     /// Additional variance of the position along the normal because the surface is not flat, m^2.
     pub(in crate::estimation) roughness_variance: f64,
-    /// Resolution, 0 the finest.
+    /// Resolution: 0 for the finest voxels, or [`FINE`].
     pub(in crate::estimation) level: usize,
 }
 

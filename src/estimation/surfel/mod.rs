@@ -9,5 +9,5 @@ mod element;
 mod flatness;
 mod moments;
 
-pub(super) use build::SurfelBuilder;
-pub(super) use element::{Patch, PlacedSurfel, PlacementState, Surfel, TimedReturn};
+pub(super) use build::{Detail, SurfelBuilder};
+pub(super) use element::{FINE, Patch, PlacedSurfel, PlacementState, Surfel, TimedReturn, voxel_edge_m};

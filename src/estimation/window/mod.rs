@@ -28,7 +28,7 @@ use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::standstill::{Standstill, standstill};
 use super::strapdown::Interval;
-use super::surfel::{Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
+use super::surfel::{Detail, Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
 use super::timing::{Stopwatch, Timing};
 use super::unknowns::Unknowns;
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
@@ -71,6 +71,8 @@ struct WindowSegment {
 pub(super) struct Window {
     spec: EstimatorSpec,
     builder: SurfelBuilder,
+    /// Surfels are also built of fine voxels until this time, because the geometry is weak, trajectory time, s.
+    fine_until_s: f64,
     /// Builds the observed surfels, if they are requested.
     observed_builder: Option<SurfelBuilder>,
     matcher: Matcher,
@@ -114,6 +116,7 @@ impl Window {
             spec: spec.clone(),
             matcher: Matcher::new(&spec.matching, &spec.surfels),
             builder,
+            fine_until_s: f64::NEG_INFINITY,
             observed_builder: None,
             nominal: Nominal::starting(start_s, initial_state.state),
             readings: Readings::of(spec.formulation),
@@ -281,7 +284,7 @@ impl Window {
         self.bridged_gap = bridged.map(|(_, interval)| interval.h).sum::<f64>() > SHORT_GAP_S
             || self.nominal.end_s() < self.wide_gate_until_s;
         let integration_s = watch.lap_s();
-        let surfels = self.builder.build(&returns, &self.nominal, &self.unknowns);
+        let surfels = self.builder.build(&returns, &self.nominal, &self.unknowns, self.detail());
         let cached = vec![CachedNeighbours::default(); surfels.len()];
         self.segments.push_back(WindowSegment { end_tau_s, returns, surfels, cached });
         let surfels_s = watch.lap_s();
@@ -293,10 +296,16 @@ impl Window {
         Timing { integration_s, surfels_s, ..Timing::default() }
     }
 
+    /// The resolutions of new surfels.
+    fn detail(&self) -> Detail {
+        if self.nominal.end_s() < self.fine_until_s { Detail::Fine } else { Detail::Usual }
+    }
+
     /// Rebuilds the surfels of the newest segment with the current trajectory.
     pub(super) fn rebuild_newest_surfels(&mut self) {
+        let detail = self.detail();
         if let Some(newest) = self.segments.back_mut() {
-            newest.surfels = self.builder.build(&newest.returns, &self.nominal, &self.unknowns);
+            newest.surfels = self.builder.build(&newest.returns, &self.nominal, &self.unknowns, detail);
             newest.cached = vec![CachedNeighbours::default(); newest.surfels.len()];
             if self.observed_builder.is_none() {
                 newest.returns = Vec::new();
@@ -347,7 +356,7 @@ impl Window {
 
     fn observed(&self, segment: &WindowSegment) -> Vec<ObservedPatch> {
         let Some(builder) = &self.observed_builder else { return Vec::new() };
-        let surfels = builder.build(&segment.returns, &self.nominal, &self.unknowns);
+        let surfels = builder.build(&segment.returns, &self.nominal, &self.unknowns, Detail::Usual);
         let placing = self.placing();
         let observed = |surfel: &Surfel| {
             let patch = surfel.place(&placing).patch;

@@ -96,6 +96,10 @@ impl Window {
             self.border.reset_to_window_start();
             linearised = None;
         }
+        let is_weak = solved.conditioning < self.spec.surfels.fine.below_conditioning;
+        if is_weak && solved.matches + solved.view_matches >= self.spec.solve.min_matches {
+            self.fine_until_s = self.nominal.end_s() + self.spec.window_s;
+        }
         (solved, linearised)
     }
 
