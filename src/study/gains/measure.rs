@@ -185,8 +185,8 @@ fn curve(
             phase_model_rad: model.arg(),
         }
     };
-    // Skip the constant; the excited lines end at the highest frequency.
-    let lines = measured.iter().skip(1).take_while(|p| p.freq_hz <= plan.up_to_hz * (1.0 + 1e-9));
+    // The odd lines are excited, up to the highest frequency.
+    let lines = measured.iter().skip(1).step_by(2).take_while(|p| p.freq_hz <= plan.up_to_hz * (1.0 + 1e-9));
     let points: Vec<GainPoint> = lines.map(point).collect();
     let samples = records.iter().map(|r| r.base.len()).sum::<usize>() as f64;
     let mean_squared_angle = records.iter().map(|r| r.sum_squared_angle).sum::<f64>() / samples;
