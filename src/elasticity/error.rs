@@ -100,6 +100,19 @@ pub enum ElasticityError {
         /// Maximum number of segments.
         max: usize,
     },
+    /// The tension is too high for the number of segments.
+    #[error(
+        "a pull of {pull_n:.1} N is too strong for a spring of {segments} segment(s): its segments are then too long for the \
+         force law; use {needed} segments or more"
+    )]
+    TooFewSegments {
+        /// Tension, N.
+        pull_n: f64,
+        /// Number of segments.
+        segments: usize,
+        /// Smallest sufficient number of segments.
+        needed: usize,
+    },
     /// The equilibrium of the inner nodes did not converge.
     #[error("the equilibrium of the spring's {segments} segments did not converge: residual {residual_n:.1e} N")]
     InnerNodes {

@@ -1,6 +1,6 @@
 //! Specs of springs.
 
-use super::{Coil, ElasticityError, Matrix6, Moduli, Spring};
+use super::{Coil, ElasticityError, Material, Matrix6, Spring};
 use crate::spec::{Kind, SpecError, checked};
 use serde::{Deserialize, Serialize};
 
@@ -44,56 +44,6 @@ pub enum SpringSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(transparent)]
 pub struct StiffnessRow(#[serde(with = "checked::FiniteArray::<6>")] pub [f64; 6]);
-
-/// Material of a wire.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
-#[serde(deny_unknown_fields, rename_all = "snake_case")]
-pub enum Material {
-    /// Patented or music wire: E = 206 GPa, G = 79.3 GPa.
-    SpringSteel,
-    /// Stainless 302: E = 193 GPa, G = 69 GPa.
-    Stainless,
-    /// A material with given moduli.
-    Moduli {
-        /// Young's modulus, GPa.
-        #[serde(with = "checked::Positive")]
-        youngs_gpa: f64,
-        /// Shear modulus, GPa.
-        #[serde(with = "checked::Positive")]
-        shear_gpa: f64,
-        /// Density, kg/m^3; needed only for the mass of the wire.
-        #[serde(default)]
-        density_kg_per_m3: Option<Density>,
-    },
-}
-
-/// A positive density, kg/m^3.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
-#[serde(transparent)]
-pub struct Density(#[serde(with = "checked::Positive")] pub f64);
-
-impl Material {
-    /// The elastic moduli.
-    pub fn moduli(&self) -> Moduli {
-        let (youngs_gpa, shear_gpa) = match self {
-            Material::SpringSteel => (206.0, 79.3),
-            Material::Stainless => (193.0, 69.0),
-            Material::Moduli { youngs_gpa, shear_gpa, .. } => (*youngs_gpa, *shear_gpa),
-        };
-        Moduli { youngs_pa: youngs_gpa * 1e9, shear_pa: shear_gpa * 1e9 }
-    }
-
-    /// The density, kg/m^3, or `None` if unknown.
-    ///
-    /// 7850 for carbon steel, 7900 for stainless 302 (typical values).
-    pub fn density_kg_per_m3(&self) -> Option<f64> {
-        match self {
-            Material::SpringSteel => Some(7850.0),
-            Material::Stainless => Some(7900.0),
-            Material::Moduli { density_kg_per_m3, .. } => density_kg_per_m3.map(|density| density.0),
-        }
-    }
-}
 
 /// An unloaded spring: a [`SpringSpec`] with the name resolved and the values validated.
 #[derive(Debug, Clone, Copy, PartialEq)]
