@@ -1,6 +1,6 @@
 //! Catalogue of available springs, as CSV: `name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material`.
 
-use super::CoilDesign;
+use super::spec::CoilDesign;
 use crate::elasticity::Material;
 use crate::spec::{Source, SpecError, name_from};
 use std::path::Path;
