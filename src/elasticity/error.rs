@@ -86,6 +86,16 @@ pub enum ElasticityError {
         /// Length under the load, mm.
         length_mm: f64,
     },
+    /// The tension is beyond the range of the force law.
+    #[error(
+        "a pull of {pull_n:.1} N stretches the spring to {length_mm:.0} mm, which is beyond the range of the force law"
+    )]
+    PullTooStrong {
+        /// Tension, N.
+        pull_n: f64,
+        /// Length under the load, mm.
+        length_mm: f64,
+    },
     /// Several segments for a spring that is given by a stiffness matrix.
     #[error("a spring given by a stiffness matrix has one segment, not {segments}: only a coil can be divided")]
     CannotBeDivided {
