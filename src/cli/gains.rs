@@ -177,13 +177,21 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
         words += &report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
         words += &study.ended.as_ref().map(|why| report::wrapped(&format!("ended {why}"), "  ")).unwrap_or_default();
     }
+    let contacts = curves.iter().map(|curve| (curve.axis, curve.coil_contact));
+    let in_swings = swings.iter().flat_map(|study| study.points.iter().map(|p| (study.axis, p.coil_contact)));
+    for (axis, contact) in contacts.chain(in_swings) {
+        if let Some(contact) = contact {
+            let warning = format!("{}: {}", report::quantity_name(axis_name(axis)), contact.warning());
+            words += &report::wrapped(&warning, "  ");
+        }
+    }
     words
 }
 
 fn figures(curves: &[GainCurve], swings: &[SwingStudy]) -> anyhow::Result<Value> {
     let axes = AXES.iter().zip(curves).map(|(axis, curve)| {
         json!({ "axis": axis_name(*axis), "peak": curve.peak, "peak_model": curve.peak_model,
-            "least_coherence": min_coherence(curve), "swing_rms_deg": curve.swing_rms_deg })
+            "least_coherence": min_coherence(curve), "swing_rms_deg": curve.swing_rms_deg, "coil_contact": curve.coil_contact })
     });
     Ok(json!({ "axes": axes.collect::<Vec<_>>(), "swing": serde_json::to_value(swings)? }))
 }

@@ -2,10 +2,10 @@
 
 use super::head::HeadModel;
 use crate::geometry::{Kinematics, Pose};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The coils of a spring touched: the simulated spring passes through itself, a real one stops there.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CoilContact {
     /// Time of the first contact, s after the start.
     pub first_t_s: f64,

@@ -178,7 +178,9 @@ impl CompliantMount<'_> {
             })?;
             self.cords.push(cord);
         }
-        self.springs.push(SpringMount { design, segments: parameters.segments, ends: parameters.ends, wire_mass_kg });
+        let end_m = parameters.spring.end_length_m()?;
+        let ends = parameters.ends.at_active_coils(end_m);
+        self.springs.push(SpringMount { design, segments: parameters.segments, ends, wire_mass_kg });
         Ok(())
     }
 

@@ -32,5 +32,5 @@ pub use haringx::{Column, loaded_stiffness};
 pub use material::{Density, Material, Stress};
 pub use section::SectionLoad;
 pub use six_vector::{Matrix6, Vector6, conditioning};
-pub use spec::{SpringDesign, SpringSpec, StiffnessRow};
+pub use spec::{EndsSpec, SpringDesign, SpringSpec, StiffnessRow};
 pub use spring::{MAX_SEGMENTS, Spring, SpringState};

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 /// Spec of a spring: `specs/springs/NAME.ron`, or a value within a head.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
-#[expect(clippy::large_enum_variant, reason = "there is one a head")]
 pub enum SpringSpec {
     /// A spring of the library or of a file, by name: `named("25x3")`.
     Named(String),
@@ -25,6 +24,9 @@ pub enum SpringSpec {
         /// Free length, without load, mm.
         #[serde(with = "checked::Positive")]
         free_length_mm: f64,
+        /// Ends of the spring, which are a part of its free length.
+        #[serde(default)]
+        ends: EndsSpec,
         /// Material of the wire.
         material: Material,
     },
@@ -38,6 +40,43 @@ pub enum SpringSpec {
         /// Stiffness matrix of the top, row by row: order x, y, z, rx, ry, rz; N, m, rad.
         rows: [StiffnessRow; 6],
     },
+}
+
+/// Ends of a coil spring (Shigley's Mechanical Engineering Design, 9th edition, table 10-1).
+///
+/// The active coils bend, shear and stretch; the ends are rigid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, schemars::JsonSchema, Serialize)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum EndsSpec {
+    /// The free length is that of the active coils.
+    #[default]
+    ActiveOnly,
+    /// Open ends: the free length has one diameter of the wire in addition; no inactive coils.
+    Open,
+    /// Closed ends: two inactive coils, three diameters of the wire.
+    Closed,
+    /// Closed and ground ends: two inactive coils, two diameters of the wire.
+    ClosedGround,
+}
+
+impl EndsSpec {
+    /// Number of inactive coils.
+    pub fn inactive_coils(self) -> f64 {
+        match self {
+            EndsSpec::ActiveOnly | EndsSpec::Open => 0.0,
+            EndsSpec::Closed | EndsSpec::ClosedGround => 2.0,
+        }
+    }
+
+    /// Length of the two ends together, in diameters of the wire.
+    fn wire_diameters(self) -> f64 {
+        match self {
+            EndsSpec::ActiveOnly => 0.0,
+            EndsSpec::Open => 1.0,
+            EndsSpec::Closed => 3.0,
+            EndsSpec::ClosedGround => 2.0,
+        }
+    }
 }
 
 /// One row of a stiffness matrix: force (N) or torque (N m) per x, y, z (m) and rx, ry, rz (rad).
@@ -76,6 +115,17 @@ impl SpringSpec {
         }
     }
 
+    /// Length of each rigid end, m; 0 for a stiffness matrix.
+    ///
+    /// # Errors
+    /// As [`SpringSpec::resolved`].
+    pub fn end_length_m(&self) -> Result<f64, SpecError> {
+        Ok(match self.resolved()? {
+            SpringSpec::Coil { wire_diameter_mm, ends, .. } => 0.5e-3 * wire_diameter_mm * ends.wire_diameters(),
+            SpringSpec::Named(_) | SpringSpec::Stiffness { .. } => 0.0,
+        })
+    }
+
     /// Mass of the active wire, kg.
     ///
     /// `None` for a stiffness matrix or a material without density.
@@ -89,16 +139,17 @@ impl SpringSpec {
         Ok(material.density_kg_per_m3().map(|density| density * coil.wire_volume_m3()))
     }
 
-    /// The validated spring.
+    /// The validated spring; a coil without its rigid ends.
     ///
     /// # Errors
     /// When there is no spring of that name, the file is invalid or names another spring, or a value is invalid.
     pub fn design(&self) -> Result<SpringDesign, ElasticityError> {
         match self {
             SpringSpec::Named(_) => self.resolved()?.design(),
-            SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, material } => {
+            SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, ends, material } => {
                 let (diameter_m, wire_m) = (coil_diameter_mm * 1e-3, wire_diameter_mm * 1e-3);
-                let coil = Coil::new(diameter_m, wire_m, *active_coils, free_length_mm * 1e-3, material.moduli())?;
+                let active_m = free_length_mm * 1e-3 - ends.wire_diameters() * wire_m;
+                let coil = Coil::new(diameter_m, wire_m, *active_coils, active_m, material.moduli())?;
                 Ok(SpringDesign::Coil(coil))
             }
             SpringSpec::Stiffness { length_mm, rows } => {

@@ -2,9 +2,10 @@
 
 use super::heads::ReferenceHead;
 use std::f64::consts::TAU;
-use zsim::dynamics::{CoilContact, ContactWatch, HeadSimulation};
+use zsim::dynamics::{CoilContact, ContactWatch, HeadModel, HeadSimulation, LinkageSpec};
 use zsim::geometry::{Kinematics, Pose, Rotation, Vector};
 use zsim::motion::BaseMotion;
+use zsim::spec::{Source, parse};
 
 /// A base that pitches about the foot of the spring, at its origin.
 struct Pitching {
@@ -76,4 +77,31 @@ fn a_pressed_spring_touches_at_its_solid_length_and_a_pulled_one_never() {
     let touched = moved(-open_m - 0.0012).expect("beyond the solid length");
     // 1.2 mm too far are 0.1 mm for each of the 12 gaps.
     assert!((touched.least_gap_mm + 0.1).abs() < 2e-3, "{touched:?}");
+}
+
+#[test]
+fn rigid_ends_are_a_shorter_spring_between_blocks() {
+    // Closed and ground ends of 3 mm wire take 3 mm at each end: 126 mm with them are 120 mm of active coils between blocks.
+    let coil = |length_mm: f64, ends: &str| {
+        format!(
+            "coil(coil_diameter_mm: 25.0, wire_diameter_mm: 3.0, active_coils: 12.0, free_length_mm: {length_mm:.1}, ends: \
+             {ends}, material: spring_steel)"
+        )
+    };
+    let head = |spring: String, block_m: f64| {
+        let (mut spec, source) = zsim::dynamics::load("handheld").unwrap();
+        if let LinkageSpec::Spring { spring: of_spec, base_from_spring, head_from_spring, .. } = &mut spec.linkage {
+            *of_spec = parse(&Source::in_memory("the spring", spring)).unwrap();
+            base_from_spring.position_m[2] += block_m;
+            head_from_spring.position_m[2] -= block_m;
+        }
+        HeadModel::new(&spec, &source).unwrap()
+    };
+    let (whole, parts) = (head(coil(126.0, "closed_ground"), 0.0), head(coil(120.0, "active_only"), 0.003));
+    let frequencies = |model: &HeadModel| model.linear_modes().iter().map(|mode| mode.frequency_hz).collect::<Vec<_>>();
+    for (a, b) in frequencies(&whole).iter().zip(frequencies(&parts)) {
+        assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
+    let rise = whole.base_from_head_at_rest().inv_mul(parts.base_from_head_at_rest());
+    assert!(rise.translation.vector.norm() < 1e-9, "{rise}");
 }

@@ -1,6 +1,7 @@
 //! Settings and result of a gain measurement.
 
 use crate::dynamics::AccelerationKind;
+use crate::dynamics::CoilContact;
 use crate::dynamics::GainPoints;
 use crate::dynamics::Peak;
 use crate::motion::Axis;
@@ -85,6 +86,9 @@ pub struct GainCurve {
     pub swing_rms_deg: f64,
     /// Maximum rotation angle, degrees.
     pub swing_most_deg: f64,
+    /// Contact of the coils of a spring in one of the realisations; `None` if they did not touch.
+    #[serde(default)]
+    pub coil_contact: Option<CoilContact>,
 }
 
 impl GainCurve {

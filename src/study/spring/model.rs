@@ -12,7 +12,10 @@ pub(super) struct SpringModel {
     pub mounting: Option<SpringMounting>,
     /// Whether the spring carries the head without a cable; the stress then follows from the motion of the head.
     pub has_no_cable: bool,
+    /// The active coils.
     pub coil: Option<Coil>,
+    /// Length of each rigid end, m.
+    pub end_m: f64,
     pub mass_kg: Option<f64>,
 }
 
@@ -31,13 +34,14 @@ impl SpringModel {
             mounting,
             has_no_cable: cable.is_none(),
             coil,
+            end_m: spring.end_length_m()?,
             mass_kg: spring.wire_mass_kg().map_err(DynamicsError::from)?,
         })
     }
 
     /// A model without wire and mounting, for a head without a rest pose or a spring.
     pub fn without_mounting() -> Self {
-        Self { wire: None, mounting: None, has_no_cable: false, coil: None, mass_kg: None }
+        Self { wire: None, mounting: None, has_no_cable: false, coil: None, end_m: 0.0, mass_kg: None }
     }
 
     /// Whether the load on the spring follows from the motion of the head.

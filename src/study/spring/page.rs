@@ -141,7 +141,7 @@ fn unloaded_pose(linkage: &LinkageSpec) -> Result<Pose, StudyError> {
         | LinkageSpec::Suspension { base_from_head, .. } => base_from_head.pose(),
         LinkageSpec::Spring { spring, base_from_spring, head_from_spring, .. } => {
             let length_m = match spring.design().map_err(crate::dynamics::DynamicsError::from)? {
-                SpringDesign::Coil(coil) => coil.free_length_m(),
+                SpringDesign::Coil(coil) => coil.free_length_m() + 2.0 * spring.end_length_m()?,
                 SpringDesign::Stiffness { length_m, .. } => length_m,
             };
             base_from_spring.pose() * Pose::translation(0.0, 0.0, length_m) * head_from_spring.pose().inverse()

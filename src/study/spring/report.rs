@@ -180,6 +180,7 @@ fn unstable_report(spec: &HeadSpec, heaviest: Option<MassLimit>, because: String
         LinkageSpec::Spring { spring, base_from_spring, .. } => {
             let model = SpringModel {
                 wire: super::Wire::of(spring)?,
+                end_m: spring.end_length_m()?,
                 mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
                 ..SpringModel::without_mounting()
             };
@@ -238,7 +239,7 @@ fn coil_report(coil: &Coil, model: &SpringModel, load_n: f64, stress_pa: Option<
     let buckling = buckling_load_n(coil).filter(|_| load_n > 0.0);
     let at_top = coil.under_load(load_n).and_then(|column| loaded_stiffness(&column)).ok();
     CoilReport {
-        free_length_mm: coil.free_length_m() * 1e3,
+        free_length_mm: (coil.free_length_m() + 2.0 * model.end_m) * 1e3,
         load_n,
         index: 2.0 * radius_m / wire_m,
         mass_g: model.mass_kg.map(|mass_kg| mass_kg * 1e3),

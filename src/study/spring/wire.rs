@@ -113,7 +113,7 @@ impl Wire {
     }
 }
 
-/// Attachments of a spring, and the body that it carries.
+/// Ends of the active coils of a spring in their attachments, and the body that it carries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpringMounting {
     base_from_foot: Pose,
@@ -124,8 +124,13 @@ pub struct SpringMounting {
 impl SpringMounting {
     /// The mounting of a head on a single spring; `None` for other linkages.
     pub fn of(spec: &HeadSpec, body: &Body) -> Option<Self> {
-        let LinkageSpec::Spring { base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
-        Some(Self { base_from_foot: base_from_spring.pose(), head_from_top: head_from_spring.pose(), body: *body })
+        let LinkageSpec::Spring { spring, base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
+        let end = Pose::translation(0.0, 0.0, spring.end_length_m().ok()?);
+        Some(Self {
+            base_from_foot: base_from_spring.pose() * end,
+            head_from_top: head_from_spring.pose() * end.inverse(),
+            body: *body,
+        })
     }
 
     /// Distance from foot to top with the head at a pose, m.

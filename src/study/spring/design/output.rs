@@ -2,7 +2,7 @@
 
 use super::search::{DesignStudy, VerifiedDesign};
 use super::spec::CoilDesign;
-use crate::elasticity::Material;
+use crate::elasticity::{EndsSpec, Material};
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
 use crate::study::spring::DesignMetrics;
 use crate::study::sweep::Measure;
@@ -24,7 +24,7 @@ const METRICS: [Measure; 7] = [
 /// The columns are the coil, the metrics in closed form and by simulation (`simulated_...`), and the
 /// margins of the simulation.
 pub fn csv(study: &DesignStudy) -> String {
-    let mut text = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material".to_owned();
+    let mut text = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,ends,material".to_owned();
     for prefix in ["", "simulated_"] {
         for name in METRICS.map(Measure::key) {
             // Writing to a string cannot fail.
@@ -62,8 +62,14 @@ fn coil_columns(coil: &CoilDesign) -> String {
         Material::Stainless => "stainless",
         Material::Moduli { .. } => "moduli",
     };
+    let ends = match coil.ends {
+        EndsSpec::ActiveOnly => "active_only",
+        EndsSpec::Open => "open",
+        EndsSpec::Closed => "closed",
+        EndsSpec::ClosedGround => "closed_ground",
+    };
     format!(
-        "{},{:.4},{:.4},{:.4},{:.4},{material}",
+        "{},{:.4},{:.4},{:.4},{:.4},{ends},{material}",
         coil.name, coil.coil_diameter_mm, coil.wire_diameter_mm, coil.active_coils, coil.free_length_mm
     )
 }
@@ -74,7 +80,7 @@ fn coil_columns(coil: &CoilDesign) -> String {
 /// violation with its value, if that is known.
 pub fn rejected_csv(study: &DesignStudy) -> String {
     let mut text =
-        "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material,by,limit,value\n".to_owned();
+        "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,ends,material,by,limit,value\n".to_owned();
     for rejection in &study.rejections {
         let by = if rejection.simulated { "simulation" } else { "closed_form" };
         let value = rejection.value.map_or(String::new(), |x| format!("{x:.5}"));

@@ -2,7 +2,7 @@
 
 use super::catalogue::catalogue;
 use super::spec::{CoilDesign, DesignSpec, SpaceSpec};
-use crate::elasticity::Material;
+use crate::elasticity::{EndsSpec, Material};
 use crate::spec::{Source, SpecError};
 
 /// A validated design space.
@@ -16,6 +16,7 @@ pub(super) struct CoilSpace {
     bounds: [[f64; 2]; 4],
     /// The wires that can be ordered, mm; `None` for any.
     wires_mm: Option<Vec<f64>>,
+    ends: EndsSpec,
     material: Material,
 }
 
@@ -31,10 +32,10 @@ impl Space {
     /// # Errors
     /// When bounds are reversed, no wire is available between them, or a catalogue cannot be read.
     pub fn of(spec: &DesignSpec, source: &Source) -> Result<Self, SpecError> {
-        let (bounds, material) = match &spec.space {
+        let (bounds, ends, material) = match &spec.space {
             SpaceSpec::Catalogue(name) => return Ok(Space::Catalogue(catalogue(name, source)?)),
-            SpaceSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, material } => {
-                ([*coil_diameter_mm, *wire_diameter_mm, *active_coils, *free_length_mm], *material)
+            SpaceSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, ends, material } => {
+                ([*coil_diameter_mm, *wire_diameter_mm, *active_coils, *free_length_mm], *ends, *material)
             }
         };
         if let Some([low, high]) = bounds.iter().find(|[low, high]| high < low) {
@@ -47,7 +48,7 @@ impl Space {
             let message = format!("no wire of {low} to {high} mm is available: widen the bounds or change build.wires");
             return Err(SpecError::about(source, "wire_diameter_mm", message));
         }
-        Ok(Space::Coils(CoilSpace { bounds, wires_mm, material }))
+        Ok(Space::Coils(CoilSpace { bounds, wires_mm, ends, material }))
     }
 }
 
@@ -66,6 +67,7 @@ impl CoilSpace {
             wire_diameter_mm: nearest.unwrap_or(wire_mm),
             active_coils: stepped(2, STEPS_PER_COIL),
             free_length_mm: stepped(3, STEPS_PER_MM_OF_LENGTH),
+            ends: self.ends,
             material: self.material,
         }
     }

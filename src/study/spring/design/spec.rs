@@ -2,7 +2,7 @@
 
 use super::super::{Shake, StressCycle, Wire};
 use super::limits::BuildLimitsSpec;
-use crate::elasticity::{Material, SpringSpec};
+use crate::elasticity::{EndsSpec, Material, SpringSpec};
 use crate::spec::checked;
 use crate::study::sweep::{GoalSpec, Measure, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
@@ -70,6 +70,9 @@ pub enum SpaceSpec {
         /// Free length, minimum and maximum, mm.
         #[serde(with = "checked::PositiveArray::<2>")]
         free_length_mm: [f64; 2],
+        /// Ends of the springs, a part of the free length.
+        #[serde(default)]
+        ends: EndsSpec,
         /// Material of the wire.
         material: Material,
     },
@@ -90,6 +93,8 @@ pub struct CoilDesign {
     pub active_coils: f64,
     /// Free length, mm.
     pub free_length_mm: f64,
+    /// Ends of the spring.
+    pub ends: EndsSpec,
     /// Material of the wire.
     pub material: Material,
 }
@@ -112,6 +117,7 @@ impl CoilDesign {
             wire_diameter_mm: self.wire_diameter_mm,
             active_coils: self.active_coils,
             free_length_mm: self.free_length_mm,
+            ends: self.ends,
             material: self.material,
         }
     }
