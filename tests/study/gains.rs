@@ -52,8 +52,8 @@ fn a_lightly_damped_head_agrees_with_the_closed_form_within_1_percent() {
     // frequency, must not count as response of the base's motion there.
     let head = handheld(0.01);
     let rocking_hz = head.linear_modes()[0].frequency_hz;
-    let plan = GainPlan { up_to_hz: 3.0, ..plan() };
-    for axis in [Axis::Pitch, Axis::X, Axis::Z] {
+    let plan = GainPlan { up_to_hz: 3.0, period_s: Some(20.0), ..plan() };
+    for axis in [Axis::Pitch, Axis::X] {
         let curve = gain_curve(&head, axis, &plan, &|_| ()).unwrap();
         for point in curve.points.iter().filter(|p| (p.freq_hz / (2.0 * rocking_hz) - 1.0).abs() < 0.1) {
             assert!((point.gain / point.gain_model - 1.0).abs() < 0.01, "{axis:?}: {point:?}");
